@@ -1,0 +1,5 @@
+"""``python -m sssfit.cli``."""
+
+from . import main
+
+main()

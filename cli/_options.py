@@ -1,0 +1,104 @@
+"""Options every verb shares, and the parameter types of this command line."""
+
+import functools
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import click
+
+_MM_PER_UNIT = {"": 1.0, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
+
+
+@dataclass(frozen=True)
+class Common:
+    """What the options shared by all verbs said."""
+
+    quiet: bool
+    verbose: bool
+    json: bool
+    threads: int | None
+    seed: int
+
+
+def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add -q, -v, --json, --threads, --seed and hand them to the command as ``common``."""
+
+    @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
+    @click.option("-v", "--verbose", is_flag=True, help="Say more.")
+    @click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")
+    @click.option(
+        "--threads",
+        type=click.IntRange(1, 1024),
+        metavar="N",
+        help="Threads to use; results do not depend on it.  [default: all cores]",
+    )
+    @click.option(
+        "--seed",
+        type=click.IntRange(0, 2**63 - 1),
+        default=1,
+        show_default=True,
+        metavar="N",
+        help="Seed of whatever is random.",
+    )
+    @functools.wraps(command)
+    def wrapper(
+        *args: Any,
+        quiet: bool,
+        verbose: bool,
+        as_json: bool,
+        threads: int | None,
+        seed: int,
+        **kwargs: Any,
+    ) -> Any:
+        common = Common(quiet, verbose, as_json, threads, seed)
+        return command(*args, common=common, **kwargs)
+
+    return wrapper
+
+
+class Length(click.ParamType[float]):
+    """A length: a plain number is mm; 250um, 3cm and 0.6m are understood. Gives mm."""
+
+    name = "length"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Parse ``value``; a usage error (exit 2) names what was expected."""
+        if isinstance(value, float):
+            return value
+        match = re.fullmatch(r"\s*([-+.\deE]+?)\s*(um|mm|cm|m|)\s*", str(value))
+        try:
+            number = float(match[1]) * _MM_PER_UNIT[match[2]] if match else math.nan
+        except ValueError:
+            number = math.nan
+        if not (math.isfinite(number) and number > 0):
+            self.fail(f"{value!r} is not a length above 0, such as 0.05, 3cm or 0.6m.", param, ctx)
+        return number
+
+
+class Count(click.ParamType[int]):
+    """A whole number that may be written 1e7."""
+
+    name = "count"
+
+    def __init__(self, least: int, most: int) -> None:
+        self.least, self.most = least, most
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Parse ``value``; a usage error (exit 2) names what was expected."""
+        try:
+            number = float(str(value).replace("_", ""))
+        except ValueError:
+            number = math.nan
+        if not (number.is_integer() and self.least <= number <= self.most):
+            self.fail(
+                f"{value!r} is not a whole number from {self.least} to {self.most:.0e} "
+                "(10000000 and 1e7 are both understood).",
+                param,
+                ctx,
+            )
+        return int(number)

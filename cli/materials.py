@@ -1,0 +1,182 @@
+"""``sssfit materials``: the materials that ship with sssfit, or one of them or yours in full."""
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ._options import Common, common_options
+from ._report import finish, table
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from sssfit.grid import RadialGrid
+    from sssfit.material import Layer, Material
+
+
+@click.command()
+@click.argument("material", required=False)
+@click.option("--toml", "as_toml", is_flag=True, help="Print MATERIAL as TOML, to start your own.")
+@common_options
+def materials(common: Common, material: str | None, as_toml: bool) -> None:
+    r"""List the materials that ship with sssfit, or show one in full.
+
+    MATERIAL is one of their names, the path of a TOML file, or - for standard input.
+
+    \b
+      sssfit materials skin1                        coefficients, mean free paths, grid
+      sssfit materials skin1 --toml > mine.toml     a file to edit into your own
+      sssfit materials mine.toml                    check it
+    """
+    if as_toml and (common.json or material is None):
+        raise click.UsageError("--toml needs a MATERIAL and does not go with --json.")
+    if material is None:
+        _list(common)
+    elif as_toml:
+        from sssfit.material import load_material
+
+        click.echo(load_material(material).to_toml(), nl=False)
+    else:
+        _show(common, material)
+
+
+def _list(common: Common) -> None:
+    """Print one row per shipped material."""
+    from sssfit.material import load_material, material_names
+
+    rows = [_figures(load_material(name)) for name in material_names()]
+    head = (
+        "name",
+        "eta",
+        "albedo R G B",
+        "mean free path R G B, mm",
+        "dr, mm",
+        "annuli",
+        "radius, mm",
+    )
+    cells = [
+        (
+            row["name"],
+            f"{row['eta']:g}",
+            " ".join(f"{each:.5f}" for each in row["albedo"]),
+            " ".join(f"{each:.4f}" for each in row["mean_free_path_mm"]),
+            f"{row['dr_mm']:.5f}",
+            f"{row['annuli']}",
+            f"{row['radius_mm']:.2f}",
+        )
+        for row in rows
+    ]
+    finish(common, {"command": "materials", "output": [], "rows": rows}, table(head, cells))
+
+
+def _show(common: Common, name_or_path: str) -> None:
+    """Print one material in full."""
+    from sssfit.material import load_material
+
+    material = load_material(name_or_path)
+    figures = {"command": "materials", "output": [], **_figures(material), **_content(material)}
+    finish(common, figures, _text(material))
+
+
+def _figures(material: "Material") -> dict[str, Any]:
+    """Return the figures of a row; those of one layer are null for a stack."""
+    one = material.layers[0] if len(material.layers) == 1 else None
+    grid = _grid(material)
+    return {
+        "name": material.name,
+        "source": material.source,
+        "channels": material.channels,
+        "eta": one and one.eta,
+        "albedo": one and one.albedo,
+        "mean_free_path_mm": one and one.mean_free_path_mm,
+        "dr_mm": grid and grid.dr_mm,
+        "annuli": grid and grid.annuli,
+        "radius_mm": grid and grid.radius_mm,
+    }
+
+
+def _content(material: "Material") -> dict[str, Any]:
+    """Return what a row leaves out: coefficients, per layer and, for one layer, on their own."""
+    layers = [
+        layer.to_dict() | {"albedo": layer.albedo, "mean_free_path_mm": layer.mean_free_path_mm}
+        for layer in material.layers
+    ]
+    keys = ("g", "sigma_a_per_mm", "sigma_s_per_mm", "thickness_mm")
+    return {
+        **{key: layers[0][key] if len(layers) == 1 else None for key in keys},
+        "eta_above": material.eta_above,
+        "eta_below": material.eta_below,
+        "specular_reflectance": material.specular_reflectance,
+        "layers": layers,
+        "sha256": material.sha256,
+    }
+
+
+def _grid(material: "Material") -> "RadialGrid | None":
+    """Return the paper's grid, or None where that would have too many annuli."""
+    from sssfit.errors import SimulationError
+    from sssfit.grid import paper_grid
+
+    try:
+        return paper_grid(material)
+    except SimulationError:
+        return None
+
+
+def _text(material: "Material") -> str:
+    """Return the page a person reads."""
+    grid = _grid(material)
+    lines = [
+        f"name                  {material.name}",
+        f"source                {_one_line(material.source) or 'not given'}",
+        f"specular reflectance  {material.specular_reflectance:.5f}",
+        "paper's grid          "
+        + (
+            f"dr {grid.dr_mm:.6g} mm, {grid.annuli} annuli, radius {grid.radius_mm:.6g} mm"
+            if grid
+            else "none: too many annuli, give simulate a --dr or --radius"
+        ),
+        f"sha256                {material.sha256}",
+    ]
+    several = len(material.layers) > 1
+    if material.eta_above != 1:
+        lines += ["", f"above: eta {material.eta_above:g}"]
+    for number, layer in enumerate(material.layers, 1):
+        lines += ["", _layer_heading(layer, number if several else None)]
+        lines.append(_layer_table(layer, material.channels))
+    if any(layer.g.any() for layer in material.layers):
+        lines.append("mean free path: the reduced one, 1 / (sigma_a + (1 - g) sigma_s)")
+    if material.eta_below != 1:
+        lines += ["", f"below: eta {material.eta_below:g}"]
+    return "\n".join(lines)
+
+
+def _layer_heading(layer: "Layer", number: int | None) -> str:
+    thickness = layer.to_dict()["thickness_mm"]
+    return (
+        (f"layer {number}: " if number else "")
+        + ("semi-infinite" if thickness is None else f"{thickness:g} mm thick")
+        + f", eta {layer.eta:g}"
+        + (", clear" if layer.is_clear else "")
+    )
+
+
+def _layer_table(layer: "Layer", channels: "Iterable[str]") -> str:
+    """Return the coefficients of a layer, a row a channel."""
+    head = ("channel", "sigma_a, 1/mm", "sigma_s, 1/mm", "g", "albedo", "mean free path, mm")
+    columns = (
+        layer.sigma_a_per_mm,
+        layer.sigma_s_per_mm,
+        layer.g,
+        layer.albedo,
+        layer.mean_free_path_mm,
+    )
+    rows = [
+        (channel, *(f"{value:.6g}" for value in values))
+        for channel, *values in zip(channels, *columns, strict=True)
+    ]
+    return table(head, rows)
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.split())

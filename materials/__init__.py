@@ -1,0 +1,1 @@
+"""The materials that ship with sssfit, one TOML file each."""

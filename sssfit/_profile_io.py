@@ -1,0 +1,158 @@
+"""The ``.profile.npz`` container: named arrays and a JSON text in an archive without pickle.
+
+The same content gives the same bytes: members are stored in a fixed order, uncompressed (zlib
+builds differ in their output) and with a fixed date. Reading trusts nothing: sizes are checked
+before anything is allocated, and whatever a damaged file makes the parsers raise leaves here as one
+line that names the file.
+"""
+
+import io
+import json
+import math
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.errors import ProfileError
+from sssfit.files import reason
+
+FORMAT = "sssfit.profile/1"
+REQUIRED = (
+    "r_edges_mm",
+    "annulus_energy",
+    "annulus_energy_stderr",
+    "beyond_grid",
+    "beyond_grid_stderr",
+    "specular_reflectance",
+    "absorbed",
+    "unfinished",
+)
+OPTIONAL = ("annulus_transmittance",)
+
+# The largest profile of the paper's materials is 0.3 MB; 2 GB is a zip bomb or somebody else's.
+_LARGEST_FILE_BYTES = 2_000_000_000
+_REMEDY = "write it again with `sssfit simulate`, or name a .profile.npz file"
+
+FloatArray = npt.NDArray[np.float64]
+
+
+def pack(arrays: Mapping[str, npt.ArrayLike | None], meta: Mapping[str, Any]) -> bytes:
+    """Return the whole file as bytes; the same content gives the same bytes everywhere."""
+    members: dict[str, npt.NDArray[Any]] = {
+        name: np.ascontiguousarray(value, dtype="<f8")
+        for name, value in arrays.items()
+        if value is not None
+    }
+    # ascontiguousarray lifts a scalar to one dimension.
+    members["specular_reflectance"] = members["specular_reflectance"].reshape(())
+    members["meta"] = np.array(json.dumps(dict(meta), sort_keys=True))
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
+        for name, array in members.items():
+            member = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
+            member.create_system = 3  # else Windows writes another byte
+            member.external_attr = 0o644 << 16
+            archive.writestr(member, _npy_bytes(array))
+    return buffer.getvalue()
+
+
+def unpack(
+    source: str | Path | BinaryIO, origin: str
+) -> tuple[dict[str, FloatArray], dict[str, Any]]:
+    """Return the arrays by name and the meta of a file or stream; ``origin`` names it in errors.
+
+    Raises
+    ------
+    ProfileError
+        Missing, unreadable, damaged, foreign, of another version of the format, or too large.
+    """
+    try:
+        if isinstance(source, str | Path):
+            with Path(source).open("rb") as stream:
+                return _unpack_stream(stream)
+        # A pipe cannot seek, an archive's directory is at its end.
+        return _unpack_stream(io.BytesIO(source.read(_LARGEST_FILE_BYTES)))
+    except ProfileError as error:
+        raise ProfileError(f"{origin} {error}; {_REMEDY}.") from None
+    except OSError as error:
+        raise ProfileError(f"{origin} cannot be read: {reason(error)}.") from error
+    except Exception as error:
+        # zipfile, zlib, struct, numpy's header parser and json raise a dozen unrelated types on
+        # damaged bytes (RuntimeError for a flipped encryption bit, MemoryError, RecursionError).
+        raise ProfileError(f"{origin} is damaged or not a profile; {_REMEDY}.") from error
+
+
+def is_profile_file(path: Path) -> bool:
+    """Tell whether ``path`` is a profile of any version of the format; reads its meta only."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return _file_format(_read_meta(archive)).startswith("sssfit.profile/")
+    except Exception:  # see unpack: damaged bytes raise nearly anything, and are not a profile
+        return False
+
+
+def _unpack_stream(stream: BinaryIO) -> tuple[dict[str, FloatArray], dict[str, Any]]:
+    """Read every member; ProfileError messages here continue a sentence that names the file."""
+    with zipfile.ZipFile(stream) as archive:
+        declared = sum(member.file_size for member in archive.infolist())
+        if declared > _LARGEST_FILE_BYTES:
+            raise ProfileError(
+                f"declares {declared / 1e9:.3g} GB, more than the {_LARGEST_FILE_BYTES / 1e9:.3g} "
+                "GB a profile may have"
+            )
+        names = [name.removesuffix(".npy") for name in archive.namelist()]
+        if "meta" not in names:
+            raise ProfileError("is not a profile: it has no 'meta'")
+        meta = _read_meta(archive)
+        if (found := _file_format(meta)) != FORMAT:
+            raise ProfileError(f"has format {found!r} where {FORMAT!r} was expected")
+        if missing := [name for name in REQUIRED if name not in names]:
+            raise ProfileError(f"lacks {', '.join(missing)}")
+        if len(set(names)) < len(names) or set(names) - {*REQUIRED, *OPTIONAL, "meta"}:
+            raise ProfileError("holds arrays that a profile does not have")
+        arrays = {name: _read_float(archive, name) for name in names if name != "meta"}
+    return arrays, meta
+
+
+def _file_format(meta: Mapping[str, Any]) -> str:
+    return str(meta.get("format", "none"))
+
+
+def _read_meta(archive: zipfile.ZipFile) -> dict[str, Any]:
+    text = _read_npy(archive, "meta", "U")
+    meta = json.loads(str(text[()]))
+    if text.ndim or not isinstance(meta, dict):
+        raise ProfileError("is not a profile: its 'meta' is not a JSON object")
+    return meta
+
+
+def _read_float(archive: zipfile.ZipFile, name: str) -> FloatArray:
+    return _read_npy(archive, name, "f").astype(np.float64, order="C")
+
+
+def _read_npy(archive: zipfile.ZipFile, name: str, kind: str) -> npt.NDArray[Any]:
+    """Read one .npy member whose header must agree with its length, before it is believed."""
+    member = archive.getinfo(f"{name}.npy")
+    if member.file_size > _LARGEST_FILE_BYTES:
+        raise ProfileError(f"declares {member.file_size / 1e9:.3g} GB for {name}")
+    stream = io.BytesIO(archive.read(member))
+    if np.lib.format.read_magic(stream) != (1, 0):
+        raise ProfileError(f"holds {name} in an unknown .npy version")
+    shape, fortran_order, dtype = np.lib.format.read_array_header_1_0(stream)
+    if dtype.kind != kind or (kind == "f" and dtype.itemsize != 8):
+        wanted = "float64" if kind == "f" else "text"
+        raise ProfileError(f"holds {name} as {dtype} where {wanted} was expected")
+    content = stream.read()
+    if math.prod(shape) * dtype.itemsize != len(content):
+        raise ProfileError(f"holds {len(content)} bytes of {name} where its header says {shape}")
+    return np.ndarray(shape, dtype, content, order="F" if fortran_order else "C")
+
+
+def _npy_bytes(array: npt.NDArray[Any]) -> bytes:
+    buffer = io.BytesIO()
+    np.lib.format.write_array(buffer, array, version=(1, 0), allow_pickle=False)
+    return buffer.getvalue()

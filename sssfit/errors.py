@@ -1,0 +1,25 @@
+"""Errors and warnings: one line each that says what arrived, what was expected, what to do."""
+
+
+class SssfitError(ValueError):
+    """Base of every error the toolkit raises on purpose; its text is one line for the user."""
+
+
+class MaterialError(SssfitError):
+    """A material file or its values cannot be used."""
+
+
+class ProfileError(SssfitError):
+    """A profile file or its values cannot be used."""
+
+
+class SimulationError(SssfitError):
+    """A simulation cannot be run as asked."""
+
+
+class FileError(SssfitError):
+    """A file cannot be read, written or replaced."""
+
+
+class SssfitWarning(UserWarning):
+    """The result stands, but something about it should be known before it is used."""

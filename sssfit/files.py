@@ -1,0 +1,148 @@
+"""Files on disk: nothing half-written, nothing foreign overwritten, no two runs on one output.
+
+Writes go to a temporary file beside the target, are flushed to the disk and renamed over it, so a
+reader sees the old file or the new one and never a part of either.
+"""
+
+import contextlib
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import BinaryIO
+
+from sssfit.errors import FileError
+
+try:
+    import fcntl
+except ImportError:  # Windows has no fcntl; its own byte-range lock serves
+    fcntl = None  # type: ignore[assignment]
+
+
+def reason(error: OSError) -> str:
+    """Say an operating-system error in lower case, without its number."""
+    return (error.strerror or str(error)).lower()
+
+
+def check_output(path: Path, is_own: Callable[[Path], bool], *, force: bool = False) -> None:
+    """Refuse an output that could not be written, before hours are spent on its content.
+
+    Parameters
+    ----------
+    path : Path
+        Where the output is to go.
+    is_own : callable
+        Whether an existing file is of the format about to replace it.
+    force : bool
+        Replace a foreign file as well.
+
+    Raises
+    ------
+    FileError
+        The folder is missing or not writable, or the file is somebody else's.
+    """
+    folder = path.parent
+    if not folder.is_dir():
+        raise FileError(f"{path}: there is no folder {folder}; make it or choose another with -o.")
+    if path.is_dir():
+        raise FileError(f"{path} is a folder; name a file in it with -o.")
+    if path.exists() and not force and not is_own(path):
+        raise FileError(
+            f"{path} exists and is not a file of this format; "
+            "choose another name with -o, or replace it with --force."
+        )
+    with _clear_errors(path):
+        handle, probe = tempfile.mkstemp(dir=folder, prefix=".sssfit-")
+        os.close(handle)
+        Path(probe).unlink()
+
+
+def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
+    """Write a whole file or nothing: temporary file in the same folder, fsync, rename.
+
+    Raises
+    ------
+    FileError
+        Disk full, folder read-only, or any other failure; an older file at ``path`` is untouched.
+    """
+    with _clear_errors(path):
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
+        temporary = Path(name)
+        try:
+            with os.fdopen(handle, "wb") as stream:
+                write(stream)
+                stream.flush()
+                os.fsync(stream.fileno())
+            temporary.chmod(_ordinary_mode())
+            temporary.replace(path)
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+
+
+@contextlib.contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Hold the output ``path`` for this process by an operating-system lock.
+
+    The lock lives on ``.NAME.lock`` beside the output and goes with the process, kill -9 included;
+    a lock file left behind by a killed run holds nothing.
+
+    Raises
+    ------
+    FileError
+        Another run holds it.
+    """
+    lock_path = path.with_name(f".{path.name}.lock")
+    with _clear_errors(path):
+        handle = _open_locked(lock_path, path)
+    try:
+        yield
+    finally:
+        # Unlink before the lock is let go: a waiting process then notices that its file is gone.
+        with contextlib.suppress(OSError):
+            lock_path.unlink()
+        os.close(handle)
+
+
+def _open_locked(lock_path: Path, path: Path) -> int:
+    """Open and lock; again if the file was unlinked between the two by the run that ended."""
+    while True:
+        handle = os.open(lock_path, os.O_RDWR | os.O_CREAT, 0o644)
+        try:
+            _lock(handle)
+        except OSError:
+            os.close(handle)
+            raise FileError(
+                f"{path} is being written by another run; wait for it or choose another name "
+                "with -o."
+            ) from None
+        with contextlib.suppress(FileNotFoundError):
+            if os.path.samestat(lock_path.stat(), os.fstat(handle)):
+                return handle
+        os.close(handle)
+
+
+def _lock(handle: int) -> None:
+    """Take an exclusive lock at once or raise OSError."""
+    if fcntl is not None:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        return
+    import msvcrt  # only there where fcntl is not
+
+    msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
+
+
+def _ordinary_mode() -> int:
+    """Permissions a plain ``open`` would give (mkstemp gives 0600, which colleagues cannot read)."""
+    mask = os.umask(0)
+    os.umask(mask)
+    return 0o666 & ~mask
+
+
+@contextlib.contextmanager
+def _clear_errors(path: Path) -> Iterator[None]:
+    """Turn operating-system errors into one line that names the file."""
+    try:
+        yield
+    except OSError as error:
+        raise FileError(f"{path} cannot be written: {reason(error)}.") from error

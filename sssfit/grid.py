@@ -1,0 +1,134 @@
+"""Radial grids: the rings in which a simulation counts the light that comes back.
+
+A grid is uniform: ``annuli`` rings, each ``dr_mm`` wide, from the axis outwards. Light that leaves
+beyond the last ring is kept apart by whoever simulates. The default spacing and radius are those of
+"Separable Subsurface Scattering", supplementary material F.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sssfit._material_checks import shown
+from sssfit.errors import SimulationError
+from sssfit.material import Material
+
+MOST_ANNULI = 100_000  # 80 times skin1's; three channels of sums and squares are then 5 MB a thread
+_RINGS_PER_MFP = 20  # of the shortest mean free path
+_MFPS_PER_RADIUS = 32  # of the longest
+
+
+@dataclass(frozen=True, slots=True)
+class RadialGrid:
+    """A uniform radial grid.
+
+    Parameters
+    ----------
+    dr_mm : float
+        Width of a ring [mm].
+    annuli : int
+        Number of rings, 1 to 100 000.
+
+    Raises
+    ------
+    SimulationError
+        A width that is not a finite length above 0, or a number of rings out of range.
+    """
+
+    dr_mm: float
+    annuli: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "dr_mm", _length("dr_mm", self.dr_mm))
+        count = self.annuli
+        if isinstance(count, bool) or not isinstance(count, Integral) or count < 1:
+            raise SimulationError(f"annuli = {shown(count)}; expected a whole number above 0.")
+        _check_count(int(count), self.dr_mm)
+        object.__setattr__(self, "annuli", int(count))
+
+    @property
+    def radius_mm(self) -> float:
+        """Outer radius of the last ring [mm]."""
+        return self.dr_mm * self.annuli
+
+    @property
+    def r_edges_mm(self) -> NDArray[np.float64]:
+        """Radii of the ring edges [mm], (annuli + 1,); the first is 0."""
+        return self.dr_mm * np.arange(self.annuli + 1, dtype=np.float64)
+
+
+def paper_grid(material: Material) -> RadialGrid:
+    """Return the grid of the paper: 20 rings in the shortest mean free path, 32 of the longest out.
+
+    ``dr = min(MFP) / 20`` and ``annuli = ceil(32 max(MFP) / dr)`` over the channels of all layers
+    that are not clear, with reduced mean free paths ("Separable Subsurface Scattering",
+    supplementary material F). For high albedo the radius cuts energy off: 2.7 % of wholemilk's red.
+
+    Raises
+    ------
+    SimulationError
+        The mean free paths differ so much that it takes over 100 000 rings.
+    """
+    return make_grid(material)
+
+
+def make_grid(
+    material: Material, *, dr_mm: float | None = None, radius_mm: float | None = None
+) -> RadialGrid:
+    """Return the grid of the paper, or one of another ring width or radius.
+
+    Parameters
+    ----------
+    material : Material
+        Its reduced mean free paths give what is left open.
+    dr_mm : float, optional
+        Width of a ring [mm]; by default a 20th of the shortest mean free path.
+    radius_mm : float, optional
+        Radius to be covered [mm], rounded up to whole rings; by default 32 of the longest mean
+        free paths.
+
+    Raises
+    ------
+    SimulationError
+        A length that is not finite and above 0, or over 100 000 rings; the message names widths
+        and radii that would do.
+    """
+    paths_mm = np.concatenate([layer.mean_free_path_mm for layer in material.layers])
+    paths_mm = paths_mm[np.isfinite(paths_mm)]
+    dr = paths_mm.min() / _RINGS_PER_MFP if dr_mm is None else _length("dr_mm", dr_mm)
+    longest = _MFPS_PER_RADIUS * paths_mm.max()
+    radius = longest if radius_mm is None else _length("radius_mm", radius_mm)
+    # 1e-9 keeps a ratio that is whole but for its last bits from gaining a ring.
+    annuli = max(1, math.ceil(radius / dr - 1e-9))
+    return RadialGrid(float(dr), annuli)
+
+
+def _length(key: str, value: Any) -> float:
+    """Return a finite length above 0."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise SimulationError(f"{key} = {shown(value)} is not a number; expected a length in mm.")
+    if not 1e-12 <= value <= 1e12:
+        raise SimulationError(f"{key} = {shown(value)}; expected a length from 1e-12 to 1e12 mm.")
+    return float(value)
+
+
+def _check_count(annuli: int, dr_mm: float) -> None:
+    """Refuse too many rings, and say which width or radius would do."""
+    if annuli > MOST_ANNULI:
+        least_dr = _rounded(dr_mm * (annuli / MOST_ANNULI), math.ceil)
+        most_radius = _rounded(dr_mm * MOST_ANNULI, math.floor)
+        raise SimulationError(
+            f"the grid would have {annuli:.6g} annuli, over the limit of {MOST_ANNULI}; use --dr "
+            f"{least_dr} or more, or --radius {most_radius} or less (both in mm)."
+        )
+
+
+def _rounded(value: float, rounding: Callable[[float], int]) -> str:
+    """Write a number with three digits, rounded to the safe side."""
+    scale = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return f"{rounding(value / scale) * scale:.3g}"

@@ -1,0 +1,183 @@
+"""Slow, literal oracles, written apart from the library and sharing no code with it.
+
+- ``scalar_walk``: one photon at a time, in double precision, every collision booked as it happens.
+- ``chandrasekhar_total``: total reflectance of an index-matched half space from the H function.
+- ``single_scattering_cumulative``: photons that leave after exactly one collision.
+- ``xoshiro128pp``: the generator in Python integers.
+"""
+
+import math
+
+import numba
+import numpy as np
+from scipy.integrate import quad
+
+MAX_COLLISIONS = 1_000_000
+
+
+@numba.njit(error_model="numpy")
+def scalar_walk(seed, photons, albedo, mean_free_path, eta, dr, annuli):
+    """Walk photons one by one; semi-infinite, g = 0, all channels carried as weights.
+
+    Returns sums over photons: bins (annuli + 1, C) of energy and of squared weights, the last
+    beyond the grid; hits per bin; energy of photons with exactly one collision per bin; absorbed,
+    unfinished (C,); roulette's squared gains (C,). Photons enter with weight 1 - specular.
+    """
+    np.random.seed(seed)
+    channels = albedo.size
+    bins = np.zeros((annuli + 1, channels))
+    squares = np.zeros((annuli + 1, channels))
+    hits = np.zeros((annuli + 1, channels))
+    once = np.zeros((annuli + 1, channels))
+    once_squares = np.zeros((annuli + 1, channels))
+    absorbed = np.zeros(channels)
+    unfinished = np.zeros(channels)
+    roulette = np.zeros(channels)
+    weight = np.empty(channels)
+    specular = ((eta - 1.0) / (eta + 1.0)) ** 2
+    for _ in range(photons):
+        weight[:] = 1.0 - specular
+        x = y = z = 0.0
+        ux = uy = 0.0
+        uz = 1.0
+        collisions = 0
+        while True:
+            step = -math.log(1.0 - np.random.random())
+            # Fly; reflect at the surface as often as it is met (once: the way down is free).
+            if uz < 0.0 and z + step * uz < 0.0:
+                to_surface = -z / uz
+                x += to_surface * ux
+                y += to_surface * uy
+                z = 0.0
+                step -= to_surface
+                cos_i = -uz
+                sin_t = eta * math.sqrt(max(0.0, 1.0 - cos_i * cos_i))
+                if sin_t >= 1.0:
+                    reflectance = 1.0
+                else:
+                    cos_t = math.sqrt(1.0 - sin_t * sin_t)
+                    r_s = (eta * cos_i - cos_t) / (eta * cos_i + cos_t)
+                    r_p = (cos_i - eta * cos_t) / (cos_i + eta * cos_t)
+                    reflectance = (r_s * r_s + r_p * r_p) / 2.0
+                if np.random.random() >= reflectance:
+                    rho = math.sqrt(x * x + y * y)
+                    for c in range(channels):
+                        k = min(int(rho * mean_free_path[c] / dr), annuli)
+                        bins[k, c] += weight[c]
+                        squares[k, c] += weight[c] ** 2
+                        hits[k, c] += 1.0
+                        if collisions == 1:
+                            once[k, c] += weight[c]
+                            once_squares[k, c] += weight[c] ** 2
+                    break
+                uz = -uz
+            x += step * ux
+            y += step * uy
+            z += step * uz
+            collisions += 1
+            for c in range(channels):
+                absorbed[c] += weight[c] * (1.0 - albedo[c])
+                weight[c] *= albedo[c]
+            if collisions >= MAX_COLLISIONS:
+                unfinished += weight
+                break
+            if weight.max() < 1e-4 * (1.0 - specular):
+                if np.random.random() < 0.1:
+                    roulette += (9.0 * weight) ** 2
+                    weight *= 10.0
+                else:
+                    roulette += weight**2
+                    break
+            uz = 2.0 * np.random.random() - 1.0
+            phi = 2.0 * math.pi * np.random.random()
+            sin_theta = math.sqrt(1.0 - uz * uz)
+            ux = sin_theta * math.cos(phi)
+            uy = sin_theta * math.sin(phi)
+    return bins, squares, hits, once, once_squares, absorbed, unfinished, roulette
+
+
+def chandrasekhar_total(albedo, nodes=400):
+    """1 - H(1) sqrt(1 - albedo): normal incidence, index-matched, isotropic scattering.
+
+    H from its equation 1/H(mu) = sqrt(1-a) + a/2 int_0^1 mu' H(mu') / (mu + mu') dmu', iterated
+    on Gauss nodes (Chandrasekhar 1960, Radiative Transfer, chapter V).
+    """
+    x, w = np.polynomial.legendre.leggauss(nodes)
+    mu, weights = (x + 1.0) / 2.0, w / 2.0
+    root = math.sqrt(1.0 - albedo)
+    h = np.ones(nodes)
+    kernel = albedo / 2.0 * weights * mu / (mu[:, None] + mu[None, :])
+    for _ in range(20_000):
+        new = 1.0 / (root + kernel @ h)
+        if np.max(np.abs(new - h)) < 1e-14:
+            break
+        h = (h + new) / 2.0
+    h_one = 1.0 / (root + albedo / 2.0 * np.sum(weights * mu * h / (1.0 + mu)))
+    return 1.0 - h_one * root
+
+
+def fresnel(cos_inside, eta):
+    """Unpolarised reflectance from inside."""
+    sin_t = eta * math.sqrt(1.0 - cos_inside**2)
+    if sin_t >= 1.0:
+        return 1.0
+    cos_t = math.sqrt(1.0 - sin_t**2)
+    r_s = (eta * cos_inside - cos_t) / (eta * cos_inside + cos_t)
+    r_p = (cos_inside - eta * cos_t) / (cos_inside + eta * cos_t)
+    return (r_s**2 + r_p**2) / 2.0
+
+
+def single_scattering_cumulative(r, albedo, eta):
+    """F1(r), r in mean free paths: energy of photons that leave within r after one collision.
+
+    a/2 (1-R_sp) int_{mu_c}^1 (1-R_F(mu)) [1 - exp(-r mu/sqrt(1-mu^2) (1+1/mu))] / (1+1/mu) dmu
+    """
+    specular = ((eta - 1.0) / (eta + 1.0)) ** 2
+    critical = math.sqrt(1.0 - 1.0 / eta**2)
+
+    def integrand(t):
+        # mu = mu_c + (1 - mu_c) t^2 takes the square root out of the critical angle
+        mu = critical + (1.0 - critical) * t * t
+        if mu <= 0.0 or mu >= 1.0:
+            reach = 0.0 if mu <= 0.0 else 1.0
+        else:
+            reach = -math.expm1(-r * mu / math.sqrt(1.0 - mu * mu) * (1.0 + 1.0 / mu))
+        slope = 2.0 * (1.0 - critical) * t
+        return (1.0 - fresnel(mu, eta)) * reach * mu / (1.0 + mu) * slope
+
+    integral, _ = quad(integrand, 0.0, 1.0, epsabs=1e-12, epsrel=1e-10, limit=500)
+    return albedo / 2.0 * (1.0 - specular) * integral
+
+
+def xoshiro128pp(state, count):
+    """First ``count`` outputs of xoshiro128++ (Blackman and Vigna 2021) in Python integers."""
+    mask = 0xFFFFFFFF
+
+    def rotl(x, k):
+        return ((x << k) | (x >> (32 - k))) & mask
+
+    s = list(state)
+    outputs = []
+    for _ in range(count):
+        outputs.append((rotl((s[0] + s[3]) & mask, 7) + s[0]) & mask)
+        t = (s[1] << 9) & mask
+        s[2] ^= s[0]
+        s[3] ^= s[1]
+        s[1] ^= s[2]
+        s[0] ^= s[3]
+        s[2] ^= t
+        s[3] = rotl(s[3], 11)
+    return outputs
+
+
+def splitmix64(start, count):
+    """First ``count`` outputs of splitmix64 in Python integers."""
+    mask = 0xFFFFFFFFFFFFFFFF
+    outputs, state = [], start
+    for _ in range(count):
+        state = (state + 0x9E3779B97F4A7C15) & mask
+        z = state
+        z = ((z ^ (z >> 30)) * 0xBF58476D1CE4E5B9) & mask
+        z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & mask
+        outputs.append(z ^ (z >> 31))
+    return outputs

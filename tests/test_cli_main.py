@@ -1,0 +1,241 @@
+"""What all verbs share: options, exit codes, one line of error, interruption, pipes."""
+
+import os
+import re
+import select
+import signal
+import subprocess
+import sys
+import textwrap
+import warnings
+
+import click
+import pytest
+
+import sssfit
+from sssfit.cli import cli, main
+from sssfit.errors import MaterialError, SssfitWarning
+
+COMMON = {"-q", "--quiet", "-v", "--verbose", "--json", "--threads", "--seed"}
+posix_only = pytest.mark.skipif(os.name != "posix", reason="needs POSIX signals, pipes, terminals")
+
+
+@pytest.fixture
+def run(capfd):
+    """Call ``main`` in this process: (exit status, stdout, stderr)."""
+    before = signal.getsignal(signal.SIGTERM)
+
+    def call(*args: str) -> tuple[int, str, str]:
+        with pytest.raises(SystemExit) as end:
+            main(args)
+        out, err = capfd.readouterr()
+        return end.value.code or 0, out, err
+
+    yield call
+    signal.signal(signal.SIGTERM, before)
+
+
+@pytest.fixture
+def verb():
+    """Add a verb ``trial`` that does what a test wants; it goes with the test."""
+
+    def add(body) -> None:
+        cli.add_command(click.Command("trial", callback=body))
+
+    yield add
+    cli.commands.pop("trial", None)
+
+
+def raising(error: BaseException):
+    """A verb's body that fails."""
+
+    def body() -> None:
+        raise error
+
+    return body
+
+
+def start(body: str, **options) -> subprocess.Popen:
+    """Run the program in another process with a verb ``trial`` of the given source."""
+    program = f"""
+import time
+import click
+from sssfit.cli import cli, main
+
+@cli.command()
+def trial():
+{textwrap.indent(textwrap.dedent(body), "    ")}
+
+main(["trial"])
+"""
+    return subprocess.Popen(
+        [sys.executable, "-c", program],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        **options,
+    )
+
+
+# Options
+
+
+@pytest.mark.parametrize("name", list(cli.commands))
+def test_every_verb_has_the_common_options(name):
+    command = cli.commands[name]
+    options = {option for each in command.params for option in each.opts}
+    assert options >= COMMON
+    seed = next(each for each in command.params if each.name == "seed")
+    assert seed.default == 1
+
+
+@pytest.mark.parametrize("name", list(cli.commands))
+def test_every_verb_explains_itself(name, run):
+    for flag in ("--help", "-h"):
+        status, out, err = run(name, flag)
+        assert status == 0
+        assert out.startswith(f"Usage: sssfit {name}")
+        assert err == ""
+
+
+def test_version(run):
+    assert run("--version") == (0, f"sssfit {sssfit.__version__}\n", "")
+
+
+@pytest.mark.parametrize("flags", [("--version", "-v"), ("-v", "--version")])
+def test_version_with_v_lists_the_libraries(flags, run):
+    status, out, _ = run(*flags)
+    assert status == 0
+    for library in ("python", "numpy", "scipy", "numba", "matplotlib", "click", "rich"):
+        assert re.search(rf"^{library} \d+\.\d+", out, re.MULTILINE), library
+
+
+# Exit status
+
+
+@pytest.mark.parametrize(
+    "args",
+    [
+        (),
+        ("no-such-verb",),
+        ("--no-such-option",),
+        *(
+            (name, *wrong)
+            for name in cli.commands
+            for wrong in (("--no-such-option",), ("--threads", "0"), ("--seed", "-1"))
+        ),
+    ],
+)
+def test_wrong_usage_is_2(args, run):
+    status, out, err = run(*args)
+    assert status == 2
+    assert "Usage: sssfit" in out + err
+    assert "Traceback" not in out + err
+
+
+@pytest.mark.parametrize(
+    ("error", "line"),
+    [
+        (MaterialError("skin9: no such material"), "Error: skin9: no such material"),
+        (click.ClickException("no"), "Error: no"),
+        (
+            FileNotFoundError(2, "No such file or directory", "a.npz"),
+            "Error: a.npz: no such file or directory.",
+        ),
+        (MemoryError(), "Error: out of memory"),
+        (RuntimeError("two\nlines"), "Error: internal error, RuntimeError: two lines."),
+    ],
+)
+def test_failure_is_1_with_one_line(error, line, run, verb):
+    verb(raising(error))
+    status, out, err = run("trial")
+    assert status == 1
+    assert out == ""
+    assert err.startswith(line)
+    assert err.count("\n") == 1
+    assert "Traceback" not in err
+
+
+def test_internal_error_shows_its_traceback_when_asked(verb, monkeypatch):
+    monkeypatch.setenv("SSSFIT_TRACEBACK", "1")
+    verb(raising(RuntimeError("inside")))
+    before = signal.getsignal(signal.SIGTERM)
+    try:
+        with pytest.raises(RuntimeError, match="inside"):
+            main(["trial"])
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt(), click.Abort()])
+def test_interrupted_is_130(error, run, verb):
+    verb(raising(error))
+    status, out, err = run("trial")
+    assert status == 130
+    assert out == ""
+    assert err.strip().count("\n") == 0
+
+
+def test_status_of_a_verb_is_the_status_of_the_program(run, verb):
+    verb(lambda: click.get_current_context().exit(130))
+    assert run("trial")[0] == 130
+
+
+@posix_only
+def test_sigterm_is_130():
+    with start("click.echo('ready')\ntime.sleep(60)") as process:
+        assert process.stdout.readline() == "ready\n"
+        process.send_signal(signal.SIGTERM)
+        _, err = process.communicate(timeout=20)
+    assert process.returncode == 130
+    assert "Traceback" not in err
+
+
+# Words
+
+
+def test_warning_is_one_line_on_stderr(run, verb):
+    verb(lambda: warnings.warn("mind the gap", SssfitWarning, stacklevel=1))
+    assert run("trial") == (0, "", "Warning: mind the gap\n")
+
+
+@posix_only
+def test_reader_that_goes_away_is_no_error():
+    with start("while True:\n    click.echo('x' * 4096)") as process:
+        process.stdout.readline()
+        process.stdout.close()
+        err = process.stderr.read()
+        process.wait(timeout=20)
+    assert err == ""
+    assert process.returncode in (1, 141)
+
+
+@posix_only
+def test_no_color_is_honoured_on_a_terminal(tmp_path):
+    import pty
+
+    ours, theirs = pty.openpty()
+    with subprocess.Popen(
+        [sys.executable, "-m", "sssfit.cli", "simulate", "skin1", "--photons", "1e5"],
+        cwd=tmp_path,
+        env=os.environ | {"NO_COLOR": "1", "TERM": "xterm-256color"},
+        stdin=subprocess.DEVNULL,
+        stdout=theirs,
+        stderr=theirs,
+    ) as process:
+        os.close(theirs)
+        seen = b""
+        while select.select([ours], [], [], 120)[0]:
+            try:
+                part = os.read(ours, 65536)
+            except OSError:  # Linux: the other end is closed
+                break
+            if not part:
+                break
+            seen += part
+    os.close(ours)
+    assert process.returncode == 0, seen
+    colours = re.findall(rb"\x1b\[[\d;]*m", seen)
+    assert not [
+        each for each in colours if re.search(rb"[\[;](?:3[0-8]|4[0-8]|9\d|10\d)[;m]", each)
+    ]

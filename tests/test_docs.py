@@ -1,0 +1,114 @@
+"""The documents say what the program does, and no file names a private place."""
+
+import re
+import runpy
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sssfit.cli import cli
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def code_blocks(language: str = "") -> list[str]:
+    """The README's fenced blocks of one language, in order."""
+    fences = re.findall(r"^```(\w*)\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
+    return [body for found, body in fences if found == language]
+
+
+def test_readme_has_two_commands_of_one_line():
+    first, tests = (block.strip() for block in code_blocks()[:2])
+    assert first.startswith("python3 -m venv .venv && ")
+    assert first.endswith("sssfit chart skin1.profile.npz")
+    assert "pytest" in tests
+    assert "\n" not in first + tests
+
+
+def test_ci_runs_the_test_command_of_the_readme():
+    command = code_blocks()[1].strip()
+    lines = (ROOT / ".ci" / "run").read_text(encoding="utf-8").splitlines()
+    assert lines[-1] == command
+
+
+@pytest.mark.parametrize("verb", list(cli.commands))
+def test_readme_names_every_verb(verb):
+    assert f"sssfit {verb}" in README
+
+
+def test_readme_python_does_what_its_command_line_does(tmp_path, monkeypatch):
+    (example,) = code_blocks("python")
+    (command,) = [block.strip() for block in code_blocks() if block.startswith("sssfit simulate")]
+    from_python, from_command_line = tmp_path / "python", tmp_path / "command-line"
+    from_python.mkdir()
+    from_command_line.mkdir()
+
+    monkeypatch.chdir(from_python)
+    exec(compile(example, "README.md", "exec"), {})
+    subprocess.run(
+        [sys.executable, "-m", "sssfit.cli", *command.split()[1:]],
+        cwd=from_command_line,
+        check=True,
+        timeout=300,
+    )
+
+    with (
+        np.load(from_python / "skin1.profile.npz") as ours,
+        np.load(from_command_line / "skin1.profile.npz") as theirs,
+    ):
+        assert set(ours) == set(theirs)
+        for name in ours:
+            np.testing.assert_array_equal(ours[name], theirs[name], err_msg=name)
+        for name in ours:
+            assert f"| `{name}` |" in README, f"{name} is not in the README's table"
+
+
+def test_readme_links_lead_somewhere():
+    for target in re.findall(r"\]\((?!https?:)([^)#]+)\)", README):
+        assert (ROOT / target).exists(), target
+
+
+def test_generated_help_is_up_to_date():
+    page = runpy.run_path(str(ROOT / "docs" / "make_cli.py"))["page"]()
+    written = (ROOT / "docs" / "cli.md").read_text(encoding="utf-8")
+    assert written == page, "run: python docs/make_cli.py"
+
+
+# Spelled so that this file does not match itself.
+PACKAGE_HOST = re.compile(
+    r"p[y]pi\.|p[y]thonhosted\.|a[n]aconda\.org|d[e]b\.debian\.org|/s[i]mple/"
+)
+MACHINE_PATH = re.compile(r"(?<![\w.])/(?:h[o]me|U[s]ers|r[o]ot|w[o]rk)/\w|\b[C]:\\+U[s]ers")
+
+
+def tracked_files() -> list[Path]:
+    """Files under version control, and new ones that are not ignored."""
+    if shutil.which("git") is None or not (ROOT / ".git").exists():
+        pytest.skip("not a git checkout: which files belong to the project is not known")
+    listed = subprocess.run(
+        [
+            *("git", "-c", f"safe.directory={ROOT}"),
+            *("ls-files", "-z", "--cached", "--others", "--exclude-standard"),
+        ],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    return [path for name in listed.split("\0") if name and (path := ROOT / name).is_file()]
+
+
+def test_no_file_names_a_package_host_or_a_path_of_some_machine():
+    for path in tracked_files():
+        try:
+            text = path.read_text(encoding="utf-8")
+        except UnicodeDecodeError:
+            continue  # pictures and arrays
+        for pattern in (PACKAGE_HOST, MACHINE_PATH):
+            found = pattern.search(text)
+            assert found is None, f"{path.relative_to(ROOT)}: {found and found[0]}"

@@ -1,0 +1,133 @@
+"""Help answers at once, and the rooms depend on each other in one direction only."""
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from sssfit.cli import cli
+
+ROOT = Path(__file__).parents[1]
+HEAVY = {"numpy", "numba", "scipy", "colour", "matplotlib", "rich"}
+
+# A room may import from rooms before it in this list, never from one after it.
+ROOMS = ["errors", "files", "material", "grid", "profile", "simulate", "chart", "cli"]
+# Files that serve one room and do not say so by their name, as _profile_io does.
+BACK_ROOMS = {"_disks": "profile"}
+# The compiled layer stands beside the list: these rooms may use it, and it uses none of them.
+ROOMS_ON_JIT = {"profile", "simulate"}
+JIT_MAY_IMPORT = {"numpy", "numba", "math", "sssfit"} | set(sys.stdlib_module_names)
+
+CLI = sorted((ROOT / "cli").rglob("*.py"))
+JIT = sorted((ROOT / "sssfit" / "_jit").rglob("*.py"))
+LIBRARY = sorted((ROOT / "sssfit").rglob("*.py"))
+SOURCES = [*LIBRARY, *CLI]
+IN_ROOMS = sorted({*SOURCES} - {*JIT} - {ROOT / "sssfit" / "__init__.py"})
+
+
+def name_of(path: Path) -> str:
+    """Test id: the path inside the project."""
+    return path.relative_to(ROOT).as_posix()
+
+
+def package_of(path: Path) -> list[str]:
+    """The import name of the folder a file lives in, as installed."""
+    folder = path.parent.relative_to(ROOT).parts
+    return list(folder) if folder[0] == "sssfit" else ["sssfit", *folder]
+
+
+def imports(path: Path) -> Iterator[str]:
+    """Every module a file imports, inside functions too, with relative names resolved."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            package = package_of(path)
+            base = package[: len(package) - node.level + 1] if node.level else []
+            module = [*base, *(node.module.split(".") if node.module else [])]
+            if module == ["sssfit"]:  # from sssfit import errors
+                yield from (f"sssfit.{alias.name}" for alias in node.names)
+            else:
+                yield ".".join(module)
+
+
+def room_of(module: str) -> str:
+    """``simulate`` of ``sssfit.simulate.montecarlo``, ``profile`` of ``sssfit._profile_io``."""
+    room = module.split(".")[1]
+    if room in BACK_ROOMS:
+        return BACK_ROOMS[room]
+    served = room.removeprefix("_").partition("_")[0]
+    return served if room.startswith("_") and served in ROOMS else room
+
+
+def module_of(path: Path) -> str:
+    """The import name of a file, as installed."""
+    return ".".join([*package_of(path), path.stem])
+
+
+def test_help_and_version_import_nothing_heavy():
+    calls = [
+        ["--help"],
+        ["--version"],
+        ["-v", "--version"],
+        *([verb, "--help"] for verb in cli.commands),
+    ]
+    program = f"""
+import sys
+from sssfit.cli import main
+for call in {calls!r}:
+    try:
+        main(call)
+    except SystemExit as end:
+        assert not end.code, (call, end.code)
+    loaded = {HEAVY!r} & {{name.partition(".")[0] for name in sys.modules}}
+    assert not loaded, f"{{call}} imports {{sorted(loaded)}}"
+"""
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, timeout=60
+    )
+    assert run.returncode == 0, run.stderr
+
+
+@pytest.mark.parametrize("path", IN_ROOMS, ids=name_of)
+def test_imports_point_down(path):
+    room = room_of(module_of(path))
+    assert room in ROOMS, f"give {room} a place in ROOMS"
+    for module in imports(path):
+        if not module.startswith("sssfit.") or module == "sssfit.__version__":
+            continue
+        other = room_of(module)
+        if other == "_jit":
+            assert room in ROOMS_ON_JIT, f"{room} imports {module}"
+        else:
+            assert other in ROOMS[: ROOMS.index(room) + 1], f"{room} imports {module}"
+
+
+def test_package_root_imports_nothing():
+    assert list(imports(ROOT / "sssfit" / "__init__.py")) == []
+
+
+@pytest.mark.parametrize("path", JIT, ids=name_of)
+def test_compiled_layer_sees_numbers_only(path):
+    for module in imports(path):
+        assert module.partition(".")[0] in JIT_MAY_IMPORT, module
+        if module.startswith("sssfit."):
+            assert module.split(".")[1] in ("_jit", "__version__"), module
+
+
+@pytest.mark.parametrize("path", LIBRARY, ids=name_of)
+def test_library_neither_prints_nor_knows_the_command_line(path):
+    assert not any(module.partition(".")[0] in ("click", "rich") for module in imports(path))
+    assert not any(module.startswith("sssfit.cli") for module in imports(path))
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            assert node.func.id != "print", f"line {node.lineno}"
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=name_of)
+def test_only_the_chart_imports_matplotlib(path):
+    if path != ROOT / "sssfit" / "chart.py":
+        assert not any(module.partition(".")[0] == "matplotlib" for module in imports(path))
