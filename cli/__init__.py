@@ -23,17 +23,15 @@ from .materials import materials
 from .show import show
 from .simulate import simulate
 
-_LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "matplotlib", "click", "rich")
+_LIBRARIES = ("numpy", "numba", "llvmlite", "matplotlib", "click", "rich")
 
 
-@click.group(
-    invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]}
-)
+@click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--version", is_flag=True, help="Print the version; with -v the libraries' too.")
 @click.option("-v", "--verbose", is_flag=True, help="With --version: the libraries underneath.")
 @click.pass_context
 def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
-    """Subsurface scattering kernels: from a material to what a real-time shader can afford.
+    r"""Subsurface scattering kernels: from a material to what a real-time shader can afford.
 
     A first session:
 
@@ -78,7 +76,9 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
         except MemoryError:
             _fail("out of memory: use a smaller grid, fewer channels or fewer --threads.")
         except OSError as error:
-            _fail(f"{error.filename or 'operating system'}: {(error.strerror or str(error)).lower()}.")
+            _fail(
+                f"{error.filename or 'operating system'}: {(error.strerror or str(error)).lower()}."
+            )
         except Exception as error:
             if os.environ.get("SSSFIT_TRACEBACK"):
                 raise
@@ -106,7 +106,7 @@ def _show_warning(
     category: type[Warning],
     filename: str,
     lineno: int,
-    file: TextIO | None = None,
+    file: TextIO | None = None,  # noqa: ARG001 (part of the protocol)
     line: str | None = None,
 ) -> None:
     """Print our own warnings as one line, others as Python would."""

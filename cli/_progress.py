@@ -10,9 +10,7 @@ if TYPE_CHECKING:
 
 
 @contextlib.contextmanager
-def walk_progress(
-    label: str, *, quiet: bool
-) -> Iterator[Callable[["WalkProgress"], None] | None]:
+def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[["WalkProgress"], None] | None]:
     """Yield a progress callback; None with ``quiet``. Piped, it leaves one line at the end."""
     if quiet:
         yield None
@@ -29,17 +27,22 @@ def walk_progress(
         TimeRemainingColumn(),
         console=Console(stderr=True),
     )
-    with bar:
-        task = bar.add_task(label, total=None, rate="", error="-")
+    task = bar.add_task(label, total=None, rate="", error="-")
 
-        def report(now: "WalkProgress") -> None:
-            error = now.relative_error
-            bar.update(
-                task,
-                total=now.photons,
-                completed=now.photons_done,
-                rate=f"{now.photons_done / max(now.seconds, 1e-9) / 1e6:.2f} M/s",
-                error=f"{100.0 * error:.2g} %" if math.isfinite(error) else "-",
-            )
+    def report(now: "WalkProgress") -> None:
+        # The bar appears with the first figures: a refused setting should leave one line only.
+        bar.start()
+        error = now.relative_error
+        bar.update(
+            task,
+            total=now.photons,
+            completed=now.photons_done,
+            rate=f"{now.photons_done / max(now.seconds, 1e-9):,.0f}/s",
+            error=f"{100.0 * error:.2g} %" if math.isfinite(error) else "-",
+        )
 
+    try:
         yield report
+    finally:
+        if bar.live.is_started:
+            bar.stop()

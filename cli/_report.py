@@ -18,7 +18,9 @@ def say(common: Common, line: str) -> None:
         click.echo(line, err=True)
 
 
-def finish(common: Common, figures: Mapping[str, Any], text: str, *, to_stderr: bool = False) -> None:
+def finish(
+    common: Common, figures: Mapping[str, Any], text: str, *, to_stderr: bool = False
+) -> None:
     """End a verb: its JSON object with ``--json``, else its text unless ``-q``.
 
     ``to_stderr`` moves the text out of the way of data that went to stdout (``-o -``).

@@ -35,7 +35,8 @@ def materials(common: Common, material: str | None, as_toml: bool) -> None:
     elif as_toml:
         from sssfit.material import load_material
 
-        click.echo(load_material(material).to_toml(), nl=False)
+        # TOML is UTF-8 whatever the terminal's encoding: bytes.
+        click.echo(load_material(material).to_toml().encode(), nl=False)
     else:
         _show(common, material)
 
@@ -125,10 +126,12 @@ def _grid(material: "Material") -> "RadialGrid | None":
 
 def _text(material: "Material") -> str:
     """Return the page a person reads."""
+    from sssfit._material_checks import printable
+
     grid = _grid(material)
     lines = [
         f"name                  {material.name}",
-        f"source                {_one_line(material.source) or 'not given'}",
+        f"source                {printable(material.source) or 'not given'}",
         f"specular reflectance  {material.specular_reflectance:.5f}",
         "paper's grid          "
         + (
@@ -176,7 +179,3 @@ def _layer_table(layer: "Layer", channels: "Iterable[str]") -> str:
         for channel, *values in zip(channels, *columns, strict=True)
     ]
     return table(head, rows)
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())

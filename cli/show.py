@@ -1,11 +1,204 @@
-"""``sssfit show``."""
+"""``sssfit show``: what a file holds, in figures."""
+
+from __future__ import annotations
+
+import sys
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ._options import Common, common_options
+from ._report import finish, newest, table
+
+if TYPE_CHECKING:
+    from sssfit.material import Material
+    from sssfit.profile import Profile
+
+_SHARES = (0.5, 0.9, 0.99)
 
 
 @click.command()
+@click.argument("file", required=False)
 @common_options
-def show(common: Common) -> None:
-    """To be written."""
+def show(file: str | None, common: Common) -> None:
+    r"""Print what FILE holds: provenance, grid, energies with standard errors.
+
+    FILE is a .profile.npz file, or - for stdin; by default the newest of this folder.
+
+    \b
+      sssfit show skin1.profile.npz
+      sssfit simulate skin1 -o - | sssfit show - --json
+    """
+    from sssfit.profile import Profile
+
+    name = file or str(newest(common, "*.profile.npz", "sssfit simulate skin1"))
+    profile = Profile.read(sys.stdin.buffer, "stdin") if name == "-" else Profile.load(name)
+    figures = {"command": "show", "output": [], "file": name, **_figures(profile)}
+    finish(common, figures, _text(figures))
+
+
+def _figures(profile: Profile) -> dict[str, Any]:
+    """Everything that is printed, as ``--json`` has it; null where a profile does not say."""
+    from sssfit._profile_radii import energy_radii_mm
+
+    meta = profile.meta
+    radii_mm = energy_radii_mm(profile, _SHARES)
+    return {
+        "format": meta["format"],
+        "material": _material_figures(profile),
+        "method": meta.get("method"),
+        "channels": list(profile.channels),
+        "photons": profile.photons,
+        "seed": meta.get("seed"),
+        "version": meta.get("version"),
+        "annuli": profile.n_annuli,
+        "dr_mm": float(profile.r_edges_mm[1]),
+        "uniform": _is_uniform(profile),
+        "radius_mm": float(profile.r_edges_mm[-1]),
+        "diffuse_reflectance": profile.diffuse_reflectance,
+        "diffuse_reflectance_stderr": profile.diffuse_reflectance_stderr,
+        "specular_reflectance": profile.specular_reflectance,
+        "beyond_grid": profile.beyond_grid,
+        "absorbed": profile.absorbed.sum(axis=0),
+        "transmitted": _transmitted(profile),
+        "unfinished": profile.unfinished,
+        "energy_balance": profile.energy_balance,
+        "energy_balance_stderr": meta.get("energy_balance_stderr"),
+        "radius_of_50_percent_mm": radii_mm[0],
+        "radius_of_90_percent_mm": radii_mm[1],
+        "radius_of_99_percent_mm": radii_mm[2],
+        "empty_annuli": _empty(profile),
+    }
+
+
+def _material_figures(profile: Profile) -> dict[str, Any] | None:
+    """Name and layers, from the top down, of the material the profile was made from."""
+    from sssfit._chart_data import material_of
+
+    material = material_of(profile)
+    return None if material is None else {**material.to_dict(), **_scales(material)}
+
+
+def _scales(material: Material) -> dict[str, Any]:
+    """Albedo and mean free path per layer and channel."""
+    return {
+        "albedo": [layer.albedo for layer in material.layers],
+        "mean_free_path_mm": [layer.mean_free_path_mm for layer in material.layers],
+    }
+
+
+def _is_uniform(profile: Profile) -> bool:
+    import numpy as np
+
+    width_mm = np.diff(profile.r_edges_mm)
+    return bool(np.allclose(width_mm, width_mm[0]))
+
+
+def _transmitted(profile: Profile) -> Any:
+    below = profile.annulus_transmittance
+    return None if below is None else below.sum(axis=0)
+
+
+def _empty(profile: Profile) -> Any:
+    """Annuli per channel in which no photon left any energy; null where none were traced."""
+    if profile.photons is None:
+        return None
+    return ((profile.annulus_energy == 0) & (profile.annulus_energy_stderr == 0)).sum(axis=0)
+
+
+def _text(figures: dict[str, Any]) -> str:
+    """All of it for people."""
+    parts = [_head(figures), _coefficients(figures), _energies(figures), _radii(figures)]
+    parts.append(
+        f"specular reflectance {figures['specular_reflectance']:.6f}, not part of diffuse R; "
+        "sum = specular + diffuse + absorbed + unfinished"
+        + ("" if figures["transmitted"] is None else " + transmitted")
+    )
+    if figures["empty_annuli"] is not None and any(figures["empty_annuli"]):
+        parts.append(
+            "empty: annuli in which nothing was seen; their standard error of 0 says that, and not "
+            "that R_d is 0 there."
+        )
+    return "\n".join(filter(None, parts))
+
+
+def _head(figures: dict[str, Any]) -> str:
+    """Provenance and grid."""
+    material, photons = figures["material"], figures["photons"]
+    name = material["name"] if material else "unknown material"
+    source = f" ({material['source']})" if material and material["source"] else ""
+    walks = "no photons" if photons is None else f"{photons:,} photons, seed {figures['seed']}"
+    width = f"{figures['dr_mm']:.4g} mm" if figures["uniform"] else "varying width"
+    return (
+        f"{figures['file']}: diffuse reflectance profile ({figures['format']})\n"
+        f"material  {name}{source}\n"
+        f"method    {figures['method'] or 'unknown'}, {walks}, "
+        f"sssfit {figures['version'] or 'version unknown'}\n"
+        f"grid      {figures['annuli']} annuli of {width}, to {figures['radius_mm']:.4g} mm"
+    )
+
+
+def _coefficients(figures: dict[str, Any]) -> str:
+    """One line a layer and channel; nothing where the material is unknown."""
+    material = figures["material"]
+    if material is None:
+        return ""
+    rows = [
+        (
+            f"{k + 1} {name}" if len(material["layers"]) > 1 else name,
+            f"{layer['eta']:g}",
+            f"{layer['g'][c]:g}",
+            f"{layer['sigma_a_per_mm'][c]:.5g}",
+            f"{layer['sigma_s_per_mm'][c]:.5g}",
+            f"{material['albedo'][k][c]:.5f}",
+            f"{material['mean_free_path_mm'][k][c]:.4f}",
+            "infinite" if layer["thickness_mm"] is None else f"{layer['thickness_mm']:g}",
+        )
+        for k, layer in enumerate(material["layers"])
+        for c, name in enumerate(material["channels"])
+    ]
+    head = ("channel", "eta", "g", "sigma_a, 1/mm", "sigma_s, 1/mm", "albedo", "MFP, mm")
+    return "\n" + table((*head, "thickness, mm"), rows)
+
+
+def _energies(figures: dict[str, Any]) -> str:
+    """Where each channel's light went."""
+    head = ["channel", "diffuse R", "+- stderr", "beyond grid", "of diffuse", "absorbed"]
+    columns = ["unfinished", "sum - 1"]
+    transmitted = figures["transmitted"]
+    if transmitted is not None:
+        columns.insert(0, "transmitted")
+    rows = []
+    for c, name in enumerate(figures["channels"]):
+        diffuse, beyond = figures["diffuse_reflectance"][c], figures["beyond_grid"][c]
+        row = [
+            name,
+            f"{diffuse:.6f}",
+            f"{figures['diffuse_reflectance_stderr'][c]:.1e}",
+            f"{beyond:.2e}",
+            f"{100.0 * beyond / diffuse:.3f} %" if diffuse > 0 else "-",
+            f"{figures['absorbed'][c]:.6f}",
+        ]
+        row += [] if transmitted is None else [f"{transmitted[c]:.6f}"]
+        row += [f"{figures['unfinished'][c]:.1e}", _balance(figures, c)]
+        rows.append(row)
+    return "\n" + table([*head, *columns], rows)
+
+
+def _balance(figures: dict[str, Any], channel: int) -> str:
+    """Sum of all energies - 1, with the standard error where the run gave one."""
+    balance = f"{figures['energy_balance'][channel]:+.0e}"
+    stderr = figures["energy_balance_stderr"]
+    return balance if stderr is None else f"{balance} +- {stderr[channel]:.0e}"
+
+
+def _radii(figures: dict[str, Any]) -> str:
+    """How far the light on the grid spreads."""
+    empty = figures["empty_annuli"]
+    head = ["channel", *(f"{100 * share:g} % within, mm" for share in _SHARES)]
+    rows = [
+        [name, *(f"{figures[f'radius_of_{100 * share:g}_percent_mm'][c]:.4f}" for share in _SHARES)]
+        + ([] if empty is None else [str(empty[c])])
+        for c, name in enumerate(figures["channels"])
+    ]
+    return "\n" + table(head + ([] if empty is None else ["empty"]), rows) + "\n"

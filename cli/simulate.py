@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ._options import Common, Count, Length, common_options
-from ._report import finish, say, table
+from ._report import say
+from ._simulate_report import figures_of, report
 
 if TYPE_CHECKING:
     from sssfit.material import Material
@@ -64,7 +65,7 @@ def simulate(
     force: bool,
     common: Common,
 ) -> None:
-    """Trace photons through MATERIAL and write its diffuse reflectance profile.
+    r"""Trace photons through MATERIAL and write its diffuse reflectance profile.
 
     MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or - for stdin.
     The profile is R_d(r) per channel as energy in annuli with standard errors, for a normally
@@ -110,33 +111,36 @@ def _run(
     """Walk, write each profile as its walk ends, and report."""
     from contextlib import ExitStack
 
+    from sssfit.errors import StoppedError
     from sssfit.files import check_output, locked
     from sssfit.profile import is_profile_file
 
     from ._interrupt import asked_to_stop
 
-    rows: list[dict[str, Any]] = []
-    interrupted = False
+    rows: dict[int, dict[str, Any]] = {}
     with ExitStack() as held:
         for path in filter(None, targets):
             check_output(path, is_profile_file, force=force)
             held.enter_context(locked(path))
         stop = held.enter_context(asked_to_stop())
         for group in _by_eta(materials):
-            if stop():
+            try:
+                profiles, seconds = _walk([materials[k] for k in group], settings, stop, common)
+            except StoppedError:
                 break
-            profiles, seconds = _walk([materials[k] for k in group], settings, stop, common)
             for k, profile in zip(group, profiles, strict=True):
                 _write(profile, targets[k])
-                rows.append(_figures(materials[k], profile, seconds, targets[k]))
+                rows[k] = figures_of(profile, seconds) | {"path": str(targets[k] or "-")}
         interrupted = stop()
-    _report(rows, targets, every=every, common=common, interrupted=interrupted)
+    if not rows:
+        raise KeyboardInterrupt
+    report([rows[k] for k in sorted(rows)], every=every, common=common, interrupted=interrupted)
     if interrupted:
         sys.exit(130)
 
 
 def _by_eta(materials: list[Material]) -> list[list[int]]:
-    """Indices of the materials that can share a walk: those of one relative refractive index."""
+    """Return the indices of the materials that can share a walk: one relative index a group."""
     groups: dict[float, list[int]] = {}
     for k, material in enumerate(materials):
         groups.setdefault(material.layers[0].eta / material.eta_above, []).append(k)
@@ -149,8 +153,7 @@ def _walk(
     """One walk for all ``materials``, with a progress bar; the profiles and the wall time."""
     from time import perf_counter
 
-    from sssfit._jit import compiled_before
-    from sssfit.simulate import simulate_montecarlo_many
+    from sssfit.simulate import compiled_before, simulate_montecarlo_many
 
     from ._progress import walk_progress
 
@@ -177,75 +180,3 @@ def _write(profile: Profile, path: Path | None) -> None:
         sys.stdout.buffer.flush()
     else:
         profile.save(path)
-
-
-def _figures(
-    material: Material, profile: Profile, seconds: float, path: Path | None
-) -> dict[str, Any]:
-    """The figures of one run, as ``--json`` prints them."""
-    photons = profile.meta["photons"]
-    return {
-        "material": material.name,
-        "method": "montecarlo",
-        "channels": list(material.channels),
-        "diffuse_reflectance": profile.diffuse_reflectance,
-        "diffuse_reflectance_stderr": profile.diffuse_reflectance_stderr,
-        "specular_reflectance": profile.specular_reflectance,
-        "absorbed": profile.absorbed.sum(axis=0),
-        "beyond_grid": profile.beyond_grid,
-        "unfinished": profile.unfinished,
-        "energy_balance": profile.energy_balance,
-        "energy_balance_stderr": profile.meta["energy_balance_stderr"],
-        "dr_mm": float(profile.r_edges_mm[1]),
-        "annuli": profile.n_annuli,
-        "photons": photons,
-        "seed": profile.meta["seed"],
-        "seconds": seconds,
-        "photons_per_second": photons / seconds,
-        "path": "-" if path is None else str(path),
-    }
-
-
-def _report(
-    rows: list[dict[str, Any]],
-    targets: list[Path | None],
-    *,
-    every: bool,
-    common: Common,
-    interrupted: bool,
-) -> None:
-    """Figures to stdout (to stderr where the profile itself went to stdout)."""
-    output = [row.pop("path") for row in rows]
-    figures = {"command": "simulate", "output": output}
-    figures |= {"rows": rows} if every else (rows[0] if rows else {})
-    if interrupted:
-        figures["interrupted"] = True
-        say(common, "Interrupted: what was done by then is saved, with its true photon count.")
-    text = "\n\n".join(_text(row, path) for row, path in zip(rows, output, strict=True))
-    finish(common, figures, text, to_stderr=targets == [None])
-
-
-def _text(row: dict[str, Any], path: str) -> str:
-    """One run for people."""
-    heads = ("channel", "diffuse R", "+- stderr", "absorbed", "beyond grid", "unfinished", "sum - 1")
-    lines = [
-        (
-            name,
-            f"{row['diffuse_reflectance'][c]:.6f}",
-            f"{row['diffuse_reflectance_stderr'][c]:.1e}",
-            f"{row['absorbed'][c]:.6f}",
-            f"{100.0 * row['beyond_grid'][c] / max(row['diffuse_reflectance'][c], 1e-300):.3f} %",
-            f"{row['unfinished'][c]:.1e}",
-            f"{row['energy_balance'][c]:+.0e} +- {row['energy_balance_stderr'][c]:.0e}",
-        )
-        for c, name in enumerate(row["channels"])
-    ]
-    return (
-        f"{row['material']}: {row['photons']:,} photons in {row['seconds']:.1f} s "
-        f"({row['photons_per_second'] / 1e6:.1f} million/s), seed {row['seed']}, "
-        f"{row['annuli']} annuli of {row['dr_mm']:.4g} mm\n"
-        + table(heads, lines)
-        + f"\nspecular reflectance {row['specular_reflectance']:.6f}; sum = specular + diffuse "
-        "+ absorbed + unfinished; beyond grid: share of diffuse R\n"
-        f"Wrote {path}"
-    )

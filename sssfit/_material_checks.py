@@ -48,6 +48,8 @@ def shown(value: object) -> str:
         text = repr(value.item() if isinstance(value, np.generic) else value)
     except ValueError:  # Python refuses to write integers of more than 4300 digits
         text = "a huge number"
+    except RecursionError:  # a dotted key of 20 000 parts reads without one
+        text = "tables nested too deep"
     text = printable(text)  # a repr of an array has newlines
     return text if len(text) <= _MOST_SHOWN else text[: _MOST_SHOWN - 3] + "..."
 

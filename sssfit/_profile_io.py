@@ -123,9 +123,8 @@ def _file_format(meta: Mapping[str, Any]) -> str:
 
 
 def _read_meta(archive: zipfile.ZipFile) -> dict[str, Any]:
-    text = _read_npy(archive, "meta", "U")
-    meta = json.loads(str(text[()]))
-    if text.ndim or not isinstance(meta, dict):
+    meta = json.loads(str(_read_npy(archive, "meta", "U")))
+    if not isinstance(meta, dict):
         raise ProfileError("is not a profile: its 'meta' is not a JSON object")
     return meta
 

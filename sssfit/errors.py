@@ -17,6 +17,10 @@ class SimulationError(SssfitError):
     """A simulation cannot be run as asked."""
 
 
+class StoppedError(SimulationError):
+    """A simulation was stopped before anything was done that could be kept."""
+
+
 class FileError(SssfitError):
     """A file cannot be read, written or replaced."""
 

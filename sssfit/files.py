@@ -6,6 +6,7 @@ reader sees the old file or the new one and never a part of either.
 
 import contextlib
 import os
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -13,10 +14,10 @@ from typing import BinaryIO
 
 from sssfit.errors import FileError
 
-try:
+if sys.platform == "win32":
+    import msvcrt
+else:
     import fcntl
-except ImportError:  # Windows has no fcntl; its own byte-range lock serves
-    fcntl = None  # type: ignore[assignment]
 
 
 def reason(error: OSError) -> str:
@@ -124,16 +125,14 @@ def _open_locked(lock_path: Path, path: Path) -> int:
 
 def _lock(handle: int) -> None:
     """Take an exclusive lock at once or raise OSError."""
-    if fcntl is not None:
+    if sys.platform == "win32":
+        msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)
+    else:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        return
-    import msvcrt  # only there where fcntl is not
-
-    msvcrt.locking(handle, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined]
 
 
 def _ordinary_mode() -> int:
-    """Permissions a plain ``open`` would give (mkstemp gives 0600, which colleagues cannot read)."""
+    """Permissions a plain ``open`` gives; mkstemp's 0600 would shut colleagues out."""
     mask = os.umask(0)
     os.umask(mask)
     return 0o666 & ~mask

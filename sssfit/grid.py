@@ -110,7 +110,8 @@ def make_grid(
 
 def _length(key: str, value: Any) -> float:
     """Return a finite length above 0."""
-    if isinstance(value, bool) or not isinstance(value, Real):
+    is_number = isinstance(value, Real) and not isinstance(value, bool)
+    if not is_number:
         raise SimulationError(f"{key} = {shown(value)} is not a number; expected a length in mm.")
     if not 1e-12 <= value <= 1e12:
         raise SimulationError(f"{key} = {shown(value)}; expected a length from 1e-12 to 1e12 mm.")

@@ -281,7 +281,9 @@ def load_material(name_or_path: str | Path) -> Material:
         shipped = resources.files("sssfit.materials") / f"{wanted}.toml"
         return parse_material(shipped.read_text("utf-8"), f"{wanted}.toml")
     if isinstance(name_or_path, Path) or is_path(wanted):
-        return _load_file(Path(wanted))
+        with located(f"{printable(wanted)}: "):
+            text = read_text(Path(wanted))
+        return parse_material(text, wanted)
     raise MaterialError(
         f"there is no material {shown(wanted)}; {did_you_mean(wanted, material_names())}"
         "`sssfit materials` lists those there are, and a file of your own ends in .toml."
@@ -318,13 +320,6 @@ def parse_material(text: str, origin: str) -> Material:
         if "channels" not in head:
             head["channels"] = default_channels(layers[0].g.size)
         return Material(layers=layers, **head)
-
-
-def _load_file(path: Path) -> Material:
-    """Read a file of the user's; every way that can fail becomes one line."""
-    with located(f"{printable(str(path))}: "):
-        text = read_text(path)
-    return parse_material(text, str(path))
 
 
 def _layer_from_table(table: Mapping[str, Any], where: str, *, dense: bool) -> Layer:

@@ -5,8 +5,7 @@ edges, whatever R_d does inside (near the beam it behaves like 1/r), and every k
 profile conserves energy by construction. The annulus tallies are those of Wang, Jacques and Zheng,
 "MCML - Monte Carlo modeling of light transport in multi-layered tissues", 1995.
 
-``sssfit._disks`` turns a profile into pixels, ``sssfit._profile_io`` into a file;
-``sssfit._profile_checks`` says what one must be.
+``_disks`` turns a profile into pixels, ``_profile_io`` into a file; ``_profile_checks`` refuses it.
 """
 
 import dataclasses
@@ -128,8 +127,8 @@ class Profile:
 
         Specular + diffuse + absorbed + unfinished (+ transmitted) - 1.
         """
-        balance = self.specular_reflectance + self.diffuse_reflectance + self.absorbed.sum(axis=0)
-        balance = balance + self.unfinished - 1.0
+        reflected = self.specular_reflectance + self.diffuse_reflectance
+        balance: FloatArray = reflected + self.absorbed.sum(axis=0) + self.unfinished - 1.0
         if self.annulus_transmittance is not None:
             balance = balance + self.annulus_transmittance.sum(axis=0)
         return balance
@@ -146,8 +145,7 @@ class Profile:
         A photon of N lands in at most one annulus, so annuli are anticorrelated and their
         variances do not add. The walk's s_i^2 = (S2_i/N - e_i^2)/(N-1) gives back the sum of
         squared weights S2_i = N ((N-1) s_i^2 + e_i^2), and these do add:
-        Var F_k = (sum_{i<k} S2_i/N - F_k^2)/(N-1). Without photons, errors count as
-        independent.
+        Var F_k = (sum_{i<k} S2_i/N - F_k^2)/(N-1). Without photons they add.
         """
         stderr = _stderr_of_sums(self.annulus_energy, self.annulus_energy_stderr, self.photons)
         return np.concatenate((np.zeros((1, self.n_channels)), stderr))
@@ -168,7 +166,7 @@ class Profile:
         Takes radii (...) [mm] from 0 up, beyond the last edge F stays at its last value; returns
         (..., C). Raises ProfileError for a radius that is negative or NaN.
         """
-        radii_mm = np.asarray(r_mm, dtype=np.float64)
+        radii_mm = np.minimum(np.asarray(r_mm, dtype=np.float64), self.r_edges_mm[-1])
         if not (radii_mm >= 0).all():
             raise ProfileError("r_mm holds a negative radius or NaN; expected radii from 0 up.")
         return _disks.cumulative_at(self.r_edges_mm, self.annulus_energy, radii_mm)
@@ -177,12 +175,8 @@ class Profile:
         """Return the flat annuli that lines and pixels are integrated from.
 
         The profile's own, the innermost ten cut into equal parts by the monotone interpolation of
-        F: R_d ~ 1/r near the beam. Energies between the original edges are unchanged.
-
-        Returns
-        -------
-        r_edges_mm : array (m+1,) [mm]
-        reflectance_per_mm2 : array (m, C) [1/mm^2]
+        F: R_d ~ 1/r near the beam. Energies between the original edges are unchanged. Returns the
+        edges (m+1,) [mm] and the densities between them (m, C) [1/mm^2].
         """
         return _disks.flat_annuli(self.r_edges_mm, self.annulus_energy)
 
@@ -273,12 +267,7 @@ class Profile:
     def read(cls, source: str | Path | BinaryIO, origin: str | None = None) -> Self:
         """Read a profile from a path or a binary stream (which need not be able to seek).
 
-        Parameters
-        ----------
-        source : path or binary stream
-            Where the bytes come from.
-        origin : str, optional
-            What error messages call it; the path, or "the profile" for a stream, if not given.
+        Error messages call it ``origin``: if not given the path, or "the profile" for a stream.
 
         Raises
         ------

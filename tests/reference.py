@@ -96,7 +96,7 @@ def scalar_walk(seed, photons, albedo, mean_free_path, eta, dr, annuli):
     return bins, squares, hits, once, once_squares, absorbed, unfinished, roulette
 
 
-def chandrasekhar_total(albedo, nodes=400):
+def chandrasekhar_total(albedo, nodes=200):
     """1 - H(1) sqrt(1 - albedo): normal incidence, index-matched, isotropic scattering.
 
     H from its equation 1/H(mu) = sqrt(1-a) + a/2 int_0^1 mu' H(mu') / (mu + mu') dmu', iterated
@@ -107,7 +107,7 @@ def chandrasekhar_total(albedo, nodes=400):
     root = math.sqrt(1.0 - albedo)
     h = np.ones(nodes)
     kernel = albedo / 2.0 * weights * mu / (mu[:, None] + mu[None, :])
-    for _ in range(20_000):
+    for _ in range(5_000):
         new = 1.0 / (root + kernel @ h)
         if np.max(np.abs(new - h)) < 1e-14:
             break

@@ -118,6 +118,12 @@ def test_stack_from_standard_input(run, monkeypatch):
     assert parse_material(run("-", "--toml"), "x.toml") == parse_material(STACK, "x.toml")
 
 
+def test_control_characters_of_a_source_do_not_reach_the_terminal(run, tmp_path):
+    path = tmp_path / "red.toml"
+    path.write_text('source = "\\u001b[31m"\n' + load_material("skin1").to_toml().split("\n", 2)[2])
+    assert r"\x1b[31m" in run(str(path))
+
+
 def test_material_beyond_the_papers_grid_is_still_shown(run, tmp_path):
     path = tmp_path / "wide.toml"
     path.write_text(

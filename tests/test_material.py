@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from sssfit.errors import MaterialError
 from sssfit.material import Layer, Material, load_material, material_names, parse_material
 
-# Jensen et al. 2001, as printed in S-supp G: sigma_a RGB, sigma_s RGB in 1/mm, eta.
+# Jensen et al. 2001, as printed in "Separable Subsurface Scattering", supplementary material G:
+# sigma_a RGB, sigma_s RGB in 1/mm, eta.
 PUBLISHED = {
     "apple": ([0.0030, 0.0034, 0.0460], [2.2900, 2.3900, 1.9700], 1.3),
     "chicken1": ([0.0150, 0.0770, 0.1900], [0.1500, 0.2100, 0.3800], 1.3),
@@ -256,6 +257,7 @@ BAD = {
     "albedo": (SKIN + "albedo = 0.9", "albedo = 0.9 ", "(1 - albedo) sigma_t"),
     # layers
     "both": (SKIN + GROUND, "eta and [[layers]] are both given", "leave [[layers]] out"),
+    "dotted deep": ("a" + ".a" * 20000 + " = 1\n" + SKIN, "a = tables nested", "Known keys"),
     "layers table": ("[layers]\n" + SKIN, "layers = {'eta': 1.3, ", "two brackets"),
     "layers none": ("layers = []", "layers = [];", "one [[layers]] table"),
     "layers of numbers": ("layers = [1]", "layers[0] = 1 is not a table", "under [[layers]]"),

@@ -15,7 +15,7 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 import numba
 
@@ -47,7 +47,7 @@ def user_cache_folder() -> Path:
 
 
 def _writable_cache_folder() -> str:
-    """The keyed cache folder, or an empty string where it cannot be made and written to."""
+    """Return the keyed cache folder, or an empty string where it cannot be made and written to."""
     try:
         folder = user_cache_folder() / source_key()
         folder.mkdir(parents=True, exist_ok=True)
@@ -81,21 +81,22 @@ def jit_inline(function: Function) -> Function:
     return _compile(function, inline="always")
 
 
-def _compile(function: Function, *, inline: str) -> Function:
+def _compile(function: Function, *, inline: Literal["never", "always"]) -> Function:
     """Decorate with numba's cache pointed at our keyed folder.
 
     numba reads its cache folder from a global setting at decoration time only; it is set for the
     length of the call and put back, so that a host program's own choice stands.
     """
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = _CACHE_FOLDER
+    before = numba.config.CACHE_DIR  # type: ignore[attr-defined]
+    numba.config.CACHE_DIR = _CACHE_FOLDER  # type: ignore[attr-defined]
     try:
-        return numba.njit(  # type: ignore[no-any-return]
+        compiled: Function = numba.njit(
             function,
             cache=bool(_CACHE_FOLDER),
             nogil=True,
             error_model="numpy",
             inline=inline,
         )
+        return compiled
     finally:
-        numba.config.CACHE_DIR = before
+        numba.config.CACHE_DIR = before  # type: ignore[attr-defined]

@@ -177,7 +177,7 @@ def cos_sin_turn(u: np.float32) -> tuple[np.float32, np.float32]:
 
 @jit
 def fresnel_reflectance(cos_inside: float, eta: float) -> float:
-    """Unpolarised Fresnel reflectance from inside, relative index ``eta``; 1 at total reflection."""
+    """Unpolarised Fresnel reflectance from inside a medium of relative index ``eta``."""
     sin_outside = eta * math.sqrt(max(0.0, 1.0 - cos_inside * cos_inside))
     if sin_outside >= 1.0:
         return 1.0
@@ -242,7 +242,8 @@ def find_events(
 @jit_inline
 def power(channels: Channels, n: int, c: int) -> float:
     """albedo^n of channel c from the two tables."""
-    return channels.power_low[n & _BLOCK_MASK, c] * channels.power_high[n >> _BLOCK_BITS, c]
+    low, high = channels.power_low[n & _BLOCK_MASK, c], channels.power_high[n >> _BLOCK_BITS, c]
+    return float(low * high)
 
 
 @jit_inline
@@ -271,7 +272,12 @@ def score_exit(
 
 @jit_inline
 def score_event(
-    sums: FloatArray, gain: float, words: LaneWords, lane: int, boost: float, channels: Channels,
+    sums: FloatArray,
+    gain: float,
+    words: LaneWords,
+    lane: int,
+    boost: float,
+    channels: Channels,
     absorbed: FloatArray,
 ) -> None:
     """Book absorption up to the lane's present collision n, and gain boost albedo^n in ``sums``."""

@@ -17,12 +17,11 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit import __version__
-from sssfit.errors import SimulationError, SssfitWarning
+from sssfit.errors import SimulationError, SssfitWarning, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
 from sssfit.simulate._batches import (
-    BATCH_PHOTONS,
     Progress,
     Tally,
     Walk,
@@ -80,7 +79,9 @@ def simulate_montecarlo(
     Raises
     ------
     SimulationError
-        A medium this walk does not cover, settings out of range, or stopped before any batch.
+        A medium this walk does not cover, or settings out of range.
+    StoppedError
+        ``stop`` said so before a batch was done.
 
     References
     ----------
@@ -140,7 +141,7 @@ def simulate_montecarlo_many(
     task = Walk(tuple(materials), tuple(grids), seed, photons)
     tally = run(task, threads, progress, stop)
     if tally.photons < 2:
-        raise SimulationError("stopped before a single batch of photons was done.")
+        raise StoppedError("stopped before a single batch of photons was done.")
     return [_profile(task, tally, k, trim=auto) for k in range(len(materials))]
 
 
@@ -203,7 +204,7 @@ def _auto_grids(
         task = Walk(tuple(materials), tuple(grids), seed, PILOT_PHOTONS)
         tally = run(task, threads, None, stop)
         if tally.photons < 2:
-            raise SimulationError("stopped before a single batch of photons was done.")
+            raise StoppedError("stopped before a single batch of photons was done.")
         wide = [
             np.max(_share_beyond(_material_bins(task, tally, k))[-1]) < AUTO_BEYOND / 2
             for k in range(len(materials))
@@ -221,7 +222,8 @@ def _share_beyond(bins: FloatArray) -> FloatArray:
     energy = bins[..., 0]
     total = np.sum(energy, axis=0)
     beyond = np.cumsum(energy[::-1], axis=0)[::-1][1:]
-    return np.divide(beyond, total, out=np.zeros_like(beyond), where=total > 0.0)
+    share: FloatArray = np.divide(beyond, total, out=np.zeros_like(beyond), where=total > 0.0)
+    return share
 
 
 def _material_channels(task: Walk, index: int) -> range:
@@ -239,7 +241,9 @@ def _material_bins(task: Walk, tally: Tally, index: int) -> FloatArray:
 def _trimmed(bins: FloatArray) -> FloatArray:
     """Move the outermost annuli beyond the grid for as long as less than the share lies there."""
     outside = np.max(_share_beyond(bins), axis=1)
-    annuli = int(np.argmax(outside < AUTO_BEYOND)) + 1 if outside[-1] < AUTO_BEYOND else len(outside)
+    annuli = (
+        int(np.argmax(outside < AUTO_BEYOND)) + 1 if outside[-1] < AUTO_BEYOND else len(outside)
+    )
     return np.concatenate([bins[:annuli], np.sum(bins[annuli:], axis=0, keepdims=True)])
 
 
@@ -262,7 +266,7 @@ def _profile(task: Walk, tally: Tally, index: int, *, trim: bool) -> Profile:
     unfinished = entering * tally.ledger.unfinished[own, 0] / tally.photons
     _, balance_error = _mean_and_error(tally.ledger.roulette[own], tally.photons)
     profile = Profile(
-        r_edges_mm=grid.dr_mm * np.arange(len(bins)),
+        r_edges_mm=grid.r_edges_mm[: len(bins)],
         annulus_energy=energy[:-1],
         annulus_energy_stderr=stderr[:-1],
         beyond_grid=energy[-1],
@@ -301,5 +305,5 @@ def _warn_unfinished(material: Material, profile: Profile) -> None:
 
 
 def _short(values: FloatArray) -> str:
-    """A channel's values in brief; one number where all are equal."""
+    """Show a channel's values in brief; one number where all are equal."""
     return f"{values[0]:g}" if np.ptp(values) == 0.0 else f"{values.tolist()}"

@@ -1,0 +1,122 @@
+"""What a photon walk found, for people and for programs."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from ._options import Common
+from ._report import finish, say, table
+
+if TYPE_CHECKING:
+    from sssfit.profile import Profile
+
+_NOTED_BEYOND = 1e-3  # share of a channel beyond the grid that is worth a remark
+_SIGMAS = 4.5  # a deviation beyond so many standard errors is no accident
+_ROUNDING = 1e-12  # below this an energy balance is rounding, not roulette
+
+
+def figures_of(profile: Profile, seconds: float) -> dict[str, Any]:
+    """Figures of one run, as ``--json`` prints them."""
+    return {
+        "material": profile.meta["material"]["name"],
+        "method": profile.meta["method"],
+        "channels": list(profile.channels),
+        "diffuse_reflectance": profile.diffuse_reflectance,
+        "diffuse_reflectance_stderr": profile.diffuse_reflectance_stderr,
+        "specular_reflectance": profile.specular_reflectance,
+        "absorbed": profile.absorbed.sum(axis=0),
+        "beyond_grid": profile.beyond_grid,
+        "unfinished": profile.unfinished,
+        "energy_balance": profile.energy_balance,
+        "energy_balance_stderr": profile.meta["energy_balance_stderr"],
+        "dr_mm": float(profile.r_edges_mm[1]),
+        "annuli": profile.n_annuli,
+        "photons": profile.photons,
+        "seed": profile.meta["seed"],
+        "seconds": seconds,
+        "photons_per_second": (profile.photons or 0) / seconds,
+    }
+
+
+def report(rows: list[dict[str, Any]], *, every: bool, common: Common, interrupted: bool) -> None:
+    """Print figures to stdout; to stderr where a profile itself went to stdout."""
+    output = [row.pop("path") for row in rows]
+    figures: dict[str, Any] = {"command": "simulate", "output": output}
+    figures |= {"rows": rows} if every else rows[0]
+    if interrupted:
+        figures["interrupted"] = True
+        say(common, "Interrupted: what was done by then is saved, with its true photon count.")
+    text = "\n".join([_heading(rows, every), _table(rows), *_energy(rows), *_beyond(rows)])
+    wrote = "the profile to stdout" if output == ["-"] else ", ".join(output)
+    finish(common, figures, f"{text}\nWrote {wrote}", to_stderr=output == ["-"])
+
+
+def _heading(rows: list[dict[str, Any]], every: bool) -> str:
+    """Who, how many photons, how fast, on which grid."""
+    row = rows[0]
+    walks = f"{row['photons']:,} photons, seed {row['seed']}"
+    if every:
+        return f"{len(rows)} materials: {walks}, all channels of one index in one walk"
+    return (
+        f"{row['material']}: {walks}, {row['seconds']:.1f} s "
+        f"({row['photons_per_second']:,.0f} a second); "
+        f"{row['annuli']} annuli of {row['dr_mm']:.4g} mm, "
+        f"to {row['annuli'] * row['dr_mm']:.4g} mm"
+    )
+
+
+def _table(rows: list[dict[str, Any]]) -> str:
+    """One line a channel; the material's name where there are several."""
+    heads = ["channel", "diffuse reflectance", "std. error", "absorbed", "beyond grid"]
+    lines = [
+        [
+            name if len(rows) == 1 else f"{row['material']} {name}",
+            f"{row['diffuse_reflectance'][c]:.6f}",
+            f"{row['diffuse_reflectance_stderr'][c]:.6f}",
+            f"{row['absorbed'][c]:.6f}",
+            f"{row['beyond_grid'][c]:.6f}",
+        ]
+        for row in rows
+        for c, name in enumerate(row["channels"])
+    ]
+    return table(heads, lines)
+
+
+def _energy(rows: list[dict[str, Any]]) -> list[str]:
+    """Say whether specular + diffuse + absorbed = 1 within the runs' own error."""
+    lines = [] if len(rows) > 1 else [f"specular reflectance {rows[0]['specular_reflectance']:.6f}"]
+    balance, stderr, name = max(
+        (
+            (float(balance), float(stderr), f"{row['material']} {name}")
+            for row in rows
+            for balance, stderr, name in zip(
+                row["energy_balance"], row["energy_balance_stderr"], row["channels"], strict=True
+            )
+        ),
+        key=lambda each: abs(each[0]),
+    )
+    unfinished = max(float(each) for row in rows for each in row["unfinished"])
+    parts = "specular + diffuse + absorbed" + (" + unfinished" if unfinished > 0.0 else "")
+    within = abs(balance) <= _SIGMAS * stderr + _ROUNDING
+    lines.append(
+        f"energy: {parts} = 1 {'within' if within else 'NOT WITHIN'} the run's own error: "
+        f"{balance:+.1e}, standard error {max(stderr, _ROUNDING):.0e} (worst channel, {name})"
+    )
+    if unfinished > 0.0:
+        lines.append(f"unfinished, at most: {unfinished:.6f}")
+    return lines
+
+
+def _beyond(rows: list[dict[str, Any]]) -> list[str]:
+    """Remark on channels that lose a noticeable share beyond the grid."""
+    lost = [
+        f"{row['material']} {name} {100.0 * share:.1f} %"
+        for row in rows
+        for name, beyond, total in zip(
+            row["channels"], row["beyond_grid"], row["diffuse_reflectance"], strict=True
+        )
+        if total > 0.0 and (share := beyond / total) > _NOTED_BEYOND
+    ]
+    if not lost:
+        return []
+    return ["beyond the grid, as a share of diffuse: " + ", ".join(lost) + " (--radius auto)"]

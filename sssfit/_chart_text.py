@@ -1,0 +1,137 @@
+"""What a chart says about a profile in words and numbers."""
+
+import math
+import textwrap
+
+import numpy as np
+
+from sssfit._chart_data import LEAST_HITS, FloatArray, Picture, material_of
+from sssfit.profile import Profile
+
+_METHODS = {"montecarlo": "Monte Carlo"}
+_LONGEST_NAME = 16
+_MOST_IN_LEGEND = 8
+_FOOTNOTE_LETTERS = 132
+_SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def title(profile: Profile) -> str:
+    """Name the material."""
+    material = material_of(profile)
+    return (
+        f"{material.name}: diffuse reflectance profile"
+        if material
+        else "Diffuse reflectance profile"
+    )
+
+
+def subtitle(profile: Profile) -> str:
+    """Say how the profile was made, and on what grid."""
+    meta, last_mm = profile.meta, profile.r_edges_mm[-1]
+    parts = []
+    if method := meta.get("method"):
+        parts.append(_METHODS.get(str(method), shortened(str(method))))
+    if profile.photons is not None:
+        parts.append(f"{count(profile.photons)} photons, seed {meta.get('seed', 'unknown')}")
+    width_mm = np.diff(profile.r_edges_mm)
+    spacing = f" of {width_mm[0]:.4g} mm" if np.allclose(width_mm, width_mm[0]) else ""
+    parts.append(f"{profile.n_annuli} annuli{spacing} to r = {last_mm:.4g} mm")
+    if version := meta.get("version"):
+        parts.append(f"sssfit {shortened(str(version))}")
+    return " · ".join(parts)
+
+
+def count(number: int) -> str:
+    """Write a count: 10⁷, 2.5×10⁶, or in full where three digits are not enough."""
+    exponent = len(str(number)) - 1
+    mantissa = number / 10**exponent
+    if exponent < 4 or round(mantissa, 2) * 10**exponent != number:
+        return f"{number:,}"
+    power = "10" + str(exponent).translate(_SUPERSCRIPTS)
+    return power if mantissa == 1 else f"{mantissa:g}×{power}"  # noqa: RUF001 (a product)
+
+
+def channel_label(profile: Profile, channel: int, *, is_drawn: bool) -> str:
+    """Name a channel with its total diffuse reflectance and standard error."""
+    total = with_error(
+        float(profile.diffuse_reflectance[channel]),
+        float(profile.diffuse_reflectance_stderr[channel]),
+    )
+    label = f"{shortened(profile.channels[channel])}  {total}"
+    return label if is_drawn else f"{label} (too few photons to draw)"
+
+
+def in_legend(n_channels: int) -> list[int]:
+    """Channels that the legend names: all, or eight spread from the first to the last."""
+    if n_channels <= _MOST_IN_LEGEND:
+        return list(range(n_channels))
+    return [int(each) for each in np.linspace(0, n_channels - 1, _MOST_IN_LEGEND).round()]
+
+
+def with_error(value: float, stderr: float) -> str:
+    """Write a value and its standard error, two digits of which set the decimals."""
+    if not stderr > 0:
+        return f"{value:.4g}"
+    decimals = min(max(1 - math.floor(math.log10(stderr)), 0), 12)
+    return f"{value:.{decimals}f} ± {stderr:.{decimals}f}"
+
+
+def shortened(name: str) -> str:
+    """Keep a name from running out of its place."""
+    return name if len(name) <= _LONGEST_NAME else f"{name[: _LONGEST_NAME - 1]}…"
+
+
+def footnotes(profile: Profile, image: str) -> list[str]:
+    """Say what the curves leave out and what they and the ``image`` mean, in lines that fit."""
+    notes = [
+        f"Beyond the grid (r > {profile.r_edges_mm[-1]:.4g} mm): {_beyond(profile)} of diffuse. "
+        f"Specular reflectance ({profile.specular_reflectance:.4g}) is not included.",
+    ]
+    if profile.photons is not None:
+        notes.append(
+            f"Steps: means over annuli merged to {LEAST_HITS} effective photons or more; a curve "
+            "ends where there are too few. Bands: ±1 standard error."
+        )
+    return [line for note in (*notes, image) for line in textwrap.wrap(note, _FOOTNOTE_LETTERS)]
+
+
+def image_note(profile: Profile, image: Picture) -> str:
+    """Say how the 2D profile became colours or shades."""
+    if profile.n_channels != 3:
+        return ""
+    named = "" if profile.channels == ("R", "G", "B") else " of the channels as R, G, B"
+    return (
+        f"(d): linear light{named}, tone curve x/(1 + x) with x = 1 at "
+        f"{image.exposure_per_mm2:.2g}/mm², encoded as sRGB."
+    )
+
+
+def path_label(profile: Profile, paths_mm: FloatArray) -> str:
+    """Name the axis in mean free paths, with the lengths where they fit."""
+    if profile.n_channels > 4:
+        return "r (mean free paths)"
+    lengths = ", ".join(
+        f"{shortened(name)} {_digits(path_mm)}"
+        for name, path_mm in zip(profile.channels, paths_mm, strict=True)
+    )
+    return f"r (mean free paths: {lengths} mm)"
+
+
+def _beyond(profile: Profile) -> str:
+    """Each channel's share beyond the grid; of many, the largest."""
+    diffuse = profile.diffuse_reflectance
+    shares = np.divide(profile.beyond_grid, diffuse, out=np.zeros_like(diffuse), where=diffuse > 0)
+    if profile.n_channels <= 4:
+        pairs = zip(profile.channels, shares, strict=True)
+        return ", ".join(f"{shortened(name)} {_percent(share)}" for name, share in pairs)
+    worst = int(np.argmax(shares))
+    return f"at most {_percent(shares[worst])} ({shortened(profile.channels[worst])})"
+
+
+def _digits(value: float) -> str:
+    """Three significant digits, trailing zeros too."""
+    return f"{value:#.3g}".rstrip(".")
+
+
+def _percent(share: float) -> str:
+    return "<0.0001 %" if 0 < share < 1e-6 else f"{100.0 * share:.2g} %"

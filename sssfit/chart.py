@@ -1,0 +1,301 @@
+"""Records to figures; nothing is computed here beyond what drawing takes.
+
+`profile_figure` draws a profile as the plots of "Separable Subsurface Scattering", Jimenez et al.
+2015, supplement G: 2 pi r R_d linear and logarithmic, R_d against mean free paths, and the 2D
+profile. `save_figure` writes PNG, SVG or PDF; the same figure gives the same bytes.
+
+The only module that imports matplotlib, and never its pyplot, which takes 0.8 s to import and keeps
+global state. ``sssfit._chart_data`` merges annuli and makes the image, ``sssfit._chart_text`` words
+the captions.
+"""
+
+import contextlib
+import math
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, BinaryIO, cast
+
+import matplotlib as mpl
+import numpy as np
+import numpy.typing as npt
+from matplotlib import font_manager
+from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import LogNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogLocator, MaxNLocator, StrMethodFormatter
+
+from sssfit import _chart_text as words
+from sssfit._chart_data import Bins, Picture, drawn_radius_mm, mean_free_paths_mm, merged, picture
+from sssfit._chart_files import FORMATS, chart_format, is_chart_file, known_format
+from sssfit._chart_style import (
+    COLOURS,
+    DPI,
+    FONT,
+    HEIGHT_INCHES,
+    LEFT,
+    LINE_STYLES,
+    RC,
+    RIGHT,
+    ROW_GAP_INCHES,
+    WIDTH_INCHES,
+    Style,
+)
+from sssfit.files import write_atomically
+from sssfit.profile import Profile
+
+__all__ = ["FORMATS", "chart_format", "is_chart_file", "profile_figure", "save_figure"]
+
+FloatArray = npt.NDArray[np.float64]
+
+_WEIGHTED = r"$2\pi r\,R_d$ (1/mm)"
+_UNWEIGHTED = r"$R_d$ (1/mm²)"
+_DECADES = 10  # most of a log axis: a profile without noise would go on to underflow
+_GREY_DECADES = 6
+_LINEAR_SHARE = 0.995
+
+
+def profile_figure(profile: Profile) -> Figure:
+    """Draw a profile: four plots on one page, with error bands.
+
+    Parameters
+    ----------
+    profile : Profile
+        Of any method; error bands and merged annuli only where it has photons.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        8 x 6 inches; 2 pi r R_d [1/mm] over r [mm], linear and logarithmic; R_d [1/mm^2] over r in
+        mean free paths (in mm where the material is unknown); R_d(x, y) over mm, in colour for
+        three channels, else the first channel in shades of grey.
+    """
+    bins = [merged(profile, channel) for channel in range(profile.n_channels)]
+    shown = picture(profile, bins)
+    with _style():
+        figure = Figure(figsize=(WIDTH_INCHES, HEIGHT_INCHES), dpi=DPI)
+        FigureCanvasAgg(figure)
+        top = _draw_head(figure, profile, bins)
+        bottom = _draw_footnotes(figure, profile, words.image_note(profile, shown))
+        panels = figure.subplots(2, 2)
+        height = 0.5 * ((top - bottom) * HEIGHT_INCHES - ROW_GAP_INCHES)
+        rows_apart = ROW_GAP_INCHES / height
+        figure.subplots_adjust(LEFT, bottom, RIGHT, top, wspace=0.24, hspace=rows_apart)
+        _draw_linear(panels[0, 0], profile, bins)
+        _draw_logarithmic(panels[0, 1], profile, bins)
+        _draw_unweighted(panels[1, 0], profile, bins)
+        _draw_image(figure, panels[1, 1], profile, shown)
+        figure.align_ylabels(panels)
+    return figure
+
+
+def save_figure(
+    figure: Figure, target: str | Path | BinaryIO, *, format: str | None = None
+) -> None:
+    """Write a figure as PNG, SVG or PDF, whole or not at all; same figure, same bytes.
+
+    Parameters
+    ----------
+    figure : Figure
+    target : path or binary stream
+    format : str, optional
+        "png", "svg" or "pdf"; by default what the path's ending says.
+
+    Raises
+    ------
+    FileError
+        Another format, or the file cannot be written.
+    """
+    chosen = chart_format(target) if format is None else known_format(format, f"format {format!r}")
+    if isinstance(target, str | Path):
+        write_atomically(Path(target), lambda stream: _print(figure, stream, chosen))
+    else:
+        _print(figure, target, chosen)
+
+
+def _print(figure: Figure, stream: BinaryIO, chosen: str) -> None:
+    undated = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    with _style():
+        figure.savefig(stream, format=chosen, dpi=DPI, metadata=undated[chosen])
+
+
+@contextlib.contextmanager
+def _style() -> Iterator[None]:
+    """Matplotlib's defaults and ours on top, whatever the user's matplotlibrc says."""
+    kept = {"backend", "backend_fallback", "interactive", "toolbar", "timezone"}
+    defaults = {key: value for key, value in mpl.rcParamsDefault.items() if key not in kept}
+    with mpl.rc_context(cast(Any, defaults | RC)):
+        yield
+
+
+def _draw_head(figure: Figure, profile: Profile, bins: list[Bins]) -> float:
+    """Title, provenance and legend; the height of what is left, as a fraction."""
+    _text(figure, 0.16, words.title(profile), size=12, weight="bold")
+    _text(figure, 0.41, words.subtitle(profile))
+    _text(figure, 0.64, "Total diffuse reflectance ± standard error", color="#444444", size=8)
+    shown = words.in_legend(profile.n_channels)
+    handles = [Line2D([], [], **_line_style(k, profile.n_channels)) for k in shown]
+    labels = [
+        _drawable(words.channel_label(profile, k, is_drawn=bool(bins[k].is_drawn.any())))
+        for k in shown
+    ]
+    # 0.068 inches a letter at 8.5 points, 0.6 for the line and the gap between columns.
+    fitting = int((RIGHT - LEFT) * WIDTH_INCHES / (0.068 * max(map(len, labels)) + 0.6))
+    columns = min(max(fitting, 1), 4, len(labels))
+    legend = figure.legend(
+        handles,
+        labels,
+        ncols=columns,
+        loc="upper left",
+        bbox_to_anchor=(LEFT, 1 - 0.71 / HEIGHT_INCHES),
+        borderaxespad=0,
+        borderpad=0.2,
+        handlelength=2.8,
+        columnspacing=1.5,
+    )
+    for text in legend.get_texts():
+        text.set_parse_math(False)
+    rows = math.ceil(len(labels) / columns)
+    return 1 - (0.98 + 0.18 * rows) / HEIGHT_INCHES
+
+
+def _draw_footnotes(figure: Figure, profile: Profile, image: str) -> float:
+    """Caption at the foot; the height where the panels may begin, as a fraction."""
+    lines = words.footnotes(profile, image)
+    for k, line in enumerate(reversed(lines)):
+        _text(figure, HEIGHT_INCHES - 0.12 - 0.145 * k, line, size=7.5, color="#444444")
+    return (0.6 + 0.145 * len(lines)) / HEIGHT_INCHES
+
+
+def _text(figure: Figure, inches_down: float, text: str, **style: Any) -> None:
+    """Put a line at the left margin."""
+    y = 1 - inches_down / HEIGHT_INCHES
+    figure.text(LEFT, y, _drawable(text), va="center", parse_math=False, **style)
+
+
+def _drawable(text: str) -> str:
+    """Replace what the font has no glyph for."""
+    font = font_manager.get_font(font_manager.findfont(FONT))
+    return "".join(c if font.get_char_index(ord(c)) else "?" for c in text)
+
+
+def _line_style(channel: int, n_channels: int) -> Style:
+    """Colour and dashes of a channel: told apart without colour as well."""
+    dashes = LINE_STYLES[channel % (3 if n_channels <= 3 else len(LINE_STYLES))]
+    if n_channels <= len(COLOURS):
+        return {"color": COLOURS[channel], "linestyle": dashes}
+    # The last tenth of viridis is too light on white.
+    return {
+        "color": mpl.colormaps["viridis"](0.9 * channel / (n_channels - 1)),
+        "linestyle": dashes,
+    }
+
+
+def _draw_linear(axes: Axes, profile: Profile, bins: list[Bins]) -> None:
+    for channel, each in enumerate(bins):
+        _draw_steps(axes, each.edges_mm, each.per_mm(), _line_style(channel, len(bins)))
+    tops = [
+        np.nan_to_num(mean + np.nan_to_num(error)).max() for mean, error in map(Bins.per_mm, bins)
+    ]
+    axes.set_xlim(0, drawn_radius_mm(profile, _LINEAR_SHARE, range(len(bins))))
+    axes.set_ylim(0, 1.05 * max(tops) or 1)
+    _tick(axes.xaxis)
+    _tick(axes.yaxis)
+    reach = f"r to {100 * _LINEAR_SHARE:g} % of every channel's energy"
+    _name(axes, f"(a) linear, {reach}", "r (mm)", _WEIGHTED)
+
+
+def _draw_logarithmic(axes: Axes, profile: Profile, bins: list[Bins]) -> None:
+    axes.set_yscale("log", nonpositive="clip")
+    for channel, each in enumerate(bins):
+        _draw_steps(axes, each.edges_mm, each.per_mm(), _line_style(channel, len(bins)))
+    axes.set_xlim(0, profile.r_edges_mm[-1])
+    _limit_decades(axes, [each.per_mm()[0] for each in bins])
+    _name(axes, "(b) logarithmic, the whole grid", "r (mm)", _WEIGHTED)
+
+
+def _draw_unweighted(axes: Axes, profile: Profile, bins: list[Bins]) -> None:
+    paths_mm = mean_free_paths_mm(profile)
+    units_mm = np.ones(len(bins)) if paths_mm is None else paths_mm
+    axes.set_yscale("log", nonpositive="clip")
+    for channel, each in enumerate(bins):
+        edges = each.edges_mm / units_mm[channel]
+        _draw_steps(axes, edges, each.per_mm2(), _line_style(channel, len(bins)))
+    values = [each.per_mm2()[0] for each in bins]
+    bottom = _limit_decades(axes, values)
+    ends = [
+        (each.edges_mm[1:] / unit_mm)[value > bottom].max(initial=0.0)
+        for each, value, unit_mm in zip(bins, values, units_mm, strict=True)
+    ]
+    axes.set_xlim(0, max(ends) or 1)
+    if paths_mm is None:
+        _name(axes, "(c) unweighted", "r (mm; no mean free paths known)", _UNWEIGHTED)
+    else:
+        label = words.path_label(profile, paths_mm)
+        _name(axes, "(c) unweighted, in mean free paths", label, _UNWEIGHTED)
+
+
+def _draw_steps(
+    axes: Axes, edges: FloatArray, values: tuple[FloatArray, FloatArray], style: Style
+) -> None:
+    """Draw a step a bin and a band of one standard error about it; a gap where nothing is known."""
+    mean, error = values
+    if axes.get_yscale() == "log":
+        mean = np.where(mean > 0, mean, np.nan)
+    axes.stairs(mean, edges, baseline=None, lw=mpl.rcParams["lines.linewidth"], **style)
+    low, high = mean - error, mean + error
+    if np.isfinite(low).any():
+        axes.stairs(high, edges, baseline=low, fill=True, lw=0, alpha=0.3, color=style["color"])
+
+
+def _limit_decades(axes: Axes, values: list[FloatArray]) -> float:
+    """From the peak down to the least value drawn, or ten decades; returns the bottom."""
+    positive = np.concatenate([each[each > 0] for each in values])
+    peak = positive.max(initial=0.0) or 1.0
+    bottom = max(positive.min(initial=peak), peak * 10.0**-_DECADES) / 2
+    axes.set_ylim(bottom, peak * 2)
+    axes.yaxis.set_major_locator(LogLocator(numticks=7))
+    _tick(axes.xaxis)
+    return float(bottom)
+
+
+def _draw_image(figure: Figure, axes: Axes, profile: Profile, shown: Picture) -> None:
+    """Fill the panel with the centre of R_d(x, y): in colour, or one channel in shades of grey."""
+    box = axes.get_position()
+    if profile.n_channels == 3:
+        axes.imshow(shown.screen_colours(), **_placed(shown))
+        title = "(d) 2D profile, tone-mapped"
+    else:
+        peak = shown.per_mm2.max() or 1.0
+        scale = LogNorm(max(shown.per_mm2.min(), peak * 10.0**-_GREY_DECADES), peak, clip=True)
+        shades = axes.imshow(shown.per_mm2[:, :, 0], cmap="gray", norm=scale, **_placed(shown))
+        beside = axes.inset_axes((1.03, 0, 0.035, 1))
+        figure.colorbar(shades, cax=beside, label=_UNWEIGHTED)
+        axes.set_position((box.x0, box.y0, 0.83 * box.width, box.height))
+        title = f"(d) 2D profile of {words.shortened(profile.channels[0])}, logarithmic"
+    box = axes.get_position()
+    aspect = box.width * WIDTH_INCHES / (box.height * HEIGHT_INCHES)
+    axes.set_xlim(-aspect * shown.half_height_mm, aspect * shown.half_height_mm)
+    axes.grid(visible=False)
+    _tick(axes.xaxis)
+    _tick(axes.yaxis)
+    _name(axes, title, "x (mm)", "y (mm)")
+
+
+def _placed(shown: Picture) -> Style:
+    width, height = shown.half_width_mm, shown.half_height_mm
+    extent = (-width, width, -height, height)
+    return {"extent": extent, "interpolation": "bilinear", "aspect": "auto"}
+
+
+def _tick(axis: Axis) -> None:
+    axis.set_major_locator(MaxNLocator(7, steps=[1, 2, 2.5, 5, 10]))
+    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
+
+
+def _name(axes: Axes, title: str, x_label: str, y_label: str) -> None:
+    axes.set_title(_drawable(title), loc="left", parse_math=False)
+    axes.set_xlabel(_drawable(x_label), parse_math=False)
+    axes.set_ylabel(y_label)

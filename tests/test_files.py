@@ -1,0 +1,129 @@
+"""Files: whole or not at all, never somebody else's, never two writers."""
+
+import errno
+import multiprocessing
+import os
+import sys
+import time
+
+import pytest
+
+from sssfit import files
+from sssfit.errors import FileError
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def own(_path):
+    return True
+
+
+def foreign(_path):
+    return False
+
+
+def test_a_failed_write_leaves_the_old_file_and_nothing_else(tmp_path):
+    target = tmp_path / "a.npz"
+    target.write_bytes(b"old")
+
+    def fail(stream):
+        stream.write(b"half")
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with pytest.raises(FileError, match=r"a\.npz cannot be written: no space left on device"):
+        files.write_atomically(target, fail)
+    assert target.read_bytes() == b"old"
+    assert names(tmp_path) == ["a.npz"]
+
+
+def test_an_interrupted_write_leaves_nothing(tmp_path):
+    def interrupted(stream):
+        stream.write(b"half")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        files.write_atomically(tmp_path / "a.npz", interrupted)
+    assert names(tmp_path) == []
+
+
+def test_a_written_file_has_ordinary_permissions(tmp_path):
+    files.write_atomically(tmp_path / "a", lambda stream: stream.write(b"x"))
+    (tmp_path / "b").write_bytes(b"x")
+    assert (tmp_path / "a").stat().st_mode == (tmp_path / "b").stat().st_mode
+
+
+def test_outputs_are_checked_before_the_work(tmp_path, monkeypatch):
+    (tmp_path / "theirs.npz").write_bytes(b"x")
+    files.check_output(tmp_path / "new.npz", foreign)
+    files.check_output(tmp_path / "theirs.npz", own)
+    files.check_output(tmp_path / "theirs.npz", foreign, force=True)
+    for path, fragment in (
+        (tmp_path / "theirs.npz", "--force"),
+        (tmp_path / "missing" / "a.npz", "there is no folder"),
+        (tmp_path, "is a folder"),
+    ):
+        with pytest.raises(FileError, match=fragment):
+            files.check_output(path, foreign)
+
+    def read_only(**_):
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    monkeypatch.setattr(files.tempfile, "mkstemp", read_only)
+    with pytest.raises(FileError, match="read-only file system"):
+        files.check_output(tmp_path / "new.npz", own)
+
+
+def hold(path, ready, seconds):
+    with files.locked(path):
+        ready.set()
+        time.sleep(seconds)
+
+
+@pytest.fixture
+def holder(tmp_path):
+    """A process that holds the lock of a.npz for a minute."""
+    context = multiprocessing.get_context("spawn")
+    ready = context.Event()
+    process = context.Process(target=hold, args=(tmp_path / "a.npz", ready, 60))
+    process.start()
+    assert ready.wait(30)
+    yield process
+    process.kill()
+    process.join()
+
+
+def test_two_runs_on_one_output_are_kept_apart(tmp_path, holder):
+    with (
+        pytest.raises(FileError, match="being written by another run"),
+        files.locked(tmp_path / "a.npz"),
+    ):
+        pass
+    with files.locked(tmp_path / "b.npz"):
+        assert holder.is_alive()
+
+
+def test_a_killed_run_holds_nothing(tmp_path, holder):
+    holder.kill()
+    holder.join()
+    with files.locked(tmp_path / "a.npz"):
+        assert (tmp_path / ".a.npz.lock").exists()
+    assert names(tmp_path) == []
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="an open file cannot be unlinked there")
+def test_a_lock_file_unlinked_under_us_is_made_again(tmp_path, monkeypatch):
+    # the run before us unlinks its lock file between our open and our lock
+    real, calls = files._lock, []
+
+    def unlink_first(handle):
+        if not calls:
+            (tmp_path / ".a.npz.lock").unlink()
+        calls.append(handle)
+        real(handle)
+
+    monkeypatch.setattr(files, "_lock", unlink_first)
+    with files.locked(tmp_path / "a.npz"):
+        assert (tmp_path / ".a.npz.lock").exists()
+    assert len(calls) == 2

@@ -1,0 +1,356 @@
+"""The profile record, its statistics, its file, and what a damaged file says."""
+
+import copy
+import io
+import json
+import os
+import pickle
+import zipfile
+
+import numpy as np
+import pytest
+from reference_pixels import make_profile, one_over_r_profile, walk_tallies
+
+from sssfit import _profile_io
+from sssfit.errors import FileError, ProfileError
+from sssfit.profile import FORMAT, Profile, is_profile_file
+
+META = {
+    "format": FORMAT,
+    "channels": ["R", "G"],
+    "material": {"name": "skin1", "sigma_a_per_mm": [0.032, 0.17]},
+    "method": "montecarlo",
+    "photons": 1000,
+    "seed": 1,
+    "version": "0.1.0",
+}
+
+
+def full_profile(**changes):
+    """Every field holds something."""
+    rng = np.random.default_rng(3)
+    fields = {
+        "r_edges_mm": [0.0, 0.1, 0.3, 1.0, 4.0],
+        "annulus_energy": rng.random((4, 2)) / 10,
+        "annulus_energy_stderr": rng.random((4, 2)) / 1000,
+        "beyond_grid": [0.01, 0.02],
+        "beyond_grid_stderr": [0.001, np.nan],
+        "specular_reflectance": 0.017,
+        "absorbed": rng.random((3, 2)),
+        "unfinished": [0.0, 1e-9],
+        "annulus_transmittance": rng.random((4, 2)),
+        "meta": META,
+    }
+    return Profile(**(fields | changes))
+
+
+def field_values(profile):
+    names = [*_profile_io.REQUIRED, *_profile_io.OPTIONAL]
+    return {name: getattr(profile, name) for name in names}
+
+
+def assert_same(one, other):
+    for name, value in field_values(one).items():
+        np.testing.assert_array_equal(getattr(other, name), value, strict=True)
+    assert dict(one.meta) == dict(other.meta)
+
+
+def test_arrays_are_read_only_copies_and_meta_too():
+    energy = np.ones((2, 1))
+    profile = make_profile([0.0, 1.0, 2.0], energy)
+    energy[0] = 7
+    assert profile.annulus_energy[0, 0] == 1
+    for value in field_values(profile).values():
+        if isinstance(value, np.ndarray):
+            assert value.dtype == np.float64
+            assert not value.flags.writeable
+    with pytest.raises(TypeError):
+        profile.meta["seed"] = 2
+    with pytest.raises(AttributeError):
+        profile.beyond_grid = energy
+
+
+def test_sizes_names_and_totals():
+    profile = full_profile()
+    assert (profile.n_annuli, profile.n_channels) == (4, 2)
+    assert profile.channels == ("R", "G")
+    total = profile.annulus_energy.sum(axis=0)
+    np.testing.assert_allclose(profile.total_on_grid, total, rtol=1e-15)
+    np.testing.assert_allclose(profile.diffuse_reflectance - total, [0.01, 0.02], rtol=1e-13)
+    assert profile.cumulative.shape == profile.cumulative_stderr.shape == (5, 2)
+    assert (profile.cumulative[0] == 0).all()
+    np.testing.assert_allclose(profile.cumulative[-1], total, rtol=1e-15)
+
+
+def test_energy_balance_counts_everything():
+    profile = full_profile()
+    total = 0.017 + profile.diffuse_reflectance + profile.absorbed.sum(axis=0) + profile.unfinished
+    total += profile.annulus_transmittance.sum(axis=0)
+    np.testing.assert_allclose(profile.energy_balance, total - 1, atol=1e-15)
+
+
+def test_density_is_energy_over_area():
+    profile = make_profile([0.0, 1.0, 3.0], [[np.pi], [8 * np.pi]])
+    np.testing.assert_allclose(profile.reflectance_per_mm2, [[1.0], [1.0]], rtol=1e-15)
+    stderr = full_profile().reflectance_per_mm2_stderr
+    expected = full_profile().annulus_energy_stderr[1] / (np.pi * (0.3**2 - 0.1**2))
+    np.testing.assert_allclose(stderr[1], expected, rtol=1e-13)
+
+
+def test_cumulative_at_is_exact_at_edges_and_monotone_between():
+    profile = full_profile()
+    np.testing.assert_array_equal(profile.cumulative_at(profile.r_edges_mm), profile.cumulative)
+    np.testing.assert_array_equal(profile.cumulative_at(1e9), profile.cumulative[-1])
+    np.testing.assert_array_equal(profile.cumulative_at(np.inf), profile.cumulative[-1])
+    radii = np.linspace(0, 4.5, 1000).reshape(10, 100)
+    values = profile.cumulative_at(radii)
+    assert values.shape == (10, 100, 2)
+    assert (np.diff(values.reshape(1000, 2), axis=0) >= -1e-16).all()
+
+
+def test_cumulative_at_follows_smooth_profiles():
+    profile = one_over_r_profile(100, 1.0, [20.0])
+    radii = np.linspace(0, 100, 1234)
+    # Third order: the error of a parabola's slope, F''' dr^2 / 6, times dr / 4 in a cubic Hermite.
+    np.testing.assert_allclose(
+        profile.cumulative_at(radii)[:, 0], -20 * np.expm1(-radii / 20), atol=2 * 20 / 20**3 / 24
+    )
+
+
+def test_one_annulus_is_enough():
+    profile = make_profile([0.0, 2.0], [[0.5]])
+    np.testing.assert_allclose(profile.cumulative_at([0.5, 1.0]), [[0.125], [0.25]])
+    assert profile.line_kernel(1.0).sum() == pytest.approx(0.5)
+
+
+@pytest.mark.parametrize("radius", [-0.1, float("nan")])
+def test_cumulative_at_refuses_negative_radii(radius):
+    with pytest.raises(ProfileError, match="from 0 up"):
+        full_profile().cumulative_at([1.0, radius])
+
+
+def test_errors_of_sums_are_those_of_the_raw_walks():
+    rng = np.random.default_rng(11)
+    photons, n_bins = 3000, 6  # five annuli and what lies beyond them
+    weights = rng.random(photons) ** 2
+    bins = rng.choice(np.arange(-1, n_bins), size=photons, p=[0.3, 0.2, 0.2, 0.1, 0.1, 0.06, 0.04])
+    raw, energy, stderr = walk_tallies(weights, bins, n_bins)
+    profile = make_profile(
+        np.arange(6.0),
+        energy[:5, None],
+        annulus_energy_stderr=stderr[:5, None],
+        beyond_grid=energy[5:],
+        beyond_grid_stderr=stderr[5:],
+        meta=META | {"photons": photons, "channels": ["R"]},
+    )
+    direct = np.cumsum(raw, axis=1).std(axis=0, ddof=1) / np.sqrt(photons)
+    np.testing.assert_allclose(profile.cumulative_stderr[1:, 0], direct[:5], rtol=1e-10)
+    np.testing.assert_allclose(profile.diffuse_reflectance_stderr[0], direct[5], rtol=1e-10)
+    np.testing.assert_allclose(profile.cumulative[1:, 0], raw.mean(axis=0).cumsum()[:5])
+    # What adding variances would say instead: the anticorrelation matters.
+    assert np.sqrt((stderr**2).sum()) > 1.1 * direct[5]
+
+
+def test_errors_of_sums_without_photons_or_with_one():
+    exact = full_profile(meta=META | {"photons": None}, annulus_energy_stderr=np.full((4, 2), 3e-5))
+    np.testing.assert_allclose(exact.cumulative_stderr[-1], 6e-5, rtol=1e-14)
+    single = full_profile(meta=META | {"photons": 1})
+    assert np.isnan(single.cumulative_stderr[1:]).all()
+    assert np.isnan(full_profile().diffuse_reflectance_stderr[1])  # its beyond_grid has no error
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"annulus_energy": np.ones(4)}, "annulus_energy has shape (4,)"),
+        ({"annulus_energy": np.ones((0, 2))}, "annulus_energy has shape (0, 2)"),
+        ({"annulus_energy": "much"}, "annulus_energy is not an array of numbers"),
+        ({"annulus_energy": np.full((4, 2), np.nan)}, "annulus_energy holds nan"),
+        ({"annulus_energy_stderr": np.full((4, 2), -1.0)}, "annulus_energy_stderr holds -1.0"),
+        ({"annulus_energy_stderr": np.full((4, 2), np.inf)}, "annulus_energy_stderr holds inf"),
+        ({"annulus_energy_stderr": np.ones((4, 1))}, "expected (4, 2)"),
+        ({"r_edges_mm": [0.0, 1.0, 2.0]}, "one edge more than annuli"),
+        ({"r_edges_mm": [0.0, 1.0, 1.0, 2.0, 3.0]}, "not strictly increasing"),
+        ({"r_edges_mm": [0.0, 1.0, 2.0, 3.0, np.inf]}, "not strictly increasing"),
+        ({"r_edges_mm": [0.1, 1.0, 2.0, 3.0, 4.0]}, "starts at 0.1"),
+        ({"beyond_grid": [0.0]}, "beyond_grid has shape (1,); expected (2,)"),
+        ({"beyond_grid": None}, "beyond_grid has shape ()"),
+        ({"specular_reflectance": [0.1]}, "specular_reflectance has shape (1,)"),
+        ({"absorbed": [0.1, 0.2]}, "absorbed has shape (2,)"),
+        ({"unfinished": [0.1, np.inf]}, "unfinished holds inf"),
+        ({"annulus_transmittance": np.ones((3, 2))}, "annulus_transmittance has shape (3, 2)"),
+        ({"meta": {}}, "meta has format None"),
+        ({"meta": META | {"channels": ["R"]}}, "expected a list of 2 names"),
+        ({"meta": META | {"photons": 0}}, "photons 0"),
+        ({"meta": META | {"when": io}}, "meta cannot be kept as JSON"),
+        ({"meta": META | {"gain": float("nan")}}, "meta cannot be kept as JSON"),
+    ],
+)
+def test_fields_that_do_not_fit_are_refused_in_one_line(changes, said):
+    with pytest.raises(ProfileError) as error:
+        full_profile(**changes)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_records_can_be_copied_and_sent_to_other_processes():
+    profile = full_profile()
+    assert_same(profile, pickle.loads(pickle.dumps(profile)))
+    assert_same(profile, copy.deepcopy(profile))
+
+
+@pytest.mark.parametrize("transmittance", [True, False])
+def test_files_hold_every_bit(tmp_path, transmittance):
+    changes = {} if transmittance else {"annulus_transmittance": None}
+    profile = full_profile(**changes)
+    path = tmp_path / "skin1.profile.npz"
+    profile.save(path)
+    assert_same(profile, Profile.load(path))
+    with np.load(path, allow_pickle=False) as arrays:  # as anyone would without this package
+        np.testing.assert_array_equal(arrays["annulus_energy"], profile.annulus_energy)
+        assert json.loads(str(arrays["meta"])) == META
+        assert len(arrays.files) == 10 if transmittance else 9
+
+
+def test_same_content_gives_same_bytes(tmp_path):
+    reordered = dict(reversed(META.items()))
+    full_profile().save(tmp_path / "a")
+    full_profile(meta=reordered).save(tmp_path / "b")
+    Profile.load(tmp_path / "a").save(str(tmp_path / "c"))
+    a, b, c = ((tmp_path / name).read_bytes() for name in "abc")
+    assert a == b == c
+
+
+def test_streams_that_cannot_seek_serve(tmp_path):
+    read_end, write_end = os.pipe()
+    profile = full_profile()
+    with os.fdopen(write_end, "wb") as stream:
+        profile.write(stream)
+    with os.fdopen(read_end, "rb") as stream:
+        assert_same(profile, Profile.read(stream, "standard input"))
+    profile.save(tmp_path / "file")
+    buffer = io.BytesIO()
+    profile.write(buffer)
+    assert buffer.getvalue() == (tmp_path / "file").read_bytes()
+
+
+def test_a_failed_save_leaves_the_older_file(tmp_path):
+    with pytest.raises(FileError):
+        full_profile().save(tmp_path / "missing" / "a.profile.npz")
+
+
+def test_own_files_are_told_from_others(tmp_path):
+    own, other, text = (tmp_path / name for name in ("own", "other", "text"))
+    full_profile().save(own)
+    np.savez(other, values=np.ones(3))
+    text.write_text("r, R_d\n")
+    assert is_profile_file(own)
+    assert not any(map(is_profile_file, (other, text, tmp_path, tmp_path / "none")))
+
+
+def contents(profile):
+    buffer = io.BytesIO()
+    profile.write(buffer)
+    return buffer.getvalue()
+
+
+def archive(**changes):
+    """The bytes of a profile with members replaced or, by None, left out."""
+    members = field_values(full_profile()) | {"meta": np.array(json.dumps(META))}
+    buffer = io.BytesIO()
+    np.savez(buffer, **{k: v for k, v in (members | changes).items() if v is not None})
+    return buffer.getvalue()
+
+
+def damaged_header():
+    """A member whose header claims 8 TB, in a file of a few kB."""
+    plain = archive()
+    claim = b"'shape': (4, 2), }" + b" " * 10
+    at = plain.index(claim)
+    huge = b"'shape': (1000000000000,), }"
+    return plain[:at] + huge + plain[at + len(claim) :]
+
+
+def bomb():
+    """An archive that says it holds more than 2 GB; its directory is all that is read."""
+    buffer = io.BytesIO(archive())
+    with zipfile.ZipFile(buffer, "a") as target:
+        target.getinfo("unfinished.npy").file_size = 3_000_000_000
+        target.writestr("last", b"")  # the directory is written again on close
+    return buffer.getvalue()
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "damaged or not a profile"),
+        (b"name = 'skin1'\n", "damaged or not a profile"),
+        (contents(full_profile())[:-30], "damaged or not a profile"),
+        (archive(beyond_grid=None), "lacks beyond_grid"),
+        (archive(meta=None), "no 'meta'"),
+        (archive(colour=np.ones(3)), "arrays that a profile does not have"),
+        (archive(unfinished=np.array([1, 2])), "int64 where float64"),
+        (archive(unfinished=np.zeros(2, dtype=np.float32)), "float32 where float64"),
+        (archive(unfinished=np.array(["a", "b"])), "where float64"),
+        (archive(unfinished=np.array([{}, {}])), "object where float64"),
+        (archive(unfinished=np.zeros(3)), "unfinished has shape (3,)"),
+        (archive(meta=np.array(b"\xff\xfe")), "where text was expected"),
+        (archive(meta=np.array("\ud800{")), "damaged or not a profile"),
+        (archive(meta=np.array("[1]")), "not a JSON object"),
+        (archive(meta=np.array(["{}"])), "damaged or not a profile"),
+        (archive(meta=np.array("[" * 100000)), "damaged or not a profile"),
+        (archive(meta=np.array('{"format": "sssfit.profile/2"}')), "'sssfit.profile/2'"),
+        (archive(meta=np.array('{"format": "sssfit.kernel/1"}')), "'sssfit.kernel/1'"),
+        (damaged_header(), "damaged or not a profile"),
+        (bomb(), "more than the 2 GB"),
+    ],
+    ids=range(20),
+)
+def test_unusable_files_are_refused_in_one_line_that_names_them(tmp_path, content, said):
+    path = tmp_path / "bad.profile.npz"
+    path.write_bytes(content)
+    for source, origin in ((path, str(path)), (io.BytesIO(content), "standard input")):
+        with pytest.raises(ProfileError) as error:
+            Profile.read(source, origin)
+        assert said in str(error.value)
+        assert str(error.value).startswith(origin)
+        assert "\n" not in str(error.value)
+
+
+def test_missing_files_and_folders_are_named(tmp_path):
+    with pytest.raises(ProfileError, match="cannot be read: no such file"):
+        Profile.load(tmp_path / "none.profile.npz")
+    with pytest.raises(ProfileError, match="cannot be read: is a directory"):
+        Profile.load(tmp_path)
+
+
+def read_or_refuse(content):
+    """The profile, or the line that refuses it; anything else that is raised fails the test."""
+    try:
+        return Profile.read(io.BytesIO(content), "f")
+    except ProfileError as error:
+        return str(error)
+
+
+def test_truncated_files_are_refused():
+    content = contents(full_profile())
+    for length in range(0, len(content), 47):
+        refusal = read_or_refuse(content[:length])
+        assert refusal.startswith("f is damaged")
+        assert "\n" not in refusal
+
+
+def test_flipped_bytes_are_refused_or_harmless():
+    profile = full_profile()
+    content = contents(profile)
+    rng = np.random.default_rng(17)
+    for _ in range(1500):
+        damaged = bytearray(content)
+        for at in rng.integers(len(content), size=rng.integers(1, 4)):
+            damaged[at] ^= 1 << rng.integers(8)
+        outcome = read_or_refuse(bytes(damaged))
+        if isinstance(outcome, str):
+            assert outcome.startswith("f ")
+            assert "\n" not in outcome
+        else:  # dates and the like may change unnoticed; numbers are under a checksum
+            assert_same(profile, outcome)
