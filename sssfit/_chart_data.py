@@ -31,6 +31,7 @@ _WIDTH_OF_LUCK = 8
 _IMAGE_SHARE_COLOUR, _IMAGE_SHARE_GREY = 0.75, 0.95
 _IMAGE_ROWS, _IMAGE_COLUMNS = 201, 501  # wider than any panel; a pixel a row of 200 dpi has two
 _EXPOSED_AT = 0.35
+_NOTHING = 1e-200  # 1/mm: stands for 0 under a logarithm
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -183,8 +184,9 @@ def _image_per_mm2(bins: Bins, pitch_mm: float) -> FloatArray:
     x = pitch_mm * (np.arange(_IMAGE_COLUMNS) - _IMAGE_COLUMNS // 2)
     r = np.hypot(y[:, None], x)
     r[_IMAGE_ROWS // 2, _IMAGE_COLUMNS // 2] = 0.5 * pitch_mm / math.sqrt(math.pi)
-    density = np.exp(np.interp(r, *_nodes(bins))) / (2.0 * math.pi * r)
-    return np.where(r < bins.edges_mm[-1], density, 0.0)
+    per_mm = np.exp(np.interp(r, *_nodes(bins)))
+    is_lit = (r < bins.edges_mm[-1]) & (per_mm > _NOTHING)
+    return np.where(is_lit, per_mm / (2.0 * math.pi * r), 0.0)
 
 
 def _nodes(bins: Bins) -> tuple[FloatArray, FloatArray]:
@@ -194,7 +196,7 @@ def _nodes(bins: Bins) -> tuple[FloatArray, FloatArray]:
     mean over the empty rest of the grid would put a glow far from the beam.
     """
     middles_mm = 0.5 * (bins.edges_mm[1:] + bins.edges_mm[:-1])
-    logarithms = np.log(np.maximum(bins.energy / np.diff(bins.edges_mm), 1e-300))
+    logarithms = np.log(np.maximum(bins.energy / np.diff(bins.edges_mm), 0.5 * _NOTHING))
     if bins.is_drawn[-1] or not bins.is_drawn.any():
         return middles_mm, logarithms
     last = int(np.flatnonzero(bins.is_drawn)[-1])

@@ -384,6 +384,16 @@ def test_shipped_materials_all_walk():
             assert_energy_conserved(simulate_montecarlo(load_material(name), photons=1000))
 
 
+def test_centre_pixel_of_skin1():
+    # flat annuli give .0062 of red's energy to the centre pixel at the paper's pitch, truth .0112
+    profile = checks.lane_profile("skin1", 1_000_000)
+    dr = float(profile.r_edges_mm[1])
+    centre = profile.quadrant_kernel(dr, 0, channel=0)[0, 0] / profile.total_on_grid[0]
+    # a bit over half of the first annulus' energy lies in it, and its error with it
+    error = profile.annulus_energy_stderr[0, 0] / profile.total_on_grid[0]
+    assert abs(centre - 0.0112) < LIMIT * 0.56 * error + 0.00005
+
+
 def test_skin1_is_what_was_published():
     # exact solution of skin1's green channel: .2096 without specular
     profile = checks.lane_profile("skin1", 1_000_000)
