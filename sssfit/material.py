@@ -201,10 +201,25 @@ class Material:
         return len(self.layers) == 1 and math.isinf(self.layers[0].thickness_mm)
 
     @property
+    def first_scattering_layer(self) -> int:
+        """Number of clear layers on top: the walk begins below them."""
+        return next(k for k, layer in enumerate(self.layers) if not layer.is_clear)
+
+    @property
     def specular_reflectance(self) -> float:
-        """Fresnel reflectance of the top face at normal incidence, ((n1 - n0) / (n1 + n0))^2."""
-        eta = self.layers[0].eta
-        return ((eta - self.eta_above) / (eta + self.eta_above)) ** 2
+        """Fresnel reflectance at normal incidence of all interfaces above the first matter.
+
+        ((n1 - n0) / (n1 + n0))^2 for one; clear layers on top add theirs, multiple reflections
+        between them included: R = R1 + (1 - R1)^2 R2 / (1 - R1 R2) (Wang, Jacques, Zheng 1995,
+        eq. 3.4 for one such layer).
+        """
+        total = 0.0
+        above = self.eta_above
+        for layer in self.layers[: self.first_scattering_layer + 1]:
+            one = ((layer.eta - above) / (layer.eta + above)) ** 2
+            total += (1.0 - total) ** 2 * one / (1.0 - total * one)
+            above = layer.eta
+        return total
 
     @property
     def sha256(self) -> str:

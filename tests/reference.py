@@ -181,3 +181,114 @@ def splitmix64(start, count):
         z = ((z ^ (z >> 27)) * 0x94D049BB133111EB) & mask
         outputs.append(z ^ (z >> 31))
     return outputs
+
+
+@numba.njit(error_model="numpy")
+def scalar_layered_walk(
+    seed, photons, sigma_a, sigma_s, g, eta, thickness, specular, first, dr, annuli, max_mm=1e30
+):
+    """MCML photon by photon, one channel: hop, drop, spin, roulette, as in the 1995 paper.
+
+    sigma_a, sigma_s, g, thickness (L,); eta (L + 2,) from above to below; ``first`` is the first
+    layer that is not clear. Returns sums over photons: reflected and transmitted (annuli + 1, 3)
+    of weight, squared weight and hits; absorbed (L,); roulette's squared gains.
+    """
+    np.random.seed(seed)
+    layers = sigma_a.size
+    top = np.zeros(layers + 1)
+    for k in range(layers):
+        top[k + 1] = top[k] + thickness[k]
+    reflected = np.zeros((annuli + 1, 3))
+    transmitted = np.zeros((annuli + 1, 3))
+    absorbed = np.zeros(layers)
+    roulette = 0.0
+    for _ in range(photons):
+        w = 1.0 - specular
+        x = y = 0.0
+        z = top[first]
+        ux = uy = 0.0
+        uz = 1.0
+        layer = first
+        left = 0.0
+        alive = True
+        while alive:
+            st = sigma_a[layer] + sigma_s[layer]
+            if st > 0.0 and left == 0.0:
+                left = -math.log(1.0 - np.random.random())
+            if uz > 0.0:
+                to_boundary = (top[layer + 1] - z) / uz
+            elif uz < 0.0:
+                to_boundary = (top[layer] - z) / uz
+            else:
+                to_boundary = max_mm
+            hits = st == 0.0 or to_boundary * st <= left
+            step = to_boundary if hits else left / st
+            x += step * ux
+            y += step * uy
+            z += step * uz
+            if hits:
+                left = max(left - step * st, 0.0)
+                n1 = eta[layer + 1]
+                n2 = eta[layer + 2] if uz > 0.0 else eta[layer]
+                z = top[layer + 1] if uz > 0.0 else top[layer]
+                cos_i = abs(uz)
+                sin_t = n1 / n2 * math.sqrt(max(0.0, 1.0 - cos_i * cos_i))
+                if n1 == n2:
+                    reflectance, cos_t = 0.0, cos_i
+                elif sin_t >= 1.0:
+                    reflectance, cos_t = 1.0, 0.0
+                else:
+                    cos_t = math.sqrt(1.0 - sin_t * sin_t)
+                    r_s = (n1 * cos_i - n2 * cos_t) / (n1 * cos_i + n2 * cos_t)
+                    r_p = (n1 * cos_t - n2 * cos_i) / (n1 * cos_t + n2 * cos_i)
+                    reflectance = (r_s * r_s + r_p * r_p) / 2.0
+                if np.random.random() < reflectance:
+                    uz = -uz
+                elif uz > 0.0 and layer == layers - 1 or uz < 0.0 and layer == 0:
+                    k = min(int(math.sqrt(x * x + y * y) / dr), annuli)
+                    out = transmitted if uz > 0.0 else reflected
+                    out[k, 0] += w
+                    out[k, 1] += w * w
+                    out[k, 2] += 1.0
+                    alive = False
+                else:
+                    ux *= n1 / n2
+                    uy *= n1 / n2
+                    if uz > 0.0:
+                        uz = cos_t
+                        layer += 1
+                    else:
+                        uz = -cos_t
+                        layer -= 1
+                continue
+            left = 0.0
+            lost = w * sigma_a[layer] / st
+            absorbed[layer] += lost
+            w -= lost
+            if w < 1e-4:
+                if np.random.random() < 0.1:
+                    roulette += (9.0 * w) ** 2
+                    w *= 10.0
+                else:
+                    roulette += w * w
+                    alive = False
+                    continue
+            gl = g[layer]
+            u = np.random.random()
+            if gl == 0.0:
+                cos_theta = 2.0 * u - 1.0
+            else:
+                t = (1.0 - gl * gl) / (1.0 - gl + 2.0 * gl * u)
+                cos_theta = (1.0 + gl * gl - t * t) / (2.0 * gl)
+            sin_theta = math.sqrt(max(0.0, 1.0 - cos_theta * cos_theta))
+            phi = 2.0 * math.pi * np.random.random()
+            c, s = math.cos(phi), math.sin(phi)
+            if abs(uz) > 1.0 - 1e-12:
+                ux, uy, uz = sin_theta * c, sin_theta * s, cos_theta * (1.0 if uz > 0 else -1.0)
+            else:
+                root = math.sqrt(1.0 - uz * uz)
+                vx = sin_theta * (ux * uz * c - uy * s) / root + ux * cos_theta
+                vy = sin_theta * (uy * uz * c + ux * s) / root + uy * cos_theta
+                uz = -sin_theta * c * root + uz * cos_theta
+                ux, uy = vx, vy
+    return reflected, transmitted, absorbed, roulette

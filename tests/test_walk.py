@@ -7,6 +7,7 @@ import pytest
 import reference
 from scipy import stats
 
+from sssfit._jit import sampling
 from sssfit._jit import semi_infinite as walk
 
 ALPHA = 2.0 * stats.norm.sf(4.5)  # two-sided probability beyond 4.5 standard errors
@@ -14,7 +15,7 @@ ALPHA = 2.0 * stats.norm.sf(4.5)  # two-sided probability beyond 4.5 standard er
 
 def words_of(seed, batch):
     words = np.zeros(8 * walk.LANES, np.uint32)
-    walk.seed_lanes(words, np.uint64(seed), np.int64(batch))
+    sampling.seed_lanes(words, np.uint64(seed), np.int64(batch))
     return words
 
 
@@ -39,7 +40,7 @@ def flights():
 def test_generator_is_xoshiro128pp():
     words = np.zeros(8 * walk.LANES, np.uint32)
     words[[0, walk.LANES, 2 * walk.LANES, 3 * walk.LANES]] = 1, 2, 3, 4
-    ours = [int(walk.next_word(words, 0)) for _ in range(10)]
+    ours = [int(sampling.next_word(words, 0)) for _ in range(10)]
     # the first outputs from state 1, 2, 3, 4 as published with the rand_xoshiro crate
     assert ours[:4] == [641, 1573767, 3222811527, 3517856514]
     assert ours == reference.xoshiro128pp([1, 2, 3, 4], 10)
@@ -66,7 +67,7 @@ def test_streams_do_not_run_into_one_another():
         for batch in range(20):
             words = words_of(seed, batch)
             drawn = np.array(
-                [[walk.next_word(words, lane) for lane in range(walk.LANES)] for _ in range(64)]
+                [[sampling.next_word(words, lane) for lane in range(walk.LANES)] for _ in range(64)]
             ).T
             runs.append(np.lib.stride_tricks.sliding_window_view(drawn, 3, axis=1).reshape(-1, 3))
     runs = np.concatenate(runs)
@@ -78,7 +79,7 @@ def test_neighbouring_lanes_and_batches_are_uncorrelated():
     for batch in range(4):
         words = words_of(1, batch)
         draws.append(
-            [[walk.next_unit(words, lane) for _ in range(400)] for lane in range(walk.LANES)]
+            [[sampling.next_unit(words, lane) for _ in range(400)] for lane in range(walk.LANES)]
         )
     x = np.array(draws, float).reshape(4 * walk.LANES, -1) - 0.5
     r = np.corrcoef(x)[np.triu_indices(len(x), 1)] * math.sqrt(x.shape[1])
@@ -87,7 +88,7 @@ def test_neighbouring_lanes_and_batches_are_uncorrelated():
 
 def test_uniforms_are_inside_the_open_interval_and_uniform():
     words = words_of(3, 0)
-    u = np.array([walk.next_unit(words, k % walk.LANES) for k in range(400_000)], float)
+    u = np.array([sampling.next_unit(words, k % walk.LANES) for k in range(400_000)], float)
     assert u.min() > 0.0
     assert u.max() < 1.0
     counts = np.histogram(u, 256, (0.0, 1.0))[0]
@@ -96,14 +97,14 @@ def test_uniforms_are_inside_the_open_interval_and_uniform():
 
 def test_logarithm_polynomial():
     u = (np.arange(2**23, dtype=np.float64)[:: 2**5] + 0.5) * 2.0**-23
-    ours = np.array([walk.negative_log(np.float32(each)) for each in u], float)
+    ours = np.array([sampling.negative_log(np.float32(each)) for each in u], float)
     np.testing.assert_allclose(ours, -np.log(u), rtol=2e-7, atol=1e-7)
     assert np.all(ours >= 0.0)
 
 
 def test_cosine_and_sine_polynomials():
     u = np.linspace(1e-6, 1.0 - 1e-6, 100_001)
-    ours = np.array([walk.cos_sin_turn(np.float32(each)) for each in u], float)
+    ours = np.array([sampling.cos_sin_turn(np.float32(each)) for each in u], float)
     angle = 2.0 * np.pi * np.float32(u).astype(float) - np.pi
     # single precision of the angle alone is 3e-7
     np.testing.assert_allclose(ours, np.stack([np.cos(angle), np.sin(angle)], 1), atol=1e-6)
@@ -112,9 +113,9 @@ def test_cosine_and_sine_polynomials():
 @pytest.mark.parametrize("eta", [1.0, 1.3, 2.0])
 def test_fresnel_reflectance(eta):
     for cos_inside in np.linspace(0.001, 1.0, 200):
-        ours = walk.fresnel_reflectance(cos_inside, eta)
+        ours = sampling.fresnel_reflectance(cos_inside, eta)
         assert ours == pytest.approx(reference.fresnel(cos_inside, eta), abs=1e-14)
-    assert walk.fresnel_reflectance(1.0, eta) == pytest.approx(((eta - 1.0) / (eta + 1.0)) ** 2)
+    assert sampling.fresnel_reflectance(1.0, eta) == pytest.approx(((eta - 1.0) / (eta + 1.0)) ** 2)
 
 
 def test_free_paths_are_exponential(flights):

@@ -1,18 +1,17 @@
-"""A walk dealt out in batches: what the compiled code is given, and its tallies added in order."""
+"""Walks dealt out in batches, whatever they walk through, and their tallies added in order."""
 
 import math
 import os
 from collections import deque
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from time import perf_counter
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._jit import semi_infinite as walk
-from sssfit.grid import RadialGrid
 from sssfit.material import Material
 
 FloatArray = npt.NDArray[np.float64]
@@ -20,8 +19,6 @@ FloatArray = npt.NDArray[np.float64]
 # 16384 photons of skin1 take 2 ms, of an absorption-free medium 0.3 s: short enough for Ctrl-C,
 # long enough that dealing out a batch (some 0.1 ms) does not show.
 BATCH_PHOTONS = 16_384
-ROULETTE_THRESHOLD = 1e-4  # MCML's; of the largest channel's weight
-ROULETTE_LEVELS = 30  # one walk in 1e30 survives so many
 REPORT_SECONDS = 0.1
 
 
@@ -41,9 +38,12 @@ class Progress:
 
 @dataclass(slots=True)
 class Tally:
-    """Sums over photons for the channels of all materials of one walk (weights begin at 1)."""
+    """Sums over photons for all channels of a walk (weights begin at 1).
 
-    ledger: walk.Ledger
+    ``ledger`` is a named tuple of float64 arrays, of whatever kind the walk books into.
+    """
+
+    ledger: Any
     photons: int = 0
     flights: int = 0
 
@@ -56,54 +56,26 @@ class Tally:
 
 
 @dataclass(frozen=True, slots=True)
-class Walk:
-    """One walk: the materials it serves, their grids, and what the compiled code wants to know."""
+class Sums:
+    """One material's part of a tally; the last axis of length 2 holds sums of w and of w^2."""
+
+    photons: int
+    reflected: FloatArray  # (n + 1, C, 2), the last bin beyond the grid
+    transmitted: FloatArray | None  # likewise; None for a half space
+    absorbed: FloatArray  # (layers, C)
+    unfinished: FloatArray  # (C, 2)
+    roulette: FloatArray  # (C, 2)
+
+
+class Walk(Protocol):
+    """What can be walked in batches."""
 
     materials: tuple[Material, ...]
-    grids: tuple[RadialGrid, ...]
-    seed: int
     photons: int
-    eta: float = field(init=False)
-    channels: walk.Channels = field(init=False)
-    roulette_at: npt.NDArray[np.uint32] = field(init=False)
 
-    def __post_init__(self) -> None:
-        largest = max(float(each.layers[0].albedo.max()) for each in self.materials)
-        object.__setattr__(self, "eta", relative_eta(self.materials[0]))
-        object.__setattr__(self, "channels", _channels(self.materials, self.grids))
-        object.__setattr__(self, "roulette_at", roulette_schedule(largest))
-
-    def trace(self, batch: int) -> Tally:
-        """Walk one batch; what comes back depends on the seed and the batch's number alone."""
-        tally = self.empty_tally()
-        tally.photons = min(BATCH_PHOTONS, self.photons - batch * BATCH_PHOTONS)
-        tally.flights = walk.trace_batch(
-            np.uint64(self.seed),
-            np.int64(batch),
-            tally.photons,
-            self.eta,
-            self.roulette_at,
-            self.channels,
-            tally.ledger,
-        )
-        return tally
-
-    def empty_tally(self) -> Tally:
-        """All sums zero."""
-        n_channels = self.channels.last_bin.size
-        cells = int(np.sum(self.channels.last_bin + 1))
-        ledger = walk.Ledger(
-            bins=np.zeros((cells, 2)),
-            absorbed=np.zeros(n_channels),
-            unfinished=np.zeros((n_channels, 2)),
-            roulette=np.zeros((n_channels, 2)),
-        )
-        return Tally(ledger)
-
-    def cells(self, channel: int) -> slice:
-        """Where a channel's bins stand in the ledger, the one beyond the grid last."""
-        first = int(self.channels.first_cell[channel])
-        return slice(first, first + int(self.channels.last_bin[channel]) + 1)
+    def trace(self, batch: int) -> Tally: ...
+    def empty_tally(self) -> Tally: ...
+    def sums(self, tally: Tally, index: int) -> Sums: ...
 
 
 def run(
@@ -150,22 +122,19 @@ def _in_order(task: Walk, threads: int, stop: Callable[[], bool] | None) -> Iter
 
 def relative_error(task: Walk, tally: Tally) -> float:
     """Largest standard error of F over the annulus edges / F at the last, of the worst channel."""
-    worst = 0.0
-    for channel in range(task.channels.last_bin.size):
-        sums = np.cumsum(tally.ledger.bins[task.cells(channel)][:-1], axis=0)
-        energy, squares = sums.T / tally.photons
-        if task.channels.power_low[1, channel] == 0.0:
-            continue  # sigma_s = 0: nothing comes back, without error
-        if energy[-1] == 0.0 or tally.photons < 2:
-            return math.inf
-        variance = np.max(squares - energy**2) / (tally.photons - 1)
-        worst = max(worst, math.sqrt(variance) / float(energy[-1]))
-    return worst
+    if tally.photons < 2:
+        return math.inf
+    return max(_worst(task.sums(tally, k)) for k in range(len(task.materials)))
 
 
-def relative_eta(material: Material) -> float:
-    """Refractive index of the top layer relative to what is above it."""
-    return material.layers[0].eta / material.eta_above
+def _worst(sums: Sums) -> float:
+    """Return the relative error of one material's worst channel."""
+    energy, squares = np.moveaxis(np.cumsum(sums.reflected[:-1], axis=0) / sums.photons, -1, 0)
+    error = np.sqrt(np.max(squares - energy**2, axis=0) / (sums.photons - 1))
+    # Nothing scattered, nothing back: such a channel is known exactly.
+    dark = sums.absorbed.sum(axis=0) >= sums.photons * (1.0 - 1e-12)
+    relative = np.divide(error, energy[-1], out=np.full_like(error, np.inf), where=energy[-1] > 0)
+    return float(np.max(np.where(dark, 0.0, relative)))
 
 
 def available_cores() -> int:
@@ -173,50 +142,3 @@ def available_cores() -> int:
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
-
-
-def roulette_schedule(albedo: float) -> npt.NDArray[np.uint32]:
-    """At how many collisions a walk that survived k = 0, 1, ... roulettes plays the next.
-
-    The smallest n with albedo^n 10^k under the threshold; the collision cap where that is larger.
-    """
-    schedule = np.full(ROULETTE_LEVELS + 1, walk.COLLISION_CAP, np.uint32)
-    if albedo == 1.0:
-        return schedule
-    decay = -math.log(albedo) if albedo > 0.0 else math.inf
-    previous = 1
-    for level in range(ROULETTE_LEVELS):
-        under = (level * math.log(10.0) - math.log(ROULETTE_THRESHOLD)) / decay
-        previous = max(previous + 1, math.floor(under) + 1)
-        schedule[level] = min(previous, walk.COLLISION_CAP)
-    return schedule
-
-
-def _channels(materials: tuple[Material, ...], grids: tuple[RadialGrid, ...]) -> walk.Channels:
-    """Lay the channels of all materials side by side."""
-    albedo = np.concatenate([each.layers[0].albedo for each in materials])
-    bins_per_mfp = np.concatenate(
-        [
-            each.layers[0].mean_free_path_mm / grid.dr_mm
-            for each, grid in zip(materials, grids, strict=True)
-        ]
-    )
-    counts = [each.n_channels for each in materials]
-    last_bin = np.repeat([grid.annuli for grid in grids], counts).astype(np.int64)
-    first_cell = np.concatenate([[0], np.cumsum(last_bin[:-1] + 1)]).astype(np.int64)
-    return walk.Channels(
-        power_low=_powers(albedo),
-        power_high=_powers(_powers(albedo)[-1] * albedo),
-        bins_per_mean_free_path=bins_per_mfp,
-        last_bin=last_bin,
-        first_cell=first_cell,
-    )
-
-
-def _powers(base: FloatArray) -> FloatArray:
-    """base^k for k below ``POWER_BLOCK``, (POWER_BLOCK, C).
-
-    Python's own power: numpy's differs in the last bit between processors.
-    """
-    rows = [[float(each) ** k for each in base] for k in range(walk.POWER_BLOCK)]
-    return np.array(rows)

@@ -1,0 +1,114 @@
+"""The walk of ``sssfit._jit.layered`` as batches: any stack of layers, any g.
+
+Channels that scatter alike (same sigma_s and g in every layer) share a walk; others walk by
+themselves, on the same random streams, which keeps their noise alike. A batch holds them all, so
+that every channel of a profile rests on the same number of photons.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit._jit import layered as walk
+from sssfit.grid import RadialGrid
+from sssfit.material import Material
+from sssfit.simulate._batches import BATCH_PHOTONS, Sums, Tally
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class LayeredWalk:
+    """The walks of one layered material, and what the compiled code wants to know of each.
+
+    ``diffuse`` lights the stack evenly from all sides instead of along the normal; reciprocity
+    (a statement on such light) is tested with it.
+    """
+
+    materials: tuple[Material, ...]
+    grids: tuple[RadialGrid, ...]
+    seed: int
+    photons: int
+    diffuse: bool = False
+    groups: tuple[tuple[walk.Stack, walk.Bins], ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        material, grid = self.materials[0], self.grids[0]
+        groups = tuple(
+            (_stack(material, members), walk.Bins(1.0 / grid.dr_mm, grid.annuli, members))
+            for members in alike_channels(material)
+        )
+        object.__setattr__(self, "groups", groups)
+
+    def trace(self, batch: int) -> Tally:
+        """Walk one batch of every group; depends on the seed and the batch's number alone."""
+        tally = self.empty_tally()
+        tally.photons = min(BATCH_PHOTONS, self.photons - batch * BATCH_PHOTONS)
+        for stack, bins in self.groups:
+            tally.flights += walk.trace_batch(
+                np.uint64(self.seed),
+                np.int64(batch),
+                tally.photons,
+                self.materials[0].first_scattering_layer,
+                self.diffuse,
+                stack,
+                bins,
+                tally.ledger,
+            )
+        return tally
+
+    def empty_tally(self) -> Tally:
+        """All sums zero."""
+        material, cells = self.materials[0], self.grids[0].annuli + 1
+        n = material.n_channels
+        ledger = walk.Ledger(
+            reflected=np.zeros((cells, n, 2)),
+            transmitted=np.zeros((cells, n, 2)),
+            absorbed=np.zeros((len(material.layers), n)),
+            unfinished=np.zeros((n, 2)),
+            roulette=np.zeros((n, 2)),
+        )
+        return Tally(ledger)
+
+    def sums(self, tally: Tally, index: int) -> Sums:
+        """Give the sums of the one material there is (``index`` 0)."""
+        ledger = tally.ledger
+        finite = np.isfinite(self.materials[index].layers[-1].thickness_mm)
+        return Sums(
+            photons=tally.photons,
+            reflected=ledger.reflected,
+            transmitted=ledger.transmitted if finite else None,
+            absorbed=ledger.absorbed,
+            unfinished=ledger.unfinished,
+            roulette=ledger.roulette,
+        )
+
+
+def alike_channels(material: Material) -> list[npt.NDArray[np.int64]]:
+    """Group the channels that differ in absorption only; indices, in their order."""
+    groups: dict[bytes, list[int]] = {}
+    for c in range(material.n_channels):
+        scattering = [(layer.sigma_s_per_mm[c], layer.g[c]) for layer in material.layers]
+        groups.setdefault(np.array(scattering).tobytes(), []).append(c)
+    return [np.array(members, np.int64) for members in groups.values()]
+
+
+def _stack(material: Material, members: npt.NDArray[np.int64]) -> walk.Stack:
+    """Lay out the layers for a group: the least absorbing channel of each layer walks."""
+    layers = material.layers
+    sigma_a = np.array([layer.sigma_a_per_mm[members] for layer in layers])
+    sigma_s = np.array([layer.sigma_s_per_mm[members[0]] for layer in layers])
+    least = sigma_a.min(axis=1)
+    sigma_t = least + sigma_s
+    edges_mm = np.concatenate([[0.0], np.cumsum([layer.thickness_mm for layer in layers])])
+    capture = np.divide(least, sigma_t, out=np.zeros_like(least), where=sigma_t > 0.0)
+    return walk.Stack(
+        top_mm=edges_mm[:-1].astype(np.float32),
+        bottom_mm=edges_mm[1:].astype(np.float32),
+        sigma_t_per_mm=sigma_t.astype(np.float32),
+        capture=capture.astype(np.float32),
+        g=np.array([layer.g[members[0]] for layer in layers], np.float32),
+        eta=np.array([material.eta_above, *(each.eta for each in layers), material.eta_below]),
+        excess_per_mm=sigma_a - least[:, None],
+    )
