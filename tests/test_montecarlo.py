@@ -16,9 +16,10 @@ import pytest
 import reference
 
 from sssfit.errors import SimulationError, SssfitWarning
-from sssfit.material import Layer, Material, load_material, material_names
+from sssfit.material import load_material, material_names
 from sssfit.simulate import simulate_montecarlo, simulate_montecarlo_many
-from sssfit.simulate._batches import BATCH_PHOTONS, Walk, roulette_schedule, run
+from sssfit.simulate._batches import BATCH_PHOTONS, run
+from sssfit.simulate._semi_infinite import SemiInfiniteWalk, roulette_schedule
 from sssfit.simulate.montecarlo import AUTO_BEYOND
 
 LIMIT = checks.LIMIT
@@ -205,7 +206,7 @@ def test_batches_may_be_walked_in_any_order():
     material = load_material("skin1")
     from sssfit.grid import paper_grid
 
-    task = Walk((material,), (paper_grid(material),), 1, 5 * BATCH_PHOTONS)
+    task = SemiInfiniteWalk((material,), (paper_grid(material),), 1, 5 * BATCH_PHOTONS)
     forwards = [task.trace(k).ledger.bins for k in range(5)]
     backwards = [task.trace(k).ledger.bins for k in reversed(range(5))][::-1]
     for a, b in zip(forwards, backwards, strict=True):
@@ -338,17 +339,14 @@ def test_settings_out_of_range_are_one_line(settings, fragment):
     assert "\n" not in str(caught.value)
 
 
-def test_media_of_later_work_are_refused_with_what_to_do():
-    with pytest.raises(SimulationError, match="reduced sigma_s"):
-        simulate_montecarlo(checks.medium(0.1, 1.0, 1.3, g=0.8))
-    slab = Material("slab", ("c",), (Layer(1.3, np.zeros(1), np.ones(1), np.ones(1), 2.0),))
-    with pytest.raises(SimulationError, match="semi-infinite"):
-        simulate_montecarlo(slab)
-    buried = Material(
-        "buried", ("c",), (Layer(1.3, np.zeros(1), np.ones(1), np.ones(1)),), eta_above=1.5
-    )
-    with pytest.raises(SimulationError, match="eta_above"):
-        simulate_montecarlo(buried)
+def test_a_g_too_steep_for_single_precision_is_refused():
+    with pytest.raises(SimulationError, match=r"g = 0\.995"):
+        simulate_montecarlo(checks.medium(0.1, 1.0, 1.3, g=0.995))
+
+
+def test_a_layered_material_walks_by_itself():
+    with pytest.raises(SimulationError, match="cannot share a walk"):
+        simulate_montecarlo_many([load_material("skin1"), checks.medium(0.1, 1.0, 1.3, g=0.5)])
 
 
 # Memory

@@ -2,8 +2,8 @@
 
 Any number of layers, Henyey-Greenstein scattering, Fresnel and total internal reflection at every
 interface, clear layers, finite stacks or a semi-infinite last layer. As in
-``sssfit._jit.semi_infinite``, ``LANES`` photons advance side by side without a branch: each flies to
-its next collision or to the interface before it, whichever comes first, and scatters in the one
+``sssfit._jit.semi_infinite``, ``LANES`` photons advance side by side without a branch: each flies
+to its next collision or to the interface before it, whichever comes first, and scatters in the one
 case and waits for its Fresnel event in the other. The events (interfaces, roulette, the collision
 cap) are then handled lane by lane.
 
@@ -65,7 +65,7 @@ FloatArray = npt.NDArray[np.float64]
 
 
 class Stack(NamedTuple):
-    """Layers from the top down, for the least absorbing channel of the walk; L layers, K channels."""
+    """Layers from the top down, for a walk's least absorbing channel; L layers, K channels."""
 
     top_mm: LaneFloats  # (L,)
     bottom_mm: LaneFloats  # (L,): infinite for a semi-infinite last layer
@@ -111,7 +111,7 @@ def sample_hg(g: np.float32, u: np.float32) -> np.float32:
 @jit
 def hg_pdf(cos_theta: float, g: float) -> float:
     """Density of ``sample_hg`` over the cosine: (1 - g^2) / (2 (1 + g^2 - 2 g cos)^(3/2))."""
-    return 0.5 * (1.0 - g * g) / (1.0 + g * g - 2.0 * g * cos_theta) ** 1.5
+    return 0.5 * (1.0 - g * g) / math.pow(1.0 + g * g - 2.0 * g * cos_theta, 1.5)
 
 
 @jit
@@ -177,9 +177,7 @@ def find_events(
 
 
 @jit_inline
-def enter_layer(
-    floats: LaneFloats, words: LaneWords, lane: int, layer: int, stack: Stack
-) -> None:
+def enter_layer(floats: LaneFloats, words: LaneWords, lane: int, layer: int, stack: Stack) -> None:
     """Put a lane into a layer: its number, and copies of what the flight needs."""
     words[_LAYER + lane] = _U32(layer)
     floats[_TOP + lane] = stack.top_mm[layer]
@@ -261,9 +259,7 @@ def score_exit(
 
 
 @jit_inline
-def score_weight(
-    booked: FloatArray, lane: int, bins: Bins, gain: float, sums: FloatArray
-) -> None:
+def score_weight(booked: FloatArray, lane: int, bins: Bins, gain: float, sums: FloatArray) -> None:
     """Add gain times every channel's weight to sums and sums of squares."""
     for k in range(booked.shape[1]):
         change = gain * booked[lane, k, 1]

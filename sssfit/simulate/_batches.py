@@ -12,6 +12,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.grid import RadialGrid
 from sssfit.material import Material
 
 FloatArray = npt.NDArray[np.float64]
@@ -70,9 +71,14 @@ class Sums:
 class Walk(Protocol):
     """What can be walked in batches."""
 
-    materials: tuple[Material, ...]
-    photons: int
-
+    @property
+    def materials(self) -> tuple[Material, ...]: ...
+    @property
+    def grids(self) -> tuple[RadialGrid, ...]: ...
+    @property
+    def seed(self) -> int: ...
+    @property
+    def photons(self) -> int: ...
     def trace(self, batch: int) -> Tally: ...
     def empty_tally(self) -> Tally: ...
     def sums(self, tally: Tally, index: int) -> Sums: ...

@@ -1,4 +1,4 @@
-"""The walk of ``sssfit._jit.layered`` as batches: any stack of layers, any g.
+"""The walk of ``sssfit._jit.layered`` in batches: any stack of layers, any g.
 
 Channels that scatter alike (same sigma_s and g in every layer) share a walk; others walk by
 themselves, on the same random streams, which keeps their noise alike. A batch holds them all, so

@@ -1,4 +1,4 @@
-"""The walk of ``sssfit._jit.semi_infinite`` as batches: half spaces, g = 0, all channels at once."""
+"""The walk of ``sssfit._jit.semi_infinite`` in batches: half spaces, g = 0, every channel."""
 
 import math
 from dataclasses import dataclass, field

@@ -1,10 +1,10 @@
 """Photon walks: the diffuse reflectance profile by Monte Carlo, with standard errors.
 
-The walk itself is compiled (``sssfit._jit.semi_infinite``, after Wang, Jacques and Zheng 1995,
-"MCML"); this file deals it out and turns what comes back into profiles. Photons are split into
-batches of ``BATCH_PHOTONS``; every batch has its own random streams and its own tallies, and the
-tallies are added in the order of the batches. So the same seed gives the same bits on any number
-of threads, and a run that was stopped after k batches equals one of k ``BATCH_PHOTONS`` photons.
+The walks are compiled (``sssfit._jit.semi_infinite`` and ``layered``, after Wang, Jacques and Zheng
+1995, "MCML"); this file picks one and turns what comes back into profiles. Photons are
+split into batches of ``BATCH_PHOTONS``; every batch has its own random streams and its own tallies,
+and the tallies are added in the order of the batches. So the same seed gives the same bits on any
+number of threads, and a run stopped after k batches equals one of k ``BATCH_PHOTONS`` photons.
 
 Standard errors come from squared weights: a photon leaves through one annulus at most, so with
 weights w the energy of an annulus is sum(w)/N and its variance (sum(w^2)/N - energy^2)/(N - 1).
@@ -12,6 +12,7 @@ weights w the energy of an annulus is sum(w)/N and its variance (sum(w^2)/N - en
 
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -21,14 +22,9 @@ from sssfit.errors import SimulationError, SssfitWarning, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
-from sssfit.simulate._batches import (
-    Progress,
-    Tally,
-    Walk,
-    available_cores,
-    relative_eta,
-    run,
-)
+from sssfit.simulate._batches import Progress, Sums, Tally, Walk, available_cores, run
+from sssfit.simulate._layered import LayeredWalk
+from sssfit.simulate._semi_infinite import SemiInfiniteWalk, relative_eta
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -36,6 +32,7 @@ MAX_PHOTONS = 10**12
 HONEST_PHOTONS = 1000  # below, a channel may rest on a handful of hits and its error on luck
 AUTO_BEYOND = 1e-3  # radius "auto": less than this share of any channel lies beyond the grid
 PILOT_PHOTONS = 200_000
+STEEPEST_G = 0.99  # beyond, single precision no longer resolves the forward peak
 
 
 def simulate_montecarlo(
@@ -49,12 +46,15 @@ def simulate_montecarlo(
     progress: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Profile:
-    """Trace photons through a homogeneous semi-infinite medium with g = 0, all channels at once.
+    """Trace photons through a material: a half space, a slab or a stack of layers.
+
+    A homogeneous half space with g = 0 takes the fast walk, which serves all channels at once;
+    anything else takes the layered one, where channels share a walk if only absorption differs.
 
     Parameters
     ----------
     material : Material
-        One layer of infinite thickness, g = 0, index at least that of the outside.
+        Any stack of layers that ``Material`` accepts, g from -0.99 to 0.99.
     photons : int
         Number of walks, 2 to 1e12; the default is the paper's.
     seed : int
@@ -79,7 +79,7 @@ def simulate_montecarlo(
     Raises
     ------
     SimulationError
-        A medium this walk does not cover, or settings out of range.
+        g beyond what the walk samples well, or settings out of range.
     StoppedError
         ``stop`` said so before a batch was done.
 
@@ -138,7 +138,7 @@ def simulate_montecarlo_many(
         grids = _auto_grids(materials, dr_mm, seed, threads, stop)
     else:
         grids = [make_grid(each, dr_mm=dr_mm, radius_mm=radius_mm) for each in materials]
-    task = Walk(tuple(materials), tuple(grids), seed, photons)
+    task = _walk(materials, grids, seed, photons)
     tally = run(task, threads, progress, stop)
     if tally.photons < 2:
         raise StoppedError("stopped before a single batch of photons was done.")
@@ -150,24 +150,37 @@ def _check_media(materials: Sequence[Material]) -> None:
     if not materials:
         raise SimulationError("no material given; name at least one.")
     for material in materials:
-        if not material.is_semi_infinite:
+        steepest = max(float(np.max(np.abs(layer.g))) for layer in material.layers)
+        if steepest > STEEPEST_G:
             raise SimulationError(
-                f"{material.name} is layered or of finite thickness; this version's photon walk "
-                "covers one semi-infinite layer: leave thickness_mm and [[layers]] out."
+                f"{material.name}: g = {steepest:g} in absolute value; the photon walk covers "
+                f"{-STEEPEST_G} to {STEEPEST_G}: give a reduced sigma_s with a smaller g."
             )
-        layer = material.layers[0]
-        if np.any(layer.g != 0.0):
+    if len(materials) == 1:
+        return
+    for material in materials:
+        if not is_plain(material):
             raise SimulationError(
-                f"{material.name}: g = {_short(layer.g)}; this version's photon walk is for g = 0: "
-                "give the reduced sigma_s' = (1 - g) sigma_s as sigma_s_per_mm, with g = 0."
-            )
-        if relative_eta(material) < 1.0:
-            raise SimulationError(
-                f"{material.name}: eta = {layer.eta} is under eta_above = {material.eta_above}; "
-                "this version's photon walk expects the medium to be the denser side."
+                f"{material.name} is layered, of finite thickness or has g other than 0: "
+                "it cannot share a walk with other materials; simulate it by itself."
             )
     if len({relative_eta(each) for each in materials}) != 1:
         raise SimulationError("one walk serves one refractive index; group the materials by eta.")
+
+
+def is_plain(material: Material) -> bool:
+    """Whether the fast walk serves: a half space, g = 0, at least as dense as what is above."""
+    layer = material.layers[0]
+    plain = material.is_semi_infinite and not np.any(layer.g)
+    return plain and relative_eta(material) >= 1.0
+
+
+def _walk(
+    materials: Sequence[Material], grids: Sequence[RadialGrid], seed: int, photons: int
+) -> Walk:
+    """Choose the walk that models no more than the material needs."""
+    kind = SemiInfiniteWalk if is_plain(materials[0]) else LayeredWalk
+    return kind(tuple(materials), tuple(grids), seed, photons)
 
 
 def _check_settings(photons: int, seed: int, threads: int | None) -> None:
@@ -201,12 +214,12 @@ def _auto_grids(
     """
     grids = [make_grid(each, dr_mm=dr_mm) for each in materials]
     while True:
-        task = Walk(tuple(materials), tuple(grids), seed, PILOT_PHOTONS)
+        task = _walk(materials, grids, seed, PILOT_PHOTONS)
         tally = run(task, threads, None, stop)
         if tally.photons < 2:
             raise StoppedError("stopped before a single batch of photons was done.")
         wide = [
-            np.max(_share_beyond(_material_bins(task, tally, k))[-1]) < AUTO_BEYOND / 2
+            np.max(_share_beyond(task.sums(tally, k))[-1]) < AUTO_BEYOND / 2
             for k in range(len(materials))
         ]
         if all(wide):
@@ -217,34 +230,29 @@ def _auto_grids(
         ]
 
 
-def _share_beyond(bins: FloatArray) -> FloatArray:
-    """Share of each channel's energy beyond every annulus, (annuli, C), from bins (n + 1, C, 2)."""
-    energy = bins[..., 0]
+def _share_beyond(sums: Sums) -> FloatArray:
+    """Share of each channel's energy, reflected and transmitted, beyond every annulus, (n, C)."""
+    energy = sums.reflected[..., 0]
+    if sums.transmitted is not None:
+        energy = energy + sums.transmitted[..., 0]
     total = np.sum(energy, axis=0)
     beyond = np.cumsum(energy[::-1], axis=0)[::-1][1:]
     share: FloatArray = np.divide(beyond, total, out=np.zeros_like(beyond), where=total > 0.0)
     return share
 
 
-def _material_channels(task: Walk, index: int) -> range:
-    """Which channels of the walk are those of material ``index``."""
-    first = sum(each.n_channels for each in task.materials[:index])
-    return range(first, first + task.materials[index].n_channels)
-
-
-def _material_bins(task: Walk, tally: Tally, index: int) -> FloatArray:
-    """One material's bins, (n + 1, C, 2), the one beyond the grid last."""
-    channels = _material_channels(task, index)
-    return np.stack([tally.ledger.bins[task.cells(c)] for c in channels], axis=1)
-
-
-def _trimmed(bins: FloatArray) -> FloatArray:
+def _trimmed(sums: Sums) -> Sums:
     """Move the outermost annuli beyond the grid for as long as less than the share lies there."""
-    outside = np.max(_share_beyond(bins), axis=1)
-    annuli = (
-        int(np.argmax(outside < AUTO_BEYOND)) + 1 if outside[-1] < AUTO_BEYOND else len(outside)
-    )
-    return np.concatenate([bins[:annuli], np.sum(bins[annuli:], axis=0, keepdims=True)])
+    outside = np.max(_share_beyond(sums), axis=1)
+    if outside[-1] >= AUTO_BEYOND:
+        return sums
+    annuli = int(np.argmax(outside < AUTO_BEYOND)) + 1
+
+    def cut(bins: FloatArray) -> FloatArray:
+        return np.concatenate([bins[:annuli], np.sum(bins[annuli:], axis=0, keepdims=True)])
+
+    transmitted = None if sums.transmitted is None else cut(sums.transmitted)
+    return replace(sums, reflected=cut(sums.reflected), transmitted=transmitted)
 
 
 def _mean_and_error(sums: FloatArray, photons: int) -> tuple[FloatArray, FloatArray]:
@@ -258,30 +266,32 @@ def _profile(task: Walk, tally: Tally, index: int, *, trim: bool) -> Profile:
     """Turn one material's share of the tally into a profile; weights begin at 1 - specular."""
     material, grid = task.materials[index], task.grids[index]
     entering = 1.0 - material.specular_reflectance
-    bins = _material_bins(task, tally, index)
+    sums = task.sums(tally, index)
     if trim:
-        bins = _trimmed(bins)
-    energy, stderr = (entering * each for each in _mean_and_error(bins, tally.photons))
-    own = slice(_material_channels(task, index).start, _material_channels(task, index).stop)
-    unfinished = entering * tally.ledger.unfinished[own, 0] / tally.photons
-    _, balance_error = _mean_and_error(tally.ledger.roulette[own], tally.photons)
+        sums = _trimmed(sums)
+    energy, stderr = (entering * each for each in _mean_and_error(sums.reflected, sums.photons))
+    through = None
+    if sums.transmitted is not None:
+        through = entering * sums.transmitted[..., 0] / sums.photons
+    _, balance_error = _mean_and_error(sums.roulette, sums.photons)
     profile = Profile(
-        r_edges_mm=grid.r_edges_mm[: len(bins)],
+        r_edges_mm=grid.r_edges_mm[: len(energy)],
         annulus_energy=energy[:-1],
         annulus_energy_stderr=stderr[:-1],
         beyond_grid=energy[-1],
         beyond_grid_stderr=stderr[-1],
         specular_reflectance=material.specular_reflectance,
-        absorbed=entering * tally.ledger.absorbed[None, own] / tally.photons,
-        unfinished=unfinished,
-        annulus_transmittance=None,
+        absorbed=entering * sums.absorbed / sums.photons,
+        unfinished=entering * sums.unfinished[:, 0] / sums.photons,
+        annulus_transmittance=None if through is None else through[:-1],
+        beyond_grid_transmittance=None if through is None else through[-1],
         meta={
             "format": "sssfit.profile/1",
             "method": "montecarlo",
             "material": material.to_dict(),
             "material_sha256": material.sha256,
             "channels": list(material.channels),
-            "photons": tally.photons,
+            "photons": sums.photons,
             "seed": task.seed,
             "version": __version__,
             "settings": {"dr_mm": grid.dr_mm, "radius": "auto" if trim else "given"},
@@ -302,8 +312,3 @@ def _warn_unfinished(material: Material, profile: Profile) -> None:
             SssfitWarning,
             stacklevel=4,
         )
-
-
-def _short(values: FloatArray) -> str:
-    """Show a channel's values in brief; one number where all are equal."""
-    return f"{values[0]:g}" if np.ptp(values) == 0.0 else f"{values.tolist()}"
