@@ -244,7 +244,7 @@ def scalar_layered_walk(
                     reflectance = (r_s * r_s + r_p * r_p) / 2.0
                 if np.random.random() < reflectance:
                     uz = -uz
-                elif uz > 0.0 and layer == layers - 1 or uz < 0.0 and layer == 0:
+                elif (uz > 0.0 and layer == layers - 1) or (uz < 0.0 and layer == 0):
                     k = min(int(math.sqrt(x * x + y * y) / dr), annuli)
                     out = transmitted if uz > 0.0 else reflected
                     out[k, 0] += w

@@ -34,7 +34,7 @@ from sssfit._jit.sampling import (
     next_unit,
     seed_lanes,
 )
-from sssfit._jit.semi_infinite import COLLISION_CAP
+from sssfit._jit.semi_infinite import COLLISION_CAP, ROULETTE_SPREAD
 
 _F32 = np.float32
 _U32 = np.uint32
@@ -91,7 +91,7 @@ class Ledger(NamedTuple):
     transmitted: FloatArray  # (n + 1, C, 2)
     absorbed: FloatArray  # (L, C)
     unfinished: FloatArray  # (C, 2)
-    roulette: FloatArray  # (C, 2): what roulette added, zero on average
+    roulette: FloatArray  # (C, 2): what roulette added, zero on average, and its variance
 
 
 @jit
@@ -259,12 +259,14 @@ def score_exit(
 
 
 @jit_inline
-def score_weight(booked: FloatArray, lane: int, bins: Bins, gain: float, sums: FloatArray) -> None:
-    """Add gain times every channel's weight to sums and sums of squares."""
+def score_weight(
+    booked: FloatArray, lane: int, bins: Bins, gain: float, spread: float, sums: FloatArray
+) -> None:
+    """Add every channel's weight w as gain w and, for the variance, spread w^2."""
     for k in range(booked.shape[1]):
-        change = gain * booked[lane, k, 1]
-        sums[bins.channel[k], 0] += change
-        sums[bins.channel[k], 1] += change * change
+        weight = booked[lane, k, 1]
+        sums[bins.channel[k], 0] += gain * weight
+        sums[bins.channel[k], 1] += spread * weight * weight
 
 
 @jit_inline
@@ -273,9 +275,9 @@ def survives_roulette(
 ) -> bool:
     """Play roulette for a booked lane; what it adds or takes has mean zero."""
     if next_unit(words, lane) >= _SURVIVAL:
-        score_weight(booked, lane, bins, -1.0, ledger.roulette)
+        score_weight(booked, lane, bins, -1.0, ROULETTE_SPREAD, ledger.roulette)
         return False
-    score_weight(booked, lane, bins, float(_GAIN) - 1.0, ledger.roulette)
+    score_weight(booked, lane, bins, float(_GAIN) - 1.0, ROULETTE_SPREAD, ledger.roulette)
     floats[_WEIGHT + lane] *= _GAIN
     for k in range(booked.shape[1]):
         booked[lane, k, 1] *= float(_GAIN)
@@ -339,7 +341,7 @@ def handle_event(
         return cross_interface(floats, words, booked, lane, stack, bins, ledger)
     book_layer(floats, words, booked, lane, stack, bins, ledger.absorbed)
     if words[_COLLISIONS + lane] >= _U32(COLLISION_CAP):
-        score_weight(booked, lane, bins, 1.0, ledger.unfinished)
+        score_weight(booked, lane, bins, 1.0, 1.0, ledger.unfinished)
         return False
     return survives_roulette(floats, words, booked, lane, bins, ledger)
 

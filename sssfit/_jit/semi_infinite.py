@@ -55,6 +55,9 @@ _WORD_ROWS = GENERATOR_ROWS + 4
 _ONE, _TWO = _F32(1.0), _F32(2.0)
 _SURVIVAL = _F32(0.1)  # MCML's roulette: one in ten survives with ten times the weight
 _GAIN = _F32(10.0)
+# Variance of what it adds, in squared weights: .9 * 1^2 + .1 * 9^2. The expected one, since gains
+# are rare: a short run without any would see a small spread about a mean that is off.
+ROULETTE_SPREAD = 9.0
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -75,7 +78,7 @@ class Ledger(NamedTuple):
     bins: FloatArray  # (cells, 2): energy leaving, per bin
     absorbed: FloatArray  # (C,)
     unfinished: FloatArray  # (C, 2): energy of walks stopped at the collision cap
-    roulette: FloatArray  # (C, 2): what roulette added, zero on average
+    roulette: FloatArray  # (C, 2): what roulette added, zero on average, and its variance
 
 
 @jit
@@ -165,20 +168,24 @@ def score_exit(
 def score_event(
     sums: FloatArray,
     gain: float,
+    spread: float,
     words: LaneWords,
     lane: int,
     boost: float,
     channels: Channels,
     absorbed: FloatArray,
 ) -> None:
-    """Book absorption up to the lane's present collision n, and gain boost albedo^n in ``sums``."""
+    """Book absorption up to the lane's present collision n, and w = boost albedo^n in ``sums``.
+
+    As gain w and, for the variance, spread w^2.
+    """
     settled = int(words[_SETTLED + lane])
     collisions = int(words[_COLLISIONS + lane])
     for c in range(absorbed.size):
         weight = boost * power(channels, collisions, c)
         absorbed[c] += boost * power(channels, settled, c) - weight
         sums[c, 0] += gain * weight
-        sums[c, 1] += (gain * weight) ** 2
+        sums[c, 1] += spread * weight * weight
     words[_SETTLED + lane] = _U32(collisions)
 
 
@@ -194,17 +201,18 @@ def survives_event(
     """Play roulette, or stop at the collision cap; book either and say whether the walk goes on.
 
     The weights roulette takes and gives are uncorrelated with mean zero (a martingale), so their
-    squares sum to the variance of the run's energy balance.
+    variances add to that of the run's energy balance.
     """
     boost = float(floats[_BOOST + lane])
     absorbed = ledger.absorbed
     if words[_COLLISIONS + lane] >= COLLISION_CAP:
-        score_event(ledger.unfinished, 1.0, words, lane, boost, channels, absorbed)
+        score_event(ledger.unfinished, 1.0, 1.0, words, lane, boost, channels, absorbed)
         return False
     if next_unit(words, lane) >= _SURVIVAL:
-        score_event(ledger.roulette, -1.0, words, lane, boost, channels, absorbed)
+        score_event(ledger.roulette, -1.0, ROULETTE_SPREAD, words, lane, boost, channels, absorbed)
         return False
-    score_event(ledger.roulette, float(_GAIN) - 1.0, words, lane, boost, channels, absorbed)
+    gain = float(_GAIN) - 1.0
+    score_event(ledger.roulette, gain, ROULETTE_SPREAD, words, lane, boost, channels, absorbed)
     level = words[_LEVEL + lane] + _U32(1)
     words[_LEVEL + lane] = _U32(level)
     words[_EVENT + lane] = roulette_at[level]
