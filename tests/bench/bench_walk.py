@@ -27,7 +27,7 @@ import reference  # noqa: E402
 
 import sssfit  # noqa: E402
 from sssfit.grid import paper_grid  # noqa: E402
-from sssfit.material import load_material  # noqa: E402
+from sssfit.material import Layer, Material, load_material  # noqa: E402
 from sssfit.profile import Profile  # noqa: E402
 from sssfit.simulate import simulate_montecarlo  # noqa: E402
 
@@ -79,6 +79,50 @@ def walk_rows(photons):
             (name, f"{slow_rate:,.0f}", f"{fast_rate:,.0f}", f"{fast_rate / slow_rate:.1f}")
         )
     return rows
+
+
+def layered_rows(photons):
+    """Three layers of g .8 against the scalar MCML, one core, one channel."""
+    material = Material(
+        "three",
+        ("mono",),
+        tuple(
+            Layer(eta, [0.8], [sigma_a], [sigma_s], thickness)
+            for eta, sigma_a, sigma_s, thickness in (
+                (1.4, 0.1, 10.0, 0.1),
+                (1.35, 0.05, 20.0, 0.5),
+                (1.45, 0.2, 15.0, np.inf),
+            )
+        ),
+    )
+    layers, grid = material.layers, paper_grid(material)
+
+    def loop(count):
+        reference.scalar_layered_walk(
+            1,
+            count,
+            *(
+                np.array([each[0] for each in column])
+                for column in zip(
+                    *((x.sigma_a_per_mm, x.sigma_s_per_mm, x.g) for x in layers), strict=True
+                )
+            ),
+            np.array([1.0, *(x.eta for x in layers), 1.0]),
+            np.array([min(x.thickness_mm, 1e30) for x in layers]),
+            material.specular_reflectance,
+            0,
+            grid.dr_mm,
+            grid.annuli,
+        )
+
+    def walk(count):
+        simulate_montecarlo(material, photons=count, threads=1)
+
+    loop(100)
+    walk(2000)
+    slow, fast, _ = paired(lambda: loop(photons // 10), lambda: walk(photons))
+    rates = photons / 10 / slow, photons / fast
+    return [("three layers, g .8", *(f"{x:,.0f}" for x in rates), f"{rates[1] / rates[0]:.1f}")]
 
 
 def thread_rows(photons):
@@ -168,6 +212,8 @@ def page(small):
         "`scalar_walk` of tests/reference.py: one photon at a time, double precision, compiled by "
         "numba too.",
         markdown(("material", "scalar loop", "lanes", "ratio"), walk_rows(photons)),
+        "The layered walk against `scalar_layered_walk`, one channel:",
+        markdown(("material", "scalar loop", "lanes", "ratio"), layered_rows(photons // 4)),
         "## Two threads against one",
         f"Seconds for {photons * 5:,} photons.",
         markdown(("material", "one thread", "two threads", "speed-up"), thread_rows(photons * 5)),
