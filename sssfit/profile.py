@@ -45,7 +45,7 @@ class Profile:
     specular_reflectance : float [1]
         Mirror reflection at entry, not part of the diffuse energies.
     absorbed : array (layers, C) [1]
-        Energy absorbed in each layer, from the top down.
+        Energy absorbed in each layer, from the top down; no layers where it is not known.
     unfinished : array (C,) [1]
         Energy of walks stopped at the collision cap.
     annulus_transmittance : array (n, C) [1] or None
@@ -54,6 +54,9 @@ class Profile:
         Provenance that JSON can hold: ``format`` ("sssfit.profile/1"), ``channels`` (C names),
         ``material``, ``method``, ``photons`` (number of walks, None where nothing is sampled),
         ``seed``, ``version``, settings.
+    beyond_grid_transmittance : array (C,) [1] or None
+        Energy that leaves through the bottom beyond the last edge; None where
+        ``annulus_transmittance`` is, or where it is not known.
 
     Raises
     ------
@@ -71,6 +74,7 @@ class Profile:
     unfinished: FloatArray
     annulus_transmittance: FloatArray | None
     meta: Mapping[str, Any]
+    beyond_grid_transmittance: FloatArray | None = None
 
     def __post_init__(self) -> None:
         given = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
@@ -79,8 +83,8 @@ class Profile:
 
     def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
         # A mapping proxy cannot be pickled; worker processes and deep copies need the record.
-        arrays = (getattr(self, field.name) for field in dataclasses.fields(self)[:-1])
-        return type(self), (*arrays, dict(self.meta))
+        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return type(self), tuple((values | {"meta": dict(self.meta)}).values())
 
     @property
     def n_annuli(self) -> int:
@@ -122,16 +126,30 @@ class Profile:
         return of_total
 
     @property
+    def transmittance(self) -> FloatArray | None:
+        """Energy that leaves through the bottom, on the grid and beyond (C,), or None.
+
+        Light that crosses a slab without a collision is part of it.
+        """
+        if self.annulus_transmittance is None:
+            return None
+        total: FloatArray = self.annulus_transmittance.sum(axis=0)
+        beyond = self.beyond_grid_transmittance
+        return total if beyond is None else total + beyond
+
+    @property
     def energy_balance(self) -> FloatArray:
         """Sum of all energies - 1 (C,): 0 but for roulette's noise and rounding.
 
-        Specular + diffuse + absorbed + unfinished (+ transmitted) - 1.
+        Specular + diffuse + absorbed + unfinished (+ transmitted) - 1; NaN where it is not known
+        what was absorbed.
         """
+        if len(self.absorbed) == 0:
+            return np.full(self.n_channels, np.nan)
         reflected = self.specular_reflectance + self.diffuse_reflectance
         balance: FloatArray = reflected + self.absorbed.sum(axis=0) + self.unfinished - 1.0
-        if self.annulus_transmittance is not None:
-            balance = balance + self.annulus_transmittance.sum(axis=0)
-        return balance
+        transmitted = self.transmittance
+        return balance if transmitted is None else balance + transmitted
 
     @property
     def cumulative(self) -> FloatArray:
@@ -250,8 +268,8 @@ class Profile:
 
     def write(self, stream: BinaryIO) -> None:
         """Write the profile to a binary stream; the same content gives the same bytes."""
-        arrays = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)[:-1]}
-        stream.write(_profile_io.pack(arrays, self.meta))
+        arrays = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        stream.write(_profile_io.pack(arrays, arrays.pop("meta")))
 
     def save(self, path: str | Path) -> None:
         """Write the profile to ``path`` (by custom ``NAME.profile.npz``), whole or not at all.
