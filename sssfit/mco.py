@@ -42,7 +42,7 @@ def load_mco(path: str | Path) -> Profile:
 
 def is_mco(text: str) -> bool:
     """Tell whether a text begins as MCML's output does."""
-    return text.lstrip()[:2] in ("A1", "B1")
+    return text.split(maxsplit=1)[:1] in (["A1"], ["B1"])
 
 
 def parse_mco(text: str, origin: str) -> Profile:

@@ -237,7 +237,8 @@ def test_bad_files_are_refused_in_one_line(text, said):
 
 def test_formats_are_told_apart():
     assert is_mco(mco_text())
-    assert not is_mco("r_mm,A1\n")
+    assert is_mco("B1 # Version\n\x00")
+    assert not any(map(is_mco, ("", "\n", "r_mm,A1\n", "A1,r_mm\n")))
 
 
 def test_cut_files_are_refused_or_whole_but_for_blocks_that_are_not_needed():
