@@ -19,6 +19,8 @@ from sssfit import __version__
 from sssfit.errors import SssfitError, SssfitWarning
 
 from .chart import chart
+from .export import export
+from .import_ import import_
 from .materials import materials
 from .show import show
 from .simulate import simulate
@@ -31,7 +33,7 @@ _LIBRARIES = ("numpy", "numba", "llvmlite", "matplotlib", "click", "rich")
 @click.option("-v", "--verbose", is_flag=True, help="With --version: the libraries underneath.")
 @click.pass_context
 def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
-    r"""Subsurface scattering kernels: from a material to what a real-time shader can afford.
+    """Subsurface scattering kernels: from a material to what a real-time shader can afford.
 
     A first session:
 
@@ -51,7 +53,7 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
         ctx.exit(2)
 
 
-for _verb in (materials, simulate, chart, show):
+for _verb in (materials, simulate, import_, export, chart, show):
     cli.add_command(_verb)
 
 

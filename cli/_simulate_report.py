@@ -54,9 +54,11 @@ def report(rows: list[dict[str, Any]], *, every: bool, common: Common, interrupt
 def _heading(rows: list[dict[str, Any]], every: bool) -> str:
     """Who, how many photons, how fast, on which grid."""
     row = rows[0]
-    walks = f"{row['photons']:,} photons, seed {row['seed']}"
+    counts = sorted({each["photons"] for each in rows})
+    walks = f"{' to '.join(f'{n:,}' for n in counts[:: len(counts) - 1 or 1])} photons, "
+    walks += f"seed {row['seed']}"
     if every:
-        return f"{len(rows)} materials: {walks}, all channels of one index in one walk"
+        return f"{len(rows)} materials: {walks}"
     return (
         f"{row['material']}: {walks}, {row['seconds']:.1f} s "
         f"({row['photons_per_second']:,.0f} a second); "

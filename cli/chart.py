@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 @click.option("--force", is_flag=True, help="Replace a file that is not a chart.")
 @common_options
 def chart(profile: str | None, output: str | None, force: bool, common: Common) -> None:
-    r"""Draw PROFILE: R_d(r) in four plots with error bands.
+    """Draw PROFILE: R_d(r) in four plots with error bands.
 
     2 pi r R_d over r, linear and logarithmic; R_d over r in mean free paths; R_d(x, y) as an image.
     PROFILE is a .profile.npz file, or - for stdin; by default the newest of this folder.

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @click.option("--toml", "as_toml", is_flag=True, help="Print MATERIAL as TOML, to start your own.")
 @common_options
 def materials(common: Common, material: str | None, as_toml: bool) -> None:
-    r"""List the materials that ship with sssfit, or show one in full.
+    """List the materials that ship with sssfit, or show one in full.
 
     MATERIAL is one of their names, the path of a TOML file, or - for standard input.
 

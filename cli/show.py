@@ -21,7 +21,7 @@ _SHARES = (0.5, 0.9, 0.99)
 @click.argument("file", required=False)
 @common_options
 def show(file: str | None, common: Common) -> None:
-    r"""Print what FILE holds: provenance, grid, energies with standard errors.
+    """Print what FILE holds: provenance, grid, energies with standard errors.
 
     FILE is a .profile.npz file, or - for stdin; by default the newest of this folder.
 
@@ -60,7 +60,7 @@ def _figures(profile: Profile) -> dict[str, Any]:
         "specular_reflectance": profile.specular_reflectance,
         "beyond_grid": profile.beyond_grid,
         "absorbed": profile.absorbed.sum(axis=0),
-        "transmitted": _transmitted(profile),
+        "transmitted": profile.transmittance,
         "unfinished": profile.unfinished,
         "energy_balance": profile.energy_balance,
         "energy_balance_stderr": meta.get("energy_balance_stderr"),
@@ -92,11 +92,6 @@ def _is_uniform(profile: Profile) -> bool:
 
     width_mm = np.diff(profile.r_edges_mm)
     return bool(np.allclose(width_mm, width_mm[0]))
-
-
-def _transmitted(profile: Profile) -> Any:
-    below = profile.annulus_transmittance
-    return None if below is None else below.sum(axis=0)
 
 
 def _empty(profile: Profile) -> Any:

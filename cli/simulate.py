@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ._mci import is_mci, load_runs
 from ._options import Common, Count, Length, common_options
 from ._report import say
 from ._simulate_report import figures_of, report
@@ -15,6 +16,8 @@ from ._simulate_report import figures_of, report
 if TYPE_CHECKING:
     from sssfit.material import Material
     from sssfit.profile import Profile
+
+    _Walk = tuple[list[int], dict[str, Any]]
 
 
 class Radius(Length):
@@ -30,6 +33,7 @@ class Radius(Length):
 @click.command()
 @click.argument("material", required=False)
 @click.option("--all", "every", is_flag=True, help="All materials that ship with sssfit.")
+@click.option("--run", type=click.IntRange(1), metavar="N", help="Of an .mci, this run only.")
 @click.option(
     "--photons",
     type=Count(2, 10**12),
@@ -50,7 +54,7 @@ class Radius(Length):
     "-o",
     "--output",
     metavar="FILE",
-    help="Where the profile goes, - for stdout; with --all a folder."
+    help="Where the profile goes, - for stdout; a folder for several."
     "  [default: MATERIAL.profile.npz]",
 )
 @click.option("--force", is_flag=True, help="Replace a file that is not a profile.")
@@ -58,6 +62,7 @@ class Radius(Length):
 def simulate(
     material: str | None,
     every: bool,
+    run: int | None,
     photons: int,
     dr: float | None,
     radius: float | str | None,
@@ -65,9 +70,10 @@ def simulate(
     force: bool,
     common: Common,
 ) -> None:
-    r"""Trace photons through MATERIAL and write its diffuse reflectance profile.
+    """Trace photons through MATERIAL and write its diffuse reflectance profile.
 
-    MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or - for stdin.
+    MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or - for stdin; or
+    an MCML input file, .mci: a profile a run, with its photons and grid where options give none.
     The profile is R_d(r) per channel as energy in annuli with standard errors, for a normally
     incident pencil beam, in mm. Ctrl-C saves what is done, with its true photon count.
 
@@ -75,25 +81,40 @@ def simulate(
       sssfit simulate skin1
       sssfit simulate skin1 --photons 1e8 --radius auto -o fine.profile.npz
       sssfit simulate ./wax.toml --json
+      sssfit simulate tissue.mci --run 2
     """
     if (material is None) != every:
         raise click.UsageError("name one MATERIAL, or give --all.")
+    if run is not None and not is_mci(material):
+        raise click.UsageError("--run chooses a run of an MCML input file, .mci.")
+    settings = {"photons": photons, "dr_mm": dr, "radius_mm": radius}
+    materials, walks = _walks(material, run, settings)
+    several = every or len(materials) > 1
+    targets = _targets(materials, output, several)
+    _run(materials, targets, walks, force=force, every=several, common=common)
+
+
+def _walks(
+    material: str | None, run: int | None, settings: dict[str, Any]
+) -> tuple[list[Material], list[_Walk]]:
+    """Load what is asked for; each walk has the indices of its materials and its settings."""
     from sssfit.material import load_material, material_names
 
-    names = material_names() if every else (material or "",)
+    if material is not None and is_mci(material):
+        materials, each = load_runs(material, run, settings)
+        return materials, [([k], own) for k, own in enumerate(each)]
+    names = material_names() if material is None else (material,)
     materials = [load_material(name) for name in names]
-    targets = _targets(materials, output, every)
-    settings = {"photons": photons, "dr_mm": dr, "radius_mm": radius}
-    _run(materials, targets, settings, force=force, every=every, common=common)
+    return materials, [(group, settings) for group in _by_eta(materials)]
 
 
-def _targets(materials: list[Material], output: str | None, every: bool) -> list[Path | None]:
+def _targets(materials: list[Material], output: str | None, several: bool) -> list[Path | None]:
     """Where each profile goes; None is stdout."""
     if output == "-":
-        if every:
-            raise click.UsageError("--all writes several files; -o names a folder for them.")
+        if several:
+            raise click.UsageError("there are several profiles; -o names a folder for them.")
         return [None]
-    if every or output is None:
+    if several or output is None:
         folder = Path(output or ".")
         return [folder / f"{each.name}.profile.npz" for each in materials]
     return [Path(output)]
@@ -102,7 +123,7 @@ def _targets(materials: list[Material], output: str | None, every: bool) -> list
 def _run(
     materials: list[Material],
     targets: list[Path | None],
-    settings: dict[str, Any],
+    walks: list[_Walk],
     *,
     force: bool,
     every: bool,
@@ -123,7 +144,7 @@ def _run(
             check_output(path, is_profile_file, force=force)
             held.enter_context(locked(path))
         stop = held.enter_context(asked_to_stop())
-        for group in _by_eta(materials):
+        for group, settings in walks:
             try:
                 profiles, seconds = _walk([materials[k] for k in group], settings, stop, common)
             except StoppedError:

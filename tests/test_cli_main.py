@@ -100,6 +100,7 @@ def test_every_verb_explains_itself(name, run):
         status, out, err = run(name, flag)
         assert status == 0
         assert out.startswith(f"Usage: sssfit {name}")
+        assert "\\b" not in out  # its examples keep their lines
         assert err == ""
 
 

@@ -14,7 +14,10 @@ ROOT = Path(__file__).parents[1]
 HEAVY = {"numpy", "numba", "scipy", "colour", "matplotlib", "rich"}
 
 # A room may import from rooms before it in this list, never from one after it.
-ROOMS = ["errors", "files", "material", "grid", "profile", "simulate", "chart", "cli"]
+ROOMS = [
+    *("errors", "files", "material", "text", "grid", "mci", "profile", "mco", "profile_csv"),
+    *("simulate", "chart", "cli"),
+]
 # Files that serve one room and do not say so by their name, as _profile_io does.
 BACK_ROOMS = {"_disks": "profile"}
 # The compiled layer stands beside the list: these rooms may use it, and it uses none of them.

@@ -89,6 +89,22 @@ def test_energy_balance_counts_everything():
     np.testing.assert_allclose(profile.energy_balance, total - 1, atol=1e-15)
 
 
+def test_transmittance_counts_what_lies_beyond_the_grid():
+    on_grid = full_profile()
+    below = on_grid.annulus_transmittance.sum(axis=0)
+    np.testing.assert_array_equal(on_grid.transmittance, below)
+    profile = full_profile(beyond_grid_transmittance=[0.01, 0.03])
+    np.testing.assert_allclose(profile.transmittance - below, [0.01, 0.03], rtol=1e-12)
+    np.testing.assert_allclose(profile.energy_balance - on_grid.energy_balance, [0.01, 0.03])
+    assert full_profile(annulus_transmittance=None).transmittance is None
+
+
+def test_energy_balance_is_unknown_where_absorption_is():
+    profile = full_profile(absorbed=np.zeros((0, 2)))
+    assert np.isnan(profile.energy_balance).all()
+    assert_same(profile, Profile.read(io.BytesIO(contents(profile))))
+
+
 def test_density_is_energy_over_area():
     profile = make_profile([0.0, 1.0, 3.0], [[np.pi], [8 * np.pi]])
     np.testing.assert_allclose(profile.reflectance_per_mm2, [[1.0], [1.0]], rtol=1e-15)
@@ -179,6 +195,12 @@ def test_errors_of_sums_without_photons_or_with_one():
         ({"absorbed": [0.1, 0.2]}, "absorbed has shape (2,)"),
         ({"unfinished": [0.1, np.inf]}, "unfinished holds inf"),
         ({"annulus_transmittance": np.ones((3, 2))}, "annulus_transmittance has shape (3, 2)"),
+        ({"beyond_grid_transmittance": [1.0]}, "beyond_grid_transmittance has shape (1,)"),
+        ({"beyond_grid_transmittance": [1.0, np.nan]}, "beyond_grid_transmittance holds nan"),
+        (
+            {"annulus_transmittance": None, "beyond_grid_transmittance": [0.1, 0.1]},
+            "given without annulus_transmittance",
+        ),
         ({"meta": {}}, "meta has format None"),
         ({"meta": META | {"channels": ["R"]}}, "expected a list of 2 names"),
         ({"meta": META | {"photons": 0}}, "photons 0"),
@@ -194,14 +216,20 @@ def test_fields_that_do_not_fit_are_refused_in_one_line(changes, said):
 
 
 def test_records_can_be_copied_and_sent_to_other_processes():
-    profile = full_profile()
+    profile = full_profile(beyond_grid_transmittance=[0.01, 0.02])
     assert_same(profile, pickle.loads(pickle.dumps(profile)))
     assert_same(profile, copy.deepcopy(profile))
 
 
-@pytest.mark.parametrize("transmittance", [True, False])
-def test_files_hold_every_bit(tmp_path, transmittance):
-    changes = {} if transmittance else {"annulus_transmittance": None}
+@pytest.mark.parametrize(
+    ("changes", "n_arrays"),
+    [
+        ({"annulus_transmittance": None}, 9),
+        ({}, 10),  # as files were before beyond_grid_transmittance
+        ({"beyond_grid_transmittance": [0.01, 0.02]}, 11),
+    ],
+)
+def test_files_hold_every_bit(tmp_path, changes, n_arrays):
     profile = full_profile(**changes)
     path = tmp_path / "skin1.profile.npz"
     profile.save(path)
@@ -209,7 +237,7 @@ def test_files_hold_every_bit(tmp_path, transmittance):
     with np.load(path, allow_pickle=False) as arrays:  # as anyone would without this package
         np.testing.assert_array_equal(arrays["annulus_energy"], profile.annulus_energy)
         assert json.loads(str(arrays["meta"])) == META
-        assert len(arrays.files) == 10 if transmittance else 9
+        assert len(arrays.files) == n_arrays
 
 
 def test_same_content_gives_same_bytes(tmp_path):

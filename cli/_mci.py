@@ -1,0 +1,46 @@
+"""MCML input files as a material of ``sssfit simulate``: one walk, and one profile, a run."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+if TYPE_CHECKING:
+    from sssfit.material import Material
+
+
+def is_mci(name: str | None) -> bool:
+    """Whether a name given for a material means an MCML input file."""
+    return name is not None and name.lower().endswith(".mci")
+
+
+def load_runs(
+    path: str, number: int | None, given: dict[str, Any]
+) -> tuple[list[Material], list[dict[str, Any]]]:
+    """Return the materials of the runs of a file, or of one, and what to trace each with.
+
+    ``given`` holds photons, dr_mm and radius_mm as the options have them; the file's own stand for
+    those that were not given.
+    """
+    from sssfit.errors import MaterialError
+    from sssfit.mci import load_mci
+
+    runs = load_mci(path)
+    if number is not None:
+        if number > len(runs):
+            raise MaterialError(f"{path} has {len(runs)} runs; --run {number} is none of them.")
+        runs = runs[number - 1 : number]
+    photons_source = click.get_current_context().get_parameter_source("photons")
+    settings = [
+        {
+            "photons": run.photons
+            if photons_source is ParameterSource.DEFAULT
+            else given["photons"],
+            "dr_mm": given["dr_mm"] or run.grid.dr_mm,
+            "radius_mm": given["radius_mm"] or run.grid.radius_mm,
+        }
+        for run in runs
+    ]
+    return [run.material for run in runs], settings

@@ -1,0 +1,176 @@
+"""``sssfit import``: a profile from another program's file."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ._options import Common, common_options
+from ._report import finish, table
+
+if TYPE_CHECKING:
+    from sssfit.profile import Profile
+
+_DEFAULT_CHANNELS = {1: "mono", 3: "R,G,B"}
+
+
+@click.command("import")
+@click.argument("files", nargs=-1, required=True, metavar="FILE...")
+@click.option(
+    "--quantity",
+    type=click.Choice(["density", "energy"]),
+    help="What the numbers of a CSV are.  [default: what its own comment says]",
+)
+@click.option(
+    "--channels",
+    metavar="A,B,...",
+    help="Names for several .mco, in their order.  [default: R,G,B for three]",
+)
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    help="Where the profile goes, - for stdout.  [default: NAME.profile.npz]",
+)
+@click.option("--force", is_flag=True, help="Replace a file that is not a profile.")
+@common_options
+def import_(
+    files: tuple[str, ...],
+    quantity: str | None,
+    channels: str | None,
+    output: str | None,
+    force: bool,
+    common: Common,
+) -> None:
+    """Make a profile of FILE: a table (CSV), or what MCML wrote (.mco, ASCII); - for stdin.
+
+    A CSV has a header with r_mm (radii in mm, of any spacing) and one column a channel;
+    X_stderr holds standard errors of X, and lines that begin with # are comments.
+
+    \b
+      density: R_d in 1/mm^2 at the radius r_mm; annuli meet half-way between radii
+      energy:  share of the light that leaves in the annulus whose OUTER edge is r_mm;
+               a last line with r_mm = inf is what leaves beyond
+
+    An .mco is one channel, in cm, without standard errors; several of one grid become the channels
+    of one profile. Their last bin, where MCML counts all beyond, becomes the energy beyond the
+    grid.
+
+    \b
+      sssfit import profile.csv --quantity density
+      sssfit import skin.mco -o skin.profile.npz
+      sssfit import r.mco g.mco b.mco --channels R,G,B -o skin.profile.npz
+    """
+    if len(files) > 1 and output is None:
+        raise click.UsageError("name the profile of several files with -o.")
+    profile = _read(files, quantity, channels)
+    path = _target(files[0], output)
+    _write(profile, path, force=force)
+    figures = {"command": "import", "output": [str(path or "-")], **_figures(profile)}
+    wrote = f"Wrote {path or 'the profile to stdout'}"
+    finish(common, figures, f"{_text(profile)}\n{wrote}", to_stderr=path is None)
+
+
+def _read(files: tuple[str, ...], quantity: str | None, channels: str | None) -> Profile:
+    """Tell the formats apart by what the files hold, and read them."""
+    from sssfit.errors import ProfileError
+    from sssfit.mco import is_mco, join_channels, parse_mco
+    from sssfit.profile_csv import parse_csv
+    from sssfit.text import read_text
+
+    origins = ["stdin" if name == "-" else name for name in files]
+    texts = [
+        read_text(
+            sys.stdin.buffer if name == "-" else name,
+            origin,
+            expected="a CSV or MCML's output in ASCII",
+            error=ProfileError,
+        )
+        for name, origin in zip(files, origins, strict=True)
+    ]
+    tables = [origin for origin, text in zip(origins, texts, strict=True) if not is_mco(text)]
+    if not tables:
+        if quantity is not None:
+            raise click.UsageError("--quantity is for a CSV; an .mco says itself what it holds.")
+        profiles = [parse_mco(*each) for each in zip(texts, origins, strict=True)]
+        return join_channels(profiles, _names(len(files), channels))
+    if len(files) > 1:
+        raise ProfileError(f"{tables[0]} is no .mco; a CSV is imported alone, with all channels.")
+    if channels is not None:
+        raise click.UsageError("--channels is for .mco files; a CSV has names in its header.")
+    return parse_csv(texts[0], origins[0], quantity=quantity)
+
+
+def _names(count: int, channels: str | None) -> list[str]:
+    """Names of the channels of so many .mco files."""
+    given = _DEFAULT_CHANNELS.get(count) if channels is None else channels
+    if given is None:
+        raise click.UsageError(f"give --channels with {count} names, one for each .mco.")
+    return [name.strip() for name in given.split(",")]
+
+
+def _target(name: str, output: str | None) -> Path | None:
+    """Where the profile goes; None is stdout. By default the current folder, the same name."""
+    if output is not None:
+        return None if output == "-" else Path(output)
+    return Path(f"{'stdin' if name == '-' else Path(name).stem}.profile.npz")
+
+
+def _write(profile: Profile, path: Path | None, *, force: bool) -> None:
+    """To the file, whole or not at all; to stdout where there is none."""
+    from sssfit.files import check_output, locked
+    from sssfit.profile import is_profile_file
+
+    if path is None:
+        profile.write(sys.stdout.buffer)
+        sys.stdout.buffer.flush()
+        return
+    check_output(path, is_profile_file, force=force)
+    with locked(path):
+        profile.save(path)
+
+
+def _figures(profile: Profile) -> dict[str, Any]:
+    """Figures of the profile, as ``--json`` prints them; null where the files do not say."""
+    material = profile.meta["material"]
+    return {
+        "source": profile.meta["source"],
+        "material": material and material["name"],
+        "method": profile.meta["method"],
+        "channels": list(profile.channels),
+        "annuli": profile.n_annuli,
+        "radius_mm": float(profile.r_edges_mm[-1]),
+        "diffuse_reflectance": profile.diffuse_reflectance,
+        "diffuse_reflectance_stderr": profile.diffuse_reflectance_stderr,
+        "specular_reflectance": profile.specular_reflectance,
+        "beyond_grid": profile.beyond_grid,
+        "transmittance": profile.transmittance,
+        "energy_balance": profile.energy_balance,
+        "photons": profile.photons,
+    }
+
+
+def _text(profile: Profile) -> str:
+    """Write the same for people: one line a channel."""
+    import numpy as np
+
+    stderr = profile.diffuse_reflectance_stderr
+    transmitted = profile.transmittance
+    rows = [
+        [
+            name,
+            f"{profile.diffuse_reflectance[c]:.6f}",
+            "-" if np.isnan(stderr[c]) else f"{stderr[c]:.6f}",
+            f"{profile.beyond_grid[c]:.6f}",
+            *([] if transmitted is None else [f"{transmitted[c]:.6f}"]),
+        ]
+        for c, name in enumerate(profile.channels)
+    ]
+    heads = ["channel", "diffuse reflectance", "std. error", "beyond grid"]
+    heads += [] if transmitted is None else ["transmittance"]
+    radius_mm = profile.r_edges_mm[-1]
+    grid = f"{profile.meta['source']}: {profile.n_annuli} annuli, to {radius_mm:.4g} mm"
+    return f"{grid}\n{table(heads, rows)}"
