@@ -28,8 +28,10 @@ def checked(given: Mapping[str, Any]) -> dict[str, Any]:
     for name, shape in _expected_shapes(fields).items():
         if fields[name] is not None:
             _check_values(name, fields[name], shape)
-    if fields["annulus_transmittance"] is None and fields["beyond_grid_transmittance"] is not None:
-        raise ProfileError("beyond_grid_transmittance is given without annulus_transmittance.")
+    if fields["annulus_transmittance"] is None:
+        for name in OPTIONAL:
+            if fields[name] is not None:
+                raise ProfileError(f"{name} is given without annulus_transmittance.")
     fields["specular_reflectance"] = float(fields["specular_reflectance"])
     fields["meta"] = _read_only_meta(given["meta"])
     _check_meta(fields["meta"], energy.shape[1])
@@ -44,9 +46,11 @@ def _expected_shapes(fields: Mapping[str, FloatArray]) -> dict[str, tuple[int, .
         "annulus_energy": per_annulus,
         "annulus_energy_stderr": per_annulus,
         "annulus_transmittance": per_annulus,
+        "annulus_transmittance_stderr": per_annulus,
         "beyond_grid": per_channel,
         "beyond_grid_stderr": per_channel,
         "beyond_grid_transmittance": per_channel,
+        "beyond_grid_transmittance_stderr": per_channel,
         "unfinished": per_channel,
         "absorbed": layers + per_channel,
         "specular_reflectance": (),

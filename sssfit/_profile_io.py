@@ -31,7 +31,12 @@ REQUIRED = (
     "absorbed",
     "unfinished",
 )
-OPTIONAL = ("annulus_transmittance", "beyond_grid_transmittance")
+OPTIONAL = (
+    "annulus_transmittance",
+    "beyond_grid_transmittance",
+    "annulus_transmittance_stderr",
+    "beyond_grid_transmittance_stderr",
+)
 
 # The largest profile of the paper's materials is 0.3 MB; 2 GB is a zip bomb or somebody else's.
 _LARGEST_FILE_BYTES = 2_000_000_000

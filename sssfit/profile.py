@@ -57,6 +57,9 @@ class Profile:
     beyond_grid_transmittance : array (C,) [1] or None
         Energy that leaves through the bottom beyond the last edge; None where
         ``annulus_transmittance`` is, or where it is not known.
+    annulus_transmittance_stderr : array (n, C) [1] or None
+    beyond_grid_transmittance_stderr : array (C,) [1] or None
+        Standard errors of the two.
 
     Raises
     ------
@@ -75,6 +78,8 @@ class Profile:
     annulus_transmittance: FloatArray | None
     meta: Mapping[str, Any]
     beyond_grid_transmittance: FloatArray | None = None
+    annulus_transmittance_stderr: FloatArray | None = None
+    beyond_grid_transmittance_stderr: FloatArray | None = None
 
     def __post_init__(self) -> None:
         given = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
@@ -136,6 +141,19 @@ class Profile:
         total: FloatArray = self.annulus_transmittance.sum(axis=0)
         beyond = self.beyond_grid_transmittance
         return total if beyond is None else total + beyond
+
+    @property
+    def transmittance_stderr(self) -> FloatArray | None:
+        """Standard error of `transmittance` (C,), or None; as `diffuse_reflectance_stderr`."""
+        on_grid, beyond = self.annulus_transmittance_stderr, self.beyond_grid_transmittance_stderr
+        if self.annulus_transmittance is None or on_grid is None or beyond is None:
+            return None
+        energy = self.annulus_transmittance
+        if self.beyond_grid_transmittance is not None:
+            energy = np.vstack((energy, self.beyond_grid_transmittance))
+            on_grid = np.vstack((on_grid, beyond))
+        of_total: FloatArray = _stderr_of_sums(energy, on_grid, self.photons)[-1]
+        return of_total
 
     @property
     def energy_balance(self) -> FloatArray:

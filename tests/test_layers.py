@@ -42,13 +42,9 @@ def stack(*layers, above=1.0, below=1.0):
 
 
 def totals(profile):
-    """Diffuse reflectance and transmittance of channel 0 with standard errors.
-
-    Transmitted weights lie between 0 and 1: their mean bounds the variance (Bernoulli).
-    """
+    """Diffuse reflectance and transmittance of channel 0 with standard errors."""
     r, r_error = profile.diffuse_reflectance[0], profile.diffuse_reflectance_stderr[0]
-    t = 0.0 if profile.transmittance is None else profile.transmittance[0]
-    return r, r_error, t, math.sqrt(max(t, 1e-9) / profile.photons)
+    return r, r_error, profile.transmittance[0], profile.transmittance_stderr[0]
 
 
 def walk_totals(task):
@@ -379,6 +375,18 @@ def test_unfinished_walks_are_kept_apart_in_layers_too():
         profile = simulate_montecarlo(material, photons=10_000, dr_mm=0.1, radius_mm=10.0)
     assert profile.unfinished[0] > 0.0
     assert_energy_conserved(profile)
+
+
+def test_transmittance_has_an_honest_error():
+    slab = stack(layer(0.2, 3.0, 0.5, 1.4, 1.0))
+    runs = [
+        simulate_montecarlo(slab, photons=1000, seed=k, dr_mm=0.5, radius_mm=2.0, threads=1)
+        for k in range(300)
+    ]
+    spread = np.std([each.transmittance[0] for each in runs], ddof=1)
+    claimed = math.sqrt(np.mean([each.transmittance_stderr[0] ** 2 for each in runs]))
+    # a standard deviation from 300 normal draws has a relative standard error of sqrt(1/598)
+    assert abs(spread / claimed - 1.0) < LIMIT * math.sqrt(1.0 / 598.0)
 
 
 def test_auto_radius_counts_what_a_slab_transmits():

@@ -270,9 +270,6 @@ def _profile(task: Walk, tally: Tally, index: int, *, trim: bool) -> Profile:
     if trim:
         sums = _trimmed(sums)
     energy, stderr = (entering * each for each in _mean_and_error(sums.reflected, sums.photons))
-    through = None
-    if sums.transmitted is not None:
-        through = entering * sums.transmitted[..., 0] / sums.photons
     _, balance_error = _mean_and_error(sums.roulette, sums.photons)
     profile = Profile(
         r_edges_mm=grid.r_edges_mm[: len(energy)],
@@ -283,8 +280,7 @@ def _profile(task: Walk, tally: Tally, index: int, *, trim: bool) -> Profile:
         specular_reflectance=material.specular_reflectance,
         absorbed=entering * sums.absorbed / sums.photons,
         unfinished=entering * sums.unfinished[:, 0] / sums.photons,
-        annulus_transmittance=None if through is None else through[:-1],
-        beyond_grid_transmittance=None if through is None else through[-1],
+        annulus_transmittance=None,
         meta={
             "format": "sssfit.profile/1",
             "method": "montecarlo",
@@ -299,7 +295,16 @@ def _profile(task: Walk, tally: Tally, index: int, *, trim: bool) -> Profile:
         },
     )
     _warn_unfinished(material, profile)
-    return profile
+    if sums.transmitted is None:
+        return profile
+    energy, stderr = (entering * each for each in _mean_and_error(sums.transmitted, sums.photons))
+    return replace(
+        profile,
+        annulus_transmittance=energy[:-1],
+        annulus_transmittance_stderr=stderr[:-1],
+        beyond_grid_transmittance=energy[-1],
+        beyond_grid_transmittance_stderr=stderr[-1],
+    )
 
 
 def _warn_unfinished(material: Material, profile: Profile) -> None:
