@@ -24,7 +24,9 @@ def chart_format(target: str | Path | BinaryIO) -> str:
 def known_format(name: str, origin: str) -> str:
     """Return the format in lower case, or refuse it with a line that begins with ``origin``."""
     if (chosen := name.lower()) not in FORMATS:
-        raise FileError(f"{origin}: charts are PNG, SVG or PDF; end the name in .png, .svg or .pdf.")
+        raise FileError(
+            f"{origin}: charts are PNG, SVG or PDF; end the name in .png, .svg or .pdf."
+        )
     return chosen
 
 
