@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from ._options import Common, Count, Length, common_options
-from ._report import say
-from ._simulate_report import figures_of, report
+from ._options import Common, Count, Length, Share, common_options
+from ._simulate_run import Request, run_walks
 
 if TYPE_CHECKING:
     from sssfit.material import Material
-    from sssfit.profile import Profile
 
 
 class Radius(Length):
@@ -33,10 +30,16 @@ class Radius(Length):
 @click.option(
     "--photons",
     type=Count(2, 10**12),
-    default="1e7",
-    show_default=True,
     metavar="N",
-    help="Photons to trace; every photon serves all channels.",
+    help="Photons to trace; every photon serves all channels."
+    "  [default: 1e7; with --target-error no limit]",
+)
+@click.option(
+    "--target-error",
+    type=Share(),
+    metavar="SHARE",
+    help="End when no channel's F(r) has a standard error above this share of F at the last edge, "
+    "such as 0.5%.",
 )
 @click.option("--dr", type=Length(), metavar="MM", help="Annulus width.  [default: MFP_min / 20]")
 @click.option(
@@ -53,15 +56,27 @@ class Radius(Length):
     help="Where the profile goes, - for stdout; with --all a folder."
     "  [default: MATERIAL.profile.npz]",
 )
+@click.option(
+    "--checkpoint-every",
+    type=click.FloatRange(min=0),
+    default=30.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="How often FILE.checkpoint is saved, from which --resume goes on.",
+)
+@click.option("--resume", is_flag=True, help="Go on where a killed or interrupted run was saved.")
 @click.option("--force", is_flag=True, help="Replace a file that is not a profile.")
 @common_options
 def simulate(
     material: str | None,
     every: bool,
-    photons: int,
+    photons: int | None,
+    target_error: float | None,
     dr: float | None,
     radius: float | str | None,
     output: str | None,
+    checkpoint_every: float,
+    resume: bool,
     force: bool,
     common: Common,
 ) -> None:
@@ -69,12 +84,15 @@ def simulate(
 
     MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or - for stdin.
     The profile is R_d(r) per channel as energy in annuli with standard errors, for a normally
-    incident pencil beam, in mm. Ctrl-C saves what is done, with its true photon count.
+    incident pencil beam, in mm. Ctrl-C saves what is done, with its true photon count; --resume
+    goes on from there, or from the last checkpoint of a run that was killed, and ends in the same
+    bits as a run that was left alone.
 
     \b
       sssfit simulate skin1
       sssfit simulate skin1 --photons 1e8 --radius auto -o fine.profile.npz
       sssfit simulate ./wax.toml --json
+      sssfit simulate skin1 --target-error 0.1% --resume
     """
     if (material is None) != every:
         raise click.UsageError("name one MATERIAL, or give --all.")
@@ -83,8 +101,17 @@ def simulate(
     names = material_names() if every else (material or "",)
     materials = [load_material(name) for name in names]
     targets = _targets(materials, output, every)
-    settings = {"photons": photons, "dr_mm": dr, "radius_mm": radius}
-    _run(materials, targets, settings, force=force, every=every, common=common)
+    if resume and targets == [None]:
+        raise click.UsageError("--resume needs a file to go on beside; leave -o - out.")
+    settings = {
+        "photons": photons,
+        "target_error": target_error,
+        "dr_mm": dr,
+        "radius_mm": radius,
+        "seed": common.seed,
+    }
+    request = Request(settings, checkpoint_every, resume, force, every, common)
+    run_walks(materials, targets, request)
 
 
 def _targets(materials: list[Material], output: str | None, every: bool) -> list[Path | None]:
@@ -97,86 +124,3 @@ def _targets(materials: list[Material], output: str | None, every: bool) -> list
         folder = Path(output or ".")
         return [folder / f"{each.name}.profile.npz" for each in materials]
     return [Path(output)]
-
-
-def _run(
-    materials: list[Material],
-    targets: list[Path | None],
-    settings: dict[str, Any],
-    *,
-    force: bool,
-    every: bool,
-    common: Common,
-) -> None:
-    """Walk, write each profile as its walk ends, and report."""
-    from contextlib import ExitStack
-
-    from sssfit.errors import StoppedError
-    from sssfit.files import check_output, locked
-    from sssfit.profile import is_profile_file
-
-    from ._interrupt import asked_to_stop
-
-    rows: dict[int, dict[str, Any]] = {}
-    with ExitStack() as held:
-        for path in filter(None, targets):
-            check_output(path, is_profile_file, force=force)
-            held.enter_context(locked(path))
-        stop = held.enter_context(asked_to_stop())
-        for group in _by_eta(materials):
-            try:
-                profiles, seconds = _walk([materials[k] for k in group], settings, stop, common)
-            except StoppedError:
-                break
-            for k, profile in zip(group, profiles, strict=True):
-                _write(profile, targets[k])
-                rows[k] = figures_of(profile, seconds) | {"path": str(targets[k] or "-")}
-        interrupted = stop()
-    if not rows:
-        raise KeyboardInterrupt
-    report([rows[k] for k in sorted(rows)], every=every, common=common, interrupted=interrupted)
-    if interrupted:
-        sys.exit(130)
-
-
-def _by_eta(materials: list[Material]) -> list[list[int]]:
-    """Return the indices of the materials that can share a walk: one relative index a group."""
-    groups: dict[float, list[int]] = {}
-    for k, material in enumerate(materials):
-        groups.setdefault(material.layers[0].eta / material.eta_above, []).append(k)
-    return list(groups.values())
-
-
-def _walk(
-    materials: list[Material], settings: dict[str, Any], stop: Any, common: Common
-) -> tuple[list[Profile], float]:
-    """One walk for all ``materials``, with a progress bar; the profiles and the wall time."""
-    from time import perf_counter
-
-    from sssfit.simulate import compiled_before, simulate_montecarlo_many
-
-    from ._progress import walk_progress
-
-    if not compiled_before():
-        say(common, "First use: compiling the photon walk, some 10 s; it is kept for later runs.")
-    label = materials[0].name if len(materials) == 1 else f"{len(materials)} materials"
-    begun = perf_counter()
-    with walk_progress(label, quiet=common.quiet) as progress:
-        profiles = simulate_montecarlo_many(
-            materials,
-            seed=common.seed,
-            threads=common.threads,
-            progress=progress,
-            stop=stop,
-            **settings,
-        )
-    return profiles, perf_counter() - begun
-
-
-def _write(profile: Profile, path: Path | None) -> None:
-    """To the file, whole or not at all; to stdout where there is none."""
-    if path is None:
-        profile.write(sys.stdout.buffer)
-        sys.stdout.buffer.flush()
-    else:
-        profile.save(path)

@@ -2,11 +2,7 @@
 
 import math
 import os
-from collections import deque
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
-from time import perf_counter
 
 import numpy as np
 import numpy.typing as npt
@@ -22,21 +18,6 @@ FloatArray = npt.NDArray[np.float64]
 BATCH_PHOTONS = 16_384
 ROULETTE_THRESHOLD = 1e-4  # MCML's; of the largest channel's weight
 ROULETTE_LEVELS = 30  # one walk in 1e30 survives so many
-REPORT_SECONDS = 0.1
-
-
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """How far a walk has come: photons done of all, seconds, and the relative error so far.
-
-    ``relative_error`` is the largest standard error of F over all annulus edges, as a share of F
-    at the last edge, of the worst channel; infinite until every channel has energy on its grid.
-    """
-
-    photons_done: int
-    photons: int
-    seconds: float
-    relative_error: float
 
 
 @dataclass(slots=True)
@@ -106,61 +87,24 @@ class Walk:
         return slice(first, first + int(self.channels.last_bin[channel]) + 1)
 
 
-def run(
-    task: Walk,
-    threads: int,
-    progress: Callable[[Progress], None] | None,
-    stop: Callable[[], bool] | None,
-) -> Tally:
-    """Walk all batches on ``threads`` threads; end early, in order, once ``stop`` says so."""
-    total = task.empty_tally()
-    begun = reported = perf_counter()
-    for tally in _in_order(task, threads, stop):
-        total.add(tally)
-        now = perf_counter()
-        if progress and (now - reported > REPORT_SECONDS or total.photons == task.photons):
-            reported = now
-            progress(
-                Progress(total.photons, task.photons, now - begun, relative_error(task, total))
-            )
-    return total
+def relative_errors(task: Walk, tally: Tally) -> FloatArray:
+    """Largest standard error of F over the annulus edges / F at the last, per channel (C,).
 
-
-def _in_order(task: Walk, threads: int, stop: Callable[[], bool] | None) -> Iterator[Tally]:
-    """Tallies of batch 0, 1, 2 ... while a few more are on their way in other threads."""
-    batches = iter(range(-(-task.photons // BATCH_PHOTONS)))
-    pending: deque[Future[Tally]] = deque()
-    with ThreadPoolExecutor(threads, thread_name_prefix="sssfit-walk") as pool:
-        try:
-            stopped = False
-            while True:
-                stopped = stopped or (stop is not None and stop())
-                # Two a thread keep every core busy and bound the memory, whatever the photons.
-                while not stopped and len(pending) < 2 * threads:
-                    batch = next(batches, None)
-                    if batch is None:
-                        break
-                    pending.append(pool.submit(task.trace, batch))
-                if not pending:
-                    return
-                yield pending.popleft().result()
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
-
-
-def relative_error(task: Walk, tally: Tally) -> float:
-    """Largest standard error of F over the annulus edges / F at the last, of the worst channel."""
-    worst = 0.0
-    for channel in range(task.channels.last_bin.size):
+    Infinite where nothing has come back within the grid; 0 where sigma_s = 0 and nothing can.
+    """
+    errors = np.zeros(task.channels.last_bin.size)
+    for channel in range(errors.size):
+        if task.channels.power_low[1, channel] == 0.0:
+            continue
         sums = np.cumsum(tally.ledger.bins[task.cells(channel)][:-1], axis=0)
         energy, squares = sums.T / tally.photons
-        if task.channels.power_low[1, channel] == 0.0:
-            continue  # sigma_s = 0: nothing comes back, without error
         if energy[-1] == 0.0 or tally.photons < 2:
-            return math.inf
-        variance = np.max(squares - energy**2) / (tally.photons - 1)
-        worst = max(worst, math.sqrt(variance) / float(energy[-1]))
-    return worst
+            errors[channel] = math.inf
+            continue
+        # Rounding may leave -1e-17 where all photons carry the same weight.
+        variance = max(0.0, float(np.max(squares - energy**2))) / (tally.photons - 1)
+        errors[channel] = math.sqrt(variance) / float(energy[-1])
+    return errors
 
 
 def relative_eta(material: Material) -> float:
