@@ -455,6 +455,7 @@ class Killer:
     def __init__(self, arguments, seconds, chance, cache=None):
         self.arguments, self.seconds, self.chance, self.cache = arguments, seconds, chance, cache
         self.hits = dict.fromkeys(("by the clock", "in a checkpoint", "in a profile"), 0)
+        self.half_written = 0
 
     def start(self, folder):
         environment = {"NUMBA_CACHE_DIR": str(self.cache)} if self.cache else {}
@@ -475,6 +476,7 @@ class Killer:
         assert "Error" not in err
         killed = process.returncode != 0
         self.hits[moment] += killed
+        self.half_written += any(each.endswith(".tmp") for each in names(folder))
         return killed
 
     def wait_for_write(self, folder, start_of_name, process):
@@ -550,7 +552,8 @@ def test_killed_a_hundred_times_and_resumed(tmp_path, undisturbed):
             shutil.rmtree(cold.cache)
         cold.finish(folder)
         assert (folder / PROFILE).read_bytes() == whole
-    print(killer.hits)
+    assert killer.half_written > 5  # else no kill fell into a write
+    print(killer.hits, killer.half_written, "half-written files")
 
 
 @posix
