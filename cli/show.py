@@ -174,7 +174,7 @@ def _energies(figures: dict[str, Any]) -> str:
         row = [
             name,
             f"{diffuse:.6f}",
-            f"{figures['diffuse_reflectance_stderr'][c]:.1e}",
+            _error(figures["diffuse_reflectance_stderr"][c]),
             f"{beyond:.2e}",
             f"{100.0 * beyond / diffuse:.3f} %" if diffuse > 0 else "-",
             f"{figures['absorbed'][c]:.6f}",
@@ -183,6 +183,10 @@ def _energies(figures: dict[str, Any]) -> str:
         row += [f"{figures['unfinished'][c]:.1e}", _balance(figures, c)]
         rows.append(row)
     return "\n" + table([*head, *columns], rows)
+
+
+def _error(stderr: float) -> str:
+    return "-" if stderr != stderr else f"{stderr:.1e}"  # NaN: none
 
 
 def _balance(figures: dict[str, Any], channel: int) -> str:

@@ -21,16 +21,17 @@ FloatArray = npt.NDArray[np.float64]
 # 100 hits of equal weight have a standard error of 10 %: a tenth of the 2.3 that make a decade.
 LEAST_HITS = 100
 # No bin is narrower than 1/40 of its radius: over that R_d falls by under 10 % out to 4 decay
-# lengths, and 1237 annuli become 130 steps without a visible change of the curve.
+# lengths, and 1236 annuli become 163 steps without a visible change of the curve.
 _RADII_PER_WIDTH = 40
 _WIDENING = 1.25
 # An exponential tail of equally full bins widens by under 1.7 a bin until it runs out of photons;
 # what then reaches 100 hits spans decades. Up to 8 annuli the widths are luck, near the beam.
 _MOST_WIDENING = 2
 _WIDTH_OF_LUCK = 8
+
 _IMAGE_SHARE_COLOUR, _IMAGE_SHARE_GREY = 0.75, 0.95
-_IMAGE_ROWS, _IMAGE_COLUMNS = 201, 501  # wider than any panel; a pixel a row of 200 dpi has two
-_EXPOSED_AT = 0.35
+_IMAGE_ROWS, _IMAGE_COLUMNS = 201, 501  # wider than any panel, 130 an inch
+_EXPOSED_AT = 0.35  # of the half height
 _NOTHING = 1e-200  # 1/mm: stands for 0 under a logarithm
 
 
@@ -38,8 +39,8 @@ _NOTHING = 1e-200  # 1/mm: stands for 0 under a logarithm
 class Bins:
     """One channel's annuli, neighbours merged: edges (m+1,) [mm], energies and errors (m,) [1].
 
-    ``is_drawn`` (m,) is False for bins of fewer than 100 effective hits, or so much wider than the
-    one before that a mean over them says little.
+    ``is_drawn`` (m,) is False for the last bins where they hold fewer than 100 effective hits, or
+    are so much wider than the one before that a mean over them says little.
     """
 
     edges_mm: FloatArray
@@ -78,10 +79,9 @@ def merged(profile: Profile, channel: int) -> Bins:
     summed = np.add.reduceat(energy, cuts[:-1])
     summed_square = np.add.reduceat(mean_square, cuts[:-1])
     variance = np.maximum(summed_square - summed**2, 0.0) / (photons - 1)
-    widths = np.diff(cuts)
-    widest = np.maximum(_MOST_WIDENING * widths[:-1], _WIDTH_OF_LUCK)
-    is_drawn = effective_hits(summed, summed_square, photons) >= LEAST_HITS
-    is_drawn[1:] &= widths[1:] <= widest
+    is_full = effective_hits(summed, summed_square, photons) >= LEAST_HITS
+    n_drawn = int(np.max(np.flatnonzero(is_full & _is_in_step(cuts)), initial=-1)) + 1
+    is_drawn = np.arange(len(summed)) < n_drawn
     return Bins(profile.r_edges_mm[cuts], summed, np.sqrt(variance), is_drawn)
 
 
@@ -110,6 +110,13 @@ def _cuts(energy: FloatArray, mean_square: FloatArray, photons: int) -> list[int
     if len(cuts) > 2 and not is_full(cuts[-2], end) and end - cuts[-2] <= cuts[-2] - cuts[-3]:
         del cuts[-2]
     return cuts
+
+
+def _is_in_step(cuts: list[int]) -> npt.NDArray[np.bool_]:
+    """Whether each bin is not too wide after the one before it."""
+    widths = np.diff(cuts)
+    widest = np.maximum(_MOST_WIDENING * widths[:-1], _WIDTH_OF_LUCK)
+    return np.concatenate(([True], widths[1:] <= widest))
 
 
 def mean_free_paths_mm(profile: Profile) -> FloatArray | None:

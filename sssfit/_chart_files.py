@@ -17,16 +17,14 @@ def chart_format(target: str | Path | BinaryIO) -> str:
         The ending is another, or a stream has none.
     """
     if not isinstance(target, str | Path):
-        raise FileError(f"a stream has no ending; give its format as one of {', '.join(FORMATS)}.")
+        raise FileError(f"a stream has no ending; name one of {', '.join(FORMATS)}.")
     return known_format(Path(target).suffix.removeprefix("."), str(target))
 
 
 def known_format(name: str, origin: str) -> str:
     """Return the format in lower case, or refuse it with a line that begins with ``origin``."""
     if (chosen := name.lower()) not in FORMATS:
-        raise FileError(
-            f"{origin}: charts are PNG, SVG or PDF; end the name in .png, .svg or .pdf."
-        )
+        raise FileError(f"{origin}: charts are PNG, SVG or PDF; end it in .png, .svg or .pdf.")
     return chosen
 
 

@@ -5,9 +5,10 @@ from typing import Any
 Style = dict[str, Any]
 
 WIDTH_INCHES, HEIGHT_INCHES, DPI = 8.0, 6.0, 200  # 1600 x 1200 pixels
-LEFT, RIGHT = 0.085, 0.98  # of the width
+LEFT, RIGHT = 0.092, 0.982  # of the width
 ROW_GAP_INCHES = 0.66
 FONT = "DejaVu Sans"  # comes with matplotlib: the same glyphs on every machine
+LINE_WIDTH = 1.1  # points
 RC: Style = {
     "font.family": [FONT],
     "font.size": 8.5,
@@ -21,7 +22,7 @@ RC: Style = {
     "grid.color": "#dddddd",
     "grid.linewidth": 0.4,
     "legend.frameon": False,
-    "lines.linewidth": 1.2,
+    "lines.linewidth": LINE_WIDTH,
     "pdf.fonttype": 42,
     "svg.hashsalt": "sssfit",
     "xtick.labelsize": 7.5,

@@ -1,7 +1,6 @@
 """What a chart says about a profile in words and numbers."""
 
 import math
-import textwrap
 
 import numpy as np
 
@@ -9,20 +8,21 @@ from sssfit._chart_data import LEAST_HITS, FloatArray, Picture, material_of
 from sssfit.profile import Profile
 
 _METHODS = {"montecarlo": "Monte Carlo"}
-_LONGEST_NAME = 16
 _MOST_IN_LEGEND = 8
-_FOOTNOTE_LETTERS = 132
 _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def title(profile: Profile) -> str:
     """Name the material."""
     material = material_of(profile)
-    return (
-        f"{material.name}: diffuse reflectance profile"
-        if material
-        else "Diffuse reflectance profile"
-    )
+    what = "diffuse reflectance profile"
+    return f"{shortened(material.name, 24)}: {what}" if material else what.capitalize()
+
+
+def legend_title(profile: Profile) -> str:
+    """Say what stands beside the channels."""
+    error = " ± standard error" if (profile.diffuse_reflectance_stderr > 0).any() else ""
+    return f"Total diffuse reflectance{error}"
 
 
 def subtitle(profile: Profile) -> str:
@@ -76,23 +76,26 @@ def with_error(value: float, stderr: float) -> str:
     return f"{value:.{decimals}f} ± {stderr:.{decimals}f}"
 
 
-def shortened(name: str) -> str:
+def shortened(name: str, longest: int = 12) -> str:
     """Keep a name from running out of its place."""
-    return name if len(name) <= _LONGEST_NAME else f"{name[: _LONGEST_NAME - 1]}…"
+    return name if len(name) <= longest else f"{name[: longest - 1]}…"
 
 
 def footnotes(profile: Profile, image: str) -> list[str]:
-    """Say what the curves leave out and what they and the ``image`` mean, in lines that fit."""
+    """Say what the curves leave out and what they and the ``image`` mean."""
     notes = [
         f"Beyond the grid (r > {profile.r_edges_mm[-1]:.4g} mm): {_beyond(profile)} of diffuse. "
         f"Specular reflectance ({profile.specular_reflectance:.4g}) is not included.",
     ]
     if profile.photons is not None:
         notes.append(
-            f"Steps: means over annuli merged to {LEAST_HITS} effective photons or more; a curve "
-            "ends where there are too few. Bands: ±1 standard error."
+            f"Steps: means over annuli merged to {LEAST_HITS} effective photons or more; curves "
+            "end where there are too few. Bands: ±1 standard error."
         )
-    return [line for note in (*notes, image) for line in textwrap.wrap(note, _FOOTNOTE_LETTERS)]
+    if profile.n_channels > _MOST_IN_LEGEND:
+        others = profile.n_channels - _MOST_IN_LEGEND
+        notes.append(f"Thin lines: the {others} channels not named above, without bands.")
+    return [*notes, image] if image else notes
 
 
 def image_note(profile: Profile, image: Picture) -> str:
@@ -114,7 +117,8 @@ def path_label(profile: Profile, paths_mm: FloatArray) -> str:
         f"{shortened(name)} {_digits(path_mm)}"
         for name, path_mm in zip(profile.channels, paths_mm, strict=True)
     )
-    return f"r (mean free paths: {lengths} mm)"
+    # 48 letters are as wide as the panel.
+    return f"r (mean free paths: {lengths} mm)" if len(lengths) <= 26 else "r (mean free paths)"
 
 
 def _beyond(profile: Profile) -> str:

@@ -1,0 +1,342 @@
+"""Charts: what is drawn is what the profile holds, nothing is cut off, same input same bytes."""
+
+import io
+import itertools
+import warnings
+
+import numpy as np
+import pytest
+from matplotlib.colors import to_hex
+from matplotlib.figure import Figure
+from matplotlib.patches import StepPatch
+from matplotlib.text import Text
+
+from sssfit._chart_data import LEAST_HITS, effective_hits, merged, picture
+from sssfit._chart_text import count, shortened, with_error
+from sssfit.chart import FORMATS, chart_format, is_chart_file, profile_figure, save_figure
+from sssfit.errors import FileError
+from sssfit.material import Layer, Material, load_material
+from sssfit.profile import Profile
+from sssfit.simulate import simulate_montecarlo
+
+SIGNATURES = {"png": b"\x89PNG\r\n\x1a\n", "svg": b"<?xml", "pdf": b"%PDF-"}
+
+
+def hand_made(energy, r_edges_mm=None, **meta):
+    """A profile without photons, errors or a material, as imports are."""
+    energy = np.asarray(energy, dtype=float)
+    n, channels = energy.shape
+    return Profile(
+        r_edges_mm=np.linspace(0.0, 20.0, n + 1) if r_edges_mm is None else r_edges_mm,
+        annulus_energy=energy,
+        annulus_energy_stderr=np.full((n, channels), np.nan),
+        beyond_grid=np.zeros(channels),
+        beyond_grid_stderr=np.full(channels, np.nan),
+        specular_reflectance=0.017,
+        absorbed=np.zeros((1, channels)),
+        unfinished=np.zeros(channels),
+        annulus_transmittance=None,
+        meta={
+            "format": "sssfit.profile/1",
+            "channels": [f"c{k}" for k in range(channels)],
+            "photons": None,
+        }
+        | meta,
+    )
+
+
+def exponential(channels, n=300):
+    """F = (1 - exp(-r / L)) / 2 with lengths from 0.5 to 3 mm."""
+    r = np.linspace(0.0, 20.0, n + 1)[:, None]
+    return np.diff(0.5 - 0.5 * np.exp(-r / np.linspace(0.5, 3.0, channels)), axis=0)
+
+
+def spectrum(names, name="spectrum"):
+    """A material of as many channels as names."""
+    sigma_a = np.geomspace(0.005, 0.5, len(names))
+    return Material(name, tuple(names), (Layer(1.3, 0.0, sigma_a, np.full(len(names), 0.9)),))
+
+
+@pytest.fixture(scope="module")
+def skin1():
+    return simulate_montecarlo(load_material("skin1"), photons=100_000)
+
+
+@pytest.fixture(scope="module")
+def skin1_figure(skin1):
+    return profile_figure(skin1)
+
+
+def steps(axes, *, filled):
+    """The curves of a panel, or its bands."""
+    return [each for each in axes.patches if isinstance(each, StepPatch) and each.fill == filled]
+
+
+def test_axes_carry_units(skin1_figure):
+    linear, logarithmic, unweighted, image = skin1_figure.axes
+    labels = [(axes.get_xlabel(), axes.get_ylabel()) for axes in (linear, logarithmic, image)]
+    weighted = r"$2\pi r\,R_d$ (1/mm)"
+    assert labels == [("r (mm)", weighted), ("r (mm)", weighted), ("x (mm)", "y (mm)")]
+    assert unweighted.get_xlabel() == "r (mean free paths: R 1.30, G 0.952, B 0.671 mm)"
+    assert unweighted.get_ylabel() == "$R_d$ (1/mm²)"
+    assert [axes.get_yscale() for axes in skin1_figure.axes] == ["linear", "log", "log", "linear"]
+
+
+def test_without_a_material_the_third_plot_is_in_mm_and_says_so():
+    axes = profile_figure(hand_made(exponential(3))).axes[2]
+    assert axes.get_xlabel() == "r (mm; no mean free paths known)"
+
+
+def test_channels_differ_in_dashes_and_colour(skin1_figure):
+    for axes in skin1_figure.axes[:3]:
+        curves = steps(axes, filled=False)
+        assert len({str(each.get_linestyle()) for each in curves}) == 3
+        colours = [to_hex(each.get_edgecolor()) for each in curves]
+        assert colours == ["#d55e00", "#009e73", "#0072b2"]
+
+
+@pytest.mark.parametrize("n_channels", [5, 64])
+def test_neighbours_among_many_channels_differ_in_dashes(n_channels):
+    legend = profile_figure(hand_made(exponential(n_channels, n=20))).legends[0]
+    styles = [(str(each.get_linestyle()), to_hex(each.get_color())) for each in legend.get_lines()]
+    assert len(set(styles)) == len(styles) == min(n_channels, 8)
+
+
+def test_title_and_caption_say_where_the_profile_comes_from(skin1):
+    texts = " ".join(each.get_text() for each in profile_figure(skin1).texts)
+    for words in (
+        "skin1: diffuse reflectance profile",
+        "Monte Carlo · 10⁵ photons, seed 1",
+        "Beyond the grid (r > ",
+        "Specular reflectance (0.01701) is not included.",
+        "Bands: ±1 standard error.",
+        "tone curve x/(1 + x)",
+    ):
+        assert words in texts
+
+
+def test_light_beyond_the_grid_is_in_the_caption():
+    profile = simulate_montecarlo(load_material("wholemilk"), photons=20_000)
+    share = 100 * profile.beyond_grid / profile.diffuse_reflectance
+    texts = " ".join(each.get_text() for each in profile_figure(profile).texts)
+    assert f"R {share[0]:.2g} %, G {share[1]:.2g} %, B {share[2]:.2g} % of diffuse" in texts
+    assert share[0] > 2
+
+
+def test_legend_gives_totals_with_errors(skin1, skin1_figure):
+    labels = [each.get_text() for each in skin1_figure.legends[0].get_texts()]
+    total, stderr = skin1.diffuse_reflectance[0], skin1.diffuse_reflectance_stderr[0]
+    assert labels[0] == f"R  {total:.4f} ± {stderr:.4f}"
+
+
+def test_bands_reach_one_standard_error_either_way(skin1, skin1_figure):
+    for channel in range(3):
+        bins = merged(skin1, channel)
+        for axes, values in zip(
+            skin1_figure.axes[:3], (bins.per_mm(), bins.per_mm(), bins.per_mm2()), strict=True
+        ):
+            mean, stderr = values
+            drawn = np.isfinite(mean)
+            curve = steps(axes, filled=False)[channel].get_data()
+            band = steps(axes, filled=True)[channel].get_data()
+            np.testing.assert_array_equal(curve.values, mean)
+            np.testing.assert_array_equal(band.values[drawn], (mean + stderr)[drawn])
+            np.testing.assert_array_equal(band.baseline[drawn], (mean - stderr)[drawn])
+
+
+@pytest.mark.parametrize("channel", range(3))
+def test_merged_annuli_conserve_energy_and_hold_enough_hits(skin1, channel):
+    bins = merged(skin1, channel)
+    np.testing.assert_allclose(bins.energy.sum(), skin1.total_on_grid[channel], rtol=1e-13)
+    assert bins.edges_mm[0] == 0
+    assert bins.edges_mm[-1] == skin1.r_edges_mm[-1]
+    mean_square = (skin1.photons - 1) * bins.stderr**2 + bins.energy**2
+    hits = effective_hits(bins.energy, mean_square, skin1.photons)
+    assert (hits[bins.is_drawn] >= LEAST_HITS).all()
+    assert bins.is_drawn.sum() > 10
+    assert (np.diff(bins.is_drawn.astype(int)) <= 0).all()  # drawn to the end, no holes
+
+
+def test_bins_do_not_get_narrower_outwards(skin1):
+    widths = np.diff(merged(skin1, 0).edges_mm)
+    assert (np.diff(widths)[:-1] > -1e-9).all()  # the grid may cut the last one short
+
+
+def test_errors_of_merged_annuli_are_those_of_the_sum(skin1):
+    bins = merged(skin1, 1)
+    cumulative = np.cumsum(bins.energy)
+    mean_square = np.cumsum((skin1.photons - 1) * bins.stderr**2 + bins.energy**2)
+    stderr = np.sqrt((mean_square - cumulative**2) / (skin1.photons - 1))
+    at = np.searchsorted(skin1.r_edges_mm, bins.edges_mm[1:])
+    np.testing.assert_allclose(stderr, skin1.cumulative_stderr[at, 1], rtol=1e-9)
+
+
+def test_more_photons_shrink_the_bins(skin1):
+    few = simulate_montecarlo(load_material("skin1"), photons=2000)
+    assert len(merged(few, 0).energy) < len(merged(skin1, 0).energy)
+
+
+def test_without_photons_nothing_is_merged_and_nothing_banded():
+    profile = hand_made(exponential(2))
+    bins = merged(profile, 0)
+    np.testing.assert_array_equal(bins.edges_mm, profile.r_edges_mm)
+    assert not steps(profile_figure(profile).axes[0], filled=True)
+
+
+def test_empty_annuli_are_gaps_on_log_plots():
+    energy = exponential(1, n=40)
+    energy[10:15] = 0.0
+    axes = profile_figure(hand_made(energy)).axes[1]
+    (curve,) = steps(axes, filled=False)
+    assert np.isnan(curve.get_data().values[10:15]).all()
+    assert axes.get_ylim()[0] > 0.1 * energy[energy > 0].min()
+
+
+def test_linear_plot_holds_the_energy_it_names(skin1, skin1_figure):
+    end_mm = skin1_figure.axes[0].get_xlim()[1]
+    shares = skin1.cumulative_at(end_mm) / skin1.total_on_grid
+    np.testing.assert_allclose(shares.min(), 0.995, atol=1e-6)
+    assert skin1_figure.axes[1].get_xlim() == (0, skin1.r_edges_mm[-1])
+
+
+def test_image_agrees_with_exact_pixels(skin1):
+    bins = [merged(skin1, channel) for channel in range(3)]
+    shown = picture(skin1, bins)
+    rows = shown.per_mm2.shape[0]
+    pitch_mm = 2 * shown.half_height_mm / rows
+    exact = skin1.quadrant_kernel(pitch_mm, rows // 2) / pitch_mm**2
+    middle = shown.per_mm2[rows // 2 :, shown.per_mm2.shape[1] // 2]
+    along = slice(10, 90)  # the noise of single annuli, which the image smooths, averages out
+    np.testing.assert_allclose(middle[along].sum(axis=0), exact[along, 0].sum(axis=0), rtol=0.05)
+    colours = shown.screen_colours()
+    assert colours.min() >= 0
+    assert colours.max() <= 1
+
+
+def drawn_texts(figure):
+    """Every text that is drawn, with its extent in pixels."""
+    figure.draw_without_rendering()
+    renderer = figure.canvas.get_renderer()
+    hidden = set()
+    for axes, name in itertools.product(figure.findobj(match=is_axes), ("x", "y")):
+        axis = getattr(axes, f"{name}axis")
+        low, high = sorted(axis.get_view_interval())
+        ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
+        shown = [low <= each.get_loc() <= high for each in ticks]
+        pairs = zip(ticks, shown, strict=True)
+        hidden |= {label for tick, seen in pairs for label in labels_of(tick, seen)}
+    texts = [
+        each
+        for each in figure.findobj(Text)
+        if each.get_visible() and each.get_text().strip() and each not in hidden
+    ]
+    return [(each.get_text(), each.get_window_extent(renderer)) for each in texts]
+
+
+def is_axes(artist):
+    return hasattr(artist, "get_xaxis")
+
+
+def labels_of(tick, seen):
+    """The labels of a tick that are not drawn."""
+    return [label for label in (tick.label1, tick.label2) if not (seen and label.get_visible())]
+
+
+def odd_profiles():
+    wavelengths = [f"{400 + 5 * k} nm" for k in range(64)]
+    long_names = [letter * 60 for letter in "Wm@$漢"]
+    dense = Material("dense", ("R", "G", "B"), (Layer(1.3, 0.0, [1e4] * 3, [1e6, 9e5, 8e5]),))
+    thin = Material("thin", ("a", "b"), (Layer(1.3, 0.0, [1e-4, 2e-4], [1e-3, 1e-3]),))
+    return {
+        "skin1": lambda: simulate_montecarlo(load_material("skin1"), photons=100_000),
+        "few photons": lambda: simulate_montecarlo(load_material("ketchup"), photons=1000),
+        "1 channel": lambda: simulate_montecarlo(spectrum(["650 nm"]), photons=5000),
+        "5 long names": lambda: simulate_montecarlo(spectrum(long_names, "m" * 100), photons=5000),
+        "3 long names": lambda: simulate_montecarlo(spectrum(long_names[:3]), photons=5000),
+        "64 channels": lambda: simulate_montecarlo(spectrum(wavelengths), photons=20_000),
+        "dense": lambda: simulate_montecarlo(dense, photons=5000),
+        "thin": lambda: simulate_montecarlo(thin, photons=5000),
+        "import": lambda: hand_made(exponential(3)),
+        "nothing": lambda: hand_made(np.zeros((20, 3))),
+        "nothing in 1": lambda: hand_made(np.zeros((20, 1))),
+        "1 annulus": lambda: hand_made(exponential(2, n=1)),
+        "below zero": lambda: hand_made(exponential(2) - 1e-6),
+        "uneven annuli": lambda: hand_made(exponential(3, n=50), np.geomspace(1, 21, 51) - 1),
+        "unknown meta": lambda: hand_made(exponential(3), method=["?"], material="$x", seed={}),
+    }
+
+
+@pytest.mark.parametrize("name", odd_profiles())
+def test_no_text_is_cut_off_or_runs_into_another(name):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figure = profile_figure(odd_profiles()[name]())
+        texts = drawn_texts(figure)
+    width, height = figure.bbox.size
+    for text, box in texts:
+        inside = box.x0 >= 0 and box.y0 >= 0 and box.x1 <= width and box.y1 <= height
+        assert inside, (text, box)
+    for (text, box), (other, other_box) in itertools.combinations(texts, 2):
+        assert not box.padded(-1).overlaps(other_box.padded(-1)), (text, other)
+
+
+@pytest.mark.parametrize("format", FORMATS)
+def test_same_profile_gives_same_bytes_in_every_format(skin1, skin1_figure, tmp_path, format):
+    written = []
+    for k, figure in enumerate((skin1_figure, profile_figure(skin1))):
+        path = tmp_path / f"{k}.{format}"
+        save_figure(figure, path)
+        written.append(path.read_bytes())
+        assert is_chart_file(path)
+    assert written[0] == written[1]
+    assert written[0].startswith(SIGNATURES[format])
+
+
+def test_png_has_the_size_of_a_page(skin1_figure):
+    stream = io.BytesIO()
+    save_figure(skin1_figure, stream, format="png")
+    head = stream.getvalue()[16:24]
+    assert (int.from_bytes(head[:4]), int.from_bytes(head[4:])) == (1600, 1200)
+
+
+def test_matplotlibrc_of_the_user_changes_nothing(skin1):
+    import matplotlib as mpl
+
+    plain, styled = io.BytesIO(), io.BytesIO()
+    save_figure(profile_figure(skin1), plain, format="svg")
+    with mpl.rc_context({"font.size": 20, "axes.facecolor": "red", "savefig.dpi": 30}):
+        save_figure(profile_figure(skin1), styled, format="svg")
+        assert mpl.rcParams["font.size"] == 20
+    assert plain.getvalue() == styled.getvalue()
+
+
+@pytest.mark.parametrize("name", ["a.jpg", "a", "png", ".png", "a.png.gz"])
+def test_other_endings_are_refused_in_one_line(tmp_path, name):
+    with pytest.raises(FileError, match=r"\.png, \.svg or \.pdf") as caught:
+        save_figure(Figure(), tmp_path / name)
+    assert "\n" not in str(caught.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_stream_needs_a_format():
+    with pytest.raises(FileError, match="one of png, svg, pdf"):
+        chart_format(io.BytesIO())
+    assert chart_format("A.PNG") == "png"
+
+
+@pytest.mark.parametrize("content", [b"", b"\x89PNG", b"notes", b"<html>", b"<?xml?><note/>"])
+def test_other_files_are_not_charts(tmp_path, content):
+    path = tmp_path / "a.png"
+    path.write_bytes(content)
+    assert not is_chart_file(path)
+    assert not is_chart_file(tmp_path / "missing.png")
+
+
+def test_numbers_read_as_people_write_them():
+    numbers = (10**7, 200_000, 1_250_000, 12_345_678, 1000, 2)
+    words = ["10⁷", "2×10⁵", "1.25×10⁶", "12,345,678", "1,000", "2"]  # noqa: RUF001
+    assert [count(each) for each in numbers] == words
+    assert with_error(0.432012, 0.000113) == "0.43201 ± 0.00011"
+    assert with_error(0.5, np.nan) == "0.5"
+    assert shortened("a" * 12) == "a" * 12
+    assert shortened("a" * 13) == "a" * 11 + "…"
