@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import click
-from click.core import ParameterSource
-
 if TYPE_CHECKING:
     from sssfit.material import Material
 
@@ -32,12 +29,12 @@ def load_runs(
         if number > len(runs):
             raise MaterialError(f"{path} has {len(runs)} runs; --run {number} is none of them.")
         runs = runs[number - 1 : number]
-    photons_source = click.get_current_context().get_parameter_source("photons")
+    # A target error alone decides when a run ends; then the file's photons are no limit either.
+    endless = given["target_error"] is not None
     settings = [
-        {
-            "photons": run.photons
-            if photons_source is ParameterSource.DEFAULT
-            else given["photons"],
+        given
+        | {
+            "photons": given["photons"] or (None if endless else run.photons),
             "dr_mm": given["dr_mm"] or run.grid.dr_mm,
             "radius_mm": given["radius_mm"] or run.grid.radius_mm,
         }

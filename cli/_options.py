@@ -102,3 +102,24 @@ class Count(click.ParamType[int]):
                 ctx,
             )
         return int(number)
+
+
+class Share(click.ParamType[float]):
+    """A share between 0 and 1, which may be written in percent: 0.5% or 0.005."""
+
+    name = "share"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Parse ``value``; a usage error (exit 2) names what was expected."""
+        text = str(value).strip()
+        try:
+            number = float(text[:-1]) / 100.0 if text.endswith("%") else float(text)
+        except ValueError:
+            number = math.nan
+        if not 0.0 < number < 1.0:
+            self.fail(
+                f"{value!r} is not a share between 0 and 100 %, such as 0.5% or 0.005.", param, ctx
+            )
+        return number

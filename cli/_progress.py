@@ -3,6 +3,7 @@
 import contextlib
 import math
 from collections.abc import Callable, Iterator
+from datetime import timedelta
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -16,7 +17,7 @@ def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[["WalkProgres
         yield None
         return
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, Progress, TextColumn
 
     bar = Progress(
         TextColumn("{task.description}"),
@@ -24,14 +25,17 @@ def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[["WalkProgres
         TextColumn("{task.percentage:3.0f} %"),
         TextColumn("{task.fields[rate]}"),
         TextColumn("error {task.fields[error]}"),
-        TimeRemainingColumn(),
+        TextColumn("{task.fields[left]}"),
         console=Console(stderr=True),
     )
-    task = bar.add_task(label, total=None, rate="", error="-")
+    task = bar.add_task(label, total=None, rate="", error="-", left="")
+    first: list[WalkProgress] = []
 
     def report(now: "WalkProgress") -> None:
         # The bar appears with the first figures: a refused setting should leave one line only.
         bar.start()
+        first.append(now)
+        del first[1:]
         error = now.relative_error
         bar.update(
             task,
@@ -39,6 +43,7 @@ def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[["WalkProgres
             completed=now.photons_done,
             rate=f"{now.photons_done / max(now.seconds, 1e-9):,.0f}/s",
             error=f"{100.0 * error:.2g} %" if math.isfinite(error) else "-",
+            left=time_left(first[0], now),
         )
 
     try:
@@ -46,3 +51,18 @@ def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[["WalkProgres
     finally:
         if bar.live.is_started:
             bar.stop()
+
+
+def time_left(first: "WalkProgress", now: "WalkProgress") -> str:
+    """Say how long the rest takes at the rate since the first report, as h:mm:ss.
+
+    That rate knows neither compilation nor earlier sittings. rich's own column loses its memory
+    whenever the total changes, which under a target error is at every check.
+    """
+    done = now.photons_done - first.photons_done
+    if now.photons == now.photons_done:
+        return "0:00:00"
+    if done <= 0:
+        return "-:--:--"
+    rest = (now.photons - now.photons_done) / done * (now.seconds - first.seconds)
+    return str(timedelta(seconds=round(rest)))

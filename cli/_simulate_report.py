@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from ._options import Common
-from ._report import finish, say, table
+from ._report import finish, table
 
 if TYPE_CHECKING:
     from sssfit.profile import Profile
@@ -15,8 +16,8 @@ _SIGMAS = 4.5  # a deviation beyond so many standard errors is no accident
 _ROUNDING = 1e-12  # below this an energy balance is rounding, not roulette
 
 
-def figures_of(profile: Profile, seconds: float) -> dict[str, Any]:
-    """Figures of one run, as ``--json`` prints them."""
+def figures_of(profile: Profile, seconds: float | None) -> dict[str, Any]:
+    """Figures of one run, as ``--json`` prints them; no seconds where it was finished before."""
     return {
         "material": profile.meta["material"]["name"],
         "method": profile.meta["method"],
@@ -34,7 +35,10 @@ def figures_of(profile: Profile, seconds: float) -> dict[str, Any]:
         "photons": profile.photons,
         "seed": profile.meta["seed"],
         "seconds": seconds,
-        "photons_per_second": (profile.photons or 0) / seconds,
+        "photons_per_second": (profile.photons or 0) / seconds if seconds else None,
+        "target_error": profile.meta["settings"]["target_error"],
+        "relative_error": profile.meta["relative_error"],
+        "finished_before": seconds is None,
     }
 
 
@@ -45,24 +49,35 @@ def report(rows: list[dict[str, Any]], *, every: bool, common: Common, interrupt
     figures |= {"rows": rows} if every else rows[0]
     if interrupted:
         figures["interrupted"] = True
-        say(common, "Interrupted: what was done by then is saved, with its true photon count.")
-    text = "\n".join([_heading(rows, every), _table(rows), *_energy(rows), *_beyond(rows)])
-    wrote = "the profile to stdout" if output == ["-"] else ", ".join(output)
-    finish(common, figures, f"{text}\nWrote {wrote}", to_stderr=output == ["-"])
+    lines = [_heading(rows, every), _table(rows), *_energy(rows), *_beyond(rows), *_target(rows)]
+    text = "\n".join([*lines, *_files(rows, output)])
+    finish(common, figures, text, to_stderr=output == ["-"])
+
+
+def _files(rows: list[dict[str, Any]], output: list[str]) -> list[str]:
+    """Which profiles were written, and which had nothing left to do."""
+    if output == ["-"]:
+        return ["Wrote the profile to stdout"]
+    lines = []
+    for start, wanted in (("Wrote", False), ("Finished before, nothing to do:", True)):
+        paths = [
+            path for row, path in zip(rows, output, strict=True) if row["finished_before"] is wanted
+        ]
+        lines += [f"{start} {', '.join(paths)}"] if paths else []
+    return lines
 
 
 def _heading(rows: list[dict[str, Any]], every: bool) -> str:
     """Who, how many photons, how fast, on which grid."""
     row = rows[0]
-    counts = sorted({each["photons"] for each in rows})
-    walks = f"{' to '.join(f'{n:,}' for n in counts[:: len(counts) - 1 or 1])} photons, "
-    walks += f"seed {row['seed']}"
+    counts = dict.fromkeys(f"{each['photons']:,}" for each in rows)
+    walks = f"{' and '.join(counts)} photons, seed {row['seed']}"
     if every:
-        return f"{len(rows)} materials: {walks}"
+        return f"{len(rows)} materials: {walks}, all channels of one index in one walk"
+    seconds, rate = row["seconds"], row["photons_per_second"]
+    speed = "" if seconds is None else f", {seconds:.1f} s ({rate:,.0f} a second)"
     return (
-        f"{row['material']}: {walks}, {row['seconds']:.1f} s "
-        f"({row['photons_per_second']:,.0f} a second); "
-        f"{row['annuli']} annuli of {row['dr_mm']:.4g} mm, "
+        f"{row['material']}: {walks}{speed}; {row['annuli']} annuli of {row['dr_mm']:.4g} mm, "
         f"to {row['annuli'] * row['dr_mm']:.4g} mm"
     )
 
@@ -122,3 +137,17 @@ def _beyond(rows: list[dict[str, Any]]) -> list[str]:
     if not lost:
         return []
     return ["beyond the grid, as a share of diffuse: " + ", ".join(lost) + " (--radius auto)"]
+
+
+def _target(rows: list[dict[str, Any]]) -> list[str]:
+    """Say whether the target error was met, and how many photons that took."""
+    target = rows[0]["target_error"]
+    if target is None:
+        return []
+    reached = [math.inf if row["relative_error"] is None else row["relative_error"] for row in rows]
+    error, photons = max(reached), " and ".join(dict.fromkeys(f"{r['photons']:,}" for r in rows))
+    return [
+        f"target error {100.0 * target:g} % of F at the last edge: "
+        f"{'met' if error < target else 'NOT MET'} with {photons} photons, "
+        f"{100.0 * error:.3g} % reached"
+    ]

@@ -2,22 +2,17 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ._mci import is_mci, load_runs
-from ._options import Common, Count, Length, common_options
-from ._report import say
-from ._simulate_report import figures_of, report
+from ._options import Common, Count, Length, Share, common_options
+from ._simulate_run import Request, Walk, run_walks
 
 if TYPE_CHECKING:
     from sssfit.material import Material
-    from sssfit.profile import Profile
-
-    _Walk = tuple[list[int], dict[str, Any]]
 
 
 class Radius(Length):
@@ -37,10 +32,16 @@ class Radius(Length):
 @click.option(
     "--photons",
     type=Count(2, 10**12),
-    default="1e7",
-    show_default=True,
     metavar="N",
-    help="Photons to trace; every photon serves all channels.",
+    help="Photons to trace; every photon serves all channels."
+    "  [default: 1e7; with --target-error no limit]",
+)
+@click.option(
+    "--target-error",
+    type=Share(),
+    metavar="SHARE",
+    help="End when no channel's F(r) has a standard error above this share of F at the last edge, "
+    "such as 0.5%.",
 )
 @click.option("--dr", type=Length(), metavar="MM", help="Annulus width.  [default: MFP_min / 20]")
 @click.option(
@@ -54,19 +55,31 @@ class Radius(Length):
     "-o",
     "--output",
     metavar="FILE",
-    help="Where the profile goes, - for stdout; a folder for several."
+    help="Where the profile goes, - for stdout; with --all a folder."
     "  [default: MATERIAL.profile.npz]",
 )
+@click.option(
+    "--checkpoint-every",
+    type=click.FloatRange(min=0),
+    default=30.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="How often FILE.checkpoint is saved, from which --resume goes on.",
+)
+@click.option("--resume", is_flag=True, help="Go on where a killed or interrupted run was saved.")
 @click.option("--force", is_flag=True, help="Replace a file that is not a profile.")
 @common_options
 def simulate(
     material: str | None,
     every: bool,
     run: int | None,
-    photons: int,
+    photons: int | None,
+    target_error: float | None,
     dr: float | None,
     radius: float | str | None,
     output: str | None,
+    checkpoint_every: float,
+    resume: bool,
     force: bool,
     common: Common,
 ) -> None:
@@ -75,37 +88,49 @@ def simulate(
     MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or - for stdin; or
     an MCML input file, .mci: a profile a run, with its photons and grid where options give none.
     The profile is R_d(r) per channel as energy in annuli with standard errors, for a normally
-    incident pencil beam, in mm. Ctrl-C saves what is done, with its true photon count.
+    incident pencil beam, in mm. Ctrl-C saves what is done, with its true photon count; --resume
+    goes on from there, or from the last checkpoint of a run that was killed, and ends in the same
+    bits as a run that was left alone.
 
     \b
       sssfit simulate skin1
       sssfit simulate skin1 --photons 1e8 --radius auto -o fine.profile.npz
       sssfit simulate ./wax.toml --json
+      sssfit simulate skin1 --target-error 0.1% --resume
       sssfit simulate tissue.mci --run 2
     """
     if (material is None) != every:
         raise click.UsageError("name one MATERIAL, or give --all.")
     if run is not None and not is_mci(material):
         raise click.UsageError("--run chooses a run of an MCML input file, .mci.")
-    settings = {"photons": photons, "dr_mm": dr, "radius_mm": radius}
+    settings = {
+        "photons": photons,
+        "target_error": target_error,
+        "dr_mm": dr,
+        "radius_mm": radius,
+        "seed": common.seed,
+    }
     materials, walks = _walks(material, run, settings)
     several = every or len(materials) > 1
     targets = _targets(materials, output, several)
-    _run(materials, targets, walks, force=force, every=several, common=common)
+    if resume and targets == [None]:
+        raise click.UsageError("--resume needs a file to go on beside; leave -o - out.")
+    run_walks(materials, targets, walks, Request(checkpoint_every, resume, force, several, common))
 
 
 def _walks(
     material: str | None, run: int | None, settings: dict[str, Any]
-) -> tuple[list[Material], list[_Walk]]:
+) -> tuple[list[Material], list[Walk]]:
     """Load what is asked for; each walk has the indices of its materials and its settings."""
     from sssfit.material import load_material, material_names
+    from sssfit.simulate import shared_walks
 
     if material is not None and is_mci(material):
         materials, each = load_runs(material, run, settings)
         return materials, [([k], own) for k, own in enumerate(each)]
     names = material_names() if material is None else (material,)
     materials = [load_material(name) for name in names]
-    return materials, [(group, settings) for group in _by_eta(materials)]
+    return materials, [(group, settings) for group in shared_walks(materials)]
 
 
 def _targets(materials: list[Material], output: str | None, several: bool) -> list[Path | None]:
@@ -118,86 +143,3 @@ def _targets(materials: list[Material], output: str | None, several: bool) -> li
         folder = Path(output or ".")
         return [folder / f"{each.name}.profile.npz" for each in materials]
     return [Path(output)]
-
-
-def _run(
-    materials: list[Material],
-    targets: list[Path | None],
-    walks: list[_Walk],
-    *,
-    force: bool,
-    every: bool,
-    common: Common,
-) -> None:
-    """Walk, write each profile as its walk ends, and report."""
-    from contextlib import ExitStack
-
-    from sssfit.errors import StoppedError
-    from sssfit.files import check_output, locked
-    from sssfit.profile import is_profile_file
-
-    from ._interrupt import asked_to_stop
-
-    rows: dict[int, dict[str, Any]] = {}
-    with ExitStack() as held:
-        for path in filter(None, targets):
-            check_output(path, is_profile_file, force=force)
-            held.enter_context(locked(path))
-        stop = held.enter_context(asked_to_stop())
-        for group, settings in walks:
-            try:
-                profiles, seconds = _walk([materials[k] for k in group], settings, stop, common)
-            except StoppedError:
-                break
-            for k, profile in zip(group, profiles, strict=True):
-                _write(profile, targets[k])
-                rows[k] = figures_of(profile, seconds) | {"path": str(targets[k] or "-")}
-        interrupted = stop()
-    if not rows:
-        raise KeyboardInterrupt
-    report([rows[k] for k in sorted(rows)], every=every, common=common, interrupted=interrupted)
-    if interrupted:
-        sys.exit(130)
-
-
-def _by_eta(materials: list[Material]) -> list[list[int]]:
-    """Return the indices of the materials that can share a walk: one relative index a group."""
-    groups: dict[float, list[int]] = {}
-    for k, material in enumerate(materials):
-        groups.setdefault(material.layers[0].eta / material.eta_above, []).append(k)
-    return list(groups.values())
-
-
-def _walk(
-    materials: list[Material], settings: dict[str, Any], stop: Any, common: Common
-) -> tuple[list[Profile], float]:
-    """One walk for all ``materials``, with a progress bar; the profiles and the wall time."""
-    from time import perf_counter
-
-    from sssfit.simulate import compiled_before, simulate_montecarlo_many
-
-    from ._progress import walk_progress
-
-    if not compiled_before():
-        say(common, "First use: compiling the photon walk, some 10 s; it is kept for later runs.")
-    label = materials[0].name if len(materials) == 1 else f"{len(materials)} materials"
-    begun = perf_counter()
-    with walk_progress(label, quiet=common.quiet) as progress:
-        profiles = simulate_montecarlo_many(
-            materials,
-            seed=common.seed,
-            threads=common.threads,
-            progress=progress,
-            stop=stop,
-            **settings,
-        )
-    return profiles, perf_counter() - begun
-
-
-def _write(profile: Profile, path: Path | None) -> None:
-    """To the file, whole or not at all; to stdout where there is none."""
-    if path is None:
-        profile.write(sys.stdout.buffer)
-        sys.stdout.buffer.flush()
-    else:
-        profile.save(path)

@@ -5,6 +5,7 @@ reader sees the old file or the new one and never a part of either.
 """
 
 import contextlib
+import glob
 import os
 import sys
 import tempfile
@@ -76,9 +77,21 @@ def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
                 os.fsync(stream.fileno())
             temporary.chmod(_ordinary_mode())
             temporary.replace(path)
+            _flush_folder(path.parent)
         except BaseException:
             temporary.unlink(missing_ok=True)
             raise
+
+
+def remove_leftovers(path: Path) -> None:
+    """Delete what writes of ``path`` left behind when they were killed half-way.
+
+    To be called by who holds the output's lock: nobody else is writing it then.
+    """
+    pattern = f".{glob.escape(path.name)}.{8 * '?'}.tmp"  # mkstemp puts eight letters in
+    with contextlib.suppress(OSError):
+        for leftover in path.parent.glob(pattern):
+            leftover.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager
@@ -97,6 +110,7 @@ def locked(path: Path) -> Iterator[None]:
     with _clear_errors(path):
         handle = _open_locked(lock_path, path)
     try:
+        remove_leftovers(path)
         yield
     finally:
         # Unlink before the lock is let go: a waiting process then notices that its file is gone.
@@ -121,6 +135,18 @@ def _open_locked(lock_path: Path, path: Path) -> int:
             if os.path.samestat(lock_path.stat(), os.fstat(handle)):
                 return handle
         os.close(handle)
+
+
+def _flush_folder(folder: Path) -> None:
+    """Put a rename on the disk as well, so that what is deleted after it is not gone before it."""
+    if sys.platform == "win32":
+        return  # a folder cannot be opened there
+    with contextlib.suppress(OSError):  # not every file system can; the file itself is safe
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
 
 
 def _lock(handle: int) -> None:

@@ -16,8 +16,8 @@ from sssfit.errors import SssfitWarning
 from sssfit.grid import RadialGrid, paper_grid
 from sssfit.material import Layer, Material, load_material
 from sssfit.simulate import simulate_montecarlo
-from sssfit.simulate._batches import run
 from sssfit.simulate._layered import LayeredWalk, alike_channels
+from sssfit.simulate._run import run
 from sssfit.simulate._semi_infinite import SemiInfiniteWalk
 
 LIMIT = checks.LIMIT
@@ -49,7 +49,7 @@ def totals(profile):
 
 def walk_totals(task):
     """Mean and standard error of channel 0's reflected and transmitted weight."""
-    sums = task.sums(run(task, 2, None, None), 0)
+    sums = task.sums(run(task, 2), 0)
     through = sums.transmitted if sums.transmitted is not None else np.zeros((1, 1, 2))
     r = sums.reflected[:, 0].sum(axis=0)
     t = through[:, 0].sum(axis=0)
@@ -182,7 +182,7 @@ def test_one_layer_equals_the_semi_infinite_walk(name, photons):
     grid = paper_grid(material)
     one = SemiInfiniteWalk((material,), (grid,), 1, photons)
     other = LayeredWalk((material,), (grid,), 2, photons)
-    a, b = (each.sums(run(each, 2, None, None), 0).reflected for each in (one, other))
+    a, b = (each.sums(run(each, 2), 0).reflected for each in (one, other))
     for c in range(3):
         hits = [checks.effective_hits(each[:, c, 0], each[:, c, 1]) for each in (a, b)]
         groups = checks.groups_of_hits(*hits)
@@ -228,7 +228,7 @@ def test_lanes_equal_the_scalar_mcml(name, photons):
     loop_photons = photons // 5  # the loop is the slow side
     grid = RadialGrid(0.02, 400)
     task = LayeredWalk((material,), (grid,), 1, photons)
-    sums = task.sums(run(task, 2, None, None), 0)
+    sums = task.sums(run(task, 2), 0)
     layers = material.layers
     reflected, transmitted, absorbed, _ = reference.scalar_layered_walk(
         7,

@@ -18,7 +18,8 @@ import reference
 from sssfit.errors import SimulationError, SssfitWarning
 from sssfit.material import load_material, material_names
 from sssfit.simulate import simulate_montecarlo, simulate_montecarlo_many
-from sssfit.simulate._batches import BATCH_PHOTONS, run
+from sssfit.simulate._batches import BATCH_PHOTONS
+from sssfit.simulate._run import run
 from sssfit.simulate._semi_infinite import SemiInfiniteWalk, roulette_schedule
 from sssfit.simulate.montecarlo import AUTO_BEYOND
 
@@ -211,9 +212,7 @@ def test_batches_may_be_walked_in_any_order():
     backwards = [task.trace(k).ledger.bins for k in reversed(range(5))][::-1]
     for a, b in zip(forwards, backwards, strict=True):
         assert a.tobytes() == b.tobytes()
-    assert (
-        run(task, 1, None, None).ledger.bins.tobytes() == sum(forwards[1:], forwards[0]).tobytes()
-    )
+    assert run(task, 1).ledger.bins.tobytes() == sum(forwards[1:], forwards[0]).tobytes()
 
 
 def test_seeds_differ_and_repeat():

@@ -1,12 +1,7 @@
 """Walks dealt out in batches, whatever they walk through, and their tallies added in order."""
 
-import math
 import os
-from collections import deque
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass
-from time import perf_counter
 from typing import Any, Protocol
 
 import numpy as np
@@ -20,21 +15,6 @@ FloatArray = npt.NDArray[np.float64]
 # 16384 photons of skin1 take 2 ms, of an absorption-free medium 0.3 s: short enough for Ctrl-C,
 # long enough that dealing out a batch (some 0.1 ms) does not show.
 BATCH_PHOTONS = 16_384
-REPORT_SECONDS = 0.1
-
-
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """How far a walk has come: photons done of all, seconds, and the relative error so far.
-
-    ``relative_error`` is the largest standard error of F over all annulus edges, as a share of F
-    at the last edge, of the worst channel; infinite until every channel has energy on its grid.
-    """
-
-    photons_done: int
-    photons: int
-    seconds: float
-    relative_error: float
 
 
 @dataclass(slots=True)
@@ -84,63 +64,26 @@ class Walk(Protocol):
     def sums(self, tally: Tally, index: int) -> Sums: ...
 
 
-def run(
-    task: Walk,
-    threads: int,
-    progress: Callable[[Progress], None] | None,
-    stop: Callable[[], bool] | None,
-) -> Tally:
-    """Walk all batches on ``threads`` threads; end early, in order, once ``stop`` says so."""
-    total = task.empty_tally()
-    begun = reported = perf_counter()
-    for tally in _in_order(task, threads, stop):
-        total.add(tally)
-        now = perf_counter()
-        if progress and (now - reported > REPORT_SECONDS or total.photons == task.photons):
-            reported = now
-            progress(
-                Progress(total.photons, task.photons, now - begun, relative_error(task, total))
-            )
-    return total
+def relative_errors(task: Walk, tally: Tally) -> FloatArray:
+    """Largest standard error of F over the annulus edges / F at the last, per channel (C,).
+
+    Infinite where nothing has come back within the grid; 0 where sigma_s = 0 and nothing can.
+    """
+    each = [_errors(task.sums(tally, k), one) for k, one in enumerate(task.materials)]
+    return np.concatenate(each)
 
 
-def _in_order(task: Walk, threads: int, stop: Callable[[], bool] | None) -> Iterator[Tally]:
-    """Tallies of batch 0, 1, 2 ... while a few more are on their way in other threads."""
-    batches = iter(range(-(-task.photons // BATCH_PHOTONS)))
-    pending: deque[Future[Tally]] = deque()
-    with ThreadPoolExecutor(threads, thread_name_prefix="sssfit-walk") as pool:
-        try:
-            stopped = False
-            while True:
-                stopped = stopped or (stop is not None and stop())
-                # Two a thread keep every core busy and bound the memory, whatever the photons.
-                while not stopped and len(pending) < 2 * threads:
-                    batch = next(batches, None)
-                    if batch is None:
-                        break
-                    pending.append(pool.submit(task.trace, batch))
-                if not pending:
-                    return
-                yield pending.popleft().result()
-        finally:
-            pool.shutdown(wait=True, cancel_futures=True)
-
-
-def relative_error(task: Walk, tally: Tally) -> float:
-    """Largest standard error of F over the annulus edges / F at the last, of the worst channel."""
-    if tally.photons < 2:
-        return math.inf
-    return max(_worst(task.sums(tally, k)) for k in range(len(task.materials)))
-
-
-def _worst(sums: Sums) -> float:
-    """Return the relative error of one material's worst channel."""
+def _errors(sums: Sums, material: Material) -> FloatArray:
+    """Return the relative errors of one material's channels."""
+    infinite = np.full(material.n_channels, np.inf)
+    dark = ~np.any([layer.sigma_s_per_mm for layer in material.layers], axis=0)
+    if sums.photons < 2:
+        return np.where(dark, 0.0, infinite)
     energy, squares = np.moveaxis(np.cumsum(sums.reflected[:-1], axis=0) / sums.photons, -1, 0)
-    error = np.sqrt(np.max(squares - energy**2, axis=0) / (sums.photons - 1))
-    # Nothing scattered, nothing back: such a channel is known exactly.
-    dark = sums.absorbed.sum(axis=0) >= sums.photons * (1.0 - 1e-12)
-    relative = np.divide(error, energy[-1], out=np.full_like(error, np.inf), where=energy[-1] > 0)
-    return float(np.max(np.where(dark, 0.0, relative)))
+    # Rounding may leave -1e-17 where all photons carry the same weight.
+    variance = np.maximum(np.max(squares - energy**2, axis=0), 0.0) / (sums.photons - 1)
+    relative = np.divide(np.sqrt(variance), energy[-1], out=infinite, where=energy[-1] > 0.0)
+    return np.where(dark, 0.0, relative)
 
 
 def available_cores() -> int:

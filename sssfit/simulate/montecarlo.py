@@ -10,9 +10,11 @@ Standard errors come from squared weights: a photon leaves through one annulus a
 weights w the energy of an annulus is sum(w)/N and its variance (sum(w^2)/N - energy^2)/(N - 1).
 """
 
+import math
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -22,13 +24,15 @@ from sssfit.errors import SimulationError, SssfitWarning, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
-from sssfit.simulate._batches import Progress, Sums, Tally, Walk, available_cores, run
+from sssfit.simulate._batches import Sums, Tally, Walk, available_cores, relative_errors
+from sssfit.simulate._checkpoint import Checkpoint, settings_of
+from sssfit.simulate._finished import ending_of, provenance
 from sssfit.simulate._layered import LayeredWalk
+from sssfit.simulate._run import Ending, Progress, run
 from sssfit.simulate._semi_infinite import SemiInfiniteWalk, relative_eta
 
 FloatArray = npt.NDArray[np.float64]
 
-MAX_PHOTONS = 10**12
 HONEST_PHOTONS = 1000  # below, a channel may rest on a handful of hits and its error on luck
 AUTO_BEYOND = 1e-3  # radius "auto": less than this share of any channel lies beyond the grid
 PILOT_PHOTONS = 200_000
@@ -38,11 +42,13 @@ STEEPEST_G = 0.99  # beyond, single precision no longer resolves the forward pea
 def simulate_montecarlo(
     material: Material,
     *,
-    photons: int = 10_000_000,
+    photons: int | None = None,
     seed: int = 1,
     threads: int | None = None,
     dr_mm: float | None = None,
     radius_mm: float | str | None = None,
+    target_error: float | None = None,
+    checkpoint: Checkpoint | str | Path | None = None,
     progress: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Profile:
@@ -55,8 +61,8 @@ def simulate_montecarlo(
     ----------
     material : Material
         Any stack of layers that ``Material`` accepts, g from -0.99 to 0.99.
-    photons : int
-        Number of walks, 2 to 1e12; the default is the paper's.
+    photons : int, optional
+        Number of walks, 2 to 1e12; by default the paper's 1e7, with a target error 1e12.
     seed : int
         Same seed, same bits, whatever the number of threads.
     threads : int, optional
@@ -66,6 +72,15 @@ def simulate_montecarlo(
     radius_mm : float or "auto", optional
         Outer radius of the grid [mm]; by default 32 times the longest mean free path. "auto"
         grows it until less than 0.1 % of any channel's diffuse reflectance lies beyond.
+    target_error : float, optional
+        End when, for every channel, the largest standard error of F(r) over the annulus edges is
+        under this share (0 to 1) of F at the last edge. Looked at after numbers of batches fixed
+        beforehand, 1/64 to 1/32 apart: the end depends on the seed alone. Channels that do not
+        scatter are left out.
+    checkpoint : Checkpoint or Path, optional
+        Where to save the sums now and then, so that a run killed at any moment can go on and end
+        in the same bits; a path stands for ``Checkpoint(path)``, which goes on from what is there.
+        The file stays until the caller has saved the profile and calls ``Checkpoint.remove``.
     progress : callable, optional
         Called with a ``Progress`` some ten times a second.
     stop : callable, optional
@@ -79,9 +94,18 @@ def simulate_montecarlo(
     Raises
     ------
     SimulationError
-        g beyond what the walk samples well, or settings out of range.
+        g beyond what the walk samples well, settings out of range or other than those of the
+        checkpoint, or a target error with a channel that returns nothing within the grid.
+    FileError
+        The checkpoint to go on from cannot be read, or is damaged or foreign.
     StoppedError
         ``stop`` said so before a batch was done.
+
+    Warns
+    -----
+    SssfitWarning
+        The photons were done before the target error was met, or a checkpoint cannot be written
+        (the run goes on).
 
     References
     ----------
@@ -102,6 +126,8 @@ def simulate_montecarlo(
         threads=threads,
         dr_mm=dr_mm,
         radius_mm=radius_mm,
+        target_error=target_error,
+        checkpoint=checkpoint,
         progress=progress,
         stop=stop,
     )[0]
@@ -110,11 +136,13 @@ def simulate_montecarlo(
 def simulate_montecarlo_many(
     materials: Sequence[Material],
     *,
-    photons: int = 10_000_000,
+    photons: int | None = None,
     seed: int = 1,
     threads: int | None = None,
     dr_mm: float | None = None,
     radius_mm: float | str | None = None,
+    target_error: float | None = None,
+    checkpoint: Checkpoint | str | Path | None = None,
     progress: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> list[Profile]:
@@ -129,7 +157,8 @@ def simulate_montecarlo_many(
         In the order of ``materials``; their noise is correlated.
     """
     _check_media(materials)
-    _check_settings(photons, seed, threads)
+    ending = ending_of(photons, target_error)
+    _check_settings(ending.photons, seed, threads)
     threads = threads or available_cores()
     auto = radius_mm == "auto"
     if isinstance(radius_mm, str):
@@ -138,11 +167,23 @@ def simulate_montecarlo_many(
         grids = _auto_grids(materials, dr_mm, seed, threads, stop)
     else:
         grids = [make_grid(each, dr_mm=dr_mm, radius_mm=radius_mm) for each in materials]
-    task = _walk(materials, grids, seed, photons)
-    tally = run(task, threads, progress, stop)
+    task = _walk(materials, grids, seed, ending.photons)
+    tally = run(
+        task,
+        threads,
+        progress,
+        stop,
+        target_error=target_error,
+        checkpoint=Checkpoint(Path(checkpoint))
+        if isinstance(checkpoint, str | Path)
+        else checkpoint,
+        settings=settings_of(materials, grids, seed),
+    )
     if tally.photons < 2:
         raise StoppedError("stopped before a single batch of photons was done.")
-    return [_profile(task, tally, k, trim=auto) for k in range(len(materials))]
+    error = float(relative_errors(task, tally).max())
+    _warn_target(ending, tally.photons, error)
+    return [_profile(task, tally, k, ending, error, trim=auto) for k in range(len(materials))]
 
 
 def _check_media(materials: Sequence[Material]) -> None:
@@ -175,6 +216,19 @@ def is_plain(material: Material) -> bool:
     return plain and relative_eta(material) >= 1.0
 
 
+def shared_walks(materials: Sequence[Material]) -> list[list[int]]:
+    """Group the materials that one walk can serve; indices, the first of each group in order.
+
+    Plain half spaces (g = 0) of one relative refractive index share one; others walk alone.
+    """
+    groups: dict[object, list[int]] = {}
+    for k, material in enumerate(materials):
+        groups.setdefault(
+            relative_eta(material) if is_plain(material) else ("alone", k), []
+        ).append(k)
+    return list(groups.values())
+
+
 def _walk(
     materials: Sequence[Material], grids: Sequence[RadialGrid], seed: int, photons: int
 ) -> Walk:
@@ -185,8 +239,6 @@ def _walk(
 
 def _check_settings(photons: int, seed: int, threads: int | None) -> None:
     """Refuse settings out of range, one line each."""
-    if not 2 <= photons <= MAX_PHOTONS:
-        raise SimulationError(f"photons = {photons}; give a whole number from 2 to 1e12.")
     if not 0 <= seed < 2**64:
         raise SimulationError(f"seed = {seed}; give a whole number from 0 to 2^64 - 1.")
     if threads is not None and threads < 1:
@@ -215,7 +267,7 @@ def _auto_grids(
     grids = [make_grid(each, dr_mm=dr_mm) for each in materials]
     while True:
         task = _walk(materials, grids, seed, PILOT_PHOTONS)
-        tally = run(task, threads, None, stop)
+        tally = run(task, threads, stop=stop)
         if tally.photons < 2:
             raise StoppedError("stopped before a single batch of photons was done.")
         wide = [
@@ -262,7 +314,9 @@ def _mean_and_error(sums: FloatArray, photons: int) -> tuple[FloatArray, FloatAr
     return mean, np.sqrt(np.maximum(mean_square - mean**2, 0.0) / (photons - 1))
 
 
-def _profile(task: Walk, tally: Tally, index: int, *, trim: bool) -> Profile:
+def _profile(
+    task: Walk, tally: Tally, index: int, ending: Ending, error: float, *, trim: bool
+) -> Profile:
     """Turn one material's share of the tally into a profile; weights begin at 1 - specular."""
     material, grid = task.materials[index], task.grids[index]
     entering = 1.0 - material.specular_reflectance
@@ -290,7 +344,8 @@ def _profile(task: Walk, tally: Tally, index: int, *, trim: bool) -> Profile:
             "photons": sums.photons,
             "seed": task.seed,
             "version": __version__,
-            "settings": {"dr_mm": grid.dr_mm, "radius": "auto" if trim else "given"},
+            "settings": provenance(task.materials, grid.dr_mm, ending, auto=trim),
+            "relative_error": error if math.isfinite(error) else None,
             "energy_balance_stderr": [entering * float(each) for each in balance_error],
         },
     )
@@ -305,6 +360,18 @@ def _profile(task: Walk, tally: Tally, index: int, *, trim: bool) -> Profile:
         beyond_grid_transmittance=energy[-1],
         beyond_grid_transmittance_stderr=stderr[-1],
     )
+
+
+def _warn_target(ending: Ending, photons: int, error: float) -> None:
+    """Say so when a run came to its last photon before its target error."""
+    target = ending.target_error
+    if target is not None and photons == ending.photons and error >= target:
+        warnings.warn(
+            f"{photons:,} photons were done before the target error of {100.0 * target:g} % was "
+            f"met; {100.0 * error:.2g} % was reached: give more --photons, or leave them out.",
+            SssfitWarning,
+            stacklevel=4,
+        )
 
 
 def _warn_unfinished(material: Material, profile: Profile) -> None:

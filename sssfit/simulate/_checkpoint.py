@@ -1,0 +1,247 @@
+"""A walk's sums on disk now and then, so that a run killed at any moment can go on.
+
+A checkpoint is what a shorter run would have ended with: the ledger summed over whole batches, the
+photons in it, and a fingerprint of what decides the bits of these batches. How many more are to
+follow is not part of that: a run may be resumed with more photons or a smaller target error, and
+ends in the same bits as one that was asked for that from the start.
+
+Which run may write a checkpoint is settled by the lock on the output it belongs to (see
+``sssfit.files.locked``); nothing here locks.
+"""
+
+import contextlib
+import io
+import json
+import math
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit._jit import source_key
+from sssfit.errors import FileError, SimulationError, SssfitWarning
+from sssfit.files import reason, remove_leftovers, write_atomically
+from sssfit.grid import RadialGrid
+from sssfit.material import Material
+from sssfit.simulate._batches import BATCH_PHOTONS, Tally
+
+FORMAT = "sssfit.checkpoint/1"
+# At most so much is lost; skin1's takes 1 ms to write, the largest (64 channels of 100 000
+# annuli, 100 MB) a quarter of a second.
+EVERY_SECONDS = 30.0
+
+
+@dataclass(slots=True)
+class State:
+    """Where a walk stands: its sums, the least error of any check so far, seconds of all sittings.
+
+    The least error tells whether a run with some target would have ended before.
+    """
+
+    tally: Tally
+    least_error: float = math.inf
+    seconds: float = 0.0
+
+
+@dataclass(slots=True)
+class Checkpoint:
+    """Where a walk saves its sums, how often, and whether it goes on from those found there.
+
+    Parameters
+    ----------
+    path : Path
+        By custom the output's name and ``.checkpoint``.
+    every_seconds : float [s]
+        Time between two saves, 0 (after every batch) or more.
+    resume : bool
+        Go on from what is there, if anything is; else start anew, and replace it by the first
+        save.
+
+    Raises
+    ------
+    SimulationError
+        A time that is negative or not finite.
+
+    Examples
+    --------
+    >>> from sssfit.material import load_material
+    >>> from sssfit.simulate import Checkpoint, simulate_montecarlo
+    >>> checkpoint = Checkpoint(Path("skin1.checkpoint"))
+    >>> profile = simulate_montecarlo(
+    ...     load_material("skin1"), photons=100_000, checkpoint=checkpoint
+    ... )
+    >>> profile.save("skin1.profile.npz")
+    >>> checkpoint.remove()
+    """
+
+    path: Path
+    every_seconds: float = EVERY_SECONDS
+    resume: bool = True
+    _settings: Mapping[str, str] = field(init=False, default_factory=dict)
+    _is_ours: bool = field(init=False, default=False)
+    _has_failed: bool = field(init=False, default=False)
+    _saved_at: float = field(init=False, default=0.0)
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.every_seconds < math.inf:
+            raise SimulationError(
+                f"a checkpoint every {self.every_seconds} s; give a time from 0 s up."
+            )
+
+    def begin(self, empty: Tally, settings: Mapping[str, str]) -> State:
+        """Return where to begin: at what was saved with the same ``settings``, or at ``empty``.
+
+        Raises
+        ------
+        FileError
+            What is there cannot be read, or is damaged or foreign.
+        SimulationError
+            It was made with other settings; the message names them.
+        """
+        remove_leftovers(self.path)
+        self._settings, self._saved_at = settings, perf_counter()
+        self._is_ours = self.resume and self.path.exists()
+        if self._is_ours:
+            return _load(self.path, empty, settings)
+        if self.path.exists():
+            warnings.warn(
+                f"starting anew beside {self.path}, which an earlier run left; it is kept until "
+                "this run's own first checkpoint (--resume would go on from it).",
+                SssfitWarning,
+                stacklevel=6,
+            )
+        return State(empty)
+
+    def save_if_due(self, state: State) -> None:
+        """Save every so often. A failure is said once and costs nothing but the checkpoint."""
+        if perf_counter() - self._saved_at >= self.every_seconds:
+            self._save(state)
+
+    def save_at_stop(self, state: State) -> None:
+        """Save what a stopped run has done, but not over the work of another, longer one."""
+        if self._is_ours or not self.path.exists():
+            self._save(state)
+
+    def is_ours(self) -> bool:
+        """Whether what lies there is this run's, saved by it or gone on from."""
+        return self._is_ours
+
+    def remove(self) -> None:
+        """Delete what this run saved or went on from, its result being safe; nobody else's."""
+        if self._is_ours:
+            with contextlib.suppress(OSError):  # a folder turned read-only: it does no harm there
+                self.path.unlink()
+            self._is_ours = False
+
+    def _save(self, state: State) -> None:
+        try:
+            _write(self.path, state, self._settings)
+        except FileError as error:
+            if not self._has_failed:
+                warnings.warn(
+                    f"{str(error).rstrip('.')}: the run goes on, and the last good checkpoint, "
+                    "if there is one, is kept.",
+                    SssfitWarning,
+                    stacklevel=6,
+                )
+            self._has_failed = True
+        else:
+            self._is_ours = True
+        self._saved_at = perf_counter()
+
+
+def settings_of(
+    materials: Sequence[Material], grids: Sequence[RadialGrid], seed: int
+) -> dict[str, str]:
+    """Everything that decides the bits of a walk's batches, in words that can be shown."""
+    return {
+        "seed": str(seed),
+        "material": ", ".join(f"{each.name} (sha256 {each.sha256[:16]})" for each in materials),
+        "dr_mm": ", ".join(repr(grid.dr_mm) for grid in grids),
+        "annuli": ", ".join(str(grid.annuli) for grid in grids),
+        "version": source_key(),
+        "photons in a batch": str(BATCH_PHOTONS),
+    }
+
+
+def _write(path: Path, state: State, settings: Mapping[str, str]) -> None:
+    """Write the whole file or nothing."""
+    meta = {
+        "format": FORMAT,
+        "settings": dict(settings),
+        "photons": state.tally.photons,
+        "flights": state.tally.flights,
+        "least_error": state.least_error,
+        "seconds": state.seconds,
+    }
+    arrays = {f"ledger_{name}": each for name, each in state.tally.ledger._asdict().items()}
+    # In memory first: on a full disk zipfile's own clean-up would fail a second time.
+    buffer = io.BytesIO()
+    np.savez(buffer, meta=np.array(json.dumps(meta)), **arrays)
+    write_atomically(path, lambda stream: stream.write(buffer.getbuffer()))
+
+
+def _load(path: Path, empty: Tally, settings: Mapping[str, str]) -> State:
+    """Fill ``empty`` with what the file holds, if it was made with the same settings."""
+    meta, arrays = _read(path)
+    if meta.get("format") != FORMAT:
+        raise FileError(f"{path} has format {meta.get('format')!r}, not {FORMAT!r}; {_REMEDY}.")
+    _check_settings(path, meta.get("settings"), settings)
+    try:
+        return _filled(empty, meta, arrays)
+    except (KeyError, TypeError, ValueError):
+        raise _damaged(path) from None
+
+
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
+    try:
+        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as members:
+            arrays = dict(members.items())
+        meta = json.loads(str(arrays.pop("meta")))
+        return dict(meta), arrays
+    except OSError as error:
+        raise FileError(f"{path} cannot be read: {reason(error)}.") from error
+    except Exception as error:
+        # zipfile, zlib, numpy's header parser and json raise a dozen unrelated types on damage.
+        raise _damaged(path) from error
+
+
+def _filled(empty: Tally, meta: Mapping[str, Any], arrays: Mapping[str, Any]) -> State:
+    """Copy what was read into the sums; raise what a wrong type, shape or name raises."""
+    ledger = {f"ledger_{name}": each for name, each in empty.ledger._asdict().items()}
+    if set(arrays) != set(ledger) or meta["photons"] % BATCH_PHOTONS or meta["photons"] <= 0:
+        raise ValueError
+    for name, mine in ledger.items():
+        if arrays[name].shape != mine.shape or arrays[name].dtype != mine.dtype:
+            raise ValueError
+        mine[...] = arrays[name]
+    empty.photons, empty.flights = int(meta["photons"]), int(meta["flights"])
+    return State(empty, float(meta["least_error"]), float(meta["seconds"]))
+
+
+def _check_settings(path: Path, there: Any, here: Mapping[str, str]) -> None:
+    """Name every setting in which a checkpoint differs from the run that is to go on from it."""
+    if not isinstance(there, dict):
+        raise _damaged(path)
+    differing = [
+        f"{name} = {there.get(name)} (now {here.get(name)})"
+        for name in {**here, **there}
+        if there.get(name) != here.get(name)
+    ]
+    if differing:
+        raise SimulationError(
+            f"{path} was made with other settings: {'; '.join(differing)}. Give the same, or "
+            "start anew without --resume."
+        )
+
+
+_REMEDY = "delete it, or start anew without --resume"
+
+
+def _damaged(path: Path) -> FileError:
+    return FileError(f"{path} is damaged or not a checkpoint; {_REMEDY}.")
