@@ -25,7 +25,10 @@ def figures_of(profile: Profile, seconds: float | None) -> dict[str, Any]:
         "diffuse_reflectance": profile.diffuse_reflectance,
         "diffuse_reflectance_stderr": profile.diffuse_reflectance_stderr,
         "specular_reflectance": profile.specular_reflectance,
+        "transmittance": profile.transmittance,
+        "transmittance_stderr": profile.transmittance_stderr,
         "absorbed": profile.absorbed.sum(axis=0),
+        "absorbed_by_layer": profile.absorbed,
         "beyond_grid": profile.beyond_grid,
         "unfinished": profile.unfinished,
         "energy_balance": profile.energy_balance,
@@ -49,7 +52,14 @@ def report(rows: list[dict[str, Any]], *, every: bool, common: Common, interrupt
     figures |= {"rows": rows} if every else rows[0]
     if interrupted:
         figures["interrupted"] = True
-    lines = [_heading(rows, every), _table(rows), *_energy(rows), *_beyond(rows), *_target(rows)]
+    lines = [
+        _heading(rows, every),
+        _table(rows),
+        *_layers(rows),
+        *_energy(rows),
+        *_beyond(rows),
+        *_target(rows),
+    ]
     text = "\n".join([*lines, *_files(rows, output)])
     finish(common, figures, text, to_stderr=output == ["-"])
 
@@ -70,10 +80,11 @@ def _files(rows: list[dict[str, Any]], output: list[str]) -> list[str]:
 def _heading(rows: list[dict[str, Any]], every: bool) -> str:
     """Who, how many photons, how fast, on which grid."""
     row = rows[0]
-    counts = dict.fromkeys(f"{each['photons']:,}" for each in rows)
-    walks = f"{' and '.join(counts)} photons, seed {row['seed']}"
+    counts = sorted({each["photons"] for each in rows})
+    walks = f"{' to '.join(f'{n:,}' for n in counts[:: len(counts) - 1 or 1])} photons, "
+    walks += f"seed {row['seed']}"
     if every:
-        return f"{len(rows)} materials: {walks}, all channels of one index in one walk"
+        return f"{len(rows)} materials: {walks}"
     seconds, rate = row["seconds"], row["photons_per_second"]
     speed = "" if seconds is None else f", {seconds:.1f} s ({rate:,.0f} a second)"
     return (
@@ -84,12 +95,16 @@ def _heading(rows: list[dict[str, Any]], every: bool) -> str:
 
 def _table(rows: list[dict[str, Any]]) -> str:
     """One line a channel; the material's name where there are several."""
-    heads = ["channel", "diffuse reflectance", "std. error", "absorbed", "beyond grid"]
+    slab = any(row["transmittance"] is not None for row in rows)
+    heads = ["channel", "diffuse reflectance", "std. error"]
+    heads += ["transmittance", "std. error"] if slab else []
+    heads += ["absorbed", "beyond grid"]
     lines = [
         [
             name if len(rows) == 1 else f"{row['material']} {name}",
             f"{row['diffuse_reflectance'][c]:.6f}",
             f"{row['diffuse_reflectance_stderr'][c]:.6f}",
+            *(_transmitted(row, c) if slab else []),
             f"{row['absorbed'][c]:.6f}",
             f"{row['beyond_grid'][c]:.6f}",
         ]
@@ -97,6 +112,24 @@ def _table(rows: list[dict[str, Any]]) -> str:
         for c, name in enumerate(row["channels"])
     ]
     return table(heads, lines)
+
+
+def _transmitted(row: dict[str, Any], channel: int) -> list[str]:
+    """Transmittance and its error; dashes for a half space among slabs."""
+    if row["transmittance"] is None:
+        return ["-", "-"]
+    return [f"{row[key][channel]:.6f}" for key in ("transmittance", "transmittance_stderr")]
+
+
+def _layers(rows: list[dict[str, Any]]) -> list[str]:
+    """Energy absorbed in each layer, where there are several."""
+    return [
+        f"absorbed by layer, {row['material']} {name}: "
+        + ", ".join(f"{each[c]:.6f}" for each in row["absorbed_by_layer"])
+        for row in rows
+        for c, name in enumerate(row["channels"])
+        if len(row["absorbed_by_layer"]) > 1
+    ]
 
 
 def _energy(rows: list[dict[str, Any]]) -> list[str]:
@@ -113,7 +146,9 @@ def _energy(rows: list[dict[str, Any]]) -> list[str]:
         key=lambda each: abs(each[0]),
     )
     unfinished = max(float(each) for row in rows for each in row["unfinished"])
-    parts = "specular + diffuse + absorbed" + (" + unfinished" if unfinished > 0.0 else "")
+    parts = "specular + diffuse + absorbed"
+    parts += " + transmitted" if any(row["transmittance"] is not None for row in rows) else ""
+    parts += " + unfinished" if unfinished > 0.0 else ""
     within = abs(balance) <= _SIGMAS * stderr + _ROUNDING
     lines.append(
         f"energy: {parts} = 1 {'within' if within else 'NOT WITHIN'} the run's own error: "
