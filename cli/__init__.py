@@ -71,7 +71,7 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
         except SssfitError as error:
             _fail(str(error))
         except (KeyboardInterrupt, click.Abort):
-            click.echo("Interrupted; nothing was written.", err=True)
+            click.echo("Interrupted.", err=True)
             sys.exit(130)
         except BrokenPipeError:
             _leave_quietly()

@@ -5,7 +5,7 @@ import math
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import click
 
@@ -45,9 +45,22 @@ def newest(common: Common, pattern: str, made_by: str) -> Path:
     return path
 
 
-def is_terminal() -> bool:
-    """Whether a person watches stderr."""
-    return sys.stderr.isatty()
+def binary_stdout() -> BinaryIO:
+    """Return stdout for bytes, or say in one line that it is closed."""
+    from sssfit.errors import FileError
+
+    if sys.stdout is None:
+        raise FileError("stdout is closed; name a file with -o, or pipe the output somewhere.")
+    return sys.stdout.buffer
+
+
+def binary_stdin() -> BinaryIO:
+    """Return stdin for bytes, or say in one line that it is closed."""
+    from sssfit.errors import FileError
+
+    if sys.stdin is None:
+        raise FileError("stdin is closed; name a file instead of -.")
+    return sys.stdin.buffer
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

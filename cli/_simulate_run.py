@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ._options import Common
-from ._report import say
+from ._report import binary_stdout, say
 from ._simulate_report import figures_of, report
 
 if TYPE_CHECKING:
@@ -55,10 +55,12 @@ def run_walks(
 
     rows: dict[int, _Outcome] = {}
     with ExitStack() as held:
+        stop = held.enter_context(asked_to_stop())
+        if None in targets:
+            binary_stdout()  # closed: said now and not after the walk
         for path in filter(None, targets):
             check_output(path, is_profile_file, force=request.force)
             held.enter_context(locked(path))
-        stop = held.enter_context(asked_to_stop())
         for group, settings in walks:
             own = [materials[k] for k in group], [targets[k] for k in group], settings
             try:
@@ -66,15 +68,22 @@ def run_walks(
             except StoppedError:
                 break
             rows |= zip(group, found, strict=True)
-    if not rows:
-        raise KeyboardInterrupt
+        if not rows:
+            raise KeyboardInterrupt
+        _report(rows, materials, request)
+
+
+def _report(rows: dict[int, _Outcome], materials: list[Material], request: Request) -> None:
+    """Print the figures; say what was interrupted or not begun, and exit 130 in that case."""
     outcomes = [rows[k] for k in sorted(rows)]
-    interrupted = len(rows) < len(materials) or not all(each.is_complete for each in outcomes)
+    missing = [each.name for k, each in enumerate(materials) if k not in rows]
+    interrupted = bool(missing) or not all(each.is_complete for each in outcomes)
     if interrupted:
         how = "; --resume goes on from there" if any(each.goes_on for each in outcomes) else ""
+        left = f" Not begun: {', '.join(missing)}." if missing else ""
         say(
             request.common,
-            f"Interrupted: what was done by then is saved, with its true photon count{how}.",
+            f"Interrupted: what was done by then is saved, with its true photon count{how}.{left}",
         )
     report(
         [each.figures for each in outcomes],
@@ -152,14 +161,17 @@ def _walk(
     stop: Callable[[], bool],
 ) -> tuple[list[Profile], float]:
     """One walk for all ``materials``, with a progress bar; the profiles and seconds of walking."""
-    from sssfit.simulate import compiled_before, simulate_montecarlo_many
+    from sssfit.simulate import is_compiled, simulate_montecarlo_many
 
     from ._progress import walk_progress
 
     common = request.common
     last: list[Progress] = []
-    if not compiled_before():
-        say(common, "First use: compiling the photon walk, some 10 s; it is kept for later runs.")
+    if not is_compiled(materials[0]):
+        say(
+            common,
+            "Compiling the photon walk, some 10 s; it is kept for later runs where it can be.",
+        )
     label = materials[0].name if len(materials) == 1 else f"{len(materials)} materials"
     resumes = request.resume and checkpoint is not None and checkpoint.path.exists()
     with walk_progress(label, quiet=common.quiet) as show:
@@ -194,7 +206,8 @@ def _outcome(
 def _write(profile: Profile, path: Path | None) -> None:
     """To the file, whole or not at all; to stdout where there is none."""
     if path is None:
-        profile.write(sys.stdout.buffer)
-        sys.stdout.buffer.flush()
+        stream = binary_stdout()
+        profile.write(stream)
+        stream.flush()
     else:
         profile.save(path)

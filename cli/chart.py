@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from ._options import Common, common_options
-from ._report import finish, newest
+from ._report import binary_stdin, binary_stdout, finish, newest
 
 if TYPE_CHECKING:
     from sssfit.profile import Profile
@@ -59,7 +58,7 @@ def _read(name: str) -> Profile:
     """From the file, or stdin for ``-``."""
     from sssfit.profile import Profile
 
-    return Profile.read(sys.stdin.buffer, "stdin") if name == "-" else Profile.load(name)
+    return Profile.read(binary_stdin(), "stdin") if name == "-" else Profile.load(name)
 
 
 def _material_name(profile: Profile) -> str | None:
@@ -86,8 +85,8 @@ def _draw(profile: Profile, path: Path | None, *, force: bool) -> None:
     if path is None:
         from sssfit.chart import profile_figure, save_figure
 
-        save_figure(profile_figure(profile), sys.stdout.buffer, format="png")
-        sys.stdout.buffer.flush()
+        save_figure(profile_figure(profile), binary_stdout(), format="png")
+        binary_stdout().flush()
         return
     check_output(path, is_chart_file, force=force)
     with locked(path):

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 
 import click
 
 from ._options import Common, common_options
-from ._report import finish, newest
+from ._report import binary_stdin, binary_stdout, finish, newest
 
 
 @click.command()
@@ -44,7 +43,7 @@ def export(file: str | None, form: str, output: str | None, force: bool, common:
     from sssfit.profile_csv import csv_text
 
     name = file or str(newest(common, "*.profile.npz", "sssfit simulate skin1"))
-    profile = Profile.read(sys.stdin.buffer, "stdin") if name == "-" else Profile.load(name)
+    profile = Profile.read(binary_stdin(), "stdin") if name == "-" else Profile.load(name)
     path = _target(name, form, output)
     _write(csv_text(profile).encode(), path, force=force)
     figures = {
@@ -72,8 +71,8 @@ def _write(content: bytes, path: Path | None, *, force: bool) -> None:
     from sssfit.profile_csv import is_profile_csv
 
     if path is None:
-        sys.stdout.buffer.write(content)
-        sys.stdout.buffer.flush()
+        binary_stdout().write(content)
+        binary_stdout().flush()
         return
     check_output(path, is_profile_csv, force=force)
     with locked(path):

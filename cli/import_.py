@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ._options import Common, common_options
-from ._report import finish, table
+from ._report import binary_stdin, binary_stdout, finish, table
 
 if TYPE_CHECKING:
     from sssfit.profile import Profile
@@ -84,7 +83,7 @@ def _read(files: tuple[str, ...], quantity: str | None, channels: str | None) ->
     origins = ["stdin" if name == "-" else name for name in files]
     texts = [
         read_text(
-            sys.stdin.buffer if name == "-" else name,
+            binary_stdin() if name == "-" else name,
             origin,
             expected="a CSV or MCML's output in ASCII",
             error=ProfileError,
@@ -125,8 +124,8 @@ def _write(profile: Profile, path: Path | None, *, force: bool) -> None:
     from sssfit.profile import is_profile_file
 
     if path is None:
-        profile.write(sys.stdout.buffer)
-        sys.stdout.buffer.flush()
+        profile.write(binary_stdout())
+        binary_stdout().flush()
         return
     check_output(path, is_profile_file, force=force)
     with locked(path):

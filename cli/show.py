@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import sys
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ._options import Common, common_options
-from ._report import finish, newest, table
+from ._report import binary_stdin, finish, newest, table
 
 if TYPE_CHECKING:
     from sssfit.material import Material
@@ -32,7 +31,7 @@ def show(file: str | None, common: Common) -> None:
     from sssfit.profile import Profile
 
     name = file or str(newest(common, "*.profile.npz", "sssfit simulate skin1"))
-    profile = Profile.read(sys.stdin.buffer, "stdin") if name == "-" else Profile.load(name)
+    profile = Profile.read(binary_stdin(), "stdin") if name == "-" else Profile.load(name)
     figures = {"command": "show", "output": [], "file": name, **_figures(profile)}
     finish(common, figures, _text(figures))
 

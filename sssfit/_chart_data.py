@@ -124,6 +124,8 @@ def mean_free_paths_mm(profile: Profile) -> FloatArray | None:
     material = material_of(profile)
     if material is None or material.n_channels != profile.n_channels:
         return None
+    if len(material.layers) > 1:
+        return None  # there is no one mean free path
     paths_mm = material.layers[0].mean_free_path_mm
     return paths_mm if np.isfinite(paths_mm).all() else None
 

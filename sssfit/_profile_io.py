@@ -77,6 +77,7 @@ def unpack(
     """
     try:
         if isinstance(source, str | Path):
+            _check_ordinary(Path(source))
             with Path(source).open("rb") as stream:
                 return _unpack_stream(stream)
         # A pipe cannot seek, an archive's directory is at its end.
@@ -121,6 +122,12 @@ def _unpack_stream(stream: BinaryIO) -> tuple[dict[str, FloatArray], dict[str, A
             raise ProfileError("holds arrays that a profile does not have")
         arrays = {name: _read_float(archive, name) for name in names if name != "meta"}
     return arrays, meta
+
+
+def _check_ordinary(path: Path) -> None:
+    """Refuse devices, which may never end, and pipes, which have no end to begin a zip from."""
+    if path.exists() and not path.is_file():
+        raise ProfileError("is not an ordinary file")
 
 
 def _file_format(meta: Mapping[str, Any]) -> str:

@@ -261,7 +261,7 @@ def _draw_unweighted(axes: Axes, profile: Profile, bins: list[Bins]) -> None:
     ]
     axes.set_xlim(0, max(ends) or 1)
     if paths_mm is None:
-        _name(axes, "(c) unweighted", "r (mm; no mean free paths known)", _UNWEIGHTED)
+        _name(axes, "(c) unweighted", "r (mm; no one mean free path)", _UNWEIGHTED)
     else:
         label = words.path_label(profile, paths_mm)
         _name(axes, "(c) unweighted, in mean free paths", label, _UNWEIGHTED)

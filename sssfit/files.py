@@ -21,6 +21,12 @@ else:
     import fcntl
 
 
+# A plain ``open`` gives 0666 less this; mkstemp's 0600 would shut colleagues out. Read once, at
+# import: it can only be read by changing it, and threads may be writing later.
+_UMASK = os.umask(0)
+os.umask(_UMASK)
+
+
 def reason(error: OSError) -> str:
     """Say an operating-system error in lower case, without its number."""
     return (error.strerror or str(error)).lower()
@@ -43,20 +49,23 @@ def check_output(path: Path, is_own: Callable[[Path], bool], *, force: bool = Fa
     FileError
         The folder is missing or not writable, or the file is somebody else's.
     """
+    path = _followed(path)
     folder = path.parent
     if not folder.is_dir():
         raise FileError(f"{path}: there is no folder {folder}; make it or choose another with -o.")
     if path.is_dir():
         raise FileError(f"{path} is a folder; name a file in it with -o.")
+    if path.exists() and not path.is_file():
+        raise FileError(f"{path} is not an ordinary file; name one with -o, or - for stdout.")
     if path.exists() and not force and not is_own(path):
         raise FileError(
             f"{path} exists and is not a file of this format; "
             "choose another name with -o, or replace it with --force."
         )
     with _clear_errors(path):
-        handle, probe = tempfile.mkstemp(dir=folder, prefix=".sssfit-")
+        handle, probe = _temporary(path)
         os.close(handle)
-        Path(probe).unlink()
+        probe.unlink()
 
 
 def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
@@ -67,15 +76,15 @@ def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
     FileError
         Disk full, folder read-only, or any other failure; an older file at ``path`` is untouched.
     """
+    path = _followed(path)
     with _clear_errors(path):
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
-        temporary = Path(name)
+        handle, temporary = _temporary(path)
         try:
             with os.fdopen(handle, "wb") as stream:
                 write(stream)
                 stream.flush()
                 os.fsync(stream.fileno())
-            temporary.chmod(_ordinary_mode())
+            temporary.chmod(path.stat().st_mode if path.exists() else 0o666 & ~_UMASK)
             temporary.replace(path)
             _flush_folder(path.parent)
         except BaseException:
@@ -106,6 +115,7 @@ def locked(path: Path) -> Iterator[None]:
     FileError
         Another run holds it.
     """
+    path = _followed(path)
     lock_path = path.with_name(f".{path.name}.lock")
     with _clear_errors(path):
         handle = _open_locked(lock_path, path)
@@ -157,11 +167,15 @@ def _lock(handle: int) -> None:
         fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
 
 
-def _ordinary_mode() -> int:
-    """Permissions a plain ``open`` gives; mkstemp's 0600 would shut colleagues out."""
-    mask = os.umask(0)
-    os.umask(mask)
-    return 0o666 & ~mask
+def _temporary(path: Path) -> tuple[int, Path]:
+    """Make the file that is to be renamed to ``path``; `remove_leftovers` knows it by its name."""
+    handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
+    return handle, Path(name)
+
+
+def _followed(path: Path) -> Path:
+    """Where a symbolic link leads, so that a rename replaces the file and not the link."""
+    return path.resolve() if path.is_symlink() else path
 
 
 @contextlib.contextmanager

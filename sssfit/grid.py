@@ -100,11 +100,16 @@ def make_grid(
     """
     paths_mm = np.concatenate([layer.mean_free_path_mm for layer in material.layers])
     paths_mm = paths_mm[np.isfinite(paths_mm)]
-    dr = paths_mm.min() / _RINGS_PER_MFP if dr_mm is None else _length("dr_mm", dr_mm)
-    longest = _MFPS_PER_RADIUS * paths_mm.max()
-    radius = longest if radius_mm is None else _length("radius_mm", radius_mm)
+    shortest, longest = float(paths_mm.min()), float(paths_mm.max())
+    dr = shortest / _RINGS_PER_MFP if dr_mm is None else _length("dr_mm", dr_mm)
+    radius = _MFPS_PER_RADIUS * longest if radius_mm is None else _length("radius_mm", radius_mm)
     # 1e-9 keeps a ratio that is whole but for its last bits from gaining a ring.
     annuli = max(1, math.ceil(radius / dr - 1e-9))
+    why = (
+        f" (sigma_a_per_mm and sigma_s_per_mm give mean free paths from {shortest:.3g} to "
+        f"{longest:.3g} mm)"
+    )
+    _check_count(annuli, dr, f"{material.name}: ", why)
     return RadialGrid(float(dr), annuli)
 
 
@@ -118,14 +123,14 @@ def _length(key: str, value: Any) -> float:
     return float(value)
 
 
-def _check_count(annuli: int, dr_mm: float) -> None:
+def _check_count(annuli: int, dr_mm: float, whose: str = "", why: str = "") -> None:
     """Refuse too many rings, and say which width or radius would do."""
     if annuli > MOST_ANNULI:
         least_dr = _rounded(dr_mm * (annuli / MOST_ANNULI), math.ceil)
         most_radius = _rounded(dr_mm * MOST_ANNULI, math.floor)
         raise SimulationError(
-            f"the grid would have {annuli:.6g} annuli, over the limit of {MOST_ANNULI}; use --dr "
-            f"{least_dr} or more, or --radius {most_radius} or less (both in mm)."
+            f"{whose}the grid would have {annuli:.6g} annuli, over the limit of {MOST_ANNULI}{why}"
+            f"; use --dr {least_dr} or more, or --radius {most_radius} or less (both in mm)."
         )
 
 

@@ -289,6 +289,8 @@ def load_material(name_or_path: str | Path) -> Material:
     """
     wanted = str(name_or_path)
     if wanted == "-":
+        if sys.stdin is None:
+            raise MaterialError("stdin is closed; name a material or a file instead of -.")
         with located("stdin: "):
             text = decode(sys.stdin.buffer.read(MOST_BYTES + 1))
         return parse_material(text, "stdin")

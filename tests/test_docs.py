@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from sssfit.cli import cli
+from sssfit.material import parse_material
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -39,6 +40,11 @@ def test_ci_runs_the_test_command_of_the_readme():
 @pytest.mark.parametrize("verb", list(cli.commands))
 def test_readme_names_every_verb(verb):
     assert f"sssfit {verb}" in README
+
+
+def test_materials_in_the_readme_load():
+    (example,) = code_blocks("toml")
+    assert len(parse_material(example, "README.md").layers) == 2
 
 
 def table_of(text: str) -> list[list[str]]:

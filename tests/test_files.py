@@ -48,6 +48,41 @@ def test_an_interrupted_write_leaves_nothing(tmp_path):
     assert names(tmp_path) == []
 
 
+@pytest.mark.skipif(sys.platform == "win32", reason="an open file cannot be replaced there")
+def test_a_reader_sees_the_old_file_or_the_new_one(tmp_path):
+    target = tmp_path / "a.npz"
+    target.write_bytes(b"old")
+
+    def write(stream):
+        stream.write(b"new,")
+        stream.flush()
+        assert target.read_bytes() == b"old"
+        stream.write(b" longer")
+
+    with target.open("rb") as reader:
+        files.write_atomically(target, write)
+        assert reader.read() == b"old"
+    assert target.read_bytes() == b"new, longer"
+
+
+def test_a_file_is_on_the_disk_whole_before_it_takes_the_name(tmp_path, monkeypatch):
+    target, real, seen = tmp_path / "a.npz", os.fsync, []
+    target.write_bytes(b"old")
+
+    def note(handle):
+        of = os.fstat(handle)
+        seen.append((of.st_ino, of.st_size, target.read_bytes()))
+        real(handle)
+
+    monkeypatch.setattr(os, "fsync", note)
+    files.write_atomically(target, lambda stream: stream.write(b"new, longer"))
+    assert seen[0] == (target.stat().st_ino, len(b"new, longer"), b"old")
+    if sys.platform != "win32":  # then the rename: a folder is flushed there too
+        assert [(inode, content) for inode, _, content in seen[1:]] == [
+            (tmp_path.stat().st_ino, b"new, longer")
+        ]
+
+
 def test_a_written_file_has_ordinary_permissions(tmp_path):
     files.write_atomically(tmp_path / "a", lambda stream: stream.write(b"x"))
     (tmp_path / "b").write_bytes(b"x")

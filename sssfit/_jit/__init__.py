@@ -10,6 +10,7 @@ folder. Where nothing can be written (read-only home, no home at all) functions 
 in each process: slower to start, otherwise the same.
 """
 
+import contextlib
 import hashlib
 import os
 import sys
@@ -18,6 +19,7 @@ from pathlib import Path
 from typing import Literal, TypeVar
 
 import numba
+from numba.core.caching import FunctionCache
 
 from sssfit import __version__
 
@@ -62,9 +64,10 @@ def _writable_cache_folder() -> str:
 _CACHE_FOLDER = _writable_cache_folder()
 
 
-def compiled_before() -> bool:
-    """Whether machine code of these very sources lies in the cache (else first use compiles)."""
-    return bool(_CACHE_FOLDER) and any(Path(_CACHE_FOLDER).rglob("*.nbc"))
+def compiled_before(walk: str) -> bool:
+    """Whether machine code of the walk of that file lies in the cache, made from these sources."""
+    pattern = f"{walk}.trace_batch-*.nbc"
+    return bool(_CACHE_FOLDER) and any(Path(_CACHE_FOLDER).rglob(pattern))
 
 
 def jit(function: Function) -> Function:
@@ -81,22 +84,42 @@ def jit_inline(function: Function) -> Function:
     return _compile(function, inline="always")
 
 
-def _compile(function: Function, *, inline: Literal["never", "always"]) -> Function:
-    """Decorate with numba's cache pointed at our keyed folder.
+class _ForgivingCache(FunctionCache):
+    """numba's cache on disk, for which nothing that goes wrong there is more than a miss.
 
-    numba reads its cache folder from a global setting at decoration time only; it is set for the
-    length of the call and put back, so that a host program's own choice stands.
+    A full disk or quota, or an index cut short by a crash, would otherwise stop every later run.
     """
-    before = numba.config.CACHE_DIR  # type: ignore[attr-defined]
-    numba.config.CACHE_DIR = _CACHE_FOLDER  # type: ignore[attr-defined]
-    try:
-        compiled: Function = numba.njit(
-            function,
-            cache=bool(_CACHE_FOLDER),
-            nogil=True,
-            error_model="numpy",
-            inline=inline,
-        )
-        return compiled
-    finally:
-        numba.config.CACHE_DIR = before  # type: ignore[attr-defined]
+
+    def load_overload(self, sig: object, target_context: object) -> object:
+        try:
+            return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
+        except Exception:  # pickle raises whatever the damaged bytes make it raise
+            self._forget()
+            return None
+
+    def save_overload(self, sig: object, data: object) -> None:
+        try:
+            super().save_overload(sig, data)  # type: ignore[no-untyped-call]
+        except Exception:
+            self._forget()
+
+    def _forget(self) -> None:
+        with contextlib.suppress(Exception):
+            self.flush()  # type: ignore[no-untyped-call]
+
+
+def _compile(function: Function, *, inline: Literal["never", "always"]) -> Function:
+    """Decorate with a cache in our keyed folder.
+
+    numba reads the folder from a global setting when a cache is made; it is set for the length of
+    the call and put back, so that a host program's own choice stands.
+    """
+    compiled: Function = numba.njit(function, nogil=True, error_model="numpy", inline=inline)
+    if _CACHE_FOLDER:
+        before = numba.config.CACHE_DIR  # type: ignore[attr-defined]
+        numba.config.CACHE_DIR = _CACHE_FOLDER  # type: ignore[attr-defined]
+        try:
+            compiled._cache = _ForgivingCache(function)  # type: ignore[attr-defined, no-untyped-call]
+        finally:
+            numba.config.CACHE_DIR = before  # type: ignore[attr-defined]
+    return compiled

@@ -1,6 +1,7 @@
 """What a profile says of how it was asked for, and whether a run has nothing left to do."""
 
 import math
+import operator
 from collections.abc import Sequence
 from typing import Any
 
@@ -25,11 +26,20 @@ def ending_of(photons: int | None, target_error: float | None) -> Ending:
     """
     if photons is None:
         photons = DEFAULT_PHOTONS if target_error is None else MAX_PHOTONS
+    photons = whole("photons", photons)
     if not 2 <= photons <= MAX_PHOTONS:
         raise SimulationError(f"photons = {photons}; give a whole number from 2 to 1e12.")
     if target_error is not None and not 0.0 < target_error < 1.0:
         raise SimulationError(f"target_error = {target_error}; give a share between 0 and 1.")
     return Ending(photons, target_error)
+
+
+def whole(name: str, value: int) -> int:
+    """Take any kind of whole number (numpy's too) for a plain int, or refuse it in one line."""
+    try:
+        return operator.index(value)
+    except TypeError:
+        raise SimulationError(f"{name} = {value!r}; give a whole number.") from None
 
 
 def provenance(

@@ -20,13 +20,14 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit import __version__
+from sssfit._jit import compiled_before
 from sssfit.errors import SimulationError, SssfitWarning, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
 from sssfit.simulate._batches import Sums, Tally, Walk, available_cores, relative_errors
 from sssfit.simulate._checkpoint import Checkpoint, settings_of
-from sssfit.simulate._finished import ending_of, provenance
+from sssfit.simulate._finished import ending_of, provenance, whole
 from sssfit.simulate._layered import LayeredWalk
 from sssfit.simulate._run import Ending, Progress, run
 from sssfit.simulate._semi_infinite import SemiInfiniteWalk, relative_eta
@@ -158,8 +159,9 @@ def simulate_montecarlo_many(
     """
     _check_media(materials)
     ending = ending_of(photons, target_error)
+    seed = whole("seed", seed)
+    threads = available_cores() if threads is None else whole("threads", threads)
     _check_settings(ending.photons, seed, threads)
-    threads = threads or available_cores()
     auto = radius_mm == "auto"
     if isinstance(radius_mm, str):
         if not auto:
@@ -191,6 +193,10 @@ def _check_media(materials: Sequence[Material]) -> None:
     if not materials:
         raise SimulationError("no material given; name at least one.")
     for material in materials:
+        if not isinstance(material, Material):
+            raise SimulationError(
+                f"{material!r} is not a Material; load one with sssfit.material.load_material."
+            )
         steepest = max(float(np.max(np.abs(layer.g))) for layer in material.layers)
         if steepest > STEEPEST_G:
             raise SimulationError(
@@ -229,6 +235,11 @@ def shared_walks(materials: Sequence[Material]) -> list[list[int]]:
     return list(groups.values())
 
 
+def is_compiled(material: Material) -> bool:
+    """Whether the walk of a material can start at once; else its first use compiles, some 10 s."""
+    return compiled_before("semi_infinite" if is_plain(material) else "layered")
+
+
 def _walk(
     materials: Sequence[Material], grids: Sequence[RadialGrid], seed: int, photons: int
 ) -> Walk:
@@ -237,11 +248,11 @@ def _walk(
     return kind(tuple(materials), tuple(grids), seed, photons)
 
 
-def _check_settings(photons: int, seed: int, threads: int | None) -> None:
+def _check_settings(photons: int, seed: int, threads: int) -> None:
     """Refuse settings out of range, one line each."""
     if not 0 <= seed < 2**64:
         raise SimulationError(f"seed = {seed}; give a whole number from 0 to 2^64 - 1.")
-    if threads is not None and threads < 1:
+    if threads < 1:
         raise SimulationError(f"threads = {threads}; give at least 1.")
     if photons < HONEST_PHOTONS:
         warnings.warn(
@@ -261,8 +272,8 @@ def _auto_grids(
 ) -> list[RadialGrid]:
     """Double each material's radius until a pilot walk loses half the allowed share or less.
 
-    Half, so that the run itself, with other noise, stays under the share; what the doubling gave
-    too much is trimmed off its result.
+    Half, so that the run itself, whose first photons are the pilot's, stays under the share; what
+    the doubling gave too much is trimmed off its result.
     """
     grids = [make_grid(each, dr_mm=dr_mm) for each in materials]
     while True:
@@ -380,7 +391,8 @@ def _warn_unfinished(material: Material, profile: Profile) -> None:
         warnings.warn(
             f"{material.name}: {100.0 * float(np.max(profile.unfinished)):.2g} % of the light was "
             "still inside after a million collisions; it is kept apart as `unfinished` and not "
-            "part of the reflectance (almost no absorption: give sigma_a_per_mm its true value).",
+            "part of the reflectance. Almost nothing absorbs here: if that is not meant, check "
+            "sigma_a_per_mm.",
             SssfitWarning,
             stacklevel=4,
         )
