@@ -1,0 +1,164 @@
+"""Where machine code is kept: keyed by every source, where the user says, or nowhere at all."""
+
+import errno
+import io
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+from sssfit import __version__, _jit
+from sssfit.material import load_material
+from sssfit.simulate import simulate_montecarlo
+
+SOURCES = Path(_jit.__file__).parent
+
+
+@pytest.fixture
+def sources(tmp_path, monkeypatch):
+    """A copy of the compiled layer's sources, of which the key is made."""
+    folder = tmp_path / "sources"
+    shutil.copytree(SOURCES, folder, ignore=shutil.ignore_patterns("__pycache__"))
+    monkeypatch.setattr(_jit, "__file__", str(folder / "__init__.py"))
+    return folder
+
+
+def python(code, **environment):
+    """What a fresh process prints."""
+    ended = subprocess.run(
+        [sys.executable, "-c", code],
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stderr == ""
+    return ended.stdout.split()
+
+
+def test_key_follows_every_source(sources, monkeypatch):
+    key = _jit.source_key()
+    assert key.startswith(f"{__version__}-")
+    for path in sorted(sources.glob("*.py")):
+        before = path.read_bytes()
+        path.write_bytes(before.replace(b"a", b"b", 1))
+        assert _jit.source_key() != key, path.name
+        path.write_bytes(before)
+        assert _jit.source_key() == key
+    (sources / "more.py").write_bytes(b"")
+    assert _jit.source_key() != key
+    (sources / "more.py").unlink()
+    monkeypatch.setattr(_jit, "__version__", "0.0.0")
+    assert _jit.source_key() == key.replace(__version__, "0.0.0", 1)
+
+
+def test_folder_is_the_users(tmp_path, monkeypatch):
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(Path, "home", lambda: tmp_path / "home")
+    for platform, variable, without in (
+        ("linux", "XDG_CACHE_HOME", Path(".cache", "sssfit")),
+        ("darwin", None, Path("Library", "Caches", "sssfit")),
+        ("win32", "LOCALAPPDATA", Path("AppData", "Local", "sssfit", "cache")),
+    ):
+        with monkeypatch.context() as here:
+            here.setattr(_jit.sys, "platform", platform)
+            assert _jit.user_cache_folder() == tmp_path / "home" / without
+            if variable:
+                here.setenv(variable, str(tmp_path / "base"))
+                found = _jit.user_cache_folder().relative_to(tmp_path / "base")
+                assert without.parts[-len(found.parts) :] == found.parts
+            here.setenv("NUMBA_CACHE_DIR", str(tmp_path / "chosen"))
+            assert _jit.user_cache_folder() == tmp_path / "chosen"
+
+
+def test_folder_is_made_and_left_empty(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "a" / "b"))
+    folder = Path(_jit._writable_cache_folder())
+    assert folder == tmp_path / "a" / "b" / _jit.source_key()
+    assert list(folder.iterdir()) == []
+
+
+def test_no_folder_where_nothing_can_be_written(tmp_path, monkeypatch):
+    # there, as on a read-only disk, but it takes no file
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert _jit._writable_cache_folder()
+
+    def refusing(real):
+        def opens(path, *arguments, **keywords):
+            if str(path).startswith(str(tmp_path)):
+                raise OSError(errno.EROFS, os.strerror(errno.EROFS))
+            return real(path, *arguments, **keywords)
+
+        return opens
+
+    monkeypatch.setattr(os, "open", refusing(os.open))
+    monkeypatch.setattr(io, "open", refusing(io.open))
+    assert _jit._writable_cache_folder() == ""
+
+
+def test_no_folder_without_a_home(monkeypatch):
+    def homeless():
+        raise RuntimeError("Could not determine home directory.")
+
+    for name in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME", "LOCALAPPDATA"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(Path, "home", homeless)
+    assert _jit._writable_cache_folder() == ""
+
+
+def test_machine_code_goes_there_and_numbas_own_setting_is_put_back(tmp_path, monkeypatch):
+    monkeypatch.setattr(_jit, "_CACHE_FOLDER", str(tmp_path))
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "the host program's")
+
+    @_jit.jit
+    def three(x):
+        return 3 * x
+
+    assert numba.config.CACHE_DIR == "the host program's"
+    assert three(2) == 6
+    assert list(tmp_path.rglob("*.nbc"))
+    with pytest.raises(TypeError):
+        _jit.jit(3)
+    assert numba.config.CACHE_DIR == "the host program's"
+
+
+TWICE = """
+from sssfit._jit.sampling import splitmix64
+print(int(splitmix64(1)))
+print(*(sum(each.values()) for each in (splitmix64.stats.cache_hits, splitmix64.stats.cache_misses)))
+"""
+
+
+def test_a_second_process_does_not_compile_again(tmp_path):
+    cache = {"NUMBA_CACHE_DIR": str(tmp_path)}
+    first, second = python(TWICE, **cache), python(TWICE, **cache)
+    assert [each.name for each in tmp_path.iterdir()] == [_jit.source_key()]
+    assert first[0] == second[0]
+    assert (first[1:], second[1:]) == (["0", "1"], ["1", "0"])  # hits, misses
+
+
+WALK = """
+from sssfit import _jit
+from sssfit.material import load_material
+from sssfit.simulate import simulate_montecarlo
+print(repr(_jit._CACHE_FOLDER))
+profile = simulate_montecarlo(load_material("skin1"), photons=1000)
+print(profile.annulus_energy.tobytes().hex())
+"""
+
+
+def test_without_a_folder_the_walk_is_compiled_anew_and_right(tmp_path):
+    # a file stands where the folder should: not even root can make it
+    (tmp_path / "file").write_bytes(b"")
+    folder, energy = python(WALK, NUMBA_CACHE_DIR=str(tmp_path / "file"))
+    assert folder == "''"
+    expected = simulate_montecarlo(load_material("skin1"), photons=1000).annulus_energy
+    np.testing.assert_array_equal(np.frombuffer(bytes.fromhex(energy)), expected.ravel())
+    assert (tmp_path / "file").read_bytes() == b""

@@ -1,0 +1,104 @@
+"""Threads: batches side by side, and compiled code that lets other Python threads run.
+
+Told by what happens while something else is under way, never by how long it takes.
+"""
+
+import contextlib
+import math
+import sys
+import threading
+
+import checks
+import numpy as np
+import pytest
+
+from sssfit.grid import RadialGrid
+from sssfit.material import Layer, Material
+from sssfit.simulate import montecarlo, simulate_montecarlo
+from sssfit.simulate._batches import BATCH_PHOTONS
+from sssfit.simulate._layered import LayeredWalk
+from sssfit.simulate._semi_infinite import SemiInfiniteWalk
+
+HALF_SPACE = checks.medium(0.1, 0.9, 1.3)
+SLAB = Material("slab", ("c",), (Layer(1.3, [0.8], [0.01], [20.0], 5.0),))
+WALKS = {"half space": (SemiInfiniteWalk, HALF_SPACE), "slab": (LayeredWalk, SLAB)}
+
+walks = pytest.mark.parametrize(("kind", "material"), WALKS.values(), ids=WALKS)
+
+
+def settings(photons, threads):
+    return {"photons": photons, "threads": threads, "dr_mm": 0.1, "radius_mm": 5.0}
+
+
+@walks
+@pytest.mark.parametrize("threads", [2, None])
+def test_two_batches_are_in_flight_at_once(monkeypatch, kind, material, threads):
+    # either waits for the other before it begins: one thread alone would wait in vain
+    real, meeting = kind.trace, threading.Barrier(2)
+
+    def trace(task, batch):
+        meeting.wait(timeout=30.0)
+        return real(task, batch)
+
+    monkeypatch.setattr(kind, "trace", trace)
+    monkeypatch.setattr(montecarlo, "available_cores", lambda: 2)
+    profile = simulate_montecarlo(material, **settings(4 * BATCH_PHOTONS, threads))
+    assert profile.photons == 4 * BATCH_PHOTONS
+
+
+def test_one_thread_walks_one_batch_at_a_time(monkeypatch):
+    real, walking, most = SemiInfiniteWalk.trace, set(), []
+
+    def trace(task, batch):
+        walking.add(batch)
+        most.append(len(walking))
+        tally = real(task, batch)
+        walking.remove(batch)
+        return tally
+
+    monkeypatch.setattr(SemiInfiniteWalk, "trace", trace)
+    simulate_montecarlo(HALF_SPACE, **settings(4 * BATCH_PHOTONS, 1))
+    assert most == [1, 1, 1, 1]
+
+
+@contextlib.contextmanager
+def no_forced_switches():
+    """Let a Python thread keep the interpreter until it gives it up."""
+    before = sys.getswitchinterval()
+    sys.setswitchinterval(1000.0)
+    try:
+        yield
+    finally:
+        sys.setswitchinterval(before)
+
+
+def runs_beside(work):
+    """Whether this thread got to run between the beginning and the end of ``work`` on another."""
+    begun, ended = threading.Event(), threading.Event()
+
+    def worker():
+        begun.set()
+        work()
+        ended.set()
+
+    with no_forced_switches():
+        thread = threading.Thread(target=worker)
+        thread.start()
+        begun.wait()
+        beside = not ended.is_set()
+        thread.join()
+    return beside
+
+
+@walks
+def test_a_compiled_batch_lets_other_threads_run(kind, material):
+    task = kind((material,), (RadialGrid(0.1, 50),), 1, BATCH_PHOTONS)
+    task.trace(0)  # compiles
+    # Ten tries, since the machine may be busy elsewhere for as long as a batch takes; holding the
+    # interpreter would keep this thread out every time.
+    assert any(runs_beside(lambda: task.trace(0)) for _ in range(10))
+
+
+def test_the_yardstick_notices_work_that_holds_the_interpreter():
+    values = list(np.linspace(0.0, 1.0, 100_000))
+    assert not any(runs_beside(lambda: math.fsum(values)) for _ in range(10))
