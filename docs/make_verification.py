@@ -13,6 +13,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT / "tests"))
 
 import checks  # noqa: E402
+import checks_layers  # noqa: E402
 
 FULL = 100_000_000
 
@@ -28,6 +29,8 @@ fails beyond {limit}. Profiles are compared by chi-square over annuli merged unt
 - The single-scattering profile F1(r) has a closed form (tests/reference.py); the walk is at albedo
   1e-6, where all but a millionth of what returns has collided once.
 - The scalar loop (tests/reference.py) follows one photon at a time in double precision.
+- The layered walk is compared at a quarter of the photons: with the semi-infinite walk, and with a
+  scalar MCML (tests/reference.py) on a fifth of these.
 - MCML 1.2.2 is the original C program; origin of its profiles: tests/data/README.md.
 
 | comparison | ours | theirs | standard errors apart |
@@ -44,6 +47,11 @@ def figures(photons):
         yield from checks.against_scalar_loop(name, photons // 5)
     for name in ("skin1", "chicken1", "ketchup"):
         yield from checks.against_mcml(name, photons)
+    yield from checks_layers.van_de_hulst(photons)
+    for name in ("skin1", "ketchup", "marble"):
+        yield from checks_layers.one_layer(name, photons // 4)
+    for name in checks_layers.STACKS:
+        yield from checks_layers.against_scalar_mcml(name, photons // 4)
 
 
 def main():
