@@ -18,10 +18,10 @@ import reference
 from sssfit.errors import SimulationError, SssfitWarning
 from sssfit.material import load_material, material_names
 from sssfit.simulate import simulate_montecarlo, simulate_montecarlo_many
+from sssfit.simulate._assemble import AUTO_BEYOND
 from sssfit.simulate._batches import BATCH_PHOTONS
 from sssfit.simulate._run import run
 from sssfit.simulate._semi_infinite import SemiInfiniteWalk, roulette_schedule
-from sssfit.simulate.montecarlo import AUTO_BEYOND
 
 LIMIT = checks.LIMIT
 # What double precision leaves of sums over a few thousand bins and a million collisions.

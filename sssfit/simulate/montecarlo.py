@@ -10,32 +10,26 @@ Standard errors come from squared weights: a photon leaves through one annulus a
 weights w the energy of an annulus is sum(w)/N and its variance (sum(w^2)/N - energy^2)/(N - 1).
 """
 
-import math
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
-from sssfit import __version__
 from sssfit._jit import compiled_before
 from sssfit.errors import SimulationError, SssfitWarning, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
-from sssfit.simulate._batches import Sums, Tally, Walk, available_cores, relative_errors
+from sssfit.simulate._assemble import AUTO_BEYOND, profile_of, share_beyond
+from sssfit.simulate._batches import Walk, available_cores, relative_errors
 from sssfit.simulate._checkpoint import Checkpoint, settings_of
-from sssfit.simulate._finished import ending_of, provenance, whole
+from sssfit.simulate._finished import ending_of, whole
 from sssfit.simulate._layered import LayeredWalk
 from sssfit.simulate._run import Ending, Progress, run
 from sssfit.simulate._semi_infinite import SemiInfiniteWalk, relative_eta
 
-FloatArray = npt.NDArray[np.float64]
-
 HONEST_PHOTONS = 1000  # below, a channel may rest on a handful of hits and its error on luck
-AUTO_BEYOND = 1e-3  # radius "auto": less than this share of any channel lies beyond the grid
 PILOT_PHOTONS = 200_000
 STEEPEST_G = 0.99  # beyond, single precision no longer resolves the forward peak
 
@@ -185,7 +179,7 @@ def simulate_montecarlo_many(
         raise StoppedError("stopped before a single batch of photons was done.")
     error = float(relative_errors(task, tally).max())
     _warn_target(ending, tally.photons, error)
-    return [_profile(task, tally, k, ending, error, trim=auto) for k in range(len(materials))]
+    return [profile_of(task, tally, k, ending, error, trim=auto) for k in range(len(materials))]
 
 
 def _check_media(materials: Sequence[Material]) -> None:
@@ -282,7 +276,7 @@ def _auto_grids(
         if tally.photons < 2:
             raise StoppedError("stopped before a single batch of photons was done.")
         wide = [
-            np.max(_share_beyond(task.sums(tally, k))[-1]) < AUTO_BEYOND / 2
+            np.max(share_beyond(task.sums(tally, k))[-1]) < AUTO_BEYOND / 2
             for k in range(len(materials))
         ]
         if all(wide):
@@ -293,86 +287,6 @@ def _auto_grids(
         ]
 
 
-def _share_beyond(sums: Sums) -> FloatArray:
-    """Share of each channel's energy, reflected and transmitted, beyond every annulus, (n, C)."""
-    energy = sums.reflected[..., 0]
-    if sums.transmitted is not None:
-        energy = energy + sums.transmitted[..., 0]
-    total = np.sum(energy, axis=0)
-    beyond = np.cumsum(energy[::-1], axis=0)[::-1][1:]
-    share: FloatArray = np.divide(beyond, total, out=np.zeros_like(beyond), where=total > 0.0)
-    return share
-
-
-def _trimmed(sums: Sums) -> Sums:
-    """Move the outermost annuli beyond the grid for as long as less than the share lies there."""
-    outside = np.max(_share_beyond(sums), axis=1)
-    if outside[-1] >= AUTO_BEYOND:
-        return sums
-    annuli = int(np.argmax(outside < AUTO_BEYOND)) + 1
-
-    def cut(bins: FloatArray) -> FloatArray:
-        return np.concatenate([bins[:annuli], np.sum(bins[annuli:], axis=0, keepdims=True)])
-
-    transmitted = None if sums.transmitted is None else cut(sums.transmitted)
-    return replace(sums, reflected=cut(sums.reflected), transmitted=transmitted)
-
-
-def _mean_and_error(sums: FloatArray, photons: int) -> tuple[FloatArray, FloatArray]:
-    """Mean over photons and its standard error from sums of w and w^2, (..., 2)."""
-    mean, mean_square = sums[..., 0] / photons, sums[..., 1] / photons
-    # Rounding may leave a variance of -1e-17 where all photons carry the same weight.
-    return mean, np.sqrt(np.maximum(mean_square - mean**2, 0.0) / (photons - 1))
-
-
-def _profile(
-    task: Walk, tally: Tally, index: int, ending: Ending, error: float, *, trim: bool
-) -> Profile:
-    """Turn one material's share of the tally into a profile; weights begin at 1 - specular."""
-    material, grid = task.materials[index], task.grids[index]
-    entering = 1.0 - material.specular_reflectance
-    sums = task.sums(tally, index)
-    if trim:
-        sums = _trimmed(sums)
-    energy, stderr = (entering * each for each in _mean_and_error(sums.reflected, sums.photons))
-    _, balance_error = _mean_and_error(sums.roulette, sums.photons)
-    profile = Profile(
-        r_edges_mm=grid.r_edges_mm[: len(energy)],
-        annulus_energy=energy[:-1],
-        annulus_energy_stderr=stderr[:-1],
-        beyond_grid=energy[-1],
-        beyond_grid_stderr=stderr[-1],
-        specular_reflectance=material.specular_reflectance,
-        absorbed=entering * sums.absorbed / sums.photons,
-        unfinished=entering * sums.unfinished[:, 0] / sums.photons,
-        annulus_transmittance=None,
-        meta={
-            "format": "sssfit.profile/1",
-            "method": "montecarlo",
-            "material": material.to_dict(),
-            "material_sha256": material.sha256,
-            "channels": list(material.channels),
-            "photons": sums.photons,
-            "seed": task.seed,
-            "version": __version__,
-            "settings": provenance(task.materials, grid.dr_mm, ending, auto=trim),
-            "relative_error": error if math.isfinite(error) else None,
-            "energy_balance_stderr": [entering * float(each) for each in balance_error],
-        },
-    )
-    _warn_unfinished(material, profile)
-    if sums.transmitted is None:
-        return profile
-    energy, stderr = (entering * each for each in _mean_and_error(sums.transmitted, sums.photons))
-    return replace(
-        profile,
-        annulus_transmittance=energy[:-1],
-        annulus_transmittance_stderr=stderr[:-1],
-        beyond_grid_transmittance=energy[-1],
-        beyond_grid_transmittance_stderr=stderr[-1],
-    )
-
-
 def _warn_target(ending: Ending, photons: int, error: float) -> None:
     """Say so when a run came to its last photon before its target error."""
     target = ending.target_error
@@ -380,19 +294,6 @@ def _warn_target(ending: Ending, photons: int, error: float) -> None:
         warnings.warn(
             f"{photons:,} photons were done before the target error of {100.0 * target:g} % was "
             f"met; {100.0 * error:.2g} % was reached: give more --photons, or leave them out.",
-            SssfitWarning,
-            stacklevel=4,
-        )
-
-
-def _warn_unfinished(material: Material, profile: Profile) -> None:
-    """Say so when walks stopped at the collision cap carry more than the run's own error."""
-    if np.any(profile.unfinished > profile.diffuse_reflectance_stderr):
-        warnings.warn(
-            f"{material.name}: {100.0 * float(np.max(profile.unfinished)):.2g} % of the light was "
-            "still inside after a million collisions; it is kept apart as `unfinished` and not "
-            "part of the reflectance. Almost nothing absorbs here: if that is not meant, check "
-            "sigma_a_per_mm.",
             SssfitWarning,
             stacklevel=4,
         )
