@@ -30,7 +30,7 @@ fails beyond {limit}. Profiles are compared by chi-square over annuli merged unt
   1e-6, where all but a millionth of what returns has collided once.
 - The scalar loop (tests/reference.py) follows one photon at a time in double precision.
 - The layered walk is compared at a quarter of the photons: with the semi-infinite walk, and with a
-  scalar MCML (tests/reference.py) on a fifth of these.
+  scalar MCML (tests/reference.py) on a fifth of these; there energies are shares of what enters.
 - MCML 1.2.2 is the original C program; origin of its profiles: tests/data/README.md.
 
 | comparison | ours | theirs | standard errors apart |

@@ -12,10 +12,13 @@ import numpy as np
 import pytest
 
 from sssfit.cli import main
+from sssfit.cli._interrupt import asked_to_stop
+from sssfit.cli._simulate_report import _energy, figures_of
 from sssfit.material import load_material
 from sssfit.profile import Profile
 from sssfit.simulate import simulate_montecarlo
 from sssfit.simulate._batches import BATCH_PHOTONS
+from sssfit.simulate._semi_infinite import SemiInfiniteWalk
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
 COMMAND = [sys.executable, "-m", "sssfit.cli", "simulate"]
@@ -92,6 +95,43 @@ def test_json_has_the_figures_and_nothing_else_on_stdout(run):
     assert figures["seed"] == 3
     profile = simulate_montecarlo(load_material("skin1"), photons=20_000, seed=3)
     assert figures["diffuse_reflectance"] == profile.diffuse_reflectance.tolist()
+
+
+def test_seconds_are_those_of_the_walk(run, monkeypatch):
+    real = SemiInfiniteWalk.trace
+
+    def trace(task, batch):
+        time.sleep(0.25)
+        return real(task, batch)
+
+    asked = ("skin1", "--photons", str(3 * BATCH_PHOTONS), "--threads", "1", "--json", "-q")
+    run(*asked)  # compiles and imports
+    monkeypatch.setattr(SemiInfiniteWalk, "trace", trace)
+    begun = time.perf_counter()
+    figures = json.loads(run(*asked)[1])
+    wall = time.perf_counter() - begun
+    # three batches of a quarter second at least: a factor of two either way would show
+    assert 0.75 <= figures["seconds"] <= wall
+    rate = figures["photons_per_second"]
+    assert rate * figures["seconds"] == pytest.approx(3 * BATCH_PHOTONS, rel=1e-12)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize(("sigmas", "said"), [(4.0, "= 1 within"), (10.0, "= 1 NOT WITHIN")])
+def test_an_energy_balance_that_is_off_is_said(sigmas, said, sign):
+    row, other = (
+        figures_of(simulate_montecarlo(load_material(name), photons=20_000), 1.0)
+        for name in ("skin1", "apple")
+    )
+    assert "= 1 within the run's own error" in _energy([row])[1]
+    error = row["energy_balance_stderr"][0]
+    assert error > 1e-9  # more than rounding
+    row["energy_balance"] = np.array([sign * sigmas * error, 0.0, 0.0])
+    other["energy_balance"] = np.zeros(3)
+    alone, together = _energy([row])[1], _energy([other, row])[0]
+    for line in (alone, together):
+        assert f"{said} the run's own error: {sign * sigmas * error:+.1e}" in line
+        assert "(worst channel, skin1 R)" in line
 
 
 def test_quiet_is_quiet(run):
@@ -205,9 +245,10 @@ def test_a_foreign_file_is_not_replaced_without_force(run, tmp_path):
 @posix
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupted_runs_save_what_is_done(tmp_path, number):
-    process = start(tmp_path, "skin1", "--photons", "1e11", "--json")
-    wait_for(lambda: (tmp_path / ".skin1.profile.npz.lock").exists())
-    time.sleep(4.0 if number == signal.SIGINT else 3.0)
+    simulate_montecarlo(load_material("skin1"), photons=1000)  # compiled before, if not yet
+    process = start(tmp_path, "skin1", "--photons", "1e11", "--json", "--checkpoint-every", "0")
+    saved = tmp_path / "skin1.profile.npz.checkpoint"  # as soon as there is a batch
+    wait_for(lambda: saved.exists() or process.poll() is not None)
     process.send_signal(number)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130
@@ -220,6 +261,32 @@ def test_interrupted_runs_save_what_is_done(tmp_path, number):
     again = simulate_montecarlo(load_material("skin1"), photons=profile.photons)
     assert again.annulus_energy.tobytes() == profile.annulus_energy.tobytes()
     assert names(tmp_path) == ["skin1.profile.npz", "skin1.profile.npz.checkpoint"]
+
+
+@posix
+@pytest.mark.parametrize("first", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("second", [signal.SIGINT, signal.SIGTERM])
+def test_a_second_signal_meets_the_former_handler(first, second):
+    seen = []
+
+    def former(number, _frame):
+        seen.append(number)
+
+    before = {number: signal.signal(number, former) for number in (signal.SIGINT, signal.SIGTERM)}
+    try:
+        with asked_to_stop() as stop:
+            assert not stop()
+            os.kill(os.getpid(), first)
+            assert stop()
+            assert seen == []
+            os.kill(os.getpid(), second)
+            assert seen == [second]
+        with asked_to_stop() as stop:
+            assert not stop()
+        assert {signal.getsignal(number) for number in before} == {former}
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
 
 
 @posix

@@ -1,11 +1,14 @@
 """The layered walk: Henyey-Greenstein, interfaces, stacks; against theory and the scalar MCML."""
 
 import math
+from pathlib import Path
 
 import checks
+import checks_layers
 import numpy as np
 import pytest
 import reference
+from checks_layers import STACKS, layer, scalar_sums, stack
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
@@ -14,11 +17,10 @@ from scipy.integrate import quad
 from sssfit._jit import layered, sampling
 from sssfit.errors import SssfitWarning
 from sssfit.grid import RadialGrid, paper_grid
-from sssfit.material import Layer, Material, load_material
-from sssfit.simulate import simulate_montecarlo
+from sssfit.mci import load_mci
+from sssfit.simulate import shared_walks, simulate_montecarlo
 from sssfit.simulate._layered import LayeredWalk, alike_channels
 from sssfit.simulate._run import run
-from sssfit.simulate._semi_infinite import SemiInfiniteWalk
 
 LIMIT = checks.LIMIT
 ALPHA = 2.0 * stats.norm.sf(LIMIT)
@@ -27,18 +29,6 @@ ROUNDING = 1e-9  # weights are single precision; sums of them telescope to about
 sizes = pytest.mark.parametrize(
     "photons", [300_000, pytest.param(30_000_000, marks=pytest.mark.slow)], ids=["3e5", "3e7"]
 )
-
-
-def layer(sigma_a, sigma_s, g=0.0, eta=1.0, thickness=math.inf):
-    """A layer; numbers make one channel, lists several."""
-    sigma_a, sigma_s = np.broadcast_arrays(np.atleast_1d(sigma_a), np.atleast_1d(sigma_s))
-    g = np.broadcast_to(np.asarray(g, float), sigma_a.shape)
-    return Layer(eta, g, sigma_a.astype(float), sigma_s.astype(float), thickness)
-
-
-def stack(*layers, above=1.0, below=1.0):
-    channels = tuple(f"c{k}" for k in range(layers[0].sigma_a_per_mm.size))
-    return Material("stack", channels, layers, eta_above=above, eta_below=below)
 
 
 def totals(profile):
@@ -57,6 +47,11 @@ def walk_totals(task):
         (each[0] / sums.photons, float(checks.standard_error(each[0], each[1], sums.photons)))
         for each in (r, t)
     ]
+
+
+def assert_within(figures):
+    for figure in figures:
+        assert abs(figure.sigmas) < LIMIT, figure
 
 
 def assert_agree(a, b, a_error, b_error):
@@ -134,10 +129,7 @@ def test_deflections_in_the_walk_have_mean_cosine_g_and_keep_directions_unit():
 
 @sizes
 def test_van_de_hulst_slab(photons):
-    slab = stack(layer(1.0, 9.0, 0.75, 1.0, 0.2))
-    r, r_error, t, t_error = totals(simulate_montecarlo(slab, photons=photons))
-    assert_agree(r, 0.09739, r_error, 5e-6)
-    assert_agree(t, 0.66096, t_error, 5e-6)
+    assert_within(checks_layers.van_de_hulst(photons))
 
 
 @sizes
@@ -178,88 +170,57 @@ def test_a_slab_without_absorption_loses_nothing():
 @sizes
 @pytest.mark.parametrize("name", ["skin1", "ketchup", "marble"])
 def test_one_layer_equals_the_semi_infinite_walk(name, photons):
-    material = load_material(name)
-    grid = paper_grid(material)
-    one = SemiInfiniteWalk((material,), (grid,), 1, photons)
-    other = LayeredWalk((material,), (grid,), 2, photons)
-    a, b = (each.sums(run(each, 2), 0).reflected for each in (one, other))
-    for c in range(3):
-        hits = [checks.effective_hits(each[:, c, 0], each[:, c, 1]) for each in (a, b)]
-        groups = checks.groups_of_hits(*hits)
-        merged = [[checks.merge(each[:, c, k], groups) for k in (0, 1)] for each in (a, b)]
-        variance = sum(checks.standard_error(*each, photons) ** 2 for each in merged)
-        difference = (merged[0][0] - merged[1][0]) / photons
-        sigmas, _ = checks.chi_square_sigmas(difference, variance)
-        assert abs(sigmas) < LIMIT
-
-
-STACKS = {
-    # MCML's own sample: 1/cm and cm there
-    "mcml sample": stack(
-        layer(0.1, 10.0, 0.9, 1.37, 1.0),
-        layer(0.1, 1.0, 0.0, 1.37, 1.0),
-        layer(0.2, 1.0, 0.7, 1.37, 2.0),
-    ),
-    "three layers, g .8": stack(
-        layer(0.1, 10.0, 0.8, 1.4, 0.1),
-        layer(0.05, 20.0, 0.8, 1.35, 0.5),
-        layer(0.2, 15.0, 0.8, 1.45),
-    ),
-    "glass, medium, glass": stack(
-        layer(0.0, 0.0, 0.0, 1.5, 1.0),
-        layer(0.1, 5.0, 0.8, 1.37, 1.0),
-        layer(0.0, 0.0, 0.0, 1.5, 1.0),
-        below=1.33,
-    ),
-    "clear gap inside, backward g": stack(
-        layer(0.2, 3.0, -0.5, 1.3, 0.5),
-        layer(0.0, 0.0, 0.0, 1.0, 0.3),
-        layer(0.05, 2.0, 0.3, 1.6, 0.7),
-        above=1.2,
-    ),
-    "into the thinner medium": stack(layer(0.1, 1.0, 0.5, 1.0), above=1.5),
-}
+    assert_within(checks_layers.one_layer(name, photons))
 
 
 @sizes
 @pytest.mark.parametrize("name", list(STACKS))
 def test_lanes_equal_the_scalar_mcml(name, photons):
-    material = STACKS[name]
-    loop_photons = photons // 5  # the loop is the slow side
-    grid = RadialGrid(0.02, 400)
-    task = LayeredWalk((material,), (grid,), 1, photons)
-    sums = task.sums(run(task, 2), 0)
-    layers = material.layers
-    reflected, transmitted, absorbed, _ = reference.scalar_layered_walk(
-        7,
-        loop_photons,
-        np.array([each.sigma_a_per_mm[0] for each in layers]),
-        np.array([each.sigma_s_per_mm[0] for each in layers]),
-        np.array([each.g[0] for each in layers]),
-        np.array([material.eta_above, *(each.eta for each in layers), material.eta_below]),
-        np.array([min(each.thickness_mm, 1e30) for each in layers]),
-        0.0,
-        material.first_scattering_layer,
-        grid.dr_mm,
-        grid.annuli,
+    assert_within(checks_layers.against_scalar_mcml(name, photons))
+
+
+def absorbed_error(absorbed, photons):
+    """At least its standard error: a photon loses at most all it has in a layer."""
+    return np.sqrt(absorbed * (1.0 - absorbed) / photons)
+
+
+@sizes
+def test_sample_mci_gives_what_mcml_gives(photons):
+    (asked,) = load_mci(Path(__file__).parent / "data" / "sample.mci")
+    material, grid = asked.material, asked.grid
+    profile = simulate_montecarlo(
+        material, photons=photons, dr_mm=grid.dr_mm, radius_mm=grid.radius_mm
     )
-    pairs = [(sums.reflected, reflected)]
-    if sums.transmitted is not None:
-        pairs.append((sums.transmitted, transmitted))
-    for ours, theirs in pairs:
-        own = checks.effective_hits(ours[:, 0, 0], ours[:, 0, 1])
-        groups = checks.groups_of_hits(own, checks.effective_hits(theirs[:, 0], theirs[:, 1]))
-        a, a_squares = (checks.merge(ours[:, 0, k], groups) for k in (0, 1))
-        b, b_squares = (checks.merge(theirs[:, k], groups) for k in (0, 1))
-        variance = (
-            checks.standard_error(a, a_squares, photons) ** 2
-            + checks.standard_error(b, b_squares, loop_photons) ** 2
-        )
-        sigmas, _ = checks.chi_square_sigmas(a / photons - b / loop_photons, variance)
-        assert abs(sigmas) < LIMIT
-    # a photon loses at most all it has in a layer: mean (1 - mean) bounds the variance
-    for a, b in zip(sums.absorbed[:, 0] / photons, absorbed / loop_photons, strict=True):
-        assert_agree(a, b, math.sqrt(a * (1 - a) / photons), math.sqrt(b * (1 - b) / loop_photons))
+    r, r_error, t, t_error = totals(profile)
+    absorbed = profile.absorbed[:, 0]
+    absorbed_here = absorbed_error(absorbed, photons)
+    assert_energy_conserved(profile)
+
+    # MCML's own 1e6 photons (tests/data/README.md), as exact as ours per photon; six printed
+    # digits, of the layers four
+    assert profile.specular_reflectance == pytest.approx(0.0243729, abs=5e-8)
+    per_photon = math.sqrt(photons / 1e6)
+    assert_agree(r, 0.237544, r_error, r_error * per_photon)
+    assert_agree(t, 0.0964896, t_error, t_error * per_photon)
+    # it counts what leaves beyond its last annulus but one into the last, from 4.9 mm on
+    rim = profile.annulus_energy[-1, 0] + profile.beyond_grid[0]
+    rim_error = math.hypot(profile.annulus_energy_stderr[-1, 0], profile.beyond_grid_stderr[0])
+    assert_agree(rim, 0.009773, rim_error, rim_error * per_photon)
+    for ours, theirs, error in zip(absorbed, (0.2612, 0.1488, 0.2316), absorbed_here, strict=True):
+        assert_agree(ours, theirs, error, math.hypot(error * per_photon, 5e-5))
+    whole_error = math.hypot(r_error, t_error)  # what is absorbed does not leave
+    assert_agree(absorbed.sum(), 0.641594, whole_error, whole_error * per_photon)
+
+    # the literal loop, for which 1 enters
+    loop_photons, entering = photons // 5, 1.0 - material.specular_reflectance
+    reflected, transmitted, lost = scalar_sums(material, loop_photons, grid)
+    for ours, error, theirs in ((r, r_error, reflected), (t, t_error, transmitted)):
+        total, squares = theirs.sum(axis=0)
+        their_error = checks.standard_error(total, squares, loop_photons)
+        assert_agree(ours, entering * total / loop_photons, error, entering * their_error)
+    lost = entering * lost / loop_photons
+    for each in zip(absorbed, lost, absorbed_here, absorbed_error(lost, loop_photons), strict=True):
+        assert_agree(*each)
 
 
 @sizes
@@ -332,6 +293,96 @@ def test_shared_walks_agree_with_walks_of_their_own(photons):
             assert_agree(a, b, math.sqrt(a / photons), math.sqrt(b / photons))
 
 
+def test_plain_half_spaces_of_one_relative_index_share_a_walk_and_layers_walk_alone():
+    plain = layer(0.1, 1.0, 0.0, 2.0)
+    materials = {
+        "index 2 under air": stack(plain),
+        "layered": stack(layer(0.1, 1.0, 0.0, 2.0, 1.0), plain),
+        "index 2 under water": stack(plain, above=1.5),
+        "index 3 under water": stack(layer(0.3, 1.0, 0.0, 3.0), above=1.5),
+        "g not 0": stack(layer(0.1, 1.0, 0.5, 2.0)),
+        "slab": stack(layer(0.1, 1.0, 0.0, 2.0, 1.0)),
+        "layered again": stack(layer(0.1, 1.0, 0.0, 2.0, 1.0), plain),
+        "into the thinner medium": stack(layer(0.1, 1.0, 0.0, 1.0), above=2.0),
+        "and again": stack(layer(0.1, 1.0, 0.0, 1.0), above=2.0),
+        "index 2 under air again": stack(layer(1.0, 9.0, 0.0, 2.0)),
+    }
+    names = list(materials)
+    shared = shared_walks(list(materials.values()))
+    assert [[names[k] for k in group] for group in shared] == [
+        ["index 2 under air", "index 3 under water", "index 2 under air again"],
+        *([name] for name in names[1:3]),
+        *([name] for name in names[4:9]),
+    ]
+
+
+# Events
+
+
+@pytest.mark.parametrize("below", [1.0, 1.4])
+def test_an_interface_lets_light_through_by_fresnels_formula(below):
+    # 100 x 256 photons out of index 1.5, up into 1 or down into what is below, decision by
+    # decision: a reflectance 1 % high would hold back some NN more
+    material = stack(layer(0.1, 1.0, 0.5, 1.5, 1.0), below=below)
+    task = LayeredWalk((material,), (RadialGrid(1.0, 5),), 1, 1000)
+    (stack_, bins), lanes = task.groups[0], sampling.LANES
+    cosines = np.random.default_rng(1).uniform(-1.0, 1.0, (100, lanes)).astype(np.float32)
+    for batch, uz in enumerate(cosines):
+        floats, words, booked, *_, ledger = lane_at_an_event(task, 1)
+        sampling.seed_lanes(words, np.uint64(1), np.int64(batch))
+        drawn = words.copy()
+        floats[layered._UX : layered._UX + lanes] = np.sqrt(1.0 - uz.astype(float) ** 2)
+        floats[layered._UZ : layered._UZ + lanes] = uz
+        words[layered._AT_INTERFACE : layered._AT_INTERFACE + lanes] = 1
+        stays = [
+            layered.handle_event(floats, words, booked, lane, stack_, bins, ledger)
+            for lane in range(lanes)
+        ]
+        expected = [
+            float(sampling.next_unit(drawn, lane))
+            < reference.fresnel(abs(float(uz[lane])), 1.5 / (below if uz[lane] > 0.0 else 1.0))
+            for lane in range(lanes)
+        ]
+        assert stays == expected
+
+
+def lane_at_an_event(task, collisions):
+    """One lane inside, of weight ten, after so many collisions; the arguments of its event."""
+    (stack_, bins), lane = task.groups[0], 3
+    floats = np.zeros(layered._FLOAT_ROWS * sampling.LANES, np.float32)
+    words = np.zeros(layered._WORD_ROWS * sampling.LANES, np.uint32)
+    booked = np.ones((sampling.LANES, bins.channel.size, 2))
+    sampling.seed_lanes(words, np.uint64(1), np.int64(0))
+    floats[layered._WEIGHT : layered._WEIGHT + sampling.LANES] = 1.0
+    floats[layered._WEIGHT + lane] = 10.0
+    floats[layered._PATH + lane] = 0.5
+    words[layered._COLLISIONS + lane] = collisions
+    booked[lane, :, 1] = 10.0
+    return floats, words, booked, lane, stack_, bins, task.empty_tally().ledger
+
+
+def test_a_layered_walk_ends_unfinished_at_a_million_collisions_and_not_before():
+    material = stack(layer([0.0, 0.2], 1.0, 0.5, 1.3))
+    task = LayeredWalk((material,), (RadialGrid(1.0, 5),), 1, 1000)
+    events = np.zeros(sampling.LANES, np.int64)
+
+    before = lane_at_an_event(task, 999_999)
+    assert layered.find_events(*before[:2], sampling.LANES, events) == 0
+    layered.handle_event(*before)
+    assert not before[-1].unfinished.any()
+    assert before[-1].roulette.any()
+
+    at = lane_at_an_event(task, 1_000_000)
+    assert layered.find_events(*at[:2], sampling.LANES, events) == 1
+    assert events[0] == at[3]
+    assert not layered.handle_event(*at)
+    assert not at[-1].roulette.any()
+    # ten: what roulette gave the photon is part of it; .2 per mm over half a mm
+    left = 10.0 * np.exp([0.0, -0.1])
+    np.testing.assert_allclose(at[-1].unfinished, np.stack([left, left**2], 1), rtol=1e-12)
+    np.testing.assert_allclose(at[-1].absorbed[0], 10.0 - left, rtol=1e-12, atol=1e-12)
+
+
 # Energy and reproducibility
 
 
@@ -363,7 +414,7 @@ def test_energy_is_conserved_over_random_stacks(material):
 
 
 def test_same_bits_on_one_and_two_threads():
-    a, b = (simulate_montecarlo(STACKS["mcml sample"], photons=60_000, threads=k) for k in (1, 2))
+    a, b = (simulate_montecarlo(STACKS["MCML's sample"], photons=60_000, threads=k) for k in (1, 2))
     assert a.annulus_energy.tobytes() == b.annulus_energy.tobytes()
     assert a.annulus_transmittance.tobytes() == b.annulus_transmittance.tobytes()
     assert a.absorbed.tobytes() == b.absorbed.tobytes()

@@ -2,7 +2,7 @@
 
     python tests/bench/bench_walk.py            full size, some three minutes
     python tests/bench/bench_walk.py --write    the same into docs/benchmarks.md
-    python tests/bench/bench_walk.py --small    a second or two; what the tests run
+    python tests/bench/bench_walk.py --small    ten seconds, most for compiling; the tests run it
 
 Everything is measured in one run: the lane walk and the literal scalar loop (tests/reference.py)
 in turn on one core, then whole commands with start-up, an empty compile cache included.
@@ -83,32 +83,23 @@ def walk_rows(photons):
 
 def layered_rows(photons):
     """Three layers of g .8 against the scalar MCML, one core, one channel."""
-    material = Material(
-        "three",
-        ("mono",),
-        tuple(
-            Layer(eta, [0.8], [sigma_a], [sigma_s], thickness)
-            for eta, sigma_a, sigma_s, thickness in (
-                (1.4, 0.1, 10.0, 0.1),
-                (1.35, 0.05, 20.0, 0.5),
-                (1.45, 0.2, 15.0, np.inf),
-            )
-        ),
+    layers = (
+        Layer(1.4, [0.8], [0.1], [10.0], 0.1),
+        Layer(1.35, [0.8], [0.05], [20.0], 0.5),
+        Layer(1.45, [0.8], [0.2], [15.0]),
     )
-    layers, grid = material.layers, paper_grid(material)
+    material = Material("three", ("mono",), layers)
+    grid = paper_grid(material)
 
     def loop(count):
         reference.scalar_layered_walk(
             1,
             count,
-            *(
-                np.array([each[0] for each in column])
-                for column in zip(
-                    *((x.sigma_a_per_mm, x.sigma_s_per_mm, x.g) for x in layers), strict=True
-                )
-            ),
-            np.array([1.0, *(x.eta for x in layers), 1.0]),
-            np.array([min(x.thickness_mm, 1e30) for x in layers]),
+            np.array([each.sigma_a_per_mm[0] for each in layers]),
+            np.array([each.sigma_s_per_mm[0] for each in layers]),
+            np.array([each.g[0] for each in layers]),
+            np.array([1.0, *(each.eta for each in layers), 1.0]),
+            np.array([min(each.thickness_mm, 1e30) for each in layers]),
             material.specular_reflectance,
             0,
             grid.dr_mm,

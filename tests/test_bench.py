@@ -1,0 +1,61 @@
+"""The benchmark script runs: every table, every figure a number."""
+
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+SCRIPT = Path(__file__).parent / "bench" / "bench_walk.py"
+
+SPEEDS = ["material", "scalar loop", "lanes", "ratio"]
+TABLES = [
+    (SPEEDS, ["skin1", "ketchup", "marble"]),
+    (SPEEDS, ["three layers, g .8"]),
+    (["material", "one thread", "two threads", "speed-up"], ["skin1", "ketchup"]),
+    (
+        ["command", "seconds"],
+        [
+            "`sssfit simulate skin1 --photons 1000`, first use, compiling",
+            "`sssfit simulate skin1 --photons 1000`",
+            "`sssfit simulate skin1 --photons 20000`",
+            "`sssfit simulate --all --photons 20000`",
+            "`sssfit chart skin1.profile.npz`",
+            "`sssfit materials`",
+        ],
+    ),
+    (["material", "pixels", "seconds"], ["skin1"]),
+]
+
+
+def tables(text):
+    """The tables of a Markdown page: heads and rows of cells."""
+    found, inside = [], False
+    for line in text.splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        if not line.startswith("|"):
+            inside = False
+        elif not inside:
+            found.append((cells, []))
+            inside = True
+        elif set(line) != {"|", "-"}:
+            found[-1][1].append(cells)
+    return found
+
+
+def test_small_benchmarks_run_and_fill_every_table():
+    ended = subprocess.run(
+        [sys.executable, str(SCRIPT), "--small"], capture_output=True, text=True, timeout=300
+    )
+    assert ended.returncode == 0, ended.stderr
+    assert ended.stderr == ""
+    found = tables(ended.stdout)
+    assert [(heads, [row[0] for row in rows]) for heads, rows in found] == TABLES
+    for heads, rows in found:
+        for row in rows:
+            figures = dict(zip(heads[1:], row[1:], strict=True))
+            if "pixels" in figures:
+                assert figures.pop("pixels") == "41 x 41"
+            for value in figures.values():
+                number = float(value.replace(",", ""))
+                assert math.isfinite(number)
+                assert number >= 0.0
