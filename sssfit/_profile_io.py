@@ -126,6 +126,8 @@ def _unpack_stream(stream: BinaryIO) -> tuple[dict[str, FloatArray], dict[str, A
 
 def _check_ordinary(path: Path) -> None:
     """Refuse devices, which may never end, and pipes, which have no end to begin a zip from."""
+    if path.is_dir():
+        raise ProfileError("is a folder")
     if path.exists() and not path.is_file():
         raise ProfileError("is not an ordinary file")
 

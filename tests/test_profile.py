@@ -348,7 +348,7 @@ def test_unusable_files_are_refused_in_one_line_that_names_them(tmp_path, conten
 def test_missing_files_and_folders_are_named(tmp_path):
     with pytest.raises(ProfileError, match="cannot be read: no such file"):
         Profile.load(tmp_path / "none.profile.npz")
-    with pytest.raises(ProfileError, match="cannot be read: is a directory"):
+    with pytest.raises(ProfileError, match="is a folder"):
         Profile.load(tmp_path)
 
 

@@ -184,8 +184,8 @@ def once_scattering(eta):
 
 @pytest.mark.parametrize("eta", [1.0, 1.3, 2.0])
 def test_first_flights_leave_where_fresnel_lets_them_and_nowhere_else(eta):
-    # 1000 x 256 photons, decision by decision. Of them a reflectance 1 % high would hold back
-    # about 15 more (eta 1.3; 13 at 2), a critical cosine half a per cent high 50 (eta 2: 110).
+    # 1000 x 256 photons, batch by batch. Of them a reflectance 1 % high would hold back some 13
+    # more (eta 1.3 or 2), a critical cosine half a per cent high 47 (eta 1.3) or 112 (2).
     task = once_scattering(eta)
     for batch in range(1000):
         floats, words = np.zeros(8 * walk.LANES, np.float32), words_of(1, batch)
