@@ -143,7 +143,7 @@ def _energy(rows: list[dict[str, Any]]) -> list[str]:
                 row["energy_balance"], row["energy_balance_stderr"], row["channels"], strict=True
             )
         ),
-        key=lambda each: abs(each[0]),
+        key=lambda each: abs(each[0]) / (_SIGMAS * each[1] + _ROUNDING),
     )
     unfinished = max(float(each) for row in rows for each in row["unfinished"])
     parts = "specular + diffuse + absorbed"
