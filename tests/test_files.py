@@ -1,10 +1,9 @@
 """Files: whole or not at all, never somebody else's, never two writers."""
 
 import errno
-import multiprocessing
 import os
+import subprocess
 import sys
-import time
 
 import pytest
 
@@ -110,23 +109,24 @@ def test_outputs_are_checked_before_the_work(tmp_path, monkeypatch):
         files.check_output(tmp_path / "new.npz", own)
 
 
-def hold(path, ready, seconds):
-    with files.locked(path):
-        ready.set()
-        time.sleep(seconds)
+HOLD = """
+import sys, time
+from pathlib import Path
+from sssfit.files import locked
+with locked(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(60)
+"""
 
 
 @pytest.fixture
 def holder(tmp_path):
     """A process that holds the lock of a.npz for a minute."""
-    context = multiprocessing.get_context("spawn")
-    ready = context.Event()
-    process = context.Process(target=hold, args=(tmp_path / "a.npz", ready, 60))
-    process.start()
-    assert ready.wait(30)
-    yield process
-    process.kill()
-    process.join()
+    command = [sys.executable, "-c", HOLD, tmp_path / "a.npz"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout.readline() == "held\n"
+        yield process
+        process.kill()
 
 
 def test_two_runs_on_one_output_are_kept_apart(tmp_path, holder):
@@ -136,12 +136,12 @@ def test_two_runs_on_one_output_are_kept_apart(tmp_path, holder):
     ):
         pass
     with files.locked(tmp_path / "b.npz"):
-        assert holder.is_alive()
+        assert holder.poll() is None
 
 
 def test_a_killed_run_holds_nothing(tmp_path, holder):
     holder.kill()
-    holder.join()
+    holder.wait()
     with files.locked(tmp_path / "a.npz"):
         assert (tmp_path / ".a.npz.lock").exists()
     assert names(tmp_path) == []
