@@ -27,7 +27,7 @@ def load_runs(
     runs = load_mci(path)
     if number is not None:
         if number > len(runs):
-            raise MaterialError(f"{path} has {len(runs)} runs; --run {number} is none of them.")
+            raise MaterialError(f"{path} has no run {number}; give --run 1 to {len(runs)}.")
         runs = runs[number - 1 : number]
     # A target error alone decides when a run ends; then the file's photons are no limit either.
     endless = given["target_error"] is not None

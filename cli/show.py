@@ -58,7 +58,7 @@ def _figures(profile: Profile) -> dict[str, Any]:
         "diffuse_reflectance_stderr": profile.diffuse_reflectance_stderr,
         "specular_reflectance": profile.specular_reflectance,
         "beyond_grid": profile.beyond_grid,
-        "absorbed": profile.absorbed.sum(axis=0),
+        "absorbed": profile.absorbed.sum(axis=0) if len(profile.absorbed) else None,
         "transmitted": profile.transmittance,
         "unfinished": profile.unfinished,
         "energy_balance": profile.energy_balance,
@@ -171,7 +171,7 @@ def _energies(figures: dict[str, Any]) -> str:
             _error(figures["diffuse_reflectance_stderr"][c]),
             f"{beyond:.2e}",
             f"{100.0 * beyond / diffuse:.3f} %" if diffuse > 0 else "-",
-            f"{figures['absorbed'][c]:.6f}",
+            "-" if figures["absorbed"] is None else f"{figures['absorbed'][c]:.6f}",
         ]
         row += [] if transmitted is None else [f"{transmitted[c]:.6f}"]
         row += [f"{figures['unfinished'][c]:.1e}", _balance(figures, c)]
@@ -185,6 +185,8 @@ def _error(stderr: float) -> str:
 
 def _balance(figures: dict[str, Any], channel: int) -> str:
     """Sum of all energies - 1, with the standard error where the run gave one."""
+    if figures["absorbed"] is None:
+        return "-"
     balance = f"{figures['energy_balance'][channel]:+.0e}"
     stderr = figures["energy_balance_stderr"]
     return balance if stderr is None else f"{balance} +- {stderr[channel]:.0e}"

@@ -28,6 +28,13 @@ class Radius(Length):
 @click.command()
 @click.argument("material", required=False)
 @click.option("--all", "every", is_flag=True, help="All materials that ship with sssfit.")
+@click.option(
+    "--method",
+    type=click.Choice(["montecarlo"]),
+    default="montecarlo",
+    show_default=True,
+    help="How; montecarlo walks photons, through layers where the material has them.",
+)
 @click.option("--run", type=click.IntRange(1), metavar="N", help="Of an .mci, this run only.")
 @click.option(
     "--photons",
@@ -72,6 +79,7 @@ class Radius(Length):
 def simulate(
     material: str | None,
     every: bool,
+    method: str,  # noqa: ARG001 (one so far; click has checked it)
     run: int | None,
     photons: int | None,
     target_error: float | None,

@@ -93,7 +93,7 @@ def test_options_go_before_the_file(run):
         (("skin1", "--run", "1"), 2, "--run chooses a run of an MCML input file"),
         (("tissue.mci", "--run", "0"), 2, "--run"),
         (("tissue.mci", "--all"), 2, "name one MATERIAL"),
-        (("tissue.mci", "--run", "3"), 1, "tissue.mci has 2 runs; --run 3 is none of them"),
+        (("tissue.mci", "--run", "3"), 1, "tissue.mci has no run 3; give --run 1 to 2"),
         (("tissue.mci", "-o", "-"), 2, "-o names a folder"),
         (("tissue.mci", "-o", "none"), 1, "there is no folder none"),
         (("none.mci",), 1, "none.mci cannot be read: no such file"),
@@ -217,6 +217,15 @@ def test_imports_can_be_shown_and_drawn(run):
 
 
 # export
+
+
+def test_what_a_table_does_not_know_is_shown_as_unknown(run):
+    Path("table.csv").write_text("r_mm,R\n0.1,1\n0.2,0.5\n")
+    assert run("import", "table.csv", "--quantity", "density")[0] == 0
+    _, out, _ = run("show", "table.profile.npz")
+    assert "nan" not in out
+    _, out, _ = run("show", "table.profile.npz", "--json")
+    assert json.loads(out)["absorbed"] is None
 
 
 def test_export_and_import_give_the_same_bits(run, tmp_path):
