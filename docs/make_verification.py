@@ -43,12 +43,12 @@ TAIL = """
 Two things take minutes and are not comparisons; `pytest -m slow` runs them.
 
 - `pytest -m slow tests/test_long_runs.py` kills a run 100 times at random moments (start-up,
-  between batches, while a checkpoint or the profile is written) and resumes it each time; every chain of
-  kills must end in the bytes of an undisturbed run. On 2026-11-22 it passed, together with the
-  largest kernels of `tests/test_pixels.py`, in 6 min 17 s.
+  between batches, while a checkpoint or the profile is written) and resumes it each time; every
+  chain of kills must end in the bytes of an undisturbed run. On 2026-11-22 it passed, together with
+  the largest kernels of `tests/test_pixels.py`, in 6 min 17 s.
 - `pytest -m slow tests/test_layers.py -k "split or turned or shared or sample or giovanelli"`: a
-  slab split in four, a stack turned over, shared walks, MCML's own sample at 3e7 photons. On 2026-11-22
-  it passed in 4 min 44 s.
+  slab split in four, a stack turned over, shared walks, MCML's own sample at 3e7 photons. On
+  2026-11-22 it passed in 4 min 44 s.
 """
 
 
