@@ -1,0 +1,172 @@
+"""Profiles that are computed and not sampled: from F(r) at the edges to a record.
+
+Every method without photons ends here, so that its profiles have the same provenance and the same
+guards. Energies stand as the walks' bins do: (n + 1, C), an annulus a row, beyond the grid last.
+Solvers that know F(r) use ``energies_from_cumulative``; closed forms that know what leaves beyond
+r use ``energies_from_beyond``, which keeps its digits out to 1e-300 where F(r) is 1 - 1e-16.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit import __version__
+from sssfit.errors import SimulationError
+from sssfit.grid import RadialGrid
+from sssfit.material import Layer, Material
+from sssfit.profile import FORMAT, Profile
+
+FloatArray = npt.NDArray[np.float64]
+
+ROUNDING = 1e-12  # F may fall by this share of the total: sums of a few thousand terms, rounded
+
+
+def energies_from_cumulative(
+    cumulative: FloatArray, total: FloatArray, *, tolerance: float = ROUNDING
+) -> FloatArray:
+    """Return the energy of each annulus and beyond the grid, all at least 0, (n + 1, C).
+
+    F cannot fall. Where it does, by no more than the method's own error, it is replaced by its
+    running maximum, held under the total: where |F - truth| <= e before, it is so afterwards.
+
+    Parameters
+    ----------
+    cumulative : (n + 1, C)
+        F(r) at the annulus edges; the first row is 0.
+    total : (C,)
+        F at infinity.
+    tolerance : float
+        How far F may fall, or exceed the total, as a share of the largest total.
+
+    Raises
+    ------
+    SimulationError
+        A value that is not finite, F that does not begin at 0, or falls by more.
+    """
+    total = np.asarray(total, dtype=np.float64)
+    everywhere = np.vstack((cumulative, total))
+    if not np.isfinite(everywhere).all():
+        raise SimulationError("F(r) is not finite everywhere; this is a defect of the method.")
+    if np.any(everywhere[0] != 0.0):
+        raise SimulationError(f"F(0) = {everywhere[0].tolist()}; expected 0 in every channel.")
+    rising = np.minimum(np.maximum.accumulate(everywhere[:-1], axis=0), np.maximum(total, 0.0))
+    rising = np.vstack((rising, np.maximum(total, 0.0)))
+    fall = float(np.max(np.abs(rising - everywhere)))
+    if fall > tolerance * max(float(np.max(total)), ROUNDING):
+        raise SimulationError(
+            f"F(r) falls by {fall:.2g}, over the {tolerance:.2g} of the total that the method "
+            "allows itself; this is a defect of the method."
+        )
+    energies: FloatArray = np.diff(rising, axis=0)
+    return energies
+
+
+def energies_from_beyond(beyond: FloatArray) -> FloatArray:
+    """Return the energies of `energies_from_cumulative` from what leaves beyond each edge.
+
+    Takes (n + 1, C), the first row the total, and keeps the last; the differences in between are
+    exact to rounding of the energy beyond, however small that is. Raises SimulationError as above.
+    """
+    if not np.isfinite(beyond).all():
+        raise SimulationError("energies are not finite everywhere; a defect of the method.")
+    falling = np.maximum(np.minimum.accumulate(beyond, axis=0), 0.0)
+    rise = float(np.max(np.abs(falling - beyond)))
+    if rise > ROUNDING * max(float(np.max(beyond[0])), ROUNDING):
+        raise SimulationError(f"energy beyond r rises by {rise:.2g}; a defect of the method.")
+    return np.vstack((-np.diff(falling, axis=0), falling[-1:]))
+
+
+def computed_profile(
+    material: Material,
+    method: str,
+    grid: RadialGrid,
+    reflected: FloatArray,
+    *,
+    stderr: FloatArray | None = None,
+    transmitted: FloatArray | None = None,
+    absorbed: FloatArray | None = None,
+    relative_error: float | None = None,
+    settings: Mapping[str, Any] | None = None,
+) -> Profile:
+    """Put energies that were computed into a profile: no photons, no seed.
+
+    Parameters
+    ----------
+    material : Material
+    method : str
+        As the command line names it; becomes ``meta["method"]``.
+    grid : RadialGrid
+        n annuli.
+    reflected : (n + 1, C)
+        Energies of the annuli and beyond the grid, shares of the incident light.
+    stderr : (n + 1, C), optional
+        The method's own estimate of their errors; NaN where there is none.
+    transmitted : (n + 1, C), optional
+        What leaves through the bottom of a slab.
+    absorbed : (layers, C), optional
+        What stays, by layer; not known by default, and then the energy balance is NaN.
+    relative_error : float, optional
+        The error reached, in the terms of the method's tolerance.
+    settings : mapping, optional
+        The method's own, for provenance; the grid's come with them.
+
+    Returns
+    -------
+    Profile
+        With ``meta["photons"]`` and ``meta["seed"]`` None.
+    """
+    n, channels = grid.annuli, material.n_channels
+    error = np.full((n + 1, channels), np.nan) if stderr is None else stderr
+    return Profile(
+        r_edges_mm=grid.r_edges_mm,
+        annulus_energy=reflected[:n],
+        annulus_energy_stderr=error[:n],
+        beyond_grid=reflected[n],
+        beyond_grid_stderr=error[n],
+        specular_reflectance=material.specular_reflectance,
+        absorbed=np.zeros((0, channels)) if absorbed is None else absorbed,
+        unfinished=np.zeros(channels),
+        annulus_transmittance=None if transmitted is None else transmitted[:n],
+        beyond_grid_transmittance=None if transmitted is None else transmitted[n],
+        meta={
+            "format": FORMAT,
+            "method": method,
+            "material": material.to_dict(),
+            "material_sha256": material.sha256,
+            "channels": list(material.channels),
+            "photons": None,
+            "seed": None,
+            "version": __version__,
+            "settings": {"dr_mm": grid.dr_mm, "radius": "given", **(settings or {})},
+            "relative_error": relative_error,
+            "energy_balance_stderr": None,
+        },
+    )
+
+
+def half_space(material: Material, method: str) -> Layer:
+    """Return the one layer of a homogeneous half space, or name the methods for anything else.
+
+    Raises
+    ------
+    SimulationError
+        Not a material, a stack, or a slab.
+    """
+    check_is_material(material)
+    if not material.is_semi_infinite:
+        what = "has several layers" if len(material.layers) > 1 else "has a finite thickness"
+        raise SimulationError(
+            f"{material.name} {what}; the method {method} covers one layer without a bottom: use "
+            "multipole or montecarlo."
+        )
+    return material.layers[0]
+
+
+def check_is_material(material: object) -> None:
+    """Refuse a name or a path, which has to be loaded first, in one line."""
+    if not isinstance(material, Material):
+        raise SimulationError(
+            f"{material!r} is not a Material; load one with sssfit.material.load_material."
+        )
