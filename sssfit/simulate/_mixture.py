@@ -65,8 +65,8 @@ def mixture_of(wavenumbers: FloatArray, transform: FloatArray, slowest: float) -
         weights, _ = optimize.nnls(rows, wanted, maxiter=60 * rates.size)
     except RuntimeError as error:
         raise SimulationError(
-            f"the way back from {wavenumbers.size} wavenumbers to radii did not converge ({error}): "
-            "give a larger tolerance."
+            f"the way back from {wavenumbers.size} wavenumbers to radii did not converge "
+            f"({error.args[0].rstrip('.')}): give a larger tolerance."
         ) from None
     used = weights > 0.0
     misfit = float(np.max(np.abs(terms @ weights - transform)))
