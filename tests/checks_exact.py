@@ -4,6 +4,7 @@ Figures as in checks.py: tests run them small, docs/make_verification.py at full
 """
 
 import functools
+import warnings
 
 import numpy as np
 from checks import (
@@ -11,14 +12,16 @@ from checks import (
     chi_square_sigmas,
     effective_hits,
     groups_of_hits,
+    medium,
     merge,
     moments,
     standard_error,
 )
 
+from sssfit.errors import SssfitWarning
 from sssfit.material import load_material, material_names
-from sssfit.simulate import shared_walks, simulate_montecarlo_many
-from sssfit.simulate.exact import simulate_exact_many
+from sssfit.simulate import shared_walks, simulate_montecarlo, simulate_montecarlo_many
+from sssfit.simulate.exact import simulate_exact, simulate_exact_many
 
 FINE = 2e-6  # tolerance of a much finer run: 20 s for the eleven materials
 
@@ -94,3 +97,38 @@ def shares_apart(names=None, tolerance=1e-4, fine=FINE):
         apart = np.abs(ours.cumulative - finer.cumulative)[3:] / finer.diffuse_reflectance
         rows.append((name, float(apart.max()), ours.meta["relative_error"]))
     return rows
+
+
+def similarity_rows(photons):
+    """Cost of the similarity relation: reduced isotropic scattering against the walk with g."""
+    rows = []
+    for g in (0.5, 0.8, 0.9):
+        for albedo in (0.9, 0.99):
+            scattering = albedo / (1.0 - g)
+            material = medium(1.0 - albedo, scattering, 1.3, g=g, name="similar")
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", SssfitWarning)  # what it says is measured here
+                exact = simulate_exact(material)
+            walk = simulate_montecarlo(material, photons=photons)
+            total = float(walk.diffuse_reflectance[0])
+            near = int(np.searchsorted(exact.r_edges_mm, 1.0))  # one reduced mean free path
+            rows.append(
+                (
+                    f"{g:g}",
+                    f"{albedo:g}",
+                    f"{total:.5f} ± {float(walk.diffuse_reflectance_stderr[0]):.5f}",
+                    f"{100.0 * (float(exact.diffuse_reflectance[0]) / total - 1.0):+.1f} %",
+                    f"{100.0 * _misplaced(exact, walk):.1f} %",
+                    f"{100.0 * (exact.cumulative[near, 0] / walk.cumulative[near, 0] - 1):+.0f} %",
+                )
+            )
+    return rows
+
+
+def _misplaced(one, other):
+    """Half the sum over annuli of the differences of their shares of the total."""
+    shares = [
+        np.append(each.annulus_energy[:, 0], each.beyond_grid[0]) / each.diffuse_reflectance[0]
+        for each in (one, other)
+    ]
+    return 0.5 * float(np.sum(np.abs(shares[0] - shares[1])))
