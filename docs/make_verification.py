@@ -32,8 +32,8 @@ fails beyond {limit}. Profiles are compared by chi-square over annuli merged unt
 - The scalar loop (tests/reference.py) follows one photon at a time in double precision.
 - The layered walk is compared at a quarter of the photons: with the semi-infinite walk, and with a
   scalar MCML (tests/reference.py) on a fifth of these; there energies are shares of what enters.
-- The exact solver is at a tolerance of {fine:g} against the walk; F is compared at every edge of the
-  merged annuli from the third on, and the worst is listed.
+- The exact solver is at a tolerance of {fine:g} against the walk; F is compared at every edge of
+  the merged annuli from the third on, and the worst is listed.
 - MCML 1.2.2 is the original C program; origin of its profiles: tests/data/README.md.
 
 | comparison | ours | theirs | standard errors apart |
@@ -53,9 +53,10 @@ tolerance of 1e-4 and against a run at {fine:g}; and the error that the run itse
 SIMILARITY = """
 ## What the similarity relation costs
 
-The exact solver with sigma_s' = (1 - g) sigma_s against the layered walk with g, eta 1.3, {photons:,}
-photons; albedo is the reduced one. Misplaced: half the sum over annuli of the differences of their
-shares of the total. F within one reduced mean free path of the beam is in the last column.
+The exact solver with sigma_s' = (1 - g) sigma_s against the layered walk with g, eta 1.3,
+{photons:,} photons; albedo is the reduced one. Misplaced: half the sum over annuli of the
+differences of their shares of the total. F within one reduced mean free path of the beam is in the
+last column.
 
 | g | albedo | walk | total | misplaced | F at 1 MFP |
 |---|---|---|---|---|---|
@@ -94,7 +95,7 @@ def figures(photons):
 
 
 def tables(photons):
-    """What is compared by other measures than standard errors."""
+    """Compare by other measures than standard errors."""
     page = FINER.format(fine=checks_exact.FINE)
     for name, apart, claimed in checks_exact.shares_apart():
         page += f"| {name} | {apart:.1e} | {claimed:.1e} |\n"
