@@ -21,6 +21,14 @@ class StoppedError(SimulationError):
     """A simulation was stopped before anything was done that could be kept."""
 
 
+class KernelError(SssfitError):
+    """A kernel file or its values cannot be used."""
+
+
+class FitError(SssfitError):
+    """A profile cannot be fitted as asked."""
+
+
 class FileError(SssfitError):
     """A file cannot be read, written or replaced."""
 

@@ -1,0 +1,173 @@
+"""From what a method found for each channel to a kernel with its errors."""
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sssfit import __version__
+from sssfit.errors import FitError
+from sssfit.fit._target import FloatArray, Target
+from sssfit.kernel import SeparableKernel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChannelFit:
+    """One channel's terms: ``signs`` (T,), ``half`` (T, h+1) passes from the middle outwards.
+
+    ``parameters`` is what the method found, for JSON; ``stop_reason`` says in words why it ended.
+    """
+
+    signs: FloatArray
+    half: FloatArray
+    stop_reason: str
+    evaluations: int = 0
+    parameters: Mapping[str, Any] | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FitResult:
+    """A kernel and how it came about; a value per channel where it is a tuple or array (C,)."""
+
+    kernel: SeparableKernel
+    evaluations: tuple[int, ...]
+    stop_reasons: tuple[str, ...]
+    seconds: float
+
+    @property
+    def relative_frobenius_error(self) -> FloatArray:
+        """||K - target|| / ||target|| over the support (C,)."""
+        return self.kernel.relative_frobenius_error
+
+    @property
+    def energy_error(self) -> FloatArray:
+        """Kernel's energy against the profile's diffuse reflectance, as a share of it (C,)."""
+        return self.kernel.energy_error
+
+
+def fit_channels(
+    target: Target,
+    method: str,
+    fit_channel: Callable[[int], ChannelFit],
+    *,
+    settings: Mapping[str, Any],
+    normalize: bool = False,
+) -> FitResult:
+    """Fit channel by channel and put the terms into one kernel.
+
+    Parameters
+    ----------
+    target : Target
+    method : str
+        As the command line names it.
+    fit_channel : callable
+        From a channel's index to its terms; not called for channels that return nothing, whose
+        weights are 0. Channels may have fewer terms than others: the rest are 0.
+    settings : mapping
+        The method's own settings, for provenance.
+    normalize : bool
+        Give every channel unit energy and keep the energy apart in ``scale``.
+
+    Raises
+    ------
+    FitError
+        A fit that is not finite, or one without energy that is to be normalised.
+    """
+    begun = time.perf_counter()
+    empty = target.is_empty
+    fits = [
+        _nothing(target) if empty[c] else fit_channel(c) for c in range(target.profile.n_channels)
+    ]
+    signs, half = _stacked(fits)
+    name = target.profile.meta["material"]["name"]
+    if not np.isfinite(half).all():
+        raise FitError(f"{name}: the {method} fit is not finite; try fewer terms.")
+    energy = _energy(signs, half, target.copies)
+    scale = np.ones(len(fits))
+    if normalize:
+        if (energy[~empty] <= 0.0).any():
+            raise FitError(f"{name}: the {method} kernel has no energy that could be made 1.")
+        scale = np.where(empty, 1.0, energy)
+    kernel = SeparableKernel(
+        method=method,
+        mm_per_pixel=target.mm_per_pixel,
+        channels=target.profile.channels,
+        signs=signs,
+        weights=np.concatenate((half[:, :0:-1], half), axis=1) / np.sqrt(scale),
+        relative_frobenius_error=_frobenius_errors(target, signs, half),
+        energy_error=np.where(empty, 0.0, energy / np.where(empty, 1.0, target.total) - 1.0),
+        scale=scale,
+        parameters=_parameters(fits, target.profile.channels),
+        meta=_provenance(target, settings, normalize=normalize),
+    )
+    return FitResult(
+        kernel,
+        tuple(each.evaluations for each in fits),
+        tuple(each.stop_reason for each in fits),
+        time.perf_counter() - begun,
+    )
+
+
+def _nothing(target: Target) -> ChannelFit:
+    return ChannelFit(
+        np.ones(1), np.zeros((1, target.half_pixels + 1)), "the channel returns no light"
+    )
+
+
+def _stacked(fits: list[ChannelFit]) -> tuple[FloatArray, FloatArray]:
+    """Return signs (T, C) and half passes (T, h+1, C), with empty terms where a channel has fewer."""
+    terms, channels = max(len(each.signs) for each in fits), len(fits)
+    signs = np.ones((terms, channels))
+    half = np.zeros((terms, fits[0].half.shape[1], channels))
+    for c, each in enumerate(fits):
+        signs[: len(each.signs), c] = each.signs
+        half[: len(each.signs), :, c] = each.half
+    return signs, half
+
+
+def _energy(signs: FloatArray, half: FloatArray, copies: FloatArray) -> FloatArray:
+    """Return the sum of the 2D kernel (C,)."""
+    sums = np.einsum("tpc,p->tc", half, copies)
+    energy: FloatArray = np.sum(signs * sums**2, axis=0)
+    return energy
+
+
+def _frobenius_errors(target: Target, signs: FloatArray, half: FloatArray) -> FloatArray:
+    """||K - target|| / ||target|| of each channel; 0 for a channel that returns nothing."""
+    errors = np.zeros(signs.shape[1])
+    for c in np.flatnonzero(~target.is_empty):
+        wanted = target.quadrant(int(c))
+        passes = half[:, :, c]
+        found = (passes * signs[:, c, None]).T @ passes
+        errors[c] = np.sqrt(_square(found - wanted, target) / _square(wanted, target))
+    return errors
+
+
+def _square(quadrant: FloatArray, target: Target) -> float:
+    """Return the squared Frobenius norm of the whole kernel from its quadrant."""
+    return float(target.copies @ (quadrant**2 @ target.copies))
+
+
+def _parameters(fits: list[ChannelFit], channels: tuple[str, ...]) -> dict[str, Any]:
+    """Return what each channel's fit found, by channel."""
+    return {
+        name: dict(each.parameters)
+        for name, each in zip(channels, fits, strict=True)
+        if each.parameters is not None
+    }
+
+
+def _provenance(target: Target, settings: Mapping[str, Any], *, normalize: bool) -> dict[str, Any]:
+    """Return where the kernel comes from."""
+    meta = target.profile.meta
+    return {
+        "material": meta["material"]["name"],
+        "material_sha256": meta.get("material_sha256"),
+        "profile_method": meta["method"],
+        "photons": meta.get("photons"),
+        "seed": meta.get("seed"),
+        "version": __version__,
+        "settings": {**settings, "normalize": normalize},
+    }
