@@ -1,4 +1,4 @@
-"""The profiles that ``sssfit simulate`` writes: where they go, held from other runs, written whole."""
+"""The outputs of ``sssfit simulate``: where they go, held from other runs, written whole."""
 
 from __future__ import annotations
 

@@ -140,7 +140,7 @@ def _transmitted(row: dict[str, Any], channel: int) -> list[str]:
 
 
 def _error(row: dict[str, Any], key: str, channel: int) -> str:
-    """An error: of a walk in the decimals of its figure, of a computation, far smaller, in two."""
+    """Write a walk's error in its figure's decimals, that of a computation, far smaller, alone."""
     if row[key] is None or math.isnan(row[key][channel]):
         return "-"
     return f"{row[key][channel]:.{'6f' if row['photons'] else '1e'}}"
@@ -158,7 +158,7 @@ def _layers(rows: list[dict[str, Any]]) -> list[str]:
 
 
 def _energy(rows: list[dict[str, Any]]) -> list[str]:
-    """Say whether specular + diffuse + absorbed = 1 within the runs' own error, if they have one."""
+    """Say whether specular + diffuse + absorbed = 1 within the runs' own error, where known."""
     lines = [] if len(rows) > 1 else [f"specular reflectance {rows[0]['specular_reflectance']:.6f}"]
     if any(row["energy_balance_stderr"] is None for row in rows):
         return lines

@@ -103,6 +103,7 @@ class Radius(Length):
 @click.pass_context
 def simulate(
     context: click.Context,
+    /,
     material: str | None,
     every: bool,
     method: str,
