@@ -17,8 +17,8 @@ from click.core import ParameterSource
 class Method:
     """One way from a material to a profile.
 
-    ``shares`` says that the function takes a list of materials, of one refractive index, and is
-    quicker for it; the others take one.
+    ``shares`` says that the function takes a list of materials, works once for what they have in
+    common, and knows ``threads`` and ``stop``; the others take one material.
     """
 
     summary: str

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,22 +28,46 @@ def run_computed(
 ) -> None:
     """Compute, write each profile as it is there, and report; a target None is stdout.
 
-    Ctrl-C and SIGTERM end the computation at once: what was written by then stays, and there is
-    nothing half done worth keeping.
+    After Ctrl-C or SIGTERM what was written by then stays; nothing half done is worth keeping.
     """
+    from sssfit.errors import StoppedError
+
+    from ._interrupt import asked_to_stop
+
     rows: dict[int, dict[str, Any]] = {}
-    with held(targets, force=request.force):
-        try:
-            for group, settings in jobs:
-                begun = time.perf_counter()
-                profiles = _computed(method, [materials[k] for k in group], settings)
-                seconds = time.perf_counter() - begun
-                for k, profile in zip(group, profiles, strict=True):
-                    write_profile(profile, targets[k])
-                    rows[k] = figures_of(profile, seconds) | {"path": str(targets[k] or "-")}
-        except KeyboardInterrupt:
-            if not rows:
-                raise
+    with asked_to_stop() as stop, held(targets, force=request.force):
+        for group, settings in jobs:
+            begun = time.perf_counter()
+            try:
+                profiles = _computed(method, [materials[k] for k in group], settings, stop)
+            except StoppedError:
+                break
+            seconds = time.perf_counter() - begun
+            for k, profile in zip(group, profiles, strict=True):
+                write_profile(profile, targets[k])
+                rows[k] = figures_of(profile, seconds) | {"path": str(targets[k] or "-")}
+        if not rows:
+            raise KeyboardInterrupt
+        _report(rows, materials, request)
+
+
+def _computed(
+    method: str, materials: list[Material], settings: dict[str, Any], stop: Callable[[], bool]
+) -> list[Profile]:
+    """Call the method's function; those that share work between materials can be stopped."""
+    from sssfit import simulate
+    from sssfit.errors import StoppedError
+
+    function = getattr(simulate, METHODS[method].function)
+    if METHODS[method].shares:
+        return list(function(materials, stop=stop, **settings))
+    if stop():
+        raise StoppedError("stopped between two materials.")
+    return [function(each, **settings) for each in materials]
+
+
+def _report(rows: dict[int, dict[str, Any]], materials: list[Material], request: Request) -> None:
+    """Print the figures; say what was not done, and exit 130 in that case."""
     missing = [each.name for k, each in enumerate(materials) if k not in rows]
     if missing:
         say(request.common, f"Interrupted. Not done: {', '.join(missing)}.")
@@ -54,13 +79,3 @@ def run_computed(
     )
     if missing:
         sys.exit(130)
-
-
-def _computed(method: str, materials: list[Material], settings: dict[str, Any]) -> list[Profile]:
-    """Call the method's function, with all materials where it shares work between them."""
-    from sssfit import simulate
-
-    function = getattr(simulate, METHODS[method].function)
-    if METHODS[method].shares:
-        return list(function(materials, **settings))
-    return [function(each, **settings) for each in materials]

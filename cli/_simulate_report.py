@@ -176,10 +176,11 @@ def _energy(rows: list[dict[str, Any]]) -> list[str]:
     parts = "specular + diffuse + absorbed"
     parts += " + transmitted" if any(row["transmittance"] is not None for row in rows) else ""
     parts += " + unfinished" if unfinished > 0.0 else ""
+    kind = "standard" if rows[0]["photons"] else "estimated"
     within = abs(balance) <= _SIGMAS * stderr + _ROUNDING
     lines.append(
         f"energy: {parts} = 1 {'within' if within else 'NOT WITHIN'} the run's own error: "
-        f"{balance:+.1e}, standard error {max(stderr, _ROUNDING):.0e} (worst channel, {name})"
+        f"{balance:+.1e}, {kind} error {max(stderr, _ROUNDING):.0e} (worst channel, {name})"
     )
     if unfinished > 0.0:
         lines.append(f"unfinished, at most: {unfinished:.6f}")

@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import StepPatch
 from matplotlib.text import Text
 
-from sssfit._chart_data import LEAST_HITS, effective_hits, merged, picture
+from sssfit._chart_data import picture
 from sssfit._chart_text import count, shortened, with_error
+from sssfit._profile_bins import LEAST_HITS, effective_hits, merged
 from sssfit.chart import FORMATS, chart_format, is_chart_file, profile_figure, save_figure
 from sssfit.errors import FileError
 from sssfit.material import Layer, Material, load_material
