@@ -15,7 +15,18 @@ HEAVY = {"numpy", "numba", "scipy", "colour", "matplotlib", "rich"}
 
 # A room may import from rooms before it in this list, never from one after it.
 ROOMS = [
-    *("errors", "files", "material", "text", "grid", "mci", "profile", "mco", "profile_csv"),
+    *(
+        "errors",
+        "files",
+        "shapes",
+        "material",
+        "text",
+        "grid",
+        "mci",
+        "profile",
+        "mco",
+        "profile_csv",
+    ),
     *("simulate", "compare", "chart", "cli"),
 ]
 # Files that serve one room and do not say so by their name, as _profile_io does.

@@ -27,13 +27,6 @@ from sssfit.simulate import (
 
 FloatArray = npt.NDArray[np.float64]
 
-# Diffusion models that are drawn; each a function of a material and the grid's two lengths.
-MODELS = {
-    "dipole": simulate_dipole,
-    "dipole-grosjean": simulate_dipole_grosjean,
-    "burley": simulate_burley,
-}
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelCurve:
@@ -112,6 +105,9 @@ def compare_models(
 ) -> ModelComparison:
     """Compute a half space by the exact solver, the photon walk and the diffusion models.
 
+    Normalised diffusion has the total as a parameter, the reflectance that an artist wants; it is
+    given the exact one, so that what is left is the error of its shape.
+
     Parameters
     ----------
     material : Material
@@ -152,14 +148,25 @@ def compare_models(
             radius_mm=radius_mm,
             progress=progress,
         )
-    models = [each(material, dr_mm=dr_mm, radius_mm=radius_mm) for each in MODELS.values()]
-    profiles = [exact, walk, *models]
+    profiles = [exact, walk, *_diffusion(material, exact, dr_mm, radius_mm)]
     cuts = [_cuts(walk, channel) for channel in range(material.n_channels)]
     return ModelComparison(
         material=material,
         edges_mm=tuple(walk.r_edges_mm[each] for each in cuts),
         curves=tuple(_curve(each, exact, cuts) for each in profiles),
     )
+
+
+def _diffusion(
+    material: Material, exact: Profile, dr_mm: float | None, radius_mm: float | None
+) -> list[Profile]:
+    """Return the models' profiles; normalised diffusion is told the true total, as by an artist."""
+    total = exact.diffuse_reflectance
+    return [
+        simulate_dipole(material, dr_mm=dr_mm, radius_mm=radius_mm),
+        simulate_dipole_grosjean(material, dr_mm=dr_mm, radius_mm=radius_mm),
+        simulate_burley(material, reflectance=total, dr_mm=dr_mm, radius_mm=radius_mm),
+    ]
 
 
 def _grid_of(walk: Profile) -> tuple[float, float]:

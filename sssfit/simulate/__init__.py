@@ -3,12 +3,15 @@
 from sssfit.simulate._checkpoint import EVERY_SECONDS, Checkpoint
 from sssfit.simulate._finished import is_complete, is_finished
 from sssfit.simulate._run import Progress
+from sssfit.simulate.burley import simulate_burley
+from sssfit.simulate.dipole import simulate_dipole, simulate_dipole_grosjean
 from sssfit.simulate.montecarlo import (
     is_compiled,
     shared_walks,
     simulate_montecarlo,
     simulate_montecarlo_many,
 )
+from sssfit.simulate.multipole import simulate_multipole
 
 __all__ = [
     "EVERY_SECONDS",
@@ -18,6 +21,10 @@ __all__ = [
     "is_complete",
     "is_finished",
     "shared_walks",
+    "simulate_burley",
+    "simulate_dipole",
+    "simulate_dipole_grosjean",
     "simulate_montecarlo",
     "simulate_montecarlo_many",
+    "simulate_multipole",
 ]

@@ -1,0 +1,122 @@
+"""What the diffusion models share: coefficients of the diffusion equation and of its boundary.
+
+Scattering enters as sigma_s' = (1 - g) sigma_s: diffusion sees directions only by their mean, so
+for these models g other than 0 is no further approximation. The boundary condition is A: flux lost
+through the surface puts the fluence's zero at 2 A D outside it, further for a denser medium.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.errors import SimulationError
+from sssfit.material import Layer
+
+FloatArray = npt.NDArray[np.float64]
+
+# The polynomial for F_dr is within 0.6 % of the integral up to 2.5, and over 1 from 3.9 on.
+LEAST_ETA, MOST_ETA = 0.4, 2.5
+_NODES = 200
+
+
+@dataclass(frozen=True, slots=True)
+class Diffusion:
+    """A layer as the diffusion equation knows it, by channel.
+
+    ``albedo`` alpha' = sigma_s' / sigma_t' (C,); ``depth_mm`` z_r = 1 / sigma_t' (C,) where the
+    beam is taken to become diffuse; ``coefficient_mm`` D (C,); ``sigma_tr_per_mm``
+    sqrt(sigma_a / D) (C,), the decay of fluence with distance.
+    """
+
+    albedo: FloatArray
+    depth_mm: FloatArray
+    coefficient_mm: FloatArray
+
+    sigma_tr_per_mm: FloatArray
+
+
+def classical(layer: Layer) -> Diffusion:
+    """D = 1 / (3 sigma_t'): Jensen et al. 2001, "A practical model for subsurface light transport".
+
+    Every channel must absorb or scatter.
+    """
+    return _with_coefficient(layer, 1.0 / (3.0 * layer.reduced_sigma_t_per_mm))
+
+
+def grosjean(layer: Layer) -> Diffusion:
+    """D = (2 sigma_a + sigma_s') / (3 sigma_t'^2): Grosjean 1956, right where much is absorbed.
+
+    Used for a dipole by d'Eon and Irving 2011, "A quantized-diffusion model".
+    """
+    both = 2.0 * layer.sigma_a_per_mm + layer.reduced_sigma_s_per_mm
+    return _with_coefficient(layer, both / (3.0 * layer.reduced_sigma_t_per_mm**2))
+
+
+def _with_coefficient(layer: Layer, coefficient_mm: FloatArray) -> Diffusion:
+    return Diffusion(
+        albedo=layer.reduced_sigma_s_per_mm / layer.reduced_sigma_t_per_mm,
+        depth_mm=1.0 / layer.reduced_sigma_t_per_mm,
+        coefficient_mm=coefficient_mm,
+        sigma_tr_per_mm=np.sqrt(layer.sigma_a_per_mm / coefficient_mm),
+    )
+
+
+def mismatch_by_polynomial(eta: float) -> float:
+    """A = (1 + F_dr) / (1 - F_dr), F_dr by polynomial; exactly 1 at eta 1.
+
+    F_dr = -1.440/eta^2 + 0.710/eta + 0.668 + 0.0636 eta above 1 (Jensen et al. 2001), and
+    -0.4399 + 0.7099/eta - 0.3319/eta^2 + 0.0636/eta^3 below (Egan and Hilgeman 1979, as in Donner
+    and Jensen 2005); eta is the index inside over that outside.
+
+    Raises
+    ------
+    SimulationError
+        eta outside 0.4 to 2.5, where the polynomials no longer describe Fresnel's formulas.
+    """
+    if not LEAST_ETA <= eta <= MOST_ETA:
+        raise SimulationError(
+            f"an interface has the relative refractive index {eta:.4g}; the polynomial of this "
+            f"method covers {LEAST_ETA} to {MOST_ETA}: use dipole-grosjean, exact or montecarlo."
+        )
+    if eta == 1.0:
+        return 1.0
+    if eta > 1.0:
+        reflected = -1.440 / eta**2 + 0.710 / eta + 0.668 + 0.0636 * eta
+    else:
+        reflected = -0.4399 + 0.7099 / eta - 0.3319 / eta**2 + 0.0636 / eta**3
+    return (1.0 + reflected) / (1.0 - reflected)
+
+
+def mismatch_by_moments(eta: float) -> float:
+    """A = (1 + 3 C_2) / (1 - 2 C_1) with the moments of Fresnel's reflectance from inside.
+
+    The boundary condition with the full first moment; see d'Eon and Irving 2011.
+    """
+    first, second = fresnel_moments(eta)
+    return (1.0 + 3.0 * second) / (1.0 - 2.0 * first)
+
+
+def fresnel_moments(eta: float) -> tuple[float, float]:
+    """C_i = int_0^1 R_F(mu) mu^i dmu for i = 1, 2, mu the cosine inside; to 1e-10.
+
+    Up to the critical angle all is reflected; from there mu = mu_c + (1 - mu_c) t^2 takes out the
+    square root. eta is the index inside over that outside.
+    """
+    x, w = np.polynomial.legendre.leggauss(_NODES)
+    t, w = 0.5 * (x + 1.0), 0.5 * w
+    critical = math.sqrt(max(0.0, 1.0 - 1.0 / eta**2))
+    mu = critical + (1.0 - critical) * t**2
+    weights = w * 2.0 * (1.0 - critical) * t * _fresnel(mu, eta)
+    first = 0.5 * critical**2 + float(weights @ mu)
+    second = critical**3 / 3.0 + float(weights @ mu**2)
+    return first, second
+
+
+def _fresnel(mu: FloatArray, eta: float) -> FloatArray:
+    """Unpolarised reflectance from inside at cosines beyond the critical angle."""
+    out = np.sqrt(np.maximum(0.0, 1.0 - eta**2 * (1.0 - mu**2)))
+    parallel = (mu - eta * out) / (mu + eta * out)
+    perpendicular = (eta * mu - out) / (eta * mu + out)
+    return np.asarray(0.5 * (parallel**2 + perpendicular**2), dtype=np.float64)

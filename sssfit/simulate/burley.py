@@ -1,0 +1,130 @@
+"""Normalised diffusion: a profile from reflectance and mean free path, as engines have it.
+
+Christensen and Burley 2015, "Approximate reflectance profiles for efficient subsurface scattering":
+R_d(r) = A s (exp(-s r) + exp(-s r/3)) / (8 pi r), whatever the material, with s from one of three
+fits to photon walks (`sssfit.shapes`). A is the diffuse reflectance, what an artist calls the
+albedo of the surface; it is not the single-scattering albedo. All of A's energy is in the profile.
+"""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.errors import SimulationError
+from sssfit.grid import make_grid
+from sssfit.material import Layer, Material
+from sssfit.profile import Profile
+from sssfit.shapes import (
+    diffusion_beyond,
+    s_diffuse,
+    s_diffuse_mean_free_path,
+    s_perpendicular,
+)
+from sssfit.simulate._deterministic import computed_profile, energies_from_beyond, half_space
+from sssfit.simulate.dipole import grosjean_reflectance
+
+FloatArray = npt.NDArray[np.float64]
+
+MAPPINGS: Mapping[str, Callable[[npt.ArrayLike], FloatArray]] = MappingProxyType(
+    {
+        "perpendicular": s_perpendicular,
+        "diffuse": s_diffuse,
+        "diffuse-mfp": s_diffuse_mean_free_path,
+    }
+)
+
+
+def simulate_burley(
+    material: Material,
+    *,
+    mapping: str = "perpendicular",
+    reflectance: npt.ArrayLike | None = None,
+    dr_mm: float | None = None,
+    radius_mm: float | None = None,
+) -> Profile:
+    """Return the profile of normalised diffusion.
+
+    Parameters
+    ----------
+    material : Material
+        A homogeneous half space; any g (by sigma_s').
+    mapping : str
+        Which fit gives s: "perpendicular" (light along the normal, as the other methods have it) or
+        "diffuse" (light from all sides), both over the mean free path 1 / sigma_t'; "diffuse-mfp",
+        over the diffuse mean free path 1 / sqrt(3 sigma_a sigma_t').
+    reflectance : (C,) or float, optional
+        A, the diffuse reflectance, 0 to 1; by default the material's own.
+    dr_mm, radius_mm : float, optional
+        Grid, as `sssfit.grid.make_grid` takes it [mm].
+
+    Returns
+    -------
+    Profile
+        Exact to rounding, for the model; standard errors are NaN. ``meta["settings"]`` holds
+        ``mapping``, ``reflectance`` and ``s_per_mm``.
+
+    Raises
+    ------
+    SimulationError
+        A slab or a stack, an unknown mapping, a reflectance out of range, "diffuse-mfp" where
+        nothing absorbs, or a grid that cannot be.
+
+    Examples
+    --------
+    >>> from sssfit.material import load_material
+    >>> profile = simulate_burley(load_material("skin1"), reflectance=[0.44, 0.22, 0.13])
+    >>> profile.diffuse_reflectance.round(12).tolist()
+    [0.44, 0.22, 0.13]
+    """
+    layer = half_space(material, "burley")
+    if mapping not in MAPPINGS:
+        raise SimulationError(f"mapping = {mapping!r}; expected one of {', '.join(MAPPINGS)}.")
+    total = _reflectance(material, reflectance)
+    s_per_mm = MAPPINGS[mapping](total) * _scale_per_mm(material, layer, mapping)
+    grid = make_grid(material, dr_mm=dr_mm, radius_mm=radius_mm)
+    beyond = total * diffusion_beyond(grid.r_edges_mm[:, None], s_per_mm)
+    settings = {
+        "mapping": mapping,
+        "reflectance": total.tolist(),
+        "s_per_mm": s_per_mm.tolist(),
+    }
+    return computed_profile(
+        material, "burley", grid, energies_from_beyond(beyond), settings=settings
+    )
+
+
+def _reflectance(material: Material, given: npt.ArrayLike | None) -> FloatArray:
+    """A of each channel (C,)."""
+    if given is None:
+        return _own_reflectance(material)
+    try:
+        total = np.broadcast_to(np.asarray(given, dtype=np.float64), (material.n_channels,))
+    except (TypeError, ValueError):
+        total = np.full(1, np.nan)
+    if not ((total >= 0.0) & (total <= 1.0)).all():
+        raise SimulationError(
+            f"reflectance = {given!r}; expected a number from 0 to 1 for each of "
+            f"{material.n_channels} channels."
+        )
+    return total
+
+
+def _own_reflectance(material: Material) -> FloatArray:
+    """Diffuse reflectance of the material (C,), where none is given."""
+    return grosjean_reflectance(material)
+
+
+def _scale_per_mm(material: Material, layer: Layer, mapping: str) -> FloatArray:
+    """What s is relative to (C,) [1/mm]: one over the mean free path that the mapping means."""
+    sigma_t = layer.reduced_sigma_t_per_mm
+    if mapping != "diffuse-mfp":
+        return sigma_t
+    for channel, sigma_a in zip(material.channels, layer.sigma_a_per_mm, strict=True):
+        if sigma_a == 0.0:
+            raise SimulationError(
+                f"{material.name}: nothing absorbs in channel {channel}, so its diffuse mean free "
+                "path is infinite; use the mapping perpendicular or diffuse."
+            )
+    return np.asarray(np.sqrt(3.0 * layer.sigma_a_per_mm * sigma_t), dtype=np.float64)

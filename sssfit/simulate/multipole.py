@@ -1,0 +1,240 @@
+"""The multipole: slabs and stacks of layers by diffusion (Donner and Jensen 2005).
+
+"Light diffusion in multi-layered translucent materials". Between two surfaces the dipole's sources
+are mirrored over and over, at 2 i H + z_r and 2 i H - z_r - 2 z_0 for every whole i, with
+H = d + z_0 + z_d, z_0 = 2 A_0 D and z_d = 2 A_d D beyond the upper and the lower surface. In the
+plane's frequencies an image at depth z is +-exp(-s |z|) / 2, s = sqrt(sigma_tr^2 + k^2), and the
+sum over all i is geometric, so no number of images has to be chosen:
+
+    Rhat(k) = alpha' sinh(s (d + z_d - l)) cosh(s z_0) / sinh(s H)
+    That(k) = alpha' sinh(s (l + z_0)) cosh(s z_d) / sinh(s H)          l = 1/sigma_t'
+
+Convolutions are products there, and layers add as in Kubelka and Munk's theory, with light that
+goes back and forth between them as 1 / (1 - R1' R2); R1' and T1' are for light from below:
+
+    R = R1 + T1 R2 T1' / (1 - R1' R2),      T = T1 T2 / (1 - R1' R2)
+
+Light that enters a layer from another one is treated as the beam is, as if it came along the
+normal; and all light is taken to scatter, also what crosses a thin slab without a collision, which
+the photon walk counts at r = 0. Next: ``docs/theory.md`` for the errors of both.
+"""
+
+import warnings
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.errors import SimulationError, SssfitWarning
+from sssfit.grid import make_grid
+from sssfit.material import Material
+from sssfit.profile import Profile
+from sssfit.simulate._deterministic import (
+    check_is_material,
+    computed_profile,
+    energies_from_beyond,
+    energies_from_cumulative,
+)
+from sssfit.simulate._diffusion import Diffusion, classical, mismatch_by_polynomial
+from sssfit.simulate._hankel import cumulative_from_transform
+from sssfit.simulate.dipole import dipole_beyond
+
+FloatArray = npt.NDArray[np.float64]
+
+THIN = 2.0  # reduced mean free paths: the beam's source is then nearer to the bottom than the top
+UNSCATTERED = 0.01
+
+
+def simulate_multipole(
+    material: Material, *, dr_mm: float | None = None, radius_mm: float | None = None
+) -> Profile:
+    """Return the profile of a slab or a stack by diffusion, reflected and transmitted.
+
+    Parameters
+    ----------
+    material : Material
+        Layers thicker than one reduced mean free path in every channel, any g (by sigma_s'); the
+        last may be without a bottom. One layer without a bottom gives the classical dipole.
+    dr_mm, radius_mm : float, optional
+        Grid, as `sssfit.grid.make_grid` takes it [mm].
+
+    Returns
+    -------
+    Profile
+        F is good to 1e-13 of what enters, for the model; the model's own error is not known to it
+        (standard errors are NaN), nor what is absorbed. Transmittance where the stack has an end.
+
+    Raises
+    ------
+    SimulationError
+        A layer that is clear or too thin in a channel, a relative index out of 0.4 to 2.5, or a
+        grid that cannot be.
+
+    Warns
+    -----
+    SssfitWarning
+        A layer thinner than two reduced mean free paths, or over 1 % of the light crosses the
+        stack without a collision.
+    """
+    check_is_material(material)
+    _check_layers(material)
+    grid = make_grid(material, dr_mm=dr_mm, radius_mm=radius_mm)
+    entering = 1.0 - material.specular_reflectance
+    layers = _layers(material)
+    if material.is_semi_infinite:
+        medium, boundary = layers[0].medium, layers[0].above
+        beyond = entering * dipole_beyond(grid.r_edges_mm, medium, boundary)
+        return computed_profile(material, "multipole", grid, energies_from_beyond(beyond))
+    _warn_of_thin(material)
+    total = _stack(layers, np.zeros((1, 1)))
+
+    def energies(name: str, shortest_mm: float) -> FloatArray:
+        """Reflected or transmitted light of 1 that enters, by annulus."""
+        cumulative = cumulative_from_transform(
+            lambda k: getattr(_stack(layers, k), name), grid.r_edges_mm, shortest_mm
+        )
+        return entering * energies_from_cumulative(cumulative, getattr(total, name)[0])
+
+    transmitted = None
+    if np.isfinite(layers[-1].thickness_mm):
+        left_mm = sum(each.thickness_mm - each.medium.depth_mm for each in layers)
+        transmitted = energies("transmitted", float(np.min(left_mm)))
+    reflected = energies("reflected", float(layers[0].medium.depth_mm.min()))
+    return computed_profile(material, "multipole", grid, reflected, transmitted=transmitted)
+
+
+@dataclass(frozen=True, slots=True)
+class _Layer:
+    """A layer by diffusion: medium, thickness [mm], and A at the interfaces above and below."""
+
+    medium: Diffusion
+    thickness_mm: float
+    above: float
+    below: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Response:
+    """What comes back and what goes through, at each wavenumber and channel (n, C).
+
+    Of light from above, and (``_up``) of light from below.
+    """
+
+    reflected: FloatArray
+    transmitted: FloatArray
+    reflected_up: FloatArray
+    transmitted_up: FloatArray
+
+
+def _layers(material: Material) -> list[_Layer]:
+    """Each layer with the mismatch at its interfaces; at none it is 1."""
+    etas = [material.eta_above, *(each.eta for each in material.layers), material.eta_below]
+    return [
+        _Layer(
+            medium=classical(layer),
+            thickness_mm=layer.thickness_mm,
+            above=mismatch_by_polynomial(layer.eta / above),
+            # without a bottom there is no interface, whatever eta_below says
+            below=mismatch_by_polynomial(layer.eta / below)
+            if np.isfinite(layer.thickness_mm)
+            else 1.0,
+        )
+        for above, layer, below in zip(etas[:-2], material.layers, etas[2:], strict=True)
+    ]
+
+
+def _stack(layers: list[_Layer], k_per_mm: FloatArray) -> _Response:
+    """Respond as a stack, from the top down, at wavenumbers (n, 1) [1/mm]."""
+    whole = _one(layers[0], k_per_mm)
+    for layer in layers[1:]:
+        whole = _added(whole, _one(layer, k_per_mm))
+    return whole
+
+
+def _one(layer: _Layer, k_per_mm: FloatArray) -> _Response:
+    """Respond as one layer."""
+    # sinh(s d) / sinh(s H) has a limit at s = 0, which a length of 1e100 mm comes to the bit
+    s = np.maximum(np.hypot(layer.medium.sigma_tr_per_mm, k_per_mm), 1e-100)
+    down = _both_ways(layer.medium, layer.thickness_mm, layer.above, layer.below, s)
+    up = _both_ways(layer.medium, layer.thickness_mm, layer.below, layer.above, s)
+    return _Response(*down, *up)
+
+
+def _both_ways(
+    medium: Diffusion, thickness_mm: float, entered: float, other: float, s: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Rhat and That (n, C) of the module's head for light from the side ``entered``.
+
+    The hyperbolic functions stand as falling exponentials: an infinite thickness is no exception.
+    """
+    depth, near = medium.depth_mm, 2.0 * entered * medium.coefficient_mm
+    far = 2.0 * other * medium.coefficient_mm
+    common = 0.5 * medium.albedo / _lost(2.0 * s * (thickness_mm + near + far))
+    reflected = (
+        np.exp(-s * depth)
+        * (1.0 + np.exp(-2.0 * s * near))
+        * _lost(2.0 * s * (thickness_mm + far - depth))
+    )
+    transmitted = (
+        np.exp(-s * (thickness_mm - depth))
+        * (1.0 + np.exp(-2.0 * s * far))
+        * _lost(2.0 * s * (depth + near))
+    )
+    return common * reflected, common * transmitted
+
+
+def _lost(exponent: FloatArray) -> FloatArray:
+    """1 - exp(-exponent)."""
+    return np.asarray(-np.expm1(-exponent), dtype=np.float64)
+
+
+def _added(top: _Response, bottom: _Response) -> _Response:
+    """Respond as one layer on another."""
+    between = 1.0 / (1.0 - top.reflected_up * bottom.reflected)
+    back = top.transmitted * bottom.reflected * top.transmitted_up * between
+    forth = bottom.transmitted_up * top.reflected_up * bottom.transmitted * between
+    return _Response(
+        reflected=top.reflected + back,
+        transmitted=top.transmitted * bottom.transmitted * between,
+        reflected_up=bottom.reflected_up + forth,
+        transmitted_up=bottom.transmitted_up * top.transmitted_up * between,
+    )
+
+
+def _check_layers(material: Material) -> None:
+    """Refuse layers that diffusion cannot describe."""
+    for k, layer in enumerate(material.layers):
+        for channel, path_mm in zip(material.channels, layer.mean_free_path_mm, strict=True):
+            where = f"{material.name}: layer {k + 1}, channel {channel}"
+            if np.isinf(path_mm):
+                raise SimulationError(
+                    f"{where} is clear; multipole needs layers that scatter: use montecarlo."
+                )
+            if layer.thickness_mm <= path_mm:
+                raise SimulationError(
+                    f"{where} is {layer.thickness_mm / path_mm:.3g} reduced mean free paths thick; "
+                    "multipole needs more than 1: use montecarlo."
+                )
+
+
+def _warn_of_thin(material: Material) -> None:
+    """Say where the model is out by more than some per cent."""
+    thinnest = min(
+        float(np.min(each.thickness_mm / each.mean_free_path_mm)) for each in material.layers
+    )
+    if thinnest < THIN:
+        warnings.warn(
+            f"{material.name}: a layer is {thinnest:.3g} reduced mean free paths thick; diffusion "
+            f"is off by some 5 % at {THIN:g} and by more below: compare with montecarlo.",
+            SssfitWarning,
+            stacklevel=3,
+        )
+    depth = sum(each.thickness_mm * each.sigma_t_per_mm for each in material.layers)
+    unscattered = float(np.exp(-np.min(depth)))
+    if unscattered > UNSCATTERED:
+        warnings.warn(
+            f"{material.name}: {100.0 * unscattered:.2g} % of the light that enters crosses "
+            "without a collision; multipole takes it to scatter: compare with montecarlo.",
+            SssfitWarning,
+            stacklevel=3,
+        )
