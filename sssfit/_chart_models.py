@@ -18,8 +18,16 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, StrMethodFormatter
 
 from sssfit import _chart_models_text as words
-from sssfit._chart_page import chart_style, draw_footnotes, draw_text, name_axes, new_figure
-from sssfit._chart_style import LEFT, RIGHT, Style
+from sssfit._chart_page import (
+    TEXT_INCHES,
+    chart_style,
+    draw_footnotes,
+    draw_text,
+    drawable,
+    fitting,
+    new_figure,
+)
+from sssfit._chart_style import LEFT, RC, RIGHT, WIDTH_INCHES, Style
 from sssfit._chart_text import WEIGHTED, method_name, spread
 from sssfit._profile_bins import FloatArray
 
@@ -28,6 +36,7 @@ if TYPE_CHECKING:
 
 HEIGHT_INCHES = 6.6
 _ROW_INCHES = 0.165
+_TABLE_LEFT = 0.37  # of the width: the legend's totals
 _MOST_COLUMNS = 3
 _DECADES = 5  # of 2 pi r R_d that are drawn at most
 _LINEAR_PERCENT, _LEAST_PERCENT, _MOST_PERCENT = 10.0, -100.0, 1000.0
@@ -60,6 +69,7 @@ def models_figure(comparison: ModelComparison) -> Figure:
         [%] below, linear to 10 % and logarithmic beyond; totals and their errors in the legend.
     """
     shown = spread(comparison.material.n_channels, _MOST_COLUMNS)
+    room = TEXT_INCHES / len(shown) - 0.15
     with chart_style():
         figure = new_figure(HEIGHT_INCHES)
         top = _draw_head(figure, comparison, shown)
@@ -70,9 +80,11 @@ def models_figure(comparison: ModelComparison) -> Figure:
         figure.subplots_adjust(LEFT, bottom, RIGHT, top, wspace=0.08, hspace=0.1)
         for k, channel in enumerate(shown):
             _draw_densities(panels[0, k], comparison, channel)
+            title = fitting(words.panel_titles(comparison, channel), RC["font.size"], room)
+            panels[0, k].set_title(drawable(title), loc="left", parse_math=False)
             _draw_errors(panels[1, k], comparison, channel)
         _limit(panels, comparison, shown)
-        name_axes(panels[0, 0], panels[0, 0].get_title(loc="left"), "", WEIGHTED)
+        panels[0, 0].set_ylabel(WEIGHTED)
         panels[1, 0].set_ylabel("relative error of $R_d$ (%)")
         figure.align_ylabels(panels[:, 0])
     return figure
@@ -85,7 +97,8 @@ def _draw_head(figure: Figure, comparison: ModelComparison, shown: Sequence[int]
     grey: Style = {"color": "#444444", "size": 8}
     down = 0.68
     draw_text(figure, down, "Total diffuse reflectance, and its error", **grey)
-    columns = np.linspace(0.37, RIGHT, len(shown) + 1)[:-1]
+    columns = np.linspace(_TABLE_LEFT, RIGHT, len(shown) + 1)[:-1]
+    room = WIDTH_INCHES * (RIGHT - _TABLE_LEFT) / len(shown) - 0.05
     for left, channel in zip(columns, shown, strict=True):
         draw_text(figure, down, words.channel_name(comparison, channel), left=left, **grey)
     for curve in comparison.curves:
@@ -93,7 +106,8 @@ def _draw_head(figure: Figure, comparison: ModelComparison, shown: Sequence[int]
         _draw_sample(figure, curve.method, down)
         draw_text(figure, down, method_name(curve.method), left=LEFT + 0.06)
         for left, channel in zip(columns, shown, strict=True):
-            draw_text(figure, down, words.total_with_error(curve, channel), left=left)
+            total = fitting(words.total_with_error(curve, channel), 8, room)
+            draw_text(figure, down, total, left=left, size=8)
     return 1 - (down + 0.42) / HEIGHT_INCHES
 
 
@@ -118,7 +132,6 @@ def _draw_densities(axes: Axes, comparison: ModelComparison, channel: int) -> No
         error = curve.energy_stderr[channel] / widths_mm
         _draw_curve(axes, curve, edges_mm, np.where(density > 0, density, np.nan), error)
     axes.set_yscale("log", nonpositive="clip")
-    axes.set_title(words.panel_title(comparison, channel), loc="left", parse_math=False)
 
 
 def _draw_errors(axes: Axes, comparison: ModelComparison, channel: int) -> None:
@@ -143,6 +156,8 @@ def _draw_curve(
 ) -> None:
     """Draw a line through the middles of the bins; the walk as steps with a band."""
     style = _STYLES[curve.method]
+    if edges_mm.size < 2:
+        return  # the walk has too few photons, as the title says
     if curve.method != "montecarlo":
         axes.plot(0.5 * (edges_mm[1:] + edges_mm[:-1]), mean, **style)
         return

@@ -16,7 +16,7 @@ MINUS = "\N{MINUS SIGN}"
 
 def models_title(comparison: ModelComparison) -> str:
     """Name the material."""
-    return f"{shortened(comparison.material.name, 24)}: profile models against the exact solution"
+    return f"{shortened(comparison.material.name, 20)}: models against the exact solution"
 
 
 def models_subtitle(comparison: ModelComparison) -> str:
@@ -34,26 +34,29 @@ def channel_name(comparison: ModelComparison, channel: int) -> str:
     return shortened(comparison.material.channels[channel])
 
 
-def panel_title(comparison: ModelComparison, channel: int) -> str:
-    """Name a channel, with its albedo and mean free path."""
+def panel_titles(comparison: ModelComparison, channel: int) -> list[str]:
+    """Name a channel, with albedo and mean free path, or why nothing is drawn; longest first."""
+    name = channel_name(comparison, channel)
+    if comparison.edges_mm[channel].size < 2:
+        return [f"{name} · too few photons to draw", f"{name} · too few photons"]
     layer = comparison.material.layers[0]
-    return (
-        f"{channel_name(comparison, channel)} · albedo {layer.albedo[channel]:.4g} · "
-        f"MFP {layer.mean_free_path_mm[channel]:.3g} mm"
-    )
+    with_albedo = f"{name} · albedo {layer.albedo[channel]:.4g}"
+    return [f"{with_albedo} · MFP {layer.mean_free_path_mm[channel]:#.3g} mm", with_albedo, name]
 
 
-def total_with_error(curve: ModelCurve, channel: int) -> str:
-    """Total diffuse reflectance, and how far it is from the exact one where it is another."""
+def total_with_error(curve: ModelCurve, channel: int) -> list[str]:
+    """Total diffuse reflectance, and how far it is from the exact one; longest first."""
     total = float(curve.profile.diffuse_reflectance[channel])
     error = 100.0 * float(curve.total_error[channel])
     if curve.method == "exact" or math.isnan(error):
-        return f"{total:.4f}"
+        return [f"{total:#.4g}"]
+    if curve.method == "burley":
+        return [f"{total:#.4g} (given)"]
     signed = f"{error:+.{2 if abs(error) < 1.0 else 1}f}".replace("-", MINUS)
     if curve.profile.photons is not None:
         stderr = float(curve.profile.diffuse_reflectance_stderr[channel])
         signed += f" ± {100.0 * stderr / total:.2f}"
-    return f"{total:.4f} ({signed} %)"
+    return [f"{total:#.4g} ({signed} %)", f"{total:#.4g}"]
 
 
 def model_notes(comparison: ModelComparison, shown: Sequence[int]) -> list[str]:
@@ -61,7 +64,7 @@ def model_notes(comparison: ModelComparison, shown: Sequence[int]) -> list[str]:
     notes = [
         "Means over annuli merged until the walk has 100 effective photons in each; curves end "
         "where it has too few. Band: ±1 standard error of the walk. Errors: linear within ±10 % "
-        "(grey), logarithmic beyond. MFP: mean free path.",
+        "(grey), logarithmic beyond, above +1000 % not drawn. MFP: mean free path.",
     ]
     left = comparison.material.n_channels - len(shown)
     if left:

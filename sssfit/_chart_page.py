@@ -67,6 +67,12 @@ def inches(text: str, size: float) -> float:
     return float(font.get_width_height()[0] / 64 / 720)  # 26.6 fixed-point pixels
 
 
+def fitting(choices: Sequence[str], size: float, width_inches: float) -> str:
+    """Return the first text that is no wider, or the last where none fits."""
+    fits = (each for each in choices if inches(each, size) <= width_inches)
+    return next(fits, choices[-1])
+
+
 def _font() -> FT2Font:
     return font_manager.get_font(font_manager.findfont(FONT))
 
