@@ -89,6 +89,7 @@ def computed_profile(
     absorbed: FloatArray | None = None,
     relative_error: float | None = None,
     settings: Mapping[str, Any] | None = None,
+    energy_balance_stderr: list[float] | None = None,
 ) -> Profile:
     """Put energies that were computed into a profile: no photons, no seed.
 
@@ -111,6 +112,8 @@ def computed_profile(
         The error reached, in the terms of the method's tolerance.
     settings : mapping, optional
         The method's own, for provenance; the grid's come with them.
+    energy_balance_stderr : list of float, optional
+        By how much the energies of each channel may miss 1.
 
     Returns
     -------
@@ -141,7 +144,7 @@ def computed_profile(
             "version": __version__,
             "settings": {"dr_mm": grid.dr_mm, "radius": "given", **(settings or {})},
             "relative_error": relative_error,
-            "energy_balance_stderr": None,
+            "energy_balance_stderr": energy_balance_stderr,
         },
     )
 

@@ -1,0 +1,230 @@
+"""The depth integral equation of a half space, for one wavenumber along the surface.
+
+Lengths in mean free paths, isotropic scattering, a the albedo. A pencil beam's first collisions
+have the density C0(z) = (1 - R_sp) exp(-z) on the axis. Fourier transformed along the surface, with
+wavenumber k, all collisions obey
+
+    C(z) = C0(z) + a int_0^inf [K_d(|z - z'|) + K_r(z + z')] C(z') dz'
+
+    K_d(d) = 1/2 int_{w0}^inf exp(-d tau(w)) dw,   tau = (e^w + k^2 e^-w)/2,  e^w0 = 1 + kappa
+    K_r(s) = K_d(s) - X(s)          off the surface, like a mirror
+    X(s)   = 1/2 int_{mu_c}^1 (1 - R_F) exp(-s/mu) J0(k s tan(theta)) dmu/mu
+    E(z)   = 1/2 int_{mu_c}^1 (1 - R_F) exp(-z/mu) J0(k z tan(theta)) dmu
+
+with kappa = sqrt(1 + k^2), and a int C(z) E(z) dz gets out. Four things make that a small matrix:
+
+- panels graded towards the surface, polynomials on them, and product quadrature for the logarithm
+  of K_d at 0 (``sssfit._jit.transport``);
+- K_d and X depend on one distance, so they are tabulated;
+- below some 25 mean free paths C falls like exp(-nu z), nu^2 = k^2 + lambda^2 with Case's
+  a artanh(lambda) = lambda: the integral over that tail is 1/2 int exp(-d tau) / (tau + nu) dw, so
+  that no albedo, 1 included, needs deeper panels;
+- the matrix does not depend on the albedo: all channels of one refractive index share it.
+
+K_r and the part of E that the critical angle adds fall like (k s tan(theta_c))^-2 and are left out
+beyond ``Resolution.phase`` radians.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import optimize, special
+
+from sssfit._jit.transport import NEGLIGIBLE, Tables, kernel_matrix
+from sssfit.simulate._surface import Cone, FloatArray, entering, gauss, is_matched
+
+_DEPTH = 26.0  # of the last panel: what does not fall like exp(-nu z) is exp(-26) = 5e-12 there
+_WIDEST = 2.5  # panel: C0 = exp(-z) needs it
+_BEYOND = 40.0  # exp(-40) = 4e-18: tables end here
+_MOST_ENTRIES = 8000  # of the table of X; only indices under 1.005 ask for more
+_OfTau = Callable[[FloatArray, FloatArray], FloatArray]
+_STRETCHES, _PER_STRETCH = 14, 8  # Gauss nodes over w; 14 times 8 give K_d to 1e-12
+
+
+@dataclass(frozen=True, slots=True)
+class Resolution:
+    """How finely the equation is solved.
+
+    ``order`` polynomial nodes a panel; ``first`` the first panel's width [1/kappa]; ``ratio`` by
+    which the next grow; ``rule`` Gauss nodes of the product quadrature; ``step`` of the table of X,
+    in radians and mean free paths; ``directions`` in the cone that gets out; ``phase`` [rad] of J0
+    up to which they are followed.
+    """
+
+    order: int
+    first: float
+    ratio: float
+    rule: int
+    step: float
+    directions: int
+    phase: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Response:
+    """Energy for one wavenumber, by albedo (A,): scattered more than once and out; absorbed."""
+
+    multiple: FloatArray
+    absorbed: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Panels:
+    """Graded panels (P) of Gauss nodes (P, p)."""
+
+    edges: FloatArray
+    nodes: FloatArray
+    weights: FloatArray
+    barycentric: FloatArray
+    last_value: FloatArray  # (p,): a panel's polynomial at its lower end from its node values
+
+
+def decay_rate(albedo: float) -> float:
+    """Return lambda of a artanh(lambda) = lambda, in [0, 1] (Case and Zweifel 1967, eq. 4.2.10).
+
+    Deep inside a medium of that albedo, light falls like exp(-lambda z), z in mean free paths.
+    """
+    if albedo <= 0.05:
+        return 1.0  # 1 - lambda = 2 exp(-2/a) < 1e-17
+    if albedo >= 1.0:
+        return 0.0
+    if albedo > 1.0 - 1e-6:
+        return math.sqrt(3.0 * (1.0 - albedo))  # the next term is 1 - albedo smaller
+
+    def excess(t: float) -> float:  # lambda = 1 - exp(t): artanh is (log(2 - exp(t)) - t) / 2
+        return 0.5 * albedo * (math.log(2.0 - math.exp(t)) - t) + math.expm1(t)
+
+    return -math.expm1(float(optimize.brentq(excess, -41.0, math.log1p(-1e-4), xtol=1e-15)))
+
+
+def respond(k: float, eta: float, albedos: FloatArray, resolution: Resolution) -> Response:
+    """Solve the depth equation for one wavenumber and any number of albedos.
+
+    Parameters
+    ----------
+    k : float [1/MFP]
+        Wavenumber, 0 or above.
+    eta : float
+        Relative refractive index, 1 or above.
+    albedos : (A,)
+        0 to 1.
+    resolution : Resolution
+
+    Returns
+    -------
+    Response
+        For a beam of energy 1 that meets the surface along the normal.
+    """
+    panels = _panels(math.sqrt(1.0 + k * k), resolution)
+    z, weights = panels.nodes.ravel(), panels.weights.ravel()
+    escape, tables = _tables(k, eta, panels, resolution)
+    matrix = kernel_matrix(
+        panels.edges,
+        panels.nodes,
+        panels.weights,
+        panels.barycentric,
+        np.stack(gauss(resolution.rule), axis=1),
+        math.sqrt(1.0 + k * k),
+        is_matched(eta),
+        tables,
+    )
+    first = entering(eta) * np.exp(-z)
+    below = panels.edges[-1] - z
+    multiple, absorbed = np.empty(len(albedos)), np.empty(len(albedos))
+    for i, albedo in enumerate(albedos):
+        nu = math.hypot(k, decay_rate(albedo))
+        system = np.eye(z.size) - albedo * matrix
+        tail = np.outer(_tail(below, k, nu), panels.last_value)
+        system[:, -resolution.order :] -= albedo * tail
+        density = np.linalg.solve(system, first)
+        deepest = float(panels.last_value @ density[-resolution.order :])
+        deep = deepest * (1.0 - albedo) / nu if nu > 0.0 else 0.0
+        multiple[i] = albedo * np.sum(weights * (density - first) * escape)
+        absorbed[i] = (1.0 - albedo) * np.sum(weights * density) + deep
+    return Response(multiple, absorbed)
+
+
+def _panels(kappa: float, resolution: Resolution) -> _Panels:
+    """Lay panels from the surface down; the first few resolve 1/kappa, the reach of K_d."""
+    edges = [0.0, resolution.first / kappa]
+    while edges[-1] < _DEPTH:
+        edges.append(edges[-1] + min(_WIDEST, edges[-1] * (resolution.ratio - 1.0)))
+    x, w = np.polynomial.legendre.leggauss(resolution.order)
+    width = np.diff(edges)[:, None]
+    # Barycentric weights of Gauss nodes: (-1)^j sqrt((1 - x^2) w) (Berrut and Trefethen 2004).
+    signs = np.where(np.arange(x.size) % 2, -1.0, 1.0)
+    barycentric: FloatArray = signs * np.sqrt((1.0 - x * x) * w)
+    at_end: FloatArray = barycentric / (1.0 - x)
+    nodes: FloatArray = np.array(edges[:-1])[:, None] + 0.5 * width * (x + 1.0)
+    return _Panels(
+        np.array(edges),
+        nodes,
+        0.5 * width * w,
+        barycentric,
+        at_end / at_end.sum(),
+    )
+
+
+def _tables(
+    k: float, eta: float, panels: _Panels, resolution: Resolution
+) -> tuple[FloatArray, Tables]:
+    """Return E at the nodes and the tables of K_d and X."""
+    kappa = math.hypot(1.0, k)
+    shortest = 1e-9 * panels.nodes[0, 0]  # nearer sources weigh 1e-9 log(1e-9) of a panel
+    per_log = 3.0 / resolution.step
+    entries = int(math.log(_BEYOND / kappa / shortest) * per_log) + 4
+    distances = shortest * np.exp(np.arange(entries) / per_log)
+    direct = _over_w(distances, k, lambda tau, _: np.ones_like(tau))
+    z = panels.nodes.ravel()
+    if is_matched(eta):
+        return _matched_escape(z, k), (direct, math.log(shortest), per_log, np.zeros(4), 1.0)
+    cone = Cone.of(eta, resolution.directions)
+    steepest = float(cone.tangent[0])
+    reach = min(_BEYOND, resolution.phase / (k * steepest)) if k > 0.0 else _BEYOND
+    rate = 1.0 / float(cone.cosine[0]) + k * steepest
+    step = max(resolution.step / rate, reach / _MOST_ENTRIES)
+    along = step * np.arange(int(reach / step) + 4, dtype=np.float64)
+    escape_table = _over_cone(along, k, cone, cone.weight / cone.cosine)
+    near = z <= reach
+    escape = np.empty_like(z)
+    escape[near] = _over_cone(z[near], k, cone, cone.weight)
+    escape[~near] = _matched_escape(z[~near], k)
+    return escape, (direct, math.log(shortest), per_log, escape_table, 1.0 / step)
+
+
+def _over_cone(distances: FloatArray, k: float, cone: Cone, weight: FloatArray) -> FloatArray:
+    """Return 1/2 int weight exp(-s/mu) J0(k s tan(theta)) over the cone, (n,)."""
+    along = distances[:, None]
+    paths = np.exp(-along / cone.cosine) * special.j0(k * along * cone.tangent)
+    integral: FloatArray = 0.5 * (paths @ weight)
+    return integral
+
+
+def _matched_escape(z: FloatArray, k: float) -> FloatArray:
+    """Return E without a surface: z/2 int (p - 1) exp(-tau z) dw, p = sqrt(tau^2 - k^2), (n,)."""
+    return z * _over_w(z, k, lambda _, p: p - 1.0)
+
+
+def _tail(below: FloatArray, k: float, nu: float) -> FloatArray:
+    """Integrate K_d(d + t) exp(-nu t) over t > 0 for nodes at distance d above the last edge."""
+    return _over_w(below, k, lambda tau, _: 1.0 / (tau + nu))
+
+
+def _over_w(distances: FloatArray, k: float, function: _OfTau) -> FloatArray:
+    """Return 1/2 int_{w0}^inf function(tau, p) exp(-d tau) dw for distances above 0, (n,).
+
+    tau = (e^w + k^2 e^-w)/2 and p = (e^w - k^2 e^-w)/2.
+    """
+    kappa = math.hypot(1.0, k)
+    d = np.minimum(distances, 10.0 * NEGLIGIBLE / kappa)  # exp(-360): 0 beyond, and no overflow
+    x, w = gauss(_PER_STRETCH)
+    places = (x + np.arange(_STRETCHES)[:, None]).ravel() / _STRETCHES
+    weights = np.tile(w, _STRETCHES) / _STRETCHES
+    start = math.log1p(kappa)
+    length = np.log(2.0 * (_BEYOND + kappa * d) / d) - start  # to where d tau > 40 + kappa d
+    power = np.exp(start + length[:, None] * places)
+    tau, p = 0.5 * (power + k * k / power), 0.5 * (power - k * k / power)
+    integral: FloatArray = 0.5 * length * ((function(tau, p) * np.exp(-d[:, None] * tau)) @ weights)
+    return integral

@@ -1,0 +1,66 @@
+"""From wavenumbers back to radii: the profile as a mixture of Bessel functions K0.
+
+Multiple scattering's transform Rhat(k) is, to the solver's own precision, a Stieltjes function of
+k^2: a sum of w q^2 / (k^2 + q^2), w >= 0, q >= lambda. Each term is the transform of
+w q^2 K0(q r) / (2 pi), of which w q r K1(q r) leaves beyond r. So the inversion
+
+    F(r) = r int_0^inf Rhat(k) J1(k r) dk
+
+becomes a non-negative least squares problem of some 40 wavenumbers and 200 rates q (Lawson and
+Hanson 1974) with a closed form behind it. F rises everywhere and R_d falls everywhere by
+construction, however far out, and the tail beyond the last wavenumber is carried on; interpolating
+Rhat and integrating against J1 left a noise of 1e-6 of the total. What the mixture misses at the
+wavenumbers is returned, and is part of the solver's error.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import optimize, special
+
+from sssfit.simulate._surface import FloatArray
+
+_PER_E_FOLD = 13  # rates; 9 leave 1e-5, 13 1e-7
+_STEEPER = 30.0  # the largest rate against the largest wavenumber
+_RADII_AT_ONCE = 8192
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mixture:
+    """Rates q (N,) [1/MFP] with weights w (N,); ``misfit`` is the largest residual in Rhat."""
+
+    rates: FloatArray
+    weights: FloatArray
+    misfit: float
+
+    def beyond(self, radii_mfp: FloatArray) -> FloatArray:
+        """Energy that leaves beyond each radius: sum of w q r K1(q r), (n,)."""
+        parts = [
+            _q_r_k1(np.outer(radii_mfp[first : first + _RADII_AT_ONCE], self.rates)) @ self.weights
+            for first in range(0, len(radii_mfp), _RADII_AT_ONCE)
+        ]
+        return np.concatenate(parts)
+
+
+def mixture_of(wavenumbers: FloatArray, transform: FloatArray, slowest: float) -> Mixture:
+    """Fit Rhat at the wavenumbers (m,) [1/MFP] by rates from ``slowest`` up.
+
+    Residuals are weighted by 1 + k: Rhat falls like 1/k^2, and the first annuli rest on large k.
+    """
+    steepest = _STEEPER * float(wavenumbers[-1])
+    # One rate at the very end of the spectrum, the others from 1 % beyond it.
+    count = math.ceil(_PER_E_FOLD * math.log(100.0 * steepest / slowest))
+    rates = slowest + np.concatenate(([0.0], np.geomspace(0.01 * slowest, steepest, count)))
+    terms = rates**2 / (wavenumbers[:, None] ** 2 + rates**2)
+    scale = 1.0 + wavenumbers
+    weights, _ = optimize.nnls(terms * scale[:, None], transform * scale, maxiter=20 * count)
+    used = weights > 0.0
+    misfit = float(np.max(np.abs(terms @ weights - transform)))
+    return Mixture(rates[used], weights[used], misfit)
+
+
+def _q_r_k1(x: FloatArray) -> FloatArray:
+    """Return x K1(x), 1 at 0."""
+    product: FloatArray = np.where(x > 0.0, x * special.k1(np.maximum(x, 1e-300)), 1.0)
+    return product

@@ -1,0 +1,378 @@
+"""The exact profile of a half space: the transport equation solved, not sampled.
+
+Isotropic scattering in a homogeneous medium without a bottom, lit by a pencil beam along the
+normal. Light scattered once has a closed form (``_single``); the rest is solved wavenumber by
+wavenumber along the surface (``_depth``) and brought back to radii as a mixture of Bessel functions
+(``_mixture``), which gives F(r) at the edges of any grid. Channels and materials of one refractive
+index share wavenumbers and kernel matrices: in mean free paths only the albedo tells them apart.
+
+The error estimate is the largest difference between two resolutions, each some ten times finer
+than the one before; it belongs to the coarser of the two, and the finer one is what is returned.
+
+Scattering with g other than 0 is replaced by isotropic scattering of the reduced coefficient
+sigma_s' = (1 - g) sigma_s (similarity relation; van de Hulst 1980, chapter 14): an approximation.
+"""
+
+import math
+import warnings
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.errors import SimulationError, SssfitWarning, StoppedError
+from sssfit.grid import RadialGrid, make_grid
+from sssfit.material import Material
+from sssfit.profile import Profile
+from sssfit.simulate._batches import available_cores
+from sssfit.simulate._depth import Resolution, Response, decay_rate, respond
+from sssfit.simulate._deterministic import computed_profile, energies_from_beyond, half_space
+from sssfit.simulate._mixture import mixture_of
+from sssfit.simulate._semi_infinite import relative_eta
+from sssfit.simulate._single import single_scattering_beyond
+from sssfit.simulate._surface import FloatArray, entering
+
+DEFAULT_TOLERANCE = 1e-4
+_LARGEST_ETA = 4.0
+_ROUNDING = 1e-14  # of the energy balance, whose terms are near 1 however small the albedo
+_LARGEST_FLOOR = 1e-2  # of the rates, for grids within one mean free path
+
+
+@dataclass(frozen=True, slots=True)
+class _Level:
+    """One resolution: of the depth equation, of wavenumbers and of single scattering."""
+
+    depth: Resolution
+    largest: float  # wavenumber [1/MFP]
+    density: float  # wavenumbers in a unit of asinh(k / k0)
+    single_step: float
+
+
+_LEVELS = (
+    _Level(Resolution(6, 1e-3, 4.0, 12, 0.06, 40, 40.0), 30.0, 3.0, 0.1),
+    _Level(Resolution(8, 1e-4, 3.0, 12, 0.03, 64, 60.0), 60.0, 4.5, 0.05),
+    _Level(Resolution(10, 1e-5, 2.5, 16, 0.02, 96, 90.0), 100.0, 6.5, 0.05),
+    _Level(Resolution(12, 1e-5, 2.5, 20, 0.01, 144, 140.0), 200.0, 9.0, 0.04),
+    _Level(Resolution(14, 1e-6, 2.0, 24, 0.006, 256, 250.0), 400.0, 13.0, 0.04),
+)
+
+
+def simulate_exact(
+    material: Material,
+    *,
+    dr_mm: float | None = None,
+    radius_mm: float | None = None,
+    tolerance: float = DEFAULT_TOLERANCE,
+    threads: int | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> Profile:
+    """Solve for the diffuse reflectance profile of a homogeneous half space.
+
+    Parameters
+    ----------
+    material : Material
+        One layer without a bottom, at least as dense optically as what is above it; for g other
+        than 0 the similarity relation is used.
+    dr_mm, radius_mm : float, optional
+        Grid, as ``sssfit.grid.make_grid`` has it.
+    tolerance : float
+        Largest error of F(r) at an annulus edge, and of the total, as a share of the total; above
+        0 and below 1.
+    threads : int, optional
+        Threads to use; all cores by default. The result does not depend on them.
+    stop : callable, optional
+        Asked now and then; once true, StoppedError is raised.
+
+    Returns
+    -------
+    Profile
+        ``annulus_energy_stderr`` holds the error estimate; ``meta["photons"]`` is None.
+
+    Raises
+    ------
+    SimulationError
+        A layered or finite medium, one thinner optically than what is above it, settings out of
+        range, or a tolerance that the finest resolution does not meet.
+    StoppedError
+        ``stop`` said so.
+
+    Warns
+    -----
+    SssfitWarning
+        g is not 0: the result is an approximation.
+
+    References
+    ----------
+    Case and Zweifel 1967, "Linear Transport Theory"; Chandrasekhar 1960, "Radiative Transfer".
+    """
+    return simulate_exact_many(
+        [material],
+        dr_mm=dr_mm,
+        radius_mm=radius_mm,
+        tolerance=tolerance,
+        threads=threads,
+        stop=stop,
+    )[0]
+
+
+def simulate_exact_many(
+    materials: Sequence[Material],
+    *,
+    dr_mm: float | None = None,
+    radius_mm: float | None = None,
+    tolerance: float = DEFAULT_TOLERANCE,
+    threads: int | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> list[Profile]:
+    """Solve for several materials; those of one relative refractive index share the work.
+
+    Parameters and errors are those of ``simulate_exact``. Returns the profiles in the order of
+    ``materials``; they differ from those of single runs by less than their error estimates.
+    """
+    threads = available_cores() if threads is None else threads
+    _check_settings(tolerance, threads)
+    for material in materials:
+        _check_medium(material)
+    grids = [make_grid(each, dr_mm=dr_mm, radius_mm=radius_mm) for each in materials]
+    groups: dict[float, list[int]] = {}
+    for k, material in enumerate(materials):
+        groups.setdefault(relative_eta(material), []).append(k)
+    profiles: dict[int, Profile] = {}
+    with ThreadPoolExecutor(threads) as pool:
+        for eta, group in groups.items():
+            own = [materials[k] for k in group], [grids[k] for k in group]
+            found = _solve_group(eta, *own, tolerance, _Workers(pool, stop))
+            profiles |= zip(group, found, strict=True)
+    return [profiles[k] for k in range(len(materials))]
+
+
+def diffuse_reflectance(albedo: npt.ArrayLike, eta: float) -> FloatArray:
+    """Return the total diffuse reflectance of a half space for normally incident light.
+
+    Parameters
+    ----------
+    albedo : array (N,)
+        0 to 1.
+    eta : float
+        Relative refractive index, 1 to 4.
+
+    Returns
+    -------
+    (N,) array
+        Good to 1e-8; specular reflection is not part of it: albedo 1 gives 1 - R_sp.
+
+    Raises
+    ------
+    SimulationError
+        An albedo or index out of range.
+    """
+    albedos = np.atleast_1d(np.asarray(albedo, dtype=np.float64))
+    if not ((albedos >= 0.0) & (albedos <= 1.0)).all():
+        raise SimulationError(f"albedo = {albedo!r}; expected numbers from 0 to 1.")
+    if not 1.0 <= eta <= _LARGEST_ETA:
+        raise SimulationError(f"eta = {eta:g}; expected a relative refractive index from 1 to 4.")
+    level = _LEVELS[3]
+    once = single_scattering_beyond(np.zeros(1), eta, level.single_step)[0]
+    total: FloatArray = albedos * once + respond(0.0, eta, albedos, level.depth).multiple
+    return total
+
+
+@dataclass(frozen=True, slots=True)
+class _Workers:
+    """Threads, and when to stop them."""
+
+    pool: ThreadPoolExecutor
+    stop: Callable[[], bool] | None
+
+    def respond(
+        self, wavenumbers: FloatArray, eta: float, albedos: FloatArray, resolution: Resolution
+    ) -> list[Response]:
+        """Solve the depth equation for each wavenumber; StoppedError once ``stop`` says so."""
+
+        def one(k: float) -> Response:
+            if self.stop is not None and self.stop():
+                raise StoppedError("stopped before the equation was solved.")
+            return respond(k, eta, albedos, resolution)
+
+        return list(self.pool.map(one, wavenumbers.tolist()))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Channel:
+    """One colour of one material in mean free paths: what is asked for."""
+
+    albedo: float
+    radii_mfp: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Answer:
+    """What leaves beyond each radius (n+1,), what is absorbed, and the known part of the error."""
+
+    beyond: FloatArray
+    absorbed: float
+    error: float
+
+
+def _solve_group(
+    eta: float,
+    materials: Sequence[Material],
+    grids: Sequence[RadialGrid],
+    tolerance: float,
+    workers: _Workers,
+) -> list[Profile]:
+    """Refine until two resolutions agree for every channel; profiles of the finer."""
+    channels = [
+        _Channel(albedo, grid.r_edges_mm * sigma_t)
+        for material, grid in zip(materials, grids, strict=True)
+        for albedo, sigma_t in zip(*_reduced(material), strict=True)
+    ]
+    coarse = _solve(eta, channels, _LEVELS[0], workers)
+    for level in _LEVELS[1:]:
+        fine = _solve(eta, channels, level, workers)
+        errors = [_errors(*pair) for pair in zip(fine, coarse, strict=True)]
+        worst = max(_share(*pair) for pair in zip(errors, fine, strict=True))
+        if worst <= tolerance:
+            return _profiles(materials, grids, fine, coarse, errors, tolerance)
+        coarse = fine
+    raise SimulationError(
+        f"the tolerance of {tolerance:g} was not met: the two finest of {len(_LEVELS)} resolutions "
+        f"differ by {worst:.2g} of the total; give {_rounded_up(worst):g} or more."
+    )
+
+
+def _solve(
+    eta: float, channels: Sequence[_Channel], level: _Level, workers: _Workers
+) -> list[_Answer]:
+    """Solve all channels at one resolution."""
+    albedos, places = np.unique([each.albedo for each in channels], return_inverse=True)
+    rates = [decay_rate(albedo) for albedo in albedos]
+    # A hundred times the grid's radius is as good as infinity: wavenumbers need not resolve it,
+    # and rates under a thousandth of theirs differ in what leaves there alone.
+    floor = min(0.01 / max(float(each.radii_mfp[-1]) for each in channels), _LARGEST_FLOOR)
+    slowest = np.maximum(rates, 1e-3 * floor)
+    wavenumbers = _wavenumbers(max(float(slowest.min()), floor), level)
+    responses = workers.respond(wavenumbers, eta, albedos, level.depth)
+    transforms = np.array([each.multiple for each in responses])
+    answers = []
+    for channel, place in zip(channels, places, strict=True):
+        mixture = mixture_of(wavenumbers, transforms[:, place], float(slowest[place]))
+        once = single_scattering_beyond(channel.radii_mfp, eta, level.single_step)
+        beyond = channel.albedo * once + mixture.beyond(channel.radii_mfp)
+        absorbed = float(responses[0].absorbed[place])
+        balance = abs(float(beyond[0]) + absorbed - entering(eta)) - _ROUNDING
+        answers.append(_Answer(beyond, absorbed, max(balance, mixture.misfit)))
+    return answers
+
+
+def _wavenumbers(slowest: float, level: _Level) -> FloatArray:
+    """Return wavenumbers from 0 to the largest, even in asinh(k / slowest)."""
+    last = math.asinh(level.largest / slowest)
+    places = np.linspace(0.0, last, math.ceil(level.density * last) + 1)
+    wavenumbers: FloatArray = slowest * np.sinh(places)
+    return wavenumbers
+
+
+def _errors(fine: _Answer, coarse: _Answer) -> FloatArray:
+    """Error of F at the edges but the first (r = 0), and of the total; (n+1,)."""
+    difference = fine.beyond - coarse.beyond
+    of_cumulative = np.abs(difference[0] - difference[1:])
+    errors = np.append(of_cumulative, abs(float(difference[0])))
+    least: FloatArray = np.maximum(errors, fine.error)
+    return least
+
+
+def _share(errors: FloatArray, answer: _Answer) -> float:
+    """Return the largest error as a share of the total; 0 where nothing scatters."""
+    total = float(answer.beyond[0])
+    return float(np.max(errors)) / total if total > 0.0 else 0.0
+
+
+def _stderr(fine: _Answer, coarse: _Answer, errors: FloatArray) -> FloatArray:
+    """Errors of the annuli and beyond the grid, (n+1,), whose squares add up to those of F.
+
+    None is under the annulus's own difference, nor the sum up to any edge under F's error there.
+    """
+    largest = np.maximum.accumulate(errors)
+    steps = np.diff(np.concatenate(([0.0], largest**2)))
+    own = np.abs(np.diff(np.append(fine.beyond - coarse.beyond, 0.0)))
+    stderr: FloatArray = np.sqrt(np.maximum(steps, own**2))
+    return stderr
+
+
+def _profiles(
+    materials: Sequence[Material],
+    grids: Sequence[RadialGrid],
+    fine: Sequence[_Answer],
+    coarse: Sequence[_Answer],
+    errors: Sequence[FloatArray],
+    tolerance: float,
+) -> list[Profile]:
+    """Put the channels' answers together again."""
+    profiles, first = [], 0
+    for material, grid in zip(materials, grids, strict=True):
+        own = slice(first, first + material.n_channels)
+        first = own.stop
+        beyond = np.stack([each.beyond for each in fine[own]], axis=1)
+        stderr = [_stderr(*each) for each in zip(fine[own], coarse[own], errors[own], strict=True)]
+        worst = max(_share(*pair) for pair in zip(errors[own], fine[own], strict=True))
+        profiles.append(
+            computed_profile(
+                material,
+                "exact",
+                grid,
+                energies_from_beyond(beyond),
+                stderr=np.stack(stderr, axis=1),
+                absorbed=np.array([[each.absorbed for each in fine[own]]]),
+                relative_error=worst,
+                settings={"tolerance": tolerance},
+                energy_balance_stderr=[each.error for each in fine[own]],
+            )
+        )
+    return profiles
+
+
+def _reduced(material: Material) -> tuple[list[float], list[float]]:
+    """Return albedo and extinction [1/mm] of each channel under the similarity relation."""
+    layer = material.layers[0]
+    sigma_t = layer.reduced_sigma_t_per_mm
+    albedo = np.divide(
+        layer.reduced_sigma_s_per_mm, sigma_t, out=np.zeros_like(sigma_t), where=sigma_t > 0.0
+    )
+    return albedo.tolist(), sigma_t.tolist()
+
+
+def _check_settings(tolerance: float, threads: int) -> None:
+    """Refuse settings out of range, one line each."""
+    if not 0.0 < tolerance < 1.0:
+        raise SimulationError(f"tolerance = {tolerance}; give a share of the total, 0 to 1.")
+    if threads < 1:
+        raise SimulationError(f"threads = {threads}; give at least 1.")
+
+
+def _check_medium(material: Material) -> None:
+    """Refuse what the equation does not cover, naming what would do; warn of similarity."""
+    layer = half_space(material, "exact")
+    eta = relative_eta(material)
+    if not 1.0 <= eta <= _LARGEST_ETA:
+        raise SimulationError(
+            f"{material.name}: eta = {layer.eta:g} under eta_above = {material.eta_above:g}; the "
+            "method exact covers a medium at least as dense optically as what is above it: use "
+            "montecarlo."
+        )
+    if layer.g.any():
+        warnings.warn(
+            f"{material.name}: g = {float(np.max(np.abs(layer.g))):g} in absolute value; the "
+            "method exact takes scattering as isotropic with sigma_s' = (1 - g) sigma_s, which is "
+            "an approximation: montecarlo has no need of it.",
+            SssfitWarning,
+            stacklevel=4,
+        )
+
+
+def _rounded_up(value: float) -> float:
+    """Round up to one digit."""
+    scale = 10.0 ** math.floor(math.log10(value))
+    return math.ceil(value / scale) * scale
