@@ -16,8 +16,8 @@ from sssfit.material import Layer
 
 FloatArray = npt.NDArray[np.float64]
 
-# The polynomial for F_dr is within 0.6 % of the integral up to 2.5, and over 1 from 3.9 on.
-LEAST_ETA, MOST_ETA = 0.4, 2.5
+# The polynomials for F_dr are within 0.006 of the integral here, and over 1 from 3.9 on.
+LEAST_ETA, MOST_ETA = 0.5, 2.5
 _NODES = 200
 
 
@@ -33,7 +33,6 @@ class Diffusion:
     albedo: FloatArray
     depth_mm: FloatArray
     coefficient_mm: FloatArray
-
     sigma_tr_per_mm: FloatArray
 
 
@@ -64,7 +63,7 @@ def _with_coefficient(layer: Layer, coefficient_mm: FloatArray) -> Diffusion:
 
 
 def mismatch_by_polynomial(eta: float) -> float:
-    """A = (1 + F_dr) / (1 - F_dr), F_dr by polynomial; exactly 1 at eta 1.
+    """Return A = (1 + F_dr) / (1 - F_dr), F_dr by polynomial; exactly 1 at eta 1.
 
     F_dr = -1.440/eta^2 + 0.710/eta + 0.668 + 0.0636 eta above 1 (Jensen et al. 2001), and
     -0.4399 + 0.7099/eta - 0.3319/eta^2 + 0.0636/eta^3 below (Egan and Hilgeman 1979, as in Donner
@@ -73,12 +72,12 @@ def mismatch_by_polynomial(eta: float) -> float:
     Raises
     ------
     SimulationError
-        eta outside 0.4 to 2.5, where the polynomials no longer describe Fresnel's formulas.
+        eta outside 0.5 to 2.5, where the polynomials no longer describe Fresnel's formulas.
     """
     if not LEAST_ETA <= eta <= MOST_ETA:
         raise SimulationError(
-            f"an interface has the relative refractive index {eta:.4g}; the polynomial of this "
-            f"method covers {LEAST_ETA} to {MOST_ETA}: use dipole-grosjean, exact or montecarlo."
+            f"an interface has the relative refractive index {eta:.4g}; this method covers "
+            f"{LEAST_ETA} to {MOST_ETA}: use montecarlo (or, without a bottom, dipole-grosjean)."
         )
     if eta == 1.0:
         return 1.0
@@ -90,7 +89,7 @@ def mismatch_by_polynomial(eta: float) -> float:
 
 
 def mismatch_by_moments(eta: float) -> float:
-    """A = (1 + 3 C_2) / (1 - 2 C_1) with the moments of Fresnel's reflectance from inside.
+    """Return A = (1 + 3 C_2) / (1 - 2 C_1) with the moments of Fresnel's reflectance from inside.
 
     The boundary condition with the full first moment; see d'Eon and Irving 2011.
     """
@@ -99,7 +98,7 @@ def mismatch_by_moments(eta: float) -> float:
 
 
 def fresnel_moments(eta: float) -> tuple[float, float]:
-    """C_i = int_0^1 R_F(mu) mu^i dmu for i = 1, 2, mu the cosine inside; to 1e-10.
+    """Return C_i = int_0^1 R_F(mu) mu^i dmu for i = 1, 2, mu the cosine inside; to 1e-10.
 
     Up to the critical angle all is reflected; from there mu = mu_c + (1 - mu_c) t^2 takes out the
     square root. eta is the index inside over that outside.

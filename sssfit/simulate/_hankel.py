@@ -22,7 +22,7 @@ _BIAS = -0.5
 # How far the range goes beyond the scales that matter, where 1e-3 and 1e3 leave 1e-10.
 _BEYOND_LOW, _BEYOND_HIGH = 1e-13, 1e6
 
-_POINTS = np.arange(-3, 5)  # eight nodes around a point: their error is step^8
+_POINTS = range(-3, 5)  # eight nodes around a point: their error is step^8
 
 
 def cumulative_from_transform(
@@ -63,7 +63,7 @@ def _interpolated(values: FloatArray, at: FloatArray) -> FloatArray:
     out = np.zeros((len(values), at.size))
     for own in _POINTS:
         weight = np.ones(at.size)
-        for other in _POINTS[_POINTS != own]:
+        for other in (each for each in _POINTS if each != own):
             weight *= (fraction - other) / (own - other)
         out += weight * values[:, first + own]
     return out

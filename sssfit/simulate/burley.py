@@ -96,7 +96,7 @@ def simulate_burley(
 
 
 def _reflectance(material: Material, given: npt.ArrayLike | None) -> FloatArray:
-    """A of each channel (C,)."""
+    """Return A of each channel (C,)."""
     if given is None:
         return _own_reflectance(material)
     try:
@@ -117,7 +117,7 @@ def _own_reflectance(material: Material) -> FloatArray:
 
 
 def _scale_per_mm(material: Material, layer: Layer, mapping: str) -> FloatArray:
-    """What s is relative to (C,) [1/mm]: one over the mean free path that the mapping means."""
+    """Return what s is relative to (C,) [1/mm]: 1 over the mean free path that a mapping means."""
     sigma_t = layer.reduced_sigma_t_per_mm
     if mapping != "diffuse-mfp":
         return sigma_t

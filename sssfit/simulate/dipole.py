@@ -41,7 +41,7 @@ def simulate_dipole(
     Parameters
     ----------
     material : Material
-        A homogeneous half space; any g (by sigma_s'), relative index 0.4 to 2.5.
+        A homogeneous half space; any g (by sigma_s'), relative index 0.5 to 2.5.
     dr_mm, radius_mm : float, optional
         Grid, as `sssfit.grid.make_grid` takes it [mm].
 
@@ -93,7 +93,8 @@ def grosjean_reflectance(material: Material) -> FloatArray:
     layer = half_space(material, "dipole-grosjean")
     boundary = mismatch_by_moments(relative_eta(material))
     entering = 1.0 - material.specular_reflectance
-    return entering * dipole_beyond(np.zeros(1), grosjean(layer), boundary)[0]
+    total: FloatArray = dipole_beyond(np.zeros(1), grosjean(layer), boundary)[0]
+    return entering * total
 
 
 def dipole_beyond(r_mm: FloatArray, medium: Diffusion, boundary: float) -> FloatArray:

@@ -67,7 +67,7 @@ def simulate_multipole(
     Raises
     ------
     SimulationError
-        A layer that is clear or too thin in a channel, a relative index out of 0.4 to 2.5, or a
+        A layer that is clear or too thin in a channel, a relative index out of 0.5 to 2.5, or a
         grid that cannot be.
 
     Warns
