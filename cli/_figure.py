@@ -5,21 +5,18 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 from ._report import binary_stdout
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
 
 @contextlib.contextmanager
-def chart_output(path: Path | None, *, force: bool) -> Iterator[Callable[[Figure], None]]:
-    """Hold an output and yield what writes a figure to it; None is PNG on stdout."""
+def chart_output(path: Path | None, *, force: bool) -> Iterator[Callable[[Any], None]]:
+    """Hold an output and yield what writes a matplotlib Figure to it; None is PNG on stdout."""
     from sssfit._chart_files import is_chart_file
     from sssfit.files import check_output, locked
 
-    def save(figure: Figure) -> None:
+    def save(figure: Any) -> None:
         from sssfit.chart import save_figure
 
         if path is not None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ._compiling import say_if_compiling
 from ._options import Common
 from ._report import binary_stdout, finish, table
 
@@ -45,6 +46,7 @@ def write_material(wish: Wish, common: Common) -> None:
     from sssfit.simulate.exact import diffuse_reflectance
     from sssfit.simulate.inversion import material_from_reflectance, published_inversions
 
+    say_if_compiling(common, solver=True)
     material = material_from_reflectance(
         wish.from_reflectance, wish.mean_free_path, wish.eta, name=name, channels=channels
     )

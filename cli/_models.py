@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ._compiling import say_if_compiling
 from ._figure import chart_output
 from ._options import Common
 from ._report import finish, table
@@ -66,6 +67,7 @@ def _compared(
 
     from ._progress import walk_progress
 
+    say_if_compiling(common, walk=None if walk else material, solver=True)
     with walk_progress(material.name, quiet=common.quiet or walk is not None) as show:
         return compare_models(
             material,

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ._compiling import say_if_compiling
 from ._methods import METHODS
 from ._report import say
 from ._simulate_outputs import held, write_profile
@@ -36,6 +37,8 @@ def run_computed(
 
     rows: dict[int, dict[str, Any]] = {}
     with asked_to_stop() as stop, held(targets, force=request.force):
+        if method == "exact":
+            say_if_compiling(request.common, solver=True)
         for group, settings in jobs:
             begun = time.perf_counter()
             try:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ._compiling import say_if_compiling
 from ._options import Common
 from ._report import say
 from ._simulate_outputs import held, write_profile
@@ -153,17 +154,13 @@ def _walk(
     stop: Callable[[], bool],
 ) -> tuple[list[Profile], float]:
     """One walk for all ``materials``, with a progress bar; the profiles and seconds of walking."""
-    from sssfit.simulate import is_compiled, simulate_montecarlo_many
+    from sssfit.simulate import simulate_montecarlo_many
 
     from ._progress import walk_progress
 
     common = request.common
     last: list[Progress] = []
-    if not is_compiled(materials[0]):
-        say(
-            common,
-            "Compiling the photon walk, some 10 s; it is kept for later runs where it can be.",
-        )
+    say_if_compiling(common, walk=materials[0])
     label = materials[0].name if len(materials) == 1 else f"{len(materials)} materials"
     resumes = request.resume and checkpoint is not None and checkpoint.path.exists()
     with walk_progress(label, quiet=common.quiet) as show:

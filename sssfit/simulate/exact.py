@@ -22,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from sssfit._jit import compiled_before
 from sssfit.errors import SimulationError, SssfitWarning, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
@@ -146,6 +147,11 @@ def simulate_exact_many(
             found = _solve_group(eta, *own, tolerance, _Workers(pool, stop))
             profiles |= zip(group, found, strict=True)
     return [profiles[k] for k in range(len(materials))]
+
+
+def is_solver_compiled() -> bool:
+    """Whether the solver can start at once; else its first use compiles, some 3 s."""
+    return compiled_before("transport", "kernel_matrix")
 
 
 def diffuse_reflectance(albedo: npt.ArrayLike, eta: float) -> FloatArray:
