@@ -10,7 +10,7 @@ from checks_layers import layer, stack
 from sssfit import shapes
 from sssfit.errors import SimulationError
 from sssfit.material import load_material
-from sssfit.simulate import simulate_burley, simulate_dipole_grosjean
+from sssfit.simulate import simulate_burley
 
 SKIN = load_material("skin1")
 
@@ -47,11 +47,15 @@ def test_radii_are_those_of_the_shape():
 
 
 def test_without_a_reflectance_it_has_the_materials_own():
-    profile = simulate_burley(SKIN)
-    grosjean = simulate_dipole_grosjean(SKIN)
-    np.testing.assert_allclose(
-        profile.diffuse_reflectance, grosjean.diffuse_reflectance, rtol=1e-12
-    )
+    # index-matched, along the normal: 1 - H(1) sqrt(1 - albedo), with g by the reduced albedo
+    profile = simulate_burley(medium([0.1, 0.1, 0.5], [0.9, 9.0, 0.5], 1.0, [0.0, 0.9, 0.0]))
+    np.testing.assert_allclose(profile.diffuse_reflectance, [0.41495, 0.41495, 0.11523], atol=5e-6)
+    assert simulate_burley(SKIN).diffuse_reflectance[1] == pytest.approx(0.2096, abs=5e-5)
+    below = stack(layer(0.1, 1.0, 0.0, 1.0), above=1.5)
+    with pytest.raises(SimulationError, match=r"denser, by 1\.5"):
+        simulate_burley(below)
+    given = simulate_burley(below, reflectance=0.3)
+    assert given.diffuse_reflectance[0] == pytest.approx(0.3)
 
 
 def test_extremes():
@@ -63,9 +67,11 @@ def test_extremes():
         assert white.diffuse_reflectance[0] == pytest.approx(1 - (0.3 / 2.3) ** 2, abs=1e-5)
     whiter = simulate_burley(medium(1e-12, 1.0, 1.3), mapping="diffuse-mfp")
     assert whiter.diffuse_reflectance[0] == pytest.approx(1 - (0.3 / 2.3) ** 2, abs=1e-5)
-    one = simulate_burley(SKIN, dr_mm=3.0, radius_mm=3.0)
+    one = simulate_burley(SKIN, reflectance=0.2, dr_mm=3.0, radius_mm=3.0)
     assert one.n_annuli == 1
-    many = simulate_burley(medium(np.full(64, 0.1), np.linspace(0.1, 6.4, 64), 1.3))
+    many = simulate_burley(
+        medium(np.full(64, 0.1), np.linspace(0.1, 6.4, 64), 1.3), reflectance=np.full(64, 0.2)
+    )
     assert many.n_channels == 64
 
 

@@ -23,7 +23,8 @@ from sssfit.shapes import (
     s_perpendicular,
 )
 from sssfit.simulate._deterministic import computed_profile, energies_from_beyond, half_space
-from sssfit.simulate.dipole import grosjean_reflectance
+from sssfit.simulate._semi_infinite import relative_eta
+from sssfit.simulate.exact import diffuse_reflectance
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -55,7 +56,8 @@ def simulate_burley(
         "diffuse" (light from all sides), both over the mean free path 1 / sigma_t'; "diffuse-mfp",
         over the diffuse mean free path 1 / sqrt(3 sigma_a sigma_t').
     reflectance : (C,) or float, optional
-        A, the diffuse reflectance, 0 to 1; by default the material's own.
+        A, the diffuse reflectance, 0 to 1; by default the exact one
+        of the material (a half second), which must then be as dense as what is above it.
     dr_mm, radius_mm : float, optional
         Grid, as `sssfit.grid.make_grid` takes it [mm].
 
@@ -81,7 +83,7 @@ def simulate_burley(
     layer = half_space(material, "burley")
     if mapping not in MAPPINGS:
         raise SimulationError(f"mapping = {mapping!r}; expected one of {', '.join(MAPPINGS)}.")
-    total = _reflectance(material, reflectance)
+    total = _reflectance(material, layer, reflectance)
     s_per_mm = MAPPINGS[mapping](total) * _scale_per_mm(material, layer, mapping)
     grid = make_grid(material, dr_mm=dr_mm, radius_mm=radius_mm)
     beyond = total * diffusion_beyond(grid.r_edges_mm[:, None], s_per_mm)
@@ -95,10 +97,10 @@ def simulate_burley(
     )
 
 
-def _reflectance(material: Material, given: npt.ArrayLike | None) -> FloatArray:
+def _reflectance(material: Material, layer: Layer, given: npt.ArrayLike | None) -> FloatArray:
     """Return A of each channel (C,)."""
     if given is None:
-        return _own_reflectance(material)
+        return _own_reflectance(material, layer)
     try:
         total = np.broadcast_to(np.asarray(given, dtype=np.float64), (material.n_channels,))
     except (TypeError, ValueError):
@@ -111,9 +113,15 @@ def _reflectance(material: Material, given: npt.ArrayLike | None) -> FloatArray:
     return total
 
 
-def _own_reflectance(material: Material) -> FloatArray:
-    """Diffuse reflectance of the material (C,), where none is given."""
-    return grosjean_reflectance(material)
+def _own_reflectance(material: Material, layer: Layer) -> FloatArray:
+    """Diffuse reflectance by the exact solver (C,); g other than 0 by the similarity relation."""
+    eta = relative_eta(material)
+    if eta < 1.0:
+        raise SimulationError(
+            f"{material.name}: what is above is denser, by {1.0 / eta:.4g}, and burley has no "
+            "reflectance of its own for that; give it one."
+        )
+    return diffuse_reflectance(layer.reduced_sigma_s_per_mm / layer.reduced_sigma_t_per_mm, eta)
 
 
 def _scale_per_mm(material: Material, layer: Layer, mapping: str) -> FloatArray:

@@ -1,0 +1,306 @@
+"""The exact solver against theory, against brute force, against the photon walk, and itself."""
+
+import threading
+import warnings
+
+import checks
+import checks_exact
+import numpy as np
+import pytest
+import reference
+import reference_exact
+from scipy import special
+
+from sssfit.errors import SimulationError, SssfitWarning, StoppedError
+from sssfit.grid import make_grid
+from sssfit.material import Layer, Material, load_material
+from sssfit.profile import Profile
+from sssfit.simulate._depth import decay_rate, respond
+from sssfit.simulate._mixture import mixture_of
+from sssfit.simulate._single import single_scattering_beyond
+from sssfit.simulate.exact import (
+    _LEVELS,
+    diffuse_reflectance,
+    simulate_exact,
+    simulate_exact_many,
+)
+
+FEW = ("skin1", "ketchup", "marble")
+
+
+def test_totals_are_chandrasekhars():
+    albedos = [0.1, 0.5, 0.9, 0.99, 0.999]
+    theory = [reference.chandrasekhar_total(each) for each in albedos]
+    np.testing.assert_allclose(diffuse_reflectance(albedos, 1.0), theory, rtol=0, atol=1e-8)
+    profile = simulate_exact(checks.medium(1.0 - np.array(albedos), np.array(albedos), 1.0))
+    np.testing.assert_allclose(profile.diffuse_reflectance, theory, rtol=0, atol=1e-5)
+
+
+def test_total_is_giovanellis():
+    profile = simulate_exact(checks.medium(1.0, 9.0, 1.5))
+    total = profile.specular_reflectance + profile.diffuse_reflectance[0]
+    assert total == pytest.approx(0.2600, abs=1e-4)  # published to four digits
+
+
+@pytest.mark.parametrize("eta", [1.0, 1.0001, 1.3, 2.0])
+def test_without_absorption_everything_comes_back(eta):
+    profile = simulate_exact(checks.medium([0.0], [1.0], eta))
+    assert profile.diffuse_reflectance[0] == pytest.approx(
+        1.0 - profile.specular_reflectance, abs=1e-6
+    )
+    assert profile.absorbed[0, 0] == 0.0
+
+
+@pytest.mark.parametrize("eta", [1.0, 1.3, 1.5, 2.0])
+def test_single_scattering_is_its_closed_form(eta):
+    radii = np.array([0.0, 1e-4, 0.003, 0.05, 0.7, 3.0, 20.0])
+    beyond = single_scattering_beyond(radii, eta, 0.05)
+    theory = [reference.single_scattering_cumulative(r, 1.0, eta) for r in (*radii[1:], 1e9)]
+    np.testing.assert_allclose(beyond[0] - beyond[1:], theory[:-1], rtol=0, atol=1e-9)
+    assert beyond[0] == pytest.approx(theory[-1], abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("k", "eta"), [(0.0, 1.0), (0.7, 1.0), (12.0, 1.0), (0.0, 1.3), (0.7, 1.3), (3.0, 1.5)]
+)
+def test_double_scattering_is_brute_force(k, eta):
+    # At albedo 1e-6 what is scattered three times is a millionth of what is scattered twice.
+    albedo = 1e-6
+    theory = reference_exact.double_scattering(k, eta, nodes=8)
+    for level in _LEVELS[1:3]:
+        solved = respond(k, eta, np.array([albedo]), level.depth).multiple[0]
+        assert solved / albedo**2 == pytest.approx(theory, abs=2e-7)
+
+
+@pytest.mark.parametrize("eta", [1.0, 1.001, 1.3, 2.0])
+def test_energy_is_conserved_at_every_albedo(eta):
+    albedos = np.array([0.001, 0.3, 0.9, 0.999, 0.99999, 1.0 - 1e-12])
+    response = respond(0.0, eta, albedos, _LEVELS[2].depth)
+    once = albedos * single_scattering_beyond(np.zeros(1), eta, 0.05)
+    enters = 1.0 - ((eta - 1.0) / (eta + 1.0)) ** 2
+    np.testing.assert_allclose(response.multiple + once + response.absorbed, enters, atol=1e-7)
+
+
+@pytest.mark.parametrize(
+    ("albedo", "rate"), [(0.5, 0.957504), (0.9, 0.525430), (0.99, 0.172511), (1.0, 0.0)]
+)
+def test_decay_rates_are_the_published_ones(albedo, rate):
+    # Case, de Hoffmann and Placzek 1953, table 2
+    assert decay_rate(albedo) == pytest.approx(rate, abs=1e-6)
+
+
+@pytest.mark.parametrize("albedo", [0.0, 0.01, 0.05, 0.0501, 0.3, 1 - 1e-5, 1 - 2e-6, 1 - 1e-9])
+def test_decay_rate_solves_its_equation(albedo):
+    rate = decay_rate(albedo)
+    assert 0.0 <= rate <= 1.0
+    if 0.06 < albedo < 1.0:
+        assert albedo * np.arctanh(rate) / rate == pytest.approx(1.0, abs=1e-9)
+
+
+def test_mixture_inverts_a_transform_with_a_closed_form():
+    # int_a^b 2q/(k^2+q^2) dq = log((k^2+b^2)/(k^2+a^2)) comes from 2 (K0(a r) - K0(b r)) beyond r.
+    a, b = 0.3, 8.0
+    k = 0.3 * np.sinh(np.linspace(0.0, 6.0, 40))
+    scale = np.log(b**2 / a**2)
+    mixture = mixture_of(k, np.log((k**2 + b**2) / (k**2 + a**2)) / scale, 0.1)
+    r = np.geomspace(1e-3, 30.0, 60)
+    theory = 2.0 * (special.k0(a * r) - special.k0(b * r)) / scale
+    np.testing.assert_allclose(mixture.beyond(r), theory, rtol=0, atol=1e-6)
+    assert mixture.misfit < 1e-6
+    assert (mixture.weights > 0.0).all()
+
+
+def test_what_is_no_mixture_is_found_out():
+    k = np.linspace(0.0, 30.0, 60)
+    assert mixture_of(k, np.exp(-((k - 10.0) ** 2)), 0.1).misfit > 0.1
+
+
+def test_edges_agree_with_a_much_finer_run():
+    for name, apart, claimed in checks_exact.shares_apart(FEW):
+        assert apart < 1e-4, name
+        assert claimed < 1e-4, name
+        assert apart < claimed, f"{name}: the error estimate is too small"
+
+
+@pytest.mark.slow
+def test_edges_agree_with_a_much_finer_run_for_all():
+    for name, apart, claimed in checks_exact.shares_apart():
+        assert apart < min(1e-4, claimed), name
+
+
+def test_profile_is_that_of_the_walk():
+    for figure in checks_exact.against_walk(10_000_000, names=("skin1",)):
+        assert abs(figure.sigmas) < checks.LIMIT, figure
+
+
+def test_eleven_profiles_are_those_of_the_walk():
+    for figure in checks_exact.against_walk(1_000_000):
+        assert abs(figure.sigmas) < checks.LIMIT, figure
+
+
+@pytest.mark.slow
+def test_eleven_profiles_are_those_of_the_walk_in_full():
+    for figure in checks_exact.against_walk(100_000_000, tolerance=checks_exact.FINE):
+        assert abs(figure.sigmas) < checks.LIMIT, figure
+
+
+def test_error_is_kept_as_standard_error():
+    profile = simulate_exact(load_material("skin1"))
+    worst = np.max(profile.cumulative_stderr / profile.diffuse_reflectance)
+    assert worst == pytest.approx(profile.meta["relative_error"], rel=0.5)
+    assert 0.0 < worst < 1e-4
+    assert (profile.diffuse_reflectance_stderr >= profile.cumulative_stderr[-1]).all()
+    assert profile.photons is None
+    assert profile.meta["settings"]["tolerance"] == 1e-4
+
+
+def test_a_finer_tolerance_gives_a_smaller_error():
+    material = checks.medium(0.3, 0.7, 1.3)
+    fine = simulate_exact(material, tolerance=5e-6)
+    assert fine.meta["relative_error"] <= 5e-6
+
+
+def test_profile_has_no_noise():
+    profile = simulate_exact(load_material("skin1"))
+    assert (profile.annulus_energy > 0.0).all()
+    assert (np.diff(profile.reflectance_per_mm2, axis=0) < 0.0).all()
+
+
+def test_profile_goes_through_a_file(tmp_path):
+    profile = simulate_exact(checks.medium(0.3, 0.7, 1.3))
+    profile.save(tmp_path / "x.profile.npz")
+    again = Profile.load(tmp_path / "x.profile.npz")
+    np.testing.assert_array_equal(again.cumulative_stderr, profile.cumulative_stderr)
+
+
+def test_materials_share_work_and_keep_their_answers():
+    materials = [load_material(name) for name in FEW]
+    together = simulate_exact_many(materials)
+    for material, shared in zip(materials, together, strict=True):
+        alone = simulate_exact(material)
+        error = np.hypot(shared.cumulative_stderr, alone.cumulative_stderr)
+        assert (np.abs(shared.cumulative - alone.cumulative) <= error).all(), material.name
+
+
+def test_threads_do_not_change_the_result():
+    material = checks.medium([0.3, 0.001], [0.7, 1.0], 1.3)
+    one, two = (simulate_exact(material, threads=n) for n in (1, 2))
+    np.testing.assert_array_equal(one.annulus_energy, two.annulus_energy)
+
+
+def test_unit_of_length_does_not_matter():
+    near = simulate_exact(checks.medium(0.3, 0.7, 1.3))
+    far = simulate_exact(checks.medium(0.0003, 0.0007, 1.3))
+    np.testing.assert_allclose(near.annulus_energy, far.annulus_energy, rtol=1e-9)
+
+
+def test_similarity_is_used_and_said():
+    material = checks.medium(0.1, 3.6, 1.3, g=0.75)
+    with pytest.warns(SssfitWarning, match="approximation"):
+        profile = simulate_exact(material)
+    isotropic = simulate_exact(checks.medium(0.1, 0.9, 1.3))
+    np.testing.assert_allclose(profile.annulus_energy, isotropic.annulus_energy, rtol=1e-9)
+
+
+def test_isotropic_scattering_is_not_warned_of():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        simulate_exact(checks.medium(0.3, 0.7, 1.3))
+
+
+def test_only_the_relative_index_counts():
+    layer = Layer(1.95, 0.0, [0.3], [0.7])
+    immersed = simulate_exact(Material("x", ("c0",), (layer,), eta_above=1.5))
+    in_air = simulate_exact(checks.medium(0.3, 0.7, 1.3))
+    np.testing.assert_allclose(immersed.annulus_energy, in_air.annulus_energy, rtol=1e-9)
+
+
+@pytest.mark.parametrize("channels", [1, 64])
+def test_any_number_of_channels(channels):
+    albedos = np.linspace(0.0, 1.0, channels) if channels > 1 else np.array([0.5])
+    profile = simulate_exact(checks.medium(1.0 - albedos + 1e-15, albedos, 1.3))
+    assert profile.diffuse_reflectance[-1] == pytest.approx(
+        diffuse_reflectance(albedos, 1.3)[-1], abs=1e-6
+    )
+    assert (np.diff(profile.diffuse_reflectance) > 0.0).all()
+
+
+def test_without_scattering_nothing_comes_back():
+    profile = simulate_exact(checks.medium([0.3, 0.3], [0.0, 0.7], 1.3))
+    assert (profile.annulus_energy[:, 0] == 0.0).all()
+    assert profile.absorbed[0, 0] == pytest.approx(1.0 - profile.specular_reflectance)
+
+
+def test_one_annulus_holds_what_the_total_leaves():
+    material = checks.medium(0.3, 0.7, 1.3)
+    profile = simulate_exact(material, dr_mm=2.0, radius_mm=2.0)
+    fine = simulate_exact(material)
+    assert profile.n_annuli == 1
+    assert profile.annulus_energy[0, 0] == pytest.approx(float(fine.cumulative_at(2.0)[0]), 1e-5)
+    assert profile.beyond_grid[0] == pytest.approx(
+        fine.diffuse_reflectance[0] - profile.annulus_energy[0, 0], rel=1e-4
+    )
+
+
+def test_grid_far_inside_a_mean_free_path():
+    material = checks.medium(0.3, 0.7, 1.3)
+    profile = simulate_exact(material, dr_mm=1e-4, radius_mm=1e-2)
+    fine = simulate_exact(material, dr_mm=1e-4, radius_mm=1e-2, tolerance=5e-6)
+    np.testing.assert_allclose(profile.cumulative[1:], fine.cumulative[1:], rtol=1e-2)
+    single = [reference.single_scattering_cumulative(r, 0.7, 1.3) for r in profile.r_edges_mm[1:]]
+    assert (profile.cumulative[1:, 0] > single).all()
+
+
+@pytest.mark.parametrize("tolerance", [0.0, -1.0, 1.0, float("nan"), float("inf")])
+def test_tolerances_out_of_range_are_refused(tolerance):
+    with pytest.raises(SimulationError, match="tolerance"):
+        simulate_exact(checks.medium(0.3, 0.7, 1.3), tolerance=tolerance)
+
+
+def test_a_tolerance_that_cannot_be_met_says_what_can():
+    with pytest.raises(SimulationError, match=r"1e-13 was not met.*give \S+ or more"):
+        simulate_exact(checks.medium(0.3, 0.7, 1.0), tolerance=1e-13, radius_mm=1.0)
+
+
+@pytest.mark.parametrize("radius", [0.0, -1.0, float("nan")])
+def test_radii_that_are_none_are_refused(radius):
+    with pytest.raises(SimulationError, match="radius_mm"):
+        simulate_exact(checks.medium(0.3, 0.7, 1.3), radius_mm=radius)
+
+
+def test_layers_and_slabs_are_refused_with_what_would_do():
+    slab = Material("slab", ("c0",), (Layer(1.3, 0.0, [0.1], [0.9], 2.0),))
+    with pytest.raises(SimulationError, match="multipole or montecarlo"):
+        simulate_exact(slab)
+    under = Material("thin", ("c0",), (Layer(1.0, 0.0, [0.1], [0.9]),), eta_above=1.3)
+    with pytest.raises(SimulationError, match="use montecarlo"):
+        simulate_exact(under)
+
+
+def test_a_material_that_is_none_is_refused():
+    with pytest.raises(SimulationError, match="load_material"):
+        simulate_exact("skin1")
+
+
+@pytest.mark.parametrize(("albedo", "eta"), [(1.1, 1.3), (-0.1, 1.3), (np.nan, 1.3), (0.5, 0.9)])
+def test_totals_out_of_range_are_refused(albedo, eta):
+    with pytest.raises(SimulationError, match="expected"):
+        diffuse_reflectance([albedo], eta)
+
+
+def test_it_can_be_stopped():
+    asked = threading.Event()
+
+    def stop():
+        was_asked = asked.is_set()
+        asked.set()
+        return was_asked
+
+    with pytest.raises(StoppedError):
+        simulate_exact(load_material("skin1"), stop=stop)
+
+
+def test_grid_is_the_papers():
+    material = load_material("ketchup")
+    profile = simulate_exact(material)
+    np.testing.assert_array_equal(profile.r_edges_mm, make_grid(material).r_edges_mm)
