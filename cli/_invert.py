@@ -154,5 +154,5 @@ def _text(figures: dict[str, Any]) -> str:
 def _given(published: dict[str, Any], asked: list[float], channel: int) -> str:
     """Albedo, reflectance and its relative error."""
     gives = published["reflectance"][channel]
-    error = f" ({100.0 * (gives / asked[channel] - 1.0):+.3g} %)" if asked[channel] else ""
+    error = f" ({100.0 * (gives / asked[channel] - 1.0):+#.3g} %)" if asked[channel] else ""
     return f"{published['albedo'][channel]:.6f}, {gives:.6f}{error}"
