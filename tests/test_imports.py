@@ -108,6 +108,11 @@ for call in {calls!r}:
     assert run.returncode == 0, run.stderr
 
 
+def test_the_photon_walk_does_not_wait_for_scipy():
+    program = "import sys, sssfit.simulate; assert 'scipy' not in sys.modules"
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
+
+
 @pytest.mark.parametrize("path", IN_ROOMS, ids=name_of)
 def test_imports_point_down(path):
     room = room_of(module_of(path))
