@@ -142,8 +142,8 @@ def simulate_exact_many(
     for k, material in enumerate(materials):
         groups.setdefault(relative_eta(material), []).append(k)
     profiles: dict[int, Profile] = {}
-    # One BLAS thread for each of ours: matrices of 100 to 400 rows gain nothing from more, and where
-    # another process keeps a core busy BLAS's waiting threads made skin1 take 14 s in place of 1.8.
+    # One BLAS thread for each of ours: matrices of 100 to 400 rows gain nothing from more, and
+    # where another process keeps a core busy its waiting threads made skin1 take 14 s, not 1.8.
     with ThreadPoolExecutor(threads) as pool, threadpool_limits(1, user_api="blas"):
         for eta, group in groups.items():
             own = [materials[k] for k in group], [grids[k] for k in group]
