@@ -25,7 +25,7 @@ from .materials import materials
 from .show import show
 from .simulate import simulate
 
-_LIBRARIES = ("numpy", "scipy", "numba", "llvmlite", "matplotlib", "click", "rich")
+_LIBRARIES = ("numpy", "scipy", "threadpoolctl", "numba", "llvmlite", "matplotlib", "click", "rich")
 
 
 @click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
@@ -38,10 +38,11 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
     A first session:
 
     \b
-      sssfit materials                    list the materials that ship with sssfit
-      sssfit simulate skin1               trace 1e7 photons: skin1.profile.npz
-      sssfit chart skin1.profile.npz      draw it: skin1.profile.png
-      sssfit show skin1.profile.npz       its figures
+      sssfit materials                      list the materials that ship with sssfit
+      sssfit simulate skin1                 trace 1e7 photons: skin1.profile.npz
+      sssfit simulate skin1 --method exact  the same without noise, in a second
+      sssfit chart skin1.profile.npz        draw it: skin1.profile.png
+      sssfit show skin1.profile.npz         its figures
 
     Lengths are mm unless written with a unit (3cm, 0.6m). Every verb explains itself with --help.
     """

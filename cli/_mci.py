@@ -1,4 +1,4 @@
-"""MCML input files as a material of ``sssfit simulate``: one walk, and one profile, a run."""
+"""MCML input files as a material of ``sssfit simulate``: one profile a run."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ def is_mci(name: str | None) -> bool:
 def load_runs(
     path: str, number: int | None, given: dict[str, Any]
 ) -> tuple[list[Material], list[dict[str, Any]]]:
-    """Return the materials of the runs of a file, or of one, and what to trace each with.
+    """Return the materials of the runs of a file, or of one, and what to simulate each with.
 
-    ``given`` holds photons, dr_mm and radius_mm as the options have them; the file's own stand for
-    those that were not given.
+    ``given`` holds dr_mm and radius_mm, and photons for a walk, as the options have them; the
+    file's own stand for those that were not given.
     """
     from sssfit.errors import MaterialError
     from sssfit.mci import load_mci
@@ -29,15 +29,16 @@ def load_runs(
         if number > len(runs):
             raise MaterialError(f"{path} has no run {number}; give --run 1 to {len(runs)}.")
         runs = runs[number - 1 : number]
-    # A target error alone decides when a run ends; then the file's photons are no limit either.
-    endless = given["target_error"] is not None
     settings = [
         given
         | {
-            "photons": given["photons"] or (None if endless else run.photons),
             "dr_mm": given["dr_mm"] or run.grid.dr_mm,
             "radius_mm": given["radius_mm"] or run.grid.radius_mm,
         }
         for run in runs
     ]
+    # A target error alone decides when a walk ends; then the file's photons are no limit either.
+    if "photons" in given and given["photons"] is None and given["target_error"] is None:
+        for run, own in zip(runs, settings, strict=True):
+            own["photons"] = run.photons
     return [run.material for run in runs], settings

@@ -104,6 +104,34 @@ class Count(click.ParamType[int]):
         return int(number)
 
 
+class Reflectance(click.ParamType[float]):
+    """A number that may be written in percent; which can be reached the library knows."""
+
+    name = "reflectance"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Parse ``value``; a usage error (exit 2) names what was expected."""
+        number = _number_or_percent(str(value))
+        if number is None:
+            self.fail(f"{value!r} is not a reflectance, such as 0.44 or 44%.", param, ctx)
+        return number
+
+
+class ListOf(click.ParamType[list[float]]):
+    """Values of another type with commas between them."""
+
+    def __init__(self, item: click.ParamType[float]) -> None:
+        self.item, self.name = item, f"list of {item.name}s"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> list[float]:
+        """Parse each item; a usage error (exit 2) names the one that is wrong."""
+        return [self.item.convert(each, param, ctx) for each in str(value).split(",")]
+
+
 class Share(click.ParamType[float]):
     """A share between 0 and 1, which may be written in percent: 0.5% or 0.005."""
 
@@ -113,13 +141,18 @@ class Share(click.ParamType[float]):
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
         """Parse ``value``; a usage error (exit 2) names what was expected."""
-        text = str(value).strip()
-        try:
-            number = float(text[:-1]) / 100.0 if text.endswith("%") else float(text)
-        except ValueError:
-            number = math.nan
-        if not 0.0 < number < 1.0:
+        number = _number_or_percent(str(value))
+        if number is None or not 0.0 < number < 1.0:
             self.fail(
                 f"{value!r} is not a share between 0 and 100 %, such as 0.5% or 0.005.", param, ctx
             )
         return number
+
+
+def _number_or_percent(text: str) -> float | None:
+    """Read 0.44 or 44%; None for what is no number."""
+    text = text.strip()
+    try:
+        return float(text[:-1]) / 100.0 if text.endswith("%") else float(text)
+    except ValueError:
+        return None

@@ -1,4 +1,4 @@
-"""What a photon walk found, for people and for programs."""
+"""What a simulation found, for people and for programs."""
 
 from __future__ import annotations
 
@@ -14,46 +14,53 @@ if TYPE_CHECKING:
 _NOTED_BEYOND = 1e-3  # share of a channel beyond the grid that is worth a remark
 _SIGMAS = 4.5  # a deviation beyond so many standard errors is no accident
 _ROUNDING = 1e-12  # below this an energy balance is rounding, not roulette
+_OWN_SETTINGS = ("tolerance", "mapping")  # of the methods that have them
 
 
 def figures_of(profile: Profile, seconds: float | None) -> dict[str, Any]:
-    """Figures of one run, as ``--json`` prints them; no seconds where it was finished before."""
+    """Figures of one run, as ``--json`` prints them; no seconds where it was finished before.
+
+    Null stands for what the method does not have: photons where nothing is sampled, say.
+    """
+    meta, settings = profile.meta, profile.meta["settings"]
+    is_known = len(profile.absorbed) > 0
     return {
-        "material": profile.meta["material"]["name"],
-        "method": profile.meta["method"],
+        "material": meta["material"]["name"],
+        "method": meta["method"],
         "channels": list(profile.channels),
         "diffuse_reflectance": profile.diffuse_reflectance,
         "diffuse_reflectance_stderr": profile.diffuse_reflectance_stderr,
         "specular_reflectance": profile.specular_reflectance,
         "transmittance": profile.transmittance,
         "transmittance_stderr": profile.transmittance_stderr,
-        "absorbed": profile.absorbed.sum(axis=0),
-        "absorbed_by_layer": profile.absorbed,
+        "absorbed": profile.absorbed.sum(axis=0) if is_known else None,
+        "absorbed_by_layer": profile.absorbed if is_known else None,
         "beyond_grid": profile.beyond_grid,
         "unfinished": profile.unfinished,
         "energy_balance": profile.energy_balance,
-        "energy_balance_stderr": profile.meta["energy_balance_stderr"],
+        "energy_balance_stderr": meta["energy_balance_stderr"],
         "dr_mm": float(profile.r_edges_mm[1]),
         "annuli": profile.n_annuli,
         "photons": profile.photons,
-        "seed": profile.meta["seed"],
+        "seed": meta["seed"],
         "seconds": seconds,
-        "photons_per_second": (profile.photons or 0) / seconds if seconds else None,
-        "target_error": profile.meta["settings"]["target_error"],
-        "relative_error": profile.meta["relative_error"],
+        "photons_per_second": profile.photons / seconds if profile.photons and seconds else None,
+        "target_error": settings.get("target_error"),
+        "relative_error": meta["relative_error"],
         "finished_before": seconds is None,
+        **{key: settings[key] for key in _OWN_SETTINGS if key in settings},
     }
 
 
-def report(rows: list[dict[str, Any]], *, every: bool, common: Common, interrupted: bool) -> None:
+def report(rows: list[dict[str, Any]], *, several: bool, common: Common, interrupted: bool) -> None:
     """Print figures to stdout; to stderr where a profile itself went to stdout."""
     output = [row.pop("path") for row in rows]
     figures: dict[str, Any] = {"command": "simulate", "output": output}
-    figures |= {"rows": rows} if every else rows[0]
+    figures |= {"rows": rows} if several else rows[0]
     if interrupted:
         figures["interrupted"] = True
     lines = [
-        _heading(rows, every),
+        _heading(rows, several),
         _table(rows),
         *_layers(rows),
         *_energy(rows),
@@ -77,35 +84,46 @@ def _files(rows: list[dict[str, Any]], output: list[str]) -> list[str]:
     return lines
 
 
-def _heading(rows: list[dict[str, Any]], every: bool) -> str:
-    """Who, how many photons, how fast, on which grid."""
+def _heading(rows: list[dict[str, Any]], several: bool) -> str:
+    """Who, by what method, how fast, on which grid."""
     row = rows[0]
-    counts = sorted({each["photons"] for each in rows})
-    walks = f"{' to '.join(f'{n:,}' for n in counts[:: len(counts) - 1 or 1])} photons, "
-    walks += f"seed {row['seed']}"
-    if every:
-        return f"{len(rows)} materials: {walks}"
+    if several:
+        return f"{len(rows)} materials: {_how(rows)}"
     seconds, rate = row["seconds"], row["photons_per_second"]
-    speed = "" if seconds is None else f", {seconds:.1f} s ({rate:,.0f} a second)"
+    speed = "" if seconds is None else f", {seconds:.1f} s"
+    speed += f" ({rate:,.0f} a second)" if rate else ""
     return (
-        f"{row['material']}: {walks}{speed}; {row['annuli']} annuli of {row['dr_mm']:.4g} mm, "
+        f"{row['material']}: {_how(rows)}{speed}; {row['annuli']} annuli of {row['dr_mm']:.4g} mm, "
         f"to {row['annuli'] * row['dr_mm']:.4g} mm"
     )
+
+
+def _how(rows: list[dict[str, Any]]) -> str:
+    """Say how many photons were traced, or what was computed."""
+    row = rows[0]
+    if row["photons"] is None:
+        tolerance, mapping = row.get("tolerance"), row.get("mapping")
+        within = "" if tolerance is None else f" to {100.0 * tolerance:g} % of the total"
+        return f"{row['method']}{within}{f' ({mapping})' if mapping else ''}"
+    counts = sorted({each["photons"] for each in rows})
+    photons = " to ".join(f"{n:,}" for n in counts[:: len(counts) - 1 or 1])
+    return f"{photons} photons, seed {row['seed']}"
 
 
 def _table(rows: list[dict[str, Any]]) -> str:
     """One line a channel; the material's name where there are several."""
     slab = any(row["transmittance"] is not None for row in rows)
-    heads = ["channel", "diffuse reflectance", "std. error"]
-    heads += ["transmittance", "std. error"] if slab else []
+    error = "std. error" if rows[0]["photons"] else "est. error"
+    heads = ["channel", "diffuse reflectance", error]
+    heads += ["transmittance", error] if slab else []
     heads += ["absorbed", "beyond grid"]
     lines = [
         [
             name if len(rows) == 1 else f"{row['material']} {name}",
             f"{row['diffuse_reflectance'][c]:.6f}",
-            f"{row['diffuse_reflectance_stderr'][c]:.6f}",
+            _error(row, "diffuse_reflectance_stderr", c),
             *(_transmitted(row, c) if slab else []),
-            f"{row['absorbed'][c]:.6f}",
+            "-" if row["absorbed"] is None else f"{row['absorbed'][c]:.6f}",
             f"{row['beyond_grid'][c]:.6f}",
         ]
         for row in rows
@@ -118,7 +136,14 @@ def _transmitted(row: dict[str, Any], channel: int) -> list[str]:
     """Transmittance and its error; dashes for a half space among slabs."""
     if row["transmittance"] is None:
         return ["-", "-"]
-    return [f"{row[key][channel]:.6f}" for key in ("transmittance", "transmittance_stderr")]
+    return [f"{row['transmittance'][channel]:.6f}", _error(row, "transmittance_stderr", channel)]
+
+
+def _error(row: dict[str, Any], key: str, channel: int) -> str:
+    """Write a walk's error in its figure's decimals, that of a computation, far smaller, alone."""
+    if row[key] is None or math.isnan(row[key][channel]):
+        return "-"
+    return f"{row[key][channel]:.{'6f' if row['photons'] else '1e'}}"
 
 
 def _layers(rows: list[dict[str, Any]]) -> list[str]:
@@ -128,13 +153,15 @@ def _layers(rows: list[dict[str, Any]]) -> list[str]:
         + ", ".join(f"{each[c]:.6f}" for each in row["absorbed_by_layer"])
         for row in rows
         for c, name in enumerate(row["channels"])
-        if len(row["absorbed_by_layer"]) > 1
+        if row["absorbed_by_layer"] is not None and len(row["absorbed_by_layer"]) > 1
     ]
 
 
 def _energy(rows: list[dict[str, Any]]) -> list[str]:
-    """Say whether specular + diffuse + absorbed = 1 within the runs' own error."""
+    """Say whether specular + diffuse + absorbed = 1 within the runs' own error, where known."""
     lines = [] if len(rows) > 1 else [f"specular reflectance {rows[0]['specular_reflectance']:.6f}"]
+    if any(row["energy_balance_stderr"] is None for row in rows):
+        return lines
     balance, stderr, name = max(
         (
             (float(balance), float(stderr), f"{row['material']} {name}")
@@ -149,10 +176,11 @@ def _energy(rows: list[dict[str, Any]]) -> list[str]:
     parts = "specular + diffuse + absorbed"
     parts += " + transmitted" if any(row["transmittance"] is not None for row in rows) else ""
     parts += " + unfinished" if unfinished > 0.0 else ""
+    kind = "standard" if rows[0]["photons"] else "estimated"
     within = abs(balance) <= _SIGMAS * stderr + _ROUNDING
     lines.append(
         f"energy: {parts} = 1 {'within' if within else 'NOT WITHIN'} the run's own error: "
-        f"{balance:+.1e}, standard error {max(stderr, _ROUNDING):.0e} (worst channel, {name})"
+        f"{balance:+.1e}, {kind} error {max(stderr, _ROUNDING):.0e} (worst channel, {name})"
     )
     if unfinished > 0.0:
         lines.append(f"unfinished, at most: {unfinished:.6f}")
@@ -171,7 +199,8 @@ def _beyond(rows: list[dict[str, Any]]) -> list[str]:
     ]
     if not lost:
         return []
-    return ["beyond the grid, as a share of diffuse: " + ", ".join(lost) + " (--radius auto)"]
+    remedy = " (--radius auto)" if rows[0]["photons"] else " (--radius)"
+    return ["beyond the grid, as a share of diffuse: " + ", ".join(lost) + remedy]
 
 
 def _target(rows: list[dict[str, Any]]) -> list[str]:

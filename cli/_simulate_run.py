@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ._compiling import say_if_compiling
 from ._options import Common
-from ._report import binary_stdout, say
+from ._report import say
+from ._simulate_outputs import held, write_profile
 from ._simulate_report import figures_of, report
 
 if TYPE_CHECKING:
@@ -25,13 +26,13 @@ Walk = tuple[list[int], dict[str, Any]]
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What was asked for, beside materials and their settings."""
+    """What was asked for, beside materials and their settings; the last two are the walk's."""
 
-    checkpoint_every: float
-    resume: bool
     force: bool
-    every: bool
+    several: bool
     common: Common
+    checkpoint_every: float = 0.0
+    resume: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,19 +49,11 @@ def run_walks(
 ) -> None:
     """Walk, write each profile as its walk ends, and report; a target None is stdout."""
     from sssfit.errors import StoppedError
-    from sssfit.files import check_output, locked
-    from sssfit.profile import is_profile_file
 
     from ._interrupt import asked_to_stop
 
     rows: dict[int, _Outcome] = {}
-    with ExitStack() as held:
-        stop = held.enter_context(asked_to_stop())
-        if None in targets:
-            binary_stdout()  # closed: said now and not after the walk
-        for path in filter(None, targets):
-            check_output(path, is_profile_file, force=request.force)
-            held.enter_context(locked(path))
+    with asked_to_stop() as stop, held(targets, force=request.force):
         for group, settings in walks:
             own = [materials[k] for k in group], [targets[k] for k in group], settings
             try:
@@ -87,7 +80,7 @@ def _report(rows: dict[int, _Outcome], materials: list[Material], request: Reque
         )
     report(
         [each.figures for each in outcomes],
-        every=request.every,
+        several=request.several,
         common=request.common,
         interrupted=interrupted,
     )
@@ -114,7 +107,7 @@ def _walk_group(
     profiles, seconds = _walk(materials, settings, request, checkpoint, stop)
     for profile, target in zip(profiles, targets, strict=True):
         try:
-            _write(profile, target)
+            write_profile(profile, target)
         except FileError as error:
             if checkpoint is None or not checkpoint.is_ours():
                 raise
@@ -161,17 +154,13 @@ def _walk(
     stop: Callable[[], bool],
 ) -> tuple[list[Profile], float]:
     """One walk for all ``materials``, with a progress bar; the profiles and seconds of walking."""
-    from sssfit.simulate import is_compiled, simulate_montecarlo_many
+    from sssfit.simulate import simulate_montecarlo_many
 
     from ._progress import walk_progress
 
     common = request.common
     last: list[Progress] = []
-    if not is_compiled(materials[0]):
-        say(
-            common,
-            "Compiling the photon walk, some 10 s; it is kept for later runs where it can be.",
-        )
+    say_if_compiling(common, walk=materials[0])
     label = materials[0].name if len(materials) == 1 else f"{len(materials)} materials"
     resumes = request.resume and checkpoint is not None and checkpoint.path.exists()
     with walk_progress(label, quiet=common.quiet) as show:
@@ -201,13 +190,3 @@ def _outcome(
 
     figures = figures_of(profile, seconds) | {"path": str(target or "-")}
     return _Outcome(figures, is_complete(profile), goes_on)
-
-
-def _write(profile: Profile, path: Path | None) -> None:
-    """To the file, whole or not at all; to stdout where there is none."""
-    if path is None:
-        stream = binary_stdout()
-        profile.write(stream)
-        stream.flush()
-    else:
-        profile.save(path)

@@ -1,4 +1,4 @@
-"""``sssfit chart``: a profile as a picture."""
+"""``sssfit chart``: a profile as a picture, or a material by every method."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ._options import Common, common_options
-from ._report import binary_stdin, binary_stdout, finish, newest
+from ._figure import chart_output
+from ._models import chart_models
+from ._options import Common, Count, common_options
+from ._report import binary_stdin, finish, newest
 
 if TYPE_CHECKING:
     from sssfit.profile import Profile
@@ -17,33 +19,64 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("profile", required=False)
 @click.option(
+    "--models", is_flag=True, help="Draw a material by every method, and the methods' errors."
+)
+@click.option(
+    "--photons",
+    type=Count(2, 10**12),
+    metavar="N",
+    help="Of the photon walk, with --models.  [default: 1e7]",
+)
+@click.option(
     "-o",
     "--output",
     metavar="FILE",
     help="Where the chart goes, as PNG, SVG or PDF by its ending; - for PNG on stdout."
-    "  [default: NAME.profile.png]",
+    "  [default: NAME.profile.png, MATERIAL.models.png]",
 )
 @click.option("--force", is_flag=True, help="Replace a file that is not a chart.")
 @common_options
-def chart(profile: str | None, output: str | None, force: bool, common: Common) -> None:
-    """Draw PROFILE: R_d(r) in four plots with error bands.
+def chart(
+    profile: str | None,
+    models: bool,
+    photons: int | None,
+    output: str | None,
+    force: bool,
+    common: Common,
+) -> None:
+    """Draw PROFILE: R_d(r) in four plots with error bands; or what models make of a material.
 
     2 pi r R_d over r, linear and logarithmic; R_d over r in mean free paths; R_d(x, y) as an image.
     PROFILE is a .profile.npz file, or - for stdin; by default the newest of this folder.
+
+    With --models PROFILE is a material, or a profile of the photon walk, which then need not be
+    walked again: the exact solution, the walk and the diffusion models in one figure, and how far
+    each is from the exact solution. Only for one half space.
 
     \b
       sssfit chart skin1.profile.npz
       sssfit chart skin1.profile.npz -o skin1.pdf
       sssfit simulate skin1 -o - | sssfit chart - -o skin1.svg
+      sssfit chart --models skin1
     """
     from sssfit._chart_files import chart_format
 
     if output not in (None, "-"):
         chart_format(str(output))  # before anything is read or drawn
+    if photons is not None and not models:
+        raise click.UsageError("--photons is for the walk of --models; leave it out.")
+    if models:
+        if profile is None:
+            raise click.UsageError("--models needs a material, or a profile of a photon walk.")
+        chart_models(profile, output, photons, common, force=force)
+        return
     name = profile or str(newest(common, "*.profile.npz", "sssfit simulate skin1"))
     loaded = _read(name)
     path = _target(name, loaded, output)
-    _draw(loaded, path, force=force)
+    with chart_output(path, force=force) as save:
+        from sssfit.chart import profile_figure
+
+        save(profile_figure(loaded))
     figures = {
         "command": "chart",
         "output": ["-" if path is None else str(path)],
@@ -75,21 +108,3 @@ def _target(name: str, profile: Profile, output: str | None) -> Path | None:
     if name == "-":
         return Path(f"{_material_name(profile) or 'stdin'}.profile.png")
     return Path(Path(name).name.removesuffix(".npz") + ".png")
-
-
-def _draw(profile: Profile, path: Path | None, *, force: bool) -> None:
-    """Draw and write; the output is checked and held before the second that takes."""
-    from sssfit._chart_files import is_chart_file
-    from sssfit.files import check_output, locked
-
-    if path is None:
-        from sssfit.chart import profile_figure, save_figure
-
-        save_figure(profile_figure(profile), binary_stdout(), format="png")
-        binary_stdout().flush()
-        return
-    check_output(path, is_chart_file, force=force)
-    with locked(path):
-        from sssfit.chart import profile_figure, save_figure
-
-        save_figure(profile_figure(profile), path)

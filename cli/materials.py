@@ -1,10 +1,12 @@
-"""``sssfit materials``: the materials that ship with sssfit, or one of them or yours in full."""
+"""``sssfit materials``: those that ship with sssfit, one in full, or a new one by reflectance."""
 
 from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
-from ._options import Common, common_options
+from ._invert import Wish, write_material
+from ._options import Common, Length, ListOf, Reflectance, common_options
 from ._report import finish, table
 
 if TYPE_CHECKING:
@@ -17,17 +19,63 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("material", required=False)
 @click.option("--toml", "as_toml", is_flag=True, help="Print MATERIAL as TOML, to start your own.")
+@click.option(
+    "--from-reflectance",
+    type=ListOf(Reflectance()),
+    metavar="A,B,...",
+    help="Make a material of this total diffuse reflectance, per channel, such as 0.44,0.23,0.13 "
+    "or 44%.",
+)
+@click.option(
+    "--mean-free-path",
+    type=ListOf(Length()),
+    metavar="MM,MM,...",
+    help="Its mean free paths, 1 / (sigma_a + sigma_s); one serves all channels.",
+)
+@click.option("--eta", type=float, metavar="N", help="Its refractive index.")
+@click.option("--name", metavar="NAME", help="Its name.  [default: that of FILE]")
+@click.option(
+    "--channels", metavar="A,B,...", help="Names of its channels.  [default: R,G,B for three]"
+)
+@click.option(
+    "-o", "--output", metavar="FILE", help="Where it goes, - for stdout.  [default: NAME.toml]"
+)
+@click.option("--force", is_flag=True, help="Replace a file that --from-reflectance did not make.")
 @common_options
-def materials(common: Common, material: str | None, as_toml: bool) -> None:
-    """List the materials that ship with sssfit, or show one in full.
+@click.pass_context
+def materials(
+    context: click.Context,
+    /,
+    material: str | None,
+    as_toml: bool,
+    from_reflectance: list[float] | None,
+    common: Common,
+    **wish: Any,
+) -> None:
+    """List the materials that ship with sssfit, show one in full, or make one.
 
     MATERIAL is one of their names, the path of a TOML file, or - for standard input.
+    --from-reflectance turns the exact solver round: it finds the albedos, for isotropic
+    scattering, whose total diffuse reflectance is what was asked for, and prints what the
+    approximate inversions of renderers would have given.
 
     \b
       sssfit materials skin1                        coefficients, mean free paths, grid
       sssfit materials skin1 --toml > mine.toml     a file to edit into your own
       sssfit materials mine.toml                    check it
+      sssfit materials --from-reflectance 0.44,0.23,0.13 --mean-free-path 1.3,0.95,0.67 \\
+        --eta 1.3 -o mine.toml                      make one
     """
+    if from_reflectance is not None:
+        if material is not None or as_toml:
+            raise click.UsageError("--from-reflectance makes a material; name none with it.")
+        write_material(Wish(from_reflectance, **wish), common)
+        return
+    for key in wish:
+        if context.get_parameter_source(key) is ParameterSource.COMMANDLINE:
+            raise click.UsageError(
+                f"--{key.replace('_', '-')} is for --from-reflectance; leave it out."
+            )
     if as_toml and (common.json or material is None):
         raise click.UsageError("--toml needs a MATERIAL and does not go with --json.")
     if material is None:

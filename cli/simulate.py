@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ._mci import is_mci, load_runs
+from ._methods import MAPPINGS, METHODS, method_lines, own_options
 from ._options import Common, Count, Length, Share, common_options
+from ._simulate_computed import run_computed
+from ._simulate_outputs import profile_paths
 from ._simulate_run import Request, Walk, run_walks
 
 if TYPE_CHECKING:
@@ -25,37 +27,55 @@ class Radius(Length):
         return value if value == "auto" else super().convert(value, param, ctx)
 
 
-@click.command()
+@click.command(epilog=method_lines())
 @click.argument("material", required=False)
 @click.option("--all", "every", is_flag=True, help="All materials that ship with sssfit.")
 @click.option(
     "--method",
-    type=click.Choice(["montecarlo"]),
+    type=click.Choice(list(METHODS)),
     default="montecarlo",
     show_default=True,
-    help="How; montecarlo walks photons, through layers where the material has them.",
+    metavar="METHOD",
+    help="How; the methods are listed below.",
 )
 @click.option("--run", type=click.IntRange(1), metavar="N", help="Of an .mci, this run only.")
 @click.option(
     "--photons",
     type=Count(2, 10**12),
     metavar="N",
-    help="Photons to trace; every photon serves all channels."
+    help="montecarlo: photons to trace; every photon serves all channels."
     "  [default: 1e7; with --target-error no limit]",
 )
 @click.option(
     "--target-error",
     type=Share(),
     metavar="SHARE",
-    help="End when no channel's F(r) has a standard error above this share of F at the last edge, "
-    "such as 0.5%.",
+    help="montecarlo: end when no channel's F(r) has a standard error above this share of F at the "
+    "last edge, such as 0.5%.",
+)
+@click.option(
+    "--tolerance",
+    type=Share(),
+    default="0.01%",
+    show_default=True,
+    metavar="SHARE",
+    help="exact: largest error of F(r), as a share of the total.",
+)
+@click.option(
+    "--mapping",
+    type=click.Choice(MAPPINGS),
+    default=MAPPINGS[0],
+    show_default=True,
+    metavar="FIT",
+    help="burley: which published fit gives s: perpendicular (light from straight above), diffuse "
+    "(from everywhere), or diffuse-mfp (from the diffuse mean free path).",
 )
 @click.option("--dr", type=Length(), metavar="MM", help="Annulus width.  [default: MFP_min / 20]")
 @click.option(
     "--radius",
     type=Radius(),
     metavar="MM|auto",
-    help="Grid radius; auto grows it until under 0.1 % of any channel lies beyond."
+    help="Grid radius; auto (montecarlo) grows it until under 0.1 % of any channel lies beyond."
     "  [default: 32 MFP_max]",
 )
 @click.option(
@@ -63,7 +83,7 @@ class Radius(Length):
     "--output",
     metavar="FILE",
     help="Where the profile goes, - for stdout; with --all a folder."
-    "  [default: MATERIAL.profile.npz]",
+    "  [default: MATERIAL.profile.npz, MATERIAL.METHOD.profile.npz]",
 )
 @click.option(
     "--checkpoint-every",
@@ -71,37 +91,42 @@ class Radius(Length):
     default=30.0,
     show_default=True,
     metavar="SECONDS",
-    help="How often FILE.checkpoint is saved, from which --resume goes on.",
+    help="montecarlo: how often FILE.checkpoint is saved, from which --resume goes on.",
 )
-@click.option("--resume", is_flag=True, help="Go on where a killed or interrupted run was saved.")
+@click.option(
+    "--resume",
+    is_flag=True,
+    help="montecarlo: go on where a killed or interrupted run was saved.",
+)
 @click.option("--force", is_flag=True, help="Replace a file that is not a profile.")
 @common_options
+@click.pass_context
 def simulate(
+    context: click.Context,
+    /,
     material: str | None,
     every: bool,
-    method: str,  # noqa: ARG001 (one so far; click has checked it)
+    method: str,
     run: int | None,
-    photons: int | None,
-    target_error: float | None,
     dr: float | None,
     radius: float | str | None,
     output: str | None,
-    checkpoint_every: float,
-    resume: bool,
     force: bool,
     common: Common,
+    **own: Any,
 ) -> None:
-    """Trace photons through MATERIAL and write its diffuse reflectance profile.
+    """Compute the diffuse reflectance profile of MATERIAL and write it.
 
     MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or - for stdin; or
     an MCML input file, .mci: a profile a run, with its photons and grid where options give none.
-    The profile is R_d(r) per channel as energy in annuli with standard errors, for a normally
-    incident pencil beam, in mm. Ctrl-C saves what is done, with its true photon count; --resume
-    goes on from there, or from the last checkpoint of a run that was killed, and ends in the same
-    bits as a run that was left alone.
+    The profile is R_d(r) per channel as energy in annuli with errors, for a normally incident
+    pencil beam, in mm. Ctrl-C saves what a photon walk has done, with its true photon count;
+    --resume goes on from there, or from the last checkpoint of a run that was killed, and ends in
+    the same bits as a run that was left alone.
 
     \b
       sssfit simulate skin1
+      sssfit simulate skin1 --method exact
       sssfit simulate skin1 --photons 1e8 --radius auto -o fine.profile.npz
       sssfit simulate ./wax.toml --json
       sssfit simulate skin1 --target-error 0.1% --resume
@@ -111,25 +136,34 @@ def simulate(
         raise click.UsageError("name one MATERIAL, or give --all.")
     if run is not None and not is_mci(material):
         raise click.UsageError("--run chooses a run of an MCML input file, .mci.")
-    settings = {
-        "photons": photons,
-        "target_error": target_error,
-        "dr_mm": dr,
-        "radius_mm": radius,
-        "seed": common.seed,
-    }
-    materials, walks = _walks(material, run, settings)
+    own = own_options(context, method, own)
+    if radius == "auto" and method != "montecarlo":
+        raise click.UsageError("--radius auto is for --method montecarlo; give a length.")
+    walk = {key: own.pop(key) for key in ("checkpoint_every", "resume") if key in own}
+    settings = {"dr_mm": dr, "radius_mm": radius, **own, **_of_common(method, common)}
+    materials, jobs = _jobs(material, run, settings, shares=METHODS[method].shares)
     several = every or len(materials) > 1
-    targets = _targets(materials, output, several)
-    if resume and targets == [None]:
+    targets = profile_paths(materials, method, output, several=several)
+    if walk.get("resume") and targets == [None]:
         raise click.UsageError("--resume needs a file to go on beside; leave -o - out.")
-    run_walks(materials, targets, walks, Request(checkpoint_every, resume, force, several, common))
+    request = Request(force, several, common, **walk)
+    if method == "montecarlo":
+        run_walks(materials, targets, jobs, request)
+    else:
+        run_computed(method, materials, targets, jobs, request)
 
 
-def _walks(
-    material: str | None, run: int | None, settings: dict[str, Any]
+def _of_common(method: str, common: Common) -> dict[str, Any]:
+    """Return the common options that the method's function takes; a walk's threads come later."""
+    if method == "montecarlo":
+        return {"seed": common.seed}
+    return {"threads": common.threads} if METHODS[method].shares else {}
+
+
+def _jobs(
+    material: str | None, run: int | None, settings: dict[str, Any], *, shares: bool
 ) -> tuple[list[Material], list[Walk]]:
-    """Load what is asked for; each walk has the indices of its materials and its settings."""
+    """Load what is asked for; each job has the indices of its materials and its settings."""
     from sssfit.material import load_material, material_names
     from sssfit.simulate import shared_walks
 
@@ -138,16 +172,5 @@ def _walks(
         return materials, [([k], own) for k, own in enumerate(each)]
     names = material_names() if material is None else (material,)
     materials = [load_material(name) for name in names]
-    return materials, [(group, settings) for group in shared_walks(materials)]
-
-
-def _targets(materials: list[Material], output: str | None, several: bool) -> list[Path | None]:
-    """Where each profile goes; None is stdout."""
-    if output == "-":
-        if several:
-            raise click.UsageError("there are several profiles; -o names a folder for them.")
-        return [None]
-    if several or output is None:
-        folder = Path(output or ".")
-        return [folder / f"{each.name}.profile.npz" for each in materials]
-    return [Path(output)]
+    groups = shared_walks(materials) if shares else [[k] for k in range(len(materials))]
+    return materials, [(group, settings) for group in groups]

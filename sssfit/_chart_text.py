@@ -4,10 +4,19 @@ import math
 
 import numpy as np
 
-from sssfit._chart_data import LEAST_HITS, FloatArray, Picture, material_of
+from sssfit._chart_data import Picture, material_of
+from sssfit._profile_bins import LEAST_HITS, FloatArray
 from sssfit.profile import Profile
 
-_METHODS = {"montecarlo": "Monte Carlo"}
+WEIGHTED = r"$2\pi r\,R_d$ (1/mm)"
+_METHODS = {
+    "montecarlo": "Monte Carlo",
+    "exact": "Exact solution",
+    "dipole": "Dipole",
+    "dipole-grosjean": "Dipole, Grosjean's D",
+    "multipole": "Multipole",
+    "burley": "Normalised diffusion",
+}
 _MOST_IN_LEGEND = 8
 _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -21,24 +30,34 @@ def title(profile: Profile) -> str:
 
 def legend_title(profile: Profile) -> str:
     """Say what stands beside the channels."""
-    error = " ± standard error" if (profile.diffuse_reflectance_stderr > 0).any() else ""
-    return f"Total diffuse reflectance{error}"
+    if not (profile.diffuse_reflectance_stderr > 0).any():
+        return "Total diffuse reflectance"
+    kind = "estimated" if profile.photons is None else "standard"
+    return f"Total diffuse reflectance ± {kind} error"
 
 
 def subtitle(profile: Profile) -> str:
     """Say how the profile was made, and on what grid."""
-    meta, last_mm = profile.meta, profile.r_edges_mm[-1]
-    parts = []
-    if method := meta.get("method"):
-        parts.append(_METHODS.get(str(method), shortened(str(method))))
+    meta = profile.meta
+    parts = [method_name(meta.get("method"))] if meta.get("method") else []
     if profile.photons is not None:
         parts.append(f"{count(profile.photons)} photons, seed {meta.get('seed', 'unknown')}")
-    width_mm = np.diff(profile.r_edges_mm)
-    spacing = f" of {width_mm[0]:.4g} mm" if np.allclose(width_mm, width_mm[0]) else ""
-    parts.append(f"{profile.n_annuli} annuli{spacing} to r = {last_mm:.4g} mm")
+    parts.append(grid(profile))
     if version := meta.get("version"):
         parts.append(f"sssfit {shortened(str(version))}")
     return " · ".join(parts)
+
+
+def method_name(method: object) -> str:
+    """Name a method for people."""
+    return _METHODS.get(str(method), shortened(str(method)))
+
+
+def grid(profile: Profile) -> str:
+    """Say how many annuli there are, how wide if all are, and how far they reach."""
+    width_mm = np.diff(profile.r_edges_mm)
+    spacing = f" of {width_mm[0]:.4g} mm" if np.allclose(width_mm, width_mm[0]) else ""
+    return f"{profile.n_annuli} annuli{spacing} to r = {profile.r_edges_mm[-1]:.4g} mm"
 
 
 def count(number: int) -> str:
@@ -63,9 +82,14 @@ def channel_label(profile: Profile, channel: int, *, is_drawn: bool) -> str:
 
 def in_legend(n_channels: int) -> list[int]:
     """Channels that the legend names: all, or eight spread from the first to the last."""
-    if n_channels <= _MOST_IN_LEGEND:
+    return spread(n_channels, _MOST_IN_LEGEND)
+
+
+def spread(n_channels: int, most: int) -> list[int]:
+    """All channels, or so many of them spread from the first to the last."""
+    if n_channels <= most:
         return list(range(n_channels))
-    return [int(each) for each in np.linspace(0, n_channels - 1, _MOST_IN_LEGEND).round()]
+    return [int(each) for each in np.linspace(0, n_channels - 1, most).round()]
 
 
 def with_error(value: float, stderr: float) -> str:

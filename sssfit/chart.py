@@ -2,39 +2,44 @@
 
 `profile_figure` draws a profile as the plots of "Separable Subsurface Scattering", Jimenez et al.
 2015, supplement G: 2 pi r R_d linear and logarithmic, R_d against mean free paths, and the 2D
-profile. `save_figure` writes PNG, SVG or PDF; the same figure gives the same bytes.
+profile. `models_figure` draws profile models against the exact solution. `save_figure` writes PNG,
+SVG or PDF; the same figure gives the same bytes.
 
-The only module that imports matplotlib, and never its pyplot, which takes 0.8 s to import and keeps
-global state. ``sssfit._chart_data`` merges annuli and makes the image, ``sssfit._chart_text`` words
-the captions.
+Matplotlib is imported here, in ``sssfit._chart_models`` and in ``sssfit._chart_page`` only, and
+never its pyplot, which takes 0.8 s to import and keeps global state. ``sssfit._profile_bins``
+merges annuli, ``sssfit._chart_data`` makes the image, ``sssfit._chart_text`` words the captions.
 """
 
-import contextlib
 import math
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, BinaryIO, cast
+from typing import BinaryIO
 
 import matplotlib as mpl
 import numpy as np
-import numpy.typing as npt
-from matplotlib import font_manager
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from matplotlib.ft2font import FT2Font
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogFormatterSciNotation, LogLocator, MaxNLocator, StrMethodFormatter
+from matplotlib.ticker import LogFormatterSciNotation, LogLocator
 
 from sssfit import _chart_text as words
-from sssfit._chart_data import Bins, Picture, drawn_radius_mm, mean_free_paths_mm, merged, picture
+from sssfit._chart_data import Picture, drawn_radius_mm, mean_free_paths_mm, picture
 from sssfit._chart_files import FORMATS, chart_format, is_chart_file, known_format
+from sssfit._chart_models import models_figure
+from sssfit._chart_page import (
+    TEXT_INCHES,
+    chart_style,
+    draw_footnotes,
+    draw_text,
+    drawable,
+    inches,
+    name_axes,
+    new_figure,
+    tick,
+)
 from sssfit._chart_style import (
     COLOURS,
     DPI,
-    FONT,
     HEIGHT_INCHES,
     LEFT,
     LINE_STYLES,
@@ -45,19 +50,23 @@ from sssfit._chart_style import (
     WIDTH_INCHES,
     Style,
 )
+from sssfit._profile_bins import Bins, FloatArray, merged
 from sssfit.files import write_atomically
 from sssfit.profile import Profile
 
-__all__ = ["FORMATS", "chart_format", "is_chart_file", "profile_figure", "save_figure"]
+__all__ = [
+    "FORMATS",
+    "chart_format",
+    "is_chart_file",
+    "models_figure",
+    "profile_figure",
+    "save_figure",
+]
 
-FloatArray = npt.NDArray[np.float64]
-
-_WEIGHTED = r"$2\pi r\,R_d$ (1/mm)"
 _UNWEIGHTED = r"$R_d$ (1/mm²)"
 _DECADES = 10  # most of a log axis: a profile without noise would go on to underflow
 _GREY_DECADES = 6
 _LINEAR_SHARE = 0.995
-_TEXT_INCHES = (RIGHT - LEFT) * WIDTH_INCHES
 
 
 def profile_figure(profile: Profile) -> Figure:
@@ -77,11 +86,11 @@ def profile_figure(profile: Profile) -> Figure:
     """
     bins = [merged(profile, channel) for channel in range(profile.n_channels)]
     shown = picture(profile, bins)
-    with _style():
-        figure = Figure(figsize=(WIDTH_INCHES, HEIGHT_INCHES), dpi=DPI)
-        FigureCanvasAgg(figure)
+    with chart_style():
+        figure = new_figure()
         top = _draw_head(figure, profile, bins)
-        bottom = _draw_footnotes(figure, profile, words.image_note(profile, shown))
+        notes = words.footnotes(profile, words.image_note(profile, shown))
+        bottom = draw_footnotes(figure, notes)
         panels = figure.subplots(2, 2)
         height = 0.5 * ((top - bottom) * HEIGHT_INCHES - ROW_GAP_INCHES)
         rows_apart = ROW_GAP_INCHES / height
@@ -125,33 +134,24 @@ def _print(figure: Figure, stream: BinaryIO, chosen: str) -> None:
         "svg": {"metadata": {"Date": None}},
         "pdf": {"metadata": {"CreationDate": None}},
     }
-    with _style():
+    with chart_style():
         figure.savefig(stream, format=chosen, dpi=DPI, **settings[chosen])
-
-
-@contextlib.contextmanager
-def _style() -> Iterator[None]:
-    """Matplotlib's defaults and ours on top, whatever the user's matplotlibrc says."""
-    kept = {"backend", "backend_fallback", "interactive", "toolbar", "timezone"}
-    defaults = {key: value for key, value in mpl.rcParamsDefault.items() if key not in kept}
-    with mpl.rc_context(cast(Any, defaults | RC)):
-        yield
 
 
 def _draw_head(figure: Figure, profile: Profile, bins: list[Bins]) -> float:
     """Title, provenance and legend; the height of what is left, as a fraction."""
-    _text(figure, 0.16, words.title(profile), size=12, weight="bold")
-    _text(figure, 0.41, words.subtitle(profile))
-    _text(figure, 0.64, words.legend_title(profile), color="#444444", size=8)
+    draw_text(figure, 0.16, words.title(profile), size=12, weight="bold")
+    draw_text(figure, 0.41, words.subtitle(profile))
+    draw_text(figure, 0.64, words.legend_title(profile), color="#444444", size=8)
     shown = words.in_legend(profile.n_channels)
     handles = [Line2D([], [], **_line_style(k, profile.n_channels)) for k in shown]
     labels = [
-        _drawable(words.channel_label(profile, k, is_drawn=bool(bins[k].is_drawn.any())))
+        drawable(words.channel_label(profile, k, is_drawn=bool(bins[k].is_drawn.any())))
         for k in shown
     ]
     # 0.6 inches for the line and the gap between columns.
-    widest = 0.6 + max(_inches(label, RC["font.size"]) for label in labels)
-    columns = min(max(int(_TEXT_INCHES / widest), 1), 4, len(labels))
+    widest = 0.6 + max(inches(label, RC["font.size"]) for label in labels)
+    columns = min(max(int(TEXT_INCHES / widest), 1), 4, len(labels))
     legend = figure.legend(
         handles,
         labels,
@@ -167,51 +167,6 @@ def _draw_head(figure: Figure, profile: Profile, bins: list[Bins]) -> float:
         text.set_parse_math(False)
     rows = math.ceil(len(labels) / columns)
     return 1 - (0.98 + 0.18 * rows) / HEIGHT_INCHES
-
-
-def _draw_footnotes(figure: Figure, profile: Profile, image: str) -> float:
-    """Caption at the foot; the height where the panels may begin, as a fraction."""
-    size = 7.5
-    lines = [line for note in words.footnotes(profile, image) for line in _wrapped(note, size)]
-    for k, line in enumerate(reversed(lines)):
-        _text(figure, HEIGHT_INCHES - 0.12 - 0.145 * k, line, size=size, color="#444444")
-    return (0.6 + 0.145 * len(lines)) / HEIGHT_INCHES
-
-
-def _wrapped(text: str, size: float) -> list[str]:
-    """Break a text into lines of the figure's width."""
-    lines = [""]
-    for word in text.split():
-        longer = f"{lines[-1]} {word}".lstrip()
-        if _inches(longer, size) <= _TEXT_INCHES:
-            lines[-1] = longer
-        else:
-            lines.append(word)
-    return lines
-
-
-def _inches(text: str, size: float) -> float:
-    """Width of a line of text at a font size in points."""
-    font = _font()
-    font.set_size(size, 720)  # at 72 dpi hinting widens a line by 3 %
-    font.set_text(_drawable(text))
-    return float(font.get_width_height()[0] / 64 / 720)  # 26.6 fixed-point pixels
-
-
-def _font() -> FT2Font:
-    return font_manager.get_font(font_manager.findfont(FONT))
-
-
-def _text(figure: Figure, inches_down: float, text: str, **style: Any) -> None:
-    """Put a line at the left margin."""
-    y = 1 - inches_down / HEIGHT_INCHES
-    figure.text(LEFT, y, _drawable(text), va="center", parse_math=False, **style)
-
-
-def _drawable(text: str) -> str:
-    """Replace what the font has no glyph for."""
-    font = _font()
-    return "".join(c if font.get_char_index(ord(c)) else "?" for c in text)
 
 
 def _line_style(channel: int, n_channels: int) -> Style:
@@ -233,10 +188,10 @@ def _draw_linear(axes: Axes, profile: Profile, bins: list[Bins]) -> None:
     ]
     axes.set_xlim(0, drawn_radius_mm(profile, _LINEAR_SHARE, range(len(bins))))
     axes.set_ylim(0, 1.05 * max(tops) or 1)
-    _tick(axes.xaxis)
-    _tick(axes.yaxis)
+    tick(axes.xaxis)
+    tick(axes.yaxis)
     reach = f"r to {100 * _LINEAR_SHARE:g} % of the energy on the grid"
-    _name(axes, f"(a) linear, {reach}", "r (mm)", _WEIGHTED)
+    name_axes(axes, f"(a) linear, {reach}", "r (mm)", words.WEIGHTED)
 
 
 def _draw_logarithmic(axes: Axes, profile: Profile, bins: list[Bins]) -> None:
@@ -244,7 +199,7 @@ def _draw_logarithmic(axes: Axes, profile: Profile, bins: list[Bins]) -> None:
     _draw_curves(axes, [each.edges_mm for each in bins], [each.per_mm() for each in bins])
     axes.set_xlim(0, profile.r_edges_mm[-1])
     _limit_decades(axes, [each.per_mm()[0] for each in bins])
-    _name(axes, "(b) logarithmic, the whole grid", "r (mm)", _WEIGHTED)
+    name_axes(axes, "(b) logarithmic, the whole grid", "r (mm)", words.WEIGHTED)
 
 
 def _draw_unweighted(axes: Axes, profile: Profile, bins: list[Bins]) -> None:
@@ -261,10 +216,10 @@ def _draw_unweighted(axes: Axes, profile: Profile, bins: list[Bins]) -> None:
     ]
     axes.set_xlim(0, max(ends) or 1)
     if paths_mm is None:
-        _name(axes, "(c) unweighted", "r (mm; no one mean free path)", _UNWEIGHTED)
+        name_axes(axes, "(c) unweighted", "r (mm; no one mean free path)", _UNWEIGHTED)
     else:
         label = words.path_label(profile, paths_mm)
-        _name(axes, "(c) unweighted, in mean free paths", label, _UNWEIGHTED)
+        name_axes(axes, "(c) unweighted, in mean free paths", label, _UNWEIGHTED)
 
 
 def _draw_curves(
@@ -304,7 +259,7 @@ def _limit_decades(axes: Axes, values: list[FloatArray]) -> float:
     # Within 1.3 decades 2 and 5 are named as well: there may be one power of ten, or none.
     axes.yaxis.set_minor_locator(LogLocator(subs=(2, 5)))
     axes.yaxis.set_minor_formatter(LogFormatterSciNotation(minor_thresholds=(1.3, 1.3)))
-    _tick(axes.xaxis)
+    tick(axes.xaxis)
     return float(bottom)
 
 
@@ -326,23 +281,12 @@ def _draw_image(figure: Figure, axes: Axes, profile: Profile, shown: Picture) ->
     aspect = box.width * WIDTH_INCHES / (box.height * HEIGHT_INCHES)
     axes.set_xlim(-aspect * shown.half_height_mm, aspect * shown.half_height_mm)
     axes.grid(visible=False)
-    _tick(axes.xaxis)
-    _tick(axes.yaxis)
-    _name(axes, title, "x (mm)", "y (mm)")
+    tick(axes.xaxis)
+    tick(axes.yaxis)
+    name_axes(axes, title, "x (mm)", "y (mm)")
 
 
 def _placed(shown: Picture) -> Style:
     width, height = shown.half_width_mm, shown.half_height_mm
     extent = (-width, width, -height, height)
     return {"extent": extent, "interpolation": "bilinear", "aspect": "auto"}
-
-
-def _tick(axis: Axis) -> None:
-    axis.set_major_locator(MaxNLocator(7, steps=[1, 2, 2.5, 5, 10]))
-    axis.set_major_formatter(StrMethodFormatter("{x:g}"))
-
-
-def _name(axes: Axes, title: str, x_label: str, y_label: str) -> None:
-    axes.set_title(_drawable(title), loc="left", parse_math=False)
-    axes.set_xlabel(_drawable(x_label), parse_math=False)
-    axes.set_ylabel(y_label)

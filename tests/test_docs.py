@@ -47,6 +47,11 @@ def test_materials_in_the_readme_load():
     assert len(parse_material(example, "README.md").layers) == 2
 
 
+def commands_of(start: str) -> list[list[str]]:
+    """The README's commands that begin so, as words."""
+    return [block.split() for block in code_blocks() if block.startswith(start)]
+
+
 def table_of(text: str) -> list[list[str]]:
     """Channel, diffuse reflectance and standard error of each line about a channel."""
     return [line.split()[:3] for line in text.splitlines() if line.startswith(("R ", "G ", "B "))]
@@ -54,8 +59,8 @@ def table_of(text: str) -> list[list[str]]:
 
 def test_readme_python_does_what_its_command_line_does(tmp_path, monkeypatch, capsys):
     (example,) = code_blocks("python")
-    (command,) = [block.split() for block in code_blocks() if block.startswith("sssfit simulate")]
-    python_prints, command_prints = code_blocks("text")
+    command, _ = commands_of("sssfit simulate")
+    python_prints, command_prints, *_ = code_blocks("text")
     from_python, from_command_line = tmp_path / "python", tmp_path / "command-line"
     from_python.mkdir()
     from_command_line.mkdir()
@@ -82,6 +87,27 @@ def test_readme_python_does_what_its_command_line_does(tmp_path, monkeypatch, ca
         for name in ours:
             np.testing.assert_array_equal(ours[name], theirs[name], err_msg=name)
             assert f"| `{name}` |" in README, f"{name} is not in the README's table"
+
+
+@pytest.mark.parametrize(
+    ("verb", "place"), [("sssfit simulate skin1 --method exact", 2), ("sssfit materials --from", 3)]
+)
+def test_readme_commands_print_what_it_says(tmp_path, verb, place):
+    (command,) = commands_of(verb)
+    printed = subprocess.run(
+        [sys.executable, "-m", "sssfit.cli", *command[1:]],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        encoding="utf-8",
+        check=True,
+        timeout=300,
+    ).stdout
+    assert figures_of(printed) == figures_of(code_blocks("text")[place])
+
+
+def figures_of(text: str) -> str:
+    """A verb's output without what differs from run to run: seconds, and what is but rounding."""
+    return re.sub(r"\d+\.\d s;|[+-]?\d\.\de-\d\d|\de-\d\d|worst channel, \w+ \w", "", text)
 
 
 def test_readme_links_lead_somewhere():

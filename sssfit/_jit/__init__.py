@@ -64,9 +64,9 @@ def _writable_cache_folder() -> str:
 _CACHE_FOLDER = _writable_cache_folder()
 
 
-def compiled_before(walk: str) -> bool:
-    """Whether machine code of the walk of that file lies in the cache, made from these sources."""
-    pattern = f"{walk}.trace_batch-*.nbc"
+def compiled_before(file: str, function: str = "trace_batch") -> bool:
+    """Whether machine code of that file's function lies in the cache, made from these sources."""
+    pattern = f"{file}.{function}-*.nbc"
     return bool(_CACHE_FOLDER) and any(Path(_CACHE_FOLDER).rglob(pattern))
 
 

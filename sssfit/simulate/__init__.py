@@ -5,6 +5,7 @@ from sssfit.simulate._finished import is_complete, is_finished
 from sssfit.simulate._run import Progress
 from sssfit.simulate.burley import simulate_burley
 from sssfit.simulate.dipole import simulate_dipole, simulate_dipole_grosjean
+from sssfit.simulate.exact import is_solver_compiled, simulate_exact, simulate_exact_many
 from sssfit.simulate.montecarlo import (
     is_compiled,
     shared_walks,
@@ -20,10 +21,13 @@ __all__ = [
     "is_compiled",
     "is_complete",
     "is_finished",
+    "is_solver_compiled",
     "shared_walks",
     "simulate_burley",
     "simulate_dipole",
     "simulate_dipole_grosjean",
+    "simulate_exact",
+    "simulate_exact_many",
     "simulate_montecarlo",
     "simulate_montecarlo_many",
     "simulate_multipole",

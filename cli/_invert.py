@@ -1,0 +1,158 @@
+"""``sssfit materials --from-reflectance``: an albedo inversion, written as a material."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ._compiling import say_if_compiling
+from ._options import Common
+from ._report import binary_stdout, finish, table
+
+if TYPE_CHECKING:
+    from sssfit.material import Material
+    from sssfit.simulate.inversion import FloatArray, Inversion
+
+# Heads the files we make: only a file that begins with it is replaced without --force.
+_OURS = "# Made by `sssfit materials --from-reflectance`, which may replace this file;"
+_PUBLISHED = {"chiang2016": "Chiang et al. 2016", "van_de_hulst": "van de Hulst"}
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What the options ask for; None where they do not say."""
+
+    from_reflectance: list[float]
+    mean_free_path: list[float] | None
+    eta: float | None
+    name: str | None
+    channels: str | None
+    output: str | None
+    force: bool
+
+
+def write_material(wish: Wish, common: Common) -> None:
+    """Invert, write the TOML, and print what was found beside the published approximations."""
+    if wish.mean_free_path is None or wish.eta is None:
+        raise click.UsageError("--from-reflectance needs --mean-free-path and --eta.")
+    channels = _channels(wish)
+    name = wish.name or _name_of(wish.output)
+    path = None if wish.output == "-" else Path(wish.output or f"{name}.toml")
+
+    from sssfit.simulate.exact import diffuse_reflectance
+    from sssfit.simulate.inversion import material_from_reflectance, published_inversions
+
+    say_if_compiling(common, solver=True)
+    material = material_from_reflectance(
+        wish.from_reflectance, wish.mean_free_path, wish.eta, name=name, channels=channels
+    )
+    _write(material, path, force=wish.force)
+    published = published_inversions(wish.from_reflectance, wish.eta)
+    reached = diffuse_reflectance(material.layers[0].albedo, wish.eta)
+    figures = {"command": "materials", "output": [str(path or "-")]}
+    figures |= _figures(material, wish, reached, published)
+    text = f"{_text(figures)}\nWrote {path or 'the material to stdout'}"
+    finish(common, figures, text, to_stderr=path is None)
+
+
+def _channels(wish: Wish) -> list[str]:
+    """Names of the channels: R, G, B for three."""
+    count = len(wish.from_reflectance)
+    if wish.channels is not None:
+        names = [each.strip() for each in wish.channels.split(",")]
+        if len(names) != count:
+            raise click.UsageError(f"--channels has {len(names)} names for {count} reflectances.")
+        return names
+    if count != 3:
+        raise click.UsageError(
+            f"--from-reflectance has {count} values; name their channels with --channels."
+        )
+    return ["R", "G", "B"]
+
+
+def _name_of(output: str | None) -> str:
+    """Name the material after its file."""
+    return "from-reflectance" if output in (None, "-") else Path(str(output)).stem
+
+
+def _write(material: Material, path: Path | None, *, force: bool) -> None:
+    """To the file, whole or not at all; to stdout where there is none."""
+    from sssfit.files import check_output, locked, write_atomically
+
+    content = f"{_OURS} delete this line to keep it.\n{material.to_toml()}".encode()
+    if path is None:
+        binary_stdout().write(content)
+        binary_stdout().flush()
+        return
+    check_output(path, _is_ours, force=force)
+    with locked(path):
+        write_atomically(path, lambda stream: stream.write(content))
+
+
+def _is_ours(path: Path) -> bool:
+    """Whether a file begins with the line that says who made it."""
+    try:
+        with path.open("rb") as stream:
+            return stream.read(len(_OURS)) == _OURS.encode()
+    except OSError:
+        return False
+
+
+def _figures(
+    material: Material, wish: Wish, reached: FloatArray, published: dict[str, Inversion]
+) -> dict[str, Any]:
+    """Everything that is printed, as ``--json`` has it."""
+    layer = material.layers[0]
+    return {
+        "name": material.name,
+        "channels": material.channels,
+        "eta": layer.eta,
+        "mean_free_path_mm": layer.mean_free_path_mm,
+        "reflectance_asked": wish.from_reflectance,
+        "reflectance": reached,
+        "largest_reflectance": 1.0 - material.specular_reflectance,
+        "albedo": layer.albedo,
+        "sigma_a_per_mm": layer.sigma_a_per_mm,
+        "sigma_s_per_mm": layer.sigma_s_per_mm,
+        "approximations": {
+            key: {"albedo": each.albedo, "reflectance": each.reflectance}
+            for key, each in published.items()
+        },
+    }
+
+
+def _text(figures: dict[str, Any]) -> str:
+    """Say for people what was made, and what the approximations would have made."""
+    heads = ["channel", "diffuse reflectance", "albedo", "sigma_a, 1/mm", "sigma_s, 1/mm"]
+    keys = ("reflectance", "albedo", "sigma_a_per_mm", "sigma_s_per_mm")
+    rows = [
+        [name, *(f"{figures[key][c]:.6f}" for key in keys[:2])]
+        + [f"{figures[key][c]:.6g}" for key in keys[2:]]
+        for c, name in enumerate(figures["channels"])
+    ]
+    published = figures["approximations"]
+    more_heads = ["channel", *(f"{head}, gives" for head in _PUBLISHED.values())]
+    more_rows = [
+        [name, *(_given(published[key], figures["reflectance_asked"], c) for key in _PUBLISHED)]
+        for c, name in enumerate(figures["channels"])
+    ]
+    return "\n".join(
+        [
+            f"{figures['name']}: eta {figures['eta']:g}, could reflect up to "
+            f"{math.floor(1e6 * figures['largest_reflectance']) / 1e6:g}",
+            table(heads, rows),
+            "approximate albedos, the diffuse reflectance they really have, and its error:",
+            table(more_heads, more_rows),
+        ]
+    )
+
+
+def _given(published: dict[str, Any], asked: list[float], channel: int) -> str:
+    """Albedo, reflectance and its relative error."""
+    gives = published["reflectance"][channel]
+    error = f" ({100.0 * (gives / asked[channel] - 1.0):+#.3g} %)" if asked[channel] else ""
+    return f"{published['albedo'][channel]:.6f}, {gives:.6f}{error}"

@@ -1,0 +1,229 @@
+"""Profile models against the exact solution: where each goes wrong, and by how much.
+
+Every method is computed on one grid. Densities are compared over bins: annuli merged until the
+photon walk has 100 hits in each, so that the walk says something about every bin and vouches for
+the exact solution there. Totals, F(r) and the L2 error use the annuli as they are.
+``sssfit.chart`` draws the record.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit._profile_bins import merged
+from sssfit.errors import SimulationError
+from sssfit.material import Material
+from sssfit.profile import Profile
+from sssfit.simulate import (
+    Progress,
+    simulate_burley,
+    simulate_dipole,
+    simulate_dipole_grosjean,
+    simulate_exact,
+    simulate_montecarlo,
+)
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModelCurve:
+    """One method's profile and its distance from the exact one, for C channels.
+
+    Parameters
+    ----------
+    profile : Profile
+    energy, energy_stderr : tuple of C arrays (m_c,) [1]
+        Energy in each bin, and its standard error: the walk's noise, the exact solver's estimate,
+        NaN where there is none.
+    relative_error, relative_error_stderr : tuple of C arrays (m_c,) [1]
+        Energy over the exact one's - 1, and that of the standard error; NaN where the exact one
+        is 0. 0 for the exact profile itself.
+    total_error : (C,) [1]
+        Total diffuse reflectance over the exact one - 1.
+    cumulative_error : (C,) [1]
+        Largest |F(r) - F_exact(r)| at an annulus edge, as a share of the exact total.
+    l2_error : (C,) [1]
+        sqrt(int r (R_d - exact)^2 dr / int r exact^2 dr) over annuli; it depends on their width,
+        since R_d ~ 1/r.
+    """
+
+    profile: Profile
+    energy: tuple[FloatArray, ...]
+    energy_stderr: tuple[FloatArray, ...]
+    relative_error: tuple[FloatArray, ...]
+    relative_error_stderr: tuple[FloatArray, ...]
+    total_error: FloatArray
+    cumulative_error: FloatArray
+    l2_error: FloatArray
+
+    @property
+    def method(self) -> str:
+        """Name of the method."""
+        return str(self.profile.meta["method"])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ModelComparison:
+    """A material by every method: the curves, exact first and the walk second, and their bins.
+
+    Parameters
+    ----------
+    material : Material
+    edges_mm : tuple of C arrays (m_c + 1,) [mm]
+        Edges of each channel's bins; they end where the walk has too few photons.
+    curves : tuple of ModelCurve
+    """
+
+    material: Material
+    edges_mm: tuple[FloatArray, ...]
+    curves: tuple[ModelCurve, ...]
+
+    @property
+    def exact(self) -> ModelCurve:
+        """The exact solution."""
+        return self.curves[0]
+
+    @property
+    def walk(self) -> ModelCurve:
+        """The photon walk."""
+        return self.curves[1]
+
+
+def compare_models(
+    material: Material,
+    *,
+    walk: Profile | None = None,
+    photons: int | None = None,
+    seed: int = 1,
+    threads: int | None = None,
+    dr_mm: float | None = None,
+    radius_mm: float | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> ModelComparison:
+    """Compute a half space by the exact solver, the photon walk and the diffusion models.
+
+    Normalised diffusion has the total as a parameter, the reflectance that an artist wants; it is
+    given the exact one, so that what is left is the error of its shape.
+
+    Parameters
+    ----------
+    material : Material
+        A homogeneous half space; with g other than 0 the exact solver warns that it is reduced.
+    walk : Profile, optional
+        The material's photon walk, if there is one already; its grid then serves all.
+    photons, seed, threads, progress
+        Of the walk otherwise; see `simulate_montecarlo`.
+    dr_mm, radius_mm : float, optional
+        The grid [mm]; by default the paper's.
+
+    Returns
+    -------
+    ModelComparison
+
+    Raises
+    ------
+    SimulationError
+        Layers or a bottom; settings out of range; or a ``walk`` on a grid that is not uniform.
+
+    Examples
+    --------
+    >>> from sssfit.material import load_material
+    >>> found = compare_models(load_material("skin1"), photons=100_000)
+    >>> [each.method for each in found.curves]
+    ['exact', 'montecarlo', 'dipole', 'dipole-grosjean', 'burley']
+    """
+    if walk is not None:
+        dr_mm, radius_mm = _grid_of(walk)
+    exact = simulate_exact(material, dr_mm=dr_mm, radius_mm=radius_mm, threads=threads)
+    if walk is None:
+        walk = simulate_montecarlo(
+            material,
+            photons=photons,
+            seed=seed,
+            threads=threads,
+            dr_mm=dr_mm,
+            radius_mm=radius_mm,
+            progress=progress,
+        )
+    profiles = [exact, walk, *_diffusion(material, exact, dr_mm, radius_mm)]
+    cuts = [_cuts(walk, channel) for channel in range(material.n_channels)]
+    return ModelComparison(
+        material=material,
+        edges_mm=tuple(walk.r_edges_mm[each] for each in cuts),
+        curves=tuple(_curve(each, exact, cuts) for each in profiles),
+    )
+
+
+def _diffusion(
+    material: Material, exact: Profile, dr_mm: float | None, radius_mm: float | None
+) -> list[Profile]:
+    """Return the models' profiles; normalised diffusion is told the true total, as by an artist."""
+    total = exact.diffuse_reflectance
+    return [
+        simulate_dipole(material, dr_mm=dr_mm, radius_mm=radius_mm),
+        simulate_dipole_grosjean(material, dr_mm=dr_mm, radius_mm=radius_mm),
+        simulate_burley(material, reflectance=total, dr_mm=dr_mm, radius_mm=radius_mm),
+    ]
+
+
+def _grid_of(walk: Profile) -> tuple[float, float]:
+    """Width and radius [mm] of a profile's annuli."""
+    width_mm = np.diff(walk.r_edges_mm)
+    if walk.photons is None or not np.allclose(width_mm, width_mm[0], rtol=1e-6):
+        raise SimulationError(
+            "models are compared on a photon walk's grid, and this profile has no photons or "
+            "annuli of varying width; walk the material anew."
+        )
+    return float(walk.r_edges_mm[1]), float(walk.r_edges_mm[-1])
+
+
+def _cuts(walk: Profile, channel: int) -> npt.NDArray[np.intp]:
+    """Return which annulus edges bound the bins in which the walk has enough photons."""
+    bins = merged(walk, channel)
+    edges_mm = bins.edges_mm[: int(bins.is_drawn.sum()) + 1]
+    cuts: npt.NDArray[np.intp] = np.searchsorted(walk.r_edges_mm, edges_mm)
+    return cuts
+
+
+def _curve(profile: Profile, exact: Profile, cuts: list[npt.NDArray[np.intp]]) -> ModelCurve:
+    """Hold one profile against the exact one."""
+    energy = [np.diff(profile.cumulative[cut, c]) for c, cut in enumerate(cuts)]
+    truth = [np.diff(exact.cumulative[cut, c]) for c, cut in enumerate(cuts)]
+    stderr = [_stderr_of_bins(profile, c, cut) for c, cut in enumerate(cuts)]
+    pairs = list(zip(energy, truth, strict=True))
+    total, apart = exact.diffuse_reflectance, np.abs(profile.cumulative - exact.cumulative)
+    return ModelCurve(
+        profile=profile,
+        energy=tuple(energy),
+        energy_stderr=tuple(stderr),
+        relative_error=tuple(_share(ours - theirs, theirs) for ours, theirs in pairs),
+        relative_error_stderr=tuple(map(_share, stderr, truth)),
+        total_error=_share(profile.diffuse_reflectance - total, total),
+        cumulative_error=_share(apart.max(axis=0), total),
+        l2_error=_l2_error(profile, exact),
+    )
+
+
+def _stderr_of_bins(profile: Profile, channel: int, cuts: npt.NDArray[np.intp]) -> FloatArray:
+    """Return the standard error of each bin (m,): a walk's as merged, others' squares added."""
+    if profile.photons is not None:
+        return merged(profile, channel).stderr[: cuts.size - 1]
+    annuli = profile.annulus_energy_stderr[:, channel]
+    summed: FloatArray = np.sqrt(np.diff(np.append(0.0, np.cumsum(annuli**2))[cuts]))
+    return summed
+
+
+def _share(value: FloatArray, whole: FloatArray) -> FloatArray:
+    """Value over whole; NaN where the whole is 0."""
+    return np.divide(value, whole, out=np.full_like(value, np.nan), where=whole > 0.0)
+
+
+def _l2_error(profile: Profile, exact: Profile) -> FloatArray:
+    """Relative L2 error of R_d (C,); the weights r dr of an annulus are its area / 2 pi."""
+    area_mm2 = np.pi * np.diff(exact.r_edges_mm**2)[:, None]
+    apart = profile.reflectance_per_mm2 - exact.reflectance_per_mm2
+    of_exact = (area_mm2 * exact.reflectance_per_mm2**2).sum(axis=0)
+    return np.sqrt(_share((area_mm2 * apart**2).sum(axis=0), of_exact))

@@ -1,0 +1,191 @@
+"""Albedo inversion: from the diffuse reflectance that an artist asks for to a material that has it.
+
+The total diffuse reflectance R of a homogeneous half space depends on its albedo a and refractive
+index alone. The exact solver gives R(a) to 1e-8, and a root finder turns it round. In
+s = sqrt(1 - a), R is smooth and nearly straight all the way to s = 0, where in a its slope is
+infinite. The approximations that renderers use stand beside it: they are formulas, and forget the
+index or were fitted to walks of one setting. Next: ``sssfit.simulate.exact``.
+
+Not imported with the other methods: scipy.optimize takes 0.2 s to load.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize.elementwise import find_root
+
+from sssfit import __version__
+from sssfit._material_checks import number
+from sssfit.errors import MaterialError, SimulationError
+from sssfit.material import Layer, Material
+from sssfit.simulate.exact import diffuse_reflectance
+
+FloatArray = npt.NDArray[np.float64]
+
+_CLOSE = 1e-8  # in reflectance; what the exact solver itself is good for
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Inversion:
+    """Albedos (C,) that a method finds for diffuse reflectances, and what these really reflect.
+
+    ``reflectance`` (C,) is that of the exact solver; for the exact inversion it is what was asked.
+    """
+
+    albedo: FloatArray
+    reflectance: FloatArray
+
+
+def largest_reflectance(eta: float) -> float:
+    """Return 1 - ((eta - 1) / (eta + 1))^2: all that enters comes back where nothing absorbs."""
+    return 1.0 - ((eta - 1.0) / (eta + 1.0)) ** 2
+
+
+def invert_reflectance(reflectance: npt.ArrayLike, eta: float) -> Inversion:
+    """Find the albedos of total diffuse reflectances, g = 0, by the exact solver.
+
+    Solves R(1 - s^2) = reflectance for s in [0, 1], all channels at once, to 1e-8 in R.
+
+    Parameters
+    ----------
+    reflectance : (C,) [1]
+        Share of the incident light, specular reflectance not included; 0 to 1 - specular.
+    eta : float
+        Refractive index relative to what is above.
+
+    Returns
+    -------
+    Inversion
+
+    Raises
+    ------
+    MaterialError
+        A reflectance that no albedo gives; the message names the largest that one does.
+
+    Examples
+    --------
+    >>> invert_reflectance([0.44], 1.3).albedo.round(4)
+    array([0.9601])
+    """
+    asked = _reachable(reflectance, eta)
+    darkest, brightest = diffuse_reflectance(np.array([0.0, 1.0]), eta)
+    # The solver's last digits may put its own ends a hair inside; the root is then that end.
+    aim = np.clip(asked, darkest, brightest)
+
+    def excess(s: FloatArray, /, wanted: FloatArray) -> FloatArray:
+        return diffuse_reflectance(1.0 - s**2, eta) - wanted
+
+    ends = np.zeros_like(aim), np.ones_like(aim)
+    found = find_root(excess, ends, args=(aim,), tolerances={"fatol": _CLOSE})
+    if not np.all(found.success):
+        raise SimulationError(f"no albedo found for reflectances {asked.tolist()} at eta = {eta}.")
+    albedo = 1.0 - np.asarray(found.x) ** 2
+    return Inversion(albedo, diffuse_reflectance(albedo, eta))
+
+
+def published_inversions(reflectance: npt.ArrayLike, eta: float) -> dict[str, Inversion]:
+    """Return what the approximate inversions of renderers give, and what that really reflects.
+
+    Parameters and errors are those of `invert_reflectance`; keys are "chiang2016" and
+    "van_de_hulst".
+    """
+    asked = _reachable(reflectance, eta)
+    found = {
+        "chiang2016": chiang_albedo(asked),
+        "van_de_hulst": van_de_hulst_albedo(asked / largest_reflectance(eta)),
+    }
+    return {key: Inversion(each, diffuse_reflectance(each, eta)) for key, each in found.items()}
+
+
+def chiang_albedo(reflectance: FloatArray) -> FloatArray:
+    """Albedo for a surface reflectance A (C,), a fit to simulations that knows no index.
+
+    a = 1 - exp(-5.09406 A + 2.61188 A^2 - 4.31805 A^3): Chiang, Kutz and Burley 2016, "Practical
+    and controllable subsurface scattering for production path tracing", SIGGRAPH talks.
+    """
+    a = reflectance
+    albedo: FloatArray = -np.expm1(a * (-5.09406 + a * (2.61188 - a * 4.31805)))
+    return albedo
+
+
+def van_de_hulst_albedo(colour: FloatArray, g: float = 0.0) -> FloatArray:
+    """Albedo for a multiple-scattering albedo C (C,), index-matched.
+
+    s = 4.09712 + 4.20863 C - sqrt(9.59217 + 41.6808 C + 17.7126 C^2), a = (1 - s^2) / (1 - g s^2):
+    van de Hulst's C = (1 - s)(1 - 0.139 s) / (1 + 1.17 s) turned round by Kulla and Conty 2017, as
+    in the OpenPBR specification 1.1, where C is the share of the light that *enters*.
+    """
+    root = np.sqrt(9.59217 + colour * (41.6808 + colour * 17.7126))
+    # Rounded coefficients: s is 0.999997 at C = 0 and -5e-6 at C = 1.
+    s_squared = np.clip(4.09712 + 4.20863 * colour - root, 0.0, 1.0) ** 2
+    albedo: FloatArray = (1.0 - s_squared) / (1.0 - g * s_squared)
+    return albedo
+
+
+def material_from_reflectance(
+    reflectance: npt.ArrayLike,
+    mean_free_path_mm: npt.ArrayLike,
+    eta: float,
+    *,
+    name: str,
+    channels: Sequence[str],
+) -> Material:
+    """Make the half space, g = 0, whose total diffuse reflectance is what was asked for.
+
+    Parameters
+    ----------
+    reflectance : (C,) [1]
+        As in `invert_reflectance`.
+    mean_free_path_mm : (C,) or float [mm]
+        1 / (sigma_a + sigma_s); one serves all channels.
+    eta : float
+    name : str
+    channels : sequence of str
+        C names.
+
+    Returns
+    -------
+    Material
+        Its ``source`` says which reflectance was asked for.
+
+    Raises
+    ------
+    MaterialError
+        As `invert_reflectance`, or lists that differ in length, or a value that no material has.
+    """
+    asked = _reachable(reflectance, eta)
+    paths_mm = np.atleast_1d(np.asarray(mean_free_path_mm, dtype=np.float64))
+    if paths_mm.size not in (1, asked.size) or paths_mm.ndim > 1:
+        raise MaterialError(
+            f"{paths_mm.size} mean free paths for {asked.size} reflectances; give as many, or one "
+            "for all."
+        )
+    if not (np.isfinite(paths_mm) & (paths_mm > 0.0)).all():
+        raise MaterialError(
+            f"mean free paths {paths_mm.tolist()}; expected lengths above 0, in mm."
+        )
+    albedo = invert_reflectance(asked, eta).albedo
+    words = ", ".join(f"{each:g}" for each in asked)
+    return Material(
+        name,
+        tuple(channels),
+        (Layer(eta, np.zeros_like(albedo), (1.0 - albedo) / paths_mm, albedo / paths_mm),),
+        source=f"diffuse reflectance {words} by exact albedo inversion, sssfit {__version__}",
+    )
+
+
+def _reachable(reflectance: npt.ArrayLike, eta: float) -> FloatArray:
+    """Return the reflectances as an array (C,); refuse those that no albedo gives."""
+    asked = np.atleast_1d(np.asarray(reflectance, dtype=np.float64))
+    if asked.ndim > 1 or asked.size == 0:
+        raise MaterialError(f"reflectance has shape {asked.shape}; expected one number a channel.")
+    most = largest_reflectance(number("eta", eta))
+    for k in np.flatnonzero(~((asked >= 0.0) & (asked <= most))):
+        raise MaterialError(
+            f"reflectance[{k}] = {asked[k]:g} cannot be reached; at eta = {eta:g} the largest is "
+            f"{math.floor(1e6 * most) / 1e6:g}, where nothing is absorbed, and the smallest 0."
+        )
+    return asked

@@ -1,0 +1,49 @@
+"""What every figure is held to: nothing cut off, no text on another."""
+
+import itertools
+import warnings
+
+from matplotlib.text import Text
+
+
+def assert_legible(draw):
+    """Draw without a warning; every text lies inside the page and clear of the others."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figure = draw()
+        texts = drawn_texts(figure)
+    width, height = figure.bbox.size
+    for text, box in texts:
+        inside = box.x0 >= 0 and box.y0 >= 0 and box.x1 <= width and box.y1 <= height
+        assert inside, (text, box)
+    for (text, box), (other, other_box) in itertools.combinations(texts, 2):
+        assert not box.padded(-1).overlaps(other_box.padded(-1)), (text, other)
+
+
+def drawn_texts(figure):
+    """Every text that is drawn, with its extent in pixels."""
+    figure.draw_without_rendering()
+    renderer = figure.canvas.get_renderer()
+    hidden = set()
+    for axes, name in itertools.product(figure.findobj(match=is_axes), ("x", "y")):
+        axis = getattr(axes, f"{name}axis")
+        low, high = sorted(axis.get_view_interval())
+        ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
+        shown = [low <= each.get_loc() <= high for each in ticks]
+        pairs = zip(ticks, shown, strict=True)
+        hidden |= {label for tick, seen in pairs for label in labels_of(tick, seen)}
+    texts = [
+        each
+        for each in figure.findobj(Text)
+        if each.get_visible() and each.get_text().strip() and each not in hidden
+    ]
+    return [(each.get_text(), each.get_window_extent(renderer)) for each in texts]
+
+
+def is_axes(artist):
+    return hasattr(artist, "get_xaxis")
+
+
+def labels_of(tick, seen):
+    """The labels of a tick that are not drawn."""
+    return [label for label in (tick.label1, tick.label2) if not (seen and label.get_visible())]

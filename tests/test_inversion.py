@@ -1,0 +1,248 @@
+"""Albedo inversion: the reflectance that was asked for, by the exact solver and by theory."""
+
+import io
+import json
+import sys
+
+import numpy as np
+import pytest
+import reference
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sssfit.cli import main
+from sssfit.errors import MaterialError
+from sssfit.material import load_material, parse_material
+from sssfit.simulate import simulate_exact
+from sssfit.simulate.exact import diffuse_reflectance
+from sssfit.simulate.inversion import (
+    chiang_albedo,
+    invert_reflectance,
+    largest_reflectance,
+    material_from_reflectance,
+    published_inversions,
+    van_de_hulst_albedo,
+)
+
+ASKED = ("--from-reflectance", "0.44,0.23,0.13", "--mean-free-path", "1.3,0.95,0.67")
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch, capfd):
+    """Run ``sssfit materials`` here; give exit status, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+    diffuse_reflectance([0.5], 1.3)  # compiled, if not yet: no word of it on stderr
+
+    def call(*arguments):
+        with pytest.raises(SystemExit) as caught:
+            main(["materials", *arguments])
+        out, err = capfd.readouterr()
+        return caught.value.code or 0, out, err
+
+    return call
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+@pytest.mark.parametrize("reflectance", [0.01, 0.11523, 0.41495, 0.75272, 0.95])
+def test_index_matched_albedos_are_those_of_chandrasekhar(reflectance):
+    (albedo,) = invert_reflectance([reflectance], 1.0).albedo
+    assert reference.chandrasekhar_total(albedo) == pytest.approx(reflectance, abs=1e-6)
+
+
+@pytest.mark.parametrize("eta", [1.0, 1.3, 1.5, 2.0])
+def test_what_was_asked_for_comes_out_from_black_to_white(eta):
+    most = largest_reflectance(eta)
+    asked = np.concatenate(([0.0, 1e-6], most * np.linspace(0.05, 0.95, 10), [most - 1e-5, most]))
+    found = invert_reflectance(asked, eta)
+    np.testing.assert_allclose(found.reflectance, asked, rtol=0, atol=1e-6)
+    np.testing.assert_allclose(diffuse_reflectance(found.albedo, eta), asked, rtol=0, atol=1e-6)
+    assert (np.diff(found.albedo) > 0).all()
+    assert found.albedo[0] == pytest.approx(0.0, abs=1e-7)
+    assert found.albedo[-1] == pytest.approx(1.0, abs=1e-12)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.lists(st.floats(0, 1), min_size=1, max_size=64), st.floats(1, 2))
+def test_any_reachable_reflectances_come_out(shares, eta):
+    asked = largest_reflectance(eta) * np.array(shares)
+    np.testing.assert_allclose(invert_reflectance(asked, eta).reflectance, asked, atol=1e-6)
+
+
+def test_a_materials_albedo_is_found_again_from_its_reflectance():
+    layer = load_material("skin1").layers[0]
+    total = simulate_exact(load_material("skin1"), dr_mm=1.0, radius_mm=3.0).diffuse_reflectance
+    np.testing.assert_allclose(invert_reflectance(total, 1.3).albedo, layer.albedo, atol=1e-5)
+
+
+@pytest.mark.parametrize("wrong", [-0.1, 1.2, 0.983, np.nan, np.inf])
+def test_what_no_albedo_gives_is_refused_with_the_largest_that_one_does(wrong):
+    for call in (invert_reflectance, published_inversions):
+        with pytest.raises(MaterialError, match=r"reflectance\[1\] = .*largest is 0\.982986") as e:
+            call([0.4, wrong], 1.3)
+        assert "\n" not in str(e.value)
+    invert_reflectance([0.982986], 1.3)  # as good as its word
+
+
+@pytest.mark.parametrize("eta", [0.9, 4.1, np.nan])
+def test_an_index_out_of_range_is_refused(eta):
+    with pytest.raises(MaterialError, match="eta"):
+        invert_reflectance([0.4], eta)
+
+
+@pytest.mark.parametrize("shape", [(), (0,), (2, 2)])
+def test_a_material_has_one_reflectance_a_channel(shape):
+    if shape == ():
+        assert invert_reflectance(0.3, 1.3).albedo.shape == (1,)
+        return
+    with pytest.raises(MaterialError, match="shape"):
+        invert_reflectance(np.full(shape, 0.3), 1.3)
+
+
+def test_chiang_is_the_published_polynomial():
+    a = np.array([0.0, 0.13, 0.5, 1.0])
+    expected = 1 - np.exp(-5.09406 * a + 2.61188 * a**2 - 4.31805 * a**3)
+    np.testing.assert_allclose(chiang_albedo(a), expected, atol=1e-15)
+
+
+@pytest.mark.parametrize("g", [0.0, 0.8])
+def test_van_de_hulsts_inverse_undoes_his_formula(g):
+    albedo = np.array([0.0, 0.1, 0.5, 0.9, 0.99, 0.9999, 1.0])
+    s = np.sqrt((1 - albedo) / (1 - albedo * g))
+    colour = (1 - s) * (1 - 0.139 * s) / (1 + 1.17 * s)
+    # The published coefficients have six digits.
+    np.testing.assert_allclose(van_de_hulst_albedo(colour, g), albedo, atol=5e-5)
+
+
+def test_the_published_ones_come_with_what_they_really_reflect():
+    for each in published_inversions([0.44, 0.23], 1.3).values():
+        np.testing.assert_array_equal(each.reflectance, diffuse_reflectance(each.albedo, 1.3))
+        assert (each.reflectance < [0.40, 0.20]).all()  # neither knows of the surface
+
+
+def test_a_material_says_what_was_asked_for_and_reflects_it():
+    asked = [0.44, 0.23, 0.13]
+    material = material_from_reflectance(
+        asked, [1.3, 0.95, 0.67], 1.3, name="mine", channels=("R", "G", "B")
+    )
+    (layer,) = material.layers
+    np.testing.assert_allclose(layer.mean_free_path_mm, [1.3, 0.95, 0.67], rtol=1e-14)
+    assert "0.44, 0.23, 0.13 by exact albedo inversion" in material.source
+    np.testing.assert_allclose(simulate_exact(material).diffuse_reflectance, asked, atol=1e-5)
+
+
+@pytest.mark.parametrize("paths", [[1.0, 2.0], [], [0.0], [np.nan], [-1.0], [[1.0]]])
+def test_mean_free_paths_are_lengths_one_or_as_many_as_reflectances(paths):
+    with pytest.raises(MaterialError, match="mean free path"):
+        material_from_reflectance([0.4] * 3, paths, 1.3, name="a", channels=("R", "G", "B"))
+
+
+def test_the_file_that_is_written_gives_the_reflectance(run, tmp_path):
+    status, out, err = run(*ASKED, "--eta", "1.3", "-o", "mine.toml")
+    assert (status, err) == (0, "")
+    assert names(tmp_path) == ["mine.toml"]
+    material = load_material(tmp_path / "mine.toml")
+    assert (material.name, material.channels) == ("mine", ("R", "G", "B"))
+    total = simulate_exact(material).diffuse_reflectance
+    np.testing.assert_allclose(total, [0.44, 0.23, 0.13], atol=1e-5)
+    for words in ("could reflect up to 0.982986", "Chiang et al. 2016, gives", "Wrote mine.toml"):
+        assert words in out
+    published = published_inversions([0.44, 0.23, 0.13], 1.3)
+    for each in published.values():
+        assert f"{each.albedo[0]:.6f}, {each.reflectance[0]:.6f} (-4" in out
+    assert max(map(len, out.splitlines())) <= 100
+
+
+def test_json_has_the_figures(run):
+    status, out, _ = run(*ASKED, "--eta", "1.3", "--json")
+    assert status == 0
+    figures = json.loads(out)
+    assert figures["output"] == ["from-reflectance.toml"]
+    assert figures["reflectance_asked"] == [0.44, 0.23, 0.13]
+    np.testing.assert_allclose(figures["reflectance"], [0.44, 0.23, 0.13], atol=1e-6)
+    assert figures["albedo"] == pytest.approx(invert_reflectance([0.44, 0.23, 0.13], 1.3).albedo)
+    assert set(figures["approximations"]) == {"chiang2016", "van_de_hulst"}
+
+
+def test_percents_units_and_one_mean_free_path_for_all(run, tmp_path):
+    asked = ("--from-reflectance", "44%, 23%,0.13", "--mean-free-path", "0.1cm", "--eta", "1.3")
+    assert run(*asked, "--name", "wax")[0] == 0
+    material = load_material(tmp_path / "wax.toml")
+    assert material.name == "wax"
+    np.testing.assert_allclose(material.layers[0].mean_free_path_mm, 1.0)
+    np.testing.assert_allclose(
+        diffuse_reflectance(material.layers[0].albedo, 1.3), [0.44, 0.23, 0.13], atol=1e-6
+    )
+
+
+def test_up_to_64_channels(run, tmp_path):
+    shares = ",".join(f"{0.01 * k}" for k in range(64))
+    channels = ",".join(f"{400 + 5 * k}nm" for k in range(64))
+    asked = ("--from-reflectance", shares, "--mean-free-path", "1", "--eta", "1.4")
+    assert run(*asked, "--channels", channels, "-o", "s.toml")[0] == 0
+    assert load_material(tmp_path / "s.toml").channels[-1] == "715nm"
+    status, _, err = run(*asked, "-o", "t.toml")
+    assert status == 2
+    assert "64 values; name their channels with --channels" in err
+    more = (*asked[:1], shares + ",0.1", *asked[2:], "--channels", channels + ",x", "-o", "t.toml")
+    status, _, err = run(*more)
+    assert status == 1
+    assert "expected 1 to 64" in err
+
+
+def test_toml_to_stdout(run, tmp_path, monkeypatch):
+    stdout = io.TextIOWrapper(io.BytesIO())
+    monkeypatch.setattr(sys, "stdout", stdout)
+    _, _, err = run(*ASKED, "--eta", "1.3", "-o", "-")
+    material = parse_material(stdout.buffer.getvalue().decode(), "stdout")
+    assert material.name == "from-reflectance"
+    assert "Wrote the material to stdout" in err
+    assert names(tmp_path) == []
+
+
+def test_only_files_of_its_own_are_replaced(run, tmp_path):
+    path = tmp_path / "mine.toml"
+    asked = (*ASKED, "--eta", "1.3", "-o", "mine.toml")
+    assert run(*asked)[0] == run(*asked)[0] == 0
+    kept = path.read_text().split("\n", 1)[1]  # without the line that says who made it
+    path.write_text(kept)
+    status, _, err = run(*asked)
+    assert status == 1
+    assert "--force" in err
+    assert path.read_text() == kept
+    assert run(*asked, "--force")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "fragment"),
+    [
+        (ASKED, 2, "needs --mean-free-path and --eta"),
+        ((*ASKED[:2], "--eta", "1.3"), 2, "needs --mean-free-path and --eta"),
+        (("--eta", "1.3"), 2, "--eta is for --from-reflectance"),
+        (("skin1", "-o", "a.toml"), 2, "--output is for --from-reflectance"),
+        (("skin1", *ASKED, "--eta", "1.3"), 2, "makes a material; name none"),
+        ((*ASKED, "--eta", "1.3", "--toml"), 2, "makes a material; name none"),
+        ((*ASKED, "--eta", "1.3", "--channels", "a,b"), 2, "2 names for 3 reflectances"),
+        ((*ASKED, "--eta", "thick"), 2, "'thick' is not a valid float"),
+        ((*ASKED, "--eta", "0.5"), 1, "eta = 0.5 is out of range"),
+        (("--from-reflectance", "a,b,c", *ASKED[2:], "--eta", "1.3"), 2, "'a' is not a refl"),
+        (("--from-reflectance", "0.4,,1", *ASKED[2:], "--eta", "1.3"), 2, "'' is not a refl"),
+        ((*ASKED[:2], "--mean-free-path", "1,0,1", "--eta", "1.3"), 2, "'0' is not a length"),
+        ((*ASKED[:2], "--mean-free-path", "1,1", "--eta", "1.3"), 1, "2 mean free paths for 3"),
+        (("--from-reflectance", "0.4,1.2,1", *ASKED[2:], "--eta", "1.3"), 1, "largest is 0.982986"),
+        (("--from-reflectance", "0.4,nan,1", *ASKED[2:], "--eta", "1.3"), 1, "cannot be reached"),
+        ((*ASKED, "--eta", "1.3", "--name", "a/b"), 1, "cannot be part of a file name"),
+        ((*ASKED, "--eta", "1.3", "-o", "no/a.toml"), 1, "there is no folder"),
+    ],
+)
+def test_bad_input_is_one_clear_line(run, tmp_path, arguments, status, fragment):
+    code, out, err = run(*arguments)
+    assert code == status
+    assert out == ""
+    assert fragment in err.splitlines()[-1]
+    assert "Traceback" not in err
+    if status == 1:
+        assert err.count("\n") == 1
+    assert names(tmp_path) == []
