@@ -103,7 +103,9 @@ class SeparableKernel:
         shapes |= {"relative_frobenius_error": (channels,), "energy_error": (channels,)}
         for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
-                raise KernelError(f"{name} has shape {getattr(self, name).shape}; expected {shape}.")
+                raise KernelError(
+                    f"{name} has shape {getattr(self, name).shape}; expected {shape}."
+                )
         if not np.isfinite(self.weights).all() or not np.isfinite(self.scale).all():
             raise KernelError("weights and scale have to be numbers, and some are not.")
         if not np.isin(self.signs, (-1.0, 1.0)).all():
@@ -130,7 +132,7 @@ class SeparableKernel:
     @property
     def pixels(self) -> int:
         """Number of pixels P of a pass."""
-        return self.weights.shape[1]
+        return int(self.weights.shape[1])
 
     @property
     def support_mm(self) -> float:

@@ -26,8 +26,9 @@ ROOMS = [
         "profile",
         "mco",
         "profile_csv",
+        "kernel",
     ),
-    *("simulate", "compare", "chart", "cli"),
+    *("simulate", "fit", "compare", "chart", "cli"),
 ]
 # Files that serve one room and do not say so by their name, as _profile_io does.
 BACK_ROOMS = {"_disks": "profile"}

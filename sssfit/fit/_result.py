@@ -117,7 +117,7 @@ def _nothing(target: Target) -> ChannelFit:
 
 
 def _stacked(fits: list[ChannelFit]) -> tuple[FloatArray, FloatArray]:
-    """Return signs (T, C) and half passes (T, h+1, C), with empty terms where a channel has fewer."""
+    """Return signs (T, C) and half passes (T, h+1, C); terms a channel lacks are 0."""
     terms, channels = max(len(each.signs) for each in fits), len(fits)
     signs = np.ones((terms, channels))
     half = np.zeros((terms, fits[0].half.shape[1], channels))

@@ -55,8 +55,7 @@ class Target:
 
     def edges_mm(self) -> FloatArray:
         """Edges of the pixels of a half line, (h+2,) [mm]: -p/2, p/2, 3p/2, ..."""
-        edges: FloatArray = self.mm_per_pixel * (np.arange(self.half_pixels + 2) - 0.5)
-        return edges
+        return self.mm_per_pixel * (np.arange(self.half_pixels + 2, dtype=np.float64) - 0.5)
 
 
 def make_target(

@@ -1,0 +1,54 @@
+"""The pre-integrated kernel: one pass, exact for edges along the axes.
+
+a_p(x) = int R_d(x, y) dy and A_p = a_p a_p / ||R_d||_1 (Jimenez et al. 2015, "Separable Subsurface
+Scattering", supplement eqs. S.5 and S.6). Convolving E(x, y) = E1(x) + E2(y) with A_p gives what
+the 2D kernel gives, if the pass holds all of the energy; the supplement's claim for an edge of any
+orientation does not hold: at 45 degrees it is off by some 6 % of the step.
+"""
+
+import math
+
+import numpy as np
+
+from sssfit.fit._result import ChannelFit, FitResult, fit_channels
+from sssfit.fit._target import make_target
+from sssfit.profile import Profile
+
+
+def fit_preintegrated(
+    profile: Profile,
+    *,
+    mm_per_pixel: float | None = None,
+    support_mm: float | None = None,
+    normalize: bool = False,
+) -> FitResult:
+    """Integrate the profile along lines, pixel by pixel, in closed form.
+
+    Parameters
+    ----------
+    profile : Profile
+    mm_per_pixel, support_mm : float, optional [mm]
+        Pixels; see ``sssfit.fit.make_target``.
+    normalize : bool
+        Unit energy for every channel, the energy kept apart.
+
+    Returns
+    -------
+    FitResult
+        One term; its energy is that of the strips within the support.
+
+    Raises
+    ------
+    FitError, ProfileError
+        The profile, the pitch or the support is of no use.
+    """
+    target = make_target(profile, mm_per_pixel, support_mm)
+    lines = target.half_line()
+
+    def fit_channel(channel: int) -> ChannelFit:
+        line = lines[:, channel]
+        # a a / sum(a) as one signed pass: the sum over the support is the energy of the kernel.
+        half = line / math.sqrt(float(target.copies @ line))
+        return ChannelFit(np.ones(1), half[None], "closed form")
+
+    return fit_channels(target, "preintegrated", fit_channel, settings={}, normalize=normalize)
