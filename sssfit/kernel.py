@@ -127,7 +127,7 @@ class SeparableKernel:
     @property
     def half_pixels(self) -> int:
         """Pixels h on either side of the middle one."""
-        return (self.weights.shape[1] - 1) // 2
+        return (self.pixels - 1) // 2
 
     @property
     def pixels(self) -> int:
