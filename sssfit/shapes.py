@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from scipy.special import iti0k0, k0
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -96,6 +95,8 @@ def diffusion_marginal(x: npt.ArrayLike, s: npt.ArrayLike) -> FloatArray:
 
     Infinite at x = 0: pixels take `diffusion_line_integral`. Its second moment is 7 / s^2.
     """
+    from scipy.special import k0  # 0.2 s that the photon walk need not wait for
+
     s = np.asarray(s, dtype=np.float64)
     t = s * np.abs(x)
     return np.asarray(s * (k0(t) + k0(t / 3.0)) / (4.0 * math.pi), dtype=np.float64)
@@ -128,6 +129,8 @@ def _k0_beyond(t: FloatArray) -> FloatArray:
     K0's own integral over u becomes sqrt(2/t) exp(-t) int_0^inf exp(-w^2) / ((1 + w^2/t)
     sqrt(1 + w^2/2t)) dw.
     """
+    from scipy.special import iti0k0  # 0.2 s, as above
+
     near = 0.5 * math.pi - iti0k0(np.minimum(t, 1.0))[1]
     far = np.maximum(t, 1.0)
     ratio = _NODES**2 / far[..., None]

@@ -108,6 +108,13 @@ for call in {calls!r}:
     assert run.returncode == 0, run.stderr
 
 
+def test_the_photon_walk_does_not_wait_for_scipy():
+    # numba imports the bare package itself; what takes 0.4 s are its parts.
+    parts = ("scipy.special", "scipy.optimize", "scipy.fft")
+    program = f"import sys, sssfit.simulate; assert not {set(parts)} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
+
+
 @pytest.mark.parametrize("path", IN_ROOMS, ids=name_of)
 def test_imports_point_down(path):
     room = room_of(module_of(path))

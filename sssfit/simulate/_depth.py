@@ -30,7 +30,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize, special
 
 from sssfit._jit.transport import NEGLIGIBLE, Tables, kernel_matrix
 from sssfit.simulate._surface import Cone, FloatArray, entering, gauss, is_matched
@@ -92,6 +91,8 @@ def decay_rate(albedo: float) -> float:
         return 0.0
     if albedo > 1.0 - 1e-6:
         return math.sqrt(3.0 * (1.0 - albedo))  # the next term is 1 - albedo smaller
+
+    from scipy import optimize  # 0.2 s that the photon walk need not wait for
 
     def excess(t: float) -> float:  # lambda = 1 - exp(t): artanh is (log(2 - exp(t)) - t) / 2
         return 0.5 * albedo * (math.log(2.0 - math.exp(t)) - t) + math.expm1(t)
@@ -196,6 +197,8 @@ def _tables(
 
 def _over_cone(distances: FloatArray, k: float, cone: Cone, weight: FloatArray) -> FloatArray:
     """Return 1/2 int weight exp(-s/mu) J0(k s tan(theta)) over the cone, (n,)."""
+    from scipy import special  # 0.2 s, as above
+
     along = distances[:, None]
     paths = np.exp(-along / cone.cosine) * special.j0(k * along * cone.tangent)
     integral: FloatArray = 0.5 * (paths @ weight)

@@ -11,7 +11,6 @@ from collections.abc import Callable
 
 import numpy as np
 import numpy.typing as npt
-from scipy.fft import fht, fhtoffset
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -43,6 +42,8 @@ def cumulative_from_transform(
     -------
     (m, C)
     """
+    from scipy.fft import fht, fhtoffset  # 0.2 s that the photon walk need not wait for
+
     low = _BEYOND_LOW / r_mm[-1]
     high = _BEYOND_HIGH / min(shortest_mm, float(r_mm[1]))
     n = math.ceil(math.log(high / low) / _STEP)

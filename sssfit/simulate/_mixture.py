@@ -17,7 +17,6 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize, special
 
 from sssfit.errors import SimulationError
 from sssfit.simulate._surface import FloatArray
@@ -51,6 +50,8 @@ def mixture_of(wavenumbers: FloatArray, transform: FloatArray, slowest: float) -
     Residuals are weighted by 1 + k: Rhat falls like 1/k^2, and the first annuli rest on large k.
     """
     steepest = _STEEPER * float(wavenumbers[-1])
+    from scipy import optimize  # 0.2 s that the photon walk need not wait for
+
     # One rate at the very end of the spectrum, the others from 1 % beyond it.
     count = math.ceil(_PER_E_FOLD * math.log(100.0 * steepest / slowest))
     rates = slowest + np.concatenate(([0.0], np.geomspace(0.01 * slowest, steepest, count)))
@@ -75,5 +76,7 @@ def mixture_of(wavenumbers: FloatArray, transform: FloatArray, slowest: float) -
 
 def _q_r_k1(x: FloatArray) -> FloatArray:
     """Return x K1(x), 1 at 0."""
+    from scipy import special  # 0.2 s, as above
+
     product: FloatArray = np.where(x > 0.0, x * special.k1(np.maximum(x, 1e-300)), 1.0)
     return product
