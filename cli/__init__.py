@@ -60,9 +60,6 @@ for _verb in (materials, simulate, import_, export, chart, show):
 
 def main(args: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and exit; the console script's entry point."""
-    # The threads are ours. OpenBLAS's own spin while they wait for a busy core: beside one other
-    # process the exact solver took 7.8 s in place of 2.2. Read when numpy is first imported.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     _terminate_like_interrupt()
     with warnings.catch_warnings():
         warnings.simplefilter("always", SssfitWarning)
