@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -43,20 +45,27 @@ def write_material(wish: Wish, common: Common) -> None:
     name = wish.name or _name_of(wish.output)
     path = None if wish.output == "-" else Path(wish.output or f"{name}.toml")
 
+    with _held(path, force=wish.force):
+        say_if_compiling(common, solver=True)
+        material, figures = _inverted(
+            wish.from_reflectance, wish.mean_free_path, wish.eta, name, channels
+        )
+        _write(material, path)
+    figures = {"command": "materials", "output": [str(path or "-")], **figures}
+    text = f"{_text(figures)}\nWrote {path or 'the material to stdout'}"
+    finish(common, figures, text, to_stderr=path is None)
+
+
+def _inverted(
+    asked: list[float], paths_mm: list[float], eta: float, name: str, channels: list[str]
+) -> tuple[Material, dict[str, Any]]:
+    """Return the material, and its figures beside those of the published approximations."""
     from sssfit.simulate.exact import diffuse_reflectance
     from sssfit.simulate.inversion import material_from_reflectance, published_inversions
 
-    say_if_compiling(common, solver=True)
-    material = material_from_reflectance(
-        wish.from_reflectance, wish.mean_free_path, wish.eta, name=name, channels=channels
-    )
-    _write(material, path, force=wish.force)
-    published = published_inversions(wish.from_reflectance, wish.eta)
-    reached = diffuse_reflectance(material.layers[0].albedo, wish.eta)
-    figures = {"command": "materials", "output": [str(path or "-")]}
-    figures |= _figures(material, wish, reached, published)
-    text = f"{_text(figures)}\nWrote {path or 'the material to stdout'}"
-    finish(common, figures, text, to_stderr=path is None)
+    material = material_from_reflectance(asked, paths_mm, eta, name=name, channels=channels)
+    reached = diffuse_reflectance(material.layers[0].albedo, eta)
+    return material, _figures(material, asked, reached, published_inversions(asked, eta))
 
 
 def _channels(wish: Wish) -> list[str]:
@@ -79,17 +88,29 @@ def _name_of(output: str | None) -> str:
     return "from-reflectance" if output in (None, "-") else Path(str(output)).stem
 
 
-def _write(material: Material, path: Path | None, *, force: bool) -> None:
+@contextlib.contextmanager
+def _held(path: Path | None, *, force: bool) -> Iterator[None]:
+    """Check the output and hold it before the work; None is stdout."""
+    from sssfit.files import check_output, locked
+
+    if path is None:
+        binary_stdout()  # closed: said now and not after the work
+        yield
+        return
+    check_output(path, _is_ours, force=force)
+    with locked(path):
+        yield
+
+
+def _write(material: Material, path: Path | None) -> None:
     """To the file, whole or not at all; to stdout where there is none."""
-    from sssfit.files import check_output, locked, write_atomically
+    from sssfit.files import write_atomically
 
     content = f"{_OURS} delete this line to keep it.\n{material.to_toml()}".encode()
     if path is None:
         binary_stdout().write(content)
         binary_stdout().flush()
-        return
-    check_output(path, _is_ours, force=force)
-    with locked(path):
+    else:
         write_atomically(path, lambda stream: stream.write(content))
 
 
@@ -103,7 +124,7 @@ def _is_ours(path: Path) -> bool:
 
 
 def _figures(
-    material: Material, wish: Wish, reached: FloatArray, published: dict[str, Inversion]
+    material: Material, asked: list[float], reached: FloatArray, published: dict[str, Inversion]
 ) -> dict[str, Any]:
     """Everything that is printed, as ``--json`` has it."""
     layer = material.layers[0]
@@ -112,7 +133,7 @@ def _figures(
         "channels": material.channels,
         "eta": layer.eta,
         "mean_free_path_mm": layer.mean_free_path_mm,
-        "reflectance_asked": wish.from_reflectance,
+        "reflectance_asked": asked,
         "reflectance": reached,
         "largest_reflectance": 1.0 - material.specular_reflectance,
         "albedo": layer.albedo,

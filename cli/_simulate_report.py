@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 _NOTED_BEYOND = 1e-3  # share of a channel beyond the grid that is worth a remark
 _SIGMAS = 4.5  # a deviation beyond so many standard errors is no accident
 _ROUNDING = 1e-12  # below this an energy balance is rounding, not roulette
-_OWN_SETTINGS = ("tolerance", "mapping")  # of the methods that have them
+_OWN_SETTINGS = ("tolerance", "similarity", "mapping")  # of the methods that have them
 
 
 def figures_of(profile: Profile, seconds: float | None) -> dict[str, Any]:
@@ -103,7 +103,10 @@ def _how(rows: list[dict[str, Any]]) -> str:
     row = rows[0]
     if row["photons"] is None:
         tolerance, mapping = row.get("tolerance"), row.get("mapping")
-        within = "" if tolerance is None else f" to {100.0 * tolerance:g} % of the total"
+        reached = max(each["relative_error"] or 0.0 for each in rows)
+        within = "" if tolerance is None else f" to {100.0 * reached:.1g} % of the total"
+        if row.get("similarity"):
+            within += ", for isotropic scattering of (1 - g) sigma_s"
         return f"{row['method']}{within}{f' ({mapping})' if mapping else ''}"
     counts = sorted({each["photons"] for each in rows})
     photons = " to ".join(f"{n:,}" for n in counts[:: len(counts) - 1 or 1])
@@ -176,11 +179,12 @@ def _energy(rows: list[dict[str, Any]]) -> list[str]:
     parts = "specular + diffuse + absorbed"
     parts += " + transmitted" if any(row["transmittance"] is not None for row in rows) else ""
     parts += " + unfinished" if unfinished > 0.0 else ""
-    kind = "standard" if rows[0]["photons"] else "estimated"
+    if not rows[0]["photons"]:
+        return [*lines, f"energy: {parts} = 1 to {abs(balance):.0e} (worst channel, {name})"]
     within = abs(balance) <= _SIGMAS * stderr + _ROUNDING
     lines.append(
         f"energy: {parts} = 1 {'within' if within else 'NOT WITHIN'} the run's own error: "
-        f"{balance:+.1e}, {kind} error {max(stderr, _ROUNDING):.0e} (worst channel, {name})"
+        f"{balance:+.1e}, standard error {max(stderr, _ROUNDING):.0e} (worst channel, {name})"
     )
     if unfinished > 0.0:
         lines.append(f"unfinished, at most: {unfinished:.6f}")

@@ -15,16 +15,23 @@ MINUS = "\N{MINUS SIGN}"
 
 
 def models_title(comparison: ModelComparison) -> str:
-    """Name the material."""
-    return f"{shortened(comparison.material.name, 20)}: models against the exact solution"
+    """Name the material, and what the models are held against."""
+    truth = "isotropic scattering" if is_similar(comparison) else "the exact solution"
+    return f"{shortened(comparison.material.name, 20)}: models against {truth}"
+
+
+def is_similar(comparison: ModelComparison) -> bool:
+    """Whether the exact solution is that of the similar isotropic medium: g is not 0."""
+    return bool(comparison.exact.profile.meta["settings"].get("similarity"))
 
 
 def models_subtitle(comparison: ModelComparison) -> str:
     """Say how the two profiles that need it were made, and on what grid."""
     exact, walk = comparison.exact.profile, comparison.walk.profile
     reached = 100.0 * float(exact.meta["relative_error"] or 0.0)
+    what = "Isotropic" if is_similar(comparison) else "Exact"
     return (
-        f"Exact to {reached:.1g} % of the total · {count(walk.photons or 0)} photons, seed "
+        f"{what} to {reached:.1g} % of the total · {count(walk.photons or 0)} photons, seed "
         f"{walk.meta.get('seed', 'unknown')} · {grid(walk)} · sssfit {exact.meta['version']}"
     )
 
@@ -66,6 +73,11 @@ def model_notes(comparison: ModelComparison, shown: Sequence[int]) -> list[str]:
         "where it has too few. Band: ±1 standard error of the walk. Errors: linear within ±10 % "
         "(grey), logarithmic beyond, above +1000 % not drawn. MFP: mean free path.",
     ]
+    if is_similar(comparison):
+        notes.append(
+            "g is not 0: the black curve solves for isotropic scattering of (1 - g) sigma_s, which "
+            "is an approximation. The walk follows g itself: where the two differ, trust the walk."
+        )
     left = comparison.material.n_channels - len(shown)
     if left:
         notes.append(f"{left} channels between these are not drawn.")

@@ -101,8 +101,14 @@ def with_error(value: float, stderr: float) -> str:
 
 
 def shortened(name: str, longest: int = 12) -> str:
-    """Keep a name from running out of its place."""
-    return name if len(name) <= longest else f"{name[: longest - 1]}…"
+    """Keep a name from running out of its place: its beginning and its end stay.
+
+    Names that have to be told apart differ at the end more often than not: infrared-850nm.
+    """
+    if len(name) <= longest:
+        return name
+    head = (longest - 1) // 2
+    return f"{name[:head]}…{name[len(name) - (longest - 1 - head) :]}"
 
 
 def footnotes(profile: Profile, image: str) -> list[str]:

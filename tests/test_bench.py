@@ -1,11 +1,26 @@
-"""The benchmark script runs: every table, every figure a number."""
+"""The benchmark scripts run: every table, every figure a number."""
 
 import math
 import subprocess
 import sys
 from pathlib import Path
 
-SCRIPT = Path(__file__).parent / "bench" / "bench_walk.py"
+import pytest
+
+BENCH = Path(__file__).parent / "bench"
+ACCURACY = ["run", "seconds", "error", "claimed"]
+EXACT = [
+    (ACCURACY, ["exact, tolerance 0.01", "exact, tolerance 0.0001", "walk, 1e+04 photons"]),
+    (
+        ["command", "seconds"],
+        [
+            "`sssfit simulate skin1 --method exact`, first use",
+            "`sssfit simulate skin1 --method exact`",
+            "2 materials, as many commands",
+            "2 materials, one process, start-up apart",
+        ],
+    ),
+]
 
 SPEEDS = ["material", "scalar loop", "lanes", "ratio"]
 TABLES = [
@@ -42,14 +57,20 @@ def tables(text):
     return found
 
 
-def test_small_benchmarks_run_and_fill_every_table():
+@pytest.mark.parametrize(
+    ("script", "expected"), [("bench_walk.py", TABLES), ("bench_exact.py", EXACT)]
+)
+def test_small_benchmarks_run_and_fill_every_table(script, expected):
     ended = subprocess.run(
-        [sys.executable, str(SCRIPT), "--small"], capture_output=True, text=True, timeout=300
+        [sys.executable, str(BENCH / script), "--small"],
+        capture_output=True,
+        text=True,
+        timeout=300,
     )
     assert ended.returncode == 0, ended.stderr
     assert ended.stderr == ""
     found = tables(ended.stdout)
-    assert [(heads, [row[0] for row in rows]) for heads, rows in found] == TABLES
+    assert [(heads, [row[0] for row in rows]) for heads, rows in found] == expected
     for heads, rows in found:
         for row in rows:
             figures = dict(zip(heads[1:], row[1:], strict=True))

@@ -300,4 +300,5 @@ def test_numbers_read_as_people_write_them():
     assert with_error(0.432012, 0.000113) == "0.43201 ± 0.00011"
     assert with_error(0.5, np.nan) == "0.5"
     assert shortened("a" * 12) == "a" * 12
-    assert shortened("a" * 13) == "a" * 11 + "…"
+    assert shortened("near-infrared-850nm") == "near-…-850nm"
+    assert shortened("near-infrared-940nm") == "near-…-940nm"

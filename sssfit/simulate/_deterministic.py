@@ -6,6 +6,7 @@ Solvers that know F(r) use ``energies_from_cumulative``; closed forms that know 
 r use ``energies_from_beyond``, which keeps its digits out to 1e-300 where F(r) is 1 - 1e-16.
 """
 
+import warnings
 from collections.abc import Mapping
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit import __version__
-from sssfit.errors import SimulationError
+from sssfit.errors import SimulationError, SssfitWarning
 from sssfit.grid import RadialGrid
 from sssfit.material import Layer, Material
 from sssfit.profile import FORMAT, Profile
@@ -165,6 +166,19 @@ def half_space(material: Material, method: str) -> Layer:
             "multipole or montecarlo."
         )
     return material.layers[0]
+
+
+def warn_of_similarity(material: Material, method: str) -> None:
+    """Say that scattering with g other than 0 is taken as isotropic, where it is."""
+    steepest = float(np.max(np.abs(material.layers[0].g)))
+    if steepest > 0.0:
+        warnings.warn(
+            f"{material.name}: g = {steepest:g} in absolute value; the method {method} takes "
+            "scattering as isotropic with sigma_s' = (1 - g) sigma_s, which is an approximation: "
+            "montecarlo has no need of it.",
+            SssfitWarning,
+            stacklevel=5,
+        )
 
 
 def check_is_material(material: object) -> None:

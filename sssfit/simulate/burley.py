@@ -22,7 +22,12 @@ from sssfit.shapes import (
     s_diffuse_mean_free_path,
     s_perpendicular,
 )
-from sssfit.simulate._deterministic import computed_profile, energies_from_beyond, half_space
+from sssfit.simulate._deterministic import (
+    computed_profile,
+    energies_from_beyond,
+    half_space,
+    warn_of_similarity,
+)
 from sssfit.simulate._semi_infinite import relative_eta
 from sssfit.simulate.exact import diffuse_reflectance
 
@@ -121,6 +126,7 @@ def _own_reflectance(material: Material, layer: Layer) -> FloatArray:
             f"{material.name}: what is above is denser, by {1.0 / eta:.4g}, and burley has no "
             "reflectance of its own for that; give it one."
         )
+    warn_of_similarity(material, "burley")
     return diffuse_reflectance(layer.reduced_sigma_s_per_mm / layer.reduced_sigma_t_per_mm, eta)
 
 

@@ -14,7 +14,6 @@ sigma_s' = (1 - g) sigma_s (similarity relation; van de Hulst 1980, chapter 14):
 """
 
 import math
-import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -24,13 +23,18 @@ import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
 from sssfit._jit import compiled_before
-from sssfit.errors import SimulationError, SssfitWarning, StoppedError
+from sssfit.errors import SimulationError, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
 from sssfit.simulate._batches import available_cores
 from sssfit.simulate._depth import Resolution, Response, decay_rate, respond
-from sssfit.simulate._deterministic import computed_profile, energies_from_beyond, half_space
+from sssfit.simulate._deterministic import (
+    computed_profile,
+    energies_from_beyond,
+    half_space,
+    warn_of_similarity,
+)
 from sssfit.simulate._mixture import mixture_of
 from sssfit.simulate._semi_infinite import relative_eta
 from sssfit.simulate._single import single_scattering_beyond
@@ -38,6 +42,7 @@ from sssfit.simulate._surface import FloatArray, entering
 
 DEFAULT_TOLERANCE = 1e-4
 _LARGEST_ETA = 4.0
+_BEST_GAIN = 100.0  # a level's error against the one before; 2 to 50 were seen
 _ROUNDING = 1e-14  # of the energy balance, whose terms are near 1 however small the albedo
 _LARGEST_FLOOR = 1e-2  # of the rates, for grids within one mean free path
 
@@ -240,16 +245,18 @@ def _solve_group(
         for albedo, sigma_t in zip(*_reduced(material), strict=True)
     ]
     coarse = _solve(eta, channels, _LEVELS[0], workers)
-    for level in _LEVELS[1:]:
+    for number, level in enumerate(_LEVELS[1:], start=2):
         fine = _solve(eta, channels, level, workers)
         errors = [_errors(*pair) for pair in zip(fine, coarse, strict=True)]
         worst = max(_share(*pair) for pair in zip(errors, fine, strict=True))
         if worst <= tolerance:
             return _profiles(materials, grids, fine, coarse, errors, tolerance)
+        if worst > tolerance * _BEST_GAIN ** (len(_LEVELS) - number):
+            break
         coarse = fine
     raise SimulationError(
-        f"the tolerance of {tolerance:g} was not met: the two finest of {len(_LEVELS)} resolutions "
-        f"differ by {worst:.2g} of the total; give {_rounded_up(worst):g} or more."
+        f"the tolerance of {tolerance:g} cannot be met: resolutions {number - 1} and {number} of "
+        f"{len(_LEVELS)} differ by {worst:.2g} of the total; give {_rounded_up(worst):g} or more."
     )
 
 
@@ -337,7 +344,7 @@ def _profiles(
                 stderr=np.stack(stderr, axis=1),
                 absorbed=np.array([[each.absorbed for each in fine[own]]]),
                 relative_error=worst,
-                settings={"tolerance": tolerance},
+                settings={"tolerance": tolerance, "similarity": bool(material.layers[0].g.any())},
                 energy_balance_stderr=[each.error for each in fine[own]],
             )
         )
@@ -372,14 +379,7 @@ def _check_medium(material: Material) -> None:
             "method exact covers a medium at least as dense optically as what is above it: use "
             "montecarlo."
         )
-    if layer.g.any():
-        warnings.warn(
-            f"{material.name}: g = {float(np.max(np.abs(layer.g))):g} in absolute value; the "
-            "method exact takes scattering as isotropic with sigma_s' = (1 - g) sigma_s, which is "
-            "an approximation: montecarlo has no need of it.",
-            SssfitWarning,
-            stacklevel=4,
-        )
+    warn_of_similarity(material, "exact")
 
 
 def _rounded_up(value: float) -> float:

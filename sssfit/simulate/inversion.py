@@ -18,7 +18,7 @@ import numpy.typing as npt
 from scipy.optimize.elementwise import find_root
 
 from sssfit import __version__
-from sssfit._material_checks import number
+from sssfit._material_checks import check_channels, check_texts, number
 from sssfit.errors import MaterialError, SimulationError
 from sssfit.material import Layer, Material
 from sssfit.simulate.exact import diffuse_reflectance
@@ -68,7 +68,7 @@ def invert_reflectance(reflectance: npt.ArrayLike, eta: float) -> Inversion:
     Examples
     --------
     >>> invert_reflectance([0.44], 1.3).albedo.round(4)
-    array([0.9601])
+    array([0.9605])
     """
     asked = _reachable(reflectance, eta)
     darkest, brightest = diffuse_reflectance(np.array([0.0, 1.0]), eta)
@@ -82,8 +82,7 @@ def invert_reflectance(reflectance: npt.ArrayLike, eta: float) -> Inversion:
     found = find_root(excess, ends, args=(aim,), tolerances={"fatol": _CLOSE})
     if not np.all(found.success):
         raise SimulationError(f"no albedo found for reflectances {asked.tolist()} at eta = {eta}.")
-    albedo = 1.0 - np.asarray(found.x) ** 2
-    return Inversion(albedo, diffuse_reflectance(albedo, eta))
+    return Inversion(1.0 - np.asarray(found.x) ** 2, aim + np.asarray(found.f_x))
 
 
 def published_inversions(reflectance: npt.ArrayLike, eta: float) -> dict[str, Inversion]:
@@ -97,7 +96,13 @@ def published_inversions(reflectance: npt.ArrayLike, eta: float) -> dict[str, In
         "chiang2016": chiang_albedo(asked),
         "van_de_hulst": van_de_hulst_albedo(asked / largest_reflectance(eta)),
     }
-    return {key: Inversion(each, diffuse_reflectance(each, eta)) for key, each in found.items()}
+    real = diffuse_reflectance(np.concatenate(list(found.values())), eta)
+    return {
+        key: Inversion(albedo, reflectance)
+        for (key, albedo), reflectance in zip(
+            found.items(), real.reshape(len(found), -1), strict=True
+        )
+    }
 
 
 def chiang_albedo(reflectance: FloatArray) -> FloatArray:
@@ -156,6 +161,8 @@ def material_from_reflectance(
     MaterialError
         As `invert_reflectance`, or lists that differ in length, or a value that no material has.
     """
+    check_texts(name, "")  # all that can be wrong is said before the seconds of work
+    check_channels(channels)
     asked = _reachable(reflectance, eta)
     paths_mm = np.atleast_1d(np.asarray(mean_free_path_mm, dtype=np.float64))
     if paths_mm.size not in (1, asked.size) or paths_mm.ndim > 1:
