@@ -16,7 +16,6 @@ colour. ``energy="keep"`` leaves them optimal; no kernel of the same rank has a 
 import operator
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from sssfit.errors import FitError
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels, frobenius_error
@@ -91,13 +90,28 @@ def eigenpairs(quadrant: FloatArray, count: int) -> tuple[FloatArray, FloatArray
     array (count,), array (count, n)
         Signed eigenvalues; halves of eigenvectors of unit length, positive in the middle.
     """
-    root = np.sqrt(np.where(np.arange(len(quadrant)) == 0, 1.0, 2.0))
-    # One thread: BLAS waits for its threads when another program holds a core.
-    with threadpool_limits(1, user_api="blas"):
-        values, vectors = _largest(quadrant, root, count)
+    root = _root_copies(len(quadrant))
+    values, vectors = _largest(quadrant, root, count)
     order = np.argsort(-np.abs(values), kind="stable")[:count]
     halves = vectors[:, order].T / root
     return values[order], np.where(halves[:, :1] < 0.0, -halves, halves)
+
+
+def all_eigenvalues(quadrant: FloatArray) -> FloatArray:
+    """Return a kernel's eigenvalues (n,), falling in magnitude; n, n as in `eigenpairs`.
+
+    0.1 s for 1237 pixels, 3 s for 3932.
+    """
+    from scipy.linalg import eigvalsh
+
+    root = _root_copies(len(quadrant))
+    values: FloatArray = eigvalsh(root[:, None] * quadrant * root)
+    return values[np.argsort(-np.abs(values), kind="stable")]
+
+
+def _root_copies(n: int) -> FloatArray:
+    """Return the square root of how often each pixel of a half line is there (n,)."""
+    return np.sqrt(np.where(np.arange(n) == 0, 1.0, 2.0))
 
 
 def _largest(quadrant: FloatArray, root: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
@@ -118,8 +132,8 @@ def _largest(quadrant: FloatArray, root: FloatArray, count: int) -> tuple[FloatA
             pass  # eigenvalues that noise has made nearly equal: take the slow road
         else:
             return values, vectors
-    values, vectors = eigh(root[:, None] * quadrant * root)
-    return values, vectors
+    found: tuple[FloatArray, FloatArray] = eigh(root[:, None] * quadrant * root)
+    return found
 
 
 def _fit_channel(target: Target, channel: int, rank: int, *, rescale: bool) -> ChannelFit:
