@@ -105,7 +105,7 @@ def all_eigenvalues(quadrant: FloatArray) -> FloatArray:
     from scipy.linalg import eigvalsh
 
     root = _root_copies(len(quadrant))
-    values: FloatArray = eigvalsh(root[:, None] * quadrant * root)
+    values = np.asarray(eigvalsh(root[:, None] * quadrant * root), dtype=np.float64)
     return values[np.argsort(-np.abs(values), kind="stable")]
 
 
