@@ -73,7 +73,7 @@ def test_the_shape_is_the_one_of_least_squares():
 
 
 def test_the_pass_is_the_models_line_integral():
-    profile = diffusion_profile([1.3], [0.4], np.linspace(0.0, 30.0, 3001))
+    profile = diffusion_profile([1.3], [0.4], np.linspace(0.0, 30.0, 601))
     kernel = fit_burley(profile, mm_per_pixel=0.25, support_mm=5.0).kernel
     line = kernel.line[:, 0]
     h = kernel.half_pixels
@@ -85,9 +85,9 @@ def test_the_pass_is_the_models_line_integral():
     half, _ = quad(lambda x: float(shapes.diffusion_marginal(x, 1.3)), 0.0, 0.125)
     assert line[h] == pytest.approx(0.8 * half, rel=1e-6)  # quadrature of a logarithm
     assert kernel.energy[0] == pytest.approx(line.sum(), rel=1e-12)
-    # what the profile itself gives, but for its flat annuli
+    # what the profile itself gives, but for its flat annuli next to the logarithm at 0
     ours, theirs = kernel, fit_preintegrated(profile, mm_per_pixel=0.25, support_mm=5.0).kernel
-    np.testing.assert_allclose(ours.weights, theirs.weights, atol=1e-4 * theirs.weights.max())
+    np.testing.assert_allclose(ours.weights, theirs.weights, atol=1e-3 * theirs.weights.max())
 
 
 def test_one_pass_has_no_smaller_error_than_the_best_of_rank_one():

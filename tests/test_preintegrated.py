@@ -23,7 +23,7 @@ def covering(profile, pitch):
 
 
 def two_passes(irradiance, kernel, channel):
-    """What a shader does: a pass along each axis; the middle, where no edge of the image is seen."""
+    """What a shader does, a pass along each axis; the middle, which sees no edge of the image."""
     weights, h = kernel.weights[0, :, channel], kernel.half_pixels
     passed = convolve1d(convolve1d(irradiance, weights, axis=0), weights, axis=1)
     return passed[h : len(passed) - h, h : passed.shape[1] - h]
@@ -67,21 +67,21 @@ def test_equals_the_2d_convolution_at_an_edge_along_an_axis(pitch, axis):
 
 
 def step_at_45_degrees(size):
-    """Irradiance 1 beyond the diagonal, 1/2 on it, 0 before: the pixels' shares of the half plane."""
+    """Irradiance 1 beyond the diagonal, 1/2 on it, 0 before: shares of the half plane."""
     x = np.arange(size) - size // 2
     return 0.5 + 0.5 * np.sign(x[None, :] + x[:, None])
 
 
-@pytest.mark.parametrize("name", ["skin1", "marble", "ketchup"])
+@pytest.mark.parametrize("name", ["skin1", "cream", "ketchup"])
 def test_an_edge_at_45_degrees_is_off_by_some_6_percent_of_the_step(name):
     profile = simulate_exact(load_material(name))
-    kernel = fit_preintegrated(profile, mm_per_pixel=0.3, support_mm=15.0).kernel
+    kernel = fit_preintegrated(profile, mm_per_pixel=0.1).kernel
     for c in range(2):
-        quadrant = profile.quadrant_kernel(0.3, kernel.half_pixels, channel=c)
+        quadrant = profile.quadrant_kernel(0.1, kernel.half_pixels, channel=c)
         edge = step_at_45_degrees(kernel.pixels + 20)
         whole = whole_convolution(edge, quadrant)
         off = np.abs(two_passes(edge, kernel, c) - whole).max() / full_kernel(quadrant).sum()
-        assert 0.04 < off < 0.07
+        assert 0.05 < off < 0.07
 
 
 def off_at_45_degrees(profile, pitch, channel):
