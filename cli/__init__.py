@@ -20,6 +20,7 @@ from sssfit.errors import SssfitError, SssfitWarning
 
 from .chart import chart
 from .export import export
+from .fit import fit
 from .import_ import import_
 from .materials import materials
 from .show import show
@@ -54,7 +55,7 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
         ctx.exit(2)
 
 
-for _verb in (materials, simulate, import_, export, chart, show):
+for _verb in (materials, simulate, fit, import_, export, chart, show):
     cli.add_command(_verb)
 
 

@@ -28,7 +28,7 @@ ROOMS = [
         "profile_csv",
         "kernel",
     ),
-    *("simulate", "fit", "compare", "chart", "cli"),
+    *("simulate", "fit", "compare", "export", "chart", "cli"),
 ]
 # Files that serve one room and do not say so by their name, as _profile_io does.
 BACK_ROOMS = {"_disks": "profile"}

@@ -1,0 +1,47 @@
+"""The methods of ``sssfit fit`` in one table: what each does, and which options are its own.
+
+Nothing of the library is imported here, so the table can make the help; ``function`` is a name in
+``sssfit.fit``. ``counted`` is the option whose value becomes part of the file's name (svd3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import click
+from click.core import ParameterSource
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """One way from a profile to a kernel."""
+
+    summary: str
+    options: tuple[str, ...] = ()
+    counted: str | None = None
+
+
+FITS = {
+    "preintegrated": Fit("one pass: the profile integrated along lines; exact for axis edges"),
+}
+
+
+def fit_lines() -> str:
+    """Return the methods, a line each; the longest name and two spaces set the column."""
+    width = max(map(len, FITS)) + 2
+    return "\n".join(f"  {name.ljust(width)}{fit.summary}" for name, fit in FITS.items())
+
+
+def own_settings(context: click.Context, method: str, given: dict[str, Any]) -> dict[str, Any]:
+    """Keep the method's own options that were given; refuse those of others."""
+    for option in given:
+        is_given = context.get_parameter_source(option) is ParameterSource.COMMANDLINE
+        owners = [name for name, fit in FITS.items() if option in fit.options]
+        if is_given and method not in owners:
+            raise click.UsageError(
+                f"--{option.replace('_', '-')} is for --method {' or '.join(owners)}, and this is "
+                f"{method}; leave it out."
+            )
+    own = FITS[method].options
+    return {key: value for key, value in given.items() if key in own and value is not None}

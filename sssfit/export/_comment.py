@@ -1,0 +1,33 @@
+"""What every exported kernel says of itself: where it comes from and what its numbers are."""
+
+import math
+from collections.abc import Sequence
+
+from sssfit.kernel import SeparableKernel
+
+
+def description(kernel: SeparableKernel) -> list[str]:
+    """Return the lines of the comment; nothing in them depends on the clock or the machine."""
+    meta = kernel.meta
+    photons = f", {meta['photons']:,} photons" if meta.get("photons") else ""
+    sha = f", sha256 {meta['material_sha256'][:16]}" if meta.get("material_sha256") else ""
+    terms = f"{kernel.rank} separable term{'s' if kernel.rank > 1 else ''}"
+    return [
+        f"Subsurface scattering kernel: {meta['material']}{sha}.",
+        f"Profile: {meta['profile_method']}{photons}. Fit: {kernel.method}, {terms}. "
+        f"sssfit {meta['version']}.",
+        f"{kernel.pixels} pixels of {kernel.mm_per_pixel:.9g} mm, the middle one on the axis; "
+        f"channels {', '.join(kernel.channels)}.",
+        "K[i][j] = sum over terms of sign * weight[i] * weight[j]: a horizontal pass and the same "
+        "pass vertically,",
+        "then the sum over terms. Weights are energies of pixels (dimensionless), linear light.",
+        f"Energy of the 2D kernel: {_values(kernel.energy.tolist())}.",
+        f"Multiply by: {_values(kernel.scale.tolist())}.",
+        f"Relative Frobenius error: {_values(kernel.relative_frobenius_error.tolist())}; "
+        f"energy error: {_values(kernel.energy_error.tolist())}.",
+    ]
+
+
+def _values(values: Sequence[float]) -> str:
+    """Write a value for each channel."""
+    return ", ".join("unknown" if math.isnan(each) else f"{each:.6g}" for each in values)

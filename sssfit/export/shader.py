@@ -1,0 +1,52 @@
+"""A kernel as shader source: constant arrays with a comment that says what they are.
+
+Numbers are single precision, written with the fewest digits that read back to the same bits.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.export._comment import description
+from sssfit.kernel import SeparableKernel
+
+_WIDEST_VECTOR = 4  # float4; kernels of more channels become arrays of floats
+
+
+def hlsl(kernel: SeparableKernel) -> str:
+    """Return HLSL: signs and weights of each term, the channel last, the weights by pixel.
+
+    Up to four channels are float to float4; beyond that weights are [term][pixel][channel].
+    """
+    terms, pixels, channels = kernel.weights.shape
+    is_vector = channels <= _WIDEST_VECTOR
+    kind = f"float{channels}" if 1 < channels <= _WIDEST_VECTOR else "float"
+    last = "" if is_vector else f"[{channels}]"
+    lines = [f"// {line}" for line in description(kernel)]
+    lines += [
+        f"static const uint SSS_TERMS = {terms};",
+        f"static const uint SSS_PIXELS = {pixels};",
+        f"static const float SSS_MM_PER_PIXEL = {_number(kernel.mm_per_pixel)};",
+        f"static const {kind} SSS_SCALE{last} = {_value(kernel.scale, kind)};",
+        f"static const {kind} SSS_SIGN[{terms}]{last} = {{",
+        *(f"    {_value(signs, kind)}," for signs in kernel.signs),
+        "};",
+        f"static const {kind} SSS_WEIGHTS[{terms}][{pixels}]{last} = {{",
+    ]
+    for weights in kernel.weights:
+        lines += ["    {", *(f"        {_value(each, kind)}," for each in weights), "    },"]
+    return "\n".join([*lines, "};", ""])
+
+
+def _value(values: npt.NDArray[np.float64], kind: str) -> str:
+    """Write one value a channel: a vector, a single number, or a list."""
+    numbers = ", ".join(_number(each) for each in values)
+    if kind != "float":
+        return f"{kind}({numbers})"
+    return numbers if values.size == 1 else f"{{{numbers}}}"
+
+
+def _number(value: float) -> str:
+    """Write a single-precision literal."""
+    text = np.format_float_scientific(np.float32(value), trim="0", exp_digits=1)
+    plain = np.format_float_positional(np.float32(value), trim="0")
+    return plain if len(plain) <= len(text) else text

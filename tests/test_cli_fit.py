@@ -1,0 +1,103 @@
+"""``sssfit fit`` and ``sssfit export`` of kernels: files, figures, one line for what is wrong."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from reference_pixels import make_profile
+
+from sssfit.cli import cli, main
+from sssfit.kernel import SeparableKernel
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    """An empty current folder with a small profile."""
+    monkeypatch.chdir(tmp_path)
+    r = np.linspace(0.0, 4.0, 41)
+    energy = np.diff(0.5 - 0.5 * np.exp(-(r**2) / 0.5))[:, None] * [1.0, 0.5]
+    make_profile(r, energy).save("wax.profile.npz")
+    return tmp_path
+
+
+def ended(*arguments):
+    """What a command ended with: exit status, stdout, stderr."""
+    return CliRunner().invoke(cli, arguments)
+
+
+def failed(capsys, *arguments):
+    """Exit status and stderr of the whole program."""
+    with pytest.raises(SystemExit) as ending:
+        main(arguments)
+    return ending.value.code, capsys.readouterr().err
+
+
+def test_a_session_from_profile_to_shader(folder):
+    assert ended("fit", "--method", "preintegrated").exit_code == 0
+    kernel = SeparableKernel.load("wax.preintegrated.kernel.json")
+    assert kernel.mm_per_pixel == pytest.approx(0.1)
+    assert ended("export", "--format", "hlsl").exit_code == 0
+    assert (folder / "wax.preintegrated.hlsl").read_text().startswith("// Subsurface")
+    assert ended("export", "--format", "json").exit_code == 0
+    assert json.loads((folder / "wax.preintegrated.json").read_text())["pixels"] == kernel.pixels
+
+
+def test_json_has_the_figures(folder):
+    result = ended("fit", "wax.profile.npz", "--method", "preintegrated", "--json")
+    figures = json.loads(result.stdout)
+    for key in (
+        *("method", "rank", "mm_per_pixel", "support_mm", "pixels", "taps", "seconds"),
+        *("relative_frobenius_error", "energy_error", "stop_reason", "command", "output"),
+    ):
+        assert key in figures
+    assert figures["stop_reason"] == ["closed form"] * 2
+    assert figures["pixels"] == 2 * round(figures["support_mm"] / figures["mm_per_pixel"]) + 1
+
+
+def test_normalised_kernels_keep_their_energy_apart(folder):
+    ended("fit", "--method", "preintegrated", "--normalize")
+    kernel = SeparableKernel.load("wax.preintegrated.kernel.json")
+    np.testing.assert_allclose(kernel.energy, 1.0, rtol=1e-12)
+    np.testing.assert_allclose(kernel.scale, [0.5, 0.25], rtol=2e-3)
+
+
+def test_list_has_a_line_for_each_method(folder):
+    from sssfit.fit import METHODS
+
+    lines = ended("fit", "--list").stdout.splitlines()
+    assert [line.split()[0] for line in lines] == list(METHODS)
+    for line, method in zip(lines, METHODS.values(), strict=True):
+        assert line.endswith(method.summary)
+
+
+def test_kernel_goes_to_stdout_and_words_to_stderr(folder):
+    result = ended("fit", "--method", "preintegrated", "-o", "-")
+    assert json.loads(result.stdout)["format"] == "sssfit.kernel/1"
+    assert "Frobenius" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "word"),
+    [
+        (("fit",), 2, "--list"),
+        (("fit", "--method", "preintegrated", "--mm-per-pixel", "0"), 2, "length"),
+        (("fit", "--method", "preintegrated", "--mm-per-pixel", "1e-9"), 1, "bytes"),
+        (("fit", "gone.profile.npz", "--method", "preintegrated"), 1, "gone.profile.npz"),
+        (("export", "wax.profile.npz", "--format", "hlsl"), 1, "kernel"),
+        (("export", "--format", "hlsl"), 1, "sssfit fit"),
+    ],
+)
+def test_bad_input_gets_one_line(folder, capsys, arguments, status, word):
+    code, text = failed(capsys, *arguments)
+    assert code == status
+    assert word in text.splitlines()[-1]
+    assert "Traceback" not in text
+
+
+def test_a_foreign_file_is_not_replaced(folder, capsys):
+    (folder / "wax.preintegrated.kernel.json").write_text("mine")
+    code, text = failed(capsys, "fit", "--method", "preintegrated")
+    assert code == 1
+    assert "--force" in text
+    assert (folder / "wax.preintegrated.kernel.json").read_text() == "mine"
