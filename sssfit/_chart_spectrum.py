@@ -23,7 +23,7 @@ from sssfit._chart_page import (
     name_axes,
     new_figure,
 )
-from sssfit._chart_style import COLOURS, LEFT, LINE_STYLES, RIGHT, Style
+from sssfit._chart_style import COLOURS, LEFT, LINE_STYLES, RC, RIGHT, WIDTH_INCHES, Style
 from sssfit._chart_text import method_name, shortened, spread
 from sssfit._profile_bins import FloatArray
 
@@ -83,7 +83,9 @@ def _draw_head(figure: Figure, spectrum: Spectrum, shown: Sequence[int]) -> floa
         y = 1 - down / HEIGHT_INCHES
         x = [LEFT, LEFT + 0.025, LEFT + 0.05]
         figure.add_artist(Line2D(x, [y] * 3, markevery=[1], **_style(k)))
-        name = fitting([shortened(spectrum.profile.channels[channel])], 8.5, 1.0)
+        whole = spectrum.profile.channels[channel]
+        room = WIDTH_INCHES * (_COLUMNS[0] - LEFT - 0.06) - 0.1
+        name = fitting([shortened(whole), shortened(whole, 6)], RC["font.size"], room)
         draw_text(figure, down, name, left=LEFT + 0.06)
         for left, figure_text in zip(_COLUMNS, _row(spectrum, channel), strict=True):
             draw_text(figure, down, figure_text, left=left, size=8)
