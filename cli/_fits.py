@@ -23,7 +23,13 @@ class Fit:
 
 
 FITS = {
+    "svd": Fit(
+        "rank N: the largest terms of the singular value decomposition; the smallest error",
+        ("rank", "energy"),
+        "rank",
+    ),
     "preintegrated": Fit("one pass: the profile integrated along lines; exact for axis edges"),
+    "burley": Fit("one pass: normalised diffusion, a shape per channel, as engines take it"),
 }
 
 

@@ -1,4 +1,4 @@
-"""``sssfit chart``: a profile as a picture, or a material by every method."""
+"""``sssfit chart``: a profile, its kernel's singular values, or a material by every method."""
 
 from __future__ import annotations
 
@@ -9,8 +9,9 @@ import click
 
 from ._figure import chart_output
 from ._models import chart_models
-from ._options import Common, Count, common_options
+from ._options import Common, Count, Length, common_options
 from ._report import binary_stdin, finish, newest
+from ._spectrum import chart_spectrum
 
 if TYPE_CHECKING:
     from sssfit.profile import Profile
@@ -20,6 +21,13 @@ if TYPE_CHECKING:
 @click.argument("profile", required=False)
 @click.option(
     "--models", is_flag=True, help="Draw a material by every method, and the methods' errors."
+)
+@click.option("--spectrum", is_flag=True, help="Draw the energy of the kernel's singular values.")
+@click.option(
+    "--mm-per-pixel",
+    type=Length(),
+    metavar="MM",
+    help="Pixels of the kernel, with --spectrum.  [default: the profile's first annulus]",
 )
 @click.option(
     "--photons",
@@ -32,22 +40,27 @@ if TYPE_CHECKING:
     "--output",
     metavar="FILE",
     help="Where the chart goes, as PNG, SVG or PDF by its ending; - for PNG on stdout."
-    "  [default: NAME.profile.png, MATERIAL.models.png]",
+    "  [default: NAME.profile.png, NAME.spectrum.png, MATERIAL.models.png]",
 )
 @click.option("--force", is_flag=True, help="Replace a file that is not a chart.")
 @common_options
 def chart(
     profile: str | None,
     models: bool,
+    spectrum: bool,
+    mm_per_pixel: float | None,
     photons: int | None,
     output: str | None,
     force: bool,
     common: Common,
 ) -> None:
-    """Draw PROFILE: R_d(r) in four plots with error bands; or what models make of a material.
+    """Draw PROFILE: R_d(r) in four plots with error bands, or its kernel's singular values.
 
     2 pi r R_d over r, linear and logarithmic; R_d over r in mean free paths; R_d(x, y) as an image.
     PROFILE is a .profile.npz file, or - for stdin; by default the newest of this folder.
+
+    With --spectrum the share that each term of a separable kernel has in the 2D kernel, of its
+    squares and of its absolute values; how many terms leave an error of 1 %.
 
     With --models PROFILE is a material, or a profile of the photon walk, which then need not be
     walked again: the exact solution, the walk and the diffusion models in one figure, and how far
@@ -57,6 +70,7 @@ def chart(
       sssfit chart skin1.profile.npz
       sssfit chart skin1.profile.npz -o skin1.pdf
       sssfit simulate skin1 -o - | sssfit chart - -o skin1.svg
+      sssfit chart --spectrum skin1.profile.npz --mm-per-pixel 0.1
       sssfit chart --models skin1
     """
     from sssfit._chart_files import chart_format
@@ -65,6 +79,10 @@ def chart(
         chart_format(str(output))  # before anything is read or drawn
     if photons is not None and not models:
         raise click.UsageError("--photons is for the walk of --models; leave it out.")
+    if mm_per_pixel is not None and not spectrum:
+        raise click.UsageError("--mm-per-pixel is for the kernel of --spectrum; leave it out.")
+    if models and spectrum:
+        raise click.UsageError("--models and --spectrum are two charts; ask for one at a time.")
     if models:
         if profile is None:
             raise click.UsageError("--models needs a material, or a profile of a photon walk.")
@@ -72,7 +90,10 @@ def chart(
         return
     name = profile or str(newest(common, "*.profile.npz", "sssfit simulate skin1"))
     loaded = _read(name)
-    path = _target(name, loaded, output)
+    path = _target(name, loaded, output, "spectrum" if spectrum else "profile")
+    if spectrum:
+        chart_spectrum(name, loaded, path, mm_per_pixel, common, force=force)
+        return
     with chart_output(path, force=force) as save:
         from sssfit.chart import profile_figure
 
@@ -101,10 +122,13 @@ def _material_name(profile: Profile) -> str | None:
     return material.name if material else None
 
 
-def _target(name: str, profile: Profile, output: str | None) -> Path | None:
+def _target(name: str, profile: Profile, output: str | None, kind: str) -> Path | None:
     """Where the chart goes; None is stdout. By default the current folder, under the same name."""
     if output is not None:
         return None if output == "-" else Path(output)
     if name == "-":
-        return Path(f"{_material_name(profile) or 'stdin'}.profile.png")
-    return Path(Path(name).name.removesuffix(".npz") + ".png")
+        return Path(f"{_material_name(profile) or 'stdin'}.{kind}.png")
+    stem = Path(name).name.removesuffix(".npz")
+    if kind != "profile":
+        stem = f"{stem.removesuffix('.profile')}.{kind}"
+    return Path(f"{stem}.png")

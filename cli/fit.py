@@ -48,6 +48,18 @@ class Support(Length):
     "--normalize", is_flag=True, help="Unit energy for every channel; its energy is kept apart."
 )
 @click.option(
+    "--rank",
+    type=click.IntRange(1, 1000),
+    metavar="N",
+    help="Number of terms, for svd.  [default: 3]",
+)
+@click.option(
+    "--energy",
+    type=click.Choice(["rescale", "keep"]),
+    help="For svd: scale the terms to the diffuse reflectance, or keep the least error."
+    "  [default: rescale]",
+)
+@click.option(
     "-o",
     "--output",
     metavar="FILE",
@@ -77,7 +89,7 @@ def fit(
     spacing is finer than most scenes need; 0.1 mm often fits as well with a third of the pixels.
 
     \b
-      sssfit fit --method preintegrated
+      sssfit fit --method svd --rank 3
       sssfit fit skin1.exact.profile.npz --method preintegrated --mm-per-pixel 0.1
     """
     if listing:

@@ -18,7 +18,16 @@ if TYPE_CHECKING:
 
 FORMAT = "sssfit.kernel/1"
 MOST_BYTES = 500_000_000  # 16000 pixels, 10 terms and 64 channels are 200 MB
-_KEYS = ("method", "mm_per_pixel", "channels", "terms", "errors", "scale", "parameters", "meta")
+_TYPES: dict[str, type | tuple[type, ...]] = {
+    "method": str,
+    "mm_per_pixel": (int, float),
+    "channels": list,
+    "terms": list,
+    "errors": dict,
+    "scale": list,
+    "parameters": dict,
+    "meta": dict,
+}
 
 
 def content(kernel: "SeparableKernel") -> dict[str, Any]:
@@ -63,9 +72,7 @@ def unpack(source: str | Path | BinaryIO, origin: str) -> dict[str, Any]:
         One line that names the origin.
     """
     whole = _parsed(_read(source, origin), origin)
-    missing = [key for key in _KEYS if key not in whole]
-    if missing:
-        raise KernelError(f"{origin}: the kernel has no {missing[0]}; make it again.")
+    _check_types(whole, origin)
     terms, errors = whole["terms"], whole["errors"]
     try:
         fields = {key: whole[key] for key in ("method", "channels", "parameters", "meta")}
@@ -115,6 +122,22 @@ def _parsed(text: bytes, origin: str) -> Mapping[str, Any]:
     if found != FORMAT:
         raise KernelError(f"{origin}: format {found!r}; expected a kernel file, {FORMAT!r}.")
     return dict(whole)
+
+
+def _check_types(whole: Mapping[str, Any], origin: str) -> None:
+    """Refuse a kernel that lacks a key or has something else under it."""
+    for key, expected in _TYPES.items():
+        if key not in whole:
+            raise KernelError(f"{origin}: the kernel has no {key}; make it again.")
+        if not isinstance(whole[key], expected):
+            found = type(whole[key]).__name__
+            raise KernelError(
+                f"{origin}: the kernel is damaged ({key} is of type {found}); make it again."
+            )
+    if not all(isinstance(each, str) for each in whole["channels"]):
+        raise KernelError(
+            f"{origin}: the kernel is damaged (channels are not names); make it again."
+        )
 
 
 def _line(value: Any) -> str:

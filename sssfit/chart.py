@@ -2,12 +2,14 @@
 
 `profile_figure` draws a profile as the plots of "Separable Subsurface Scattering", Jimenez et al.
 2015, supplement G: 2 pi r R_d linear and logarithmic, R_d against mean free paths, and the 2D
-profile. `models_figure` draws profile models against the exact solution. `save_figure` writes PNG,
-SVG or PDF; the same figure gives the same bytes.
+profile. `models_figure` draws profile models against the exact solution, `spectrum_figure`
+the singular values of a profile's kernel. `save_figure` writes PNG, SVG or PDF; the same figure
+gives the same bytes.
 
-Matplotlib is imported here, in ``sssfit._chart_models`` and in ``sssfit._chart_page`` only, and
-never its pyplot, which takes 0.8 s to import and keeps global state. ``sssfit._profile_bins``
-merges annuli, ``sssfit._chart_data`` makes the image, ``sssfit._chart_text`` words the captions.
+Matplotlib is imported here and in ``sssfit._chart_models``, ``_chart_page`` and ``_chart_spectrum``
+only, and never its pyplot, which takes 0.8 s to import and keeps global state.
+``sssfit._profile_bins`` merges annuli, ``sssfit._chart_data`` makes the image,
+``sssfit._chart_text`` words the captions.
 """
 
 import math
@@ -37,6 +39,7 @@ from sssfit._chart_page import (
     new_figure,
     tick,
 )
+from sssfit._chart_spectrum import spectrum_figure
 from sssfit._chart_style import (
     COLOURS,
     DPI,
@@ -61,6 +64,7 @@ __all__ = [
     "models_figure",
     "profile_figure",
     "save_figure",
+    "spectrum_figure",
 ]
 
 _UNWEIGHTED = r"$R_d$ (1/mm²)"

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from sssfit.fit import METHODS
+
 BENCH = Path(__file__).parent / "bench"
 ACCURACY = ["run", "seconds", "error", "claimed"]
 EXACT = [
@@ -80,3 +82,20 @@ def test_small_benchmarks_run_and_fill_every_table(script, expected):
                 number = float(value.replace(",", ""))
                 assert math.isfinite(number)
                 assert number >= 0.0
+
+
+def test_small_benchmarks_of_fits_run_and_fill_every_table():
+    ended = subprocess.run(
+        [sys.executable, str(BENCH / "bench_fit.py"), "--small"],
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+    solver, whole, methods = tables(ended.stdout)
+    assert [row[0].split()[0] for row in solver[1]] == ["the", "rank", "numpy.linalg.svd"]
+    assert float(solver[1][1][3]) < 1e-10  # ours against numpy's, in the same run
+    assert [row[0] for row in whole[1]] == ["skin1", "ketchup"]
+    assert [row[0] for row in methods[1]] == [f"apple, {name}" for name in METHODS]
+    for row in methods[1]:
+        assert all(math.isfinite(float(value)) for value in row[1:])

@@ -1,5 +1,6 @@
 """What is lost: one profile, kernel or picture held against another, in figures."""
 
 from sssfit.compare.models import ModelComparison, ModelCurve, compare_models
+from sssfit.compare.spectrum import Spectrum, compute_spectrum
 
-__all__ = ["ModelComparison", "ModelCurve", "compare_models"]
+__all__ = ["ModelComparison", "ModelCurve", "Spectrum", "compare_models", "compute_spectrum"]

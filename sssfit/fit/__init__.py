@@ -9,9 +9,20 @@ from dataclasses import dataclass
 
 from sssfit.fit._result import FitResult
 from sssfit.fit._target import make_target, support_of
+from sssfit.fit.burley import fit_burley
 from sssfit.fit.preintegrated import fit_preintegrated
+from sssfit.fit.svd import fit_svd
 
-__all__ = ["METHODS", "FitMethod", "FitResult", "fit_preintegrated", "make_target", "support_of"]
+__all__ = [
+    "METHODS",
+    "FitMethod",
+    "FitResult",
+    "fit_burley",
+    "fit_preintegrated",
+    "fit_svd",
+    "make_target",
+    "support_of",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +34,13 @@ class FitMethod:
 
 
 METHODS = {
+    "svd": FitMethod(
+        fit_svd, "rank N: the largest terms of the singular value decomposition; the smallest error"
+    ),
     "preintegrated": FitMethod(
         fit_preintegrated, "one pass: the profile integrated along lines; exact for axis edges"
+    ),
+    "burley": FitMethod(
+        fit_burley, "one pass: normalised diffusion, a shape per channel, as engines take it"
     ),
 }

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from sssfit._disks import checked_support
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.profile import Profile
 
@@ -101,7 +102,8 @@ def make_target(
             stacklevel=3,
         )
     target = Target(profile, pitch, half)
-    profile.line_kernel(pitch, half)  # refuses what memory cannot hold before anything is done
+    # Before anything is done: every fit makes a quadrant, if only for its error.
+    checked_support(float(profile.r_edges_mm[-1]), pitch, half, dimensions=2)
     return target
 
 

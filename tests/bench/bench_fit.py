@@ -1,0 +1,126 @@
+"""Time and error of fits: tables on stdout, or docs/benchmarks-fit.md with ``--write``.
+
+    python tests/bench/bench_fit.py            full size, some minutes
+    python tests/bench/bench_fit.py --write    the same into docs/benchmarks-fit.md
+    python tests/bench/bench_fit.py --small    ten seconds; the tests run it
+
+The whole 2473 x 2473 kernel of skin1 goes to numpy's SVD in the same run as its quadrant to ours.
+"""
+
+import argparse
+import platform
+import resource
+import sys
+from pathlib import Path
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+ROOT = Path(__file__).parents[2]
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "bench")]
+
+from bench_exact import timed  # noqa: E402
+from bench_walk import markdown, processor  # noqa: E402
+
+import sssfit  # noqa: E402
+from sssfit.fit import METHODS, fit_svd  # noqa: E402
+from sssfit.fit.svd import eigenpairs  # noqa: E402
+from sssfit.material import load_material, material_names  # noqa: E402
+from sssfit.profile import full_kernel  # noqa: E402
+from sssfit.simulate import simulate_exact  # noqa: E402
+
+RANK = 6
+
+
+def solver_rows(small):
+    """One channel of skin1: the matrix, our eigenvalues, numpy's of the whole kernel."""
+    profile = simulate_exact(load_material("skin1"))
+    pitch = 0.5 if small else float(profile.r_edges_mm[1])
+    half = int(profile.r_edges_mm[-1] / pitch + 1e-9)
+    matrix, quadrant = timed(lambda: profile.quadrant_kernel(pitch, half, channel=0))
+    with threadpool_limits(1, user_api="blas"):
+        eigenpairs(quadrant, RANK)  # scipy loaded
+        ours, (values, _) = timed(lambda: eigenpairs(quadrant, RANK))
+        whole = full_kernel(quadrant)
+        numpys, (_, singular, _) = timed(lambda: np.linalg.svd(whole))
+    apart = np.abs(np.abs(values) - singular[:RANK]).max() / singular[0]
+    size = f"{len(whole)} x {len(whole)}"
+    return [
+        ("the quadrant's pixels", size, f"{matrix:.3f}", "0"),
+        ("rank 6 of the quadrant", size, f"{ours:.4f}", f"{apart:.0e}"),
+        ("numpy.linalg.svd of the whole", size, f"{numpys:.3f}", "0"),
+    ]
+
+
+def whole_fit_rows(small):
+    """All channels on the paper's grid, support the whole grid, pixels and errors included."""
+    rows = []
+    for name in ("skin1", "ketchup"):
+        profile = simulate_exact(load_material(name))
+        pitch = 0.5 if small else None
+        reach = float(profile.r_edges_mm[-1])
+        pixels_mm = {"mm_per_pixel": pitch, "support_mm": reach}
+        took, found = timed(lambda p=profile, m=pixels_mm: fit_svd(p, rank=RANK, **m))
+        pixels = found.kernel.pixels
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        rows.append((name, f"{pixels} x {pixels}", f"{took:.2f}", f"{memory:.0f}"))
+    return rows
+
+
+def method_rows(small):
+    """Every method on every material, at 0.1 mm and its own defaults."""
+    rows = []
+    names = material_names()[:1] if small else material_names()
+    for name in names:
+        profile = simulate_exact(load_material(name))
+        for method, each in METHODS.items():
+            took, found = timed(
+                lambda p=profile, f=each.fit: f(p, mm_per_pixel=1.0 if small else 0.1)
+            )
+            errors = [f"{100 * error:.3g}" for error in found.relative_frobenius_error]
+            energy = 100 * np.abs(found.energy_error).max()
+            energy_error = f"{energy:.2g}" if energy > 1e-9 else "0"  # else but rounding
+            row = (f"{name}, {method}", str(found.kernel.rank), *errors, energy_error)
+            rows.append((*row, f"{took:.2f}"))
+    return rows
+
+
+def page(small):
+    """All tables."""
+    sections = [
+        "# Benchmarks of fits",
+        "Made by `python tests/bench/bench_fit.py --write`; times move with the machine. This run: "
+        f"sssfit {sssfit.__version__}, {processor()}, Python {platform.python_version()}, numpy "
+        f"{np.__version__}.",
+        "## Singular values of skin1's red kernel",
+        "One thread; the last column is the largest difference of the six singular values, as a "
+        "share of the first.",
+        markdown(("work", "pixels", "seconds", "apart"), solver_rows(small)),
+        "## Rank 6 of three channels on the paper's grid",
+        "Seconds for pixels, terms and errors together, and the most memory the process has held.",
+        markdown(("material", "pixels", "seconds", "MB"), whole_fit_rows(small)),
+        "## All methods, all materials",
+        "At 0.1 mm, exact profiles, each method's defaults: relative Frobenius error of each "
+        "channel and the largest energy error in percent.",
+        markdown(
+            ("material, method", "terms", "R", "G", "B", "energy", "seconds"), method_rows(small)
+        ),
+    ]
+    return "\n\n".join(sections) + "\n"
+
+
+def main():
+    """Print the page, or write it."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--small", action="store_true", help="tiny sizes, to see that it runs")
+    parser.add_argument("--write", action="store_true", help="into docs/benchmarks-fit.md")
+    options = parser.parse_args()
+    text = page(options.small)
+    if options.write:
+        (ROOT / "docs" / "benchmarks-fit.md").write_text(text)
+    else:
+        sys.stdout.write(text)
+
+
+if __name__ == "__main__":
+    main()

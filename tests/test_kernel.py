@@ -1,0 +1,279 @@
+"""Kernel records and their files: the same bits back, a schema, one line for what is no kernel."""
+
+import copy
+import io
+import itertools
+import json
+import pickle
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from reference_pixels import one_over_r_profile
+
+import sssfit
+from sssfit.errors import FileError, KernelError
+from sssfit.fit import fit_preintegrated, fit_svd
+from sssfit.kernel import FORMAT, SeparableKernel, is_kernel_file
+
+SCHEMA = json.loads((Path(sssfit.__file__).parent / "kernel.schema.json").read_text("utf-8"))
+ARRAYS = ("signs", "weights", "relative_frobenius_error", "energy_error", "scale")
+
+
+def kernel_of(half, signs=None, **changes):
+    """A kernel with the given half passes (T, h+1, C); ``changes`` replace fields."""
+    half = np.asarray(half, dtype=float)
+    terms, _, channels = half.shape
+    fields = {
+        "method": "test",
+        "mm_per_pixel": 0.1,
+        "channels": tuple(f"c{k}" for k in range(channels)),
+        "signs": np.ones((terms, channels)) if signs is None else signs,
+        "weights": np.concatenate((half[:, :0:-1], half), axis=1),
+        "relative_frobenius_error": np.full(channels, np.nan),
+        "energy_error": np.zeros(channels),
+        "scale": np.ones(channels),
+        "parameters": {},
+        "meta": {"material": "test"},
+    }
+    return SeparableKernel(**(fields | changes))
+
+
+def bytes_of(kernel):
+    stream = io.BytesIO()
+    kernel.write(stream)
+    return stream.getvalue()
+
+
+def assert_same_bits(ours, theirs):
+    for name in ARRAYS:
+        assert getattr(ours, name).tobytes() == getattr(theirs, name).tobytes(), name
+    for name in ("method", "mm_per_pixel", "channels"):
+        assert getattr(ours, name) == getattr(theirs, name), name
+    assert dict(ours.parameters) == dict(theirs.parameters)
+    assert dict(ours.meta) == dict(theirs.meta)
+
+
+numbers = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e150, max_value=1e150)
+json_values = st.recursive(
+    st.none() | st.booleans() | st.integers(-(2**60), 2**60) | numbers | st.text(max_size=8),
+    lambda inner: (
+        st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3)
+    ),
+    max_leaves=6,
+)
+
+
+@st.composite
+def kernels(draw):
+    terms, half, channels = (draw(st.integers(1, most)) for most in (3, 4, 3))
+    shape = (terms, half, channels)
+    errors = arrays(float, channels, elements=st.floats(0.0, 1e9) | st.just(np.nan))
+    return kernel_of(
+        draw(arrays(float, shape, elements=numbers)),
+        draw(arrays(float, (terms, channels), elements=st.sampled_from((-1.0, 1.0)))),
+        method=draw(st.text(max_size=12)),
+        mm_per_pixel=draw(st.floats(1e-12, 1e12)),
+        channels=tuple(draw(st.lists(st.text(max_size=6), min_size=channels, max_size=channels))),
+        relative_frobenius_error=draw(errors),
+        energy_error=draw(errors),
+        scale=draw(arrays(float, channels, elements=numbers)),
+        parameters=draw(st.dictionaries(st.text(max_size=5), json_values, max_size=3)),
+        meta=draw(st.dictionaries(st.text(max_size=5), json_values, max_size=3)),
+    )
+
+
+@settings(max_examples=150, deadline=None)
+@given(kernels())
+def test_a_file_gives_the_same_bits_back_and_obeys_the_schema(kernel):
+    written = bytes_of(kernel)
+    read = SeparableKernel.read(io.BytesIO(written))
+    assert_same_bits(read, kernel)
+    assert bytes_of(read) == written
+    jsonschema.validate(json.loads(written), SCHEMA)
+
+
+def test_the_schema_is_one_and_refuses_what_is_no_kernel():
+    jsonschema.Draft202012Validator.check_schema(SCHEMA)
+    assert SCHEMA["title"] == FORMAT
+    good = kernel_of(np.ones((2, 3, 1))).to_dict()
+    jsonschema.validate(good, SCHEMA)
+    for key in SCHEMA["required"]:
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate({name: good[name] for name in good if name != key}, SCHEMA)
+    for changes in ({"mm_per_pixel": 0}, {"terms": []}, {"rank": 0}, {"format": "sssfit.kernel/2"}):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate(good | changes, SCHEMA)
+
+
+@pytest.mark.parametrize("name", ["fit_svd", "fit_preintegrated"])
+def test_kernels_of_fits_come_back_and_obey_the_schema(tmp_path, name):
+    fit = {"fit_svd": fit_svd, "fit_preintegrated": fit_preintegrated}[name]
+    kernel = fit(one_over_r_profile(20, 0.1, [0.3, 0.9]), normalize=True).kernel
+    path = tmp_path / "test.kernel.json"
+    kernel.save(path)
+    assert is_kernel_file(path)
+    assert_same_bits(SeparableKernel.load(path), kernel)
+    jsonschema.validate(json.loads(path.read_bytes()), SCHEMA)
+
+
+def test_subnormal_weights_and_the_sign_of_zero_come_back():
+    tiny = kernel_of(np.full((1, 2, 1), 5e-324))
+    assert_same_bits(SeparableKernel.read(io.BytesIO(bytes_of(tiny))), tiny)
+    assert np.signbit(
+        SeparableKernel.read(io.BytesIO(bytes_of(kernel_of(np.full((1, 2, 1), -0.0))))).weights
+    ).all()
+
+
+def test_a_file_has_a_line_a_term():
+    lines = bytes_of(kernel_of(np.ones((3, 4, 2)))).decode().splitlines()
+    assert sum(line.startswith('  {"sign"') for line in lines) == 3
+    assert json.loads(lines[1].removesuffix(",").join("{}"))["format"] == FORMAT
+
+
+@settings(max_examples=60, deadline=None)
+@given(
+    arrays(float, (3, 4, 2), elements=st.floats(-3.0, 3.0)),
+    arrays(float, (3, 2), elements=st.sampled_from((-1.0, 1.0))),
+)
+def test_passes_and_the_2d_kernel_agree(half, signs):
+    kernel = kernel_of(half, signs)
+    assert (kernel.rank, kernel.pixels, kernel.half_pixels) == (3, 7, 3)
+    assert kernel.support_mm == pytest.approx(0.3)
+    rng = np.random.default_rng(1)
+    image = rng.uniform(size=(7, 7))
+    for c in range(2):
+        full = kernel.full(c)
+        literal = np.zeros((7, 7))
+        for t, i, j in itertools.product(range(3), range(7), range(7)):
+            literal[i, j] += signs[t, c] * kernel.weights[t, i, c] * kernel.weights[t, j, c]
+        np.testing.assert_allclose(full, literal, atol=1e-12)
+        np.testing.assert_allclose(kernel.quadrant(c), full[3:, 3:], atol=1e-12)
+        np.testing.assert_array_equal(kernel.quadrant(c), kernel.quadrant(c).T)
+        np.testing.assert_allclose(kernel.line[:, c], full.sum(axis=0), atol=1e-11)
+        assert kernel.energy[c] == pytest.approx(full.sum(), abs=1e-10)
+        passes = kernel.weights[:, :, c]
+        in_passes = sum(signs[t, c] * (passes[t] @ image @ passes[t]) for t in range(3))
+        assert in_passes == pytest.approx((full * image).sum(), abs=1e-10)
+
+
+def test_copies_and_pickles_hold_the_same():
+    kernel = kernel_of(np.ones((2, 3, 1)), parameters={"c0": {"v": [1.0]}})
+    for twin in (pickle.loads(pickle.dumps(kernel)), copy.deepcopy(kernel)):
+        np.testing.assert_array_equal(twin.weights, kernel.weights)
+        assert dict(twin.parameters) == {"c0": {"v": [1.0]}}
+        assert not twin.weights.flags.writeable
+        assert bytes_of(twin) == bytes_of(kernel)
+
+
+def test_a_kernel_cannot_be_changed():
+    kernel = kernel_of(np.ones((1, 2, 1)))
+    with pytest.raises(ValueError, match="read-only"):
+        kernel.weights[0] = 2.0
+    with pytest.raises(TypeError):
+        kernel.meta["material"] = "other"
+    with pytest.raises(AttributeError):
+        kernel.scale = np.ones(1)
+
+
+@pytest.mark.parametrize(
+    ("changes", "fragment"),
+    [
+        ({"mm_per_pixel": 0.0}, "mm_per_pixel = 0.0; expected a length above 0"),
+        ({"mm_per_pixel": np.nan}, "mm_per_pixel = nan"),
+        ({"weights": np.ones((1, 4, 1))}, "an odd number of pixels"),
+        ({"weights": np.ones((0, 3, 1))}, "weights have shape (0, 3, 1)"),
+        ({"weights": np.ones((1, 3))}, "weights have shape (1, 3)"),
+        ({"weights": np.array([[[1.0], [2.0], [3.0]]])}, "not symmetric"),
+        ({"weights": np.full((1, 3, 1), np.nan)}, "have to be numbers"),
+        ({"scale": [np.inf]}, "have to be numbers"),
+        ({"scale": [1.0, 1.0]}, "scale has shape (2,); expected (1,)"),
+        ({"signs": [[0.5]]}, "signs have to be +1 or -1"),
+        ({"channels": ("R", "G")}, "2 channel names for 1 channels"),
+    ],
+)
+def test_what_is_no_kernel_is_one_clear_line(changes, fragment):
+    with pytest.raises(KernelError) as caught:
+        kernel_of(np.ones((1, 2, 1)), **changes)
+    assert fragment in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def damaged():
+    """Bytes that are no kernel, with what is to be said of them."""
+    whole = json.loads(bytes_of(kernel_of(np.ones((2, 3, 2)))))
+
+    def changed(**changes):
+        return json.dumps(whole | changes).encode()
+
+    term = whole["terms"][0]
+    yield "empty", b"", "not JSON, or cut short"
+    yield "cut", bytes_of(kernel_of(np.ones((2, 3, 2))))[:-200], "not JSON, or cut short"
+    yield "binary", bytes(range(256)), "not JSON, or cut short"
+    yield "deep", b"[" * 100_000, "not JSON, or cut short"
+    yield "an npz", b"PK\x03\x04", "not JSON, or cut short"
+    yield "a list", b"[1, 2]", "format None; expected a kernel file, 'sssfit.kernel/1'"
+    yield "foreign", b'{"asset": {"version": "2.0"}}', "format None; expected a kernel file"
+    yield "newer", changed(format="sssfit.kernel/2"), "format 'sssfit.kernel/2'; expected"
+    for key in ("method", "mm_per_pixel", "channels", "terms", "errors", "scale", "meta"):
+        without = {name: whole[name] for name in whole if name != key}
+        yield f"no {key}", json.dumps(without).encode(), f"the kernel has no {key}"
+    for name, terms in {
+        "no terms": [],
+        "terms are numbers": [1, 2],
+        "no weights": [{"sign": [1, 1]}],
+        "ragged": [term, {"sign": [1, 1], "weights": [[1.0, 1.0]]}],
+        "words": [term | {"weights": [["a", "b"]] * 5}],
+        "null weights": [term | {"weights": [[None, 1.0]] * 5}],
+        "one channel": [term | {"weights": [[1.0]] * 5}],
+        "signs": [term | {"sign": [1, 3]}],
+        "terms are null": None,
+    }.items():
+        yield name, changed(terms=terms), ""
+    yield "errors are null", changed(errors=None), "damaged"
+    yield "errors lack one", changed(errors={"energy": [0.0, 0.0]}), "relative_frobenius"
+    yield "pitch", changed(mm_per_pixel="wide"), "damaged"
+    yield "negative pitch", changed(mm_per_pixel=-1.0), "mm_per_pixel = -1.0"
+    yield "parameters", changed(parameters=3), "damaged"
+    yield "meta", changed(meta=["a"]), "damaged"
+    yield "channels", changed(channels=7), "damaged"
+    yield "channel names", changed(channels=[1, 2]), "damaged"
+    yield "method", changed(method=5), "damaged"
+    yield "NaN", bytes_of(kernel_of(np.ones((1, 2, 1)))).replace(b"1.0", b"NaN"), ""
+
+
+@pytest.mark.parametrize(
+    ("content", "fragment"), [pytest.param(*rest, id=name) for name, *rest in damaged()]
+)
+def test_damaged_and_foreign_files_are_one_clear_line(tmp_path, content, fragment):
+    path = tmp_path / "bad.kernel.json"
+    path.write_bytes(content)
+    for source in (path, io.BytesIO(content)):
+        with pytest.raises(KernelError) as caught:
+            SeparableKernel.read(source, "bad.kernel.json")
+        assert str(caught.value).startswith("bad.kernel.json: ")
+        assert fragment in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+
+def test_cut_files_never_make_a_kernel():
+    content = bytes_of(kernel_of(np.ones((2, 3, 1))))
+    for length in range(len(content) - 2):  # the last two are the brace and the line's end
+        with pytest.raises(KernelError, match=r"^the kernel: .*cut short"):
+            SeparableKernel.read(io.BytesIO(content[:length]))
+
+
+def test_files_that_cannot_be_read_or_written_are_named(tmp_path):
+    with pytest.raises(KernelError, match=r"there\.kernel\.json"):
+        SeparableKernel.load(tmp_path / "there.kernel.json")
+    with pytest.raises(KernelError, match=str(tmp_path)):
+        SeparableKernel.load(tmp_path)
+    with pytest.raises(FileError):
+        kernel_of(np.ones((1, 2, 1))).save(tmp_path / "no" / "a.kernel.json")
+    other = tmp_path / "other.json"
+    other.write_text("{}")
+    assert not is_kernel_file(other)
