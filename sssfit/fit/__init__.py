@@ -9,9 +9,18 @@ from dataclasses import dataclass
 
 from sssfit.fit._result import FitResult
 from sssfit.fit._target import make_target, support_of
+from sssfit.fit.gaussians import fit_gaussians
 from sssfit.fit.preintegrated import fit_preintegrated
 
-__all__ = ["METHODS", "FitMethod", "FitResult", "fit_preintegrated", "make_target", "support_of"]
+__all__ = [
+    "METHODS",
+    "FitMethod",
+    "FitResult",
+    "fit_gaussians",
+    "fit_preintegrated",
+    "make_target",
+    "support_of",
+]
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,6 +32,9 @@ class FitMethod:
 
 
 METHODS = {
+    "gaussians": FitMethod(
+        fit_gaussians, "1 to 10 passes: a sum of Gaussians, best for the profile, r-weighted"
+    ),
     "preintegrated": FitMethod(
         fit_preintegrated, "one pass: the profile integrated along lines; exact for axis edges"
     ),

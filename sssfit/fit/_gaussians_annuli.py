@@ -62,9 +62,13 @@ class Annuli:
     signed: bool
 
     def at(self, log_variances: FloatArray) -> Point:
-        """Find the best weights for given variances."""
+        """Find the best weights for given variances; infinitely bad where there is no answer."""
         columns, slopes = self._columns(log_variances)
-        free = self._free(columns)
+        try:
+            free = self._free(columns)
+        except RuntimeError:  # columns alike to rounding can send the solver round in circles
+            nowhere = np.full(self.wanted.shape, np.inf)
+            return Point(log_variances, 0.0 * log_variances, nowhere, 0.0 * slopes)
         basis, wanted = self._unconstrained(columns[:, free])
         norms = np.linalg.norm(basis, axis=0)
         q, r = np.linalg.qr(basis / norms)
@@ -97,7 +101,7 @@ class Annuli:
         if self.signed:
             return np.arange(terms)
         if self.total is None:
-            r = np.linalg.qr(np.column_stack((columns, self.wanted)), mode="r")
+            r: FloatArray = np.linalg.qr(np.column_stack((columns, self.wanted)), mode="r")
             return np.flatnonzero(nnls(r[:, :terms], r[:, terms])[0] > 0.0)
         # Weights on a simplex: with sum w = T, columns w - wanted = sum_i w_i/T (T column_i -
         # wanted). The non-negative u that minimises |that with u|^2 + (1 - sum u)^2 is a multiple

@@ -55,9 +55,7 @@ def search(annuli: Annuli, terms: int, least_mm2: float, most_mm2: float) -> Fou
             reason = f"{len(best.weights)} of {terms} terms meet the profile to rounding"
             break
     assert best is not None
-    return Found(
-        np.exp(best.log_variances), best.weights, best.cost**0.5, evaluations, reason
-    )
+    return Found(np.exp(best.log_variances), best.weights, best.cost**0.5, evaluations, reason)
 
 
 def _starts(log_variances: FloatArray | None, bounds: tuple[float, float]) -> list[FloatArray]:
@@ -110,8 +108,9 @@ def _step(point: Point, damping: float) -> FloatArray:
     # Gaussians of weight 0 have no slope: the floor keeps the matrix regular and them in place.
     diagonal = np.maximum(np.diag(curvature), 1e-12 * max(float(curvature.max()), 1e-300))
     slope = point.jacobian.T @ point.residual
-    step = -np.linalg.solve(curvature + damping * np.diag(diagonal), slope)
-    return step / max(1.0, float(np.abs(step).max()) / _LONGEST_STEP)
+    step: FloatArray = np.linalg.solve(curvature + damping * np.diag(diagonal), -slope)
+    step /= max(1.0, float(np.abs(step).max()) / _LONGEST_STEP)
+    return step
 
 
 def _without_idle(point: Point) -> Point:
