@@ -22,6 +22,9 @@ import numpy.typing as npt
 
 from sssfit.fit._target import FloatArray
 
+# Signed weights may cancel: two of +-1e8 on variances that hardly differ were seen to fit the noise
+# of photons. Their absolute sum may be this many times the energy.
+_LARGEST_SUM = 10.0
 _RANK = 1e-12  # columns closer than this, as Gaussians of one variance are, count as one
 
 
@@ -64,22 +67,29 @@ class Annuli:
     def at(self, log_variances: FloatArray) -> Point:
         """Find the best weights for given variances; infinitely bad where there is no answer."""
         columns, slopes = self._columns(log_variances)
+        weights = np.zeros(len(log_variances))
         try:
             free = self._free(columns)
         except RuntimeError:  # columns alike to rounding can send the solver round in circles
-            nowhere = np.full(self.wanted.shape, np.inf)
-            return Point(log_variances, 0.0 * log_variances, nowhere, 0.0 * slopes)
+            return self._nowhere(log_variances)
         basis, wanted = self._unconstrained(columns[:, free])
         norms = np.linalg.norm(basis, axis=0)
+        norms[norms == 0.0] = 1.0  # two of one variance, one put in by the total
         q, r = np.linalg.qr(basis / norms)
         found = np.linalg.lstsq(r, q.T @ wanted, rcond=_RANK)[0] / norms
         if self.total is not None:
             found = np.append(found, self.total - found.sum())
-        weights = np.zeros(len(log_variances))
+        if np.abs(found).sum() > _LARGEST_SUM * max(1.0, self.total or 0.0):
+            return self._nowhere(log_variances)
         weights[free] = found
         jacobian = -slopes * weights
         jacobian -= q @ (q.T @ jacobian)
         return Point(log_variances, weights, self.wanted - columns @ weights, jacobian)
+
+    def _nowhere(self, log_variances: FloatArray) -> Point:
+        """Return a point that is worse than any other."""
+        nothing = np.zeros((len(self.wanted), len(log_variances)))
+        return Point(log_variances, nothing[0], np.full(self.wanted.shape, np.inf), nothing)
 
     def _columns(self, log_variances: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Scaled energies of unit Gaussians in the annuli (n, N); derivatives by log variance.
@@ -101,12 +111,12 @@ class Annuli:
         if self.signed:
             return np.arange(terms)
         if self.total is None:
-            r: FloatArray = np.linalg.qr(np.column_stack((columns, self.wanted)), mode="r")
+            r = _triangle(np.column_stack((columns, self.wanted)))
             return np.flatnonzero(nnls(r[:, :terms], r[:, terms])[0] > 0.0)
         # Weights on a simplex: with sum w = T, columns w - wanted = sum_i w_i/T (T column_i -
         # wanted). The non-negative u that minimises |that with u|^2 + (1 - sum u)^2 is a multiple
         # of the best w, because for w fixed in direction both terms grow with the former.
-        r = np.linalg.qr(self.total * columns - self.wanted[:, None], mode="r")
+        r = _triangle(self.total * columns - self.wanted[:, None])
         rows = np.vstack((r, np.ones(terms)))
         aim = np.append(np.zeros(len(r)), 1.0)
         return np.flatnonzero(nnls(rows, aim)[0] > 0.0)
@@ -117,6 +127,11 @@ class Annuli:
             return columns, self.wanted
         last = columns[:, -1]
         return columns[:, :-1] - last[:, None], self.wanted - self.total * last
+
+
+def _triangle(matrix: FloatArray) -> FloatArray:
+    """R of the QR decomposition: a small matrix of the same inner products."""
+    return np.asarray(np.linalg.qr(matrix, mode="r"), dtype=np.float64)
 
 
 def make_annuli(

@@ -12,7 +12,7 @@ import numpy as np
 from sssfit.fit._gaussians_annuli import Annuli, Point
 from sssfit.fit._target import FloatArray
 
-_ROUGH, _FINE = 1e-3, 1e-10  # relative gain of a step at which a start, or the fit, has converged
+_ROUGH, _FINE = 1e-3, 1e-8  # relative gain of a step at which a start, or the fit, has converged
 _LONGEST_STEP = 1.5  # of a log variance: a factor of 4.5
 _LEAST_STEP = 1e-9  # shorter ones are rounding
 _MOST_EVALUATIONS = 300  # from one start; 5 to 40 are usual
@@ -86,6 +86,8 @@ def _descend(
 
     A step that does not lower the cost, or gives NaN, is damped more.
     """
+    if not np.isfinite(point.cost):
+        return point, True, 0
     damping = 1e-3
     for count in range(1, _MOST_EVALUATIONS + 1):
         moved = np.clip(point.log_variances + _step(point, damping), *bounds)
@@ -108,9 +110,9 @@ def _step(point: Point, damping: float) -> FloatArray:
     # Gaussians of weight 0 have no slope: the floor keeps the matrix regular and them in place.
     diagonal = np.maximum(np.diag(curvature), 1e-12 * max(float(curvature.max()), 1e-300))
     slope = point.jacobian.T @ point.residual
-    step: FloatArray = np.linalg.solve(curvature + damping * np.diag(diagonal), -slope)
-    step /= max(1.0, float(np.abs(step).max()) / _LONGEST_STEP)
-    return step
+    step = np.linalg.solve(curvature + damping * np.diag(diagonal), -slope)
+    longest = float(np.abs(step).max())
+    return np.asarray(step * min(1.0, _LONGEST_STEP / max(longest, 1e-300)), dtype=np.float64)
 
 
 def _without_idle(point: Point) -> Point:

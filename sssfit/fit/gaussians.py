@@ -150,6 +150,7 @@ def _warn_of_pitch(target: Target) -> None:
     """Say once where the objective depends on the grid: see ``_PITCH_MATTERS``."""
     profile = target.profile
     energy = profile.annulus_energy[:, ~target.is_empty]
+    energy = energy / energy.sum(axis=0)  # else the squares of a faint profile are 0
     areas = math.pi * np.diff(profile.r_edges_mm**2)
     norms = (energy**2 / areas[:, None]).sum(axis=0)
     apart = (energy[:2] ** 2 / areas[:2, None]).sum(axis=0)
