@@ -21,7 +21,8 @@ from scipy.integrate import quad
 import sssfit.fit._gaussians_annuli as annuli_module
 from sssfit import shapes
 from sssfit.errors import FitError, SssfitWarning
-from sssfit.fit import METHODS, fit_gaussians
+from sssfit.fit import METHODS, fit_gaussians, make_target
+from sssfit.fit._gaussians_rings import rings
 from sssfit.grid import make_grid
 from sssfit.material import load_material, material_names
 from sssfit.simulate.dipole import simulate_dipole
@@ -312,7 +313,7 @@ def test_settings_and_course_are_kept(marble):
 
 def test_a_profile_that_is_steep_near_the_beam_brings_one_notice():
     steep = one_over_r_profile(400, 0.02, [0.5, 1.0])
-    with pytest.warns(SssfitWarning, match=r"profile's dr = 0\.02 mm") as caught:
+    with pytest.warns(SssfitWarning, match=r"depend on the pitch of 0\.4 mm") as caught:
         fit(steep, 3)
     assert len(caught) == 1
     assert "1/r" in str(caught[0].message)
@@ -327,6 +328,35 @@ def test_objective_of_a_steep_profile_does_depend_on_the_grid():
             errors(fit(one_over_r_profile(round(8.0 / dr), dr, [1.0]), 2))[0] for dr in (0.08, 0.01)
         ]
     assert found[1] > 1.2 * found[0]
+
+
+# Relative Frobenius errors of the best sums of 1 to 6 Gaussians on the kernel of skin1's red, exact
+# profile at the paper grid's pitch, no constraint on the energy.
+FROBENIUS_OPTIMAL = (0.57, 0.29, 0.146, 0.070, 0.034, 0.016)
+
+
+def test_a_steep_profile_is_seen_as_finely_as_its_pixels():
+    """The r-weighted optimum is another one than the kernel's, but next to it."""
+    profile = simulate_exact(load_material("skin1"))
+    for terms, best in enumerate(FROBENIUS_OPTIMAL, start=1):
+        with pytest.warns(SssfitWarning, match="steep"):
+            result = fit_gaussians(profile, terms=terms, free_energy=True)
+        assert 0.98 * best < result.relative_frobenius_error[0] < 1.5 * best
+
+
+def test_rings_keep_the_energy_and_smooth_profiles_their_annuli():
+    steep = one_over_r_profile(40, 0.02, [0.5])
+    edges, energy = rings(make_target(steep, 0.011), 0)
+    assert len(energy) == 10 * 4 + 30
+    np.testing.assert_allclose(np.diff(edges)[:40], 0.005, rtol=1e-9)
+    np.testing.assert_allclose(energy[:40].reshape(10, 4).sum(axis=1), steep.annulus_energy[:10, 0])
+    np.testing.assert_array_equal(energy[40:], steep.annulus_energy[10:, 0])
+    exact = np.diff(-0.5 * np.expm1(-edges / 0.5))
+    np.testing.assert_allclose(energy, exact, rtol=1e-3)
+    for profile, pitch in ((steep, 0.04), (simulate_dipole(load_material("skin1")), 0.01)):
+        edges, energy = rings(make_target(profile, pitch), 0)
+        np.testing.assert_array_equal(edges, profile.r_edges_mm)
+        np.testing.assert_array_equal(energy, profile.annulus_energy[:, 0])
 
 
 def test_a_channel_without_light_is_empty():

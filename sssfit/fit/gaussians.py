@@ -8,13 +8,13 @@ techniques for realistic real-time skin rendering", GPU Gems 3, chapter 14). A G
 is a product of two along the axes, so each term is one pass, integrated over the pixels.
 
 The fit sees the profile's annuli and not the pixels: variances and weights do not depend on the
-pitch of the kernel, but on the profile's grid. Where R_d ~ 1/r near the beam the integral of r R^2
-has no limit as the innermost annulus narrows, and a warning says so.
+pitch. The exception are profiles with R_d ~ 1/r near the beam, where the integral of r R^2 has no
+limit as annuli narrow; these are looked at as finely as the pixels are, and a warning says so.
 
-Next: ``_gaussians_annuli.py`` has the objective, ``_gaussians_search.py`` the search.
+Next: ``_gaussians_annuli.py`` has the objective, ``_gaussians_search.py`` the search,
+``_gaussians_rings.py`` what is looked at how finely.
 """
 
-import math
 import operator
 import warnings
 
@@ -23,6 +23,7 @@ from threadpoolctl import threadpool_limits
 
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._gaussians_annuli import make_annuli
+from sssfit.fit._gaussians_rings import is_steep, rings
 from sssfit.fit._gaussians_search import Found, search
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
 from sssfit.fit._target import Target, make_target
@@ -33,9 +34,6 @@ MOST_TERMS = 10
 # Of the first annulus's width: a Gaussian this narrow has 0.9997 of its energy there, and a
 # narrower one cannot be told from it.
 _NARROWEST = 0.25
-# Merging the first two annuli lowers int r R^2 dr by this share or more: 16 to 33 % where R_d ~ 1/r
-# (the exact profiles of four materials), under 0.6 % for dipoles on grids five times too coarse.
-_PITCH_MATTERS = 0.05
 
 
 def fit_gaussians(
@@ -81,7 +79,7 @@ def fit_gaussians(
     Warns
     -----
     SssfitWarning
-        R_d rises towards the beam as 1/r, so that the error depends on the profile's grid.
+        R_d rises towards the beam as 1/r, so that Gaussians and errors depend on the pitch.
     """
     number = _checked_terms(terms)
     target = make_target(profile, mm_per_pixel, support_mm)
@@ -89,12 +87,12 @@ def fit_gaussians(
     _warn_of_pitch(target)
 
     def fit_channel(channel: int) -> ChannelFit:
-        energy = profile.annulus_energy[:, channel]
+        edges_mm, energy = rings(target, channel)
         on_grid = float(energy.sum())
-        total = None if free_energy else float(profile.diffuse_reflectance[channel]) / on_grid
-        annuli = make_annuli(profile.r_edges_mm, energy, total, signed=signed)
-        narrowest_mm = _NARROWEST * float(profile.r_edges_mm[1])
-        found = search(annuli, number, narrowest_mm**2, float(profile.r_edges_mm[-1]) ** 2)
+        total = None if free_energy else float(target.total[channel]) / on_grid
+        annuli = make_annuli(edges_mm, energy, total, signed=signed)
+        narrowest_mm = _NARROWEST * float(edges_mm[1])
+        found = search(annuli, number, narrowest_mm**2, float(edges_mm[-1]) ** 2)
         return _as_passes(target, found, on_grid)
 
     # One BLAS thread: matrices of a few thousand rows and 10 columns gain nothing from more.
@@ -147,20 +145,12 @@ def _check_annuli(profile: Profile, terms: int) -> None:
 
 
 def _warn_of_pitch(target: Target) -> None:
-    """Say once where the objective depends on the grid: see ``_PITCH_MATTERS``."""
-    profile = target.profile
-    energy = profile.annulus_energy[:, ~target.is_empty]
-    energy = energy / energy.sum(axis=0)  # else the squares of a faint profile are 0
-    areas = math.pi * np.diff(profile.r_edges_mm**2)
-    norms = (energy**2 / areas[:, None]).sum(axis=0)
-    apart = (energy[:2] ** 2 / areas[:2, None]).sum(axis=0)
-    together = energy[:2].sum(axis=0) ** 2 / areas[:2].sum()
-    share = float(np.max((apart - together) / norms))
-    if share > _PITCH_MATTERS:
+    """Say once where the objective has no limit of its own."""
+    if any(is_steep(target, int(c)) for c in np.flatnonzero(~target.is_empty)):
         warnings.warn(
-            f"{profile.meta['material']['name']}: R_d is steep near the beam (single scattering is "
-            f"1/r), so the Gaussians depend on the profile's dr = {profile.r_edges_mm[1]:.3g} mm: "
-            "compare fits on one grid only.",
+            f"{target.profile.meta['material']['name']}: R_d is steep near the beam (single "
+            "scattering is 1/r), so the Gaussians depend on the pitch of "
+            f"{target.mm_per_pixel:.3g} mm: compare fits of one pitch and one profile grid only.",
             SssfitWarning,
             stacklevel=3,
         )
