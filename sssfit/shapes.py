@@ -48,6 +48,21 @@ def gaussian_marginal(x: npt.ArrayLike, variance: npt.ArrayLike) -> FloatArray:
     return np.exp(-np.square(x) / (2.0 * v)) / np.sqrt(2.0 * math.pi * v)
 
 
+def gaussian_line_integral(
+    left: npt.ArrayLike, right: npt.ArrayLike, variance: npt.ArrayLike
+) -> FloatArray:
+    """Integral of `gaussian_marginal` from ``left`` to ``right``: energy of a pixel's column.
+
+    A difference of two tails, on the side of 0 where these are small and keep their digits.
+    """
+    from scipy.special import ndtr  # 0.2 s that the photon walk need not wait for
+
+    sigma = np.sqrt(np.asarray(variance, dtype=np.float64))
+    a, b = np.asarray(left) / sigma, np.asarray(right) / sigma
+    near, far = np.where(a + b < 0.0, -b, a), np.where(a + b < 0.0, -a, b)
+    return np.asarray(ndtr(-near) - ndtr(-far), dtype=np.float64)
+
+
 def diffusion_density(r: npt.ArrayLike, s: npt.ArrayLike) -> FloatArray:
     """Normalised diffusion, s (exp(-s r) + exp(-s r / 3)) / (8 pi r): infinite at r = 0.
 

@@ -36,6 +36,16 @@ def test_gaussian_marginal_is_the_density_along_a_line(x):
     assert shapes.gaussian_marginal(x, 1.7) == pytest.approx(line, rel=1e-10)
 
 
+@pytest.mark.parametrize(
+    ("left", "right"), [(-0.05, 0.05), (0.0, 1e-6), (0.9, 1.1), (-3.5, -2.5), (9.0, 11.0), (-1, 2)]
+)
+def test_gaussian_line_integral_against_quadrature(left, right):
+    expected, _ = quad(
+        lambda x: float(shapes.gaussian_marginal(x, 0.7)), left, right, epsabs=0, epsrel=1e-13
+    )
+    assert shapes.gaussian_line_integral(left, right, 0.7) == pytest.approx(expected, rel=1e-12)
+
+
 @pytest.mark.parametrize("s", [0.2, 1.0, 9.0])
 @pytest.mark.parametrize("r", RADII)
 def test_diffusion_disk(r, s):

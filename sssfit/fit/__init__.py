@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from sssfit.fit._result import FitResult
 from sssfit.fit._target import make_target, support_of
 from sssfit.fit.burley import fit_burley
+from sssfit.fit.gaussians import fit_gaussians
 from sssfit.fit.preintegrated import fit_preintegrated
 from sssfit.fit.svd import fit_svd
 
@@ -18,6 +19,7 @@ __all__ = [
     "FitMethod",
     "FitResult",
     "fit_burley",
+    "fit_gaussians",
     "fit_preintegrated",
     "fit_svd",
     "make_target",
@@ -36,6 +38,9 @@ class FitMethod:
 METHODS = {
     "svd": FitMethod(
         fit_svd, "rank N: the largest terms of the singular value decomposition; the smallest error"
+    ),
+    "gaussians": FitMethod(
+        fit_gaussians, "1 to 10 passes: a sum of Gaussians, best for the profile, r-weighted"
     ),
     "preintegrated": FitMethod(
         fit_preintegrated, "one pass: the profile integrated along lines; exact for axis edges"

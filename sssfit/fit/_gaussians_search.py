@@ -1,0 +1,124 @@
+"""Search for the variances of a sum of Gaussians: one Gaussian more at a time.
+
+The best sum of N starts from the best of N - 1 with a new Gaussian in each gap between variances,
+below the smallest and above the largest. With weight 0 for the new one each start is as good as
+what it started from, so the error cannot rise with N.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sssfit.fit._gaussians_annuli import Annuli, Point
+from sssfit.fit._target import FloatArray
+
+_ROUGH, _FINE = 1e-3, 1e-8  # relative gain of a step at which a start, or the fit, has converged
+_LONGEST_STEP = 1.5  # of a log variance: a factor of 4.5
+_LEAST_STEP = 1e-9  # shorter ones are rounding
+_MOST_EVALUATIONS = 300  # from one start; 5 to 40 are usual
+_MET = 1e-28  # square of a relative error that is rounding
+_SINGLE_STARTS = 5  # for the first Gaussian, over the whole range
+_FINISHED = 2  # of the starts, the best ones, go on to the end
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Found:
+    """The best sum: ascending variances (N,) [mm^2], weights (N,) as shares of the on-grid energy.
+
+    ``error`` is relative; ``stop_reason`` says in words why it ended.
+    """
+
+    variances_mm2: FloatArray
+    weights: FloatArray
+    error: float
+    evaluations: int
+    stop_reason: str
+
+
+def search(annuli: Annuli, terms: int, least_mm2: float, most_mm2: float) -> Found:
+    """Find up to ``terms`` Gaussians with variances between two limits [mm^2].
+
+    Fewer where another one does not lower the error.
+    """
+    bounds = float(np.log(least_mm2)), float(np.log(most_mm2))
+    best, evaluations, reason = None, 0, ""
+    for number in range(1, terms + 1):
+        starts = _starts(None if best is None else best.log_variances, bounds)
+        found, settled, count = _best_of(annuli, starts, bounds)
+        evaluations += count
+        if best is not None and not found.cost < best.cost:
+            reason = f"{number - 1} of {terms} terms are enough: one more does not lower the error"
+            break
+        best = _without_idle(found)
+        reason = "converged" if settled else f"stopped after {_MOST_EVALUATIONS} evaluations"
+        if best.cost <= _MET:
+            reason = f"{len(best.weights)} of {terms} terms meet the profile to rounding"
+            break
+    assert best is not None
+    return Found(np.exp(best.log_variances), best.weights, best.cost**0.5, evaluations, reason)
+
+
+def _starts(log_variances: FloatArray | None, bounds: tuple[float, float]) -> list[FloatArray]:
+    """Return where to start from: ascending log variances with a new one in each gap."""
+    if log_variances is None:
+        return [np.array([each]) for each in np.linspace(*bounds, _SINGLE_STARTS + 2)[1:-1]]
+    inside = 0.5 * (log_variances[1:] + log_variances[:-1])
+    new = np.clip([log_variances[0] - 2.0, *inside, log_variances[-1] + 1.5], *bounds)
+    return [np.append(log_variances, each) for each in new]
+
+
+def _best_of(
+    annuli: Annuli, starts: list[FloatArray], bounds: tuple[float, float]
+) -> tuple[Point, bool, int]:
+    """Try all starts roughly, finish the best; the best point, whether it settled, evaluations."""
+    tried = [_descend(annuli, annuli.at(start), bounds, _ROUGH) for start in starts]
+    tried.sort(key=lambda each: each[0].cost)
+    finished = [_descend(annuli, each[0], bounds, _FINE) for each in tried[:_FINISHED]]
+    count = len(starts) + sum(each[2] for each in [*tried, *finished])
+    best = min(finished, key=lambda each: each[0].cost)
+    return best[0], best[1], count
+
+
+def _descend(
+    annuli: Annuli, point: Point, bounds: tuple[float, float], tolerance: float
+) -> tuple[Point, bool, int]:
+    """Levenberg and Marquardt's method from a point; the last point, settled or not, evaluations.
+
+    A step that does not lower the cost, or gives NaN, is damped more.
+    """
+    if not np.isfinite(point.cost):
+        return point, True, 0
+    damping = 1e-3
+    for count in range(1, _MOST_EVALUATIONS + 1):
+        moved = np.clip(point.log_variances + _step(point, damping), *bounds)
+        trial = annuli.at(moved)
+        gain = point.cost - trial.cost
+        if gain > 0.0:
+            point, damping = trial, max(0.1 * damping, 1e-9)
+            if gain <= tolerance * point.cost or point.cost <= _MET:
+                return point, True, count
+        elif np.abs(moved - point.log_variances).max() <= _LEAST_STEP:
+            return point, True, count
+        else:
+            damping = max(10.0 * damping, 1e-6)
+    return point, False, _MOST_EVALUATIONS
+
+
+def _step(point: Point, damping: float) -> FloatArray:
+    """Return the damped Gauss-Newton step, no longer than a factor of 4.5 in a variance."""
+    curvature = point.jacobian.T @ point.jacobian
+    # Gaussians of weight 0 have no slope: the floor keeps the matrix regular and them in place.
+    diagonal = np.maximum(np.diag(curvature), 1e-12 * max(float(curvature.max()), 1e-300))
+    slope = point.jacobian.T @ point.residual
+    step = np.linalg.solve(curvature + damping * np.diag(diagonal), -slope)
+    longest = float(np.abs(step).max())
+    return np.asarray(step * min(1.0, _LONGEST_STEP / max(longest, 1e-300)), dtype=np.float64)
+
+
+def _without_idle(point: Point) -> Point:
+    """Leave out Gaussians of weight 0 and put the others in ascending order."""
+    order = np.argsort(point.log_variances)
+    kept = order[point.weights[order] != 0.0]
+    return Point(
+        point.log_variances[kept], point.weights[kept], point.residual, point.jacobian[:, kept]
+    )

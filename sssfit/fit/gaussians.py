@@ -1,0 +1,156 @@
+"""A sum of Gaussians: the classical kernel, N separable passes of known widths.
+
+minimise  int r (R_d(r) - sum_i w_i G(v_i, r))^2 dr,   G(v, r) = exp(-r^2 / 2v) / (2 pi v)
+
+with the sum of the weights held at the diffuse reflectance (Jimenez et al. 2015, "Separable
+Subsurface Scattering", supplement eq. S.1; without that constraint d'Eon and Luebke 2007, "Advanced
+techniques for realistic real-time skin rendering", GPU Gems 3, chapter 14). A Gaussian in the plane
+is a product of two along the axes, so each term is one pass, integrated over the pixels.
+
+The fit sees the profile's annuli and not the pixels: variances and weights do not depend on the
+pitch. The exception are profiles with R_d ~ 1/r near the beam, where the integral of r R^2 has no
+limit as annuli narrow; these are looked at as finely as the pixels are, and a warning says so.
+
+Next: ``_gaussians_annuli.py`` has the objective, ``_gaussians_search.py`` the search,
+``_gaussians_rings.py`` what is looked at how finely.
+"""
+
+import operator
+import warnings
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from sssfit.errors import FitError, SssfitWarning
+from sssfit.fit._gaussians_annuli import make_annuli
+from sssfit.fit._gaussians_rings import is_steep, rings
+from sssfit.fit._gaussians_search import Found, search
+from sssfit.fit._result import ChannelFit, FitResult, fit_channels
+from sssfit.fit._target import Target, make_target
+from sssfit.profile import Profile
+from sssfit.shapes import gaussian_line_integral
+
+MOST_TERMS = 10
+# Of the first annulus's width: a Gaussian this narrow has 0.9997 of its energy there, and a
+# narrower one cannot be told from it.
+_NARROWEST = 0.25
+
+
+def fit_gaussians(
+    profile: Profile,
+    *,
+    terms: int = 4,
+    signed: bool = False,
+    free_energy: bool = False,
+    mm_per_pixel: float | None = None,
+    support_mm: float | None = None,
+    normalize: bool = False,
+) -> FitResult:
+    """Fit a sum of Gaussians to the profile, r-weighted least squares.
+
+    Parameters
+    ----------
+    profile : Profile
+    terms : int
+        Number N of Gaussians, 1 to 10; fewer come out where one more does not lower the error.
+    signed : bool
+        Allow negative weights.
+    free_energy : bool
+        Do not hold the sum of the weights at the diffuse reflectance: a smaller error near the
+        beam for an energy that is off.
+    mm_per_pixel, support_mm : float, optional [mm]
+        Pixels; see ``sssfit.fit.make_target``.
+    normalize : bool
+        Unit energy for every channel, the energy kept apart.
+
+    Returns
+    -------
+    FitResult
+        The kernel's ``parameters`` have for each channel ``variances_mm2`` (ascending), ``weights``
+        (energies, before ``normalize``) and ``relative_error``, that of the literature:
+        sqrt(int r (R - fit)^2 dr / int r R^2 dr) over the profile's grid.
+
+    Raises
+    ------
+    FitError, ProfileError
+        Terms out of range or too many for the annuli; the profile, the pitch or the support is of
+        no use.
+
+    Warns
+    -----
+    SssfitWarning
+        R_d rises towards the beam as 1/r, so that Gaussians and errors depend on the pitch.
+    """
+    number = _checked_terms(terms)
+    target = make_target(profile, mm_per_pixel, support_mm)
+    _check_annuli(profile, number)
+    _warn_of_pitch(target)
+
+    def fit_channel(channel: int) -> ChannelFit:
+        edges_mm, energy = rings(target, channel)
+        on_grid = float(energy.sum())
+        total = None if free_energy else float(target.total[channel]) / on_grid
+        annuli = make_annuli(edges_mm, energy, total, signed=signed)
+        narrowest_mm = _NARROWEST * float(edges_mm[1])
+        found = search(annuli, number, narrowest_mm**2, float(edges_mm[-1]) ** 2)
+        return _as_passes(target, found, on_grid)
+
+    # One BLAS thread: matrices of a few thousand rows and 10 columns gain nothing from more.
+    with threadpool_limits(1, user_api="blas"):
+        return fit_channels(
+            target,
+            "gaussians",
+            fit_channel,
+            settings={"terms": number, "signed": signed, "free_energy": free_energy},
+            normalize=normalize,
+        )
+
+
+def _as_passes(target: Target, found: Found, on_grid: float) -> ChannelFit:
+    """Integrate the Gaussians over the pixels; a weight's root goes into each of its two passes."""
+    weights, edges_mm = found.weights * on_grid, target.edges_mm()
+    columns = gaussian_line_integral(edges_mm[:-1], edges_mm[1:], found.variances_mm2[:, None])
+    return ChannelFit(
+        signs=np.sign(weights),
+        half=np.sqrt(np.abs(weights))[:, None] * columns,
+        stop_reason=found.stop_reason,
+        evaluations=found.evaluations,
+        parameters={
+            "variances_mm2": found.variances_mm2.tolist(),
+            "weights": weights.tolist(),
+            "relative_error": found.error,
+        },
+    )
+
+
+def _checked_terms(terms: int) -> int:
+    """Refuse a number of Gaussians that is none."""
+    try:
+        number = operator.index(terms)
+    except TypeError:
+        number = 0
+    if not 1 <= number <= MOST_TERMS:
+        raise FitError(f"terms = {terms!r}; expected a whole number from 1 to {MOST_TERMS}.")
+    return number
+
+
+def _check_annuli(profile: Profile, terms: int) -> None:
+    """Refuse more unknowns than data."""
+    if profile.n_annuli < 2 * terms:
+        raise FitError(
+            f"{profile.meta['material']['name']}: a profile of {profile.n_annuli} annuli cannot "
+            f"fix {terms} Gaussians, a width and a weight each; give a finer profile or fewer "
+            "terms."
+        )
+
+
+def _warn_of_pitch(target: Target) -> None:
+    """Say once where the objective has no limit of its own."""
+    if any(is_steep(target, int(c)) for c in np.flatnonzero(~target.is_empty)):
+        warnings.warn(
+            f"{target.profile.meta['material']['name']}: R_d is steep near the beam (single "
+            "scattering is 1/r), so the Gaussians depend on the pitch of "
+            f"{target.mm_per_pixel:.3g} mm: compare fits of one pitch and one profile grid only.",
+            SssfitWarning,
+            stacklevel=3,
+        )
