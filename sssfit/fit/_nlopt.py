@@ -3,8 +3,9 @@
 SLSQP is sequential quadratic programming (Kraft 1988, "A software package for sequential quadratic
 programming"), as NLopt ships it. What it is handed should be scaled: objectives near 1 at the
 start, second derivatives near 1 in every parameter; its first step takes the Hessian for the
-identity. Four habits of nlopt are met here: an objective that is NaN comes back as success; rounding
-near an optimum of 0 raises; a start outside the bounds is refused; an exception loses the result.
+identity. Four habits of nlopt are met here: an objective that is NaN comes back as success;
+rounding near an optimum of 0 raises; a start outside the bounds is refused; an exception loses the
+result.
 """
 
 from collections.abc import Callable

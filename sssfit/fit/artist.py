@@ -1,8 +1,9 @@
 """The artist-friendly kernel: two Gaussians in one pass, to be fitted or set by hand.
 
-a_m(x) = w G(x, v_near) + (1 - w) G(x, v_far) per channel (Jimenez et al. 2015, "Separable Subsurface
-Scattering", supplement E). A shader multiplies each sample by exp(-d_z^2 / (2 max(v_near, v_far)))
-for the depth between it and the middle; that variance goes into the kernel's parameters.
+a_m(x) = w G(x, v_near) + (1 - w) G(x, v_far) per channel (Jimenez et al. 2015, "Separable
+Subsurface Scattering", supplement E). A shader multiplies each sample by
+exp(-d_z^2 / (2 max(v_near, v_far))) for the depth between it and the middle; that variance goes
+into the kernel's parameters.
 """
 
 import itertools
@@ -15,8 +16,8 @@ import numpy as np
 from sssfit.errors import FitError
 from sssfit.fit._by_hand import per_channel
 from sssfit.fit._nlopt import Minimum, minimise
-from sssfit.fit._result import ChannelFit, FitResult, fit_channels
 from sssfit.fit._passes import gaussian_pixels, kernel_misfit, line_misfit, of_unit_sum
+from sssfit.fit._result import ChannelFit, FitResult, fit_channels
 from sssfit.fit._target import FloatArray, Target, make_target
 from sssfit.profile import Profile
 
@@ -111,7 +112,7 @@ def _fitted(pixels: Target, channel: int, target: str) -> Minimum:
 
     # A tenth of a pixel is a point, and twice the support is flat.
     log_v = 2.0 * np.log(np.array((0.1, 2.0 * (pixels.half_pixels + 1))) * pixels.mm_per_pixel)
-    pairs = itertools.combinations(np.linspace(*log_v, _WIDTHS + 2)[1:-1], 2)
+    pairs = itertools.combinations(np.linspace(log_v[0], log_v[1], _WIDTHS + 2)[1:-1], 2)
     starts = [np.array((w, *pair)) for pair in pairs for w in (0.25, 0.5, 0.75)]
     starts.sort(key=lambda x: objective(x)[0])
     lower = np.array((0.0, log_v[0], log_v[0]))

@@ -1,8 +1,8 @@
 """The model of 2012: the red skin profile, stretched, with part of the light left unscattered.
 
-s(w, t, f)[x] = p(x / m) t + delta(x) (1 - t) with m = STRETCH w (0.001 + f), width w, strength t and
-falloff f, and p the red channel of d'Eon's six-Gaussian skin (Jimenez, Jarabo, Gutierrez 2012,
-"Separable Subsurface Scattering", RR-02-12, eqs. 1 to 3). Where the report leaves a choice:
+s(w, t, f)[x] = p(x / m) t / m + delta(x) (1 - t) with m = STRETCH w (0.001 + f), width w, strength
+t and falloff f, and p the red channel of d'Eon's six-Gaussian skin (Jimenez, Jarabo, Gutierrez
+2012, "Separable Subsurface Scattering", RR-02-12, eqs. 1 to 3). Where the report leaves a choice:
 
 - Eq. 1 prints p[x w / (0.001 + f)], by which a larger width narrows; its figure 6 and the released
   shader widen. The figure is followed.
@@ -19,6 +19,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from sssfit.errors import FitError
 from sssfit.fit._by_hand import per_channel
@@ -29,7 +30,7 @@ from sssfit.fit._target import FloatArray, make_target
 from sssfit.profile import Profile
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS
 
-STRETCH = 127.3
+STRETCH = 127.8
 
 _SIGMAS_MM = np.sqrt(SKIN_VARIANCES_MM2)
 _RED = np.array([row[0] for row in SKIN_WEIGHTS])
@@ -139,7 +140,7 @@ def sampled_misfit(half: FloatArray, quadrant: FloatArray) -> tuple[float, Float
     return value, gradient
 
 
-def samples(pixels: int) -> np.ndarray[tuple[int], np.dtype[np.int64]]:
+def samples(pixels: int) -> npt.NDArray[np.int64]:
     """Return the pixels that eq. 3 looks at, of so many on a half line: dense near the middle."""
     at = [0]
     while (farther := at[-1] + max(1, at[-1] // _DENSE)) < pixels:
@@ -156,9 +157,8 @@ def fit_scale(quadrant: FloatArray, edges_mm: FloatArray) -> Minimum:
         return value, slopes @ gradient
 
     # From skin that is a point in the middle pixel to skin that is flat over the support.
-    narrow = 0.2 * edges_mm[1] / _SIGMAS_MM[-1]
-    logs = np.log((narrow, 2.0 * edges_mm[-1] / _SIGMAS_MM[-1]))
-    grid = itertools.product(_STRENGTHS, np.linspace(*logs, _SCALES))
+    logs = np.log(np.array((0.2 * edges_mm[1], 2.0 * edges_mm[-1])) / _SIGMAS_MM[-1])
+    grid = itertools.product(_STRENGTHS, np.linspace(logs[0], logs[1], _SCALES))
     starts = sorted((np.array(x) for x in grid), key=lambda x: objective(x)[0])
     lower, upper = np.array((0.0, logs[0])), np.array((1.0, logs[1]))
     found = [minimise(objective, x, lower=lower, upper=upper) for x in starts[:_REFINED]]

@@ -1,9 +1,10 @@
 """The guided kernel: one pass, fitted where a guide function says that it matters.
 
 Minimise over a the sum of Gamma (R_d - a a^T)^2 subject to (sum a)^2 = ||R_d||_1, with
-Gamma(x, y; k) = (x^2 + y^2)^(k/2) (1 - exp(-b x^2)) (1 - exp(-b y^2)), x and y from -1 to 1 over the
-support (Jimenez et al. 2015, "Separable Subsurface Scattering", supplement eqs. S.7 to S.9): k = 0
-favours light near the beam, k = 4 far light. Sequential quadratic programming, coarse to fine.
+Gamma(x, y; k) = (x^2 + y^2)^(k/2) (1 - exp(-b x^2)) (1 - exp(-b y^2)), x and y from -1 to 1 over
+the support (Jimenez et al. 2015, "Separable Subsurface Scattering", supplement eqs. S.7 to S.9):
+k = 0 favours light near the beam, k = 4 far light. Sequential quadratic programming, coarse to
+fine.
 
 Gamma vanishes along the axes, so that the middle pixel a(0) is all but free: it takes up whatever
 energy the rest does not want and becomes a spike, which is reported and can be bounded.
@@ -181,7 +182,7 @@ def _fit_channel(target: Target, channel: int, k: float, b: float, most: float) 
     """Fit level by level; energies as shares of the channel's, so that sum(a) = 1."""
     total = float(target.total[channel])
     levels: list[dict[str, Any]] = []
-    found = None
+    found: Minimum | None = None
     for half in _levels(target.half_pixels):
         pitch = target.mm_per_pixel * (target.half_pixels + 0.5) / (half + 0.5)
         level = Target(target.profile, pitch, half)
