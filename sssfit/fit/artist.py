@@ -8,7 +8,7 @@ into the kernel's parameters.
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Literal
 
 import numpy as np
@@ -25,6 +25,7 @@ _WIDTHS = 10  # tried for each Gaussian, all pairs, before the best are refined
 _REFINED = 3
 
 PerChannel = float | Sequence[float]
+Misfit = Callable[[FloatArray], tuple[float, FloatArray]]
 
 
 def fit_artist(
@@ -77,7 +78,7 @@ def fit_artist(
         if by_hand is not None:
             x = by_hand[:, channel]
             return _channel_fit(pixels, channel, x, "set by hand", 0)
-        found = _fitted(pixels, channel, target)
+        found = fit_two_gaussians(pixels.edges_mm(), _misfit_of(pixels, channel, target))
         return _channel_fit(pixels, channel, found.x, found.stop_reason, found.evaluations)
 
     settings = {"target": target, "by_hand": by_hand is not None}
@@ -95,23 +96,25 @@ def two_gaussians(edges_mm: FloatArray, x: FloatArray) -> tuple[FloatArray, Floa
     return shares @ energy, np.concatenate((energy[:1] - energy[1:], slopes))
 
 
-def _fitted(pixels: Target, channel: int, target: str) -> Minimum:
-    """Minimise over (w, log v_near, log v_far), from the best of a grid of variances."""
-    edges, copies = pixels.edges_mm(), pixels.copies
-    if target == "line":
-        misfit, wanted = line_misfit, pixels.half_line()[:, channel]
-        wanted = wanted / (copies @ wanted)
-    else:
-        misfit, wanted = kernel_misfit, pixels.quadrant(channel) / float(pixels.total[channel])
+def fit_two_gaussians(edges_mm: FloatArray, misfit: Misfit) -> Minimum:
+    """Minimise over (w, log v_near, log v_far), from the best of a grid of variances.
+
+    Parameters
+    ----------
+    edges_mm : array (h+2,) [mm]
+        `Target.edges_mm`.
+    misfit : callable
+        From a pass of sum 1 (h+1,) to how far off it is, and the gradient.
+    """
 
     def objective(x: FloatArray) -> tuple[float, FloatArray]:
         # With the energy it will have: a pass that spills over the support would else look good.
-        half, slopes = of_unit_sum(*two_gaussians(edges, x))
-        value, gradient = misfit(half, wanted, copies)
+        half, slopes = of_unit_sum(*two_gaussians(edges_mm, x))
+        value, gradient = misfit(half)
         return value, slopes @ gradient
 
     # A tenth of a pixel is a point, and twice the support is flat.
-    log_v = 2.0 * np.log(np.array((0.1, 2.0 * (pixels.half_pixels + 1))) * pixels.mm_per_pixel)
+    log_v = 2.0 * np.log(np.array((0.2 * edges_mm[1], 2.0 * edges_mm[-1])))
     pairs = itertools.combinations(np.linspace(log_v[0], log_v[1], _WIDTHS + 2)[1:-1], 2)
     starts = [np.array((w, *pair)) for pair in pairs for w in (0.25, 0.5, 0.75)]
     starts.sort(key=lambda x: objective(x)[0])
@@ -121,6 +124,16 @@ def _fitted(pixels: Target, channel: int, target: str) -> Minimum:
     best = min(found, key=lambda each: each.value)
     evaluations = len(starts) + sum(each.evaluations for each in found)
     return Minimum(_near_first(best.x), best.value, evaluations, best.stop_reason)
+
+
+def _misfit_of(pixels: Target, channel: int, target: str) -> Misfit:
+    """Return what measures a pass of sum 1 against the channel's line or its 2D kernel."""
+    copies = pixels.copies
+    if target == "line":
+        line = pixels.half_line()[:, channel]
+        return lambda half: line_misfit(half, line / (copies @ line), copies)
+    quadrant = pixels.quadrant(channel) / float(pixels.total[channel])
+    return lambda half: kernel_misfit(half, quadrant, copies)
 
 
 def _near_first(x: FloatArray) -> FloatArray:
