@@ -26,7 +26,10 @@ from .materials import materials
 from .show import show
 from .simulate import simulate
 
-_LIBRARIES = ("numpy", "scipy", "threadpoolctl", "numba", "llvmlite", "matplotlib", "click", "rich")
+_LIBRARIES = (
+    *("numpy", "scipy", "threadpoolctl", "nlopt", "numba", "llvmlite", "matplotlib"),
+    *("click", "rich"),
+)
 
 
 @click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})

@@ -20,6 +20,7 @@ class Fit:
     summary: str
     options: tuple[str, ...] = ()
     counted: str | None = None
+    count: int | None = None  # where the option is not given
 
 
 FITS = {
@@ -27,10 +28,32 @@ FITS = {
         "rank N: the largest terms of the singular value decomposition; the smallest error",
         ("rank", "energy"),
         "rank",
+        3,
+    ),
+    "gaussians": Fit(
+        "1 to 10 passes: a sum of Gaussians, best for the profile, r-weighted",
+        ("terms", "signed", "free_energy"),
+        "terms",
+        4,
     ),
     "preintegrated": Fit("one pass: the profile integrated along lines; exact for axis edges"),
+    "guided": Fit(
+        "one pass fitted under a guide function: near (k = 0) to far (k = 4) scattering",
+        ("k", "b", "centre_bound"),
+    ),
+    "artist": Fit(
+        "one pass of two Gaussians per channel, fitted or set by hand",
+        ("target", "near", "far", "weight"),
+    ),
+    "falloff": Fit(
+        "one pass, red skin stretched: width, strength and falloff, fitted or by hand",
+        ("width", "strength", "falloff"),
+    ),
     "burley": Fit("one pass: normalised diffusion, a shape per channel, as engines take it"),
 }
+
+
+_KEYWORDS = {"near": "near_mm2", "far": "far_mm2"}  # where the library's name has the unit
 
 
 def fit_lines() -> str:
@@ -50,4 +73,8 @@ def own_settings(context: click.Context, method: str, given: dict[str, Any]) -> 
                 f"{method}; leave it out."
             )
     own = FITS[method].options
-    return {key: value for key, value in given.items() if key in own and value is not None}
+    return {
+        _KEYWORDS.get(key, key): value
+        for key, value in given.items()
+        if key in own and value not in (None, False)
+    }

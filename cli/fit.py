@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ._fit_options import fit_options
 from ._fits import FITS, fit_lines, own_settings
 from ._options import Common, Length, common_options
 from ._report import binary_stdin, binary_stdout, finish, newest, table
@@ -47,18 +48,7 @@ class Support(Length):
 @click.option(
     "--normalize", is_flag=True, help="Unit energy for every channel; its energy is kept apart."
 )
-@click.option(
-    "--rank",
-    type=click.IntRange(1, 1000),
-    metavar="N",
-    help="Number of terms, for svd.  [default: 3]",
-)
-@click.option(
-    "--energy",
-    type=click.Choice(["rescale", "keep"]),
-    help="For svd: scale the terms to the diffuse reflectance, or keep the least error."
-    "  [default: rescale]",
-)
+@fit_options
 @click.option(
     "-o",
     "--output",
@@ -144,8 +134,9 @@ def _target(
     stem = Path(name).name.removesuffix(".npz").removesuffix(".profile")
     if name == "-":
         stem = str(profile.meta["material"]["name"])
-    counted = FITS[method].counted
-    return Path(f"{stem}.{method}{settings.get(counted, '') if counted else ''}.kernel.json")
+    fit = FITS[method]
+    count = settings.get(fit.counted, fit.count) if fit.counted else ""
+    return Path(f"{stem}.{method}{count}.kernel.json")
 
 
 def _figures(result: FitResult, name: str, path: Path | None) -> dict[str, Any]:
@@ -186,7 +177,7 @@ def _text(result: FitResult, figures: dict[str, Any]) -> str:
         [
             channel,
             f"{100.0 * kernel.relative_frobenius_error[c]:.3g} %",
-            f"{100.0 * kernel.energy_error[c]:+.2g} %",
+            _percent(kernel.energy_error[c]),
             f"{kernel.energy[c]:.6f}",
             result.stop_reasons[c],
         ]
@@ -194,3 +185,8 @@ def _text(result: FitResult, figures: dict[str, Any]) -> str:
     ]
     heads = ["channel", "Frobenius error", "energy error", "energy", "ended"]
     return "\n".join([head, table(heads, rows), f"Wrote {figures['output'][0]}"])
+
+
+def _percent(share: float) -> str:
+    """Write a signed share in percent; rounding of a sum of pixels is 0."""
+    return "0 %" if abs(share) < 1e-12 else f"{100.0 * share:+.2g} %"

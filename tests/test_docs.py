@@ -105,9 +105,27 @@ def test_readme_commands_print_what_it_says(tmp_path, verb, place):
     assert figures_of(printed) == figures_of(code_blocks("text")[place])
 
 
+def test_readme_session_ends_in_shader_source(tmp_path):
+    (fit,) = commands_of("sssfit fit")
+    commands = (["simulate", "skin1", "--method", "exact"], fit[1:], ["export", "--format", "hlsl"])
+    printed = [
+        subprocess.run(
+            [sys.executable, "-m", "sssfit.cli", *each],
+            cwd=tmp_path,
+            stdout=subprocess.PIPE,
+            encoding="utf-8",
+            check=True,
+            timeout=300,
+        ).stdout
+        for each in commands
+    ]
+    assert figures_of(printed[1]) == figures_of(code_blocks("text")[4])
+    assert "SSS_WEIGHTS[3][427]" in (tmp_path / "skin1.exact.svd3.hlsl").read_text()
+
+
 def figures_of(text: str) -> str:
     """A verb's output without what differs from run to run: seconds, and what is but rounding."""
-    return re.sub(r"\d+\.\d s;|[+-]?\d\.\de-\d\d|\de-\d\d|worst channel, \w+ \w", "", text)
+    return re.sub(r"\d+\.\d s\b;?|[+-]?\d\.\de-\d\d|\de-\d\d|worst channel, \w+ \w", "", text)
 
 
 def test_readme_links_lead_somewhere():

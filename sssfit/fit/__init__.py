@@ -9,8 +9,11 @@ from dataclasses import dataclass
 
 from sssfit.fit._result import FitResult
 from sssfit.fit._target import make_target, support_of
+from sssfit.fit.artist import fit_artist
 from sssfit.fit.burley import fit_burley
+from sssfit.fit.falloff import fit_falloff
 from sssfit.fit.gaussians import fit_gaussians
+from sssfit.fit.guided import fit_guided
 from sssfit.fit.preintegrated import fit_preintegrated
 from sssfit.fit.svd import fit_svd
 
@@ -18,8 +21,11 @@ __all__ = [
     "METHODS",
     "FitMethod",
     "FitResult",
+    "fit_artist",
     "fit_burley",
+    "fit_falloff",
     "fit_gaussians",
+    "fit_guided",
     "fit_preintegrated",
     "fit_svd",
     "make_target",
@@ -44,6 +50,13 @@ METHODS = {
     ),
     "preintegrated": FitMethod(
         fit_preintegrated, "one pass: the profile integrated along lines; exact for axis edges"
+    ),
+    "guided": FitMethod(
+        fit_guided, "one pass fitted under a guide function: near (k = 0) to far (k = 4) scattering"
+    ),
+    "artist": FitMethod(fit_artist, "one pass of two Gaussians per channel, fitted or set by hand"),
+    "falloff": FitMethod(
+        fit_falloff, "one pass, red skin stretched: width, strength and falloff, fitted or by hand"
     ),
     "burley": FitMethod(
         fit_burley, "one pass: normalised diffusion, a shape per channel, as engines take it"

@@ -1,0 +1,157 @@
+"""The one file that knows nlopt: SLSQP with gradients, in our words.
+
+SLSQP is sequential quadratic programming (Kraft 1988, "A software package for sequential quadratic
+programming"), as NLopt ships it. What it is handed should be scaled: objectives near 1 at the
+start, second derivatives near 1 in every parameter; its first step takes the Hessian for the
+identity. Four habits of nlopt are met here: an objective that is NaN comes back as success;
+rounding near an optimum of 0 raises; a start outside the bounds is refused; an exception loses the
+result.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.errors import FitError
+
+FloatArray = npt.NDArray[np.float64]
+Function = Callable[[FloatArray], tuple[float, FloatArray]]
+
+FEASIBLE = 1e-9  # a point counts where the equality holds to this
+_TO_ZERO = 1e-26  # absolute change that is none, for objectives whose optimum is 0
+_MOST_EVALUATIONS = 2000
+
+# By nlopt's name: numbers differ between releases.
+_WORDS = {
+    "SUCCESS": "converged",
+    "FTOL_REACHED": "converged: the objective no longer changes",
+    "XTOL_REACHED": "converged: the parameters no longer change",
+    "MAXEVAL_REACHED": f"stopped after {_MOST_EVALUATIONS} evaluations, the best of them kept",
+    "ROUNDOFF_LIMITED": "converged as far as rounding allows",
+    "FORCED_STOP": "stopped where the objective was no number, the best point before kept",
+    "FAILURE": "stopped without progress, the best point kept",
+    "INVALID_ARGS": "the optimiser refused the problem",
+    "OUT_OF_MEMORY": "out of memory",
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Minimum:
+    """Where an objective is lowest: ``x`` (n,), its ``value``, and how it was found."""
+
+    x: FloatArray
+    value: float
+    evaluations: int
+    stop_reason: str
+
+
+class _Watch:
+    """Call the objective, and keep the best feasible point and the count."""
+
+    def __init__(self, objective: Function, equality: Function | None) -> None:
+        self.objective, self.equality = objective, equality
+        self.evaluations = 0
+        self.value = np.inf
+        self.x: FloatArray | None = None
+
+    def __call__(self, x: FloatArray, gradient: FloatArray) -> float:
+        import nlopt
+
+        self.evaluations += 1
+        value, slope = self.objective(x)
+        if not (np.isfinite(value) and np.isfinite(slope).all()):
+            raise nlopt.ForcedStop
+        if value < self.value and (self.equality is None or abs(self.equality(x)[0]) <= FEASIBLE):
+            self.value, self.x = value, x.copy()
+        if gradient.size:
+            gradient[:] = slope
+        return value
+
+
+def minimise(
+    objective: Function,
+    start: FloatArray,
+    *,
+    lower: FloatArray,
+    upper: FloatArray,
+    equality: Function | None = None,
+    relative_change: float = 1e-12,
+) -> Minimum:
+    """Minimise a smooth function within bounds and, if given, on equality(x) = 0.
+
+    Parameters
+    ----------
+    objective, equality : callable
+        From x (n,) to a value and its gradient (n,).
+    start : array (n,)
+        Moved into the bounds.
+    lower, upper : array (n,)
+        May be infinite.
+    relative_change : float
+        Of the objective, from one step to the next, below which it ends.
+
+    Returns
+    -------
+    Minimum
+        The best feasible point met, also where nlopt gave up; the stop reason says so.
+
+    Raises
+    ------
+    FitError
+        No point met was both feasible and finite.
+    """
+    import nlopt  # only fits need it
+
+    watch = _Watch(objective, equality)
+    solver = nlopt.opt(nlopt.LD_SLSQP, start.size)
+    solver.set_min_objective(watch)
+    if equality is not None:
+        solver.add_equality_constraint(_filling(equality), FEASIBLE)
+    solver.set_lower_bounds(lower)
+    solver.set_upper_bounds(upper)
+    solver.set_ftol_rel(relative_change)
+    solver.set_ftol_abs(_TO_ZERO)
+    solver.set_maxeval(_MOST_EVALUATIONS)
+    reason = _run(solver, np.clip(start, lower, upper))
+    if watch.x is None:
+        raise FitError(
+            f"the optimiser met no usable point ({reason}); expected finite energies and settings: "
+            "try a larger mm_per_pixel or another method."
+        )
+    return Minimum(watch.x, watch.value, watch.evaluations, reason)
+
+
+def _filling(function: Function) -> Callable[[FloatArray, FloatArray], float]:
+    """Return a function as nlopt calls it, that writes its gradient where asked to."""
+
+    def call(x: FloatArray, gradient: FloatArray) -> float:
+        value, slope = function(x)
+        if gradient.size:
+            gradient[:] = slope
+        return value
+
+    return call
+
+
+def _run(solver: Any, start: FloatArray) -> str:
+    """Run to the end, however it ends, and say in words how."""
+    import nlopt
+
+    try:
+        solver.optimize(start)
+    except nlopt.ForcedStop:
+        return _WORDS["FORCED_STOP"]
+    except nlopt.RoundoffLimited:
+        return _WORDS["ROUNDOFF_LIMITED"]
+    except MemoryError:
+        return _WORDS["OUT_OF_MEMORY"]
+    except ValueError:
+        return _WORDS["INVALID_ARGS"]
+    except RuntimeError:
+        return _WORDS["FAILURE"]
+    code = solver.last_optimize_result()
+    names = (name for name in _WORDS if getattr(nlopt, name, None) == code)
+    return _WORDS.get(next(names, ""), f"ended with nlopt's code {code}")

@@ -1,0 +1,62 @@
+"""Passes made of Gaussians over pixels, with derivatives, and how far off they are.
+
+What the artist's and the 2012 model share. A pass covers a half line of pixels, middle first.
+"""
+
+import numpy as np
+
+from sssfit.fit._target import FloatArray
+
+
+def gaussian_pixels(edges_mm: FloatArray, sigmas_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Integrate 1D Gaussians of unit energy over pixels.
+
+    Parameters
+    ----------
+    edges_mm : array (h+2,) [mm]
+        `Target.edges_mm`.
+    sigmas_mm : array (g,) [mm]
+        Standard deviations: roots of variances per axis.
+
+    Returns
+    -------
+    array (g, h+1), array (g, h+1)
+        Energies, and their derivatives with respect to log(sigma).
+    """
+    from scipy.special import ndtr  # 0.2 s that nothing else need wait for
+
+    t = edges_mm / sigmas_mm[:, None]
+    # Beyond the axis from the far side, where small shares keep their digits.
+    energy = ndtr(-t[:, :-1]) - ndtr(-t[:, 1:])
+    slope = t * np.exp(-0.5 * t**2) / np.sqrt(2.0 * np.pi)
+    return energy, slope[:, :-1] - slope[:, 1:]
+
+
+def of_unit_sum(half: FloatArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Scale a half line (h+1,) and its derivatives (m, h+1) to a whole pass of sum 1."""
+    copies = np.where(np.arange(half.size) == 0, 1.0, 2.0)
+    total = copies @ half
+    half = half / total
+    return half, (slopes - np.outer(slopes @ copies, half)) / total
+
+
+def line_misfit(
+    half: FloatArray, wanted: FloatArray, weights: FloatArray
+) -> tuple[float, FloatArray]:
+    """Return sum weights (half - wanted)^2 over that at half = 0, and the gradient in half."""
+    norm = float(weights @ wanted**2) or 1.0
+    left = half - wanted
+    return float(weights @ left**2) / norm, 2.0 / norm * weights * left
+
+
+def kernel_misfit(
+    half: FloatArray, wanted: FloatArray, weights: FloatArray
+) -> tuple[float, FloatArray]:
+    """Return sum_ij w_i w_j (half_i half_j - wanted_ij)^2 over that at half = 0, and its gradient.
+
+    ``wanted`` (n, n) are pixels of a quadrant, ``weights`` (n,) how often each row is there.
+    """
+    norm = float(weights @ (wanted**2 @ weights)) or 1.0
+    left = half[:, None] * half - wanted
+    value = float(weights @ (left**2 @ weights)) / norm
+    return value, 4.0 / norm * weights * (left @ (weights * half))

@@ -1,0 +1,170 @@
+"""The artist-friendly kernel: two Gaussians in one pass, to be fitted or set by hand.
+
+a_m(x) = w G(x, v_near) + (1 - w) G(x, v_far) per channel (Jimenez et al. 2015, "Separable
+Subsurface Scattering", supplement E). A shader multiplies each sample by
+exp(-d_z^2 / (2 max(v_near, v_far))) for the depth between it and the middle; that variance goes
+into the kernel's parameters.
+"""
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from typing import Literal
+
+import numpy as np
+
+from sssfit.errors import FitError
+from sssfit.fit._by_hand import per_channel
+from sssfit.fit._nlopt import Minimum, minimise
+from sssfit.fit._passes import gaussian_pixels, kernel_misfit, line_misfit, of_unit_sum
+from sssfit.fit._result import ChannelFit, FitResult, fit_channels
+from sssfit.fit._target import FloatArray, Target, make_target
+from sssfit.profile import Profile
+
+_WIDTHS = 10  # tried for each Gaussian, all pairs, before the best are refined
+_REFINED = 3
+
+PerChannel = float | Sequence[float]
+Misfit = Callable[[FloatArray], tuple[float, FloatArray]]
+
+
+def fit_artist(
+    profile: Profile,
+    *,
+    mm_per_pixel: float | None = None,
+    support_mm: float | None = None,
+    normalize: bool = False,
+    target: Literal["line", "kernel"] = "line",
+    near_mm2: PerChannel | None = None,
+    far_mm2: PerChannel | None = None,
+    weight: PerChannel | None = None,
+) -> FitResult:
+    """Fit two Gaussians per channel by least squares, or take those that are given.
+
+    The pass has the profile's energy, whatever the support cuts off.
+
+    Parameters
+    ----------
+    profile : Profile
+    mm_per_pixel, support_mm : float, optional [mm]
+        Pixels; see ``sssfit.fit.make_target``.
+    normalize : bool
+        Unit energy for every channel, the energy kept apart.
+    target : str
+        What to be near to: "line", the profile integrated along lines, which is what a long
+        straight edge sees; or "kernel", all pixels of the 2D kernel.
+    near_mm2, far_mm2 : float or one per channel, optional [mm^2]
+        Variances per axis, set by hand; with ``weight`` or not at all.
+    weight : float or one per channel, optional
+        Share of the near Gaussian, 0 to 1.
+
+    Returns
+    -------
+    FitResult
+        One term. By channel the parameters hold ``near_mm2``, ``far_mm2``, ``weight`` and
+        ``depth_variance_mm2``.
+
+    Raises
+    ------
+    FitError, ProfileError
+        The profile, the pixels or a setting is of no use.
+    """
+    if target not in ("line", "kernel"):
+        raise FitError(f'target = "{target}"; expected "line" or "kernel".')
+    pixels = make_target(profile, mm_per_pixel, support_mm)
+    by_hand = _by_hand(near_mm2, far_mm2, weight, profile.channels)
+
+    def fit_channel(channel: int) -> ChannelFit:
+        if by_hand is not None:
+            x = by_hand[:, channel]
+            return _channel_fit(pixels, channel, x, "set by hand", 0)
+        found = fit_two_gaussians(pixels.edges_mm(), _misfit_of(pixels, channel, target))
+        return _channel_fit(pixels, channel, found.x, found.stop_reason, found.evaluations)
+
+    settings = {"target": target, "by_hand": by_hand is not None}
+    return fit_channels(pixels, "artist", fit_channel, settings=settings, normalize=normalize)
+
+
+def two_gaussians(edges_mm: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return a_m over pixels (h+1,) and its derivatives (3, h+1) in w, log v_near, log v_far.
+
+    ``x`` is (w, log v_near, log v_far).
+    """
+    energy, slope = gaussian_pixels(edges_mm, np.exp(0.5 * x[1:]))
+    shares = np.array((x[0], 1.0 - x[0]))
+    slopes = 0.5 * shares[:, None] * slope
+    return shares @ energy, np.concatenate((energy[:1] - energy[1:], slopes))
+
+
+def fit_two_gaussians(edges_mm: FloatArray, misfit: Misfit) -> Minimum:
+    """Minimise over (w, log v_near, log v_far), from the best of a grid of variances.
+
+    Parameters
+    ----------
+    edges_mm : array (h+2,) [mm]
+        `Target.edges_mm`.
+    misfit : callable
+        From a pass of sum 1 (h+1,) to how far off it is, and the gradient.
+    """
+
+    def objective(x: FloatArray) -> tuple[float, FloatArray]:
+        # With the energy it will have: a pass that spills over the support would else look good.
+        half, slopes = of_unit_sum(*two_gaussians(edges_mm, x))
+        value, gradient = misfit(half)
+        return value, slopes @ gradient
+
+    # A tenth of a pixel is a point, and twice the support is flat.
+    log_v = 2.0 * np.log(np.array((0.2 * edges_mm[1], 2.0 * edges_mm[-1])))
+    pairs = itertools.combinations(np.linspace(log_v[0], log_v[1], _WIDTHS + 2)[1:-1], 2)
+    starts = [np.array((w, *pair)) for pair in pairs for w in (0.25, 0.5, 0.75)]
+    starts.sort(key=lambda x: objective(x)[0])
+    lower = np.array((0.0, log_v[0], log_v[0]))
+    upper = np.array((1.0, log_v[1], log_v[1]))
+    found = [minimise(objective, x, lower=lower, upper=upper) for x in starts[:_REFINED]]
+    best = min(found, key=lambda each: each.value)
+    evaluations = len(starts) + sum(each.evaluations for each in found)
+    return Minimum(_near_first(best.x), best.value, evaluations, best.stop_reason)
+
+
+def _misfit_of(pixels: Target, channel: int, target: str) -> Misfit:
+    """Return what measures a pass of sum 1 against the channel's line or its 2D kernel."""
+    copies = pixels.copies
+    if target == "line":
+        line = pixels.half_line()[:, channel]
+        return lambda half: line_misfit(half, line / (copies @ line), copies)
+    quadrant = pixels.quadrant(channel) / float(pixels.total[channel])
+    return lambda half: kernel_misfit(half, quadrant, copies)
+
+
+def _near_first(x: FloatArray) -> FloatArray:
+    """Name the narrower Gaussian the near one."""
+    return x if x[1] <= x[2] else np.array((1.0 - x[0], x[2], x[1]))
+
+
+def _channel_fit(
+    pixels: Target, channel: int, x: FloatArray, stop_reason: str, evaluations: int
+) -> ChannelFit:
+    """Return the pass with the profile's energy, and its parameters."""
+    half, _ = of_unit_sum(*two_gaussians(pixels.edges_mm(), x))
+    scale = math.sqrt(float(pixels.total[channel]))
+    near, far = (float(each) for each in np.exp(x[1:]))
+    parameters = {"near_mm2": near, "far_mm2": far, "weight": float(x[0])}
+    parameters["depth_variance_mm2"] = max(near, far)
+    return ChannelFit(np.ones(1), scale * half[None], stop_reason, evaluations, parameters)
+
+
+def _by_hand(
+    near_mm2: PerChannel | None,
+    far_mm2: PerChannel | None,
+    weight: PerChannel | None,
+    channels: tuple[str, ...],
+) -> FloatArray | None:
+    """Return (w, log v_near, log v_far) by channel (3, C), or None where nothing is given."""
+    values = per_channel({"weight": weight, "near_mm2": near_mm2, "far_mm2": far_mm2}, channels)
+    if values is None:
+        return None
+    if ((values[0] < 0.0) | (values[0] > 1.0)).any():
+        raise FitError(f"weight = {weight}; expected shares from 0 to 1.")
+    if (values[1:] <= 0.0).any():
+        raise FitError(f"near_mm2 = {near_mm2}, far_mm2 = {far_mm2}; expected variances above 0.")
+    return np.concatenate((values[:1], np.log(values[1:])))

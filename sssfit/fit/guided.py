@@ -1,0 +1,287 @@
+"""The guided kernel: one pass, fitted where a guide function says that it matters.
+
+Minimise over a the sum of Gamma (R_d - a a^T)^2 subject to (sum a)^2 = ||R_d||_1, with
+Gamma(x, y; k) = (x^2 + y^2)^(k/2) (1 - exp(-b x^2)) (1 - exp(-b y^2)), x and y from -1 to 1 over
+the support (Jimenez et al. 2015, "Separable Subsurface Scattering", supplement eqs. S.7 to S.9):
+k = 0 favours light near the beam, k = 4 far light. Sequential quadratic programming, coarse to
+fine.
+
+Gamma vanishes along the axes, so that the middle pixel a(0) is all but free: it takes up whatever
+energy the rest does not want and becomes a spike, which is reported and can be bounded.
+"""
+
+import math
+import warnings
+from typing import Any
+
+import numpy as np
+
+from sssfit.errors import FitError, SssfitWarning
+from sssfit.fit._nlopt import Function, Minimum, minimise
+from sssfit.fit._result import ChannelFit, FitResult, fit_channels
+from sssfit.fit._target import FloatArray, Target, make_target
+from sssfit.profile import Profile
+
+NEUTRAL = 1.55  # the k that the paper draws, nearest to the pre-integrated kernel
+MOST_PIXELS = 513
+_COARSEST = 8  # pixels on either side at the first level: each level has twice those of the last
+_SPIKE = (
+    0.25  # of sum(a): a middle pixel above it, and twice the pre-integrated one's, is warned of
+)
+_ACROSS = 64  # quadrature nodes of Gamma along a half line, at least: the steps are 1/7 wide
+
+
+def fit_guided(
+    profile: Profile,
+    *,
+    mm_per_pixel: float | None = None,
+    support_mm: float | None = None,
+    normalize: bool = False,
+    k: float = NEUTRAL,
+    b: float = 50.0,
+    centre_bound: float | None = None,
+) -> FitResult:
+    """Fit one pass under the guide function Gamma.
+
+    Parameters
+    ----------
+    profile : Profile
+    mm_per_pixel, support_mm : float, optional [mm]
+        Pixels, 513 at most; see ``sssfit.fit.make_target``.
+    normalize : bool
+        Unit energy for every channel, the energy kept apart.
+    k : float
+        0 (near scattering) to 4 (far scattering).
+    b : float
+        How close to the axes Gamma vanishes: within some 1/sqrt(b) of the support.
+    centre_bound : float, optional
+        Largest share of sum(a) that the middle pixel may hold, above 0 and up to 1.
+
+    Returns
+    -------
+    FitResult
+        One term. By channel the parameters hold ``centre_share`` = a(0) / sum(a), that of the
+        pre-integrated pass, the share of sum Gamma R_d^2 that is left, and how each level ended.
+
+    Raises
+    ------
+    FitError, ProfileError
+        The profile, the pixels or a setting is of no use.
+
+    Warns
+    -----
+    SssfitWarning
+        The middle pixel holds over a quarter of sum(a) and over twice the pre-integrated pass's.
+    """
+    from threadpoolctl import threadpool_limits
+
+    _check_settings(k, b, centre_bound)
+    target = make_target(profile, mm_per_pixel, support_mm)
+    _check_pixels(target)
+    most = 1.0 if centre_bound is None else centre_bound
+
+    def fit_channel(channel: int) -> ChannelFit:
+        return _fit_channel(target, channel, k, b, most)
+
+    # Matrices of at most 257 x 257: a second thread only waits for the first.
+    with threadpool_limits(1, user_api="blas"):
+        result = fit_channels(
+            target,
+            "guided",
+            fit_channel,
+            settings={"k": k, "b": b, "centre_bound": centre_bound},
+            normalize=normalize,
+        )
+    _warn_of_spikes(result)
+    return result
+
+
+def gamma(half_pixels: int, k: float, b: float = 50.0) -> FloatArray:
+    """Mean of Gamma over every pixel of a quadrant (h+1, h+1), both axes included: eq. S.9.
+
+    The support reaches from -1 to 1, so that pixel i covers (i - 1/2, i + 1/2) / (h + 1/2).
+    """
+    order = max(4, math.ceil(_ACROSS / (half_pixels + 1)))
+    nodes, weights = np.polynomial.legendre.leggauss(order)
+    pixels = np.arange(half_pixels + 1)[:, None]
+    square = (((pixels + 0.5 * nodes) / (half_pixels + 0.5)) ** 2).ravel()
+    rising = -np.expm1(-b * square)
+    values = (square[:, None] + square) ** (0.5 * k) * rising[:, None] * rising
+    blocks = values.reshape(half_pixels + 1, order, half_pixels + 1, order)
+    mean: FloatArray = np.einsum("iajb,a,b->ij", blocks, 0.5 * weights, 0.5 * weights)
+    return mean
+
+
+def rank_one(
+    wanted: FloatArray,
+    weights: FloatArray,
+    start: FloatArray,
+    *,
+    total: float | None = 1.0,
+    centre_bound: float = math.inf,
+) -> Minimum:
+    """Minimise sum c_i c_j weights_ij (wanted_ij - a_i a_j)^2 over a >= 0 on a half line.
+
+    Parameters
+    ----------
+    wanted, weights : array (h+1, h+1)
+        A quadrant; c counts each pixel's copies in the plane.
+    start : array (h+1,)
+        Where to begin, and what the scale of each a_i is judged from.
+    total : float or None
+        What (sum of the whole pass)^2 has to be; None leaves it free.
+    centre_bound : float
+        Largest a_0.
+
+    Returns
+    -------
+    Minimum
+        ``x`` is a; ``value`` the minimum as a share of that at a = 0.
+    """
+    copies = np.where(np.arange(start.size) == 0, 1.0, 2.0)
+    weights = copies[:, None] * copies * weights
+    norm = float(np.sum(weights * wanted**2)) or 1.0
+    # In units of 1 / sqrt(second derivative) of each a_i SLSQP, which begins with the identity for
+    # a Hessian, needs 11 evaluations at 65 pixels and at 513; in units of a_i itself 227 at 65.
+    scale = np.sqrt(norm / (8.0 * weights @ start**2))
+
+    def objective(x: FloatArray) -> tuple[float, FloatArray]:
+        return _misfit(scale * x, wanted, weights, scale, norm)
+
+    upper = np.full(start.size, np.inf)
+    upper[0] = centre_bound / scale[0]
+    found = minimise(
+        objective,
+        start / scale,
+        lower=np.zeros(start.size),
+        upper=upper,
+        equality=None if total is None else _sum_is(math.sqrt(total), copies * scale),
+    )
+    return Minimum(scale * found.x, found.value, found.evaluations, found.stop_reason)
+
+
+def _misfit(
+    a: FloatArray, wanted: FloatArray, weights: FloatArray, scale: FloatArray, norm: float
+) -> tuple[float, FloatArray]:
+    """Return sum weights (wanted - a a^T)^2 / norm and its gradient in units of ``scale``."""
+    left = wanted - a[:, None] * a
+    pull = weights * left
+    return float(np.sum(pull * left)) / norm, -4.0 / norm * scale * (pull @ a)
+
+
+def _sum_is(wanted: float, weights: FloatArray) -> Function:
+    """Return weights x - wanted with its gradient: (sum a)^2 = total has one root with a >= 0."""
+
+    def equality(x: FloatArray) -> tuple[float, FloatArray]:
+        return float(weights @ x) - wanted, weights
+
+    return equality
+
+
+def _fit_channel(target: Target, channel: int, k: float, b: float, most: float) -> ChannelFit:
+    """Fit level by level; energies as shares of the channel's, so that sum(a) = 1."""
+    total = float(target.total[channel])
+    levels: list[dict[str, Any]] = []
+    found: Minimum | None = None
+    for half in _levels(target.half_pixels):
+        pitch = target.mm_per_pixel * (target.half_pixels + 0.5) / (half + 0.5)
+        level = Target(target.profile, pitch, half)
+        line = level.half_line()[:, channel]
+        start = line if found is None else _refined(found.x, half)
+        found = rank_one(
+            level.quadrant(channel) / total,
+            gamma(half, k, b),
+            _on_the_sum(start, most),
+            centre_bound=most if half else 1.0,
+        )
+        levels.append(
+            {
+                "pixels": 2 * half + 1,
+                "evaluations": found.evaluations,
+                "stop_reason": found.stop_reason,
+            }
+        )
+    assert found is not None
+    return ChannelFit(
+        np.ones(1),
+        math.sqrt(total) * found.x[None],
+        found.stop_reason,
+        evaluations=sum(level["evaluations"] for level in levels),
+        parameters={
+            "centre_share": float(found.x[0]),
+            "preintegrated_centre_share": float(line[0] / (level.copies @ line)),
+            "weighted_residual": found.value,
+            "levels": levels,
+        },
+    )
+
+
+def _levels(half_pixels: int) -> list[int]:
+    """Return the half pixels of each level, coarse to fine: 8, 16, ..., up to those asked for."""
+    halves = [half_pixels]
+    while halves[0] >= 2 * _COARSEST:
+        halves.insert(0, halves[0] // 2)
+    return halves
+
+
+def _refined(half_line: FloatArray, half_pixels: int) -> FloatArray:
+    """Spread a pass (h'+1,) over more pixels of the same support, keeping its sum and sign."""
+    from scipy.interpolate import PchipInterpolator
+
+    def edges(half: int) -> FloatArray:
+        return np.concatenate(([0.0], (np.arange(half + 1) + 0.5) / (half + 0.5)))
+
+    # The sum from the axis outwards, monotone between the edges where it is known.
+    within = np.cumsum(np.concatenate(([0.0, 0.5 * half_line[0]], half_line[1:])))
+    fine = np.diff(PchipInterpolator(edges(half_line.size - 1), within)(edges(half_pixels)))
+    fine[0] *= 2.0
+    return np.asarray(fine)
+
+
+def _on_the_sum(a: FloatArray, most: float) -> FloatArray:
+    """Scale a half line to a whole pass of sum 1 whose middle holds no more than ``most``."""
+    a = a / (2.0 * a.sum() - a[0])
+    if a[0] <= most or a.size == 1:
+        return a
+    rest = a[1:].sum()
+    outer = a[1:] / rest if rest > 0.0 else np.full(a.size - 1, 1.0 / (a.size - 1))
+    return np.concatenate(([most], 0.5 * (1.0 - most) * outer))
+
+
+def _check_settings(k: float, b: float, centre_bound: float | None) -> None:
+    if not 0.0 <= k <= 4.0:
+        raise FitError(f"k = {k:g} is outside [0, 4]; 0 favours near scattering, 4 far scattering.")
+    if not (math.isfinite(b) and b > 0.0):
+        raise FitError(f"b = {b:g}; expected a number above 0, such as 50.")
+    if centre_bound is not None and not 0.0 < centre_bound <= 1.0:
+        raise FitError(f"centre_bound = {centre_bound:g}; expected a share above 0, up to 1.")
+
+
+def _check_pixels(target: Target) -> None:
+    """Refuse more pixels than the optimiser's dense matrices should see, and name a pitch."""
+    pixels, most = 2 * target.half_pixels + 1, MOST_PIXELS // 2
+    if pixels <= MOST_PIXELS:
+        return
+    enough = (target.half_pixels + 1) * target.mm_per_pixel / (most + 1)
+    unit = 10.0 ** (math.floor(math.log10(enough)) - 2)
+    raise FitError(
+        f"the guided fit takes up to {MOST_PIXELS} pixels, and the support is {pixels} pixels of "
+        f"{target.mm_per_pixel:.4g} mm: use mm_per_pixel = {math.ceil(enough / unit) * unit:.3g} "
+        "or more, or a smaller support."
+    )
+
+
+def _warn_of_spikes(result: FitResult) -> None:
+    """Warn of channels whose middle pixel took up what the guide function left over."""
+    spikes = []
+    for channel, found in result.kernel.parameters.items():
+        share, line = found["centre_share"], found["preintegrated_centre_share"]
+        if share > max(_SPIKE, 2.0 * line):
+            spikes.append(f"{channel} {share:.2f} (pre-integrated {line:.2f})")
+    if spikes:
+        warnings.warn(
+            f"the guided kernel's middle pixel holds much of its sum, {', '.join(spikes)}: "
+            "centre_bound limits it, a smaller k lowers it.",
+            SssfitWarning,
+            stacklevel=3,
+        )
