@@ -80,7 +80,8 @@ def fit(
 
     \b
       sssfit fit --method svd --rank 3
-      sssfit fit skin1.exact.profile.npz --method preintegrated --mm-per-pixel 0.1
+      sssfit fit skin1.exact.profile.npz --method gaussians --terms 6 --mm-per-pixel 0.1
+      sssfit fit --method falloff --width .014 --strength .78,.70,.75 --falloff .57,.13,.08
     """
     if listing:
         click.echo(fit_lines())
@@ -171,7 +172,7 @@ def _text(result: FitResult, figures: dict[str, Any]) -> str:
     head = (
         f"{figures['material']}: {kernel.method}, {kernel.rank} "
         f"term{'s' if kernel.rank > 1 else ''}, {kernel.pixels} pixels of "
-        f"{kernel.mm_per_pixel:.4g} mm, {result.seconds:.2f} s"
+        f"{kernel.mm_per_pixel:.4g} mm, {result.seconds:.1f} s"
     )
     rows = [
         [

@@ -11,6 +11,7 @@ import argparse
 import platform
 import resource
 import sys
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from bench_exact import timed  # noqa: E402
 from bench_walk import markdown, processor  # noqa: E402
 
 import sssfit  # noqa: E402
+from sssfit.errors import SssfitWarning  # noqa: E402
 from sssfit.fit import METHODS, fit_svd  # noqa: E402
 from sssfit.fit.svd import eigenpairs  # noqa: E402
 from sssfit.material import load_material, material_names  # noqa: E402
@@ -114,6 +116,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--small", action="store_true", help="tiny sizes, to see that it runs")
     parser.add_argument("--write", action="store_true", help="into docs/benchmarks-fit.md")
+    warnings.simplefilter("ignore", SssfitWarning)  # steep profiles and spikes: known here
     options = parser.parse_args()
     text = page(options.small)
     if options.write:
