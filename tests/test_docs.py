@@ -52,6 +52,18 @@ def commands_of(start: str) -> list[list[str]]:
     return [block.split() for block in code_blocks() if block.startswith(start)]
 
 
+def printed_by(arguments: list[str], folder: Path) -> str:
+    """What a command of ours that ends well prints on stdout."""
+    return subprocess.run(
+        [sys.executable, "-m", "sssfit.cli", *arguments],
+        cwd=folder,
+        stdout=subprocess.PIPE,
+        encoding="utf-8",
+        check=True,
+        timeout=300,
+    ).stdout
+
+
 def table_of(text: str) -> list[list[str]]:
     """Channel, diffuse reflectance and standard error of each line about a channel."""
     return [line.split()[:3] for line in text.splitlines() if line.startswith(("R ", "G ", "B "))]
@@ -68,14 +80,7 @@ def test_readme_python_does_what_its_command_line_does(tmp_path, monkeypatch, ca
     monkeypatch.chdir(from_python)
     exec(compile(example, "README.md", "exec"), {})
     assert capsys.readouterr().out == python_prints
-    printed = subprocess.run(
-        [sys.executable, "-m", "sssfit.cli", *command[1:]],
-        cwd=from_command_line,
-        stdout=subprocess.PIPE,
-        encoding="utf-8",
-        check=True,
-        timeout=300,
-    ).stdout
+    printed = printed_by(command[1:], from_command_line)
     assert table_of(printed) == table_of(command_prints)
     assert len(table_of(printed)) == 3
 
@@ -94,31 +99,14 @@ def test_readme_python_does_what_its_command_line_does(tmp_path, monkeypatch, ca
 )
 def test_readme_commands_print_what_it_says(tmp_path, verb, place):
     (command,) = commands_of(verb)
-    printed = subprocess.run(
-        [sys.executable, "-m", "sssfit.cli", *command[1:]],
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        encoding="utf-8",
-        check=True,
-        timeout=300,
-    ).stdout
+    printed = printed_by(command[1:], tmp_path)
     assert figures_of(printed) == figures_of(code_blocks("text")[place])
 
 
 def test_readme_session_ends_in_shader_source(tmp_path):
     (fit,) = commands_of("sssfit fit")
     commands = (["simulate", "skin1", "--method", "exact"], fit[1:], ["export", "--format", "hlsl"])
-    printed = [
-        subprocess.run(
-            [sys.executable, "-m", "sssfit.cli", *each],
-            cwd=tmp_path,
-            stdout=subprocess.PIPE,
-            encoding="utf-8",
-            check=True,
-            timeout=300,
-        ).stdout
-        for each in commands
-    ]
+    printed = [printed_by(each, tmp_path) for each in commands]
     assert figures_of(printed[1]) == figures_of(code_blocks("text")[4])
     assert "SSS_WEIGHTS[3][427]" in (tmp_path / "skin1.exact.svd3.hlsl").read_text()
 

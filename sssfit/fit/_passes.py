@@ -6,6 +6,7 @@ What the artist's and the 2012 model share. A pass covers a half line of pixels,
 import numpy as np
 
 from sssfit.fit._target import FloatArray
+from sssfit.shapes import gaussian_line_integral
 
 
 def gaussian_pixels(edges_mm: FloatArray, sigmas_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -23,11 +24,8 @@ def gaussian_pixels(edges_mm: FloatArray, sigmas_mm: FloatArray) -> tuple[FloatA
     array (g, h+1), array (g, h+1)
         Energies, and their derivatives with respect to log(sigma).
     """
-    from scipy.special import ndtr  # 0.2 s that nothing else need wait for
-
+    energy = gaussian_line_integral(edges_mm[:-1], edges_mm[1:], sigmas_mm[:, None] ** 2)
     t = edges_mm / sigmas_mm[:, None]
-    # Beyond the axis from the far side, where small shares keep their digits.
-    energy = ndtr(-t[:, :-1]) - ndtr(-t[:, 1:])
     slope = t * np.exp(-0.5 * t**2) / np.sqrt(2.0 * np.pi)
     return energy, slope[:, :-1] - slope[:, 1:]
 
