@@ -29,6 +29,10 @@ class FitError(SssfitError):
     """A profile cannot be fitted as asked."""
 
 
+class RenderError(SssfitError):
+    """A picture cannot be rendered or compared as asked."""
+
+
 class FileError(SssfitError):
     """A file cannot be read, written or replaced."""
 

@@ -27,15 +27,18 @@ ROOMS = [
         "mco",
         "profile_csv",
         "kernel",
+        "image",
     ),
-    *("simulate", "fit", "compare", "export", "chart", "cli"),
+    *("simulate", "fit", "render", "compare", "export", "chart", "cli"),
 ]
 # Files that serve one room and do not say so by their name, as _profile_io does.
 BACK_ROOMS = {"_disks": "profile"}
 # What verbs ask of the chart's room before there is anything to draw; quick to import.
 LIGHT_CHART_FILES = {"_chart_data", "_chart_files"}
 # The compiled layer stands beside the list: these rooms may use it, and it uses none of them.
-ROOMS_ON_JIT = {"profile", "simulate"}
+ROOMS_ON_JIT = {"profile", "simulate", "render"}
+# Neighbours that hand records on and know nothing of each other.
+APART = {"simulate", "fit", "render"}
 JIT_MAY_IMPORT = {"numpy", "numba", "math", "sssfit"} | set(sys.stdlib_module_names)
 
 CLI = sorted((ROOT / "cli").rglob("*.py"))
@@ -128,6 +131,7 @@ def test_imports_point_down(path):
             assert room in ROOMS_ON_JIT, f"{room} imports {module}"
         else:
             assert other in ROOMS[: ROOMS.index(room) + 1], f"{room} imports {module}"
+            assert not (room != other and {room, other} <= APART), f"{room} imports {module}"
 
 
 def test_package_root_imports_nothing():

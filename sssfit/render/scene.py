@@ -1,0 +1,113 @@
+"""What a kernel is applied to: an irradiance picture, with its geometry where it has one."""
+
+import dataclasses
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.errors import RenderError
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """Irradiance on pixels, linear light, with the buffers a renderer would have beside it.
+
+    Arrays are stored as read-only float64, channel axis last. H rows from the top, W columns.
+
+    Parameters
+    ----------
+    name : str
+        What it is, for reports: a made picture's name or a file's.
+    irradiance : array (H, W, C)
+        What arrives at the surface, at least 0. C = 1 serves kernels of any number of channels.
+    mm_per_pixel : float [mm]
+        Size of a pixel on the surface; for a perspective view that of the plane at ``distance_mm``.
+    distance_mm : float, optional [mm]
+        From the eye to that plane; None for a flat picture, seen from straight above.
+    depth_mm : array (H, W), optional [mm]
+        Distance along the view axis from the eye; inf where nothing is.
+    mask : array (H, W) of int, optional
+        Which translucent object a pixel belongs to, 1 and up; 0 for everything else.
+    specular : array (H, W, C) or (H, W, 1), optional
+        Light reflected at the surface: never blurred, added afterwards.
+    thickness_mm : array (H, W), optional [mm]
+        How far light travels inside the object to this point from the light's side.
+    back_irradiance : array (H, W, C) or (H, W, 1), optional
+        Irradiance where that light enters.
+
+    Raises
+    ------
+    RenderError
+        A buffer has another shape than the irradiance, or holds NaN or negative values.
+    """
+
+    name: str
+    irradiance: FloatArray
+    mm_per_pixel: float
+    distance_mm: float | None = None
+    depth_mm: FloatArray | None = None
+    mask: npt.NDArray[np.int32] | None = None
+    specular: FloatArray | None = None
+    thickness_mm: FloatArray | None = None
+    back_irradiance: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        if np.ndim(self.irradiance) != 3 or 0 in np.shape(self.irradiance):
+            raise RenderError(
+                f"{self.name}: irradiance of shape {np.shape(self.irradiance)}; expected rows, "
+                "columns and channels, at least one of each."
+            )
+        if not (np.isfinite(self.mm_per_pixel) and self.mm_per_pixel > 0.0):
+            raise RenderError(
+                f"{self.name}: mm_per_pixel = {self.mm_per_pixel:g}; expected a length above 0."
+            )
+        for field in ("irradiance", "specular", "thickness_mm", "back_irradiance", "depth_mm"):
+            self._store(field, np.float64)
+        self._store("mask", np.int32)
+
+    def _store(self, field: str, dtype: npt.DTypeLike) -> None:
+        """Check a buffer against the irradiance and keep it read-only."""
+        given = getattr(self, field)
+        if given is None:
+            return
+        values = np.array(given, dtype=dtype)
+        if values.shape[:2] != np.shape(self.irradiance)[:2]:
+            raise RenderError(
+                f"{self.name}: {field} is {values.shape[:2]} and irradiance "
+                f"{np.shape(self.irradiance)[:2]}; expected the same rows and columns."
+            )
+        # Only depth may be infinite: where the eye sees past the object.
+        bad = np.isnan(values) if field == "depth_mm" else ~np.isfinite(values)
+        if bad.any() or (values < 0).any():
+            what = "NaN or infinite" if bad.any() else "negative"
+            count = int(bad.sum()) if bad.any() else int((values < 0).sum())
+            raise RenderError(
+                f"{self.name}: {field} has {count} {what} values; expected numbers from 0 up."
+            )
+        values.setflags(write=False)
+        object.__setattr__(self, field, values)
+
+    @property
+    def height(self) -> int:
+        """Rows."""
+        return self.irradiance.shape[0]
+
+    @property
+    def width(self) -> int:
+        """Columns."""
+        return self.irradiance.shape[1]
+
+    @property
+    def channels(self) -> int:
+        """Channels of the irradiance; 1 serves kernels of any number."""
+        return self.irradiance.shape[2]
+
+    @property
+    def fov_degrees(self) -> float | None:
+        """Vertical field of view, from tan(fov / 2) = H / 2 * mm_per_pixel / distance_mm."""
+        if self.distance_mm is None:
+            return None
+        half_height_mm = 0.5 * self.height * self.mm_per_pixel
+        return float(np.degrees(2.0 * np.arctan(half_height_mm / self.distance_mm)))
