@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
+from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Normalize, SymLogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
@@ -30,14 +31,21 @@ _ROW_INCHES = _IMAGE_INCHES + 0.33
 _SECOND = LEFT * WIDTH_INCHES + _IMAGE_INCHES + 0.22  # from the left edge: the residual
 _THIRD = _SECOND + _IMAGE_INCHES + 0.72  # the pass
 _BAR_INCHES = 0.09
-_BAR_DOWN = 0.5  # under the last row: room for the numbers and the name of x
+_BAR_DOWN = 0.2  # under the last row: room for the name of x
+_BAR_WIDER = 0.46  # the residual's, whose numbers are long
 _FOOT_INCHES = 0.52  # under the bars: their numbers and names
 _TABLE_INCHES = 0.165
 _COLUMNS = (0.25, 0.44, 0.61, 0.80)  # of the width: the table's figures
-_HEADS = ("middle pixel of the pass", "energy misplaced", "Frobenius error", "left of Γ R²")
+_HEADS = ("middle pixel of the pass", "energy misplaced", "Frobenius error", "misfit weighted by Γ")
 _DECADES = 4  # of the residual, on either side of what is drawn linearly
 _PASS_DECADES = 6
 _GREY = "#666666"
+_NOTE = (
+    "Residual: 2D kernel less a aᵀ, as a share of the channel's energy; red where the fit has too "
+    "little light, blue where it has too much. Misplaced: half the sum of |residual|. Misfit: sum "
+    "of Γ residual² over that of Γ kernel². Passes add up to 1; the middle pixel reaches the left "
+    "edge."
+)
 
 
 def guide_figure(guide: Guide) -> Figure:
@@ -60,7 +68,7 @@ def guide_figure(guide: Guide) -> Figure:
     with chart_style():
         figure = new_figure(height)
         _draw_head(figure, guide)
-        draw_footnotes(figure, [_note(guide)])
+        draw_footnotes(figure, [_NOTE])
         shades = Normalize(0.0, 1.0), _scale(guide.residual)
         for row in range(len(guide.ks)):
             down = head + _ROW_INCHES * row
@@ -128,12 +136,14 @@ def _panel(figure: Figure, left: float, down: float, width: float = _IMAGE_INCHE
     return figure.add_axes((*box, _IMAGE_INCHES / height))
 
 
-def _draw_image(axes: Axes, guide: Guide, quadrant: FloatArray, norm: Normalize, map: str) -> None:
+def _draw_image(
+    axes: Axes, guide: Guide, quadrant: FloatArray, norm: Normalize, shades: str
+) -> None:
     """Show the whole plane of a quadrant."""
     reach = 0.5 * guide.pixels * guide.mm_per_pixel
     extent = (-reach, reach, -reach, reach)
     axes.imshow(
-        full_kernel(quadrant), norm=norm, cmap=map, extent=extent, interpolation="nearest"
+        full_kernel(quadrant), norm=norm, cmap=shades, extent=extent, interpolation="nearest"
     )
     axes.grid(visible=False)
     for axis in (axes.xaxis, axes.yaxis):
@@ -155,9 +165,7 @@ def _draw_pass(axes: Axes, guide: Guide, row: int) -> None:
         label="pre-integrated",
         **line,
     )
-    axes.stairs(
-        guide.passes[row] / pitch, edges, color=COLOURS[2], lw=1.4, label="guided", **line
-    )
+    axes.stairs(guide.passes[row] / pitch, edges, color=COLOURS[2], lw=1.4, label="guided", **line)
     axes.set_xscale("log")
     axes.set_yscale("log", nonpositive="clip")
     axes.set_xlim(edges[0], edges[-1])
@@ -167,7 +175,7 @@ def _draw_pass(axes: Axes, guide: Guide, row: int) -> None:
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_minor_formatter(NullFormatter())
     if row == 0:
-        axes.legend(loc="lower left", fontsize=7.5)
+        axes.legend(loc="lower left", fontsize=7.5, reverse=True)
 
 
 def _scale(residual: FloatArray) -> SymLogNorm:
@@ -180,24 +188,28 @@ def _scale(residual: FloatArray) -> SymLogNorm:
 def _draw_bars(figure: Figure, down: float, shades: tuple[Normalize, SymLogNorm]) -> None:
     """Explain the colours of both columns of images, under them."""
     height = figure.get_figheight()
-    names = ("Γ over its largest", "energy per pixel (share)")
-    lefts = (LEFT * WIDTH_INCHES, _SECOND)
-    for norm, map, left, name in zip(shades, ("cividis", "RdBu_r"), lefts, names, strict=True):
-        box = (left / WIDTH_INCHES, 1 - (down + _BAR_INCHES) / height)
-        size = (_IMAGE_INCHES / WIDTH_INCHES, _BAR_INCHES / height)
-        bar = figure.colorbar(
-            ScalarMappable(norm, map), cax=figure.add_axes((*box, *size)), orientation="horizontal"
-        )
+    bottom, tall = 1 - (down + _BAR_INCHES) / height, _BAR_INCHES / height
+    lefts = LEFT, _SECOND / WIDTH_INCHES
+    wide, wider = (_IMAGE_INCHES + each for each in (0.0, _BAR_WIDER))
+    for norm, shown, left, width, name in (
+        (shades[0], "cividis", lefts[0], wide, "Γ over its largest"),
+        (shades[1], "RdBu_r", lefts[1], wider, "energy per pixel, of the channel's"),
+    ):
+        cax = figure.add_axes((left, bottom, width / WIDTH_INCHES, tall))
+        bar = figure.colorbar(ScalarMappable(norm, shown), cax=cax, orientation="horizontal")
         bar.set_label(name)
         if isinstance(norm, SymLogNorm):
-            powers = math.log10(norm.linthresh) + np.array([_DECADES, _DECADES / 2])
-            ticks = 10.0 ** np.rint(powers)
-            bar.set_ticks([*-ticks, 0.0, *ticks[::-1]])
-            words = [f"10^{{{round(math.log10(each))}}}" for each in ticks]
-            bar.set_ticklabels(
-                [*(f"$-{each}$" for each in words), "0", *(f"${each}$" for each in words[::-1])]
-            )
-            bar.ax.minorticks_off()
+            _tick_powers(bar, round(math.log10(norm.linthresh)))
+
+
+def _tick_powers(bar: Colorbar, linear: int) -> None:
+    """Write 0 and two powers of ten on either side; linear within 10^``linear``."""
+    powers = linear + 1, linear + _DECADES
+    ticks = [10.0**each for each in powers]
+    words = [f"10^{{{each}}}" for each in powers]
+    bar.set_ticks([-ticks[1], -ticks[0], 0.0, *ticks])
+    bar.set_ticklabels([f"$-{words[1]}$", f"$-{words[0]}$", "0", *(f"${each}$" for each in words)])
+    bar.ax.minorticks_off()
 
 
 def _title(guide: Guide) -> str:
@@ -214,12 +226,3 @@ def _subtitle(guide: Guide) -> str:
     parts = [method_name(meta["method"])] if meta.get("method") else []
     parts.append(f"{guide.pixels} x {guide.pixels} pixels of {guide.mm_per_pixel:.4g} mm")
     return " · ".join([*parts, f"sssfit {shortened(str(meta['version']))}"])
-
-
-def _note(guide: Guide) -> str:
-    """Say what is drawn."""
-    return (
-        "Residual: R_d - a aᵀ as a share of the channel's energy; red where the fit has too little "
-        "light, blue where it has too much. A pass adds up to 1; its middle pixel reaches the left "
-        "edge of the plot. Misplaced: half the sum of |residual|."
-    )

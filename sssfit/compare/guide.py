@@ -13,6 +13,7 @@ import numpy as np
 
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import FitResult, fit_guided, make_target
+from sssfit.fit._target import Target
 from sssfit.fit.guided import NEUTRAL, gamma
 from sssfit.profile import Profile
 from sssfit.shapes import FloatArray
@@ -77,7 +78,7 @@ def compute_guide(
     profile: Profile,
     *,
     ks: Sequence[float] = DRAWN,
-    channel: int = 0,
+    channel: str | None = None,
     mm_per_pixel: float | None = None,
     support_mm: float | None = None,
 ) -> Guide:
@@ -90,8 +91,8 @@ def compute_guide(
     profile : Profile
     ks : sequence of float
         One to four, from 0 (near scattering) to 4 (far scattering).
-    channel : int
-        Has to return light.
+    channel : str, optional
+        Its name; by default the first that returns light.
     mm_per_pixel, support_mm : float, optional [mm]
         Pixels; see ``sssfit.fit.fit_guided``.
 
@@ -111,31 +112,41 @@ def compute_guide(
     if not 1 <= len(ks) <= MOST:
         raise FitError(f"{len(ks)} values of k; expected one to {MOST}.")
     target = make_target(profile, mm_per_pixel, support_mm)
-    if target.is_empty[channel]:
-        name = profile.channels[channel]
-        raise FitError(f"channel {name} returns no light: nothing to guide; choose another.")
+    c = _chosen(target, channel)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SssfitWarning)  # of the target they were given above
         fits = [
             fit_guided(profile, mm_per_pixel=mm_per_pixel, support_mm=support_mm, k=k) for k in ks
         ]
-    wanted = target.quadrant(channel)
+    wanted = target.quadrant(c)
     guides = np.stack([gamma(target.half_pixels, k) for k in ks])
-    halves = np.stack([_half(fit, channel) for fit in fits])
-    line = target.half_line()[:, channel]
-    found = [fit.kernel.parameters[profile.channels[channel]] for fit in fits]
+    halves = np.stack([_half(fit, c) for fit in fits])
+    line = target.half_line()[:, c]
+    found = [fit.kernel.parameters[profile.channels[c]] for fit in fits]
     return Guide(
         profile,
-        channel,
+        c,
         target.mm_per_pixel,
         tuple(float(k) for k in ks),
         guides / guides.max(axis=(1, 2), keepdims=True),
-        (wanted - halves[:, :, None] * halves[:, None, :]) / target.total[channel],
+        (wanted - halves[:, :, None] * halves[:, None, :]) / target.total[c],
         halves / (halves @ target.copies)[:, None],
         line / (target.copies @ line),
-        np.array([fit.relative_frobenius_error[channel] for fit in fits]),
+        np.array([fit.relative_frobenius_error[c] for fit in fits]),
         np.array([each["weighted_residual"] for each in found]),
     )
+
+
+def _chosen(target: Target, channel: str | None) -> int:
+    """Return the index of a channel that has light."""
+    names = target.profile.channels
+    if channel is None:
+        return int(np.argmin(target.is_empty))
+    if channel not in names:
+        raise FitError(f"there is no channel {channel}; expected one of {', '.join(names)}.")
+    if target.is_empty[names.index(channel)]:
+        raise FitError(f"channel {channel} returns no light: choose another.")
+    return names.index(channel)
 
 
 def _half(fit: FitResult, channel: int) -> FloatArray:
