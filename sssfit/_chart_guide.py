@@ -33,7 +33,7 @@ _THIRD = _SECOND + _IMAGE_INCHES + 0.72  # the pass
 _BAR_INCHES = 0.09
 _BAR_DOWN = 0.2  # under the last row: room for the name of x
 _BAR_WIDER = 0.46  # the residual's, whose numbers are long
-_FOOT_INCHES = 0.52  # under the bars: their numbers and names
+_FOOT_INCHES = 1.05  # under the bars: their numbers and names, and three lines of notes
 _TABLE_INCHES = 0.165
 _COLUMNS = (0.25, 0.44, 0.61, 0.80)  # of the width: the table's figures
 _HEADS = ("middle pixel of the pass", "energy misplaced", "Frobenius error", "misfit weighted by Γ")
@@ -43,8 +43,7 @@ _GREY = "#666666"
 _NOTE = (
     "Residual: 2D kernel less a aᵀ, as a share of the channel's energy; red where the fit has too "
     "little light, blue where it has too much. Misplaced: half the sum of |residual|. Misfit: sum "
-    "of Γ residual² over that of Γ kernel². Passes add up to 1; the middle pixel reaches the left "
-    "edge."
+    "of Γ residual² over that of Γ kernel². A pass adds up to 1; its middle pixel ends at the left."
 )
 
 
@@ -62,9 +61,8 @@ def guide_figure(guide: Guide) -> Figure:
         channel's energy in each pixel, over mm: symmetric and logarithmic, one scale for all rows.
         a / sum(a) per mm over the distance from the middle, with the pre-integrated pass.
     """
-    # As tall as what is in it: the table, the rows, the bars and up to two lines of notes.
     head = 0.95 + _TABLE_INCHES * (len(guide.ks) + 1) + 0.12
-    height = head + _ROW_INCHES * len(guide.ks) + _BAR_DOWN + _FOOT_INCHES + 0.42
+    height = head + _ROW_INCHES * len(guide.ks) + _BAR_DOWN + _FOOT_INCHES
     with chart_style():
         figure = new_figure(height)
         _draw_head(figure, guide)
@@ -182,7 +180,7 @@ def _scale(residual: FloatArray) -> SymLogNorm:
     """One scale for all rows: linear about 0, then the decades up to the largest."""
     most = float(np.abs(residual).max()) or 1.0
     linear = 10.0 ** (math.floor(math.log10(most)) - _DECADES)
-    return SymLogNorm(linear, vmin=-most, vmax=most, base=10)
+    return SymLogNorm(linear, linscale=0.4, vmin=-most, vmax=most, base=10)
 
 
 def _draw_bars(figure: Figure, down: float, shades: tuple[Normalize, SymLogNorm]) -> None:
