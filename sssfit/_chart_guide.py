@@ -37,13 +37,13 @@ _FOOT_INCHES = 1.05  # under the bars: their numbers and names, and three lines 
 _TABLE_INCHES = 0.165
 _COLUMNS = (0.25, 0.44, 0.61, 0.80)  # of the width: the table's figures
 _HEADS = ("middle pixel of the pass", "energy misplaced", "Frobenius error", "misfit weighted by Γ")
-_DECADES = 4  # of the residual, on either side of what is drawn linearly
+_DECADES = 5  # of the residual, on either side of what is drawn linearly
 _PASS_DECADES = 6
 _GREY = "#666666"
 _NOTE = (
     "Residual: 2D kernel less a aᵀ, as a share of the channel's energy; red where the fit has too "
-    "little light, blue where it has too much. Misplaced: half the sum of |residual|. Misfit: sum "
-    "of Γ residual² over that of Γ kernel². A pass adds up to 1; its middle pixel ends at the left."
+    "little light, blue where it has too much. Misplaced: half the sum of |residual|. Misfit: "
+    "Γ residual² over Γ kernel², summed. The first step of a pass is its middle pixel."
 )
 
 
@@ -122,6 +122,7 @@ def _draw_row(
     name_axes(second, f"residual, {k}", x_label, "")
     name_axes(third, f"pass, {k}", "distance from the middle (mm)" if is_last else "", "")
     third.set_ylabel("share per mm")
+    third.yaxis.set_label_coords(-0.16, 0.5)  # the same in all rows
     second.tick_params(labelleft=False)
     for each in (first, second, third):
         each.tick_params(labelbottom=is_last)
@@ -180,7 +181,7 @@ def _scale(residual: FloatArray) -> SymLogNorm:
     """One scale for all rows: linear about 0, then the decades up to the largest."""
     most = float(np.abs(residual).max()) or 1.0
     linear = 10.0 ** (math.floor(math.log10(most)) - _DECADES)
-    return SymLogNorm(linear, linscale=0.4, vmin=-most, vmax=most, base=10)
+    return SymLogNorm(linear, vmin=-most, vmax=most, base=10)
 
 
 def _draw_bars(figure: Figure, down: float, shades: tuple[Normalize, SymLogNorm]) -> None:
@@ -202,7 +203,7 @@ def _draw_bars(figure: Figure, down: float, shades: tuple[Normalize, SymLogNorm]
 
 def _tick_powers(bar: Colorbar, linear: int) -> None:
     """Write 0 and two powers of ten on either side; linear within 10^``linear``."""
-    powers = linear + 1, linear + _DECADES
+    powers = linear + 2, linear + _DECADES
     ticks = [10.0**each for each in powers]
     words = [f"10^{{{each}}}" for each in powers]
     bar.set_ticks([-ticks[1], -ticks[0], 0.0, *ticks])
