@@ -19,7 +19,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 from sssfit._chart_data import material_of
 from sssfit._chart_page import chart_style, draw_footnotes, draw_text, name_axes, new_figure
 from sssfit._chart_style import COLOURS, LEFT, LINE_WIDTH, RIGHT, WIDTH_INCHES, Style
-from sssfit._chart_text import method_name, shortened
+from sssfit._chart_text import kernel_subtitle, shortened
 from sssfit._profile_bins import FloatArray
 from sssfit.profile import full_kernel
 
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 _IMAGE_INCHES = 1.62  # a square
 _ROW_INCHES = _IMAGE_INCHES + 0.33
-_SECOND = LEFT * WIDTH_INCHES + _IMAGE_INCHES + 0.22  # from the left edge: the residual
+_SECOND = LEFT * WIDTH_INCHES + _IMAGE_INCHES + 0.32  # from the left edge: the residual
 _THIRD = _SECOND + _IMAGE_INCHES + 0.72  # the pass
 _BAR_INCHES = 0.09
 _BAR_DOWN = 0.2  # under the last row: room for the name of x
@@ -79,7 +79,7 @@ def guide_figure(guide: Guide) -> Figure:
 def _draw_head(figure: Figure, guide: Guide) -> None:
     """Title, provenance and a table: a line for each k."""
     draw_text(figure, 0.16, _title(guide), size=12, weight="bold")
-    draw_text(figure, 0.41, _subtitle(guide))
+    draw_text(figure, 0.41, kernel_subtitle(guide.profile, guide.pixels, guide.mm_per_pixel))
     down = 0.68
     grey: Style = {"color": "#444444", "size": 8}
     for left, head in zip(_COLUMNS, _HEADS, strict=True):
@@ -197,6 +197,7 @@ def _draw_bars(figure: Figure, down: float, shades: tuple[Normalize, SymLogNorm]
         cax = figure.add_axes((left, bottom, width / WIDTH_INCHES, tall))
         bar = figure.colorbar(ScalarMappable(norm, shown), cax=cax, orientation="horizontal")
         bar.set_label(name)
+        bar.ax.xaxis.set_major_formatter("{x:g}")
         if isinstance(norm, SymLogNorm):
             _tick_powers(bar, round(math.log10(norm.linthresh)))
 
@@ -217,11 +218,3 @@ def _title(guide: Guide) -> str:
     channel = shortened(guide.profile.channels[guide.channel])
     what = "guide function and residual of the guided kernel"
     return f"{shortened(material.name, 24) + ', ' if material else ''}{channel}: {what}"
-
-
-def _subtitle(guide: Guide) -> str:
-    """Say which kernel it is."""
-    meta = guide.profile.meta
-    parts = [method_name(meta["method"])] if meta.get("method") else []
-    parts.append(f"{guide.pixels} x {guide.pixels} pixels of {guide.mm_per_pixel:.4g} mm")
-    return " · ".join([*parts, f"sssfit {shortened(str(meta['version']))}"])

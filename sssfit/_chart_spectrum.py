@@ -24,7 +24,7 @@ from sssfit._chart_page import (
     new_figure,
 )
 from sssfit._chart_style import COLOURS, LEFT, LINE_STYLES, RC, RIGHT, WIDTH_INCHES, Style
-from sssfit._chart_text import method_name, shortened, spread
+from sssfit._chart_text import kernel_subtitle, shortened, spread
 from sssfit._profile_bins import FloatArray
 
 if TYPE_CHECKING:
@@ -73,7 +73,9 @@ def spectrum_figure(spectrum: Spectrum) -> Figure:
 def _draw_head(figure: Figure, spectrum: Spectrum, shown: Sequence[int]) -> float:
     """Title, provenance and a legend with figures; the height of what is left, as a fraction."""
     draw_text(figure, 0.16, _title(spectrum), size=12, weight="bold")
-    draw_text(figure, 0.41, _subtitle(spectrum))
+    draw_text(
+        figure, 0.41, kernel_subtitle(spectrum.profile, spectrum.pixels, spectrum.mm_per_pixel)
+    )
     grey: Style = {"color": "#444444", "size": 8}
     down = 0.68
     for left, head in zip(_COLUMNS, _HEADS, strict=True):
@@ -133,14 +135,6 @@ def _title(spectrum: Spectrum) -> str:
     material = material_of(spectrum.profile)
     what = "energy of the kernel's singular values"
     return f"{shortened(material.name, 24)}: {what}" if material else what.capitalize()
-
-
-def _subtitle(spectrum: Spectrum) -> str:
-    """Say which kernel it is."""
-    meta = spectrum.profile.meta
-    parts = [method_name(meta["method"])] if meta.get("method") else []
-    parts.append(f"{spectrum.pixels} x {spectrum.pixels} pixels of {spectrum.mm_per_pixel:.4g} mm")
-    return " · ".join([*parts, f"sssfit {shortened(str(meta['version']))}"])
 
 
 def _row(spectrum: Spectrum, channel: int) -> list[str]:

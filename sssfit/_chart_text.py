@@ -48,6 +48,14 @@ def subtitle(profile: Profile) -> str:
     return " · ".join(parts)
 
 
+def kernel_subtitle(profile: Profile, pixels: int, mm_per_pixel: float) -> str:
+    """Say which pixels a profile's kernel is on, and how the profile was made."""
+    meta = profile.meta
+    parts = [method_name(meta["method"])] if meta.get("method") else []
+    parts.append(f"{pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm")
+    return " · ".join([*parts, f"sssfit {shortened(str(meta['version']))}"])
+
+
 def method_name(method: object) -> str:
     """Name a method for people."""
     return _METHODS.get(str(method), shortened(str(method)))
