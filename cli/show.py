@@ -71,11 +71,19 @@ def _figures(profile: Profile) -> dict[str, Any]:
 
 
 def _material_figures(profile: Profile) -> dict[str, Any] | None:
-    """Name and layers, from the top down, of the material the profile was made from."""
+    """Name and layers, from the top down, of the material the profile was made from.
+
+    No layers where only a name is known; null where there is not even that.
+    """
     from sssfit._chart_data import material_of
+    from sssfit._material_checks import printable
 
     material = material_of(profile)
-    return None if material is None else {**material.to_dict(), **_scales(material)}
+    if material is not None:
+        return {**material.to_dict(), **_scales(material)}
+    name, record = profile.material_name, profile.meta["material"]
+    source = printable(str(record.get("source") or "")) if name else ""
+    return {"name": name, "source": source, "layers": []} if name else None
 
 
 def _scales(material: Material) -> dict[str, Any]:
@@ -135,7 +143,7 @@ def _head(figures: dict[str, Any]) -> str:
 def _coefficients(figures: dict[str, Any]) -> str:
     """One line a layer and channel; nothing where the material is unknown."""
     material = figures["material"]
-    if material is None:
+    if material is None or not material["layers"]:
         return ""
     rows = [
         (
