@@ -81,9 +81,10 @@ def _material_figures(profile: Profile) -> dict[str, Any] | None:
     material = material_of(profile)
     if material is not None:
         return {**material.to_dict(), **_scales(material)}
-    name, record = profile.material_name, profile.meta["material"]
-    source = printable(str(record.get("source") or "")) if name else ""
-    return {"name": name, "source": source, "layers": []} if name else None
+    if profile.material_name is None:
+        return None
+    source = printable(str(profile.meta["material"].get("source") or ""))
+    return {"name": profile.material_name, "source": source, "layers": []}
 
 
 def _scales(material: Material) -> dict[str, Any]:

@@ -187,7 +187,7 @@ def _provenance(target: Target, settings: Mapping[str, Any], *, normalize: bool)
     return {
         "material": target.name,
         "material_sha256": meta.get("material_sha256"),
-        "profile_method": meta["method"],
+        "profile_method": meta.get("method", "unknown"),
         "photons": meta.get("photons"),
         "seed": meta.get("seed"),
         "version": __version__,

@@ -19,7 +19,7 @@ def checked_name(name: str, source: str | None, channels: Sequence[str]) -> Name
     """Return what stands for the material, or refuse names that a material could not have."""
     try:
         check_texts(name, "" if source is None else source)
-        check_channels(list(channels) if isinstance(channels, (list, tuple)) else channels)
+        check_channels(channels)
     except MaterialError as error:
         raise SimulationError(str(error)) from None
     return Named(name, source or "", tuple(channels))

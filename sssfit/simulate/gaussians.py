@@ -29,8 +29,8 @@ def simulate_deon_skin(*, dr_mm: float | None = None, radius_mm: float | None = 
     """Return the skin of a face, the six Gaussians of d'Eon, Luebke and Enderton 2007.
 
     Every channel returns all of the light: the model leaves the colour of skin to a texture. By
-    default 2151 annuli of 0.008 mm, to 17.208 mm, beyond which lies 1.6e-10 of R. Takes the grid, and
-    raises, as `simulate_gaussians`.
+    default 2151 annuli of 0.008 mm, to 17.208 mm, beyond which lies 1.6e-10 of R. Takes the grid,
+    and raises, as `simulate_gaussians`.
 
     Examples
     --------
