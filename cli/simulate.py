@@ -70,13 +70,18 @@ class Radius(Length):
     help="burley: which published fit gives s: perpendicular (light from straight above), diffuse "
     "(from everywhere), or diffuse-mfp (from the diffuse mean free path).",
 )
-@click.option("--dr", type=Length(), metavar="MM", help="Annulus width.  [default: MFP_min / 20]")
+@click.option(
+    "--dr",
+    type=Length(),
+    metavar="MM",
+    help="Annulus width.  [default: MFP_min / 20; deon-skin: 0.008]",
+)
 @click.option(
     "--radius",
     type=Radius(),
     metavar="MM|auto",
     help="Grid radius; auto (montecarlo) grows it until under 0.1 % of any channel lies beyond."
-    "  [default: 32 MFP_max]",
+    "  [default: 32 MFP_max; deon-skin: 17.2]",
 )
 @click.option(
     "-o",
