@@ -163,7 +163,7 @@ def test_a_channel_without_light():
     energy[:, 1] = np.exp(-np.arange(40) / 8)
     profile = make_profile(np.arange(41) * 0.1, 0.05 * energy)
     result = fit_falloff(profile, mm_per_pixel=0.2)
-    assert list(result.kernel.parameters) == ["G"]
+    assert list(result.kernel.parameters) == ["c1"]
     assert result.stop_reasons[0] == "the channel returns no light"
 
 
