@@ -131,7 +131,7 @@ def chart(
         "command": "chart",
         "output": ["-" if path is None else str(path)],
         "profile": name,
-        "material": _material_name(loaded),
+        "material": loaded.material_name,
         "channels": loaded.channels,
     }
     finish(common, figures, f"Wrote {path or 'a PNG to stdout'}", to_stderr=path is None)
@@ -162,19 +162,12 @@ def _read(name: str) -> Profile:
     return Profile.read(binary_stdin(), "stdin") if name == "-" else Profile.load(name)
 
 
-def _material_name(profile: Profile) -> str | None:
-    from sssfit._chart_data import material_of
-
-    material = material_of(profile)
-    return material.name if material else None
-
-
 def _target(name: str, profile: Profile, output: str | None, kind: str) -> Path | None:
     """Where the chart goes; None is stdout. By default the current folder, under the same name."""
     if output is not None:
         return None if output == "-" else Path(output)
     if name == "-":
-        return Path(f"{_material_name(profile) or 'stdin'}.{kind}.png")
+        return Path(f"{profile.material_name or 'stdin'}.{kind}.png")
     stem = Path(name).name.removesuffix(".npz")
     if kind != "profile":
         stem = f"{stem.removesuffix('.profile')}.{kind}"

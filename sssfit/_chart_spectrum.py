@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from sssfit._chart_data import material_of
 from sssfit._chart_page import (
     chart_style,
     draw_footnotes,
@@ -132,9 +131,8 @@ def _limit(axes: Axes, spectrum: Spectrum, shown: Sequence[int]) -> None:
 
 def _title(spectrum: Spectrum) -> str:
     """Name the material."""
-    material = material_of(spectrum.profile)
-    what = "energy of the kernel's singular values"
-    return f"{shortened(material.name, 24)}: {what}" if material else what.capitalize()
+    name, what = spectrum.profile.material_name, "energy of the kernel's singular values"
+    return f"{shortened(name, 24)}: {what}" if name else what.capitalize()
 
 
 def _row(spectrum: Spectrum, channel: int) -> list[str]:
