@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit._disks import checked_support
+from sssfit._material_checks import printable
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.profile import Profile
 
@@ -29,6 +30,11 @@ class Target:
     profile: Profile
     mm_per_pixel: float
     half_pixels: int
+
+    @property
+    def name(self) -> str:
+        """What messages and kernels call the profile."""
+        return name_of(self.profile)
 
     @property
     def total(self) -> FloatArray:
@@ -114,9 +120,14 @@ def support_of(profile: Profile) -> float:
     return float(profile.r_edges_mm[int(np.argmax(kept.all(axis=1)))])
 
 
+def name_of(profile: Profile) -> str:
+    """Return what messages and kernels call the profile: its material, or the file it came from."""
+    return profile.material_name or printable(str(profile.meta.get("source") or "unknown material"))
+
+
 def _check_profile(profile: Profile) -> None:
     """One clear line for data that no fit can use."""
-    energy, name = profile.annulus_energy, profile.meta["material"]["name"]
+    energy, name = profile.annulus_energy, name_of(profile)
     if not np.isfinite(energy).all():
         raise FitError(f"{name}: the profile holds NaN or infinite energies; make it again.")
     if (energy < 0.0).any():

@@ -26,7 +26,7 @@ from sssfit.fit._gaussians_annuli import make_annuli
 from sssfit.fit._gaussians_rings import is_steep, rings
 from sssfit.fit._gaussians_search import Found, search
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
-from sssfit.fit._target import Target, make_target
+from sssfit.fit._target import Target, make_target, name_of
 from sssfit.profile import Profile
 from sssfit.shapes import gaussian_line_integral
 
@@ -138,7 +138,7 @@ def _check_annuli(profile: Profile, terms: int) -> None:
     """Refuse more unknowns than data."""
     if profile.n_annuli < 2 * terms:
         raise FitError(
-            f"{profile.meta['material']['name']}: a profile of {profile.n_annuli} annuli cannot "
+            f"{name_of(profile)}: a profile of {profile.n_annuli} annuli cannot "
             f"fix {terms} Gaussians, a width and a weight each; give a finer profile or fewer "
             "terms."
         )
@@ -148,7 +148,7 @@ def _warn_of_pitch(target: Target) -> None:
     """Say once where the objective has no limit of its own."""
     if any(is_steep(target, int(c)) for c in np.flatnonzero(~target.is_empty)):
         warnings.warn(
-            f"{target.profile.meta['material']['name']}: R_d is steep near the beam (single "
+            f"{target.name}: R_d is steep near the beam (single "
             "scattering is 1/r), so the Gaussians depend on the pitch of "
             f"{target.mm_per_pixel:.3g} mm: compare fits of one pitch and one profile grid only.",
             SssfitWarning,
