@@ -19,6 +19,12 @@ MATERIALS = {
     *("apple", "chicken1", "chicken2", "cream", "ketchup", "marble"),
     *("potato", "skimmilk", "skin1", "skin2", "wholemilk"),
 }
+# Distributions that are imported by another name.
+IMPORT_NAMES = {
+    "colour-science": "colour",
+    "scikit-image": "skimage",
+    "flip-evaluator": "flip_evaluator",
+}
 
 
 @pytest.fixture(scope="module")
@@ -100,13 +106,26 @@ def test_citation_has_the_version():
 
 
 def test_declared_dependencies_are_the_imported_ones():
-    declared = {
-        re.match(r"[\w.-]+", requirement)[0] for requirement in PYPROJECT["project"]["dependencies"]
-    }
+    project = PYPROJECT["project"]
+    needed = import_names(project["dependencies"])
+    extra = import_names(project["optional-dependencies"]["metrics"])
+    foreign = set(sys.stdlib_module_names) | {"sssfit"}
+    assert needed | extra == imported(r"^\s*(?:from|import) (\w+)") - foreign
+    at_heads = imported(r"^(?:from|import) (\w+)")
+    assert not extra & at_heads, "what an extra brings is imported in functions only"
+
+
+def import_names(requirements):
+    """What is imported of each, where it has another name."""
+    names = {re.match(r"[\w.-]+", requirement)[0] for requirement in requirements}
+    return {IMPORT_NAMES.get(name, name) for name in names}
+
+
+def imported(pattern):
+    """The packages that lines of this form import, anywhere in the sources."""
     sources = "\n".join(
         path.read_text(encoding="utf-8")
         for top in ("sssfit", "cli")
         for path in (ROOT / top).rglob("*.py")
     )
-    imported = set(re.findall(r"^\s*(?:from|import) (\w+)", sources, re.MULTILINE))
-    assert declared == imported - set(sys.stdlib_module_names) - {"sssfit"}
+    return set(re.findall(pattern, sources, re.MULTILINE))

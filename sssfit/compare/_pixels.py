@@ -1,0 +1,102 @@
+"""What every measure asks of two pictures first: checks, the exposure, what a display shows."""
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.errors import RenderError
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+# Rows of the matrix from linear sRGB to XYZ: the luminance of ITU-R BT.709.
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+# Below 1 so that the red of lit skin, some 1.25 times its luminance, is not clipped.
+AUTO_LUMINANCE = 0.8
+AUTO_PERCENTILE = 99.0
+
+
+def check_pair(image: npt.ArrayLike, truth: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return both pictures as float64 (H, W, C) or refuse them."""
+    pictures = np.asarray(image, dtype=np.float64), np.asarray(truth, dtype=np.float64)
+    if pictures[0].shape != pictures[1].shape:
+        raise RenderError(
+            f"image is {pictures[0].shape} and truth {pictures[1].shape}; expected the same rows, "
+            "columns and channels."
+        )
+    for name, picture in zip(("image", "truth"), pictures, strict=True):
+        check_picture(name, picture)
+    return pictures
+
+
+def check_picture(name: str, picture: FloatArray) -> None:
+    """Refuse what is no picture; negative pixels are allowed, kernels with negative terms ring."""
+    if picture.ndim != 3 or 0 in picture.shape:
+        raise RenderError(
+            f"{name} has shape {picture.shape}; expected rows, columns and channels, at least one "
+            "of each."
+        )
+    bad = picture.size - int(np.count_nonzero(np.isfinite(picture)))
+    if bad:
+        raise RenderError(f"{name} has {bad} NaN or infinite values; expected numbers.")
+
+
+def selection(mask: npt.ArrayLike | None, picture: FloatArray) -> BoolArray:
+    """Return which pixels (H, W) count: those of a mask above 0, all without one."""
+    if mask is None:
+        return np.ones(picture.shape[:2], dtype=np.bool_)
+    selected = np.asarray(mask) > 0
+    if selected.shape != picture.shape[:2]:
+        raise RenderError(
+            f"mask is {selected.shape} and the picture {picture.shape[:2]}; expected the same rows "
+            "and columns."
+        )
+    if not selected.any():
+        raise RenderError("mask has no pixel above 0; expected some of the object, or no mask.")
+    return selected
+
+
+def auto_exposure(truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> float:
+    """Return the factor that brings the 99th percentile of luminance to 0.8.
+
+    It depends on the truth alone, so that every picture held against it is seen alike. Dark pixels
+    (luminance 0 or less) are left out: a small lit object is exposed as if it filled the picture.
+
+    Parameters
+    ----------
+    truth : array (H, W, C)
+        Linear light. Luminance is that of sRGB for three channels, else their mean.
+    mask : array (H, W), optional
+        Only pixels above 0 count.
+
+    Raises
+    ------
+    RenderError
+        No pixel is lit, or truth or mask is of no use.
+    """
+    picture = np.asarray(truth, dtype=np.float64)
+    check_picture("truth", picture)
+    return exposure_of(picture[selection(mask, picture)])
+
+
+def exposure_of(pixels: FloatArray) -> float:
+    """Return `auto_exposure` of pixels (N, C)."""
+    channels = pixels.shape[-1]
+    weights = np.array(LUMINANCE) if channels == 3 else np.full(channels, 1.0 / channels)
+    luminance = pixels @ weights
+    lit = luminance[luminance > 0.0]
+    if lit.size == 0:
+        raise RenderError("truth is black: no exposure can be found; give one.")
+    return float(AUTO_LUMINANCE / np.percentile(lit, AUTO_PERCENTILE))
+
+
+def check_exposure(exposure: float) -> float:
+    """Return an exposure that was given, or refuse it."""
+    if not (np.isfinite(exposure) and exposure > 0.0):
+        raise RenderError(f"exposure = {exposure:g}; expected a factor above 0.")
+    return float(exposure)
+
+
+def shown(pixels: FloatArray, exposure: float) -> FloatArray:
+    """Return what a display has to show: exposed, cut to [0, 1], grey as three channels."""
+    cut: FloatArray = np.clip(pixels * exposure, 0.0, 1.0)
+    return np.repeat(cut, 3, axis=-1) if cut.shape[-1] == 1 else cut

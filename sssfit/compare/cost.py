@@ -1,0 +1,100 @@
+"""What a kernel costs: passes and taps, which carry over to any processor, and measured seconds."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+
+import numpy as np
+
+from sssfit.errors import RenderError
+from sssfit.kernel import SeparableKernel
+
+# What shaders hold weights in.
+FLOAT_BYTES = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """The price of a kernel by pixel.
+
+    Parameters
+    ----------
+    passes : int
+        One-dimensional passes over the picture: two a term.
+    taps_per_pixel : int
+        Weights applied to a pixel in all passes; one weight serves all channels at once.
+    kernel_bytes : int
+        A float32 table of all terms, pixels and channels: T P C 4. Both halves of a pass are in it.
+    seconds_per_megapixel : float, optional [s]
+        Measured, of 1e6 pixels with all their channels; None where nothing was timed.
+    """
+
+    passes: int
+    taps_per_pixel: int
+    kernel_bytes: int
+    seconds_per_megapixel: float | None = None
+
+
+def cost_of(kernel: SeparableKernel, seconds_per_megapixel: float | None = None) -> Cost:
+    """Return what a kernel costs; terms that are 0 in every channel cost nothing.
+
+    Parameters
+    ----------
+    kernel : SeparableKernel
+    seconds_per_megapixel : float, optional [s]
+        As the function of that name measured it.
+
+    Examples
+    --------
+    >>> from sssfit.fit import fit_svd
+    >>> from sssfit.material import load_material
+    >>> from sssfit.simulate import simulate_dipole
+    >>> profile = simulate_dipole(load_material("skin1"))
+    >>> cost_of(fit_svd(profile, rank=3, mm_per_pixel=0.5, support_mm=8).kernel)
+    Cost(passes=6, taps_per_pixel=198, kernel_bytes=1188, seconds_per_megapixel=None)
+    """
+    terms = int(np.count_nonzero(np.any(kernel.weights != 0.0, axis=(1, 2))))
+    return Cost(
+        passes=2 * terms,
+        taps_per_pixel=2 * terms * kernel.pixels,
+        kernel_bytes=terms * kernel.pixels * len(kernel.channels) * FLOAT_BYTES,
+        seconds_per_megapixel=seconds_per_megapixel,
+    )
+
+
+def seconds_per_megapixel(
+    render: Callable[[], object],
+    pixels: int,
+    repeats: int = 5,
+    clock: Callable[[], float] = perf_counter,
+) -> float:
+    """Return the least wall time of a call, by 1e6 pixels [s].
+
+    One call before them is not counted: it compiles, plans and warms caches. The least of several
+    is the one that other programs disturbed least.
+
+    Parameters
+    ----------
+    render : callable
+        Renders ``pixels`` pixels; what it returns is dropped.
+    pixels : int
+        H W of its picture.
+    repeats : int
+        Calls that are timed.
+    clock : callable
+        Seconds now.
+
+    Raises
+    ------
+    RenderError
+        Pixels or repeats below 1.
+    """
+    if pixels < 1 or repeats < 1:
+        raise RenderError(f"{pixels} pixels, {repeats} repeats; expected at least 1 of each.")
+    render()
+    times = []
+    for _ in range(repeats):
+        start = clock()
+        render()
+        times.append(clock() - start)
+    return min(times) * 1e6 / pixels
