@@ -180,9 +180,15 @@ def _forward(plane: FloatArray, y: _Axis, x: _Axis, workers: int) -> ComplexArra
     from scipy.fft import fft, rfft
 
     wide = np.zeros((y.size, x.length))
-    wide[:, : x.sources.size] = plane[:, x.sources]
+    wide[:, x.inside] = plane
+    # The margins only, from what lies dense: taken from all of RGB, all columns, it took 60 ms of
+    # 2048 x 2048 pixels, as long as the transforms.
+    for margin in (slice(0, x.start), slice(x.start + x.size, x.sources.size)):
+        wide[:, margin] = np.take(wide, x.start + x.sources[margin], axis=1)
     rows = rfft(wide, axis=1, workers=workers, overwrite_x=True)
-    spectrum = np.zeros((y.length, x.bins), dtype=np.complex128)
+    spectrum = np.empty((y.length, x.bins), dtype=np.complex128)
+    spectrum[y.sources.size :] = 0.0
+    # "clip": with the default, numpy makes the rows elsewhere first and copies them.
     np.take(rows, y.sources, axis=0, out=spectrum[: y.sources.size], mode="clip")
     transformed: ComplexArray = fft(spectrum, axis=0, workers=workers, overwrite_x=True)
     return transformed
