@@ -18,6 +18,7 @@ ROOMS = [
     *(
         "errors",
         "files",
+        "threads",
         "shapes",
         "material",
         "text",

@@ -1,6 +1,5 @@
 """Walks dealt out in batches, whatever they walk through, and their tallies added in order."""
 
-import os
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -84,10 +83,3 @@ def _errors(sums: Sums, material: Material) -> FloatArray:
     variance = np.maximum(np.max(squares - energy**2, axis=0), 0.0) / (sums.photons - 1)
     relative = np.divide(np.sqrt(variance), energy[-1], out=infinite, where=energy[-1] > 0.0)
     return np.where(dark, 0.0, relative)
-
-
-def available_cores() -> int:
-    """Cores this process may use (containers and ``taskset`` grant fewer than there are)."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

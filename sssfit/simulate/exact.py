@@ -27,7 +27,6 @@ from sssfit.errors import SimulationError, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
-from sssfit.simulate._batches import available_cores
 from sssfit.simulate._depth import Resolution, Response, decay_rate, respond
 from sssfit.simulate._deterministic import (
     computed_profile,
@@ -39,6 +38,7 @@ from sssfit.simulate._mixture import mixture_of
 from sssfit.simulate._semi_infinite import relative_eta
 from sssfit.simulate._single import single_scattering_beyond
 from sssfit.simulate._surface import FloatArray, entering
+from sssfit.threads import available_cores
 
 DEFAULT_TOLERANCE = 1e-4
 _LARGEST_ETA = 4.0

@@ -22,12 +22,13 @@ from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
 from sssfit.simulate._assemble import AUTO_BEYOND, profile_of, share_beyond
-from sssfit.simulate._batches import Walk, available_cores, relative_errors
+from sssfit.simulate._batches import Walk, relative_errors
 from sssfit.simulate._checkpoint import Checkpoint, settings_of
 from sssfit.simulate._finished import ending_of, whole
 from sssfit.simulate._layered import LayeredWalk
 from sssfit.simulate._run import Ending, Progress, run
 from sssfit.simulate._semi_infinite import SemiInfiniteWalk, relative_eta
+from sssfit.threads import available_cores
 
 HONEST_PHOTONS = 1000  # below, a channel may rest on a handful of hits and its error on luck
 PILOT_PHOTONS = 200_000
