@@ -23,6 +23,7 @@ from .export import export
 from .fit import fit
 from .import_ import import_
 from .materials import materials
+from .render import render
 from .show import show
 from .simulate import simulate
 
@@ -58,7 +59,7 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
         ctx.exit(2)
 
 
-for _verb in (materials, simulate, fit, import_, export, chart, show):
+for _verb in (materials, simulate, fit, render, import_, export, chart, show):
     cli.add_command(_verb)
 
 

@@ -92,17 +92,17 @@ class Scene:
     @property
     def height(self) -> int:
         """Rows."""
-        return self.irradiance.shape[0]
+        return int(self.irradiance.shape[0])
 
     @property
     def width(self) -> int:
         """Columns."""
-        return self.irradiance.shape[1]
+        return int(self.irradiance.shape[1])
 
     @property
     def channels(self) -> int:
         """Channels of the irradiance; 1 serves kernels of any number."""
-        return self.irradiance.shape[2]
+        return int(self.irradiance.shape[2])
 
     @property
     def fov_degrees(self) -> float | None:

@@ -1,0 +1,86 @@
+"""The options of ``sssfit render`` that say what is lit, and how the kernel is applied."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+from ._options import Length
+from ._scene import MADE, Size
+
+_OPTIONS = (
+    click.option(
+        "--irradiance",
+        default=MADE[0],
+        show_default=True,
+        metavar="NAME|FILE",
+        help=f"What is lit: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG file.",
+    ),
+    click.option(
+        "--size",
+        type=Size(),
+        metavar="WxH",
+        help="Made pictures: columns and rows.  [default: 512x512; head: the whole face, up to "
+        "1080x1080]",
+    ),
+    click.option(
+        "--mm-per-pixel",
+        type=Length(),
+        metavar="MM",
+        help="Your own file: size of its pixels, unless its header says.",
+    ),
+    click.option(
+        "--angle",
+        "angle_degrees",
+        type=click.FLOAT,
+        metavar="DEGREES",
+        help="edge, stripes: the direction of their normal.  [default: 0]",
+    ),
+    click.option(
+        "--period",
+        "period_mm",
+        type=Length(),
+        metavar="MM",
+        help="stripes: length of a period.",
+    ),
+    click.option(
+        "--spacing",
+        "spacing_mm",
+        type=Length(),
+        metavar="MM",
+        help="points: from one to the next.",
+    ),
+    click.option(
+        "--distance",
+        "distance_mm",
+        type=Length(),
+        metavar="MM",
+        help="head: from the eye to the face.  [default: 600]",
+    ),
+    click.option(
+        "--border",
+        type=click.Choice(["mirror", "clamp", "zero"]),
+        default="mirror",
+        show_default=True,
+        help="What lies beyond the picture's rim.",
+    ),
+    click.option(
+        "--screen",
+        is_flag=True,
+        help="As a shader does it: in perspective, by depth, within the mask; head only.",
+    ),
+    click.option(
+        "--follow",
+        type=click.Choice(["gaussian", "lerp", "none"]),
+        help="With --screen: what steps in depth do to a sample.  [default: gaussian]",
+    ),
+)
+
+
+def picture_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add them all, in this order."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command

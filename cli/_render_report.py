@@ -1,0 +1,75 @@
+"""The figures of ``sssfit render``, for people and for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from ._report import table
+
+if TYPE_CHECKING:
+    from sssfit.compare.judge import Judgement
+    from sssfit.kernel import SeparableKernel
+    from sssfit.render.scene import Scene
+
+_SCORES = (
+    *("rmse", "relative_l2", "maximum", "psnr_db", "energy_drift"),
+    *("delta_e_2000_mean", "delta_e_2000_p99", "exposure", "ssim", "flip"),
+)
+
+
+def figures_of(result: Judgement, scene: Scene, kernel: SeparableKernel) -> dict[str, Any]:
+    """Everything that is printed, as ``--json`` has it; null where nothing was measured."""
+    cost = result.cost
+    return {
+        "material": kernel.meta.get("material"),
+        "method": kernel.method,
+        "rank": kernel.rank,
+        "channels": list(kernel.channels),
+        "irradiance": scene.name,
+        "width": scene.width,
+        "height": scene.height,
+        "mm_per_pixel": scene.mm_per_pixel,
+        "passes": cost.passes,
+        "taps_per_pixel": cost.taps_per_pixel,
+        "kernel_bytes": cost.kernel_bytes,
+        "seconds_per_megapixel": cost.seconds_per_megapixel,
+        "radial_asymmetry": result.asymmetry,
+        **{key: getattr(result.score, key, None) for key in _SCORES},
+    }
+
+
+def text_of(figures: Mapping[str, Any]) -> str:
+    """Write the figures for people."""
+    how = f"{figures['border']} borders"
+    if figures["follow"]:
+        how = f"screen space, follow {figures['follow']}, {how}"
+    lines = [
+        f"{figures['irradiance']}: {figures['width']} x {figures['height']} pixels of "
+        f"{figures['mm_per_pixel']:.4g} mm, {how}; {figures['kernel']}",
+        f"cost: {figures['passes']} passes, {figures['taps_per_pixel']} weights a pixel, "
+        f"{figures['kernel_bytes']:,} bytes, {figures['seconds_per_megapixel']:.2g} s a megapixel",
+    ]
+    if figures["rmse"] is not None:
+        lines += _measured(figures)
+    return "\n".join([*lines, f"Wrote {', '.join(figures['output'])}"])
+
+
+def _measured(figures: Mapping[str, Any]) -> list[str]:
+    """Lines of what was lost against the truth."""
+    lines = [
+        f"against the 2D kernel of {figures['profile']}:",
+        f"  Delta E 2000 mean {figures['delta_e_2000_mean']:.3g}, 99th percentile "
+        f"{figures['delta_e_2000_p99']:.3g}, at exposure {figures['exposure']:.4g}",
+        f"  relative L2 {100.0 * figures['relative_l2']:.3g} %, RMSE {figures['rmse']:.3g}, "
+        f"largest {figures['maximum']:.3g}, PSNR {figures['psnr_db']:.1f} dB",
+    ]
+    if figures["ssim"] is not None:
+        lines.append(f"  SSIM {figures['ssim']:.4f}, FLIP {figures['flip']:.4f}")
+    rows = [
+        [name, f"{100.0 * drift:+.3g} %", f"{asymmetry:.3g}"]
+        for name, drift, asymmetry in zip(
+            figures["channels"], figures["energy_drift"], figures["radial_asymmetry"], strict=True
+        )
+    ]
+    return [*lines, table(["channel", "energy drift", "radial asymmetry"], rows)]

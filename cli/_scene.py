@@ -1,0 +1,117 @@
+"""The picture a kernel is applied to: made by name, or the user's own file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ._options import Common
+from ._report import say
+
+if TYPE_CHECKING:
+    from sssfit.render.scene import Scene
+
+MADE = ("head", "disk", "edge", "separable", "stripes", "points", "noise", "highlights")
+_ROWS = 512
+_MOST_ROWS = 1080  # of a head whose size is not given
+
+
+class Size(click.ParamType[tuple[int, int]]):
+    """Columns and rows, as 1920x1080; gives (rows, columns)."""
+
+    name = "size"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[int, int]:
+        """Parse ``value``; a usage error (exit 2) names what was expected."""
+        if isinstance(value, tuple):
+            return value
+        width, _, height = str(value).lower().partition("x")
+        if not (width.isdecimal() and height.isdecimal() and int(width) and int(height)):
+            self.fail(f"{value!r} is not a size in pixels, such as 1920x1080.", param, ctx)
+        return int(height), int(width)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What was asked for; ``own`` has the options of single made pictures that were given."""
+
+    irradiance: str
+    size: tuple[int, int] | None
+    mm_per_pixel: float | None
+    own: Mapping[str, Any]
+
+    @property
+    def is_made(self) -> bool:
+        """Whether it is one of ours."""
+        return self.irradiance in MADE
+
+    @property
+    def name(self) -> str:
+        """For file names."""
+        return self.irradiance if self.is_made else Path(self.irradiance).stem
+
+
+def make_or_read(picture: Picture, mm_per_pixel: float, common: Common) -> Scene:
+    """Make the picture on a kernel's pixels, or read it from its file."""
+    return (_made if picture.is_made else _read)(picture, mm_per_pixel, common)
+
+
+def _made(picture: Picture, mm_per_pixel: float, common: Common) -> Scene:
+    from sssfit.render.irradiance import make_scene
+
+    if picture.mm_per_pixel is not None:
+        raise click.UsageError(
+            f"--mm-per-pixel is for pictures from files; {picture.irradiance} is made on the "
+            "kernel's pixels."
+        )
+    height, width = picture.size or _default_size(picture, mm_per_pixel, common)
+    own = {key: value for key, value in picture.own.items() if value is not None}
+    if picture.irradiance == "noise":
+        own["seed"] = common.seed
+    return make_scene(
+        picture.irradiance, height=height, width=width, mm_per_pixel=mm_per_pixel, **own
+    )
+
+
+def _default_size(picture: Picture, mm_per_pixel: float, common: Common) -> tuple[int, int]:
+    """512 x 512; for a head as many rows as it takes, up to 1080."""
+    if picture.irradiance != "head":
+        return _ROWS, _ROWS
+    from sssfit.render.head import rows_for_face
+
+    wanted = rows_for_face(mm_per_pixel)
+    if wanted > _MOST_ROWS:
+        say(
+            common,
+            f"The whole face takes {wanted} rows of {mm_per_pixel:.4g} mm; {_MOST_ROWS} show its "
+            "middle (--size for more).",
+        )
+    rows = min(wanted, _MOST_ROWS)
+    return rows, rows
+
+
+def _read(picture: Picture, _mm_per_pixel: float, common: Common) -> Scene:
+    from sssfit.errors import RenderError
+    from sssfit.image import load_image
+    from sssfit.render.scene import Scene
+
+    given = [key for key, value in {**picture.own, "size": picture.size}.items() if value]
+    if given:
+        raise click.UsageError(
+            f"--{given[0].split('_')[0]} is for made pictures ({', '.join(MADE)}); leave it out."
+        )
+    image = load_image(picture.irradiance)
+    for note in image.notes:
+        say(common, f"{picture.irradiance}: {note}")
+    pitch = picture.mm_per_pixel or image.mm_per_pixel
+    if pitch is None:
+        raise RenderError(
+            f"{picture.irradiance} does not say how large its pixels are; give --mm-per-pixel."
+        )
+    return Scene(image.name, image.pixels, pitch)

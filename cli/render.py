@@ -1,0 +1,192 @@
+"""``sssfit render``: a kernel on a picture, and what it lost against the true 2D kernel."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ._options import Common, common_options
+from ._render_options import picture_options
+from ._render_report import figures_of, text_of
+from ._report import binary_stdin, binary_stdout, finish, newest, say
+from ._scene import Picture, make_or_read
+from ._truth import true_profile
+
+if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
+    from sssfit.compare.judge import Judgement
+    from sssfit.kernel import SeparableKernel
+
+    FloatArray = npt.NDArray[np.float64]
+
+
+@click.command()
+@click.argument("kernel", required=False)
+@picture_options
+@click.option(
+    "--profile",
+    metavar="FILE",
+    help="What to measure against.  [default: the profile here that the kernel was fitted to]",
+)
+@click.option(
+    "--exposure",
+    type=click.FloatRange(min=0.0, min_open=True),
+    metavar="FACTOR",
+    help="Of Delta E and of PNG files.  [default: from the true picture]",
+)
+@click.option("--structure", is_flag=True, help='SSIM and FLIP too (needs "sssfit[metrics]").')
+@click.option(
+    "-o",
+    "--output",
+    metavar="FILE",
+    help="Where the picture goes, .exr, .tif or .png (16 bits, sRGB); - for EXR on stdout."
+    "  [default: KERNEL.PICTURE.exr]",
+)
+@click.option("--truth", metavar="FILE", help="Write the true picture as well.")
+@click.option("--difference", metavar="FILE", help="Write the absolute difference as well.")
+@click.option("--force", is_flag=True, help="Replace a file that is not a picture.")
+@common_options
+def render(
+    kernel: str | None,
+    irradiance: str,
+    size: tuple[int, int] | None,
+    mm_per_pixel: float | None,
+    border: str,
+    screen: bool,
+    follow: str | None,
+    profile: str | None,
+    exposure: float | None,
+    structure: bool,
+    output: str | None,
+    truth: str | None,
+    difference: str | None,
+    force: bool,
+    common: Common,
+    **own: Any,
+) -> None:
+    """Apply KERNEL to a picture of irradiance, and measure what it loses.
+
+    KERNEL is a .kernel.json file, or - for stdin; by default the newest of this folder. The result
+    is radiant exitance in linear light. Made pictures have the kernel's pixels; a file of your own
+    (EXR, HDR, TIFF, PNG) has to have them too. The truth is the same picture convolved with the
+    whole 2D kernel of the profile; Delta E 2000 is of both in sRGB at the exposure.
+
+    \b
+      sssfit render skin1.svd3.kernel.json --irradiance head -o out.exr
+      sssfit render --irradiance edge --angle 45 --size 256x256
+      sssfit render --irradiance mine.png --mm-per-pixel 0.1 -o mine.tif --difference lost.png
+      sssfit render --screen --irradiance head
+    """
+    _check_options(screen, follow, profile or truth or difference or structure)
+    picture = Picture(irradiance, size, mm_per_pixel, own)
+    name, loaded = _kernel(kernel, common)
+    path = _target(name, picture, output)
+    targets = {"picture": path} if path else {}
+    targets |= {k: Path(v) for k, v in (("truth", truth), ("difference", difference)) if v}
+    with _held(list(targets.values()), force=force):
+        scene = make_or_read(picture, loaded.mm_per_pixel, common)
+        source, source_name = (
+            (None, None) if screen else true_profile(loaded, name, profile, common)
+        )
+        if source is None and (truth or difference):
+            raise click.UsageError("--truth and --difference need the profile; name it.")
+        settings: dict[str, Any] = {"border": border, "threads": common.threads}
+        if screen:
+            from sssfit.compare.judge import judge_in_screen_space
+
+            result = judge_in_screen_space(scene, loaded, follow=follow or "gaussian", **settings)
+        else:
+            from sssfit.compare.judge import judge
+
+            settings |= {"exposure": exposure, "structure": structure}
+            result = judge(scene, loaded, source, **settings)
+        _write(result, loaded, targets, exposure, common)
+    figures = {
+        "command": "render",
+        "output": [*(["-"] if path is None else []), *map(str, targets.values())],
+        "kernel": name,
+        "profile": source_name,
+        "border": border,
+        "follow": (follow or "gaussian") if screen else None,
+        **figures_of(result, scene, loaded),
+    }
+    finish(common, figures, text_of(figures), to_stderr=path is None)
+
+
+def _check_options(screen: bool, follow: str | None, compared: object) -> None:
+    """Refuse options that would do nothing."""
+    if screen and compared:
+        raise click.UsageError(
+            "--screen has no true picture to measure against: leave out --profile, --truth, "
+            "--difference and --structure."
+        )
+    if follow and not screen:
+        raise click.UsageError("--follow is for --screen; leave it out.")
+
+
+def _kernel(given: str | None, common: Common) -> tuple[str, SeparableKernel]:
+    """Return the kernel's name and the kernel; by default the newest of this folder."""
+    from sssfit.kernel import SeparableKernel
+
+    name = given or str(newest(common, "*.kernel.json", "sssfit fit --method svd --rank 3"))
+    if name == "-":
+        return name, SeparableKernel.read(binary_stdin(), "stdin")
+    return name, SeparableKernel.load(name)
+
+
+def _target(name: str, picture: Picture, output: str | None) -> Path | None:
+    """Where the picture goes; None is stdout. By default the current folder, under both names."""
+    if output is not None:
+        return None if output == "-" else Path(output)
+    stem = "stdin" if name == "-" else Path(name).name.removesuffix(".json").removesuffix(".kernel")
+    return Path(f"{stem}.{picture.name}.exr")
+
+
+@contextlib.contextmanager
+def _held(paths: Sequence[Path], *, force: bool) -> Iterator[None]:
+    """Check that pictures can be written there, and keep other runs off them."""
+    from sssfit.files import check_output, locked
+    from sssfit.image import image_format, is_image_file
+
+    if not paths:
+        binary_stdout()  # closed: said now and not after the work
+    if len({path.resolve() for path in paths}) < len(paths):
+        raise click.UsageError("two of -o, --truth and --difference name the same file.")
+    with contextlib.ExitStack() as stack:
+        for path in paths:
+            image_format(path)
+            check_output(path, is_image_file, force=force)
+            stack.enter_context(locked(path))
+        yield
+
+
+def _write(
+    result: Judgement,
+    kernel: SeparableKernel,
+    targets: dict[str, Path],
+    exposure: float | None,
+    common: Common,
+) -> None:
+    """Write the picture, and the truth and the difference where they are wanted."""
+    from sssfit.image import save_image
+
+    pictures = {"picture": result.picture, "truth": result.truth}
+    if result.truth is not None:
+        pictures["difference"] = abs(result.picture - result.truth)
+    settings: dict[str, Any] = {
+        "channels": kernel.channels,
+        "mm_per_pixel": kernel.mm_per_pixel,
+        "exposure": result.score.exposure if result.score else exposure or 1.0,
+    }
+    if "picture" not in targets:
+        save_image(binary_stdout(), result.picture, format="exr", **settings)
+        binary_stdout().flush()
+    for what, path in targets.items():
+        for note in save_image(path, pictures[what], **settings):
+            say(common, f"{path}: {note}")

@@ -1,0 +1,131 @@
+"""A kernel on a picture, held against the truth: what it shows, loses and costs."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.compare.asymmetry import radial_asymmetry
+from sssfit.compare.cost import Cost, cost_of, seconds_per_megapixel
+from sssfit.compare.metrics import ImageScore, measure
+from sssfit.kernel import SeparableKernel
+from sssfit.profile import Profile
+from sssfit.render.reference import render_reference
+from sssfit.render.scene import Scene
+from sssfit.render.screen import render_screen
+from sssfit.render.separable import render_separable
+
+FloatArray = npt.NDArray[np.float64]
+
+_QUICK_SECONDS = 0.5  # a picture rendered faster is timed again, since other programs disturb it
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judgement:
+    """A rendered picture with its score and price.
+
+    Parameters
+    ----------
+    picture : array (H, W, C)
+        Radiant exitance by the kernel.
+    truth : array (H, W, C), optional
+        The same by the profile's 2D kernel; None where there is no profile.
+    score : ImageScore, optional
+        Of the picture against the truth; within the scene's mask, where it has one.
+    cost : Cost
+        Of the kernel, with measured seconds.
+    asymmetry : array (C,)
+        `radial_asymmetry` of the kernel.
+    """
+
+    picture: FloatArray
+    truth: FloatArray | None
+    score: ImageScore | None
+    cost: Cost
+    asymmetry: FloatArray
+
+
+def judge(
+    scene: Scene,
+    kernel: SeparableKernel,
+    profile: Profile | None = None,
+    *,
+    border: str = "mirror",
+    exposure: float | None = None,
+    structure: bool = False,
+    threads: int | None = None,
+) -> Judgement:
+    """Render a scene with a kernel and with a profile's 2D kernel, and compare.
+
+    Parameters
+    ----------
+    scene : Scene
+        Flat: its depth is not looked at.
+    kernel : SeparableKernel
+        On the scene's pixels.
+    profile : Profile, optional
+        What the truth is made from; without it nothing is measured but the cost.
+    border, threads
+        As `render_separable`.
+    exposure, structure
+        As `measure`.
+
+    Raises
+    ------
+    RenderError
+        The kernel does not fit the scene or the profile, or as `measure`.
+    """
+    picture, seconds = timed(
+        lambda: np.asarray(
+            render_separable(scene, kernel, border=border, threads=threads), dtype=np.float64
+        ),
+        scene.height * scene.width,
+    )
+    truth = score = None
+    if profile is not None:
+        truth = render_reference(scene, profile, border=border, threads=threads)
+        score = measure(picture, truth, exposure=exposure, mask=scene.mask, structure=structure)
+    return Judgement(picture, truth, score, cost_of(kernel, seconds), asymmetry_of(kernel))
+
+
+def asymmetry_of(kernel: SeparableKernel) -> FloatArray:
+    """`radial_asymmetry` of each channel's 2D kernel (C,); a single pixel has none."""
+    if kernel.pixels == 1:
+        return np.zeros(len(kernel.channels))
+    return np.array([radial_asymmetry(kernel.full(c)) for c in range(len(kernel.channels))])
+
+
+def timed(render: Callable[[], FloatArray], pixels: int) -> tuple[FloatArray, float]:
+    """Render, then again with a clock: the picture, and seconds per 1e6 pixels.
+
+    The first call compiles where that is yet to be done. Quick renderers are timed three times
+    more, and the least counts.
+    """
+    picture = render()
+    begun = time.perf_counter()
+    render()
+    seconds = time.perf_counter() - begun
+    if seconds < _QUICK_SECONDS:
+        return picture, seconds_per_megapixel(render, pixels, repeats=3)
+    return picture, seconds * 1e6 / pixels
+
+
+def judge_in_screen_space(
+    scene: Scene,
+    kernel: SeparableKernel,
+    *,
+    follow: str = "gaussian",
+    border: str = "mirror",
+    threads: int | None = None,
+) -> Judgement:
+    """Render a scene as a shader does; there is no truth in perspective to hold it against.
+
+    Parameters and errors are those of `render_screen`.
+    """
+    picture, seconds = timed(
+        lambda: render_screen(scene, kernel, follow=follow, border=border, threads=threads),
+        scene.height * scene.width,
+    )
+    return Judgement(picture, None, None, cost_of(kernel, seconds), asymmetry_of(kernel))
