@@ -19,6 +19,7 @@ from sssfit.profile import Profile
 FloatArray = npt.NDArray[np.float64]
 
 KEPT = 0.999  # support "auto": share of every channel's on-grid energy within it
+_FAINTEST = 1e-100  # energy: squares of fainter pixels are 0, and errors relative to them nothing
 _WIDEST = 1e9  # pixels: beyond it the profile refuses for memory anyway; keeps floor() finite
 
 
@@ -77,7 +78,8 @@ def make_target(
     Raises
     ------
     FitError
-        Energies that are NaN, negative or all zero; a pitch or support that is no length.
+        Energies that are NaN, negative or all zero; a pitch or support that is no length; a
+        channel of whose light the support holds nothing.
     ProfileError
         A kernel of more than 2 GB a channel.
 
@@ -104,6 +106,7 @@ def make_target(
     target = Target(profile, pitch, half)
     # Before anything is done: every fit makes a quadrant, if only for its error.
     checked_support(float(profile.r_edges_mm[-1]), pitch, half, dimensions=2)
+    _check_light(target)
     return target
 
 
@@ -112,6 +115,18 @@ def support_of(profile: Profile) -> float:
     cumulative = profile.cumulative
     kept = cumulative >= KEPT * cumulative[-1]
     return float(profile.r_edges_mm[int(np.argmax(kept.all(axis=1)))])
+
+
+def _check_light(target: Target) -> None:
+    """Refuse channels that return light, but none that the pixels could show."""
+    corner_mm = math.sqrt(2.0) * target.mm_per_pixel * (target.half_pixels + 0.5)
+    within = target.profile.cumulative_at(np.array([corner_mm]))[0]
+    for c in np.flatnonzero(~target.is_empty & (within < _FAINTEST)):
+        raise FitError(
+            f"channel {target.profile.channels[c]}: of its diffuse reflectance "
+            f"{target.total[c]:.3g} the support of {target.half_pixels * target.mm_per_pixel:.4g} "
+            f"mm holds {within[c]:.3g}: use a larger support, or set the channel to 0."
+        )
 
 
 def _check_profile(profile: Profile) -> None:
