@@ -415,7 +415,7 @@ def test_terms_out_of_range(marble, terms):
 
 def test_fewer_annuli_than_unknowns():
     one = make_profile([0.0, 1.0], [[0.5]])
-    with pytest.raises(FitError, match="test: a profile of 1 annuli cannot fix 1 Gaussians"):
+    with pytest.raises(FitError, match=r"test: a profile of one annulus cannot fix .*, terms = 1;"):
         fit_gaussians(one, terms=1)
     four = profile_of_gaussians([0.3, 4.0], [[0.5], [0.4]], np.linspace(0.0, 6.0, 5))
     with pytest.warns(SssfitWarning, match="steep"):

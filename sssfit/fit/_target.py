@@ -19,7 +19,7 @@ from sssfit.profile import Profile
 FloatArray = npt.NDArray[np.float64]
 
 KEPT = 0.999  # support "auto": share of every channel's on-grid energy within it
-_FAINTEST = 1e-100  # energy: squares of fainter pixels are 0, and errors relative to them nothing
+_FAINTEST = 1e-145  # energy: squares of fainter pixels are 0, and errors relative to them nothing
 _WIDEST = 1e9  # pixels: beyond it the profile refuses for memory anyway; keeps floor() finite
 
 
