@@ -107,6 +107,13 @@ class Profile:
         return tuple(self.meta["channels"])
 
     @property
+    def name(self) -> str:
+        """Name of the material; where that is not known, of the file the profile came from."""
+        material = self.meta.get("material")
+        name = material.get("name") if isinstance(material, Mapping) else None
+        return str(name or self.meta.get("source") or "unknown")
+
+    @property
     def photons(self) -> int | None:
         """Number of photon walks behind the energies; None where nothing was sampled."""
         return self.meta.get("photons")

@@ -131,7 +131,7 @@ def _check_light(target: Target) -> None:
 
 def _check_profile(profile: Profile) -> None:
     """One clear line for data that no fit can use."""
-    energy, name = profile.annulus_energy, profile.meta["material"]["name"]
+    energy, name = profile.annulus_energy, profile.name
     if not np.isfinite(energy).all():
         raise FitError(f"{name}: the profile holds NaN or infinite energies; make it again.")
     if (energy < 0.0).any():
