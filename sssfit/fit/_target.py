@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._disks import checked_support
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.profile import Profile
 
@@ -20,7 +19,8 @@ FloatArray = npt.NDArray[np.float64]
 
 KEPT = 0.999  # support "auto": share of every channel's on-grid energy within it
 _FAINTEST = 1e-145  # energy: squares of fainter pixels are 0, and errors relative to them nothing
-_WIDEST = 1e9  # pixels: beyond it the profile refuses for memory anyway; keeps floor() finite
+_MOST_BYTES = 2e9
+_WIDEST = 1e9  # pixels: beyond it the fit is refused for memory anyway; keeps floor() finite
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,9 +79,7 @@ def make_target(
     ------
     FitError
         Energies that are NaN, negative or all zero; a pitch or support that is no length; a
-        channel of whose light the support holds nothing.
-    ProfileError
-        A kernel of more than 2 GB a channel.
+        channel of whose light the support holds nothing; more than 2 GB for a channel.
 
     Warns
     -----
@@ -104,8 +102,7 @@ def make_target(
             stacklevel=3,
         )
     target = Target(profile, pitch, half)
-    # Before anything is done: every fit makes a quadrant, if only for its error.
-    checked_support(float(profile.r_edges_mm[-1]), pitch, half, dimensions=2)
+    _check_memory(target)
     _check_light(target)
     return target
 
@@ -115,6 +112,21 @@ def support_of(profile: Profile) -> float:
     cumulative = profile.cumulative
     kept = cumulative >= KEPT * cumulative[-1]
     return float(profile.r_edges_mm[int(np.argmax(kept.all(axis=1)))])
+
+
+def _check_memory(target: Target) -> None:
+    """Refuse pixels that would not fit in memory, before anything is done.
+
+    Every fit holds two quadrants at once, the target's and its own, if only for the error.
+    """
+    size = 2.0 * 8.0 * (target.half_pixels + 1.0) ** 2
+    if size > _MOST_BYTES:
+        pixels = 2 * target.half_pixels + 1
+        raise FitError(
+            f"a kernel of {pixels} x {pixels} pixels of {target.mm_per_pixel:.4g} mm would need "
+            f"{size / 1e9:.3g} GB of memory a channel, and {_MOST_BYTES / 1e9:.3g} GB is the "
+            "most: use a larger mm_per_pixel or a smaller support."
+        )
 
 
 def _check_light(target: Target) -> None:
