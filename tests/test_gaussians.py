@@ -45,6 +45,9 @@ PUBLISHED = {
     ),
 }
 
+# Some random profiles are ones that a kernel of few terms does not suit, and it says so.
+random_profiles = pytest.mark.filterwarnings("ignore:.* kernel (is farther|has not)")
+
 
 def fine_dipole(name):
     """A dipole as the published figures have it, on a grid that is as good as none.
@@ -173,6 +176,7 @@ def test_error_never_rises_with_the_number_of_terms(make, signed, free_energy):
     assert (np.array(found[-1]) < 1e-2 * np.array(found[0])).all()
 
 
+@random_profiles
 @settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), free_energy=st.booleans(), signed=st.booleans())
 def test_noisy_profiles(seed, free_energy, signed):
