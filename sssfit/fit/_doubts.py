@@ -9,7 +9,7 @@ from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._target import FloatArray
 from sssfit.kernel import SeparableKernel
 
-# Share of a channel's energy. Default fits of the eleven materials are off by up to 2.2 %.
+# Share of a channel's energy. Default fits of the eleven materials are off by up to 2.7 %.
 _MOST_ENERGY_ERROR = 0.1
 
 
