@@ -18,13 +18,15 @@ class Method:
     """One way from a material to a profile.
 
     ``shares`` says that the function takes a list of materials, works once for what they have in
-    common, and knows ``threads`` and ``stop``; the others take one material.
+    common, and knows ``threads`` and ``stop``; the others take one material. One that ``makes``
+    a profile by name takes none, and that name needs no ``--method``.
     """
 
     summary: str
     function: str
     options: tuple[str, ...] = ()
     shares: bool = False
+    makes: str | None = None
 
 
 METHODS = {
@@ -57,6 +59,11 @@ METHODS = {
         "simulate_burley",
         ("mapping",),
     ),
+    "gaussians": Method(
+        "skin as the six Gaussians of d'Eon et al. 2007; deon-skin only",
+        "simulate_deon_skin",
+        makes="deon-skin",
+    ),
 }
 MAPPINGS = ("perpendicular", "diffuse", "diffuse-mfp")
 
@@ -70,6 +77,29 @@ def method_lines() -> str:
     return "\b\nMethods:\n" + "\n".join(
         f"  {name.ljust(width)}{method.summary}" for name, method in METHODS.items()
     )
+
+
+def method_for(context: click.Context, method: str, material: str | None) -> str:
+    """Return the method that a name asks for; refuse a method and a name that do not go together.
+
+    A name of a profile that a method makes has no coefficients, and no other method can use it.
+    """
+    made = METHODS[method].makes
+    if made is not None and material != made:
+        asked = "--all" if material is None else material
+        raise click.UsageError(
+            f"--method {method} makes {made} only, and this is {asked}; for sums of Gaussians of a "
+            "material's profile use sssfit fit --method gaussians."
+        )
+    owners = [name for name, each in METHODS.items() if each.makes == material]
+    if material is None or not owners or method in owners:
+        return method
+    if context.get_parameter_source("method") is ParameterSource.COMMANDLINE:
+        raise click.UsageError(
+            f"{material} has no coefficients, and --method {method} needs them; use --method "
+            f"{owners[0]} or leave it out."
+        )
+    return owners[0]
 
 
 def own_options(context: click.Context, method: str, given: dict[str, Any]) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ._compiling import say_if_compiling
+from ._deon_skin import DEON_SKIN
 from ._figure import chart_output
 from ._options import Common
 from ._report import finish, table
@@ -47,6 +48,8 @@ def _read(name: str) -> tuple[Material, Profile | None]:
     from sssfit.material import load_material
     from sssfit.profile import Profile
 
+    if name == DEON_SKIN:
+        raise ProfileError(f"{name} has no coefficients for other methods; name a material.")
     if not name.endswith(".npz"):
         return load_material(name), None
     profile = Profile.load(name)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,11 +18,12 @@ from ._simulate_run import Request, Walk
 if TYPE_CHECKING:
     from sssfit.material import Material
     from sssfit.profile import Profile
+    from sssfit.simulate import Named
 
 
 def run_computed(
     method: str,
-    materials: list[Material],
+    materials: Sequence[Material | Named],
     targets: list[Path | None],
     jobs: list[Walk],
     request: Request,
@@ -55,7 +56,10 @@ def run_computed(
 
 
 def _computed(
-    method: str, materials: list[Material], settings: dict[str, Any], stop: Callable[[], bool]
+    method: str,
+    materials: Sequence[Material | Named],
+    settings: dict[str, Any],
+    stop: Callable[[], bool],
 ) -> list[Profile]:
     """Call the method's function; those that share work between materials can be stopped."""
     from sssfit import simulate
@@ -66,10 +70,14 @@ def _computed(
         return list(function(materials, stop=stop, **settings))
     if stop():
         raise StoppedError("stopped between two materials.")
+    if METHODS[method].makes is not None:
+        return [function(**settings)]
     return [function(each, **settings) for each in materials]
 
 
-def _report(rows: dict[int, dict[str, Any]], materials: list[Material], request: Request) -> None:
+def _report(
+    rows: dict[int, dict[str, Any]], materials: Sequence[Material | Named], request: Request
+) -> None:
     """Print the figures; say what was not done, and exit 130 in that case."""
     missing = [each.name for k, each in enumerate(materials) if k not in rows]
     if missing:

@@ -134,7 +134,7 @@ def _target(
         return None if output == "-" else Path(output)
     stem = Path(name).name.removesuffix(".npz").removesuffix(".profile")
     if name == "-":
-        stem = Path(profile.name).name
+        stem = profile.material_name or "stdin"
     fit = FITS[method]
     count = settings.get(fit.counted, fit.count) if fit.counted else ""
     return Path(f"{stem}.{method}{count}.kernel.json")

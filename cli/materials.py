@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from ._deon_skin import DEON_SKIN, show_deon_skin
 from ._invert import Wish, write_material
 from ._options import Common, Length, ListOf, Reflectance, common_options
 from ._report import finish, table
@@ -80,6 +81,8 @@ def materials(
         raise click.UsageError("--toml needs a MATERIAL and does not go with --json.")
     if material is None:
         _list(common)
+    elif material == DEON_SKIN:
+        show_deon_skin(common, as_toml=as_toml)
     elif as_toml:
         from sssfit.material import load_material
 
@@ -115,7 +118,9 @@ def _list(common: Common) -> None:
         )
         for row in rows
     ]
-    finish(common, {"command": "materials", "output": [], "rows": rows}, table(head, cells))
+    figures = {"command": "materials", "output": [], "rows": rows, "profiles": [DEON_SKIN]}
+    text = f"{table(head, cells)}\n\n{DEON_SKIN}: a profile without coefficients, for simulate only"
+    finish(common, figures, text)
 
 
 def _show(common: Common, name_or_path: str) -> None:

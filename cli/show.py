@@ -71,11 +71,20 @@ def _figures(profile: Profile) -> dict[str, Any]:
 
 
 def _material_figures(profile: Profile) -> dict[str, Any] | None:
-    """Name and layers, from the top down, of the material the profile was made from."""
+    """Name and layers, from the top down, of the material the profile was made from.
+
+    No layers where only a name is known; null where there is not even that.
+    """
     from sssfit._chart_data import material_of
+    from sssfit._material_checks import printable
 
     material = material_of(profile)
-    return None if material is None else {**material.to_dict(), **_scales(material)}
+    if material is not None:
+        return {**material.to_dict(), **_scales(material)}
+    if profile.material_name is None:
+        return None
+    source = printable(str(profile.meta["material"].get("source") or ""))
+    return {"name": profile.material_name, "source": source, "layers": []}
 
 
 def _scales(material: Material) -> dict[str, Any]:
@@ -135,7 +144,7 @@ def _head(figures: dict[str, Any]) -> str:
 def _coefficients(figures: dict[str, Any]) -> str:
     """One line a layer and channel; nothing where the material is unknown."""
     material = figures["material"]
-    if material is None:
+    if material is None or not material["layers"]:
         return ""
     rows = [
         (

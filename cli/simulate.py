@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ._mci import is_mci, load_runs
-from ._methods import MAPPINGS, METHODS, method_lines, own_options
+from ._methods import MAPPINGS, METHODS, method_for, method_lines, own_options
 from ._options import Common, Count, Length, Share, common_options
 from ._simulate_computed import run_computed
 from ._simulate_outputs import profile_paths
@@ -70,13 +70,18 @@ class Radius(Length):
     help="burley: which published fit gives s: perpendicular (light from straight above), diffuse "
     "(from everywhere), or diffuse-mfp (from the diffuse mean free path).",
 )
-@click.option("--dr", type=Length(), metavar="MM", help="Annulus width.  [default: MFP_min / 20]")
+@click.option(
+    "--dr",
+    type=Length(),
+    metavar="MM",
+    help="Annulus width.  [default: MFP_min / 20; deon-skin: 0.008]",
+)
 @click.option(
     "--radius",
     type=Radius(),
     metavar="MM|auto",
     help="Grid radius; auto (montecarlo) grows it until under 0.1 % of any channel lies beyond."
-    "  [default: 32 MFP_max]",
+    "  [default: 32 MFP_max; deon-skin: 17.2]",
 )
 @click.option(
     "-o",
@@ -131,16 +136,21 @@ def simulate(
       sssfit simulate ./wax.toml --json
       sssfit simulate skin1 --target-error 0.1% --resume
       sssfit simulate tissue.mci --run 2
+      sssfit simulate deon-skin
     """
     if (material is None) != every:
         raise click.UsageError("name one MATERIAL, or give --all.")
     if run is not None and not is_mci(material):
         raise click.UsageError("--run chooses a run of an MCML input file, .mci.")
+    method = method_for(context, method, material)
     own = own_options(context, method, own)
     if radius == "auto" and method != "montecarlo":
         raise click.UsageError("--radius auto is for --method montecarlo; give a length.")
     walk = {key: own.pop(key) for key in ("checkpoint_every", "resume") if key in own}
     settings = {"dr_mm": dr, "radius_mm": radius, **own, **_of_common(method, common)}
+    if METHODS[method].makes is not None:
+        _make(method, settings, output, Request(force, several=False, common=common))
+        return
     materials, jobs = _jobs(material, run, settings, shares=METHODS[method].shares)
     several = every or len(materials) > 1
     targets = profile_paths(materials, method, output, several=several)
@@ -151,6 +161,14 @@ def simulate(
         run_walks(materials, targets, jobs, request)
     else:
         run_computed(method, materials, targets, jobs, request)
+
+
+def _make(method: str, settings: dict[str, Any], output: str | None, request: Request) -> None:
+    """Run a method that takes no material."""
+    from sssfit.simulate import DEON_SKIN
+
+    targets = profile_paths([DEON_SKIN], method, output, several=False)
+    run_computed(method, [DEON_SKIN], targets, [([0], settings)], request)
 
 
 def _of_common(method: str, common: Common) -> dict[str, Any]:

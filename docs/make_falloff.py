@@ -4,27 +4,22 @@ python docs/make_falloff.py
 """
 
 import math
-import sys
 from pathlib import Path
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "tests"))
-
-from reference_pixels import make_profile  # noqa: E402
-
-from sssfit.fit import fit_falloff, make_target  # noqa: E402
-from sssfit.fit.falloff import (  # noqa: E402
+from sssfit.fit import fit_falloff, make_target
+from sssfit.fit.falloff import (
     STRETCH,
     sampled_misfit,
     samples,
     scale_of,
     stretched_skin,
 )
-from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS, gaussian_cdf  # noqa: E402
+from sssfit.simulate import simulate_deon_skin
 
+ROOT = Path(__file__).parents[1]
 TABLE_1 = {"width": 0.014, "strength": (0.78, 0.70, 0.75), "falloff": (0.57, 0.13, 0.08)}
 PITCHES_MM = (0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0)
 PITCH_MM = 0.5  # in smaller pixels the delta of table 1 is too dense for any length
@@ -53,13 +48,6 @@ gives the widest channel the falloff 1; one column shows the same kernel at tabl
 |---|---|---|---|---|---|
 {sets}
 """
-
-
-def skin():
-    """Return the six-Gaussian skin as a profile, out to 20 mm."""
-    edges = np.linspace(0.0, 20.0, 4001)
-    within = gaussian_cdf(edges[:, None], SKIN_VARIANCES_MM2) @ np.array(SKIN_WEIGHTS)
-    return make_profile(edges, np.diff(within, axis=0), beyond_grid=1.0 - within[-1])
 
 
 def left_by(quadrants, edges_mm, strengths, scales):
@@ -120,7 +108,7 @@ def fitted(profile, pitch_mm, **by_hand):
 
 def section():
     """Return the section's text."""
-    profile = skin()
+    profile = simulate_deon_skin()
     unit = TABLE_1["width"] * (0.001 + np.array(TABLE_1["falloff"]))
     scan = []
     for pitch in PITCHES_MM:

@@ -14,7 +14,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
 
-from sssfit._chart_data import material_of
 from sssfit._chart_page import (
     chart_style,
     draw_footnotes,
@@ -24,7 +23,7 @@ from sssfit._chart_page import (
     new_figure,
 )
 from sssfit._chart_style import COLOURS, LEFT, LINE_STYLES, RC, RIGHT, WIDTH_INCHES, Style
-from sssfit._chart_text import method_name, shortened, spread
+from sssfit._chart_text import kernel_subtitle, shortened, spread
 from sssfit._profile_bins import FloatArray
 
 if TYPE_CHECKING:
@@ -73,7 +72,9 @@ def spectrum_figure(spectrum: Spectrum) -> Figure:
 def _draw_head(figure: Figure, spectrum: Spectrum, shown: Sequence[int]) -> float:
     """Title, provenance and a legend with figures; the height of what is left, as a fraction."""
     draw_text(figure, 0.16, _title(spectrum), size=12, weight="bold")
-    draw_text(figure, 0.41, _subtitle(spectrum))
+    draw_text(
+        figure, 0.41, kernel_subtitle(spectrum.profile, spectrum.pixels, spectrum.mm_per_pixel)
+    )
     grey: Style = {"color": "#444444", "size": 8}
     down = 0.68
     for left, head in zip(_COLUMNS, _HEADS, strict=True):
@@ -130,17 +131,8 @@ def _limit(axes: Axes, spectrum: Spectrum, shown: Sequence[int]) -> None:
 
 def _title(spectrum: Spectrum) -> str:
     """Name the material."""
-    material = material_of(spectrum.profile)
-    what = "energy of the kernel's singular values"
-    return f"{shortened(material.name, 24)}: {what}" if material else what.capitalize()
-
-
-def _subtitle(spectrum: Spectrum) -> str:
-    """Say which kernel it is."""
-    meta = spectrum.profile.meta
-    parts = [method_name(meta["method"])] if meta.get("method") else []
-    parts.append(f"{spectrum.pixels} x {spectrum.pixels} pixels of {spectrum.mm_per_pixel:.4g} mm")
-    return " · ".join([*parts, f"sssfit {shortened(str(meta['version']))}"])
+    name, what = spectrum.profile.material_name, "energy of the kernel's singular values"
+    return f"{shortened(name, 24)}: {what}" if name else what.capitalize()
 
 
 def _row(spectrum: Spectrum, channel: int) -> list[str]:

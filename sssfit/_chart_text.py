@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from sssfit._chart_data import Picture, material_of
+from sssfit._chart_data import Picture
 from sssfit._profile_bins import LEAST_HITS, FloatArray
 from sssfit.profile import Profile
 
@@ -16,6 +16,7 @@ _METHODS = {
     "dipole-grosjean": "Dipole, Grosjean's D",
     "multipole": "Multipole",
     "burley": "Normalised diffusion",
+    "gaussians": "Sum of Gaussians",
 }
 _MOST_IN_LEGEND = 8
 _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -23,9 +24,8 @@ _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 def title(profile: Profile) -> str:
     """Name the material."""
-    material = material_of(profile)
-    what = "diffuse reflectance profile"
-    return f"{shortened(material.name, 24)}: {what}" if material else what.capitalize()
+    name, what = profile.material_name, "diffuse reflectance profile"
+    return f"{shortened(name, 24)}: {what}" if name else what.capitalize()
 
 
 def legend_title(profile: Profile) -> str:
@@ -46,6 +46,14 @@ def subtitle(profile: Profile) -> str:
     if version := meta.get("version"):
         parts.append(f"sssfit {shortened(str(version))}")
     return " · ".join(parts)
+
+
+def kernel_subtitle(profile: Profile, pixels: int, mm_per_pixel: float) -> str:
+    """Say which pixels a profile's kernel is on, and how the profile was made."""
+    meta = profile.meta
+    parts = [method_name(meta["method"])] if meta.get("method") else []
+    parts.append(f"{pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm")
+    return " · ".join([*parts, f"sssfit {shortened(str(meta['version']))}"])
 
 
 def method_name(method: object) -> str:

@@ -9,7 +9,7 @@ import math
 import re
 from collections.abc import Callable, Iterator, Sequence
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -125,9 +125,14 @@ def check_not_per_cm(layer: "Layer") -> None:
         )
 
 
+def is_name(name: object) -> TypeGuard[str]:
+    """Tell whether something is a text that can be part of a file name."""
+    return isinstance(name, str) and re.fullmatch(_NAME, name) is not None
+
+
 def check_texts(name: object, source: object) -> None:
     """Check that the name can be part of a file name and the source be written to a file."""
-    if not (isinstance(name, str) and re.fullmatch(_NAME, name)):
+    if not is_name(name):
         raise MaterialError(
             f"name = {shown(name)} cannot be part of a file name; use at most 100 letters, digits "
             "and . _ + -, a letter or digit first."

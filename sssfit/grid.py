@@ -103,14 +103,25 @@ def make_grid(
     shortest, longest = float(paths_mm.min()), float(paths_mm.max())
     dr = shortest / _RINGS_PER_MFP if dr_mm is None else _length("dr_mm", dr_mm)
     radius = _MFPS_PER_RADIUS * longest if radius_mm is None else _length("radius_mm", radius_mm)
-    # 1e-9 keeps a ratio that is whole but for its last bits from gaining a ring.
-    annuli = max(1, math.ceil(radius / dr - 1e-9))
     why = (
         f" (sigma_a_per_mm and sigma_s_per_mm give mean free paths from {shortest:.3g} to "
         f"{longest:.3g} mm)"
     )
-    _check_count(annuli, dr, f"{material.name}: ", why)
-    return RadialGrid(float(dr), annuli)
+    return grid_of_lengths(dr, radius, whose=f"{material.name}: ", why=why)
+
+
+def grid_of_lengths(
+    dr_mm: float, radius_mm: float, *, whose: str = "", why: str = ""
+) -> RadialGrid:
+    """Return the grid of rings ``dr_mm`` wide that covers ``radius_mm``, rounded up to whole rings.
+
+    Raises SimulationError as `make_grid`; ``whose`` stands before its message, ``why`` within.
+    """
+    dr, radius = _length("dr_mm", dr_mm), _length("radius_mm", radius_mm)
+    # 1e-9 keeps a ratio that is whole but for its last bits from gaining a ring.
+    annuli = max(1, math.ceil(radius / dr - 1e-9))
+    _check_count(annuli, dr, whose, why)
+    return RadialGrid(dr, annuli)
 
 
 def _length(key: str, value: Any) -> float:

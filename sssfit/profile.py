@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from sssfit import _disks, _profile_checks, _profile_io
 from sssfit._disks import FloatArray, full_kernel
+from sssfit._material_checks import is_name
 from sssfit._profile_io import FORMAT, is_profile_file
 from sssfit.errors import ProfileError
 from sssfit.files import write_atomically
@@ -107,13 +108,6 @@ class Profile:
         return tuple(self.meta["channels"])
 
     @property
-    def name(self) -> str:
-        """Name of the material; where that is not known, of the file the profile came from."""
-        material = self.meta.get("material")
-        name = material.get("name") if isinstance(material, Mapping) else None
-        return str(name or self.meta.get("source") or "unknown")
-
-    @property
     def photons(self) -> int | None:
         """Number of photon walks behind the energies; None where nothing was sampled."""
         return self.meta.get("photons")
@@ -161,6 +155,16 @@ class Profile:
             on_grid = np.vstack((on_grid, beyond))
         of_total: FloatArray = _stderr_of_sums(energy, on_grid, self.photons)[-1]
         return of_total
+
+    @property
+    def material_name(self) -> str | None:
+        """Name of the material, or of what else the profile was made from; None if unknown.
+
+        A profile may have a name and no coefficients. Names that no file could have count as none.
+        """
+        record = self.meta.get("material")
+        name = record.get("name") if isinstance(record, Mapping) else None
+        return name if is_name(name) else None
 
     @property
     def energy_balance(self) -> FloatArray:

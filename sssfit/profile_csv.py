@@ -368,9 +368,10 @@ def _check_names(channels: Sequence[str]) -> None:
 def _provenance(profile: Profile) -> str:
     """Say where a profile comes from, for people."""
     meta = profile.meta
-    material = meta.get("material")
-    name = material.get("name") if isinstance(material, dict) else None
-    parts = [str(name or meta.get("source") or "unknown material"), str(meta.get("method"))]
+    parts = [
+        str(profile.material_name or meta.get("source") or "unknown material"),
+        str(meta.get("method")),
+    ]
     if profile.photons is not None:
         parts.append(f"{profile.photons} photons, seed {meta.get('seed')}")
     return ", ".join([*parts, f"sssfit {meta.get('version')}"])

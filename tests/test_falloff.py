@@ -21,6 +21,7 @@ from sssfit.fit.falloff import (
     stretched_skin,
 )
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS
+from sssfit.simulate import simulate_deon_skin
 
 ROOT = Path(__file__).parents[1]
 MADE = runpy.run_path(str(ROOT / "docs" / "make_falloff.py"))
@@ -29,7 +30,7 @@ TABLE_1 = MADE["TABLE_1"]
 
 @pytest.fixture(scope="module")
 def skin():
-    return MADE["skin"]()
+    return simulate_deon_skin()
 
 
 def test_samples_are_dense_near_the_middle_and_reach_far_out():
@@ -142,7 +143,7 @@ def test_no_grid_of_parameters_beats_the_fit(skin):
 def test_the_widest_channel_has_the_falloff_one_and_all_share_the_width(skin):
     fitted = fit_falloff(skin, mm_per_pixel=0.3, support_mm=8.0)
     found = fitted.kernel.parameters
-    assert found["c0"]["falloff"] == pytest.approx(1)
+    assert found["R"]["falloff"] == pytest.approx(1)
     assert all(0 <= each["falloff"] <= 1 + 1e-12 for each in found.values())
     assert len({each["width"] for each in found.values()}) == 1
     np.testing.assert_allclose(fitted.kernel.energy, 1, rtol=1e-9)
@@ -150,7 +151,7 @@ def test_the_widest_channel_has_the_falloff_one_and_all_share_the_width(skin):
         skin,
         mm_per_pixel=0.3,
         support_mm=8.0,
-        width=found["c0"]["width"],
+        width=found["R"]["width"],
         strength=[each["strength"] for each in found.values()],
         falloff=[each["falloff"] for each in found.values()],
     )

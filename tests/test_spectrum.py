@@ -196,7 +196,7 @@ def test_the_verb_gives_json(run, spectrum):
     ("arguments", "status", "fragment"),
     [
         (("--spectrum", "--models", "skin1"), 2, "--models and --spectrum are two charts"),
-        (("--mm-per-pixel", "0.1"), 2, "--mm-per-pixel is for the kernel of --spectrum"),
+        (("--mm-per-pixel", "0.1"), 2, "--mm-per-pixel is for the kernel of --spectrum or --guide"),
         (("--spectrum", "--mm-per-pixel", "0"), 2, "not a length above 0"),
         (("--spectrum", "there.profile.npz"), 1, "there.profile.npz"),
         (("--spectrum", "-o", "a.jpg"), 1, ".png, .svg or .pdf"),

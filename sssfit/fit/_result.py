@@ -100,7 +100,7 @@ def fit_channels(
         fits = [_nothing(target) if empty[c] else fit_channel(c) for c in channels]
         errors = _frobenius_errors(target, fits)
     signs, half = _stacked(fits)
-    name = target.profile.name
+    name = target.name
     if not np.isfinite(half).all():
         raise FitError(f"{name}: the {method} fit is not finite; try fewer terms.")
     energy = _energy(signs, half, target.copies)
@@ -200,9 +200,9 @@ def _provenance(target: Target, settings: Mapping[str, Any], *, normalize: bool)
     """Return where the kernel comes from."""
     meta = target.profile.meta
     return {
-        "material": target.profile.name,
+        "material": target.name,
         "material_sha256": meta.get("material_sha256"),
-        "profile_method": meta.get("method"),
+        "profile_method": meta.get("method", "unknown"),
         "photons": meta.get("photons"),
         "seed": meta.get("seed"),
         "version": __version__,

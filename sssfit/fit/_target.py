@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from sssfit._material_checks import printable
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.profile import Profile
 
@@ -30,6 +31,11 @@ class Target:
     profile: Profile
     mm_per_pixel: float
     half_pixels: int
+
+    @property
+    def name(self) -> str:
+        """What messages and kernels call the profile."""
+        return name_of(self.profile)
 
     @property
     def total(self) -> FloatArray:
@@ -141,9 +147,14 @@ def _check_light(target: Target) -> None:
         )
 
 
+def name_of(profile: Profile) -> str:
+    """Return what messages and kernels call the profile: its material, or the file it came from."""
+    return profile.material_name or printable(str(profile.meta.get("source") or "unknown material"))
+
+
 def _check_profile(profile: Profile) -> None:
     """One clear line for data that no fit can use."""
-    energy, name = profile.annulus_energy, profile.name
+    energy, name = profile.annulus_energy, name_of(profile)
     if not np.isfinite(energy).all():
         raise FitError(f"{name}: the profile holds NaN or infinite energies; make it again.")
     if (energy < 0.0).any():

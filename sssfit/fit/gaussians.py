@@ -26,7 +26,7 @@ from sssfit.fit._gaussians_annuli import make_annuli
 from sssfit.fit._gaussians_rings import is_steep, rings
 from sssfit.fit._gaussians_search import Found, search
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
-from sssfit.fit._target import Target, make_target
+from sssfit.fit._target import Target, make_target, name_of
 from sssfit.profile import Profile
 from sssfit.shapes import gaussian_line_integral
 
@@ -140,7 +140,7 @@ def _check_annuli(profile: Profile, terms: int) -> None:
     if profile.n_annuli < 2 * terms:
         annuli = "one annulus" if profile.n_annuli == 1 else f"{profile.n_annuli} annuli"
         raise FitError(
-            f"{profile.name}: a profile of {annuli} cannot fix the width and "
+            f"{name_of(profile)}: a profile of {annuli} cannot fix the width and "
             f"the weight of each Gaussian, terms = {terms}; give a finer profile or fewer terms."
         )
 
@@ -149,7 +149,7 @@ def _warn_of_pitch(target: Target) -> None:
     """Say once where the objective has no limit of its own."""
     if any(is_steep(target, int(c)) for c in np.flatnonzero(~target.is_empty)):
         warnings.warn(
-            f"{target.profile.name}: R_d is steep near the beam (single "
+            f"{target.name}: R_d is steep near the beam (single "
             "scattering is 1/r), so the Gaussians depend on the pitch of "
             f"{target.mm_per_pixel:.3g} mm: compare fits of one pitch and one profile grid only.",
             SssfitWarning,

@@ -1,11 +1,13 @@
 """Material to profile: one method, one file, one signature ``simulate_x(material, ...)``."""
 
 from sssfit.simulate._checkpoint import EVERY_SECONDS, Checkpoint
+from sssfit.simulate._deterministic import Named
 from sssfit.simulate._finished import is_complete, is_finished
 from sssfit.simulate._run import Progress
 from sssfit.simulate.burley import simulate_burley
 from sssfit.simulate.dipole import simulate_dipole, simulate_dipole_grosjean
 from sssfit.simulate.exact import is_solver_compiled, simulate_exact, simulate_exact_many
+from sssfit.simulate.gaussians import DEON_SKIN, simulate_deon_skin, simulate_gaussians
 from sssfit.simulate.montecarlo import (
     is_compiled,
     shared_walks,
@@ -15,8 +17,10 @@ from sssfit.simulate.montecarlo import (
 from sssfit.simulate.multipole import simulate_multipole
 
 __all__ = [
+    "DEON_SKIN",
     "EVERY_SECONDS",
     "Checkpoint",
+    "Named",
     "Progress",
     "is_compiled",
     "is_complete",
@@ -24,10 +28,12 @@ __all__ = [
     "is_solver_compiled",
     "shared_walks",
     "simulate_burley",
+    "simulate_deon_skin",
     "simulate_dipole",
     "simulate_dipole_grosjean",
     "simulate_exact",
     "simulate_exact_many",
+    "simulate_gaussians",
     "simulate_montecarlo",
     "simulate_montecarlo_many",
     "simulate_multipole",

@@ -8,6 +8,7 @@ r use ``energies_from_beyond``, which keeps its digits out to 1e-300 where F(r) 
 
 import warnings
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,26 @@ from sssfit.profile import FORMAT, Profile
 FloatArray = npt.NDArray[np.float64]
 
 ROUNDING = 1e-12  # F may fall by this share of the total: sums of a few thousand terms, rounded
+
+
+@dataclass(frozen=True, slots=True)
+class Named:
+    """What stands for a material where there are no coefficients: a name, and a source."""
+
+    name: str
+    source: str
+    channels: tuple[str, ...]
+    specular_reflectance: float = 0.0
+    sha256: None = None
+
+    @property
+    def n_channels(self) -> int:
+        """Number of channels."""
+        return len(self.channels)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what JSON holds of it."""
+        return {"name": self.name, "source": self.source}
 
 
 def energies_from_cumulative(
@@ -80,7 +101,7 @@ def energies_from_beyond(beyond: FloatArray) -> FloatArray:
 
 
 def computed_profile(
-    material: Material,
+    material: Material | Named,
     method: str,
     grid: RadialGrid,
     reflected: FloatArray,
@@ -96,7 +117,7 @@ def computed_profile(
 
     Parameters
     ----------
-    material : Material
+    material : Material or Named
     method : str
         As the command line names it; becomes ``meta["method"]``.
     grid : RadialGrid

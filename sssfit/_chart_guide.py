@@ -1,0 +1,220 @@
+"""The guide function beside what the guided fit leaves, as a figure: `guide_figure`.
+
+The record comes from ``sssfit.compare.guide``, which has computed everything.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colorbar import Colorbar
+from matplotlib.colors import Normalize, SymLogNorm
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+
+from sssfit._chart_data import material_of
+from sssfit._chart_page import chart_style, draw_footnotes, draw_text, name_axes, new_figure
+from sssfit._chart_style import COLOURS, LEFT, LINE_WIDTH, RIGHT, WIDTH_INCHES, Style
+from sssfit._chart_text import kernel_subtitle, shortened
+from sssfit._profile_bins import FloatArray
+from sssfit.profile import full_kernel
+
+if TYPE_CHECKING:
+    from sssfit.compare.guide import Guide
+
+_IMAGE_INCHES = 1.62  # a square
+_ROW_INCHES = _IMAGE_INCHES + 0.33
+_SECOND = LEFT * WIDTH_INCHES + _IMAGE_INCHES + 0.32  # from the left edge: the residual
+_THIRD = _SECOND + _IMAGE_INCHES + 0.72  # the pass
+_BAR_INCHES = 0.09
+_BAR_DOWN = 0.2  # under the last row: room for the name of x
+_BAR_WIDER = 0.46  # the residual's, whose numbers are long
+_FOOT_INCHES = 1.05  # under the bars: their numbers and names, and three lines of notes
+_TABLE_INCHES = 0.165
+_COLUMNS = (0.25, 0.44, 0.61, 0.80)  # of the width: the table's figures
+_HEADS = ("middle pixel of the pass", "energy misplaced", "Frobenius error", "misfit weighted by Γ")
+_DECADES = 5  # of the residual, on either side of what is drawn linearly
+_PASS_DECADES = 6
+_GREY = "#666666"
+_NOTE = (
+    "Residual: 2D kernel less a aᵀ, as a share of the channel's energy; red where the fit has too "
+    "little light, blue where it has too much. Misplaced: half the sum of |residual|. Misfit: "
+    "Γ residual² over Γ kernel², summed. The first step of a pass is its middle pixel."
+)
+
+
+def guide_figure(guide: Guide) -> Figure:
+    """Draw the guide function, what the fit leaves, and its pass; a row for each k.
+
+    Parameters
+    ----------
+    guide : Guide
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        8 inches wide. Gamma over its largest, and the residual R_d - a a^T as a share of the
+        channel's energy in each pixel, over mm: symmetric and logarithmic, one scale for all rows.
+        a / sum(a) per mm over the distance from the middle, with the pre-integrated pass.
+    """
+    head = 0.95 + _TABLE_INCHES * (len(guide.ks) + 1) + 0.12
+    height = head + _ROW_INCHES * len(guide.ks) + _BAR_DOWN + _FOOT_INCHES
+    with chart_style():
+        figure = new_figure(height)
+        _draw_head(figure, guide)
+        draw_footnotes(figure, [_NOTE])
+        shades = Normalize(0.0, 1.0), _scale(guide.residual)
+        for row in range(len(guide.ks)):
+            down = head + _ROW_INCHES * row
+            _draw_row(figure, guide, row, down, shades)
+        below = head + _ROW_INCHES * len(guide.ks) + _BAR_DOWN
+        _draw_bars(figure, below, shades)
+    return figure
+
+
+def _draw_head(figure: Figure, guide: Guide) -> None:
+    """Title, provenance and a table: a line for each k."""
+    draw_text(figure, 0.16, _title(guide), size=12, weight="bold")
+    draw_text(figure, 0.41, kernel_subtitle(guide.profile, guide.pixels, guide.mm_per_pixel))
+    down = 0.68
+    grey: Style = {"color": "#444444", "size": 8}
+    for left, head in zip(_COLUMNS, _HEADS, strict=True):
+        draw_text(figure, down, head, left=left, **grey)
+    for name, figures in _table(guide):
+        down += _TABLE_INCHES
+        draw_text(figure, down, name)
+        for left, each in zip(_COLUMNS, figures, strict=True):
+            draw_text(figure, down, each, left=left, size=8)
+
+
+def _table(guide: Guide) -> list[tuple[str, list[str]]]:
+    """Name and figures of each line."""
+    columns = (
+        guide.centre_share,
+        guide.misplaced,
+        guide.relative_frobenius_error,
+        guide.weighted_residual,
+    )
+    rows = [
+        (f"k = {k:g}", [f"{100.0 * each[i]:.1f} %" for each in columns])
+        for i, k in enumerate(guide.ks)
+    ]
+    return [*rows, ("pre-integrated", [f"{100.0 * guide.preintegrated[0]:.1f} %", "", "", ""])]
+
+
+def _draw_row(
+    figure: Figure, guide: Guide, row: int, down: float, shades: tuple[Normalize, SymLogNorm]
+) -> None:
+    """Draw Gamma, residual and pass for one k, their top so many inches down the page."""
+    is_last = row == len(guide.ks) - 1
+    x_label = "x (mm)" if is_last else ""
+    k = f"k = {guide.ks[row]:g}"
+    first, second = (_panel(figure, left, down) for left in (LEFT * WIDTH_INCHES, _SECOND))
+    third = _panel(figure, _THIRD, down, RIGHT * WIDTH_INCHES - _THIRD)
+    _draw_image(first, guide, guide.gamma[row], shades[0], "cividis")
+    _draw_image(second, guide, guide.residual[row], shades[1], "RdBu_r")
+    _draw_pass(third, guide, row)
+    name_axes(first, f"guide function Γ, {k}", x_label, "y (mm)")
+    name_axes(second, f"residual, {k}", x_label, "")
+    name_axes(third, f"pass, {k}", "distance from the middle (mm)" if is_last else "", "")
+    third.set_ylabel("share per mm")
+    third.yaxis.set_label_coords(-0.16, 0.5)  # the same in all rows
+    second.tick_params(labelleft=False)
+    for each in (first, second, third):
+        each.tick_params(labelbottom=is_last)
+
+
+def _panel(figure: Figure, left: float, down: float, width: float = _IMAGE_INCHES) -> Axes:
+    """Add axes as tall as the images, all in inches from the top left corner."""
+    height = figure.get_figheight()
+    box = (left / WIDTH_INCHES, 1 - (down + _IMAGE_INCHES) / height, width / WIDTH_INCHES)
+    return figure.add_axes((*box, _IMAGE_INCHES / height))
+
+
+def _draw_image(
+    axes: Axes, guide: Guide, quadrant: FloatArray, norm: Normalize, shades: str
+) -> None:
+    """Show the whole plane of a quadrant."""
+    reach = 0.5 * guide.pixels * guide.mm_per_pixel
+    extent = (-reach, reach, -reach, reach)
+    axes.imshow(
+        full_kernel(quadrant), norm=norm, cmap=shades, extent=extent, interpolation="nearest"
+    )
+    axes.grid(visible=False)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
+
+
+def _draw_pass(axes: Axes, guide: Guide, row: int) -> None:
+    """Step from pixel to pixel; the middle one, from 0 to half a pixel, reaches the left edge."""
+    pitch = guide.mm_per_pixel
+    edges = pitch * (np.arange(guide.preintegrated.size + 1) - 0.5)
+    edges[0] = 0.2 * pitch
+    line: Style = {"baseline": None, "snap": False}
+    axes.stairs(
+        guide.preintegrated / pitch,
+        edges,
+        color=_GREY,
+        ls=(0, (4, 1.6)),
+        lw=LINE_WIDTH,
+        label="pre-integrated",
+        **line,
+    )
+    axes.stairs(guide.passes[row] / pitch, edges, color=COLOURS[2], lw=1.4, label="guided", **line)
+    axes.set_xscale("log")
+    axes.set_yscale("log", nonpositive="clip")
+    axes.set_xlim(edges[0], edges[-1])
+    top = 2.0 * float(max(guide.passes.max(), guide.preintegrated[0])) / pitch
+    axes.set_ylim(top * 10.0**-_PASS_DECADES, top)
+    axes.yaxis.set_major_locator(LogLocator(numticks=5))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_minor_formatter(NullFormatter())
+    if row == 0:
+        axes.legend(loc="lower left", fontsize=7.5, reverse=True)
+
+
+def _scale(residual: FloatArray) -> SymLogNorm:
+    """One scale for all rows: linear about 0, then the decades up to the largest."""
+    most = float(np.abs(residual).max()) or 1.0
+    linear = 10.0 ** (math.floor(math.log10(most)) - _DECADES)
+    return SymLogNorm(linear, vmin=-most, vmax=most, base=10)
+
+
+def _draw_bars(figure: Figure, down: float, shades: tuple[Normalize, SymLogNorm]) -> None:
+    """Explain the colours of both columns of images, under them."""
+    height = figure.get_figheight()
+    bottom, tall = 1 - (down + _BAR_INCHES) / height, _BAR_INCHES / height
+    lefts = LEFT, _SECOND / WIDTH_INCHES
+    wide, wider = (_IMAGE_INCHES + each for each in (0.0, _BAR_WIDER))
+    for norm, shown, left, width, name in (
+        (shades[0], "cividis", lefts[0], wide, "Γ over its largest"),
+        (shades[1], "RdBu_r", lefts[1], wider, "energy per pixel, of the channel's"),
+    ):
+        cax = figure.add_axes((left, bottom, width / WIDTH_INCHES, tall))
+        bar = figure.colorbar(ScalarMappable(norm, shown), cax=cax, orientation="horizontal")
+        bar.set_label(name)
+        bar.ax.xaxis.set_major_formatter("{x:g}")
+        if isinstance(norm, SymLogNorm):
+            _tick_powers(bar, round(math.log10(norm.linthresh)))
+
+
+def _tick_powers(bar: Colorbar, linear: int) -> None:
+    """Write 0 and two powers of ten on either side; linear within 10^``linear``."""
+    powers = linear + 2, linear + _DECADES
+    ticks = [10.0**each for each in powers]
+    words = [f"10^{{{each}}}" for each in powers]
+    bar.set_ticks([-ticks[1], -ticks[0], 0.0, *ticks])
+    bar.set_ticklabels([f"$-{words[1]}$", f"$-{words[0]}$", "0", *(f"${each}$" for each in words)])
+    bar.ax.minorticks_off()
+
+
+def _title(guide: Guide) -> str:
+    """Name the material and the channel."""
+    material = material_of(guide.profile)
+    channel = shortened(guide.profile.channels[guide.channel])
+    what = "guide function and residual of the guided kernel"
+    return f"{shortened(material.name, 24) + ', ' if material else ''}{channel}: {what}"

@@ -1,0 +1,155 @@
+"""What the guided fit looks at and what it leaves: Gamma, residual and pass, for several k.
+
+Supplement figure S.1 (Jimenez et al. 2015, "Separable Subsurface Scattering") draws Gamma for
+k = 1.55; here each k has its own, with the fit that follows from it. ``sssfit.chart`` draws the
+record.
+"""
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sssfit.errors import FitError, SssfitWarning
+from sssfit.fit import FitResult, fit_guided, make_target
+from sssfit.fit._target import Target
+from sssfit.fit.guided import NEUTRAL, gamma
+from sssfit.profile import Profile
+from sssfit.shapes import FloatArray
+
+DRAWN = (0.0, NEUTRAL, 4.0)  # the paper's nearest, its drawn and its farthest
+MOST = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Guide:
+    """Guided fits of one channel for K values of k, on a quadrant of h + 1 pixels.
+
+    Parameters
+    ----------
+    profile : Profile
+    channel : int
+        Which of the profile's.
+    mm_per_pixel : float [mm]
+    ks : tuple of float
+        0 (near) to 4 (far).
+    gamma : array (K, h+1, h+1) [1]
+        Mean of the guide function over each pixel, over its largest.
+    residual : array (K, h+1, h+1) [1]
+        R_d - a a^T in each pixel, as a share of the channel's energy.
+    passes : array (K, h+1) [1]
+        a / sum(a), middle first.
+    preintegrated : array (h+1,) [1]
+        The same of the profile integrated along lines.
+    relative_frobenius_error, weighted_residual : array (K,) [1]
+        ||R_d - a a^T|| / ||R_d||; sum Gamma (R_d - a a^T)^2 over sum Gamma R_d^2.
+    """
+
+    profile: Profile
+    channel: int
+    mm_per_pixel: float
+    ks: tuple[float, ...]
+    gamma: FloatArray
+    residual: FloatArray
+    passes: FloatArray
+    preintegrated: FloatArray
+    relative_frobenius_error: FloatArray
+    weighted_residual: FloatArray
+
+    @property
+    def pixels(self) -> int:
+        """Pixels along an edge of the kernel."""
+        return 2 * self.preintegrated.size - 1
+
+    @property
+    def centre_share(self) -> FloatArray:
+        """a(0) / sum(a), the spike, for each k (K,)."""
+        return self.passes[:, 0]
+
+    @property
+    def misplaced(self) -> FloatArray:
+        """Half the sum of |residual| over all pixels, for each k (K,)."""
+        copies = np.where(np.arange(self.preintegrated.size) == 0, 1.0, 2.0)
+        return 0.5 * np.asarray(np.abs(self.residual) @ copies @ copies)
+
+
+def compute_guide(
+    profile: Profile,
+    *,
+    ks: Sequence[float] = DRAWN,
+    channel: str | None = None,
+    mm_per_pixel: float | None = None,
+    support_mm: float | None = None,
+) -> Guide:
+    """Fit the guided kernel for each k, and keep what it looked at and what it left.
+
+    A middle pixel that holds much of the pass is in the record, so it is not warned of.
+
+    Parameters
+    ----------
+    profile : Profile
+    ks : sequence of float
+        One to four, from 0 (near scattering) to 4 (far scattering).
+    channel : str, optional
+        Its name; by default the first that returns light.
+    mm_per_pixel, support_mm : float, optional [mm]
+        Pixels; see ``sssfit.fit.fit_guided``.
+
+    Raises
+    ------
+    FitError, ProfileError
+        The profile, the channel, the pixels or a k is of no use.
+
+    Examples
+    --------
+    >>> from sssfit.material import load_material
+    >>> from sssfit.simulate import simulate_exact
+    >>> found = compute_guide(simulate_exact(load_material("skin1")), mm_per_pixel=0.3)
+    >>> (100 * found.centre_share).round(1).tolist()
+    [14.5, 21.3, 30.4]
+    """
+    if not 1 <= len(ks) <= MOST:
+        raise FitError(f"{len(ks)} values of k; expected one to {MOST}.")
+    target = make_target(profile, mm_per_pixel, support_mm)
+    c = _chosen(target, channel)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SssfitWarning)  # of the target they were given above
+        fits = [
+            fit_guided(profile, mm_per_pixel=mm_per_pixel, support_mm=support_mm, k=k) for k in ks
+        ]
+    wanted = target.quadrant(c)
+    guides = np.stack([gamma(target.half_pixels, k) for k in ks])
+    halves = np.stack([_half(fit, c) for fit in fits])
+    line = target.half_line()[:, c]
+    found = [fit.kernel.parameters[profile.channels[c]] for fit in fits]
+    return Guide(
+        profile,
+        c,
+        target.mm_per_pixel,
+        tuple(float(k) for k in ks),
+        guides / guides.max(axis=(1, 2), keepdims=True),
+        (wanted - halves[:, :, None] * halves[:, None, :]) / target.total[c],
+        halves / (halves @ target.copies)[:, None],
+        line / (target.copies @ line),
+        np.array([fit.relative_frobenius_error[c] for fit in fits]),
+        np.array([each["weighted_residual"] for each in found]),
+    )
+
+
+def _chosen(target: Target, channel: str | None) -> int:
+    """Return the index of a channel that has light."""
+    names = target.profile.channels
+    if channel is None:
+        return int(np.argmin(target.is_empty))
+    if channel not in names:
+        raise FitError(f"there is no channel {channel}; expected one of {', '.join(names)}.")
+    if target.is_empty[names.index(channel)]:
+        raise FitError(f"channel {channel} returns no light: choose another.")
+    return names.index(channel)
+
+
+def _half(fit: FitResult, channel: int) -> FloatArray:
+    """Return a pass from the middle outwards (h+1,)."""
+    half: FloatArray = fit.kernel.weights[0, fit.kernel.half_pixels :, channel]
+    return half

@@ -1,0 +1,259 @@
+"""Gamma beside the residual of the guided fit: the figures, the chart, the verb."""
+
+import io
+import json
+import warnings
+
+import numpy as np
+import pytest
+from figures import assert_legible
+from reference_pixels import make_profile, one_over_r_profile
+
+from sssfit.chart import guide_figure, save_figure
+from sssfit.cli import main
+from sssfit.compare import compute_guide
+from sssfit.errors import FitError, SssfitWarning
+from sssfit.fit import fit_guided, fit_preintegrated, make_target, support_of
+from sssfit.fit.guided import gamma, rank_one
+from sssfit.material import load_material
+from sssfit.profile import full_kernel
+from sssfit.simulate import simulate_exact
+
+
+@pytest.fixture(scope="module")
+def skin1():
+    return simulate_exact(load_material("skin1"))
+
+
+@pytest.fixture(scope="module")
+def guide(skin1):
+    return compute_guide(skin1, mm_per_pixel=0.3, channel="G")
+
+
+def test_the_record_is_what_the_fits_left(skin1, guide):
+    energy = skin1.diffuse_reflectance[1]
+    for i, k in enumerate((0.0, 1.55, 4.0)):
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", SssfitWarning)
+            fit = fit_guided(skin1, mm_per_pixel=0.3, k=k)
+        kernel = fit.kernel
+        wanted = full_kernel(skin1.quadrant_kernel(0.3, kernel.half_pixels, channel=1))
+        left = wanted - kernel.full(1)
+        found = full_kernel(guide.residual[i])
+        np.testing.assert_allclose(found, left / energy, atol=1e-15)
+        assert guide.misplaced[i] == pytest.approx(0.5 * np.abs(left).sum() / energy)
+        assert guide.relative_frobenius_error[i] == pytest.approx(
+            np.linalg.norm(left) / np.linalg.norm(wanted)
+        )
+        weights = full_kernel(guide.gamma[i])
+        assert guide.weighted_residual[i] == pytest.approx(
+            np.sum(weights * left**2) / np.sum(weights * wanted**2)
+        )
+        whole = kernel.weights[0, :, 1]
+        assert guide.centre_share[i] == pytest.approx(whole[kernel.half_pixels] / whole.sum())
+    assert guide.ks == (0.0, 1.55, 4.0)
+    np.testing.assert_allclose(guide.gamma.max(axis=(1, 2)), 1.0)
+
+
+def test_the_pass_beside_it_is_the_preintegrated_one(skin1, guide):
+    line = fit_preintegrated(skin1, mm_per_pixel=0.3).kernel.weights[0, :, 1]
+    half = len(line) // 2
+    np.testing.assert_allclose(guide.preintegrated, line[half:] / line.sum(), rtol=1e-12)
+
+
+@pytest.mark.parametrize("channel", ["R", "G", "B"])
+def test_k_0_leaves_its_residual_farther_out_than_k_4(skin1, channel):
+    found = compute_guide(skin1, mm_per_pixel=0.2, ks=(0, 4), channel=channel)
+    x = 0.2 * np.arange(found.preintegrated.size)
+    distance = np.hypot(x[:, None], x)
+    off_axes = (x > 0.0)[:, None] & (x > 0.0)
+    order = np.argsort(distance[off_axes])
+    reach = []
+    for residual in found.residual:
+        within = np.cumsum(np.abs(residual[off_axes][order]))
+        reach.append(distance[off_axes][order][np.searchsorted(within, 0.9 * within[-1])])
+    assert reach[0] > reach[1]
+    assert found.misplaced[0] < found.misplaced[1]  # near light is most of the light
+
+
+def test_the_spike_of_a_guide_sampled_on_the_axis_is_the_known_one(skin1):
+    # docs/fits.md: 257 pixels, red; a Gamma that is 0 on the axes, and not its mean over pixels.
+    target = make_target(skin1, support_of(skin1) / 128.001)
+    line = target.half_line()[:, 0]
+    line /= target.copies @ line
+    square = np.linspace(0.0, 1.0, 129) ** 2
+    rising = -np.expm1(-50.0 * square)
+    wanted = target.quadrant(0) / target.total[0]
+    known = {1.55: (0.24, 0.20), 4.0: (0.37, 0.30)}
+    assert line[0] == pytest.approx(0.11, abs=0.005)
+    for k, (sampled, averaged) in known.items():
+        points = (square[:, None] + square) ** (0.5 * k) * rising[:, None] * rising
+        # Not quite 0: the search takes its scale from each weight's row.
+        floor = 1e-14 * points.max()
+        for weights, share in ((np.maximum(points, floor), sampled), (gamma(128, k), averaged)):
+            assert rank_one(wanted, weights, line).x[0] == pytest.approx(share, abs=0.005)
+
+
+def images(figure):
+    return [axes.images[0] for axes in figure.axes if axes.images]
+
+
+def test_what_is_drawn_is_what_was_computed(guide):
+    figure = guide_figure(guide)
+    drawn = images(figure)
+    assert len(drawn) == 6
+    reach = 0.5 * guide.pixels * 0.3
+    for i in range(3):
+        for image, quadrant in zip(
+            drawn[2 * i : 2 * i + 2], (guide.gamma[i], guide.residual[i]), strict=True
+        ):
+            np.testing.assert_array_equal(image.get_array(), full_kernel(quadrant))
+            assert image.get_extent() == [-reach, reach, -reach, reach]
+    residuals = drawn[1::2]
+    most = np.abs(guide.residual).max()
+    for image in residuals:
+        assert image.get_clim() == (-most, most)
+        assert image.norm(0.0) == pytest.approx(0.5)
+    passes = [axes.patches for axes in figure.axes if axes.patches]
+    for patches, guided in zip(passes, guide.passes, strict=True):
+        line, fitted = (each.get_data().values for each in patches)
+        np.testing.assert_allclose(line, guide.preintegrated / 0.3)
+        np.testing.assert_allclose(fitted, guided / 0.3)
+    texts = " ".join(each.get_text() for each in figure.texts)
+    for words in (
+        "skin1, G: guide function and residual",
+        "Exact solution",
+        f"{guide.pixels} x {guide.pixels} pixels of 0.3 mm",
+        f"{100 * guide.centre_share[2]:.1f} %",
+        f"{100 * guide.misplaced[0]:.1f} %",
+        f"{100 * guide.preintegrated[0]:.1f} %",
+    ):
+        assert words in texts
+
+
+def long_names():
+    meta = dict(one_over_r_profile(10, 0.1, [0.4]).meta) | {"channels": ["W" * 60]}
+    return make_profile(np.arange(11) * 0.1, np.full((10, 1), 0.05), meta=meta)
+
+
+ODD = {
+    "noise": lambda: compute_guide(
+        make_profile(
+            np.arange(41) * 0.1, np.random.default_rng(2).exponential(size=(40, 1)) / 150.0
+        )
+    ),
+    "one k": lambda: compute_guide(one_over_r_profile(40, 0.1, [0.4]), ks=[2]),
+    "four": lambda: compute_guide(one_over_r_profile(40, 0.1, [0.4]), ks=[0, 1, 2, 4]),
+    "one pixel": lambda: compute_guide(one_over_r_profile(10, 0.1, [0.4]), mm_per_pixel=9),
+    "small": lambda: compute_guide(one_over_r_profile(40, 1e-4, [4e-4])),
+    "long names": lambda: compute_guide(long_names()),
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_no_text_is_cut_off_or_runs_into_another(name):
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SssfitWarning)
+        found = ODD[name]()
+    assert_legible(lambda: guide_figure(found))
+
+
+def test_skin1_is_legible_and_gives_the_same_bytes(guide):
+    assert_legible(lambda: guide_figure(guide))
+    streams = [io.BytesIO() for _ in range(2)]
+    for each in streams:
+        save_figure(guide_figure(guide), each, format="svg")
+    assert streams[0].getvalue() == streams[1].getvalue()
+
+
+def test_the_spike_is_in_the_record_and_the_target_warned_of_once(skin1):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", SssfitWarning)
+        found = compute_guide(skin1, mm_per_pixel=0.3, ks=[4], channel="R")
+    assert found.centre_share[0] > 0.25
+    with pytest.warns(SssfitWarning) as caught:
+        compute_guide(one_over_r_profile(10, 0.1, [0.4]), mm_per_pixel=9)
+    assert len(caught) == 1
+
+
+@pytest.mark.parametrize(
+    ("settings", "words"),
+    [
+        ({"ks": []}, "0 values of k; expected one to 4"),
+        ({"ks": [1] * 5}, "5 values of k"),
+        ({"ks": [5]}, r"k = 5 is outside \[0, 4\]"),
+        ({"channel": "X"}, "there is no channel X; expected one of c0, c1"),
+        ({"channel": "c0"}, "channel c0 returns no light"),
+    ],
+)
+def test_bad_settings_are_one_line(settings, words):
+    names = {"channels": ["c0", "c1"]}
+    meta = dict(one_over_r_profile(10, 0.1, [0.4]).meta) | names
+    profile = make_profile(np.arange(11) * 0.1, np.outer(np.full(10, 0.05), [0.0, 1.0]), meta=meta)
+    assert compute_guide(profile).channel == 1
+    with pytest.raises(FitError, match=words):
+        compute_guide(profile, **settings)
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch, capfd, skin1):
+    """Run ``sssfit chart`` beside skin1's profile; give exit status, stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+    skin1.save(tmp_path / "skin1.profile.npz")
+
+    def call(*arguments):
+        with pytest.raises(SystemExit) as caught:
+            main(["chart", *arguments])
+        out, err = capfd.readouterr()
+        return caught.value.code or 0, out, err
+
+    return call
+
+
+def test_the_verb_draws_the_newest_profile_and_tabulates_it(run, tmp_path, guide):
+    status, out, _ = run("--guide", "--mm-per-pixel", "300um", "--channel", "G")
+    assert status == 0
+    assert (tmp_path / "skin1.guide.png").read_bytes().startswith(b"\x89PNG")
+    assert "Wrote skin1.guide.png" in out
+    (line,) = [each for each in out.splitlines() if each.startswith("1.55 ")]
+    figures = (
+        guide.centre_share,
+        guide.misplaced,
+        guide.relative_frobenius_error,
+        guide.weighted_residual,
+    )
+    assert line.split() == ["1.55", *" ".join(f"{100 * each[1]:.2f} %" for each in figures).split()]
+
+
+def test_the_verb_gives_json(run, guide):
+    status, out, err = run(
+        *("--guide", "skin1.profile.npz", "--mm-per-pixel", "0.3", "--channel", "G"),
+        *("--k", "4,0", "-o", "a.svg", "--json"),
+    )
+    assert (status, err) == (0, "")
+    figures = json.loads(out)
+    assert figures["output"] == ["a.svg"]
+    assert (figures["pixels"], figures["k"]) == (guide.pixels, [4, 0])
+    np.testing.assert_allclose(figures["centre_share"], guide.centre_share[[2, 0]])
+    np.testing.assert_allclose(figures["misplaced"], guide.misplaced[[2, 0]])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "fragment"),
+    [
+        (("--guide", "--spectrum"), 2, "--spectrum and --guide are two charts"),
+        (("--k", "1"), 2, "--k is for the fits of --guide"),
+        (("--spectrum", "--channel", "R"), 2, "--channel is for the fits of --guide"),
+        (("--guide", "--k", "near"), 2, "'near' is not a valid float"),
+        (("--guide", "--mm-per-pixel", "1", "--k", "4.5"), 1, "k = 4.5 is outside [0, 4]"),
+        (("--guide", "--mm-per-pixel", "1", "--channel", "X"), 1, "there is no channel X"),
+        (("--guide",), 1, "up to 513 pixels"),
+    ],
+)
+def test_bad_input_is_one_clear_line(run, tmp_path, arguments, status, fragment):
+    code, out, err = run(*arguments)
+    assert code == status
+    assert out == ""
+    assert fragment in err.splitlines()[-1]
+    assert "Traceback" not in err
+    assert not list(tmp_path.glob("*.png"))
