@@ -76,5 +76,5 @@ def own_settings(context: click.Context, method: str, given: dict[str, Any]) -> 
     return {
         _KEYWORDS.get(key, key): value
         for key, value in given.items()
-        if key in own and value not in (None, False)
+        if key in own and value is not None and value is not False  # 0 is a value
     }

@@ -177,17 +177,18 @@ def _text(result: FitResult, figures: dict[str, Any]) -> str:
     rows = [
         [
             channel,
-            f"{100.0 * kernel.relative_frobenius_error[c]:.3g} %",
-            _percent(kernel.energy_error[c]),
+            _percent(kernel.relative_frobenius_error[c], ".3g"),
+            _percent(kernel.energy_error[c], "+.2g"),
             f"{kernel.energy[c]:.6f}",
             result.stop_reasons[c],
         ]
         for c, channel in enumerate(kernel.channels)
     ]
     heads = ["channel", "Frobenius error", "energy error", "energy", "ended"]
-    return "\n".join([head, table(heads, rows), f"Wrote {figures['output'][0]}"])
+    wrote = "the kernel to stdout" if figures["output"] == ["-"] else figures["output"][0]
+    return "\n".join([head, table(heads, rows), f"Wrote {wrote}"])
 
 
-def _percent(share: float) -> str:
-    """Write a signed share in percent; rounding of a sum of pixels is 0."""
-    return "0 %" if abs(share) < 1e-12 else f"{100.0 * share:+.2g} %"
+def _percent(share: float, digits: str) -> str:
+    """Write a share in percent; rounding of a sum of pixels is 0."""
+    return "0 %" if abs(share) < 1e-12 else f"{100.0 * share:{digits}} %"

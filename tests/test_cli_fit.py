@@ -82,7 +82,7 @@ def test_kernel_goes_to_stdout_and_words_to_stderr(folder):
     [
         (("fit",), 2, "--list"),
         (("fit", "--method", "preintegrated", "--mm-per-pixel", "0"), 2, "length"),
-        (("fit", "--method", "preintegrated", "--mm-per-pixel", "1e-9"), 1, "bytes"),
+        (("fit", "--method", "preintegrated", "--mm-per-pixel", "1e-9"), 1, "GB"),
         (("fit", "gone.profile.npz", "--method", "preintegrated"), 1, "gone.profile.npz"),
         (("export", "wax.profile.npz", "--format", "hlsl"), 1, "kernel"),
         (("export", "--format", "hlsl"), 1, "sssfit fit"),

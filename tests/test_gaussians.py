@@ -45,6 +45,9 @@ PUBLISHED = {
     ),
 }
 
+# Some random profiles are ones that a kernel of few terms does not suit, and it says so.
+random_profiles = pytest.mark.filterwarnings("ignore:.* kernel (is farther|has not)")
+
 
 def fine_dipole(name):
     """A dipole as the published figures have it, on a grid that is as good as none.
@@ -173,6 +176,7 @@ def test_error_never_rises_with_the_number_of_terms(make, signed, free_energy):
     assert (np.array(found[-1]) < 1e-2 * np.array(found[0])).all()
 
 
+@random_profiles
 @settings(max_examples=10, deadline=None)
 @given(seed=st.integers(0, 2**32 - 1), free_energy=st.booleans(), signed=st.booleans())
 def test_noisy_profiles(seed, free_energy, signed):
@@ -415,7 +419,7 @@ def test_terms_out_of_range(marble, terms):
 
 def test_fewer_annuli_than_unknowns():
     one = make_profile([0.0, 1.0], [[0.5]])
-    with pytest.raises(FitError, match="test: a profile of 1 annuli cannot fix 1 Gaussians"):
+    with pytest.raises(FitError, match=r"test: a profile of one annulus cannot fix .*, terms = 1;"):
         fit_gaussians(one, terms=1)
     four = profile_of_gaussians([0.3, 4.0], [[0.5], [0.4]], np.linspace(0.0, 6.0, 5))
     with pytest.warns(SssfitWarning, match="steep"):

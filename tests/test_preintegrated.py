@@ -14,6 +14,9 @@ from sssfit.material import load_material, material_names
 from sssfit.profile import full_kernel
 from sssfit.simulate import simulate_dipole, simulate_exact
 
+# Some random profiles are ones that a kernel of few terms does not suit, and it says so.
+random_profiles = pytest.mark.filterwarnings("ignore:.* kernel (is farther|has not)")
+
 
 def covering(profile, pitch):
     """A fit whose pixels cover the grid, and the profile's 2D kernel on them."""
@@ -33,6 +36,7 @@ def whole_convolution(irradiance, quadrant):
     return fftconvolve(irradiance, full_kernel(quadrant), mode="valid")
 
 
+@random_profiles
 @settings(max_examples=40, deadline=None)
 @given(
     pitch=st.floats(0.05, 7.0),
@@ -119,14 +123,16 @@ def test_energy_is_that_of_the_strips_within_the_support():
     profile = one_over_r_profile(40, 0.1, [0.5, 0.9])
     whole, _ = covering(profile, 0.1)
     np.testing.assert_allclose(whole.energy, profile.total_on_grid, rtol=1e-12)
-    part = fit_preintegrated(profile, support_mm=1.0)
+    with pytest.warns(SssfitWarning, match=r"has not the profile's energy \(c1 -16.1 %\): try"):
+        part = fit_preintegrated(profile, support_mm=1.0)
     line = profile.line_kernel(0.1, 10)
     np.testing.assert_allclose(part.kernel.energy, line.sum(axis=0), rtol=1e-12)
     np.testing.assert_allclose(part.kernel.line, line, rtol=1e-12)
     np.testing.assert_allclose(
         part.energy_error, line.sum(axis=0) / profile.diffuse_reflectance - 1.0, rtol=1e-12
     )
-    normal = fit_preintegrated(profile, support_mm=1.0, normalize=True).kernel
+    with pytest.warns(SssfitWarning, match="energy"):
+        normal = fit_preintegrated(profile, support_mm=1.0, normalize=True).kernel
     np.testing.assert_allclose(normal.energy, 1.0, rtol=1e-12)
     np.testing.assert_allclose(normal.scale, part.kernel.energy, rtol=1e-12)
 

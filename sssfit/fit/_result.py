@@ -11,6 +11,7 @@ from threadpoolctl import threadpool_limits
 
 from sssfit import __version__
 from sssfit.errors import FitError
+from sssfit.fit._doubts import check_finite, warn_of_misfit
 from sssfit.fit._target import FloatArray, Target
 from sssfit.kernel import SeparableKernel
 
@@ -59,6 +60,8 @@ def fit_channels(
     *,
     settings: Mapping[str, Any],
     normalize: bool = False,
+    is_fitted: bool = True,
+    keeps_energy: bool = True,
 ) -> FitResult:
     """Fit channel by channel and put the terms into one kernel.
 
@@ -74,11 +77,20 @@ def fit_channels(
         The method's own settings, for provenance.
     normalize : bool
         Give every channel unit energy and keep the energy apart in ``scale``.
+    is_fitted : bool
+        False for kernels set by hand, which need not be near the profile.
+    keeps_energy : bool
+        False where another energy than the profile's was asked for.
 
     Raises
     ------
     FitError
         A fit that is not finite, or one without energy that is to be normalised.
+
+    Warns
+    -----
+    SssfitWarning
+        A fit that is farther from the profile than no kernel at all, or that lost its energy.
     """
     begun = time.perf_counter()
     empty = target.is_empty
@@ -109,6 +121,9 @@ def fit_channels(
         parameters=_parameters(fits, target.profile.channels),
         meta=_provenance(target, settings, normalize=normalize),
     )
+    check_finite(name, kernel)
+    if is_fitted:
+        warn_of_misfit(name, kernel, keeps_energy=keeps_energy)
     return FitResult(
         kernel,
         tuple(each.evaluations for each in fits),

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._disks import checked_support
 from sssfit._material_checks import printable
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.profile import Profile
@@ -20,7 +19,9 @@ from sssfit.profile import Profile
 FloatArray = npt.NDArray[np.float64]
 
 KEPT = 0.999  # support "auto": share of every channel's on-grid energy within it
-_WIDEST = 1e9  # pixels: beyond it the profile refuses for memory anyway; keeps floor() finite
+_FAINTEST = 1e-145  # energy: squares of fainter pixels are 0, and errors relative to them nothing
+_MOST_BYTES = 2e9
+_WIDEST = 1e9  # pixels: beyond it the fit is refused for memory anyway; keeps floor() finite
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -83,9 +84,8 @@ def make_target(
     Raises
     ------
     FitError
-        Energies that are NaN, negative or all zero; a pitch or support that is no length.
-    ProfileError
-        A kernel of more than 2 GB a channel.
+        Energies that are NaN, negative or all zero; a pitch or support that is no length; a
+        channel of whose light the support holds nothing; more than 2 GB for a channel.
 
     Warns
     -----
@@ -108,8 +108,8 @@ def make_target(
             stacklevel=3,
         )
     target = Target(profile, pitch, half)
-    # Before anything is done: every fit makes a quadrant, if only for its error.
-    checked_support(float(profile.r_edges_mm[-1]), pitch, half, dimensions=2)
+    _check_memory(target)
+    _check_light(target)
     return target
 
 
@@ -118,6 +118,33 @@ def support_of(profile: Profile) -> float:
     cumulative = profile.cumulative
     kept = cumulative >= KEPT * cumulative[-1]
     return float(profile.r_edges_mm[int(np.argmax(kept.all(axis=1)))])
+
+
+def _check_memory(target: Target) -> None:
+    """Refuse pixels that would not fit in memory, before anything is done.
+
+    Every fit holds two quadrants at once, the target's and its own, if only for the error.
+    """
+    size = 2.0 * 8.0 * (target.half_pixels + 1.0) ** 2
+    if size > _MOST_BYTES:
+        pixels = 2 * target.half_pixels + 1
+        raise FitError(
+            f"a kernel of {pixels} x {pixels} pixels of {target.mm_per_pixel:.4g} mm would need "
+            f"{size / 1e9:.3g} GB of memory a channel, and {_MOST_BYTES / 1e9:.3g} GB is the "
+            "most: use a larger mm_per_pixel or a smaller support."
+        )
+
+
+def _check_light(target: Target) -> None:
+    """Refuse channels that return light, but none that the pixels could show."""
+    corner_mm = math.sqrt(2.0) * target.mm_per_pixel * (target.half_pixels + 0.5)
+    within = target.profile.cumulative_at(np.array([corner_mm]))[0]
+    for c in np.flatnonzero(~target.is_empty & (within < _FAINTEST)):
+        raise FitError(
+            f"channel {target.profile.channels[c]}: of its diffuse reflectance "
+            f"{target.total[c]:.3g} the support of {target.half_pixels * target.mm_per_pixel:.4g} "
+            f"mm holds {within[c]:.3g}: use a larger support, or set the channel to 0."
+        )
 
 
 def name_of(profile: Profile) -> str:

@@ -82,7 +82,14 @@ def fit_artist(
         return _channel_fit(pixels, channel, found.x, found.stop_reason, found.evaluations)
 
     settings = {"target": target, "by_hand": by_hand is not None}
-    return fit_channels(pixels, "artist", fit_channel, settings=settings, normalize=normalize)
+    return fit_channels(
+        pixels,
+        "artist",
+        fit_channel,
+        settings=settings,
+        normalize=normalize,
+        is_fitted=by_hand is None,
+    )
 
 
 def two_gaussians(edges_mm: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:

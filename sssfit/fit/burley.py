@@ -17,6 +17,7 @@ import math
 import numpy as np
 
 from sssfit.errors import FitError
+from sssfit.fit._nlopt import root
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
 from sssfit.fit._target import FloatArray, make_target
 from sssfit.profile import Profile
@@ -63,13 +64,13 @@ def fit_burley(
     def fit_channel(channel: int) -> ChannelFit:
         total = float(target.total[channel])
         shares = profile.cumulative[:, channel] / total
-        s, evaluations = _fit_shape(profile.r_edges_mm, shares, profile.channels[channel])
+        s, evaluations, reason = _fit_shape(profile.r_edges_mm, shares, profile.channels[channel])
         line = total * diffusion_line_integral(edges_mm[:-1], edges_mm[1:], s)
         error = np.abs(diffusion_cdf(profile.r_edges_mm, s) - shares).max()
         return ChannelFit(
             np.ones(1),
             (line / math.sqrt(float(target.copies @ line)))[None],
-            "the shape no longer changed",
+            reason,
             evaluations,
             {"s_per_mm": s, "diffuse_reflectance": total, "cumulative_error": float(error)},
         )
@@ -77,14 +78,12 @@ def fit_burley(
     return fit_channels(target, "burley", fit_channel, settings={}, normalize=normalize)
 
 
-def _fit_shape(r_mm: FloatArray, shares: FloatArray, channel: str) -> tuple[float, int]:
-    """Return the s [1/mm] of least squares to F / A at the edges (n+1,), and evaluations.
+def _fit_shape(r_mm: FloatArray, shares: FloatArray, channel: str) -> tuple[float, int, str]:
+    """Return the s [1/mm] of least squares to F / A at the edges (n+1,), evaluations, why it ended.
 
     A scan of log s finds the best stretch, so that no start has to be guessed; in it the objective
     has a slope of 0, which gives s to rounding, as its smallest value would not.
     """
-    from scipy.optimize import brentq  # 0.2 s that other methods need not wait for
-
     weights = 0.5 * (np.diff(r_mm, append=r_mm[-1]) + np.diff(r_mm, prepend=r_mm[0]))
 
     def objective(log_s: float) -> float:
@@ -105,5 +104,5 @@ def _fit_shape(r_mm: FloatArray, shares: FloatArray, channel: str) -> tuple[floa
             "larger ones; the profile needs annuli within which, and a radius beyond which, only "
             "part of the energy lies."
         )
-    log_s, found = brentq(slope, low, high, xtol=1e-14, full_output=True)
-    return math.exp(log_s), len(scan) + found.function_calls
+    log_s, evaluations, reason = root(slope, low, high)
+    return math.exp(log_s), len(scan) + evaluations, reason

@@ -107,7 +107,14 @@ def fit_falloff(
         )
 
     settings = {"by_hand": given is not None}
-    return fit_channels(target, "falloff", fit_channel, settings=settings, normalize=normalize)
+    return fit_channels(
+        target,
+        "falloff",
+        fit_channel,
+        settings=settings,
+        normalize=normalize,
+        is_fitted=given is None,
+    )
 
 
 def scale_of(width: float, falloff: float) -> float:

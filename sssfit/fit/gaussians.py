@@ -103,6 +103,7 @@ def fit_gaussians(
             fit_channel,
             settings={"terms": number, "signed": signed, "free_energy": free_energy},
             normalize=normalize,
+            keeps_energy=not free_energy,
         )
 
 
@@ -137,10 +138,10 @@ def _checked_terms(terms: int) -> int:
 def _check_annuli(profile: Profile, terms: int) -> None:
     """Refuse more unknowns than data."""
     if profile.n_annuli < 2 * terms:
+        annuli = "one annulus" if profile.n_annuli == 1 else f"{profile.n_annuli} annuli"
         raise FitError(
-            f"{name_of(profile)}: a profile of {profile.n_annuli} annuli cannot "
-            f"fix {terms} Gaussians, a width and a weight each; give a finer profile or fewer "
-            "terms."
+            f"{name_of(profile)}: a profile of {annuli} cannot fix the width and "
+            f"the weight of each Gaussian, terms = {terms}; give a finer profile or fewer terms."
         )
 
 

@@ -23,6 +23,7 @@ from sssfit.fit._target import FloatArray, Target, make_target
 from sssfit.profile import Profile
 
 ENERGIES = ("rescale", "keep")
+_USUAL_RANK = 3
 # Up to here all eigenvalues take 4 ms, no more than a few by Lanczos; at 1237 pixels it is 90 ms
 # against 6 ms, at 3932 seconds against 0.1 s.
 _SMALL = 200
@@ -31,7 +32,7 @@ _SMALL = 200
 def fit_svd(
     profile: Profile,
     *,
-    rank: int = 3,
+    rank: int | None = None,
     energy: str = "rescale",
     mm_per_pixel: float | None = None,
     support_mm: float | None = None,
@@ -42,8 +43,9 @@ def fit_svd(
     Parameters
     ----------
     profile : Profile
-    rank : int
-        Number of terms, from 1 to the pixels of a half line: more the kernel does not have.
+    rank : int, optional
+        Number of terms, from 1 to the pixels of a half line: more the kernel does not have. By
+        default 3, or all of a smaller kernel.
     energy : str
         "rescale" (default): every channel's terms scaled to its diffuse reflectance. "keep": as
         they are, optimal in the Frobenius norm.
@@ -72,7 +74,14 @@ def fit_svd(
         return _fit_channel(target, channel, rank, rescale=energy == "rescale")
 
     settings = {"rank": rank, "energy": energy}
-    return fit_channels(target, "svd", fit_channel, settings=settings, normalize=normalize)
+    return fit_channels(
+        target,
+        "svd",
+        fit_channel,
+        settings=settings,
+        normalize=normalize,
+        keeps_energy=energy == "rescale",
+    )
 
 
 def eigenpairs(quadrant: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
@@ -161,9 +170,11 @@ def _fit_channel(target: Target, channel: int, rank: int, *, rescale: bool) -> C
     )
 
 
-def _checked_rank(rank: int, target: Target) -> int:
+def _checked_rank(rank: int | None, target: Target) -> int:
     """Refuse a rank that the kernel does not have."""
     pixels, most = 2 * target.half_pixels + 1, target.half_pixels + 1
+    if rank is None:
+        return min(_USUAL_RANK, most)
     try:
         whole = operator.index(rank)
     except TypeError:
