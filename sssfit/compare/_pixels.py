@@ -55,6 +55,11 @@ def selection(mask: npt.ArrayLike | None, picture: FloatArray) -> BoolArray:
     return selected
 
 
+def selected_pixels(picture: FloatArray, selected: BoolArray) -> FloatArray:
+    """Return pixels (N, C) of a picture, without a copy where all are selected."""
+    return picture.reshape(-1, picture.shape[-1]) if selected.all() else picture[selected]
+
+
 def auto_exposure(truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> float:
     """Return the factor that brings the 99th percentile of luminance to 0.8.
 
@@ -75,7 +80,7 @@ def auto_exposure(truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> fl
     """
     picture = np.asarray(truth, dtype=np.float64)
     check_picture("truth", picture)
-    return exposure_of(picture[selection(mask, picture)])
+    return exposure_of(selected_pixels(picture, selection(mask, picture)))
 
 
 def exposure_of(pixels: FloatArray) -> float:
