@@ -184,6 +184,7 @@ def test_flip_sees_less_of_fine_squares_further_away_and_only_in_the_mask():
         ({"mask": np.ones((4, 3))}, "mask is (4, 3) and the picture (4, 4); expected the same"),
         ({"mask": np.zeros((4, 4))}, "mask has no pixel above 0; expected some of the object"),
         ({"truth": np.zeros((4, 4, 3))}, "truth is black: no exposure can be found; give one."),
+        ({"truth": np.full((4, 4, 3), 1e-320)}, "truth is black: no exposure can be found"),
         ({"structure": True}, "has no 11 x 11 window for SSIM inside it; give a larger one."),
     ],
 )

@@ -88,7 +88,7 @@ def exposure_of(pixels: FloatArray) -> float:
     channels = pixels.shape[-1]
     weights = np.array(LUMINANCE) if channels == 3 else np.full(channels, 1.0 / channels)
     luminance = pixels @ weights
-    lit = luminance[luminance > 0.0]
+    lit = luminance[luminance > np.finfo(np.float64).tiny]  # of less, the inverse overflows
     if lit.size == 0:
         raise RenderError("truth is black: no exposure can be found; give one.")
     return float(AUTO_LUMINANCE / np.percentile(lit, AUTO_PERCENTILE))
