@@ -3,8 +3,12 @@
 Lab is under D65 with the 2 degree observer, and its white is linear sRGB (1, 1, 1).
 """
 
+from types import ModuleType
+
 import numpy as np
 import numpy.typing as npt
+
+from sssfit.compare._pixels import shown
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -12,13 +16,15 @@ FloatArray = npt.NDArray[np.float64]
 BLOCK_PIXELS = 16384
 
 
-def delta_e_2000(image: FloatArray, truth: FloatArray) -> FloatArray:
+def delta_e_2000(image: FloatArray, truth: FloatArray, exposure: float = 1.0) -> FloatArray:
     """Return CIE Delta E 2000 of pixels, k_L = k_C = k_H = 1.
 
     Parameters
     ----------
-    image, truth : array (N, 3)
-        Linear sRGB in [0, 1].
+    image, truth : array (N, 3) or (N, 1)
+        Linear sRGB or grey.
+    exposure : float
+        Factor before pixels are cut to [0, 1].
 
     Returns
     -------
@@ -30,22 +36,27 @@ def delta_e_2000(image: FloatArray, truth: FloatArray) -> FloatArray:
     supplementary test data, and mathematical observations", Color Research and Application 30(1),
     2005, equations 2 to 22.
     """
-    # 1.1 s on a free machine, and every part of colour imports all of it: only here.
-    from colour.difference import delta_E_CIE2000
-
+    delta_e = _load_colour().difference.delta_E_CIE2000
     differences = np.empty(len(image))
     for start in range(0, len(image), BLOCK_PIXELS):
         block = slice(start, start + BLOCK_PIXELS)
-        differences[block] = delta_E_CIE2000(lab(image[block]), lab(truth[block]))
+        colour, true = (lab(shown(pixels[block], exposure)) for pixels in (image, truth))
+        differences[block] = delta_e(colour, true)
     return differences
 
 
 def lab(pixels: FloatArray) -> FloatArray:
     """Return CIE L, a, b of linear sRGB pixels (N, 3)."""
-    from colour import RGB_COLOURSPACES, XYZ_to_Lab, normalised_primary_matrix
-
-    srgb = RGB_COLOURSPACES["sRGB"]
+    colour = _load_colour()
+    srgb = colour.RGB_COLOURSPACES["sRGB"]
     # From the primaries, not the standard's table: its four digits give white b = 0.01.
-    to_xyz = normalised_primary_matrix(srgb.primaries, srgb.whitepoint)
-    colours: FloatArray = np.asarray(XYZ_to_Lab(pixels @ to_xyz.T, srgb.whitepoint))
+    to_xyz = colour.normalised_primary_matrix(srgb.primaries, srgb.whitepoint)
+    colours: FloatArray = np.asarray(colour.XYZ_to_Lab(pixels @ to_xyz.T, srgb.whitepoint))
     return colours
+
+
+def _load_colour() -> ModuleType:
+    """Import colour-science: 0.8 s for any of its parts, so only when colours are compared."""
+    with np.printoptions():  # at its import it sets how all of numpy prints, to the way of 1.13
+        import colour
+    return colour

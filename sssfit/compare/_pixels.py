@@ -55,6 +55,11 @@ def selection(mask: npt.ArrayLike | None, picture: FloatArray) -> BoolArray:
     return selected
 
 
+def selected_pixels(picture: FloatArray, selected: BoolArray) -> FloatArray:
+    """Return pixels (N, C) of a picture, without a copy where all are selected."""
+    return picture.reshape(-1, picture.shape[-1]) if selected.all() else picture[selected]
+
+
 def auto_exposure(truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> float:
     """Return the factor that brings the 99th percentile of luminance to 0.8.
 
@@ -75,7 +80,7 @@ def auto_exposure(truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> fl
     """
     picture = np.asarray(truth, dtype=np.float64)
     check_picture("truth", picture)
-    return exposure_of(picture[selection(mask, picture)])
+    return exposure_of(selected_pixels(picture, selection(mask, picture)))
 
 
 def exposure_of(pixels: FloatArray) -> float:
@@ -83,7 +88,7 @@ def exposure_of(pixels: FloatArray) -> float:
     channels = pixels.shape[-1]
     weights = np.array(LUMINANCE) if channels == 3 else np.full(channels, 1.0 / channels)
     luminance = pixels @ weights
-    lit = luminance[luminance > 0.0]
+    lit = luminance[luminance > np.finfo(np.float64).tiny]  # of less, the inverse overflows
     if lit.size == 0:
         raise RenderError("truth is black: no exposure can be found; give one.")
     return float(AUTO_LUMINANCE / np.percentile(lit, AUTO_PERCENTILE))

@@ -16,8 +16,8 @@ from sssfit.compare._pixels import (
     check_exposure,
     check_pair,
     exposure_of,
+    selected_pixels,
     selection,
-    shown,
 )
 
 __all__ = ["ImageScore", "auto_exposure", "measure"]
@@ -102,7 +102,7 @@ def measure(
     """
     pictures = check_pair(image, truth)
     selected = selection(mask, pictures[1])
-    pixels, true = (picture[selected] for picture in pictures)
+    pixels, true = (selected_pixels(picture, selected) for picture in pictures)
     exposure = exposure_of(true) if exposure is None else check_exposure(exposure)
     mean, p99 = _colour_differences(pixels, true, exposure)
     return ImageScore(
@@ -118,16 +118,22 @@ def measure(
 def _differences(pixels: FloatArray, true: FloatArray) -> dict[str, float]:
     """Return the figures of linear light for pixels (N, C)."""
     difference = pixels - true
-    rmse = float(np.sqrt(np.mean(difference**2)))
+    rmse = _root_mean_square(difference)
     peak = float(true.max())
     with np.errstate(divide="ignore"):  # identical: inf; a black truth: -inf
         psnr = np.inf if rmse == 0.0 else 20.0 * np.log10(max(peak, 0.0) / rmse)
     return {
         "rmse": rmse,
-        "relative_l2": float(_ratio(rmse, np.sqrt(np.mean(true**2)))),
-        "maximum": float(np.abs(difference).max()),
+        "relative_l2": float(_ratio(rmse, _root_mean_square(true))),
+        "maximum": float(max(difference.max(), -difference.min())),
         "psnr_db": float(psnr),
     }
+
+
+def _root_mean_square(values: FloatArray) -> float:
+    """Return sqrt(mean(values^2)) without a second array of squares."""
+    flat = values.reshape(-1)
+    return float(np.sqrt(np.dot(flat, flat) / flat.size))
 
 
 def _ratio(part: npt.ArrayLike, whole: npt.ArrayLike) -> FloatArray:
@@ -143,7 +149,7 @@ def _colour_differences(
     """Return mean and 99th percentile of Delta E 2000 of pixels (N, C)."""
     if pixels.shape[1] not in (1, 3):
         return np.nan, np.nan
-    differences = delta_e_2000(shown(pixels, exposure), shown(true, exposure))
+    differences = delta_e_2000(pixels, true, exposure)
     return float(differences.mean()), float(np.percentile(differences, 99.0))
 
 
