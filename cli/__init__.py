@@ -28,7 +28,7 @@ from .simulate import simulate
 
 _LIBRARIES = (
     *("numpy", "scipy", "threadpoolctl", "nlopt", "numba", "llvmlite", "matplotlib"),
-    *("click", "rich"),
+    *("click", "rich", "OpenImageIO"),
 )
 
 
