@@ -34,6 +34,17 @@ class Choice:
         return tuple(str(self.spec.channelnames[place]) for place in self.colours)
 
     @property
+    def alpha(self) -> int | None:
+        """The place of alpha, if there is one."""
+        return self.spec.alpha_channel if self.spec.alpha_channel >= 0 else None
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """First place and one past the last of what has to be read."""
+        places = [*self.colours, *([] if self.alpha is None else [self.alpha])]
+        return min(places), max(places) + 1
+
+    @property
     def bits(self) -> int | None:
         """8 or 16 for whole numbers, None for floating point."""
         return {"uint8": 8, "uint16": 16}.get(str(self.spec.format))

@@ -25,31 +25,38 @@ _LONGEST_REASON = 120
 
 def read_image(path: Path, largest_bytes: float) -> dict[str, Any]:
     """Return the fields of an `Image`; see `sssfit.image.load_image`."""
-    kind = found_format(path)
-    if kind == "png":
+    if found_format(path) == "png":
         check_png(path)
+    try:
+        choice, stored = _stored(path, largest_bytes)
+        whole = _upright(_in_window(stored, choice.spec), choice.spec)
+        pixels, alpha, done = _linear(whole, choice)
+        scale = finite_number(choice.spec.get_string_attribute(SCALE_KEY)) or 0.0
+        return {
+            "pixels": pixels,
+            "channels": choice.names,
+            "mm_per_pixel": scale if scale > 0.0 else None,
+            "alpha": alpha,
+            "name": path.name,
+            "notes": (*choice.notes, *_about_file(choice.spec), *done),
+        }
+    except UnicodeDecodeError:  # bytes of a damaged header, in what the library hands on or says
+        raise FileError(f"{path} is damaged (a word in its header is not text).") from None
+
+
+def _stored(path: Path, largest_bytes: float) -> tuple[Choice, npt.NDArray[Any]]:
+    """Return what is read of a file, and its numbers as they lie there."""
     source = _open(path)
     try:
         choice = choose(source, path)
         check_kind(choice, path)
         check_size(choice, path, largest_bytes)
-        raw = source.read_image(choice.part, 0, 0, choice.spec.nchannels, "unknown")
-        if raw is None:
+        stored = source.read_image(choice.part, 0, *choice.span, "unknown")
+        if stored is None:
             raise FileError(f"{path} is damaged or cut short ({_one_line(source.geterror())}).")
+        return choice, stored
     finally:
         source.close()
-    whole = _upright(_in_window(raw, choice.spec), choice.spec)
-    pixels, alpha, said = _linear(whole, choice)
-    notes = (*choice.notes, *_about_file(choice.spec), *said)
-    text = choice.spec.get_string_attribute(SCALE_KEY)
-    return {
-        "pixels": pixels,
-        "channels": choice.names,
-        "mm_per_pixel": finite_number(text),
-        "alpha": alpha,
-        "name": path.name,
-        "notes": notes,
-    }
 
 
 def _open(path: Path) -> "ImageInput":
@@ -126,11 +133,12 @@ def _linear(
     whole: npt.NDArray[Any], choice: Choice
 ) -> tuple[FloatArray, FloatArray | None, list[str]]:
     """Return linear colour, alpha, and what was done, in words."""
-    spec = choice.spec
-    values = whole.astype(np.float64) / FULL_SCALE.get(str(spec.format), 1)
-    colour, alpha, notes = values[..., list(choice.colours)], None, []
-    if spec.alpha_channel >= 0:
-        alpha = np.ascontiguousarray(values[..., spec.alpha_channel])
+    spec, first = choice.spec, choice.span[0]
+    full = FULL_SCALE.get(str(spec.format), 1)
+    colour = whole[..., [place - first for place in choice.colours]].astype(np.float64) / full
+    alpha, notes = None, []
+    if choice.alpha is not None:
+        alpha = whole[..., choice.alpha - first].astype(np.float64) / full
         is_multiplied = not spec.get_int_attribute("oiio:UnassociatedAlpha")
         notes.append(_about_alpha(is_multiplied, choice.bits))
         if is_multiplied and choice.bits:  # the curve of sRGB belongs to the colour without alpha

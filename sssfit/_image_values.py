@@ -69,6 +69,6 @@ def as_float32(light: FloatArray, exposure: float) -> npt.NDArray[np.float32]:
             "at 1 or write a PNG."
         )
     largest = float(np.abs(light).max())
-    if largest > np.finfo(np.float32).max:
+    if largest > float(np.finfo(np.float32).max):
         raise RenderError(f"{largest:.3g} does not fit 32-bit floats; scale the picture down.")
     return light.astype(np.float32)

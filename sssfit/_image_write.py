@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from sssfit._image_read import SCALE_KEY
 from sssfit.errors import FileError
+from sssfit.files import reason
 
 # The library would put in the time of writing, and a picture made twice would differ.
 _DATE = "1980:01:01 00:00:00"
@@ -47,14 +48,15 @@ def image_bytes(
         spec.attribute("compression", "zip" if format == "exr" else "none")
     if format == "exr" and mm_per_pixel is not None:
         spec.attribute(SCALE_KEY, repr(float(mm_per_pixel)))
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"picture.{format}"
-        target = OpenImageIO.ImageOutput.create(str(path))
-        # Other layouts in memory are refused.
-        packed = np.ascontiguousarray(pixels)
-        if not (target and target.open(str(path), spec) and target.write_image(packed)):
-            said = target.geterror() if target else OpenImageIO.geterror()
-            raise FileError(f"the picture cannot be written: {said.strip()}.")
-        if not target.close():
-            raise FileError(f"the picture cannot be written: {target.geterror().strip()}.")
-        return path.read_bytes()
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / f"picture.{format}"
+            target = OpenImageIO.ImageOutput.create(str(path))
+            # Other layouts in memory are refused.
+            packed = np.ascontiguousarray(pixels)
+            assert target is not None  # these formats are part of the library
+            if not (target.open(str(path), spec) and target.write_image(packed) and target.close()):
+                raise FileError(f"the picture cannot be written: {target.geterror().strip()}.")
+            return path.read_bytes()
+    except OSError as error:
+        raise FileError(f"the picture cannot be written: {reason(error)}.") from error
