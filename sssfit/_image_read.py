@@ -134,11 +134,10 @@ def _linear(
 ) -> tuple[FloatArray, FloatArray | None, list[str]]:
     """Return linear colour, alpha, and what was done, in words."""
     spec, first = choice.spec, choice.span[0]
-    full = FULL_SCALE.get(str(spec.format), 1)
-    colour = whole[..., [place - first for place in choice.colours]].astype(np.float64) / full
+    colour = _as_float64(whole[..., [place - first for place in choice.colours]])
     alpha, notes = None, []
     if choice.alpha is not None:
-        alpha = whole[..., choice.alpha - first].astype(np.float64) / full
+        alpha = _as_float64(whole[..., choice.alpha - first])
         is_multiplied = not spec.get_int_attribute("oiio:UnassociatedAlpha")
         notes.append(_about_alpha(is_multiplied, choice.bits))
         if is_multiplied and choice.bits:  # the curve of sRGB belongs to the colour without alpha
@@ -152,6 +151,12 @@ def _linear(
     if gamma := spec.get_float_attribute("oiio:Gamma"):
         notes.append(f"gamma {gamma:.3g} of the file taken for sRGB")
     return srgb_decode(colour), alpha, [*notes, f"{choice.bits}-bit sRGB decoded to linear"]
+
+
+def _as_float64(stored: npt.NDArray[Any]) -> FloatArray:
+    """Return floats as they are, whole numbers as shares of their largest code."""
+    with np.errstate(invalid="ignore"):  # some NaN warn when widened; they are refused later
+        return stored.astype(np.float64) / FULL_SCALE.get(stored.dtype.name, 1)
 
 
 def _about_alpha(is_multiplied: bool, bits: int | None) -> str:
