@@ -19,7 +19,7 @@ from sssfit._image_srgb import srgb_decode, srgb_encode
 from sssfit._image_values import as_float32, channel_names, check_values, png_codes
 from sssfit._image_write import image_bytes
 from sssfit.errors import FileError
-from sssfit.files import reason, write_atomically
+from sssfit.files import write_atomically
 
 __all__ = [
     "Image",
@@ -158,8 +158,5 @@ def save_image(
     if isinstance(target, str | Path):
         write_atomically(Path(target), lambda stream: stream.write(data))
     else:
-        try:
-            target.write(data)
-        except OSError as error:
-            raise FileError(f"the picture cannot be written: {reason(error)}.") from error
+        target.write(data)
     return notes
