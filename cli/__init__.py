@@ -29,7 +29,7 @@ from .simulate import simulate
 
 _LIBRARIES = (
     *("numpy", "scipy", "threadpoolctl", "nlopt", "numba", "llvmlite", "matplotlib"),
-    *("colour-science", "click", "rich"),
+    *("colour-science", "OpenImageIO", "click", "rich"),
 )
 
 

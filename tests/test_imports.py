@@ -11,7 +11,7 @@ import pytest
 from sssfit.cli import cli
 
 ROOT = Path(__file__).parents[1]
-HEAVY = {"numpy", "numba", "scipy", "colour", "matplotlib", "rich"}
+HEAVY = {"numpy", "numba", "scipy", "colour", "matplotlib", "rich", "OpenImageIO"}
 
 # A room may import from rooms before it in this list, never from one after it.
 ROOMS = [

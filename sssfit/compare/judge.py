@@ -19,6 +19,7 @@ from sssfit.render.separable import render_separable
 
 FloatArray = npt.NDArray[np.float64]
 
+_FROM_PIXELS = 4  # skin1's round kernel has .06 from the first circle on, .003 from the fourth on
 _QUICK_SECONDS = 0.5  # a picture rendered faster is timed again, since other programs disturb it
 
 
@@ -91,10 +92,16 @@ def judge(
 
 
 def asymmetry_of(kernel: SeparableKernel) -> FloatArray:
-    """`radial_asymmetry` of each channel's 2D kernel (C,); a single pixel has none."""
-    if kernel.pixels == 1:
-        return np.zeros(len(kernel.channels))
-    return np.array([radial_asymmetry(kernel.full(c)) for c in range(len(kernel.channels))])
+    """`radial_asymmetry` of each channel's 2D kernel (C,), from the fourth circle on.
+
+    Nearer circles see the squareness of pixels. NaN where the kernel does not reach that far.
+    """
+    channels = len(kernel.channels)
+    if kernel.half_pixels < _FROM_PIXELS:
+        return np.full(channels, np.nan)
+    return np.array(
+        [radial_asymmetry(kernel.full(c), from_pixels=_FROM_PIXELS) for c in range(channels)]
+    )
 
 
 def timed(render: Callable[[], FloatArray], pixels: int) -> tuple[FloatArray, float]:

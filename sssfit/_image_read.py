@@ -1,0 +1,166 @@
+"""Pictures from files, through OpenImageIO: whole, turned upright, linear."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit._image_choice import FULL_SCALE, Choice, check_kind, check_size, choose
+from sssfit._image_files import check_png, found_format
+from sssfit._image_srgb import srgb_decode
+from sssfit._material_checks import printable
+from sssfit.errors import FileError
+from sssfit.text import finite_number
+
+if TYPE_CHECKING:
+    from OpenImageIO import ImageInput, ImageSpec
+
+FloatArray = npt.NDArray[np.float64]
+
+# In EXR headers, as text: so that a written picture can be read again without naming its scale.
+SCALE_KEY = "sssfit:mm_per_pixel"
+_LONGEST_REASON = 120
+
+
+def read_image(path: Path, largest_bytes: float) -> dict[str, Any]:
+    """Return the fields of an `Image`; see `sssfit.image.load_image`."""
+    if found_format(path) == "png":
+        check_png(path)
+    try:
+        choice, stored = _stored(path, largest_bytes)
+        whole = _upright(_in_window(stored, choice.spec), choice.spec)
+        pixels, alpha, done = _linear(whole, choice)
+        scale = finite_number(choice.spec.get_string_attribute(SCALE_KEY)) or 0.0
+        return {
+            "pixels": pixels,
+            "channels": choice.names,
+            "mm_per_pixel": scale if scale > 0.0 else None,
+            "alpha": alpha,
+            "name": path.name,
+            "notes": (*choice.notes, *_about_file(choice.spec), *done),
+        }
+    except UnicodeDecodeError:  # bytes of a damaged header, in what the library hands on or says
+        raise FileError(f"{path} is damaged (a word in its header is not text).") from None
+
+
+def _stored(path: Path, largest_bytes: float) -> tuple[Choice, npt.NDArray[Any]]:
+    """Return what is read of a file, and its numbers as they lie there."""
+    source = _open(path)
+    try:
+        choice = choose(source, path)
+        check_kind(choice, path)
+        check_size(choice, path, largest_bytes)
+        stored = source.read_image(choice.part, 0, *choice.span, "unknown")
+        if stored is None:
+            raise FileError(f"{path} is damaged or cut short ({_one_line(source.geterror())}).")
+        return choice, stored
+    finally:
+        source.close()
+
+
+def _open(path: Path) -> "ImageInput":
+    """Open by content; alpha stays unmultiplied where a file has it so."""
+    import OpenImageIO  # 0.2 s
+
+    config = OpenImageIO.ImageSpec()
+    config.attribute("oiio:UnassociatedAlpha", 1)
+    try:
+        source = OpenImageIO.ImageInput.open(str(path), config)
+    except TypeError:  # what a name that is not UTF-8 becomes
+        raise FileError(
+            f"{printable(str(path))} has a name that is not UTF-8; rename it."
+        ) from None
+    if source is None:
+        raise FileError(f"{path} is damaged or cut short ({_one_line(OpenImageIO.geterror())}).")
+    return source
+
+
+def _one_line(text: str) -> str:
+    """Shorten what the library says to one line."""
+    line = printable(text.strip().partition("\n")[0]).rstrip(".")
+    return line if len(line) <= _LONGEST_REASON else f"{line[:_LONGEST_REASON]}..."
+
+
+def _in_window(raw: npt.NDArray[Any], spec: "ImageSpec") -> npt.NDArray[Any]:
+    """Put an EXR's window of data into the picture it belongs to: black around, cut outside."""
+    if (spec.x, spec.y, spec.width, spec.height) == (
+        *(spec.full_x, spec.full_y),
+        *(spec.full_width, spec.full_height),
+    ):
+        return raw
+    whole = np.zeros((spec.full_height, spec.full_width, raw.shape[2]), dtype=raw.dtype)
+    top, left = spec.y - spec.full_y, spec.x - spec.full_x
+    rows = slice(max(top, 0), max(top + spec.height, 0))
+    columns = slice(max(left, 0), max(left + spec.width, 0))
+    target = whole[rows, columns]
+    first_row, first_column = max(-top, 0), max(-left, 0)
+    target[:] = raw[first_row:, first_column:][: target.shape[0], : target.shape[1]]
+    return whole
+
+
+def _upright(stored: npt.NDArray[Any], spec: "ImageSpec") -> npt.NDArray[Any]:
+    """Turn rows and columns as the orientation, 1 to 8 as in TIFF and Exif, says."""
+    turned = {
+        2: stored[:, ::-1],
+        3: stored[::-1, ::-1],
+        4: stored[::-1],
+        5: stored.transpose(1, 0, 2),
+        6: np.rot90(stored, -1),
+        7: stored[::-1, ::-1].transpose(1, 0, 2),
+        8: np.rot90(stored),
+    }
+    return turned.get(spec.get_int_attribute("Orientation", 1), stored)
+
+
+def _about_file(spec: "ImageSpec") -> list[str]:
+    """Say what of the header changed the picture, and what was not heeded."""
+    notes = []
+    if (orientation := spec.get_int_attribute("Orientation", 1)) in range(2, 9):
+        notes.append(f"turned upright from orientation {orientation}")
+    if (spec.width, spec.height) != (spec.full_width, spec.full_height):
+        notes.append(
+            f"{spec.width} x {spec.height} pixels of data put into the {spec.full_width} x "
+            f"{spec.full_height} of the picture"
+        )
+    profile = spec.get_string_attribute("ICCProfile:profile_description")
+    if profile and "sRGB" not in profile:
+        notes.append(f"colour profile {printable(profile)} not applied")
+    return notes
+
+
+def _linear(
+    whole: npt.NDArray[Any], choice: Choice
+) -> tuple[FloatArray, FloatArray | None, list[str]]:
+    """Return linear colour, alpha, and what was done, in words."""
+    spec, first = choice.spec, choice.span[0]
+    colour = _as_float64(whole[..., [place - first for place in choice.colours]])
+    alpha, notes = None, []
+    if choice.alpha is not None:
+        alpha = _as_float64(whole[..., choice.alpha - first])
+        is_multiplied = not spec.get_int_attribute("oiio:UnassociatedAlpha")
+        notes.append(_about_alpha(is_multiplied, choice.bits))
+        if is_multiplied and choice.bits:  # the curve of sRGB belongs to the colour without alpha
+            safe = np.where(alpha > 0.0, alpha, 1.0)[..., None]
+            colour = np.minimum(colour / safe, 1.0)
+    if choice.bits is None:
+        return colour, alpha, notes
+    space = spec.get_string_attribute("oiio:ColorSpace")
+    if space.startswith("lin"):
+        return colour, alpha, [*notes, f"{choice.bits}-bit, linear as the file says"]
+    if gamma := spec.get_float_attribute("oiio:Gamma"):
+        notes.append(f"gamma {gamma:.3g} of the file taken for sRGB")
+    return srgb_decode(colour), alpha, [*notes, f"{choice.bits}-bit sRGB decoded to linear"]
+
+
+def _as_float64(stored: npt.NDArray[Any]) -> FloatArray:
+    """Return floats as they are, whole numbers as shares of their largest code."""
+    with np.errstate(invalid="ignore"):  # some NaN warn when widened; they are refused later
+        return stored.astype(np.float64) / FULL_SCALE.get(stored.dtype.name, 1)
+
+
+def _about_alpha(is_multiplied: bool, bits: int | None) -> str:
+    if is_multiplied and bits:
+        return "alpha kept apart, colour divided by it"
+    state = "multiplied by it" if is_multiplied else "without it"
+    return f"alpha kept apart, colour used as stored, {state}"

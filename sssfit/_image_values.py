@@ -1,0 +1,74 @@
+"""A picture's values: what may be read, and what each format can hold."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit._image_srgb import srgb_encode
+from sssfit.errors import RenderError
+
+FloatArray = npt.NDArray[np.float64]
+
+_CODES = 65535  # the largest of 16 bits
+
+
+def channel_names(light: FloatArray, given: Sequence[str] | None, format: str) -> tuple[str, ...]:
+    """Check the shape and return a name for each channel."""
+    if light.ndim != 3 or 0 in light.shape:
+        raise RenderError(
+            f"pixels of shape {light.shape}; expected rows, columns and channels, one or more each."
+        )
+    count = light.shape[2]
+    usual = {1: ("Y",), 3: ("R", "G", "B")}
+    if format != "exr":
+        if count not in usual:
+            raise RenderError(
+                f"{count} channels do not fit a {format.upper()} file, which takes 1 or 3; "
+                "write an EXR."
+            )
+        return usual[count]
+    names = tuple(given) if given is not None else usual.get(count, ())
+    if len(set(names)) != count or "" in names:
+        raise RenderError(f"{len(names)} channel names for {count} channels; give one to each.")
+    return names
+
+
+def check_values(
+    pixels: FloatArray, channels: Sequence[str], origin: str, *, negative: bool
+) -> None:
+    """Refuse NaN and infinite values, and negative ones unless allowed: how many, where first."""
+    for what, bad in (
+        ("NaN or infinite", ~np.isfinite(pixels)),
+        ("negative", np.zeros(0, dtype=bool) if negative else pixels < 0.0),
+    ):
+        if bad.any():
+            row, column, channel = (int(i[0]) for i in np.nonzero(bad))
+            raise RenderError(
+                f"{origin}: {int(bad.sum())} of {bad.size} values are {what}, the first at row "
+                f"{row}, column {column}, channel {channels[channel]}; mend them first."
+            )
+
+
+def png_codes(light: FloatArray, exposure: float) -> tuple[npt.NDArray[np.uint16], tuple[str, ...]]:
+    """Return 16-bit sRGB codes, and how many values were clipped."""
+    if not (np.isfinite(exposure) and exposure > 0.0):
+        raise RenderError(f"exposure = {exposure:g}; expected a factor above 0.")
+    exposed = exposure * light
+    clipped = int(((exposed < 0.0) | (exposed > 1.0)).sum())
+    codes = np.rint(_CODES * srgb_encode(np.clip(exposed, 0.0, 1.0))).astype(np.uint16)
+    said = f"{clipped} of {light.size} values clipped to 0 to 1"
+    return codes, (said,) if clipped else ()
+
+
+def as_float32(light: FloatArray, exposure: float) -> npt.NDArray[np.float32]:
+    """Return float32, or refuse what it cannot hold."""
+    if exposure != 1.0:
+        raise RenderError(
+            f"exposure = {exposure:g} is for PNG; EXR and TIFF keep the light as it is: leave it "
+            "at 1 or write a PNG."
+        )
+    largest = float(np.abs(light).max())
+    if largest > float(np.finfo(np.float32).max):
+        raise RenderError(f"{largest:.3g} does not fit 32-bit floats; scale the picture down.")
+    return light.astype(np.float32)

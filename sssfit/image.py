@@ -1,0 +1,162 @@
+"""Pictures of linear light, to and from EXR, TIFF and PNG files; Radiance HDR is read too.
+
+What is read is known by its content. 8- and 16-bit pictures are decoded from sRGB, floating point
+is linear as it stands; what was done to a file's numbers stands in `Image.notes`.
+"""
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit._image_choice import LARGEST_BYTES
+from sssfit._image_files import FORMATS, image_format, is_image_file
+from sssfit._image_read import read_image
+from sssfit._image_srgb import srgb_decode, srgb_encode
+from sssfit._image_values import as_float32, channel_names, check_values, png_codes
+from sssfit._image_write import image_bytes
+from sssfit.errors import FileError
+from sssfit.files import write_atomically
+
+__all__ = [
+    "Image",
+    "image_format",
+    "is_image_file",
+    "load_image",
+    "save_image",
+    "srgb_decode",
+    "srgb_encode",
+]
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class Image:
+    """A picture of linear light. Arrays are stored as read-only float64.
+
+    Parameters
+    ----------
+    pixels : array (H, W, C)
+        Linear light; row 0 is the top.
+    channels : tuple of str
+        Names of the channels: ("R", "G", "B"), ("Y",) for grey, others as an EXR has them.
+    mm_per_pixel : float, optional [mm]
+        Size of a pixel; None where the file does not say.
+    alpha : array (H, W), optional
+        Coverage, kept apart from the colour.
+    name : str
+        The file's name without its folder.
+    notes : tuple of str
+        What was done to the file's numbers, in words for stderr.
+    """
+
+    pixels: FloatArray
+    channels: tuple[str, ...]
+    mm_per_pixel: float | None = None
+    alpha: FloatArray | None = None
+    name: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        for field in ("pixels", "alpha"):
+            if (values := getattr(self, field)) is not None:
+                kept = np.array(values, dtype=np.float64, order="C")
+                kept.setflags(write=False)
+                object.__setattr__(self, field, kept)
+
+
+def load_image(path: str | Path, *, largest_bytes: float = LARGEST_BYTES) -> Image:
+    """Read a picture as linear light.
+
+    EXR: R, G, B of the first part that has them, else Y, else all channels; its window of data is
+    put into the picture's, black around. Palettes become RGB, grey stays one channel.
+
+    Parameters
+    ----------
+    path : str or Path
+        An EXR, Radiance HDR, TIFF or PNG file, whatever its ending. The EXPOSURE line of an HDR
+        file is not heeded.
+    largest_bytes : float [bytes]
+        Refuse pictures that would need more to be rendered, 32 bytes for each of their values.
+
+    Returns
+    -------
+    Image
+        8- and 16-bit numbers sRGB-decoded (IEC 61966-2-1) unless the file says that they are
+        linear, floating point as it stands; turned upright.
+
+    Raises
+    ------
+    FileError
+        Missing, unreadable, damaged, cut short or of another format.
+    RenderError
+        Too large, without channels that can be used, or with NaN, infinite or negative values.
+    """
+    image = Image(**read_image(Path(path), largest_bytes))
+    check_values(image.pixels, image.channels, str(path), negative=False)
+    return image
+
+
+def save_image(
+    target: str | Path | BinaryIO,
+    pixels: npt.ArrayLike,
+    *,
+    channels: Sequence[str] | None = None,
+    format: str | None = None,
+    exposure: float = 1.0,
+    mm_per_pixel: float | None = None,
+) -> tuple[str, ...]:
+    """Write linear light: float32 to EXR or TIFF as it is, 16-bit sRGB to PNG.
+
+    A PNG holds ``exposure`` times the light, clipped to 0 to 1 and sRGB-encoded. Files are written
+    whole or not at all, and the same picture gives the same bytes.
+
+    Parameters
+    ----------
+    target : path or binary stream
+        Where to.
+    pixels : array (H, W, C)
+        Linear light; row 0 is the top.
+    channels : sequence of str, optional
+        Names for EXR; needed for other counts than 1 (Y) and 3 (R, G, B), which only EXR can hold.
+    format : str, optional
+        "exr", "tiff" or "png"; by default what the ending says.
+    exposure : float
+        Factor for PNG; the other formats keep the light as it is.
+    mm_per_pixel : float, optional [mm]
+        Kept in the header of an EXR, from where `load_image` takes it.
+
+    Returns
+    -------
+    tuple of str
+        What was done to the numbers, in words for stderr.
+
+    Raises
+    ------
+    FileError
+        The file cannot be written; an older one is untouched.
+    RenderError
+        The values are not finite, or do not fit the format.
+    """
+    chosen = format or image_format(target)
+    if chosen not in FORMATS:
+        raise FileError(f"format {chosen!r}: pictures are written as {', '.join(FORMATS)}.")
+    light = np.asarray(pixels, dtype=np.float64)
+    names = channel_names(light, channels, chosen)
+    check_values(light, names, "the picture", negative=True)
+    values: npt.NDArray[np.uint16] | npt.NDArray[np.float32]
+    notes: tuple[str, ...] = ()
+    if chosen == "png":
+        values, notes = png_codes(light, exposure)
+    else:
+        values = as_float32(light, exposure)
+    data = image_bytes(values, format=chosen, channels=names, mm_per_pixel=mm_per_pixel)
+    if isinstance(target, str | Path):
+        write_atomically(Path(target), lambda stream: stream.write(data))
+    else:
+        target.write(data)
+    return notes
