@@ -176,9 +176,9 @@ def _write(
     """Write the picture, and the truth and the difference where they are wanted."""
     from sssfit.image import save_image
 
-    pictures = {"picture": result.picture, "truth": result.truth}
+    pictures = {"picture": result.picture}
     if result.truth is not None:
-        pictures["difference"] = abs(result.picture - result.truth)
+        pictures |= {"truth": result.truth, "difference": abs(result.picture - result.truth)}
     settings: dict[str, Any] = {
         "channels": kernel.channels,
         "mm_per_pixel": kernel.mm_per_pixel,
