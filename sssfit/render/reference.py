@@ -126,6 +126,11 @@ def convolve(
     return out
 
 
+def padded_shape(height: int, width: int, half: int, border: str) -> tuple[int, int]:
+    """Rows and columns that `convolve` transforms for a kernel of half width h."""
+    return _axis(height, half, border).length, _axis(width, half, border).length
+
+
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
 class _Axis:
     """One axis of the continued picture: ``size`` pixels from place ``start`` on, of ``length``."""
