@@ -99,3 +99,25 @@ def test_small_benchmarks_of_fits_run_and_fill_every_table():
     assert [row[0] for row in methods[1]] == [f"apple, {name}" for name in METHODS]
     for row in methods[1]:
         assert all(math.isfinite(float(value)) for value in row[1:])
+
+
+def test_small_benchmarks_of_renderers_run_and_fill_every_table():
+    ended = subprocess.run(
+        [sys.executable, str(BENCH / "bench_render.py"), "--small"],
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+    few, many, compiling, reference = tables(ended.stdout)
+    for _, rows in (few, many):
+        names = [row[0].split(",")[0] for row in rows]
+        scipys = ["scipy.ndimage.convolve1d"] * 2
+        assert names == [*["float32", "float32", "float64", "float64"], *scipys, "cv2.sepFilter2D"]
+        for row in rows:
+            if row[1] != "not installed":
+                limit = 1e-13 if "float64" in row[0] else 1e-5  # all of them blur alike
+                assert float(row[3]) < limit
+    assert [len(compiling[1]), len(reference[1])] == [2, 2]
+    for row in [*(row[1:] for row in compiling[1]), *(row[3:] for row in reference[1])]:
+        assert all(float(value) >= 0.0 for value in row)

@@ -116,14 +116,21 @@ def convolve(
     workers = thread_count(threads)
     y, x = _plan(height, width, half, channels, border)
     out = np.empty((height, width, channels))
+    if given == 1:
+        shared = _forward(irradiance[:, :, 0], y, x, workers)
     for c in range(channels):
-        if c < given:
-            spectrum = _forward(irradiance[:, :, c], y, x, workers)
-        used_again = given == 1 and c + 1 < channels
-        product = spectrum.copy() if used_again else spectrum
-        _multiply(product, _even_spectrum(quadrant[:, :, c], y, x, workers))
+        spectrum = shared if given == 1 else _forward(irradiance[:, :, c], y, x, workers)
+        even = _even_spectrum(quadrant[:, :, c], y, x, workers)
+        product = np.empty_like(spectrum) if given == 1 else spectrum
+        _multiply(spectrum, even, product)
         out[:, :, c] = _backward(product, y, x, workers)
+        del spectrum, product, even  # else the next channel's are made beside them
     return out
+
+
+def padded_shape(height: int, width: int, half: int, border: str) -> tuple[int, int]:
+    """Rows and columns that `convolve` transforms for a kernel of half width h."""
+    return _axis(height, half, border).length, _axis(width, half, border).length
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -165,7 +172,8 @@ def _axis(size: int, half: int, border: str) -> _Axis:
 def _plan(height: int, width: int, half: int, channels: int, border: str) -> tuple[_Axis, _Axis]:
     """Return both axes, if the work on them fits in memory."""
     y, x = _axis(height, half, border), _axis(width, half, border)
-    # Three complex half spectra, or two and the real lines they are made from; result and kernel.
+    # Three complex half spectra or real arrays of their size; result; kernel. Measured: 0.6 to
+    # 1.04 of it.
     spectrum = 16.0 * y.length * x.bins
     check_memory(
         3.0 * spectrum + 8.0 * channels * (height * width + (half + 1.0) ** 2),
@@ -204,10 +212,11 @@ def _even_spectrum(quadrant: FloatArray, y: _Axis, x: _Axis, workers: int) -> Fl
     return spectrum
 
 
-def _multiply(spectrum: ComplexArray, even: FloatArray) -> None:
-    """Multiply in place; rows past Nyquist's are negative frequencies, the same backwards."""
-    spectrum[: len(even)] *= even
-    spectrum[len(even) :] *= even[-2:0:-1]
+def _multiply(spectrum: ComplexArray, even: FloatArray, product: ComplexArray) -> None:
+    """Multiply into ``product``; rows past Nyquist's are those before it, backwards."""
+    n = len(even)
+    np.multiply(spectrum[:n], even, out=product[:n])
+    np.multiply(spectrum[n:], even[-2:0:-1], out=product[n:])
 
 
 def _backward(spectrum: ComplexArray, y: _Axis, x: _Axis, workers: int) -> FloatArray:
