@@ -1,5 +1,8 @@
 """Screen space against a literal shader, flat convolution, and what masks and slopes must do."""
 
+import runpy
+from pathlib import Path
+
 import numpy as np
 import pytest
 from reference_screen import exact_pass, pixels_per_mm, slow_flat, slow_screen
@@ -10,6 +13,7 @@ from sssfit.render._view import LERP_SIGMAS, lerp_falloff, second_moments
 from sssfit.render.scene import Scene
 from sssfit.render.screen import render_screen
 
+ROOT = Path(__file__).parents[1]
 PITCH_MM, DISTANCE_MM = 0.5, 300.0
 
 
@@ -312,3 +316,9 @@ def test_bad_input_is_one_line(rng, fields, settings, words):
     with pytest.raises(RenderError, match=words) as error:
         render_screen(scene, random_kernel(rng), **settings)
     assert "\n" not in str(error.value)
+
+
+def test_the_documented_figures_are_up_to_date():
+    section = runpy.run_path(str(ROOT / "docs" / "make_screen.py"))["section"]()
+    page = (ROOT / "docs" / "screen-space.md").read_text(encoding="utf-8")
+    assert section in page, "run: python docs/make_screen.py"
