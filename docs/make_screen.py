@@ -32,7 +32,8 @@ TEXT = """skin1, exact profile, `artist` at {pitch:.3g} mm a pixel: near and far
 G {v[G]}, B {v[B]} mm^2, share of the near one {w[R]:.2f} {w[G]:.2f} {w[B]:.2f}.
 
 **Slopes.** What one pass makes of a lit line on a plane tilted by an angle, against the exact form
-per area of surface, sum w G(x, v cos^2): sum of absolute differences over the sum, R G B in percent.
+per area of surface, sum w G(x, v cos^2): sum of absolute differences over the sum, R G B in
+percent.
 
 | angle | {heads} |
 |---|{rules}|
