@@ -3,6 +3,9 @@
 Pictures are (N, C), N = H W pixels row after row. A sample lies between two pixels and is read
 linearly. What a sample brings is split in three: light that is seen; light lost by depth, made up
 for as `View.lost` says; and the share of pixels of other objects, for which the middle stands in.
+
+Helpers are called and not merged (``jit_inline``): that takes 25 ns a sample of three channels, and
+60 merged.
 """
 
 import math
@@ -11,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._jit import jit, jit_inline
+from sssfit._jit import jit
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -82,7 +85,7 @@ def blur(
             out[p, c] = total(sums, c, picture[p, c], lost)
 
 
-@jit_inline
+@jit
 def clear(sums: FloatArray) -> None:
     """Set to 0 by hand: a slice costs 20 ns a call, as much as a sample."""
     for row in range(sums.shape[0]):
@@ -90,7 +93,7 @@ def clear(sums: FloatArray) -> None:
             sums[row, c] = 0.0
 
 
-@jit_inline
+@jit
 def sample(
     light: FloatArray,
     picture: FloatArray,
@@ -132,7 +135,7 @@ def sample(
     return share, dz
 
 
-@jit_inline
+@jit
 def inside(j: int, length: int, border: int) -> int:
     """Pixel of the picture that stands for pixel j of the endless line; -1 for none."""
     index = j
@@ -148,7 +151,7 @@ def inside(j: int, length: int, border: int) -> int:
     return index
 
 
-@jit_inline
+@jit
 def kept(dz: float, rate: float, follow: int) -> float:
     """Share of a sample's light that stays, ``dz`` deeper than the middle."""
     share = 1.0
@@ -160,7 +163,7 @@ def kept(dz: float, rate: float, follow: int) -> float:
     return share
 
 
-@jit_inline
+@jit
 def add(sums: FloatArray, c: int, weight: float, keep: float, share: float, light: float) -> None:
     """Add a sample to the sums of channel c."""
     sums[SEEN, c] += weight * keep * light
@@ -170,7 +173,7 @@ def add(sums: FloatArray, c: int, weight: float, keep: float, share: float, ligh
     sums[MASS, c] += abs(weight) * keep * share
 
 
-@jit_inline
+@jit
 def total(sums: FloatArray, c: int, middle: float, lost: int) -> float:
     """Return what the pass leaves in a pixel: seen, foreign from the middle, lost as chosen."""
     instead = 0.0
@@ -178,4 +181,5 @@ def total(sums: FloatArray, c: int, middle: float, lost: int) -> float:
         instead = middle
     elif lost == MEAN:
         instead = sums[NEAR, c] / sums[MASS, c]
-    return sums[SEEN, c] + sums[FOREIGN, c] * middle + sums[LOST, c] * instead
+    left: float = sums[SEEN, c] + sums[FOREIGN, c] * middle + sums[LOST, c] * instead
+    return left

@@ -49,15 +49,7 @@ def make_view(
     mask = objects(scene)
     depth_mm = depths(scene, mask)
     sizes = _sizes(scale, mask.shape)
-    rate, stretch = np.zeros(len(kernel.channels)), np.ones(mask.shape)
-    if follow == "gaussian":
-        rate = 0.5 / depth_variances(kernel, depth_variance_mm2)
-        # A kernel of half the size has a quarter of the variance.
-        stretch = np.divide(1.0, sizes, out=np.zeros(mask.shape), where=sizes > 0.0)
-    elif follow == "lerp":
-        rate[:] = lerp_falloff(kernel) if falloff_per_mm is None else falloff_per_mm
-        if not (rate >= 0.0).all():
-            raise RenderError(f"falloff_per_mm = {falloff_per_mm}; expected a number from 0 up.")
+    rate, stretch = _factor(kernel, follow, depth_variance_mm2, falloff_per_mm, sizes)
     chosen = ("middle" if follow == "lerp" else "mean") if lost is None else lost
     return compiled.View(
         depth_mm=depth_mm.ravel(),
@@ -71,6 +63,26 @@ def make_view(
         lost=LOST[chosen],
         border=BORDER[border],
     )
+
+
+def _factor(
+    kernel: SeparableKernel,
+    follow: str,
+    depth_variance_mm2: float | Sequence[float] | None,
+    falloff_per_mm: float | None,
+    sizes: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the rates (C,) at which light is lost with depth, and the stretch of depth (H, W)."""
+    rate, stretch = np.zeros(len(kernel.channels)), np.ones(sizes.shape)
+    if follow == "gaussian":
+        rate = 0.5 / depth_variances(kernel, depth_variance_mm2)
+        # A kernel of half the size has a quarter of the variance.
+        stretch = np.divide(1.0, sizes, out=np.zeros(sizes.shape), where=sizes > 0.0)
+    elif follow == "lerp":
+        rate[:] = lerp_falloff(kernel) if falloff_per_mm is None else falloff_per_mm
+        if not (rate >= 0.0).all():
+            raise RenderError(f"falloff_per_mm = {falloff_per_mm}; expected a number from 0 up.")
+    return rate, stretch
 
 
 def objects(scene: Scene) -> npt.NDArray[np.int32]:
@@ -132,7 +144,8 @@ def second_moments(kernel: SeparableKernel) -> FloatArray:
     line = np.abs(kernel.line)
     energy = line.sum(axis=0)
     moment = np.divide(x**2 @ line, energy, out=np.zeros_like(energy), where=energy > 0.0)
-    return np.maximum(moment, kernel.mm_per_pixel**2 / 12.0)
+    at_least: FloatArray = np.maximum(moment, kernel.mm_per_pixel**2 / 12.0)
+    return at_least
 
 
 def lerp_falloff(kernel: SeparableKernel) -> float:

@@ -1,0 +1,154 @@
+"""Write the figures of docs/screen-space.md: skin1's artist kernel on slopes and at steps.
+
+python docs/make_screen.py
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from sssfit.fit import fit_artist
+from sssfit.material import load_material
+from sssfit.render._view import lerp_falloff
+from sssfit.render.scene import Scene
+from sssfit.render.screen import render_screen
+from sssfit.shapes import gaussian_line_integral
+from sssfit.simulate import simulate_exact
+
+ROOT = Path(__file__).parents[1]
+START, END = "<!-- made by docs/make_screen.py -->", "<!-- end of make_screen.py -->"
+SLOPES = (0, 15, 30, 45, 60, 75)
+STEPS_MM = (0.2, 0.5, 1, 2, 5, 10)
+FAR_MM = 1e7  # seen from so far that a slope is the same for all pixels
+WAYS = (
+    ("gaussian, none", {"follow": "gaussian", "lost": "none"}),
+    ("gaussian, middle", {"follow": "gaussian", "lost": "middle"}),
+    ("gaussian, mean", {"follow": "gaussian", "lost": "mean"}),
+    ("lerp", {"follow": "lerp"}),
+    ("no following", {"follow": "none"}),
+)
+
+TEXT = """skin1, exact profile, `artist` at {pitch:.3g} mm a pixel: near and far variances R {v[R]},
+G {v[G]}, B {v[B]} mm^2, share of the near one {w[R]:.2f} {w[G]:.2f} {w[B]:.2f}.
+
+**Slopes.** What one pass makes of a lit line on a plane tilted by an angle, against the exact form
+per area of surface, sum w G(x, v cos^2): sum of absolute differences over the sum, R G B in
+percent.
+
+| angle | {heads} |
+|---|{rules}|
+{slopes}
+
+Of even light one pass with "gaussian, none" keeps, R G B in percent (all others keep 100):
+
+| angle | exact form: the cosine | factor |
+|---|---|---|
+{kept}
+
+The factor is nowhere smaller than the exact form, so the difference of the two columns is also the
+sum of absolute differences between them, as parts of the flat pass.
+
+**Steps.** Of the light beyond a step of height dz the exact form keeps w exp(-dz^2 / 2 v_near) +
+(1 - w) exp(-dz^2 / 2 v_far), the factor exp(-dz^2 / 2 v_far); R G B in percent. The difference is
+the error:
+
+| step mm | exact form | factor | lerp |
+|---|---|---|---|
+{steps}
+"""
+
+
+def skin1():
+    """Return the artist's kernel of skin1."""
+    return fit_artist(simulate_exact(load_material("skin1"))).kernel
+
+
+def figures(kernel):
+    """Return near and far variances and the near one's share, each (C,)."""
+    found = [kernel.parameters[name] for name in kernel.channels]
+    return (np.array([each[key] for each in found]) for key in ("near_mm2", "far_mm2", "weight"))
+
+
+def response(kernel, degrees, settings):
+    """Return what a pass makes of a lit pixel on the slope (P, C), of a flat sum of 1."""
+    h, pitch = kernel.half_pixels, kernel.mm_per_pixel
+    width = 4 * h + 1
+    lit = np.zeros((1, width, 1))
+    lit[0, 2 * h] = 1.0
+    x_mm = pitch * (np.arange(width) - 2 * h)
+    depth_mm = FAR_MM + np.tan(np.radians(degrees)) * x_mm[None]
+    scene = Scene("slope", lit, pitch, distance_mm=FAR_MM, depth_mm=depth_mm)
+    # One row, mirrored: the vertical pass only multiplies by its sum.
+    row = render_screen(scene, kernel, border="mirror", **settings)[0]
+    return row[h : 3 * h + 1] / (kernel.energy * kernel.scale)
+
+
+def exact(kernel, degrees):
+    """Return the exact form per area of surface, integrated over the pixels (P, C)."""
+    near, far, share = figures(kernel)
+    h, cosine = kernel.half_pixels, np.cos(np.radians(degrees))
+    edges = (kernel.mm_per_pixel * (np.arange(2 * h + 2) - h - 0.5))[:, None]
+    narrow, wide = (
+        gaussian_line_integral(edges[:-1], edges[1:], v * cosine**2) for v in (near, far)
+    )
+    return share * narrow + (1.0 - share) * wide
+
+
+def percent(values):
+    """Return a value per channel as text."""
+    return " ".join(f"{100.0 * each:.1f}" for each in values)
+
+
+def slope_row(kernel, degrees):
+    """Return a slope's errors as a line of the table."""
+    truth = exact(kernel, degrees)
+    truth = truth / truth.sum(axis=0)  # as the pass: all of the energy within the support
+    errors = [
+        percent(np.abs(response(kernel, degrees, each) - truth).sum(axis=0)) for _, each in WAYS
+    ]
+    return f"| {degrees} | {' | '.join(errors)} |"
+
+
+def kept_row(kernel, degrees):
+    """Return what is kept where lost light stays lost."""
+    kept = response(kernel, degrees, WAYS[0][1]).sum(axis=0)
+    return f"| {degrees} | {100.0 * np.cos(np.radians(degrees)):.1f} | {percent(kept)} |"
+
+
+def step_row(kernel, dz_mm, falloff_per_mm):
+    """Return what three forms keep beyond a step."""
+    near, far, share = figures(kernel)
+    narrow, wide = (np.exp(-(dz_mm**2) / (2.0 * v)) for v in (near, far))
+    lerp = np.full(len(near), 1.0 - min(falloff_per_mm * dz_mm, 1.0))
+    texts = (percent(each) for each in (share * narrow + (1.0 - share) * wide, wide, lerp))
+    return f"| {dz_mm:g} | {' | '.join(texts)} |"
+
+
+def section():
+    """Return the section's text."""
+    kernel = skin1()
+    near, far, share = figures(kernel)
+    names = kernel.channels
+    return TEXT.format(
+        pitch=kernel.mm_per_pixel,
+        v={each: f"{near[c]:.3g} and {far[c]:.3g}" for c, each in enumerate(names)},
+        w=dict(zip(names, share, strict=True)),
+        heads=" | ".join(name for name, _ in WAYS),
+        rules="|".join("---" for _ in WAYS),
+        slopes="\n".join(slope_row(kernel, each) for each in SLOPES),
+        kept="\n".join(kept_row(kernel, each) for each in SLOPES),
+        steps="\n".join(step_row(kernel, each, lerp_falloff(kernel)) for each in STEPS_MM),
+    )
+
+
+def main():
+    """Put the section in its place."""
+    path = ROOT / "docs" / "screen-space.md"
+    page = path.read_text(encoding="utf-8")
+    before, _, rest = page.partition(START)
+    after = rest.partition(END)[2]
+    path.write_text(f"{before}{START}\n\n{section()}\n{END}{after}", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
