@@ -15,6 +15,7 @@ from sssfit._jit import jit, jit_inline
 
 # Past the border of a cell, so that the next cell is the one that the ray has entered [mm].
 NUDGE_MM = 1e-7
+START_LEVEL = 4
 
 
 @jit
@@ -81,7 +82,13 @@ def first_hit(heights, levels, maxima, x, y, z, dx, dy, dz, near, far):
     near, far = clip_axis(x, dx, heights.shape[1] - 1.0, near, far)
     near, far = clip_axis(y, dy, heights.shape[0] - 1.0, near, far)
     top = levels.shape[0] - 1
-    level, t = top, near
+    highest = maxima[levels[top, 0]]
+    if dz < 0.0:
+        near = max(near, (highest - z) / dz)
+    elif dz > 0.0:
+        far = min(far, (highest - z) / dz)
+    # Rays start or end near the surface, where large blocks are seldom passed over: 16 cells.
+    level, t = min(top, START_LEVEL), near
     while t < far:
         size = 1 << level
         inside = t + NUDGE_MM

@@ -104,9 +104,7 @@ def light_point(
 
 
 @jit_inline
-def look(
-    fine: Field, view: View, across: float, up: float
-) -> tuple[int, Vector, Vector]:
+def look(fine: Field, view: View, across: float, up: float) -> tuple[int, Vector, Vector]:
     """Label, point and direction to the eye for a point of the picture, in pixels from its middle."""
     pitch, distance, floor = view
     x, y = across * pitch, up * pitch

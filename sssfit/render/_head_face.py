@@ -17,17 +17,17 @@ MOUTH_Y = -54.0
 # The nose along its ridge: y, how far it stands out, half width.
 NOSE = np.array(
     [
-        (-42.0, 0.0, 15.0),
-        (-36.0, 0.3, 14.5),
-        (-32.0, 3.0, 13.5),
-        (-29.0, 8.5, 12.5),
-        (-26.0, 14.5, 11.5),
-        (-22.0, 18.0, 11.0),
-        (-16.0, 18.0, 10.8),
-        (-8.0, 15.5, 10.5),
-        (0.0, 12.0, 9.8),
-        (8.0, 8.5, 9.0),
-        (16.0, 5.2, 8.6),
+        (-42.0, 0.0, 12.0),
+        (-36.0, 0.2, 11.0),
+        (-32.0, 2.0, 9.5),
+        (-29.0, 6.0, 8.8),
+        (-26.0, 11.0, 8.4),
+        (-22.0, 14.5, 8.2),
+        (-16.0, 15.5, 8.4),
+        (-8.0, 14.8, 8.8),
+        (0.0, 12.0, 9.0),
+        (8.0, 8.8, 8.8),
+        (16.0, 5.6, 8.6),
         (22.0, 4.2, 9.0),
         (30.0, 4.0, 12.0),
         (38.0, 2.0, 16.0),
@@ -63,8 +63,11 @@ def nose(x, y, z):
     stand = CubicSpline(NOSE[:, 0], NOSE[:, 1])(np.clip(y, -42.0, 52.0))
     width = CubicSpline(NOSE[:, 0], NOSE[:, 2])(np.clip(y, -42.0, 52.0))
     z = z + np.maximum(stand, 0.0) * np.exp(-((x / width) ** 2))
-    z = smooth_max(z, ellipsoid(x, y, (0.0, -18.0, 14.0), (10.5, 9.0, 7.5)), 9.0)
-    z = smooth_max(z, ellipsoid(x, y, (11.8, -22.8, 2.5), (6.6, 7.4, 9.0)), 7.0)
+    z = z + 7.0 * np.exp(-(np.hypot(x / 9.6, (y + 17.5) / 8.4) ** 2.6))
+    # The wings are rounder than Gaussians; both, so that they meet without a crease.
+    for side in (-1.0, 1.0):
+        wing = np.hypot((x - side * 12.6) / 6.8, (y + 23.5) / 7.6)
+        z = z + 9.0 * np.exp(-(wing**2.6))
     # The groove above and behind the wings, and the hole.
     behind = np.hypot((x - 12.0) / 1.0, (y + 24.0) / 1.05)
     side = smooth_step((x - 10.0) / 8.0) * smooth_step((y + 36.0) / 10.0)
@@ -76,15 +79,15 @@ def mouth(x, y, z):
     """Philtrum, lips, the line between them and the corners."""
     philtrum = smooth_step((y + 50.0) / 6.0) * smooth_step((-33.0 - y) / 6.0)
     z = z + philtrum * (0.9 * gaussian(x - 5.0, 1.9) - 1.2 * gaussian(x, 2.6))
-    wide = np.maximum(1.0 - (x / 26.0) ** 2, 0.0)
+    wide = np.maximum(1.0 - (x / 27.0) ** 2, 0.0)
     line = MOUTH_Y - 1.0 * gaussian(x, 5.0) + 0.8 * gaussian(x - 12.0, 6.0)
     bow = (7.6 - 1.6 * gaussian(x, 3.4)) * wide**0.75
     low = 9.8 * wide**0.6
     t, s = y - line, line - y
-    upper = 3.0 * gaussian(t - 0.5 * bow, 2.6) * wide**0.6
-    upper += 0.9 * smooth_step((bow - t + 0.6) / 1.6) * (t > 0.0) * wide**0.8
-    lower = 4.4 * gaussian(s - 0.47 * low, 3.3) * wide**0.6
-    lower += 0.7 * smooth_step((low - s + 0.8) / 2.4) * (s >= 0.0) * wide**0.8
+    upper = 3.0 * gaussian(t - 0.5 * bow, 2.6) * wide
+    upper += 0.9 * smooth_step((bow - t + 0.6) / 1.6) * (t > 0.0) * wide
+    lower = 4.4 * gaussian(s - 0.47 * low, 3.3) * wide
+    lower += 0.7 * smooth_step((low - s + 0.8) / 2.4) * (s >= 0.0) * wide
     z = z + upper + lower - 2.8 * gaussian(t, 0.95) * smooth_step((28.0 - x) / 6.0)
     return z - 2.2 * gaussian(x - 27.0, 3.5) * gaussian(t, 3.5)
 
@@ -118,7 +121,9 @@ def eye(x, y, z):
     inside = np.minimum(inside, 14.8 - np.abs(u))
     ball = ellipsoid(x, y, (EYE_X, EYE_Y, EYE_Z), (15.6, 12.2, 12.2))
     # The cornea stands out of the ball.
-    ball = smooth_max(ball, ellipsoid(x, y, (EYE_X, EYE_Y + 0.3, EYE_Z + 5.6), (7.4, 7.4, 7.6)), 0.6)
+    ball = smooth_max(
+        ball, ellipsoid(x, y, (EYE_X, EYE_Y + 0.3, EYE_Z + 5.6), (7.4, 7.4, 7.6)), 0.6
+    )
     z = z + (np.minimum(ball, z - 0.3) - z) * smooth_step((inside + 0.35) / 0.7)
     return z, inside
 
