@@ -10,8 +10,13 @@ point is the root of a quadratic, so there are no steps to be too long and no te
 import math
 
 import numpy as np
+import numpy.typing as npt
 
 from sssfit._jit import jit, jit_inline
+
+FloatArray = npt.NDArray[np.float64]
+Levels = npt.NDArray[np.int64]
+Vector = tuple[float, float, float]
 
 # Past the border of a cell, so that the next cell is the one that the ray has entered [mm].
 NUDGE_MM = 1e-7
@@ -19,7 +24,7 @@ START_LEVEL = 4
 
 
 @jit
-def fill_maxima(heights, levels, maxima):
+def fill_maxima(heights: FloatArray, levels: Levels, maxima: FloatArray) -> None:
     """Fill the pyramid; ``levels`` (L, 3) holds offset, rows, columns; level 0 is one cell each."""
     rows, columns = levels[0, 1], levels[0, 2]
     for i in range(rows):
@@ -39,7 +44,9 @@ def fill_maxima(heights, levels, maxima):
 
 
 @jit_inline
-def clip_axis(start, slope, end, near, far):
+def clip_axis(
+    start: float, slope: float, end: float, near: float, far: float
+) -> tuple[float, float]:
     """Shorten [near, far] to where 0 <= start + t slope <= end."""
     if slope == 0.0:
         return (near, far) if 0.0 <= start <= end else (1.0, 0.0)
@@ -48,7 +55,9 @@ def clip_axis(start, slope, end, near, far):
 
 
 @jit_inline
-def patch_root(heights, row, column, at, step, length):
+def patch_root(
+    heights: FloatArray, row: int, column: int, at: Vector, step: Vector, length: float
+) -> float:
     """First t in [0, length] where the ray is on or under the patch; -1 where it stays above.
 
     Height over the patch is f(t) = C + B t + A t^2, because the patch is a + b u + c v + e u v.
@@ -77,8 +86,18 @@ def patch_root(heights, row, column, at, step, length):
 
 
 @jit
-def first_hit(heights, levels, maxima, x, y, z, dx, dy, dz, near, far):
+def first_hit(
+    heights: FloatArray,
+    levels: Levels,
+    maxima: FloatArray,
+    start: Vector,
+    step: Vector,
+    near: float,
+    far: float,
+) -> float:
     """Parameter t [mm] in [near, far] of the first meeting; -1 where there is none."""
+    x, y, z = start
+    dx, dy, dz = step
     near, far = clip_axis(x, dx, heights.shape[1] - 1.0, near, far)
     near, far = clip_axis(y, dy, heights.shape[0] - 1.0, near, far)
     top = levels.shape[0] - 1
@@ -108,7 +127,7 @@ def first_hit(heights, levels, maxima, x, y, z, dx, dy, dz, near, far):
             level -= 1
         else:
             at = (x + t * dx, y + t * dy, z + t * dz)
-            root = patch_root(heights, row, column, at, (dx, dy, dz), end - t)
+            root = patch_root(heights, row, column, at, step, end - t)
             if root >= 0.0:
                 return t + root
             t = end
@@ -116,18 +135,19 @@ def first_hit(heights, levels, maxima, x, y, z, dx, dy, dz, near, far):
 
 
 @jit_inline
-def bilinear(values, x, y):
+def bilinear(values: FloatArray, x: float, y: float) -> float:
     """Value between nodes; x and y in cells."""
     column = min(max(int(x), 0), values.shape[1] - 2)
     row = min(max(int(y), 0), values.shape[0] - 2)
     u, v = x - column, y - row
     upper = values[row, column] * (1.0 - u) + values[row, column + 1] * u
     lower = values[row + 1, column] * (1.0 - u) + values[row + 1, column + 1] * u
-    return upper * (1.0 - v) + lower * v
+    value: float = upper * (1.0 - v) + lower * v
+    return value
 
 
 @jit_inline
-def slope_at(heights, row, column):
+def slope_at(heights: FloatArray, row: int, column: int) -> tuple[float, float]:
     """Central differences at a node [mm per cell]; one-sided at the border."""
     rows, columns = heights.shape
     left, right = max(column - 1, 0), min(column + 1, columns - 1)
@@ -138,8 +158,8 @@ def slope_at(heights, row, column):
 
 
 @jit_inline
-def normal_at(heights, spacing, x, y):
-    """Unit normal from the nodes' slopes, bilinear in between, so that no cell shows as a facet."""
+def normal_at(heights: FloatArray, spacing: float, x: float, y: float) -> Vector:
+    """Mix the unit normal from the nodes' slopes, bilinear in between, so that no cell shows as a facet."""
     column = min(max(int(x), 0), heights.shape[1] - 2)
     row = min(max(int(y), 0), heights.shape[0] - 2)
     u, v = x - column, y - row

@@ -42,9 +42,9 @@ def dot(a: Vector, b: Vector) -> float:
 def meet(field: Field, point: Vector, direction: Vector, near: float, far: float) -> float:
     """First meeting of a ray, all in mm, with a field; -1 where there is none."""
     heights, _, levels, maxima, x0, y0, spacing = field
-    x, y = (point[0] - x0) / spacing, (point[1] - y0) / spacing
-    dx, dy = direction[0] / spacing, direction[1] / spacing
-    return first_hit(heights, levels, maxima, x, y, point[2], dx, dy, direction[2], near, far)
+    start = ((point[0] - x0) / spacing, (point[1] - y0) / spacing, point[2])
+    step = (direction[0] / spacing, direction[1] / spacing, direction[2])
+    return first_hit(heights, levels, maxima, start, step, near, far)
 
 
 @jit_inline
@@ -79,8 +79,9 @@ def shine(normal: Vector, light: Vector, eye: Vector, exponent: float, face_on: 
         return 0.0
     cosine = max((dot(normal, light) + dot(normal, eye)) / length, 0.0)
     # E.H is half the length of E + L.
-    fresnel = face_on + (1.0 - face_on) * max(1.0 - 0.5 * length, 0.0) ** 5
-    return fresnel * (exponent + 8.0) / 8.0 * cosine**exponent
+    fresnel: float = face_on + (1.0 - face_on) * max(1.0 - 0.5 * length, 0.0) ** 5
+    bright: float = fresnel * (exponent + 8.0) / 8.0 * cosine**exponent
+    return bright
 
 
 @jit_inline
@@ -105,7 +106,7 @@ def light_point(
 
 @jit_inline
 def look(fine: Field, view: View, across: float, up: float) -> tuple[int, Vector, Vector]:
-    """Label, point and direction to the eye for a point of the picture, in pixels from its middle."""
+    """Label, point and direction to the eye; ``across`` and ``up`` in pixels from the middle."""
     pitch, distance, floor = view
     x, y = across * pitch, up * pitch
     length = math.sqrt(x * x + y * y + distance * distance)

@@ -103,18 +103,27 @@ def light_field(
     """
     from sssfit._jit.lit_field import light_rows
 
-    height, width = shape
     buffers = Buffers(
         np.full(shape, np.inf), np.zeros(shape, np.int32), np.zeros(shape), np.zeros(shape)
     )
-    outputs = (buffers.depth_mm, buffers.labels, buffers.irradiance, buffers.specular)
     tables = (fine.tables, (coarse or fine).tables)
     view = (float(mm_per_pixel), float(distance_mm), float(floor_mm))
     lamp = (lamps.key, lamps.fill, lamps.strengths, lamps.exponent, lamps.face_on)
 
     def band(first: int) -> None:
-        light_rows(*tables, view, lamp, smooth, (first, min(first + BAND, height)), *outputs)
+        rows = (first, min(first + BAND, shape[0]))
+        light_rows(
+            *tables,
+            view,
+            lamp,
+            smooth,
+            rows,
+            buffers.depth_mm,
+            buffers.labels,
+            buffers.irradiance,
+            buffers.specular,
+        )
 
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
-        list(pool.map(band, range(0, height, BAND)))
+        list(pool.map(band, range(0, shape[0], BAND)))
     return buffers

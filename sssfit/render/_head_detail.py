@@ -4,6 +4,8 @@ Each kind fades out before the grid gets too coarse for it: relief shorter than 
 come out as noise of the grid, not of the skin.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from sssfit.render._head_face import MOUTH_Y
@@ -71,8 +73,14 @@ def _brows(x: FloatArray, y: FloatArray, spacing_mm: float) -> FloatArray:
     return where * (4.0 + 5.0 * hairs)
 
 
-def _within(form, x: FloatArray, y: FloatArray, box, *more: float):
-    """A form on the columns and rows of its box only; what lies outside is 0 to 1e-6."""
+def _within(
+    form: Callable[..., FloatArray],
+    x: FloatArray,
+    y: FloatArray,
+    box: tuple[float, float, float, float],
+    *more: float,
+) -> FloatArray:
+    """Lay a form on the columns and rows of its box only; what lies outside is 0 to 1e-6."""
     left, right, low, high = box
     columns = np.flatnonzero((x[0] >= left) & (x[0] <= right))
     rows = np.flatnonzero((y[:, 0] >= low) & (y[:, 0] <= high))

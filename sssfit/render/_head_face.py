@@ -37,12 +37,12 @@ NOSE = np.array(
 )
 
 
-def pair(x, at, sigma):
-    """A Gaussian on either side: no crease where the halves meet."""
+def pair(x: FloatArray, at: float, sigma: float) -> FloatArray:
+    """Add a Gaussian on either side: no crease where the halves meet."""
     return gaussian(x - at, sigma) + gaussian(x + at, sigma)
 
 
-def planes(x, y):
+def planes(x: FloatArray, y: FloatArray) -> FloatArray:
     """Broad forms: what is added to the head before nose, eyes and mouth."""
     add = 5.0 * pair(x, 27.0, 15.0) * gaussian(y - 37.0 + 0.006 * (x - 24.0) ** 2, 6.0)
     add += 3.0 * gaussian(x, 10.0) * gaussian(y - 36.0, 8.0)
@@ -56,7 +56,7 @@ def planes(x, y):
     return add
 
 
-def nose(x, y, z):
+def nose(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
     """Bridge, tip, wings and nostrils on the surface z."""
     from scipy.interpolate import CubicSpline
 
@@ -65,8 +65,8 @@ def nose(x, y, z):
     z = z + np.maximum(stand, 0.0) * np.exp(-((x / width) ** 2))
     z = z + 7.0 * np.exp(-(np.hypot(x / 9.6, (y + 17.5) / 8.4) ** 2.6))
     # The wings are rounder than Gaussians; both, so that they meet without a crease.
-    for side in (-1.0, 1.0):
-        wing = np.hypot((x - side * 12.6) / 6.8, (y + 23.5) / 7.6)
+    for sign in (-1.0, 1.0):
+        wing = np.hypot((x - sign * 12.6) / 6.8, (y + 23.5) / 7.6)
         z = z + 9.0 * np.exp(-(wing**2.6))
     # The groove above and behind the wings, and the hole.
     behind = np.hypot((x - 12.0) / 1.0, (y + 24.0) / 1.05)
@@ -75,7 +75,7 @@ def nose(x, y, z):
     return z - 7.0 * np.exp(-(((x - 6.6) / 3.5) ** 2) - ((y + 29.0) / 2.3) ** 2)
 
 
-def mouth(x, y, z):
+def mouth(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
     """Philtrum, lips, the line between them and the corners."""
     philtrum = smooth_step((y + 50.0) / 6.0) * smooth_step((-33.0 - y) / 6.0)
     z = z + philtrum * (0.9 * gaussian(x - 5.0, 1.9) - 1.2 * gaussian(x, 2.6))
@@ -92,7 +92,7 @@ def mouth(x, y, z):
     return z - 2.2 * gaussian(x - 27.0, 3.5) * gaussian(t, 3.5)
 
 
-def fold(x, y, z):
+def fold(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
     """From the wings of the nose to beside the mouth."""
     along = np.clip((-22.0 - y) / 36.0, 0.0, 1.0)
     at = 20.0 + 14.5 * along**1.2
@@ -101,7 +101,7 @@ def fold(x, y, z):
     return z + fade * (1.3 * gaussian(d - 6.0, 5.0) - 1.1 * gaussian(d, 2.6))
 
 
-def eye(x, y, z):
+def eye(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Socket, lids and the ball between them; also how far inside the lids' opening a point is."""
     u, v = x - EYE_X, y - EYE_Y
     z = z - 10.0 * np.exp(-((u / 18.0) ** 2) - ((v - 1.0) / 12.0) ** 2)
@@ -128,7 +128,7 @@ def eye(x, y, z):
     return z, inside
 
 
-def face(x, y):
+def face(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Heights [mm] of the smooth head, and where the eyes are (above 0)."""
     half = np.abs(x)
     z = shape(x, y)

@@ -5,11 +5,16 @@ the face's front. Sizes are those of an adult: crown to chin 232 mm, cheekbone t
 """
 
 import functools
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicSpline
+
 FloatArray = npt.NDArray[np.float64]
+Outline = tuple[tuple[float, float, float, float], ...]
 
 # Behind this there is nothing to see.
 FLOOR_MM = -150.0
@@ -62,7 +67,7 @@ def smooth_step(t: FloatArray) -> FloatArray:
 
 
 @functools.cache
-def _curves(outline: tuple[tuple[float, ...], ...], smooth_mm: float):
+def _curves(outline: Outline, smooth_mm: float) -> "list[CubicSpline[np.float64]]":
     """Squared half width, squared depth and z of the sides as smooth functions of y."""
     from scipy.interpolate import CubicSpline, PchipInterpolator
     from scipy.ndimage import gaussian_filter1d
@@ -80,7 +85,9 @@ def _curves(outline: tuple[tuple[float, ...], ...], smooth_mm: float):
     return curves
 
 
-def loft(outline, x: FloatArray, y: FloatArray, power: float, smooth_mm: float) -> FloatArray:
+def loft(
+    outline: Outline, x: FloatArray, y: FloatArray, power: float, smooth_mm: float
+) -> FloatArray:
     """Heights of slices |x / w|^p + |(z - side) / depth|^p = 1; a cliff outside them."""
     known = np.clip(y, min(knot[0] for knot in outline) - 15.0, outline[0][0] + 15.0)
     squares, depths, sides = (curve(known) for curve in _curves(outline, smooth_mm))
@@ -89,7 +96,9 @@ def loft(outline, x: FloatArray, y: FloatArray, power: float, smooth_mm: float) 
     depth = np.sqrt(np.maximum(depths, 0.0))
     across = np.abs(x) / np.maximum(width, 1e-3)
     inside = np.maximum(1.0 - across**power, 0.0) ** (1.0 / power)
-    return sides + depth * inside - 40.0 * np.maximum(np.abs(x) - width, 0.0)
+    front: FloatArray = sides + depth * inside
+    cliff: FloatArray = 40.0 * np.maximum(np.abs(x) - width, 0.0)
+    return front - cliff
 
 
 def gaussian(d: FloatArray, sigma: float) -> FloatArray:
@@ -107,7 +116,7 @@ def ellipsoid(
 
 
 def ear(x: FloatArray, y: FloatArray) -> FloatArray:
-    """A slab with a rim, a bowl and a lobe, standing off the head's side."""
+    """Shape a slab with a rim, a bowl and a lobe, standing off the head's side."""
     # Tilted back at the top, as ears are.
     v = y - 3.0
     u = x - 75.5 - 0.16 * v

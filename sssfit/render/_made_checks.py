@@ -9,12 +9,10 @@ MAX_PIXELS = 400_000_000
 
 
 def check_size(name: str, height: int, width: int, mm_per_pixel: float) -> None:
-    """Rows and columns of at least one pixel, pixels of some size."""
+    """Refuse pictures without pixels, pixels without size and pictures past memory."""
     for word, value in (("height", height), ("width", width)):
         if value != int(value) or value < 1:
-            raise RenderError(
-                f"{name}: {word} = {value}; expected a whole number of pixels from 1."
-            )
+            raise RenderError(f"{name}: {word} = {value}; expected a whole number from 1.")
     if height * width > MAX_PIXELS:
         raise RenderError(
             f"{name}: {width} x {height} pixels would take {height * width * 8e-9:.1f} GB a buffer; "
@@ -24,19 +22,19 @@ def check_size(name: str, height: int, width: int, mm_per_pixel: float) -> None:
 
 
 def check_above(name: str, option: str, value: float, least: float) -> None:
-    """A finite number above ``least``."""
+    """Refuse all but a finite number above ``least``."""
     if not (math.isfinite(value) and value > least):
         raise RenderError(f"{name}: {option} = {value:g}; expected a number above {least:g}.")
 
 
 def check_range(name: str, option: str, value: float, low: float, high: float) -> None:
-    """A number from ``low`` to ``high``."""
+    """Refuse all but a number from ``low`` to ``high``."""
     if not low <= value <= high:
         raise RenderError(f"{name}: {option} = {value:g}; expected {low:g} to {high:g}.")
 
 
 def check_finite(name: str, option: str, value: float) -> None:
-    """Any number that is one."""
+    """Refuse NaN and infinity."""
     if not math.isfinite(value):
         raise RenderError(f"{name}: {option} = {value:g}; expected a finite number.")
 
@@ -46,6 +44,6 @@ def check_period(name: str, period_mm: float, mm_per_pixel: float) -> None:
     check_above(name, "period_mm", period_mm, 0.0)
     if period_mm < 2.0 * mm_per_pixel:
         raise RenderError(
-            f"{name}: period_mm = {period_mm:g} is under two pixels of {mm_per_pixel:g} mm; expected "
-            f"{2.0 * mm_per_pixel:g} or more, or smaller pixels."
+            f"{name}: period_mm = {period_mm:g} is under two pixels of {mm_per_pixel:g} mm; "
+            f"expected {2.0 * mm_per_pixel:g} or more, or smaller pixels."
         )

@@ -11,7 +11,7 @@ FloatArray = npt.NDArray[np.float64]
 
 def middle_out(pixels: int) -> FloatArray:
     """Coordinates of pixel centres from the middle of the picture, in pixels."""
-    return np.arange(pixels) - 0.5 * (pixels - 1)
+    return np.arange(pixels, dtype=np.float64) - 0.5 * (pixels - 1)
 
 
 def _quarter(x: FloatArray, y: FloatArray, radius: float) -> FloatArray:
@@ -62,7 +62,8 @@ def half_plane_coverage(distance: FloatArray, angle_degrees: float) -> FloatArra
     # Where s = 0 there are no corners: depth / s is not used, so 1 will do.
     corner = depth * (depth / (s or 1.0)) / (2.0 * c)
     corner = np.where(distance > 0.0, 1.0 - corner, corner)
-    return np.where(np.abs(distance) < 0.5 * (c - s), 0.5 + distance / c, corner)
+    area: FloatArray = np.where(np.abs(distance) < 0.5 * (c - s), 0.5 + distance / c, corner)
+    return area
 
 
 def disk(*, height: int, width: int, mm_per_pixel: float, radius_mm: float | None = None) -> Scene:

@@ -56,10 +56,12 @@ def highlights(
     reach = int(np.ceil(radius_mm / mm_per_pixel)) + 1
     for _ in range(count):
         row, column = int(draws.integers(height)), int(draws.integers(width))
-        rows = np.arange(max(row - reach, 0), min(row + reach + 1, height))
-        columns = np.arange(max(column - reach, 0), min(column + reach + 1, width))
-        spot = disk_coverage(columns - column + 0.0, rows - row + 0.0, radius_mm / mm_per_pixel)
-        part = np.ix_(rows, columns)
+        rows = np.arange(max(row - reach, 0), min(row + reach + 1, height), dtype=np.float64)
+        columns = np.arange(
+            max(column - reach, 0), min(column + reach + 1, width), dtype=np.float64
+        )
+        spot = disk_coverage(columns - column, rows - row, radius_mm / mm_per_pixel)
+        part = np.ix_(rows.astype(int), columns.astype(int))
         covered[part] = np.maximum(covered[part], spot)
     light = BASE + (HIGHLIGHT - BASE) * covered
     return Scene("highlights", light[..., None], mm_per_pixel)

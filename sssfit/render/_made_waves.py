@@ -10,7 +10,7 @@ from sssfit.render.scene import Scene
 def wave(phase: FloatArray, across: float, along: float) -> FloatArray:
     """(1 + cos(2 pi phase)) / 2, averaged over pixels ``across`` and ``along`` periods wide.
 
-    The average of a cosine over a box is the cosine times sinc of the box in periods; one axis each.
+    Averaged over a box, a cosine is multiplied by the sinc of the box in periods, once an axis.
     """
     contrast = float(np.sinc(across) * np.sinc(along))
     return 0.5 + 0.5 * contrast * np.cos(2.0 * np.pi * phase)

@@ -27,7 +27,7 @@ def whole_face_mm_per_pixel(height: int, width: int) -> float:
 
 
 def _toward(side_degrees: float, up_degrees: float) -> tuple[float, float, float]:
-    """Unit vector that many degrees to the left of the view axis and above it."""
+    """Return the unit vector that many degrees to the left of the view axis and above it."""
     side, up = math.radians(side_degrees), math.radians(up_degrees)
     return -math.sin(side) * math.cos(up), math.sin(up), math.cos(side) * math.cos(up)
 
