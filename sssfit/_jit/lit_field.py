@@ -1,0 +1,177 @@
+"""A height field seen in perspective under a sharp key light: the buffers of a range of rows.
+
+The eye is at (0, 0, distance) over the field's origin and looks down; a pixel is ``mm_per_pixel``
+wide on the plane z = 0. The key light is directional: a point is lit if the ray toward it meets
+nothing. Five samples a pixel (its centre and four rooks), and sixteen more where they disagree
+about what is seen or lit, so that the edges of shadows have no steps.
+
+A field is the tuple (heights, inner, levels, maxima, x0, y0, spacing): ``inner`` is above 0 where
+an object of its own, label 2, lies in the surface of label 1. A view is (mm_per_pixel, distance,
+floor): what lies below the floor is background. A lamp is (direction to the key light, to the fill
+light, their strengths and the ambient light's, exponent, reflectance at normal incidence).
+"""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit._jit import jit, jit_inline
+from sssfit._jit.heightfield import bilinear, clip_axis, first_hit, normal_at
+
+FloatArray = npt.NDArray[np.float64]
+Vector = tuple[float, float, float]
+Field = tuple[FloatArray, FloatArray, npt.NDArray[np.int64], FloatArray, float, float, float]
+View = tuple[float, float, float]
+Lamp = tuple[Vector, Vector, Vector, float, float]
+
+# Clear of the patch that the light's ray starts on [mm]; the finest cells are 0.02 mm and more.
+LIFT_MM = 1e-3
+# Rooks: no two in a row or a column, so edges along either axis have five steps, not three.
+FIRST = np.array([(0.5, 0.5), (0.1, 0.3), (0.7, 0.1), (0.9, 0.7), (0.3, 0.9)])
+MORE = np.array([((i % 4 + 0.5) / 4.0, (i // 4 + 0.5) / 4.0) for i in range(16)])
+
+
+@jit_inline
+def dot(a: Vector, b: Vector) -> float:
+    """Scalar product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@jit_inline
+def meet(field: Field, point: Vector, direction: Vector, near: float, far: float) -> float:
+    """First meeting of a ray, all in mm, with a field; -1 where there is none."""
+    heights, _, levels, maxima, x0, y0, spacing = field
+    start = ((point[0] - x0) / spacing, (point[1] - y0) / spacing, point[2])
+    step = (direction[0] / spacing, direction[1] / spacing, direction[2])
+    return first_hit(heights, levels, maxima, start, step, near, far)
+
+
+@jit_inline
+def leaves(field: Field, point: Vector, direction: Vector, near: float) -> float:
+    """Where a ray from inside leaves the field's rectangle."""
+    heights, _, _, _, x0, y0, spacing = field
+    start, slope = (point[0] - x0) / spacing, direction[0] / spacing
+    near, far = clip_axis(start, slope, heights.shape[1] - 1.0, near, 1e9)
+    start, slope = (point[1] - y0) / spacing, direction[1] / spacing
+    near, far = clip_axis(start, slope, heights.shape[0] - 1.0, near, far)
+    return far
+
+
+@jit_inline
+def in_shadow(fine: Field, coarse: Field, point: Vector, light: Vector) -> bool:
+    """Whether the ray toward the light meets the fine field or, further on, the coarse one."""
+    if meet(fine, point, light, LIFT_MM, 1e9) >= 0.0:
+        return True
+    near = max(leaves(fine, point, light, LIFT_MM), LIFT_MM)
+    return meet(coarse, point, light, near, 1e9) >= 0.0
+
+
+@jit_inline
+def shine(normal: Vector, light: Vector, eye: Vector, exponent: float, face_on: float) -> float:
+    """Blinn and Phong's highlight, times pi: the exitance of a matt surface as bright.
+
+    pi F (n + 8) / (8 pi) (N.H)^n, with Schlick's F = F0 + (1 - F0) (1 - E.H)^5 (Akenine-Moller,
+    Haines, Hoffman 2008, "Real-Time Rendering", chapter 7).
+    """
+    length = math.sqrt(2.0 + 2.0 * dot(light, eye))
+    if length == 0.0:
+        return 0.0
+    cosine = max((dot(normal, light) + dot(normal, eye)) / length, 0.0)
+    # E.H is half the length of E + L.
+    fresnel: float = face_on + (1.0 - face_on) * max(1.0 - 0.5 * length, 0.0) ** 5
+    bright: float = fresnel * (exponent + 8.0) / 8.0 * cosine**exponent
+    return bright
+
+
+@jit_inline
+def light_point(
+    fine: Field, coarse: Field, point: Vector, eye: Vector, lamp: Lamp
+) -> tuple[float, float, bool]:
+    """Irradiance and highlight of a point, and whether the key light is blocked."""
+    key, fill, strengths, exponent, face_on = lamp
+    x, y = (point[0] - fine[4]) / fine[6], (point[1] - fine[5]) / fine[6]
+    normal = normal_at(fine[0], fine[6], x, y)
+    weak = strengths[1] * max(dot(normal, fill), 0.0)
+    # The ambient light is a sky: twice as strong on what looks up as on what looks ahead.
+    irradiance = weak + strengths[2] * 0.5 * (1.0 + normal[1])
+    highlight = weak * shine(normal, fill, eye, exponent, face_on)
+    cosine = dot(normal, key)
+    if cosine <= 0.0 or in_shadow(fine, coarse, point, key):
+        return irradiance, highlight, True
+    irradiance += strengths[0] * cosine
+    highlight += strengths[0] * cosine * shine(normal, key, eye, exponent, face_on)
+    return irradiance, highlight, False
+
+
+@jit_inline
+def look(fine: Field, view: View, across: float, up: float) -> tuple[int, Vector, Vector]:
+    """Label, point and direction to the eye; ``across`` and ``up`` in pixels from the middle."""
+    pitch, distance, floor = view
+    x, y = across * pitch, up * pitch
+    length = math.sqrt(x * x + y * y + distance * distance)
+    ray = (x / length, y / length, -distance / length)
+    back = (-ray[0], -ray[1], -ray[2])
+    t = meet(fine, (0.0, 0.0, distance), ray, 0.0, 1e9)
+    point = (t * ray[0], t * ray[1], distance + t * ray[2])
+    if t < 0.0 or point[2] < floor:
+        return 0, point, back
+    inner = bilinear(fine[1], (point[0] - fine[4]) / fine[6], (point[1] - fine[5]) / fine[6])
+    return (2 if inner > 0.0 else 1), point, back
+
+
+@jit
+def gather(
+    fine: Field,
+    coarse: Field,
+    view: View,
+    lamp: Lamp,
+    corner: tuple[float, float],
+    samples: FloatArray,
+    label: int,
+) -> tuple[int, float, float, bool]:
+    """Count, irradiance and highlight of the samples that see ``label``; whether all agree."""
+    count, irradiance, highlight, blocked = 0, 0.0, 0.0, 0
+    for k in range(samples.shape[0]):
+        across, up = corner[0] + samples[k, 0], corner[1] - samples[k, 1]
+        seen, point, eye = look(fine, view, across, up)
+        if seen == label:
+            e, h, shadow = light_point(fine, coarse, point, eye, lamp)
+            count += 1
+            irradiance += e
+            highlight += h
+            blocked += shadow
+    agree = count == samples.shape[0] and (blocked == 0 or blocked == count)
+    return count, irradiance, highlight, agree
+
+
+@jit
+def light_rows(
+    fine: Field,
+    coarse: Field,
+    view: View,
+    lamp: Lamp,
+    smooth: bool,
+    rows: tuple[int, int],
+    depth: FloatArray,
+    labels: npt.NDArray[np.int32],
+    irradiance: FloatArray,
+    specular: FloatArray,
+) -> None:
+    """Fill a range of rows of the buffers; one sample a pixel, its centre, if not ``smooth``."""
+    height, width = depth.shape
+    for i in range(rows[0], rows[1]):
+        for j in range(width):
+            corner = (j - 0.5 * width, 0.5 * height - i)
+            label, point, _ = look(fine, view, corner[0] + 0.5, corner[1] - 0.5)
+            if label == 0:
+                continue
+            labels[i, j] = label
+            depth[i, j] = view[1] - point[2]
+            first = FIRST if smooth else FIRST[:1]
+            count, e, h, agree = gather(fine, coarse, view, lamp, corner, first, label)
+            if smooth and not agree:
+                more, f, g, _ = gather(fine, coarse, view, lamp, corner, MORE, label)
+                count, e, h = count + more, e + f, h + g
+            irradiance[i, j] = e / count
+            specular[i, j] = h / count

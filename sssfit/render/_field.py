@@ -1,0 +1,129 @@
+"""A height field with what rays need to meet it quickly; lit by threads, a band of rows each."""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+
+# Rows that a thread takes at a time: the head is in the middle of the picture, so bands are thin.
+BAND = 16
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeightField:
+    """Heights on nodes, bilinear in between.
+
+    Parameters
+    ----------
+    heights : array (rows, columns) [mm]
+        Of the nodes, toward the eye; rows go up, columns to the right.
+    x0_mm, y0_mm : float [mm]
+        Where the first node is.
+    spacing_mm : float [mm]
+        Between nodes, the same along rows and columns.
+    inner : array (rows, columns), optional
+        Above 0 where an object of its own (label 2) lies in the surface; without it all is label 1.
+    """
+
+    heights: FloatArray
+    x0_mm: float
+    y0_mm: float
+    spacing_mm: float
+    inner: FloatArray | None = None
+    tables: tuple[Any, ...] = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        heights = np.ascontiguousarray(self.heights, dtype=np.float64)
+        inner = np.full_like(heights, -1.0) if self.inner is None else self.inner
+        inner = np.ascontiguousarray(inner, dtype=np.float64)
+        levels, maxima = _pyramid(heights)
+        place = (float(self.x0_mm), float(self.y0_mm), float(self.spacing_mm))
+        object.__setattr__(self, "tables", (heights, inner, levels, maxima, *place))
+
+
+def _pyramid(heights: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
+    """Offset, rows and columns of each level, and the maxima of them all in one array."""
+    from sssfit._jit.heightfield import fill_maxima
+
+    rows, columns = heights.shape[0] - 1, heights.shape[1] - 1
+    levels, offset = [], 0
+    while True:
+        levels.append((offset, rows, columns))
+        offset += rows * columns
+        if rows == 1 and columns == 1:
+            break
+        rows, columns = (rows + 1) // 2, (columns + 1) // 2
+    table, maxima = np.array(levels, dtype=np.int64), np.empty(offset)
+    fill_maxima(heights, table, maxima)
+    return table, maxima
+
+
+@dataclass(frozen=True, slots=True)
+class Lamps:
+    """Light on a field: directions point to the light, strengths are irradiance face on."""
+
+    key: tuple[float, float, float]
+    fill: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    strengths: tuple[float, float, float] = (1.0, 0.0, 0.0)
+    exponent: float = 20.0
+    face_on: float = 0.028
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Buffers:
+    """What the eye sees: (H, W) each; depth inf, label 0 and no light on the background."""
+
+    depth_mm: FloatArray
+    labels: npt.NDArray[np.int32]
+    irradiance: FloatArray
+    specular: FloatArray
+
+
+def light_field(
+    fine: HeightField,
+    lamps: Lamps,
+    *,
+    shape: tuple[int, int],
+    mm_per_pixel: float,
+    distance_mm: float,
+    floor_mm: float,
+    coarse: HeightField | None = None,
+    smooth: bool = True,
+    threads: int | None = None,
+) -> Buffers:
+    """Light a field under a perspective view from ``distance_mm`` above its origin.
+
+    ``coarse`` casts shadows from outside the fine field. ``smooth`` averages several samples a
+    pixel; without it a pixel is what its centre sees.
+    """
+    from sssfit._jit.lit_field import light_rows
+
+    buffers = Buffers(
+        np.full(shape, np.inf), np.zeros(shape, np.int32), np.zeros(shape), np.zeros(shape)
+    )
+    tables = (fine.tables, (coarse or fine).tables)
+    view = (float(mm_per_pixel), float(distance_mm), float(floor_mm))
+    lamp = (lamps.key, lamps.fill, lamps.strengths, lamps.exponent, lamps.face_on)
+
+    def band(first: int) -> None:
+        rows = (first, min(first + BAND, shape[0]))
+        light_rows(
+            *tables,
+            view,
+            lamp,
+            smooth,
+            rows,
+            buffers.depth_mm,
+            buffers.labels,
+            buffers.irradiance,
+            buffers.specular,
+        )
+
+    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+        list(pool.map(band, range(0, shape[0], BAND)))
+    return buffers

@@ -1,0 +1,49 @@
+"""Checks that the made pictures share: one line each, with what arrived and what to do."""
+
+import math
+
+from sssfit.errors import RenderError
+
+# 20000 x 20000 pixels: 3.2 GB for one channel of float64.
+MAX_PIXELS = 400_000_000
+
+
+def check_size(name: str, height: int, width: int, mm_per_pixel: float) -> None:
+    """Refuse pictures without pixels, pixels without size and pictures past memory."""
+    for word, value in (("height", height), ("width", width)):
+        if value != int(value) or value < 1:
+            raise RenderError(f"{name}: {word} = {value}; expected a whole number from 1.")
+    if height * width > MAX_PIXELS:
+        raise RenderError(
+            f"{name}: {width} x {height} pixels would take {height * width * 8e-9:.1f} GB a buffer; "
+            f"make it smaller than {MAX_PIXELS:.0e} pixels."
+        )
+    check_above(name, "mm_per_pixel", mm_per_pixel, 0.0)
+
+
+def check_above(name: str, option: str, value: float, least: float) -> None:
+    """Refuse all but a finite number above ``least``."""
+    if not (math.isfinite(value) and value > least):
+        raise RenderError(f"{name}: {option} = {value:g}; expected a number above {least:g}.")
+
+
+def check_range(name: str, option: str, value: float, low: float, high: float) -> None:
+    """Refuse all but a number from ``low`` to ``high``."""
+    if not low <= value <= high:
+        raise RenderError(f"{name}: {option} = {value:g}; expected {low:g} to {high:g}.")
+
+
+def check_finite(name: str, option: str, value: float) -> None:
+    """Refuse NaN and infinity."""
+    if not math.isfinite(value):
+        raise RenderError(f"{name}: {option} = {value:g}; expected a finite number.")
+
+
+def check_period(name: str, period_mm: float, mm_per_pixel: float) -> None:
+    """No pixels can show a period of less than two of them (Nyquist)."""
+    check_above(name, "period_mm", period_mm, 0.0)
+    if period_mm < 2.0 * mm_per_pixel:
+        raise RenderError(
+            f"{name}: period_mm = {period_mm:g} is under two pixels of {mm_per_pixel:g} mm; "
+            f"expected {2.0 * mm_per_pixel:g} or more, or smaller pixels."
+        )

@@ -1,0 +1,121 @@
+"""A lit head: a face-like height field of real size, seen in perspective under a sharp light.
+
+Its forms are in `_head_shape` and `_head_face`, its fine relief in `_head_detail`; `_field` lights
+it. Grey: what arrives at the surface, not what a painted face sends back. Nothing is measured from
+a person.
+"""
+
+import math
+import os
+
+from sssfit.render._field import Lamps, light_field
+from sssfit.render._head_shape import FLOOR_MM
+from sssfit.render._head_surface import COARSE_MM, bust, seen_part
+from sssfit.render._made_checks import check_above, check_range, check_size
+from sssfit.render.scene import Scene
+
+# Of the picture that holds the face with a margin, around its middle [mm].
+FACE_HEIGHT_MM, FACE_WIDTH_MM = 210.0, 165.0
+# The tip of the nose stands out 22 mm; nearer than this the ears are no longer seen.
+MIN_DISTANCE_MM = 100.0
+
+
+def whole_face_mm_per_pixel(height: int, width: int) -> float:
+    """Smallest ``mm_per_pixel`` at which the face, chin to hairline and cheek to cheek, fits."""
+    check_size("head", height, width, 1.0)
+    return max(FACE_HEIGHT_MM / height, FACE_WIDTH_MM / width)
+
+
+def _toward(side_degrees: float, up_degrees: float) -> tuple[float, float, float]:
+    """Return the unit vector that many degrees to the left of the view axis and above it."""
+    side, up = math.radians(side_degrees), math.radians(up_degrees)
+    return -math.sin(side) * math.cos(up), math.sin(up), math.cos(side) * math.cos(up)
+
+
+def head_scene(
+    *,
+    height: int,
+    width: int,
+    mm_per_pixel: float,
+    distance_mm: float = 600.0,
+    light_degrees: float = 45.0,
+    light_up_degrees: float = 35.0,
+    fill: float = 0.06,
+    ambient: float = 0.05,
+    detail_mm: float = 0.1,
+    smooth: bool = True,
+    threads: int | None = None,
+) -> Scene:
+    """Light the head and look at it.
+
+    Parameters
+    ----------
+    height, width : int
+        Pixels. The middle of the picture is between nose and eyes; what does not fit is cut off.
+    mm_per_pixel : float [mm]
+        Of the plane at ``distance_mm``, which goes through the front of the cheeks: the tip of the
+        nose is 22 mm before it, the ears are 80 mm behind.
+    distance_mm : float [mm]
+        From the eye to that plane, 100 or more.
+    light_degrees : float [degrees]
+        How far to the left of the view axis the key light is, -85 to 85.
+    light_up_degrees : float [degrees]
+        How far above, -85 to 85. Face on, the key light gives an irradiance of 1.
+    fill, ambient : float
+        Irradiance of a weak light from the other side and of a sky above; neither casts shadows.
+    detail_mm : float [mm]
+        Depth of a pore, 0 to 0.5; wrinkles, lips and brows go with it. Relief finer than three
+        nodes of the grid (2.25 pixels) is left out.
+    smooth : bool
+        Average 5 to 21 samples a pixel; without it a pixel is what its centre sees.
+    threads : int, optional
+        All cores by default. The result does not depend on it.
+
+    Returns
+    -------
+    Scene
+        Irradiance averaged over what the pixel shows of its own object, specular (a highlight of
+        Blinn and Phong, as exitance of a matt surface as bright), depth of the pixel's centre, and
+        mask: 1 skin, 2 eyeballs, 0 background, where there is no light and depth is inf.
+
+    Raises
+    ------
+    RenderError
+        A value out of its range.
+    """
+    check_size("head", height, width, mm_per_pixel)
+    check_range("head", "distance_mm", distance_mm, MIN_DISTANCE_MM, 1e6)
+    for option, degrees in (
+        ("light_degrees", light_degrees),
+        ("light_up_degrees", light_up_degrees),
+    ):
+        check_range("head", option, degrees, -85.0, 85.0)
+    for option, light in (("fill", fill), ("ambient", ambient)):
+        check_range("head", option, light, 0.0, 1.0)
+    check_range("head", "detail_mm", detail_mm, 0.0, 0.5)
+    if threads is not None:
+        check_above("head", "threads", threads, 0)
+    cores = threads or os.cpu_count() or 1
+    view = (height, width, mm_per_pixel, distance_mm)
+    fine, whole = seen_part(*view, detail_mm, cores)
+    opposite = _toward(-0.8 * light_degrees, 0.3 * light_up_degrees)
+    seen = light_field(
+        fine,
+        Lamps(_toward(light_degrees, light_up_degrees), opposite, (1.0, fill, ambient)),
+        shape=(height, width),
+        mm_per_pixel=mm_per_pixel,
+        distance_mm=distance_mm,
+        floor_mm=FLOOR_MM,
+        coarse=None if whole else bust(COARSE_MM, 0.0, cores),
+        smooth=smooth,
+        threads=cores,
+    )
+    return Scene(
+        "head",
+        seen.irradiance[..., None],
+        mm_per_pixel,
+        distance_mm=distance_mm,
+        depth_mm=seen.depth_mm,
+        mask=seen.labels,
+        specular=seen.specular[..., None],
+    )
