@@ -39,11 +39,18 @@ _OPTIONS = (
         help="edge, stripes: the direction of their normal.  [default: 0]",
     ),
     click.option(
+        "--radius",
+        "radius_mm",
+        type=Length(),
+        metavar="MM",
+        help="disk, highlights: of the disk, of a spot.",
+    ),
+    click.option(
         "--period",
         "period_mm",
         type=Length(),
         metavar="MM",
-        help="stripes: length of a period.",
+        help="stripes, separable: length of a period.",
     ),
     click.option(
         "--spacing",

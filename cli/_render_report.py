@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from ._report import table
+from ._report import percent, table
 
 if TYPE_CHECKING:
     from sssfit.compare.judge import Judgement
@@ -67,7 +67,7 @@ def _measured(figures: Mapping[str, Any]) -> list[str]:
     if figures["ssim"] is not None:
         lines.append(f"  SSIM {figures['ssim']:.4f}, FLIP {figures['flip']:.4f}")
     rows = [
-        [name, f"{100.0 * drift:+.3g} %", f"{asymmetry:.3g}"]
+        [name, percent(drift), f"{asymmetry:.3g}"]
         for name, drift, asymmetry in zip(
             figures["channels"], figures["energy_drift"], figures["radial_asymmetry"], strict=True
         )

@@ -76,6 +76,11 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(lines)
 
 
+def percent(share: float, digits: str = "+.2g") -> str:
+    """Write a share in percent; rounding of a sum of pixels is 0."""
+    return "0 %" if abs(share) < 1e-12 else f"{100.0 * share:{digits}} %"
+
+
 def _plain(value: Any) -> Any:
     """Arrays to lists, paths to text, and what JSON cannot hold (NaN, inf) to null."""
     if isinstance(value, Mapping):

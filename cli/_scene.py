@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -63,7 +64,7 @@ def make_or_read(picture: Picture, mm_per_pixel: float, common: Common) -> Scene
 
 
 def _made(picture: Picture, mm_per_pixel: float, common: Common) -> Scene:
-    from sssfit.render.irradiance import make_scene
+    from sssfit.render.irradiance import make_scene, options_of
 
     if picture.mm_per_pixel is not None:
         raise click.UsageError(
@@ -71,8 +72,8 @@ def _made(picture: Picture, mm_per_pixel: float, common: Common) -> Scene:
             "kernel's pixels."
         )
     height, width = picture.size or _default_size(picture, mm_per_pixel, common)
-    own = {key: value for key, value in picture.own.items() if value is not None}
-    if picture.irradiance == "noise":
+    own = dict(picture.own)
+    if "seed" in options_of(picture.irradiance):
         own["seed"] = common.seed
     return make_scene(
         picture.irradiance, height=height, width=width, mm_per_pixel=mm_per_pixel, **own
@@ -83,9 +84,10 @@ def _default_size(picture: Picture, mm_per_pixel: float, common: Common) -> tupl
     """512 x 512; for a head as many rows as it takes, up to 1080."""
     if picture.irradiance != "head":
         return _ROWS, _ROWS
-    from sssfit.render.head import rows_for_face
+    from sssfit.render.head import whole_face_mm_per_pixel
 
-    wanted = rows_for_face(mm_per_pixel)
+    # The face takes the more rows, the smaller a pixel.
+    wanted = math.ceil(whole_face_mm_per_pixel(1, 1) / mm_per_pixel)
     if wanted > _MOST_ROWS:
         say(
             common,

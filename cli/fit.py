@@ -10,7 +10,7 @@ import click
 from ._fit_options import fit_options
 from ._fits import FITS, fit_lines, own_settings
 from ._options import Common, Length, common_options
-from ._report import binary_stdin, binary_stdout, finish, newest, table
+from ._report import binary_stdin, binary_stdout, finish, newest, percent, table
 
 if TYPE_CHECKING:
     from sssfit.fit import FitResult
@@ -177,8 +177,8 @@ def _text(result: FitResult, figures: dict[str, Any]) -> str:
     rows = [
         [
             channel,
-            _percent(kernel.relative_frobenius_error[c], ".3g"),
-            _percent(kernel.energy_error[c], "+.2g"),
+            percent(kernel.relative_frobenius_error[c], ".3g"),
+            percent(kernel.energy_error[c], "+.2g"),
             f"{kernel.energy[c]:.6f}",
             result.stop_reasons[c],
         ]
@@ -187,8 +187,3 @@ def _text(result: FitResult, figures: dict[str, Any]) -> str:
     heads = ["channel", "Frobenius error", "energy error", "energy", "ended"]
     wrote = "the kernel to stdout" if figures["output"] == ["-"] else figures["output"][0]
     return "\n".join([head, table(heads, rows), f"Wrote {wrote}"])
-
-
-def _percent(share: float, digits: str) -> str:
-    """Write a share in percent; rounding of a sum of pixels is 0."""
-    return "0 %" if abs(share) < 1e-12 else f"{100.0 * share:{digits}} %"

@@ -174,7 +174,8 @@ def _write(
     common: Common,
 ) -> None:
     """Write the picture, and the truth and the difference where they are wanted."""
-    from sssfit.image import save_image
+    from sssfit.compare.metrics import auto_exposure
+    from sssfit.image import image_format, save_image
 
     pictures = {"picture": result.picture}
     if result.truth is not None:
@@ -182,11 +183,12 @@ def _write(
     settings: dict[str, Any] = {
         "channels": kernel.channels,
         "mm_per_pixel": kernel.mm_per_pixel,
-        "exposure": result.score.exposure if result.score else exposure or 1.0,
     }
     if "picture" not in targets:
         save_image(binary_stdout(), result.picture, format="exr", **settings)
         binary_stdout().flush()
+    shown = exposure or (result.score.exposure if result.score else auto_exposure(result.picture))
     for what, path in targets.items():
-        for note in save_image(path, pictures[what], **settings):
+        factor = shown if image_format(path) == "png" else 1.0
+        for note in save_image(path, pictures[what], exposure=factor, **settings):
             say(common, f"{path}: {note}")

@@ -8,11 +8,9 @@ from sssfit.errors import RenderError
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
-# Rows of the matrix from linear sRGB to XYZ: the luminance of ITU-R BT.709.
-LUMINANCE = (0.2126, 0.7152, 0.0722)
-# Below 1 so that the red of lit skin, some 1.25 times its luminance, is not clipped.
-AUTO_LUMINANCE = 0.8
-AUTO_PERCENTILE = 99.0
+# The largest channel and not the luminance: red is 1.7 times the luminance of skin1, and with that
+# at 0.8 all of the red that light has left would have been cut off.
+AUTO_VALUE, AUTO_PERCENTILE = 0.8, 99.0
 
 
 def check_pair(image: npt.ArrayLike, truth: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -61,15 +59,15 @@ def selected_pixels(picture: FloatArray, selected: BoolArray) -> FloatArray:
 
 
 def auto_exposure(truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> float:
-    """Return the factor that brings the 99th percentile of luminance to 0.8.
+    """Return the factor that brings the 99th percentile of the largest channel to 0.8.
 
-    It depends on the truth alone, so that every picture held against it is seen alike. Dark pixels
-    (luminance 0 or less) are left out: a small lit object is exposed as if it filled the picture.
+    It depends on the truth alone, so that every picture held against it is seen alike. Black
+    pixels are left out: a small lit object is exposed as if it filled the picture.
 
     Parameters
     ----------
     truth : array (H, W, C)
-        Linear light. Luminance is that of sRGB for three channels, else their mean.
+        Linear light.
     mask : array (H, W), optional
         Only pixels above 0 count.
 
@@ -85,13 +83,11 @@ def auto_exposure(truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> fl
 
 def exposure_of(pixels: FloatArray) -> float:
     """Return `auto_exposure` of pixels (N, C)."""
-    channels = pixels.shape[-1]
-    weights = np.array(LUMINANCE) if channels == 3 else np.full(channels, 1.0 / channels)
-    luminance = pixels @ weights
-    lit = luminance[luminance > np.finfo(np.float64).tiny]  # of less, the inverse overflows
+    largest = pixels.max(axis=-1)
+    lit = largest[largest > np.finfo(np.float64).tiny]  # of less, the inverse overflows
     if lit.size == 0:
         raise RenderError("truth is black: no exposure can be found; give one.")
-    return float(AUTO_LUMINANCE / np.percentile(lit, AUTO_PERCENTILE))
+    return float(AUTO_VALUE / np.percentile(lit, AUTO_PERCENTILE))
 
 
 def check_exposure(exposure: float) -> float:
