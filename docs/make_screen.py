@@ -49,9 +49,9 @@ The factor is nowhere smaller than the exact form, so the difference of the two 
 sum of absolute differences between them, as parts of the flat pass.
 
 **Energy on a slope in perspective.** A lit disk 20 mm wide on the screen, on a plane tilted about
-the vertical through its middle, 300 mm away, 0.5 mm a pixel (both passes; pixels count by the surface
-they show, as d^3). Energy that comes out against energy in times diffuse reflectance, less 1, R G B
-in percent:
+the vertical through its middle, 300 mm away, 0.5 mm a pixel (both passes; pixels count by the
+surface they show, as d^3). Energy that comes out against energy in times diffuse reflectance,
+less 1, R G B in percent:
 
 | angle | {heads} |
 |---|{rules}|
