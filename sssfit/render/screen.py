@@ -53,8 +53,8 @@ def render_screen(
 
     Pixels of mask 0, or of infinite depth, are no translucent object: their irradiance comes back
     as it is, as a stencil leaves it. Light of one object never reaches another: for the share of a
-    sample that lies on another object's pixel the middle stands in. What comes through the object
-    from behind joins the irradiance before the blur; specular light is added after it, unblurred.
+    sample that lies on another object's pixel the middle stands in. Light through the object joins
+    the irradiance before the blur; specular light is added after it, unblurred.
 
     Parameters
     ----------
