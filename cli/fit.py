@@ -171,8 +171,9 @@ def _text(result: FitResult, figures: dict[str, Any]) -> str:
     kernel = result.kernel
     head = (
         f"{figures['material']}: {kernel.method}, {kernel.rank} "
-        f"term{'s' if kernel.rank > 1 else ''}, {kernel.pixels} pixels of "
-        f"{kernel.mm_per_pixel:.4g} mm, {result.seconds:.1f} s"
+        f"term{'s' if kernel.rank > 1 else ''}, {kernel.pixels} "
+        f"pixel{'s' if kernel.pixels > 1 else ''} of {kernel.mm_per_pixel:.4g} mm, "
+        f"{result.seconds:.1f} s"
     )
     rows = [
         [

@@ -92,10 +92,11 @@ def test_small_benchmarks_of_fits_run_and_fill_every_table():
         timeout=300,
     )
     assert (ended.returncode, ended.stderr) == (0, "")
-    solver, whole, methods = tables(ended.stdout)
+    solver, whole, limits, methods = tables(ended.stdout)
     assert [row[0].split()[0] for row in solver[1]] == ["the", "rank", "numpy.linalg.svd"]
     assert float(solver[1][1][3]) < 1e-10  # ours against numpy's, in the same run
     assert [row[0] for row in whole[1]] == ["skin1", "ketchup"]
+    assert [row[0].split(",")[0] for row in limits[1]] == ["gaussians"] + 4 * ["guided"]
     assert [row[0] for row in methods[1]] == [f"apple, {name}" for name in METHODS]
     for row in methods[1]:
         assert all(math.isfinite(float(value)) for value in row[1:])

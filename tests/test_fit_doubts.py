@@ -9,7 +9,7 @@ from reference_pixels import make_profile
 
 from sssfit.cli import main
 from sssfit.errors import FitError, SssfitError, SssfitWarning
-from sssfit.fit import METHODS, _doubts, fit_burley, fit_preintegrated, fit_svd
+from sssfit.fit import METHODS, _doubts, fit_burley, fit_preintegrated, fit_svd, make_target
 from sssfit.kernel import SeparableKernel
 from sssfit.profile_csv import parse_csv
 from sssfit.simulate import simulate_dipole, simulate_montecarlo
@@ -276,3 +276,21 @@ def test_settings_out_of_range_are_one_line(run, arguments, status, fragment):
 def test_a_setting_of_0_is_not_the_default(run):
     kernels = run(energies(*SMOOTH[:8]), "--method", "guided", "--k", "0")[2]
     assert SeparableKernel.load(kernels[0]).meta["settings"]["k"] == 0.0
+
+
+def test_a_ratio_that_is_whole_but_for_its_last_bits_keeps_its_pixel():
+    profile = make_profile(EDGES, SMOOTH[:, None])
+    assert 0.6 / 0.2 < 3.0
+    assert make_target(profile, 0.2, 0.6).half_pixels == 3
+
+
+def test_one_annulus_has_no_shape(tmp_path, monkeypatch, capfd):
+    profile = make_profile([0.0, 1.0], [[0.5]])
+    for method in METHODS.values():
+        with pytest.raises(FitError, match="one annulus has no shape"):
+            method.fit(profile)
+
+
+def test_a_kernel_too_large_is_refused_with_its_true_size():
+    with pytest.raises(FitError, match=r"200000000001 x .* 1\.6e\+14 GB"):
+        make_target(make_profile(EDGES, SMOOTH[:, None]), 0.01, 1e9)

@@ -128,6 +128,23 @@ def test_more_terms_than_the_profile_has_are_left_out():
     assert result.stop_reasons == ("2 of 5 terms meet the profile to rounding",)
 
 
+def test_terms_that_came_out_without_weight_are_named():
+    energy = np.where(np.arange(19) == 9, 0.5, 0.001)[:, None]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SssfitWarning)
+        result = fit_gaussians(make_profile(np.arange(20.0), energy), terms=6)
+    assert result.kernel.rank < 6
+    assert f"{result.kernel.rank} of 6 terms" in result.stop_reasons[0]
+
+
+def test_variances_may_be_as_wide_as_the_grid():
+    edges = np.linspace(0.0, 5.0, 101)
+    profile = profile_of_gaussians([1.0, 20.0], [[0.4], [0.5]], edges)  # 25 is the limit
+    with pytest.warns(SssfitWarning, match="energy"):
+        found = parameters(fit(profile, 2), "c0")
+    np.testing.assert_allclose(found["variances_mm2"], [1.0, 20.0], rtol=1e-6)
+
+
 @pytest.mark.parametrize("free_energy", [True, False])
 def test_published_optima_of_the_dipole_of_marble(marble, free_energy):
     published, variances, weights = PUBLISHED[free_energy]
@@ -340,7 +357,11 @@ FROBENIUS_OPTIMAL = (0.57, 0.29, 0.146, 0.070, 0.034, 0.016)
 
 
 def test_a_steep_profile_is_seen_as_finely_as_its_pixels():
-    """The r-weighted optimum is another one than the kernel's, but next to it."""
+    """The r-weighted optimum is another one than the kernel's, but next to it.
+
+    The table has two digits, hence 0.98; seen as coarsely as the annuli of .034 mm, six Gaussians
+    had eleven times the optimum's error, so that a half more tells one from the other.
+    """
     profile = simulate_exact(load_material("skin1"))
     for terms, best in enumerate(FROBENIUS_OPTIMAL, start=1):
         with pytest.warns(SssfitWarning, match="steep"):
@@ -418,9 +439,6 @@ def test_terms_out_of_range(marble, terms):
 
 
 def test_fewer_annuli_than_unknowns():
-    one = make_profile([0.0, 1.0], [[0.5]])
-    with pytest.raises(FitError, match=r"test: a profile of one annulus cannot fix .*, terms = 1;"):
-        fit_gaussians(one, terms=1)
     four = profile_of_gaussians([0.3, 4.0], [[0.5], [0.4]], np.linspace(0.0, 6.0, 5))
     with pytest.warns(SssfitWarning, match="steep"):
         assert fit_gaussians(four, terms=2).kernel.rank == 2

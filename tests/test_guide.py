@@ -247,7 +247,7 @@ def test_the_verb_gives_json(run, guide):
         (("--guide", "--k", "near"), 2, "'near' is not a valid float"),
         (("--guide", "--mm-per-pixel", "1", "--k", "4.5"), 1, "k = 4.5 is outside [0, 4]"),
         (("--guide", "--mm-per-pixel", "1", "--channel", "X"), 1, "there is no channel X"),
-        (("--guide",), 1, "up to 513 pixels"),
+        (("--guide", "--mm-per-pixel", ".02"), 1, "up to 513 pixels"),
     ],
 )
 def test_bad_input_is_one_clear_line(run, tmp_path, arguments, status, fragment):

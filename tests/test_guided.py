@@ -10,7 +10,7 @@ from scipy.optimize import LinearConstraint, check_grad, minimize
 
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import fit_guided, fit_preintegrated, make_target, support_of
-from sssfit.fit.guided import _levels, _misfit, _refined, gamma, rank_one
+from sssfit.fit.guided import _levels, _misfit, _refined, gamma, guided_target, rank_one
 from sssfit.material import load_material
 from sssfit.simulate import simulate_exact
 
@@ -210,10 +210,12 @@ def test_a_channel_without_light_and_one_in_a_single_annulus():
 
 def test_too_many_pixels_name_a_pitch_that_would_do(skin1):
     with pytest.raises(FitError, match=r"up to 513 pixels.*1275 pixels") as refusal:
-        fit_guided(skin1)
+        fit_guided(skin1, mm_per_pixel=float(skin1.r_edges_mm[1]))
     pitch = float(str(refusal.value).partition("mm_per_pixel = ")[2].split()[0])
     pixels = 2 * int(support_of(skin1) / pitch) + 1
     assert 500 < pixels <= 513
+    with pytest.warns(SssfitWarning, match=rf"pixels of {pitch:.3g} mm are used"):
+        assert guided_target(skin1, None, None).mm_per_pixel == pitch
 
 
 @pytest.mark.parametrize(

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from sssfit.errors import FitError, SssfitWarning
-from sssfit.fit import FitResult, fit_guided, make_target
+from sssfit.fit import FitResult, fit_guided
 from sssfit.fit._target import Target
-from sssfit.fit.guided import NEUTRAL, gamma
+from sssfit.fit.guided import NEUTRAL, gamma, guided_target
 from sssfit.profile import Profile
 from sssfit.shapes import FloatArray
 
@@ -111,12 +111,13 @@ def compute_guide(
     """
     if not 1 <= len(ks) <= MOST:
         raise FitError(f"{len(ks)} values of k; expected one to {MOST}.")
-    target = make_target(profile, mm_per_pixel, support_mm)
+    target = guided_target(profile, mm_per_pixel, support_mm)
     c = _chosen(target, channel)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SssfitWarning)  # of the target they were given above
         fits = [
-            fit_guided(profile, mm_per_pixel=mm_per_pixel, support_mm=support_mm, k=k) for k in ks
+            fit_guided(profile, mm_per_pixel=target.mm_per_pixel, support_mm=support_mm, k=k)
+            for k in ks
         ]
     wanted = target.quadrant(c)
     guides = np.stack([gamma(target.half_pixels, k) for k in ks])

@@ -10,12 +10,14 @@ def description(kernel: SeparableKernel) -> list[str]:
     """Return the lines of the comment; nothing in them depends on the clock or the machine."""
     meta = kernel.meta
     photons = f", {meta['photons']:,} photons" if meta.get("photons") else ""
+    photons += f", seed {meta['seed']}" if meta.get("seed") is not None else ""
+    settings = ", ".join(f"{key} {value}" for key, value in meta.get("settings", {}).items())
     sha = f", sha256 {meta['material_sha256'][:16]}" if meta.get("material_sha256") else ""
     terms = f"{kernel.rank} separable term{'s' if kernel.rank > 1 else ''}"
     return [
         f"Subsurface scattering kernel: {meta['material']}{sha}.",
-        f"Profile: {meta['profile_method']}{photons}. Fit: {kernel.method}, {terms}. "
-        f"sssfit {meta['version']}.",
+        f"Profile: {meta['profile_method']}{photons}. Fit: {kernel.method}, {terms}"
+        f"{f' ({settings})' if settings else ''}. sssfit {meta['version']}.",
         f"{kernel.pixels} pixels of {kernel.mm_per_pixel:.9g} mm, the middle one on the axis; "
         f"channels {', '.join(kernel.channels)}.",
         "K[i][j] = sum over terms of sign * weight[i] * weight[j]: a horizontal pass and the same "

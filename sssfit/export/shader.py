@@ -46,7 +46,10 @@ def _value(values: npt.NDArray[np.float64], kind: str) -> str:
 
 
 def _number(value: float) -> str:
-    """Write a single-precision literal."""
-    text = np.format_float_scientific(np.float32(value), trim="0", exp_digits=1)
-    plain = np.format_float_positional(np.float32(value), trim="0")
+    """Write a single-precision literal; what is under the least normal one is 0, as on GPUs."""
+    single = np.float32(value)
+    if abs(single) < np.finfo(np.float32).tiny:
+        return "0.0"
+    text = np.format_float_scientific(single, trim="0", exp_digits=1)
+    plain = np.format_float_positional(single, trim="0")
     return plain if len(plain) <= len(text) else text

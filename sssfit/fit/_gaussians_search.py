@@ -55,6 +55,8 @@ def search(annuli: Annuli, terms: int, least_mm2: float, most_mm2: float) -> Fou
             reason = f"{len(best.weights)} of {terms} terms meet the profile to rounding"
             break
     assert best is not None
+    if "terms" not in reason and len(best.weights) < terms:
+        reason += f"; {len(best.weights)} of {terms} terms have a weight"
     return Found(np.exp(best.log_variances), best.weights, best.cost**0.5, evaluations, reason)
 
 

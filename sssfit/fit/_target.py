@@ -21,7 +21,7 @@ FloatArray = npt.NDArray[np.float64]
 KEPT = 0.999  # support "auto": share of every channel's on-grid energy within it
 _FAINTEST = 1e-145  # energy: squares of fainter pixels are 0, and errors relative to them nothing
 _MOST_BYTES = 2e9
-_WIDEST = 1e9  # pixels: beyond it the fit is refused for memory anyway; keeps floor() finite
+_WIDEST = 1e15  # pixels: beyond it the fit is refused for memory anyway; keeps floor() finite
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -162,6 +162,10 @@ def _check_profile(profile: Profile) -> None:
         raise FitError(
             f"{name}: annulus {k} of channel {profile.channels[c]} has the negative energy "
             f"{energy[k, c]:.3g}; expected energies from 0 up: measured noise has to be cut at 0."
+        )
+    if profile.n_annuli == 1:
+        raise FitError(
+            f"{name}: a profile of one annulus has no shape to fit; simulate it with a smaller dr."
         )
     if not (profile.total_on_grid > 0.0).any():
         raise FitError(f"{name}: no channel of the profile returns any energy: nothing to fit.")

@@ -138,9 +138,8 @@ def _checked_terms(terms: int) -> int:
 def _check_annuli(profile: Profile, terms: int) -> None:
     """Refuse more unknowns than data."""
     if profile.n_annuli < 2 * terms:
-        annuli = "one annulus" if profile.n_annuli == 1 else f"{profile.n_annuli} annuli"
         raise FitError(
-            f"{name_of(profile)}: a profile of {annuli} cannot fix the width and "
+            f"{name_of(profile)}: a profile of {profile.n_annuli} annuli cannot fix the width and "
             f"the weight of each Gaussian, terms = {terms}; give a finer profile or fewer terms."
         )
 

@@ -47,7 +47,8 @@ def fit_guided(
     ----------
     profile : Profile
     mm_per_pixel, support_mm : float, optional [mm]
-        Pixels, 513 at most; see ``sssfit.fit.make_target``.
+        Pixels, 513 at most; see ``sssfit.fit.make_target``. By default the first annulus's width,
+        or the least with which 513 pixels suffice.
     normalize : bool
         Unit energy for every channel, the energy kept apart.
     k : float
@@ -76,8 +77,7 @@ def fit_guided(
     from threadpoolctl import threadpool_limits
 
     _check_settings(k, b, centre_bound)
-    target = make_target(profile, mm_per_pixel, support_mm)
-    _check_pixels(target)
+    target = guided_target(profile, mm_per_pixel, support_mm)
     most = 1.0 if centre_bound is None else centre_bound
 
     def fit_channel(channel: int) -> ChannelFit:
@@ -257,18 +257,31 @@ def _check_settings(k: float, b: float, centre_bound: float | None) -> None:
         raise FitError(f"centre_bound = {centre_bound:g}; expected a share above 0, up to 1.")
 
 
-def _check_pixels(target: Target) -> None:
-    """Refuse more pixels than the optimiser's dense matrices should see, and name a pitch."""
-    pixels, most = 2 * target.half_pixels + 1, MOST_PIXELS // 2
+def guided_target(profile: Profile, mm_per_pixel: float | None, support_mm: float | None) -> Target:
+    """Choose pixels as `make_target` does, but no more than 513, and name a pitch that will do.
+
+    Raises FitError where a pitch was given that takes more; warns where the default was widened.
+    """
+    target = make_target(profile, mm_per_pixel, support_mm)
+    pixels, pitch = 2 * target.half_pixels + 1, target.mm_per_pixel
     if pixels <= MOST_PIXELS:
-        return
-    enough = (target.half_pixels + 1) * target.mm_per_pixel / (most + 1)
-    unit = 10.0 ** (math.floor(math.log10(enough)) - 2)
-    raise FitError(
+        return target
+    # The optimiser's matrices are dense: time grows with the third power of the pixels.
+    enough = _rounded_up((target.half_pixels + 1) * pitch / (MOST_PIXELS // 2 + 1))
+    what = (
         f"the guided fit takes up to {MOST_PIXELS} pixels, and the support is {pixels} pixels of "
-        f"{target.mm_per_pixel:.4g} mm: use mm_per_pixel = {math.ceil(enough / unit) * unit:.3g} "
-        "or more, or a smaller support."
+        f"{pitch:.4g} mm"
     )
+    if mm_per_pixel is not None:
+        raise FitError(f"{what}: use mm_per_pixel = {enough:.3g} or more, or a smaller support.")
+    warnings.warn(f"{what}: pixels of {enough:.3g} mm are used.", SssfitWarning, stacklevel=3)
+    return make_target(profile, enough, support_mm)
+
+
+def _rounded_up(value: float) -> float:
+    """Round up to three digits."""
+    unit = 10.0 ** (math.floor(math.log10(value)) - 2)
+    return float(f"{math.ceil(value / unit) * unit:.3g}")
 
 
 def _warn_of_spikes(result: FitResult) -> None:
