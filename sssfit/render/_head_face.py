@@ -64,10 +64,11 @@ def nose(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
     width = CubicSpline(NOSE[:, 0], NOSE[:, 2])(np.clip(y, -42.0, 52.0))
     z = z + np.maximum(stand, 0.0) * np.exp(-((x / width) ** 2))
     z = z + 7.0 * np.exp(-(np.hypot(x / 9.6, (y + 17.5) / 8.4) ** 2.6))
+    above = smooth_step((y + 31.0) / 8.0)
     # The wings are rounder than Gaussians; both, so that they meet without a crease.
     for sign in (-1.0, 1.0):
         wing = np.hypot((x - sign * 12.6) / 6.8, (y + 23.5) / 7.6)
-        z = z + 9.0 * np.exp(-(wing**2.6))
+        z = z + 9.5 * np.exp(-(wing**3.0)) - 1.2 * gaussian(wing - 1.25, 0.16) * above
     # The groove above and behind the wings, and the hole.
     behind = np.hypot((x - 12.0) / 1.0, (y + 24.0) / 1.05)
     side = smooth_step((x - 10.0) / 8.0) * smooth_step((y + 36.0) / 10.0)
