@@ -20,11 +20,11 @@ NOSE = np.array(
         (-42.0, 0.0, 12.0),
         (-36.0, 0.2, 11.0),
         (-32.0, 2.0, 9.5),
-        (-29.0, 6.0, 8.8),
-        (-26.0, 11.0, 8.4),
-        (-22.0, 14.5, 8.2),
-        (-16.0, 15.5, 8.4),
-        (-8.0, 14.8, 8.8),
+        (-29.0, 5.0, 10.0),
+        (-26.0, 9.5, 10.2),
+        (-22.0, 13.0, 10.2),
+        (-16.0, 14.5, 9.8),
+        (-8.0, 14.0, 9.4),
         (0.0, 12.0, 9.0),
         (8.0, 8.8, 8.8),
         (16.0, 5.6, 8.6),
@@ -63,14 +63,13 @@ def nose(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
     stand = CubicSpline(NOSE[:, 0], NOSE[:, 1])(np.clip(y, -42.0, 52.0))
     width = CubicSpline(NOSE[:, 0], NOSE[:, 2])(np.clip(y, -42.0, 52.0))
     z = z + np.maximum(stand, 0.0) * np.exp(-((x / width) ** 2))
-    z = z + 7.0 * np.exp(-(np.hypot(x / 9.6, (y + 17.5) / 8.4) ** 2.6))
-    above = smooth_step((y + 31.0) / 8.0)
+    z = z + 7.5 * np.exp(-(np.hypot(x / 10.2, (y + 18.0) / 8.6) ** 3.2))
     # The wings are rounder than Gaussians; both, so that they meet without a crease.
     for sign in (-1.0, 1.0):
         wing = np.hypot((x - sign * 12.6) / 6.8, (y + 23.5) / 7.6)
-        z = z + 9.5 * np.exp(-(wing**3.0)) - 1.2 * gaussian(wing - 1.25, 0.16) * above
-    # The groove above and behind the wings, and the hole.
-    behind = np.hypot((x - 12.0) / 1.0, (y + 24.0) / 1.05)
+        z = z + 8.0 * np.exp(-(wing**2.7))
+    # The groove behind the wings, and the hole.
+    behind = np.hypot(x - 12.0, (y + 24.0) / 1.05)
     side = smooth_step((x - 10.0) / 8.0) * smooth_step((y + 36.0) / 10.0)
     z = z - 0.9 * gaussian(behind - 8.6, 1.8) * side
     return z - 7.0 * np.exp(-(((x - 6.6) / 3.5) ** 2) - ((y + 29.0) / 2.3) ** 2)
