@@ -192,6 +192,14 @@ def test_real_size():
     assert opening[np.argmin(np.abs(y[:, 0] - EYE_Y)), np.argmin(np.abs(x[0] - EYE_X))]
 
 
+def test_the_halves_meet_without_a_crease():
+    y = np.arange(-95.0, 125.0, 0.25)[:, None]
+    z, _ = face(np.array([[0.0, 0.01]]), y)
+    # Smooth and symmetric: the slope is 0 in the middle, and 0.005 mm off it the curvature's
+    # 0.005 / R: a ridge of 1 mm radius would have 0.005; the eye sees creases from 0.02 on.
+    assert np.abs(np.diff(z, axis=1) / 0.01).max() < 0.01
+
+
 def test_pores_show_close_up_and_are_left_out_of_coarse_grids():
     smooth, rough = (
         head_scene(height=60, width=60, mm_per_pixel=0.1, detail_mm=d) for d in (0.0, 0.1)
