@@ -125,6 +125,27 @@ def test_the_shadow_of_a_step_has_its_length_to_a_fraction_of_a_pixel():
     assert ((ground > 0.1) & (ground < 0.9)).any(), "no pixel shows part of the edge"
 
 
+def test_a_slanted_shadow_has_many_shades_not_steps():
+    field = surface(lambda x, y: np.where(x < 0.3 * y, 5.0, 0.0), 0.1, 20.0)
+    light = (-np.sqrt(0.5), 0.0, np.sqrt(0.5))
+    seen = light_field(
+        field, Lamps(light), shape=(20, 44), mm_per_pixel=0.5, distance_mm=1e5, floor_mm=-1.0
+    )
+    ground = seen.irradiance[:, 28:] / np.sqrt(0.5)
+    # Of 21 samples, five of them on a coarser pattern that alone would make four shades.
+    shades = np.unique(np.round(21.0 * ground[(ground > 0.01) & (ground < 0.99)]))
+    assert shades.size > 6
+
+
+def test_shadows_come_from_outside_the_fine_field_too():
+    flat = surface(lambda x, y: 0.0 * (x + y), 0.5, 10.0)
+    wall = surface(lambda x, y: np.where(np.abs(x + 40.0) < 5.0, 100.0, 0.0) + 0.0 * y, 1.0)
+    light = (-np.sqrt(0.5), 0.0, np.sqrt(0.5))
+    view = {"shape": (8, 8), "mm_per_pixel": 1.0, "distance_mm": DISTANCE, "floor_mm": -1.0}
+    assert (light_field(flat, Lamps(light), **view).irradiance > 0.7).all()
+    assert not light_field(flat, Lamps(light), coarse=wall, **view).irradiance.any()
+
+
 def test_buffers_agree_about_the_background():
     scene = head_scene(height=96, width=128, mm_per_pixel=2.5, detail_mm=0.0)
     nothing = scene.mask == 0
