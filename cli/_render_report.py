@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -59,8 +60,7 @@ def _measured(figures: Mapping[str, Any]) -> list[str]:
     """Lines of what was lost against the truth."""
     lines = [
         f"against the 2D kernel of {figures['profile']}:",
-        f"  Delta E 2000 mean {figures['delta_e_2000_mean']:.3g}, 99th percentile "
-        f"{figures['delta_e_2000_p99']:.3g}, at exposure {figures['exposure']:.4g}",
+        f"  {_colours(figures)}",
         f"  relative L2 {100.0 * figures['relative_l2']:.3g} %, RMSE {figures['rmse']:.3g}, "
         f"largest {figures['maximum']:.3g}, PSNR {figures['psnr_db']:.1f} dB",
     ]
@@ -73,3 +73,13 @@ def _measured(figures: Mapping[str, Any]) -> list[str]:
         )
     ]
     return [*lines, table(["channel", "energy drift", "radial asymmetry"], rows)]
+
+
+def _colours(figures: Mapping[str, Any]) -> str:
+    """Say how far colours are off; only 1 and 3 channels have any."""
+    if math.isnan(figures["delta_e_2000_mean"]):
+        return f"no Delta E: {len(figures['channels'])} channels are no colour"
+    return (
+        f"Delta E 2000 mean {figures['delta_e_2000_mean']:.3g}, 99th percentile "
+        f"{figures['delta_e_2000_p99']:.3g}, at exposure {figures['exposure']:.4g}"
+    )

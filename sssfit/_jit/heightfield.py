@@ -159,7 +159,7 @@ def slope_at(heights: FloatArray, row: int, column: int) -> tuple[float, float]:
 
 @jit_inline
 def normal_at(heights: FloatArray, spacing: float, x: float, y: float) -> Vector:
-    """Mix the unit normal from the nodes' slopes, bilinear in between, so that no cell shows as a facet."""
+    """Mix the unit normal from four nodes' slopes, so that no cell shows as a facet."""
     column = min(max(int(x), 0), heights.shape[1] - 2)
     row = min(max(int(y), 0), heights.shape[0] - 2)
     u, v = x - column, y - row

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from sssfit.compare.asymmetry import radial_asymmetry
 from sssfit.compare.cost import Cost, cost_of, seconds_per_megapixel
 from sssfit.compare.metrics import ImageScore, measure
+from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
 from sssfit.profile import Profile
 from sssfit.render.reference import render_reference
@@ -86,9 +87,19 @@ def judge(
     )
     truth = score = None
     if profile is not None:
+        _check_channels(kernel, profile)
         truth = render_reference(scene, profile, border=border, threads=threads)
         score = measure(picture, truth, exposure=exposure, mask=scene.mask, structure=structure)
     return Judgement(picture, truth, score, cost_of(kernel, seconds), asymmetry_of(kernel))
+
+
+def _check_channels(kernel: SeparableKernel, profile: Profile) -> None:
+    """Refuse a profile of other channels than the kernel's."""
+    if kernel.channels != profile.channels:
+        raise RenderError(
+            f"the kernel has the channels {', '.join(kernel.channels)} and the profile "
+            f"{', '.join(profile.channels)}; give the profile that the kernel was fitted to."
+        )
 
 
 def asymmetry_of(kernel: SeparableKernel) -> FloatArray:

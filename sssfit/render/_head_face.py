@@ -20,11 +20,11 @@ NOSE = np.array(
         (-42.0, 0.0, 12.0),
         (-36.0, 0.2, 11.0),
         (-32.0, 2.0, 9.5),
-        (-29.0, 6.0, 8.8),
-        (-26.0, 11.0, 8.4),
-        (-22.0, 14.5, 8.2),
-        (-16.0, 15.5, 8.4),
-        (-8.0, 14.8, 8.8),
+        (-29.0, 5.0, 10.0),
+        (-26.0, 9.5, 10.2),
+        (-22.0, 13.0, 10.2),
+        (-16.0, 14.5, 9.8),
+        (-8.0, 14.0, 9.4),
         (0.0, 12.0, 9.0),
         (8.0, 8.8, 8.8),
         (16.0, 5.6, 8.6),
@@ -44,7 +44,9 @@ def pair(x: FloatArray, at: float, sigma: float) -> FloatArray:
 
 def planes(x: FloatArray, y: FloatArray) -> FloatArray:
     """Broad forms: what is added to the head before nose, eyes and mouth."""
-    add = 5.0 * pair(x, 27.0, 15.0) * gaussian(y - 37.0 + 0.006 * (x - 24.0) ** 2, 6.0)
+    add = (
+        5.0 * pair(x, 27.0, 15.0) * gaussian(y - 37.0 + 0.006 * (np.hypot(x, 8.0) - 25.0) ** 2, 6.0)
+    )
     add += 3.0 * gaussian(x, 10.0) * gaussian(y - 36.0, 8.0)
     add += 1.5 * pair(x, 24.0, 18.0) * gaussian(y - 72.0, 16.0)  # frontal bones
     add -= 4.0 * pair(x, 66.0, 10.0) * gaussian(y - 44.0, 20.0)  # temples
@@ -63,24 +65,24 @@ def nose(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
     stand = CubicSpline(NOSE[:, 0], NOSE[:, 1])(np.clip(y, -42.0, 52.0))
     width = CubicSpline(NOSE[:, 0], NOSE[:, 2])(np.clip(y, -42.0, 52.0))
     z = z + np.maximum(stand, 0.0) * np.exp(-((x / width) ** 2))
-    z = z + 7.0 * np.exp(-(np.hypot(x / 9.6, (y + 17.5) / 8.4) ** 2.6))
+    z = z + 7.5 * np.exp(-(np.hypot(x / 10.2, (y + 18.0) / 8.6) ** 3.2))
     # The wings are rounder than Gaussians; both, so that they meet without a crease.
     for sign in (-1.0, 1.0):
         wing = np.hypot((x - sign * 12.6) / 6.8, (y + 23.5) / 7.6)
-        z = z + 9.0 * np.exp(-(wing**2.6))
-    # The groove above and behind the wings, and the hole.
-    behind = np.hypot((x - 12.0) / 1.0, (y + 24.0) / 1.05)
+        z = z + 8.0 * np.exp(-(wing**2.7))
+    # The groove behind the wings, and the hole.
+    behind = np.hypot(x - 12.0, (y + 24.0) / 1.05)
     side = smooth_step((x - 10.0) / 8.0) * smooth_step((y + 36.0) / 10.0)
     z = z - 0.9 * gaussian(behind - 8.6, 1.8) * side
-    return z - 7.0 * np.exp(-(((x - 6.6) / 3.5) ** 2) - ((y + 29.0) / 2.3) ** 2)
+    return z - 7.0 * pair(x, 6.6, 2.5) * gaussian(y + 29.0, 1.6)
 
 
 def mouth(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
     """Philtrum, lips, the line between them and the corners."""
     philtrum = smooth_step((y + 50.0) / 6.0) * smooth_step((-33.0 - y) / 6.0)
-    z = z + philtrum * (0.9 * gaussian(x - 5.0, 1.9) - 1.2 * gaussian(x, 2.6))
+    z = z + philtrum * (0.9 * pair(x, 5.0, 1.9) - 1.2 * gaussian(x, 2.6))
     wide = np.maximum(1.0 - (x / 27.0) ** 2, 0.0)
-    line = MOUTH_Y - 1.0 * gaussian(x, 5.0) + 0.8 * gaussian(x - 12.0, 6.0)
+    line = MOUTH_Y - 1.0 * gaussian(x, 5.0) + 0.8 * pair(x, 12.0, 6.0)
     bow = (7.6 - 1.6 * gaussian(x, 3.4)) * wide**0.75
     low = 9.8 * wide**0.6
     t, s = y - line, line - y
@@ -104,7 +106,7 @@ def fold(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
 def eye(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Socket, lids and the ball between them; also how far inside the lids' opening a point is."""
     u, v = x - EYE_X, y - EYE_Y
-    z = z - 10.0 * np.exp(-((u / 18.0) ** 2) - ((v - 1.0) / 12.0) ** 2)
+    z = z - 10.0 * pair(x, EYE_X, 12.7) * gaussian(v - 1.0, 8.5)
     z = z - 3.5 * gaussian(x - 17.0, 4.5) * gaussian(v - 3.0, 6.0)
     lids = ellipsoid(x, y, (EYE_X, EYE_Y, EYE_Z), (16.5, 13.2, 13.6))
     z = smooth_max(z, lids, 8.0)

@@ -61,7 +61,7 @@ def seen_part(
     detail_mm: float,
     threads: int,
 ) -> tuple[HeightField, bool]:
-    """Sample what the picture's rays can meet, three quarters of a pixel a cell; whether that is all."""
+    """Sample what the rays can meet, three quarters of a pixel a cell; say whether that is all."""
     # Rays spread on from the plane z = 0 to the floor.
     spread = 0.5 * mm_per_pixel * (distance_mm - FLOOR_MM) / distance_mm
     across = min(spread * width, BUST_WIDTH_MM)

@@ -8,15 +8,26 @@ from sssfit.errors import RenderError
 MAX_PIXELS = 400_000_000
 
 
+def is_whole(value: float) -> bool:
+    """Whether a number is finite and has no fraction."""
+    return math.isfinite(value) and value == int(value)
+
+
+def check_seed(name: str, seed: float) -> None:
+    """Refuse what the random numbers cannot start from."""
+    if not is_whole(seed) or seed < 0:
+        raise RenderError(f"{name}: seed = {seed}; expected a whole number from 0.")
+
+
 def check_size(name: str, height: int, width: int, mm_per_pixel: float) -> None:
-    """Refuse pictures without pixels, pixels without size and pictures past memory."""
+    """Refuse pictures without pixels, pixels without size and what no memory holds."""
     for word, value in (("height", height), ("width", width)):
-        if value != int(value) or value < 1:
-            raise RenderError(f"{name}: {word} = {value}; expected a whole number from 1.")
+        if not is_whole(value) or value < 1:
+            raise RenderError(f"{name}: {word} = {value}; expected a whole number, 1 or more.")
     if height * width > MAX_PIXELS:
         raise RenderError(
-            f"{name}: {width} x {height} pixels would take {height * width * 8e-9:.1f} GB a buffer; "
-            f"make it smaller than {MAX_PIXELS:.0e} pixels."
+            f"{name}: {width} x {height} pixels would take {height * width * 8e-9:.1f} GB "
+            f"a buffer; make it smaller than {MAX_PIXELS:.0e} pixels."
         )
     check_above(name, "mm_per_pixel", mm_per_pixel, 0.0)
 

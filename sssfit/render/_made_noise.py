@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sssfit.render._made_checks import check_size
+from sssfit.render._made_checks import check_seed, check_size
 from sssfit.render.scene import Scene
 
 
@@ -16,6 +16,7 @@ def noise(*, height: int, width: int, mm_per_pixel: float, seed: int = 1) -> Sce
     from scipy.fft import irfft2, rfft2
 
     check_size("noise", height, width, mm_per_pixel)
+    check_seed("noise", seed)
     white = np.random.default_rng(seed).standard_normal((height, width))
     down = np.fft.fftfreq(height)[:, None]
     across = np.fft.rfftfreq(width)[None, :]

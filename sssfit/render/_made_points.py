@@ -3,7 +3,7 @@
 import numpy as np
 
 from sssfit.errors import RenderError
-from sssfit.render._made_checks import check_above, check_finite, check_size
+from sssfit.render._made_checks import check_above, check_finite, check_seed, check_size
 from sssfit.render._made_edges import disk_coverage
 from sssfit.render.scene import Scene
 
@@ -51,10 +51,11 @@ def highlights(
         radius_mm = 1.5 * mm_per_pixel
     check_above("highlights", "radius_mm", radius_mm, 0.0)
     check_above("highlights", "count", count, 0.0)
+    check_seed("highlights", seed)
     draws = np.random.default_rng(seed)
     covered = np.zeros((height, width))
     reach = int(np.ceil(radius_mm / mm_per_pixel)) + 1
-    for _ in range(count):
+    for _ in range(int(count)):
         row, column = int(draws.integers(height)), int(draws.integers(width))
         rows = np.arange(max(row - reach, 0), min(row + reach + 1, height), dtype=np.float64)
         columns = np.arange(

@@ -1,0 +1,224 @@
+"""``sssfit render``: pictures out, figures of what was lost, one line for what is wrong."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO
+import pytest
+from reference_pixels import make_profile
+
+from sssfit.cli import main
+from sssfit.fit import fit_svd
+from sssfit.image import load_image, save_image
+from sssfit.kernel import SeparableKernel
+from sssfit.profile import Profile
+from sssfit.render.reference import render_reference
+from sssfit.render.scene import Scene
+from sssfit.render.separable import render_separable
+
+KERNEL = "wax.svd2.kernel.json"
+SIZE = ("--size", "40x24")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """A profile of three channels and a kernel of it."""
+    folder = tmp_path_factory.mktemp("made")
+    r = np.linspace(0.0, 4.0, 41)
+    energy = np.diff(0.5 - 0.5 * np.exp(-r / 0.4))[:, None] * [1.0, 0.5, 0.2]
+    make_profile(r, energy).save(folder / "wax.profile.npz")
+    profile = Profile.load(folder / "wax.profile.npz")
+    fit_svd(profile, rank=2, mm_per_pixel=0.2).kernel.save(folder / KERNEL)
+    return folder
+
+
+@pytest.fixture
+def folder(made, tmp_path, monkeypatch):
+    """A copy of these files as the current folder."""
+    shutil.copytree(made, tmp_path, dirs_exist_ok=True)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def run(folder, capfd):
+    """Run the command line here; give exit status, stdout and stderr."""
+
+    def call(*arguments):
+        with pytest.raises(SystemExit) as ending:
+            main([str(each) for each in arguments])
+        return ending.value.code, *capfd.readouterr()
+
+    return call
+
+
+def names(folder):
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_figures_are_those_of_the_pictures(run):
+    files = ("-o", "out.exr", "--truth", "true.tif", "--difference", "lost.exr")
+    status, out, _ = run("render", "--irradiance", "disk", *SIZE, *files, "--json")
+    figures = json.loads(out)
+    assert status == 0
+    assert figures["output"] == ["out.exr", "true.tif", "lost.exr"]
+    picture, truth, lost = (load_image(each).pixels for each in figures["output"])
+    assert picture.shape == (24, 40, 3)
+    assert lost == pytest.approx(np.abs(picture - truth), abs=1e-7)
+    assert figures["rmse"] == pytest.approx(np.sqrt(np.mean((picture - truth) ** 2)), rel=1e-4)
+    assert figures["maximum"] == pytest.approx(np.abs(picture - truth).max(), rel=1e-4)
+    assert figures["passes"] == 4
+    assert figures["taps_per_pixel"] == 4 * SeparableKernel.load(KERNEL).pixels
+    assert figures["seconds_per_megapixel"] > 0.0
+    assert 0.0 < figures["delta_e_2000_mean"] < figures["delta_e_2000_p99"]
+
+
+def test_a_picture_of_ones_own(run):
+    light = np.random.default_rng(3).random((12, 9, 3))
+    save_image("mine.exr", light)
+    status, out, _ = run(
+        *("render", "--irradiance", "mine.exr", "--mm-per-pixel", ".2", "-o", "out.exr", "--json")
+    )
+    assert status == 0
+    kernel, profile = SeparableKernel.load(KERNEL), Profile.load("wax.profile.npz")
+    scene = Scene("mine", light.astype(np.float32), 0.2)
+    wanted = render_separable(scene, kernel)
+    assert load_image("out.exr").pixels == pytest.approx(wanted, abs=1e-7)
+    truth = render_reference(scene, profile)
+    rmse = np.sqrt(np.mean((wanted - truth) ** 2))
+    assert json.loads(out)["rmse"] == pytest.approx(rmse, rel=1e-9)
+
+
+def test_a_picture_that_was_rendered_knows_its_pixels(run):
+    assert run("render", "--irradiance", "disk", *SIZE, "-o", "first.exr")[0] == 0
+    assert run("render", KERNEL, "--irradiance", "first.exr", "-o", "twice.exr")[0] == 0
+
+
+def test_8_bit_pictures_are_said_to_be_decoded(run, folder):
+    save_image("mine.png", np.full((8, 8, 3), 0.5))
+    status, _, words = run("render", "--irradiance", "mine.png", "--mm-per-pixel", ".2")
+    assert status == 0
+    assert "sRGB" in words
+    assert "wax.svd2.mine.exr" in names(folder)
+
+
+def test_without_its_profile_the_cost_is_all_that_is_measured(run):
+    Path("wax.profile.npz").unlink()
+    status, out, words = run("render", "--irradiance", "edge", *SIZE, "--json")
+    assert status == 0
+    assert json.loads(out)["rmse"] is None
+    assert "--profile" in words
+    status, _, words = run("render", "--irradiance", "edge", *SIZE, "--truth", "true.exr")
+    assert status == 2
+    assert "profile" in words
+
+
+def test_a_profile_of_another_run_is_not_taken_for_the_kernels(run):
+    profile = Profile.load("wax.profile.npz")
+    profile.save("first.profile.npz")
+    Path("wax.profile.npz").unlink()
+    run("simulate", "skin1", "--method", "dipole", "-o", "last.profile.npz")
+    _, out, _ = run("render", "--irradiance", "edge", *SIZE, "--json")
+    assert json.loads(out)["profile"] == "first.profile.npz"
+
+
+def test_screen_space_needs_depth_and_measures_nothing(run):
+    status, out, _ = run("render", "--screen", "--size", "48x48", "--json")
+    figures = json.loads(out)
+    assert status == 0
+    assert figures["rmse"] is None
+    assert figures["follow"] == "gaussian"
+    status, _, words = run("render", "--screen", "--irradiance", "disk", *SIZE)
+    assert status == 1
+    assert "depth" in words
+
+
+def test_the_picture_goes_to_stdout(folder, capfdbinary):
+    with pytest.raises(SystemExit) as ending:
+        main(["render", "--irradiance", "edge", *SIZE, "-o", "-"])
+    assert ending.value.code == 0
+    out, words = capfdbinary.readouterr()
+    (folder / "piped.exr").write_bytes(out)
+    assert load_image("piped.exr").pixels.shape == (24, 40, 3)
+    assert b"Delta E" in words
+
+
+def test_two_channels_have_no_colour(run, made):
+    profile = Profile.load(made / "wax.profile.npz")
+    make_profile(profile.r_edges_mm, profile.annulus_energy[:, :2]).save("duo.profile.npz")
+    run("fit", "duo.profile.npz", "--method", "svd", "--mm-per-pixel", ".2")
+    status, out, _ = run("render", "duo.svd3.kernel.json", "--irradiance", "edge", *SIZE)
+    assert status == 0
+    assert "2 channels are no colour" in out
+    arguments = ("render", "duo.svd3.kernel.json", "--profile", "wax.profile.npz")
+    status, _, words = run(*arguments, "--irradiance", "edge", *SIZE)
+    assert status == 1
+    assert "fitted to" in words
+
+
+@pytest.mark.parametrize(
+    ("options", "status", "word"),
+    [
+        (("--irradiance", "none.exr"), 1, "none.exr"),
+        (("--irradiance", "disk", "--size", "0x5"), 2, "1920x1080"),
+        (("--irradiance", "disk", "--size", "big"), 2, "1920x1080"),
+        (("--irradiance", "disk", "--mm-per-pixel", ".2"), 2, "--mm-per-pixel"),
+        (("--irradiance", "disk", "--angle", "3"), 1, "angle"),
+        (("--irradiance", "stripes", "--period", ".3"), 1, "period"),
+        (("--irradiance", "disk", "-o", "out.jpg"), 1, ".exr"),
+        (("--irradiance", "disk", "--truth", "a.exr", "-o", "a.exr"), 2, "same file"),
+        (("--irradiance", "disk", "--follow", "lerp"), 2, "--screen"),
+        (("--irradiance", "disk", "--screen", "--truth", "a.exr"), 2, "--screen"),
+        (("--irradiance", "disk", "--exposure", "0"), 2, "--exposure"),
+        (("--irradiance", "disk", "--size", "90000x90000"), 1, "GB"),
+        (("--irradiance", "wax.profile.npz"), 1, "wax.profile.npz"),
+        (("wax.profile.npz",), 1, "wax.profile.npz"),
+        (("--irradiance", "disk", "-o", "wax.profile.npz"), 1, ".exr"),
+    ],
+)
+def test_what_is_wrong_is_one_line_and_nothing_is_written(run, folder, options, status, word):
+    before = names(folder)
+    size = () if "--size" in options or "none.exr" in options else SIZE
+    size = () if options[-1].endswith(".npz") and "-o" not in options else size
+    ended, out, words = run("render", *options, *size)
+    lines = [line for line in words.splitlines() if line.startswith("Error")]
+    assert ended == status, words
+    assert out == ""
+    assert len(lines) == 1
+    assert word in lines[0]
+    assert names(folder) == before
+
+
+@pytest.mark.parametrize(
+    ("pixels", "word"),
+    [(np.full((4, 4, 3), np.nan), "NaN"), (np.full((4, 4, 3), -1.0), "negative")],
+)
+def test_pictures_that_are_no_light_are_refused(run, pixels, word):
+    spec = OpenImageIO.ImageSpec(4, 4, 3, "float")
+    writer = OpenImageIO.ImageOutput.create("bad.exr")
+    writer.open("bad.exr", spec)
+    writer.write_image(pixels.astype(np.float32))
+    writer.close()
+    status, _, words = run("render", "--irradiance", "bad.exr", "--mm-per-pixel", ".2")
+    assert status == 1
+    assert word in words
+
+
+def test_a_file_must_say_its_pixels(run):
+    save_image("mine.png", np.full((8, 8, 3), 0.5))
+    status, _, words = run("render", "--irradiance", "mine.png")
+    assert status == 1
+    assert "--mm-per-pixel" in words
+    status, _, words = run("render", "--irradiance", "mine.png", "--mm-per-pixel", ".3")
+    assert status == 1
+    assert "fit the kernel at" in words
+
+
+def test_foreign_files_stay(run, folder):
+    (folder / "notes.exr").write_text("mine")
+    status, _, words = run("render", "--irradiance", "disk", *SIZE, "-o", "notes.exr")
+    assert status == 1
+    assert "--force" in words
+    assert (folder / "notes.exr").read_text() == "mine"
