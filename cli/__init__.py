@@ -48,6 +48,9 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
       sssfit simulate skin1 --method exact  the same without noise, in a second
       sssfit chart skin1.profile.npz        draw it: skin1.profile.png
       sssfit show skin1.profile.npz         its figures
+      sssfit fit --method svd --rank 3      fit a separable kernel to it
+      sssfit render --irradiance head       see it on a lit head, and what it loses
+      sssfit export --format hlsl           write it as shader source
 
     Lengths are mm unless written with a unit (3cm, 0.6m). Every verb explains itself with --help.
     """

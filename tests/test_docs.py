@@ -109,11 +109,13 @@ def test_readme_session_ends_in_shader_source(tmp_path):
     printed = [printed_by(each, tmp_path) for each in commands]
     assert figures_of(printed[1]) == figures_of(code_blocks("text")[4])
     assert "SSS_WEIGHTS[3][427]" in (tmp_path / "skin1.exact.svd3.hlsl").read_text()
+    (render,) = commands_of("sssfit render")
+    assert figures_of(printed_by(render[1:], tmp_path)) == figures_of(code_blocks("text")[5])
 
 
 def figures_of(text: str) -> str:
     """A verb's output without what differs from run to run: seconds, and what is but rounding."""
-    return re.sub(r"\d+\.\d s\b;?|[+-]?\d\.\de-\d\d|\de-\d\d|worst channel, \w+ \w", "", text)
+    return re.sub(r"\d+(\.\d+)? s\b;?|[+-]?\d\.\de-\d\d|\de-\d\d|worst channel, \w+ \w", "", text)
 
 
 def test_readme_links_lead_somewhere():
