@@ -6,8 +6,10 @@ A row is one kernel on one picture. Errors are against the picture by the profil
 
 import dataclasses
 from collections.abc import Callable, Sequence
+from time import perf_counter
 
 import numpy as np
+import numpy.typing as npt
 
 from sssfit.compare._pixels import selected_pixels, selection
 from sssfit.compare.candidates import Candidate
@@ -22,8 +24,13 @@ from sssfit.profile import Profile
 from sssfit.render._checks import check_channels, thread_count
 from sssfit.render.reference import render_reference
 from sssfit.render.scene import Scene
+from sssfit.render.separable import render_separable
 
 Report = Callable[[int, int, str], None]
+_Judged = tuple[Candidate, FitResult, Sequence[Judgement]]
+
+# Turns in which kernels are timed: two at least, then until so much time has gone.
+_LEAST_TURNS, _MOST_TURNS, _TIMED_SECONDS = 2, 12, 8.0
 
 
 def compare_kernels(
@@ -70,7 +77,7 @@ def compare_kernels(
     wanted = every_candidate(pixels) if candidates is None else tuple(candidates)
     truths = [render_reference(scene, profile, threads=threads) for scene in scenes]
     exposures = [auto_exposure(t, s.mask) for t, s in zip(truths, scenes, strict=True)]
-    rows: list[KernelRow] = []
+    judged: list[_Judged] = []
     left_out: list[tuple[str, str]] = []
     for done, candidate in enumerate(wanted):
         if progress is not None:
@@ -80,14 +87,20 @@ def compare_kernels(
         except FitError as error:
             left_out.append((candidate.label, str(error)))
             continue
-        judged = [
+        scores = [
             judge(scene, fit.kernel, truth=truth, exposure=exposure, threads=threads)
             for scene, truth, exposure in zip(scenes, truths, exposures, strict=True)
         ]
-        rows += _rows(candidate, fit, scenes, judged)
-    if not rows:
+        judged.append((candidate, fit, scores))
+    if not judged:
         reason = left_out[0][1] if left_out else "there are none."
         raise FitError(f"{target.name}: no kernel of {len(wanted)} could be fitted: {reason}")
+    seconds = _timed_in_turn([fit for _, fit, _ in judged], scenes, threads)
+    rows = [
+        row
+        for each, price in zip(judged, seconds, strict=True)
+        for row in _rows(*each, scenes, price)
+    ]
     return Comparison(
         profile=profile,
         mm_per_pixel=mm_per_pixel,
@@ -129,16 +142,36 @@ def _picture(scene: Scene, exposure: float) -> Picture:
     return Picture(scene.name, scene.width, scene.height, exposure)
 
 
-def _rows(
-    candidate: Candidate, fit: FitResult, scenes: Sequence[Scene], judged: Sequence[Judgement]
-) -> list[KernelRow]:
-    """Return the rows of one kernel, yet without fronts.
+def _timed_in_turn(
+    fits: Sequence[FitResult], scenes: Sequence[Scene], threads: int | None
+) -> npt.NDArray[np.float64]:
+    """Return the least seconds per megapixel of each kernel, on the largest picture (n,).
 
-    A kernel has one price: the least of what was measured on its pictures, since other programs
-    can only add to it.
+    All kernels in turn, again and again, and not each some times in a row: what other programs
+    take then falls on all alike. In a row, kernels of equal work differed by a factor of two.
     """
+    scene = max(scenes, key=lambda each: each.height * each.width)
+    least = np.full(len(fits), np.inf)
+    begun = perf_counter()
+    for done in range(_MOST_TURNS):
+        if done >= _LEAST_TURNS and perf_counter() - begun > _TIMED_SECONDS:
+            break
+        for k, fit in enumerate(fits):
+            start = perf_counter()
+            render_separable(scene, fit.kernel, threads=threads)
+            least[k] = min(least[k], perf_counter() - start)
+    return least * 1e6 / (scene.height * scene.width)
+
+
+def _rows(
+    candidate: Candidate,
+    fit: FitResult,
+    judged: Sequence[Judgement],
+    scenes: Sequence[Scene],
+    seconds: float,
+) -> list[KernelRow]:
+    """Return the rows of one kernel, yet without fronts."""
     cost = judged[0].cost
-    seconds = min(each.cost.seconds_per_megapixel or np.inf for each in judged)
     found = []
     for scene, each in zip(scenes, judged, strict=True):
         assert each.score is not None  # a truth was given
@@ -159,7 +192,7 @@ def _rows(
                 passes=cost.passes,
                 taps_per_pixel=cost.taps_per_pixel,
                 kernel_bytes=cost.kernel_bytes,
-                seconds_per_megapixel=seconds,
+                seconds_per_megapixel=float(seconds),
                 fit_seconds=fit.seconds,
                 relative_frobenius_error=fit.relative_frobenius_error,
                 stop_reasons=fit.stop_reasons,
@@ -175,7 +208,7 @@ def _with_fronts(rows: Sequence[KernelRow]) -> tuple[KernelRow, ...]:
         places = [i for i, row in enumerate(rows) if row.picture == picture]
         for error in ERRORS:
             for cost in COSTS:
-                points = [(rows[i].cost(cost), rows[i].error(error)) for i in places]
+                points = [(rows[i].rounded_cost(cost), rows[i].error(error)) for i in places]
                 on_front = pareto_front(*zip(*points, strict=True))
                 for i, is_on in zip(places, on_front, strict=True):
                     if is_on:
