@@ -19,6 +19,7 @@ from sssfit import __version__
 from sssfit.errors import SssfitError, SssfitWarning
 
 from .chart import chart
+from .compare import compare
 from .export import export
 from .fit import fit
 from .import_ import import_
@@ -48,6 +49,7 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
       sssfit simulate skin1 --method exact  the same without noise, in a second
       sssfit chart skin1.profile.npz        draw it: skin1.profile.png
       sssfit show skin1.profile.npz         its figures
+      sssfit compare skin1                  what every kernel of it loses and costs
 
     Lengths are mm unless written with a unit (3cm, 0.6m). Every verb explains itself with --help.
     """
@@ -59,7 +61,7 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
         ctx.exit(2)
 
 
-for _verb in (materials, simulate, fit, render, import_, export, chart, show):
+for _verb in (materials, simulate, fit, render, compare, import_, export, chart, show):
     cli.add_command(_verb)
 
 
