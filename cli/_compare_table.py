@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -54,6 +55,7 @@ def figures_of(comparison: Comparison) -> dict[str, Any]:
             {key: getattr(each, key) for key in ("name", "width", "height", "exposure")}
             for each in comparison.pictures
         ],
+        "missing_share": comparison.missing_share,
         "left_out": [{"label": label, "reason": why} for label, why in comparison.left_out],
         "rows": [row_figures(row, comparison) for row in comparison.rows],
     }
@@ -156,23 +158,30 @@ def _cells(row: KernelRow, mark: str) -> list[str]:
         f"{row.passes}",
         f"{row.taps_per_pixel}",
         f"{row.seconds_per_megapixel:.2g}",
-        f"{row.delta_e_2000_mean:.3f}",
-        f"{row.delta_e_2000_p99:.2f}",
+        _or_dash(row.delta_e_2000_mean, ".3f"),
+        _or_dash(row.delta_e_2000_p99, ".2f"),
         f"{100.0 * row.relative_l2:.3g} %",
         f"{row.psnr_db:.1f}",
         percent(drift),
-        f"{row.radial_asymmetry.max():.2g}",
+        _or_dash(float(row.radial_asymmetry.max()), ".2g"),
     ]
+
+
+def _or_dash(value: float, digits: str) -> str:
+    """Write a figure; a dash where there is none."""
+    return "-" if math.isnan(value) else f"{value:{digits}}"
 
 
 def _setting(comparison: Comparison) -> str:
     """Say what was compared, on which pixels."""
     profile = comparison.profile
     threads = "1 thread" if comparison.threads == 1 else f"{comparison.threads} threads"
+    missing = comparison.missing_share.max()
     return (
         f"{profile.material_name or 'profile'}, {profile.meta.get('method') or 'no method'}: "
         f"kernels of {comparison.pixels} pixels of {comparison.mm_per_pixel:.4g} mm against the "
-        f"whole 2D kernel; seconds on {threads}, float64"
+        f"whole 2D kernel, which lacks up to {percent(missing, '.2g')} of a channel's light beyond "
+        f"the grid; seconds on {threads}, float64"
     )
 
 

@@ -49,6 +49,7 @@ _MOST_TICKS = 8
 _LANE_INCHES = 0.1  # between points of the same cost
 _JUST_NOTICEABLE = 1.0  # Delta E
 _NOTICED: Style = {"color": _GREY, "lw": 0.8, "ls": (0, (4, 2))}
+_WORTH_A_NOTE = 1e-3  # of the light
 _LEAST = {"delta-e": 1e-3, "l2": 1e-5}  # smaller errors are drawn there
 _ERRORS = {"delta-e": "mean ΔE 2000", "l2": "relative L2 error"}
 _COSTS = {
@@ -266,6 +267,12 @@ def _notes(comparison: Comparison, error: str, cost: str) -> list[str]:
     notes = [f"{first} {second} {third}"]
     if any(picture.name == "edge" for picture in comparison.pictures):
         notes.append("Along an axis, as the made edge is, a pre-integrated kernel is exact.")
+    if comparison.missing_share.max() >= _WORTH_A_NOTE:
+        notes.append(
+            f"Beyond the profile's grid lies up to {100.0 * comparison.missing_share.max():.2g} % "
+            "of a channel's light: true pictures lack it, kernels but those with energy kept do "
+            "not."
+        )
     if comparison.left_out:
         notes.append(f"Could not be fitted: {', '.join(name for name, _ in comparison.left_out)}.")
     return notes

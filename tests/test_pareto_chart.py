@@ -151,6 +151,18 @@ def test_one_kernel_and_one_picture_are_drawn(comparison):
     assert "made edge" not in text
 
 
+def test_light_that_true_pictures_lack_is_noted(comparison):
+    profile = comparison.profile
+    beyond = np.array([0.0, 0.01, 0.0]) * profile.total_on_grid / 0.99
+    found = dataclasses.replace(
+        comparison, profile=dataclasses.replace(profile, beyond_grid=beyond)
+    )
+    assert found.missing_share == pytest.approx([0.0, 0.01, 0.0])
+    assert "lies up to 1 % of a channel's light" in words_of(pareto_figure(found))
+    assert "Beyond the profile's grid" not in words_of(pareto_figure(comparison))
+    assert_legible(lambda: pareto_figure(found))
+
+
 def test_names_of_pictures_may_be_long_and_strange(comparison):
     name = "a picture $with_a^name$ that \u4e2d goes on and on.exr"
     found = dataclasses.replace(

@@ -130,6 +130,17 @@ class Comparison:
     rows: tuple[KernelRow, ...]
     left_out: tuple[tuple[str, str], ...]
 
+    @property
+    def missing_share(self) -> FloatArray:
+        """Share of the diffuse reflectance that lies beyond the profile's grid (C,).
+
+        True pictures lack it. A kernel with its energy restored has it, and cannot be nearer to
+        them than that.
+        """
+        total = self.profile.diffuse_reflectance
+        beyond = self.profile.beyond_grid
+        return np.divide(beyond, total, out=np.zeros_like(total), where=total > 0.0)
+
     def rows_of(self, picture: str) -> list[KernelRow]:
         """Rows of one picture."""
         return [row for row in self.rows if row.picture == picture]
