@@ -19,6 +19,7 @@ from sssfit import __version__
 from sssfit.errors import SssfitError, SssfitWarning
 
 from .chart import chart
+from .compare import compare
 from .export import export
 from .fit import fit
 from .import_ import import_
@@ -51,6 +52,7 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
       sssfit fit --method svd --rank 3      fit a separable kernel to it
       sssfit render --irradiance head       see it on a lit head, and what it loses
       sssfit export --format hlsl           write it as shader source
+      sssfit compare skin1                  what every kernel of it loses and costs
 
     Lengths are mm unless written with a unit (3cm, 0.6m). Every verb explains itself with --help.
     """
@@ -62,7 +64,7 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
         ctx.exit(2)
 
 
-for _verb in (materials, simulate, fit, render, import_, export, chart, show):
+for _verb in (materials, simulate, fit, render, compare, import_, export, chart, show):
     cli.add_command(_verb)
 
 

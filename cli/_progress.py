@@ -1,7 +1,8 @@
-"""The progress bar of a photon walk, on stderr: rate, time left and the present error."""
+"""Progress bars on stderr: of a photon walk with rate and present error, and of counted steps."""
 
 import contextlib
 import math
+import sys
 from collections.abc import Callable, Iterator
 from datetime import timedelta
 from typing import TYPE_CHECKING
@@ -51,6 +52,29 @@ def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[["WalkProgres
     finally:
         if bar.live.is_started:
             bar.stop()
+
+
+@contextlib.contextmanager
+def step_progress(label: str, *, quiet: bool) -> Iterator[Callable[[int, int, str], None] | None]:
+    """Yield a callback for (done, of how many, the next one's name); None unless in a terminal."""
+    if quiet or sys.stderr is None or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TextColumn("{task.completed} of {task.total}"),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[step]}"),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    task = bar.add_task(label, total=None, step="")
+    with bar:
+        yield lambda done, total, step: bar.update(task, completed=done, total=total, step=step)
 
 
 def time_left(first: "WalkProgress", now: "WalkProgress") -> str:

@@ -26,7 +26,7 @@ def finish(
     ``to_stderr`` moves the text out of the way of data that went to stdout (``-o -``).
     """
     if common.json:
-        click.echo(json.dumps(_plain(figures), allow_nan=False), err=to_stderr)
+        click.echo(json.dumps(plain(figures), allow_nan=False), err=to_stderr)
     elif not common.quiet:
         click.echo(text, err=to_stderr)
 
@@ -81,14 +81,14 @@ def percent(share: float, digits: str = "+.2g") -> str:
     return "0 %" if abs(share) < 1e-12 else f"{100.0 * share:{digits}} %"
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """Arrays to lists, paths to text, and what JSON cannot hold (NaN, inf) to null."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(each) for key, each in value.items()}
+        return {str(key): plain(each) for key, each in value.items()}
     if hasattr(value, "tolist"):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, (list, tuple)):
-        return [_plain(each) for each in value]
+        return [plain(each) for each in value]
     if isinstance(value, Path):
         return str(value)
     if isinstance(value, float) and not math.isfinite(value):

@@ -3,11 +3,12 @@
 `profile_figure` draws a profile as the plots of "Separable Subsurface Scattering", Jimenez et al.
 2015, supplement G: 2 pi r R_d linear and logarithmic, R_d against mean free paths, and the 2D
 profile. `models_figure` draws profile models against the exact solution, `spectrum_figure`
-the singular values of a profile's kernel, `guide_figure` what guided fits look at and leave.
+the singular values of a profile's kernel, `guide_figure` what guided fits look at and leave,
+`pareto_figure` kernels by error and cost.
 `save_figure` writes PNG, SVG or PDF; the same figure gives the same bytes.
 
-Matplotlib is imported here and in ``sssfit._chart_guide``, ``_chart_models``, ``_chart_page`` and
-``_chart_spectrum`` only, and never its pyplot, which takes 0.8 s to import and keeps global state.
+Matplotlib is imported here and in ``sssfit._chart_guide``, ``_chart_labels``, ``_chart_models``,
+``_chart_page``, ``_chart_pareto`` and ``_chart_spectrum`` only, and never its pyplot, which takes 0.8 s to import and keeps global state.
 ``sssfit._profile_bins`` merges annuli, ``sssfit._chart_data`` makes the image,
 ``sssfit._chart_text`` words the captions.
 """
@@ -40,6 +41,7 @@ from sssfit._chart_page import (
     new_figure,
     tick,
 )
+from sssfit._chart_pareto import pareto_figure
 from sssfit._chart_spectrum import spectrum_figure
 from sssfit._chart_style import (
     COLOURS,
@@ -64,6 +66,7 @@ __all__ = [
     "guide_figure",
     "is_chart_file",
     "models_figure",
+    "pareto_figure",
     "profile_figure",
     "save_figure",
     "spectrum_figure",

@@ -54,6 +54,7 @@ def judge(
     kernel: SeparableKernel,
     profile: Profile | None = None,
     *,
+    truth: FloatArray | None = None,
     border: str = "mirror",
     exposure: float | None = None,
     structure: bool = False,
@@ -69,6 +70,8 @@ def judge(
         On the scene's pixels.
     profile : Profile, optional
         What the truth is made from; without it nothing is measured but the cost.
+    truth : array (H, W, C), optional
+        Rendered already, as `render_reference` does it with this border; no profile is needed then.
     border, threads
         As `render_separable`.
     exposure, structure
@@ -85,10 +88,11 @@ def judge(
         ),
         scene.height * scene.width,
     )
-    truth = score = None
-    if profile is not None:
+    if truth is None and profile is not None:
         _check_channels(kernel, profile)
         truth = render_reference(scene, profile, border=border, threads=threads)
+    score = None
+    if truth is not None:
         score = measure(picture, truth, exposure=exposure, mask=scene.mask, structure=structure)
     return Judgement(picture, truth, score, cost_of(kernel, seconds), asymmetry_of(kernel))
 

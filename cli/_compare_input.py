@@ -1,0 +1,84 @@
+"""What ``sssfit compare`` looks at: a profile, made where there is none, and its pictures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from ._compiling import say_if_compiling
+from ._deon_skin import DEON_SKIN
+from ._options import Common
+from ._report import binary_stdin
+from ._scene import MADE, Picture, make_or_read
+
+if TYPE_CHECKING:
+    from sssfit.profile import Profile
+    from sssfit.render.scene import Scene
+
+MM_PER_PIXEL = 0.3  # of made pictures: skin1's whole kernel is 143 pixels
+_SIZE = (512, 512)
+
+
+def profile_of(name: str, common: Common) -> Profile:
+    """Read a profile, ``-`` for stdin, or make the exact one of a material."""
+    from sssfit.profile import Profile
+
+    if name == "-":
+        return Profile.read(binary_stdin(), "stdin")
+    if name.endswith(".npz"):
+        return Profile.load(name)
+    if name == DEON_SKIN:
+        from sssfit.simulate import simulate_deon_skin
+
+        return simulate_deon_skin()
+    return _exact(name, common)
+
+
+def _exact(name: str, common: Common) -> Profile:
+    """Solve a half space; for others there is no exact method."""
+    from sssfit.errors import SimulationError
+    from sssfit.material import load_material
+    from sssfit.simulate import simulate_exact
+
+    material = load_material(name)
+    if not material.is_semi_infinite:
+        raise SimulationError(
+            f"{material.name} is not one half space, the only thing that is solved exactly: walk "
+            f"its photons with `sssfit simulate`, and compare {material.name}.profile.npz."
+        )
+    say_if_compiling(common, solver=True)
+    return simulate_exact(material, threads=common.threads)
+
+
+def scenes_of(
+    pictures: Sequence[str],
+    size: tuple[int, int] | None,
+    mm_per_pixel: float | None,
+    common: Common,
+) -> tuple[list[Scene], float]:
+    """Return pictures on the same pixels, and the pixels' size [mm].
+
+    That is what was asked for, else what the first file says, else the default.
+    """
+    for name in pictures:
+        if name not in MADE and not Path(name).exists():
+            raise click.UsageError(
+                f"there is no picture {name!r}; expected {', '.join(MADE)}, or your own file."
+            )
+    files = [name for name in pictures if name not in MADE]
+    if size is not None and len(files) == len(pictures):
+        raise click.UsageError("--size is for made pictures; leave it out.")
+    # The size of made pictures is known only once files have been read.
+    read = {
+        name: make_or_read(Picture(name, None, mm_per_pixel, {}), 0.0, common) for name in files
+    }
+    pitch = next((each.mm_per_pixel for each in read.values()), mm_per_pixel or MM_PER_PIXEL)
+    return [
+        read[name]
+        if name in read
+        else make_or_read(Picture(name, size or _SIZE, None, {}), pitch, common)
+        for name in pictures
+    ], pitch

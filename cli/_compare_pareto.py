@@ -1,0 +1,214 @@
+"""``sssfit compare``: kernels by error and cost, into a table and a chart."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ._compare_input import profile_of, scenes_of
+from ._compare_table import FORMATS, figures_of, is_table_file, table_text, text_of
+from ._figure import chart_output
+from ._options import Common
+from ._progress import step_progress
+from ._report import finish, say, table
+
+if TYPE_CHECKING:
+    from sssfit.compare.comparison import Comparison
+    from sssfit.profile import Profile
+    from sssfit.render.scene import Scene
+
+
+@dataclass(frozen=True)
+class Wish:
+    """What was asked for: pictures and their pixels, the front's error and cost, foreign files."""
+
+    pictures: Sequence[str]
+    size: tuple[int, int] | None
+    mm_per_pixel: float | None
+    error: str
+    cost: str
+    force: bool
+    common: Common
+
+    def scenes(self) -> tuple[list[Scene], float]:
+        """Make or read the pictures."""
+        return scenes_of(self.pictures, self.size, self.mm_per_pixel, self.common)
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """Where a comparison goes beside the terminal; a chart ``-`` is PNG on stdout."""
+
+    chart: str | None
+    table: str | None
+
+    @property
+    def names(self) -> list[str]:
+        """For reports."""
+        return [name for name in (self.chart, self.table) if name is not None]
+
+
+def compare_one(name: str, outputs: Outputs, wish: Wish) -> None:
+    """Compare the kernels of a material or profile, write what is wanted and print the table."""
+    with _held([outputs], wish):
+        comparison = _compared(profile_of(name, wish.common), *wish.scenes(), wish)
+        _write(comparison, outputs, wish)
+    figures = {
+        "command": "compare",
+        "output": outputs.names,
+        "error": wish.error,
+        "cost": wish.cost,
+        **figures_of(comparison),
+    }
+    text = text_of(comparison, wish.error, wish.cost)
+    if outputs.names:
+        text += f"\n\nWrote {', '.join(outputs.names)}"
+    finish(wish.common, figures, text, to_stderr=outputs.chart == "-")
+
+
+def compare_all(folder: Path, wish: Wish) -> None:
+    """Compare the kernels of every shipped material, with a chart and a table for each.
+
+    A material that fails is named at the end; the others are done.
+    """
+    from sssfit.errors import FitError, SssfitError
+    from sssfit.material import material_names
+
+    names = material_names()
+    stems = [folder / f"{name}-pareto" for name in names]
+    outputs = [Outputs(f"{stem}.png", f"{stem}.md") for stem in stems]
+    done: list[tuple[Comparison, Outputs]] = []
+    failed: list[str] = []
+    with _held(outputs, wish):
+        scenes, pitch = wish.scenes()
+        for name, each in zip(names, outputs, strict=True):
+            try:
+                profile = profile_of(name, wish.common)
+                done.append((_compared(profile, scenes, pitch, wish), each))
+                _write(*done[-1], wish)
+            except SssfitError as error:
+                failed.append(f"{name}: {error}")
+    if done:
+        _report(done, wish)
+    if failed:
+        raise FitError(f"{len(failed)} of {len(names)} materials failed; {' '.join(failed)}")
+
+
+def _compared(
+    profile: Profile, scenes: Sequence[Scene], mm_per_pixel: float, wish: Wish
+) -> Comparison:
+    """Fit and judge, with a progress bar in a terminal."""
+    from sssfit.compare import compare_kernels
+    from sssfit.compare.comparison import check_error
+
+    check_error(wish.error, profile.n_channels)
+    with step_progress(profile.material_name or "profile", quiet=wish.common.quiet) as show:
+        return compare_kernels(
+            profile,
+            scenes,
+            mm_per_pixel=mm_per_pixel,
+            threads=wish.common.threads,
+            progress=show,
+        )
+
+
+@contextlib.contextmanager
+def _held(outputs: Sequence[Outputs], wish: Wish) -> Iterator[None]:
+    """Check that everything can be written, and keep other runs off it, before the work begins."""
+    with contextlib.ExitStack() as stack:
+        for each in outputs:
+            if each.chart is not None:
+                _hold_chart(each.chart, stack, wish)
+            if each.table is not None:
+                _hold_table(Path(each.table), stack, wish)
+        yield
+
+
+def _hold_chart(name: str, stack: contextlib.ExitStack, wish: Wish) -> None:
+    from sssfit._chart_files import chart_format
+
+    if name != "-":
+        chart_format(name)
+    stack.enter_context(chart_output(None if name == "-" else Path(name), force=wish.force))
+
+
+def _hold_table(path: Path, stack: contextlib.ExitStack, wish: Wish) -> None:
+    from sssfit.errors import FileError
+    from sssfit.files import check_output, locked
+
+    if path.suffix.lower() not in FORMATS:
+        raise FileError(f"{path}: tables are Markdown, CSV or JSON; end it in .md, .csv or .json.")
+    check_output(path, is_table_file, force=wish.force)
+    stack.enter_context(locked(path))
+
+
+def _write(comparison: Comparison, outputs: Outputs, wish: Wish) -> None:
+    """Write chart and table, each whole or not at all; they are held by now."""
+    from sssfit.files import write_atomically
+
+    if outputs.chart is not None:
+        _draw(comparison, outputs.chart, wish)
+    if outputs.table is not None:
+        path = Path(outputs.table)
+        text = table_text(comparison, path.suffix.lower(), wish.error, wish.cost)
+        write_atomically(path, lambda stream: stream.write(text.encode()))
+
+
+def _draw(comparison: Comparison, name: str, wish: Wish) -> None:
+    from sssfit.chart import pareto_figure, save_figure
+
+    from ._report import binary_stdout
+
+    figure = pareto_figure(comparison, error=wish.error, cost=wish.cost)
+    if name == "-":
+        save_figure(figure, binary_stdout(), format="png")
+        binary_stdout().flush()
+    else:
+        save_figure(figure, name)
+
+
+def _report(done: Sequence[tuple[Comparison, Outputs]], wish: Wish) -> None:
+    """Print the fronts of all materials; with ``--json`` all rows."""
+    cells = [
+        [
+            comparison.profile.material_name or "profile",
+            picture.name,
+            ", ".join(
+                f"{row.label} {row.error(wish.error):.2g}"
+                for row in comparison.front(picture.name, wish.error, wish.cost)
+            ),
+        ]
+        for comparison, _ in done
+        for picture in comparison.pictures
+    ]
+    for comparison, _ in done:
+        for label, reason in comparison.left_out:
+            say(wish.common, f"Left out {label}: {reason}")
+    figures: dict[str, Any] = {
+        "command": "compare",
+        "output": [name for _, each in done for name in each.names],
+        "error": wish.error,
+        "cost": wish.cost,
+        "materials": [comparison.profile.material_name for comparison, _ in done],
+        "rows": [row for comparison, _ in done for row in figures_of(comparison)["rows"]],
+    }
+    heads = ["material", "picture", f"front of {wish.error} by {wish.cost}, cheapest first"]
+    text = f"{table(heads, cells)}\nWrote {', '.join(figures['output'])}"
+    finish(wish.common, figures, text)
+
+
+def check_outputs(
+    material: str | None, every: bool, chart: str | None, table: str | None, output: str | None
+) -> None:
+    """Refuse options that do not go together."""
+    if (material is None) != every:
+        raise click.UsageError("name one MATERIAL or profile, or give --all.")
+    if every and (chart or table):
+        raise click.UsageError("--all names its charts and tables; leave --chart and --table out.")
+    if output is not None and not every:
+        raise click.UsageError("-o is the folder of --all; name files by --chart and --table.")

@@ -1,0 +1,196 @@
+"""The rows of ``sssfit compare``: for programs, for people, and as Markdown, CSV or JSON files."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ._report import percent, plain, table
+
+if TYPE_CHECKING:
+    from sssfit.compare.comparison import Comparison, KernelRow, Picture
+
+FORMATS = (".md", ".csv", ".json")
+_HEADS = (
+    *("kernel", "passes", "weights", "s/Mpixel", "Delta E", "99th", "relative L2", "PSNR, dB"),
+    *("energy drift", "asymmetry"),
+)
+_MARKDOWN_TITLE = ": kernels by error and cost"
+_OWN_BEGIN = {".md": b"# ", ".csv": b"material,picture,label,", ".json": b'{"command": "compare"'}
+
+
+def row_figures(row: KernelRow, comparison: Comparison) -> dict[str, Any]:
+    """Everything of a row, as ``--json`` has it; null where nothing was measured."""
+    from sssfit.compare.comparison import COSTS, ERRORS
+
+    keys = (
+        *("picture", "label", "method", "rank", "settings", "delta_e_2000_mean"),
+        *("delta_e_2000_p99", "relative_l2", "rmse", "psnr_db", "energy_drift"),
+        *("radial_asymmetry", "passes", "taps_per_pixel", "kernel_bytes", "taps"),
+        *("seconds_per_megapixel", "fit_seconds", "relative_frobenius_error", "stop_reasons"),
+    )
+    on_front = {error: {cost: (error, cost) in row.fronts for cost in COSTS} for error in ERRORS}
+    return {
+        "material": comparison.profile.material_name,
+        **{key: getattr(row, key) for key in keys},
+        "on_front": on_front,
+    }
+
+
+def figures_of(comparison: Comparison) -> dict[str, Any]:
+    """Everything of a comparison, as ``--json`` has it."""
+    return {
+        "material": comparison.profile.material_name,
+        "profile_method": comparison.profile.meta.get("method"),
+        "channels": comparison.profile.channels,
+        "mm_per_pixel": comparison.mm_per_pixel,
+        "pixels": comparison.pixels,
+        "threads": comparison.threads,
+        "pictures": [
+            {key: getattr(each, key) for key in ("name", "width", "height", "exposure")}
+            for each in comparison.pictures
+        ],
+        "missing_share": comparison.missing_share,
+        "left_out": [{"label": label, "reason": why} for label, why in comparison.left_out],
+        "rows": [row_figures(row, comparison) for row in comparison.rows],
+    }
+
+
+def text_of(comparison: Comparison, error: str, cost: str) -> str:
+    """Write a table for each picture, sorted by cost and error, the front marked with a star."""
+    parts = [_setting(comparison)]
+    for picture in comparison.pictures:
+        rows = _sorted(comparison, picture, error, cost)
+        cells = [_cells(row, "* " if (error, cost) in row.fronts else "  ") for row in rows]
+        parts.append(f"{_picture_line(picture)}\n{table(['  kernel', *_HEADS[1:]], cells)}")
+    parts.append(f"* {_front(error, cost)}")
+    parts += left_out_lines(comparison)
+    return "\n\n".join(parts)
+
+
+def left_out_lines(comparison: Comparison) -> list[str]:
+    """Say which candidates could not be fitted, and why."""
+    return [f"Left out {label}: {reason}" for label, reason in comparison.left_out]
+
+
+def table_text(comparison: Comparison, ending: str, error: str, cost: str) -> str:
+    """Return the content of a table file."""
+    if ending == ".md":
+        return _markdown(comparison, error, cost)
+    if ending == ".csv":
+        return _csv(comparison)
+    return json.dumps(plain({"command": "compare", **figures_of(comparison)}), allow_nan=False)
+
+
+def is_table_file(path: Path) -> bool:
+    """Tell whether a file begins as our tables do."""
+    try:
+        with path.open("rb") as stream:
+            line = stream.readline(1024)
+    except OSError:
+        return False
+    begins = line.startswith(_OWN_BEGIN.get(path.suffix.lower(), b"\0"))
+    is_markdown = path.suffix.lower() == ".md"
+    return begins and (not is_markdown or _MARKDOWN_TITLE.encode() in line)
+
+
+def _markdown(comparison: Comparison, error: str, cost: str) -> str:
+    """Write a table for each picture; the front in bold."""
+    name = comparison.profile.material_name or "profile"
+    parts = [f"# {name}{_MARKDOWN_TITLE}", _setting(comparison)]
+    head = f"| {' | '.join(_HEADS)} |\n|---|{(len(_HEADS) - 1) * '---:|'}"
+    for picture in comparison.pictures:
+        rows = _sorted(comparison, picture, error, cost)
+        lines = [_markdown_row(row, (error, cost) in row.fronts) for row in rows]
+        parts.append(f"## {_picture_line(picture)}\n\n" + "\n".join([head, *lines]))
+    parts.append(f"Bold: {_front(error, cost)}.")
+    parts += left_out_lines(comparison)
+    return "\n\n".join(parts) + "\n"
+
+
+def _markdown_row(row: KernelRow, is_on_front: bool) -> str:
+    label, *cells = _cells(row, "")
+    return f"| {f'**{label}**' if is_on_front else label} | {' | '.join(cells)} |"
+
+
+def _csv(comparison: Comparison) -> str:
+    """All rows, what there is by channel in columns of its own."""
+    lines = [
+        _flat(plain(row_figures(row, comparison)), comparison.profile.channels)
+        for row in comparison.rows
+    ]
+    stream = io.StringIO()
+    writer = csv.DictWriter(stream, list(lines[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(lines)
+    return stream.getvalue()
+
+
+def _flat(figures: dict[str, Any], channels: Sequence[str]) -> dict[str, Any]:
+    """One value a column: NAME_CHANNEL, on_front_ERROR_COST; settings as JSON."""
+    flat: dict[str, Any] = {}
+    for key, value in figures.items():
+        if isinstance(value, list):
+            flat |= {f"{key}_{name}": each for name, each in zip(channels, value, strict=True)}
+        elif key == "on_front":
+            flat |= {f"{key}_{e}_{c}": int(is_on) for e in value for c, is_on in value[e].items()}
+        else:
+            flat[key] = json.dumps(value) if isinstance(value, dict) else value
+    return flat
+
+
+def _sorted(comparison: Comparison, picture: Picture, error: str, cost: str) -> list[KernelRow]:
+    """Rows of a picture by cost, then by error."""
+    rows = comparison.rows_of(picture.name)
+    return sorted(rows, key=lambda row: (row.rounded_cost(cost), row.error(error)))
+
+
+def _cells(row: KernelRow, mark: str) -> list[str]:
+    """Figures of a row for people; drift and asymmetry of the worst channel."""
+    drift = max(row.energy_drift.tolist(), key=abs)
+    return [
+        f"{mark}{row.label}",
+        f"{row.passes}",
+        f"{row.taps_per_pixel}",
+        f"{row.seconds_per_megapixel:.2g}",
+        _or_dash(row.delta_e_2000_mean, ".3f"),
+        _or_dash(row.delta_e_2000_p99, ".2f"),
+        f"{100.0 * row.relative_l2:.3g} %",
+        f"{row.psnr_db:.1f}",
+        percent(drift),
+        _or_dash(float(row.radial_asymmetry.max()), ".2g"),
+    ]
+
+
+def _or_dash(value: float, digits: str) -> str:
+    """Write a figure; a dash where there is none."""
+    return "-" if math.isnan(value) else f"{value:{digits}}"
+
+
+def _setting(comparison: Comparison) -> str:
+    """Say what was compared, on which pixels."""
+    profile = comparison.profile
+    threads = "1 thread" if comparison.threads == 1 else f"{comparison.threads} threads"
+    missing = comparison.missing_share.max()
+    return (
+        f"{profile.material_name or 'profile'}, {profile.meta.get('method') or 'no method'}: "
+        f"kernels of {comparison.pixels} pixels of {comparison.mm_per_pixel:.4g} mm against the "
+        f"whole 2D kernel, which lacks up to {percent(missing, '.2g')} of a channel's light beyond "
+        f"the grid; seconds on {threads}, float64"
+    )
+
+
+def _front(error: str, cost: str) -> str:
+    """Say what is special about the rows that are marked."""
+    return f"no other kernel of the picture has as small an error ({error}) at the cost ({cost})"
+
+
+def _picture_line(picture: Picture) -> str:
+    """Name a picture with its size and exposure."""
+    size = f"{picture.width} x {picture.height} pixels"
+    return f"{picture.name}, {size}, exposure {picture.exposure:.4g}"

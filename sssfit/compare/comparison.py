@@ -1,0 +1,159 @@
+"""The records of a comparison of kernels: its pictures, and a row for each kernel on each.
+
+``sssfit.compare.pareto`` fills them.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.errors import RenderError
+from sssfit.profile import Profile
+
+FloatArray = npt.NDArray[np.float64]
+
+# What a front can be of: the names of the command line, and the rows' fields.
+ERRORS = {"delta-e": "delta_e_2000_mean", "l2": "relative_l2"}
+COSTS = {"passes": "passes", "weights": "taps_per_pixel", "seconds": "seconds_per_megapixel"}
+_COLOURED = (1, 3)  # channels that have a colour, or are grey
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A picture of a comparison: its size in pixels, and the exposure of its truth."""
+
+    name: str
+    width: int
+    height: int
+    exposure: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KernelRow:
+    """One kernel on one picture; C channels.
+
+    Parameters
+    ----------
+    label, method : str
+        The candidate's, as "svd 3, kept" and "svd".
+    rank : int
+        Separable terms.
+    settings : mapping
+        Keywords of the fit.
+    picture : str
+    delta_e_2000_mean, delta_e_2000_p99, relative_l2, rmse, psnr_db : float
+    energy_drift : array (C,)
+        As in `ImageScore`.
+    radial_asymmetry : array (C,)
+        As in `Judgement`; NaN for kernels of fewer than 9 pixels.
+    passes, taps_per_pixel, kernel_bytes : int
+        As in `Cost`.
+    seconds_per_megapixel : float [s]
+        Wall time of `render_separable` in float64 on the largest picture, the least of several.
+    fit_seconds : float [s]
+    relative_frobenius_error : array (C,)
+        Of the kernel, as in `FitResult`.
+    stop_reasons : tuple of str
+        Why the fit of each channel ended.
+    fronts : frozenset of (error, cost)
+        Keys of ``ERRORS`` and ``COSTS`` for which no row of the same picture beats this one.
+    taps : int, optional
+        Bilinear taps of a shader; None: there are none yet.
+    """
+
+    label: str
+    method: str
+    rank: int
+    settings: Mapping[str, Any]
+    picture: str
+    delta_e_2000_mean: float
+    delta_e_2000_p99: float
+    relative_l2: float
+    rmse: float
+    psnr_db: float
+    energy_drift: FloatArray
+    radial_asymmetry: FloatArray
+    passes: int
+    taps_per_pixel: int
+    kernel_bytes: int
+    seconds_per_megapixel: float
+    fit_seconds: float
+    relative_frobenius_error: FloatArray
+    stop_reasons: tuple[str, ...]
+    fronts: frozenset[tuple[str, str]] = frozenset()
+    taps: int | None = None
+
+    def error(self, name: str) -> float:
+        """Return the error that a key of ``ERRORS`` names."""
+        return float(getattr(self, ERRORS[name]))
+
+    def cost(self, name: str) -> float:
+        """Return the cost that a key of ``COSTS`` names."""
+        return float(getattr(self, COSTS[name]))
+
+    def rounded_cost(self, name: str) -> float:
+        """Return the cost as a front counts it: seconds to two digits, as sure as clocks are.
+
+        Otherwise of kernels of equal work each that was a percent faster is on the front.
+        """
+        cost = self.cost(name)
+        return float(f"{cost:.2g}") if name == "seconds" else cost
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """Every kernel on every picture.
+
+    Parameters
+    ----------
+    profile : Profile
+    mm_per_pixel : float [mm]
+    pixels : int
+        Of a pass.
+    threads : int
+        That the seconds were measured with.
+    pictures : tuple of Picture
+    rows : tuple of KernelRow
+        Kernel by kernel in the candidates' order, for each all pictures.
+    left_out : tuple of (label, reason)
+        Candidates that could not be fitted.
+    """
+
+    profile: Profile
+    mm_per_pixel: float
+    pixels: int
+    threads: int
+    pictures: tuple[Picture, ...]
+    rows: tuple[KernelRow, ...]
+    left_out: tuple[tuple[str, str], ...]
+
+    @property
+    def missing_share(self) -> FloatArray:
+        """Share of the diffuse reflectance that lies beyond the profile's grid (C,).
+
+        True pictures lack it. A kernel with its energy restored has it, and cannot be nearer to
+        them than that.
+        """
+        total = self.profile.diffuse_reflectance
+        beyond = self.profile.beyond_grid
+        return np.divide(beyond, total, out=np.zeros_like(total), where=total > 0.0)
+
+    def rows_of(self, picture: str) -> list[KernelRow]:
+        """Rows of one picture."""
+        return [row for row in self.rows if row.picture == picture]
+
+    def front(self, picture: str, error: str, cost: str) -> list[KernelRow]:
+        """Rows of a picture that none of its rows beats, cheapest first."""
+        found = [row for row in self.rows_of(picture) if (error, cost) in row.fronts]
+        return sorted(found, key=lambda row: row.cost(cost))
+
+
+def check_error(error: str, channels: int) -> None:
+    """Refuse Delta E for channels that have no colour."""
+    if error == "delta-e" and channels not in _COLOURED:
+        raise RenderError(
+            f"Delta E of {channels} channels; expected 3, or 1 for grey: choose the error l2."
+        )

@@ -1,0 +1,219 @@
+"""Speed against accuracy: every kernel that can be fitted, judged on the same pictures.
+
+A row is one kernel on one picture. Errors are against the picture by the profile's whole 2D kernel;
+`sssfit.compare.front` says which rows are worth their cost, `sssfit.chart` draws them.
+"""
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from time import perf_counter
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.compare._pixels import selected_pixels, selection
+from sssfit.compare.candidates import Candidate
+from sssfit.compare.candidates import candidates as every_candidate
+from sssfit.compare.comparison import COSTS, ERRORS, Comparison, KernelRow, Picture
+from sssfit.compare.front import pareto_front
+from sssfit.compare.judge import Judgement, judge
+from sssfit.compare.metrics import auto_exposure
+from sssfit.errors import FitError, RenderError
+from sssfit.fit import FitResult, make_target
+from sssfit.profile import Profile
+from sssfit.render._checks import check_channels, thread_count
+from sssfit.render.reference import render_reference
+from sssfit.render.scene import Scene
+from sssfit.render.separable import render_separable
+
+Report = Callable[[int, int, str], None]
+_Judged = tuple[Candidate, FitResult, Sequence[Judgement]]
+
+# Turns in which kernels are timed: two at least, then until so much time has gone.
+_LEAST_TURNS, _MOST_TURNS, _TIMED_SECONDS = 2, 12, 8.0
+
+
+def compare_kernels(
+    profile: Profile,
+    scenes: Sequence[Scene],
+    *,
+    mm_per_pixel: float,
+    support_mm: float | None = None,
+    candidates: Sequence[Candidate] | None = None,
+    threads: int | None = None,
+    progress: Report | None = None,
+) -> Comparison:
+    """Fit every candidate once, and judge each on every picture.
+
+    Parameters
+    ----------
+    profile : Profile
+        What is fitted, and what the true pictures are made from.
+    scenes : sequence of Scene
+        On pixels of ``mm_per_pixel``, of different names.
+    mm_per_pixel, support_mm : float [mm]
+        As `make_target`.
+    candidates : sequence of Candidate, optional
+        By default all that ``sssfit.compare.candidates`` knows for these pixels.
+    threads : int, optional
+        By default all cores; only the seconds depend on it.
+    progress : callable, optional
+        Called with how many candidates are done, of how many, and the label of the next.
+
+    Returns
+    -------
+    Comparison
+
+    Raises
+    ------
+    FitError
+        The profile cannot be used, or no candidate could be fitted.
+    RenderError
+        As `check_scenes`, or as `judge`.
+    """
+    check_scenes(scenes, mm_per_pixel, profile.n_channels)
+    target = make_target(profile, mm_per_pixel, support_mm)
+    pixels = 2 * target.half_pixels + 1
+    wanted = every_candidate(pixels) if candidates is None else tuple(candidates)
+    truths = [render_reference(scene, profile, threads=threads) for scene in scenes]
+    exposures = [auto_exposure(t, s.mask) for t, s in zip(truths, scenes, strict=True)]
+    judged: list[_Judged] = []
+    left_out: list[tuple[str, str]] = []
+    for done, candidate in enumerate(wanted):
+        if progress is not None:
+            progress(done, len(wanted), candidate.label)
+        try:
+            fit = candidate.fit(profile, mm_per_pixel, support_mm)
+        except FitError as error:
+            left_out.append((candidate.label, str(error)))
+            continue
+        scores = [
+            judge(scene, fit.kernel, truth=truth, exposure=exposure, threads=threads)
+            for scene, truth, exposure in zip(scenes, truths, exposures, strict=True)
+        ]
+        judged.append((candidate, fit, scores))
+    if not judged:
+        reason = left_out[0][1] if left_out else "there are none."
+        raise FitError(f"{target.name}: no kernel of {len(wanted)} could be fitted: {reason}")
+    seconds = _timed_in_turn([fit for _, fit, _ in judged], scenes, threads)
+    rows = [
+        row
+        for each, price in zip(judged, seconds, strict=True)
+        for row in _rows(*each, scenes, price)
+    ]
+    return Comparison(
+        profile=profile,
+        mm_per_pixel=mm_per_pixel,
+        pixels=pixels,
+        threads=thread_count(threads),
+        pictures=tuple(map(_picture, scenes, exposures)),
+        rows=_with_fronts(rows),
+        left_out=tuple(left_out),
+    )
+
+
+def check_scenes(scenes: Sequence[Scene], mm_per_pixel: float, channels: int) -> None:
+    """Refuse pictures that say nothing, before anything is fitted.
+
+    Raises
+    ------
+    RenderError
+        No picture, two of one name, another pixel size or other channels, or one colour all over.
+    """
+    names = [scene.name for scene in scenes]
+    if not scenes or len(set(names)) < len(names):
+        raise RenderError(f"pictures {', '.join(names) or '-'}; expected one or more, each once.")
+    for scene in scenes:
+        check_channels(scene.channels, channels)
+        if abs(scene.mm_per_pixel - mm_per_pixel) > 1e-6 * mm_per_pixel:
+            raise RenderError(
+                f"{scene.name} has {scene.mm_per_pixel:.7g} mm per pixel and the kernels "
+                f"{mm_per_pixel:.7g}; expected the same."
+            )
+        lit = selected_pixels(scene.irradiance, selection(scene.mask, scene.irradiance))
+        if not np.ptp(lit, axis=0).any():
+            raise RenderError(
+                f"{scene.name} is of one colour: blurred it is the same, and no kernel can be told "
+                "from another; give a picture with edges in it."
+            )
+
+
+def _picture(scene: Scene, exposure: float) -> Picture:
+    return Picture(scene.name, scene.width, scene.height, exposure)
+
+
+def _timed_in_turn(
+    fits: Sequence[FitResult], scenes: Sequence[Scene], threads: int | None
+) -> npt.NDArray[np.float64]:
+    """Return the least seconds per megapixel of each kernel, on the largest picture (n,).
+
+    All kernels in turn, again and again, and not each some times in a row: what other programs
+    take then falls on all alike. In a row, kernels of equal work differed by a factor of two.
+    """
+    scene = max(scenes, key=lambda each: each.height * each.width)
+    least = np.full(len(fits), np.inf)
+    begun = perf_counter()
+    for done in range(_MOST_TURNS):
+        if done >= _LEAST_TURNS and perf_counter() - begun > _TIMED_SECONDS:
+            break
+        for k, fit in enumerate(fits):
+            start = perf_counter()
+            render_separable(scene, fit.kernel, threads=threads)
+            least[k] = min(least[k], perf_counter() - start)
+    return least * 1e6 / (scene.height * scene.width)
+
+
+def _rows(
+    candidate: Candidate,
+    fit: FitResult,
+    judged: Sequence[Judgement],
+    scenes: Sequence[Scene],
+    seconds: float,
+) -> list[KernelRow]:
+    """Return the rows of one kernel, yet without fronts."""
+    cost = judged[0].cost
+    found = []
+    for scene, each in zip(scenes, judged, strict=True):
+        assert each.score is not None  # a truth was given
+        found.append(
+            KernelRow(
+                label=candidate.label,
+                method=candidate.method,
+                rank=fit.kernel.rank,
+                settings=candidate.settings,
+                picture=scene.name,
+                delta_e_2000_mean=each.score.delta_e_2000_mean,
+                delta_e_2000_p99=each.score.delta_e_2000_p99,
+                relative_l2=each.score.relative_l2,
+                rmse=each.score.rmse,
+                psnr_db=each.score.psnr_db,
+                energy_drift=each.score.energy_drift,
+                radial_asymmetry=each.asymmetry,
+                passes=cost.passes,
+                taps_per_pixel=cost.taps_per_pixel,
+                kernel_bytes=cost.kernel_bytes,
+                seconds_per_megapixel=float(seconds),
+                fit_seconds=fit.seconds,
+                relative_frobenius_error=fit.relative_frobenius_error,
+                stop_reasons=fit.stop_reasons,
+            )
+        )
+    return found
+
+
+def _with_fronts(rows: Sequence[KernelRow]) -> tuple[KernelRow, ...]:
+    """Say of each row which fronts of its picture it is on."""
+    fronts: list[set[tuple[str, str]]] = [set() for _ in rows]
+    for picture in dict.fromkeys(row.picture for row in rows):
+        places = [i for i, row in enumerate(rows) if row.picture == picture]
+        for error in ERRORS:
+            for cost in COSTS:
+                points = [(rows[i].rounded_cost(cost), rows[i].error(error)) for i in places]
+                on_front = pareto_front(*zip(*points, strict=True))
+                for i, is_on in zip(places, on_front, strict=True):
+                    if is_on:
+                        fronts[i].add((error, cost))
+    return tuple(
+        dataclasses.replace(row, fronts=frozenset(own))
+        for row, own in zip(rows, fronts, strict=True)
+    )

@@ -1,0 +1,264 @@
+"""``sssfit compare``: its table, files and refusals."""
+
+import csv
+import io
+import json
+import os
+
+import numpy as np
+import pytest
+
+from sssfit.cli import main
+from sssfit.cli._compare_table import is_table_file
+from sssfit.compare import pareto
+from sssfit.compare.candidates import candidates
+from sssfit.image import save_image
+from sssfit.material import load_material
+from sssfit.simulate import exact, simulate_exact
+
+SMALL = ("--picture", "disk", "--size", "32x32", "--mm-per-pixel", "2.5")
+SLAB = (
+    "eta = 1.3\ng = 0\nsigma_a_per_mm = [0.1, 0.1, 0.1]\nsigma_s_per_mm = [9, 9, 9]\n"
+    "thickness_mm = 2\n"
+)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled():
+    """The solver is compiled before its words on stderr are looked at."""
+    exact.diffuse_reflectance([0.5], 1.3)
+
+
+@pytest.fixture(autouse=True)
+def few(monkeypatch):
+    """Few kernels, quickly fitted; the verb hands what to try to the library."""
+    labels = ("pre-integrated", "svd 1", "svd 2", "svd 2, kept", "gaussians 1")
+    some = [each for each in candidates(17) if each.label in labels]
+    monkeypatch.setattr(pareto, "every_candidate", lambda _: some)
+    return [each.label for each in some]
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch, capfd):
+    """Run ``sssfit compare`` in an empty folder; give its stdout, or stderr for a status."""
+    monkeypatch.chdir(tmp_path)
+
+    def call(*arguments, status=0):
+        with pytest.raises(SystemExit) as caught:
+            main(["compare", *arguments])
+        out, err = capfd.readouterr()
+        assert caught.value.code == status, err
+        return err if status else out
+
+    return call
+
+
+def one_line(text):
+    assert text.count("\n") == 1
+    assert text.startswith("Error: ")
+    return text
+
+
+def test_rows_for_programs(run, tmp_path, few):
+    found = json.loads(run("skin1", *SMALL, "--json"))
+    assert found["command"] == "compare"
+    assert found["output"] == []
+    assert (found["material"], found["profile_method"]) == ("skin1", "exact")
+    assert (found["mm_per_pixel"], found["channels"]) == (2.5, ["R", "G", "B"])
+    assert found["pictures"][0] == {"name": "disk", "width": 32, "height": 32} | {
+        "exposure": pytest.approx(found["pictures"][0]["exposure"])
+    }
+    assert [row["label"] for row in found["rows"]] == few
+    row = found["rows"][0]
+    assert row["taps"] is None
+    assert len(row["energy_drift"]) == len(row["stop_reasons"]) == 3
+    assert set(row["on_front"]) == {"delta-e", "l2"}
+    assert set(row["on_front"]["l2"]) == {"passes", "weights", "seconds"}
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_table_for_people_is_sorted_and_marks_the_front(run, few):
+    text = run("skin1", *SMALL, "--error", "l2", "--cost", "passes")
+    lines = text.splitlines()
+    start = next(k for k, line in enumerate(lines) if line.startswith("  kernel"))
+    rows = lines[start + 1 : lines.index("", start)]
+    assert len(rows) == len(few)
+    parts = [line[2:].split("  ") for line in rows]
+    cells = [[each.strip() for each in line if each.strip()] for line in parts]
+    key = [(int(each[1]), float(each[6].removesuffix(" %"))) for each in cells]
+    assert key == sorted(key)
+    starred = [k for (k, line) in zip(key, rows, strict=True) if line.startswith("* ")]
+    assert starred
+    assert starred == sorted(starred, key=lambda each: (each[0], -each[1]))
+    assert starred[0] == key[0]
+
+
+def test_chart_and_tables_are_written(run, tmp_path):
+    for ending in (".md", ".csv", ".json"):
+        out = run("skin1", *SMALL, "--chart", "c.png", "--table", f"t{ending}")
+        assert out.splitlines()[-1] == f"Wrote c.png, t{ending}"
+        assert is_table_file(tmp_path / f"t{ending}")
+    assert (tmp_path / "c.png").read_bytes().startswith(b"\x89PNG")
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["c.png", "t.csv", "t.json", "t.md"]
+    rows = json.loads((tmp_path / "t.json").read_text())["rows"]
+    lines = list(csv.DictReader(io.StringIO((tmp_path / "t.csv").read_text())))
+    assert [line["label"] for line in lines] == [row["label"] for row in rows]
+    for line, row in zip(lines, rows, strict=True):
+        assert float(line["relative_l2"]) == row["relative_l2"]
+        assert float(line["energy_drift_G"]) == row["energy_drift"][1]
+        assert json.loads(line["settings"]) == row["settings"]
+        assert bool(int(line["on_front_delta-e_passes"])) == row["on_front"]["delta-e"]["passes"]
+    markdown = (tmp_path / "t.md").read_text()
+    table = [line for line in markdown.splitlines() if line.startswith("|")]
+    assert len(table) == 2 + len(rows)
+    assert len({line.count("|") for line in table}) == 1
+    assert sum(line.startswith("| **") for line in table) == sum(
+        row["on_front"]["delta-e"]["weights"] for row in rows
+    )
+
+
+def test_a_profile_stands_for_its_material(run, tmp_path):
+    simulate_exact(load_material("skin1")).save(tmp_path / "p.profile.npz")
+    ours, theirs = (
+        json.loads(run(name, *SMALL, "--json"))["rows"] for name in ("p.profile.npz", "skin1")
+    )
+    assert [row["relative_l2"] for row in ours] == [row["relative_l2"] for row in theirs]
+
+
+def test_the_skin_of_six_gaussians_can_be_compared(run):
+    assert json.loads(run("deon-skin", *SMALL, "--json"))["profile_method"] == "gaussians"
+
+
+def test_a_picture_brings_its_pixel_size(run, tmp_path):
+    light = np.zeros((24, 24, 3))
+    light[8:16, 8:16] = 1.0
+    save_image(tmp_path / "mine.exr", light, mm_per_pixel=2.0)
+    found = json.loads(run("skin1", "--picture", "mine.exr,disk", "--size", "32x32", "--json"))
+    assert found["mm_per_pixel"] == 2.0
+    assert [(each["name"], each["width"]) for each in found["pictures"]] == [
+        ("mine.exr", 24),
+        ("disk", 32),
+    ]
+    again = json.loads(run("skin1", "--picture", "mine.exr", "--mm-per-pixel", "3", "--json"))
+    assert again["mm_per_pixel"] == 3.0
+
+
+def test_a_picture_without_pixel_size_or_of_one_colour_is_refused(run, tmp_path):
+    save_image(tmp_path / "flat.png", np.full((16, 16, 3), 0.5))
+    line = one_line(run("skin1", "-q", "--picture", "flat.png", status=1))
+    assert "does not say how large its pixels are; give --mm-per-pixel" in line
+    line = one_line(run("skin1", "-q", "--picture", "flat.png", "--mm-per-pixel", "2", status=1))
+    assert "flat.png is of one colour" in line
+
+
+def test_pictures_that_do_not_agree_are_refused(run, tmp_path):
+    light = np.zeros((24, 24, 1))
+    light[8:16, 8:16] = 1.0
+    for name, pitch in (("a.exr", 2.0), ("b.exr", 3.0)):
+        save_image(tmp_path / name, light, mm_per_pixel=pitch)
+    line = one_line(run("skin1", "--picture", "a.exr", "--picture", "b.exr", status=1))
+    assert "b.exr has 3 mm per pixel and the kernels 2" in line
+    assert "each once" in one_line(run("skin1", "--picture", "disk,disk", status=1))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((), "name one MATERIAL"),
+        (("skin1", "--all"), "name one MATERIAL"),
+        (("--all", "--chart", "c.png"), "leave --chart and --table out"),
+        (("skin1", "-o", "folder"), "-o is the folder of --all"),
+        (("skin1", "--picture", "dsk"), "there is no picture 'dsk'"),
+        (("skin1", "--cost", "money"), "'money' is not one of"),
+        (("skin1", "--mm-per-pixel", "0"), "is not a length above 0"),
+    ],
+)
+def test_wrong_usage(run, arguments, words):
+    assert words in run(*arguments, status=2)
+
+
+def test_size_without_made_pictures_is_wrong_usage(run, tmp_path):
+    save_image(tmp_path / "mine.exr", np.eye(16)[:, :, None], mm_per_pixel=2.0)
+    assert "--size is for made" in run("skin1", "--picture", "mine.exr", "--size", "9x9", status=2)
+
+
+def test_a_slab_needs_its_photons_walked(run, tmp_path):
+    (tmp_path / "slab.toml").write_text(SLAB)
+    line = one_line(run("slab.toml", *SMALL, status=1))
+    assert "slab is not one half space" in line
+    assert "compare slab.profile.npz" in line
+
+
+def test_profiles_without_a_colour_need_the_other_error(run, tmp_path):
+    from reference_pixels import make_profile
+
+    make_profile([0.0, 3.0, 9.0], [[0.3, 0.2], [0.1, 0.1]]).save(tmp_path / "two.profile.npz")
+    line = one_line(run("two.profile.npz", *SMALL, status=1))
+    assert "Delta E of 2 channels" in line
+    rows = json.loads(run("two.profile.npz", *SMALL, "--error", "l2", "--json"))["rows"]
+    assert {row["delta_e_2000_mean"] for row in rows} == {None}
+
+
+def test_a_material_that_cannot_be_fitted_is_one_line(run, tmp_path):
+    from reference_pixels import make_profile
+
+    make_profile([0.0, 3.0, 9.0], np.zeros((2, 3))).save(tmp_path / "black.profile.npz")
+    assert "nothing to fit" in one_line(run("black.profile.npz", *SMALL, status=1))
+
+
+def test_foreign_files_stay(run, tmp_path):
+    for name in ("c.png", "t.md", "t.csv", "t.json"):
+        (tmp_path / name).write_text("# mine\n")
+        option = "--chart" if name == "c.png" else "--table"
+        line = one_line(run("skin1", *SMALL, option, name, status=1))
+        assert "is not a file of this format" in line
+        assert (tmp_path / name).read_text() == "# mine\n"
+    run("skin1", *SMALL, "--table", "t.md", "--force")
+    run("skin1", *SMALL, "--table", "t.md")
+    assert "end it in .md" in one_line(run("skin1", *SMALL, "--table", "t.txt", status=1))
+    assert "end it in .png" in one_line(run("skin1", *SMALL, "--chart", "t.gif", status=1))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="bytes of a pipe")
+def test_a_chart_may_go_to_stdout(tmp_path, monkeypatch, capfdbinary):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit):
+        main(["compare", "skin1", *SMALL, "--chart", "-"])
+    out, err = capfdbinary.readouterr()
+    assert out.startswith(b"\x89PNG")
+    assert b"pre-integrated" in err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch):
+    from sssfit import material
+    from sssfit.cli import _compare_pareto as verb
+
+    real = verb.profile_of
+    (tmp_path / "marble.toml").write_text(SLAB)
+    # In place of the shipped marble, a slab.
+    paths = {"marble": "marble.toml"}
+    monkeypatch.setattr(
+        verb, "profile_of", lambda name, common: real(paths.get(name, name), common)
+    )
+    monkeypatch.setattr(material, "material_names", lambda: ("marble", "skin1"))
+    (tmp_path / "out").mkdir()
+    err = run("--all", "-o", "out", *SMALL, status=1)
+    assert "1 of 2 materials failed; marble: marble is not one half space" in err
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
+        "skin1-pareto.md",
+        "skin1-pareto.png",
+    ]
+
+
+def test_all_prints_the_fronts(run, tmp_path, monkeypatch):
+    from sssfit import material
+
+    monkeypatch.setattr(material, "material_names", lambda: ("skin1", "marble"))
+    lines = run("--all", *SMALL).splitlines()
+    assert [line.split()[0] for line in lines[1:3]] == ["skin1", "marble"]
+    names = [f"{name}-pareto.{end}" for name in ("skin1", "marble") for end in ("png", "md")]
+    assert lines[-1] == f"Wrote {', '.join(names)}"
+    found = json.loads(run("--all", *SMALL, "--json"))
+    assert {row["material"] for row in found["rows"]} == {"skin1", "marble"}
+    assert found["output"] == names

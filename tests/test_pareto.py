@@ -1,0 +1,221 @@
+"""Kernels by error and cost: the front, and rows against what judges them one at a time."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from reference_front import literal_front
+from reference_pixels import make_profile
+
+from sssfit.compare.candidates import Candidate, candidates
+from sssfit.compare.comparison import COSTS, ERRORS, check_error
+from sssfit.compare.front import pareto_front
+from sssfit.compare.judge import judge
+from sssfit.compare.metrics import measure
+from sssfit.compare.pareto import check_scenes, compare_kernels
+from sssfit.errors import FitError, RenderError
+from sssfit.material import load_material
+from sssfit.render.irradiance import make_scene
+from sssfit.render.reference import render_reference
+from sssfit.render.scene import Scene
+from sssfit.render.separable import render_separable
+from sssfit.simulate import simulate_exact
+
+PITCH = 1.0
+SOME = (
+    Candidate("svd 1", "svd", 1, {"rank": 1}),
+    Candidate("svd 2", "svd", 2, {"rank": 2}),
+    Candidate("svd 2, kept", "svd", 2, {"rank": 2, "energy": "keep"}),
+    Candidate("gaussians 2", "gaussians", 2, {"terms": 2}),
+    Candidate("pre-integrated", "preintegrated", 1),
+)
+IMPOSSIBLE = Candidate("svd 0", "svd", 0, {"rank": 0})
+# Few values, so that ties are common; NaN and inf among them.
+FIGURES = st.sampled_from([0.0, 1.0, 2.0, 3.0, float("nan"), float("inf")]) | st.floats(0, 9)
+
+
+@pytest.fixture(scope="module")
+def skin1():
+    return simulate_exact(load_material("skin1"))
+
+
+@pytest.fixture(scope="module")
+def scenes():
+    return [make_scene(name, height=64, width=64, mm_per_pixel=PITCH) for name in ("disk", "head")]
+
+
+@pytest.fixture(scope="module")
+def comparison(skin1, scenes):
+    return compare_kernels(skin1, scenes, mm_per_pixel=PITCH, candidates=SOME)
+
+
+def flat(value=0.5, name="flat", pitch=PITCH):
+    return Scene(name, np.full((8, 8, 1), value), pitch)
+
+
+@given(st.lists(st.tuples(FIGURES, FIGURES), max_size=12))
+def test_the_front_is_the_literal_one(points):
+    cost, error = [each[0] for each in points], [each[1] for each in points]
+    assert pareto_front(cost, error).tolist() == literal_front(cost, error)
+
+
+@given(st.lists(st.tuples(FIGURES, FIGURES), max_size=12))
+def test_along_the_front_cost_rises_and_error_falls(points):
+    cost, error = np.array(points, dtype=float).reshape(-1, 2).T
+    front = pareto_front(cost, error)
+    order = np.argsort(cost[front])
+    assert (np.diff(cost[front][order]) > 0).all()
+    assert (np.diff(error[front][order]) < 0).all()
+    assert front.any() == (np.isfinite(cost) & np.isfinite(error)).any()
+
+
+def test_of_equal_points_the_first_is_kept():
+    assert pareto_front([2, 2, 2], [0.3, 0.1, 0.1]).tolist() == [False, True, False]
+    assert pareto_front([], []).tolist() == []
+
+
+@pytest.mark.parametrize("points", [([1, 2], [1]), ([[1, 2]], [[1, 2]]), (1.0, 1.0)])
+def test_points_that_do_not_pair_are_refused(points):
+    with pytest.raises(RenderError, match="two lists of one length"):
+        pareto_front(*points)
+
+
+def test_rows_are_what_judge_and_measure_say(skin1, scenes, comparison):
+    rows = iter(comparison.rows)
+    for candidate in SOME:
+        fit = candidate.fit(skin1, PITCH, None)
+        for scene in scenes:
+            row, alone = next(rows), judge(scene, fit.kernel, skin1)
+            truth = render_reference(scene, skin1)
+            score = measure(render_separable(scene, fit.kernel), truth, mask=scene.mask)
+            assert (row.label, row.method) == (candidate.label, candidate.method)
+            assert (row.picture, row.rank) == (scene.name, fit.kernel.rank)
+            keys = ("delta_e_2000_mean", "delta_e_2000_p99", "relative_l2", "rmse", "psnr_db")
+            for key in keys:
+                assert getattr(row, key) == getattr(alone.score, key) == getattr(score, key)
+            np.testing.assert_array_equal(row.energy_drift, score.energy_drift)
+            np.testing.assert_array_equal(row.radial_asymmetry, alone.asymmetry)
+            np.testing.assert_array_equal(
+                row.relative_frobenius_error, fit.relative_frobenius_error
+            )
+            assert row.stop_reasons == fit.stop_reasons
+            assert row.passes == 2 * candidate.terms
+            assert row.taps_per_pixel == row.passes * comparison.pixels
+            assert row.kernel_bytes == 4 * candidate.terms * comparison.pixels * 3
+            assert row.taps is None
+            assert row.seconds_per_megapixel > 0 < row.fit_seconds
+    assert next(rows, None) is None
+
+
+def test_pictures_are_named_with_the_exposure_of_their_truth(skin1, scenes, comparison):
+    for scene, picture in zip(scenes, comparison.pictures, strict=True):
+        score = judge(scene, SOME[0].fit(skin1, PITCH, None).kernel, skin1).score
+        assert dataclasses.astuple(picture) == (scene.name, 64, 64, score.exposure)
+
+
+def test_fronts_are_those_of_each_picture(comparison):
+    for picture in ("disk", "head"):
+        rows = comparison.rows_of(picture)
+        assert [row.label for row in rows] == [each.label for each in SOME]
+        for error in ERRORS:
+            for cost in COSTS:
+                wanted = literal_front(
+                    [row.rounded_cost(cost) for row in rows], [row.error(error) for row in rows]
+                )
+                found = [(error, cost) in row.fronts for row in rows]
+                assert found == wanted
+                front = comparison.front(picture, error, cost)
+                # Not beaten by the figures as measured either, which are not rounded.
+                exact = [row.cost(cost) for row in front], [row.error(error) for row in front]
+                assert all(literal_front(*exact))
+
+
+def test_the_same_call_gives_the_same_rows_but_for_seconds(skin1, scenes, comparison):
+    again = compare_kernels(skin1, scenes, mm_per_pixel=PITCH, candidates=SOME, threads=1)
+    for row, other in zip(comparison.rows, again.rows, strict=True):
+        for field in dataclasses.fields(row):
+            if "seconds" in field.name:
+                continue
+            one, two = (getattr(each, field.name) for each in (row, other))
+            if field.name == "fronts":
+                one, two = ({each for each in own if "seconds" not in each} for own in (one, two))
+            np.testing.assert_array_equal(one, two)
+
+
+def test_all_candidates_are_tried_unless_some_are_named(skin1):
+    seen, scene = [], make_scene("disk", height=32, width=32, mm_per_pixel=4.0)
+    found = compare_kernels(
+        skin1, [scene], mm_per_pixel=4.0, progress=lambda *each: seen.append(each)
+    )
+    wanted = [each.label for each in candidates(found.pixels)]
+    assert [row.label for row in found.rows] == wanted
+    assert seen == [(k, len(wanted), label) for k, label in enumerate(wanted)]
+
+
+def test_support_is_handed_to_the_fits(skin1, scenes):
+    found = compare_kernels(
+        skin1, scenes[:1], mm_per_pixel=PITCH, support_mm=4.0, candidates=SOME[:1]
+    )
+    assert found.pixels == 9
+    assert found.rows[0].taps_per_pixel == 18
+
+
+def test_what_cannot_be_fitted_is_left_out_by_name(skin1, scenes):
+    found = compare_kernels(skin1, scenes, mm_per_pixel=PITCH, candidates=[SOME[0], IMPOSSIBLE])
+    assert [row.label for row in found.rows] == ["svd 1", "svd 1"]
+    ((label, reason),) = found.left_out
+    assert label == "svd 0"
+    assert "rank" in reason
+
+
+def test_nothing_fitted_is_an_error(skin1, scenes):
+    with pytest.raises(FitError, match=r"skin1: no kernel of 1 could be fitted: .*rank"):
+        compare_kernels(skin1, scenes, mm_per_pixel=PITCH, candidates=[IMPOSSIBLE])
+
+
+@pytest.mark.parametrize("value", [0.0, 0.5])
+def test_a_picture_of_one_colour_is_refused(skin1, value):
+    with pytest.raises(RenderError, match="flat is of one colour"):
+        compare_kernels(skin1, [flat(value)], mm_per_pixel=PITCH, candidates=SOME)
+
+
+def test_a_picture_of_one_colour_within_its_mask_is_refused():
+    light, mask = np.zeros((8, 8, 1)), np.zeros((8, 8), dtype=int)
+    light[:, :4], mask[:, :4] = 1.0, 1
+    with pytest.raises(RenderError, match="one colour"):
+        check_scenes([Scene("half", light, PITCH, mask=mask)], PITCH, 3)
+    check_scenes([Scene("half", light, PITCH)], PITCH, 3)
+
+
+def test_pictures_that_cannot_be_told_apart_or_compared_are_refused(scenes):
+    with pytest.raises(RenderError, match="each once"):
+        check_scenes([scenes[0], scenes[0]], PITCH, 3)
+    with pytest.raises(RenderError, match="one or more"):
+        check_scenes([], PITCH, 3)
+    with pytest.raises(RenderError, match=r"disk has 1 mm per pixel and the kernels 0\.5"):
+        check_scenes(scenes, 0.5, 3)
+    colours = Scene("colours", np.random.default_rng(1).random((8, 8, 3)), PITCH)
+    with pytest.raises(RenderError, match="channels"):
+        check_scenes([colours], PITCH, 2)
+
+
+def test_delta_e_needs_channels_that_have_a_colour(scenes):
+    profile = make_profile([0.0, 2.0, 8.0], [[0.3, 0.2], [0.1, 0.1]])
+    found = compare_kernels(profile, scenes, mm_per_pixel=PITCH, candidates=SOME[:2])
+    assert all(np.isnan(row.delta_e_2000_mean) for row in found.rows)
+    assert found.front("disk", "delta-e", "passes") == []
+    assert found.front("disk", "l2", "passes")
+    with pytest.raises(RenderError, match="Delta E of 2 channels"):
+        check_error("delta-e", 2)
+    check_error("l2", 2)
+
+
+def test_a_truth_that_is_there_is_not_rendered_again(skin1, scenes):
+    kernel = SOME[0].fit(skin1, PITCH, None).kernel
+    truth = 2.0 * render_reference(scenes[0], skin1)
+    found = judge(scenes[0], kernel, truth=truth)
+    assert found.truth is truth
+    score = measure(found.picture, truth)
+    assert found.score.rmse == score.rmse

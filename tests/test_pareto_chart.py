@@ -1,0 +1,203 @@
+"""The chart of error over cost: what is drawn, labelled and refused, and that it can be read."""
+
+import dataclasses
+import io
+
+import numpy as np
+import pytest
+from figures import assert_legible, drawn_texts
+
+from sssfit._chart_labels import place_labels
+from sssfit._chart_page import chart_style, new_figure
+from sssfit.chart import pareto_figure, save_figure
+from sssfit.compare.candidates import Candidate
+from sssfit.compare.comparison import COSTS, ERRORS
+from sssfit.compare.pareto import compare_kernels
+from sssfit.errors import RenderError
+from sssfit.material import load_material
+from sssfit.render.irradiance import make_scene
+from sssfit.simulate import simulate_exact
+
+PITCH = 2.0
+PICTURES = ("disk", "edge", "head")
+
+
+@pytest.fixture(scope="module")
+def comparison():
+    """Every candidate, as the verb has it."""
+    profile = simulate_exact(load_material("skin1"))
+    scenes = [make_scene(name, height=32, width=32, mm_per_pixel=PITCH) for name in PICTURES]
+    return compare_kernels(profile, scenes, mm_per_pixel=PITCH)
+
+
+def panels_of(figure):
+    return figure.axes
+
+
+def words_of(figure):
+    """All text from the top down, so that footnotes read as they were written."""
+    texts = sorted(drawn_texts(figure), key=lambda each: -each[1].y1)
+    return " ".join(text for text, _ in texts)
+
+
+def texts_in(axes):
+    return [each.get_text() for each in axes.texts]
+
+
+def with_rows(comparison, change):
+    """The same comparison with rows changed."""
+    return dataclasses.replace(comparison, rows=tuple(map(change, comparison.rows)))
+
+
+@pytest.mark.parametrize("error", ERRORS)
+@pytest.mark.parametrize("cost", COSTS)
+def test_every_chart_is_legible(comparison, error, cost):
+    assert_legible(lambda: pareto_figure(comparison, error=error, cost=cost))
+
+
+@pytest.mark.parametrize("error", ERRORS)
+@pytest.mark.parametrize("cost", COSTS)
+def test_the_front_alone_is_labelled_and_joined(comparison, error, cost):
+    figure = pareto_figure(comparison, error=error, cost=cost)
+    for axes, picture in zip(panels_of(figure), PICTURES, strict=True):
+        front = comparison.front(picture, error, cost)
+        assert texts_in(axes) == [row.label for row in front]
+        (line,) = (each for each in axes.lines if each.get_drawstyle() == "steps-post")
+        points = [(row.cost(cost), row.error(error)) for row in front]
+        np.testing.assert_array_equal(np.transpose(line.get_data())[:-1], points)
+        full = [
+            each for each in axes.lines if each.get_marker() != "None" and each.get_alpha() == 1
+        ]
+        assert sorted(tuple(np.ravel(each.get_data())) for each in full) == sorted(points)
+        faint = [each for each in axes.lines if (each.get_alpha() or 1.0) < 0.5]
+        assert len(faint) == len(comparison.rows_of(picture)) - len(front)
+
+
+def test_points_of_one_cost_are_apart(comparison):
+    axes = panels_of(pareto_figure(comparison, cost="passes"))[0]
+    rows = [row for row in comparison.rows_of("disk") if row.passes == 2]
+    left = {}
+    for row, line in zip(comparison.rows_of("disk"), axes.lines, strict=False):
+        left.setdefault((row.method, row.label.endswith("kept")), []).append((row, line))
+    places = {
+        round(float(line.get_xdata()[0]), 6)
+        for own in left.values()
+        for row, line in own
+        if row.passes == 2
+    }
+    kinds = {(row.method, row.label.endswith("kept")) for row in rows}
+    assert len(places) >= len(kinds)
+    assert min(places) == 2.0  # the front stands at its cost
+
+
+def test_a_line_at_one_marks_what_is_just_noticeable(comparison):
+    for error, wanted in (("delta-e", 1), ("l2", 0)):
+        for axes in panels_of(pareto_figure(comparison, error=error)):
+            flat = [each for each in axes.lines if list(each.get_ydata()) == [1.0, 1.0]]
+            assert len(flat) == wanted
+
+
+def test_title_and_notes_say_what_was_compared(comparison):
+    figure = pareto_figure(comparison, cost="weights")
+    text = words_of(figure)
+    exposure = f"exposure {comparison.pictures[0].exposure:.3g}"
+    for part in (
+        "skin1: mean ΔE 2000 against weights",
+        "Exact solution",
+        f"{comparison.pixels} x {comparison.pixels} pixels of 2 mm",
+        "disk, 32 × 32 pixels, " + exposure,  # noqa: RUF001
+        f"passes times the {comparison.pixels} pixels of a pass",
+        "as the made edge is",
+    ):
+        assert part in text
+    threads = pareto_figure(dataclasses.replace(comparison, threads=1), cost="seconds")
+    assert "on 1 thread of this machine" in words_of(threads)
+
+
+def test_methods_have_a_colour_and_a_marker_of_their_own(comparison):
+    axes = panels_of(pareto_figure(comparison))[0]
+    looks = {}
+    for row, line in zip(comparison.rows_of("disk"), axes.lines, strict=False):
+        looks.setdefault(row.method, set()).add((line.get_color(), line.get_marker()))
+    assert all(len(each) == 1 for each in looks.values())
+    assert len({next(iter(each))[0] for each in looks.values()}) == len(looks) == 7
+    assert len({next(iter(each))[1] for each in looks.values()}) == 7
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        pytest.param(lambda _: {"delta_e_2000_mean": 0.0}, id="no error at all"),
+        pytest.param(lambda _: {"delta_e_2000_mean": 3.0}, id="all alike"),
+        pytest.param(lambda row: {"delta_e_2000_mean": 1e-3 * row.delta_e_2000_mean}, id="small"),
+        pytest.param(lambda _: {"taps_per_pixel": 42}, id="one cost"),
+        pytest.param(lambda row: {"label": f"{row.label}, of a long name"}, id="long labels"),
+    ],
+)
+def test_strange_figures_are_drawn(comparison, change):
+    found = with_rows(comparison, lambda row: dataclasses.replace(row, **change(row)))
+    assert_legible(lambda: pareto_figure(found))
+
+
+def test_one_kernel_and_one_picture_are_drawn(comparison):
+    profile = comparison.profile
+    scenes = [make_scene("points", height=32, width=48, mm_per_pixel=PITCH)]
+    one = [Candidate("svd 1", "svd", 1, {"rank": 1}), Candidate("svd 0", "svd", 0, {"rank": 0})]
+    found = compare_kernels(profile, scenes, mm_per_pixel=PITCH, candidates=one)
+    figure = pareto_figure(found)
+    assert_legible(lambda: pareto_figure(found))
+    text = words_of(figure)
+    assert "Could not be fitted: svd 0." in text
+    assert "made edge" not in text
+
+
+def test_light_that_true_pictures_lack_is_noted(comparison):
+    profile = comparison.profile
+    beyond = np.array([0.0, 0.01, 0.0]) * profile.total_on_grid / 0.99
+    found = dataclasses.replace(
+        comparison, profile=dataclasses.replace(profile, beyond_grid=beyond)
+    )
+    assert found.missing_share == pytest.approx([0.0, 0.01, 0.0])
+    assert "lies up to 1 % of a channel's light" in words_of(pareto_figure(found))
+    assert "Beyond the profile's grid" not in words_of(pareto_figure(comparison))
+    assert_legible(lambda: pareto_figure(found))
+
+
+def test_names_of_pictures_may_be_long_and_strange(comparison):
+    name = "a picture $with_a^name$ that \u4e2d goes on and on.exr"
+    found = dataclasses.replace(
+        with_rows(comparison, lambda row: dataclasses.replace(row, picture=name)),
+        pictures=(dataclasses.replace(comparison.pictures[0], name=name),),
+    )
+    assert_legible(lambda: pareto_figure(found))
+
+
+def test_no_delta_e_without_colour(comparison):
+    from reference_pixels import make_profile
+
+    two = make_profile([0.0, 1.0], [[0.3, 0.2]])
+    with pytest.raises(RenderError, match="Delta E of 2 channels"):
+        pareto_figure(dataclasses.replace(comparison, profile=two))
+
+
+def test_the_same_comparison_gives_the_same_bytes(comparison):
+    files = [io.BytesIO(), io.BytesIO()]
+    for file in files:
+        save_figure(pareto_figure(comparison), file, format="svg")
+    assert files[0].getvalue() == files[1].getvalue()
+
+
+@pytest.mark.parametrize("many", [2, 12, 40])
+def test_labels_never_meet_however_dense_the_front(many):
+    rng = np.random.default_rng(many)
+    x, y = np.sort(rng.uniform(0.5, 0.6, many)), np.sort(rng.uniform(0.4, 0.9, many))[::-1]
+    with chart_style():
+        figure = new_figure(3.0)
+        axes = figure.subplots()
+        axes.set(xlim=(0, 1), ylim=(0, 1))
+        place_labels(axes, list(zip(x, y, strict=True)), [f"kernel {k}" for k in range(many)])
+    assert texts_in(axes)
+    assert_legible(lambda: figure)
+    for _, box in [each for each in drawn_texts(figure) if each[0].startswith("kernel")]:
+        pixels = axes.transData.transform(np.transpose([x, y]))
+        assert not any(box.contains(*each) for each in pixels)
