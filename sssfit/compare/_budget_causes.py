@@ -81,9 +81,11 @@ class Switches:
         """Fit the kernels."""
         on_grid, cut = sources.on_grid(sources.exact), sources.cut(sources.exact)
         simulated = sources.walk if model is None else sources.models[model]
-        profiles = on_grid, cut, sources.on_grid(simulated)
-        kernels = [fit.fit(each, mm_per_pixel, None).kernel for each in profiles]
-        return cls(sources, on_grid, cut, *kernels, model, storage)
+        kernel, kernel_of_cut, whole = (
+            fit.fit(each, mm_per_pixel, None).kernel
+            for each in (on_grid, cut, sources.on_grid(simulated))
+        )
+        return cls(sources, on_grid, cut, kernel, kernel_of_cut, whole, model, storage)
 
     @property
     def whole_stored(self) -> SeparableKernel:

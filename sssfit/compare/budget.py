@@ -19,6 +19,7 @@ import numpy.typing as npt
 
 from sssfit.compare._budget_causes import Cause, Switches, causes_of, everything
 from sssfit.compare._budget_profiles import MODELS, make_sources, picture_reach_mm
+from sssfit.compare._pixels import selected_pixels, selection
 from sssfit.compare._storage import STORAGES
 from sssfit.compare.candidates import Candidate
 from sssfit.compare.metrics import ImageScore
@@ -83,6 +84,23 @@ class Budget:
             values = np.array(getattr(self, name), dtype=np.float64)
             values.setflags(write=False)
             object.__setattr__(self, name, values)
+
+    def share(self, cause: Cause) -> float:
+        """Return which part of the whole's squared error a cause makes up; NaN where there is none.
+
+        <d, D> / <D, D> of its difference d and the whole's, D, over channels and the pixels that
+        count. Shares of the causes in the whole and of the interaction add up to 1; a share is
+        negative where the cause makes up for others.
+        """
+        if cause.difference is None or self.whole.difference is None:
+            return math.nan
+        selected = selection(self.scene.mask, self.truth)
+        part, whole = (
+            selected_pixels(each, selected).ravel()
+            for each in (cause.difference, self.whole.difference)
+        )
+        square = float(whole @ whole)
+        return float(part @ whole) / square if square > 0.0 else math.nan
 
 
 def error_budget(material: Material, scene: Scene, **settings: Any) -> Budget:
