@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -47,12 +47,17 @@ def compare_budget(material: str, request: BudgetRequest, common: Common) -> Non
     with _chart(request) as draw:
         budgets = _budgets(material, request, common)
         draw(budgets)
-    rows = [row for each in budgets for row in _rows(each)]
     output = [] if request.chart is None else [request.chart]
+    figures = {"command": "compare", "output": output, **_figures(budgets)}
+    text = "\n\n".join(_text(each) for each in budgets)
+    written = "".join(f"\nWrote {each}" for each in output if each != "-")
+    finish(common, figures, text + written, to_stderr=request.chart == "-")
+
+
+def _figures(budgets: Sequence[Budget]) -> dict[str, Any]:
+    """Everything that is printed, as ``--json`` has it."""
     first = budgets[0]
-    figures = {
-        "command": "compare",
-        "output": output,
+    return {
         "material": first.material.name,
         "channels": first.material.channels,
         "method": first.kernel.method,
@@ -64,18 +69,15 @@ def compare_budget(material: str, request: BudgetRequest, common: Common) -> Non
         "mm_per_pixel": first.scene.mm_per_pixel,
         "radius_mm": first.radius_mm,
         "beyond_grid": first.beyond_grid,
-        "rows": rows,
+        "rows": [row for each in budgets for row in _rows(each)],
     }
-    text = "\n\n".join(_text(each) for each in budgets)
-    written = "".join(f"\nWrote {each}" for each in output if each != "-")
-    finish(common, figures, text + written, to_stderr=request.chart == "-")
 
 
 @contextlib.contextmanager
-def _chart(request: BudgetRequest) -> Iterator[Any]:
-    """Hold the chart's file and yield what draws budgets into it."""
+def _chart(request: BudgetRequest) -> Iterator[Callable[[Sequence[Budget]], object]]:
+    """Hold the chart's file and yield what draws budgets into it; where none is wanted, nothing does."""
     if request.chart is None:
-        yield lambda budgets: None
+        yield len
         return
     from sssfit._chart_files import chart_format
 
@@ -83,13 +85,13 @@ def _chart(request: BudgetRequest) -> Iterator[Any]:
         chart_format(request.chart)
     path = None if request.chart == "-" else Path(request.chart)
     with chart_output(path, force=request.force) as save:
+        yield lambda budgets: _draw(budgets, save)
 
-        def draw(budgets: Sequence[Budget]) -> None:
-            from sssfit.chart import budget_figure
 
-            save(budget_figure(budgets))
+def _draw(budgets: Sequence[Budget], save: Callable[[Any], None]) -> None:
+    from sssfit.chart import budget_figure
 
-        yield draw
+    save(budget_figure(budgets))
 
 
 def _budgets(name: str, request: BudgetRequest, common: Common) -> list[Budget]:
