@@ -75,7 +75,7 @@ def _figures(budgets: Sequence[Budget]) -> dict[str, Any]:
 
 @contextlib.contextmanager
 def _chart(request: BudgetRequest) -> Iterator[Callable[[Sequence[Budget]], object]]:
-    """Hold the chart's file and yield what draws budgets into it; where none is wanted, nothing does."""
+    """Hold the chart's file and yield what draws into it; without a file nothing is drawn."""
     if request.chart is None:
         yield len
         return

@@ -75,7 +75,7 @@ def budget_figure(budgets: Budget | Sequence[Budget]) -> Figure:
     bars, rows = _BAR_INCHES * len(shown), _ROW_INCHES * len(names)
     with chart_style():
         upper = _HEAD_INCHES + _LEGEND_INCHES + _AXIS_INCHES
-        lower = upper + bars + _GAP_INCHES + _LEGEND_INCHES
+        lower = upper + bars + _GAP_INCHES + _LEGEND_INCHES - 0.12
         figure = new_figure(lower + rows + 1.25)
         _draw_head(figure, given[0])
         draw_footnotes(figure, [*_NOTES, *_left_out(given)])
@@ -95,11 +95,17 @@ def _panel(figure: Figure, down: float, tall: float) -> Axes:
 def _draw_head(figure: Figure, budget: Budget) -> None:
     """Title and provenance."""
     name = shortened(budget.material.name, 24)
-    draw_text(figure, 0.16, f"{name}: why the kernel's picture is not the true one", size=12)
+    draw_text(
+        figure,
+        0.16,
+        f"{name}: why the kernel's picture is not the true one",
+        size=12,
+        weight="bold",
+    )
     source = budget.model or f"{count(budget.photons)} photons, seed {budget.seed}"
     kernel, scene = budget.kernel, budget.scene
     words = [
-        f"{source} to {budget.radius_mm:.3g} mm",
+        f"{source}, grid to {budget.radius_mm:.3g} mm",
         f"{kernel.method}, {kernel.rank} term{'s' * (kernel.rank > 1)} on {kernel.pixels} pixels "
         f"of {scene.mm_per_pixel:.4g} mm",
         f"pictures {scene.width} x {scene.height}",
@@ -144,7 +150,7 @@ def _draw_shares(axes: Axes, budgets: Sequence[Budget]) -> None:
         Patch(facecolor=fills[each][0], hatch=fills[each][1], edgecolor="white", label=each)
         for each in parts
     ]
-    _legend(axes, "(a) the kernel's error, by cause", swatches, 3)
+    _legend(axes, "(a) shares by cause", swatches, 3)
 
 
 def _write_share(axes: Axes, row: int, middle: float, percent: float) -> None:
@@ -160,7 +166,7 @@ def _draw_alone(axes: Axes, budgets: Sequence[Budget], names: Sequence[tuple[str
     for k, budget in enumerate(budgets):
         for row, (name, _) in enumerate(names):
             values = _figures(_cause(budget, name), is_seen=is_seen)
-            place = row + 0.5 * (k - 0.5 * (len(budgets) - 1)) / len(budgets)
+            place = row + 0.7 * (k - 0.5 * (len(budgets) - 1)) / len(budgets)
             drawn = [max(each, _LEAST) for each in values]
             line: Style = {"color": _PICTURES[k], "marker": _MARKERS[k], "markersize": 4.5, "lw": 0}
             axes.plot(drawn[:1], [place], clip_on=False, zorder=3, **line)
@@ -172,7 +178,7 @@ def _draw_alone(axes: Axes, budgets: Sequence[Budget], names: Sequence[tuple[str
     axes.xaxis.set_major_formatter("{x:g}")
     if is_seen:
         axes.axvline(1.0, color="#444444", lw=0.8, ls=(0, (4, 1.6)), zorder=1)
-    unit = "Delta E 2000 (dashed: 1, just visible)" if is_seen else "relative L2 (%)"
+    unit = "Delta E 2000 (dashed: 1)" if is_seen else "relative L2 (%)"
     name_axes(axes, "", f"{unit}; smaller than {_LEAST:g} at the left edge", "")
     handles = [
         Line2D([], [], lw=0, color=_PICTURES[k], marker=_MARKERS[k], markersize=4.5, label=label)
@@ -188,8 +194,8 @@ def _legend(axes: Axes, title: str, handles: Sequence[Patch | Line2D], columns: 
         return
     box = axes.get_position()
     tall = figure.get_size_inches()[1]
-    top = box.y1 + (_LEGEND_INCHES - 0.02) / tall
-    figure.text(LEFT - 0.07, top - 0.07 / tall, title, va="center", fontweight="bold")
+    top = box.y1 + (_LEGEND_INCHES if columns == 3 and len(handles) > 3 else 0.24) / tall
+    figure.text(LEFT, top - 0.07 / tall, title, va="center", fontweight="bold")
     legend = figure.legend(
         handles=list(handles),
         ncols=columns,
