@@ -4,11 +4,11 @@
 2015, supplement G: 2 pi r R_d linear and logarithmic, R_d against mean free paths, and the 2D
 profile. `models_figure` draws profile models against the exact solution, `spectrum_figure`
 the singular values of a profile's kernel, `guide_figure` what guided fits look at and leave,
-`pareto_figure` kernels by error and cost.
-`save_figure` writes PNG, SVG or PDF; the same figure gives the same bytes.
+`pareto_figure` kernels by error and cost, `budget_figure` why a kernel's picture is not the true
+one. `save_figure` writes PNG, SVG or PDF; the same figure gives the same bytes.
 
-Matplotlib is imported here and in ``sssfit._chart_guide``, ``_chart_labels``, ``_chart_models``,
-``_chart_page``, ``_chart_pareto`` and ``_chart_spectrum`` only, and never its pyplot, which takes 0.8 s to import and keeps global state.
+Matplotlib is imported in this room only, ``sssfit.chart`` and the files ``sssfit._chart_*`` it draws
+with, and never its pyplot, which takes 0.8 s to import and keeps global state.
 ``sssfit._profile_bins`` merges annuli, ``sssfit._chart_data`` makes the image,
 ``sssfit._chart_text`` words the captions.
 """
@@ -26,6 +26,7 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator
 
 from sssfit import _chart_text as words
+from sssfit._chart_budget import budget_figure
 from sssfit._chart_data import Picture, drawn_radius_mm, mean_free_paths_mm, picture
 from sssfit._chart_files import FORMATS, chart_format, is_chart_file, known_format
 from sssfit._chart_guide import guide_figure
@@ -62,6 +63,7 @@ from sssfit.profile import Profile
 
 __all__ = [
     "FORMATS",
+    "budget_figure",
     "chart_format",
     "guide_figure",
     "is_chart_file",

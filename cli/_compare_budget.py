@@ -1,0 +1,194 @@
+"""``sssfit compare --budget``: what each cause alone does to a picture, in figures and drawn."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ._compiling import say_if_compiling
+from ._deon_skin import DEON_SKIN
+from ._figure import chart_output
+from ._options import Common
+from ._report import finish, percent, table
+from ._scene import Picture, make_or_read
+
+if TYPE_CHECKING:
+    from sssfit.compare.budget import Budget, Cause
+    from sssfit.render.scene import Scene
+
+_MM_PER_PIXEL = 0.3
+_SIZE = (512, 512)
+_HEADS = ["", "Delta E mean", "p99", "relative L2", "largest drift", "of the whole"]
+_SCORES = ("delta_e_2000_mean", "delta_e_2000_p99", "relative_l2", "energy_drift")
+
+
+@dataclass(frozen=True)
+class BudgetRequest:
+    """What was asked for; ``settings`` are keywords of the fit."""
+
+    pictures: Sequence[str]
+    size: tuple[int, int] | None
+    mm_per_pixel: float | None
+    photons: int
+    method: str
+    settings: Mapping[str, Any]
+    model: str | None
+    chart: str | None
+    force: bool
+
+
+def compare_budget(material: str, request: BudgetRequest, common: Common) -> None:
+    """Make the budget of a material on each picture, print it, draw it if asked to."""
+    with _chart(request) as draw:
+        budgets = _budgets(material, request, common)
+        draw(budgets)
+    output = [] if request.chart is None else [request.chart]
+    figures = {"command": "compare", "output": output, **_figures(budgets)}
+    text = "\n\n".join(_text(each) for each in budgets)
+    written = "".join(f"\nWrote {each}" for each in output if each != "-")
+    finish(common, figures, text + written, to_stderr=request.chart == "-")
+
+
+def _figures(budgets: Sequence[Budget]) -> dict[str, Any]:
+    """Everything that is printed, as ``--json`` has it."""
+    first = budgets[0]
+    return {
+        "material": first.material.name,
+        "channels": first.material.channels,
+        "method": first.kernel.method,
+        "rank": first.kernel.rank,
+        "model": first.model,
+        "storage": first.storage,
+        "photons": first.photons,
+        "seed": first.seed,
+        "mm_per_pixel": first.scene.mm_per_pixel,
+        "radius_mm": first.radius_mm,
+        "beyond_grid": first.beyond_grid,
+        "rows": [row for each in budgets for row in _rows(each)],
+    }
+
+
+@contextlib.contextmanager
+def _chart(request: BudgetRequest) -> Iterator[Callable[[Sequence[Budget]], object]]:
+    """Hold the chart's file and yield what draws into it; without a file nothing is drawn."""
+    if request.chart is None:
+        yield len
+        return
+    from sssfit._chart_files import chart_format
+
+    if request.chart != "-":
+        chart_format(request.chart)
+    path = None if request.chart == "-" else Path(request.chart)
+    with chart_output(path, force=request.force) as save:
+        yield lambda budgets: _draw(budgets, save)
+
+
+def _draw(budgets: Sequence[Budget], save: Callable[[Any], None]) -> None:
+    from sssfit.chart import budget_figure
+
+    save(budget_figure(budgets))
+
+
+def _budgets(name: str, request: BudgetRequest, common: Common) -> list[Budget]:
+    """Read the material, make the pictures, and take the errors apart."""
+    from sssfit.compare.budget import error_budgets
+    from sssfit.errors import ProfileError
+    from sssfit.material import load_material
+
+    from ._progress import walk_progress
+
+    if name == DEON_SKIN:
+        raise ProfileError(f"{name} has no coefficients for other methods; name a material.")
+    material = load_material(name)
+    scenes = [_scene(each, request, common) for each in request.pictures]
+    say_if_compiling(common, walk=material, solver=True)
+    with walk_progress(material.name, quiet=common.quiet) as show:
+        return error_budgets(
+            material,
+            scenes,
+            photons=request.photons,
+            seed=common.seed,
+            method=request.method,
+            settings=request.settings or None,
+            model=request.model,
+            threads=common.threads,
+            progress=show,
+        )
+
+
+def _scene(name: str, request: BudgetRequest, common: Common) -> Scene:
+    """Make a picture, or read the user's own."""
+    if not name:
+        raise click.UsageError("--picture has an empty name; give names with commas between them.")
+    asked = Picture(name, request.size, request.mm_per_pixel, {})
+    if asked.is_made:
+        asked = Picture(name, request.size or _SIZE, None, {})
+    return make_or_read(asked, request.mm_per_pixel or _MM_PER_PIXEL, common)
+
+
+def _rows(budget: Budget) -> list[dict[str, Any]]:
+    """Figures of every cause, of the whole and of the interaction; null for what is not made."""
+    return [
+        {
+            "picture": budget.scene.name,
+            "width": budget.scene.width,
+            "height": budget.scene.height,
+            "cause": each.name,
+            "in_whole": each.is_in_whole,
+            **{key: getattr(each.score, key, None) for key in _SCORES},
+            "share_of_whole": budget.share(each),
+            "hint": each.hint,
+        }
+        for each in (*budget.causes, budget.interaction, budget.whole)
+    ]
+
+
+def _text(budget: Budget) -> str:
+    """Write the budget of a picture for people."""
+    scene, kernel = budget.scene, budget.kernel
+    simulated = f"{budget.photons:,} photons" if budget.model is None else str(budget.model)
+    inside = [each for each in budget.causes if each.is_in_whole]
+    others = [each for each in budget.causes if not each.is_in_whole]
+    lines = [
+        f"{budget.material.name} on {scene.name}, {scene.width} x {scene.height} pixels of "
+        f"{scene.mm_per_pixel:.4g} mm: {simulated} to {budget.radius_mm:.4g} mm, {kernel.method}, "
+        f"{kernel.rank} terms",
+        table(
+            _HEADS,
+            [
+                *(_line(budget, each) for each in inside),
+                _line(budget, budget.interaction),
+                _line(budget, budget.whole),
+                *(_line(budget, each) for each in others),
+            ],
+        ),
+        _advice(inside),
+    ]
+    return "\n".join(lines)
+
+
+def _line(budget: Budget, cause: Cause) -> list[str]:
+    """Figures of one cause; what is not in the whole has no share in it."""
+    name = cause.name if cause.is_in_whole else f"({cause.name})"
+    score = cause.score
+    if score is None:
+        return [name, cause.hint, "", "", "", ""]
+    return [
+        name,
+        f"{score.delta_e_2000_mean:.4f}",
+        f"{score.delta_e_2000_p99:.3f}",
+        f"{100.0 * score.relative_l2:.4f} %",
+        percent(max(score.energy_drift, key=abs), "+.3f"),
+        percent(budget.share(cause), "+.1f") if cause.is_in_whole else "",
+    ]
+
+
+def _advice(inside: Sequence[Cause]) -> str:
+    """Say what to do about the two largest."""
+    first, second = inside[:2]
+    return f"First: {first.name} ({first.hint}). Then: {second.name} ({second.hint})."

@@ -1,0 +1,193 @@
+"""What each cause of an error budget does to a picture, alone and with the others."""
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.compare._budget_profiles import Sources
+from sssfit.compare._storage import STORAGES, stored
+from sssfit.compare.candidates import Candidate
+from sssfit.compare.metrics import ImageScore, measure
+from sssfit.kernel import SeparableKernel
+from sssfit.profile import Profile
+from sssfit.render.reference import convolve, reference_quadrant
+from sssfit.render.scene import Scene
+from sssfit.render.separable import render_separable
+
+FloatArray = npt.NDArray[np.float64]
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class Cause:
+    """One reason why a picture differs from the truth.
+
+    Parameters
+    ----------
+    name : str
+    hint : str
+        What to do about it.
+    is_in_whole : bool
+        Whether the kernel that a user has contains it; if not, it is an alternative.
+    difference : array (H, W, C), optional
+        The picture with this cause alone less the true one; None for what is not made yet.
+    score : ImageScore, optional
+        Of truth + difference against the truth, within the scene's mask.
+    """
+
+    name: str
+    hint: str
+    is_in_whole: bool
+    difference: FloatArray | None
+    score: ImageScore | None
+
+    def __post_init__(self) -> None:
+        if self.difference is not None:
+            self.difference.setflags(write=False)
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class Switches:
+    """Profiles and kernels with which causes are switched on.
+
+    Parameters
+    ----------
+    sources : Sources
+    on_grid : Profile
+        The exact one on the user's grid; what is beyond is known as a sum.
+    cut : Profile
+        The same without the light beyond.
+    kernel, kernel_of_cut : SeparableKernel
+        Fitted to these two.
+    whole : SeparableKernel
+        Fitted to the walk, or to the model, on the grid.
+    model, storage : str or None, str
+    """
+
+    sources: Sources
+    on_grid: Profile
+    cut: Profile
+    kernel: SeparableKernel
+    kernel_of_cut: SeparableKernel
+    whole: SeparableKernel
+    model: str | None
+    storage: str
+
+    @classmethod
+    def make(
+        cls, sources: Sources, fit: Candidate, mm_per_pixel: float, model: str | None, storage: str
+    ) -> "Switches":
+        """Fit the kernels."""
+        on_grid, cut = sources.on_grid(sources.exact), sources.cut(sources.exact)
+        simulated = sources.walk if model is None else sources.models[model]
+        kernel, kernel_of_cut, whole = (
+            fit.fit(each, mm_per_pixel, None).kernel
+            for each in (on_grid, cut, sources.on_grid(simulated))
+        )
+        return cls(sources, on_grid, cut, kernel, kernel_of_cut, whole, model, storage)
+
+    @property
+    def whole_stored(self) -> SeparableKernel:
+        """What a user has."""
+        return stored(self.whole, self.storage)
+
+
+def causes_of(
+    scene: Scene, switches: Switches, threads: int | None
+) -> tuple[FloatArray, list[Cause]]:
+    """Return the true picture (H, W, C), and every cause."""
+    truth = true_picture(scene, switches.sources.exact, threads)
+    differences = [
+        *_of_profiles(scene, switches, truth, threads),
+        *_of_kernels(scene, switches, truth, threads),
+    ]
+    causes = [_measured(scene, truth, *each) for each in differences]
+    taps = Cause("taps", "not made yet", True, None, None)
+    return truth, [*causes, taps]
+
+
+def everything(
+    scene: Scene,
+    switches: Switches,
+    truth: FloatArray,
+    causes: Sequence[Cause],
+    threads: int | None,
+) -> tuple[Cause, Cause]:
+    """Return the whole, and what it has beyond the sum of its causes."""
+    whole = render_separable(scene, switches.whole_stored, threads=threads) - truth
+    parts = [each.difference for each in causes if each.is_in_whole and each.difference is not None]
+    interaction = whole - np.sum(parts, axis=0)
+    return (
+        _measured(scene, truth, "everything at once", "the kernel that a user has", True, whole),
+        _measured(scene, truth, "interaction", "the whole less its causes", True, interaction),
+    )
+
+
+def true_picture(scene: Scene, profile: Profile, threads: int | None = None) -> FloatArray:
+    """Convolve with a profile's 2D kernel and keep all of its energy (H, W, C).
+
+    What comes from further than the picture reaches or from beyond the profile's grid is the mean
+    of the picture, as it is of one that is mirrored again and again.
+    """
+    shape = scene.mm_per_pixel, scene.height, scene.width
+    quadrant, left_out = reference_quadrant(profile, *shape)
+    far = left_out * scene.irradiance.mean(axis=(0, 1))
+    picture: FloatArray = convolve(scene.irradiance, quadrant, threads=threads) + far
+    return picture
+
+
+_Difference = tuple[str, str, bool, FloatArray]
+
+
+def _of_profiles(
+    scene: Scene, switches: Switches, truth: FloatArray, threads: int | None
+) -> Iterator[_Difference]:
+    """Yield name, hint, whether it is in the whole and difference of what profiles do."""
+    sources, model = switches.sources, switches.model
+    walked = true_picture(scene, sources.walk, threads) - truth
+    hint = "more photons: 4 times as many halve it"
+    yield "simulation noise", hint, model is None, walked
+    for name, profile in sources.models.items():
+        instead = true_picture(scene, profile, threads) - truth
+        hint = "the exact solution or the walk in place of a model"
+        yield f"{name} instead of exact", hint, name == model, instead
+
+
+def _of_kernels(
+    scene: Scene, switches: Switches, truth: FloatArray, threads: int | None
+) -> Iterator[_Difference]:
+    """Yield the same of the grid's end, of the fit and of storage."""
+
+    def rendered(kernel: SeparableKernel) -> FloatArray:
+        return np.asarray(render_separable(scene, kernel, threads=threads), dtype=np.float64)
+
+    cut = true_picture(scene, switches.cut, threads)
+    kernel, kernel_of_cut = rendered(switches.kernel), rendered(switches.kernel_of_cut)
+    # Where the fit puts the light beyond the grid: added evenly to its kernel, or nowhere.
+    put = kernel - kernel_of_cut
+    hint = "a larger --radius of the simulation"
+    yield "energy beyond the grid", hint, True, cut + put - truth
+    hint = "a fit that keeps all energy, or a larger --radius"
+    yield "energy beyond the grid, if lost", hint, False, cut - truth
+    yield "separability", "a higher rank, or another fit", True, kernel_of_cut - cut
+    for storage in dict.fromkeys((switches.storage, "half", "8-bit")):
+        kept = rendered(stored(switches.kernel, storage)) - kernel
+        name, hint = f"storage, {STORAGES[storage]}", _STORAGE_HINTS[storage]
+        yield name, hint, storage == switches.storage, kept
+
+
+_STORAGE_HINTS = {
+    "float64": "nothing",
+    "float32": "nothing",
+    "half": "float32 in place of half",
+    "8-bit": "half float in place of 8 bit",
+}
+
+
+def _measured(
+    scene: Scene, truth: FloatArray, name: str, hint: str, is_in_whole: bool, difference: FloatArray
+) -> Cause:
+    """Measure one difference."""
+    score = measure(truth + difference, truth, mask=scene.mask)
+    return Cause(name, hint, is_in_whole, difference, score)

@@ -1,0 +1,247 @@
+"""The error budget: why a kernel's picture differs from the true one, each cause apart.
+
+The truth is irradiance convolved with the exact profile's whole 2D kernel; light from further than
+the picture reaches is the picture's mean. One cause at a time is switched on against it, and what
+it does to the picture is its difference. Differences are pictures and add up: their sum, and the
+`interaction` that is stated, make the difference of the kernel that a user has. Norms and Delta E
+of differences do not add up, since differences cancel in places.
+
+``_budget_profiles`` has the profiles, ``_budget_causes`` what each cause does.
+"""
+
+import dataclasses
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.compare._budget_causes import Cause, Switches, causes_of, everything
+from sssfit.compare._budget_profiles import MODELS, make_sources, picture_reach_mm
+from sssfit.compare._pixels import selected_pixels, selection
+from sssfit.compare._storage import STORAGES
+from sssfit.compare.candidates import Candidate
+from sssfit.compare.metrics import ImageScore
+from sssfit.errors import RenderError, SimulationError
+from sssfit.kernel import SeparableKernel
+from sssfit.material import Material
+from sssfit.render.scene import Scene
+from sssfit.simulate import Progress
+
+__all__ = ["MODELS", "STORAGES", "Budget", "Cause", "error_budget", "error_budgets"]
+
+FloatArray = npt.NDArray[np.float64]
+
+PHOTONS = 1_000_000
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class Budget:
+    """What a kernel loses on one picture, by cause.
+
+    Parameters
+    ----------
+    material : Material
+    scene : Scene
+    photons, seed : int
+        Of the walk.
+    radius_mm : float [mm]
+        Of the grid that the kernel's profile is on.
+    beyond_grid : array (C,) [1]
+        Energy beyond that grid, by the exact solution.
+    model, storage : str or None, str
+        As they were asked for.
+    kernel : SeparableKernel
+        What a user has, with every cause on.
+    truth : array (H, W, C)
+        The true picture.
+    causes : tuple of Cause
+        First those that are in the whole, then alternatives to them; largest first by mean Delta E,
+        or by relative L2 where there is no colour.
+    whole : Cause
+        All at once: the picture of ``kernel`` against the truth.
+    interaction : Cause
+        The whole less the sum of its causes.
+    """
+
+    material: Material
+    scene: Scene
+    photons: int
+    seed: int
+    radius_mm: float
+    beyond_grid: FloatArray
+    model: str | None
+    storage: str
+    kernel: SeparableKernel
+    truth: FloatArray
+    causes: tuple[Cause, ...]
+    whole: Cause
+    interaction: Cause
+
+    def __post_init__(self) -> None:
+        for name in ("beyond_grid", "truth"):
+            values = np.array(getattr(self, name), dtype=np.float64)
+            values.setflags(write=False)
+            object.__setattr__(self, name, values)
+
+    def share(self, cause: Cause) -> float:
+        """Return which part of the whole's squared error a cause makes up; NaN where there is none.
+
+        <d, D> / <D, D> of its difference d and the whole's, D, over channels and the pixels that
+        count. Shares of the causes in the whole and of the interaction add up to 1; a share is
+        negative where the cause makes up for others.
+        """
+        if cause.difference is None or self.whole.difference is None:
+            return math.nan
+        selected = selection(self.scene.mask, self.truth)
+        part, whole = (
+            selected_pixels(each, selected).ravel()
+            for each in (cause.difference, self.whole.difference)
+        )
+        square = float(whole @ whole)
+        return float(part @ whole) / square if square > 0.0 else math.nan
+
+
+def error_budget(material: Material, scene: Scene, **settings: Any) -> Budget:
+    """Return the budget on one picture; parameters and errors are those of `error_budgets`.
+
+    Examples
+    --------
+    >>> from sssfit.material import load_material
+    >>> from sssfit.render.irradiance import make_scene
+    >>> scene = make_scene("disk", height=64, width=64, mm_per_pixel=0.5)
+    >>> budget = error_budget(load_material("skin1"), scene, photons=100_000)
+    >>> [each.name for each in budget.causes if each.is_in_whole][:2]
+    ['separability', 'simulation noise']
+    """
+    return error_budgets(material, [scene], **settings)[0]
+
+
+def error_budgets(
+    material: Material,
+    scenes: Sequence[Scene],
+    *,
+    photons: int = PHOTONS,
+    seed: int = 1,
+    radius_mm: float | None = None,
+    method: str = "svd",
+    settings: Mapping[str, Any] | None = None,
+    model: str | None = None,
+    storage: str = "half",
+    threads: int | None = None,
+    progress: Callable[[Progress], None] | None = None,
+) -> list[Budget]:
+    """Take the difference of a fitted kernel's picture from the true one apart.
+
+    Parameters
+    ----------
+    material : Material
+        A homogeneous half space with g = 0: what the exact solver covers.
+    scenes : sequence of Scene
+        Flat, all of the same pixel size; their profiles and kernels are shared.
+    photons, seed, progress
+        Of the photon walk; see ``simulate_montecarlo``.
+    radius_mm : float, optional [mm]
+        Of the grid of the kernel's profile; by default the paper's.
+    method, settings
+        The fit, as ``sssfit.fit.METHODS`` has it, and its keywords; by default svd of rank 3.
+    model : str, optional
+        One of `MODELS`: the kernel is fitted to it in place of the walk, and there is no noise.
+    storage : str
+        One of `STORAGES`: how the kernel's weights are kept.
+    threads : int, optional
+        By default all cores; nothing depends on them.
+
+    Returns
+    -------
+    list of Budget
+        In the order of ``scenes``.
+
+    Raises
+    ------
+    SimulationError
+        A material that the exact solver does not cover, no such model, or settings of the walk.
+    RenderError
+        No scene, pixels of several sizes, a picture of one colour, or what it takes to render.
+    FitError, KernelError
+        No such fit or storage.
+    """
+    _check(scenes, model)
+    reach_mm = max(picture_reach_mm(each.height, each.width, each.mm_per_pixel) for each in scenes)
+    sources = make_sources(
+        material,
+        reach_mm,
+        photons=photons,
+        seed=seed,
+        radius_mm=radius_mm,
+        threads=threads,
+        progress=progress,
+    )
+    default = {"rank": 3} if method == "svd" else {}
+    fit = Candidate(method, method, 0, default if settings is None else settings)
+    switches = Switches.make(sources, fit, scenes[0].mm_per_pixel, model, storage)
+    about = {
+        "photons": photons,
+        "seed": seed,
+        "radius_mm": float(switches.on_grid.r_edges_mm[-1]),
+        "beyond_grid": switches.on_grid.beyond_grid,
+        "model": model,
+        "storage": storage,
+        "kernel": switches.whole_stored,
+    }
+    return [_budget(material, scene, switches, threads, about) for scene in scenes]
+
+
+def _budget(
+    material: Material,
+    scene: Scene,
+    switches: Switches,
+    threads: int | None,
+    about: Mapping[str, Any],
+) -> Budget:
+    """Render and measure one scene's causes."""
+    truth, causes = causes_of(scene, switches, threads)
+    whole, interaction = everything(scene, switches, truth, causes, threads)
+    return Budget(
+        material=material,
+        scene=scene,
+        truth=truth,
+        causes=tuple(sorted(causes, key=_order)),
+        whole=whole,
+        interaction=interaction,
+        **about,
+    )
+
+
+def _order(cause: Cause) -> tuple[bool, float]:
+    """Those in the whole first, the largest first, what is not there last."""
+    return not cause.is_in_whole, -size_of(cause.score)
+
+
+def size_of(score: ImageScore | None) -> float:
+    """Return what causes are ordered by: mean Delta E, relative L2 without colours, -1 if none."""
+    if score is None:
+        return -1.0
+    seen = score.delta_e_2000_mean
+    return score.relative_l2 if math.isnan(seen) else seen
+
+
+def _check(scenes: Sequence[Scene], model: str | None) -> None:
+    """Refuse what has no budget, before anything is simulated."""
+    if model is not None and model not in MODELS:
+        raise SimulationError(f"model = {model!r}; expected one of {', '.join(MODELS)}, or none.")
+    if not scenes:
+        raise RenderError("no picture: an error budget is of at least one.")
+    pitches = sorted({each.mm_per_pixel for each in scenes})
+    if len(pitches) > 1:
+        raise RenderError(
+            f"pictures have pixels of {pitches[0]:g} to {pitches[-1]:g} mm; expected one size: a "
+            "kernel belongs to its pixels."
+        )
+    for scene in scenes:
+        if np.ptp(scene.irradiance, axis=(0, 1)).max() == 0.0:
+            raise RenderError(
+                f"{scene.name} is of one colour, which no kernel blurs; give a picture with an "
+                "edge in it."
+            )

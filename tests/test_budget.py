@@ -1,0 +1,351 @@
+"""The error budget: each cause by a closed form or by other code, and what they add up to."""
+
+import functools
+import json
+
+import numpy as np
+import pytest
+from figures import assert_legible
+from matplotlib.figure import Figure
+
+from sssfit.chart import budget_figure
+from sssfit.cli import main
+from sssfit.compare._budget_causes import true_picture
+from sssfit.compare._budget_profiles import make_sources
+from sssfit.compare._storage import stored
+from sssfit.compare.budget import error_budget, error_budgets
+from sssfit.compare.judge import judge
+from sssfit.compare.metrics import measure
+from sssfit.errors import FitError, KernelError, RenderError, SimulationError
+from sssfit.fit import fit_svd
+from sssfit.material import load_material, parse_material
+from sssfit.profile import Profile
+from sssfit.render.irradiance import make_scene
+from sssfit.render.reference import render_reference
+from sssfit.render.scene import Scene
+from sssfit.simulate import simulate_exact, simulate_montecarlo
+
+PHOTONS = 100_000
+MATERIALS = ("skin1", "wholemilk", "ketchup")
+
+
+def scene_of(name="edge", size=64, mm_per_pixel=1.0):
+    return make_scene(name, height=size, width=size, mm_per_pixel=mm_per_pixel)
+
+
+def noise_scene(size=12, mm_per_pixel=0.3):
+    light = np.random.default_rng(3).uniform(size=(size, size, 1))
+    return Scene("random", light, mm_per_pixel)
+
+
+def cause(budget, name):
+    return next(each for each in budget.causes if each.name == name)
+
+
+@functools.cache
+def exact_of(name):
+    return simulate_exact(load_material(name))
+
+
+@functools.cache
+def budget_of(name):
+    return error_budget(load_material(name), scene_of(), photons=PHOTONS)
+
+
+@pytest.fixture(params=MATERIALS)
+def budget(request):
+    return budget_of(request.param)
+
+
+@pytest.fixture(scope="module")
+def milk():
+    scenes = [scene_of("edge"), scene_of("disk")]
+    return error_budgets(load_material("wholemilk"), scenes, photons=PHOTONS, storage="float64")
+
+
+def norm(picture):
+    return float(np.linalg.norm(picture))
+
+
+def test_causes_and_interaction_make_the_whole(budget):
+    parts = [c.difference for c in budget.causes if c.is_in_whole and c.difference is not None]
+    assert len(parts) == 4
+    total = sum(parts) + budget.interaction.difference
+    np.testing.assert_allclose(total, budget.whole.difference, rtol=0, atol=1e-15)
+    bound = sum(map(norm, parts)) + norm(budget.interaction.difference)
+    assert norm(budget.whole.difference) <= bound
+    shares = [budget.share(c) for c in (*budget.causes, budget.interaction) if c.is_in_whole]
+    assert np.nansum(shares) == pytest.approx(1.0, abs=1e-9)
+
+
+def test_the_interaction_is_smaller_than_the_second_largest_cause(budget):
+    sizes = sorted(norm(c.difference) for c in budget.causes if c.is_in_whole and c.score)
+    assert norm(budget.interaction.difference) < sizes[-2]
+
+
+def test_the_whole_is_the_kernel_a_user_has(budget):
+    # The verbs' way to it: the walk on its own grid, its fit, weights in half float.
+    walk = simulate_montecarlo(budget.material, photons=PHOTONS)
+    kernel = fit_svd(walk, rank=3, mm_per_pixel=1.0).kernel
+    found = judge(scene_of(), stored(kernel, "half"))
+    picture = budget.truth + budget.whole.difference
+    # One more ulp of a weight where sums are taken in another order: half float has 2^-11.
+    np.testing.assert_allclose(picture, found.picture, rtol=2.0**-11)
+    assert budget.kernel.rank == 3
+
+
+def test_causes_are_ordered_by_mean_delta_e(budget):
+    for group in (True, False):
+        seen = [
+            c.score.delta_e_2000_mean
+            for c in budget.causes
+            if c.is_in_whole == group and c.score is not None
+        ]
+        assert seen == sorted(seen, reverse=True)
+    assert cause(budget, "taps").score is None
+
+
+def test_separability_and_the_grid_are_what_judge_finds_for_the_exact_profile(milk):
+    for found in milk:
+        profile = exact_of(found.material.name)
+        kernel = fit_svd(profile, rank=3, mm_per_pixel=1.0).kernel
+        judged = judge(found.scene, kernel).picture
+        parts = ("separability", "energy beyond the grid")
+        ours = sum(cause(found, name).difference for name in parts)
+        np.testing.assert_allclose(found.truth + ours, judged, rtol=0, atol=1e-12)
+
+
+def test_separability_alone_is_judges_score_where_no_light_is_beyond(budget):
+    if budget.beyond_grid.max() > 1e-5:
+        pytest.skip("light lies beyond the grid")
+    profile = exact_of(budget.material.name)
+    kernel = fit_svd(profile, rank=3, mm_per_pixel=1.0).kernel
+    judged = measure(judge(budget.scene, kernel).picture, budget.truth)
+    ours = cause(budget, "separability").score
+    # 1e-6 of the light is not on the grid; Delta E is of some 100 steps of lightness.
+    assert ours.delta_e_2000_mean == pytest.approx(judged.delta_e_2000_mean, abs=1e-3)
+    assert ours.relative_l2 == pytest.approx(judged.relative_l2, abs=2e-6)
+
+
+def test_the_truth_is_the_references_picture_where_the_grid_holds_all():
+    scene = scene_of("disk", 64, 2.0)  # reaches 126 mm: three times skin1's grid
+    found = error_budget(load_material("skin1"), scene, photons=PHOTONS)
+    truth = render_reference(scene, exact_of("skin1"))
+    np.testing.assert_allclose(found.truth, truth, rtol=0, atol=2e-6)
+
+
+def test_light_beyond_the_grid_is_its_share_of_the_mean_where_the_picture_ends_sooner():
+    scene = noise_scene()
+    found = error_budget(load_material("wholemilk"), scene, photons=PHOTONS, radius_mm=6.0)
+    assert found.beyond_grid.min() > 1e-3
+    lost = cause(found, "energy beyond the grid, if lost").difference
+    even = found.beyond_grid * scene.irradiance.mean()
+    np.testing.assert_allclose(lost, -np.broadcast_to(even, lost.shape), rtol=1e-9)
+
+
+def test_a_fit_that_rescales_puts_the_light_beyond_into_its_kernel(milk):
+    for found in milk:
+        cut = 1.0 - found.beyond_grid / exact_of(found.material.name).diffuse_reflectance
+        parts = ("separability", "energy beyond the grid")
+        by_kernel = found.truth + sum(cause(found, each).difference for each in parts)
+        # Rescaling multiplies the kernel, so all it adds is a share of its own picture.
+        put = by_kernel * (1.0 - cut)
+        gap = "energy beyond the grid", "energy beyond the grid, if lost"
+        added = cause(found, gap[0]).difference - cause(found, gap[1]).difference
+        np.testing.assert_allclose(added, put, rtol=1e-9, atol=1e-15)
+
+
+def test_a_fit_that_keeps_the_least_error_loses_the_light_beyond():
+    found = error_budget(
+        load_material("wholemilk"),
+        scene_of("disk", 16),
+        photons=PHOTONS,
+        settings={"rank": 3, "energy": "keep"},
+    )
+    lost, here = (
+        cause(found, f"energy beyond the grid{each}").difference for each in (", if lost", "")
+    )
+    np.testing.assert_array_equal(lost, here)
+    assert found.whole.score.energy_drift[0] < -0.02
+
+
+def test_the_truth_keeps_all_energy(milk):
+    for found in milk:
+        drift = found.truth.mean(axis=(0, 1)) / found.scene.irradiance.mean()
+        exact = exact_of(found.material.name).diffuse_reflectance
+        np.testing.assert_allclose(drift, exact, rtol=1e-6)
+
+
+def test_the_truths_grid_is_widened_and_its_start_is_the_users():
+    material = load_material("wholemilk")
+    sources = make_sources(material, 60.0, photons=10_000)
+    ours, theirs = sources.on_grid(sources.exact), exact_of("wholemilk")
+    assert sources.exact.beyond_grid.max() < 1e-4 < theirs.beyond_grid.max()
+    assert sources.exact.r_edges_mm.tolist() == sources.walk.r_edges_mm.tolist()
+    np.testing.assert_allclose(ours.r_edges_mm, theirs.r_edges_mm)
+    np.testing.assert_allclose(ours.annulus_energy, theirs.annulus_energy, atol=2e-4)
+    np.testing.assert_allclose(ours.beyond_grid, theirs.beyond_grid, atol=2e-4)
+    assert isinstance(ours, Profile)
+
+
+def test_noise_falls_with_the_root_of_the_photons():
+    # The squared error of a walk has the mean V / photons; how well six walks tell it, and the
+    # ratio of two such means, the walks themselves say.
+    scene, material = scene_of("edge", 32), load_material("skin1")
+    truth = true_picture(scene, exact_of("skin1"))
+    few, many = (
+        np.array(
+            [
+                np.square(true_picture(scene, walk) - truth).sum()
+                for seed in range(1, 7)
+                for walk in [simulate_montecarlo(material, photons=photons, seed=seed)]
+            ]
+        )
+        for photons in (10_000, 1_000_000)
+    )
+    spread = np.hypot(*(each.std(ddof=1) / each.mean() / np.sqrt(6) for each in (few, many)))
+    assert spread < 0.7  # else any ratio would do
+    assert abs(np.log(few.mean() / many.mean()) - np.log(100.0)) < 4.0 * spread
+
+
+def test_storage_in_double_precision_is_nothing(milk):
+    for found in milk:
+        here = cause(found, "storage, float64")
+        assert here.is_in_whole
+        assert not here.difference.any()
+        assert here.score.delta_e_2000_mean == 0.0
+
+
+def test_stored_weights_are_steps_of_their_format():
+    kernel = fit_svd(exact_of("skin1"), rank=3, mm_per_pixel=0.5).kernel
+    np.testing.assert_array_equal(stored(kernel, "float64").weights, kernel.weights)
+    half = stored(kernel, "half").weights
+    # 11 bits: rounding is up to 2^-11 of the weight, or 2^-25 where it is under 2^-14.
+    bound = np.maximum(2.0**-11 * abs(kernel.weights), 2.0**-25)
+    assert (abs(half - kernel.weights) <= bound).all()
+    assert (half != kernel.weights).any()
+    byte = stored(kernel, "8-bit").weights
+    for c in range(3):
+        largest = abs(kernel.weights[:, :, c]).max()
+        steps = byte[:, :, c] / largest * 127.0
+        assert kernel.weights[:, :, c].min() < 0.0
+        np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
+        assert abs(byte - kernel.weights)[:, :, c].max() <= 0.5 / 127.0 * largest * (1.0 + 1e-9)
+    with pytest.raises(KernelError, match=r"4-bit.*float64, float32, half, 8-bit"):
+        stored(kernel, "4-bit")
+
+
+def test_a_model_takes_the_walks_place():
+    found = error_budget(load_material("skin1"), scene_of("disk"), photons=PHOTONS, model="dipole")
+    assert not cause(found, "simulation noise").is_in_whole
+    inside = [each.name for each in found.causes if each.is_in_whole and each.score]
+    assert inside[0] == "dipole instead of exact"
+    # A kernel fitted to the dipole has the dipole's error: 13 % too bright in blue.
+    assert found.whole.score.energy_drift[2] == pytest.approx(
+        cause(found, "dipole instead of exact").score.energy_drift[2], abs=0.01
+    )
+
+
+def test_the_same_seed_gives_the_same_budget_on_any_threads():
+    one, two = (
+        error_budget(load_material("skin1"), noise_scene(), photons=20_000, threads=each)
+        for each in (1, 2)
+    )
+    np.testing.assert_array_equal(one.whole.difference, two.whole.difference)
+
+
+def test_bad_input_is_one_line():
+    skin1 = load_material("skin1")
+    even = Scene("even", np.ones((8, 8, 1)), 1.0)
+    with pytest.raises(RenderError, match="even is of one colour"):
+        error_budget(skin1, even)
+    with pytest.raises(RenderError, match="no picture"):
+        error_budgets(skin1, [])
+    with pytest.raises(RenderError, match=r"0\.3 to 1 mm; expected one size"):
+        error_budgets(skin1, [scene_of(), noise_scene()])
+    with pytest.raises(SimulationError, match=r"model = 'photon'.*dipole, dipole-grosjean, burley"):
+        error_budget(skin1, noise_scene(), model="photon")
+    forward = parse_material(skin1.to_toml().replace("g = 0.0", "g = 0.8"), "forward.toml")
+    assert forward.layers[0].g[0] == 0.8
+    with pytest.raises(SimulationError, match=r"g = 0\.8; .*leave g out"):
+        error_budget(forward, noise_scene())
+    slab = parse_material(skin1.to_toml() + "thickness_mm = 5.0\n", "slab.toml")
+    with pytest.raises(SimulationError, match="one layer without a bottom"):
+        error_budget(slab, noise_scene())
+    with pytest.raises(FitError, match="rank"):
+        error_budget(skin1, noise_scene(), photons=1000, settings={"rank": 1000})
+
+
+def test_the_chart_is_legible_and_shares_are_stacked(milk):
+    assert_legible(lambda: budget_figure(milk))
+    assert_legible(lambda: budget_figure(budget_of("skin1")))
+    figure = budget_figure(milk)
+    assert isinstance(figure, Figure)
+    stacked, alone = figure.axes
+    widths = {}
+    for bar in stacked.patches:
+        row = round(bar.get_y() + 0.5 * bar.get_height())
+        widths[row] = widths.get(row, 0.0) + bar.get_width()
+    assert widths == pytest.approx({0: 100.0, 1: 100.0})
+    drawn = [label.get_text() for label in alone.get_yticklabels()]
+    assert drawn[:2] == [each.name for each in milk[0].causes[:2]]
+    assert "(dipole instead of exact)" in drawn
+
+
+def run(capsys, *arguments):
+    with pytest.raises(SystemExit) as ended:
+        main(["compare", *arguments])
+    return ended.value.code, capsys.readouterr()
+
+
+def test_the_command_prints_what_the_library_finds(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    given = ("skin1", "--budget", "--picture", "edge,disk", "--size", "64x64", "--photons", "1e5")
+    code, printed = run(capsys, *given, "--mm-per-pixel", "1", "--chart", "b.png", "--json")
+    assert code == 0
+    figures = json.loads(printed.out)
+    assert figures["output"] == ["b.png"]
+    assert (tmp_path / "b.png").read_bytes().startswith(b"\x89PNG")
+    found = budget_of("skin1")
+    rows = {row["cause"]: row for row in figures["rows"] if row["picture"] == "edge"}
+    assert {row["picture"] for row in figures["rows"]} == {"edge", "disk"}
+    for each in (*found.causes, found.whole, found.interaction):
+        row = rows[each.name]
+        assert row["in_whole"] == each.is_in_whole
+        if each.score is None:
+            assert row["delta_e_2000_mean"] is None
+            assert row["hint"] == "not made yet"
+            continue
+        assert row["delta_e_2000_mean"] == each.score.delta_e_2000_mean
+        assert row["energy_drift"] == each.score.energy_drift.tolist()
+        assert row["share_of_whole"] == found.share(each)
+
+
+def test_the_command_writes_a_table_and_what_to_do(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    given = ("skin1", "--budget", "--size", "64x64", "--mm-per-pixel", "2", "--photons", "1e5")
+    code, printed = run(
+        capsys, *given, "--method", "gaussians", "--terms", "2", "--model", "burley"
+    )
+    assert code == 0
+    lines = printed.out.splitlines()
+    assert lines[0].startswith("skin1 on head, 64 x 64 pixels of 2 mm: burley to 41.48 mm")
+    assert any(line.startswith("burley instead of exact") for line in lines)
+    assert any(line.startswith("(simulation noise)") for line in lines)
+    assert lines[-1].startswith("First: ")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "says"),
+    [
+        (("skin1",), 2, "--budget"),
+        (("skin1", "--budget", "--rank", "2", "--method", "burley"), 2, "--rank is for"),
+        (("skin1", "--budget", "--picture", "edge,"), 2, "empty name"),
+        (("deon-skin", "--budget"), 1, "deon-skin has no coefficients"),
+        (("skin1", "--budget", "--chart", "b.txt"), 1, "b.txt"),
+    ],
+)
+def test_wrong_usage_is_one_line(capsys, arguments, code, says):
+    found, printed = run(capsys, *arguments)
+    assert found == code
+    assert says in printed.err
