@@ -78,22 +78,25 @@ def test_impulse_response_is_the_kernel(border, height, width):
 
 
 def test_a_constant_picture_stays_constant_between_mirrors():
-    profile = one_over_r_profile(40, 0.1, [0.5, 1.5])
+    whole = one_over_r_profile(40, 0.1, [0.5, 1.5])
+    profile = make_profile(whole.r_edges_mm, whole.annulus_energy, beyond_grid=[0.25, 0.125])
     scene = Scene("even", np.full((23, 30, 1), 3.0), 0.2)
     quadrant, left_out = reference_quadrant(profile, 0.2, 23, 30)
     energy = full_kernel(quadrant).sum(axis=(0, 1))
     assert quadrant.shape == (21, 21, 2)  # 4 mm: the whole grid
     assert energy == pytest.approx(profile.total_on_grid, rel=1e-13)
     assert left_out == pytest.approx(profile.beyond_grid, abs=1e-13)
-    for border in ("mirror", "clamp"):
+    # Mirrors bring back what lies beyond the grid too.
+    for border, kept in (("mirror", profile.diffuse_reflectance), ("clamp", energy)):
         found = render_reference(scene, profile, border=border)
-        assert found == pytest.approx(np.broadcast_to(3.0 * energy, (23, 30, 2)), rel=1e-12)
+        assert found == pytest.approx(np.broadcast_to(3.0 * kept, (23, 30, 2)), rel=1e-12)
     # Black borders take light away, and with mirrors none is lost whatever the picture.
     dark = render_reference(scene, profile, border="zero")
     assert (dark[0, 0] < 0.5 * dark[11, 15]).all()
     noise = Scene("noise", np.random.default_rng(4).random((23, 30, 2)), 0.2)
     total = render_reference(noise, profile).sum(axis=(0, 1))
-    assert total == pytest.approx(noise.irradiance.sum(axis=(0, 1)) * energy, rel=1e-12)
+    whole = noise.irradiance.sum(axis=(0, 1)) * profile.diffuse_reflectance
+    assert total == pytest.approx(whole, rel=1e-12)
 
 
 def test_a_small_picture_sees_a_part_of_the_kernel_and_the_rest_is_told():

@@ -27,6 +27,11 @@ def render_reference(
 ) -> FloatArray:
     """Convolve irradiance with a profile's own 2D kernel on the scene's pixels.
 
+    Light that leaves beyond the profile's grid, or further than the picture is wide, has no pixels
+    of its own; in a picture that goes on mirrored it sees the mean of the irradiance, which is
+    added. So a constant picture comes back with all of the diffuse reflectance. The other borders
+    go without.
+
     Parameters
     ----------
     scene : Scene
@@ -52,8 +57,13 @@ def render_reference(
     thread_count(threads)  # refused before the kernel's pixels are made
     half = reference_half_pixels(profile, scene.mm_per_pixel, scene.height, scene.width)
     _plan(scene.height, scene.width, half, profile.n_channels, border)
-    quadrant, _ = reference_quadrant(profile, scene.mm_per_pixel, scene.height, scene.width)
-    return convolve(scene.irradiance, quadrant, border=border, threads=threads)
+    quadrant, left_out = reference_quadrant(
+        profile, scene.mm_per_pixel, scene.height, scene.width
+    )
+    picture = convolve(scene.irradiance, quadrant, border=border, threads=threads)
+    if border == "mirror":
+        picture += left_out * scene.irradiance.mean(axis=(0, 1))
+    return picture
 
 
 def reference_half_pixels(profile: Profile, mm_per_pixel: float, height: int, width: int) -> int:
