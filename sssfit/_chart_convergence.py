@@ -83,7 +83,7 @@ def _draw_head(figure: Figure, found: Convergence) -> None:
 
 
 def _draw_photons(axes: Axes, found: Convergence) -> None:
-    """Walks, the line through them, and one of slope -1/2 through their middle."""
+    """Draw walks, the line through them, and one of slope -1/2 through their middle."""
     photons = np.array([each.photons for each in found.walks], dtype=np.float64)
     errors = np.array([each.error for each in found.walks])
     ends = np.array([photons.min(), photons.max()])
@@ -96,7 +96,7 @@ def _draw_photons(axes: Axes, found: Convergence) -> None:
 
 
 def _draw_seconds(axes: Axes, found: Convergence) -> None:
-    """Walks and resolutions by what they took; hollow: the exact method's own estimate."""
+    """Draw both methods by what they took; hollow: the exact method's own estimate."""
     seconds = [each.seconds for each in found.walks]
     axes.plot(seconds, [each.error for each in found.walks], label="photon walks", **_WALK)
     known = [(each.seconds, each.error) for each in found.resolutions if each.error is not None]

@@ -5,7 +5,7 @@ The record comes from ``sssfit.compare.editing``, which has computed everything.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
@@ -16,11 +16,11 @@ from sssfit._chart_style import LEFT, RIGHT, WIDTH_INCHES
 if TYPE_CHECKING:
     from sssfit.compare.editing import Edit, Editing
 
-AMPLIFIED = 5.0
+AMPLIFIED = 10.0
 _HEAD_INCHES = 1.12
 _APART_INCHES = 0.12
 _WORDS_INCHES = 0.24  # under a row of pictures
-_FOOT_INCHES = 1.0
+_FOOT_INCHES = 0.6
 _MOST_INCHES = 1.65  # 330 of the page's pixels
 _GREY = "#444444"
 
@@ -35,7 +35,7 @@ def editing_figure(editing: Editing) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        8 inches wide; sRGB at one exposure, differences of lightness five times amplified.
+        8 inches wide; sRGB at one exposure, differences of lightness ten times amplified.
     """
     count = len(editing.edits)
     room = (RIGHT - LEFT) * WIDTH_INCHES - (count - 1) * _APART_INCHES
@@ -52,15 +52,13 @@ def editing_figure(editing: Editing) -> Figure:
             if k > 0:
                 difference = edit.panel.difference
                 draw_difference(figure, left, second, difference, inches, AMPLIFIED)
-        label = f"CIE L* less the original's, amplified {AMPLIFIED:g} times"
-        bar = second + 0.5 * tall
-        draw_bar(figure, LEFT * WIDTH_INCHES, bar, inches - 0.05, AMPLIFIED, "CIE L*")
-        _put(figure, bar - 0.1, label.partition(",")[0], LEFT * WIDTH_INCHES)
+        bar = LEFT * WIDTH_INCHES + 0.1, second + 0.5 * tall
+        draw_bar(figure, *bar, inches - 0.25, AMPLIFIED, "CIE L* less the original's")
         draw_footnotes(figure, _notes(editing))
     return figure
 
 
-def _put(figure: Figure, down: float, text: str, left: float, **style: str) -> None:
+def _put(figure: Figure, down: float, text: str, left: float, **style: Any) -> None:
     """Write a line, left in inches."""
     draw_text(figure, down, text, left=left / WIDTH_INCHES, **style)
 

@@ -59,9 +59,7 @@ def _norm(amplified: float) -> Normalize:
     return Normalize(-_LIGHTEST / amplified, _LIGHTEST / amplified)
 
 
-def _place(
-    figure: Figure, left: float, down: float, shape: tuple[int, ...], inches: float
-) -> Axes:
+def _place(figure: Figure, left: float, down: float, shape: tuple[int, ...], inches: float) -> Axes:
     """Add axes for rows and columns, without a frame's ticks."""
     tall = inches * shape[0] / shape[1]
     height = figure.get_figheight()

@@ -5,7 +5,7 @@ The record comes from ``sssfit.compare.sheet``, which has computed everything.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from matplotlib.figure import Figure
 
@@ -64,7 +64,7 @@ def sheet_figure(sheet: Sheet) -> Figure:
     return figure
 
 
-def _put(figure: Figure, down: float, text: str, left: float = _LEFT_INCHES, **style: str) -> None:
+def _put(figure: Figure, down: float, text: str, left: float = _LEFT_INCHES, **style: Any) -> None:
     """Write a line, left in inches."""
     draw_text(figure, down, text, left=left / WIDTH_INCHES, **style)
 
@@ -84,7 +84,8 @@ def _draw_head(figure: Figure, sheet: Sheet) -> None:
         f"sssfit {shortened(str(meta.get('version', '')))}",
     ]
     _put(figure, 0.41, " · ".join(parts))
-    words = f"left: sRGB; right: difference of lightness, amplified {AMPLIFIED:g} times; below: mean Delta E 2000"
+    words = f"right of each picture its difference of lightness, amplified {AMPLIFIED:g} times; "
+    words += "below, mean Delta E 2000"
     _put(figure, 0.64, words, color=_GREY)
 
 

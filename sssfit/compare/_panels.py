@@ -66,9 +66,10 @@ def make_panel(
 
 def lightness(linear: FloatArray) -> FloatArray:
     """Return CIE 1976 L*, 0 to 100, of linear sRGB (..., 3)."""
-    y = linear @ _LUMINANCE
+    y: FloatArray = linear @ _LUMINANCE
     above = 116.0 * np.cbrt(np.maximum(y, _JOINT)) - 16.0
-    return np.where(y > _JOINT, above, _SLOPE * y)
+    found: FloatArray = np.where(y > _JOINT, above, _SLOPE * y)
+    return found
 
 
 def check_colours(name: str, channels: int) -> None:

@@ -22,7 +22,7 @@ from sssfit.simulate import simulate_deon_skin
 
 # The delta in the model is one pixel: docs/fits.md, on STRETCH, says why 0.5 mm.
 MM_PER_PIXEL = 0.5
-HEIGHT, WIDTH = 420, 330  # the whole face
+HEIGHT, WIDTH = 210, 165  # brows to mouth, with the shadow of the nose
 SUPPORT_MM = 16.0  # three standard deviations of red at the larger width
 TABLE_1: dict[str, Any] = {
     "width": 0.014,
@@ -103,9 +103,7 @@ def compute_editing(
     pictures = []
     for label, change in EDITS.items():
         settings = TABLE_1 | change
-        fitted = fit_falloff(
-            profile, mm_per_pixel=mm_per_pixel, support_mm=SUPPORT_MM, **settings
-        )
+        fitted = fit_falloff(profile, mm_per_pixel=mm_per_pixel, support_mm=SUPPORT_MM, **settings)
         rendered = render_separable(scene, fitted.kernel, threads=threads)
         pictures.append(np.asarray(rendered, dtype=np.float64))
         panel = make_panel(pictures[-1], pictures[0], exposure=exposure, mask=scene.mask)

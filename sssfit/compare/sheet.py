@@ -195,9 +195,7 @@ class _Easel:
             make_scene(name, height=pixels, width=pixels, mm_per_pixel=mm_per_pixel)
             for name in names
         ]
-        self.truths = [
-            render_reference(scene, profile, threads=threads) for scene in self._scenes
-        ]
+        self.truths = [render_reference(scene, profile, threads=threads) for scene in self._scenes]
         self.exposures = tuple(
             auto_exposure(truth, scene.mask)
             for truth, scene in zip(self.truths, self._scenes, strict=True)
