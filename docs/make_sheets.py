@@ -41,7 +41,7 @@ PICTURES = {
 
 
 def draw(name):
-    """Write a picture with 256 colours: a third of the bytes, and smooth to the eye."""
+    """Write a picture with 256 colours: a third of the bytes."""
     path = DOCS / name
     save_figure(PICTURES[name](), path)
     Image.open(path).convert("RGB").quantize(256, dither=0).save(path, optimize=True)

@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from sssfit.compare.convergence import Convergence
 
 _HEIGHT_INCHES, _HEAD_INCHES = 4.2, 0.98
-_GREY = "#666666"
 _WALK: Style = {"color": COLOURS[0], "marker": "o", "markersize": 4, "linestyle": "none"}
 _EXACT: Style = {"color": COLOURS[2], "marker": "s", "markersize": 5, "linestyle": "none"}
 _HOLLOW: Style = _EXACT | {"markerfacecolor": "white"}
@@ -89,9 +88,9 @@ def _draw_photons(axes: Axes, found: Convergence) -> None:
     ends = np.array([photons.min(), photons.max()])
     middle = np.exp(np.log(photons).mean()), np.exp(np.log(errors).mean())
     half = middle[1] * (ends / middle[0]) ** -0.5
-    axes.plot(ends, half, color=_GREY, ls=(0, (4, 1.6)), lw=1.4, label="slope -1/2")
     slope = f"fitted, slope {found.line.slope:.3f}"
-    axes.plot(ends, found.line.at(ends), color=COLOURS[0], lw=1.0, label=slope)
+    axes.plot(ends, half, color="black", ls=(0, (4, 3)), lw=1.0, zorder=3, label="slope -1/2")
+    axes.plot(ends, found.line.at(ends), color=COLOURS[0], lw=2.2, alpha=0.6, label=slope)
     axes.plot(photons, errors, label="photon walks", **_WALK)
 
 

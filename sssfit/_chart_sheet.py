@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from sssfit._chart_page import chart_style, draw_footnotes, draw_text, new_figure
 from sssfit._chart_panels import draw_bar, draw_difference, draw_picture
-from sssfit._chart_style import WIDTH_INCHES
+from sssfit._chart_style import WIDTH_INCHES, Style
 from sssfit._chart_text import method_name, shortened
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def _draw_row(
 ) -> None:
     """Draw one kernel's name, price, pictures and figures."""
     for k, words in enumerate(_label(row)):
-        style = {"color": _GREY} if k else {}
+        style: Style = {"color": _GREY} if k else {}
         _put(figure, down + 0.1 + 0.15 * k, words, **style)
     for left, panel in zip(lefts, row.panels, strict=True):
         draw_picture(figure, left, down, panel.codes, inches)

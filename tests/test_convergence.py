@@ -88,9 +88,8 @@ def test_lines_are_those_of_numpy():
 
 def test_seconds_are_the_clocks(skin1):
     ticks = itertools.count()
-    run = found_with(
-        skin1, photons=(1000, 2000), seeds=1, tolerances=(1e-4,), clock=lambda: float(next(ticks))
-    )
+    settings = {"photons": (1000, 2000), "seeds": 1, "tolerances": (1e-4,)}
+    run = found_with(skin1, clock=lambda: float(next(ticks)), **settings)
     assert {each.seconds for each in run.walks + run.resolutions} == {1.0}
 
 
