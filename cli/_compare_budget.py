@@ -14,7 +14,7 @@ from ._compiling import say_if_compiling
 from ._deon_skin import DEON_SKIN
 from ._figure import chart_output
 from ._options import Common
-from ._report import finish, percent, table
+from ._report import percent, table
 from ._scene import Picture, make_or_read
 
 if TYPE_CHECKING:
@@ -42,16 +42,14 @@ class BudgetRequest:
     force: bool
 
 
-def compare_budget(material: str, request: BudgetRequest, common: Common) -> None:
-    """Make the budget of a material on each picture, print it, draw it if asked to."""
+def compare_budget(
+    material: str, request: BudgetRequest, common: Common
+) -> tuple[dict[str, Any], str]:
+    """Make the budget of a material on each picture, draw it if asked to; figures and text."""
     with _chart(request) as draw:
         budgets = _budgets(material, request, common)
         draw(budgets)
-    output = [] if request.chart is None else [request.chart]
-    figures = {"command": "compare", "output": output, **_figures(budgets)}
-    text = "\n\n".join(_text(each) for each in budgets)
-    written = "".join(f"\nWrote {each}" for each in output if each != "-")
-    finish(common, figures, text + written, to_stderr=request.chart == "-")
+    return _figures(budgets), "\n\n".join(_text(each) for each in budgets)
 
 
 def _figures(budgets: Sequence[Budget]) -> dict[str, Any]:

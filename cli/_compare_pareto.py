@@ -8,8 +8,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from ._compare_input import profile_of, scenes_of
 from ._compare_table import FORMATS, figures_of, is_table_file, table_text, text_of
 from ._figure import chart_output
@@ -53,22 +51,13 @@ class Outputs:
         return [name for name in (self.chart, self.table) if name is not None]
 
 
-def compare_one(name: str, outputs: Outputs, wish: Wish) -> None:
-    """Compare the kernels of a material or profile, write what is wanted and print the table."""
+def compare_one(name: str, outputs: Outputs, wish: Wish) -> tuple[dict[str, Any], str]:
+    """Compare the kernels of a material or profile, write what is wanted; figures and text."""
     with _held([outputs], wish):
         comparison = _compared(profile_of(name, wish.common), *wish.scenes(), wish)
         _write(comparison, outputs, wish)
-    figures = {
-        "command": "compare",
-        "output": outputs.names,
-        "error": wish.error,
-        "cost": wish.cost,
-        **figures_of(comparison),
-    }
-    text = text_of(comparison, wish.error, wish.cost)
-    if outputs.names:
-        text += f"\n\nWrote {', '.join(outputs.names)}"
-    finish(wish.common, figures, text, to_stderr=outputs.chart == "-")
+    figures = {"error": wish.error, "cost": wish.cost, **figures_of(comparison)}
+    return figures, text_of(comparison, wish.error, wish.cost)
 
 
 def compare_all(folder: Path, wish: Wish) -> None:
@@ -200,15 +189,3 @@ def _report(done: Sequence[tuple[Comparison, Outputs]], wish: Wish) -> None:
     heads = ["material", "picture", f"front of {wish.error} by {wish.cost}, cheapest first"]
     text = f"{table(heads, cells)}\nWrote {', '.join(figures['output'])}"
     finish(wish.common, figures, text)
-
-
-def check_outputs(
-    material: str | None, every: bool, chart: str | None, table: str | None, output: str | None
-) -> None:
-    """Refuse options that do not go together."""
-    if (material is None) != every:
-        raise click.UsageError("name one MATERIAL or profile, or give --all.")
-    if every and (chart or table):
-        raise click.UsageError("--all names its charts and tables; leave --chart and --table out.")
-    if output is not None and not every:
-        raise click.UsageError("-o is the folder of --all; name files by --chart and --table.")

@@ -1,104 +1,191 @@
-"""``sssfit compare``: every kernel of a material by error and cost."""
+"""``sssfit compare``: why a kernel's picture is not the true one, and every kernel by its cost."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import click
 
-from ._compare_input import MM_PER_PIXEL
-from ._compare_pareto import Outputs, Wish, check_outputs, compare_all, compare_one
-from ._options import Common, Length, common_options
-from ._scene import MADE, Size
+from ._compare_budget import BudgetRequest, compare_budget
+from ._compare_options import PICTURES, compare_options
+from ._compare_pareto import Outputs, Wish, compare_all, compare_one
+from ._compare_sheet import chart_convergence, chart_editing, chart_sheet
+from ._deon_skin import DEON_SKIN
+from ._fits import own_settings
+from ._options import Common, common_options
+from ._report import finish, say
 
-_PICTURES = "disk,edge,head"
+_BUDGET = ("photons", "method", "rank", "terms", "model")
+_SHEETS = ("sheet", "editing", "convergence")
+_PHOTONS = 10**6
 
 
 @click.command()
 @click.argument("material", required=False)
-@click.option("--all", "every", is_flag=True, help="All materials that ship with sssfit.")
-@click.option(
-    "--chart",
-    metavar="FILE",
-    help="Draw it, as PNG, SVG or PDF by the ending; - for PNG on stdout.",
-)
-@click.option("--table", metavar="FILE", help="Write the rows, .md, .csv or .json.")
-@click.option(
-    "--picture",
-    "pictures",
-    metavar="NAME|FILE,...",
-    multiple=True,
-    help=f"What is lit: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG files."
-    f"  [default: {_PICTURES}]",
-)
-@click.option(
-    "--mm-per-pixel",
-    type=Length(),
-    metavar="MM",
-    help=f"Size of all pixels.  [default: what your own file says, else {MM_PER_PIXEL}]",
-)
-@click.option(
-    "--size",
-    type=Size(),
-    metavar="WxH",
-    help="Made pictures: columns and rows.  [default: 512x512]",
-)
-@click.option(
-    "--error",
-    type=click.Choice(["delta-e", "l2"]),
-    default="delta-e",
-    show_default=True,
-    help="Of chart and front: mean Delta E 2000, or relative L2 of linear light.",
-)
-@click.option(
-    "--cost",
-    type=click.Choice(["weights", "passes", "seconds"]),
-    default="weights",
-    show_default=True,
-    help="Of chart and front: weights applied to a pixel, passes, or measured seconds.",
-)
-@click.option(
-    "-o",
-    "--output",
-    metavar="FOLDER",
-    help="Where --all puts NAME-pareto.png and NAME-pareto.md.  [default: here]",
-)
-@click.option("--force", is_flag=True, help="Replace files that are no charts or tables of ours.")
+@compare_options
 @common_options
+@click.pass_context
 def compare(
-    material: str | None,
-    every: bool,
-    chart: str | None,
-    table: str | None,
-    pictures: Sequence[str],
-    mm_per_pixel: float | None,
-    size: tuple[int, int] | None,
-    error: str,
-    cost: str,
-    output: str | None,
-    force: bool,
-    common: Common,
+    context: click.Context, /, material: str | None, common: Common, **given: Any
 ) -> None:
-    """Fit MATERIAL by every method, and hold what each kernel loses against what it costs.
+    """Say why a kernel of MATERIAL loses what it loses, and what every other would.
+
+    First the error budget: noise of the simulation, energy beyond the grid, separability, storage,
+    each switched on alone against the exact profile's whole 2D kernel, the largest first. Then
+    every method, rank and number of Gaussians on the pictures' pixels, with error and cost; a star
+    marks the Pareto front: no other kernel is better in both. Seconds are of this machine.
 
     MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or a .profile.npz
-    file, - for one on stdin. Methods, ranks and numbers of Gaussians are all fitted to the exact
-    profile on the pictures' pixels, applied, and compared with the picture by the profile's whole
-    2D kernel. A star marks the Pareto front: no other kernel is better in error and cost both.
-    Seconds are of this machine.
+    file, - for one on stdin; a budget takes a half space with g = 0.
 
     \b
       sssfit compare skin1
       sssfit compare skin1 --chart skin1-pareto.png --table skin1.csv
+      sssfit compare skin1 --only budget --method gaussians --budget-chart budget.png
       sssfit compare skin1 --picture head --size 1024x1024 --mm-per-pixel 0.15 --cost seconds
       sssfit compare slab.profile.npz --picture mine.exr --error l2
       sssfit compare --all -o charts
+      sssfit compare skin1 --sheet skin1-sheet.png
     """
-    check_outputs(material, every, chart, table, output)
-    names = [name for given in pictures or (_PICTURES,) for name in given.split(",")]
-    wish = Wish(names, size, mm_per_pixel, error, cost, force, common)
+    asked = {key: given[key] for key in _SHEETS if given[key]}
+    if asked:
+        _check_sheets(material, asked, given)
+        _sheets(material, asked, given, common)
+        return
+    _check(material, given)
+    names = [name for each in given["pictures"] or (PICTURES,) for name in each.split(",")]
+    wish = Wish(
+        names,
+        given["size"],
+        given["mm_per_pixel"],
+        given["error"],
+        given["cost"],
+        given["force"],
+        common,
+    )
     if material is None:
-        compare_all(Path(output or "."), wish)
-    else:
-        compare_one(material, Outputs(chart, table), wish)
+        compare_all(Path(given["output"] or "."), wish)
+        return
+    request = _request(context, names, given)
+    budget = None if given["only"] == "kernels" else _budget(material, request, given, common)
+    kernels = (
+        None
+        if given["only"] == "budget"
+        else compare_one(material, Outputs(given["chart"], given["table"]), wish)
+    )
+    _report([budget, kernels], given, common)
+
+
+def _request(
+    context: click.Context, pictures: Sequence[str], given: Mapping[str, Any]
+) -> BudgetRequest:
+    """Put together what the budget needs."""
+    terms = {key: given[key] for key in ("rank", "terms")}
+    return BudgetRequest(
+        pictures,
+        given["size"],
+        given["mm_per_pixel"],
+        given["photons"] or _PHOTONS,
+        given["method"],
+        own_settings(context, given["method"], terms),
+        given["model"],
+        given["budget_chart"],
+        given["force"],
+    )
+
+
+def _budget(
+    material: str, request: BudgetRequest, given: Mapping[str, Any], common: Common
+) -> tuple[dict[str, Any], str] | None:
+    """Make the budget; say why there is none, unless it is all that was asked for."""
+    from sssfit.errors import SimulationError
+
+    named = material.endswith(".npz") or material in ("-", DEON_SKIN)
+    if named and given["only"] != "budget":
+        say(common, f"No budget: {material} has no coefficients to simulate with.")
+        return None
+    try:
+        return compare_budget(material, request, common)
+    except SimulationError as error:
+        if given["only"] == "budget":
+            raise
+        say(common, f"No budget: {error}")
+        return None
+
+
+def _report(
+    parts: Sequence[tuple[dict[str, Any], str] | None], given: Mapping[str, Any], common: Common
+) -> None:
+    """Print both parts and what was written."""
+    budget, kernels = (None if part is None else part[0] for part in parts)
+    output = [given[key] for key in ("budget_chart", "chart", "table") if given[key]]
+    figures = {
+        "command": "compare",
+        "output": output,
+        **(kernels or {"rows": []}),
+        "budget": budget,
+    }
+    texts = [part[1] for part in parts if part is not None]
+    if output:
+        texts.append(f"Wrote {', '.join(output)}")
+    finish(common, figures, "\n\n".join(texts), to_stderr="-" in output)
+
+
+def _sheets(
+    material: str | None, asked: Mapping[str, str], given: Mapping[str, Any], common: Common
+) -> None:
+    """Draw the sheets that were asked for."""
+    force = given["force"]
+    if "sheet" in asked:
+        from ._compare_input import profile_of
+
+        profile = profile_of(str(material), common)
+        chart_sheet(profile, asked["sheet"], given["mm_per_pixel"], common, force=force)
+    if "editing" in asked:
+        chart_editing(asked["editing"], common, force=force)
+    if "convergence" in asked:
+        chart_convergence(
+            str(material), asked["convergence"], given["photons"], common, force=force
+        )
+
+
+def _check_sheets(
+    material: str | None, asked: Mapping[str, str], given: Mapping[str, Any]
+) -> None:
+    """Refuse what does not go with a sheet."""
+    if material is None and set(asked) != {"editing"}:
+        raise click.UsageError("name one MATERIAL; only --editing needs none.")
+    others = ("every", "only", "pictures", "size", "chart", "table", "budget_chart", "output")
+    for key in others:
+        if given[key]:
+            raise click.UsageError(
+                f"{_option(key)} does not go with --{next(iter(asked))}; leave it out."
+            )
+    for key, owner in (("mm_per_pixel", "sheet"), ("photons", "convergence")):
+        if given[key] is not None and owner not in asked:
+            raise click.UsageError(f"{_option(key)} is for another chart; leave it out.")
+
+
+def _check(material: str | None, given: Mapping[str, Any]) -> None:
+    """Refuse options that do not go together, or that would do nothing."""
+    if (material is None) != given["every"]:
+        raise click.UsageError("name one MATERIAL or profile, or give --all.")
+    if given["every"] and (given["chart"] or given["table"]):
+        raise click.UsageError("--all names its charts and tables; leave --chart and --table out.")
+    if given["output"] is not None and not given["every"]:
+        raise click.UsageError("-o is the folder of --all; name files by --chart and --table.")
+    without_budget = given["every"] or given["only"] == "kernels"
+    idle = ["budget_chart", "photons", "rank", "terms", "model"] if without_budget else []
+    idle += ["chart", "table"] if given["only"] == "budget" else []
+    for key in idle:
+        if given[key]:
+            raise click.UsageError(f"{_option(key)} is for the other part; leave it out.")
+    if given["chart"] == given["budget_chart"] == "-":
+        raise click.UsageError("only one of --chart and --budget-chart can go to stdout.")
+
+
+def _option(key: str) -> str:
+    """Return an option as it is typed."""
+    return "--" + {"every": "all", "pictures": "picture"}.get(key, key).replace("_", "-")

@@ -3,12 +3,14 @@
 `profile_figure` draws a profile as the plots of "Separable Subsurface Scattering", Jimenez et al.
 2015, supplement G: 2 pi r R_d linear and logarithmic, R_d against mean free paths, and the 2D
 profile. `models_figure` draws profile models against the exact solution, `spectrum_figure`
-the singular values of a profile's kernel, `guide_figure` what guided fits look at and leave,
-`pareto_figure` kernels by error and cost, `budget_figure` why a kernel's picture is not the true
-one. `save_figure` writes PNG, SVG or PDF; the same figure gives the same bytes.
+the singular values of a profile's kernel, `guide_figure` what guided fits look at and leave.
+`pareto_figure` draws kernels by error and cost, `budget_figure` why a kernel's picture is not the
+true one, `sheet_figure` kernels' pictures beside their differences, `editing_figure` edits of the
+2012 model, `convergence_figure` a simulation's error over its price. `save_figure` writes PNG, SVG
+or PDF; the same figure gives the same bytes.
 
-Matplotlib is imported in this room only, ``sssfit.chart`` and the files ``sssfit._chart_*`` it draws
-with, and never its pyplot, which takes 0.8 s to import and keeps global state.
+Matplotlib is imported in this room only, and never its pyplot, which takes 0.8 s to import and
+keeps global state.
 ``sssfit._profile_bins`` merges annuli, ``sssfit._chart_data`` makes the image,
 ``sssfit._chart_text`` words the captions.
 """
@@ -27,7 +29,9 @@ from matplotlib.ticker import LogFormatterSciNotation, LogLocator
 
 from sssfit import _chart_text as words
 from sssfit._chart_budget import budget_figure
+from sssfit._chart_convergence import convergence_figure
 from sssfit._chart_data import Picture, drawn_radius_mm, mean_free_paths_mm, picture
+from sssfit._chart_editing import editing_figure
 from sssfit._chart_files import FORMATS, chart_format, is_chart_file, known_format
 from sssfit._chart_guide import guide_figure
 from sssfit._chart_models import models_figure
@@ -43,6 +47,7 @@ from sssfit._chart_page import (
     tick,
 )
 from sssfit._chart_pareto import pareto_figure
+from sssfit._chart_sheet import sheet_figure
 from sssfit._chart_spectrum import spectrum_figure
 from sssfit._chart_style import (
     COLOURS,
@@ -65,12 +70,15 @@ __all__ = [
     "FORMATS",
     "budget_figure",
     "chart_format",
+    "convergence_figure",
+    "editing_figure",
     "guide_figure",
     "is_chart_file",
     "models_figure",
     "pareto_figure",
     "profile_figure",
     "save_figure",
+    "sheet_figure",
     "spectrum_figure",
 ]
 

@@ -1,0 +1,120 @@
+"""The options of ``sssfit compare``: what is lit, which kernels and causes, what is drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import click
+
+from ._compare_input import MM_PER_PIXEL
+from ._fits import FITS
+from ._options import Count, Length
+from ._scene import MADE, Size
+
+PICTURES = "disk,edge,head"
+
+_OPTIONS = (
+    click.option("--all", "every", is_flag=True, help="All materials that ship with sssfit."),
+    click.option(
+        "--only",
+        type=click.Choice(["budget", "kernels"]),
+        help="One of the two parts.  [default: both]",
+    ),
+    click.option(
+        "--picture",
+        "pictures",
+        metavar="NAME|FILE,...",
+        multiple=True,
+        help=f"What is lit: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG files."
+        f"  [default: {PICTURES}]",
+    ),
+    click.option(
+        "--mm-per-pixel",
+        type=Length(),
+        metavar="MM",
+        help=f"Size of all pixels.  [default: what your own file says, else {MM_PER_PIXEL}]",
+    ),
+    click.option(
+        "--size",
+        type=Size(),
+        metavar="WxH",
+        help="Made pictures: columns and rows.  [default: 512x512]",
+    ),
+    click.option(
+        "--chart",
+        metavar="FILE",
+        help="Draw the kernels by error and cost, as PNG, SVG or PDF by the ending; - for PNG on "
+        "stdout.",
+    ),
+    click.option("--table", metavar="FILE", help="Write the kernels' rows, .md, .csv or .json."),
+    click.option(
+        "--error",
+        type=click.Choice(["delta-e", "l2"]),
+        default="delta-e",
+        show_default=True,
+        help="Of chart and front: mean Delta E 2000, or relative L2 of linear light.",
+    ),
+    click.option(
+        "--cost",
+        type=click.Choice(["weights", "passes", "seconds"]),
+        default="weights",
+        show_default=True,
+        help="Of chart and front: weights applied to a pixel, passes, or measured seconds.",
+    ),
+    click.option("--budget-chart", metavar="FILE", help="Draw the budget."),
+    click.option(
+        "--photons",
+        type=Count(2, 10**12),
+        metavar="N",
+        help="Of the budget's photon walk, or the most of --convergence."
+        "  [default: 1e6; --convergence: 1e7]",
+    ),
+    click.option(
+        "--method",
+        type=click.Choice(list(FITS)),
+        default="svd",
+        show_default=True,
+        help="The kernel whose budget it is.",
+    ),
+    click.option(
+        "--rank", type=click.IntRange(1, 1000), metavar="N", help="Its rank, svd.  [default: 3]"
+    ),
+    click.option(
+        "--terms", type=click.IntRange(1, 10), metavar="N", help="Its Gaussians.  [default: 4]"
+    ),
+    click.option(
+        "--model",
+        type=click.Choice(["dipole", "dipole-grosjean", "burley"]),
+        help="The budget of a kernel of this model.  [default: of the photon walk]",
+    ),
+    click.option(
+        "--sheet", metavar="FILE", help="Instead draw a contact sheet of every kernel's pictures."
+    ),
+    click.option(
+        "--editing",
+        metavar="FILE",
+        help="Instead draw the 2012 model edited by hand; needs no MATERIAL.",
+    ),
+    click.option(
+        "--convergence",
+        metavar="FILE",
+        help="Instead draw the simulation's error over photons and seconds.",
+    ),
+    click.option(
+        "-o",
+        "--output",
+        metavar="FOLDER",
+        help="Where --all puts NAME-pareto.png and NAME-pareto.md.  [default: here]",
+    ),
+    click.option(
+        "--force", is_flag=True, help="Replace files that are no charts or tables of ours."
+    ),
+)
+
+
+def compare_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add them all, in this order."""
+    for option in reversed(_OPTIONS):
+        command = option(command)
+    return command

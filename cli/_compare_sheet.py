@@ -1,0 +1,225 @@
+"""Sheets of ``sssfit compare``: pictures of every kernel and of edits, a simulation's error."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ._compiling import say_if_compiling
+from ._deon_skin import DEON_SKIN
+from ._figure import chart_output
+from ._options import Common
+from ._report import finish, table
+
+if TYPE_CHECKING:
+    from sssfit.compare.convergence import Convergence
+    from sssfit.compare.editing import Editing
+    from sssfit.compare.sheet import Sheet
+    from sssfit.profile import Profile
+
+MOST_PHOTONS = 10**7
+_LEAST_PHOTONS = 10_000
+_PER_DECADE = 2
+
+
+def chart_sheet(
+    profile: Profile, output: str, mm_per_pixel: float | None, common: Common, *, force: bool
+) -> None:
+    """Draw a contact sheet of a profile's kernels; ``-`` is PNG on stdout."""
+    path = _path(output)
+    with chart_output(path, force=force) as save:
+        from sssfit.compare.sheet import compute_sheet
+
+        given: dict[str, Any] = {} if mm_per_pixel is None else {"mm_per_pixel": mm_per_pixel}
+        sheet = compute_sheet(profile, threads=common.threads, **given)
+
+        from sssfit.chart import sheet_figure
+
+        save(sheet_figure(sheet))
+    _finish(path, _sheet_figures(sheet), _sheet_text, common)
+
+
+def chart_editing(output: str, common: Common, *, force: bool) -> None:
+    """Draw the 2012 model edited by hand; ``-`` is PNG on stdout."""
+    path = _path(output)
+    with chart_output(path, force=force) as save:
+        from sssfit.compare.editing import compute_editing
+
+        editing = compute_editing(threads=common.threads)
+
+        from sssfit.chart import editing_figure
+
+        save(editing_figure(editing))
+    _finish(path, _editing_figures(editing), _editing_text, common)
+
+
+def chart_convergence(
+    name: str, output: str, photons: int | None, common: Common, *, force: bool
+) -> None:
+    """Draw a simulation's error against its price; ``-`` is PNG on stdout.
+
+    ``photons`` is the largest number walked.
+    """
+    from sssfit.errors import SimulationError
+    from sssfit.material import load_material
+
+    if name == DEON_SKIN:
+        raise SimulationError(f"{name} has no coefficients to simulate with; name a material.")
+    numbers = photon_numbers(photons or MOST_PHOTONS)
+    material = load_material(name)
+    path = _path(output)
+    with chart_output(path, force=force) as save:
+        from sssfit.compare.convergence import compute_convergence
+
+        say_if_compiling(common, walk=material, solver=True)
+        found = compute_convergence(
+            material, photons=numbers, first_seed=common.seed, threads=common.threads
+        )
+
+        from sssfit.chart import convergence_figure
+
+        save(convergence_figure(found))
+    _finish(path, _convergence_figures(found), _convergence_text, common)
+
+
+def photon_numbers(most: int) -> tuple[int, ...]:
+    """Return two numbers of photons a decade, from 1e4 up to ``most``."""
+    if most < 10 * _LEAST_PHOTONS:
+        raise click.UsageError(f"{most:,} photons are too few for a slope; expected 1e5 or more.")
+    numbers: list[int] = []
+    while (number := round(_LEAST_PHOTONS * 10 ** (len(numbers) / _PER_DECADE))) <= most:
+        numbers.append(number)
+    return tuple(numbers)
+
+
+def _path(output: str) -> Path | None:
+    """None is stdout."""
+    from sssfit._chart_files import chart_format
+
+    if output == "-":
+        return None
+    chart_format(output)  # before anything is computed
+    return Path(output)
+
+
+def _finish(
+    path: Path | None,
+    figures: dict[str, Any],
+    text: Callable[[dict[str, Any]], str],
+    common: Common,
+) -> None:
+    """Print the figures, and say where the chart went."""
+    figures = {"command": "compare", "output": [str(path or "-")], **figures}
+    words = f"{text(figures)}\nWrote {path or 'a PNG to stdout'}"
+    finish(common, figures, words, to_stderr=path is None)
+
+
+def _sheet_figures(sheet: Sheet) -> dict[str, Any]:
+    """Figures of a contact sheet, a row a kernel."""
+    return {
+        "material": sheet.profile.material_name,
+        "mm_per_pixel": sheet.mm_per_pixel,
+        "pixels": sheet.pixels,
+        "support_mm": sheet.support_mm,
+        "scenes": sheet.scenes,
+        "exposures": sheet.exposures,
+        "production": sheet.production,
+        "rows": [
+            {
+                "label": row.label,
+                "passes": row.passes,
+                "delta_e_2000_mean": [each.score.delta_e_2000_mean for each in row.panels],
+                "delta_e_2000_p99": [each.score.delta_e_2000_p99 for each in row.panels],
+                "relative_l2": [each.score.relative_l2 for each in row.panels],
+            }
+            for row in sheet.rows
+        ],
+    }
+
+
+def _sheet_text(figures: dict[str, Any]) -> str:
+    """Write mean Delta E for people."""
+    rows = [
+        [
+            row["label"],
+            str(row["passes"] or "-"),
+            *(f"{each:.3g}" for each in row["delta_e_2000_mean"]),
+        ]
+        for row in figures["rows"]
+    ]
+    return (
+        f"{figures['material']}: mean Delta E 2000 on {figures['pixels']} x {figures['pixels']} "
+        f"pixels of {figures['mm_per_pixel']:.4g} mm\n"
+        f"{table(['kernel', 'passes', *figures['scenes']], rows)}"
+    )
+
+
+def _editing_figures(editing: Editing) -> dict[str, Any]:
+    """Figures of edits."""
+    return {
+        "mm_per_pixel": editing.mm_per_pixel,
+        "original_delta_e_2000_mean": editing.original_score.delta_e_2000_mean,
+        "original_delta_e_2000_p99": editing.original_score.delta_e_2000_p99,
+        "rows": [
+            {
+                "label": each.label,
+                **each.settings,
+                "delta_e_2000_mean": each.panel.score.delta_e_2000_mean,
+                "delta_e_2000_p99": each.panel.score.delta_e_2000_p99,
+            }
+            for each in editing.edits
+        ],
+    }
+
+
+def _editing_text(figures: dict[str, Any]) -> str:
+    """Write Delta E to the original for people."""
+    rows = [
+        [row["label"], f"{row['delta_e_2000_mean']:.3g}", f"{row['delta_e_2000_p99']:.3g}"]
+        for row in figures["rows"]
+    ]
+    heads = ["edit", "mean Delta E to the original", "99th percentile"]
+    return (
+        f"{table(heads, rows)}\n"
+        "The original against the 2D kernel of the six Gaussians: mean "
+        f"{figures['original_delta_e_2000_mean']:.3g}, 99th percentile "
+        f"{figures['original_delta_e_2000_p99']:.3g}"
+    )
+
+
+def _convergence_figures(found: Convergence) -> dict[str, Any]:
+    """Figures of walks and resolutions."""
+    walk = ("photons", "seed", "seconds", "error")
+    exact = ("tolerance", "seconds", "estimate", "error")
+    return {
+        "material": found.exact.material_name,
+        "slope": found.line.slope,
+        "slope_stderr": found.line.slope_stderr,
+        "rows": [{key: getattr(each, key) for key in walk} for each in found.walks],
+        "exact": [{key: getattr(each, key) for key in exact} for each in found.resolutions],
+    }
+
+
+def _convergence_text(figures: dict[str, Any]) -> str:
+    """Write the same for people, a line a run."""
+    rows = [
+        [f"{row['photons']:,} photons", f"{row['seconds']:.3f}", f"{row['error']:.2g}", "-"]
+        for row in figures["rows"]
+    ]
+    rows += [
+        [
+            f"exact, tolerance {row['tolerance']:g}",
+            f"{row['seconds']:.3f}",
+            "-" if row["error"] is None else f"{row['error']:.2g}",
+            f"{row['estimate']:.2g}",
+        ]
+        for row in figures["exact"]
+    ]
+    return (
+        f"{figures['material']}: error of F(r) as a share of the total; slope "
+        f"{figures['slope']:.3f} +- {figures['slope_stderr']:.3f}, theory -0.5\n"
+        f"{table(['run', 'seconds', 'error', 'own estimate'], rows)}"
+    )

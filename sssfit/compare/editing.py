@@ -1,0 +1,112 @@
+"""The 2012 model edited by hand: what its parameters do to a lit head.
+
+The edits are those of figure 6 of Jimenez, Jarabo and Gutierrez 2012, "Separable Subsurface
+Scattering", technical report RR-02-12, on the six-Gaussian skin of that report and without
+texture. ``sssfit.chart`` draws the record.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sssfit.compare._panels import Panel, make_panel
+from sssfit.compare.metrics import ImageScore, auto_exposure, measure
+from sssfit.fit import fit_falloff
+from sssfit.profile import Profile
+from sssfit.render.irradiance import make_scene
+from sssfit.render.reference import render_reference
+from sssfit.render.separable import render_separable
+from sssfit.simulate import simulate_deon_skin
+
+# The delta in the model is one pixel: docs/fits.md, on STRETCH, says why 0.5 mm.
+MM_PER_PIXEL = 0.5
+HEIGHT, WIDTH = 210, 165  # brows to mouth, with the shadow of the nose
+SUPPORT_MM = 16.0  # three standard deviations of red at the larger width
+TABLE_1: dict[str, Any] = {
+    "width": 0.014,
+    "strength": (0.78, 0.70, 0.75),
+    "falloff": (0.57, 0.13, 0.08),
+}
+EDITS: dict[str, dict[str, Any]] = {
+    "original": {},
+    "width .025": {"width": 0.025},
+    "strength 1 .71 .51": {"strength": (1.0, 0.71, 0.51)},
+    "red falloff .5": {"falloff": (0.5, 0.13, 0.08)},
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Edit:
+    """The model with one parameter changed.
+
+    Parameters
+    ----------
+    label : str
+    settings : mapping
+        width, strength and falloff.
+    panel : Panel
+        Held against the original.
+    """
+
+    label: str
+    settings: Mapping[str, Any]
+    panel: Panel
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Editing:
+    """Edits of a model, the original first.
+
+    Parameters
+    ----------
+    profile : Profile
+    mm_per_pixel : float [mm]
+    edits : tuple of Edit
+    original_score : ImageScore
+        Of the original against the profile's own 2D kernel.
+    """
+
+    profile: Profile
+    mm_per_pixel: float
+    edits: tuple[Edit, ...]
+    original_score: ImageScore
+
+
+def compute_editing(
+    *,
+    mm_per_pixel: float = MM_PER_PIXEL,
+    height: int = HEIGHT,
+    width: int = WIDTH,
+    threads: int | None = None,
+) -> Editing:
+    """Render the head with table 1's kernel and with each of the figure's edits.
+
+    Parameters
+    ----------
+    mm_per_pixel : float [mm]
+    height, width : int
+        Pixels of the head.
+    threads : int, optional
+
+    Raises
+    ------
+    FitError, RenderError
+        Pixels of no use.
+    """
+    profile = simulate_deon_skin()
+    scene = make_scene("head", height=height, width=width, mm_per_pixel=mm_per_pixel)
+    truth = render_reference(scene, profile, threads=threads)
+    exposure = auto_exposure(truth, scene.mask)
+    edits: list[Edit] = []
+    pictures = []
+    for label, change in EDITS.items():
+        settings = TABLE_1 | change
+        fitted = fit_falloff(profile, mm_per_pixel=mm_per_pixel, support_mm=SUPPORT_MM, **settings)
+        rendered = render_separable(scene, fitted.kernel, threads=threads)
+        pictures.append(np.asarray(rendered, dtype=np.float64))
+        panel = make_panel(pictures[-1], pictures[0], exposure=exposure, mask=scene.mask)
+        edits.append(Edit(label, settings, panel))
+    score = measure(pictures[0], truth, exposure=exposure, mask=scene.mask)
+    return Editing(profile, mm_per_pixel, tuple(edits), score)
