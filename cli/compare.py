@@ -27,9 +27,7 @@ _PHOTONS = 10**6
 @compare_options
 @common_options
 @click.pass_context
-def compare(
-    context: click.Context, /, material: str | None, common: Common, **given: Any
-) -> None:
+def compare(context: click.Context, /, material: str | None, common: Common, **given: Any) -> None:
     """Say why a kernel of MATERIAL loses what it loses, and what every other would.
 
     First the error budget: noise of the simulation, energy beyond the grid, separability, storage,
@@ -151,9 +149,7 @@ def _sheets(
         )
 
 
-def _check_sheets(
-    material: str | None, asked: Mapping[str, str], given: Mapping[str, Any]
-) -> None:
+def _check_sheets(material: str | None, asked: Mapping[str, str], given: Mapping[str, Any]) -> None:
     """Refuse what does not go with a sheet."""
     if material is None and set(asked) != {"editing"}:
         raise click.UsageError("name one MATERIAL; only --editing needs none.")

@@ -57,9 +57,7 @@ def render_reference(
     thread_count(threads)  # refused before the kernel's pixels are made
     half = reference_half_pixels(profile, scene.mm_per_pixel, scene.height, scene.width)
     _plan(scene.height, scene.width, half, profile.n_channels, border)
-    quadrant, left_out = reference_quadrant(
-        profile, scene.mm_per_pixel, scene.height, scene.width
-    )
+    quadrant, left_out = reference_quadrant(profile, scene.mm_per_pixel, scene.height, scene.width)
     picture = convolve(scene.irradiance, quadrant, border=border, threads=threads)
     if border == "mirror":
         picture += left_out * scene.irradiance.mean(axis=(0, 1))
