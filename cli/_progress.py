@@ -66,7 +66,6 @@ def step_progress(label: str, *, quiet: bool) -> Iterator[Callable[[int, int, st
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(),
-        TextColumn("{task.completed} of {task.total}"),
         TimeElapsedColumn(),
         TextColumn("{task.fields[step]}"),
         console=Console(stderr=True),
@@ -74,7 +73,9 @@ def step_progress(label: str, *, quiet: bool) -> Iterator[Callable[[int, int, st
     )
     task = bar.add_task(label, total=None, step="")
     with bar:
-        yield lambda done, total, step: bar.update(task, completed=done, total=total, step=step)
+        yield lambda done, total, step: bar.update(
+            task, completed=done, total=total, step=f"{done} of {total}, {step}"
+        )
 
 
 def time_left(first: "WalkProgress", now: "WalkProgress") -> str:

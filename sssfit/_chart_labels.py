@@ -17,7 +17,13 @@ _MARKER_INCHES = 0.045  # its half width
 _FARTHEST = 8  # lines down that a label is moved at most
 
 
-def place_labels(axes: Axes, points: Sequence[tuple[float, float]], labels: Sequence[str]) -> None:
+def place_labels(
+    axes: Axes,
+    points: Sequence[tuple[float, float]],
+    labels: Sequence[str],
+    *,
+    level: float | None = None,
+) -> None:
     """Write a label below and left of each point of a falling front, where nothing else can be.
 
     A label that would meet another goes further down, with a line to its point. Limits and place of
@@ -29,12 +35,17 @@ def place_labels(axes: Axes, points: Sequence[tuple[float, float]], labels: Sequ
     points : sequence of (x, y)
         In data, x rising and y falling.
     labels : sequence of str
+    level : float, optional
+        A horizontal line in data that labels stay off.
     """
     dpi = axes.figure.dpi
     pixels = [axes.transData.transform(point) / dpi for point in points]
     taken = [_marker(x, y) for x, y in pixels]
     panel = axes.get_window_extent()
     rim = Bbox.from_extents(*(each / dpi for each in panel.extents))
+    if level is not None:
+        height = axes.transData.transform((points[0][0], level))[1] / dpi
+        taken.append(Bbox.from_extents(rim.x0, height - 0.01, rim.x1, height + 0.01))
     for (x, y), label in zip(pixels, labels, strict=True):
         box = _free(x, y, inches(label, _SIZE), taken, rim)
         if box is None:

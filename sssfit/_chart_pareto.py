@@ -164,7 +164,8 @@ def _draw_panel(
     x_front, y_front = (list(each) for each in zip(*points, strict=True))
     style: Style = {"where": "post", "color": _GREY, "lw": 1.0, "zorder": 2}
     axes.step([*x_front, high], [*y_front, y_front[-1]], **style)
-    place_labels(axes, points, [row.label for row in front])
+    level = _JUST_NOTICEABLE if error == "delta-e" else None
+    place_labels(axes, points, [row.label for row in front], level=level)
 
 
 def _lanes(rows: Sequence[KernelRow], front: Sequence[KernelRow], cost: str) -> list[int]:

@@ -195,9 +195,11 @@ def test_labels_never_meet_however_dense_the_front(many):
         figure = new_figure(3.0)
         axes = figure.subplots()
         axes.set(xlim=(0, 1), ylim=(0, 1))
-        place_labels(axes, list(zip(x, y, strict=True)), [f"kernel {k}" for k in range(many)])
+        names = [f"kernel {k}" for k in range(many)]
+        place_labels(axes, list(zip(x, y, strict=True)), names, level=y[0] - 0.05)
     assert texts_in(axes)
     assert_legible(lambda: figure)
     for _, box in [each for each in drawn_texts(figure) if each[0].startswith("kernel")]:
         pixels = axes.transData.transform(np.transpose([x, y]))
+        assert not box.y0 < axes.transData.transform((0.5, y[0] - 0.05))[1] < box.y1
         assert not any(box.contains(*each) for each in pixels)

@@ -58,7 +58,8 @@ def compare_kernels(
     threads : int, optional
         By default all cores; only the seconds depend on it.
     progress : callable, optional
-        Called with how many candidates are done, of how many, and the label of the next.
+        Called with how many candidates are done, of how many, and the label of the next; at the
+        end with "timing".
 
     Returns
     -------
@@ -95,6 +96,8 @@ def compare_kernels(
     if not judged:
         reason = left_out[0][1] if left_out else "there are none."
         raise FitError(f"{target.name}: no kernel of {len(wanted)} could be fitted: {reason}")
+    if progress is not None:
+        progress(len(wanted), len(wanted), "timing")
     seconds = _timed_in_turn([fit for _, fit, _ in judged], scenes, threads)
     rows = [
         row
