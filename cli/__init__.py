@@ -19,6 +19,7 @@ from sssfit import __version__
 from sssfit.errors import SssfitError, SssfitWarning
 
 from .chart import chart
+from .choose import choose
 from .export import export
 from .fit import fit
 from .import_ import import_
@@ -59,7 +60,7 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
         ctx.exit(2)
 
 
-for _verb in (materials, simulate, fit, render, import_, export, chart, show):
+for _verb in (materials, simulate, fit, render, choose, import_, export, chart, show):
     cli.add_command(_verb)
 
 

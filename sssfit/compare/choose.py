@@ -277,8 +277,8 @@ class _Search:
         scene = self.views.scenes[0]
 
         def render() -> FloatArray:
-            picture: FloatArray = render_separable(scene, fitted.kernel, threads=self.views.threads)
-            return picture
+            blurred = render_separable(scene, fitted.kernel, threads=self.views.threads)
+            return np.asarray(blurred, dtype=np.float64)
 
         return timed(render, scene.height * scene.width)[1]
 
