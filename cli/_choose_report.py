@@ -126,7 +126,10 @@ def _kernel(choice: Choice) -> list[str]:
         lines.append(f"runner-up: {_beside(choice.runner_up, chosen)}")
     if choice.cheaper:
         lines.append(f"cheaper is not enough: {_beside(choice.cheaper, chosen)}")
-    lines += [f"dearer is not needed: {_beside(each, chosen)}" for each in choice.dearer]
+    lines += [
+        f"dearer {'is not needed' if each.within else 'is no better'}: {_beside(each, chosen)}"
+        for each in choice.dearer
+    ]
     return [*lines, *_untried(choice), *_photon_lines(choice.photons)]
 
 
