@@ -36,7 +36,7 @@ def test_the_kernel_is_written_and_the_choice_explained():
     text = ended("skin1", *SMALL).stdout
     kernel = SeparableKernel.load("skin1.chosen.kernel.json")
     lines = text.splitlines()
-    assert lines[0].startswith("skin1 at 0.14 m, 0.5862 mm per pixel")
+    assert lines[0].startswith("skin1 at 0.14 m, 0.5861 mm per pixel")
     assert f"on {kernel.pixels} pixels" in lines[1]
     for word in (
         "runner-up: ",
@@ -77,7 +77,7 @@ def test_a_picture_of_ones_own_takes_the_pitch():
     pixels[:, 20:] = 0.8
     save_image("mine.exr", pixels)
     figures = json.loads(ended("skin1", *SMALL, "--irradiance", "mine.exr", "--json").stdout)
-    assert figures["pictures"][0]["irradiance"] == "mine"
+    assert figures["pictures"][0]["irradiance"] == "mine.exr"
     assert figures["pictures"][0]["mm_per_pixel"] == figures["mm_per_pixel"]
 
 
