@@ -19,6 +19,7 @@ from sssfit import __version__
 from sssfit.errors import SssfitError, SssfitWarning
 
 from .chart import chart
+from .choose import choose
 from .compare import compare
 from .export import export
 from .fit import fit
@@ -64,7 +65,7 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
         ctx.exit(2)
 
 
-for _verb in (materials, simulate, fit, render, compare, import_, export, chart, show):
+for _verb in (*(materials, simulate, fit, render, compare, choose, import_, export, chart, show),):
     cli.add_command(_verb)
 
 

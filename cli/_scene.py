@@ -60,10 +60,13 @@ class Picture:
 
 def make_or_read(picture: Picture, mm_per_pixel: float, common: Common) -> Scene:
     """Make the picture on a kernel's pixels, or read it from its file."""
-    return (_made if picture.is_made else _read)(picture, mm_per_pixel, common)
+    if picture.is_made:
+        return made_scene(picture, mm_per_pixel, common)
+    return read_scene(picture, None, common)
 
 
-def _made(picture: Picture, mm_per_pixel: float, common: Common) -> Scene:
+def made_scene(picture: Picture, mm_per_pixel: float, common: Common) -> Scene:
+    """Make the picture on these pixels."""
     from sssfit.render.irradiance import make_scene, options_of
 
     if picture.mm_per_pixel is not None:
@@ -98,7 +101,8 @@ def _default_size(picture: Picture, mm_per_pixel: float, common: Common) -> tupl
     return rows, rows
 
 
-def _read(picture: Picture, _mm_per_pixel: float, common: Common) -> Scene:
+def read_scene(picture: Picture, otherwise: float | None, common: Common) -> Scene:
+    """Read the picture; ``otherwise`` is the size of its pixels where nothing says it."""
     from sssfit.errors import RenderError
     from sssfit.image import load_image
     from sssfit.render.scene import Scene
@@ -111,7 +115,7 @@ def _read(picture: Picture, _mm_per_pixel: float, common: Common) -> Scene:
     image = load_image(picture.irradiance)
     for note in image.notes:
         say(common, f"{picture.irradiance}: {note}")
-    pitch = picture.mm_per_pixel or image.mm_per_pixel
+    pitch = picture.mm_per_pixel or image.mm_per_pixel or otherwise
     if pitch is None:
         raise RenderError(
             f"{picture.irradiance} does not say how large its pixels are; give --mm-per-pixel."

@@ -1,0 +1,185 @@
+"""The figures of ``sssfit choose``, for people and for programs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sssfit.compare.choose import Choice, PhotonNeed, Step
+
+
+def figures_of(choice: Choice) -> dict[str, Any]:
+    """Everything that is printed, as ``--json`` has it; kernel is null where none is needed."""
+    fit = choice.fit
+    return {
+        "material": choice.profile.material_name,
+        "profile_method": choice.profile.meta.get("method"),
+        "mm_per_pixel": choice.mm_per_pixel,
+        "support_mm": choice.support_mm,
+        "tolerance": choice.tolerance,
+        "pictures": [
+            {
+                "irradiance": each.name,
+                "width": each.width,
+                "height": each.height,
+                "mm_per_pixel": each.mm_per_pixel,
+            }
+            for each in choice.scenes
+        ],
+        "kernel": None
+        if fit is None
+        else {
+            "method": fit.kernel.method,
+            "rank": fit.kernel.rank,
+            "pixels": fit.kernel.pixels,
+            "support_mm": fit.kernel.support_mm,
+            "seconds_per_megapixel": choice.seconds_per_megapixel,
+            "relative_frobenius_error": fit.relative_frobenius_error,
+        },
+        "chosen": _row(choice.chosen),
+        "runner_up": _row(choice.runner_up),
+        "cheaper": _row(choice.cheaper),
+        "dearer": [_row(each) for each in choice.dearer],
+        "photons": _photons(choice.photons),
+        "rows": [_row(each) for each in choice.steps],
+    }
+
+
+def _row(step: Step | None) -> dict[str, Any] | None:
+    """One step; method null is no blur."""
+    if step is None:
+        return None
+    option = step.option
+    return {
+        "label": step.label,
+        "method": option and option.candidate.method,
+        "rank": option.candidate.terms if option else 0,
+        "settings": dict(option.candidate.settings) if option else {},
+        "share": option and option.share,
+        "support_mm": option and option.support_mm,
+        "pixels": option.pixels if option else 1,
+        "taps_per_pixel": step.taps_per_pixel,
+        "delta_e_2000_mean": step.delta_e_2000_mean,
+        "delta_e_2000_p99": step.delta_e_2000_p99,
+        "mm_per_pixel": step.mm_per_pixel,
+        "within": step.within,
+    }
+
+
+def _photons(need: PhotonNeed | None) -> dict[str, Any] | None:
+    if need is None:
+        return None
+    return {
+        "photons": need.photons,
+        "tried": list(need.counts),
+        "delta_e_2000_mean": list(need.delta_e_2000_mean),
+        "seconds": list(need.seconds),
+        "profile_seconds": need.truth_seconds,
+    }
+
+
+def step_line(step: Step) -> str:
+    """Write a step as a line: what it is, what it costs, what it loses."""
+    return (
+        f"{_what(step)}: {step.taps_per_pixel} weights, Delta E {step.delta_e_2000_mean:.3g}, "
+        f"{'within' if step.within else 'not enough'}"
+    )
+
+
+def text_of(choice: Choice, written: Sequence[str], figures: Mapping[str, Any]) -> str:
+    """Write the choice first, then why neither less nor more."""
+    where = (
+        f"{figures['material']} at {figures['distance_mm'] / 1000.0:g} m, {choice.mm_per_pixel:.4g}"
+        f" mm per pixel, mean Delta E within {choice.tolerance:g}:"
+    )
+    lines = [where, *(_no_blur(choice) if choice.fit is None else _kernel(choice)), *_seen(choice)]
+    return "\n".join([*lines, f"Wrote {written[0]}" if written else "No kernel is written."])
+
+
+def _no_blur(choice: Choice) -> list[str]:
+    """Say why no blur is needed."""
+    if choice.chosen is not None:
+        return [
+            "no blur is needed: irradiance times diffuse reflectance has "
+            f"{_loss(choice.chosen)}; any kernel would cost more."
+        ]
+    if choice.scenes:
+        return ["no blur is needed: the head is under a pixel."]
+    return [
+        f"no blur is needed: the profile is under a pixel, 99.9 % of it within "
+        f"{choice.support_mm:.3g} mm."
+    ]
+
+
+def _kernel(choice: Choice) -> list[str]:
+    """Say what was chosen, what else would do, and what would not."""
+    chosen, fit = choice.chosen, choice.fit
+    if chosen is None or fit is None:
+        return []
+    lines = [
+        f"{_what(chosen)}: {fit.kernel.rank} term{'s' * (fit.kernel.rank > 1)}, "
+        f"{chosen.taps_per_pixel} weights a pixel, {_loss(chosen)}, "
+        f"{choice.seconds_per_megapixel:.2g} s a megapixel here",
+    ]
+    if choice.runner_up:
+        lines.append(f"runner-up: {_beside(choice.runner_up, chosen)}")
+    if choice.cheaper:
+        lines.append(f"cheaper is not enough: {_beside(choice.cheaper, chosen)}")
+    lines += [
+        f"dearer {'is not needed' if each.within else 'is no better'}: {_beside(each, chosen)}"
+        for each in choice.dearer
+    ]
+    return [*lines, *_untried(choice), *_photon_lines(choice.photons)]
+
+
+def _untried(choice: Choice) -> list[str]:
+    """Say which guided fits were left out."""
+    tried = [each.option for each in choice.steps if each.option]
+    if any(each.candidate.method == "guided" for each in tried):
+        return []
+    return ["not tried: guided fits, for their time, where another pass will do or one is wide"]
+
+
+def _photon_lines(need: PhotonNeed | None) -> list[str]:
+    """Say how many photons a walk would need, and what the truth took."""
+    if need is None:
+        return []
+    if need.photons is None:
+        enough = f"{need.counts[-1]:.0e} photons are not enough for a walk"
+    else:
+        enough = f"a walk of {need.photons:.0e} photons would do"
+    tried = ", ".join(
+        f"{count:.0e} Delta E {error:.3g} in {seconds:.1f} s"
+        for count, error, seconds in zip(
+            need.counts, need.delta_e_2000_mean, need.seconds, strict=True
+        )
+    )
+    by = "needs none" if need.truth_method == "exact" else "is the truth here"
+    text = f"photons: {enough} ({tried}); {need.truth_method} {by}, {need.truth_seconds:.1f} s"
+    return [text.replace("e+0", "e")]
+
+
+def _seen(choice: Choice) -> list[str]:
+    """Say what it was judged on."""
+    return [
+        f"judged on {each.name}, {each.width} x {each.height} pixels of {each.mm_per_pixel:.4g} mm"
+        for each in choice.scenes
+    ]
+
+
+def _what(step: Step) -> str:
+    """Name a step with its pixels."""
+    if step.option is None:
+        return step.label
+    return f"{step.label} on {step.option.pixels} pixels (+-{step.option.support_mm:.3g} mm)"
+
+
+def _loss(step: Step) -> str:
+    return f"Delta E {step.delta_e_2000_mean:.3g} (99th percentile {step.delta_e_2000_p99:.3g})"
+
+
+def _beside(step: Step, chosen: Step) -> str:
+    """Hold a step against the chosen one."""
+    times = step.taps_per_pixel / chosen.taps_per_pixel
+    return f"{_what(step)}, {_loss(step)} for {times:.3g} times the weights"

@@ -1,0 +1,82 @@
+"""How few photons would have done: walks of growing length, fitted as the choice was."""
+
+import time
+import warnings
+from dataclasses import dataclass
+
+from sssfit.compare._choose_options import Option
+from sssfit.compare._choose_views import Views
+from sssfit.errors import FitError, SssfitWarning
+from sssfit.material import Material
+from sssfit.simulate import simulate_montecarlo
+
+COUNTS = (10_000, 100_000, 1_000_000, 10_000_000)
+
+
+@dataclass(frozen=True, slots=True)
+class PhotonNeed:
+    """Photons of a walk whose profile, fitted in the same way, stays within the tolerance.
+
+    Parameters
+    ----------
+    photons : int, optional
+        The fewest of ``COUNTS``; None where none would do.
+    counts : tuple of int
+        What was tried, up to that.
+    delta_e_2000_mean : tuple of float
+        Of the worst view by each; inf where the profile cannot be fitted.
+    seconds : tuple of float [s]
+        That each took, compilation included.
+    truth_method : str
+        How the profile that the choice was made on was found.
+    truth_seconds : float [s]
+        That it took.
+    """
+
+    photons: int | None
+    counts: tuple[int, ...]
+    delta_e_2000_mean: tuple[float, ...]
+    seconds: tuple[float, ...]
+    truth_method: str
+    truth_seconds: float
+
+
+def photons_needed(
+    material: Material,
+    option: Option,
+    views: Views,
+    tolerance: float,
+    seed: int,
+    truth_seconds: float,
+) -> PhotonNeed:
+    """Trace 1e4 photons, ten times as many, ..., until the option is within the tolerance."""
+    errors: list[float] = []
+    seconds: list[float] = []
+    method = str(views.profile.meta.get("method"))
+    # The truth of a slab is itself a walk of the last count.
+    counts = COUNTS if views.profile.photons is None else COUNTS[:-1]
+    for photons in counts:
+        begun = time.perf_counter()
+        errors.append(_error(material, option, views, tolerance, photons, seed))
+        seconds.append(time.perf_counter() - begun)
+        if errors[-1] <= tolerance:
+            break
+    enough = counts[len(errors) - 1] if errors[-1] <= tolerance else None
+    if enough is None and views.profile.photons is not None:
+        enough = views.profile.photons
+    return PhotonNeed(
+        enough, counts[: len(errors)], tuple(errors), tuple(seconds), method, truth_seconds
+    )
+
+
+def _error(
+    material: Material, option: Option, views: Views, tolerance: float, photons: int, seed: int
+) -> float:
+    """Return the mean Delta E of the worst view; what would be warned of is in it."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SssfitWarning)
+        walk = simulate_montecarlo(material, photons=photons, seed=seed, threads=views.threads)
+        try:
+            return views.score_of_option(option, tolerance, walk)[0]
+        except FitError:  # a dark channel that no photon came back in
+            return float("inf")

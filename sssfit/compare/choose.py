@@ -1,0 +1,297 @@
+"""No more than a scene needs: the cheapest kernel whose picture stays within a tolerance.
+
+What is judged is the mean CIE Delta E 2000 of a picture against the profile's own 2D kernel
+(``_choose_views``); what counts as cheap is weights applied to a pixel, ties going to the smaller
+Delta E (``_choose_options``). Neither depends on a clock, so the same seed gives the same choice.
+
+No blur at all is tried first, then every option in the order of its cost until one will do. Left
+out are supports too narrow for any kernel: those to which the profile's own kernel cannot be cut
+(its energy kept) without leaving the tolerance, but for the widest of them.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from sssfit.compare._choose_options import (
+    Option,
+    by_cost,
+    half_pixels,
+    options,
+    split_guided,
+    supports,
+)
+from sssfit.compare._choose_photons import PhotonNeed, photons_needed
+from sssfit.compare._choose_truth import check_colours, truth_of
+from sssfit.compare._choose_views import Views, checked_scene, head_scenes, mm_per_pixel_at
+from sssfit.compare.judge import timed
+from sssfit.errors import FitError, RenderError
+from sssfit.fit import FitResult, support_of
+from sssfit.material import Material
+from sssfit.profile import Profile
+from sssfit.render.scene import FloatArray, Scene
+from sssfit.render.separable import render_separable
+
+__all__ = ["Choice", "PhotonNeed", "Step", "choose", "mm_per_pixel_at"]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One option that was tried.
+
+    Parameters
+    ----------
+    option : Option, optional
+        None is no blur: irradiance times diffuse reflectance.
+    taps_per_pixel : int
+        Its cost.
+    delta_e_2000_mean, delta_e_2000_p99 : float
+        Of its worst view; of the first that was out of tolerance, where one was.
+    mm_per_pixel : float [mm]
+        Of that view.
+    within : bool
+        Whether every view is within the tolerance.
+    """
+
+    option: Option | None
+    taps_per_pixel: int
+    delta_e_2000_mean: float
+    delta_e_2000_p99: float
+    mm_per_pixel: float
+    within: bool
+
+    @property
+    def label(self) -> str:
+        """In words, without the support."""
+        return "no blur" if self.option is None else self.option.candidate.label
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Choice:
+    """The cheapest that will do, and why neither less nor more is needed.
+
+    Parameters
+    ----------
+    profile : Profile
+        What the kernel is fitted to and the truth is made from.
+    mm_per_pixel : float [mm]
+    tolerance : float
+        Largest mean Delta E 2000.
+    scenes : tuple of Scene
+        The pictures; the first has the pixels asked for. Empty where none was needed.
+    steps : tuple of Step
+        Everything tried, in order; the first is no blur.
+    chosen : Step, optional
+        None where the profile, or the head, is under a pixel.
+    fit : FitResult, optional
+        None where no blur is needed.
+    runner_up : Step, optional
+        The next best that will do as well.
+    cheaper : Step, optional
+        The next cheaper step, which will not do.
+    dearer : tuple of Step
+        What another term, a wider support and the dearest option would give.
+    photons : PhotonNeed, optional
+        How few photons would have done; None where no blur is needed.
+    seconds_per_megapixel : float, optional [s]
+        Measured, of the chosen kernel.
+    """
+
+    profile: Profile
+    mm_per_pixel: float
+    tolerance: float
+    scenes: tuple[Scene, ...] = ()
+    steps: tuple[Step, ...] = ()
+    chosen: Step | None = None
+    fit: FitResult | None = None
+    runner_up: Step | None = None
+    cheaper: Step | None = None
+    dearer: tuple[Step, ...] = ()
+    photons: PhotonNeed | None = None
+    seconds_per_megapixel: float | None = None
+
+    @property
+    def support_mm(self) -> float:
+        """Radius that keeps 99.9 % of every channel [mm]."""
+        return support_of(self.profile)
+
+
+def choose(
+    material: Material,
+    *,
+    mm_per_pixel: float,
+    scene: Scene | None = None,
+    distance_mm: float = 600.0,
+    frame: tuple[int, int] = (1080, 1920),
+    tolerance: float = 1.0,
+    seed: int = 1,
+    threads: int | None = None,
+    progress: Callable[[Step], None] | None = None,
+) -> Choice:
+    """Find the cheapest method, support and rank that keep within a tolerance.
+
+    Parameters
+    ----------
+    material : Material
+        Its exact profile is the truth; where there is no exact method (slabs, layers), a walk of
+        1e7 photons.
+    mm_per_pixel : float [mm]
+        `mm_per_pixel_at` has it for a distance, a field of view and the rows of a frame.
+    scene : Scene, optional
+        Judged on in place of the head, its middle 512 x 512 pixels at most, within its mask.
+    distance_mm : float [mm]
+        From the eye to the head, 100 or more.
+    frame : tuple of int
+        Rows and columns that are rendered; of more than 512 the middle ones show the head.
+    tolerance : float
+        Largest mean Delta E 2000, above 0.
+    seed : int
+        Of the walks.
+    threads : int, optional
+        By default all cores; the choice does not depend on it.
+    progress : callable, optional
+        Called with every step.
+
+    Raises
+    ------
+    RenderError
+        A value out of its range, a picture of no use, or nothing within the tolerance.
+    SimulationError, FitError
+        No profile, or one that cannot be fitted.
+    """
+    if not (math.isfinite(tolerance) and tolerance > 0.0):
+        raise RenderError(f"tolerance = {tolerance:g}; expected a mean Delta E above 0.")
+    if not (math.isfinite(mm_per_pixel) and mm_per_pixel > 0.0):
+        raise RenderError(f"mm_per_pixel = {mm_per_pixel:g}; expected a length above 0.")
+    check_colours(material)
+    own = None if scene is None else checked_scene(scene, mm_per_pixel)
+    profile, seconds = truth_of(material, seed=seed, threads=threads)
+    if half_pixels(support_of(profile), mm_per_pixel) == 0:
+        return Choice(profile, mm_per_pixel, tolerance)
+    scenes = [own] if own else head_scenes(mm_per_pixel, distance_mm, frame, threads)
+    if not any(each.mask is None or (each.mask > 0).any() for each in scenes):
+        return Choice(profile, mm_per_pixel, tolerance, tuple(scenes))
+    search = _Search(Views(profile, scenes, threads), tolerance, progress)
+    return search.run(material, seconds, seed)
+
+
+class _Search:
+    """The steps, and the pictures they are tried on."""
+
+    def __init__(
+        self, views: Views, tolerance: float, progress: Callable[[Step], None] | None
+    ) -> None:
+        self.views, self.tolerance, self.progress = views, tolerance, progress
+        self.steps: list[Step] = []
+
+    def run(self, material: Material, seconds: float, seed: int) -> Choice:
+        """Try no blur, then options by cost; then what is beside the one that will do."""
+        views, pitch = self.views, self.views.scenes[0].mm_per_pixel
+        given = (views.profile, pitch, self.tolerance, tuple(views.scenes))
+        nothing = self._try(None)
+        if nothing.within:
+            return Choice(*given, steps=tuple(self.steps), chosen=nothing)
+        kept = self._wide_enough(supports(views.profile, pitch))
+        found = options(kept, pitch)
+        chosen, runner_up = self._cheapest(found)
+        if chosen is None or chosen.option is None:
+            raise RenderError(self._too_tight())
+        fitted = chosen.option.fit(views.profile, pitch)
+        if fitted is None:
+            raise FitError(f"{chosen.label} has no kernel on pixels of {pitch:.4g} mm.")
+        return Choice(
+            *given,
+            steps=tuple(self.steps),
+            chosen=chosen,
+            fit=fitted,
+            runner_up=runner_up,
+            cheaper=_next_cheaper(self.steps, chosen),
+            dearer=self._dearer(chosen.option, found),
+            photons=photons_needed(material, chosen.option, views, self.tolerance, seed, seconds),
+            seconds_per_megapixel=self._seconds(fitted),
+        )
+
+    def _try(self, option: Option | None) -> Step:
+        """Judge an option and keep its step."""
+        step = self._judged(option)
+        self.steps.append(step)
+        if self.progress:
+            self.progress(step)
+        return step
+
+    def _judged(self, option: Option | None) -> Step:
+        score = self.views.score_of_option(option, self.tolerance)
+        cost = option.taps_per_pixel if option else 0
+        return Step(option, cost, *score, within=score[0] <= self.tolerance)
+
+    def _wide_enough(self, found: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+        """Leave out supports to which even the true kernel cannot be cut, but for the widest.
+
+        That one is kept so that the next cheaper step is one that was tried.
+        """
+        pitch = self.views.scenes[0].mm_per_pixel
+        for k, (_, radius) in enumerate(found):
+            if self.views.score_of_cut(half_pixels(radius, pitch)) <= self.tolerance:
+                return list(found[max(k - 1, 0) :])
+        return list(found[-1:])
+
+    def _cheapest(self, found: Sequence[Option]) -> tuple[Step | None, Step | None]:
+        """Return the cheapest option within the tolerance and the next best that is too."""
+        within: list[Step] = []
+        for group in by_cost(found):
+            quick, slow = split_guided(group)
+            steps = [self._try(each) for each in quick]
+            if not within and not any(each.within for each in steps):
+                steps += [self._try(each) for each in slow]
+            best = [each for each in steps if each.within]
+            within += sorted(best, key=lambda each: each.delta_e_2000_mean)
+            if len(within) > 1:
+                break
+        first, second, *_ = (*within, None, None)
+        return first, second
+
+    def _dearer(self, chosen: Option, found: Sequence[Option]) -> tuple[Step, ...]:
+        """Judge one term more, the next wider support, and the dearest of all."""
+        terms = chosen.candidate.terms + 1
+        more = [
+            each
+            for each in found
+            if (each.candidate.label, each.share) == (f"svd {terms}", chosen.share)
+        ]
+        wider = [
+            each
+            for each in found
+            if each.candidate == chosen.candidate and each.pixels > chosen.pixels
+        ]
+        dearest = [each for each in found if each.candidate.method == "svd"][-1:]
+        picked: list[Option] = []
+        for option in (*more, *wider[:1], *dearest):
+            if option != chosen and option not in picked:
+                picked.append(option)
+        return tuple(self._judged(each) for each in picked)
+
+    def _seconds(self, fitted: FitResult) -> float:
+        """Measure what the chosen kernel takes [s a megapixel]."""
+        scene = self.views.scenes[0]
+
+        def render() -> FloatArray:
+            blurred = render_separable(scene, fitted.kernel, threads=self.views.threads)
+            return np.asarray(blurred, dtype=np.float64)
+
+        return timed(render, scene.height * scene.width)[1]
+
+    def _too_tight(self) -> str:
+        best = min(self.steps, key=lambda each: each.delta_e_2000_mean)
+        return (
+            f"nothing is within a mean Delta E of {self.tolerance:g}: the best of {len(self.steps)}"
+            f", {best.label}, has {best.delta_e_2000_mean:.2g} on pixels of "
+            f"{best.mm_per_pixel:.3g} mm; give a larger tolerance."
+        )
+
+
+def _next_cheaper(steps: Sequence[Step], chosen: Step) -> Step | None:
+    """Return the step that costs the most of those that cost less; the best of several such."""
+    below = [each for each in steps if each.taps_per_pixel < chosen.taps_per_pixel]
+    return max(below, key=lambda each: (each.taps_per_pixel, -each.delta_e_2000_mean), default=None)

@@ -1,0 +1,124 @@
+"""``sssfit choose``: what is printed and written, one line for what is wrong."""
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from sssfit.cli import cli, main
+from sssfit.image import save_image
+from sssfit.kernel import SeparableKernel
+
+SMALL = ("--resolution", "128x128", "--distance", "0.14m")
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def ended(*arguments):
+    result = CliRunner().invoke(cli, ["choose", *arguments])
+    assert result.exit_code == 0, result.output
+    return result
+
+
+def failed(capsys, *arguments):
+    """Exit status and the last line of stderr of the whole program."""
+    with pytest.raises(SystemExit) as ending:
+        main(["choose", *arguments])
+    return ending.value.code, capsys.readouterr().err.splitlines()
+
+
+def test_the_kernel_is_written_and_the_choice_explained():
+    text = ended("skin1", *SMALL).stdout
+    kernel = SeparableKernel.load("skin1.chosen.kernel.json")
+    lines = text.splitlines()
+    assert lines[0].startswith("skin1 at 0.14 m, 0.5861 mm per pixel")
+    assert f"on {kernel.pixels} pixels" in lines[1]
+    for word in (
+        "runner-up: ",
+        "cheaper is not enough: ",
+        "dearer ",
+        "photons: ",
+        "judged on head",
+    ):
+        assert any(line.startswith(word) for line in lines), word
+    assert lines[-1] == "Wrote skin1.chosen.kernel.json"
+
+
+def test_json_has_everything():
+    figures = json.loads(ended("skin1", *SMALL, "--json", "-o", "mine.kernel.json").stdout)
+    assert figures["output"] == ["mine.kernel.json"]
+    kernel = SeparableKernel.load("mine.kernel.json")
+    chosen = figures["chosen"]
+    assert chosen["taps_per_pixel"] == 2 * kernel.rank * kernel.pixels
+    assert chosen["delta_e_2000_mean"] <= figures["tolerance"] == 1.0
+    assert figures["cheaper"]["delta_e_2000_mean"] > 1.0
+    assert figures["kernel"]["method"] == kernel.method
+    assert figures["photons"]["photons"] >= 10_000
+    assert figures["rows"][0]["method"] is None
+    assert figures["pictures"][0]["width"] == 128
+
+
+def test_no_blur_writes_no_kernel(folder):
+    figures = json.loads(ended("skin1", "--distance", "60m", "--json").stdout)
+    assert (figures["kernel"], figures["output"], figures["rows"]) == (None, [], [])
+    assert "under a pixel" in ended("skin1", "--distance", "60m").stdout
+    far = ended("skin1", "--resolution", "64x64", "--distance", "1m").stdout
+    assert "no blur is needed: irradiance times diffuse reflectance" in far
+    assert not list(folder.iterdir())
+
+
+def test_a_picture_of_ones_own_takes_the_pitch():
+    pixels = np.zeros((40, 40, 3))
+    pixels[:, 20:] = 0.8
+    save_image("mine.exr", pixels)
+    figures = json.loads(ended("skin1", *SMALL, "--irradiance", "mine.exr", "--json").stdout)
+    assert figures["pictures"][0]["irradiance"] == "mine.exr"
+    assert figures["pictures"][0]["mm_per_pixel"] == figures["mm_per_pixel"]
+
+
+def test_the_kernel_goes_to_stdout_and_words_to_stderr():
+    result = ended("skin1", *SMALL, "--irradiance", "edge", "-o", "-", "-v")
+    assert json.loads(result.stdout)["format"] == "sssfit.kernel/1"
+    assert "runner-up" in result.stderr
+    assert "no blur: 0 weights" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "word"),
+    [
+        (("skin1", "--distance", "0"), 2, "not a length above 0"),
+        (("skin1", "--distance", "-1m"), 2, "not a length above 0"),
+        (("skin1", "--distance", "1cm"), 1, "distance_mm = 10"),
+        (("skin1", "--fov", "180"), 2, "180"),
+        (("skin1", "--fov", "0"), 2, "0.0"),
+        (("skin1", "--fov", "nan"), 1, "between 0 and 180"),
+        (("skin1", "--tolerance", "0"), 1, "tolerance = 0"),
+        (("skin1", "--tolerance", "-1"), 1, "tolerance = -1"),
+        (("skin1", "--tolerance", "nan"), 1, "tolerance = nan"),
+        (("skin1", "--resolution", "0x0"), 2, "not a size"),
+        (("skin1", "--irradiance", "grey.exr"), 1, "of one colour"),
+        (("skin1", "--irradiance", "other.exr"), 1, "5 mm per pixel"),
+        (("no-such",), 1, "no-such"),
+    ],
+)
+def test_bad_input_gets_one_line(capsys, arguments, status, word):
+    save_image("grey.exr", np.full((8, 8, 3), 0.5))
+    pixels = np.zeros((8, 8, 3))
+    pixels[4:] = 1.0
+    save_image("other.exr", pixels, mm_per_pixel=5.0)
+    code, lines = failed(capsys, *arguments)
+    assert code == status
+    assert word in lines[-1]
+    assert sum(line.startswith("Error") for line in lines) == 1
+
+
+def test_a_foreign_file_is_not_replaced(folder, capsys):
+    (folder / "skin1.chosen.kernel.json").write_text("notes")
+    code, lines = failed(capsys, "skin1", *SMALL)
+    assert (code, len(lines)) == (1, 1)
+    assert (folder / "skin1.chosen.kernel.json").read_text() == "notes"
