@@ -8,21 +8,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from ._compiling import say_if_compiling
 from ._deon_skin import DEON_SKIN
 from ._figure import chart_output
 from ._options import Common
 from ._report import percent, table
-from ._scene import Picture, make_or_read
 
 if TYPE_CHECKING:
     from sssfit.compare.budget import Budget, Cause
     from sssfit.render.scene import Scene
 
-_MM_PER_PIXEL = 0.3
-_SIZE = (512, 512)
 _HEADS = ["", "Delta E mean", "p99", "relative L2", "largest drift", "of the whole"]
 _SCORES = ("delta_e_2000_mean", "delta_e_2000_p99", "relative_l2", "energy_drift")
 
@@ -31,9 +26,6 @@ _SCORES = ("delta_e_2000_mean", "delta_e_2000_p99", "relative_l2", "energy_drift
 class BudgetRequest:
     """What was asked for; ``settings`` are keywords of the fit."""
 
-    pictures: Sequence[str]
-    size: tuple[int, int] | None
-    mm_per_pixel: float | None
     photons: int
     method: str
     settings: Mapping[str, Any]
@@ -43,11 +35,11 @@ class BudgetRequest:
 
 
 def compare_budget(
-    material: str, request: BudgetRequest, common: Common
+    material: str, scenes: Sequence[Scene], request: BudgetRequest, common: Common
 ) -> tuple[dict[str, Any], str]:
     """Make the budget of a material on each picture, draw it if asked to; figures and text."""
     with _chart(request) as draw:
-        budgets = _budgets(material, request, common)
+        budgets = _budgets(material, scenes, request, common)
         draw(budgets)
     return _figures(budgets), "\n\n".join(_text(each) for each in budgets)
 
@@ -92,8 +84,10 @@ def _draw(budgets: Sequence[Budget], save: Callable[[Any], None]) -> None:
     save(budget_figure(budgets))
 
 
-def _budgets(name: str, request: BudgetRequest, common: Common) -> list[Budget]:
-    """Read the material, make the pictures, and take the errors apart."""
+def _budgets(
+    name: str, scenes: Sequence[Scene], request: BudgetRequest, common: Common
+) -> list[Budget]:
+    """Read the material and take the errors of its pictures apart."""
     from sssfit.compare.budget import error_budgets
     from sssfit.errors import ProfileError
     from sssfit.material import load_material
@@ -103,7 +97,6 @@ def _budgets(name: str, request: BudgetRequest, common: Common) -> list[Budget]:
     if name == DEON_SKIN:
         raise ProfileError(f"{name} has no coefficients for other methods; name a material.")
     material = load_material(name)
-    scenes = [_scene(each, request, common) for each in request.pictures]
     say_if_compiling(common, walk=material, solver=True)
     with walk_progress(material.name, quiet=common.quiet) as show:
         return error_budgets(
@@ -117,16 +110,6 @@ def _budgets(name: str, request: BudgetRequest, common: Common) -> list[Budget]:
             threads=common.threads,
             progress=show,
         )
-
-
-def _scene(name: str, request: BudgetRequest, common: Common) -> Scene:
-    """Make a picture, or read the user's own."""
-    if not name:
-        raise click.UsageError("--picture has an empty name; give names with commas between them.")
-    asked = Picture(name, request.size, request.mm_per_pixel, {})
-    if asked.is_made:
-        asked = Picture(name, request.size or _SIZE, None, {})
-    return make_or_read(asked, request.mm_per_pixel or _MM_PER_PIXEL, common)
 
 
 def _rows(budget: Budget) -> list[dict[str, Any]]:

@@ -64,7 +64,7 @@ def scenes_of(
     That is what was asked for, else what the first file says, else the default.
     """
     for name in pictures:
-        if name not in MADE and not Path(name).exists():
+        if not name or (name not in MADE and not Path(name).exists()):
             raise click.UsageError(
                 f"there is no picture {name!r}; expected {', '.join(MADE)}, or your own file."
             )

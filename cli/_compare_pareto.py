@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,8 +34,9 @@ class Wish:
     force: bool
     common: Common
 
+    @cached_property
     def scenes(self) -> tuple[list[Scene], float]:
-        """Make or read the pictures."""
+        """Make or read the pictures, once; the size of their pixels [mm]."""
         return scenes_of(self.pictures, self.size, self.mm_per_pixel, self.common)
 
 
@@ -54,7 +56,7 @@ class Outputs:
 def compare_one(name: str, outputs: Outputs, wish: Wish) -> tuple[dict[str, Any], str]:
     """Compare the kernels of a material or profile, write what is wanted; figures and text."""
     with _held([outputs], wish):
-        comparison = _compared(profile_of(name, wish.common), *wish.scenes(), wish)
+        comparison = _compared(profile_of(name, wish.common), *wish.scenes, wish)
         _write(comparison, outputs, wish)
     figures = {"error": wish.error, "cost": wish.cost, **figures_of(comparison)}
     return figures, text_of(comparison, wish.error, wish.cost)
@@ -74,7 +76,7 @@ def compare_all(folder: Path, wish: Wish) -> None:
     done: list[tuple[Comparison, Outputs]] = []
     failed: list[str] = []
     with _held(outputs, wish):
-        scenes, pitch = wish.scenes()
+        scenes, pitch = wish.scenes
         for name, each in zip(names, outputs, strict=True):
             try:
                 profile = profile_of(name, wish.common)

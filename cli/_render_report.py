@@ -36,6 +36,7 @@ def figures_of(result: Judgement, scene: Scene, kernel: SeparableKernel) -> dict
         "kernel_bytes": cost.kernel_bytes,
         "seconds_per_megapixel": cost.seconds_per_megapixel,
         "radial_asymmetry": result.asymmetry,
+        "true_radial_asymmetry": result.true_asymmetry,
         **{key: getattr(result.score, key, None) for key in _SCORES},
     }
 
@@ -67,12 +68,17 @@ def _measured(figures: Mapping[str, Any]) -> list[str]:
     if figures["ssim"] is not None:
         lines.append(f"  SSIM {figures['ssim']:.4f}, FLIP {figures['flip']:.4f}")
     rows = [
-        [name, percent(drift), f"{asymmetry:.3g}"]
-        for name, drift, asymmetry in zip(
-            figures["channels"], figures["energy_drift"], figures["radial_asymmetry"], strict=True
+        [name, percent(drift), *("-" if math.isnan(each) else f"{each:.3g}" for each in both)]
+        for name, drift, *both in zip(
+            figures["channels"],
+            figures["energy_drift"],
+            figures["radial_asymmetry"],
+            figures["true_radial_asymmetry"],
+            strict=True,
         )
     ]
-    return [*lines, table(["channel", "energy drift", "radial asymmetry"], rows)]
+    heads = ["channel", "energy drift", "radial asymmetry", "of the true kernel"]
+    return [*lines, table(heads, rows)]
 
 
 def _colours(figures: Mapping[str, Any]) -> str:

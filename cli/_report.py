@@ -78,7 +78,7 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def percent(share: float, digits: str = "+.2g") -> str:
     """Write a share in percent; rounding of a sum of pixels is 0."""
-    return "0 %" if abs(share) < 1e-12 else f"{100.0 * share:{digits}} %"
+    return "0 %" if abs(share) < 1e-9 else f"{100.0 * share:{digits}} %"
 
 
 def plain(value: Any) -> Any:

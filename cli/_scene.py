@@ -75,8 +75,13 @@ def made_scene(picture: Picture, mm_per_pixel: float, common: Common) -> Scene:
             "kernel's pixels."
         )
     height, width = picture.size or _default_size(picture, mm_per_pixel, common)
-    own = dict(picture.own)
-    if "seed" in options_of(picture.irradiance):
+    own, known = dict(picture.own), options_of(picture.irradiance)
+    for key, value in own.items():
+        if value is not None and key not in known:
+            raise click.UsageError(
+                f"--{key.split('_')[0]} is not for {picture.irradiance}; leave it out."
+            )
+    if "seed" in known:
         own["seed"] = common.seed
     return make_scene(
         picture.irradiance, height=height, width=width, mm_per_pixel=mm_per_pixel, **own
@@ -107,7 +112,13 @@ def read_scene(picture: Picture, otherwise: float | None, common: Common) -> Sce
     from sssfit.image import load_image
     from sssfit.render.scene import Scene
 
-    given = [key for key, value in {**picture.own, "size": picture.size}.items() if value]
+    if not Path(picture.irradiance).exists():
+        raise click.UsageError(
+            f"there is no picture {picture.irradiance!r}; expected {', '.join(MADE)}, or your own "
+            "file."
+        )
+    asked = {**picture.own, "size": picture.size}
+    given = [key for key, value in asked.items() if value is not None]
     if given:
         raise click.UsageError(
             f"--{given[0].split('_')[0]} is for made pictures ({', '.join(MADE)}); leave it out."

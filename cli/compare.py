@@ -66,25 +66,19 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
     if material is None:
         compare_all(Path(given["output"] or "."), wish)
         return
-    request = _request(context, names, given)
-    budget = None if given["only"] == "kernels" else _budget(material, request, given, common)
-    kernels = (
-        None
-        if given["only"] == "budget"
-        else compare_one(material, Outputs(given["chart"], given["table"]), wish)
-    )
+    request = _request(context, given)
+    kernels = budget = None
+    if given["only"] != "budget":
+        kernels = compare_one(material, Outputs(given["chart"], given["table"]), wish)
+    if given["only"] != "kernels":
+        budget = _budget(material, request, wish, only=given["only"] == "budget")
     _report([budget, kernels], given, common)
 
 
-def _request(
-    context: click.Context, pictures: Sequence[str], given: Mapping[str, Any]
-) -> BudgetRequest:
+def _request(context: click.Context, given: Mapping[str, Any]) -> BudgetRequest:
     """Put together what the budget needs."""
     terms = {key: given[key] for key in ("rank", "terms")}
     return BudgetRequest(
-        pictures,
-        given["size"],
-        given["mm_per_pixel"],
         given["photons"] or _PHOTONS,
         given["method"],
         own_settings(context, given["method"], terms),
@@ -95,21 +89,20 @@ def _request(
 
 
 def _budget(
-    material: str, request: BudgetRequest, given: Mapping[str, Any], common: Common
+    material: str, request: BudgetRequest, wish: Wish, *, only: bool
 ) -> tuple[dict[str, Any], str] | None:
     """Make the budget; say why there is none, unless it is all that was asked for."""
     from sssfit.errors import SimulationError
 
-    named = material.endswith(".npz") or material in ("-", DEON_SKIN)
-    if named and given["only"] != "budget":
-        say(common, f"No budget: {material} has no coefficients to simulate with.")
+    if not only and (material.endswith(".npz") or material in ("-", DEON_SKIN)):
+        say(wish.common, f"No budget: {material} has no coefficients to simulate with.")
         return None
     try:
-        return compare_budget(material, request, common)
+        return compare_budget(material, wish.scenes[0], request, wish.common)
     except SimulationError as error:
-        if given["only"] == "budget":
+        if only:
             raise
-        say(common, f"No budget: {error}")
+        say(wish.common, f"No budget: {error}")
         return None
 
 

@@ -35,8 +35,9 @@ class Choice:
 
     @property
     def alpha(self) -> int | None:
-        """The place of alpha, if there is one."""
-        return self.spec.alpha_channel if self.spec.alpha_channel >= 0 else None
+        """The place of alpha, if there is one and it is no colour: some call their first "A"."""
+        place = int(self.spec.alpha_channel)
+        return place if place >= 0 and place not in self.colours else None
 
     @property
     def span(self) -> tuple[int, int]:
@@ -61,7 +62,9 @@ def choose(source: "ImageInput", path: Path) -> Choice:
             if set(wanted) <= set(names):
                 colours = tuple(names.index(name) for name in wanted)
                 return Choice(part, spec, colours, _left_out(specs, part, colours))
-    colours = tuple(i for i in range(specs[0].nchannels) if i != specs[0].alpha_channel)
+    # Only beside colours that are known by name is a channel called A alpha; two are grey with it.
+    alpha = specs[0].alpha_channel if specs[0].nchannels in (2, 4) else -1
+    colours = tuple(i for i in range(specs[0].nchannels) if i != alpha)
     # A dot parts a layer from its channel: depth and normals may be among them.
     if not colours or any("." in name for name in specs[0].channelnames):
         names = list(specs[0].channelnames)

@@ -11,6 +11,7 @@ from sssfit.errors import RenderError
 FloatArray = npt.NDArray[np.float64]
 
 _CODES = 65535  # the largest of 16 bits
+_ROUNDING = 1e-6  # of white: what no code shows is not said to be clipped
 
 
 def channel_names(light: FloatArray, given: Sequence[str] | None, format: str) -> tuple[str, ...]:
@@ -55,7 +56,7 @@ def png_codes(light: FloatArray, exposure: float) -> tuple[npt.NDArray[np.uint16
     if not (np.isfinite(exposure) and exposure > 0.0):
         raise RenderError(f"exposure = {exposure:g}; expected a factor above 0.")
     exposed = exposure * light
-    clipped = int(((exposed < 0.0) | (exposed > 1.0)).sum())
+    clipped = int(((exposed < -_ROUNDING) | (exposed > 1.0 + _ROUNDING)).sum())
     codes = np.rint(_CODES * srgb_encode(np.clip(exposed, 0.0, 1.0))).astype(np.uint16)
     said = f"{clipped} of {light.size} values clipped to 0 to 1"
     return codes, (said,) if clipped else ()

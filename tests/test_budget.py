@@ -300,11 +300,23 @@ def run(capsys, *arguments):
 
 def test_the_command_prints_what_the_library_finds(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    given = ("skin1", "--budget", "--picture", "edge,disk", "--size", "64x64", "--photons", "1e5")
-    code, printed = run(capsys, *given, "--mm-per-pixel", "1", "--chart", "b.png", "--json")
+    given = (
+        "skin1",
+        "--only",
+        "budget",
+        "--picture",
+        "edge,disk",
+        "--size",
+        "64x64",
+        "--photons",
+        "1e5",
+    )
+    code, printed = run(capsys, *given, "--mm-per-pixel", "1", "--budget-chart", "b.png", "--json")
     assert code == 0
-    figures = json.loads(printed.out)
-    assert figures["output"] == ["b.png"]
+    whole = json.loads(printed.out)
+    assert whole["output"] == ["b.png"]
+    assert whole["rows"] == []
+    figures = whole["budget"]
     assert (tmp_path / "b.png").read_bytes().startswith(b"\x89PNG")
     found = budget_of("skin1")
     rows = {row["cause"]: row for row in figures["rows"] if row["picture"] == "edge"}
@@ -323,7 +335,8 @@ def test_the_command_prints_what_the_library_finds(tmp_path, monkeypatch, capsys
 
 def test_the_command_writes_a_table_and_what_to_do(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    given = ("skin1", "--budget", "--size", "64x64", "--mm-per-pixel", "2", "--photons", "1e5")
+    given = ("skin1", "--only", "budget", "--picture", "head", "--size", "64x64")
+    given += ("--mm-per-pixel", "2", "--photons", "1e5")
     code, printed = run(
         capsys, *given, "--method", "gaussians", "--terms", "2", "--model", "burley"
     )
@@ -338,11 +351,11 @@ def test_the_command_writes_a_table_and_what_to_do(tmp_path, monkeypatch, capsys
 @pytest.mark.parametrize(
     ("arguments", "code", "says"),
     [
-        (("skin1",), 2, "--budget"),
-        (("skin1", "--budget", "--rank", "2", "--method", "burley"), 2, "--rank is for"),
-        (("skin1", "--budget", "--picture", "edge,"), 2, "empty name"),
-        (("deon-skin", "--budget"), 1, "deon-skin has no coefficients"),
-        (("skin1", "--budget", "--chart", "b.txt"), 1, "b.txt"),
+        (("skin1", "--only", "kernels", "--model", "dipole"), 2, "--model is for"),
+        (("skin1", "--only", "budget", "--rank", "2", "--method", "burley"), 2, "--rank is for"),
+        (("skin1", "--only", "budget", "--picture", "edge,"), 2, "no picture ''"),
+        (("deon-skin", "--only", "budget"), 1, "deon-skin has no coefficients"),
+        (("skin1", "--only", "budget", "--budget-chart", "b.txt"), 1, "b.txt"),
     ],
 )
 def test_wrong_usage_is_one_line(capsys, arguments, code, says):

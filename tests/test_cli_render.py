@@ -161,11 +161,11 @@ def test_two_channels_have_no_colour(run, made):
 @pytest.mark.parametrize(
     ("options", "status", "word"),
     [
-        (("--irradiance", "none.exr"), 1, "none.exr"),
+        (("--irradiance", "none.exr"), 2, "highlights"),
         (("--irradiance", "disk", "--size", "0x5"), 2, "1920x1080"),
         (("--irradiance", "disk", "--size", "big"), 2, "1920x1080"),
         (("--irradiance", "disk", "--mm-per-pixel", ".2"), 2, "--mm-per-pixel"),
-        (("--irradiance", "disk", "--angle", "3"), 1, "angle"),
+        (("--irradiance", "disk", "--angle", "3"), 2, "--angle"),
         (("--irradiance", "stripes", "--period", ".3"), 1, "period"),
         (("--irradiance", "disk", "-o", "out.jpg"), 1, ".exr"),
         (("--irradiance", "disk", "--truth", "a.exr", "-o", "a.exr"), 2, "same file"),

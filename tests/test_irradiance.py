@@ -189,7 +189,7 @@ def test_none_stands_for_the_default():
         ("disk", {"height": 0}, "disk: height = 0; expected a whole number, 1 or more."),
         ("disk", {"width": 2.5}, "disk: width = 2.5; expected a whole number"),
         ("disk", {"width": float("nan")}, "disk: width = nan; expected a whole number"),
-        ("disk", {"height": 100_000, "width": 100_000}, "would take 80.0 GB a buffer"),
+        ("disk", {"height": 100_000, "width": 100_000}, "would take 1.2e+03 GB to render"),
         ("disk", {"mm_per_pixel": -1.0}, "disk: mm_per_pixel = -1; expected a number above 0."),
         ("disk", {"radius_mm": 0.0}, "disk: radius_mm = 0; expected a number above 0."),
         ("edge", {"angle_degrees": float("nan")}, "edge: angle_degrees = nan; expected a finite"),

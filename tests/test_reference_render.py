@@ -86,10 +86,11 @@ def test_a_constant_picture_stays_constant_between_mirrors():
     assert quadrant.shape == (21, 21, 2)  # 4 mm: the whole grid
     assert energy == pytest.approx(profile.total_on_grid, rel=1e-13)
     assert left_out == pytest.approx(profile.beyond_grid, abs=1e-13)
-    # Mirrors bring back what lies beyond the grid too.
-    for border, kept in (("mirror", profile.diffuse_reflectance), ("clamp", energy)):
+    # What lies beyond the grid comes back too.
+    for border in ("mirror", "clamp"):
         found = render_reference(scene, profile, border=border)
-        assert found == pytest.approx(np.broadcast_to(3.0 * kept, (23, 30, 2)), rel=1e-12)
+        kept = np.broadcast_to(3.0 * profile.diffuse_reflectance, (23, 30, 2))
+        assert found == pytest.approx(kept, rel=1e-12)
     # Black borders take light away, and with mirrors none is lost whatever the picture.
     dark = render_reference(scene, profile, border="zero")
     assert (dark[0, 0] < 0.5 * dark[11, 15]).all()
@@ -102,16 +103,38 @@ def test_a_constant_picture_stays_constant_between_mirrors():
 def test_a_small_picture_sees_a_part_of_the_kernel_and_the_rest_is_told():
     whole = one_over_r_profile(40, 0.1, [0.5, 1.5])
     profile = make_profile(whole.r_edges_mm, whole.annulus_energy, beyond_grid=[0.25, 0.125])
-    quadrant, left_out = reference_quadrant(profile, 0.2, 5, 9)
-    assert quadrant.shape == (9, 9, 2)
+    quadrant, left_out = reference_quadrant(profile, 0.01, 5, 9)
+    assert quadrant.shape == (256, 256, 2)  # of 401
     energy = full_kernel(quadrant).sum(axis=(0, 1))
     assert left_out + energy == pytest.approx(profile.diffuse_reflectance, rel=1e-13)
     assert (left_out > profile.beyond_grid + 1e-3).all()
     # Black borders: the part that is left out changes no pixel.
-    scene = Scene("small", np.random.default_rng(5).random((5, 9, 2)), 0.2)
+    scene = Scene("small", np.random.default_rng(5).random((5, 9, 2)), 0.01)
     found = render_reference(scene, profile, border="zero")
-    expected = convolve(scene.irradiance, profile.quadrant_kernel(0.2), border="zero")
+    expected = convolve(scene.irradiance, profile.quadrant_kernel(0.01), border="zero")
     assert found == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize("border", ["mirror", "clamp"])
+def test_light_from_far_away_is_the_mean_of_the_continuation(border):
+    """A profile's outer annulus, cut off and put beyond the grid, comes back all but the same."""
+    edges = np.array([0.0, 0.2, 1.0, 60.0])
+    whole = make_profile(edges, np.array([[0.1], [0.2], [0.3]]))
+    cut = make_profile(edges[:3], np.array([[0.1], [0.2]]), beyond_grid=[0.3])
+    scene = Scene("small", np.random.default_rng(5).random((6, 8, 1)), 0.25)
+    true = render_reference(scene, whole, border=border)
+    found = render_reference(scene, cut, border=border)
+    # The picture's own rows and columns, continued, are 2 R (W + H) of the annulus's pi R^2: 3.7 %.
+    assert found == pytest.approx(true, abs=0.037 * 0.3)
+    assert np.abs(found - render_reference(scene, cut, border="zero")).min() > 0.1
+
+
+def test_rounding_leaves_no_negative_light():
+    profile = one_over_r_profile(40, 0.1, [0.5, 1.5])
+    light = np.zeros((64, 64, 1))
+    light[0, 0] = 1e4
+    assert convolve(light, profile.quadrant_kernel(0.2)).min() < 0.0
+    assert render_reference(Scene("spot", light, 0.2), profile).min() >= 0.0
 
 
 @borders
@@ -130,7 +153,7 @@ def test_what_cannot_be_rendered_is_refused_in_one_line():
     profile = one_over_r_profile(40, 0.1, [0.5, 1.5])
     three = Scene("three", np.ones((4, 4, 3)), 0.2)
     gray = Scene("gray", np.ones((4, 4, 1)), 0.2)
-    with pytest.raises(RenderError, match="irradiance has 3 channels and the kernel 2; expected 2"):
+    with pytest.raises(RenderError, match="picture has 3 channels and the kernel 2; expected 2,"):
         render_reference(three, profile)
     with pytest.raises(RenderError, match="border = 'wrap'; expected mirror, clamp, zero"):
         render_reference(gray, profile, border="wrap")

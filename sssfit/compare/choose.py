@@ -274,13 +274,12 @@ class _Search:
 
     def _seconds(self, fitted: FitResult) -> float:
         """Measure what the chosen kernel takes [s a megapixel]."""
-        scene = self.views.scenes[0]
 
-        def render() -> FloatArray:
+        def render(scene: Scene) -> FloatArray:
             blurred = render_separable(scene, fitted.kernel, threads=self.views.threads)
             return np.asarray(blurred, dtype=np.float64)
 
-        return timed(render, scene.height * scene.width)[1]
+        return timed(render, self.views.scenes[0])[1]
 
     def _too_tight(self) -> str:
         best = min(self.steps, key=lambda each: each.delta_e_2000_mean)

@@ -1,7 +1,7 @@
 """A kernel on a picture, held against the truth: what it shows, loses and costs."""
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from sssfit.compare.cost import Cost, cost_of, seconds_per_megapixel
 from sssfit.compare.metrics import ImageScore, measure
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
-from sssfit.profile import Profile
+from sssfit.profile import Profile, full_kernel
 from sssfit.render.reference import render_reference
 from sssfit.render.scene import Scene
 from sssfit.render.screen import render_screen
@@ -21,6 +21,7 @@ from sssfit.render.separable import render_separable
 FloatArray = npt.NDArray[np.float64]
 
 _FROM_PIXELS = 4  # skin1's round kernel has .06 from the first circle on, .003 from the fourth on
+_CORNER = 8  # pixels
 _QUICK_SECONDS = 0.5  # a picture rendered faster is timed again, since other programs disturb it
 
 
@@ -31,15 +32,18 @@ class Judgement:
     Parameters
     ----------
     picture : array (H, W, C)
-        Radiant exitance by the kernel.
+        Radiant exitance by the kernel; black outside the scene's mask, where it has one: a flat
+        kernel carries light past an outline.
     truth : array (H, W, C), optional
         The same by the profile's 2D kernel; None where there is no profile.
     score : ImageScore, optional
         Of the picture against the truth; within the scene's mask, where it has one.
     cost : Cost
         Of the kernel, with measured seconds.
-    asymmetry : array (C,)
-        `radial_asymmetry` of the kernel.
+    asymmetry, true_asymmetry : array (C,)
+        `radial_asymmetry` of the kernel, and of the profile's on the same pixels: round kernels
+        whose light lies within a few pixels have much of it, since pixels are square. NaN where
+        kernel or profile do not say.
     """
 
     picture: FloatArray
@@ -47,6 +51,7 @@ class Judgement:
     score: ImageScore | None
     cost: Cost
     asymmetry: FloatArray
+    true_asymmetry: FloatArray
 
 
 def judge(
@@ -83,10 +88,10 @@ def judge(
         The kernel does not fit the scene or the profile, or as `measure`.
     """
     picture, seconds = timed(
-        lambda: np.asarray(
-            render_separable(scene, kernel, border=border, threads=threads), dtype=np.float64
+        lambda shown: np.asarray(
+            render_separable(shown, kernel, border=border, threads=threads), dtype=np.float64
         ),
-        scene.height * scene.width,
+        scene,
     )
     if truth is None and profile is not None:
         _check_channels(kernel, profile)
@@ -94,7 +99,20 @@ def judge(
     score = None
     if truth is not None:
         score = measure(picture, truth, exposure=exposure, mask=scene.mask, structure=structure)
-    return Judgement(picture, truth, score, cost_of(kernel, seconds), asymmetry_of(kernel))
+        truth = _within(scene, truth)
+    return Judgement(
+        _within(scene, picture),
+        truth,
+        score,
+        cost_of(kernel, seconds),
+        asymmetry_of(kernel),
+        _true_asymmetry(kernel, profile),
+    )
+
+
+def _within(scene: Scene, picture: FloatArray) -> FloatArray:
+    """Leave a picture black outside the scene's objects."""
+    return picture if scene.mask is None else np.where(scene.mask[..., None] > 0, picture, 0.0)
 
 
 def _check_channels(kernel: SeparableKernel, profile: Profile) -> None:
@@ -111,26 +129,37 @@ def asymmetry_of(kernel: SeparableKernel) -> FloatArray:
 
     Nearer circles see the squareness of pixels. NaN where the kernel does not reach that far.
     """
-    channels = len(kernel.channels)
-    if kernel.half_pixels < _FROM_PIXELS:
-        return np.full(channels, np.nan)
-    return np.array(
-        [radial_asymmetry(kernel.full(c), from_pixels=_FROM_PIXELS) for c in range(channels)]
-    )
+    return _asymmetry([kernel.full(c) for c in range(len(kernel.channels))])
 
 
-def timed(render: Callable[[], FloatArray], pixels: int) -> tuple[FloatArray, float]:
-    """Render, then again with a clock: the picture, and seconds per 1e6 pixels.
+def _true_asymmetry(kernel: SeparableKernel, profile: Profile | None) -> FloatArray:
+    """Return the same of the profile's own kernel on the kernel's pixels."""
+    if profile is None:
+        return np.full(len(kernel.channels), np.nan)
+    quadrants = profile.quadrant_kernel(kernel.mm_per_pixel, kernel.half_pixels)
+    return _asymmetry([full_kernel(quadrants[:, :, c]) for c in range(quadrants.shape[2])])
 
-    The first call compiles where that is yet to be done. Quick renderers are timed three times
+
+def _asymmetry(kernels: Sequence[FloatArray]) -> FloatArray:
+    """Return `radial_asymmetry` of 2D kernels (P, P) from the fourth circle on."""
+    if len(kernels[0]) // 2 < _FROM_PIXELS:
+        return np.full(len(kernels), np.nan)
+    return np.array([radial_asymmetry(each, from_pixels=_FROM_PIXELS) for each in kernels])
+
+
+def timed(render: Callable[[Scene], FloatArray], scene: Scene) -> tuple[FloatArray, float]:
+    """Render a scene; the picture, and seconds per 1e6 pixels without compiling.
+
+    A corner goes first, which compiles what is yet to be. Quick renderers are timed three times
     more, and the least counts.
     """
-    picture = render()
+    render(scene.corner(_CORNER))
     begun = time.perf_counter()
-    render()
+    picture = render(scene)
     seconds = time.perf_counter() - begun
+    pixels = scene.height * scene.width
     if seconds < _QUICK_SECONDS:
-        return picture, seconds_per_megapixel(render, pixels, repeats=3)
+        return picture, seconds_per_megapixel(lambda: render(scene), pixels, repeats=3)
     return picture, seconds * 1e6 / pixels
 
 
@@ -147,7 +176,8 @@ def judge_in_screen_space(
     Parameters and errors are those of `render_screen`.
     """
     picture, seconds = timed(
-        lambda: render_screen(scene, kernel, follow=follow, border=border, threads=threads),
-        scene.height * scene.width,
+        lambda shown: render_screen(shown, kernel, follow=follow, border=border, threads=threads),
+        scene,
     )
-    return Judgement(picture, None, None, cost_of(kernel, seconds), asymmetry_of(kernel))
+    cost, asymmetry = cost_of(kernel, seconds), asymmetry_of(kernel)
+    return Judgement(picture, None, None, cost, asymmetry, _true_asymmetry(kernel, None))

@@ -26,9 +26,9 @@ def thread_count(threads: int | None) -> int:
 def check_channels(picture: int, kernel: int) -> None:
     """Refuse a kernel of other channels than the picture's; a picture of one serves all."""
     if picture not in (1, kernel):
+        expected = f"{kernel}, or 1 that serves all" if kernel > 1 else "1"
         raise RenderError(
-            f"the irradiance has {picture} channels and the kernel {kernel}; expected "
-            f"{kernel}, or 1 that serves all."
+            f"the picture has {picture} channels and the kernel {kernel}; expected {expected}."
         )
 
 

@@ -4,8 +4,9 @@ import math
 
 from sssfit.errors import RenderError
 
-# 20000 x 20000 pixels: 3.2 GB for one channel of float64.
-MAX_PIXELS = 400_000_000
+# A render holds some 120 bytes a pixel of RGB, and 8 GB is its limit: said before a head is made,
+# which takes half a minute for 11000 x 11000.
+MAX_PIXELS = 60_000_000
 
 
 def is_whole(value: float) -> bool:
@@ -26,8 +27,8 @@ def check_size(name: str, height: int, width: int, mm_per_pixel: float) -> None:
             raise RenderError(f"{name}: {word} = {value}; expected a whole number, 1 or more.")
     if height * width > MAX_PIXELS:
         raise RenderError(
-            f"{name}: {width} x {height} pixels would take {height * width * 8e-9:.1f} GB "
-            f"a buffer; make it smaller than {MAX_PIXELS:.0e} pixels."
+            f"{name}: {width} x {height} pixels would take {height * width * 120e-9:.3g} GB to "
+            f"render; make it no larger than {MAX_PIXELS:.0e} pixels."
         )
     check_above(name, "mm_per_pixel", mm_per_pixel, 0.0)
 

@@ -21,16 +21,17 @@ from sssfit.render.scene import Scene
 FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
+_LEAST_REACH = 256
+
 
 def render_reference(
     scene: Scene, profile: Profile, *, border: str = "mirror", threads: int | None = None
 ) -> FloatArray:
     """Convolve irradiance with a profile's own 2D kernel on the scene's pixels.
 
-    Light that leaves beyond the profile's grid, or further than the picture is wide, has no pixels
-    of its own; in a picture that goes on mirrored it sees the mean of the irradiance, which is
-    added. So a constant picture comes back with all of the diffuse reflectance. The other borders
-    go without.
+    Light that leaves beyond the profile's grid, or beyond the kernel's pixels, sees what lies far
+    away, on average: with mirrors the picture's mean, with clamped borders that of its corners. It
+    is added, so that a constant picture comes back with all of the diffuse reflectance.
 
     Parameters
     ----------
@@ -59,15 +60,28 @@ def render_reference(
     _plan(scene.height, scene.width, half, profile.n_channels, border)
     quadrant, left_out = reference_quadrant(profile, scene.mm_per_pixel, scene.height, scene.width)
     picture = convolve(scene.irradiance, quadrant, border=border, threads=threads)
-    if border == "mirror":
-        picture += left_out * scene.irradiance.mean(axis=(0, 1))
-    return picture
+    picture += left_out * _far_away(scene.irradiance, border)
+    # Rounding of the transforms, 1e-16 of the largest pixel, would be negative light.
+    return np.maximum(picture, 0.0, out=picture) if quadrant.min() >= 0.0 else picture
+
+
+def _far_away(irradiance: FloatArray, border: str) -> FloatArray:
+    """Mean irradiance (1 or C,) over a picture's continuation, far from it."""
+    if border == "zero":
+        return np.zeros(1)
+    seen = irradiance[:: max(len(irradiance) - 1, 1), :: max(irradiance.shape[1] - 1, 1)]
+    mean: FloatArray = (irradiance if border == "mirror" else seen).mean(axis=(0, 1))
+    return mean
 
 
 def reference_half_pixels(profile: Profile, mm_per_pixel: float, height: int, width: int) -> int:
-    """Half width h of the true kernel: its whole grid, or all that the picture can see of it."""
+    """Half width h of the true kernel: its whole grid, or what a picture of 256 can see of it.
+
+    Larger pictures see more. Without the least, small ones had kernels cut to their own size, and
+    with mirrors 20 x 20 pixels of 0.4 mm were .6 % off for skin1.
+    """
     covering = checked_support(profile.r_edges_mm[-1], mm_per_pixel, None, dimensions=1)[1]
-    return min(covering, max(height, width) - 1)
+    return min(covering, max(height, width, _LEAST_REACH) - 1)
 
 
 def reference_quadrant(
@@ -76,8 +90,8 @@ def reference_quadrant(
     """Return the true kernel for a picture of that size, and the energy that is not in it.
 
     Two pixels of a picture are at most max(H, W) - 1 apart along either axis: what the profile
-    sends further than that, or beyond its own grid, is left out. Within that reach zero borders
-    lose nothing; mirror and clamp lack light from reflections further out.
+    sends further than that (or 255, in small pictures), or beyond its own grid, is left out. Zero
+    borders lose nothing; mirror and clamp lack light from reflections further out.
 
     Returns
     -------

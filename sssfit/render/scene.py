@@ -1,6 +1,7 @@
 """What a kernel is applied to: an irradiance picture, with its geometry where it has one."""
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -88,6 +89,15 @@ class Scene:
             )
         values.setflags(write=False)
         object.__setattr__(self, field, values)
+
+    def corner(self, pixels: int) -> "Scene":
+        """Return the scene's upper left corner, so many pixels wide and high."""
+        buffers: dict[str, Any] = {
+            field.name: value[:pixels, :pixels]
+            for field in dataclasses.fields(self)
+            if isinstance(value := getattr(self, field.name), np.ndarray)
+        }
+        return dataclasses.replace(self, **buffers)
 
     @property
     def height(self) -> int:
