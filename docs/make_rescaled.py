@@ -3,7 +3,6 @@
 python docs/make_rescaled.py
 """
 
-import dataclasses
 from pathlib import Path
 
 from sssfit.compare.candidates import Candidate
@@ -12,7 +11,7 @@ from sssfit.compare.sheet import MM_PER_PIXEL, PIXELS, SCENES
 from sssfit.fit import support_of
 from sssfit.material import load_material
 from sssfit.render.irradiance import make_scene
-from sssfit.render.reference import reference_quadrant, render_reference
+from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
 from sssfit.simulate import simulate_exact
 
@@ -27,7 +26,6 @@ The supplement (section B) says that SVD rescaled to the profile's energy, thoug
 the L2 sense, "still provides a perceptionally better match than the Gaussian approximation with
 the same number of terms". It says nothing of rescaled against kept. Mean Delta E 2000 against the
 2D kernel, {pixels} x {pixels} pixels of {pitch:g} mm, N terms: **rescaled / kept / Gaussians**.
-Rescaled and Gaussians have the energy of the truth's pixels.
 
 {tables}
 
@@ -36,18 +34,17 @@ Rescaled is nearer than kept in {kept} of {count}; N by N, of {each} each: {by_r
 With {most} terms the worst of all cases is {worst_rescaled:.2f} rescaled, {worst_kept:.2f} kept and
 {worst_gaussians:.2f} by Gaussians.
 
-**Whose energy.** `sssfit fit` rescales to all of the diffuse reflectance, what lies beyond the grid
-too, and the truth on a picture holds the light of its own pixels only. Where much is lost that is
-all that the head's Delta E shows, whatever the rank; as fitted, {most} terms:
+**Light beyond the grid.** Rescaled kernels put it back, too near; kept ones leave it out; in the
+truth it sees the mean of the picture. With {most} terms, on the head:
 
-| | energy not in the truth, R G B | Delta E on the head, as fitted | with the truth's energy |
+| | energy beyond the grid, R G B | rescaled | kept |
 |---|---|---|---|
 {lost}
 """
 
 
 def judged(material):
-    """Mean Delta E by (scene, rank): rescaled, kept, Gaussians, rescaled as fitted; light lost."""
+    """Mean Delta E by (scene, rank): rescaled, kept, Gaussians; shares of light off the grid."""
     profile = simulate_exact(load_material(material))
     support = support_of(profile)
     found = {}
@@ -55,13 +52,8 @@ def judged(material):
         make_scene(each, height=PIXELS, width=PIXELS, mm_per_pixel=MM_PER_PIXEL) for each in SCENES
     ]
     truths = [render_reference(each, profile) for each in scenes]
-    left_out = reference_quadrant(profile, MM_PER_PIXEL, PIXELS, PIXELS)[1]
-    energy = profile.diffuse_reflectance - left_out
     for n in RANKS:
-        rescaled, kept, gaussians = (
-            each.fit(profile, MM_PER_PIXEL, support).kernel for each in methods(n)
-        )
-        kernels = (with_energy(rescaled, energy), kept, with_energy(gaussians, energy), rescaled)
+        kernels = [each.fit(profile, MM_PER_PIXEL, support).kernel for each in methods(n)]
         for scene, truth in zip(scenes, truths, strict=True):
             exposure = auto_exposure(truth, scene.mask)
             found[scene.name, n] = tuple(
@@ -70,12 +62,7 @@ def judged(material):
                 ).delta_e_2000_mean
                 for kernel in kernels
             )
-    return found, left_out / profile.diffuse_reflectance
-
-
-def with_energy(kernel, energy):
-    """Return the kernel with another sum over its pixels (C,)."""
-    return dataclasses.replace(kernel, scale=energy / kernel.energy)
+    return found, profile.beyond_grid / profile.diffuse_reflectance
 
 
 def methods(n):
@@ -91,16 +78,16 @@ def table(material, found):
     """One material as a table."""
     rows = [f"| {material}, N | {' | '.join(SCENES)} |", f"|---|{'---|' * len(SCENES)}"]
     for n in RANKS:
-        cells = [" / ".join(f"{each:.2f}" for each in found[name, n][:3]) for name in SCENES]
+        cells = [" / ".join(f"{each:.2f}" for each in found[name, n]) for name in SCENES]
         rows.append(f"| {n} | {' | '.join(cells)} |")
     return "\n".join(rows)
 
 
 def lost_row(material, found, lost):
-    """Say what the truth lacks, and what that does to the head."""
+    """Say what lies beyond the grid, and what that does to the head."""
     shares = " ".join(f"{100.0 * each:.2f} %" for each in lost)
     values = found["head", RANKS[-1]]
-    return f"| {material} | {shares} | {values[3]:.2f} | {values[0]:.2f} |"
+    return f"| {material} | {shares} | {values[0]:.2f} | {values[1]:.2f} |"
 
 
 def section():

@@ -1,12 +1,13 @@
 """A height field with what rays need to meet it quickly; lit by threads, a band of rows each."""
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+
+from sssfit.render._checks import thread_count
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -124,6 +125,6 @@ def light_field(
             buffers.specular,
         )
 
-    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(thread_count(threads)) as pool:
         list(pool.map(band, range(0, shape[0], BAND)))
     return buffers

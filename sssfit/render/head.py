@@ -6,12 +6,12 @@ a person.
 """
 
 import math
-import os
 
+from sssfit.render._checks import thread_count
 from sssfit.render._field import Lamps, light_field
 from sssfit.render._head_shape import FLOOR_MM
 from sssfit.render._head_surface import COARSE_MM, bust, seen_part
-from sssfit.render._made_checks import check_above, check_range, check_size
+from sssfit.render._made_checks import check_range, check_size
 from sssfit.render.scene import Scene
 
 # Of the picture that holds the face with a margin, around its middle [mm].
@@ -93,9 +93,7 @@ def head_scene(
     for option, light in (("fill", fill), ("ambient", ambient)):
         check_range("head", option, light, 0.0, 1.0)
     check_range("head", "detail_mm", detail_mm, 0.0, 0.5)
-    if threads is not None:
-        check_above("head", "threads", threads, 0)
-    cores = threads or os.cpu_count() or 1
+    cores = thread_count(threads)
     view = (height, width, mm_per_pixel, distance_mm)
     fine, whole = seen_part(*view, detail_mm, cores)
     opposite = _toward(-0.8 * light_degrees, 0.3 * light_up_degrees)

@@ -16,7 +16,6 @@ in world units as they say, and 2 W / H times as wide.
 compares the ways to follow a surface.
 """
 
-import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 
@@ -26,6 +25,7 @@ import numpy.typing as npt
 from sssfit._jit import screen as compiled
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
+from sssfit.render._checks import thread_count
 from sssfit.render._view import make_view
 from sssfit.render.scene import Scene
 from sssfit.render.transmittance import transmitted
@@ -96,8 +96,7 @@ def render_screen(
     channels = len(kernel.channels)
     for field in ("irradiance", "specular", "back_irradiance"):
         _check_channels(scene, field, channels)
-    if threads is not None and threads < 1:
-        raise RenderError(f"threads = {threads}; give at least 1.")
+    workers = thread_count(threads)
     view = make_view(
         scene,
         kernel,
@@ -111,7 +110,7 @@ def render_screen(
     lit = scene.irradiance
     through = transmitted(scene, kernel)
     lit = np.broadcast_to(lit if through is None else lit + through, (*lit.shape[:2], channels))
-    blurred = _blurred(lit, kernel, view, threads or os.cpu_count() or 1)
+    blurred = _blurred(lit, kernel, view, workers)
     inside = view.mask.reshape(lit.shape[:2])[..., None] > 0
     picture = np.where(inside, blurred.reshape(lit.shape), scene.irradiance)
     return picture if scene.specular is None else picture + scene.specular
