@@ -204,7 +204,7 @@ def test_the_picture_and_the_kernel_have_to_match():
         render_separable(scene(pitch=0.25), kernel)
     with pytest.raises(RenderError, match=r"kernel has 0\.5 mm .* wall 0\.500001;"):
         render_separable(scene(pitch=0.500001), kernel)
-    with pytest.raises(RenderError, match="irradiance has 2 channels and the kernel 3; expected 3"):
+    with pytest.raises(RenderError, match="picture has 2 channels and the kernel 3; expected 3"):
         render_separable(scene(channels=2), kernel)
     with pytest.raises(RenderError, match="border = 'wrap'; expected mirror, clamp, zero"):
         render_separable(scene(), kernel, border="wrap")

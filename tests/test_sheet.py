@@ -263,9 +263,9 @@ def test_the_verb_draws_edits(run, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "status", "fragment"),
     [
-        (("--sheet", "a.jpg"), 1, ".png, .svg or .pdf"),
+        (("skin1", "--sheet", "a.jpg"), 1, ".png, .svg or .pdf"),
         (("--editing", "a.jpg"), 1, ".png, .svg or .pdf"),
-        (("--sheet", "a.png", "--mm-per-pixel", "0"), 2, "not a length above 0"),
+        (("skin1", "--sheet", "a.png", "--mm-per-pixel", "0"), 2, "not a length above 0"),
         (("nothing", "--sheet", "a.png"), 1, "nothing"),
     ],
 )
