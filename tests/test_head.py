@@ -254,7 +254,7 @@ def test_the_whole_face_fits():
         ({"light_up_degrees": 90.0}, "light_up_degrees = 90"),
         ({"detail_mm": -1.0}, "detail_mm = -1; expected 0 to 0.5"),
         ({"fill": 2.0}, "fill = 2"),
-        ({"threads": 0}, "threads = 0"),
+        ({"height": -1}, "height = -1; expected a whole number"),
         ({"height": 0}, "height = 0; expected a whole number"),
         ({"mm_per_pixel": 0.0}, "mm_per_pixel = 0; expected a number above 0"),
     ],

@@ -4,9 +4,11 @@ import time
 import warnings
 from dataclasses import dataclass
 
+from sssfit.compare._all_light import radius_of
 from sssfit.compare._choose_options import Option
 from sssfit.compare._choose_views import Views
 from sssfit.errors import FitError, SssfitWarning
+from sssfit.grid import RadialGrid
 from sssfit.material import Material
 from sssfit.simulate import simulate_montecarlo
 
@@ -73,9 +75,13 @@ def _error(
     material: Material, option: Option, views: Views, tolerance: float, photons: int, seed: int
 ) -> float:
     """Return the mean Delta E of the worst view; what would be warned of is in it."""
+    truth = views.profile
+    radius_mm = radius_of(RadialGrid(float(truth.r_edges_mm[1]), truth.n_annuli))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SssfitWarning)
-        walk = simulate_montecarlo(material, photons=photons, seed=seed, threads=views.threads)
+        walk = simulate_montecarlo(
+            material, photons=photons, seed=seed, radius_mm=radius_mm, threads=views.threads
+        )
         try:
             return views.score_of_option(option, tolerance, walk)[0]
         except FitError:  # a dark channel that no photon came back in

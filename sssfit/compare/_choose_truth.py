@@ -1,20 +1,27 @@
 """The profile a choice is held against: exact, or a long walk where there is no exact method."""
 
+import math
 import time
 
+from sssfit.compare._all_light import exact_with_all_light
 from sssfit.errors import RenderError
+from sssfit.grid import make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
-from sssfit.simulate import simulate_exact, simulate_montecarlo
+from sssfit.simulate import simulate_montecarlo
 
 WALK_PHOTONS = 10_000_000  # the papers' number
 
 
 def truth_of(material: Material, *, seed: int, threads: int | None) -> tuple[Profile, float]:
-    """Return a half space's exact profile, a slab's or a stack's by a walk; and the seconds."""
+    """Return a half space's exact profile, a slab's or a stack's by a walk; and the seconds.
+
+    The exact one has all of the light: marble's kernels, 2.2 % of whose red lies beyond the paper's
+    grid, were .39 Delta E off on the head at best.
+    """
     begun = time.perf_counter()
     if material.is_semi_infinite:
-        profile = simulate_exact(material, threads=threads)
+        profile = exact_with_all_light(material, make_grid(material), math.inf, threads=threads)
     else:
         profile = simulate_montecarlo(material, photons=WALK_PHOTONS, seed=seed, threads=threads)
     return profile, time.perf_counter() - begun
