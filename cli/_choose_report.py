@@ -41,6 +41,7 @@ def figures_of(choice: Choice) -> dict[str, Any]:
         "runner_up": _row(choice.runner_up),
         "cheaper": _row(choice.cheaper),
         "dearer": [_row(each) for each in choice.dearer],
+        "too_narrow": list(choice.too_narrow),
         "photons": _photons(choice.photons),
         "rows": [_row(each) for each in choice.steps],
     }
@@ -134,11 +135,19 @@ def _kernel(choice: Choice) -> list[str]:
 
 
 def _untried(choice: Choice) -> list[str]:
-    """Say which guided fits were left out."""
+    """Say which supports and guided fits were left out."""
     tried = [each.option for each in choice.steps if each.option]
-    if any(each.candidate.method == "guided" for each in tried):
-        return []
-    return ["not tried: guided fits, for their time, where another pass will do or one is wide"]
+    lines = []
+    if choice.too_narrow:
+        lines.append(
+            f"not tried: kernels of {', '.join(map(str, choice.too_narrow))} pixels, to which even "
+            "the true one cannot be cut"
+        )
+    if not any(each.candidate.method == "guided" for each in tried):
+        lines.append(
+            "not tried: guided fits, for their time, where another pass will do or one is wide"
+        )
+    return lines
 
 
 def _photon_lines(need: PhotonNeed | None) -> list[str]:
@@ -172,7 +181,8 @@ def _what(step: Step) -> str:
     """Name a step with its pixels."""
     if step.option is None:
         return step.label
-    return f"{step.label} on {step.option.pixels} pixels (+-{step.option.support_mm:.3g} mm)"
+    half_mm = step.option.pixels // 2 * step.mm_per_pixel
+    return f"{step.label} on {step.option.pixels} pixels (+-{half_mm:.3g} mm)"
 
 
 def _loss(step: Step) -> str:

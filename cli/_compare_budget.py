@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -161,12 +162,17 @@ def _line(budget: Budget, cause: Cause) -> list[str]:
         return [name, cause.hint, "", "", "", ""]
     return [
         name,
-        f"{score.delta_e_2000_mean:.4f}",
-        f"{score.delta_e_2000_p99:.3f}",
+        _number(score.delta_e_2000_mean, ".4f"),
+        _number(score.delta_e_2000_p99, ".3f"),
         f"{100.0 * score.relative_l2:.4f} %",
         percent(max(score.energy_drift, key=abs), "+.3f"),
         percent(budget.share(cause), "+.1f") if cause.is_in_whole else "",
     ]
+
+
+def _number(value: float, digits: str) -> str:
+    """Write a figure; a dash for channels that have no colour."""
+    return "-" if math.isnan(value) else f"{value:{digits}}"
 
 
 def _advice(inside: Sequence[Cause]) -> str:

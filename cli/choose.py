@@ -11,6 +11,7 @@ import click
 
 from ._choose_report import figures_of, step_line, text_of
 from ._compiling import say_if_compiling
+from ._deon_skin import DEON_SKIN
 from ._options import Common, Length, common_options
 from ._report import binary_stdout, finish, say
 from ._scene import MADE, Picture, Size, made_scene, read_scene
@@ -85,9 +86,10 @@ def choose(
 ) -> None:
     """Find the cheapest kernel for MATERIAL that the scene shows no difference to, and write it.
 
-    Distance, field of view and rows give the size of a pixel on the surface. Every method, support
-    and number of terms is tried on it, from no blur at all upwards by the weights it applies to a
-    pixel, until the mean Delta E of the picture is within --tolerance. The picture is the middle of
+    Distance, field of view and rows give the size of a pixel on the surface. Every method and
+    number of terms is tried on it, each at seven supports, from no blur at all upwards by the
+    weights it applies to a pixel, until the mean Delta E of the picture is within --tolerance. The
+    picture is the middle of
     the frame, 512 x 512 pixels at most; where it shows less than 64 mm of the head, the choice
     has to hold on a view of 64 mm as well.
 
@@ -100,6 +102,11 @@ def choose(
     from sssfit.compare.choose import mm_per_pixel_at
     from sssfit.material import load_material
 
+    if material == DEON_SKIN:
+        raise click.UsageError(
+            f"{material} has no coefficients, and choose needs a material: `sssfit materials` "
+            "lists them."
+        )
     loaded = load_material(material)
     pitch = mm_per_pixel_at(distance_mm, fov_degrees, resolution[0])
     path = None if output == "-" else Path(output or f"{loaded.name}.chosen.kernel.json")
@@ -121,6 +128,8 @@ def choose(
     view = {"distance_mm": distance_mm, "fov_degrees": fov_degrees, "resolution": resolution[::-1]}
     figures = {"command": "choose", "output": written, **view, **figures_of(choice)}
     finish(common, figures, text_of(choice, written, figures), to_stderr=written == ["-"])
+    if not written and path is not None and path.exists():
+        say(common, f"{path} is of an earlier run, and not needed here.")
 
 
 def _scene(irradiance: str, pitch: float, resolution: tuple[int, int], common: Common) -> Scene:
@@ -134,11 +143,16 @@ def _scene(irradiance: str, pitch: float, resolution: tuple[int, int], common: C
 
 def _say_first(material: Material, common: Common) -> None:
     """Say what takes longest."""
-    if material.is_semi_infinite:
+    from sssfit.compare.choose import is_exact
+
+    if is_exact(material):
         say_if_compiling(common, solver=True)
         return
     say_if_compiling(common, walk=material)
-    say(common, f"{material.name} is no half space: tracing 1e7 photons for its true profile.")
+    say(
+        common,
+        f"{material.name} is no half space with g = 0: tracing 1e7 photons for its true profile.",
+    )
 
 
 def _say_step(step: Step, common: Common) -> None:

@@ -41,8 +41,9 @@ percent; in brackets what the kernel does not have):
 
 The order is what to act on. For skin1 and ketchup that is rank alone: 1e6 photons and half floats
 do not show. For wholemilk it is the grid, from which 2.7 % of red is missing: give
-`sssfit simulate` a larger `--radius`. 8-bit weights and diffusion models cost more than three
-terms do.
+`sssfit simulate` a larger `--radius`. For skin1 and ketchup 8-bit weights and every diffusion
+model cost more than stopping at three terms; for wholemilk, which scatters most, Grosjean's dipole
+costs next to nothing.
 """
 
 

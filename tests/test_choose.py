@@ -5,12 +5,13 @@ import math
 import numpy as np
 import pytest
 
+import sssfit.compare._all_light as all_light
 import sssfit.compare._choose_truth as truths
 import sssfit.compare.choose as rooms
 from sssfit.compare._choose_options import SHARES, supports
-from sssfit.compare.choose import choose, mm_per_pixel_at
+from sssfit.compare.choose import choose, is_exact, mm_per_pixel_at
 from sssfit.compare.metrics import measure
-from sssfit.errors import RenderError, SimulationError, SssfitError
+from sssfit.errors import FitError, RenderError, SimulationError, SssfitError
 from sssfit.fit import METHODS
 from sssfit.material import Layer, Material, load_material, material_names
 from sssfit.render.irradiance import make_scene
@@ -268,6 +269,30 @@ def test_two_channels_have_no_colour():
 
 
 def test_a_material_that_fails_to_converge(skin1, monkeypatch):
-    monkeypatch.setattr(truths, "simulate_exact", lambda m, **_: simulate_exact(m, tolerance=1e-15))
+    monkeypatch.setattr(
+        all_light, "simulate_exact", lambda m, **_: simulate_exact(m, tolerance=1e-15)
+    )
     with pytest.raises(SimulationError, match="cannot be met"):
         choose(skin1, mm_per_pixel=0.6, frame=FRAME)
+
+
+def test_forward_scattering_is_walked_and_not_taken_for_isotropic():
+    layer = Layer(1.3, np.array([0.8]), np.array([0.1]), np.array([5.0]))
+    forward = Material("forward", ("grey",), (layer,))
+    assert not is_exact(forward)
+    even = Layer(1.3, np.zeros(1), np.array([0.1]), np.array([5.0]))
+    assert is_exact(Material("even", ("grey",), (even,)))
+
+
+def test_a_material_that_returns_nothing_is_refused():
+    layer = Layer(1.3, np.zeros(1), np.array([0.1]), np.zeros(1))
+    with pytest.raises(FitError, match="returns no light"):
+        choose(Material("black", ("grey",), (layer,)), mm_per_pixel=0.6, frame=FRAME)
+
+
+def test_supports_that_are_too_narrow_are_named(skin1):
+    found = choose(skin1, mm_per_pixel=0.6, frame=FRAME, tolerance=0.5)
+    tried = {each.option.pixels for each in found.steps if each.option}
+    assert found.too_narrow
+    assert not tried & set(found.too_narrow)
+    assert max(found.too_narrow) < min(tried)

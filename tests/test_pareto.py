@@ -1,6 +1,7 @@
 """Kernels by error and cost: the front, and rows against what judges them one at a time."""
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from hypothesis import strategies as st
 from reference_front import literal_front
 from reference_pixels import make_profile
 
+from sssfit.compare import pareto
 from sssfit.compare.candidates import Candidate, candidates
 from sssfit.compare.comparison import COSTS, ERRORS, check_error
 from sssfit.compare.front import pareto_front
@@ -220,3 +222,11 @@ def test_a_truth_that_is_there_is_not_rendered_again(skin1, scenes):
     assert found.truth is truth
     score = measure(found.picture, truth)
     assert found.score.rmse == score.rmse
+
+
+def test_seconds_are_by_pixels(skin1, monkeypatch):
+    ticks = itertools.count()
+    monkeypatch.setattr(pareto, "perf_counter", lambda: 0.001 * next(ticks))
+    oblong = make_scene("disk", height=20, width=50, mm_per_pixel=PITCH)
+    found = compare_kernels(skin1, [oblong], mm_per_pixel=PITCH, candidates=SOME[:1])
+    assert found.rows[0].seconds_per_megapixel == pytest.approx(0.001 * 1e6 / (20 * 50))

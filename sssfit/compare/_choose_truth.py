@@ -3,6 +3,8 @@
 import math
 import time
 
+import numpy as np
+
 from sssfit.compare._all_light import exact_with_all_light
 from sssfit.errors import RenderError
 from sssfit.grid import make_grid
@@ -14,17 +16,24 @@ WALK_PHOTONS = 10_000_000  # the papers' number
 
 
 def truth_of(material: Material, *, seed: int, threads: int | None) -> tuple[Profile, float]:
-    """Return a half space's exact profile, a slab's or a stack's by a walk; and the seconds.
+    """Return a half space's exact profile, that of others by a walk; and the seconds.
 
+    Others are slabs, stacks, and scattering with g other than 0, which the exact solver takes for
+    isotropic: skin1's coefficients with g = 0.8 had a Delta E of 5.3 against the walk.
     The exact one has all of the light: marble's kernels, 2.2 % of whose red lies beyond the paper's
     grid, were .39 Delta E off on the head at best.
     """
     begun = time.perf_counter()
-    if material.is_semi_infinite:
+    if is_exact(material):
         profile = exact_with_all_light(material, make_grid(material), math.inf, threads=threads)
     else:
         profile = simulate_montecarlo(material, photons=WALK_PHOTONS, seed=seed, threads=threads)
     return profile, time.perf_counter() - begun
+
+
+def is_exact(material: Material) -> bool:
+    """Whether the exact solver has the material's own profile: one half space with g = 0."""
+    return material.is_semi_infinite and not np.any(material.layers[0].g)
 
 
 def check_colours(material: Material) -> None:

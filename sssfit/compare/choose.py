@@ -24,7 +24,7 @@ from sssfit.compare._choose_options import (
     supports,
 )
 from sssfit.compare._choose_photons import PhotonNeed, photons_needed
-from sssfit.compare._choose_truth import check_colours, truth_of
+from sssfit.compare._choose_truth import check_colours, is_exact, truth_of
 from sssfit.compare._choose_views import Views, checked_scene, head_scenes, mm_per_pixel_at
 from sssfit.compare.judge import timed
 from sssfit.errors import FitError, RenderError
@@ -34,7 +34,7 @@ from sssfit.profile import Profile
 from sssfit.render.scene import FloatArray, Scene
 from sssfit.render.separable import render_separable
 
-__all__ = ["Choice", "PhotonNeed", "Step", "choose", "mm_per_pixel_at"]
+__all__ = ["Choice", "PhotonNeed", "Step", "choose", "is_exact", "mm_per_pixel_at"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +97,8 @@ class Choice:
         How few photons would have done; None where no blur is needed.
     seconds_per_megapixel : float, optional [s]
         Measured, of the chosen kernel.
+    too_narrow : tuple of int
+        Pixels of the supports that were left out: the true kernel itself cannot be cut to them.
     """
 
     profile: Profile
@@ -111,6 +113,7 @@ class Choice:
     dearer: tuple[Step, ...] = ()
     photons: PhotonNeed | None = None
     seconds_per_megapixel: float | None = None
+    too_narrow: tuple[int, ...] = ()
 
     @property
     def support_mm(self) -> float:
@@ -168,6 +171,8 @@ def choose(
     check_colours(material)
     own = None if scene is None else checked_scene(scene, mm_per_pixel)
     profile, seconds = truth_of(material, seed=seed, threads=threads)
+    if not (profile.total_on_grid > 0.0).any():
+        raise FitError(f"{material.name} returns no light: there is nothing to blur.")
     if half_pixels(support_of(profile), mm_per_pixel) == 0:
         return Choice(profile, mm_per_pixel, tolerance)
     scenes = [own] if own else head_scenes(mm_per_pixel, distance_mm, frame, threads)
@@ -193,7 +198,8 @@ class _Search:
         nothing = self._try(None)
         if nothing.within:
             return Choice(*given, steps=tuple(self.steps), chosen=nothing)
-        kept = self._wide_enough(supports(views.profile, pitch))
+        every = supports(views.profile, pitch)
+        kept = self._wide_enough(every)
         found = options(kept, pitch)
         chosen, runner_up = self._cheapest(found)
         if chosen is None or chosen.option is None:
@@ -211,6 +217,11 @@ class _Search:
             dearer=self._dearer(chosen.option, found),
             photons=photons_needed(material, chosen.option, views, self.tolerance, seed, seconds),
             seconds_per_megapixel=self._seconds(fitted),
+            too_narrow=tuple(
+                2 * half_pixels(radius, pitch) + 1
+                for share, radius in every
+                if (share, radius) not in kept
+            ),
         )
 
     def _try(self, option: Option | None) -> Step:
