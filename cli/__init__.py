@@ -53,7 +53,8 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
       sssfit fit --method svd --rank 3      fit a separable kernel to it
       sssfit render --irradiance head       see it on a lit head, and what it loses
       sssfit export --format hlsl           write it as shader source
-      sssfit compare skin1                  what every kernel of it loses and costs
+      sssfit compare skin1                  what every kernel of it loses and costs, and why
+      sssfit choose skin1 --distance 0.6m   the cheapest that a view can do with
 
     Lengths are mm unless written with a unit (3cm, 0.6m). Every verb explains itself with --help.
     """

@@ -1,4 +1,4 @@
-"""``sssfit compare --budget``: what each cause alone does to a picture, in figures and drawn."""
+"""The error budget of ``sssfit compare``: what each cause alone does to a picture, in figures and drawn."""
 
 from __future__ import annotations
 
