@@ -192,4 +192,8 @@ def _loss(step: Step) -> str:
 def _beside(step: Step, chosen: Step) -> str:
     """Hold a step against the chosen one."""
     times = step.taps_per_pixel / chosen.taps_per_pixel
-    return f"{_what(step)}, {_loss(step)} for {times:.3g} times the weights"
+    if step.option is None:
+        price = "no weights"
+    else:
+        price = "as many weights" if times == 1.0 else f"{times:.3g} times the weights"
+    return f"{_what(step)}, {_loss(step)} for {price}"

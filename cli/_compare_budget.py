@@ -1,4 +1,4 @@
-"""The error budget of ``sssfit compare``: what each cause alone does to a picture, in figures and drawn."""
+"""The error budget of ``sssfit compare``: what each cause alone does to a picture."""
 
 from __future__ import annotations
 

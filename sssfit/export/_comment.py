@@ -5,6 +5,8 @@ from collections.abc import Sequence
 
 from sssfit.kernel import SeparableKernel
 
+_ROUNDING = 1e-12
+
 
 def description(kernel: SeparableKernel) -> list[str]:
     """Return the lines of the comment; nothing in them depends on the clock or the machine."""
@@ -31,5 +33,8 @@ def description(kernel: SeparableKernel) -> list[str]:
 
 
 def _values(values: Sequence[float]) -> str:
-    """Write a value for each channel."""
-    return ", ".join("unknown" if math.isnan(each) else f"{each:.6g}" for each in values)
+    """Write a value for each channel; rounding of sums of pixels is 0."""
+    return ", ".join(
+        "unknown" if math.isnan(each) else f"{0.0 if abs(each) < _ROUNDING else each:.6g}"
+        for each in values
+    )
