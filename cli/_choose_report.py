@@ -126,12 +126,20 @@ def _kernel(choice: Choice) -> list[str]:
     if choice.runner_up:
         lines.append(f"runner-up: {_beside(choice.runner_up, chosen)}")
     if choice.cheaper:
-        lines.append(f"cheaper is not enough: {_beside(choice.cheaper, chosen)}")
+        why = _why(choice, choice.cheaper)
+        lines.append(f"cheaper is not enough: {_beside(choice.cheaper, chosen)}{why}")
     lines += [
         f"dearer {'is not needed' if each.within else 'is no better'}: {_beside(each, chosen)}"
         for each in choice.dearer
     ]
     return [*lines, *_untried(choice), *_photon_lines(choice.photons)]
+
+
+def _why(choice: Choice, step: Step) -> str:
+    """Say why a step is out although its Delta E is within: wider views have 95 % of it."""
+    if step.within or step.delta_e_2000_mean > choice.tolerance:
+        return ""
+    return f", on a wider view, which may have {choice.wider_tolerance:.3g}"
 
 
 def _untried(choice: Choice) -> list[str]:

@@ -90,8 +90,8 @@ def choose(
     number of terms is tried on it, each at seven supports, from no blur at all upwards by the
     weights it applies to a pixel, until the mean Delta E of the picture is within --tolerance. The
     picture is the middle of
-    the frame, 512 x 512 pixels at most; where it shows less than 64 mm of the head, the choice
-    has to hold on a view of 64 mm as well.
+    the frame, 512 x 512 pixels at most; where it shows less than 88 mm of the head, the choice
+    has to hold on wider views, up to 88 mm, as well.
 
     \b
       sssfit choose skin1 --distance 0.6m --fov 30 --resolution 1920x1080

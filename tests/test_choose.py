@@ -52,13 +52,14 @@ def rendered_again(profile, option, mm_per_pixel, distance_mm=600.0):
 @pytest.mark.filterwarnings("ignore::sssfit.errors.SssfitWarning")
 @pytest.mark.parametrize("tolerance", [1.0, 0.3])
 def test_the_choice_will_do_and_the_next_cheaper_will_not(skin1, tolerance):
-    found = choose(skin1, mm_per_pixel=0.6, frame=FRAME, tolerance=tolerance)
+    found = choose(skin1, mm_per_pixel=0.7, frame=FRAME, tolerance=tolerance)
     exact = simulate_exact(skin1)
-    chosen = rendered_again(exact, found.chosen.option, 0.6)
+    assert len(found.scenes) == 1  # 90 mm: no wider view
+    chosen = rendered_again(exact, found.chosen.option, 0.7)
     assert chosen <= tolerance
     assert chosen == pytest.approx(found.chosen.delta_e_2000_mean, rel=1e-9)
-    assert rendered_again(exact, found.runner_up.option, 0.6) <= tolerance
-    assert rendered_again(exact, found.cheaper.option, 0.6) > tolerance
+    assert rendered_again(exact, found.runner_up.option, 0.7) <= tolerance
+    assert rendered_again(exact, found.cheaper.option, 0.7) > tolerance
     assert found.cheaper.taps_per_pixel < found.chosen.taps_per_pixel
     assert found.runner_up.taps_per_pixel >= found.chosen.taps_per_pixel
 
@@ -157,7 +158,8 @@ def test_cost_never_rises_with_distance_for_any_material(name, tolerance, monkey
 def test_a_close_up_has_to_hold_on_the_wider_view(skin1, monkeypatch):
     quick(monkeypatch)
     near = choose(skin1, mm_per_pixel=0.25, distance_mm=250.0, frame=FRAME)
-    assert [each.mm_per_pixel for each in near.scenes] == [0.25, 0.5]
+    pitches = [each.mm_per_pixel for each in near.scenes]
+    assert pitches == [0.25, 0.5, 0.625, 0.6875]  # 32 mm, and views of 64, 80 and 88 mm
     assert near.scenes[1].distance_mm == pytest.approx(500.0)
     exact = simulate_exact(skin1)
     for mm_per_pixel, distance in ((0.25, 250.0), (0.5, 500.0)):

@@ -83,6 +83,6 @@ def _error(
             material, photons=photons, seed=seed, radius_mm=radius_mm, threads=views.threads
         )
         try:
-            return views.score_of_option(option, tolerance, walk)[0]
+            return views.score_of_option(option, tolerance, walk, wider=1.0)[0]
         except FitError:  # a dark channel that no photon came back in
             return float("inf")

@@ -25,7 +25,13 @@ from sssfit.compare._choose_options import (
 )
 from sssfit.compare._choose_photons import PhotonNeed, photons_needed
 from sssfit.compare._choose_truth import check_colours, is_exact, truth_of
-from sssfit.compare._choose_views import Views, checked_scene, head_scenes, mm_per_pixel_at
+from sssfit.compare._choose_views import (
+    WIDER,
+    Views,
+    checked_scene,
+    head_scenes,
+    mm_per_pixel_at,
+)
 from sssfit.compare.judge import timed
 from sssfit.errors import FitError, RenderError
 from sssfit.fit import FitResult, support_of
@@ -52,7 +58,7 @@ class Step:
     mm_per_pixel : float [mm]
         Of that view.
     within : bool
-        Whether every view is within the tolerance.
+        Whether every view is within the tolerance, wider ones within 95 % of it.
     """
 
     option: Option | None
@@ -114,6 +120,11 @@ class Choice:
     photons: PhotonNeed | None = None
     seconds_per_megapixel: float | None = None
     too_narrow: tuple[int, ...] = ()
+
+    @property
+    def wider_tolerance(self) -> float:
+        """Largest mean Delta E of a close-up's wider views."""
+        return WIDER * self.tolerance
 
     @property
     def support_mm(self) -> float:
@@ -233,9 +244,9 @@ class _Search:
         return step
 
     def _judged(self, option: Option | None) -> Step:
-        score = self.views.score_of_option(option, self.tolerance)
+        mean, p99, pitch, within = self.views.score_of_option(option, self.tolerance)
         cost = option.taps_per_pixel if option else 0
-        return Step(option, cost, *score, within=score[0] <= self.tolerance)
+        return Step(option, cost, mean, p99, pitch, within)
 
     def _wide_enough(self, found: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
         """Leave out supports to which even the true kernel cannot be cut, but for the widest.
