@@ -19,11 +19,13 @@ import os
 import pickle
 import sys
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Literal, TypeVar
 
 import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.registry import cpu_target
 
 from sssfit import __version__
 
@@ -74,6 +76,20 @@ def compiled_before(file: str, function: str = "trace_batch") -> bool:
     """Whether machine code of that file's function lies in the cache, made from these sources."""
     pattern = f"{file}.{function}-*.nbc"
     return bool(_CACHE_FOLDER) and any(Path(_CACHE_FOLDER).rglob(pattern))
+
+
+def thread_pool(threads: int, name: str = "sssfit") -> ThreadPoolExecutor:
+    """Make threads for compiled functions, numba having imported what it needs to load them.
+
+    Left to the first call that is 0.3 s of imports on several threads at once, where an interrupt
+    or the end of memory in one of them can leave the others waiting for its locks for ever.
+    """
+    from numba.core import boxing  # noqa: F401
+    from numba.core.runtime import context as runtime  # noqa: F401
+
+    for context in (cpu_target.typing_context, cpu_target.target_context):
+        context.refresh()
+    return ThreadPoolExecutor(threads, thread_name_prefix=name)
 
 
 def jit(function: Function) -> Function:
