@@ -14,6 +14,9 @@ import click
 from sssfit.errors import SssfitError, SssfitWarning
 
 from ._group import cli
+from ._memory import is_out_of_memory
+
+_OUT_OF_MEMORY = "out of memory: use a smaller grid or picture, fewer channels or --threads."
 
 
 def run(args: Sequence[str] | None) -> NoReturn:
@@ -33,13 +36,15 @@ def run(args: Sequence[str] | None) -> NoReturn:
             sys.exit(130)
         except BrokenPipeError:
             _leave_quietly()
-        except MemoryError:
-            _fail("out of memory: use a smaller grid, fewer channels or fewer --threads.")
         except OSError as error:
+            if is_out_of_memory(error):
+                _fail(_OUT_OF_MEMORY)
             _fail(
                 f"{error.filename or 'operating system'}: {(error.strerror or str(error)).lower()}."
             )
         except Exception as error:
+            if is_out_of_memory(error):
+                _fail(_OUT_OF_MEMORY)
             if os.environ.get("SSSFIT_TRACEBACK"):
                 raise
             _fail(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ._options import Common, common_options
+from ._outputs import held
 from ._report import binary_stdin, binary_stdout, finish, table
 
 if TYPE_CHECKING:
@@ -34,7 +36,7 @@ _DEFAULT_CHANNELS = {1: "mono", 3: "R,G,B"}
     metavar="FILE",
     help="Where the profile goes, - for stdout.  [default: NAME.profile.npz]",
 )
-@click.option("--force", is_flag=True, help="Replace a file that is not a profile.")
+@click.option("--force", is_flag=True, help="Replace an input, or a file that is not our profile.")
 @common_options
 def import_(
     files: tuple[str, ...],
@@ -67,7 +69,7 @@ def import_(
         raise click.UsageError("name the profile of several files with -o.")
     profile = _read(files, quantity, channels)
     path = _target(files[0], output)
-    _write(profile, path, force=force)
+    _write(profile, path, files, force=force)
     figures = {"command": "import", "output": [str(path or "-")], **_figures(profile)}
     wrote = f"Wrote {path or 'the profile to stdout'}"
     finish(common, figures, f"{_text(profile)}\n{wrote}", to_stderr=path is None)
@@ -118,18 +120,16 @@ def _target(name: str, output: str | None) -> Path | None:
     return Path(f"{'stdin' if name == '-' else Path(name).stem}.profile.npz")
 
 
-def _write(profile: Profile, path: Path | None, *, force: bool) -> None:
+def _write(profile: Profile, path: Path | None, files: Sequence[str], *, force: bool) -> None:
     """To the file, whole or not at all; to stdout where there is none."""
-    from sssfit.files import check_output, locked
     from sssfit.profile import is_profile_file
 
-    if path is None:
+    with held([path], is_profile_file, inputs=files, force=force):
+        if path is not None:
+            profile.save(path)
+            return
         profile.write(binary_stdout())
         binary_stdout().flush()
-        return
-    check_output(path, is_profile_file, force=force)
-    with locked(path):
-        profile.save(path)
 
 
 def _figures(profile: Profile) -> dict[str, Any]:

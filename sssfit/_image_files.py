@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from sssfit.errors import FileError
-from sssfit.files import reason
+from sssfit.files import has_mark, reason
 
 # What is written, by ending.
 _ENDINGS = {".exr": "exr", ".tif": "tiff", ".tiff": "tiff", ".png": "png"}
@@ -19,6 +19,15 @@ _MAGIC = {
     "hdr": (b"#?RADIANCE", b"#?RGBE"),
     "tiff": (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"),
     "png": (_PNG,),
+}
+# How pictures that we write name their maker; PNG has it in its Exif, which is TIFF's.
+MAKER = "sssfit picture"
+_MARKS = {
+    begin: b"Software\0string\0\x0e\0\0\0" + MAKER.encode()
+    if name == "exr"
+    else MAKER.encode() + b"\0"
+    for name, begins in _MAGIC.items()
+    for begin in begins
 }
 _CRC_BLOCK = 1 << 20  # bytes held at a time while a chunk is summed
 
@@ -42,11 +51,8 @@ def image_format(target: str | Path | BinaryIO) -> str:
 
 
 def is_image_file(path: Path) -> bool:
-    """Tell whether a file begins as EXR, Radiance HDR, TIFF or PNG files do."""
-    try:
-        return _format_of(path) is not None
-    except OSError:
-        return False
+    """Tell whether a file is a picture that we wrote, by what it says of its maker."""
+    return has_mark(path, _MARKS)
 
 
 def found_format(path: Path) -> str:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sssfit._image_files import MAKER
 from sssfit._image_read import SCALE_KEY
 from sssfit.errors import FileError
 from sssfit.files import reason, temporary_folder
@@ -38,6 +39,7 @@ def image_bytes(
     )
     spec.channelnames = tuple(channels)
     spec.alpha_channel = -1
+    spec.attribute("Software", MAKER)
     if format == "png":
         spec.attribute("oiio:ColorSpace", "srgb_rec709_scene")
     else:

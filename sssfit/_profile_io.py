@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit.errors import ProfileError
-from sssfit.files import reason
+from sssfit.files import read_at_most, reason
 
 FORMAT = "sssfit.profile/1"
 REQUIRED = (
@@ -81,7 +81,7 @@ def unpack(
             with Path(source).open("rb") as stream:
                 return _unpack_stream(stream)
         # A pipe cannot seek, an archive's directory is at its end.
-        return _unpack_stream(io.BytesIO(source.read(_LARGEST_FILE_BYTES)))
+        return _unpack_stream(io.BytesIO(read_at_most(source, _LARGEST_FILE_BYTES)))
     except ProfileError as error:
         raise ProfileError(f"{origin} {error}; {_REMEDY}.") from None
     except OSError as error:

@@ -25,12 +25,13 @@ import numpy.typing as npt
 
 from sssfit._jit import source_key
 from sssfit.errors import FileError, SimulationError, SssfitWarning
-from sssfit.files import reason, remove_leftovers, write_atomically
+from sssfit.files import has_mark, reason, remove_leftovers, write_atomically
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
 from sssfit.simulate._batches import BATCH_PHOTONS, Tally
 
 FORMAT = "sssfit.checkpoint/1"
+_MARK = '"format": "sssfit.checkpoint/'.encode("utf-32-le")  # as numpy keeps text
 # At most so much is lost; skin1's takes 1 ms to write, the largest (64 channels of 100 000
 # annuli, 100 MB) a quarter of a second.
 EVERY_SECONDS = 30.0
@@ -153,6 +154,11 @@ class Checkpoint:
         else:
             self._is_ours = True
         self._saved_at = perf_counter()
+
+
+def is_checkpoint_file(path: Path) -> bool:
+    """Tell whether a file is a checkpoint of any version, or what damage has left of one."""
+    return has_mark(path, {b"PK": _MARK})
 
 
 def settings_of(
