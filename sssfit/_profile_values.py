@@ -104,7 +104,7 @@ def _json_value(path: str, value: object) -> Any:
     if value is None or isinstance(value, bool):
         return value
     if not isinstance(value, (int, float)):
-        raise ValueError(f"{path} is of type {type(value).__name__}")
+        raise ValueError(f"{path} is of type {type(value).__name__}")  # noqa: TRY004 (one for all)
     if not _is_finite(value):
         raise ValueError(f"{path} = {shown(value)} is not a finite number")
     return int(value) if isinstance(value, int) else float(value)
@@ -112,7 +112,7 @@ def _json_value(path: str, value: object) -> Any:
 
 def _json_key(path: str, key: object) -> str:
     if not isinstance(key, str):
-        raise ValueError(f"{path} has the key {shown(key)}, which is not a text")
+        raise ValueError(f"{path} has the key {shown(key)}, not a text")  # noqa: TRY004
     return _json_text(path, key)
 
 
