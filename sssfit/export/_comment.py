@@ -20,10 +20,11 @@ def description(kernel: SeparableKernel) -> list[str]:
     settings = ", ".join(f"{key} {value}" for key, value in meta.get("settings", {}).items())
     sha = f", sha256 {meta['material_sha256'][:16]}" if meta.get("material_sha256") else ""
     terms = f"{kernel.rank} separable term{'s' if kernel.rank > 1 else ''}"
+    fit = f"{kernel.method}, {terms}{f' ({settings})' if settings else ''}"
     lines = [
         f"Subsurface scattering kernel: {meta.get('material') or 'unknown material'}{sha}.",
-        f"Profile: {meta.get('profile_method') or 'unknown'}{photons}. Fit: {kernel.method}, "
-        f"{terms}{f' ({settings})' if settings else ''}. sssfit {meta.get('version') or '(unknown)'}.",
+        f"Profile: {meta.get('profile_method') or 'unknown'}{photons}. Fit: {fit}. "
+        f"sssfit {meta.get('version') or '(unknown)'}.",
         f"{kernel.pixels} pixels of {kernel.mm_per_pixel:.9g} mm, the middle one on the axis; "
         f"channels {', '.join(kernel.channels)}.",
         "K[i][j] = sum over terms of sign * weight[i] * weight[j]: a horizontal pass and the same "
