@@ -25,7 +25,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit._jit import source_key
-from sssfit._material_checks import shown
+from sssfit._material_checks import printable, shown
 from sssfit._profile_io import read_npy
 from sssfit.errors import FileError, SimulationError, SssfitWarning
 from sssfit.files import reason, remove_leftovers, write_atomically
@@ -266,10 +266,10 @@ def _check_sums(name: str, sums: npt.NDArray[Any], mine: npt.NDArray[Any], photo
 
 def _check_settings(path: Path, there: Any, here: Mapping[str, str]) -> None:
     """Name every setting in which a checkpoint differs from the run that is to go on from it."""
-    if not isinstance(there, dict):
+    if not (isinstance(there, dict) and all(isinstance(each, str) for each in there.values())):
         raise _damaged(path)
     differing = [
-        f"{name} = {there.get(name)} (now {here.get(name)})"
+        f"{_short(name)} = {_short(there.get(name))} (now {_short(here.get(name))})"
         for name in {**here, **there}
         if there.get(name) != here.get(name)
     ]
@@ -278,6 +278,11 @@ def _check_settings(path: Path, there: Any, here: Mapping[str, str]) -> None:
             f"{path} was made with other settings: {'; '.join(differing)}. Give the same, or "
             "start anew without --resume."
         )
+
+
+def _short(text: str | None) -> str:
+    """Give what a file says on one line: many materials in a walk would fill a page."""
+    return printable(str(text))[:200]
 
 
 _REMEDY = "delete it, or start anew without --resume"
