@@ -3,6 +3,7 @@
 Each takes a ``random.Random`` and returns something else of the same kind; nothing else decides.
 """
 
+import contextlib
 import io
 import json
 import re
@@ -58,7 +59,7 @@ _WORD = re.compile(rb"[A-Za-z_]+")
 
 def damaged_text(rng, content):
     """A text with one to three things done to its bytes, lines or words."""
-    for _ in range(rng.randint(1, 3)):
+    for _ in range(_few(rng)):
         content = rng.choice(_OF_TEXT)(rng, content)
     return content
 
@@ -68,7 +69,7 @@ def damaged_json(rng, content):
     if rng.random() < 0.15:
         return damaged_text(rng, content)
     whole = json.loads(content)
-    for _ in range(rng.randint(1, 3)):
+    for _ in range(_few(rng)):
         _change_somewhere(rng, whole)
     return json.dumps(whole).encode()
 
@@ -79,7 +80,7 @@ def damaged_npz(rng, content):
         return rng.choice((_flip, _cut))(rng, content)
     with np.load(io.BytesIO(content)) as members:
         arrays = dict(members)
-    for _ in range(rng.randint(1, 2)):
+    for _ in range(_few(rng)):
         rng.choice(_OF_ARRAYS)(rng, arrays)
     stored = zipfile.ZIP_STORED if rng.random() < 0.7 else zipfile.ZIP_DEFLATED
     buffer = io.BytesIO()
@@ -88,6 +89,11 @@ def damaged_npz(rng, content):
             archive.writestr(name if "." in name else f"{name}.npy", _npy(rng, value))
     packed = buffer.getvalue()
     return _bomb(rng, packed) if rng.random() < 0.03 else packed
+
+
+def _few(rng):
+    """Mostly one: what is wrong in a single place gets furthest."""
+    return rng.choice((1, 1, 1, 2, 3))
 
 
 def _flip(rng, content):
@@ -120,6 +126,20 @@ def _replace(pattern):
         return content[:start] + rng.choice(WORDS).encode() + content[end:]
 
     return replaced
+
+
+def _scaled(rng, content):
+    """A number that may well be right, only another one."""
+    places = list(_NUMBER.finditer(content))
+    if not places:
+        return content
+    match = rng.choice(places)
+    try:
+        value = float(match[0]) * rng.choice((-1.0, 1e-6, 1e-3, 0.5, 1.01, 2.0, 10.0, 1e3, 1e6))
+    except (ValueError, OverflowError):
+        return content
+    text = repr(int(value) if b"." not in match[0] and abs(value) < 1e15 else value)
+    return content[: match.start()] + text.encode() + content[match.end() :]
 
 
 def _lines(change):
@@ -158,7 +178,7 @@ def _utf16(rng, content):
 
 _OF_TEXT = (
     *(_flip, _cut, _insert, _insert, _begin, _replace(_NUMBER), _replace(_NUMBER)),
-    *(_replace(_NUMBER), _replace(_WORD), _utf16),
+    *(_replace(_NUMBER), _replace(_WORD), _utf16, _scaled, _scaled, _scaled, _scaled),
     *map(_lines, (_twice, _gone, _often, _swapped, _long)),
 )
 
@@ -219,9 +239,12 @@ def _shape_changed(rng, arrays):
 
 def _type_changed(rng, arrays):
     name = rng.choice(list(arrays))
-    kinds = ("f4", "i8", "?", "c16", "U8", ">f8", "O")
-    with np.errstate(all="ignore"):
-        arrays[name] = np.asarray(arrays[name]).astype(rng.choice(kinds), casting="unsafe")
+    value = np.asarray(arrays[name])
+    kinds = (
+        ("f4", "i8", "?", "c16", "U8", ">f8", "O") if value.dtype.kind == "f" else ("O", "S", "U9")
+    )
+    with np.errstate(all="ignore"), contextlib.suppress(ValueError):
+        arrays[name] = value.astype(rng.choice(kinds), casting="unsafe")
 
 
 def _member_changed(rng, arrays):
@@ -239,7 +262,11 @@ def _member_changed(rng, arrays):
 
 def _meta_changed(rng, arrays):
     if isinstance(arrays.get("meta"), np.ndarray) and arrays["meta"].dtype.kind == "U":
-        text = damaged_json(rng, str(arrays["meta"]).encode("utf-8", "surrogatepass"))
+        content = str(arrays["meta"]).encode("utf-8", "surrogatepass")
+        try:
+            text = damaged_json(rng, content)
+        except ValueError:  # damaged before, no longer JSON
+            text = damaged_text(rng, content)
         arrays["meta"] = np.array(text.decode("utf-8", "replace"))
 
 
