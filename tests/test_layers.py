@@ -66,28 +66,27 @@ def assert_energy_conserved(profile):
 # Henyey-Greenstein
 
 
-@pytest.mark.parametrize("g", [-0.99, -0.9, -0.5, -0.01, 0.0, 0.3, 0.8, 0.9, 0.99])
+@pytest.mark.parametrize("g", [-0.99, -0.9, -0.5, -0.01, 0.0, 0.3, 0.8, 0.9, 0.99, 0.9999])
 def test_sampled_directions_follow_henyey_greenstein(g):
     words = np.zeros(8 * sampling.LANES, np.uint32)
     sampling.seed_lanes(words, np.uint64(1), np.int64(0))
     n = 400_000
-    cosines = np.array(
-        [
-            layered.sample_hg(np.float32(g), sampling.next_unit(words, k % sampling.LANES))
-            for k in range(n)
-        ],
-        float,
-    )
+    back = np.float32(1.0 - g)
+    draws = [
+        layered.sample_hg(back, sampling.next_unit(words, k % sampling.LANES)) for k in range(n)
+    ]
+    less = np.array(draws, float)  # 1 - cosine
     # variance of the cosine: second moment (1 + 2 g^2)/3 less the mean's square
     sigma = math.sqrt((1.0 + 2.0 * g * g) / 3.0 - g * g)
-    assert abs(cosines.mean() - g) * math.sqrt(n) / sigma < LIMIT
+    assert abs(less.mean() - (1.0 - g)) * math.sqrt(n) / sigma < LIMIT
     # equal shares of probability, by the inverse of the cumulative density
     u = np.linspace(0.0, 1.0, 101)
-    edges = 2.0 * u - 1.0
+    edges = 2.0 - 2.0 * u
     if g != 0.0:
-        edges = (1.0 + g * g - ((1.0 - g * g) / (1.0 - g + 2.0 * g * u)) ** 2) / (2.0 * g)
-    edges[0], edges[-1] = -1.0, 1.0
-    assert stats.chisquare(np.histogram(cosines, edges)[0]).pvalue > ALPHA
+        s = (1.0 - g * g) / (1.0 - g + 2.0 * g * u)
+        edges = (s * s - (1.0 - g) ** 2) / (2.0 * g)
+    edges[0], edges[-1] = 2.0, 0.0
+    assert stats.chisquare(np.histogram(less, edges[::-1])[0]).pvalue > ALPHA
 
 
 @pytest.mark.parametrize("g", [-0.7, 0.0, 0.9])
@@ -104,9 +103,9 @@ def test_deflections_in_the_walk_have_mean_cosine_g_and_keep_directions_unit():
     words = np.zeros(layered._WORD_ROWS * lanes, np.uint32)
     sampling.seed_lanes(words, np.uint64(1), np.int64(0))
     view = floats.reshape(rows, lanes)
-    row = {name: getattr(layered, name) // lanes for name in ("_UX", "_UY", "_UZ", "_G")}
+    row = {name: getattr(layered, name) // lanes for name in ("_UX", "_UY", "_UZ", "_BACK")}
     view[row["_UZ"]] = 1.0
-    view[row["_G"]] = 0.9
+    view[row["_BACK"]] = 0.1
     view[layered._SIGMA_T // lanes] = 1.0
     view[layered._BOTTOM // lanes], view[layered._TOP // lanes] = np.inf, -np.inf
     cosines, azimuth = [], []
@@ -122,6 +121,31 @@ def test_deflections_in_the_walk_have_mean_cosine_g_and_keep_directions_unit():
     assert abs(cosines.mean() - 0.9) * math.sqrt(cosines.size) / sigma < LIMIT
     # after 2000 deflections of mean cosine .9 the azimuth has forgotten where it began
     assert stats.chisquare(np.histogram(azimuth[-1], 8, (-np.pi, np.pi))[0]).pvalue > ALPHA
+
+
+@pytest.mark.parametrize("g", [0.99, 0.995, 0.9999])
+def test_directions_are_forgotten_as_g_to_the_number_of_collisions(g):
+    """Mean cosine between the first direction and the n-th is g^n; here n = 1/(1 - g)."""
+    rows, lanes, n = layered._FLOAT_ROWS, sampling.LANES, round(1.0 / (1.0 - g))
+    floats = np.zeros(rows * lanes, np.float32)
+    words = np.zeros(layered._WORD_ROWS * lanes, np.uint32)
+    view = floats.reshape(rows, lanes)
+    view[layered._BACK // lanes] = 1.0 - g
+    view[layered._SIGMA_T // lanes] = 1.0
+    view[layered._BOTTOM // lanes], view[layered._TOP // lanes] = np.inf, -np.inf
+    start = np.array([0.48, 0.6, 0.64])
+    cosines = []
+    for batch in range(40):
+        sampling.seed_lanes(words, np.uint64(1), np.int64(batch))
+        view[: layered._UZ // lanes + 1] = 0.0
+        for row, component in zip((layered._UX, layered._UY, layered._UZ), start, strict=True):
+            view[row // lanes] = component
+        for _ in range(n):
+            layered.advance(floats, words, lanes)
+        after = view[[layered._UX // lanes, layered._UY // lanes, layered._UZ // lanes]]
+        cosines.append(start @ after.astype(float))
+    cosines = np.concatenate(cosines)
+    assert abs(cosines.mean() - g**n) / (cosines.std() / math.sqrt(cosines.size)) < LIMIT
 
 
 # Published and closed forms
