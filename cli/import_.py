@@ -146,13 +146,14 @@ def _target(name: str, output: str | None) -> Path | None:
 
 def _write(profile: Profile, path: Path | None, *, force: bool) -> None:
     """To the file, whole or not at all; to stdout where there is none."""
-    from sssfit.files import check_output, locked
+    from sssfit.files import check_ending, check_output, locked
     from sssfit.profile import is_profile_file
 
     if path is None:
         profile.write(binary_stdout())
         binary_stdout().flush()
         return
+    check_ending(path, "a profile", ".npz")
     check_output(path, is_profile_file, force=force)
     with locked(path):
         profile.save(path)

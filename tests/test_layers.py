@@ -22,6 +22,7 @@ from sssfit.simulate import shared_walks, simulate_montecarlo
 from sssfit.simulate._layered import LayeredWalk, alike_channels
 from sssfit.simulate._run import run
 
+DATA = Path(__file__).parent / "data"
 LIMIT = checks.LIMIT
 ALPHA = 2.0 * stats.norm.sf(LIMIT)
 ROUNDING = 1e-9  # weights are single precision; sums of them telescope to about 1e-11
@@ -186,6 +187,63 @@ def test_a_slab_without_absorption_loses_nothing():
     profile = simulate_montecarlo(stack(layer(0.0, 10.0, 0.8, 1.4, 2.0)), photons=50_000)
     whole = profile.specular_reflectance + profile.diffuse_reflectance + profile.transmittance
     np.testing.assert_allclose(whole, 1.0, atol=ROUNDING)
+
+
+# Inputs of MCML that others run: g to 1, n below 1 (tests/data/README.md has the right values)
+
+
+def walked_input(name, photons=None):
+    """The profile of a .mci of tests/data on its own grid."""
+    (asked,) = load_mci(DATA / name)
+    return simulate_montecarlo(
+        asked.material,
+        photons=photons or asked.photons,
+        dr_mm=asked.grid.dr_mm,
+        radius_mm=asked.grid.radius_mm,
+    )
+
+
+def test_g_of_one_is_a_slab_that_only_absorbs():
+    """Beams between two faces, each of reflectance R: T = (1-R)^2 a / (1 - R^2 a^2), a = e^-.1."""
+    profile = walked_input("water-g1.mci")
+    r, r_error, t, t_error = totals(profile)
+    once, through = (0.33 / 2.33) ** 2, math.exp(-0.1)
+    whole = (1.0 - once) ** 2 * through / (1.0 - (once * through) ** 2)
+    assert (whole, whole * once * through) == pytest.approx((0.869187, 0.015776), abs=1e-6)
+    assert_agree(t, whole, t_error, 0.0)
+    assert_agree(r, whole * once * through, r_error, 0.0)
+    assert profile.annulus_energy[1:].sum() + profile.beyond_grid[0] == 0.0  # straight back
+
+
+def test_n_below_one():
+    r, r_error, t, t_error = totals(walked_input("n098.mci", photons=200_000))
+    assert_agree(r, 0.2500, r_error, 0.0006)
+    assert_agree(t, 0.5859, t_error, 0.0006)
+
+
+def test_only_ratios_of_indices_count():
+    """Twice all indices, exact in binary, is the same walk."""
+    one, two = (
+        simulate_montecarlo(
+            stack(layer(0.1, 10.0, 0.9, n, 1.0), above=n0, below=n0), photons=20_000
+        )
+        for n, n0 in ((0.75, 1.0), (1.5, 2.0))
+    )
+    assert one.annulus_energy.tobytes() == two.annulus_energy.tobytes()
+    assert one.specular_reflectance == two.specular_reflectance
+
+
+@pytest.mark.parametrize(
+    "photons", [50_000, pytest.param(5_000_000, marks=pytest.mark.slow)], ids=["5e4", "5e6"]
+)
+def test_blood_scatters_forward(photons):
+    """A photon at a time in double precision, cosines as published: .022613 +- .000054 (3e6)."""
+    profile = walked_input("blood-g0.995.mci", photons=photons)
+    r, error = profile.diffuse_reflectance[0], profile.diffuse_reflectance_stderr[0]
+    assert_agree(r, 0.022613, error, 0.000054)
+    assert_energy_conserved(profile)
+    if photons <= 50_000:  # the published run's own error is about that of 1e5 photons
+        assert_agree(r, 0.02290, error, 0.0003)
 
 
 # Against the other walks
