@@ -17,8 +17,9 @@ INPUT_COMMENT = re.compile(r"#")
 OUTPUT_COMMENT = re.compile(r"(?:^|\s)#")
 
 
-# What files of MCML 2 and 3 begin with: mcmli2.0 (input), mcmloA2.0 (output in ASCII).
-_OTHER_VERSION = re.compile(r"mcml[io]?[ab]?(\d+(?:\.\d+)*)", re.IGNORECASE | re.ASCII)
+# What files of MCML 2 and 3 begin with: mcmli2.0 and mcmli_3.0 (inputs), mcmloA2.0 and mcmlo_3.0
+# (outputs in ASCII).
+_OTHER_VERSION = re.compile(r"mcml[io][ab]?_?(\d+(?:\.\d+)*)", re.IGNORECASE | re.ASCII)
 
 
 def other_version(word: str) -> str | None:
