@@ -26,7 +26,7 @@ import numpy.typing as npt
 
 from sssfit._jit import source_key
 from sssfit._material_checks import printable, shown
-from sssfit._profile_io import read_npy
+from sssfit._profile_io import is_marked, read_npy
 from sssfit.errors import FileError, SimulationError, SssfitWarning
 from sssfit.files import reason, remove_leftovers, write_atomically
 from sssfit.grid import RadialGrid
@@ -34,6 +34,8 @@ from sssfit.material import Material
 from sssfit.simulate._batches import BATCH_PHOTONS, MAX_PHOTONS, Tally
 
 FORMAT = "sssfit.checkpoint/1"
+# By either a file is ours, however damaged; both stand uncompressed.
+_MARKS = (b"ledger_absorbed.npy", "sssfit.checkpoint/".encode("utf-32-le"))
 # At most so much is lost; skin1's takes 1 ms to write, the largest (64 channels of 100 000
 # annuli, 100 MB) a quarter of a second.
 EVERY_SECONDS = 30.0
@@ -229,6 +231,9 @@ def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
         raise
     except Exception as error:
         # zipfile, zlib, numpy's header parser and json raise a dozen unrelated types on damage.
+        with contextlib.suppress(OSError), path.open("rb") as stream:
+            if not is_marked(stream, _MARKS):
+                raise FileError(f"{path} is not a checkpoint; {_REMEDY}.") from None
         raise _damaged(path) from error
 
 
@@ -289,4 +294,4 @@ _REMEDY = "delete it, or start anew without --resume"
 
 
 def _damaged(path: Path) -> FileError:
-    return FileError(f"{path} is damaged or not a checkpoint; {_REMEDY}.")
+    return FileError(f"{path} is a damaged checkpoint; {_REMEDY}.")
