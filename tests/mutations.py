@@ -69,7 +69,9 @@ def damaged_json(rng, content):
     if rng.random() < 0.15:
         return damaged_text(rng, content)
     whole = json.loads(content)
-    for _ in range(_few(rng)):
+    if "terms" in whole and rng.random() < 0.3:
+        _rescale(rng, whole)
+    for _ in range(_few(rng) if rng.random() < 0.9 else 0):
         _change_somewhere(rng, whole)
     return json.dumps(whole).encode()
 
@@ -213,12 +215,27 @@ def _change_somewhere(rng, whole):
         container[key] = rng.choice(VALUES)
 
 
+def _rescale(rng, kernel):
+    """Another kernel that agrees with itself: brighter, fainter, of another pitch."""
+    factor = rng.choice((0.0, 1e-40, 1e-30, 1e-3, 3.0, 1e9, 1e16, 1e18, 1e19))
+    pitch = rng.choice((1e-13, 1e-12, 0.2, 1.0, 1e12, 1e13))
+    for term in kernel["terms"]:
+        term["weights"] = [[factor * each for each in row] for row in term["weights"]]
+    kernel["energy"] = [factor**2 * each for each in kernel["energy"]]
+    kernel["support_mm"] = (kernel["pixels"] - 1) // 2 * pitch
+    kernel["mm_per_pixel"] = pitch
+    scale = rng.choice((0.0, 1e-300, 1e-3, 1.0, 1e18))
+    kernel["scale"] = [scale * each for each in kernel["scale"]]
+
+
 def _number_changed(rng, arrays):
     name = rng.choice([name for name in arrays if name != "meta"] or ["none"])
     value = arrays.get(name)
     if isinstance(value, np.ndarray) and value.size and value.dtype.kind == "f":
         arrays[name] = value.copy()
-        arrays[name].flat[rng.randrange(value.size)] = rng.choice(FLOATS)
+        at = rng.randrange(value.size)
+        mild = value.flat[at] * rng.choice((0.0, 0.5, 1.001, 2.0, 100.0))
+        arrays[name].flat[at] = rng.choice((mild, rng.choice(FLOATS)))
 
 
 def _all_changed(rng, arrays):
@@ -226,7 +243,7 @@ def _all_changed(rng, arrays):
     value = arrays[name]
     if isinstance(value, np.ndarray) and value.dtype.kind == "f":
         with np.errstate(all="ignore"):
-            arrays[name] = value * rng.choice((-1.0, 0.0, 1e6, 1e12, 1e200, 1e-200))
+            arrays[name] = value * rng.choice((-1.0, 0.0, 2.0, 1e6, 1e12, 1e200, 1e-200))
 
 
 def _shape_changed(rng, arrays):
