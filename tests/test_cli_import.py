@@ -59,6 +59,13 @@ def test_a_run_is_walked_on_its_own_grid(run, tmp_path):
     assert profile.annulus_energy.tobytes() == same.annulus_energy.tobytes()
 
 
+def test_a_comment_in_latin_1_does_not_stop_a_run(run):
+    status, out, _ = run("simulate", str(DATA / "latin1-comment.mci"), "--json")
+    assert status == 0
+    (found,) = json.loads(out)["diffuse_reflectance"]
+    assert found == pytest.approx(0.263246, abs=5e-4)  # the same walk; rounding may part photons
+
+
 def test_all_runs_or_one(run, tmp_path):
     second = run_text("b.mco", layer="1.4 1 5 0 1E8").replace("1000 ", "2000 ")
     Path("tissue.mci").write_text(file_text(run_text("a.mco"), second))
@@ -194,7 +201,8 @@ def test_import_through_pipes(tmp_path, content):
         (("a.mco", "-o", "no/x.npz"), 1, "there is no folder no"),
         (("none.mco",), 1, "none.mco cannot be read: no such file"),
         (("cut.mco",), 1, "cut.mco: ends after line"),
-        (("a.mco", "-o", "mine.csv"), 1, "exists and is not a file of this format"),
+        (("a.mco", "-o", "notes"), 1, "exists and is not a file of this format"),
+        (("a.mco", "-o", "mine.csv"), 1, "mine.csv ends in .csv, and a profile is written"),
     ],
 )
 def test_wrong_imports(run, tmp_path, arguments, status, said):
@@ -204,6 +212,7 @@ def test_wrong_imports(run, tmp_path, arguments, status, said):
     Path("cut.mco").write_text(mco_text()[:700])
     Path("mcml2.mco").write_bytes((DATA / "mcml2.mco").read_bytes())
     Path("run.mci").write_text(file_text(run_text()))
+    Path("notes").write_text("mine")
     Path("picture.png").write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")
     before = names(tmp_path)
     code, out, err = run("import", *arguments)

@@ -140,7 +140,7 @@ def test_comments_blank_lines_tabs_and_windows_ends(tmp_path):
         ("2.0\n1\n", "line 1: not an MCML input file: it begins with '2.0'; expected the file"),
         ("name = 'skin1'\n", "line 1: not an MCML input file: it begins with \"name = 'skin1'\""),
         ("mcmli2.0 # version\n", "line 1: this is a file of MCML 2.0; only the input of MCML 1"),
-        ("# mine\nmcmli3.0.0\n", "line 2: this is a file of MCML 3.0.0; only the input of MCML 1"),
+        ("# mine\nmcmli_3.0\n", "line 2: this is a file of MCML 3.0; only the input of MCML 1"),
         ("1.0\nmany\n", "line 2: the number of runs = 'many'; expected a whole number from 1"),
         ("1.0\n0\n", "line 2: the number of runs = '0'"),
         ("1.0\n-1\n", "line 2: the number of runs = '-1'"),

@@ -256,7 +256,7 @@ def test_what_does_not_belong_together_is_not_joined(other, channels, said):
         ("A1\nRAT\n", "line 2: 'RAT' stands where InParm should"),
         ("mcmloA2.0 # v\n", "line 1: this is a file of MCML 2.0; only the output of MCML 1 (ve"),
         (
-            "mcmloA3.0\n",
+            "mcmlo_3.0\n",
             "line 1: this is a file of MCML 3.0; only the output of MCML 1 (version A1",
         ),
         ("A1\n", "ends after line 1, before the block InParm"),
@@ -293,6 +293,7 @@ def test_formats_are_told_apart():
     assert is_mco(mco_text())
     assert is_mco("B1 # Version\n\x00")
     assert is_mco((DATA / "mcml2.mco").read_text())
+    assert is_mco("# mine\nmcmlo_3.0 # version\n")
     assert not any(map(is_mco, ("", "\n", "r_mm,A1\n", "A1,r_mm\n", "# A1\nr_mm,R\n")))
 
 
