@@ -1,7 +1,12 @@
 """The files pictures come from and go to: formats by ending, and by what the file begins with."""
 
+import contextlib
+import os
 import struct
+import sys
+import threading
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
@@ -20,6 +25,7 @@ _MAGIC = {
     "tiff": (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"),
     "png": (_PNG,),
 }
+_STDERR = threading.Lock()  # two at once would put the wrong stderr back
 _CRC_BLOCK = 1 << 20  # bytes held at a time while a chunk is summed
 
 
@@ -70,10 +76,28 @@ def found_format(path: Path) -> str:
     return found
 
 
-def check_png(path: Path) -> None:
-    """Check a PNG's chunks against their own sums.
+@contextlib.contextmanager
+def without_lines_of_libpng() -> Iterator[None]:
+    """Keep stderr to ourselves: libpng writes its errors there, and then hands them on as well."""
+    with _STDERR:
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            sys.stderr.flush()
+        try:
+            kept = os.dup(2)
+        except OSError:  # closed: there is nothing to keep clean
+            yield
+            return
+        try:
+            with Path(os.devnull).open("wb") as nowhere:
+                os.dup2(nowhere.fileno(), 2)
+            yield
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
 
-    libpng does so too, but writes lines of its own to stderr about what it finds.
+
+def check_png(path: Path) -> None:
+    """Check a PNG's chunks against their own sums, which libpng does for some of them only.
 
     Raises
     ------

@@ -1,7 +1,8 @@
 """Pictures of linear light, to and from EXR, TIFF and PNG files; Radiance HDR is read too.
 
 What is read is known by its content. 8- and 16-bit pictures are decoded from sRGB, floating point
-is linear as it stands; what was done to a file's numbers stands in `Image.notes`.
+is linear; light comes back in the primaries of sRGB. What was done to a file's numbers stands in
+`Image.notes`.
 """
 
 import dataclasses
@@ -16,7 +17,14 @@ from sssfit._image_choice import LARGEST_BYTES
 from sssfit._image_files import FORMATS, image_format, is_image_file
 from sssfit._image_read import read_image
 from sssfit._image_srgb import srgb_decode, srgb_encode
-from sssfit._image_values import as_float32, channel_names, check_values, png_codes
+from sssfit._image_values import (
+    as_float32,
+    as_format_has_it,
+    channel_names,
+    check_alpha,
+    check_values,
+    png_codes,
+)
 from sssfit._image_write import image_bytes
 from sssfit.errors import FileError
 from sssfit.files import write_atomically
@@ -48,6 +56,8 @@ class Image:
         Size of a pixel; None where the file does not say.
     alpha : array (H, W), optional
         Coverage, kept apart from the colour.
+    alpha_is_multiplied : bool
+        Whether ``pixels`` hold the light times the coverage, as in an EXR.
     name : str
         The file's name without its folder.
     notes : tuple of str
@@ -58,6 +68,7 @@ class Image:
     channels: tuple[str, ...]
     mm_per_pixel: float | None = None
     alpha: FloatArray | None = None
+    alpha_is_multiplied: bool = False
     name: str = ""
     notes: tuple[str, ...] = ()
 
@@ -69,17 +80,23 @@ class Image:
                 object.__setattr__(self, field, kept)
 
 
-def load_image(path: str | Path, *, largest_bytes: float = LARGEST_BYTES) -> Image:
+def load_image(
+    path: str | Path, *, layer: str | None = None, largest_bytes: float = LARGEST_BYTES
+) -> Image:
     """Read a picture as linear light.
 
-    EXR: R, G, B of the first part that has them, else Y, else all channels; its window of data is
-    put into the picture's, black around. Palettes become RGB, grey stays one channel.
+    EXR: R, G, B of the first part that has them, or of the only layer that has, else Y, else all
+    channels; its window of data is put into the picture's, black around. Palettes become RGB, grey
+    stays one channel. Primaries other than those of sRGB are converted, white staying white: the
+    chromaticities of an EXR, PRIMARIES of a Radiance file, cHRM of a PNG. Values that would fall
+    below 0 then are set to 0. Radiance's EXPOSURE and COLORCORR are taken out of the light.
 
     Parameters
     ----------
     path : str or Path
-        An EXR, Radiance HDR, TIFF or PNG file, whatever its ending. The EXPOSURE line of an HDR
-        file is not heeded.
+        An EXR, Radiance HDR, TIFF or PNG file, by its content and not by its ending.
+    layer : str, optional
+        Of an EXR: what stands before the last dot in its channels' names, or the name of a part.
     largest_bytes : float [bytes]
         Refuse pictures that would need more to be rendered, 32 bytes for each of their values.
 
@@ -87,17 +104,21 @@ def load_image(path: str | Path, *, largest_bytes: float = LARGEST_BYTES) -> Ima
     -------
     Image
         8- and 16-bit numbers sRGB-decoded (IEC 61966-2-1) unless the file says that they are
-        linear, floating point as it stands; turned upright.
+        linear; turned upright.
 
     Raises
     ------
     FileError
-        Missing, unreadable, damaged, cut short or of another format.
+        Missing, unreadable, damaged, cut short, of another format, or compressed in a way that
+        the library was built without.
     RenderError
-        Too large, without channels that can be used, or with NaN, infinite or negative values.
+        Too large, without channels that can be used, with several layers and none of them named,
+        or with NaN, infinite or negative values.
     """
-    image = Image(**read_image(Path(path), largest_bytes))
+    image = Image(**read_image(Path(path), layer, largest_bytes))
     check_values(image.pixels, image.channels, str(path), negative=False)
+    if image.alpha is not None:
+        check_values(image.alpha[..., None], ("alpha",), str(path), negative=True)
     return image
 
 
@@ -109,11 +130,14 @@ def save_image(
     format: str | None = None,
     exposure: float = 1.0,
     mm_per_pixel: float | None = None,
+    alpha: npt.ArrayLike | None = None,
+    alpha_is_multiplied: bool = False,
 ) -> tuple[str, ...]:
     """Write linear light: float32 to EXR or TIFF as it is, 16-bit sRGB to PNG.
 
-    A PNG holds ``exposure`` times the light, clipped to 0 to 1 and sRGB-encoded. Files are written
-    whole or not at all, and the same picture gives the same bytes.
+    A PNG holds ``exposure`` times the light, clipped to 0 to 1 and sRGB-encoded. With alpha, an EXR
+    holds the light times it and a PNG the light without it, as these formats have it; a TIFF says
+    which. Files are written whole or not at all, and the same picture gives the same bytes.
 
     Parameters
     ----------
@@ -129,6 +153,10 @@ def save_image(
         Factor for PNG; the other formats keep the light as it is.
     mm_per_pixel : float, optional [mm]
         Kept in the header of an EXR, from where `load_image` takes it.
+    alpha : array (H, W), optional
+        Coverage, for pictures of 1 or 3 channels.
+    alpha_is_multiplied : bool
+        Whether ``pixels`` hold the light times the coverage.
 
     Returns
     -------
@@ -148,15 +176,24 @@ def save_image(
     light = np.asarray(pixels, dtype=np.float64)
     names = channel_names(light, channels, chosen)
     check_values(light, names, "the picture", negative=True)
+    coverage = None if alpha is None else check_alpha(alpha, light, names)
+    light, is_multiplied, done = as_format_has_it(light, coverage, alpha_is_multiplied, chosen)
     values: npt.NDArray[np.uint16] | npt.NDArray[np.float32]
-    notes: tuple[str, ...] = ()
+    clipped: tuple[str, ...] = ()
     if chosen == "png":
-        values, notes = png_codes(light, exposure)
+        values, clipped = png_codes(light, exposure, coverage)
     else:
-        values = as_float32(light, exposure)
-    data = image_bytes(values, format=chosen, channels=names, mm_per_pixel=mm_per_pixel)
+        values = as_float32(light, exposure, coverage)
+    data = image_bytes(
+        values,
+        format=chosen,
+        channels=names if coverage is None else (*names, "A"),
+        mm_per_pixel=mm_per_pixel,
+        has_alpha=coverage is not None,
+        is_multiplied=is_multiplied,
+    )
     if isinstance(target, str | Path):
         write_atomically(Path(target), lambda stream: stream.write(data))
     else:
         target.write(data)
-    return notes
+    return (*done, *clipped)

@@ -1,14 +1,19 @@
 """What a kernel is applied to: an irradiance picture, with its geometry where it has one."""
 
 import dataclasses
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
 from sssfit.errors import RenderError
 
+if TYPE_CHECKING:
+    from sssfit.image import Image
+
 FloatArray = npt.NDArray[np.float64]
+
+_HALF = 0.5  # of coverage: a pixel of an outline belongs to what covers more of it
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -37,6 +42,10 @@ class Scene:
         How far light travels inside the object to this point from the light's side.
     back_irradiance : array (H, W, C) or (H, W, 1), optional
         Irradiance where that light enters.
+    alpha : array (H, W), optional
+        Coverage of a picture from a file: carried along for what is written, never blurred.
+    alpha_is_multiplied : bool
+        Whether the irradiance holds the light times the coverage.
 
     Raises
     ------
@@ -53,6 +62,47 @@ class Scene:
     specular: FloatArray | None = None
     thickness_mm: FloatArray | None = None
     back_irradiance: FloatArray | None = None
+    alpha: FloatArray | None = None
+    alpha_is_multiplied: bool = False
+
+    @classmethod
+    def from_image(
+        cls, image: "Image", mm_per_pixel: float, *, alpha_is_mask: bool = False
+    ) -> "Scene":
+        """Return a picture from a file as irradiance on a flat surface.
+
+        Parameters
+        ----------
+        image : Image
+            Of ``sssfit.image.load_image``.
+        mm_per_pixel : float [mm]
+        alpha_is_mask : bool
+            The object is what alpha covers by half or more: there the light is taken without
+            alpha; all else is dark and of mask 0.
+
+        Raises
+        ------
+        RenderError
+            Alpha is to be the mask, and there is none, or it covers nothing.
+        """
+        if not alpha_is_mask:
+            return cls(
+                image.name,
+                image.pixels,
+                mm_per_pixel,
+                alpha=image.alpha,
+                alpha_is_multiplied=image.alpha_is_multiplied,
+            )
+        if image.alpha is None:
+            raise RenderError(f"{image.name} has no alpha that could be the mask.")
+        inside = image.alpha >= _HALF
+        if not inside.any():
+            raise RenderError(
+                f"{image.name}: alpha is under {_HALF:g} everywhere; nothing is left."
+            )
+        share = np.where(inside, image.alpha, 1.0) if image.alpha_is_multiplied else 1.0
+        light = np.where(inside[..., None], image.pixels / np.expand_dims(share, -1), 0.0)
+        return cls(image.name, light, mm_per_pixel, mask=inside.astype(np.int32), alpha=image.alpha)
 
     def __post_init__(self) -> None:
         if np.ndim(self.irradiance) != 3 or 0 in np.shape(self.irradiance):
@@ -66,6 +116,7 @@ class Scene:
             )
         for field in ("irradiance", "specular", "thickness_mm", "back_irradiance", "depth_mm"):
             self._store(field, np.float64)
+        self._store("alpha", np.float64)
         self._store("mask", np.int32)
 
     def _store(self, field: str, dtype: npt.DTypeLike) -> None:
