@@ -4,6 +4,7 @@ import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from sssfit._image_files import called
 from sssfit._material_checks import printable
 from sssfit.errors import RenderError
 
@@ -84,8 +85,8 @@ def choose(source: "ImageInput", path: Path, layer: str | None) -> Choice:
             return _chosen(specs, plain[0])
         if len(found) > 1:
             raise RenderError(
-                f"{path} has the layers {_listed([each.label for each in found])}; name the one "
-                "that is meant."
+                f"{called(path)} has the layers {_listed([each.label for each in found])}; name "
+                "the one that is meant."
             )
         if found:
             return _chosen(specs, found[0])
@@ -131,7 +132,7 @@ def _named(specs: list["ImageSpec"], layers: list[_Layer], name: str, path: Path
             return _chosen(specs, each)
     labels = [each.label for each in layers if each.label]
     what = f"it has {_listed(labels)}" if labels else "it has none of R, G, B or Y with a name"
-    raise RenderError(f"{path} has no layer {printable(name)!r}; {what}.")
+    raise RenderError(f"{called(path)} has no layer {printable(name)!r}; {what}.")
 
 
 def _chosen(specs: list["ImageSpec"], layer: _Layer) -> Choice:
@@ -151,8 +152,8 @@ def _nameless(specs: list["ImageSpec"], path: Path) -> Choice:
     # A dot parts a layer from its channel: depth and normals may be among them.
     if not colours or any("." in name for name in names):
         raise RenderError(
-            f"{path} has the channels {_listed(names)}; expected R, G, B or Y: write the layer "
-            "that is meant into a picture of its own."
+            f"{called(path)} has the channels {_listed(names)}; expected R, G, B or Y: write the "
+            "layer that is meant into a picture of its own."
         )
     kept = None if alpha < 0 else alpha
     notes = _left_out(specs, 0, colours, kept)
@@ -186,13 +187,15 @@ def check_kind(choice: Choice, path: Path) -> None:
     """Refuse numbers that say nothing of light, and pixels that lie in depth."""
     spec = choice.spec
     if spec.deep or spec.depth > 1:
-        raise RenderError(f"{path} has several samples in a pixel's depth; flatten it first.")
+        raise RenderError(
+            f"{called(path)} has several samples in a pixel's depth; flatten it first."
+        )
     kinds = {str(spec.channelformats[place]) for place in choice.colours if spec.channelformats}
     kinds = kinds or {str(spec.format)}
     if not kinds <= {*_FLOATS, *FULL_SCALE}:
         raise RenderError(
-            f"{path} has pixels of {' and '.join(sorted(kinds))}; expected 8 or 16 bits, half, "
-            "float or double: write it as one of these."
+            f"{called(path)} has pixels of {' and '.join(sorted(kinds))}; expected 8 or 16 bits, "
+            "half, float or double: write it as one of these."
         )
 
 
@@ -202,10 +205,12 @@ def check_size(choice: Choice, path: Path, largest_bytes: float) -> None:
     # A window of data may be larger than the picture it belongs to.
     width, height = max(spec.width, spec.full_width), max(spec.height, spec.full_height)
     if width < 1 or height < 1:
-        raise RenderError(f"{path} has {height} rows of {width} pixels; expected at least one.")
+        raise RenderError(
+            f"{called(path)} has {height} rows of {width} pixels; expected at least one."
+        )
     needed = BYTES_PER_VALUE * width * height * count
     if needed > largest_bytes:
         raise RenderError(
-            f"{path} is {width} x {height} with {count} channels: rendering needs "
+            f"{called(path)} is {width} x {height} with {count} channels: rendering needs "
             f"{needed / 1e9:.3g} GB, the limit is {largest_bytes / 1e9:.3g} GB; crop or scale it."
         )

@@ -5,6 +5,7 @@ import struct
 from dataclasses import dataclass
 from pathlib import Path
 
+from sssfit._image_files import called
 from sssfit._material_checks import printable
 from sssfit.errors import FileError, RenderError
 from sssfit.files import reason
@@ -42,7 +43,7 @@ def read_header(path: Path, format: str) -> Header:
         if format == "png":
             return Header(primaries=_png_primaries(path))
     except OSError as error:
-        raise FileError(f"{path} cannot be read: {reason(error)}.") from error
+        raise FileError(f"{called(path)} cannot be read: {reason(error)}.") from error
     return Header()
 
 
@@ -60,8 +61,8 @@ def _radiance(path: Path) -> Header:
         key = key.strip()
         if key == "FORMAT" and value.strip() == "32-bit_rle_xyze":
             raise RenderError(
-                f"{path} holds CIE XYZ (FORMAT={value.strip()}); expected R, G, B: convert it with "
-                "Radiance's ra_xyze -r."
+                f"{called(path)} holds CIE XYZ (FORMAT={value.strip()}); expected R, G, B: convert "
+                "it with Radiance's ra_xyze -r."
             )
         if key == "EXPOSURE":
             exposure *= _numbers(path, key, value, 1)[0]
@@ -72,7 +73,8 @@ def _radiance(path: Path) -> Header:
             primaries = _numbers(path, key, value, 8)
     if not all(1.0 / _LARGEST <= each <= _LARGEST for each in (exposure, *correction)):
         raise FileError(
-            f"{path} is damaged (the product of its EXPOSURE or COLORCORR lines is out of range)."
+            f"{called(path)} is damaged (the product of its EXPOSURE or COLORCORR lines is out of "
+            "range)."
         )
     return Header(exposure, correction, primaries)
 
@@ -85,8 +87,8 @@ def _numbers(path: Path, key: str, value: str, count: int) -> tuple[float, ...]:
         numbers = ()
     if len(numbers) != count or not all(math.isfinite(each) and each > 0.0 for each in numbers):
         raise FileError(
-            f"{path} is damaged ({key}={printable(value.strip()[:60])} in its header; expected "
-            f"{count} numbers above 0)."
+            f"{called(path)} is damaged ({key}={printable(value.strip()[:60])} in its header; "
+            f"expected {count} numbers above 0)."
         )
     return numbers
 

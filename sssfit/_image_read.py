@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit._image_choice import FULL_SCALE, Choice, check_kind, check_size, choose
-from sssfit._image_files import check_png, found_format, without_lines_of_libpng
+from sssfit._image_files import called, check_png, found_format, without_lines_of_libpng
 from sssfit._image_header import Header, read_header
 from sssfit._image_primaries import matrix_to_bt709
 from sssfit._image_srgb import srgb_decode
@@ -69,7 +69,7 @@ def read_image(path: Path, layer: str | None, largest_bytes: float) -> dict[str,
             ),
         }
     except UnicodeDecodeError:  # bytes of a damaged header, in what the library hands on or says
-        raise FileError(f"{path} is damaged (a word in its header is not text).") from None
+        raise FileError(f"{called(path)} is damaged (a word in its header is not text).") from None
 
 
 def _stored(path: Path, layer: str | None, largest_bytes: float) -> tuple[Choice, npt.NDArray[Any]]:
@@ -90,12 +90,12 @@ def _stored(path: Path, layer: str | None, largest_bytes: float) -> tuple[Choice
 def _unreadable(path: Path, spec: "ImageSpec", words: str) -> FileError:
     """Tell a compression that the library was built without from a damaged file."""
     if not words.endswith(_NOT_BUILT):
-        return FileError(f"{path} is damaged or cut short ({words}).")
+        return FileError(f"{called(path)} is damaged or cut short ({words}).")
     code = spec.get_int_attribute("tiff:Compression")
     name = _COMPRESSIONS.get(code, f"scheme {code}")
     return FileError(
-        f"{path} is compressed by {name}, which the reader of pictures was built without; save it "
-        "with LZW, ZIP or no compression."
+        f"{called(path)} is compressed by {name}, which the reader of pictures was built without; "
+        "save it with LZW, ZIP or no compression."
     )
 
 
@@ -108,11 +108,11 @@ def _open(path: Path) -> "ImageInput":
     try:
         source = OpenImageIO.ImageInput.open(str(path), config)
     except TypeError:  # what a name that is not UTF-8 becomes
-        raise FileError(
-            f"{printable(str(path))} has a name that is not UTF-8; rename it."
-        ) from None
+        raise FileError(f"{called(path)} has a name that is not UTF-8; rename it.") from None
     if source is None:
-        raise FileError(f"{path} is damaged or cut short ({one_line(OpenImageIO.geterror())}).")
+        raise FileError(
+            f"{called(path)} is damaged or cut short ({one_line(OpenImageIO.geterror())})."
+        )
     return source
 
 
@@ -228,7 +228,7 @@ def _in_our_primaries(
     """
     if primaries is None or choice.names != ("R", "G", "B"):
         return colour, []
-    if (matrix := matrix_to_bt709(primaries, str(path))) is None:
+    if (matrix := matrix_to_bt709(primaries, called(path))) is None:
         return colour, []
     words = " ".join(f"{each:.4g}" for each in primaries)
     notes = [f"converted from the chromaticities {words} to those of sRGB"]

@@ -1,18 +1,46 @@
 """A picture's values: what may be read, and what each format can hold."""
 
 from collections.abc import Sequence
+from numbers import Real
 
 import numpy as np
 import numpy.typing as npt
 
 from sssfit._image_srgb import srgb_encode
+from sssfit._material_checks import printable, shown
 from sssfit.errors import RenderError
 
 FloatArray = npt.NDArray[np.float64]
 
 _LONGEST_PNG = 1_000_000  # pixels a side: libpng's own limit
+_LONGEST_NAME = 255  # bytes of a channel's name: the most that an EXR keeps
 _CODES = 65535  # the largest of 16 bits
 _ROUNDING = 1e-6  # of white: what no code shows is not said to be clipped
+
+
+def as_light(values: npt.ArrayLike, what: str) -> FloatArray:
+    """Return numbers as float64; refuse words, objects, complex numbers and ragged rows."""
+    try:
+        array = np.asarray(values)
+        found = f"of type {array.dtype}"
+    except (TypeError, ValueError) as error:  # rows of unlike lengths
+        array = np.array(None)
+        found = str(error).partition(".")[0]
+    if array.dtype.kind not in "biuf":
+        raise RenderError(
+            f"{what} is not an array of real numbers ({printable(found[:80])}); expected rows and "
+            "columns of them."
+        )
+    return array.astype(np.float64)
+
+
+def positive(value: object, what: str) -> float:
+    """Return a finite number above 0."""
+    is_number = isinstance(value, Real) and not isinstance(value, bool)
+    if not is_number or not 0.0 < float(value) < np.inf:  # type: ignore[arg-type]
+        said = f"{value:g}" if isinstance(value, float) else shown(value)
+        raise RenderError(f"{what} = {said}; expected a number above 0.")
+    return float(value)  # type: ignore[arg-type]
 
 
 def channel_names(light: FloatArray, given: Sequence[str] | None, format: str) -> tuple[str, ...]:
@@ -35,7 +63,17 @@ def channel_names(light: FloatArray, given: Sequence[str] | None, format: str) -
                 "write an EXR."
             )
         return usual[count]
+    if given is not None and not isinstance(given, Sequence):
+        raise RenderError(f"channels = {shown(given)}; expected a list of names.")
     names = tuple(given) if given is not None else usual.get(count, ())
+    for name in names:
+        if not (
+            isinstance(name, str) and name.isprintable() and len(name.encode()) <= _LONGEST_NAME
+        ):
+            raise RenderError(
+                f"channel name {shown(name)}; expected a text of at most {_LONGEST_NAME} bytes "
+                "that can be printed."
+            )
     if len(set(names)) != count or "" in names:
         raise RenderError(f"{len(names)} channel names for {count} channels; give one to each.")
     return names
@@ -59,7 +97,7 @@ def check_values(
 
 def check_alpha(alpha: npt.ArrayLike, light: FloatArray, names: Sequence[str]) -> FloatArray:
     """Return coverage (H, W); refuse what does not fit the picture, or would not be found again."""
-    coverage = np.asarray(alpha, dtype=np.float64)
+    coverage = as_light(alpha, "alpha")
     if coverage.shape != light.shape[:2]:
         raise RenderError(
             f"alpha of shape {coverage.shape} for a picture of {light.shape[:2]}; expected the "
@@ -90,8 +128,6 @@ def png_codes(
     light: FloatArray, exposure: float, alpha: FloatArray | None = None
 ) -> tuple[npt.NDArray[np.uint16], tuple[str, ...]]:
     """Return 16-bit sRGB codes, those of alpha as shares behind them; how many were clipped."""
-    if not (np.isfinite(exposure) and exposure > 0.0):
-        raise RenderError(f"exposure = {exposure:g}; expected a factor above 0.")
     exposed = exposure * light
     clipped = int(((exposed < -_ROUNDING) | (exposed > 1.0 + _ROUNDING)).sum())
     codes = np.rint(_CODES * srgb_encode(np.clip(exposed, 0.0, 1.0))).astype(np.uint16)

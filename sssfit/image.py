@@ -14,20 +14,23 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit._image_choice import LARGEST_BYTES
-from sssfit._image_files import FORMATS, image_format, is_image_file
+from sssfit._image_files import FORMATS, as_path, called, image_format, is_image_file
 from sssfit._image_read import read_image
 from sssfit._image_srgb import srgb_decode, srgb_encode
 from sssfit._image_values import (
     as_float32,
     as_format_has_it,
+    as_light,
     channel_names,
     check_alpha,
     check_values,
     png_codes,
+    positive,
 )
 from sssfit._image_write import image_bytes
-from sssfit.errors import FileError
-from sssfit.files import write_atomically
+from sssfit._material_checks import shown
+from sssfit.errors import FileError, RenderError
+from sssfit.files import reason, write_atomically
 
 __all__ = [
     "Image",
@@ -62,6 +65,11 @@ class Image:
         The file's name without its folder.
     notes : tuple of str
         What was done to the file's numbers, in words for stderr.
+
+    Raises
+    ------
+    RenderError
+        An array does not hold real numbers, or has another shape.
     """
 
     pixels: FloatArray
@@ -73,11 +81,25 @@ class Image:
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for field in ("pixels", "alpha"):
-            if (values := getattr(self, field)) is not None:
-                kept = np.array(values, dtype=np.float64, order="C")
-                kept.setflags(write=False)
-                object.__setattr__(self, field, kept)
+        self._store("pixels", 3)
+        if self.alpha is not None:
+            self._store("alpha", 2)
+            if self.alpha.shape != self.pixels.shape[:2]:
+                raise RenderError(
+                    f"alpha of shape {self.alpha.shape} for a picture of {self.pixels.shape[:2]}; "
+                    "expected the same rows and columns."
+                )
+
+    def _store(self, field: str, dimensions: int) -> None:
+        """Keep an array read-only, in the order of C."""
+        kept = np.array(as_light(getattr(self, field), field), order="C")
+        if kept.ndim != dimensions:
+            raise RenderError(
+                f"{field} of shape {kept.shape}; expected {dimensions} dimensions: rows, columns"
+                f"{' and channels' if dimensions == 3 else ''}."
+            )
+        kept.setflags(write=False)
+        object.__setattr__(self, field, kept)
 
 
 def load_image(
@@ -115,10 +137,15 @@ def load_image(
         Too large, without channels that can be used, with several layers and none of them named,
         or with NaN, infinite or negative values.
     """
-    image = Image(**read_image(Path(path), layer, largest_bytes))
-    check_values(image.pixels, image.channels, str(path), negative=False)
+    source = as_path(path)
+    largest = positive(largest_bytes, "largest_bytes")
+    if layer is not None and not isinstance(layer, str):
+        raise RenderError(f"layer = {shown(layer)}; expected a name.")
+    image = Image(**read_image(source, layer, largest))
+    origin = called(source)
+    check_values(image.pixels, image.channels, origin, negative=False)
     if image.alpha is not None:
-        check_values(image.alpha[..., None], ("alpha",), str(path), negative=True)
+        check_values(image.alpha[..., None], ("alpha",), origin, negative=True)
     return image
 
 
@@ -172,8 +199,10 @@ def save_image(
     """
     chosen = format or image_format(target)
     if chosen not in FORMATS:
-        raise FileError(f"format {chosen!r}: pictures are written as {', '.join(FORMATS)}.")
-    light = np.asarray(pixels, dtype=np.float64)
+        raise FileError(f"format {shown(chosen)}: pictures are written as {', '.join(FORMATS)}.")
+    light = as_light(pixels, "the picture")
+    exposure = positive(exposure, "exposure")
+    pitch = None if mm_per_pixel is None else positive(mm_per_pixel, "mm_per_pixel")
     names = channel_names(light, channels, chosen)
     check_values(light, names, "the picture", negative=True)
     coverage = None if alpha is None else check_alpha(alpha, light, names)
@@ -188,12 +217,20 @@ def save_image(
         values,
         format=chosen,
         channels=names if coverage is None else (*names, "A"),
-        mm_per_pixel=mm_per_pixel,
+        mm_per_pixel=pitch,
         has_alpha=coverage is not None,
         is_multiplied=is_multiplied,
     )
     if isinstance(target, str | Path):
-        write_atomically(Path(target), lambda stream: stream.write(data))
+        _write(as_path(target), data)
     else:
         target.write(data)
     return (*done, *clipped)
+
+
+def _write(path: Path, data: bytes) -> None:
+    """Write the whole file or nothing."""
+    try:
+        write_atomically(path, lambda stream: stream.write(data))
+    except OSError as error:  # a name that no file system takes
+        raise FileError(f"{called(path)} cannot be written: {reason(error)}.") from None

@@ -1,5 +1,6 @@
 """What light is in a picture file: layers, primaries, Radiance's factors, alpha, compressions."""
 
+import io
 import struct
 from pathlib import Path
 
@@ -394,3 +395,94 @@ def test_a_png_has_a_longest_side(tmp_path, capfd):
         with pytest.raises(RenderError, match=r"do not fit a PNG file, which takes 1000000 a side"):
             image.save_image(tmp_path / "a.png", np.zeros(shape))
     assert capfd.readouterr().err == ""
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    ["abc", None, [[1], [1, 2]], object(), {}, np.ones((2, 2, 3), complex), [[["a"]]], np.ones(3)],
+)
+def test_what_is_no_picture_is_one_line(tmp_path, wrong):
+    for call in (
+        lambda: image.save_image(tmp_path / "a.exr", wrong),
+        lambda: image.Image(wrong, ("R", "G", "B")),
+        lambda: Scene("x", wrong, 0.3),
+    ):
+        with pytest.raises(RenderError, match=r"array of real numbers|of shape") as caught:
+            call()
+        assert "\n" not in str(caught.value)
+    if wrong is not None:
+        for call in (
+            lambda: image.save_image(tmp_path / "a.exr", picture(), alpha=wrong),
+            lambda: image.Image(picture(), ("R", "G", "B"), alpha=wrong),
+            lambda: Scene("x", picture(), 0.3, mask=wrong),
+        ):
+            with pytest.raises(RenderError, match=r"real numbers|of shape|mask is \("):
+                call()
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"channels": 5}, "channels = 5; expected a list of names"),
+        ({"channels": [1, 2, 3]}, "channel name 1; expected a text"),
+        ({"channels": ["a\0", "b", "c"]}, r"channel name 'a\\x00'; expected a text"),
+        ({"channels": ["\udc80", "b", "c"]}, "expected a text"),
+        ({"channels": ["a" * 256, "b", "c"]}, "expected a text of at most 255 bytes"),
+        ({"format": 5}, "format 5: pictures are written as"),
+        *[({"exposure": each}, "exposure = .*; expected a number above 0") for each in ("x", None)],
+        *[
+            ({"mm_per_pixel": each}, "mm_per_pixel = .*; expected a number above 0")
+            for each in ("x", np.nan, -1, 0, True)
+        ],
+    ],
+)
+def test_what_else_cannot_be_written(options, words):
+    stream = io.BytesIO()
+    with pytest.raises(SssfitError, match=words) as caught:
+        image.save_image(stream, picture(), **{"format": "exr", **options})
+    assert str(caught.value).isprintable()
+    assert stream.getvalue() == b""
+
+
+@pytest.mark.parametrize(
+    ("path", "words"),
+    [
+        (None, "None is no path"),
+        (5, "5 is no path"),
+        (b"a.png", "is no path"),
+        ("a\0b.png", "holds a null character"),
+        (5000 * "x" + ".png", r"^x{200}\.\.\.x{196}\.png cannot be .*name too long"),
+        ("a\n\x1b[31mb.png", r"a\\n\\x1b\[31mb\.png cannot be read: no such file"),
+    ],
+)
+def test_what_is_no_path(tmp_path, monkeypatch, path, words):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(FileError, match=words) as caught:
+        image.load_image(path)
+    assert str(caught.value).isprintable()
+    if isinstance(path, str) and "\n" not in path:
+        with pytest.raises(FileError, match=words):
+            image.save_image(path, picture())
+    assert not image.is_image_file(path)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [({"layer": 5}, "layer = 5"), ({"largest_bytes": None}, "largest_bytes = None")],
+)
+def test_wrong_options_of_reading(options, words):
+    with pytest.raises(RenderError, match=words):
+        image.load_image(DATA / "blender-layer.exr", **options)
+
+
+@pytest.mark.parametrize("mask", [np.full((5, 7), 0.5), np.full((5, 7), 1e20)])
+def test_a_mask_holds_whole_numbers(mask):
+    with pytest.raises(RenderError, match="mask holds other values than whole numbers"):
+        Scene("x", picture(), 0.3, mask=mask)
+
+
+def test_alpha_a_little_below_0_is_none():
+    alpha = np.full((5, 7), -1e-3)
+    scene = Scene.from_image(image.Image(picture(), ("R", "G", "B"), alpha=alpha), 0.3)
+    assert scene.alpha.tolist() == np.zeros((5, 7)).tolist()
