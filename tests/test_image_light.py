@@ -14,8 +14,7 @@ from sssfit.errors import FileError, RenderError, SssfitError
 from sssfit.render.scene import Scene
 
 DATA = Path(__file__).parent / "data"
-# SMPTE ST 2065-1, ACEScg and ITU-R BT.2020, with what colour-science 0.4.7 gives for them:
-# matrix_RGB_to_RGB(..., "ITU-R BT.709", chromatic_adaptation_transform="Bradford").
+# SMPTE ST 2065-1, ACES S-2014-004 and ITU-R BT.2020-2.
 PRIMARIES = {
     "ACES2065-1": (0.7347, 0.2653, 0.0, 1.0, 0.0001, -0.077, 0.32168, 0.33767),
     "ACEScg": (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767),
@@ -32,12 +31,16 @@ def exr_with(path, channels, **header):
 
 def other_library(name):
     """The matrix to BT.709 by colour-science."""
-    import colour
+    with np.printoptions():  # which its import changes
+        import colour
 
     theirs, ours = (colour.RGB_COLOURSPACES[each] for each in (name, "ITU-R BT.709"))
-    for space in (theirs, ours):
-        space.use_derived_transformation_matrices(True)
-    return colour.matrix_RGB_to_RGB(theirs, ours, chromatic_adaptation_transform="Bradford")
+    to_xyz, from_xyz = (
+        colour.normalised_primary_matrix(each.primaries, each.whitepoint) for each in (theirs, ours)
+    )
+    whites = (colour.xy_to_XYZ(each.whitepoint) for each in (theirs, ours))
+    adapted = colour.adaptation.matrix_chromatic_adaptation_VonKries(*whites, transform="Bradford")
+    return np.linalg.inv(from_xyz) @ adapted @ to_xyz
 
 
 def test_a_compression_that_the_reader_lacks_is_named():
