@@ -237,7 +237,9 @@ def _reachable(reflectance: npt.ArrayLike, eta: float, light: str) -> FloatArray
         raise MaterialError(f"reflectance has shape {asked.shape}; expected one number a channel.")
     if light not in LIGHTS:
         raise MaterialError(f"light = {light!r}; expected {' or '.join(LIGHTS)}.")
-    most = largest_reflectance(number("eta", eta), light)
+    if number("eta", eta) < 1.0:  # a material may have less; the exact solver takes no less
+        raise MaterialError(f"eta = {eta:g}; expected a relative refractive index from 1 to 4.")
+    most = largest_reflectance(eta, light)
     where = "under diffuse light" if light == "diffuse" else f"at eta = {eta:g}"
     for k in np.flatnonzero(~((asked >= 0.0) & (asked <= most))):
         raise MaterialError(
