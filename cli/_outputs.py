@@ -10,6 +10,9 @@ import click
 
 from ._report import binary_stdout
 
+# What is written, and the ending of its name.
+PROFILE, KERNEL = ("a profile", ".npz"), ("a kernel", ".json")
+
 
 @contextlib.contextmanager
 def held(
@@ -18,12 +21,14 @@ def held(
     *,
     inputs: Iterable[str | Path | None],
     force: bool,
+    named: tuple[str, str] | None = None,
 ) -> Iterator[None]:
     """Refuse outputs that could not or should not be written, and lock the others; None is stdout.
 
-    ``is_own`` tells an older output of the same kind, ``inputs`` are what the verb reads.
+    ``is_own`` tells an older output of the same kind, ``inputs`` are what the verb reads, ``named``
+    is what is written and how its name ends: ("a profile", ".npz").
     """
-    from sssfit.files import check_output, locked
+    from sssfit.files import check_ending, check_output, locked
 
     if None in paths:
         binary_stdout()  # closed: said now and not after the work
@@ -32,6 +37,8 @@ def held(
     check_distinct(files)
     with contextlib.ExitStack() as locks:
         for path in files:
+            if named is not None:
+                check_ending(path, *named)
             check_output(path, is_own, force=force, inputs=read)
             locks.enter_context(locked(path))
         yield

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._compiling import say_if_compiling
 from ._methods import METHODS
-from ._outputs import held
+from ._outputs import PROFILE, held
 from ._report import say
 from ._simulate_outputs import write_profile
 from ._simulate_report import figures_of, report
@@ -39,7 +39,9 @@ def run_computed(
     from ._interrupt import asked_to_stop
 
     rows: dict[int, dict[str, Any]] = {}
-    outputs = held(targets, is_profile_file, inputs=request.inputs, force=request.force)
+    outputs = held(
+        targets, is_profile_file, inputs=request.inputs, force=request.force, named=PROFILE
+    )
     with asked_to_stop() as stop, outputs:
         if method == "exact":
             say_if_compiling(request.common, solver=True)

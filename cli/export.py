@@ -106,7 +106,9 @@ def _write(content: bytes, path: Path | None, form: str, name: str, *, force: bo
     from sssfit.profile_csv import is_profile_csv
 
     own = {"hlsl": is_hlsl_file, "json": is_kernel_file, "csv": is_profile_csv}
-    with held([path], own[form], inputs=[name], force=force):
+    with held(
+        [path], own[form], inputs=[name], force=force, named=(f"--format {form}", f".{form}")
+    ):
         if path is not None:
             write_atomically(path, lambda stream: stream.write(content))
             return

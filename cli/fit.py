@@ -10,7 +10,7 @@ import click
 from ._fit_options import fit_options
 from ._fits import FITS, fit_lines, own_settings
 from ._options import Common, Length, common_options
-from ._outputs import held
+from ._outputs import KERNEL, held
 from ._report import binary_stdin, binary_stdout, finish, newest, percent, table
 
 if TYPE_CHECKING:
@@ -97,7 +97,7 @@ def fit(
     from sssfit.kernel import is_kernel_file
 
     settings["support_mm"] = None if support == "auto" else support
-    with held([path], is_kernel_file, inputs=[name], force=force):
+    with held([path], is_kernel_file, inputs=[name], force=force, named=KERNEL):
         result = _fit_and_write(source, method, settings, path)
     figures = _figures(result, name, path)
     finish(common, figures, _text(result, figures), to_stderr=path is None)
