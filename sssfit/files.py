@@ -7,6 +7,7 @@ reader sees the old file or the new one and never a part of either.
 import contextlib
 import glob
 import os
+import shutil
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
@@ -25,6 +26,10 @@ else:
 # import: it can only be read by changing it, and threads may be writing later.
 _UMASK = os.umask(0)
 os.umask(_UMASK)
+
+
+# Temporary files and folders, and locks, of this process at this moment.
+_unfinished: set[Path] = set()
 
 
 def reason(error: OSError) -> str:
@@ -107,6 +112,7 @@ def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
     path = _followed(path)
     with _clear_errors(path):
         handle, temporary = _temporary(path)
+        _unfinished.add(temporary)
         try:
             with os.fdopen(handle, "wb") as stream:
                 write(stream)
@@ -118,6 +124,32 @@ def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
         except BaseException:
             temporary.unlink(missing_ok=True)
             raise
+        finally:
+            _unfinished.discard(temporary)
+
+
+@contextlib.contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Make a folder outside the user's own, removed again also where the process ends at once."""
+    with tempfile.TemporaryDirectory() as name:
+        _unfinished.add(Path(name))
+        try:
+            yield Path(name)
+        finally:
+            _unfinished.discard(Path(name))
+
+
+def remove_unfinished() -> None:
+    """Delete temporary files and locks of this process, which is about to end at once.
+
+    Other threads may still be writing: what is not yet renamed into place goes, what is stays.
+    """
+    for path in tuple(_unfinished):
+        with contextlib.suppress(OSError):
+            if path.is_dir():
+                shutil.rmtree(path)
+            else:
+                path.unlink()
 
 
 def remove_leftovers(path: Path) -> None:
@@ -147,6 +179,7 @@ def locked(path: Path) -> Iterator[None]:
     lock_path = path.with_name(f".{path.name}.lock")
     with _clear_errors(path):
         handle = _open_locked(lock_path, path)
+    _unfinished.add(lock_path)
     try:
         remove_leftovers(path)
         yield
@@ -154,6 +187,7 @@ def locked(path: Path) -> Iterator[None]:
         # Unlink before the lock is let go: a waiting process then notices that its file is gone.
         with contextlib.suppress(OSError):
             lock_path.unlink()
+        _unfinished.discard(lock_path)
         os.close(handle)
 
 

@@ -1,6 +1,5 @@
 """A height field with what rays need to meet it quickly; lit by threads, a band of rows each."""
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -102,6 +101,7 @@ def light_field(
     ``coarse`` casts shadows from outside the fine field. ``smooth`` averages several samples a
     pixel; without it a pixel is what its centre sees.
     """
+    from sssfit._jit import thread_pool
     from sssfit._jit.lit_field import light_rows
 
     buffers = Buffers(
@@ -125,6 +125,6 @@ def light_field(
             buffers.specular,
         )
 
-    with ThreadPoolExecutor(thread_count(threads)) as pool:
+    with thread_pool(thread_count(threads)) as pool:
         list(pool.map(band, range(0, shape[0], BAND)))
     return buffers
