@@ -1,0 +1,414 @@
+"""A small folder of every kind of file, the command line run in copies of it, and calls recorded.
+
+The long works of the library (walks of 1e7 photons, comparisons, choices) are recorded with all
+their arguments, defaults filled in, and then done in small: see ``STAND_INS``.
+"""
+
+import contextlib
+import functools
+import importlib
+import inspect
+import json
+import shlex
+import shutil
+import tempfile
+import warnings
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from types import NoneType
+from typing import Any
+
+import numpy as np
+from click.testing import CliRunner
+from matplotlib.figure import Figure
+from test_mci import file_text, run_text
+from test_mco import mco_text
+
+from sssfit import compare, simulate
+from sssfit.cli import cli
+from sssfit.compare import budget, choose, convergence, editing, pareto, sheet
+from sssfit.compare.candidates import Candidate, candidates
+from sssfit.errors import SssfitWarning
+from sssfit.fit import fit_svd
+from sssfit.image import load_image, save_image
+from sssfit.kernel import SeparableKernel
+from sssfit.material import Material, parse_material
+from sssfit.profile import Profile
+from sssfit.profile_csv import csv_text
+from sssfit.render.irradiance import make_scene
+from sssfit.render.scene import Scene
+from sssfit.simulate import Checkpoint, inversion, simulate_montecarlo
+from sssfit.simulate._finished import DEFAULT_PHOTONS
+
+WAX = (
+    'name = "wax"\nsource = "a test"\neta = 1.3\ng = 0\n'
+    "sigma_a_per_mm = [0.03, 0.2, 0.6]\nsigma_s_per_mm = [0.7, 0.8, 0.9]\n"
+)
+LAYERS = (
+    'name = "plate"\nchannels = ["R", "G", "B"]\neta_above = 1.1\neta_below = 1.2\n'
+    "[[layers]]\neta = 1.4\ng = 0.5\nsigma_a_per_mm = [0.1, 0.2, 0.3]\n"
+    "sigma_s_per_mm = [4.0, 5.0, 6.0]\nthickness_mm = 0.5\n"
+    "[[layers]]\neta = 1.3\ng = 0.1\nsigma_a_per_mm = [0.2, 0.4, 0.5]\n"
+    "sigma_s_per_mm = [1.0, 1.5, 1.25]\nthickness_mm = 1.5\n"
+)
+PHOTONS, DR_MM, RADIUS_MM = 4000, 0.2, 6.0
+GRID = f"--dr {DR_MM} --radius {RADIUS_MM}"
+FOREIGN = "mine\n"  # what a file of somebody else's holds
+ENDINGS = ("npz", "json", "exr", "png", "md", "csv", "toml", "hlsl")
+
+
+@functools.cache
+def wax() -> Material:
+    return parse_material(WAX, "wax.toml")
+
+
+@functools.cache
+def plate() -> Material:
+    return parse_material(LAYERS, "plate.toml")
+
+
+@functools.cache
+def profile() -> Profile:
+    """A walk: noise, energy beyond the grid, and three channels that differ in everything."""
+    return simulate_montecarlo(wax(), photons=PHOTONS, dr_mm=DR_MM, radius_mm=RADIUS_MM)
+
+
+@functools.cache
+def plate_profile() -> Profile:
+    return simulate_montecarlo(plate(), photons=PHOTONS, dr_mm=DR_MM, radius_mm=RADIUS_MM)
+
+
+@functools.cache
+def kernel() -> SeparableKernel:
+    """Its energy is not the profile's, so that drifts of the channels differ."""
+    return fit_svd(profile(), rank=2, energy="keep").kernel
+
+
+@functools.cache
+def picture() -> np.ndarray:
+    return np.random.default_rng(3).random((12, 9, 3)).astype(np.float32)
+
+
+@functools.cache
+def files() -> Path:
+    """The folder that every run begins with a copy of."""
+    folder = Path(tempfile.mkdtemp(prefix="sssfit-world-"))
+    (folder / "wax.toml").write_text(WAX)
+    (folder / "plate.toml").write_text(LAYERS)
+    plate_profile().save(folder / "plate.profile.npz")
+    profile().save(folder / "wax.profile.npz")
+    kernel().save(folder / "wax.svd2.kernel.json")
+    save_image(folder / "mine.exr", picture(), mm_per_pixel=DR_MM)
+    save_image(folder / "bare.exr", picture())
+    second = run_text("b.mco", layer="1.4 1 5 0 1E8")
+    (folder / "two.mci").write_text(file_text(run_text("a.mco"), second))
+    (folder / "r.mco").write_text(mco_text(name="r.mco"))
+    green = mco_text(layers=("1.4 3 100 0.8 0.1", "1.4 2.5 10 0 0.2"), name="g.mco")
+    (folder / "g.mco").write_text(green)
+    (folder / "table.csv").write_text(csv_text(profile()))
+    (folder / "bare.csv").write_text("r_mm,R,G\n1,.02,.015\n2,.01,.005\n4,.002,.001\n")
+    for ending in ENDINGS:
+        (folder / f"foreign.{ending}").write_text(FOREIGN)
+    (folder / "out").mkdir()
+    return folder
+
+
+@dataclass(frozen=True)
+class Ran:
+    """What a command left: its exit status, what it said, its files, and the calls it made."""
+
+    status: int
+    stdout: str
+    stderr: str
+    written: dict[str, bytes]
+    calls: tuple[Any, ...] = field(default=())
+
+    @property
+    def figures(self) -> dict[str, Any]:
+        """The JSON object."""
+        return json.loads(next(line for line in self.stdout.splitlines() if line[:1] == "{"))
+
+    @property
+    def text(self) -> str:
+        """What people read: all but the JSON object."""
+        return "\n".join(line for line in self.stdout.splitlines() if line[:1] != "{")
+
+    def loaded(self, kind: Any, ending: str) -> Any:
+        """The one file written of an ending, read by ``kind``."""
+        (name,) = [each for each in self.written if each.endswith(ending)]
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / Path(name).name
+            path.write_bytes(self.written[name])
+            return kind(path)
+
+    @property
+    def profile(self) -> dict[str, Any]:
+        return content_of(self.loaded(Profile.load, ".npz"))
+
+    @property
+    def kernel(self) -> Any:
+        return weights_of(self.loaded(SeparableKernel.load, ".kernel.json"))
+
+    @property
+    def picture(self) -> np.ndarray:
+        return self.loaded(load_image, ".exr").pixels
+
+
+def content_of(made: Profile) -> dict[str, Any]:
+    """The figures of a profile."""
+    names = ("r_edges_mm", "annulus_energy", "beyond_grid", "annulus_transmittance", "channels")
+    return {name: getattr(made, name) for name in names}
+
+
+def weights_of(made: SeparableKernel) -> list[Any]:
+    """The figures of a kernel."""
+    return [made.mm_per_pixel, made.signs, made.weights, made.scale]
+
+
+CALLS: list[Any] = []
+ASIDE = {"progress", "stop", "clock"}  # arguments that only report, stop or measure
+
+
+@functools.cache
+def run(command: str, *, both: bool = False) -> Ran:
+    """Run a command in a copy of `files`; ``both`` prints the JSON object and then the text."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        shutil.copytree(files(), folder, dirs_exist_ok=True)
+        before = contents(folder)
+        CALLS.clear()
+        with contextlib.chdir(folder), warnings.catch_warnings(), finishing(both):
+            warnings.simplefilter("ignore", SssfitWarning)
+            ended = CliRunner().invoke(cli, shlex.split(command))
+        if ended.exception is not None and not isinstance(
+            ended.exception, (SystemExit, ValueError)
+        ):
+            raise ended.exception
+        after = contents(folder)
+    changed = {name: data for name, data in after.items() if before.get(name) != data}
+    stdout = ended.stdout_bytes.decode(errors="replace")
+    return Ran(ended.exit_code, stdout, ended.stderr, changed, tuple(CALLS))
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    paths = [path for path in folder.rglob("*") if path.is_file()]
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
+
+
+@contextlib.contextmanager
+def finishing(both: bool):
+    """Let every verb end with its JSON object and its text, of one and the same run."""
+    if not both:
+        yield
+        return
+    from sssfit.cli import _report
+
+    real = _report.finish
+
+    def twice(common, figures, text, *, to_stderr=False):
+        for as_json in (True, False):
+            real(replace(common, json=as_json, quiet=False), figures, text)
+
+    modules = [each for name, each in cli_modules() if getattr(each, "finish", None) is real]
+    for each in modules:
+        each.finish = twice
+    try:
+        yield
+    finally:
+        for each in modules:
+            each.finish = real
+
+
+def cli_modules():
+    import sys
+
+    return [(k, v) for k, v in list(sys.modules.items()) if k.startswith("sssfit.cli")]
+
+
+# What the library is called with
+
+
+def told(value: Any) -> Any:
+    """An argument as it can be compared."""
+    if isinstance(value, Profile):
+        return value.material_name, value.meta.get("method"), float(value.annulus_energy.sum())
+    if isinstance(value, Material):
+        return value.name
+    if isinstance(value, Scene):
+        light = value.irradiance
+        return value.name, light.shape, value.mm_per_pixel, zlib.crc32(light.tobytes())
+    if isinstance(value, Checkpoint):
+        return value.every_seconds
+    if isinstance(value, Candidate):
+        return value.label
+    if isinstance(value, (list, tuple)):
+        return [told(each) for each in value]
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, Mapping):
+        return dict(value)
+    return value if isinstance(value, (str, int, float, NoneType)) else type(value).__name__
+
+
+def recorded(real, stand_in):
+    """A function that notes what it was called with, in full, and does its work in small."""
+    signature = inspect.signature(real)
+
+    @functools.wraps(real)
+    def call(*arguments, **keywords):
+        bound = signature.bind(*arguments, **keywords)
+        bound.apply_defaults()
+        noted = {key: told(each) for key, each in bound.arguments.items() if key not in ASIDE}
+        if noted.get("photons", 0) is None and noted.get("target_error") is None:
+            noted["photons"] = DEFAULT_PHOTONS  # what None stands for
+        CALLS.append((real.__name__, noted))
+        return stand_in(real, dict(bound.arguments))
+
+    return call
+
+
+def called(path: str, *arguments: Any, **keywords: Any) -> tuple[Any, ...]:
+    """What is recorded of a call of the library by a user of Python."""
+    CALLS.clear()
+    module, function = path.rsplit(".", 1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SssfitWarning)
+        getattr(importlib.import_module(module), function)(*arguments, **keywords)
+    return tuple(CALLS)
+
+
+def _unrecorded(function: Any) -> Any:
+    """The real function, whether it is being recorded or not."""
+    return getattr(function, "__wrapped__", function)
+
+
+def few_photons(real, given):
+    if given["target_error"] is None:
+        given["photons"] = min(given["photons"] or PHOTONS, PHOTONS)
+    return real(given.pop("materials"), **given)
+
+
+@functools.cache
+def exact_profile() -> Profile:
+    return _unrecorded(simulate.simulate_exact)(wax(), dr_mm=0.25, radius_mm=12.0)
+
+
+@functools.cache
+def inverted() -> Material:
+    real = _unrecorded(inversion.material_from_reflectance)
+    return real([0.4, 0.2, 0.1], [1.3, 0.9, 0.7], 1.3, name="lard", channels=["R", "G", "B"])
+
+
+@functools.cache
+def choice() -> Any:
+    """One small choice, whatever is asked for."""
+    scene = make_scene("edge", height=48, width=48, mm_per_pixel=0.5)
+    return _unrecorded(choose.choose)(wax(), mm_per_pixel=0.5, scene=scene, tolerance=0.8)
+
+
+def small_choice(_real, given):
+    for step in choice().steps if given["progress"] else ():
+        given["progress"](step)
+    return choice()
+
+
+@functools.cache
+def comparison() -> Any:
+    """One small comparison, whatever is asked for."""
+    labels = ("pre-integrated", "svd 1", "svd 2", "svd 2, kept", "gaussians 1")
+    some = [each for each in candidates(61) if each.label in labels]
+    scenes = [
+        make_scene(name, height=24, width=32, mm_per_pixel=0.5, **own)
+        for name, own in (("disk", {}), ("edge", {"angle_degrees": 20.0}))
+    ]
+    real = _unrecorded(pareto.compare_kernels)
+    return real(profile(), scenes, mm_per_pixel=0.5, support_mm=3.0, candidates=some)
+
+
+@functools.cache
+def budgets(terms: int = 2) -> Any:
+    """The budget of one small picture, by the number of terms."""
+    scene = make_scene("disk", height=24, width=24, mm_per_pixel=0.5)
+    real = _unrecorded(budget.error_budgets)
+    return real(wax(), [scene], photons=PHOTONS, settings={"rank": terms})
+
+
+def rank_of(given: Mapping[str, Any]) -> int:
+    """The rank that was asked for; 3 where the library is to choose."""
+    return (given["settings"] or {}).get("rank", 3)
+
+
+@functools.cache
+def models() -> Any:
+    return _unrecorded(compare.compare_models)(wax(), walk=profile())
+
+
+@functools.cache
+def small_sheet() -> Any:
+    real = _unrecorded(sheet.compute_sheet)
+    return real(profile(), mm_per_pixel=0.5, pixels=24, most_terms=1)
+
+
+@functools.cache
+def small_editing() -> Any:
+    return _unrecorded(editing.compute_editing)(height=24, width=24, mm_per_pixel=5.0)
+
+
+@functools.cache
+def small_convergence() -> Any:
+    """Made up: resolutions of the exact solver take seconds."""
+    walks = tuple(
+        convergence.WalkRun(photons, 1 + k, 0.125 * (k + 1), error)
+        for k, (photons, error) in enumerate(((1000, 0.031), (2000, 0.027), (4000, 0.0142)))
+    )
+    line = convergence.fit_line([each.photons for each in walks], [each.error for each in walks])
+    exact = (
+        convergence.ExactRun(1e-2, 0.51, 3.1e-3, 2.2e-3),
+        convergence.ExactRun(1e-4, 1.73, 4.3e-5, None),
+    )
+    return convergence.Convergence(exact_profile(), walks, exact, line)
+
+
+def blank(*_) -> Figure:
+    """A chart with nothing on it: what charts look like is tested where they are made."""
+    return Figure(figsize=(0.1, 0.1))
+
+
+_CHARTS = ("profile", "pareto", "budget", "sheet", "editing", "convergence", "models", "guide")
+STAND_INS = {
+    "sssfit.simulate.simulate_montecarlo_many": few_photons,
+    "sssfit.simulate.simulate_exact": lambda *_: exact_profile(),
+    "sssfit.simulate.simulate_exact_many": lambda *_: [exact_profile()],
+    "sssfit.simulate.inversion.material_from_reflectance": lambda *_: inverted(),
+    "sssfit.compare.choose.choose": small_choice,
+    "sssfit.compare.compare_kernels": lambda *_: comparison(),
+    "sssfit.compare.budget.error_budgets": lambda _, given: budgets(rank_of(given)),
+    "sssfit.compare.compare_models": lambda *_: models(),
+    "sssfit.compare.sheet.compute_sheet": lambda *_: small_sheet(),
+    "sssfit.compare.editing.compute_editing": lambda *_: small_editing(),
+    "sssfit.compare.convergence.compute_convergence": lambda *_: small_convergence(),
+    **{f"sssfit.chart.{kind}_figure": blank for kind in (*_CHARTS, "spectrum")},
+}
+
+
+@contextlib.contextmanager
+def recording():
+    """Record the calls of the long works and do them in small."""
+    import pytest
+
+    with pytest.MonkeyPatch.context() as patch:
+        for name, stand_in in STAND_INS.items():
+            module, function = name.rsplit(".", 1)
+            owner = importlib.import_module(module)
+            patch.setattr(owner, function, recorded(getattr(owner, function), stand_in))
+        patch.setattr("sssfit.material.material_names", lambda: ("skin1", "marble"))
+        yield
+
+
+def quietly(function, *arguments: Any, **settings: Any) -> Any:
+    """Call what may warn of noisy profiles."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SssfitWarning)
+        return function(*arguments, **settings)
