@@ -24,7 +24,7 @@ import numpy as np
 from click.testing import CliRunner
 from matplotlib.figure import Figure
 from test_mci import file_text, run_text
-from test_mco import mco_text
+from test_mco import BELOW, DR_CM, IN_LAYERS, N_R, REFLECTED, SPECULAR, block, mco_text
 
 from sssfit import compare, simulate
 from sssfit.cli import cli
@@ -105,14 +105,25 @@ def files() -> Path:
     second = run_text("b.mco", layer="1.4 1 5 0 1E8")
     (folder / "two.mci").write_text(file_text(run_text("a.mco"), second))
     (folder / "r.mco").write_text(mco_text(name="r.mco"))
-    green = mco_text(layers=("1.4 3 100 0.8 0.1", "1.4 2.5 10 0 0.2"), name="g.mco")
-    (folder / "g.mco").write_text(green)
+    (folder / "g.mco").write_text(mco_text(name="g.mco", **green_blocks()))
     (folder / "table.csv").write_text(csv_text(profile()))
     (folder / "bare.csv").write_text("r_mm,R,G\n1,.02,.015\n2,.01,.005\n4,.002,.001\n")
     for ending in ENDINGS:
         (folder / f"foreign.{ending}").write_text(FOREIGN)
     (folder / "out").mkdir()
     return folder
+
+
+def green_blocks() -> dict[str, str]:
+    """Those of an .mco that reflects half of what the other does, and transmits the rest."""
+    reflected, below = 0.5 * REFLECTED, BELOW + 0.5 * REFLECTED
+    area_cm2 = 2 * np.pi * (np.arange(N_R) + 0.5) * DR_CM**2
+    rat = [SPECULAR, reflected.sum(), IN_LAYERS.sum(), below.sum()]
+    return {
+        "RAT": block("RAT", rat, "{:<14.6G} \t#which one [-]"),
+        "Rd_r": block("Rd_r", reflected / area_cm2),
+        "Tt_r": block("Tt_r", below / area_cm2),
+    }
 
 
 @dataclass(frozen=True)
@@ -291,8 +302,11 @@ def few_photons(real, given):
 
 
 @functools.cache
-def exact_profile() -> Profile:
-    return _unrecorded(simulate.simulate_exact)(wax(), dr_mm=0.25, radius_mm=12.0)
+def exact_profile(name: str = "wax") -> Profile:
+    """An exact profile, that of wax whatever it is called."""
+    made = _unrecorded(simulate.simulate_exact)(wax(), dr_mm=0.25, radius_mm=12.0)
+    made.meta["material"]["name"] = name
+    return made
 
 
 @functools.cache
@@ -325,6 +339,19 @@ def comparison() -> Any:
     ]
     real = _unrecorded(pareto.compare_kernels)
     return real(profile(), scenes, mm_per_pixel=0.5, support_mm=3.0, candidates=some)
+
+
+def small_comparison(_real, given):
+    """That of wax; another material has errors half as large again, so that they can be told."""
+    if given["profile"].material_name == "wax":
+        return comparison()
+    rows = [
+        replace(
+            row, delta_e_2000_mean=1.5 * row.delta_e_2000_mean, relative_l2=1.5 * row.relative_l2
+        )
+        for row in comparison().rows
+    ]
+    return replace(comparison(), profile=given["profile"], rows=tuple(rows))
 
 
 @functools.cache
@@ -379,11 +406,13 @@ def blank(*_) -> Figure:
 _CHARTS = ("profile", "pareto", "budget", "sheet", "editing", "convergence", "models", "guide")
 STAND_INS = {
     "sssfit.simulate.simulate_montecarlo_many": few_photons,
-    "sssfit.simulate.simulate_exact": lambda *_: exact_profile(),
-    "sssfit.simulate.simulate_exact_many": lambda *_: [exact_profile()],
+    "sssfit.simulate.simulate_exact": (lambda _, given: exact_profile(given["material"].name)),
+    "sssfit.simulate.simulate_exact_many": (
+        lambda _, given: [exact_profile(each.name) for each in given["materials"]]
+    ),
     "sssfit.simulate.inversion.material_from_reflectance": lambda *_: inverted(),
     "sssfit.compare.choose.choose": small_choice,
-    "sssfit.compare.compare_kernels": lambda *_: comparison(),
+    "sssfit.compare.compare_kernels": small_comparison,
     "sssfit.compare.budget.error_budgets": lambda _, given: budgets(rank_of(given)),
     "sssfit.compare.compare_models": lambda *_: models(),
     "sssfit.compare.sheet.compute_sheet": lambda *_: small_sheet(),
