@@ -325,7 +325,53 @@ def choice() -> Any:
 def small_choice(_real, given):
     for step in choice().steps if given["progress"] else ():
         given["progress"](step)
-    return choice()
+    return OTHER_CHOICES.get(given["tolerance"], choice)()
+
+
+def under_a_pixel() -> Any:
+    return choose.Choice(choice().profile, 30.0, 7.0)
+
+
+def head_under_a_pixel() -> Any:
+    return choose.Choice(choice().profile, 30.0, 7.0, choice().scenes)
+
+
+def no_blur_is_within() -> Any:
+    nothing = replace(choice().steps[0], within=True)
+    return choose.Choice(choice().profile, 0.5, 9.0, choice().scenes, (nothing,), nothing)
+
+
+def other_reasons() -> Any:
+    """What the small choice does not come to: a wider view, supports left out, too few photons."""
+    found = choice()
+    photons = replace(
+        found.photons,
+        photons=None,
+        counts=(10_000, 100_000),
+        delta_e_2000_mean=(1.75, 1.25),
+        seconds=(0.5, 1.5),
+        truth_method="montecarlo",
+    )
+    option = found.chosen.option
+    guided = replace(option, candidate=Candidate("guided k = 4", "guided", 1, {"k": 4.0}))
+    return replace(
+        found,
+        tolerance=found.tolerance + 0.0625,
+        cheaper=replace(found.cheaper, delta_e_2000_mean=0.5, within=False),
+        dearer=(*found.dearer, replace(found.dearer[0], within=False)),
+        steps=(*found.steps, replace(found.chosen, option=guided)),
+        photons=photons,
+        too_narrow=(5, 9),
+    )
+
+
+# By the tolerance that is asked for.
+OTHER_CHOICES = {
+    6.0: under_a_pixel,
+    7.0: head_under_a_pixel,
+    8.0: no_blur_is_within,
+    9.0: other_reasons,
+}
 
 
 @functools.cache

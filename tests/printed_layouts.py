@@ -548,11 +548,31 @@ def choice(f: Figures) -> list[Any]:
         )
         for each in f["pictures"]
     ]
+    if f["kernel"] is None:
+        return [head, _no_blur(f), *judged, Words("No kernel is written.")]
     return [head, *_kernel_lines(f), *judged, wrote(f)]
 
 
+def _no_blur(f: Figures) -> Words:
+    if f["chosen"]:
+        return Words(
+            "no blur is needed: irradiance times diffuse reflectance has {}; any kernel would cost "
+            "more.",
+            _loss(f["chosen"]),
+        )
+    if f["pictures"]:
+        return Words("no blur is needed: the head is under a pixel.")
+    return Words(
+        "no blur is needed: the profile is under a pixel, 99.9 % of it within {} mm.",
+        f["support_mm"],
+    )
+
+
 def _kernel_lines(f: Figures) -> list[Any]:
-    chosen, kernel = f["chosen"], f["kernel"]
+    chosen, kernel, cheaper = f["chosen"], f["kernel"], f["cheaper"]
+    why: Any = Words("")
+    if cheaper["delta_e_2000_mean"] <= f["tolerance"]:  # 95 % of it are for wider views
+        why = Words(", on a wider view, which may have {}", 0.95 * f["tolerance"])
     lines = [
         Words(
             f"{{}}: {{}} {plural(kernel['rank'], 'term')}, {{}} weights a pixel, {{}}, {{}} s a "
@@ -561,16 +581,21 @@ def _kernel_lines(f: Figures) -> list[Any]:
             kernel["seconds_per_megapixel"],
         ),
         Words("runner-up: {}", _beside(f["runner_up"], chosen)),
-        Words("cheaper is not enough: {}", _beside(f["cheaper"], chosen)),
+        Words("cheaper is not enough: {}{}", _beside(cheaper, chosen), why),
     ]
     for each in f["dearer"]:
-        why = "is not needed" if each["within"] else "is no better"
-        lines.append(Words("dearer {}: {}", why, _beside(each, chosen)))
+        what = "is not needed" if each["within"] else "is no better"
+        lines.append(Words("dearer {}: {}", what, _beside(each, chosen)))
+    return [*lines, *_not_tried(f), _photons(f["photons"])]
+
+
+def _not_tried(f: Figures) -> list[Words]:
+    lines = []
     if f["too_narrow"]:
         pixels = ", ".join(map(str, f["too_narrow"]))
         lines.append(
             Words(
-                "not tried: kernels of {} pixels, to which even the true one cannot be cut", pixels
+                f"not tried: kernels of {pixels} pixels, to which even the true one cannot be cut"
             )
         )
     if not any(row["method"] == "guided" for row in f["rows"]):
@@ -579,7 +604,7 @@ def _kernel_lines(f: Figures) -> list[Any]:
                 "not tried: guided fits, for their time, where another pass will do or one is wide"
             )
         )
-    return [*lines, _photons(f["photons"])]
+    return lines
 
 
 def _what(step: Figures) -> Any:
@@ -609,10 +634,14 @@ def _photons(f: Figures) -> Words:
             f["tried"], f["delta_e_2000_mean"], f["seconds"], strict=True
         )
     ]
+    enough = Words("a walk of {} photons would do", Exact(f["photons"]))
+    truth = "exact needs none"
+    if f["photons"] is None:
+        enough = Words("{} photons are not enough for a walk", Exact(f["tried"][-1]))
+        truth = "montecarlo is the truth here"
     return Words(
-        "photons: a walk of {} photons would do (" + ", ".join("{}" for _ in tried) + "); "
-        "exact needs none, {} s",
-        *(Exact(f["photons"]), *tried, Rough(f["profile_seconds"])),
+        "photons: {} (" + ", ".join("{}" for _ in tried) + "); {}, {} s",
+        *(enough, *tried, truth, Rough(f["profile_seconds"])),
     )
 
 
@@ -819,6 +848,10 @@ PRINTED: dict[str, Layout] = {
     "compare --editing e.png": editing,
     "compare wax.toml --convergence c.png": convergence,
     "choose wax.toml": choice,
+    "choose wax.toml --tolerance 6": choice,
+    "choose wax.toml --tolerance 7": choice,
+    "choose wax.toml --tolerance 8": choice,
+    "choose wax.toml --tolerance 9": choice,
     "import table.csv": imported,
     "import r.mco g.mco --channels a,b -o x.profile.npz": imported,
     "export --format csv": written,
