@@ -163,13 +163,14 @@ def _say_step(step: Step, common: Common) -> None:
 @contextlib.contextmanager
 def _held(path: Path | None, *, force: bool) -> Iterator[None]:
     """Check that the kernel can be written there, and keep other runs off it."""
-    from sssfit.files import check_output, locked
+    from sssfit.files import check_ending, check_output, locked
     from sssfit.kernel import is_kernel_file
 
     if path is None:
         binary_stdout()  # closed: said now and not after the work
         yield
         return
+    check_ending(path, "a kernel", ".json")
     check_output(path, is_kernel_file, force=force)
     with locked(path):
         yield
