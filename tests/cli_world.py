@@ -107,7 +107,10 @@ def files() -> Path:
     (folder / "r.mco").write_text(mco_text(name="r.mco"))
     (folder / "g.mco").write_text(mco_text(name="g.mco", **green_blocks()))
     (folder / "table.csv").write_text(csv_text(profile()))
-    (folder / "bare.csv").write_text("r_mm,R,G\n1,.02,.015\n2,.01,.005\n4,.002,.001\n")
+    for name, head in (("bare", "r_mm"), ("plain", "r")):
+        (folder / f"{name}.csv").write_text(
+            f"{head},R,G\n.5,.02,.015\n1.5,.01,.005\n2.5,.002,.001\n"
+        )
     for ending in ENDINGS:
         (folder / f"foreign.{ending}").write_text(FOREIGN)
     (folder / "out").mkdir()

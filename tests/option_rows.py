@@ -713,13 +713,31 @@ def _joined(*channels: str) -> Any:
     return _content(join_channels(found, channels))
 
 
+def _table(name: str, **settings: Any) -> Any:
+    return _content(world.quietly(load_csv, world.files() / name, **settings))
+
+
 IMPORT = {
     "--quantity": Row(
         "import bare.csv -o x.profile.npz",
         "--quantity density",
         lambda ran: ran.status or ran.profile,
-        lambda: _content(load_csv(world.files() / "bare.csv", quantity="density")),
+        lambda: _table("bare.csv", quantity="density"),
         words="what its own comment says",
+    ),
+    "--unit": Row(
+        "import plain.csv --quantity density -o x.profile.npz",
+        "--unit cm",
+        lambda ran: ran.status or ran.profile,
+        lambda: _table("plain.csv", quantity="density", unit="cm"),
+    ),
+    "--density-unit": Row(
+        "import bare.csv --quantity density -o x.profile.npz",
+        "--density-unit cm",
+        made_profile,
+        lambda: _table("bare.csv", quantity="density", density_unit="cm"),
+        default="mm",
+        words="the unit of its radii",
     ),
     "--channels": Row(
         _MCO,
