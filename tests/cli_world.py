@@ -15,7 +15,7 @@ import tempfile
 import warnings
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from types import NoneType
 from typing import Any
@@ -137,7 +137,8 @@ class Ran:
     stdout: str
     stderr: str
     written: dict[str, bytes]
-    calls: tuple[Any, ...] = field(default=())
+    calls: tuple[Any, ...] = ()
+    raw: bytes = b""  # stdout, where a file goes there
 
     @property
     def figures(self) -> dict[str, Any]:
@@ -203,7 +204,8 @@ def run(command: str, *, both: bool = False) -> Ran:
         after = contents(folder)
     changed = {name: data for name, data in after.items() if before.get(name) != data}
     stdout = ended.stdout_bytes.decode(errors="replace")
-    return Ran(ended.exit_code, stdout, ended.stderr, changed, tuple(CALLS))
+    calls = tuple(CALLS)
+    return Ran(ended.exit_code, stdout, ended.stderr, changed, calls, ended.stdout_bytes)
 
 
 def contents(folder: Path) -> dict[str, bytes]:

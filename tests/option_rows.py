@@ -936,3 +936,25 @@ THREADS = {
 }
 
 VERBOSE = {"choose"}  # where --verbose has something to say
+
+# Commands that write one file; with the last word replaced by - it goes to stdout.
+STREAMS = (
+    f"{_BURLEY} -o x.profile.npz",
+    "fit wax.profile.npz --method svd -o x.kernel.json",
+    f"{_DISK} -o x.exr",
+    f"{_CHOOSE} -o x.kernel.json",
+    "import table.csv -o x.profile.npz",
+    "export --format csv -o x.csv",
+    "export --format hlsl -o x.hlsl",
+    "export --format json -o x.json",
+    "chart wax.profile.npz -o x.png",
+    "chart wax.profile.npz --spectrum -o x.png",
+    "chart wax.profile.npz --guide -o x.png",
+    "chart wax.profile.npz --models -o x.png",
+    f"{_MAKE} --name lard -o x.toml",
+    f"{_KERNELS} --chart x.png",
+    f"{_BUDGET} --budget-chart x.png",
+    "compare wax.profile.npz --sheet x.png",
+    "compare --editing x.png",
+    "compare wax.toml --convergence x.png",
+)

@@ -9,7 +9,7 @@ import cli_world as world
 import click
 import numpy as np
 import pytest
-from option_rows import COMMANDS, ROWS, SEEDS, THREADS, VERBOSE
+from option_rows import COMMANDS, ROWS, SEEDS, STREAMS, THREADS, VERBOSE
 
 from sssfit.cli import cli
 from sssfit.cli._options import common_options
@@ -123,11 +123,11 @@ def test_quiet_says_nothing_and_json_one_object(verb):
 TIMES = re.compile(r"\d[\d.,]*(e[-+]?\d+)? (s\b|a second)|\(\d[\d,]* a second\)")
 
 
-def said(ran):
-    """What a run printed, but for its seconds and its progress."""
+def said(*printed):
+    """What was printed, but for seconds and progress."""
     lines = [
         line
-        for line in (ran.stdout + ran.stderr).splitlines()
+        for line in "".join(printed).splitlines()
         if "\N{BOX DRAWINGS HEAVY HORIZONTAL}" not in line
     ]
     return TIMES.sub("", "\n".join(lines))
@@ -135,7 +135,8 @@ def said(ran):
 
 @pytest.mark.parametrize("verb", list(COMMANDS))
 def test_verbose_says_more_where_there_is_more_to_say(verb):
-    plain, verbose = said(world.run(COMMANDS[verb])), said(world.run(f"{COMMANDS[verb]} -v"))
+    runs = world.run(COMMANDS[verb]), world.run(f"{COMMANDS[verb]} -v")
+    plain, verbose = (said(each.stdout, each.stderr) for each in runs)
     assert (len(verbose) > len(plain)) == (verb in VERBOSE)
     assert verb in VERBOSE or verbose == plain
 
@@ -151,3 +152,20 @@ def test_what_is_not_random_depends_neither_on_seed_nor_on_threads(verb, option)
     for name, data in plain.written.items():
         if not name.endswith((".png", ".exr")):  # they carry the time of their making
             assert other.written[name] == data
+
+
+@pytest.mark.parametrize("command", STREAMS)
+def test_a_dash_sends_the_file_to_stdout_and_the_words_to_stderr(command):
+    start, name = command.rsplit(" ", 1)
+    to_file, to_stdout = world.run(command), world.run(f"{start} -")
+    assert (to_file.status, to_stdout.status) == (0, 0), to_stdout.stderr
+    assert (list(to_file.written), list(to_stdout.written)) == ([name], [])
+    content = to_file.written[name]
+    assert to_stdout.raw[:4] == content[:4]
+    if not name.endswith((".png", ".exr")):  # they carry the time of their making
+        assert to_stdout.raw == content
+    words, same_words = (
+        said(*each).splitlines() for each in ((to_stdout.stderr,), (to_file.stderr, to_file.stdout))
+    )
+    assert "stdout" in words[-1] or words[-1] == "Wrote -"
+    assert words[:-1] == same_words[:-1]
