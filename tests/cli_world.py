@@ -21,6 +21,7 @@ from types import NoneType
 from typing import Any
 
 import numpy as np
+import OpenImageIO
 from click.testing import CliRunner
 from matplotlib.figure import Figure
 from test_mci import file_text, run_text
@@ -91,6 +92,21 @@ def picture() -> np.ndarray:
     return np.random.default_rng(3).random((12, 9, 3)).astype(np.float32)
 
 
+def write_layers(path: Path) -> None:
+    """An EXR of two layers and alpha; nothing in it says how large its pixels are."""
+    near, far = picture(), picture()[::-1]
+    alpha = (np.arange(picture().shape[1]) < 6).astype(np.float32)
+    pixels = np.dstack([near, far, np.broadcast_to(alpha, near.shape[:2])])
+    height, width, count = pixels.shape
+    spec = OpenImageIO.ImageSpec(width, height, count, "float")
+    names = [f"{layer}.{each}" for layer in ("near", "far") for each in "RGB"]
+    spec.channelnames = (*names, "far.A")
+    writer = OpenImageIO.ImageOutput.create(str(path))
+    assert writer.open(str(path), spec)
+    assert writer.write_image(np.ascontiguousarray(pixels))
+    writer.close()
+
+
 @functools.cache
 def files() -> Path:
     """The folder that every run begins with a copy of."""
@@ -102,6 +118,7 @@ def files() -> Path:
     kernel().save(folder / "wax.svd2.kernel.json")
     save_image(folder / "mine.exr", picture(), mm_per_pixel=DR_MM)
     save_image(folder / "bare.exr", picture())
+    write_layers(folder / "layers.exr")
     second = run_text("b.mco", layer="1.4 1 5 0 1E8")
     (folder / "two.mci").write_text(file_text(run_text("a.mco"), second))
     (folder / "r.mco").write_text(mco_text(name="r.mco"))
@@ -254,7 +271,8 @@ def told(value: Any) -> Any:
         return value.name
     if isinstance(value, Scene):
         light = value.irradiance
-        return value.name, light.shape, value.mm_per_pixel, zlib.crc32(light.tobytes())
+        mask = b"" if value.mask is None else value.mask.tobytes()
+        return value.name, light.shape, value.mm_per_pixel, zlib.crc32(light.tobytes() + mask)
     if isinstance(value, Checkpoint):
         return value.every_seconds
     if isinstance(value, Candidate):
@@ -315,9 +333,10 @@ def exact_profile(name: str = "wax") -> Profile:
 
 
 @functools.cache
-def inverted() -> Material:
+def inverted(light: str) -> Material:
     real = _unrecorded(inversion.material_from_reflectance)
-    return real([0.4, 0.2, 0.1], [1.3, 0.9, 0.7], 1.3, name="lard", channels=["R", "G", "B"])
+    given = {"name": "lard", "channels": ["R", "G", "B"], "light": light}
+    return real([0.4, 0.2, 0.1], [1.3, 0.9, 0.7], 1.3, **given)
 
 
 @functools.cache
@@ -461,7 +480,9 @@ STAND_INS = {
     "sssfit.simulate.simulate_exact_many": (
         lambda _, given: [exact_profile(each.name) for each in given["materials"]]
     ),
-    "sssfit.simulate.inversion.material_from_reflectance": lambda *_: inverted(),
+    "sssfit.simulate.inversion.material_from_reflectance": (
+        lambda _, given: inverted(given["light"])
+    ),
     "sssfit.compare.choose.choose": small_choice,
     "sssfit.compare.compare_kernels": small_comparison,
     "sssfit.compare.budget.error_budgets": lambda _, given: budgets(rank_of(given)),

@@ -5,6 +5,7 @@ click's own objects and fails where one has no row. Options that all verbs share
 ``COMMANDS``, ``SEEDS``, ``THREADS`` and ``VERBOSE``.
 """
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,7 @@ from sssfit import fit
 from sssfit.compare.judge import judge, judge_in_screen_space
 from sssfit.compare.metrics import auto_exposure
 from sssfit.export import json_document
+from sssfit.image import load_image
 from sssfit.mci import load_mci
 from sssfit.mco import join_channels, load_mco
 from sssfit.profile_csv import csv_text, load_csv
@@ -282,6 +284,19 @@ FIT = {
     ),
 }
 
+# pictures from files
+
+_LAYER = "R, G, B without a layer, or the only layer with them"
+_ALPHA = "all of it"
+
+
+def _from_file(mm_per_pixel: float, layer: str, *, alpha_is_mask: bool = False) -> Scene:
+    """A layer of the EXR with two, as the library reads it in the folder of the files."""
+    with contextlib.chdir(world.files()):
+        image = load_image("layers.exr", layer=layer)
+    return Scene.from_image(image, mm_per_pixel, alpha_is_mask=alpha_is_mask)
+
+
 # render
 
 _SIZE = "--size 24x16"
@@ -312,6 +327,8 @@ def _measured(**settings: Any) -> Any:
 _FIGURES = fields("delta_e_2000_mean", "exposure", "ssim", "flip")
 _DISK = f"render --irradiance disk {_SIZE}"
 
+_LAYERS = f"render --irradiance layers.exr --mm-per-pixel {DR_MM} -o x.exr"
+
 RENDER = {
     "--irradiance": Row(
         f"render {_SIZE}",
@@ -333,6 +350,20 @@ RENDER = {
         f"--mm-per-pixel {DR_MM}",
         lambda ran: ran.status or ran.picture,
         lambda: _rendered(Scene("bare", picture(), DR_MM)),
+    ),
+    "--layer": Row(
+        f"{_LAYERS} --layer near",
+        "--layer far",
+        made_picture,
+        lambda: _rendered(_from_file(DR_MM, "far")),
+        words=_LAYER,
+    ),
+    "--mask": Row(
+        f"{_LAYERS} --layer far",
+        "--mask alpha",
+        made_picture,
+        lambda: _rendered(_from_file(DR_MM, "far", alpha_is_mask=True)),
+        words=_ALPHA,
     ),
     "--angle": _lit("edge", "--angle", "30", "0", angle_degrees=30.0),
     "--radius": _lit("disk", "--radius", "1.1", radius_mm=1.1),
@@ -440,6 +471,7 @@ def _converged(**settings: Any) -> Any:
     return called("sssfit.compare.convergence.compute_convergence", wax(), **settings)
 
 
+_OF_LAYERS = "compare wax.profile.npz --only kernels --picture layers.exr --mm-per-pixel .4"
 _BOTH = "compare wax.toml --size 24x16 --picture disk"
 _CONVERGENCE = "compare wax.toml --convergence c.png"
 
@@ -502,6 +534,20 @@ COMPARE = {
         calls,
         lambda: _compared(_pictures("disk", "edge", size=(10, 20))),
         default="512x512",
+    ),
+    "--layer": Row(
+        f"{_OF_LAYERS} --layer near",
+        "--layer far",
+        calls,
+        lambda: _compared([_from_file(0.4, "far")], 0.4),
+        words=_LAYER,
+    ),
+    "--mask": Row(
+        f"{_OF_LAYERS} --layer far",
+        "--mask alpha",
+        calls,
+        lambda: _compared([_from_file(0.4, "far", alpha_is_mask=True)], 0.4),
+        words=_ALPHA,
     ),
     "--chart": Row(_KERNELS, "--chart c.png", is_written("png"), lambda: ["c.png"]),
     "--table": Row(_KERNELS, "--table t.csv", is_written("csv"), lambda: ["t.csv"]),
@@ -585,11 +631,16 @@ COMPARE = {
 # choose
 
 
+_PITCH = 2.0 * 600.0 * np.tan(np.radians(15.0)) / 1080  # mm, of the default view
+
+
 def _chosen(
     distance_mm: float = 600.0, fov: float = 30.0, frame=(1080, 1920), scene=None, **own: Any
 ) -> Any:
     pitch = 2.0 * distance_mm * np.tan(np.radians(fov) / 2.0) / frame[0]
-    if scene:
+    if isinstance(scene, Scene):
+        own["scene"] = scene
+    elif scene:
         own["scene"] = make_scene(scene, height=512, width=512, mm_per_pixel=pitch)
     return called(
         "sssfit.compare.choose.choose",
@@ -602,11 +653,17 @@ def _chosen(
 
 
 def _rounded(ran_calls: Any) -> Any:
-    """The pitch to 12 digits: the view's own formula rounds in another order."""
-    return [
-        (name, noted | {"mm_per_pixel": float(f"{noted['mm_per_pixel']:.12g}")})
-        for name, noted in ran_calls
-    ]
+    """The pitches to 12 digits: the view's own formula rounds in another order."""
+    found = []
+    for name, noted in ran_calls:
+        pitch = float(f"{noted['mm_per_pixel']:.12g}")
+        scene = noted["scene"] and (
+            *noted["scene"][:2],
+            float(f"{noted['scene'][2]:.12g}"),
+            noted["scene"][3],
+        )
+        found.append((name, noted | {"mm_per_pixel": pitch, "scene": scene}))
+    return found
 
 
 def _asked(ran: Ran) -> Any:
@@ -636,6 +693,20 @@ CHOOSE = {
         _asked,
         lambda: _rounded(_chosen(scene="edge")),
         default="head",
+    ),
+    "--layer": Row(
+        f"{_CHOOSE} --irradiance layers.exr --layer near",
+        "--layer far",
+        _asked,
+        lambda: _rounded(_chosen(scene=_from_file(_PITCH, "far"))),
+        words=_LAYER,
+    ),
+    "--mask": Row(
+        f"{_CHOOSE} --irradiance layers.exr --layer far",
+        "--mask alpha",
+        _asked,
+        lambda: _rounded(_chosen(scene=_from_file(_PITCH, "far", alpha_is_mask=True))),
+        words=_ALPHA,
     ),
     "--output": Row(
         _CHOOSE,
@@ -674,6 +745,9 @@ MATERIALS = {
     ),
     "--mean-free-path": Row(
         _MAKE, "--mean-free-path 2", calls, lambda: _inverted(mean_free_path_mm=[2.0])
+    ),
+    "--light": Row(
+        _MAKE, "--light diffuse", calls, lambda: _inverted(light="diffuse"), default="normal"
     ),
     "--eta": Row(_MAKE, "--eta 1.4", calls, lambda: _inverted(eta=1.4)),
     "--name": Row(

@@ -95,8 +95,12 @@ def six_gaussians(f: Figures) -> list[Any]:
 
 
 def inversion(f: Figures) -> list[Any]:
-    heads = ["channel", "diffuse reflectance", "albedo", "sigma_a, 1/mm", "sigma_s, 1/mm"]
-    keys = ("reflectance", "albedo", "sigma_a_per_mm", "sigma_s_per_mm")
+    what, heads, keys = "diffuse reflectance", ["diffuse reflectance"], ["reflectance"]
+    if f["light"] == "diffuse":
+        what = "base colour"
+        heads, keys = [what, "normal reflectance"], [*keys, "reflectance_normal"]
+    heads = ["channel", *heads, "albedo", "sigma_a, 1/mm", "sigma_s, 1/mm"]
+    keys += ["albedo", "sigma_a_per_mm", "sigma_s_per_mm"]
     published = [f["approximations"][key] for key in ("chiang2016", "van_de_hulst")]
     rows = [
         [
@@ -116,9 +120,12 @@ def inversion(f: Figures) -> list[Any]:
     # What could be reflected is cut off and not rounded: nobody may ask for more than is printed.
     most = int(1e6 * f["largest_reflectance"]) / 1e6
     return [
-        Words("{}: eta {}, could reflect up to {}", f["name"], f["eta"], most),
+        Words(
+            "{}: eta {}, could reflect up to {} under {} light",
+            *(f["name"], f["eta"], most, f["light"]),
+        ),
         Table(heads, by_channel(f, keys)),
-        Words("approximate albedos, the diffuse reflectance they really have, and its error:"),
+        Words(f"approximate albedos, the {what} they really have, and its error:"),
         Table(["channel", "Chiang et al. 2016, gives", "van de Hulst, gives"], rows),
         wrote(f),
     ]
@@ -814,15 +821,16 @@ def _empty(f: Figures) -> list[Words]:
     ]
 
 
+_MAKE = "materials --from-reflectance .4,.2,.1 --mean-free-path 1.3,.9,.7 --eta 1.3 -o lard.toml"
+
 # A command that prints each of them, on the files of ``cli_world``.
 PRINTED: dict[str, Layout] = {
     "materials": materials_list,
     "materials wax.toml": one_material,
     "materials plate.toml": one_material,
     "materials deon-skin": six_gaussians,
-    "materials --from-reflectance .4,.2,.1 --mean-free-path 1.3,.9,.7 --eta 1.3 -o lard.toml": (
-        inversion
-    ),
+    f"{_MAKE} --light normal": inversion,
+    f"{_MAKE} --light diffuse": inversion,
     "simulate wax.toml --photons 4000 --dr .2 --radius 6": simulation,
     "simulate wax.toml --photons 4000 --dr .2 --radius 6 --resume": simulation,
     "simulate wax.toml --photons 4000 --dr .2 --radius 40 --seed 3": simulation,
