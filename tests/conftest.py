@@ -1,8 +1,19 @@
-"""What holds for all tests."""
+"""What holds for all tests: Ctrl-C arrives, and none runs for ever."""
 
 import signal
+
+import pytest
+
+SLOW_SECONDS = 4 * 3600.0  # the longest, a walk of 1e8 photons through layers, takes under one
 
 # A shell starts its background jobs with SIGINT ignored, and children inherit that: tests of Ctrl-C
 # would wait for ever.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_collection_modifyitems(items):
+    """Give the tests marked slow a limit of their own; ``timeout`` in pyproject.toml has the rest."""
+    for item in items:
+        if item.get_closest_marker("slow") and not item.get_closest_marker("timeout"):
+            item.add_marker(pytest.mark.timeout(SLOW_SECONDS))
