@@ -78,7 +78,7 @@ class SeparableKernel:
     def __post_init__(self) -> None:
         arrays = ("signs", "weights", "relative_frobenius_error", "energy_error", "scale")
         for name in arrays:
-            value = np.array(getattr(self, name), dtype=np.float64)
+            value = np.array(getattr(self, name), dtype=np.float64, order="C")
             value.setflags(write=False)
             object.__setattr__(self, name, value)
         object.__setattr__(self, "mm_per_pixel", float(self.mm_per_pixel))

@@ -73,7 +73,8 @@ class Scene:
         given = getattr(self, field)
         if given is None:
             return
-        values = np.array(given, dtype=dtype)
+        # Row after row, whatever came: in another order sums over pixels round otherwise.
+        values = np.array(given, dtype=dtype, order="C")
         if values.shape[:2] != np.shape(self.irradiance)[:2]:
             raise RenderError(
                 f"{self.name}: {field} is {values.shape[:2]} and irradiance "
