@@ -16,11 +16,11 @@ from matplotlib.colors import Normalize, SymLogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
-from sssfit._chart_data import material_of
 from sssfit._chart_page import chart_style, draw_footnotes, draw_text, name_axes, new_figure
 from sssfit._chart_style import COLOURS, LEFT, LINE_WIDTH, RIGHT, WIDTH_INCHES, Style
 from sssfit._chart_text import kernel_subtitle, shortened
 from sssfit._profile_bins import FloatArray
+from sssfit._profile_radii import material_of
 from sssfit.profile import full_kernel
 
 if TYPE_CHECKING:

@@ -73,7 +73,8 @@ def _parts(annuli: int) -> npt.NDArray[np.intp]:
     """Return how many parts each annulus is cut into (n,): 64 of the first ten, then ever fewer."""
     share = SUBDIVIDED_ANNULI / np.arange(1, annuli + 1)
     parts = np.ceil(PARTS_PER_ANNULUS * np.minimum(share, 1.0)).astype(np.intp)
-    return np.maximum(parts, min(LEAST_PARTS, PARTS_PER_ANNULUS))
+    at_least: npt.NDArray[np.intp] = np.maximum(parts, min(LEAST_PARTS, PARTS_PER_ANNULUS))
+    return at_least
 
 
 def _growth(t: FloatArray, energy: FloatArray, rise0: FloatArray, rise1: FloatArray) -> FloatArray:

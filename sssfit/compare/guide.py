@@ -14,11 +14,11 @@ import numpy as np
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import FitResult, fit_guided
 from sssfit.fit._target import Target
-from sssfit.fit.guided import NEUTRAL, gamma, guided_target
+from sssfit.fit.guided import DRAWN_K, gamma, guided_target
 from sssfit.profile import Profile
 from sssfit.shapes import FloatArray
 
-DRAWN = (0.0, NEUTRAL, 4.0)  # the paper's nearest, its drawn and its farthest
+DRAWN = (0.0, DRAWN_K, 4.0)  # the paper's nearest, its drawn and its farthest
 MOST = 4
 
 
