@@ -97,7 +97,7 @@ def first_run(
         before = 0.0
         for k in range(count + 1):
             middle = 0.5 * (before + cuts[k])
-            if value(over, middle) <= 0.0 <= value(under, middle):
+            if cuts[k] > before and value(over, middle) <= 0.0 <= value(under, middle):
                 if stop >= 0.0 and t + before > stop + GAP_MM:
                     return start, stop, True
                 start = t + before if stop < 0.0 else start
