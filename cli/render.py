@@ -91,7 +91,7 @@ def render(
     """
     _check_options(screen, follow, profile or truth or difference or structure)
     if transmit:
-        own = _lit_from_behind(own)
+        own = _lit_from_behind(irradiance, own)
     picture = Picture(irradiance, size, mm_per_pixel, own)
     name, loaded = _kernel(kernel, common)
     path = _target(name, picture, output)
@@ -133,8 +133,10 @@ def render(
     finish(common, figures, text_of(figures), to_stderr=path is None)
 
 
-def _lit_from_behind(own: dict[str, Any]) -> dict[str, Any]:
-    """Return a picture's options with light through it, its key light behind unless it is given."""
+def _lit_from_behind(irradiance: str, own: dict[str, Any]) -> dict[str, Any]:
+    """Return the head's options with light through it, its key light behind unless it is given."""
+    if irradiance != "head":
+        raise click.UsageError("--transmit is for the head; leave it out.")
     light = own["light_degrees"]
     return {**own, "transmit": True, "light_degrees": _BEHIND_DEGREES if light is None else light}
 
