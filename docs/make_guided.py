@@ -2,7 +2,7 @@
 
 python docs/make_guided.py
 
-Minutes: 33 fits for each of three rules that say where x = 1 in the guide function.
+Minutes: 66 fits for each of three rules that say where x = 1 in the guide function.
 """
 
 import datetime
