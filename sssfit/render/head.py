@@ -10,7 +10,7 @@ from typing import Any
 
 from sssfit.render._checks import thread_count
 from sssfit.render._field import Lamps, light_field, light_through
-from sssfit.render._head_shape import FLOOR_MM, FloatArray
+from sssfit.render._head_shape import FLOOR_MM
 from sssfit.render._head_surface import COARSE_MM, body, bust, seen_part
 from sssfit.render._made_checks import check_range, check_size
 from sssfit.render.scene import Scene
@@ -128,10 +128,10 @@ def head_scene(
         smooth=smooth,
         **seeing,
     )
-    through: dict[str, FloatArray] = {}
+    thickness, back = None, None
     if transmit and solid is not None:
         thickness, cosines = light_through(fine, solid, key, **seeing)
-        through = {"thickness_mm": thickness, "back_irradiance": cosines[..., None]}
+        back = cosines[..., None]
     return Scene(
         "head",
         seen.irradiance[..., None],
@@ -140,5 +140,6 @@ def head_scene(
         depth_mm=seen.depth_mm,
         mask=seen.labels,
         specular=seen.specular[..., None],
-        **through,
+        thickness_mm=thickness,
+        back_irradiance=back,
     )
