@@ -193,13 +193,31 @@ def test_no_light_crosses_the_mask(rng, follow):
 def test_what_is_no_object_comes_back_as_it_was(rng):
     shape = (6, 8)
     mask, depth = rng.integers(0, 2, shape), rng.uniform(200.0, 300.0, shape)
-    depth[2, 3], depth[mask == 0] = np.inf, 0.0
+    mask[2, 3], mask[4, 5], mask[1, 1] = 1, 2, 0
+    depth[mask == 0] = 0.0
+    # In the mask, but the eye meets nothing there: this is no object either.
+    depth[2, 3] = depth[4, 5] = np.inf
     irradiance = rng.random((*shape, 1))
     out = render_screen(make_scene(irradiance, depth, mask=mask), random_kernel(rng))
-    nothing = (mask == 0) | np.isinf(depth)
-    expected = np.broadcast_to(irradiance, out.shape)[nothing]
-    np.testing.assert_array_equal(out[nothing], expected)
+    for nothing in (mask == 0, np.isinf(depth)):
+        assert nothing.any()
+        expected = np.broadcast_to(irradiance, out.shape)[nothing]
+        np.testing.assert_array_equal(out[nothing], expected)
+    objects = (mask > 0) & np.isfinite(depth)
+    assert (out[objects] != irradiance[objects]).all()
     assert np.isfinite(out).all()
+
+
+def test_no_light_comes_from_a_pixel_of_infinite_depth(rng):
+    irradiance, depth = rng.random((1, 9, 1)), np.full((1, 9), DISTANCE_MM)
+    depth[0, 4] = np.inf
+    kernel = gaussian_kernel(1.0, half=3)
+    mask = np.ones((1, 9), int)
+    dark = render_screen(make_scene(irradiance, depth, mask=mask), kernel)
+    irradiance[0, 4] = 1000.0
+    bright = render_screen(make_scene(irradiance, depth, mask=mask), kernel)
+    np.testing.assert_array_equal(np.delete(dark, 4, axis=1), np.delete(bright, 4, axis=1))
+    assert bright[0, 4, 0] == 1000.0
 
 
 def test_scale_zero_leaves_a_pixel_unblurred(rng):
