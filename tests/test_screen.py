@@ -284,8 +284,8 @@ def test_variances_come_from_the_kernel(rng):
 
 
 def test_the_lerp_ends_where_the_listing_ends_it_for_table_1():
-    # RR-02-12: s = saturate(300 D sssWidth |dz|) (appendix A) at the width of table 1, and 20 degrees
-    # of the released shader. The outermost sample lies 2 sssWidth away and stands for 3 mm of skin.
+    # RR-02-12: s = saturate(300 D sssWidth |dz|) (appendix A), the width of table 1, and the
+    # released shader's 20 degrees. The outermost sample, 2 sssWidth away, is for 3 mm of skin.
     width = 0.014
     end = 1.0 / (300.0 / math.tan(math.radians(0.5 * 20.0)) * width)
     red = [weights[0] for weights in shapes.SKIN_WEIGHTS]
