@@ -284,6 +284,8 @@ def test_forward_scattering_is_walked_and_not_taken_for_isotropic():
     assert not is_exact(forward)
     even = Layer(1.3, np.zeros(1), np.array([0.1]), np.array([5.0]))
     assert is_exact(Material("even", ("grey",), (even,)))
+    # Nor is a medium thinner optically than what is above it, which the exact solver refuses.
+    assert not is_exact(Material("under-water", ("grey",), (even,), eta_above=1.33))
 
 
 def test_a_material_that_returns_nothing_is_refused():

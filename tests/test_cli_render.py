@@ -1,5 +1,6 @@
 """``sssfit render``: pictures out, figures of what was lost, one line for what is wrong."""
 
+import dataclasses
 import json
 import shutil
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 from reference_pixels import make_profile
 
 from sssfit.cli import main
+from sssfit.compare.judge import judge
 from sssfit.fit import fit_svd
 from sssfit.image import load_image, save_image
 from sssfit.kernel import SeparableKernel
@@ -124,6 +126,74 @@ def test_a_profile_of_another_run_is_not_taken_for_the_kernels(run):
     assert json.loads(out)["profile"] == "first.profile.npz"
 
 
+TABLE = "r_mm,red,green\n0.2,0.2,0.1\n0.4,0.1,0.04\n0.8,0.05,0.01\n1.2,0.02,0.004\ninf,0.01,0\n"
+
+
+def profile_found(run, kernel):
+    """What `render` measures a kernel against, and what it says on stderr."""
+    arguments = ("render", kernel, "--irradiance", "edge", *SIZE, "-o", "out.exr", "--json")
+    status, out, words = run(*arguments)
+    assert status == 0, words
+    return json.loads(out)["profile"], words
+
+
+def test_a_kernel_of_any_profile_finds_it_again(run, folder):
+    Path("table.csv").write_text(TABLE)
+    Path("other.csv").write_text(TABLE.replace("0.2,0.2", "0.2,0.3"))
+    walk = ("--photons", "2000", "-q")
+    for arguments in (
+        ("import", "table.csv", "--quantity", "energy"),
+        ("import", "other.csv", "--quantity", "energy"),
+        ("simulate", "deon-skin", "--radius", "4", "-o", "deon-skin.profile.npz"),
+        ("simulate", "skin1", "--method", "dipole", "-o", "dipole.npz"),
+        ("simulate", "skin1", *walk),
+        ("simulate", "skin1", *walk, "--seed", "2", "-o", "two.profile.npz"),
+    ):
+        assert run(*arguments)[0] == 0
+    for name in ("table.profile", "other.profile", "deon-skin.profile", "dipole", "skin1.profile"):
+        fit = ("fit", f"{name}.npz", "--method", "preintegrated", "--mm-per-pixel", ".4")
+        status, _, words = run(*fit, "-o", "k.json")
+        assert status == 0, words
+        assert SeparableKernel.load("k.json").meta["profile_sha256"] == (
+            Profile.load(f"{name}.npz").sha256
+        )
+        assert profile_found(run, "k.json") == (f"{name}.npz", "")
+
+
+def test_a_profile_under_another_name_or_in_the_kernels_folder_is_found(run, folder):
+    (folder / "deep").mkdir()
+    Path(KERNEL).rename(folder / "deep" / KERNEL)
+    Path("wax.profile.npz").rename(folder / "deep" / "moved.npz")
+    found, _ = profile_found(run, f"deep/{KERNEL}")
+    assert found == str(Path("deep") / "moved.npz")
+
+
+def test_a_profile_that_has_changed_since_is_not_measured_against(run):
+    profile = Profile.load("wax.profile.npz")
+    make_profile(profile.r_edges_mm, 0.9 * profile.annulus_energy).save("wax.profile.npz")
+    found, words = profile_found(run, KERNEL)
+    assert found is None
+    assert words == (
+        "wax.profile.npz is a profile of test by the same method, but not the one that "
+        f"{KERNEL} was fitted to, or it has changed since, so nothing is measured: fit the kernel "
+        "again, or name its profile with --profile.\n"
+    )
+    given = ("--profile", "wax.profile.npz", "-o", "out.exr", "--json")
+    status, out, words = run("render", KERNEL, "--irradiance", "edge", *SIZE, *given)
+    assert status == 0
+    assert json.loads(out)["rmse"] > 0.0
+    assert words == f"wax.profile.npz is not the profile that {KERNEL} was fitted to.\n"
+
+
+def test_a_kernel_without_a_record_of_its_profile_says_so(run):
+    whole = json.loads(Path(KERNEL).read_text())
+    del whole["meta"]["profile_sha256"]
+    Path("old.kernel.json").write_text(json.dumps(whole))
+    found, words = profile_found(run, "old.kernel.json")
+    assert found is None
+    assert "old.kernel.json does not record which profile it was fitted to" in words
+
+
 def test_screen_space_needs_depth_and_measures_nothing(run):
     status, out, _ = run("render", "--screen", "--size", "48x48", "--json")
     figures = json.loads(out)
@@ -214,6 +284,91 @@ def test_a_file_must_say_its_pixels(run):
     status, _, words = run("render", "--irradiance", "mine.png", "--mm-per-pixel", ".3")
     assert status == 1
     assert "fit the kernel at" in words
+
+
+COVERED = np.repeat([[0.0, 0.25, 0.75, 1.0]], 10, axis=1).repeat(24, axis=0)
+
+
+def lit(channels=3):
+    """A picture of light with alpha; no two pixels alike."""
+    return np.random.default_rng(1).random((24, 40, channels))
+
+
+@pytest.mark.parametrize("ending", ["exr", "tif", "png"])
+def test_alpha_of_a_file_goes_into_the_result_and_the_truth(run, folder, ending):
+    save_image("mine.png", lit(), alpha=COVERED)
+    kernel = SeparableKernel.load(KERNEL)
+    light = load_image("mine.png").pixels
+    plain = render_separable(Scene("mine", light, 0.2), kernel)
+    files = ("-o", f"out.{ending}", "--truth", f"true.{ending}", "--difference", "lost.exr")
+    given = ("--irradiance", "mine.png", "--mm-per-pixel", 0.2, "--exposure", 1)
+    status, _, words = run("render", *given, *files)
+    assert status == 0, words
+    found, truth = load_image(f"out.{ending}"), load_image(f"true.{ending}")
+    for each in (found, truth):
+        np.testing.assert_allclose(each.alpha, COVERED, atol=1e-5)
+    wanted = plain * COVERED[..., None] if ending == "exr" else plain
+    np.testing.assert_allclose(found.pixels, np.clip(wanted, 0.0, None), atol=2e-5)
+    assert load_image("lost.exr").alpha is None
+    assert ("multiplied by alpha" in words) is (ending == "exr")
+
+
+def test_alpha_serves_as_the_mask(run, folder):
+    save_image("mine.exr", lit(), alpha=COVERED, mm_per_pixel=0.2)
+    inside = COVERED >= 0.5
+    scene = Scene("mine", np.where(inside[..., None], lit(), 0.0), 0.2, mask=inside)
+    kernel, profile = SeparableKernel.load(KERNEL), Profile.load("wax.profile.npz")
+    result = judge(scene, kernel, profile)
+    status, out, _ = run(
+        "render", "--irradiance", "mine.exr", "--mask", "alpha", "-o", "out.tif", "--json"
+    )
+    assert status == 0
+    figures = json.loads(out)
+    assert figures["delta_e_2000_mean"] == pytest.approx(result.score.delta_e_2000_mean, rel=1e-3)
+    found = load_image("out.tif")
+    np.testing.assert_allclose(found.pixels, result.picture, atol=1e-6)
+    assert (found.pixels[~inside] == 0.0).all()
+    np.testing.assert_allclose(found.alpha, COVERED)
+    status, out, _ = run("render", "--irradiance", "mine.exr", "-o", "all.tif", "--json")
+    whole = json.loads(out)["delta_e_2000_mean"]
+    assert abs(whole - figures["delta_e_2000_mean"]) > 0.01
+
+
+def test_a_layer_of_a_file_is_chosen(run, folder):
+    two = np.concatenate((lit(), 0.5 * lit()[:, ::-1]), axis=2)
+    names_of_two = [f"{layer}.{channel}" for layer in ("a", "b") for channel in "RGB"]
+    save_image("mine.exr", two, channels=names_of_two, mm_per_pixel=0.2)
+    status, _, words = run("render", "--irradiance", "mine.exr")
+    assert status == 1
+    assert "has the layers a, b; name the one" in words
+    assert run("render", "--irradiance", "mine.exr", "--layer", "b", "-o", "out.exr")[0] == 0
+    light = np.float32(two[..., 3:]).astype(float)
+    wanted = render_separable(Scene("mine", light, 0.2), SeparableKernel.load(KERNEL))
+    np.testing.assert_allclose(load_image("out.exr").pixels, wanted, atol=1e-6)
+
+
+def test_options_of_files_are_refused_where_they_would_do_nothing(run, folder):
+    for option in (("--layer", "a"), ("--mask", "alpha")):
+        status, _, words = run("render", "--irradiance", "disk", *SIZE, *option)
+        assert status == 2
+        assert f"{option[0]} is for pictures from files" in words
+    save_image("mine.exr", lit(), mm_per_pixel=0.2)
+    status, _, words = run("render", "--irradiance", "mine.exr", "--mask", "alpha")
+    assert status == 1
+    assert "mine.exr has no alpha that could be the mask" in words
+
+
+def test_alpha_that_no_file_can_hold_is_left_out(run, folder):
+    profile = Profile.load("wax.profile.npz")
+    two = dataclasses.replace(
+        fit_svd(profile, rank=1, mm_per_pixel=0.2).kernel, channels=("A", "R", "G")
+    )
+    two.save("odd.kernel.json")
+    (folder / "wax.profile.npz").unlink()  # its channels are others
+    save_image("mine.exr", lit(1), alpha=COVERED, mm_per_pixel=0.2)
+    status, _, words = run("render", "odd.kernel.json", "--irradiance", "mine.exr", "-o", "out.exr")
+    assert status == 0, words
+    assert "alpha left out beside the channels A, R, G" in words
 
 
 def test_foreign_files_stay(run, folder):
