@@ -14,7 +14,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 def pytest_collection_modifyitems(items):
-    """Give the tests marked slow a limit of their own; ``timeout`` in pyproject.toml has the rest."""
+    """Give slow tests a limit of their own; ``timeout`` in pyproject.toml holds for the rest."""
     for item in items:
         if item.get_closest_marker("slow") and not item.get_closest_marker("timeout"):
             item.add_marker(pytest.mark.timeout(SLOW_SECONDS))

@@ -72,7 +72,9 @@ def body(threads: int) -> Solid:
         part = slice(first, first + STRIP)
         behind[part] = back(x[None, :], y[part, None])
 
-    with ThreadPoolExecutor(threads) as pool:
+    from sssfit._jit import thread_pool
+
+    with thread_pool(threads) as pool:
         list(pool.map(strip, range(0, rows, STRIP)))
     return Solid(front.heights, behind, front.x0_mm, front.y0_mm, SOLID_MM)
 
