@@ -33,6 +33,7 @@ _LIBRARIES = (
     *("numpy", "scipy", "threadpoolctl", "nlopt", "numba", "llvmlite", "matplotlib"),
     *("colour-science", "OpenImageIO", "click", "rich"),
 )
+_LONGEST_LINE = 1000  # a path may be 4096 characters, an option's value anything
 
 
 @click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
@@ -79,8 +80,7 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
         try:
             status = cli.main(args, prog_name="sssfit", standalone_mode=False)
         except click.ClickException as error:
-            error.show()
-            sys.exit(error.exit_code)
+            _refuse(error)
         except SssfitError as error:
             _fail(str(error))
         except (KeyboardInterrupt, click.Abort):
@@ -106,8 +106,29 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
 
 def _fail(line: str) -> NoReturn:
     """Print one line on stderr and exit 1."""
-    click.echo(f"Error: {line}", err=True)
+    click.echo(f"Error: {_one_line(line)}", err=True)
     sys.exit(1)
+
+
+def _refuse(error: click.ClickException) -> NoReturn:
+    """Print the usage, as click does, and then on one line what is wrong with it."""
+    context = getattr(error, "ctx", None)
+    if context is not None:
+        help_option = context.help_option_names[-1]
+        click.echo(context.get_usage(), err=True)
+        click.echo(f"Try '{context.command_path} {help_option}' for help.\n", err=True)
+    # click lists the choices of an option on lines of their own.
+    click.echo(f"Error: {_one_line(' '.join(error.format_message().split()))}", err=True)
+    sys.exit(error.exit_code)
+
+
+def _one_line(text: str) -> str:
+    """Escape what would move the cursor or the line, and cut the middle out of what is too long."""
+    from sssfit._material_checks import printable
+
+    line = printable(text)
+    half = _LONGEST_LINE // 2
+    return line if len(line) <= _LONGEST_LINE else f"{line[:half]} ... {line[-half:]}"
 
 
 def _leave_quietly() -> NoReturn:
@@ -126,7 +147,7 @@ def _show_warning(
 ) -> None:
     """Print our own warnings as one line, others as Python would."""
     if issubclass(category, SssfitWarning):
-        click.echo(f"Warning: {message}", err=True)
+        click.echo(f"Warning: {_one_line(str(message))}", err=True)
     else:
         click.echo(warnings.formatwarning(message, category, filename, lineno, line), err=True)
 

@@ -9,6 +9,8 @@ profile conserves energy by construction. The annulus tallies are those of Wang,
 """
 
 import dataclasses
+import hashlib
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, Self
@@ -111,6 +113,18 @@ class Profile:
     def photons(self) -> int | None:
         """Number of photon walks behind the energies; None where nothing was sampled."""
         return self.meta.get("photons")
+
+    @property
+    def sha256(self) -> str:
+        """Fingerprint of what fits and true pictures are made from, by which kernels name it.
+
+        Radii, energies on the grid and beyond, channels; no provenance, so that the same light is
+        the same profile, by whatever program and version.
+        """
+        digest = hashlib.sha256(json.dumps(self.channels).encode())
+        for each in (self.r_edges_mm, self.annulus_energy, self.beyond_grid):
+            digest.update(each.astype("<f8").tobytes())
+        return digest.hexdigest()
 
     @property
     def total_on_grid(self) -> FloatArray:

@@ -124,6 +124,74 @@ def test_a_profile_of_another_run_is_not_taken_for_the_kernels(run):
     assert json.loads(out)["profile"] == "first.profile.npz"
 
 
+TABLE = "r_mm,red,green\n0.2,0.2,0.1\n0.4,0.1,0.04\n0.8,0.05,0.01\n1.2,0.02,0.004\ninf,0.01,0\n"
+
+
+def profile_found(run, kernel):
+    """What `render` measures a kernel against, and what it says on stderr."""
+    arguments = ("render", kernel, "--irradiance", "edge", *SIZE, "-o", "out.exr", "--json")
+    status, out, words = run(*arguments)
+    assert status == 0, words
+    return json.loads(out)["profile"], words
+
+
+def test_a_kernel_of_any_profile_finds_it_again(run, folder):
+    Path("table.csv").write_text(TABLE)
+    Path("other.csv").write_text(TABLE.replace("0.2,0.2", "0.2,0.3"))
+    walk = ("--photons", "2000", "-q")
+    for arguments in (
+        ("import", "table.csv", "--quantity", "energy"),
+        ("import", "other.csv", "--quantity", "energy"),
+        ("simulate", "deon-skin", "--radius", "4", "-o", "deon-skin.profile.npz"),
+        ("simulate", "skin1", "--method", "dipole", "-o", "dipole.npz"),
+        ("simulate", "skin1", *walk),
+        ("simulate", "skin1", *walk, "--seed", "2", "-o", "two.profile.npz"),
+    ):
+        assert run(*arguments)[0] == 0
+    for name in ("table.profile", "other.profile", "deon-skin.profile", "dipole", "skin1.profile"):
+        fit = ("fit", f"{name}.npz", "--method", "preintegrated", "--mm-per-pixel", ".4")
+        status, _, words = run(*fit, "-o", "k.json")
+        assert status == 0, words
+        assert SeparableKernel.load("k.json").meta["profile_sha256"] == (
+            Profile.load(f"{name}.npz").sha256
+        )
+        assert profile_found(run, "k.json") == (f"{name}.npz", "")
+
+
+def test_a_profile_under_another_name_or_in_the_kernels_folder_is_found(run, folder):
+    (folder / "deep").mkdir()
+    Path(KERNEL).rename(folder / "deep" / KERNEL)
+    Path("wax.profile.npz").rename(folder / "deep" / "moved.npz")
+    found, _ = profile_found(run, f"deep/{KERNEL}")
+    assert found == str(Path("deep") / "moved.npz")
+
+
+def test_a_profile_that_has_changed_since_is_not_measured_against(run):
+    profile = Profile.load("wax.profile.npz")
+    make_profile(profile.r_edges_mm, 0.9 * profile.annulus_energy).save("wax.profile.npz")
+    found, words = profile_found(run, KERNEL)
+    assert found is None
+    assert words == (
+        "wax.profile.npz is a profile of test by the same method, but not the one that "
+        f"{KERNEL} was fitted to, or it has changed since, so nothing is measured: fit the kernel "
+        "again, or name its profile with --profile.\n"
+    )
+    given = ("--profile", "wax.profile.npz", "-o", "out.exr", "--json")
+    status, out, words = run("render", KERNEL, "--irradiance", "edge", *SIZE, *given)
+    assert status == 0
+    assert json.loads(out)["rmse"] > 0.0
+    assert words == f"wax.profile.npz is not the profile that {KERNEL} was fitted to.\n"
+
+
+def test_a_kernel_without_a_record_of_its_profile_says_so(run):
+    whole = json.loads(Path(KERNEL).read_text())
+    del whole["meta"]["profile_sha256"]
+    Path("old.kernel.json").write_text(json.dumps(whole))
+    found, words = profile_found(run, "old.kernel.json")
+    assert found is None
+    assert "old.kernel.json does not record which profile it was fitted to" in words
+
+
 def test_screen_space_needs_depth_and_measures_nothing(run):
     status, out, _ = run("render", "--screen", "--size", "48x48", "--json")
     figures = json.loads(out)

@@ -10,10 +10,10 @@ from sssfit.errors import SimulationError
 from sssfit.grid import make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
+from sssfit.simulate._batches import MAX_PHOTONS
 from sssfit.simulate._run import Ending
 
 DEFAULT_PHOTONS = 10_000_000
-MAX_PHOTONS = 10**12
 
 
 def ending_of(photons: int | None, target_error: float | None) -> Ending:
