@@ -4,6 +4,7 @@ from sssfit.simulate._checkpoint import EVERY_SECONDS, Checkpoint
 from sssfit.simulate._deterministic import Named
 from sssfit.simulate._finished import is_complete, is_finished
 from sssfit.simulate._run import Progress
+from sssfit.simulate._so_far import SoFar, read_checkpoint
 from sssfit.simulate.burley import simulate_burley
 from sssfit.simulate.dipole import simulate_dipole, simulate_dipole_grosjean
 from sssfit.simulate.exact import is_solver_compiled, simulate_exact, simulate_exact_many
@@ -22,10 +23,12 @@ __all__ = [
     "Checkpoint",
     "Named",
     "Progress",
+    "SoFar",
     "is_compiled",
     "is_complete",
     "is_finished",
     "is_solver_compiled",
+    "read_checkpoint",
     "shared_walks",
     "simulate_burley",
     "simulate_deon_skin",
