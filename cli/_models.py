@@ -54,7 +54,8 @@ def _read(name: str) -> tuple[Material, Profile | None]:
         return load_material(name), None
     profile = Profile.load(name)
     material = material_of(profile)
-    if material is None or profile.meta.get("method") != "montecarlo":
+    is_walk = profile.meta.get("method") == "montecarlo" and profile.photons is not None
+    if material is None or not is_walk or profile.channels != material.channels:
         raise ProfileError(
             f"{name} is no photon walk of a known material; name a material, or a profile by "
             "`sssfit simulate`."

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +15,15 @@ from ._compiling import say_if_compiling
 from ._deon_skin import DEON_SKIN
 from ._options import Common, Length, common_options
 from ._report import binary_stdout, finish, say
-from ._scene import MADE, Picture, Size, made_scene, read_scene
+from ._scene import (
+    MADE,
+    Picture,
+    Size,
+    check_file_options,
+    file_options,
+    made_scene,
+    read_scene,
+)
 
 if TYPE_CHECKING:
     from sssfit.compare.choose import Choice, Step
@@ -65,6 +74,7 @@ if TYPE_CHECKING:
     metavar="NAME|FILE",
     help=f"What it is judged on: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG file.",
 )
+@file_options
 @click.option(
     "-o",
     "--output",
@@ -80,6 +90,8 @@ def choose(
     resolution: tuple[int, int],
     tolerance: float,
     irradiance: str,
+    layer: str | None,
+    mask: str | None,
     output: str | None,
     force: bool,
     common: Common,
@@ -107,11 +119,13 @@ def choose(
             f"{material} has no coefficients, and choose needs a material: `sssfit materials` "
             "lists them."
         )
+    picture = Picture(irradiance, None, None, {}, layer, mask)
+    check_file_options(layer, mask, has_file=not picture.is_made)
     loaded = load_material(material)
     pitch = mm_per_pixel_at(distance_mm, fov_degrees, resolution[0])
     path = None if output == "-" else Path(output or f"{loaded.name}.chosen.kernel.json")
     with _held(path, force=force):
-        scene = None if irradiance == "head" else _scene(irradiance, pitch, resolution, common)
+        scene = None if irradiance == "head" else _scene(picture, pitch, resolution, common)
         _say_first(loaded, common)
         choice = choose_kernel(
             loaded,
@@ -132,13 +146,12 @@ def choose(
         say(common, f"{path} is of an earlier run, and not needed here.")
 
 
-def _scene(irradiance: str, pitch: float, resolution: tuple[int, int], common: Common) -> Scene:
+def _scene(picture: Picture, pitch: float, resolution: tuple[int, int], common: Common) -> Scene:
     """Make or read what the choice is judged on; a file that does not say has the pitch."""
-    picture = Picture(irradiance, None, None, {})
     if not picture.is_made:
         return read_scene(picture, pitch, common)
     size = min(resolution[0], 512), min(resolution[1], 512)
-    return made_scene(Picture(irradiance, size, None, {}), pitch, common)
+    return made_scene(replace(picture, size=size), pitch, common)
 
 
 def _say_first(material: Material, common: Common) -> None:

@@ -151,3 +151,8 @@ def _check_material(meta: Mapping[str, Any]) -> None:
             f"meta.material_sha256 is not that of meta.material ({material.sha256[:16]}...): one "
             "of the two was changed; simulate the material again."
         )
+    if list(material.channels) != meta["channels"]:
+        raise ProfileError(
+            f"meta.channels = {shown(meta['channels'])}, but meta.material has "
+            f"{shown(list(material.channels))}."
+        )

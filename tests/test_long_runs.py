@@ -1,6 +1,7 @@
 """Long runs: saved now and then, killed at any moment, resumed to the same bits."""
 
 import contextlib
+import dataclasses
 import errno
 import itertools
 import json
@@ -389,6 +390,18 @@ def test_a_damaged_or_edited_profile_is_not_finished(run, tmp_path):
     (tmp_path / PROFILE).write_bytes(whole.replace(b'"seed": 1', b'"seed": x'))
     assert run("skin1", "--photons", "2e4", "--resume", "--force")[0] == 0
     assert (tmp_path / PROFILE).read_bytes() == whole
+
+
+@pytest.mark.parametrize("name", ["relative_error", "energy_balance_stderr", "material"])
+def test_a_profile_without_a_figure_of_its_walk_is_not_finished(run, tmp_path, name):
+    run("skin1", "--photons", "2e3")
+    profile = Profile.load(PROFILE)
+    meta = {key: value for key, value in profile.meta.items() if key != name}
+    dataclasses.replace(profile, meta=meta).save(PROFILE)
+    status, _, err = run("skin1", "--photons", "2e3", "--resume")
+    assert status == 0
+    assert "There is no" in err
+    assert dict(Profile.load(PROFILE).meta) == dict(profile.meta)
 
 
 def test_a_checkpoint_is_gone_on_from_and_removed(run, tmp_path):

@@ -1,6 +1,7 @@
 """The profile record, its statistics, its file, and what a damaged file says."""
 
 import copy
+import dataclasses
 import io
 import json
 import os
@@ -13,7 +14,7 @@ from reference_pixels import make_profile, one_over_r_profile, walk_tallies
 
 from sssfit import _profile_io
 from sssfit.errors import FileError, ProfileError
-from sssfit.material import load_material
+from sssfit.material import Layer, load_material
 from sssfit.profile import FORMAT, Profile, is_profile_file
 
 META = {
@@ -269,13 +270,20 @@ def test_fields_that_do_not_fit_are_refused_in_one_line(changes, said):
 
 def test_coefficients_must_be_those_of_the_fingerprint():
     material = load_material("skin1")
-    record = material.to_dict() | {"channels": ["R", "G", "B"]}
+    material = dataclasses.replace(
+        material,
+        channels=("R", "G"),
+        layers=(Layer(1.3, [0.0, 0.0], [0.1, 0.2], [1.0, 2.0]),),
+    )
+    record = material.to_dict()
     good = META | {"material": record, "material_sha256": material.sha256}
     assert full_profile(meta=good).meta["material_sha256"] == material.sha256
     edited = copy.deepcopy(record)
     edited["layers"][0]["sigma_a_per_mm"][1] *= 2.0
     with pytest.raises(ProfileError, match=r"meta.material_sha256 is not that of meta.material"):
         full_profile(meta=good | {"material": edited})
+    with pytest.raises(ProfileError, match=r"meta.channels = \['G', 'R'\], but meta.material has"):
+        full_profile(meta=good | {"channels": ["G", "R"]})
 
 
 def test_the_fingerprint_is_that_of_the_light():

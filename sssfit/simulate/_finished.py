@@ -91,6 +91,8 @@ def is_finished(
         meta.get("method") == "montecarlo"
         and meta.get("settings") == expected
         and meta.get("material_sha256") == material.sha256
+        and profile.material_name == material.name
+        and {"relative_error", "energy_balance_stderr"} <= meta.keys()
         and (meta.get("seed"), meta.get("version")) == (seed, __version__)
         and (auto or profile.n_annuli == grid.annuli)
         and is_complete(profile)
