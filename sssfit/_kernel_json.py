@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 
 FORMAT = "sssfit.kernel/1"
-_MARK = b'"sssfit.kernel/'  # by which a file is ours, however damaged
+MARK = b'"sssfit.kernel/'  # by which a file is ours, however damaged
 _REMEDY = "name a .kernel.json file, as `sssfit fit` writes it"
 MOST_BYTES = 500_000_000  # 16000 pixels, 10 terms and 64 channels are 200 MB
 _ROUNDING = 1e-9  # relative; sums of pixels may be taken in another order
@@ -93,7 +93,7 @@ def unpack(source: str | Path | BinaryIO, origin: str) -> dict[str, Any]:
 def is_kernel_file(path: Path) -> bool:
     """Whether a file is a kernel of any version, by its first bytes."""
     with path.open("rb") as file:
-        return _MARK in file.read(200)
+        return MARK in file.read(200)
 
 
 def _read(source: str | Path | BinaryIO, origin: str) -> bytes:
@@ -116,7 +116,7 @@ def _parsed(text: bytes, origin: str) -> Mapping[str, Any]:
     try:
         whole = json.loads(text, object_pairs_hook=_once_each, parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
-        if _MARK not in text:
+        if MARK not in text:
             raise KernelError(f"{origin}: not a kernel; {_REMEDY}.") from None
         if isinstance(error, KernelError):
             raise KernelError(f"{origin}: {error}; fit the kernel again.") from None

@@ -1,6 +1,6 @@
 """Material to profile: one method, one file, one signature ``simulate_x(material, ...)``."""
 
-from sssfit.simulate._checkpoint import EVERY_SECONDS, Checkpoint
+from sssfit.simulate._checkpoint import CHECKPOINT_MARKS, EVERY_SECONDS, Checkpoint
 from sssfit.simulate._deterministic import Named
 from sssfit.simulate._finished import is_complete, is_finished
 from sssfit.simulate._run import Progress
@@ -18,6 +18,7 @@ from sssfit.simulate.montecarlo import (
 from sssfit.simulate.multipole import simulate_multipole
 
 __all__ = [
+    "CHECKPOINT_MARKS",
     "DEON_SKIN",
     "EVERY_SECONDS",
     "Checkpoint",

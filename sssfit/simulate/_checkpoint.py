@@ -36,7 +36,7 @@ from sssfit.simulate._batches import BATCH_PHOTONS, MAX_PHOTONS, Tally
 
 FORMAT = "sssfit.checkpoint/1"
 # By either a file is ours, however damaged; both stand uncompressed.
-MARKS = (b"ledger_absorbed.npy", "sssfit.checkpoint/".encode("utf-32-le"))
+CHECKPOINT_MARKS = (b"ledger_absorbed.npy", "sssfit.checkpoint/".encode("utf-32-le"))
 # At most so much is lost; skin1's takes 1 ms to write, the largest (64 channels of 100 000
 # annuli, 100 MB) a quarter of a second.
 EVERY_SECONDS = 30.0
@@ -225,7 +225,7 @@ def opened(source: Path | BinaryIO, origin: str) -> Iterator[zipfile.ZipFile]:
         # zipfile, zlib, numpy's header parser and json raise a dozen unrelated types on damage.
         is_ours = True
         with contextlib.suppress(OSError), _rewound(source) as stream:
-            is_ours = is_marked(stream, MARKS)
+            is_ours = is_marked(stream, CHECKPOINT_MARKS)
         what = "is a damaged checkpoint" if is_ours else "is not a checkpoint"
         raise FileError(f"{origin} {what}; {_REMEDY}.") from error
 
