@@ -152,9 +152,7 @@ def chart(
         path = _target(name, _stem(found), output, "kernel")
         chart_kernel(name, found, path, profile, channel, common, force=force)
         return
-    for option, value in (("--profile", profile), ("--channel", channel)):
-        if value is not None:
-            raise click.UsageError(f"{option} is for a kernel, and {name} is none; leave it out.")
+    _refuse({"--channel": channel, "--profile": profile})
     _chart_whole(name, found, output, common, force=force)
 
 
@@ -233,9 +231,20 @@ def _check_options(
         what, owners = _WHOSE[option]
         if value is not None and not set(owners) & set(charts):
             raise click.UsageError(f"{option} is for {what} {' or '.join(owners)}; leave it out.")
+    if charts == ["--guide"]:
+        of_kernels = {"--profile": of_kernels["--profile"]}
+    if charts:
+        _refuse(of_kernels)
+
+
+_OF_KERNELS = {"--channel": "the fits of --guide, or for a kernel", "--profile": "a kernel"}
+
+
+def _refuse(of_kernels: dict[str, str | None]) -> None:
+    """Refuse the options of a kernel where there is none."""
     for option, value in of_kernels.items():
-        if value is not None and charts and (option, charts[0]) != ("--channel", "--guide"):
-            raise click.UsageError(f"{option} is for a kernel, not for {charts[0]}; leave it out.")
+        if value is not None:
+            raise click.UsageError(f"{option} is for {_OF_KERNELS[option]}; leave it out.")
 
 
 _ENDINGS = (".checkpoint", ".npz", ".json", ".toml", ".kernel", ".profile")

@@ -20,8 +20,8 @@ from matplotlib.lines import Line2D
 from matplotlib.ticker import (
     FixedLocator,
     FuncFormatter,
-    LogFormatterSciNotation,
     LogLocator,
+    NullFormatter,
 )
 
 from sssfit._chart_page import (
@@ -30,6 +30,7 @@ from sssfit._chart_page import (
     draw_footnotes,
     draw_text,
     drawable,
+    fitting,
     inches,
     name_axes,
     new_figure,
@@ -213,12 +214,13 @@ def _draw_passes(figure: Figure, view: KernelView, down: float) -> None:
     for k, c in enumerate(view.channels):
         left = _LEFT_INCHES + k * (width + _PASS_GAP)
         axes = place_panel(figure, left, down, width, _PASS_INCHES)
+        # Scales first: a channel without light has nothing that a logarithmic one could fit.
+        _scale_distance(axes, edges)
+        _scale_passes(axes, half)
         for t in range(kernel.rank):
             axes.stairs(
                 half[t, :, k], edges, baseline=None, snap=False, **_term_style(t, kernel.rank)
             )
-        _scale_distance(axes, edges)
-        _scale_passes(axes, half)
         title = f"passes, {shortened(kernel.channels[c])}"
         name_axes(axes, title, "distance from the middle (mm)", "" if k else "weight (1/mm)")
         axes.tick_params(labelleft=k == 0)
@@ -269,10 +271,11 @@ def _scale_distance(axes: Axes, edges: FloatArray) -> None:
 
 
 def _tick_decades(axis: Axis, most: int) -> None:
-    """Tick powers of ten; where there may be one or none, 2 and 5 are named as well."""
+    """Tick powers of ten; 2 and 5 have numbers too where an axis with limits is short."""
     axis.set_major_locator(LogLocator(numticks=most))
     axis.set_minor_locator(LogLocator(subs=(2, 5)))
-    axis.set_minor_formatter(LogFormatterSciNotation(minor_thresholds=(1.3, 1.3)))
+    low, high = axis.get_view_interval()
+    axis.set_minor_formatter("{x:g}" if math.log10(high / low) < 1.3 else NullFormatter())
 
 
 def _image_norm(view: KernelView) -> LogNorm:
@@ -296,7 +299,9 @@ def _draw_row(
         shades = _SIGNED_SHADES if is_signed else _SHADES
         seen = images[row] if is_signed else _lifted(images[row], norms[0])
         draw_plane(axes, seen, _half_mm(view), norms[is_signed], shades)
-        name_axes(axes, f"{title}, {name}", "x (mm)" if is_last else "", "" if k else "y (mm)")
+        titles = f"{title}, {name}", title
+        title = fitting(titles, RC["axes.titlesize"], _IMAGE_INCHES)
+        name_axes(axes, title, "x (mm)" if is_last else "", "" if k else "y (mm)")
         axes.tick_params(labelleft=k == 0, labelbottom=is_last)
         ticks = [-_round(_half_mm(view)), 0.0, _round(_half_mm(view))]
         axes.set_xticks(ticks)
@@ -350,6 +355,7 @@ def _draw_slices(axes: Axes, view: KernelView, row: int) -> None:
         (view.true_axis, view.axis, pitches[0], _AXIS, "axis"),
         (view.true_diagonal, view.diagonal, pitches[1], _DIAGONAL, "diagonal"),
     )
+    _scale_slices(axes, view)
     for true, ours, pitch, style, name in slices:
         edges = _edges(kernel.half_pixels, pitch)
         if true is not None:
@@ -359,15 +365,20 @@ def _draw_slices(axes: Axes, view: KernelView, row: int) -> None:
         axes.plot([], [], label=name, **style)
     if view.true_axis is not None:
         axes.plot([], [], label="profile (wide)", **(_PALE | {"color": "#666666"}))
-    _scale_distance(axes, _edges(kernel.half_pixels, pitches[1]))
-    axes.set_xlim(left=_MIDDLE * pitches[0])
+    if row == 0:
+        axes.legend(loc="lower left", fontsize=7.5, handlelength=2.4, labelspacing=0.25)
+
+
+def _scale_slices(axes: Axes, view: KernelView) -> None:
+    """Scale both axes logarithmically, alike for all channels."""
+    kernel = view.kernel
+    _scale_distance(axes, _edges(kernel.half_pixels, math.sqrt(2.0) * kernel.mm_per_pixel))
+    axes.set_xlim(left=_MIDDLE * kernel.mm_per_pixel)
     axes.set_yscale("log")
-    every = (view.axis, view.diagonal, _or_zero(view.true_axis))
+    every = (np.abs(view.axis), np.abs(view.diagonal), _or_zero(view.true_axis))
     most = max(float(each.max()) for each in every) or 1.0
     axes.set_ylim(most * 10.0**-_SLICE_DECADES, 3.0 * most)
     _tick_decades(axes.yaxis, 5)
-    if row == 0:
-        axes.legend(loc="lower left", fontsize=7.5, handlelength=2.4, labelspacing=0.25)
 
 
 def _draw_steps(axes: Axes, values: FloatArray, edges: FloatArray, style: Style) -> None:

@@ -61,6 +61,8 @@ def material_figure(material: Material) -> Figure:
         bottom = draw_footnotes(figure, notes)
         panels = figure.subplots(1, 3)
         figure.subplots_adjust(LEFT, bottom, RIGHT, 1 - head / height, wspace=_GAP)
+        for axes in panels:
+            axes.set_yscale("log")
         for k, layer in enumerate(shown):
             _draw_layer(panels, material.layers[layer], k)
         titles = ("(a) sigma_s' and, hollow, sigma_a", "(b) mean free path", "(c) 1 - albedo")
@@ -68,7 +70,7 @@ def material_figure(material: Material) -> Figure:
         for axes, title, name in zip(panels, titles, names, strict=True):
             name_axes(axes, title, "channel", name)
             _name_channels(axes, material.channels)
-            _scale(axes)
+            _limit(axes)
     return figure
 
 
@@ -161,9 +163,8 @@ def _name_channels(axes: Axes, channels: Sequence[str]) -> None:
     axes.set_xlim(-beside, most + beside)
 
 
-def _scale(axes: Axes) -> None:
-    """Scale logarithmically, over a decade at least."""
-    axes.set_yscale("log")
+def _limit(axes: Axes) -> None:
+    """Set the limits of a logarithmic axis, a decade apart at least."""
     values = np.concatenate([np.asarray(line.get_ydata()) for line in axes.lines])
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if values.size else (0.1, 1.0)
