@@ -22,7 +22,6 @@ _KINDS = (
     "(.checkpoint)"
 )
 _MOST_BYTES = 500_000_000  # the most that a file of ours may have
-_BLOCK_BYTES = 1 << 20
 # What every material has: a table of layers or a coefficient, if by a name that has to be mended.
 _MATERIAL = re.compile(r"^\s*(\[\[layers\]\]|[\"']?(sigma|mu)_?[as])", re.MULTILINE | re.IGNORECASE)
 
@@ -76,14 +75,12 @@ def _material(source: Path | io.BytesIO, origin: str) -> Material:
 def _stdin() -> io.BytesIO:
     """Take all of stdin, which cannot seek, up to the most that a file of ours may have."""
     from sssfit.errors import FileError
+    from sssfit.files import read_at_most
 
-    content, stream = io.BytesIO(), binary_stdin()
-    while block := stream.read(_BLOCK_BYTES):
-        content.write(block)
-        if content.tell() > _MOST_BYTES:
-            raise FileError(f"stdin has over {_MOST_BYTES:,} bytes; expected {_KINDS}.")
-    content.seek(0)
-    return content
+    content = read_at_most(binary_stdin(), _MOST_BYTES + 1)
+    if len(content) > _MOST_BYTES:
+        raise FileError(f"stdin has over {_MOST_BYTES:,} bytes; expected {_KINDS}.")
+    return io.BytesIO(content)
 
 
 def _check_ordinary(name: str, path: Path) -> None:

@@ -27,10 +27,10 @@ def chart_kernel(
     force: bool,
 ) -> None:
     """Draw a kernel and put it into figures; ``given`` is its profile's file, no path is stdout."""
-    with chart_output(path, force=force) as save:
+    profile, source = true_profile(kernel, name, given, common)
+    with chart_output(path, inputs=[name, source], force=force) as save:
         from sssfit.compare import view_kernel
 
-        profile, source = true_profile(kernel, name, given, common)
         view = view_kernel(kernel, profile, channels=None if channel is None else [channel])
 
         from sssfit.chart import kernel_figure

@@ -50,8 +50,8 @@ if TYPE_CHECKING:
 @click.option(
     "--channel",
     metavar="NAME",
-    help="Which one, with --guide or of a kernel.  [default: --guide the first that returns light;"
-    " of a kernel all of three, or three of more]",
+    help="Which one, with --guide or of a kernel."
+    "  [default: the first that returns light; of a kernel up to three]",
 )
 @click.option(
     "--profile",
@@ -72,7 +72,7 @@ if TYPE_CHECKING:
     "  [default: NAME.profile.png, NAME.kernel.png, NAME.material.png, NAME.checkpoint.png,"
     " NAME.spectrum.png, NAME.guide.png, MATERIAL.models.png]",
 )
-@click.option("--force", is_flag=True, help="Replace a file that is not a chart.")
+@click.option("--force", is_flag=True, help="Replace an input, or a file that is not our chart.")
 @common_options
 def chart(
     file: str | None,
@@ -103,7 +103,8 @@ def chart(
     squares and of its absolute values; how many terms leave an error of 1 %.
 
     With --guide, for each k, the guide function of the guided fit, the residual that the fit leaves
-    of one channel, and its pass beside the pre-integrated one.
+    of one channel, and its pass beside the pre-integrated one; and the same of that one, under a
+    guide function that has it for the best.
 
     With --models FILE is a material, or a profile of the photon walk, which then need not be
     walked again: the exact solution, the walk and the diffusion models in one figure, and how far
@@ -169,7 +170,7 @@ def _chart_whole(
     kind = kinds[type(found)]
     material = shown.name if isinstance(shown, Material) else shown.material_name
     path = _target(name, material, output, kind)
-    with chart_output(path, force=force) as save:
+    with chart_output(path, inputs=[name], force=force) as save:
         from sssfit.chart import material_figure, profile_figure
 
         save(material_figure(shown) if isinstance(shown, Material) else profile_figure(shown))

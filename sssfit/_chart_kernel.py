@@ -298,6 +298,7 @@ def _draw_row(
         axes = place_panel(figure, _left(k), down, _IMAGE_INCHES, _IMAGE_INCHES)
         shades = _SIGNED_SHADES if is_signed else _SHADES
         seen = images[row] if is_signed else _lifted(images[row], norms[0])
+        axes.set_facecolor("#bbbbbb")  # seen where the logarithm has no value
         draw_plane(axes, seen, _half_mm(view), norms[is_signed], shades)
         titles = f"{title}, {name}", title
         title = fitting(titles, RC["axes.titlesize"], _IMAGE_INCHES)

@@ -84,7 +84,6 @@ def draw_plane(
 ) -> None:
     """Show the whole plane of a quadrant, which reaches so far from the middle to its rim."""
     extent = (-half_mm, half_mm, -half_mm, half_mm)
-    axes.set_facecolor("#bbbbbb")  # shows where a logarithmic scale has nothing to show
     axes.imshow(
         full_kernel(quadrant), norm=norm, cmap=shades, extent=extent, interpolation="nearest"
     )
