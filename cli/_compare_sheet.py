@@ -10,7 +10,7 @@ import click
 
 from ._compiling import say_if_compiling
 from ._deon_skin import DEON_SKIN
-from ._figure import chart_output
+from ._figure import chart_path, write_chart
 from ._options import Common
 from ._report import finish, table
 
@@ -25,40 +25,34 @@ _LEAST_PHOTONS = 10_000
 _PER_DECADE = 2
 
 
-def chart_sheet(
-    profile: Profile, output: str, mm_per_pixel: float | None, common: Common, *, force: bool
-) -> None:
+def chart_sheet(profile: Profile, output: str, mm_per_pixel: float | None, common: Common) -> None:
     """Draw a contact sheet of a profile's kernels; ``-`` is PNG on stdout."""
-    path = _path(output)
-    with chart_output(path, force=force) as save:
-        from sssfit.compare.sheet import compute_sheet
+    from sssfit.compare.sheet import compute_sheet
 
-        given: dict[str, Any] = {} if mm_per_pixel is None else {"mm_per_pixel": mm_per_pixel}
-        sheet = compute_sheet(profile, threads=common.threads, **given)
+    given: dict[str, Any] = {} if mm_per_pixel is None else {"mm_per_pixel": mm_per_pixel}
+    sheet = compute_sheet(profile, threads=common.threads, **given)
 
-        from sssfit.chart import sheet_figure
+    from sssfit.chart import sheet_figure
 
-        save(sheet_figure(sheet))
+    path = chart_path(output)
+    write_chart(sheet_figure(sheet), path)
     _finish(path, _sheet_figures(sheet), _sheet_text, common)
 
 
-def chart_editing(output: str, common: Common, *, force: bool) -> None:
+def chart_editing(output: str, common: Common) -> None:
     """Draw the 2012 model edited by hand; ``-`` is PNG on stdout."""
-    path = _path(output)
-    with chart_output(path, force=force) as save:
-        from sssfit.compare.editing import compute_editing
+    from sssfit.compare.editing import compute_editing
 
-        editing = compute_editing(threads=common.threads)
+    editing = compute_editing(threads=common.threads)
 
-        from sssfit.chart import editing_figure
+    from sssfit.chart import editing_figure
 
-        save(editing_figure(editing))
+    path = chart_path(output)
+    write_chart(editing_figure(editing), path)
     _finish(path, _editing_figures(editing), _editing_text, common)
 
 
-def chart_convergence(
-    name: str, output: str, photons: int | None, common: Common, *, force: bool
-) -> None:
+def chart_convergence(name: str, output: str, photons: int | None, common: Common) -> None:
     """Draw a simulation's error against its price; ``-`` is PNG on stdout.
 
     ``photons`` is the largest number walked.
@@ -70,18 +64,17 @@ def chart_convergence(
         raise SimulationError(f"{name} has no coefficients to simulate with; name a material.")
     numbers = photon_numbers(photons or MOST_PHOTONS)
     material = load_material(name)
-    path = _path(output)
-    with chart_output(path, force=force) as save:
-        from sssfit.compare.convergence import compute_convergence
+    from sssfit.compare.convergence import compute_convergence
 
-        say_if_compiling(common, walk=material, solver=True)
-        found = compute_convergence(
-            material, photons=numbers, first_seed=common.seed, threads=common.threads
-        )
+    say_if_compiling(common, walk=material, solver=True)
+    found = compute_convergence(
+        material, photons=numbers, first_seed=common.seed, threads=common.threads
+    )
 
-        from sssfit.chart import convergence_figure
+    from sssfit.chart import convergence_figure
 
-        save(convergence_figure(found))
+    path = chart_path(output)
+    write_chart(convergence_figure(found), path)
     _finish(path, _convergence_figures(found), _convergence_text, common)
 
 
@@ -93,16 +86,6 @@ def photon_numbers(most: int) -> tuple[int, ...]:
     while (number := round(_LEAST_PHOTONS * 10 ** (len(numbers) / _PER_DECADE))) <= most:
         numbers.append(number)
     return tuple(numbers)
-
-
-def _path(output: str) -> Path | None:
-    """None is stdout."""
-    from sssfit._chart_files import chart_format
-
-    if output == "-":
-        return None
-    chart_format(output)  # before anything is computed
-    return Path(output)
 
 
 def _finish(

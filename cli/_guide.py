@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ._figure import chart_output
+from ._memory import check_memory
 from ._options import Common
 from ._report import finish, table
 
@@ -28,7 +29,8 @@ def chart_guide(
 
     ``settings`` are keywords of `compute_guide`; None is its default.
     """
-    with chart_output(path, force=force) as save:
+    check_memory("figures", common.threads)
+    with chart_output(path, inputs=[name], force=force) as save:
         from sssfit.compare import compute_guide
 
         given = {key: value for key, value in settings.items() if value is not None}

@@ -11,6 +11,7 @@ import click
 from ._compiling import say_if_compiling
 from ._deon_skin import DEON_SKIN
 from ._figure import chart_output
+from ._memory import check_memory
 from ._options import Common
 from ._report import finish, table
 
@@ -26,11 +27,12 @@ def chart_models(
     name: str, output: str | None, photons: int | None, common: Common, *, force: bool
 ) -> None:
     """Draw a material by every method; a profile of a photon walk stands for material and walk."""
+    check_memory("figures", common.threads)
     material, walk = _read(name)
     if walk is not None and photons is not None:
         raise click.UsageError("--photons is for a walk that is yet to be; leave it out.")
     path = None if output == "-" else Path(output or f"{material.name}.models.png")
-    with chart_output(path, force=force) as save:
+    with chart_output(path, inputs=[name], force=force) as save:
         comparison = _compared(material, walk, photons, common)
 
         from sssfit.chart import models_figure

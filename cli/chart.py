@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     "  [default: NAME.profile.png, NAME.spectrum.png, NAME.guide.png,"
     " MATERIAL.models.png]",
 )
-@click.option("--force", is_flag=True, help="Replace a file that is not a chart.")
+@click.option("--force", is_flag=True, help="Replace an input, or a file that is not our chart.")
 @common_options
 def chart(
     profile: str | None,
@@ -124,7 +124,7 @@ def chart(
         settings = {"mm_per_pixel": mm_per_pixel, "ks": ks, "channel": channel}
         chart_guide(name, loaded, path, settings, common, force=force)
         return
-    with chart_output(path, force=force) as save:
+    with chart_output(path, inputs=[name], force=force) as save:
         from sssfit.chart import profile_figure
 
         save(profile_figure(loaded))

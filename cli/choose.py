@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,6 +12,7 @@ from ._choose_report import figures_of, step_line, text_of
 from ._compiling import say_if_compiling
 from ._deon_skin import DEON_SKIN
 from ._options import Common, Length, common_options
+from ._outputs import KERNEL, held
 from ._report import binary_stdout, finish, say
 from ._scene import (
     MADE,
@@ -81,7 +80,7 @@ if TYPE_CHECKING:
     metavar="FILE",
     help="Where the kernel goes, - for stdout.  [default: MATERIAL.chosen.kernel.json]",
 )
-@click.option("--force", is_flag=True, help="Replace a file that is not a kernel.")
+@click.option("--force", is_flag=True, help="Replace an input, or a file that is not our kernel.")
 @common_options
 def choose(
     material: str,
@@ -112,6 +111,7 @@ def choose(
     """
     from sssfit.compare.choose import choose as choose_kernel
     from sssfit.compare.choose import mm_per_pixel_at
+    from sssfit.kernel import is_kernel_file
     from sssfit.material import load_material
 
     if material == DEON_SKIN:
@@ -124,7 +124,7 @@ def choose(
     loaded = load_material(material)
     pitch = mm_per_pixel_at(distance_mm, fov_degrees, resolution[0])
     path = None if output == "-" else Path(output or f"{loaded.name}.chosen.kernel.json")
-    with _held(path, force=force):
+    with held([path], is_kernel_file, inputs=[material, irradiance], force=force, named=KERNEL):
         scene = None if irradiance == "head" else _scene(picture, pitch, resolution, common)
         _say_first(loaded, common)
         choice = choose_kernel(
@@ -171,22 +171,6 @@ def _say_first(material: Material, common: Common) -> None:
 def _say_step(step: Step, common: Common) -> None:
     if common.verbose:
         say(common, step_line(step))
-
-
-@contextlib.contextmanager
-def _held(path: Path | None, *, force: bool) -> Iterator[None]:
-    """Check that the kernel can be written there, and keep other runs off it."""
-    from sssfit.files import check_ending, check_output, locked
-    from sssfit.kernel import is_kernel_file
-
-    if path is None:
-        binary_stdout()  # closed: said now and not after the work
-        yield
-        return
-    check_ending(path, "a kernel", ".json")
-    check_output(path, is_kernel_file, force=force)
-    with locked(path):
-        yield
 
 
 def _write(choice: Choice, path: Path | None) -> list[str]:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ._options import Common, common_options
+from ._outputs import held
 from ._render_options import picture_options
 from ._render_report import figures_of, text_of
 from ._report import binary_stdin, binary_stdout, finish, newest, say
@@ -55,7 +54,7 @@ _BEHIND_DEGREES = 170.0
 )
 @click.option("--truth", metavar="FILE", help="Write the true picture as well.")
 @click.option("--difference", metavar="FILE", help="Write the absolute difference as well.")
-@click.option("--force", is_flag=True, help="Replace a file that is not a picture.")
+@click.option("--force", is_flag=True, help="Replace an input, or a file that is not our picture.")
 @common_options
 def render(
     kernel: str | None,
@@ -93,6 +92,8 @@ def render(
       sssfit render --screen --irradiance head
       sssfit render --irradiance head --transmit -o ears.png
     """
+    from sssfit.image import image_format, is_image_file
+
     _check_options(screen, follow, profile or truth or difference or structure)
     if transmit:
         own = _lit_from_behind(irradiance, own)
@@ -101,7 +102,10 @@ def render(
     path = _target(name, picture, output)
     targets = {"picture": path} if path else {}
     targets |= {k: Path(v) for k, v in (("truth", truth), ("difference", difference)) if v}
-    with _held(list(targets.values()), force=force):
+    for each in targets.values():
+        image_format(each)
+    outputs = [*targets.values(), *([None] if path is None else [])]
+    with held(outputs, is_image_file, inputs=[name, irradiance, profile], force=force):
         scene = make_or_read(picture, loaded.mm_per_pixel, common)
         through = None
         if transmit:
@@ -172,24 +176,6 @@ def _target(name: str, picture: Picture, output: str | None) -> Path | None:
         return None if output == "-" else Path(output)
     stem = "stdin" if name == "-" else Path(name).name.removesuffix(".json").removesuffix(".kernel")
     return Path(f"{stem}.{picture.name}.exr")
-
-
-@contextlib.contextmanager
-def _held(paths: Sequence[Path], *, force: bool) -> Iterator[None]:
-    """Check that pictures can be written there, and keep other runs off them."""
-    from sssfit.files import check_output, locked
-    from sssfit.image import image_format, is_image_file
-
-    if not paths:
-        binary_stdout()  # closed: said now and not after the work
-    if len({path.resolve() for path in paths}) < len(paths):
-        raise click.UsageError("two of -o, --truth and --difference name the same file.")
-    with contextlib.ExitStack() as stack:
-        for path in paths:
-            image_format(path)
-            check_output(path, is_image_file, force=force)
-            stack.enter_context(locked(path))
-        yield
 
 
 def _write(

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from sssfit import _kernel_schema
 from sssfit._material_checks import shown
 from sssfit.errors import KernelError
-from sssfit.files import reason
+from sssfit.files import has_mark, read_at_most, reason
 
 if TYPE_CHECKING:
     from sssfit.kernel import SeparableKernel
@@ -91,9 +91,8 @@ def unpack(source: str | Path | BinaryIO, origin: str) -> dict[str, Any]:
 
 
 def is_kernel_file(path: Path) -> bool:
-    """Whether a file is a kernel of any version, by its first bytes."""
-    with path.open("rb") as file:
-        return _MARK in file.read(200)
+    """Whether a file is a kernel of any version, by the format it names."""
+    return has_mark(path, {b"{": b'"format": "sssfit.kernel/'})
 
 
 def _read(source: str | Path | BinaryIO, origin: str) -> bytes:
@@ -101,9 +100,9 @@ def _read(source: str | Path | BinaryIO, origin: str) -> bytes:
     try:
         if isinstance(source, str | Path):
             with Path(source).open("rb") as file:
-                text = file.read(MOST_BYTES + 1)
+                text = read_at_most(file, MOST_BYTES + 1)
         else:
-            text = source.read(MOST_BYTES + 1)
+            text = read_at_most(source, MOST_BYTES + 1)
     except OSError as error:
         raise KernelError(f"{origin}: {reason(error)}.") from None
     if len(text) > MOST_BYTES:

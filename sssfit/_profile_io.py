@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from sssfit._material_checks import shown
 from sssfit.errors import ProfileError
-from sssfit.files import reason
+from sssfit.files import read_at_most, reason
 
 FORMAT = "sssfit.profile/1"
 REQUIRED = (
@@ -89,7 +89,7 @@ def unpack(
             with Path(source).open("rb") as stream:
                 return _unpack_known(stream)
         # A pipe cannot seek, an archive's directory is at its end.
-        return _unpack_known(io.BytesIO(source.read(_LARGEST_FILE_BYTES)))
+        return _unpack_known(io.BytesIO(read_at_most(source, _LARGEST_FILE_BYTES)))
     except ProfileError as error:
         remedy = _FOREIGN if str(error).startswith("is not ") else _REMEDY
         raise ProfileError(f"{origin} {error}; {remedy}.") from None

@@ -36,6 +36,7 @@ import numpy.typing as npt
 from sssfit import __version__, _disks
 from sssfit._material_checks import check_channels, printable, shown
 from sssfit.errors import MaterialError, ProfileError, SssfitWarning
+from sssfit.files import has_mark
 from sssfit.profile import FORMAT, Profile
 from sssfit.text import finite_number, read_text, tenfold_number
 
@@ -194,11 +195,7 @@ def csv_text(profile: Profile) -> str:
 
 def is_profile_csv(path: Path) -> bool:
     """Tell whether a file is a table that `csv_text` wrote."""
-    try:
-        with path.open("rb") as stream:
-            return stream.read(len(_MARK)) == _MARK.encode()
-    except OSError:
-        return False
+    return has_mark(path, {_MARK.encode(): b""})
 
 
 @dataclass(frozen=True, slots=True)

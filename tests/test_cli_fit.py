@@ -38,7 +38,11 @@ def test_a_session_from_profile_to_shader(folder):
     kernel = SeparableKernel.load("wax.preintegrated.kernel.json")
     assert kernel.mm_per_pixel == pytest.approx(0.1)
     assert ended("export", "--format", "hlsl").exit_code == 0
-    assert (folder / "wax.preintegrated.hlsl").read_text().startswith("// Subsurface")
+    assert (
+        (folder / "wax.preintegrated.hlsl")
+        .read_text()
+        .startswith("// sssfit.hlsl/1\n// Subsurface")
+    )
     assert ended("export", "--format", "json").exit_code == 0
     assert json.loads((folder / "wax.preintegrated.json").read_text())["pixels"] == kernel.pixels
 
@@ -101,3 +105,27 @@ def test_a_foreign_file_is_not_replaced(folder, capsys):
     assert code == 1
     assert "--force" in text
     assert (folder / "wax.preintegrated.kernel.json").read_text() == "mine"
+
+
+# Normalised diffusion is nothing like the Gaussian that it is fitted to here, and says so.
+@pytest.mark.filterwarnings("ignore:.* the burley kernel is farther")
+@pytest.mark.parametrize("method", ["svd", "gaussians", "preintegrated", "burley"])
+def test_energy_is_restored_or_kept_as_asked(folder, method):
+    short = ("--support", "0.5", "--mm-per-pixel", "0.1")
+    kernels = {}
+    for energy in ("rescale", "keep"):
+        result = ended("fit", "--method", method, "--energy", energy, *short, "--json")
+        (path,) = json.loads(result.stdout)["output"]
+        kernels[energy] = SeparableKernel.load(path)
+        assert kernels[energy].meta["settings"]["energy"] == energy
+    ended("fit", "--method", method, *short)
+    assert SeparableKernel.load(path).to_dict() == kernels["rescale"].to_dict()
+    np.testing.assert_allclose(kernels["rescale"].energy_error, 0.0, atol=1e-9)
+    assert (kernels["keep"].energy_error < -0.05).all()
+
+
+@pytest.mark.parametrize("method", ["guided", "artist", "falloff"])
+def test_methods_that_always_keep_the_energy_have_no_option_for_it(folder, capsys, method):
+    code, text = failed(capsys, "fit", "--method", method, "--energy", "keep")
+    assert code == 2
+    assert "--energy is for --method svd or gaussians or preintegrated or burley" in text

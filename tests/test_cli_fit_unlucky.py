@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+from processes import start
 from reference_pixels import make_profile
 
 from sssfit.cli import main
@@ -68,13 +69,7 @@ def names(folder):
 
 def begin(folder, midst="time.sleep(60)"):
     """Start a fit of its own process and wait until it is in its midst."""
-    process = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM.format(midst=midst), *FIT],
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    process = start([sys.executable, "-c", PROGRAM.format(midst=midst), *FIT], cwd=folder)
     assert process.stdout.readline() == "midst\n"
     return process
 
@@ -157,7 +152,7 @@ def test_a_foreign_file_is_replaced_by_force_only(folder, run):
     (folder / "notes.txt").write_text("mine")
     status, _, err = run(*FIT, "-o", "notes.txt")
     assert status == 1
-    assert "notes.txt exists and is not a file of this format; choose another" in err
+    assert "notes.txt exists and was not written by sssfit as such a file; choose another" in err
     assert (folder / "notes.txt").read_text() == "mine"
     profile = (folder / "wax.profile.npz").read_bytes()
     assert run(*FIT, "-o", "wax.profile.npz")[0] == 1

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from sssfit.image import load_image, save_image
 from sssfit.kernel import SeparableKernel
 from sssfit.profile import Profile
 from sssfit.render.head import head_scene
+from sssfit.render.irradiance import make_scene
 from sssfit.render.reference import render_reference
 from sssfit.render.scene import Scene
 from sssfit.render.screen import render_screen
@@ -120,13 +122,41 @@ def test_without_its_profile_the_cost_is_all_that_is_measured(run):
     assert "profile" in words
 
 
-def test_a_profile_of_another_run_is_not_taken_for_the_kernels(run):
+OTHERS = {
+    "material": {"name": "lard"},
+    "material_sha256": "0123",
+    "method": "montecarlo",
+    "photons": 10_000,
+    "seed": 7,
+}
+
+
+@pytest.mark.parametrize("key", list(OTHERS))
+def test_a_profile_that_differs_in_one_thing_is_not_the_kernels(run, key):
+    """It is newer than the kernel's own, and all light lies elsewhere: another error."""
     profile = Profile.load("wax.profile.npz")
-    profile.save("first.profile.npz")
-    Path("wax.profile.npz").unlink()
+    wanted = json.loads(run("render", "--irradiance", "edge", *SIZE, "--json")[1])
+    energy = profile.annulus_energy[::-1].copy()
+    meta = {**profile.meta, key: OTHERS[key]}
+    make_profile(profile.r_edges_mm, energy, meta=meta).save("other.profile.npz")
+    newest = Path("wax.profile.npz").stat().st_mtime + 60.0
+    os.utime("other.profile.npz", (newest, newest))
+    found = json.loads(run("render", "--irradiance", "edge", *SIZE, "--json")[1])
+    assert found["profile"] == "wax.profile.npz"
+    assert found["rmse"] == wanted["rmse"]
+
+
+def test_without_another_the_same_profile_is_found_under_any_name(run):
+    Path("wax.profile.npz").rename("first.profile.npz")
     run("simulate", "skin1", "--method", "dipole", "-o", "last.profile.npz")
-    _, out, _ = run("render", "--irradiance", "edge", *SIZE, "--json")
-    assert json.loads(out)["profile"] == "first.profile.npz"
+    status, out, _ = run("render", "--irradiance", "edge", *SIZE, "--json")
+    figures = json.loads(out)
+    assert status == 0
+    assert figures["profile"] == "first.profile.npz"
+    scene = make_scene("edge", height=24, width=40, mm_per_pixel=0.2)
+    truth = render_reference(scene, Profile.load("first.profile.npz"))
+    lost = render_separable(scene, SeparableKernel.load(KERNEL)) - truth
+    assert figures["rmse"] == pytest.approx(np.sqrt(np.mean(lost**2)), rel=1e-9)
 
 
 TABLE = "r_mm,red,green\n0.2,0.2,0.1\n0.4,0.1,0.04\n0.8,0.05,0.01\n1.2,0.02,0.004\ninf,0.01,0\n"

@@ -1,6 +1,5 @@
 """A height field with what rays need to meet it quickly; lit by threads, a band of rows each."""
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -131,6 +130,7 @@ def light_field(
     behind the field: the body that then casts the shadows. ``smooth`` averages several samples a
     pixel; without it a pixel is what its centre sees.
     """
+    from sssfit._jit import thread_pool
     from sssfit._jit.lit_field import light_rows
 
     buffers = Buffers(
@@ -155,7 +155,7 @@ def light_field(
             buffers.specular,
         )
 
-    with ThreadPoolExecutor(thread_count(threads)) as pool:
+    with thread_pool(thread_count(threads)) as pool:
         list(pool.map(band, range(0, shape[0], BAND)))
     return buffers
 
@@ -176,6 +176,7 @@ def light_through(
     Both (H, W), and 0 where the surface faces the light or nothing is; the cosine is 0 in the
     shadow of another part, too. View as `light_field`.
     """
+    from sssfit._jit import thread_pool
     from sssfit._jit.lit_field import through_rows
 
     thickness, cosines = np.zeros(shape), np.zeros(shape)
@@ -185,6 +186,6 @@ def light_through(
         rows = (first, min(first + BAND, shape[0]))
         through_rows(fine.tables, solid.tables, view, light, rows, thickness, cosines)
 
-    with ThreadPoolExecutor(thread_count(threads)) as pool:
+    with thread_pool(thread_count(threads)) as pool:
         list(pool.map(band, range(0, shape[0], BAND)))
     return thickness, cosines

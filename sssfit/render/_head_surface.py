@@ -1,7 +1,6 @@
 """The head as a height field: the forms, the fine relief, and the grids they are sampled on."""
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
@@ -43,7 +42,13 @@ def head_field(
         # A little below the floor, so that no ray comes to rest on it.
         heights[part], eyes[part] = np.maximum(z, FLOOR_MM - 10.0), inside
 
-    with ThreadPoolExecutor(threads) as pool:
+    # Before the threads, which need them all.
+    import scipy.interpolate
+    import scipy.ndimage  # noqa: F401
+
+    from sssfit._jit import skin_noise, thread_pool  # noqa: F401
+
+    with thread_pool(threads) as pool:
         list(pool.map(strip, range(0, y.size, STRIP)))
     return HeightField(heights, float(x[0]), float(y[0]), spacing_mm, eyes)
 
@@ -67,7 +72,9 @@ def body(threads: int) -> Solid:
         part = slice(first, first + STRIP)
         behind[part] = back(x[None, :], y[part, None])
 
-    with ThreadPoolExecutor(threads) as pool:
+    from sssfit._jit import thread_pool
+
+    with thread_pool(threads) as pool:
         list(pool.map(strip, range(0, rows, STRIP)))
     return Solid(front.heights, behind, front.x0_mm, front.y0_mm, SOLID_MM)
 

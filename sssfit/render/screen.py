@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit._jit import screen as compiled
+from sssfit._jit import thread_pool
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
 from sssfit.render._checks import thread_count
@@ -75,7 +76,7 @@ def render_screen(
         v of "gaussian". By default the larger variance of the artist's kernel; for other kernels
         their second moment. Where ``scale`` is s, v s^2 is used.
     falloff_per_mm : float, optional [1/mm]
-        Of "lerp". By default complete at 5.2 standard deviations of the widest channel.
+        Of "lerp". By default complete at 3.8 standard deviations of the widest channel.
     scale : float or array (H, W), optional
         Size of the kernel: 0 leaves a pixel unblurred.
     border : str
@@ -132,7 +133,7 @@ def _blurred(
     """Return the sum of the kernel's terms (N, C), each a horizontal and a vertical pass."""
     picture = np.ascontiguousarray(lit.reshape(-1, lit.shape[2]))
     total = np.zeros_like(picture)
-    with ThreadPoolExecutor(threads) as pool:
+    with thread_pool(threads) as pool:
         for signs, weights in zip(kernel.signs, kernel.weights, strict=True):
             across = _pass(pool, picture, weights, view, vertical=False)
             total += signs * _pass(pool, across, weights, view, vertical=True)

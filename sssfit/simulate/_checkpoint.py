@@ -28,7 +28,7 @@ from sssfit._jit import source_key
 from sssfit._material_checks import printable, shown
 from sssfit._profile_io import is_marked, read_npy
 from sssfit.errors import FileError, SimulationError, SssfitWarning
-from sssfit.files import reason, remove_leftovers, write_atomically
+from sssfit.files import has_mark, reason, remove_leftovers, write_atomically
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
 from sssfit.simulate._batches import BATCH_PHOTONS, MAX_PHOTONS, Tally
@@ -160,6 +160,11 @@ class Checkpoint:
         else:
             self._is_ours = True
         self._saved_at = perf_counter()
+
+
+def is_checkpoint_file(path: Path) -> bool:
+    """Tell whether a file is a checkpoint of any version, or what damage has left of one."""
+    return has_mark(path, {b"PK": _MARKS[1]})
 
 
 def settings_of(
