@@ -693,11 +693,12 @@ def spectrum(f: Figures) -> list[Any]:
 def guide(f: Figures) -> list[Any]:
     keys = ("centre_share", "misplaced", "relative_frobenius_error", "weighted_residual")
     rows = [[k, *(Percent(f[key][i]) for key in keys)] for i, k in enumerate(f["k"])]
+    names = ("centre_share", "misplaced", "frobenius_error", "weighted_residual")
+    rows.append(["pre-integrated", *(Percent(f[f"preintegrated_{name}"]) for name in names)])
     return [
         Words(
-            "Channel {}; {} x {} pixels of {} mm; pre-integrated middle pixel {}",
+            "Channel {}; {} x {} pixels of {} mm",
             *(f["channel"], f["pixels"], f["pixels"], f["mm_per_pixel"]),
-            Percent(f["preintegrated_centre_share"]),
         ),
         Table(["k", "middle pixel", "misplaced", "Frobenius error", "weighted misfit"], rows),
         wrote(f),
