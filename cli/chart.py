@@ -10,7 +10,7 @@ import click
 from ._figure import chart_output
 from ._guide import chart_guide
 from ._models import chart_models
-from ._options import Common, Count, Length, ListOf, common_options
+from ._options import Common, Count, Length, ListOf, Number, common_options
 from ._report import binary_stdin, finish, newest
 from ._spectrum import chart_spectrum
 
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 @click.option(
     "--k",
     "ks",
-    type=ListOf(click.FLOAT),
+    type=ListOf(Number()),
     metavar="0..4,...",
     help="One to four values, with --guide.  [default: 0,1.55,4]",
 )
