@@ -22,8 +22,8 @@ _OPTIONS = (
     click.option(
         "--energy",
         type=click.Choice(["rescale", "keep"]),
-        help="svd: scale the terms to the diffuse reflectance, or keep the least error."
-        "  [default: rescale]",
+        help="svd, gaussians, preintegrated, burley: scale the kernel to the diffuse reflectance, "
+        "or keep what the support holds (svd: the least error).  [default: rescale]",
     ),
     click.option(
         "--terms",
@@ -57,8 +57,9 @@ _OPTIONS = (
     ),
     click.option(
         "--target",
-        type=click.Choice(["line", "kernel"]),
-        help="artist: fit the line integral or the 2D kernel.  [default: line]",
+        type=click.Choice(["line", "kernel", "picture"]),
+        help="artist: fit the line integral, the 2D kernel, or what is seen of a disk, an edge and "
+        "a head, in some 5 s.  [default: line]",
     ),
     click.option(
         "--near",

@@ -45,7 +45,7 @@ def chart_models(
 
 def _read(name: str) -> tuple[Material, Profile | None]:
     """Return a material and, where it was a profile of a walk that was named, the walk."""
-    from sssfit._chart_data import material_of
+    from sssfit._profile_radii import material_of
     from sssfit.errors import ProfileError
     from sssfit.material import load_material
     from sssfit.profile import Profile

@@ -84,7 +84,8 @@ def chart(
     squares and of its absolute values; how many terms leave an error of 1 %.
 
     With --guide, for each k, the guide function of the guided fit, the residual that the fit leaves
-    of one channel, and its pass beside the pre-integrated one.
+    of one channel, and its pass beside the pre-integrated one; and the same of that one, under a
+    guide function that has it for the best.
 
     With --models PROFILE is a material, or a profile of the photon walk, which then need not be
     walked again: the exact solution, the walk and the diffusion models in one figure, and how far

@@ -82,6 +82,7 @@ def fit(
     \b
       sssfit fit --method svd --rank 3
       sssfit fit skin1.exact.profile.npz --method gaussians --terms 6 --mm-per-pixel 0.1
+      sssfit fit --method artist --target picture --mm-per-pixel 0.3
       sssfit fit --method falloff --width .014 --strength .78,.70,.75 --falloff .57,.13,.08
     """
     if listing:
@@ -93,7 +94,7 @@ def fit(
     name = profile or str(newest(common, "*.profile.npz", "sssfit simulate skin1"))
     source = _load(name)
     path = _target(name, source, method, settings, output)
-    settings |= {"mm_per_pixel": mm_per_pixel, "normalize": normalize}
+    settings |= _judge(settings) | {"mm_per_pixel": mm_per_pixel, "normalize": normalize}
     from sssfit.kernel import is_kernel_file
 
     settings["support_mm"] = None if support == "auto" else support
@@ -101,6 +102,15 @@ def fit(
         result = _fit_and_write(source, method, settings, path)
     figures = _figures(result, name, path)
     finish(common, figures, _text(result, figures), to_stderr=path is None)
+
+
+def _judge(settings: dict[str, Any]) -> dict[str, Any]:
+    """Return what judges pictures, if they are the target: the fits by themselves render none."""
+    if settings.get("target") != "picture":
+        return {}
+    from sssfit.compare.pictures import picture_error
+
+    return {"target": picture_error}
 
 
 def _load(name: str) -> Profile:

@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     FloatArray = npt.NDArray[np.float64]
 
 
+# Of the head's key light: behind both ears.
+_BEHIND_DEGREES = 170.0
+
+
 @click.command()
 @click.argument("kernel", required=False)
 @picture_options
@@ -60,6 +64,7 @@ def render(
     layer: str | None,
     mask: str | None,
     border: str,
+    transmit: bool,
     screen: bool,
     follow: str | None,
     profile: str | None,
@@ -85,10 +90,13 @@ def render(
       sssfit render --irradiance edge --angle 45 --size 256x256
       sssfit render --irradiance mine.png --mm-per-pixel 0.1 -o mine.tif --difference lost.png
       sssfit render --screen --irradiance head
+      sssfit render --irradiance head --transmit -o ears.png
     """
     from sssfit.image import image_format, is_image_file
 
     _check_options(screen, follow, profile or truth or difference or structure)
+    if transmit:
+        own = _lit_from_behind(irradiance, own)
     picture = Picture(irradiance, size, mm_per_pixel, own, layer, mask)
     name, loaded = _kernel(kernel, common)
     path = _target(name, picture, output)
@@ -99,6 +107,12 @@ def render(
     outputs = [*targets.values(), *([None] if path is None else [])]
     with held(outputs, is_image_file, inputs=[name, irradiance, profile], force=force):
         scene = make_or_read(picture, loaded.mm_per_pixel, common)
+        through = None
+        if transmit:
+            from sssfit.render.transmittance import transmitted, with_transmitted
+
+            through = transmitted(scene, loaded)
+            scene = scene if screen else with_transmitted(scene, loaded)
         source, source_name = (
             (None, None) if screen else true_profile(loaded, name, profile, common)
         )
@@ -122,9 +136,17 @@ def render(
         "profile": source_name,
         "border": border,
         "follow": (follow or "gaussian") if screen else None,
-        **figures_of(result, scene, loaded),
+        **figures_of(result, scene, loaded, through),
     }
     finish(common, figures, text_of(figures), to_stderr=path is None)
+
+
+def _lit_from_behind(irradiance: str, own: dict[str, Any]) -> dict[str, Any]:
+    """Return the head's options with light through it, its key light behind unless it is given."""
+    if irradiance != "head":
+        raise click.UsageError("--transmit is for the head; leave it out.")
+    light = own["light_degrees"]
+    return {**own, "transmit": True, "light_degrees": _BEHIND_DEGREES if light is None else light}
 
 
 def _check_options(screen: bool, follow: str | None, compared: object) -> None:

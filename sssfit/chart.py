@@ -30,7 +30,7 @@ from matplotlib.ticker import LogFormatterSciNotation, LogLocator
 from sssfit import _chart_text as words
 from sssfit._chart_budget import budget_figure
 from sssfit._chart_convergence import convergence_figure
-from sssfit._chart_data import Picture, drawn_radius_mm, mean_free_paths_mm, picture
+from sssfit._chart_data import Picture, drawn_radius_mm, picture
 from sssfit._chart_editing import editing_figure
 from sssfit._chart_files import FORMATS, MAKER, chart_format, is_chart_file, known_format
 from sssfit._chart_guide import guide_figure
@@ -63,6 +63,7 @@ from sssfit._chart_style import (
     Style,
 )
 from sssfit._profile_bins import Bins, FloatArray, merged
+from sssfit._profile_radii import mean_free_paths_mm
 from sssfit.files import write_atomically
 from sssfit.profile import Profile
 

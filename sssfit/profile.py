@@ -235,9 +235,10 @@ class Profile:
     def flat_annuli(self) -> tuple[FloatArray, FloatArray]:
         """Return the flat annuli that lines and pixels are integrated from.
 
-        The profile's own, the innermost ten cut into equal parts by the monotone interpolation of
-        F: R_d ~ 1/r near the beam. Energies between the original edges are unchanged. Returns the
-        edges (m+1,) [mm] and the densities between them (m, C) [1/mm^2].
+        The profile's own, cut into equal parts by the monotone interpolation of F: the innermost
+        ten into 64 each, where R_d ~ 1/r is steep, those further out into fewer, and all of them
+        into two at least. Energies between the original edges are unchanged. Returns the edges
+        (m+1,) [mm] and the densities between them (m, C) [1/mm^2].
         """
         return _disks.flat_annuli(self.r_edges_mm, self.annulus_energy)
 

@@ -368,6 +368,8 @@ SMALL = {
     "compare": ("--size", "8x6", *FEW),
     "choose": ("--resolution", "8x6"),
 }
+# The interrupt that cuts a run short may arrive while Python collects garbage, which swallows it.
+CUT = pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
 SLOW = ("compare", "choose")
 # What each verb reads, and the options it cannot do without.
 USUAL = {
@@ -449,12 +451,14 @@ def try_options(bench, originals, examples):
     trial()
 
 
+@CUT
 def test_odd_options(bench, originals):
     try_options(bench, originals, 60)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(7200)
+@CUT
 def test_two_thousand_option_lists(bench, originals):
     try_options(bench, originals, 2000)
 
