@@ -137,8 +137,13 @@ def _show(common: Common, name_or_path: str) -> None:
     from sssfit.material import load_material
 
     material = load_material(name_or_path)
-    figures = {"command": "materials", "output": [], **_figures(material), **_content(material)}
-    finish(common, figures, _text(material))
+    figures = {"command": "materials", "output": [], **material_figures(material)}
+    finish(common, figures, material_text(material))
+
+
+def material_figures(material: "Material") -> dict[str, Any]:
+    """Everything that is printed of one material, as ``--json`` has it."""
+    return {**_figures(material), **_content(material)}
 
 
 def _figures(material: "Material") -> dict[str, Any]:
@@ -186,7 +191,7 @@ def _grid(material: "Material") -> "RadialGrid | None":
         return None
 
 
-def _text(material: "Material") -> str:
+def material_text(material: "Material") -> str:
     """Return the page a person reads."""
     from sssfit._material_checks import printable
 

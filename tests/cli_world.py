@@ -480,7 +480,10 @@ def blank(*_) -> Figure:
     return Figure(figsize=(0.1, 0.1))
 
 
-_CHARTS = ("profile", "pareto", "budget", "sheet", "editing", "convergence", "models", "guide")
+_CHARTS = (
+    *("profile", "kernel", "material", "pareto", "budget", "sheet", "editing", "convergence"),
+    *("models", "guide", "spectrum"),
+)
 STAND_INS = {
     "sssfit.simulate.simulate_montecarlo_many": few_photons,
     "sssfit.simulate.simulate_exact": (lambda _, given: exact_profile(given["material"].name)),
@@ -497,7 +500,7 @@ STAND_INS = {
     "sssfit.compare.sheet.compute_sheet": lambda *_: small_sheet(),
     "sssfit.compare.editing.compute_editing": lambda *_: small_editing(),
     "sssfit.compare.convergence.compute_convergence": lambda *_: small_convergence(),
-    **{f"sssfit.chart.{kind}_figure": blank for kind in (*_CHARTS, "spectrum")},
+    **{f"sssfit.chart.{kind}_figure": blank for kind in _CHARTS},
 }
 
 

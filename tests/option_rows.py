@@ -16,6 +16,7 @@ import numpy as np
 from cli_world import DR_MM, GRID, PHOTONS, RADIUS_MM, Ran, called, kernel, picture, profile, wax
 
 from sssfit import fit
+from sssfit.compare import view_kernel
 from sssfit.compare.judge import judge, judge_in_screen_space
 from sssfit.compare.metrics import auto_exposure
 from sssfit.export import json_document
@@ -937,7 +938,18 @@ CHART = {
         _GUIDES,
         lambda: _guided(channel="G"),
         default="R",
-        words="the first that returns light",
+        words="the first that returns light; of a kernel up to three",
+    ),
+    "--profile": Row(
+        "chart wax.svd2.kernel.json --json",
+        "--profile plate.profile.npz",
+        fields("profile", "misplaced"),
+        lambda: [
+            "plate.profile.npz",
+            view_kernel(kernel(), world.plate_profile()).misplaced.tolist(),
+        ],
+        default="wax.profile.npz",
+        words="found beside it or here by its fingerprint",
     ),
     "--photons": Row(
         "chart wax.toml --models",
@@ -952,7 +964,8 @@ CHART = {
         is_written("svg", "png"),
         lambda: ["x.svg"],
         default="wax.profile.png",
-        words="NAME.profile.png, NAME.spectrum.png, NAME.guide.png, MATERIAL.models.png",
+        words="NAME.profile.png, NAME.kernel.png, NAME.material.png, NAME.checkpoint.png, "
+        "NAME.spectrum.png, NAME.guide.png, MATERIAL.models.png",
     ),
     "--force": Row("chart -o foreign.png", "--force", is_written("png"), lambda: ["foreign.png"]),
 }

@@ -126,7 +126,7 @@ def run(
     ending = Ending(task.photons, target_error)
     state = State(task.empty_tally())
     if checkpoint:
-        state = checkpoint.begin(state.tally, settings or {})
+        state = checkpoint.begin(state.tally, settings or {}, task.materials)
         _check_still_to_do(checkpoint, state, ending)
     watch = _Watch(task, ending, state, progress)
     if state.tally.photons:
