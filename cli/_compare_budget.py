@@ -19,8 +19,11 @@ if TYPE_CHECKING:
     from sssfit.compare.budget import Budget, Cause
     from sssfit.render.scene import Scene
 
-_HEADS = ["", "Delta E mean", "p99", "relative L2", "largest drift", "of the whole"]
-_SCORES = ("delta_e_2000_mean", "delta_e_2000_p99", "relative_l2", "energy_drift")
+_HEADS = ["", "Delta E mean", "p95", "p99", "relative L2", "largest drift", "of the whole"]
+_SCORES = (
+    *("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99", "share_above_1"),
+    *("relative_l2", "energy_drift"),
+)
 
 
 @dataclass(frozen=True)
@@ -159,10 +162,11 @@ def _line(budget: Budget, cause: Cause) -> list[str]:
     name = cause.name if cause.is_in_whole else f"({cause.name})"
     score = cause.score
     if score is None:
-        return [name, cause.hint, "", "", "", ""]
+        return [name, cause.hint, "", "", "", "", ""]
     return [
         name,
         _number(score.delta_e_2000_mean, ".4f"),
+        _number(score.delta_e_2000_p95, ".3f"),
         _number(score.delta_e_2000_p99, ".3f"),
         f"{100.0 * score.relative_l2:.4f} %",
         percent(max(score.energy_drift, key=abs), "+.3f"),

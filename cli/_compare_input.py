@@ -12,7 +12,7 @@ from ._compiling import say_if_compiling
 from ._deon_skin import DEON_SKIN
 from ._options import Common
 from ._report import binary_stdin
-from ._scene import MADE, Picture, make_or_read
+from ._scene import MADE, Picture, made_options, make_or_read
 
 if TYPE_CHECKING:
     from sssfit.profile import Profile
@@ -79,6 +79,6 @@ def scenes_of(
     return [
         read[name]
         if name in read
-        else make_or_read(Picture(name, size or _SIZE, None, {}), pitch, common)
+        else make_or_read(Picture(name, size or _SIZE, None, made_options(name)), pitch, common)
         for name in pictures
     ], pitch

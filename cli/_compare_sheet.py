@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 MOST_PHOTONS = 10**7
 _LEAST_PHOTONS = 10_000
 _PER_DECADE = 2
+_COLOURS = ("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99", "share_above_1")
 
 
 def chart_sheet(
@@ -131,8 +132,7 @@ def _sheet_figures(sheet: Sheet) -> dict[str, Any]:
             {
                 "label": row.label,
                 "passes": row.passes,
-                "delta_e_2000_mean": [each.score.delta_e_2000_mean for each in row.panels],
-                "delta_e_2000_p99": [each.score.delta_e_2000_p99 for each in row.panels],
+                **{key: [getattr(each.score, key) for each in row.panels] for key in _COLOURS},
                 "relative_l2": [each.score.relative_l2 for each in row.panels],
             }
             for row in sheet.rows
@@ -161,14 +161,12 @@ def _editing_figures(editing: Editing) -> dict[str, Any]:
     """Figures of edits."""
     return {
         "mm_per_pixel": editing.mm_per_pixel,
-        "original_delta_e_2000_mean": editing.original_score.delta_e_2000_mean,
-        "original_delta_e_2000_p99": editing.original_score.delta_e_2000_p99,
+        **{f"original_{key}": getattr(editing.original_score, key) for key in _COLOURS},
         "rows": [
             {
                 "label": each.label,
                 **each.settings,
-                "delta_e_2000_mean": each.panel.score.delta_e_2000_mean,
-                "delta_e_2000_p99": each.panel.score.delta_e_2000_p99,
+                **{key: getattr(each.panel.score, key) for key in _COLOURS},
             }
             for each in editing.edits
         ],

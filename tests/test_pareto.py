@@ -15,7 +15,7 @@ from sssfit.compare.candidates import Candidate, candidates
 from sssfit.compare.comparison import COSTS, ERRORS, check_error
 from sssfit.compare.front import pareto_front
 from sssfit.compare.judge import judge
-from sssfit.compare.metrics import measure
+from sssfit.compare.metrics import COLOUR_FIGURES, measure
 from sssfit.compare.pareto import check_scenes, compare_kernels
 from sssfit.errors import FitError, RenderError
 from sssfit.material import load_material
@@ -94,7 +94,7 @@ def test_rows_are_what_judge_and_measure_say(skin1, scenes, comparison):
             score = measure(render_separable(scene, fit.kernel), truth, mask=scene.mask)
             assert (row.label, row.method) == (candidate.label, candidate.method)
             assert (row.picture, row.rank) == (scene.name, fit.kernel.rank)
-            keys = ("delta_e_2000_mean", "delta_e_2000_p99", "relative_l2", "rmse", "psnr_db")
+            keys = (*COLOUR_FIGURES, "relative_l2", "rmse", "psnr_db")
             for key in keys:
                 assert getattr(row, key) == getattr(alone.score, key) == getattr(score, key)
             np.testing.assert_array_equal(row.energy_drift, score.energy_drift)
