@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ._compare_input import material_of
 from ._compiling import say_if_compiling
-from ._deon_skin import DEON_SKIN
 from ._figure import chart_output
 from ._options import Common
 from ._report import percent, table
@@ -93,14 +93,10 @@ def _budgets(
 ) -> list[Budget]:
     """Read the material and take the errors of its pictures apart."""
     from sssfit.compare.budget import error_budgets
-    from sssfit.errors import ProfileError
-    from sssfit.material import load_material
 
     from ._progress import walk_progress
 
-    if name == DEON_SKIN:
-        raise ProfileError(f"{name} has no coefficients for other methods; name a material.")
-    material = load_material(name)
+    material = material_of(name, "a budget")
     say_if_compiling(common, walk=material, solver=True)
     with walk_progress(material.name, quiet=common.quiet) as show:
         return error_budgets(

@@ -15,6 +15,7 @@ from ._report import binary_stdin
 from ._scene import MADE, Picture, made_options, make_or_read
 
 if TYPE_CHECKING:
+    from sssfit.material import Material
     from sssfit.profile import Profile
     from sssfit.render.scene import Scene
 
@@ -35,6 +36,21 @@ def profile_of(name: str, common: Common) -> Profile:
 
         return simulate_deon_skin()
     return _exact(name, common)
+
+
+def material_of(name: str, what: str) -> Material:
+    """Load a material; of a profile, which has no light to trace, say what ``what`` needs."""
+    from sssfit.errors import ProfileError
+    from sssfit.material import load_material
+
+    if name == DEON_SKIN:
+        raise ProfileError(f"{name} has no coefficients to simulate with; name a material.")
+    if name.endswith(".npz"):
+        raise ProfileError(
+            f"{name} is a profile, and {what} simulates a material: name that, such as skin1 or a "
+            ".toml file of your own."
+        )
+    return load_material(name)
 
 
 def _exact(name: str, common: Common) -> Profile:

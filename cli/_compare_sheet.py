@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ._compare_input import material_of
 from ._compiling import say_if_compiling
-from ._deon_skin import DEON_SKIN
 from ._figure import chart_output
 from ._options import Common
 from ._report import finish, table
@@ -65,12 +65,14 @@ def chart_convergence(
     ``photons`` is the largest number walked.
     """
     from sssfit.errors import SimulationError
-    from sssfit.material import load_material
 
-    if name == DEON_SKIN:
-        raise SimulationError(f"{name} has no coefficients to simulate with; name a material.")
     numbers = photon_numbers(photons or MOST_PHOTONS)
-    material = load_material(name)
+    material = material_of(name, "a convergence")
+    if not material.is_semi_infinite:
+        raise SimulationError(
+            f"{material.name} is not one half space: walks are held against the exact solution, "
+            "and only half spaces have one; name another material."
+        )
     path = _path(output)
     with chart_output(path, force=force) as save:
         from sssfit.compare.convergence import compute_convergence

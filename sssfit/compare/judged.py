@@ -9,7 +9,6 @@ import math
 
 import numpy as np
 import numpy.typing as npt
-from scipy.ndimage import distance_transform_edt
 
 from sssfit.fit import support_of
 from sssfit.profile import Profile
@@ -56,6 +55,8 @@ def border_of(scene: Scene) -> str:
 
 def _within(chosen: BoolArray, reach: float) -> BoolArray:
     """Tell which pixels are within so many pixels of a chosen one."""
+    from scipy.ndimage import distance_transform_edt  # .1 s that other comparisons do not need
+
     near: BoolArray = distance_transform_edt(~chosen) <= reach
     return near
 
