@@ -45,6 +45,7 @@ def figures_of(choice: Choice) -> dict[str, Any]:
         "cheaper": _row(choice.cheaper),
         "dearer": [_row(each) for each in choice.dearer],
         "too_narrow": list(choice.too_narrow),
+        "unfitted": list(choice.unfitted),
         "photons": _photons(choice.photons),
         "rows": [_row(each) for each in choice.steps],
     }
@@ -157,6 +158,8 @@ def _untried(choice: Choice) -> list[str]:
             f"not tried: kernels of {', '.join(map(str, choice.too_narrow))} pixels, to which even "
             "the true one cannot be cut"
         )
+    if choice.unfitted:
+        lines.append(f"cannot be fitted to this profile: {', '.join(choice.unfitted)}")
     if not any(each.candidate.method == "guided" for each in tried):
         lines.append(
             "not tried: guided fits, for their time, where another pass will do or one is wide"

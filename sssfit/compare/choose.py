@@ -129,6 +129,8 @@ class Choice:
         Measured, of the chosen kernel.
     too_narrow : tuple of int
         Pixels of the supports that were left out: the true kernel itself cannot be cut to them.
+    unfitted : tuple of str
+        Candidates that cannot be fitted to this profile: seven Gaussians to six annuli, say.
     """
 
     profile: Profile
@@ -145,6 +147,7 @@ class Choice:
     photons: PhotonNeed | None = None
     seconds_per_megapixel: float | None = None
     too_narrow: tuple[int, ...] = ()
+    unfitted: tuple[str, ...] = ()
 
     @property
     def wider_tolerance(self) -> float:
@@ -255,13 +258,14 @@ class _Search:
     def __init__(self, views: Views, progress: Callable[[Step], None] | None) -> None:
         self.views, self.progress = views, progress
         self.steps: list[Step] = []
+        self.unfitted: list[str] = []
 
     def run(self, material: Material | None, seconds: float, seed: int) -> Choice:
         """Try no blur, then options by cost; then what is beside the one that will do."""
         views, pitch = self.views, self.views.scenes[0].mm_per_pixel
         given = (views.profile, pitch, views.tolerance, views.tolerance_of, tuple(views.scenes))
         nothing = self._try(None)
-        if nothing.within:
+        if nothing is not None and nothing.within:
             return Choice(*given, steps=tuple(self.steps), chosen=nothing)
         every = supports(views.profile, pitch)
         kept = self._wide_enough(every)
@@ -287,18 +291,26 @@ class _Search:
                 for share, radius in every
                 if (share, radius) not in kept
             ),
+            unfitted=tuple(dict.fromkeys(self.unfitted)),
         )
 
-    def _try(self, option: Option | None) -> Step:
-        """Judge an option and keep its step."""
+    def _try(self, option: Option | None) -> Step | None:
+        """Judge an option and keep its step; None where it cannot be fitted."""
         step = self._judged(option)
-        self.steps.append(step)
-        if self.progress:
-            self.progress(step)
+        if step is not None:
+            self.steps.append(step)
+            if self.progress:
+                self.progress(step)
         return step
 
-    def _judged(self, option: Option | None) -> Step:
-        found = self.views.score_of_option(option)
+    def _judged(self, option: Option | None) -> Step | None:
+        try:
+            found = self.views.score_of_option(option)
+        except FitError:
+            if option is None:
+                raise
+            self.unfitted.append(option.candidate.label)
+            return None
         return Step(
             option=option,
             taps_per_pixel=option.taps_per_pixel if option else 0,
@@ -325,9 +337,9 @@ class _Search:
         for group in by_cost(found):
             quick, slow = split_guided(group)
             steps = [self._try(each) for each in quick]
-            if not within and not any(each.within for each in steps):
+            if not within and not any(each and each.within for each in steps):
                 steps += [self._try(each) for each in slow]
-            best = [each for each in steps if each.within]
+            best = [each for each in steps if each and each.within]
             within += sorted(best, key=lambda each: each.error)
             if len(within) > 1:
                 break
@@ -352,7 +364,8 @@ class _Search:
         for option in (*more, *wider[:1], *dearest):
             if option != chosen and option not in picked:
                 picked.append(option)
-        return tuple(self._judged(each) for each in picked)
+        judged = (self._judged(each) for each in picked)
+        return tuple(each for each in judged if each is not None)
 
     def _seconds(self, fitted: FitResult) -> float:
         """Measure what the chosen kernel takes [s a megapixel]."""
