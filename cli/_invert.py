@@ -91,12 +91,13 @@ def _name_of(output: str | None) -> str:
 @contextlib.contextmanager
 def _held(path: Path | None, *, force: bool) -> Iterator[None]:
     """Check the output and hold it before the work; None is stdout."""
-    from sssfit.files import check_output, locked
+    from sssfit.files import check_ending, check_output, locked
 
     if path is None:
         binary_stdout()  # closed: said now and not after the work
         yield
         return
+    check_ending(path, "a material", ".toml")
     check_output(path, _is_ours, force=force)
     with locked(path):
         yield

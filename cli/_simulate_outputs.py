@@ -34,13 +34,14 @@ def profile_paths(
 @contextlib.contextmanager
 def held(paths: Sequence[Path | None], *, force: bool) -> Iterator[None]:
     """Check every output, and hold it from other runs, before the work begins."""
-    from sssfit.files import check_output, locked
+    from sssfit.files import check_ending, check_output, locked
     from sssfit.profile import is_profile_file
 
     with contextlib.ExitStack() as locks:
         if None in paths:
             binary_stdout()  # closed: said now and not after the work
         for path in filter(None, paths):
+            check_ending(path, "a profile", ".npz")
             check_output(path, is_profile_file, force=force)
             locks.enter_context(locked(path))
         yield

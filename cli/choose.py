@@ -232,7 +232,7 @@ def _say_first(source: Material | Profile, common: Common) -> None:
     say_if_compiling(common, walk=source)
     say(
         common,
-        f"{source.name} is not a half space with g = 0: tracing 1e7 photons for its true profile.",
+        f"{source.name} has no exact solution: tracing 1e7 photons for its true profile.",
     )
 
 
@@ -244,13 +244,15 @@ def _say_step(step: Step, common: Common) -> None:
 @contextlib.contextmanager
 def _held(path: Path | None, profile_path: Path | None, *, force: bool) -> Iterator[None]:
     """Check that kernel and profile can be written there, and keep other runs off them."""
-    from sssfit.files import check_output, locked
+    from sssfit.files import check_ending, check_output, locked
     from sssfit.kernel import is_kernel_file
     from sssfit.profile import is_profile_file
 
     with contextlib.ExitStack() as stack:
         if path is None:
             binary_stdout()  # closed: said now and not after the work
+        else:
+            check_ending(path, "a kernel", ".json")
         for each, is_own in ((path, is_kernel_file), (profile_path, is_profile_file)):
             if each is not None:
                 check_output(each, is_own, force=force)

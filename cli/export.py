@@ -108,12 +108,13 @@ def _is_own(form: str, path: Path) -> bool:
 
 def _write(content: bytes, path: Path | None, form: str, *, force: bool) -> None:
     """To the file, whole or not at all; to stdout where there is none."""
-    from sssfit.files import check_output, locked, write_atomically
+    from sssfit.files import check_ending, check_output, locked, write_atomically
 
     if path is None:
         binary_stdout().write(content)
         binary_stdout().flush()
         return
+    check_ending(path, f"--format {form}", f".{form}")
     check_output(path, lambda each: _is_own(form, each), force=force)
     with locked(path):
         write_atomically(path, lambda stream: stream.write(content))

@@ -109,7 +109,7 @@ def _fit_and_write(
     profile: Profile, method: str, settings: dict[str, Any], path: Path | None, *, force: bool
 ) -> FitResult:
     """Hold the output, fit, write; nothing is written where the fit fails."""
-    from sssfit.files import check_output, locked
+    from sssfit.files import check_ending, check_output, locked
     from sssfit.fit import METHODS
     from sssfit.kernel import is_kernel_file
 
@@ -119,6 +119,7 @@ def _fit_and_write(
         result.kernel.write(stream)
         stream.flush()
         return result
+    check_ending(path, "a kernel", ".json")
     check_output(path, is_kernel_file, force=force)
     with locked(path):
         result = METHODS[method].fit(profile, **settings)

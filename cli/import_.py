@@ -7,13 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ._mci import is_mci
 from ._options import Common, common_options
 from ._report import binary_stdin, binary_stdout, finish, table
 
 if TYPE_CHECKING:
     from sssfit.profile import Profile
+    from sssfit.text import Text
 
 _DEFAULT_CHANNELS = {1: "mono", 3: "R,G,B"}
+_UNITS = ("um", "mm", "cm", "m")
+_OF_TABLES = {"quantity": "--quantity", "unit": "--unit", "density_unit": "--density-unit"}
 
 
 @click.command("import")
@@ -22,6 +26,16 @@ _DEFAULT_CHANNELS = {1: "mono", 3: "R,G,B"}
     "--quantity",
     type=click.Choice(["density", "energy"]),
     help="What the numbers of a CSV are.  [default: what its own comment says]",
+)
+@click.option(
+    "--unit",
+    type=click.Choice(_UNITS),
+    help="Unit of a CSV's column r; r_um, r_mm, r_cm and r_m say theirs.",
+)
+@click.option(
+    "--density-unit",
+    type=click.Choice(_UNITS),
+    help="A CSV's densities are per square of this unit.  [default: the unit of its radii]",
 )
 @click.option(
     "--channels",
@@ -38,34 +52,37 @@ _DEFAULT_CHANNELS = {1: "mono", 3: "R,G,B"}
 @common_options
 def import_(
     files: tuple[str, ...],
-    quantity: str | None,
     channels: str | None,
     output: str | None,
     force: bool,
     common: Common,
+    **of_table: str | None,
 ) -> None:
     """Make a profile of FILE: a table (CSV), or what MCML wrote (.mco, ASCII); - for stdin.
 
-    A CSV has a header with r_mm (radii in mm, of any spacing) and one column a channel;
-    X_stderr holds standard errors of X, and lines that begin with # are comments.
+    A CSV has a header with r_mm (radii in mm, of any spacing) and one column a channel; r_um, r_cm
+    and r_m are read as well and converted. X_stderr holds standard errors of X, and lines that
+    begin with # are comments.
 
     \b
-      density: R_d in 1/mm^2 at the radius r_mm; annuli meet half-way between radii
-      energy:  share of the light that leaves in the annulus whose OUTER edge is r_mm;
-               a last line with r_mm = inf is what leaves beyond
+      density: R_d per square of the radius' unit (1/mm^2 beside r_mm, 1/cm^2 beside
+               r_cm) at that radius; annuli meet half-way between radii
+      energy:  share of the light that leaves in the annulus whose OUTER edge is the
+               radius; a last line with radius inf is what leaves beyond
 
-    An .mco is one channel, in cm, without standard errors; several of one grid become the channels
-    of one profile. Their last bin, where MCML counts all beyond, becomes the energy beyond the
-    grid.
+    An .mco is one channel, in cm, without standard errors, as MCML 1 and its ports to GPUs write
+    it; several of one grid become the channels of one profile. Their last bin, where MCML counts
+    all beyond, becomes the energy beyond the grid.
 
     \b
       sssfit import profile.csv --quantity density
+      sssfit import measured.csv --quantity density --unit mm --density-unit cm
       sssfit import skin.mco -o skin.profile.npz
       sssfit import r.mco g.mco b.mco --channels R,G,B -o skin.profile.npz
     """
     if len(files) > 1 and output is None:
         raise click.UsageError("name the profile of several files with -o.")
-    profile = _read(files, quantity, channels)
+    profile = _read(files, of_table, channels)
     path = _target(files[0], output)
     _write(profile, path, force=force)
     figures = {"command": "import", "output": [str(path or "-")], **_figures(profile)}
@@ -73,34 +90,43 @@ def import_(
     finish(common, figures, f"{_text(profile)}\n{wrote}", to_stderr=path is None)
 
 
-def _read(files: tuple[str, ...], quantity: str | None, channels: str | None) -> Profile:
+def _read(files: tuple[str, ...], of_table: dict[str, str | None], channels: str | None) -> Profile:
     """Tell the formats apart by what the files hold, and read them."""
     from sssfit.errors import ProfileError
     from sssfit.mco import is_mco, join_channels, parse_mco
     from sssfit.profile_csv import parse_csv
-    from sssfit.text import read_text
 
     origins = ["stdin" if name == "-" else name for name in files]
-    texts = [
-        read_text(
-            binary_stdin() if name == "-" else name,
-            origin,
-            expected="a CSV or MCML's output in ASCII",
-            error=ProfileError,
-        )
-        for name, origin in zip(files, origins, strict=True)
-    ]
-    tables = [origin for origin, text in zip(origins, texts, strict=True) if not is_mco(text)]
+    texts = [_text_of(name, origin) for name, origin in zip(files, origins, strict=True)]
+    tables = [each for each, text in zip(origins, texts, strict=True) if not is_mco(text.content)]
     if not tables:
-        if quantity is not None:
-            raise click.UsageError("--quantity is for a CSV; an .mco says itself what it holds.")
-        profiles = [parse_mco(*each) for each in zip(texts, origins, strict=True)]
+        if given := [option for key, option in _OF_TABLES.items() if of_table[key] is not None]:
+            raise click.UsageError(f"{given[0]} is for a CSV; an .mco says itself what it holds.")
+        profiles = []
+        for text, origin in zip(texts, origins, strict=True):
+            with text.hinting(ProfileError) as content:
+                profiles.append(parse_mco(content, origin))
         return join_channels(profiles, _names(len(files), channels))
     if len(files) > 1:
         raise ProfileError(f"{tables[0]} is no .mco; a CSV is imported alone, with all channels.")
     if channels is not None:
         raise click.UsageError("--channels is for .mco files; a CSV has names in its header.")
-    return parse_csv(texts[0], origins[0], quantity=quantity)
+    with texts[0].hinting(ProfileError) as content:
+        return parse_csv(content, origins[0], **of_table)
+
+
+def _text_of(name: str, origin: str) -> Text:
+    """Read a file that may be a table or MCML's output."""
+    from sssfit.errors import ProfileError
+    from sssfit.text import read_text
+
+    if is_mci(name):
+        raise ProfileError(
+            f"{name} is an MCML input file; `sssfit simulate` walks what it describes."
+        )
+    source = binary_stdin() if name == "-" else name
+    expected = "a CSV or MCML's output in ASCII"
+    return read_text(source, origin, expected=expected, error=ProfileError)
 
 
 def _names(count: int, channels: str | None) -> list[str]:
@@ -120,13 +146,14 @@ def _target(name: str, output: str | None) -> Path | None:
 
 def _write(profile: Profile, path: Path | None, *, force: bool) -> None:
     """To the file, whole or not at all; to stdout where there is none."""
-    from sssfit.files import check_output, locked
+    from sssfit.files import check_ending, check_output, locked
     from sssfit.profile import is_profile_file
 
     if path is None:
         profile.write(binary_stdout())
         binary_stdout().flush()
         return
+    check_ending(path, "a profile", ".npz")
     check_output(path, is_profile_file, force=force)
     with locked(path):
         profile.save(path)

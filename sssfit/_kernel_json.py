@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 
+from sssfit._material_checks import shown
 from sssfit.errors import KernelError
 from sssfit.files import reason
 
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
     from sssfit.kernel import SeparableKernel
 
 FORMAT = "sssfit.kernel/1"
+_MARK = b'"sssfit.kernel/'  # by which a file is ours, however damaged
+_REMEDY = "name a .kernel.json file, as `sssfit fit` writes it"
 MOST_BYTES = 500_000_000  # 16000 pixels, 10 terms and 64 channels are 200 MB
 _TYPES: dict[str, type | tuple[type, ...]] = {
     "method": str,
@@ -92,7 +95,7 @@ def unpack(source: str | Path | BinaryIO, origin: str) -> dict[str, Any]:
 def is_kernel_file(path: Path) -> bool:
     """Whether a file is a kernel of any version, by its first bytes."""
     with path.open("rb") as file:
-        return b'"sssfit.kernel/' in file.read(200)
+        return _MARK in file.read(200)
 
 
 def _read(source: str | Path | BinaryIO, origin: str) -> bytes:
@@ -106,7 +109,7 @@ def _read(source: str | Path | BinaryIO, origin: str) -> bytes:
     except OSError as error:
         raise KernelError(f"{origin}: {reason(error)}.") from None
     if len(text) > MOST_BYTES:
-        raise KernelError(f"{origin}: over {MOST_BYTES:,} bytes; this is no kernel file.")
+        raise KernelError(f"{origin}: over {MOST_BYTES:,} bytes; this is not a kernel file.")
     return text
 
 
@@ -114,14 +117,20 @@ def _parsed(text: bytes, origin: str) -> Mapping[str, Any]:
     """Parse JSON and look at its format."""
     try:
         whole = json.loads(text)
-    except (ValueError, RecursionError):
+    except (ValueError, RecursionError) as error:
+        if _MARK not in text:
+            raise KernelError(f"{origin}: not a kernel; {_REMEDY}.") from None
+        how = "; save it as UTF-8" if isinstance(error, UnicodeDecodeError) else ", or cut short"
         raise KernelError(
-            f"{origin}: not JSON, or cut short; expected a kernel that `sssfit fit` wrote."
+            f"{origin}: the kernel is damaged (not valid JSON{how}); make it again."
         ) from None
     found = whole.get("format") if isinstance(whole, dict) else None
-    if found != FORMAT:
-        raise KernelError(f"{origin}: format {found!r}; expected a kernel file, {FORMAT!r}.")
-    return dict(whole)
+    if found == FORMAT:
+        return dict(whole)
+    if isinstance(found, str) and found.startswith("sssfit.kernel/"):
+        raise KernelError(f"{origin}: format {shown(found)}; expected {FORMAT!r}.")
+    said = "" if found is None else f": it has format {shown(found)}"
+    raise KernelError(f"{origin}: not a kernel{said}; {_REMEDY}.")
 
 
 def _check_types(whole: Mapping[str, Any], origin: str) -> None:

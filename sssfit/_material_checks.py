@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sssfit.errors import MaterialError
+from sssfit.text import printable as printable  # also for those who import it from here
 
 if TYPE_CHECKING:
     from sssfit.material import Layer
@@ -23,16 +24,21 @@ FloatArray = NDArray[np.float64]
 
 MOST_CHANNELS = 64
 DENSE_PER_MM = 10.0  # cream, the densest of Jensen et al. 2001, has 7.38; skin1 in 1/cm has 7.7
+# Only ratios of indices count: a vacuum beside air or water taken as 1 lies below 1.
+LEAST_ETA, MOST_ETA = 0.5, 4
 _LEAST, _MOST = 1e-9, 1e9  # 1/mm and mm: 1000 km and an atom's width are beyond any material
 _MOST_SHOWN = 60  # characters of a value worth repeating to the person who wrote it
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._+-]{0,99}"
 
 # For each number of a material: whether it will do, and what to say was expected.
 _RULES: dict[str, tuple[Callable[[float], bool], str]] = {
-    "eta": (lambda v: 1 <= v <= 4, "one refractive index from 1 to 4, such as 1.4"),
+    "eta": (
+        lambda v: LEAST_ETA <= v <= MOST_ETA,
+        f"one refractive index from {LEAST_ETA} to {MOST_ETA}, such as 1.4",
+    ),
     "g": (
-        lambda v: -1 < v < 1,
-        "a number between -1 and 1, both excluded; 0 if sigma_s is a reduced one (sigma_s')",
+        lambda v: -1 < v <= 1,
+        "a number above -1 and up to 1 (no scattering); 0 if sigma_s is a reduced one (sigma_s')",
     ),
     "sigma": (lambda v: 0 <= v <= _MOST, f"a number from 0 to {_MOST:g}, in 1/mm"),
     "thickness_mm": (
@@ -52,11 +58,6 @@ def shown(value: object) -> str:
         text = "tables nested too deep"
     text = printable(text)  # a repr of an array has newlines
     return text if len(text) <= _MOST_SHOWN else text[: _MOST_SHOWN - 3] + "..."
-
-
-def printable(text: str) -> str:
-    """Escape what does not print (newlines too), so that ``text`` can stand inside a message."""
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 @contextlib.contextmanager
@@ -97,7 +98,7 @@ def numbers(key: str, values: Any, rule: str = "") -> FloatArray:
 
 
 def check_lengths(layer: "Layer") -> None:
-    """Check that the lists of one layer agree, and that no channel is all but clear."""
+    """Check that the lists of one layer agree."""
     n_channels = layer.sigma_a_per_mm.size
     for key in ("sigma_s_per_mm", "g"):
         size = getattr(layer, key).size
@@ -106,6 +107,10 @@ def check_lengths(layer: "Layer") -> None:
                 f"{key} has {size} values and sigma_a_per_mm has {n_channels}; give one per "
                 "channel."
             )
+
+
+def check_clear_or_not(layer: "Layer") -> None:
+    """Refuse a channel that is all but clear."""
     sigma_t = layer.sigma_t_per_mm
     for c in np.flatnonzero((sigma_t > 0) & (sigma_t < _LEAST)):
         raise MaterialError(

@@ -17,6 +17,8 @@ from typing import Any
 from sssfit._material_checks import printable, shown
 from sssfit.errors import MaterialError
 from sssfit.files import reason
+from sssfit.text import Text
+from sssfit.text import decode as text_of_bytes
 
 REQUIRED_KEYS = ("eta", "g", "sigma_a_per_mm", "sigma_s_per_mm")
 LAYER_KEYS = (*REQUIRED_KEYS, "thickness_mm")
@@ -69,7 +71,7 @@ def is_path(wanted: str) -> bool:
     return False
 
 
-def read_text(path: Path) -> str:
+def read_text(path: Path) -> Text:
     """Read a material file, and no more than ``MOST_BYTES`` of whatever it turns out to be."""
     try:
         is_folder = path.is_dir()
@@ -88,17 +90,14 @@ def _first_bytes(path: Path) -> bytes:
         return stream.read(MOST_BYTES + 1)
 
 
-def decode(content: bytes) -> str:
-    """Return the text of a material file; a byte order mark, as Windows writes it, is dropped."""
+def decode(content: bytes) -> Text:
+    """Return the text of a material file, in UTF-8 or as Windows writes it."""
     if len(content) > MOST_BYTES:
         raise MaterialError("the file is larger than 1 MB; expected a TOML file of a few lines.")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError as error:
-        raise MaterialError(
-            f"the file is not UTF-8 text (byte {content[error.start]:#04x} at offset "
-            f"{error.start}); expected a TOML file."
-        ) from None
+    text = text_of_bytes(content)
+    if text is None:
+        raise MaterialError("the file is not text; expected a material file in TOML.")
+    return text
 
 
 def default_channels(n_values: int) -> tuple[str, str, str]:

@@ -5,17 +5,27 @@ Every message names the file, the line, what it holds and what was expected ther
 
 import re
 from collections.abc import Callable
-from decimal import Decimal
 from typing import NamedTuple
 
 from sssfit._material_checks import printable, shown
 from sssfit.errors import SssfitError
-from sssfit.text import finite_number
+from sssfit.text import finite_number, tenfold_number
 
 # What the two formats call a comment. In an input it begins at any #. In an output that would make
 # 1 of the 1.#INF that some C libraries print, and MCML itself puts a space or tab before its own.
 INPUT_COMMENT = re.compile(r"#")
 OUTPUT_COMMENT = re.compile(r"(?:^|\s)#")
+
+
+# What files of MCML 2 and 3 begin with: mcmli2.0 and mcmli_3.0 (inputs), mcmloA2.0 and mcmlo_3.0
+# (outputs in ASCII).
+_OTHER_VERSION = re.compile(r"mcml[io][ab]?_?(\d+(?:\.\d+)*)", re.IGNORECASE | re.ASCII)
+
+
+def other_version(word: str) -> str | None:
+    """Return the version of MCML that a file's first word names; None for MCML 1, and others."""
+    match = _OTHER_VERSION.fullmatch(word)
+    return match[1] if match else None
 
 
 class Line(NamedTuple):
@@ -45,7 +55,8 @@ class Lines:
     ) -> None:
         self._raw = text.split("\n")
         self._taken = 0
-        self._origin, self._comment, self._error = printable(origin), comment, error
+        self._origin, self._error = printable(origin), error
+        self.comment = comment
 
     def failure(self, number: int, said: str) -> SssfitError:
         """Return the error to raise about a line."""
@@ -54,7 +65,7 @@ class Lines:
     def peek(self) -> Line | None:
         """Return the next line that holds data, and leave it there; None at the end."""
         while self._taken < len(self._raw):
-            words = self._comment.split(self._raw[self._taken], maxsplit=1)[0].split()
+            words = self.comment.split(self._raw[self._taken], maxsplit=1)[0].split()
             if words:
                 return Line(self._taken + 1, tuple(words))
             self._taken += 1
@@ -120,5 +131,4 @@ class Lines:
             raise self.failure(
                 line.number, f"{name} = {shown(word)} is out of range; expected {expected}."
             )
-        # Not for 0, which may be written 0e999999999999999999999, beyond what Decimal knows.
-        return float(Decimal(word).scaleb(tenfold)) if value else 0.0
+        return tenfold_number(word, tenfold)

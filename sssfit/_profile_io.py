@@ -6,17 +6,19 @@ before anything is allocated, and whatever a damaged file makes the parsers rais
 line that names the file.
 """
 
+import errno
 import io
 import json
 import math
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
 
+from sssfit._material_checks import shown
 from sssfit.errors import ProfileError
 from sssfit.files import reason
 
@@ -41,6 +43,10 @@ OPTIONAL = (
 # The largest profile of the paper's materials is 0.3 MB; 2 GB is a zip bomb or somebody else's.
 _LARGEST_FILE_BYTES = 2_000_000_000
 _REMEDY = "write it again with `sssfit simulate`, or name a .profile.npz file"
+_FOREIGN = "name a .profile.npz file, as `sssfit simulate` and `sssfit import` write it"
+# By either a file is ours, however damaged: the first member's name, or the format in its JSON,
+# four bytes a letter. Both stand uncompressed, one near the beginning and one near the end.
+_MARKS = (b"r_edges_mm.npy", "sssfit.profile/".encode("utf-32-le"))
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -79,17 +85,14 @@ def unpack(
         if isinstance(source, str | Path):
             _check_ordinary(Path(source))
             with Path(source).open("rb") as stream:
-                return _unpack_stream(stream)
+                return _unpack_known(stream)
         # A pipe cannot seek, an archive's directory is at its end.
-        return _unpack_stream(io.BytesIO(source.read(_LARGEST_FILE_BYTES)))
+        return _unpack_known(io.BytesIO(source.read(_LARGEST_FILE_BYTES)))
     except ProfileError as error:
-        raise ProfileError(f"{origin} {error}; {_REMEDY}.") from None
+        remedy = _FOREIGN if str(error).startswith("is not ") else _REMEDY
+        raise ProfileError(f"{origin} {error}; {remedy}.") from None
     except OSError as error:
         raise ProfileError(f"{origin} cannot be read: {reason(error)}.") from error
-    except Exception as error:
-        # zipfile, zlib, struct, numpy's header parser and json raise a dozen unrelated types on
-        # damaged bytes (RuntimeError for a flipped encryption bit, MemoryError, RecursionError).
-        raise ProfileError(f"{origin} is damaged or not a profile; {_REMEDY}.") from error
 
 
 def is_profile_file(path: Path) -> bool:
@@ -99,6 +102,34 @@ def is_profile_file(path: Path) -> bool:
             return _file_format(_read_meta(archive)).startswith("sssfit.profile/")
     except Exception:  # see unpack: damaged bytes raise nearly anything, and are not a profile
         return False
+
+
+def _unpack_known(stream: BinaryIO) -> tuple[dict[str, FloatArray], dict[str, Any]]:
+    """Read every member; a file that does not name itself ours is called foreign, not damaged."""
+    try:
+        return _unpack_stream(stream)
+    except ProfileError:
+        raise
+    except Exception as error:
+        # A damaged directory may send zipfile to before the beginning of the file.
+        if isinstance(error, OSError) and error.errno != errno.EINVAL:
+            raise
+        # zipfile, zlib, struct, numpy's header parser and json raise a dozen unrelated types on
+        # damaged bytes (RuntimeError for a flipped encryption bit, MemoryError, RecursionError).
+        if not is_marked(stream, _MARKS):
+            raise ProfileError("is not a profile") from None
+        raise ProfileError("is damaged") from error
+
+
+def is_marked(stream: BinaryIO, marks: Sequence[bytes]) -> bool:
+    """Whether a file holds one of some marks, anywhere in it."""
+    stream.seek(0)
+    kept = b""
+    while block := stream.read(1 << 24):
+        if any(mark in kept + block for mark in marks):
+            return True
+        kept = block[-100:]
+    return False
 
 
 def _unpack_stream(stream: BinaryIO) -> tuple[dict[str, FloatArray], dict[str, Any]]:
@@ -112,10 +143,11 @@ def _unpack_stream(stream: BinaryIO) -> tuple[dict[str, FloatArray], dict[str, A
             )
         names = [name.removesuffix(".npy") for name in archive.namelist()]
         if "meta" not in names:
-            raise ProfileError("is not a profile: it has no 'meta'")
+            raise ProfileError(f"is not a profile: it holds {_listed(names)}")
         meta = _read_meta(archive)
         if (found := _file_format(meta)) != FORMAT:
-            raise ProfileError(f"has format {found!r} where {FORMAT!r} was expected")
+            other = "has" if found.startswith("sssfit.profile/") else "is not a profile: it has"
+            raise ProfileError(f"{other} format {shown(found)} where {FORMAT!r} was expected")
         if missing := [name for name in REQUIRED if name not in names]:
             raise ProfileError(f"lacks {', '.join(missing)}")
         if len(set(names)) < len(names) or set(names) - {*REQUIRED, *OPTIONAL, "meta"}:
@@ -130,6 +162,11 @@ def _check_ordinary(path: Path) -> None:
         raise ProfileError("is a folder")
     if path.exists() and not path.is_file():
         raise ProfileError("is not an ordinary file")
+
+
+def _listed(names: Sequence[str]) -> str:
+    """Name a few members of an archive."""
+    return shown(", ".join(names)) if names else "nothing"
 
 
 def _file_format(meta: Mapping[str, Any]) -> str:

@@ -68,6 +68,34 @@ def check_output(path: Path, is_own: Callable[[Path], bool], *, force: bool = Fa
         probe.unlink()
 
 
+# Endings that promise a format; a name without one of them promises nothing.
+_DATA = (".csv", ".json", ".mci", ".mco", ".md", ".npz", ".toml")
+_PICTURES = (".exr", ".hdr", ".jpeg", ".jpg", ".pdf", ".png", ".svg", ".tif", ".tiff")
+_SHADERS = (".glsl", ".hlsl", ".wgsl")
+
+
+def check_ending(path: Path, what: str, own: str) -> None:
+    """Refuse an output whose name promises another format than it will have.
+
+    Parameters
+    ----------
+    path : Path
+        Where the output is to go.
+    what : str
+        What it is, with its article: "a profile".
+    own : str
+        The ending of its format: ".npz".
+
+    Raises
+    ------
+    FileError
+        The name ends as files of another format do.
+    """
+    ending = path.suffix.lower()
+    if ending != own and ending in (*_DATA, *_PICTURES, *_SHADERS):
+        raise FileError(f"{path} ends in {ending}, and {what} is written; end its name in {own}.")
+
+
 def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
     """Write a whole file or nothing: temporary file in the same folder, fsync, rename.
 

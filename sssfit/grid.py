@@ -95,8 +95,8 @@ def make_grid(
     Raises
     ------
     SimulationError
-        A length that is not finite and above 0, or over 100 000 rings; the message names widths
-        and radii that would do.
+        A length that is not finite and above 0, rings wider than the radius, or over 100 000 of
+        them; the message names widths and radii that would do.
     """
     paths_mm = np.concatenate([layer.mean_free_path_mm for layer in material.layers])
     paths_mm = paths_mm[np.isfinite(paths_mm)]
@@ -118,6 +118,11 @@ def grid_of_lengths(
     Raises SimulationError as `make_grid`; ``whose`` stands before its message, ``why`` within.
     """
     dr, radius = _length("dr_mm", dr_mm), _length("radius_mm", radius_mm)
+    if dr > radius * (1.0 + 1e-9):
+        raise SimulationError(
+            f"{whose}annuli {dr:g} mm wide do not fit into a radius of {radius:g} mm; use a "
+            "smaller --dr or a larger --radius (both in mm)."
+        )
     # 1e-9 keeps a ratio that is whole but for its last bits from gaining a ring.
     annuli = max(1, math.ceil(radius / dr - 1e-9))
     _check_count(annuli, dr, whose, why)

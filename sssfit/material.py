@@ -36,6 +36,7 @@ from sssfit._material_checks import (
     DENSE_PER_MM,
     FloatArray,
     check_channels,
+    check_clear_or_not,
     check_lengths,
     check_not_per_cm,
     check_stack,
@@ -66,9 +67,10 @@ class Layer:
     Parameters
     ----------
     eta : float
-        Refractive index, 1 to 4, the same for all channels.
+        Refractive index, 0.5 to 4, the same for all channels; only ratios of indices count.
     g : (C,) or float
-        Mean cosine of scattering, -1 to 1 exclusive; above 0 is forward. One number serves all.
+        Mean cosine of scattering, above -1 to 1; above 0 is forward. One number serves all. 1 is
+        no scattering at all, and becomes sigma_s = 0 and g = 0 in that channel.
     sigma_a_per_mm, sigma_s_per_mm : (C,)
         Absorption and scattering coefficients [1/mm]. Both 0: the layer is clear in that channel.
     thickness_mm : float
@@ -94,6 +96,10 @@ class Layer:
         _store(self, sigma_s_per_mm=numbers("sigma_s_per_mm", self.sigma_s_per_mm, "sigma"))
         _store(self, thickness_mm=number("thickness_mm", self.thickness_mm))
         check_lengths(self)
+        scatters = self.g < 1
+        _store(self, g=_read_only(np.where(scatters, self.g, 0.0)))
+        _store(self, sigma_s_per_mm=_read_only(np.where(scatters, self.sigma_s_per_mm, 0.0)))
+        check_clear_or_not(self)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Layer) and self.to_dict() == other.to_dict()
@@ -293,14 +299,16 @@ def load_material(name_or_path: str | Path) -> Material:
             raise MaterialError("stdin is closed; name a material or a file instead of -.")
         with located("stdin: "):
             text = decode(sys.stdin.buffer.read(MOST_BYTES + 1))
-        return parse_material(text, "stdin")
+        with text.hinting(MaterialError) as content:
+            return parse_material(content, "stdin")
     if not isinstance(name_or_path, Path) and wanted in material_names():
         shipped = resources.files("sssfit.materials") / f"{wanted}.toml"
         return parse_material(shipped.read_text("utf-8"), f"{wanted}.toml")
     if isinstance(name_or_path, Path) or is_path(wanted):
         with located(f"{printable(wanted)}: "):
             text = read_text(Path(wanted))
-        return parse_material(text, wanted)
+        with text.hinting(MaterialError) as content:
+            return parse_material(content, wanted)
     raise MaterialError(
         f"there is no material {shown(wanted)}; {did_you_mean(wanted, material_names())}"
         "`sssfit materials` lists those there are, and a file of your own ends in .toml."
@@ -359,6 +367,11 @@ def _layer_table(layer: Layer) -> dict[str, Any]:
     if len(set(table["g"])) == 1:
         table["g"] = table["g"][0]
     return table
+
+
+def _read_only(array: FloatArray) -> FloatArray:
+    array.setflags(write=False)
+    return array
 
 
 def _store(record: object, **values: Any) -> None:

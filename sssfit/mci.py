@@ -15,7 +15,8 @@ runs, and for each run from the top down::
     1.37  1  10   0    1E8
     1.0                          # n below
 
-What MCML writes in turn is read by ``sssfit.mco``.
+Only ratios of refractive indices count, so n may be below 1; g = 1 is no scattering at all. What
+MCML writes in turn is read by ``sssfit.mco``.
 """
 
 import math
@@ -26,8 +27,8 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from sssfit._material_checks import printable, shown
-from sssfit._mci_lines import INPUT_COMMENT, Line, Lines
+from sssfit._material_checks import LEAST_ETA, MOST_ETA, printable, shown
+from sssfit._mci_lines import INPUT_COMMENT, Line, Lines, other_version
 from sssfit.errors import MaterialError, SssfitError
 from sssfit.grid import MOST_ANNULI, RadialGrid
 from sssfit.material import Layer, Material
@@ -39,14 +40,14 @@ SEMI_INFINITE_CM = 1e6  # 10 km; the manual writes 1E8 cm, "Separable Subsurface
 _MOST = 10**12
 _LENGTH = "a length above 0, in cm"
 _COEFFICIENT = "a number of 0 or more, in 1/cm"
-_INDEX = "a refractive index from 1 to 4"
+_INDEX = f"a refractive index from {LEAST_ETA} to {MOST_ETA}"
 
 # The columns of a layer's line: name, what will do, what to say was expected, power of ten to mm.
 _COLUMNS: tuple[tuple[str, Callable[[float], bool], str, int], ...] = (
-    ("n", lambda v: 1 <= v <= 4, _INDEX, 0),
+    ("n", lambda v: LEAST_ETA <= v <= MOST_ETA, _INDEX, 0),
     ("mua", lambda v: 0 <= v <= 1e9, _COEFFICIENT, -1),
     ("mus", lambda v: 0 <= v <= 1e9, _COEFFICIENT, -1),
-    ("g", lambda v: -1 < v < 1, "a number between -1 and 1, both excluded", 0),
+    ("g", lambda v: -1 < v <= 1, "a number above -1 and up to 1", 0),
     ("d", lambda v: 1e-9 < v < 1e300, _LENGTH, 1),
 )
 
@@ -81,8 +82,9 @@ class MciRun:
 
 def load_mci(path: str | Path) -> tuple[MciRun, ...]:
     """Read the runs of an MCML input file; see `parse_mci`."""
-    expected = "an MCML input file"
-    return parse_mci(read_text(path, str(path), expected=expected, error=MaterialError), str(path))
+    text = read_text(path, str(path), expected="an MCML input file", error=MaterialError)
+    with text.hinting(MaterialError) as content:
+        return parse_mci(content, str(path))
 
 
 def parse_mci(text: str, origin: str) -> tuple[MciRun, ...]:
@@ -113,12 +115,7 @@ def parse_mci(text: str, origin: str) -> tuple[MciRun, ...]:
     ([0.15], 1.0)
     """
     lines = Lines(text, origin, comment=INPUT_COMMENT, error=MaterialError)
-    version = lines.take_words("the file version, 1.0")
-    if version.words[0] != "1.0":
-        raise lines.failure(
-            version.number,
-            f"the file version is {shown(version.words[0])}; expected 1.0, that of an MCML input.",
-        )
+    _take_version(lines)
     count_line = lines.take_words("the number of runs")
     count = lines.whole(count_line, 0, "the number of runs", _MOST)
     runs: dict[str, MciRun] = {}
@@ -140,6 +137,23 @@ def parse_mci(text: str, origin: str) -> tuple[MciRun, ...]:
             f"announces {count}. Raise that number, or put a # before what is a comment.",
         )
     return tuple(runs.values())
+
+
+def _take_version(lines: Lines) -> None:
+    """Take the first line; one without a version is a foreign file's."""
+    line = lines.take("the file version, 1.0")
+    if (version := other_version(line.words[0])) is not None:
+        raise lines.failure(
+            line.number,
+            f"this is a file of MCML {version}; only the input of MCML 1 (version 1.0) is read. "
+            "Write its layers in that form.",
+        )
+    if line.words != ("1.0",):
+        raise lines.failure(
+            line.number,
+            f"not an MCML input file: it begins with {shown(' '.join(line.words))}; expected the "
+            "file version, 1.0.",
+        )
 
 
 def read_run(lines: Lines, which: str, source: str) -> MciRun:

@@ -1,7 +1,8 @@
 """MCML output files (``.mco``, ASCII): what the original program found, as a profile in mm.
 
 The format is that of MCML 1.2.2 (Wang, Jacques, Zheng, Computer Methods and Programs in Biomedicine
-47, 1995; its manual, appendix E): the version A1, then named blocks. ``InParm`` repeats the input;
+47, 1995; its manual, appendix E): the version A1, then named blocks. ``InParm`` repeats the input
+(``InParam`` in the ports to GPUs after Alerstam et al. 2008, which copy the lines of the input);
 ``RAT`` has the specular and diffuse reflectance, the absorbed fraction and the transmittance;
 ``A_l``, ``Rd_r`` and ``Tt_r`` have what a profile needs, in cm. The other blocks are checked for
 their length and left alone.
@@ -10,6 +11,7 @@ Rd_r[i] is energy over area, and the area is 2 pi (i + 1/2) dr^2; the last bin a
 leaves beyond it, so it says nothing about a radius and goes to ``beyond_grid``. Tt_r likewise.
 """
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -19,8 +21,8 @@ import numpy.typing as npt
 
 from sssfit import __version__
 from sssfit._material_checks import check_channels, printable, shown
-from sssfit._mci_lines import OUTPUT_COMMENT, Line, Lines
-from sssfit.errors import MaterialError, ProfileError
+from sssfit._mci_lines import INPUT_COMMENT, OUTPUT_COMMENT, Line, Lines, other_version
+from sssfit.errors import MaterialError, ProfileError, SssfitWarning
 from sssfit.material import Layer, Material
 from sssfit.mci import MciRun, read_run
 from sssfit.profile import FORMAT, Profile
@@ -31,18 +33,27 @@ FloatArray = npt.NDArray[np.float64]
 # MCML prints five digits of Rd_r and Tt_r, four of A_l: half a unit of the last is 5e-5 or 5e-4 of
 # the number at most, and that of a sum too.
 _RADIAL_DIGITS, _LAYER_DIGITS = 1e-4, 1e-3
+# Roulette adds 3e-4 a photon at random, under 1e-5 in a thousand; RAT has six digits.
+_LOST = 1e-3
+_HEADS = ("InParm", "InParam")
 _NEEDED = ("RAT", "A_l", "Rd_r", "Tt_r")
 
 
 def load_mco(path: str | Path) -> Profile:
     """Read an MCML output file as a profile of one channel; see `parse_mco`."""
     text = read_text(path, str(path), expected="MCML's output in ASCII", error=ProfileError)
-    return parse_mco(text, str(path))
+    with text.hinting(ProfileError) as content:
+        return parse_mco(content, str(path))
 
 
 def is_mco(text: str) -> bool:
-    """Tell whether a text begins as MCML's output does."""
-    return text.split(maxsplit=1)[:1] in (["A1"], ["B1"])
+    """Tell whether a text begins as a file of MCML does, of whatever version, after its comments.
+
+    Inputs count only where they name MCML: those of version 1 begin with a bare number.
+    """
+    line = Lines(text, "", comment=OUTPUT_COMMENT, error=ProfileError).peek()
+    word = line.words[0] if line else ""
+    return word in ("A1", "B1") or other_version(word) is not None
 
 
 def parse_mco(text: str, origin: str) -> Profile:
@@ -65,20 +76,31 @@ def parse_mco(text: str, origin: str) -> Profile:
     Raises
     ------
     ProfileError
-        One line with the origin and the line's number: cut short, not of this format, in binary, or
-        the blocks contradict one another.
+        One line with the origin and the line's number: cut short, not of this format, of another
+        version of MCML, in binary, or the blocks contradict one another.
+
+    Warns
+    -----
+    SssfitWarning
+        The energies of RAT do not add up to 1.
     """
     lines = Lines(text, origin, comment=OUTPUT_COMMENT, error=ProfileError)
     _take_version(lines)
     name = lines.take_words("the block InParm")
-    if name.words != ("InParm",):
+    if name.words[0] not in _HEADS:
         raise lines.failure(name.number, f"{shown(name.words[0])} stands where InParm should.")
+    if name.words[0] == "InParam":
+        lines.comment = INPUT_COMMENT
     run = read_run(lines, "the run", f"{Path(origin).name} (MCML)")
     if run.grid.annuli < 2:
         raise lines.failure(
             name.number, "1 bin over r holds all that leaves, near and far; a profile needs 2 dr."
         )
-    return _profile(run, _read_blocks(lines, run), origin)
+    lines.comment = OUTPUT_COMMENT
+    blocks = _read_blocks(lines, run)
+    profile = _profile(run, blocks, origin)
+    _check_energies(origin, *blocks["RAT"].tolist())
+    return profile
 
 
 def join_channels(profiles: Sequence[Profile], channels: Sequence[str]) -> Profile:
@@ -129,6 +151,12 @@ def _take_version(lines: Lines) -> None:
     line = lines.take("A1, the version of MCML's output format")
     if line.words[0] == "B1":
         raise lines.failure(line.number, "this is binary output; run MCML with format A.")
+    if (version := other_version(line.words[0])) is not None:
+        raise lines.failure(
+            line.number,
+            f"this is a file of MCML {version}; only the output of MCML 1 (version A1) is read. "
+            "Write its layers as an input file of MCML 1, and `sssfit simulate` walks them.",
+        )
     if line.words != ("A1",):
         raise lines.failure(
             line.number,
@@ -192,6 +220,27 @@ def _energy(lines: Lines, line: Line, name: str, word: str) -> float:
             "long as InParm says?",
         )
     return value
+
+
+def _check_energies(
+    origin: str, specular: float, diffuse: float, absorbed: float, transmitted: float
+) -> None:
+    """Refuse more light than arrives, and say where some of it went missing."""
+    reflected = specular + diffuse
+    if reflected > 1.0 + _LOST:
+        raise ProfileError(
+            f"{printable(origin)}: RAT says that {reflected:.6g} of 1 is reflected; expected at "
+            "most 1. The file was changed; take it as MCML wrote it."
+        )
+    total = reflected + absorbed + transmitted
+    if abs(total - 1.0) > _LOST:
+        warnings.warn(
+            f"{printable(origin)}: the energies of RAT add up to {total:.6g} of 1 (reflected "
+            f"{reflected:.6g}, absorbed {absorbed:.6g}, transmitted {transmitted:.6g}); expected "
+            "1. Was absorption counted, or the run cut short?",
+            SssfitWarning,
+            stacklevel=3,
+        )
 
 
 def _profile(run: MciRun, blocks: dict[str, FloatArray], origin: str) -> Profile:

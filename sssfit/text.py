@@ -1,16 +1,21 @@
 """Text files of other programs: read whole, known to be text, their numbers taken strictly.
 
 The three formats that come in this way are MCML's input (``sssfit.mci``) and output
-(``sssfit.mco``) and tables of a profile (``sssfit.profile_csv``).
+(``sssfit.mco``) and tables of a profile (``sssfit.profile_csv``); materials (``sssfit.material``)
+share the decoding. UTF-8 is what is meant; UTF-16 and the Western code page of Windows are what
+editors there also write, and are read: names and comments may hold any letter, numbers are ASCII.
 """
 
+import codecs
+import contextlib
 import io
 import math
 import re
+from collections.abc import Iterator
+from decimal import Decimal
 from pathlib import Path
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
-from sssfit._material_checks import printable
 from sssfit.errors import SssfitError
 from sssfit.files import reason
 
@@ -18,12 +23,31 @@ from sssfit.files import reason
 MOST_BYTES = 500_000_000
 
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+_HINT = "The file is not UTF-8 text: if a letter is the trouble, save it as UTF-8."
+_LOOKED_AT = 4096  # bytes among which those of pictures and archives have a null
+
+
+class Text(NamedTuple):
+    """A decoded file: lines end in newline characters; whether its bytes were UTF-8 or UTF-16."""
+
+    content: str
+    is_unicode: bool
+
+    @contextlib.contextmanager
+    def hinting(self, error: type[SssfitError]) -> Iterator[str]:
+        """Lend the content; an ``error`` raised meanwhile also says how to save the file."""
+        try:
+            yield self.content
+        except error as failure:
+            if self.is_unicode:
+                raise
+            raise error(f"{failure} {_HINT}") from None
 
 
 def read_text(
     source: str | Path | BinaryIO, origin: str, *, expected: str, error: type[SssfitError]
-) -> str:
-    """Read a text of another program; every line in it ends with a single newline character.
+) -> Text:
+    """Read a text of another program.
 
     Parameters
     ----------
@@ -39,7 +63,7 @@ def read_text(
     Raises
     ------
     SssfitError
-        Of the type ``error``: missing, unreadable, a folder, not UTF-8, or larger than 500 MB.
+        Of the type ``error``: missing, unreadable, a folder, no text, or larger than 500 MB.
     """
     try:
         content = _bytes(source)
@@ -51,15 +75,48 @@ def read_text(
         raise error(
             f"{printable(origin)} is larger than {MOST_BYTES / 1e6:.0f} MB, not {expected}."
         )
+    text = decode(content)
+    if text is None:
+        raise error(f"{printable(origin)} is not text; expected {expected}.")
+    # NEL ends lines on mainframes; in the Windows code page its byte is an ellipsis.
+    return text._replace(content=text.content.replace("\x85", "\n"))
+
+
+def decode(content: bytes) -> Text | None:
+    """Decode UTF-8, UTF-16 or the Western code page of Windows; None for what is not text.
+
+    Byte order marks are dropped, line ends become newline characters.
+    """
+    text, is_unicode = _decoded(content)
+    if "\0" in text[:_LOOKED_AT]:
+        return None
+    text = text.rstrip("\x1a")  # DOS's mark of the end
+    return Text(io.StringIO(text, newline=None).getvalue(), is_unicode)
+
+
+def _decoded(content: bytes) -> tuple[str, bool]:
+    """Return the text, and whether it was Unicode."""
+    encoding = _utf16(content[:_LOOKED_AT])
+    if encoding is not None:
+        return content.decode(encoding, errors="replace"), True
     try:
-        text = content.decode("utf-8-sig")
-    except UnicodeDecodeError as failure:
-        line = content[: failure.start].count(b"\n") + 1
-        raise error(
-            f"{printable(origin)}: line {line} holds the byte {content[failure.start]:#04x}, which "
-            f"is no UTF-8 text; expected {expected}."
-        ) from None
-    return io.StringIO(text, newline=None).getvalue()
+        return content.decode("utf-8-sig"), True
+    except UnicodeDecodeError:
+        pass
+    # Five bytes stand for nothing in the code page; a name or comment that has one is not lost.
+    return content.decode("cp1252", errors="replace"), False
+
+
+def _utf16(head: bytes) -> str | None:
+    """Tell UTF-16 by its mark, or by a null in every other byte of what begins in ASCII."""
+    if head.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "utf-16"
+    first = head[:8]
+    if len(first) >= 4 and not any(first[1::2]) and all(first[::2]):
+        return "utf-16-le"
+    if len(first) >= 4 and not any(first[::2]) and all(first[1::2]):
+        return "utf-16-be"
+    return None
 
 
 def _bytes(source: str | Path | BinaryIO) -> bytes:
@@ -74,3 +131,17 @@ def finite_number(word: str) -> float | None:
     """Return the number that a whole word writes in decimal; None if it is none, or too large."""
     value = float(word) if _NUMBER.fullmatch(word) else math.inf
     return value if math.isfinite(value) else None
+
+
+def tenfold_number(word: str, power: int) -> float:
+    """Return a word that `finite_number` reads, times 10 to a power.
+
+    The shift is decimal: 7.4 per cm gives the same bits as 0.74 per mm.
+    """
+    # Not for 0, which may be written 0e999999999999999999999, beyond what Decimal knows.
+    return float(Decimal(word).scaleb(power)) if finite_number(word) else 0.0
+
+
+def printable(text: str) -> str:
+    """Escape what does not print (newlines too), so that ``text`` can stand inside a message."""
+    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

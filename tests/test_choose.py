@@ -6,6 +6,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from reference_pixels import make_profile
 
 import sssfit.compare._all_light as all_light
 import sssfit.compare._choose_truth as truths
@@ -436,12 +437,23 @@ def test_forward_scattering_is_walked_and_not_taken_for_isotropic():
     assert not is_exact(forward)
     even = Layer(1.3, np.zeros(1), np.array([0.1]), np.array([5.0]))
     assert is_exact(Material("even", ("grey",), (even,)))
+    # Nor is a medium thinner optically than what is above it, which the exact solver refuses.
+    assert not is_exact(Material("under-water", ("grey",), (even,), eta_above=1.33))
 
 
 def test_a_material_that_returns_nothing_is_refused():
     layer = Layer(1.3, np.zeros(1), np.array([0.1]), np.zeros(1))
     with pytest.raises(FitError, match="returns no light"):
         choose(Material("black", ("grey",), (layer,)), mm_per_pixel=0.6, frame=FRAME)
+
+
+def test_what_cannot_be_fitted_to_a_profile_is_left_out_by_name(monkeypatch):
+    quick(monkeypatch)
+    coarse = make_profile([0.0, 1.0, 2.0, 4.0, 9.0], [[0.1], [0.1], [0.1], [0.05]])
+    edge = make_scene("edge", height=48, width=48, mm_per_pixel=0.6, angle_degrees=30.0)
+    found = choose(coarse, mm_per_pixel=0.6, scene=edge, tolerance=0.2)
+    assert "gaussians 3" in found.unfitted  # 6 parameters, 4 annuli
+    assert not set(found.unfitted) & {each.label for each in found.steps}
 
 
 def test_supports_that_are_too_narrow_are_named(skin1):

@@ -17,6 +17,7 @@ from sssfit.profile import Profile
 from sssfit.simulate import simulate_montecarlo
 
 TABLE = "r_mm,R,R_stderr\n0.5,0.1,0.001\n1,0.05,0.002\ninf,0.01,nan\n"
+DATA = Path(__file__).parent / "data"
 COMMAND = [sys.executable, "-m", "sssfit.cli"]
 GREEN = mco_text(layers=("1.4 3 100 0.8 0.1", "1.4 2.5 10 0 0.2"), name="g.mco")
 
@@ -58,6 +59,13 @@ def test_a_run_is_walked_on_its_own_grid(run, tmp_path):
     assert profile.annulus_energy.tobytes() == same.annulus_energy.tobytes()
 
 
+def test_a_comment_in_latin_1_does_not_stop_a_run(run):
+    status, out, _ = run("simulate", str(DATA / "latin1-comment.mci"), "--json")
+    assert status == 0
+    (found,) = json.loads(out)["diffuse_reflectance"]
+    assert found == pytest.approx(0.263246, abs=5e-4)  # the same walk; rounding may part photons
+
+
 def test_all_runs_or_one(run, tmp_path):
     second = run_text("b.mco", layer="1.4 1 5 0 1E8").replace("1000 ", "2000 ")
     Path("tissue.mci").write_text(file_text(run_text("a.mco"), second))
@@ -97,12 +105,12 @@ def test_options_go_before_the_file(run):
         (("tissue.mci", "-o", "-"), 2, "-o names a folder"),
         (("tissue.mci", "-o", "none"), 1, "there is no folder none"),
         (("none.mci",), 1, "none.mci cannot be read: no such file"),
-        (("bad.mci",), 1, "bad.mci: line 9: g = '1' is out of range"),
+        (("bad.mci",), 1, "bad.mci: line 9: g = '2' is out of range"),
     ],
 )
 def test_wrong_runs(run, tmp_path, arguments, status, said):
     Path("tissue.mci").write_text(file_text(run_text("a.mco"), run_text("b.mco")))
-    Path("bad.mci").write_text(file_text(run_text(layer="1.3 1 2 1 1")))
+    Path("bad.mci").write_text(file_text(run_text(layer="1.3 1 2 2 1")))
     code, out, err = run("simulate", *arguments)
     assert (code, out) == (status, "")
     assert said in err.splitlines()[-1]
@@ -175,6 +183,17 @@ def test_import_through_pipes(tmp_path, content):
         (("mine.csv", "--quantity", "density"), 1, "line 4, column 'r_mm': inf"),
         (("mine.csv", "--channels", "R"), 2, "--channels is for .mco files"),
         (("a.mco", "--quantity", "energy"), 2, "--quantity is for a CSV"),
+        (("a.mco", "--unit", "cm"), 2, "--unit is for a CSV"),
+        (("a.mco", "--density-unit", "cm"), 2, "--density-unit is for a CSV"),
+        (("mine.csv", "--quantity", "energy", "--unit", "cm"), 1, "r_mm says mm, and the unit giv"),
+        (("mine.csv", "--quantity", "energy", "--density-unit", "cm"), 1, "energies have no unit"),
+        (
+            ("mcml2.mco",),
+            1,
+            "line 1: this is a file of MCML 2.0; only the output of MCML 1 (version",
+        ),
+        (("run.mci",), 1, "run.mci is an MCML input file; `sssfit simulate` walks"),
+        (("picture.png",), 1, "picture.png is not text; expected a CSV or MCML's output in ASCII"),
         (("a.mco", "g.mco"), 2, "name the profile of several files with -o"),
         (("a.mco", "g.mco", "-o", "x.npz"), 2, "give --channels with 2 names"),
         (("a.mco", "g.mco", "-o", "x.npz", "--channels", "R"), 1, "1 channel names"),
@@ -182,7 +201,8 @@ def test_import_through_pipes(tmp_path, content):
         (("a.mco", "-o", "no/x.npz"), 1, "there is no folder no"),
         (("none.mco",), 1, "none.mco cannot be read: no such file"),
         (("cut.mco",), 1, "cut.mco: ends after line"),
-        (("a.mco", "-o", "mine.csv"), 1, "exists and is not a file of this format"),
+        (("a.mco", "-o", "notes"), 1, "exists and is not a file of this format"),
+        (("a.mco", "-o", "mine.csv"), 1, "mine.csv ends in .csv, and a profile is written"),
     ],
 )
 def test_wrong_imports(run, tmp_path, arguments, status, said):
@@ -190,6 +210,10 @@ def test_wrong_imports(run, tmp_path, arguments, status, said):
     Path("a.mco").write_text(mco_text())
     Path("g.mco").write_text(GREEN)
     Path("cut.mco").write_text(mco_text()[:700])
+    Path("mcml2.mco").write_bytes((DATA / "mcml2.mco").read_bytes())
+    Path("run.mci").write_text(file_text(run_text()))
+    Path("notes").write_text("mine")
+    Path("picture.png").write_bytes(b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR")
     before = names(tmp_path)
     code, out, err = run("import", *arguments)
     assert (code, out) == (status, "")
@@ -198,11 +222,42 @@ def test_wrong_imports(run, tmp_path, arguments, status, said):
     assert names(tmp_path) == before
 
 
-def test_units_that_cannot_be_are_pointed_out(run):
-    Path("mine.csv").write_text("r_mm,R\n0.5,3\n1,2\n")
-    status, _, err = run("import", "mine.csv", "--quantity", "density")
+def test_units_that_cannot_be_are_refused_with_those_that_can(run, tmp_path):
+    Path("mine.csv").write_text("r_mm,R\n50,0.3\n150,0.2\n")
+    status, out, err = run("import", "mine.csv", "--quantity", "density")
+    assert (status, out) == (1, "")
+    assert "'R' adds up to 28274.3 of 1 that arrives; it would be 0.02827 with radii in um" in err
+    assert err.count("\n") == 1
+    assert names(tmp_path) == ["mine.csv"]
+    Path("mine.csv").write_text("r_um,R\n50,0.3\n150,0.2\n")
+    arguments = ("mine.csv", "--quantity", "density", "--density-unit", "mm", "--json")
+    status, out, _ = run("import", *arguments)
+    assert json.loads(out)["diffuse_reflectance"] == [pytest.approx(0.0282743, rel=1e-5)]
+
+
+def test_a_table_in_cm_is_converted(run):
+    status, out, err = run(
+        "import", str(DATA / "low-albedo-cm.csv"), "--quantity", "density", "--json"
+    )
+    assert (status, err) == (0, "")
+    figures = json.loads(out)
+    assert figures["diffuse_reflectance"] == [pytest.approx(0.008006, abs=5e-7)]
+    assert figures["radius_mm"] == pytest.approx(8.0)
+    Path("r.csv").write_text((DATA / "low-albedo-cm.csv").read_text().replace("r_cm", "r"))
+    _, out, _ = run("import", "r.csv", "--quantity", "density", "--unit", "cm", "--json")
+    assert json.loads(out)["diffuse_reflectance"] == figures["diffuse_reflectance"]
+
+
+def test_lost_energy_and_gaps_are_said_on_import(run):
+    Path("a.mco").write_text(mco_text(RAT="RAT\n0.01\n0.3\n0.2\n0.1\n", A_l="A_l\n0.1\n0.1\n"))
+    status, _, err = run("import", "a.mco", "-q")
     assert status == 0
-    assert err.startswith("Warning: mine.csv: 'R' adds up to")
+    assert err.startswith("Warning: a.mco: the energies of RAT add up to 0.61 of 1")
+    assert err.count("\n") == 1
+    Path("far.csv").write_text("r_mm,R\n1,0.1\n1.1,0.09\n")
+    status, _, err = run("import", "far.csv", "--quantity", "density")
+    assert status == 0
+    assert err.startswith("Warning: far.csv begins at r = 1 mm")
     assert err.count("\n") == 1
 
 

@@ -143,9 +143,9 @@ def test_unknown_name_exits_1_with_a_suggestion(run):
 
 def test_bad_file_exits_1_with_one_line(run, tmp_path):
     path = tmp_path / "bad.toml"
-    path.write_text("eta = 0.5\ng = 0\nsigma_a_per_mm = [1]\nsigma_s_per_mm = [1]\n")
+    path.write_text("eta = 0.4\ng = 0\nsigma_a_per_mm = [1]\nsigma_s_per_mm = [1]\n")
     error = run(str(path), status=1)
-    assert error.startswith(f"Error: {path}: eta = 0.5 is out of range")
+    assert error.startswith(f"Error: {path}: eta = 0.4 is out of range")
     assert error.count("\n") == 1
 
 

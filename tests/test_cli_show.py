@@ -1,12 +1,14 @@
 """``sssfit show`` and ``sssfit chart`` as a user meets them: files, pipes, --json, refusals."""
 
 import json
+import re
 import subprocess
 import sys
 
 import numpy as np
 import pytest
 
+from sssfit import __version__
 from sssfit._profile_radii import energy_radii_mm
 from sssfit.material import load_material
 from sssfit.profile import Profile
@@ -51,23 +53,74 @@ def sssfit(folder, *args, given=b""):
     )
 
 
+def tables(text):
+    """The tables of a page, by the second word of their head: a dict of cells a channel."""
+    found = {}
+    for block in text.split("\n\n"):
+        head, *rows = [re.split(r"  +", line.strip()) for line in block.splitlines()]
+        if head[0] == "channel":
+            found[head[1]] = {row[0]: dict(zip(head[1:], row[1:], strict=True)) for row in rows}
+    return found
+
+
+def linear_radius_mm(profile, channel, share):
+    """Radius within which a share of a channel's light on the grid leaves, F straight in annuli."""
+    grown = np.cumsum(profile.annulus_energy[:, channel])
+    return np.interp(share * grown[-1], np.append(0.0, grown), profile.r_edges_mm)
+
+
 def test_show_prints_what_the_profile_holds(folder, profile):
+    """Every cell against the profile's arrays and Jensen et al.'s coefficients."""
     run = sssfit(folder, "show")
     assert run.returncode == 0, run.stderr
     assert b"Using skin1.profile.npz" in run.stderr
     text = run.stdout.decode()
-    total, stderr = profile.diffuse_reflectance[0], profile.diffuse_reflectance_stderr[0]
-    for words in (
+    assert text.splitlines()[:4] == [
+        "skin1.profile.npz: diffuse reflectance profile (sssfit.profile/1)",
         "material  skin1 (Jensen et al. 2001)",
-        "montecarlo, 20,000 photons, seed 1",
-        f"grid      {profile.n_annuli} annuli of 0.03356 mm",
-        f"{total:.6f}    {stderr:.1e}",
-        "sigma_a, 1/mm",
-        "90 % within, mm",
-        "empty: annuli in which nothing was seen",
-    ):
-        assert words in text
+        f"method    montecarlo, 20,000 photons, seed 1, sssfit {__version__}",
+        "grid      1236 annuli of 0.03356 mm, to 41.48 mm",
+    ]
     assert max(map(len, text.splitlines())) <= 110
+    page = tables(text)
+    coefficients = {"R": (0.032, 0.74), "G": (0.17, 0.88), "B": (0.48, 1.01)}
+    for c, name in enumerate("RGB"):
+        sigma_a, sigma_s = coefficients[name]
+        assert page["eta"][name] == {
+            "eta": "1.3",
+            "g": "0",
+            "sigma_a, 1/mm": f"{sigma_a:.5g}",
+            "sigma_s, 1/mm": f"{sigma_s:.5g}",
+            "albedo": f"{sigma_s / (sigma_a + sigma_s):.5f}",
+            "MFP, mm": f"{1.0 / (sigma_a + sigma_s):.4f}",
+            "thickness, mm": "infinite",
+        }
+        beyond, absorbed = profile.beyond_grid[c], profile.absorbed[0, c]
+        diffuse = profile.annulus_energy[:, c].sum() + beyond
+        energies = page["diffuse R"][name]
+        balance = energies.pop("sum - 1")
+        stderr = float(energies.pop("+- stderr"))
+        assert energies == {
+            "diffuse R": f"{diffuse:.6f}",
+            "beyond grid": f"{beyond:.2e}",
+            "of diffuse": f"{100.0 * beyond / diffuse:.3f} %",
+            "absorbed": f"{absorbed:.6f}",
+            "unfinished": "0.0e+00",
+        }
+        # A photon brings at most what entered: its variance is at most that of all or nothing.
+        entered = 1.0 - profile.specular_reflectance
+        assert 0.2 < stderr / np.sqrt(diffuse * (entered - diffuse) / 20_000) <= 1.0
+        off = 0.3**2 / 2.3**2 + diffuse + absorbed - 1.0
+        # One digit of a sum of ones: its last bit is 2e-16, and these are sums of thousands.
+        assert float(balance.split(" +- ")[0]) == pytest.approx(off, rel=0.5, abs=1e-13)
+        radii = page["50 % within, mm"][name]
+        assert radii.pop("empty") == str(np.sum(profile.annulus_energy[:, c] == 0.0))
+        for share in (50, 90, 99):
+            printed = float(radii.pop(f"{share} % within, mm"))
+            assert printed == pytest.approx(linear_radius_mm(profile, c, share / 100), abs=0.02)
+        assert radii == {}
+    assert f"specular reflectance {(0.3 / 2.3) ** 2:.6f}, not part of diffuse R" in text
+    assert "empty: annuli in which nothing was seen" in text
 
 
 def test_show_json_has_the_same_figures(folder, profile):

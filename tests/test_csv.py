@@ -2,6 +2,7 @@
 
 import string
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from sssfit.profile import FORMAT
 from sssfit.profile_csv import csv_text, is_profile_csv, load_csv, parse_csv
 from sssfit.simulate import simulate_montecarlo
 
+DATA = Path(__file__).parent / "data"
 FIELDS = (
     "r_edges_mm",
     "annulus_energy",
@@ -71,7 +73,8 @@ def test_energies_at_outer_edges():
 
 def test_densities_at_unequal_radii():
     """Edges half-way between, the last as far out as its annulus is deep; energy = R_d area."""
-    profile = parse_csv("r_mm,R\n1,0.01\n2,0.005\n4,0.001\n", "a.csv", quantity="density")
+    with pytest.warns(SssfitWarning, match="begins at r = 1 mm"):
+        profile = parse_csv("r_mm,R\n1,0.01\n2,0.005\n4,0.001\n", "a.csv", quantity="density")
     assert profile.r_edges_mm.tolist() == [0.0, 1.5, 3.0, 5.0]
     areas = np.pi * np.diff(np.square([0.0, 1.5, 3.0, 5.0]))
     np.testing.assert_allclose(profile.annulus_energy[:, 0], areas * [0.01, 0.005, 0.001])
@@ -136,7 +139,7 @@ NAMES = st.text(
     lambda name: (
         name.isprintable()
         and name.strip() == name
-        and name != "r_mm"
+        and name not in ("r", "r_um", "r_mm", "r_cm", "r_m")
         and not name.endswith("_stderr")
     )
 )
@@ -170,7 +173,9 @@ def test_any_profile_comes_back_to_the_bit(profile):
     assert_same_bits(profile, parse_csv(csv_text(profile), "a.csv"))
 
 
-@pytest.mark.parametrize("names", [["R_stderr"], ["r_mm"], [""], ["R", "R"], ["two\nlines"]])
+@pytest.mark.parametrize(
+    "names", [["R_stderr"], ["r_mm"], ["r_cm"], ["r"], [""], ["R", "R"], ["two\nlines"]]
+)
 def test_names_that_would_not_come_back_are_not_written(names):
     with pytest.raises(ProfileError) as error:
         csv_text(named_profile(names, np.full((2, len(names)), 0.1)))
@@ -178,7 +183,7 @@ def test_names_that_would_not_come_back_are_not_written(names):
 
 
 def test_quantity_is_said_by_the_table_or_the_caller():
-    table = "r_mm,R\n1,0.01\n2,0.005\n"
+    table = "r_mm,R\n0.5,0.01\n1.5,0.005\n"
     with pytest.raises(ProfileError, match="give --quantity density"):
         parse_csv(table, "a.csv")
     by_comment = parse_csv("# quantity = density\n" + table, "a.csv")
@@ -190,9 +195,116 @@ def test_quantity_is_said_by_the_table_or_the_caller():
         parse_csv("# quantity = flux\n" + table, "a.csv")
 
 
-def test_more_light_than_arrives_is_pointed_out():
-    with pytest.warns(SssfitWarning, match=r"a\.csv: 'R' adds up to 1\.5 of 1 .* per cm\^2"):
-        parse_csv("r_mm,R\n1,1\n2,0.5\n", "a.csv", quantity="energy")
+def table_of(radii, densities, head):
+    rows = zip(radii.tolist(), densities.tolist(), strict=True)
+    return "\n".join([f"{head},R", *(f"{r!r},{d!r}" for r, d in rows)])
+
+
+# R_d = .3 exp(-r/.8 mm) / (2 pi .64 mm^2): all but .3 exp(-r/.8)(1 + r/.8) lies within r.
+CENTRES_MM = 0.05 + 0.1 * np.arange(100)
+DENSITY_PER_MM2 = 0.3 * np.exp(-CENTRES_MM / 0.8) / (2.0 * np.pi * 0.64)
+MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
+
+
+@pytest.mark.parametrize("unit", MM)
+@pytest.mark.parametrize("per", MM)
+def test_radii_and_densities_in_any_unit_are_the_same_profile(unit, per):
+    """One physical profile, its table written in every pair of units, comes in as itself."""
+    radii, densities = CENTRES_MM / MM[unit], DENSITY_PER_MM2 * MM[per] ** 2
+    given = {} if per == unit else {"density_unit": per}
+    mm = parse_csv(table_of(CENTRES_MM, DENSITY_PER_MM2, "r_mm"), "a.csv", quantity="density")
+    named = table_of(radii, densities, f"r_{unit}")
+    profile = parse_csv(named, "a.csv", quantity="density", **given)
+    np.testing.assert_allclose(profile.r_edges_mm, mm.r_edges_mm, rtol=1e-12)
+    np.testing.assert_allclose(profile.annulus_energy, mm.annulus_energy, rtol=1e-12)
+    assert profile.diffuse_reflectance[0] == pytest.approx(0.3, rel=2e-3)
+    plain = table_of(radii, densities, "r")
+    same = parse_csv(plain, "a.csv", quantity="density", unit=unit, **given)
+    assert_same_bits(profile, same)
+
+
+def test_units_move_energies_radii_only_and_standard_errors_with_densities():
+    energies = parse_csv("r_cm,R\n0.05,0.1\n0.2,0.05\ninf,0.01\n", "a.csv", quantity="energy")
+    assert energies.r_edges_mm.tolist() == [0.0, 0.5, 2.0]
+    assert energies.annulus_energy[:, 0].tolist() == [0.1, 0.05]
+    text = "r_cm,R,R_stderr\n0.05,0.1,0.02\n0.15,0.05,0.01\n"
+    errors = parse_csv(text, "a.csv", quantity="density")
+    ratio = errors.annulus_energy_stderr / errors.annulus_energy
+    np.testing.assert_allclose(ratio, 0.2, rtol=1e-14)
+
+
+def test_a_table_in_cm_has_the_reflectance_it_was_made_with():
+    """Multiplying the radii alone by 10, as a message once advised, gives .80."""
+    profile = load_csv(DATA / "low-albedo-cm.csv", quantity="density")
+    assert profile.diffuse_reflectance[0] == pytest.approx(0.008006, abs=5e-7)
+    assert profile.r_edges_mm[-1] == pytest.approx(8.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "given", "said"),
+    [
+        ("r,R\n1,0.1\n2,0.1\n", {}, "the column r does not say its unit"),
+        ("r_mm,R\n1,0.1\n2,0.1\n", {"unit": "cm"}, "r_mm says mm, and the unit given is cm"),
+        ("r_mm,r_cm,R\n1,0.1,0\n", {}, "r_mm and r_cm are both radii"),
+        ("r,R\n1,0.1\n2,0.1\n", {"unit": "inch"}, "unit = 'inch'; expected um, mm, cm or m"),
+        ("r_mm,R\n1,0\n2,0\n", {"density_unit": "km"}, "density_unit = 'km'; expected um, mm"),
+        ("r_cm,R\n1,0.1\n0.5,0.1\n", {}, "'0.5' is not above the 1.0 before it"),
+        ("r_cm,R\n-1,0.1\n", {}, "column 'r_cm': '-1'; expected a radius in cm"),
+    ],
+)
+def test_units_that_cannot_be_are_refused(text, given, said):
+    with pytest.raises(ProfileError) as error:
+        parse_csv(text, "a.csv", quantity="density", **given)
+    assert said in str(error.value)
+    assert "\n" not in str(error.value)
+    with pytest.raises(ProfileError, match="energies have no unit"):
+        parse_csv("r_mm,R\n1,0\n2,0\n", "a.csv", quantity="energy", density_unit="mm")
+
+
+@pytest.mark.parametrize(
+    ("head", "radii_mm", "per_mm2", "said"),
+    [
+        # Micrometres under the name of millimetres: 300 180 of 1.
+        ("r_mm", 1000.0, 1.0, {"unit": "um", "density_unit": "mm"}),
+        # Densities per cm^2 beside millimetres: 30 of 1.
+        ("r_mm", 1.0, 100.0, {"unit": "mm", "density_unit": "cm"}),
+        # Millimetres under the name of centimetres, densities as the header would have them.
+        ("r_cm", 1.0, 100.0, {"unit": "mm", "density_unit": "cm"}),
+    ],
+)
+def test_more_light_than_arrives_names_the_units_that_make_it_right(head, radii_mm, per_mm2, said):
+    """What the message proposes is done here, and gives the profile's own .3."""
+    radii, densities = CENTRES_MM * radii_mm, DENSITY_PER_MM2 * per_mm2
+    with pytest.raises(ProfileError) as error:
+        parse_csv(table_of(radii, densities, head), "a.csv", quantity="density")
+    line = str(error.value)
+    assert " of 1 that arrives; it would be 0.3002 with " in line
+    assert f"--density-unit {said['density_unit']}" in line
+    assert (f"name the column r_{said['unit']}" in line) == (head != f"r_{said['unit']}")
+    named = table_of(radii, densities, f"r_{said['unit']}")
+    right = parse_csv(named, "a.csv", quantity="density", density_unit=said["density_unit"])
+    assert right.diffuse_reflectance[0] == pytest.approx(0.3, rel=5e-3)
+
+
+def test_more_energy_than_arrives_is_no_matter_of_units():
+    said = refusal("r_mm,R\n1,1\n2,0.5\n")
+    assert "'R' adds up to 1.5 of 1 that arrives" in said
+    assert "divide by 100 if they are per cent" in said
+    assert "--quantity density" in said
+    assert "per cent" not in refusal("r_mm,R\n1,1000\n2,0.5\n")
+
+
+def test_a_table_that_begins_far_out_says_what_the_gap_may_hide():
+    """R_d ~ 1/r has twice the energy inside r = 1 mm that a flat one has: 2 pi .1 against pi .1."""
+    text = "r_mm,R\n1,0.1\n1.1,0.09\n1.2,0.08\n"
+    with pytest.warns(SssfitWarning) as caught:
+        parse_csv(text, "a.csv", quantity="density")
+    (line,) = (str(each.message) for each in caught)
+    assert line.startswith("a.csv begins at r = 1 mm: what leaves nearer to the beam is not in it.")
+    assert f"has {np.pi * 0.1:.3g} of its" in line
+    assert f"another {np.pi * 0.1:.3g} is missing" in line
+    # Centres of bins begin at half a bin: no gap.
+    parse_csv("r_mm,R\n0.5,0.1\n1.5,0.05\n", "a.csv", quantity="density")
 
 
 @pytest.mark.parametrize(
@@ -204,9 +316,8 @@ def test_more_light_than_arrives_is_pointed_out():
         ("r_mm;R;G\n1;2;3\n", "line 1: 'r_mm;R;G' is one column"),
         ("r_mm\n1\n", "line 1: 'r_mm' is one column"),
         ("radius,R\n1,0.1\n", "line 1: no column is named r_mm"),
-        ("r_cm,R\n1,0.1\n", "line 1: 'r_cm' is not in mm: multiply it by 10 and name it r_mm"),
-        ("r_um,R\n1,0.1\n", "divide it by 1000"),
-        ("r,R\n1,0.1\n", "'r' is not in mm: convert it to mm"),
+        ("r_cm,R\n1,0.1\n", "a.csv has 1 radius"),
+        ("r,R\n1,0.1\n", "the column r does not say its unit; name it r_mm"),
         ("r_mm,R,R\n1,0.1,0.1\n", "line 1: the column 'R' is there twice"),
         ("r_mm,r_mm,R\n1,0.1,0.1\n", "line 1: the column 'r_mm' is there twice"),
         ("r_mm,R,\n1,0.1,\n", "line 1: a column has no name"),
@@ -262,10 +373,42 @@ def test_bad_tables_of_densities(text, said):
     assert said in refusal(text, "density")
 
 
-def test_files_that_are_no_text(tmp_path):
+def test_letters_of_windows_never_stop_a_table(tmp_path):
+    profile = load_csv(DATA / "latin1-comment.csv", quantity="density")
+    assert profile.diffuse_reflectance[0] == pytest.approx(0.785398, abs=5e-7)
+    text = "# R_d of Müller, in 1/mm², at 20 °C…\r\nr_mm,Rückwärts\r\n0.5,0.1\r\n1.5,0.05\r\n"
+    path = tmp_path / "a.csv"
+    for encoding in ("utf-8", "utf-8-sig", "cp1252", "utf-16", "utf-16-le", "utf-16-be"):
+        path.write_bytes(text.encode(encoding))
+        profile = load_csv(path, quantity="density")
+        assert profile.channels == ("Rückwärts",), encoding
+        assert profile.diffuse_reflectance[0] == pytest.approx(0.785398, abs=5e-7)
+    path.write_bytes("# ü\x85r_mm,R\x850.5,0.1\x851.5,0.05\x85".encode())
+    assert load_csv(path, quantity="density").n_annuli == 2
+    path.write_bytes(b"r_mm,R\r\n0.5,0.1\r\n1.5,0.05\r\n\x1a")  # the end as DOS marks it
+    assert load_csv(path, quantity="density").n_annuli == 2
+
+
+def test_other_bytes_elsewhere_say_how_to_save(tmp_path):
     path = tmp_path / "a.csv"
     path.write_bytes(b"r_mm,R\n1,\xb5\n")
-    with pytest.raises(ProfileError, match=r"a\.csv: line 2 holds the byte 0xb5"):
+    with pytest.raises(ProfileError, match=r"line 2, column 'R'.*save it as UTF-8\.$"):
+        load_csv(path, quantity="energy")
+    path.write_bytes("r_mm,R\n1,µ\n".encode())
+    with pytest.raises(ProfileError) as error:
+        load_csv(path, quantity="energy")
+    assert "UTF-8" not in str(error.value)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", b"PK\x03\x04\x14\0\0\0", bytes(range(256)), bytes(99)],
+    ids=["png", "zip", "all bytes", "zeros"],
+)
+def test_files_that_are_no_text(tmp_path, content):
+    path = tmp_path / "a.csv"
+    path.write_bytes(content)
+    with pytest.raises(ProfileError, match=r"a\.csv is not text; expected a table of a profile"):
         load_csv(path)
     with pytest.raises(ProfileError, match="cannot be read: no such file"):
         load_csv(tmp_path / "none.csv")

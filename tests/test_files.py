@@ -4,10 +4,12 @@ import errno
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from sssfit import files
+from sssfit.cli import main
 from sssfit.errors import FileError
 
 
@@ -107,6 +109,64 @@ def test_outputs_are_checked_before_the_work(tmp_path, monkeypatch):
     monkeypatch.setattr(files.tempfile, "mkstemp", read_only)
     with pytest.raises(FileError, match="read-only file system"):
         files.check_output(tmp_path / "new.npz", own)
+
+
+@pytest.mark.parametrize("name", ["x.json", "x.TOML", "x.csv", "x.profile.png", "x.tiff", "x.mco"])
+def test_an_ending_that_promises_another_format_is_refused(name):
+    with pytest.raises(
+        FileError, match=r"ends in \.\w+, and a profile is written; end its name in"
+    ):
+        files.check_ending(Path(name), "a profile", ".npz")
+
+
+@pytest.mark.parametrize("name", ["x.npz", "x.NPZ", "x", "x.profile", "skin.2026-11-27", ".npz"])
+def test_other_endings_promise_nothing(name):
+    files.check_ending(Path(name), "a profile", ".npz")
+
+
+ASKED = ("--from-reflectance", ".4,.3,.2", "--mean-free-path", "1", "--eta", "1.3")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "ending"),
+    [
+        (("simulate", "skin1", "--photons", "2000", "-o", "x.json"), ".npz"),
+        (("simulate", "skin1", "--method", "dipole", "-o", "x.csv"), ".npz"),
+        (("simulate", "deon-skin", "-o", "x.toml"), ".npz"),
+        (("import", "t.csv", "--quantity", "energy", "-o", "x.json"), ".npz"),
+        (("materials", *ASKED, "-o", "x.json"), ".toml"),
+        (("fit", "t.profile.npz", "--method", "preintegrated", "-o", "x.npz"), ".json"),
+        (("choose", "skin1", "--distance", "1m", "-o", "x.hlsl"), ".json"),
+        (("export", "t.profile.npz", "--format", "csv", "-o", "x.json"), ".csv"),
+        (("export", "t.kernel.json", "--format", "hlsl", "-o", "x.json"), ".hlsl"),
+        (("export", "t.kernel.json", "--format", "json", "-o", "x.hlsl"), ".json"),
+        (("chart", "t.profile.npz", "-o", "x.json"), ".png"),
+        (("render", "t.kernel.json", "-o", "x.json"), ".exr"),
+        (("compare", "skin1", "--only", "kernels", "--table", "x.npz"), ".md"),
+        (("compare", "skin1", "--only", "kernels", "--chart", "x.csv"), ".png"),
+    ],
+)
+def test_no_verb_writes_a_format_that_the_name_denies(
+    tmp_path, monkeypatch, capfd, arguments, ending
+):
+    monkeypatch.chdir(tmp_path)
+    Path("t.csv").write_text("r_mm,R,G,B\n0.5,.1,.1,.1\n1,.05,.04,.03\n1.5,.02,.01,.01\n")
+    for first in (
+        ("import", "t.csv", "--quantity", "energy", "-q"),
+        ("fit", "t.profile.npz", "--method", "preintegrated", "-o", "t.kernel.json", "-q"),
+    ):
+        with pytest.raises(SystemExit) as end:
+            main(first)
+        assert not end.value.code
+    before = names(tmp_path)
+    capfd.readouterr()
+    with pytest.raises(SystemExit) as end:
+        main(arguments)
+    out, err = capfd.readouterr()
+    assert (end.value.code, out) == (1, ""), err
+    assert err.count("\n") == 1, err
+    assert ending in err
+    assert names(tmp_path) == before
 
 
 HOLD = """

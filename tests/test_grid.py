@@ -59,7 +59,15 @@ def test_overrides_replace_the_papers_rule_one_at_a_time():
     assert make_grid(SKIN1, dr_mm=0.1, radius_mm=1.01) == RadialGrid(0.1, 11)
     assert make_grid(SKIN1, dr_mm=1).annuli == math.ceil(32 / 0.772)
     assert make_grid(SKIN1, radius_mm=1.0).dr_mm == paper_grid(SKIN1).dr_mm
-    assert make_grid(SKIN1, dr_mm=5.0, radius_mm=1.0) == RadialGrid(5.0, 1)
+    assert make_grid(SKIN1, dr_mm=1.0, radius_mm=1.0) == RadialGrid(1.0, 1)
+
+
+def test_rings_wider_than_the_radius_are_refused():
+    """3 mm of annuli 50 mm wide were one annulus of 50 mm."""
+    with pytest.raises(SimulationError, match="annuli 50 mm wide do not fit into a radius of 3 mm"):
+        make_grid(SKIN1, dr_mm=50.0, radius_mm=3.0)
+    with pytest.raises(SimulationError, match=r"do not fit into a radius of 0\.001 mm"):
+        make_grid(SKIN1, radius_mm=0.001)
 
 
 @pytest.mark.parametrize("key", ["dr_mm", "radius_mm"])

@@ -211,13 +211,22 @@ def damaged():
         return json.dumps(whole | changes).encode()
 
     term = whole["terms"][0]
-    yield "empty", b"", "not JSON, or cut short"
-    yield "cut", bytes_of(kernel_of(np.ones((2, 3, 2))))[:-200], "not JSON, or cut short"
-    yield "binary", bytes(range(256)), "not JSON, or cut short"
-    yield "deep", b"[" * 100_000, "not JSON, or cut short"
-    yield "an npz", b"PK\x03\x04", "not JSON, or cut short"
-    yield "a list", b"[1, 2]", "format None; expected a kernel file, 'sssfit.kernel/1'"
-    yield "foreign", b'{"asset": {"version": "2.0"}}', "format None; expected a kernel file"
+    foreign = ": not a kernel; name a .kernel.json file, as `sssfit fit` writes it."
+    yield "empty", b"", foreign
+    yield (
+        "cut",
+        bytes_of(kernel_of(np.ones((2, 3, 2))))[:-200],
+        "is damaged (not valid JSON, or cut",
+    )
+    latin = changed(method="x").replace(b'"x"', b'"\xfc"')
+    yield "latin", latin, "is damaged (not valid JSON; save it as UTF-8)"
+    yield "binary", bytes(range(256)), foreign
+    yield "a picture", b"\x89PNG\r\n\x1a\n" + bytes(99), foreign
+    yield "deep", b"[" * 100_000, foreign
+    yield "an npz", b"PK\x03\x04", foreign
+    yield "a list", b"[1, 2]", foreign
+    yield "foreign", b'{"asset": {"version": "2.0"}}', foreign
+    yield "another", b'{"format": "glTF"}', ": not a kernel: it has format 'glTF'; name a"
     yield "newer", changed(format="sssfit.kernel/2"), "format 'sssfit.kernel/2'; expected"
     for key in ("method", "mm_per_pixel", "channels", "terms", "errors", "scale", "meta"):
         without = {name: whole[name] for name in whole if name != key}
@@ -263,7 +272,9 @@ def test_damaged_and_foreign_files_are_one_clear_line(tmp_path, content, fragmen
 def test_cut_files_never_make_a_kernel():
     content = bytes_of(kernel_of(np.ones((2, 3, 1))))
     for length in range(len(content) - 2):  # the last two are the brace and the line's end
-        with pytest.raises(KernelError, match=r"^the kernel: .*cut short"):
+        is_marked = b'"sssfit.kernel/' in content[:length]
+        said = r"^the kernel: .*cut short" if is_marked else "^the kernel: not a kernel; name"
+        with pytest.raises(KernelError, match=said):
             SeparableKernel.read(io.BytesIO(content[:length]))
 
 

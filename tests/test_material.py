@@ -2,6 +2,7 @@ import io
 import json
 import os
 import pickle
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -146,6 +147,53 @@ def test_forward_scattering_is_judged_by_its_reduced_extinction():
     assert parse_material(text, "tissue.toml").layers[0].g.tolist() == [0.95] * 3
 
 
+def test_g_of_one_is_no_scattering():
+    """A channel that goes straight on scatters nothing: clear, or absorbing only."""
+    material = parse_material(skin("g = 0.0", "g = [0.5, 1, 0]"), "a.toml")
+    (layer,) = material.layers
+    assert layer.g.tolist() == [0.5, 0.0, 0.0]
+    assert layer.sigma_s_per_mm.tolist() == [0.74, 0.0, 1.01]
+    assert layer.sigma_a_per_mm.tolist() == [0.032, 0.17, 0.48]
+    assert parse_material(material.to_toml(), "a.toml") == material
+    clear = skin("g = 0.0", "g = 1").replace("[0.032, 0.17, 0.48]", "[0, 0, 0]")
+    with pytest.raises(MaterialError, match="needs something that absorbs or scatters"):
+        parse_material(clear, "a.toml")
+
+
+def test_only_ratios_of_indices_count():
+    water = parse_material("eta_above = 1.3\n" + SKIN.replace("1.3", "0.98"), "a.toml")
+    assert (water.layers[0].eta, water.eta_above) == (0.98, 1.3)
+    assert water.specular_reflectance == pytest.approx((0.32 / 2.28) ** 2)
+
+
+@pytest.mark.parametrize(("unit", "mm"), [("um", 1e-3), ("mm", 1.0), ("cm", 10.0), ("m", 1e3)])
+@pytest.mark.parametrize("name", ["mu_a", "mu_s", "mu_s_prime", "sigma_s_p"])
+def test_remedies_that_name_a_factor_turn_coefficients_into_per_mm(name, unit, mm):
+    """What a message says is done to 1 per unit, which is 1/mm of it per mm."""
+    text = SKIN + f"{name}_per_{unit} = [1, 1, 1]\n"
+    with pytest.raises(MaterialError) as caught:
+        parse_material(text, "a.toml")
+    assert f"sigma_{'a' if '_a' in name else 's'}_per_mm" in str(caught.value)
+    assert factor_in(str(caught.value)) == pytest.approx(1.0 / mm)
+
+
+@pytest.mark.parametrize(("unit", "mm"), [("um", 1e-3), ("cm", 10.0), ("m", 1e3)])
+@pytest.mark.parametrize("name", ["thickness", "depth"])
+def test_remedies_that_name_a_factor_turn_lengths_into_mm(name, unit, mm):
+    with pytest.raises(MaterialError) as caught:
+        parse_material(SKIN + f"{name}_{unit} = 1\n", "a.toml")
+    assert "rename it thickness_mm" in str(caught.value)
+    assert factor_in(str(caught.value)) == pytest.approx(mm)
+
+
+def factor_in(message):
+    """By what a message asks to multiply; 1 where it names no factor."""
+    found = re.search(r"(multiply|divide) it(?:s values)? by (\d+)", message)
+    if found is None:
+        return 1.0
+    return float(found[2]) if found[1] == "multiply" else 1.0 / float(found[2])
+
+
 MANY = ", ".join(f'"c{k}"' for k in range(65))
 BAD = {
     # values: text, start of the message after the origin, remedy
@@ -168,16 +216,16 @@ BAD = {
     "text for a list": (skin("[0.032, 0.17, 0.48]", '"abc"'), "sigma_a_per_mm = 'abc';", "a list"),
     "empty list": (skin("[0.032, 0.17, 0.48]", "[]"), "sigma_a_per_mm = [];", "one number per"),
     "long text": (skin("0.17", f'"{"x" * 500}"'), "sigma_a_per_mm[1] = 'xxx", "xxx... is not"),
-    "g one": (skin("g = 0.0", "g = 1.0"), "g = 1.0 ", "between -1 and 1"),
-    "g in a list": (skin("g = 0.0", "g = [0, -1, 0]"), "g[1] = -1 ", "between -1 and 1"),
+    "g above one": (skin("g = 0.0", "g = 1.1"), "g = 1.1 ", "above -1 and up to 1"),
+    "g in a list": (skin("g = 0.0", "g = [0, -1, 0]"), "g[1] = -1 ", "above -1 and up to 1"),
     "g text": (skin("g = 0.0", 'g = "0"'), "g = '0' ", "not a number"),
     "g list too short": (skin("g = 0.0", "g = [0, 0]"), "g has 2 values", "one per channel"),
-    "eta low": (skin("1.3", "0.99"), "eta = 0.99 ", "from 1 to 4"),
-    "eta high": (skin("1.3", "4.1"), "eta = 4.1 ", "from 1 to 4"),
+    "eta low": (skin("1.3", "0.49"), "eta = 0.49 ", "from 0.5 to 4"),
+    "eta high": (skin("1.3", "4.1"), "eta = 4.1 ", "from 0.5 to 4"),
     "eta bool": (skin("1.3", "true"), "eta = True ", "not a number"),
     "eta list": (skin("1.3", "[1.3, 1.3, 1.3]"), "eta = [1.3, 1.3, 1.3] ", "one refractive index"),
     "eta table": ("eta.x = 1\n" + skin("eta = 1.3\n", ""), "eta = {'x': 1} ", "not a number"),
-    "eta_above": ("eta_above = 0.5\n" + SKIN, "eta_above = 0.5 ", "from 1 to 4"),
+    "eta_above": ("eta_above = 0.4\n" + SKIN, "eta_above = 0.4 ", "from 0.5 to 4"),
     "thickness zero": (SKIN + "thickness_mm = 0", "thickness_mm = 0 ", "leave it out"),
     "thickness negative": (SKIN + "thickness_mm = -inf", "thickness_mm = -inf ", "leave it out"),
     "thickness nan": (SKIN + "thickness_mm = nan", "thickness_mm = nan ", "leave it out"),
@@ -346,11 +394,24 @@ def test_byte_order_mark_and_windows_lines_are_read(tmp_path):
     assert load_material(path) == parse_material(SKIN, "mine.toml")
 
 
+def test_letters_of_windows_never_stop_a_material(tmp_path):
+    path = tmp_path / "mine.toml"
+    text = '# µa à 633 nm…\r\nsource = "Müller"\r\n' + SKIN.replace("\n", "\r\n")
+    for encoding in ("utf-8", "utf-8-sig", "cp1252", "utf-16", "utf-16-le", "utf-16-be"):
+        path.write_bytes(text.encode(encoding))
+        material = load_material(path)
+        assert material.source == "Müller", encoding
+        assert material.layers == parse_material(SKIN, "mine.toml").layers
+    path.write_bytes(text.replace("1.3", "1.3°").encode("cp1252"))
+    with pytest.raises(MaterialError, match=r"not valid TOML.*save it as UTF-8\.$"):
+        load_material(path)
+
+
 def test_dash_reads_standard_input(monkeypatch):
     monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b'name = "x"\n' + SKIN.encode())))
     assert load_material("-").name == "x"
-    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"\xff")))
-    with pytest.raises(MaterialError, match=r"^stdin: the file is not UTF-8 text \(byte 0xff"):
+    monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(b"\0")))
+    with pytest.raises(MaterialError, match=r"^stdin: the file is not text; expected a material"):
         load_material("-")
 
 
@@ -384,8 +445,8 @@ def unreadable(folder, content, mode=0o644):
     [
         (lambda folder: folder / "none.toml", "cannot be read: no such file or directory"),
         (lambda folder: folder, "this is a folder; name"),
-        (lambda folder: unreadable(folder, b"\x89PNG\r\n\x1a\n"), "not UTF-8 text (byte 0x89 at"),
-        (lambda folder: unreadable(folder, b"\x00" * 100), "not valid TOML"),
+        (lambda folder: unreadable(folder, b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"), "is not text; expe"),
+        (lambda folder: unreadable(folder, b"\x00" * 100), "the file is not text; expected a mat"),
         (lambda folder: unreadable(folder, b"#" * 1_000_001), "larger than 1 MB"),
         (lambda folder: unreadable(folder, b""), "the file is empty"),
         (lambda _: Path(os.devnull), "the file is empty"),
@@ -474,7 +535,7 @@ def test_layer_made_in_python_meets_the_same_checks(values):
 
 
 finite = st.floats(1e-6, 1e3)
-indices = st.floats(1.0, 4.0)
+indices = st.floats(0.5, 4.0)
 labels = st.text(min_size=1).filter(lambda s: s.isprintable() and s.strip() == s)
 
 

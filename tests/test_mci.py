@@ -137,8 +137,10 @@ def test_comments_blank_lines_tabs_and_windows_ends(tmp_path):
     [
         ("", "ends after line 0, before the file version"),
         ("# only\n", "ends after line 1, before the file version"),
-        ("2.0\n1\n", "line 1: the file version is '2.0'; expected 1.0"),
-        ("name = 'skin1'\n", "line 1: \"name = 'skin1'\" has 3 values; expected 1"),
+        ("2.0\n1\n", "line 1: not an MCML input file: it begins with '2.0'; expected the file"),
+        ("name = 'skin1'\n", "line 1: not an MCML input file: it begins with \"name = 'skin1'\""),
+        ("mcmli2.0 # version\n", "line 1: this is a file of MCML 2.0; only the input of MCML 1"),
+        ("# mine\nmcmli_3.0\n", "line 2: this is a file of MCML 3.0; only the input of MCML 1"),
         ("1.0\nmany\n", "line 2: the number of runs = 'many'; expected a whole number from 1"),
         ("1.0\n0\n", "line 2: the number of runs = '0'"),
         ("1.0\n-1\n", "line 2: the number of runs = '-1'"),
@@ -179,11 +181,12 @@ def test_comments_blank_lines_tabs_and_windows_ends(tmp_path):
         (file_text(run_text(layer="1.3 x 2 0 1")), "line 9: mua = 'x' is not a number"),
         (file_text(run_text(layer="1.3 -1 2 0 1")), "line 9: mua = '-1' is out of range"),
         (file_text(run_text(layer="1.3 1 -2 0 1")), "line 9: mus = '-2' is out of range"),
-        (file_text(run_text(layer="1.3 1 2 1 1")), "line 9: g = '1' is out of range"),
+        (file_text(run_text(layer="1.3 1 2 1.01 1")), "line 9: g = '1.01' is out of range"),
         (file_text(run_text(layer="1.3 1 2 -1 1")), "line 9: g = '-1' is out of range"),
         (file_text(run_text(layer="1.3 1 2 0 0")), "line 9: d = '0' is out of range"),
         (file_text(run_text(layer="1.3 1 2 0 -1")), "line 9: d = '-1' is out of range"),
-        (file_text(run_text(layer="0.9 1 2 0 1")), "line 9: n = '0.9' is out of range"),
+        (file_text(run_text(layer="0.4 1 2 0 1")), "line 9: n = '0.4' is out of range"),
+        (file_text(run_text(layer="1.3 0 9 1 1")), "line 3: run 1 of 1: sigma_a_per_mm[0]"),
         (file_text(run_text(layer="1.3 1e-12 0 0 1")), "line 9: layer 1, in mm: sigma_a_per_mm[0]"),
         (file_text(run_text(layer="1.3 0 0 0 1e8")), "line 9: layer 1 is clear"),
         (file_text(run_text(layer="1.3 0 0 0 1")), "line 3: run 1 of 1: sigma_a_per_mm[0]"),
@@ -208,11 +211,12 @@ def test_every_cut_is_refused():
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (b"1.0\n1\n\xff\xfe\n", "line 3 holds the byte 0xff, which is no UTF-8 text"),
-        (bytes(range(256)), "is no UTF-8 text; expected an MCML input file"),
-        (b"\x00" * 100, "line 1: the file version is '\\x00"),
+        (b"1.0\n1\n\xff\xfe\n", "line 3: 'ÿþ' has 1 value; expected 2"),
+        (bytes(range(256)), "is not text; expected an MCML input file"),
+        (b"\x00" * 100, "is not text; expected an MCML input file"),
+        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "is not text; expected an MCML input file"),
     ],
-    ids=["byte order mark", "all bytes", "zeros"],
+    ids=["byte order mark", "all bytes", "zeros", "png"],
 )
 def test_files_that_are_no_text(tmp_path, content, said):
     path = tmp_path / "a.mci"
@@ -222,6 +226,36 @@ def test_files_that_are_no_text(tmp_path, content, said):
     assert said in str(error.value)
     assert str(error.value).startswith(str(path))
     assert "\n" not in str(error.value)
+
+
+def test_letters_of_windows_never_stop_an_input(tmp_path):
+    (run,) = load_mci(SAMPLE.with_name("latin1-comment.mci"))
+    assert run.material.layers[0].g.tolist() == [0.9]
+    text = "# µa de la peau…\r\n" + file_text(run_text("größe.mco")).replace("\n", " # é\r\n")
+    path = tmp_path / "a.mci"
+    for encoding in ("utf-8", "utf-8-sig", "cp1252", "utf-16", "utf-16-le", "utf-16-be"):
+        path.write_bytes(text.encode(encoding))
+        (run,) = load_mci(path)
+        assert run.output == "größe.mco", encoding
+        assert run.material.layers == parse_mci(file_text(run_text()), "a.mci")[0].material.layers
+    path.write_bytes(file_text(run_text()).replace("\n", "\x85").encode())
+    assert load_mci(path)[0].photons == 1000
+
+
+def test_other_bytes_elsewhere_say_how_to_save(tmp_path):
+    path = tmp_path / "a.mci"
+    path.write_bytes(file_text(run_text(layer="1.3 1 2 0,9µ 1")).encode("cp1252"))
+    with pytest.raises(MaterialError, match=r"line 9: g = '0,9µ'.*save it as UTF-8\.$"):
+        load_mci(path)
+
+
+def test_g_of_one_is_no_scattering_and_n_below_one_stays():
+    (run,) = load_mci(SAMPLE.with_name("water-g1.mci"))
+    (layer,) = run.material.layers
+    assert (layer.sigma_s_per_mm.tolist(), layer.g.tolist()) == ([0.0], [0.0])
+    assert layer.sigma_a_per_mm.tolist() == [0.1]
+    (run,) = parse_mci(file_text(run_text(layer="0.98 1 2 0 1", below="0.98")), "a.mci")
+    assert (run.material.layers[0].eta, run.material.eta_below) == (0.98, 0.98)
 
 
 def test_missing_files_and_folders(tmp_path):

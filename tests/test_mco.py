@@ -1,15 +1,17 @@
 """MCML output files: units, the last bin, what must add up, and one line for what is wrong."""
 
 import io
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sssfit.errors import ProfileError
+from sssfit.errors import ProfileError, SssfitWarning
 from sssfit.material import Material
 from sssfit.mco import is_mco, join_channels, load_mco, parse_mco
 from sssfit.profile import Profile
 
+DATA = Path(__file__).parent / "data"
 N_Z, N_R, N_A = 4, 8, 3
 DR_CM = 0.02
 LAYERS = ("1.4 1 100 0.9 0.1", "1.4 2.5 10 0 0.2")
@@ -120,7 +122,8 @@ def test_provenance_and_material():
 
 def test_semi_infinite_ground_has_no_transmittance():
     layers = (LAYERS[0], "1.4 2.5 10 0 1E+08")
-    profile = parse_mco(mco_text(layers=layers, below=np.zeros(N_R)), "a.mco")
+    with pytest.warns(SssfitWarning, match=r"add up to 0\.9 of 1"):
+        profile = parse_mco(mco_text(layers=layers, below=np.zeros(N_R)), "a.mco")
     assert profile.annulus_transmittance is None
     assert profile.beyond_grid_transmittance is None
     assert profile.transmittance is None
@@ -144,6 +147,52 @@ def test_profiles_go_through_a_file(tmp_path):
         again.beyond_grid_transmittance, profile.beyond_grid_transmittance
     )
     assert dict(again.meta) == dict(profile.meta)
+
+
+def test_outputs_of_the_ports_to_gpus(tmp_path):
+    """InParam, and below it the lines of the input file as they were, comments and all."""
+    profile = load_mco(DATA / "cudamcml-inparam.mco")
+    np.testing.assert_allclose(profile.diffuse_reflectance, 0.4, rtol=1e-6)
+    np.testing.assert_allclose(profile.beyond_grid, 0.1, rtol=1e-6)
+    np.testing.assert_allclose(profile.r_edges_mm, [0.0, 1.0, 2.0])
+    assert profile.absorbed.tolist() == [[0.6]]
+    text = mco_text().replace("InParm \t", "InParam\t").replace("5000 \t", "5000# photons\t")
+    same = parse_mco(text, "skin.mco")
+    assert same.annulus_energy.tobytes() == parse_mco(mco_text(), "a").annulus_energy.tobytes()
+    assert same.meta["settings"] == {"photons": [5000]}
+
+
+def test_comments_may_stand_before_the_version(tmp_path):
+    text = "# Compiled yesterday\n\n  # by me\n" + mco_text()
+    assert is_mco(text)
+    assert parse_mco(text, "a.mco").n_annuli == N_R - 1
+
+
+def test_letters_of_windows_never_stop_an_output(tmp_path):
+    text = mco_text(name="peau_brûlée.mco").replace("# dz, dr", "# dz, dr, à 633 nm")
+    path = tmp_path / "a.mco"
+    for encoding in ("utf-8", "utf-8-sig", "cp1252", "utf-16", "utf-16-le", "utf-16-be"):
+        path.write_bytes(text.replace("\n", "\r\n").encode(encoding))
+        profile = load_mco(path)
+        assert profile.meta["material"]["name"] == "peau_br_l_e", encoding
+        assert profile.diffuse_reflectance[0] == pytest.approx(0.3, rel=1e-4)
+    path.write_bytes(text.replace("5000 ", "5000µ ").encode("cp1252"))
+    with pytest.raises(ProfileError, match=r"'5000µ'; expected.*save it as UTF-8\.$"):
+        load_mco(path)
+    path.write_bytes(b"B1 # Version\n\x00\x01")
+    with pytest.raises(ProfileError, match="is not text; expected MCML's output in ASCII"):
+        load_mco(path)
+
+
+def test_energies_that_do_not_add_up_are_said():
+    text = mco_text(RAT="RAT\n0.01\n0.3\n0.2\n0.1\n", A_l=block("A_l", [0.1, 0.1]))
+    with pytest.warns(SssfitWarning) as caught:
+        profile = parse_mco(text, "a.mco")
+    (line,) = (str(each.message) for each in caught)
+    assert line.startswith("a.mco: the energies of RAT add up to 0.61 of 1 (reflected 0.31, absorb")
+    np.testing.assert_allclose(profile.energy_balance, -0.39, atol=3e-5)
+    said = refusal(mco_text(RAT="RAT\n0.8\n0.3\n0.57222\n0.1\n"))
+    assert "RAT says that 1.1 of 1 is reflected" in said
 
 
 def test_channels_are_joined():
@@ -178,7 +227,7 @@ def test_channels_are_joined():
         (mco_text(), ["R", ""], "channels[1] = ''; expected a name"),
         (mco_text(layers=("1.5 1 100 0.9 0.1", LAYERS[1])), ["R", "G"], "b.mco has other layers"),
         (mco_text(layers=("1.4 1 100 0.9 0.2", LAYERS[1])), ["R", "G"], "b.mco has other layers"),
-        (mco_text(RAT="RAT\n0.1\n0.3\n0.57222\n0.1\n"), ["R", "G"], "b.mco has other layers"),
+        (mco_text(RAT="RAT\n0.0281\n0.3\n0.57222\n0.1\n"), ["R", "G"], "b.mco has other layers"),
         (
             mco_text(
                 dr_cm=0.01,
@@ -205,6 +254,11 @@ def test_what_does_not_belong_together_is_not_joined(other, channels, said):
         ("r_mm,R\n1,2\n", "line 1: 'r_mm,R' stands where A1 should"),
         ("B1 # Version\n", "line 1: this is binary output; run MCML with format A"),
         ("A1\nRAT\n", "line 2: 'RAT' stands where InParm should"),
+        ("mcmloA2.0 # v\n", "line 1: this is a file of MCML 2.0; only the output of MCML 1 (ve"),
+        (
+            "mcmlo_3.0\n",
+            "line 1: this is a file of MCML 3.0; only the output of MCML 1 (version A1",
+        ),
         ("A1\n", "ends after line 1, before the block InParm"),
         (mco_text(RAT=None), "before the block RAT"),
         (mco_text(A_l=None), "before the block A_l"),
@@ -238,7 +292,9 @@ def test_bad_files_are_refused_in_one_line(text, said):
 def test_formats_are_told_apart():
     assert is_mco(mco_text())
     assert is_mco("B1 # Version\n\x00")
-    assert not any(map(is_mco, ("", "\n", "r_mm,A1\n", "A1,r_mm\n")))
+    assert is_mco((DATA / "mcml2.mco").read_text())
+    assert is_mco("# mine\nmcmlo_3.0 # version\n")
+    assert not any(map(is_mco, ("", "\n", "r_mm,A1\n", "A1,r_mm\n", "# A1\nr_mm,R\n")))
 
 
 def test_cut_files_are_refused_or_whole_but_for_blocks_that_are_not_needed():

@@ -339,8 +339,10 @@ def test_settings_out_of_range_are_one_line(settings, fragment):
 
 
 def test_a_g_too_steep_for_single_precision_is_refused():
-    with pytest.raises(SimulationError, match=r"g = 0\.995"):
-        simulate_montecarlo(checks.medium(0.1, 1.0, 1.3, g=0.995))
+    with pytest.raises(SimulationError, match=r"g = 0\.99995; the photon walk"):
+        simulate_montecarlo(checks.medium(0.1, 1.0, 1.3, g=0.99995))
+    with pytest.raises(SimulationError, match=r"g = -0\.995; the photon walk covers -0\.99 to"):
+        simulate_montecarlo(checks.medium(0.1, 1.0, 1.3, g=-0.995))
 
 
 def test_a_layered_material_walks_by_itself():

@@ -282,6 +282,20 @@ def contents(profile):
     return buffer.getvalue()
 
 
+def test_values_of_the_monotone_interpolation():
+    """Edges 0 1 2 3, energies 1 .2 .04, by hand (Fritsch and Carlson 1980).
+
+    Chords 1 .2 .04; slopes at 1 and 2 are their means .6 and .12, within three times the smaller
+    chord (.6 and .12). F(1.5) = 1 + .1 + (.6 - .12)/8 = 1.16, F(2.5) = 1.2 + .02 + (.12 - 0)/8, the
+    slope at 3 being 2 x .04 - .12, below 0, so 0. F(.5) = .5 + (1.4 - .6)/8, the slope at 0 being
+    2 x 1 - .6.
+    """
+    profile = make_profile([0.0, 1.0, 2.0, 3.0], [[1.0], [0.2], [0.04]])
+    radii_mm = [0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 9.0]
+    values = profile.cumulative_at(radii_mm)[:, 0]
+    np.testing.assert_allclose(values, [0.6, 1.0, 1.16, 1.2, 1.235, 1.24, 1.24], rtol=1e-14)
+
+
 def archive(**changes):
     """The bytes of a profile with members replaced or, by None, left out."""
     members = field_values(full_profile()) | {"meta": np.array(json.dumps(META))}
@@ -311,11 +325,13 @@ def bomb():
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (b"", "damaged or not a profile"),
-        (b"name = 'skin1'\n", "damaged or not a profile"),
-        (contents(full_profile())[:-30], "damaged or not a profile"),
+        (b"", " is not a profile; name a .profile.npz file"),
+        (b"name = 'skin1'\n", " is not a profile; name a .profile.npz file"),
+        (b"\x89PNG\r\n\x1a\n" + bytes(99), " is not a profile; name a .profile.npz file"),
+        (b"PK\x03\x04 and no more", " is not a profile; name a .profile.npz file"),
+        (contents(full_profile())[:-30], " is damaged; write it again with"),
         (archive(beyond_grid=None), "lacks beyond_grid"),
-        (archive(meta=None), "no 'meta'"),
+        (archive(meta=None), "is not a profile: it holds 'r_edges_mm, annulus_energy"),
         (archive(colour=np.ones(3)), "arrays that a profile does not have"),
         (archive(unfinished=np.array([1, 2])), "int64 where float64"),
         (archive(unfinished=np.zeros(2, dtype=np.float32)), "float32 where float64"),
@@ -323,16 +339,19 @@ def bomb():
         (archive(unfinished=np.array([{}, {}])), "object where float64"),
         (archive(unfinished=np.zeros(3)), "unfinished has shape (3,)"),
         (archive(meta=np.array(b"\xff\xfe")), "where text was expected"),
-        (archive(meta=np.array("\ud800{")), "damaged or not a profile"),
+        (archive(meta=np.array("\ud800{")), " is damaged; write it again with"),
         (archive(meta=np.array("[1]")), "not a JSON object"),
-        (archive(meta=np.array(["{}"])), "damaged or not a profile"),
-        (archive(meta=np.array("[" * 100000)), "damaged or not a profile"),
+        (archive(meta=np.array(["{}"])), " is damaged; write it again with"),
+        (archive(meta=np.array("[" * 100000)), " is damaged; write it again with"),
         (archive(meta=np.array('{"format": "sssfit.profile/2"}')), "'sssfit.profile/2'"),
-        (archive(meta=np.array('{"format": "sssfit.kernel/1"}')), "'sssfit.kernel/1'"),
-        (damaged_header(), "damaged or not a profile"),
+        (
+            archive(meta=np.array('{"format": "sssfit.kernel/1"}')),
+            "is not a profile: it has format 'sssfit.kernel/1'",
+        ),
+        (damaged_header(), " is damaged; write it again with"),
         (bomb(), "more than the 2 GB"),
     ],
-    ids=range(20),
+    ids=range(22),
 )
 def test_unusable_files_are_refused_in_one_line_that_names_them(tmp_path, content, said):
     path = tmp_path / "bad.profile.npz"
@@ -364,7 +383,8 @@ def test_truncated_files_are_refused():
     content = contents(full_profile())
     for length in range(0, len(content), 47):
         refusal = read_or_refuse(content[:length])
-        assert refusal.startswith("f is damaged")
+        # Up to the first member's name nothing says whose the file was.
+        assert refusal.startswith("f is damaged" if length > 44 else "f is not a profile")
         assert "\n" not in refusal
 
 

@@ -40,8 +40,13 @@ def truth_of(
 
 
 def is_exact(material: Material) -> bool:
-    """Whether the exact solver has the material's own profile: one half space with g = 0."""
-    return material.is_semi_infinite and not np.any(material.layers[0].g)
+    """Whether the exact solver has the material's own profile: one half space with g = 0.
+
+    Nor may it be thinner optically than what is above it, as vacuum under air is.
+    """
+    layer = material.layers[0]
+    is_dense = layer.eta >= material.eta_above
+    return material.is_semi_infinite and is_dense and not np.any(layer.g)
 
 
 def material_of(source: Material | Profile) -> Material | None:

@@ -24,6 +24,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit._jit import source_key
+from sssfit._material_checks import shown
+from sssfit._profile_io import is_marked
 from sssfit.errors import FileError, SimulationError, SssfitWarning
 from sssfit.files import reason, remove_leftovers, write_atomically
 from sssfit.grid import RadialGrid
@@ -31,6 +33,8 @@ from sssfit.material import Material
 from sssfit.simulate._batches import BATCH_PHOTONS, Tally
 
 FORMAT = "sssfit.checkpoint/1"
+# By either a file is ours, however damaged; both stand uncompressed.
+_MARKS = (b"ledger_absorbed.npy", "sssfit.checkpoint/".encode("utf-32-le"))
 # At most so much is lost; skin1's takes 1 ms to write, the largest (64 channels of 100 000
 # annuli, 100 MB) a quarter of a second.
 EVERY_SECONDS = 30.0
@@ -190,7 +194,9 @@ def _load(path: Path, empty: Tally, settings: Mapping[str, str]) -> State:
     """Fill ``empty`` with what the file holds, if it was made with the same settings."""
     meta, arrays = _read(path)
     if meta.get("format") != FORMAT:
-        raise FileError(f"{path} has format {meta.get('format')!r}, not {FORMAT!r}; {_REMEDY}.")
+        raise FileError(
+            f"{path} has format {shown(meta.get('format'))}, not {FORMAT!r}; {_REMEDY}."
+        )
     _check_settings(path, meta.get("settings"), settings)
     try:
         return _filled(empty, meta, arrays)
@@ -208,6 +214,9 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
         raise FileError(f"{path} cannot be read: {reason(error)}.") from error
     except Exception as error:
         # zipfile, zlib, numpy's header parser and json raise a dozen unrelated types on damage.
+        with contextlib.suppress(OSError), path.open("rb") as stream:
+            if not is_marked(stream, _MARKS):
+                raise FileError(f"{path} is not a checkpoint; {_REMEDY}.") from None
         raise _damaged(path) from error
 
 
@@ -244,4 +253,4 @@ _REMEDY = "delete it, or start anew without --resume"
 
 
 def _damaged(path: Path) -> FileError:
-    return FileError(f"{path} is damaged or not a checkpoint; {_REMEDY}.")
+    return FileError(f"{path} is a damaged checkpoint; {_REMEDY}.")

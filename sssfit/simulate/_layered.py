@@ -108,7 +108,7 @@ def _stack(material: Material, members: npt.NDArray[np.int64]) -> walk.Stack:
         bottom_mm=edges_mm[1:].astype(np.float32),
         sigma_t_per_mm=sigma_t.astype(np.float32),
         capture=capture.astype(np.float32),
-        g=np.array([layer.g[members[0]] for layer in layers], np.float32),
+        back=np.array([1.0 - layer.g[members[0]] for layer in layers], np.float32),
         eta=np.array([material.eta_above, *(each.eta for each in layers), material.eta_below]),
         excess_per_mm=sigma_a - least[:, None],
     )

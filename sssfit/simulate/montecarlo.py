@@ -32,7 +32,8 @@ from sssfit.threads import available_cores
 
 HONEST_PHOTONS = 1000  # below, a channel may rest on a handful of hits and its error on luck
 PILOT_PHOTONS = 200_000
-STEEPEST_G = 0.99  # beyond, single precision no longer resolves the forward peak
+# Beyond, single precision no longer resolves the peak (see ``sample_hg``, made for a forward one).
+LEAST_G, MOST_G = -0.99, 0.9999
 
 
 def simulate_montecarlo(
@@ -192,11 +193,11 @@ def _check_media(materials: Sequence[Material]) -> None:
             raise SimulationError(
                 f"{material!r} is not a Material; load one with sssfit.material.load_material."
             )
-        steepest = max(float(np.max(np.abs(layer.g))) for layer in material.layers)
-        if steepest > STEEPEST_G:
+        every_g = np.concatenate([layer.g for layer in material.layers])
+        for g in every_g[(every_g < LEAST_G) | (every_g > MOST_G)].tolist():
             raise SimulationError(
-                f"{material.name}: g = {steepest:g} in absolute value; the photon walk covers "
-                f"{-STEEPEST_G} to {STEEPEST_G}: give a reduced sigma_s with a smaller g."
+                f"{material.name}: g = {g:.9g}; the photon walk covers {LEAST_G} to {MOST_G}: give "
+                "a smaller g, with sigma_s such that (1 - g) sigma_s stays as it is."
             )
     if len(materials) == 1:
         return
