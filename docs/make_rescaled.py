@@ -3,7 +3,7 @@
 python docs/make_rescaled.py
 """
 
-from pathlib import Path
+from sections import put_section
 
 from sssfit.compare.candidates import Candidate
 from sssfit.compare.metrics import auto_exposure, measure
@@ -15,10 +15,8 @@ from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
 from sssfit.simulate import simulate_exact
 
-ROOT = Path(__file__).parents[1]
 MATERIALS = ("skin1", "marble", "ketchup", "wholemilk")
 RANKS = range(1, 7)
-START, END = "<!-- made by docs/make_rescaled.py -->", "<!-- end of make_rescaled.py -->"
 
 TEXT = """## Is SVD rescaled the better one to look at?
 
@@ -123,11 +121,7 @@ def section():
 
 def main():
     """Put the section in its place."""
-    path = ROOT / "docs" / "how-to-choose.md"
-    before, _, rest = path.read_text(encoding="utf-8").partition(START)
-    after = rest.partition(END)[2] or "\n"
-    text = f"{before.rstrip()}\n\n{START}\n\n{section()}\n{END}{after}"
-    path.write_text(text, encoding="utf-8")
+    put_section("how-to-choose.md", "docs/make_rescaled.py", section())
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from sssfit.compare.front import pareto_front
 from sssfit.errors import RenderError
+from sssfit.fit import support_of
 from sssfit.profile import Profile
 
 FloatArray = npt.NDArray[np.float64]
@@ -145,6 +146,11 @@ class Comparison:
         total = self.profile.diffuse_reflectance
         beyond = self.profile.beyond_grid
         return np.divide(beyond, total, out=np.zeros_like(total), where=total > 0.0)
+
+    @property
+    def support_mm(self) -> float:
+        """Radius that keeps 99.9 % of every channel [mm]: how far a disk or an edge counts."""
+        return support_of(self.profile)
 
     def rows_of(self, picture: str) -> list[KernelRow]:
         """Rows of one picture."""
