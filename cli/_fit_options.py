@@ -22,8 +22,8 @@ _OPTIONS = (
     click.option(
         "--energy",
         type=click.Choice(["rescale", "keep"]),
-        help="svd: scale the terms to the diffuse reflectance, or keep the least error."
-        "  [default: rescale]",
+        help="svd, gaussians, preintegrated, burley: scale the kernel to the diffuse reflectance, "
+        "or keep what the support holds (svd: the least error).  [default: rescale]",
     ),
     click.option(
         "--terms",

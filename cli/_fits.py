@@ -32,11 +32,13 @@ FITS = {
     ),
     "gaussians": Fit(
         "1 to 10 passes: a sum of Gaussians, best for the profile, r-weighted",
-        ("terms", "signed", "free_energy"),
+        ("terms", "signed", "free_energy", "energy"),
         "terms",
         4,
     ),
-    "preintegrated": Fit("one pass: the profile integrated along lines; exact for axis edges"),
+    "preintegrated": Fit(
+        "one pass: the profile integrated along lines; exact for axis edges", ("energy",)
+    ),
     "guided": Fit(
         "one pass fitted under a guide function: near (k = 0) to far (k = 4) scattering",
         ("k", "b", "centre_bound"),
@@ -49,7 +51,9 @@ FITS = {
         "one pass, red skin stretched: width, strength and falloff, fitted or by hand",
         ("width", "strength", "falloff"),
     ),
-    "burley": Fit("one pass: normalised diffusion, a shape per channel, as engines take it"),
+    "burley": Fit(
+        "one pass: normalised diffusion, a shape per channel, as engines take it", ("energy",)
+    ),
 }
 
 

@@ -101,3 +101,27 @@ def test_a_foreign_file_is_not_replaced(folder, capsys):
     assert code == 1
     assert "--force" in text
     assert (folder / "wax.preintegrated.kernel.json").read_text() == "mine"
+
+
+# Normalised diffusion is nothing like the Gaussian that it is fitted to here, and says so.
+@pytest.mark.filterwarnings("ignore:.* the burley kernel is farther")
+@pytest.mark.parametrize("method", ["svd", "gaussians", "preintegrated", "burley"])
+def test_energy_is_restored_or_kept_as_asked(folder, method):
+    short = ("--support", "0.5", "--mm-per-pixel", "0.1")
+    kernels = {}
+    for energy in ("rescale", "keep"):
+        result = ended("fit", "--method", method, "--energy", energy, *short, "--json")
+        (path,) = json.loads(result.stdout)["output"]
+        kernels[energy] = SeparableKernel.load(path)
+        assert kernels[energy].meta["settings"]["energy"] == energy
+    ended("fit", "--method", method, *short)
+    assert SeparableKernel.load(path).to_dict() == kernels["rescale"].to_dict()
+    np.testing.assert_allclose(kernels["rescale"].energy_error, 0.0, atol=1e-9)
+    assert (kernels["keep"].energy_error < -0.05).all()
+
+
+@pytest.mark.parametrize("method", ["guided", "artist", "falloff"])
+def test_methods_that_always_keep_the_energy_have_no_option_for_it(folder, capsys, method):
+    code, text = failed(capsys, "fit", "--method", method, "--energy", "keep")
+    assert code == 2
+    assert "--energy is for --method svd or gaussians or preintegrated or burley" in text

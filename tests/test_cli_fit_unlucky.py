@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+from processes import start
 from reference_pixels import make_profile
 
 from sssfit.cli import main
@@ -68,13 +69,7 @@ def names(folder):
 
 def begin(folder, midst="time.sleep(60)"):
     """Start a fit of its own process and wait until it is in its midst."""
-    process = subprocess.Popen(
-        [sys.executable, "-c", PROGRAM.format(midst=midst), *FIT],
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    process = start([sys.executable, "-c", PROGRAM.format(midst=midst), *FIT], cwd=folder)
     assert process.stdout.readline() == "midst\n"
     return process
 

@@ -13,6 +13,7 @@ import warnings
 from pathlib import Path
 
 import click
+import processes
 import pytest
 
 import sssfit
@@ -73,13 +74,7 @@ def trial():
 
 main(["trial"])
 """
-    return subprocess.Popen(
-        [sys.executable, "-c", program],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        **options,
-    )
+    return processes.start([sys.executable, "-c", program], **options)
 
 
 # Options
@@ -224,7 +219,7 @@ def test_no_color_is_honoured_on_a_terminal(tmp_path):
     import pty
 
     ours, theirs = pty.openpty()
-    with subprocess.Popen(
+    with processes.start(
         [sys.executable, "-m", "sssfit.cli", "simulate", "skin1", "--photons", "1e5"],
         cwd=tmp_path,
         env=os.environ | {"NO_COLOR": "1", "TERM": "xterm-256color"},

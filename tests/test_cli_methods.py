@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from processes import start
 
 from sssfit import simulate
 from sssfit.cli import cli, main
@@ -282,13 +283,7 @@ def test_what_was_done_before_a_signal_stays(run, tmp_path, monkeypatch, number)
 @posix
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_solver_leaves_nothing_behind(tmp_path, number):
-    process = subprocess.Popen(
-        [*COMMAND, "--all", "--method", "exact"],
-        cwd=tmp_path,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    process = start([*COMMAND, "--all", "--method", "exact"], cwd=tmp_path)
     end = time.monotonic() + 60.0
     while not (tmp_path / ".wholemilk.exact.profile.npz.lock").exists():  # the last of them
         assert process.poll() is None

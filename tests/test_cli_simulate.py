@@ -9,6 +9,7 @@ import sys
 import time
 
 import numpy as np
+import processes
 import pytest
 
 from sssfit.cli import main
@@ -43,13 +44,7 @@ def run(tmp_path, monkeypatch, capfd):
 
 
 def start(folder, *arguments):
-    return subprocess.Popen(
-        [*COMMAND, *arguments],
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    return processes.start([*COMMAND, *arguments], cwd=folder)
 
 
 def wait_for(condition, seconds=60.0):

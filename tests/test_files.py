@@ -2,11 +2,11 @@
 
 import errno
 import os
-import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from processes import start
 
 from sssfit import files
 from sssfit.cli import main
@@ -183,10 +183,9 @@ with locked(Path(sys.argv[1])):
 def holder(tmp_path):
     """A process that holds the lock of a.npz for a minute."""
     command = [sys.executable, "-c", HOLD, tmp_path / "a.npz"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
-        assert process.stdout.readline() == "held\n"
-        yield process
-        process.kill()
+    process = start(command)
+    assert process.stdout.readline() == "held\n"
+    return process
 
 
 def test_two_runs_on_one_output_are_kept_apart(tmp_path, holder):

@@ -84,7 +84,8 @@ def test_the_shape_is_the_one_of_least_squares(spacing):
 
 def test_the_pass_is_the_models_line_integral():
     profile = diffusion_profile([1.3], [0.4], np.linspace(0.0, 30.0, 601))
-    kernel = fit_burley(profile, mm_per_pixel=0.25, support_mm=5.0).kernel
+    pixels = {"mm_per_pixel": 0.25, "support_mm": 5.0}
+    kernel = fit_burley(profile, energy="keep", **pixels).kernel
     line = kernel.line[:, 0]
     h = kernel.half_pixels
     for k in (1, 2, 7, h):
@@ -96,8 +97,24 @@ def test_the_pass_is_the_models_line_integral():
     assert line[h] == pytest.approx(0.8 * half, rel=1e-6)  # quadrature of a logarithm
     assert kernel.energy[0] == pytest.approx(line.sum(), rel=1e-12)
     # what the profile itself gives, but for its flat annuli next to the logarithm at 0
-    ours, theirs = kernel, fit_preintegrated(profile, mm_per_pixel=0.25, support_mm=5.0).kernel
-    np.testing.assert_allclose(ours.weights, theirs.weights, atol=1e-3 * theirs.weights.max())
+    theirs = fit_preintegrated(profile, energy="keep", **pixels).kernel
+    np.testing.assert_allclose(kernel.weights, theirs.weights, atol=1e-3 * theirs.weights.max())
+
+
+def test_energy_outside_the_support_is_restored():
+    profile = simulate_exact(load_material("skin1"))
+    for pixels, lost in ((13, 0.306), (31, 0.106)):
+        support = {"mm_per_pixel": 0.3, "support_mm": 0.15 * (pixels - 1)}
+        result = fit_burley(profile, **support)
+        kept = fit_burley(profile, energy="keep", **support)
+        np.testing.assert_allclose(result.kernel.energy, profile.diffuse_reflectance, rtol=1e-12)
+        np.testing.assert_allclose(result.energy_error, 0.0, atol=1e-12)
+        assert kept.energy_error[0] == pytest.approx(-lost, abs=0.002)
+        assert result.kernel.parameters == kept.kernel.parameters
+        assert result.kernel.meta["settings"] == {"energy": "rescale", "normalize": False}
+        assert kept.kernel.meta["settings"] == {"energy": "keep", "normalize": False}
+    with pytest.raises(FitError, match="energy = 'lose'; expected 'rescale' or 'keep'"):
+        fit_burley(profile, energy="lose")
 
 
 def test_one_pass_has_no_smaller_error_than_the_best_of_rank_one():

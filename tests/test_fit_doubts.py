@@ -9,7 +9,9 @@ from reference_pixels import make_profile
 
 from sssfit.cli import main
 from sssfit.errors import FitError, SssfitError, SssfitWarning
-from sssfit.fit import METHODS, _doubts, fit_burley, fit_preintegrated, fit_svd, make_target
+from sssfit.fit import METHODS, _doubts, fit_preintegrated, fit_svd, make_target
+from sssfit.fit._energy import factor_to
+from sssfit.fit._result import ChannelFit, fit_channels
 from sssfit.kernel import SeparableKernel
 from sssfit.profile_csv import parse_csv
 from sssfit.simulate import simulate_dipole, simulate_montecarlo
@@ -84,14 +86,27 @@ def test_a_kernel_is_near_or_doubted_or_refused(method, kind):
         assert result.kernel.pixels > 1 or "is a single pixel" in said
 
 
+def fit_a_dim_spike(profile):
+    """A method that is off in shape and in energy, as none of ours is by itself."""
+    target = make_target(profile)
+
+    def fit_channel(channel):
+        half = np.zeros((2, target.half_pixels + 1))
+        half[:, 0] = np.sqrt([0.9, 0.5])
+        return ChannelFit(np.array([1.0, -1.0]), half, "made up")
+
+    return fit_channels(target, "burley", fit_channel, settings={})
+
+
 def test_what_the_doubts_say():
     with pytest.warns(SssfitWarning) as caught:
-        fit_burley(many_channels(), support_mm=1.0)
+        fit_a_dim_spike(many_channels())
     said = str(caught[0].message)
     assert len(caught) == 1
     assert caught[0].filename == __file__
     assert said.startswith("test: the burley kernel is farther from the profile than no kernel")
-    assert "(c0 1" in said
+    assert "(c0 " in said
+    assert "has not the profile's energy (c0 -20" in said
     assert said.count("and 59 more)") == 2
     assert said.endswith("try a larger support, more terms or another method.")
 
@@ -100,6 +115,21 @@ def test_an_energy_that_was_not_asked_for_is_not_doubted():
     fit_svd(ring(), rank=1, energy="keep")  # loses half of it; warnings are errors here
     hand = {"width": 0.5, "strength": 0.1, "falloff": 1.0}
     METHODS["falloff"].fit(ring(), **hand)
+
+
+def test_terms_that_cancel_cannot_be_scaled():
+    target = make_target(make_profile(EDGES, 0.5 * SMOOTH[:, None]), 0.5, 2.0)
+    half = np.stack((np.full(5, 0.1), np.full(5, 0.2)))
+    copies = np.array([1.0, 2.0, 2.0, 2.0, 2.0])
+    energies = (half @ copies) ** 2
+    apart = energies[1] - energies[0]
+    assert factor_to(0.5, target, 0, np.array([-1.0, 1.0]), half) == pytest.approx(0.5 / apart)
+    with pytest.raises(FitError, match=r"channel c0: the terms have the energy -2.43 within the"):
+        factor_to(0.5, target, 0, np.array([1.0, -1.0]), half)
+    with pytest.raises(
+        FitError, match=r"which cannot be scaled to -0.1; use energy = \"keep\", an"
+    ):
+        factor_to(-0.1, target, 0, np.array([-1.0, 1.0]), half)
 
 
 def test_a_support_without_light_is_refused():

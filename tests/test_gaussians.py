@@ -141,8 +141,7 @@ def test_terms_that_came_out_without_weight_are_named():
 def test_variances_may_be_as_wide_as_the_grid():
     edges = np.linspace(0.0, 5.0, 101)
     profile = profile_of_gaussians([1.0, 20.0], [[0.4], [0.5]], edges)  # 25 is the limit
-    with pytest.warns(SssfitWarning, match="energy"):
-        found = parameters(fit(profile, 2), "c0")
+    found = parameters(fit(profile, 2), "c0")
     np.testing.assert_allclose(found["variances_mm2"], [1.0, 20.0], rtol=1e-6)
 
 
@@ -303,7 +302,7 @@ def test_gradient_by_finite_differences(total, signed):
 def test_passes_are_the_gaussians_over_the_pixels():
     variances, weights = [0.05, 1.3], np.array([[0.2], [0.6]])
     profile = profile_of_gaussians(variances, weights, SKIN_EDGES)
-    kernel = fit_gaussians(profile, terms=2, mm_per_pixel=0.4, support_mm=3.0).kernel
+    kernel = fit_gaussians(profile, terms=2, energy="keep", mm_per_pixel=0.4, support_mm=3.0).kernel
 
     def share(v, k):
         ends = 0.4 * (k - 0.5), 0.4 * (k + 0.5)
@@ -325,11 +324,23 @@ def test_parameters_do_not_depend_on_the_pixels(marble):
     np.testing.assert_allclose(fine.kernel.energy, 1.0, rtol=1e-12)
 
 
-def test_energy_is_the_diffuse_reflectance_but_for_what_lies_beyond_the_support(marble):
-    result = fit_gaussians(marble, terms=6, mm_per_pixel=0.5, support_mm=60.0)
-    np.testing.assert_allclose(result.energy_error, 0.0, atol=1e-6)
+def test_energy_is_the_diffuse_reflectance_whatever_the_support_cuts_off(marble):
+    for support in (60.0, 6.0, 1.5):
+        pixels = {"mm_per_pixel": 0.5, "support_mm": support}
+        result = fit_gaussians(marble, terms=6, **pixels)
+        np.testing.assert_allclose(result.energy_error, 0.0, atol=1e-12)
+    kept = fit_gaussians(marble, terms=6, energy="keep", **pixels)
+    assert (kept.energy_error < -0.2).all()
+    ratio = result.kernel.weights / np.where(kept.kernel.weights == 0.0, 1.0, kept.kernel.weights)
+    for c in range(3):  # one factor for all terms
+        np.testing.assert_allclose(ratio[:, :, c], ratio[0, 3, c], rtol=1e-12)
+    assert result.kernel.parameters == kept.kernel.parameters
     free = fit_gaussians(marble, mm_per_pixel=0.5, support_mm=60.0, free_energy=True)
     assert (free.energy_error < -0.03).all()
+    narrow = fit_gaussians(marble, free_energy=True, **pixels)
+    np.testing.assert_allclose(narrow.energy_error, free.energy_error, atol=1e-5)
+    with pytest.raises(FitError, match="energy = 'lose'; expected 'rescale' or 'keep'"):
+        fit_gaussians(marble, energy="lose", **pixels)
 
 
 def test_settings_and_course_are_kept(marble):
@@ -340,6 +351,7 @@ def test_settings_and_course_are_kept(marble):
         "terms": 2,
         "signed": True,
         "free_energy": False,
+        "energy": "rescale",
         "normalize": False,
     }
     assert result.stop_reasons == ("converged",) * 3

@@ -14,6 +14,7 @@ import time
 import warnings
 
 import numpy as np
+import processes
 import pytest
 
 from sssfit import files
@@ -394,14 +395,7 @@ def test_a_full_disk_at_the_end_is_one_line_and_resumed(run, tmp_path, monkeypat
 
 
 def start(folder, *arguments, **environment):
-    return subprocess.Popen(
-        [*COMMAND, *arguments],
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        env=os.environ | environment,
-    )
+    return processes.start([*COMMAND, *arguments], cwd=folder, env=os.environ | environment)
 
 
 def wait_for(condition, seconds=60.0):

@@ -8,7 +8,7 @@ from reference_pixels import make_profile, one_over_r_profile
 from scipy.ndimage import convolve1d
 from scipy.signal import fftconvolve
 
-from sssfit.errors import SssfitWarning
+from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import fit_preintegrated
 from sssfit.material import load_material, material_names
 from sssfit.profile import full_kernel
@@ -19,9 +19,14 @@ random_profiles = pytest.mark.filterwarnings("ignore:.* kernel (is farther|has n
 
 
 def covering(profile, pitch):
-    """A fit whose pixels cover the grid, and the profile's 2D kernel on them."""
+    """A fit whose pixels cover the grid, and the profile's 2D kernel on them.
+
+    With the energy on the grid: what lies beyond it the 2D kernel does not have either.
+    """
     last = float(profile.r_edges_mm[-1])
-    kernel = fit_preintegrated(profile, mm_per_pixel=pitch, support_mm=last + pitch).kernel
+    kernel = fit_preintegrated(
+        profile, energy="keep", mm_per_pixel=pitch, support_mm=last + pitch
+    ).kernel
     return kernel, profile.quadrant_kernel(pitch, kernel.half_pixels)
 
 
@@ -79,7 +84,7 @@ def step_at_45_degrees(size):
 @pytest.mark.parametrize("name", ["skin1", "cream", "ketchup"])
 def test_an_edge_at_45_degrees_is_off_by_some_6_percent_of_the_step(name):
     profile = simulate_exact(load_material(name))
-    kernel = fit_preintegrated(profile, mm_per_pixel=0.1).kernel
+    kernel = fit_preintegrated(profile, energy="keep", mm_per_pixel=0.1).kernel
     for c in range(2):
         quadrant = profile.quadrant_kernel(0.1, kernel.half_pixels, channel=c)
         edge = step_at_45_degrees(kernel.pixels + 20)
@@ -90,7 +95,7 @@ def test_an_edge_at_45_degrees_is_off_by_some_6_percent_of_the_step(name):
 
 def off_at_45_degrees(profile, pitch, channel):
     """The same figure from sums along diagonals: all that such an edge sees of a kernel."""
-    kernel = fit_preintegrated(profile, mm_per_pixel=pitch).kernel
+    kernel = fit_preintegrated(profile, energy="keep", mm_per_pixel=pitch).kernel
     whole = full_kernel(profile.quadrant_kernel(pitch, kernel.half_pixels, channel=channel))
     x = np.arange(kernel.pixels)
     apart = kernel.full(channel) - whole
@@ -111,7 +116,7 @@ def test_figures_of_the_45_degree_edge_in_the_docs():
 
 def test_sums_along_diagonals_tell_what_the_convolution_tells():
     profile = simulate_exact(load_material("skin1"), dr_mm=0.1, radius_mm=8.0)
-    kernel = fit_preintegrated(profile, mm_per_pixel=0.4).kernel
+    kernel = fit_preintegrated(profile, energy="keep", mm_per_pixel=0.4).kernel
     quadrant = profile.quadrant_kernel(0.4, kernel.half_pixels, channel=1)
     edge = step_at_45_degrees(kernel.pixels + 20)
     apart = np.abs(two_passes(edge, kernel, 1) - whole_convolution(edge, quadrant)).max()
@@ -119,26 +124,58 @@ def test_sums_along_diagonals_tell_what_the_convolution_tells():
     assert found == pytest.approx(apart / full_kernel(quadrant).sum(), rel=1e-9)
 
 
-def test_energy_is_that_of_the_strips_within_the_support():
+def test_energy_outside_the_support_is_restored():
+    # Supplement, S.6: ||a_p||_1 = ||R_d||_1. Red loses a third of it on 13 pixels, a tenth on 31.
+    profile = simulate_exact(load_material("skin1"))
+    for pixels, lost in ((13, 0.31), (31, 0.10)):
+        support = {"mm_per_pixel": 0.3, "support_mm": 0.15 * (pixels - 1)}
+        result = fit_preintegrated(profile, **support)
+        kept = fit_preintegrated(profile, energy="keep", **support)
+        assert result.kernel.pixels == pixels
+        np.testing.assert_allclose(result.kernel.energy, profile.diffuse_reflectance, rtol=1e-12)
+        np.testing.assert_allclose(result.energy_error, 0.0, atol=1e-12)
+        assert kept.energy_error[0] == pytest.approx(-lost, abs=0.01)
+        np.testing.assert_allclose(
+            result.kernel.weights / result.kernel.weights[:, pixels // 2],
+            kept.kernel.weights / kept.kernel.weights[:, pixels // 2],
+            rtol=1e-12,
+        )
+        assert result.kernel.meta["settings"] == {"energy": "rescale", "normalize": False}
+        assert kept.kernel.meta["settings"] == {"energy": "keep", "normalize": False}
+
+
+def test_energy_beyond_the_grid_is_restored():
+    profile = simulate_dipole(load_material("marble"))  # 2 % of it
+    result = fit_preintegrated(profile, mm_per_pixel=0.3)
+    assert (profile.beyond_grid > 0.01 * profile.diffuse_reflectance).any()
+    np.testing.assert_allclose(result.kernel.energy, profile.diffuse_reflectance, rtol=1e-12)
+
+
+def test_another_word_for_the_energy_is_refused():
+    with pytest.raises(FitError, match="energy = 'lose'; expected 'rescale' or 'keep'"):
+        fit_preintegrated(one_over_r_profile(40, 0.1, [0.5]), energy="lose")
+
+
+def test_energy_kept_is_that_of_the_strips_within_the_support():
     profile = one_over_r_profile(40, 0.1, [0.5, 0.9])
     whole, _ = covering(profile, 0.1)
     np.testing.assert_allclose(whole.energy, profile.total_on_grid, rtol=1e-12)
-    with pytest.warns(SssfitWarning, match=r"has not the profile's energy \(c1 -16.1 %\): try"):
-        part = fit_preintegrated(profile, support_mm=1.0)
+    part = fit_preintegrated(profile, energy="keep", support_mm=1.0)
     line = profile.line_kernel(0.1, 10)
     np.testing.assert_allclose(part.kernel.energy, line.sum(axis=0), rtol=1e-12)
     np.testing.assert_allclose(part.kernel.line, line, rtol=1e-12)
     np.testing.assert_allclose(
         part.energy_error, line.sum(axis=0) / profile.diffuse_reflectance - 1.0, rtol=1e-12
     )
-    with pytest.warns(SssfitWarning, match="energy"):
-        normal = fit_preintegrated(profile, support_mm=1.0, normalize=True).kernel
+    normal = fit_preintegrated(profile, energy="keep", support_mm=1.0, normalize=True).kernel
     np.testing.assert_allclose(normal.energy, 1.0, rtol=1e-12)
     np.testing.assert_allclose(normal.scale, part.kernel.energy, rtol=1e-12)
 
 
 def test_one_pixel_blurs_nothing():
     with pytest.warns(SssfitWarning, match="blurs nothing"):
-        fitted = fit_preintegrated(one_over_r_profile(10, 0.1, [0.5]), mm_per_pixel=3.0)
+        fitted = fit_preintegrated(
+            one_over_r_profile(10, 0.1, [0.5]), energy="keep", mm_per_pixel=3.0
+        )
     assert fitted.kernel.pixels == 1
     assert fitted.kernel.energy[0] == pytest.approx(-0.5 * np.expm1(-2.0), rel=1e-12)

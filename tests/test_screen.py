@@ -1,5 +1,6 @@
 """Screen space against a literal shader, flat convolution, and what masks and slopes must do."""
 
+import math
 import runpy
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 from reference_screen import exact_pass, pixels_per_mm, slow_flat, slow_screen
 
+from sssfit import shapes
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
 from sssfit.render._view import LERP_SIGMAS, lerp_falloff, second_moments
@@ -279,6 +281,18 @@ def test_variances_come_from_the_kernel(rng):
         render_screen(scene, kernel, follow="lerp"),
         render_screen(scene, kernel, follow="lerp", falloff_per_mm=lerp_falloff(kernel)),
     )
+
+
+def test_the_lerp_ends_where_the_listing_ends_it_for_table_1():
+    # RR-02-12: s = saturate(300 D sssWidth |dz|) (appendix A) at the width of table 1, and 20 degrees
+    # of the released shader. The outermost sample lies 2 sssWidth away and stands for 3 mm of skin.
+    width = 0.014
+    end = 1.0 / (300.0 / math.tan(math.radians(0.5 * 20.0)) * width)
+    red = [weights[0] for weights in shapes.SKIN_WEIGHTS]
+    sigma_mm = math.sqrt(np.dot(red, shapes.SKIN_VARIANCES_MM2))
+    assert pytest.approx(end / (2.0 * width) * 3.0 / sigma_mm, abs=0.05) == LERP_SIGMAS
+    kernel = gaussian_kernel(4.0, half=30)
+    assert 1.0 / lerp_falloff(kernel) == pytest.approx(3.8 * 2.0, rel=1e-10)
 
 
 def test_a_kernel_of_one_pixel_and_a_picture_of_one(rng):

@@ -9,7 +9,8 @@ profile's own. s is the one that minimises
 over the grid, F(r) being the energy within r. Energies and not densities: R_d ~ 1/r would make the
 objective depend on the pixels or on the width of the first annulus, and F is known exactly at the
 edges. The kernel is the model's line integral, in closed form: s/(4 pi) (K0(s x) + K0(s x / 3))
-integrated over each pixel, as `sssfit.fit.preintegrated` does with the profile itself.
+integrated over each pixel, as `sssfit.fit.preintegrated` does with the profile itself; what the
+model has outside the support is restored as there.
 """
 
 import math
@@ -17,6 +18,7 @@ import math
 import numpy as np
 
 from sssfit.errors import FitError
+from sssfit.fit._energy import restores
 from sssfit.fit._nlopt import root
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
 from sssfit.fit._target import FloatArray, make_target
@@ -31,6 +33,7 @@ _LEAST, _MOST = 1e-2, 1e2
 def fit_burley(
     profile: Profile,
     *,
+    energy: str = "rescale",
     mm_per_pixel: float | None = None,
     support_mm: float | None = None,
     normalize: bool = False,
@@ -40,6 +43,9 @@ def fit_burley(
     Parameters
     ----------
     profile : Profile
+    energy : str
+        "rescale" (default): every channel scaled to its diffuse reflectance A. "keep": what the
+        model's strips within the support hold.
     mm_per_pixel, support_mm : float, optional [mm]
         Pixels; see ``sssfit.fit.make_target``. The shape does not depend on them.
     normalize : bool
@@ -55,9 +61,10 @@ def fit_burley(
     Raises
     ------
     FitError, ProfileError
-        The profile, the pitch or the support is of no use, or a channel's grid does not tell its
-        shape.
+        The profile, the pitch, the support or the energy is invalid, or a channel's grid does not
+        tell its shape.
     """
+    rescale = restores(energy)
     target = make_target(profile, mm_per_pixel, support_mm)
     edges_mm = target.edges_mm()
 
@@ -66,16 +73,24 @@ def fit_burley(
         shares = profile.cumulative[:, channel] / total
         s, evaluations, reason = _fit_shape(profile.r_edges_mm, shares, profile.channels[channel])
         line = total * diffusion_line_integral(edges_mm[:-1], edges_mm[1:], s)
+        within = float(target.copies @ line)
         error = np.abs(diffusion_cdf(profile.r_edges_mm, s) - shares).max()
         return ChannelFit(
             np.ones(1),
-            (line / math.sqrt(float(target.copies @ line)))[None],
+            (math.sqrt(total if rescale else within) / within * line)[None],
             reason,
             evaluations,
             {"s_per_mm": s, "diffuse_reflectance": total, "cumulative_error": float(error)},
         )
 
-    return fit_channels(target, "burley", fit_channel, settings={}, normalize=normalize)
+    return fit_channels(
+        target,
+        "burley",
+        fit_channel,
+        settings={"energy": energy},
+        normalize=normalize,
+        keeps_energy=rescale,
+    )
 
 
 def _fit_shape(r_mm: FloatArray, shares: FloatArray, channel: str) -> tuple[float, int, str]:

@@ -13,16 +13,17 @@ to all of ||R_d||_1, beyond the support and the grid too, so that a wall in even
 colour. ``energy="keep"`` leaves them optimal; no kernel of the same rank has a smaller error.
 """
 
+import math
 import operator
 
 import numpy as np
 
 from sssfit.errors import FitError
+from sssfit.fit._energy import factor_to, restores
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels, frobenius_error
 from sssfit.fit._target import FloatArray, Target, make_target
 from sssfit.profile import Profile
 
-ENERGIES = ("rescale", "keep")
 _USUAL_RANK = 3
 # Up to here all eigenvalues take 4 ms, no more than a few by Lanczos; at 1237 pixels it is 90 ms
 # against 6 ms, at 3932 seconds against 0.1 s.
@@ -67,11 +68,10 @@ def fit_svd(
     """
     target = make_target(profile, mm_per_pixel, support_mm)
     rank = _checked_rank(rank, target)
-    if energy not in ENERGIES:
-        raise FitError(f"energy = {energy!r}; expected {' or '.join(map(repr, ENERGIES))}.")
+    rescale = restores(energy)
 
     def fit_channel(channel: int) -> ChannelFit:
-        return _fit_channel(target, channel, rank, rescale=energy == "rescale")
+        return _fit_channel(target, channel, rank, rescale=rescale)
 
     settings = {"rank": rank, "energy": energy}
     return fit_channels(
@@ -80,7 +80,7 @@ def fit_svd(
         fit_channel,
         settings=settings,
         normalize=normalize,
-        keeps_energy=energy == "rescale",
+        keeps_energy=rescale,
     )
 
 
@@ -149,18 +149,11 @@ def _fit_channel(target: Target, channel: int, rank: int, *, rescale: bool) -> C
     """One channel's terms, and its error while its pixels are at hand."""
     quadrant = target.quadrant(channel)
     values, vectors = eigenpairs(quadrant, rank)
-    factor = 1.0
-    if rescale:
-        energy = float(values @ (vectors @ target.copies) ** 2)
-        if energy <= 0.0:
-            name = target.profile.channels[channel]
-            raise FitError(
-                f"channel {name}: {rank} terms have the energy {energy:.3g}, which cannot be "
-                'scaled to the profile\'s; use energy = "keep" or another rank.'
-            )
-        factor = float(target.total[channel]) / energy
     signs = np.where(values < 0.0, -1.0, 1.0)
-    half = np.sqrt(factor * np.abs(values))[:, None] * vectors
+    half = np.sqrt(np.abs(values))[:, None] * vectors
+    total = float(target.total[channel])
+    factor = factor_to(total, target, channel, signs, half) if rescale else 1.0
+    half *= math.sqrt(factor)
     return ChannelFit(
         signs,
         half,

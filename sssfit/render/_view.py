@@ -17,7 +17,7 @@ LOST = {"none": compiled.NOWHERE, "middle": compiled.MIDDLE, "mean": compiled.ME
 BORDER = {"mirror": compiled.MIRROR, "clamp": compiled.CLAMP, "zero": compiled.ZERO}
 
 # The lerp's end in standard deviations of the kernel; docs/screen-space.md derives it.
-LERP_SIGMAS = 5.2
+LERP_SIGMAS = 3.8
 _FARTHEST = 1e9  # pixels from the middle to a sample; far below where indices overflow
 
 

@@ -75,7 +75,7 @@ def render_screen(
         v of "gaussian". By default the larger variance of the artist's kernel; for other kernels
         their second moment. Where ``scale`` is s, v s^2 is used.
     falloff_per_mm : float, optional [1/mm]
-        Of "lerp". By default complete at 5.2 standard deviations of the widest channel.
+        Of "lerp". By default complete at 3.8 standard deviations of the widest channel.
     scale : float or array (H, W), optional
         Size of the kernel: 0 leaves a pixel unblurred.
     border : str

@@ -1,0 +1,35 @@
+"""Child processes of tests: interruptible whatever the parent ignores, and gone after the test."""
+
+import signal
+import subprocess
+
+_started = []
+
+
+def start(command, **options):
+    """Start a child with pipes for text; `end_all` ends it, if the test does not.
+
+    A shell starts background jobs with SIGINT ignored; Python and exec leave that as it is. A child
+    of such a test run would not be interrupted by a SIGINT, so it is started with the default.
+    """
+    options = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True} | options
+    before = signal.getsignal(signal.SIGINT)
+    # exec turns a handler into the default, and keeps only what is ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        process = subprocess.Popen(command, **options)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    _started.append(process)
+    return process
+
+
+def end_all():
+    """Kill what still runs of the processes started, close their pipes and wait for their end."""
+    while _started:
+        process = _started.pop()
+        process.kill()
+        for stream in (process.stdin, process.stdout, process.stderr):
+            if stream is not None:
+                stream.close()
+        process.wait()
