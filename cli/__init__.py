@@ -5,6 +5,7 @@ verb imports the library in its body. Exit status: 0 done, 1 a clear error, 2 wr
 interrupted with what was done saved.
 """
 
+import logging
 import os
 import signal
 import sys
@@ -73,6 +74,7 @@ for _verb in (*(materials, simulate, fit, render, compare, choose, import_, expo
 def main(args: Sequence[str] | None = None) -> NoReturn:
     """Run the command line and exit; the console script's entry point."""
     _terminate_like_interrupt()
+    _keep_matplotlib_quiet()
     with warnings.catch_warnings():
         warnings.simplefilter("always", SssfitWarning)
         warnings.showwarning = _show_warning
@@ -138,6 +140,16 @@ def _terminate_like_interrupt() -> None:
         raise KeyboardInterrupt
 
     signal.signal(signal.SIGTERM, interrupt)
+
+
+def _keep_matplotlib_quiet() -> None:
+    """Leave stderr and the choice of a backend to us; colour-science imports matplotlib as well.
+
+    It logs where it keeps its cache of fonts, and what it cannot read of a file of settings, and
+    an unknown MPLBACKEND is an error on import. Charts are drawn by Agg, without a display.
+    """
+    logging.getLogger("matplotlib").addHandler(logging.NullHandler())
+    os.environ["MPLBACKEND"] = "agg"
 
 
 def _print_version(*, with_libraries: bool) -> None:

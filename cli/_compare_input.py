@@ -12,7 +12,7 @@ from ._compiling import say_if_compiling
 from ._deon_skin import DEON_SKIN
 from ._options import Common
 from ._report import binary_stdin
-from ._scene import MADE, Picture, made_options, make_or_read
+from ._scene import MADE, Picture, check_file_options, made_options, make_or_read
 
 if TYPE_CHECKING:
     from sssfit.material import Material
@@ -74,6 +74,9 @@ def scenes_of(
     size: tuple[int, int] | None,
     mm_per_pixel: float | None,
     common: Common,
+    *,
+    layer: str | None = None,
+    mask: str | None = None,
 ) -> tuple[list[Scene], float]:
     """Return pictures on the same pixels, and the pixels' size [mm].
 
@@ -87,9 +90,11 @@ def scenes_of(
     files = [name for name in pictures if name not in MADE]
     if size is not None and len(files) == len(pictures):
         raise click.UsageError("--size is for made pictures; leave it out.")
+    check_file_options(layer, mask, has_file=bool(files))
     # The size of made pictures is known only once files have been read.
     read = {
-        name: make_or_read(Picture(name, None, mm_per_pixel, {}), 0.0, common) for name in files
+        name: make_or_read(Picture(name, None, mm_per_pixel, {}, layer, mask), 0.0, common)
+        for name in files
     }
     pitch = next((each.mm_per_pixel for each in read.values()), mm_per_pixel or MM_PER_PIXEL)
     return [

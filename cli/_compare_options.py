@@ -10,7 +10,7 @@ import click
 from ._compare_input import MM_PER_PIXEL
 from ._fits import FITS
 from ._options import Count, Length
-from ._scene import EDGE_DEGREES, MADE, Size
+from ._scene import EDGE_DEGREES, FILE_OPTIONS, MADE, Size
 
 PICTURES = "disk,edge,points,head"
 
@@ -41,6 +41,7 @@ _OPTIONS = (
         metavar="WxH",
         help="Made pictures: columns and rows.  [default: 512x512]",
     ),
+    *FILE_OPTIONS,
     click.option(
         "--chart",
         metavar="FILE",

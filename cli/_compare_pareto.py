@@ -34,11 +34,20 @@ class Wish:
     cost: str
     force: bool
     common: Common
+    layer: str | None = None
+    mask: str | None = None
 
     @cached_property
     def scenes(self) -> tuple[list[Scene], float]:
         """Make or read the pictures, once; the size of their pixels [mm]."""
-        return scenes_of(self.pictures, self.size, self.mm_per_pixel, self.common)
+        return scenes_of(
+            self.pictures,
+            self.size,
+            self.mm_per_pixel,
+            self.common,
+            layer=self.layer,
+            mask=self.mask,
+        )
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from ._report import binary_stdout, finish, table
 
 if TYPE_CHECKING:
     from sssfit.material import Material
-    from sssfit.simulate.inversion import FloatArray, Inversion
+    from sssfit.simulate.exact import Light
 
 # Heads the files we make: only a file that begins with it is replaced without --force.
 _OURS = "# Made by `sssfit materials --from-reflectance`, which may replace this file;"
@@ -31,6 +31,7 @@ class Wish:
     from_reflectance: list[float]
     mean_free_path: list[float] | None
     eta: float | None
+    light: Light
     name: str | None
     channels: str | None
     output: str | None
@@ -48,7 +49,7 @@ def write_material(wish: Wish, common: Common) -> None:
     with _held(path, force=wish.force):
         say_if_compiling(common, solver=True)
         material, figures = _inverted(
-            wish.from_reflectance, wish.mean_free_path, wish.eta, name, channels
+            wish.from_reflectance, wish.mean_free_path, wish.eta, wish.light, name, channels
         )
         _write(material, path)
     figures = {"command": "materials", "output": [str(path or "-")], **figures}
@@ -57,15 +58,44 @@ def write_material(wish: Wish, common: Common) -> None:
 
 
 def _inverted(
-    asked: list[float], paths_mm: list[float], eta: float, name: str, channels: list[str]
+    asked: list[float],
+    paths_mm: list[float],
+    eta: float,
+    light: Light,
+    name: str,
+    channels: list[str],
 ) -> tuple[Material, dict[str, Any]]:
     """Return the material, and its figures beside those of the published approximations."""
-    from sssfit.simulate.exact import diffuse_reflectance
-    from sssfit.simulate.inversion import material_from_reflectance, published_inversions
+    from sssfit.simulate.inversion import (
+        largest_reflectance,
+        material_from_reflectance,
+        published_inversions,
+        reflectance_of,
+    )
 
-    material = material_from_reflectance(asked, paths_mm, eta, name=name, channels=channels)
-    reached = diffuse_reflectance(material.layers[0].albedo, eta)
-    return material, _figures(material, asked, reached, published_inversions(asked, eta))
+    material = material_from_reflectance(
+        asked, paths_mm, eta, name=name, channels=channels, light=light
+    )
+    layer = material.layers[0]
+    published = published_inversions(asked, eta, light=light)
+    return material, {
+        "name": material.name,
+        "channels": material.channels,
+        "light": light,
+        "eta": eta,
+        "mean_free_path_mm": layer.mean_free_path_mm,
+        "reflectance_asked": asked,
+        "reflectance": reflectance_of(layer.albedo, eta, light),
+        "reflectance_normal": reflectance_of(layer.albedo, eta, "normal"),
+        "largest_reflectance": largest_reflectance(eta, light),
+        "albedo": layer.albedo,
+        "sigma_a_per_mm": layer.sigma_a_per_mm,
+        "sigma_s_per_mm": layer.sigma_s_per_mm,
+        "approximations": {
+            key: {"albedo": each.albedo, "reflectance": each.reflectance}
+            for key, each in published.items()
+        },
+    }
 
 
 def _channels(wish: Wish) -> list[str]:
@@ -124,36 +154,22 @@ def _is_ours(path: Path) -> bool:
         return False
 
 
-def _figures(
-    material: Material, asked: list[float], reached: FloatArray, published: dict[str, Inversion]
-) -> dict[str, Any]:
-    """Everything that is printed, as ``--json`` has it."""
-    layer = material.layers[0]
-    return {
-        "name": material.name,
-        "channels": material.channels,
-        "eta": layer.eta,
-        "mean_free_path_mm": layer.mean_free_path_mm,
-        "reflectance_asked": asked,
-        "reflectance": reached,
-        "largest_reflectance": 1.0 - material.specular_reflectance,
-        "albedo": layer.albedo,
-        "sigma_a_per_mm": layer.sigma_a_per_mm,
-        "sigma_s_per_mm": layer.sigma_s_per_mm,
-        "approximations": {
-            key: {"albedo": each.albedo, "reflectance": each.reflectance}
-            for key, each in published.items()
-        },
-    }
-
-
 def _text(figures: dict[str, Any]) -> str:
     """Say for people what was made, and what the approximations would have made."""
-    heads = ["channel", "diffuse reflectance", "albedo", "sigma_a, 1/mm", "sigma_s, 1/mm"]
-    keys = ("reflectance", "albedo", "sigma_a_per_mm", "sigma_s_per_mm")
+    is_diffuse = figures["light"] == "diffuse"
+    heads = (
+        ["channel", "base colour", "normal reflectance"]
+        if is_diffuse
+        else [
+            "channel",
+            "diffuse reflectance",
+        ]
+    )
+    heads += ["albedo", "sigma_a, 1/mm", "sigma_s, 1/mm"]
+    decimals = ("reflectance", *(("reflectance_normal",) if is_diffuse else ()), "albedo")
     rows = [
-        [name, *(f"{figures[key][c]:.6f}" for key in keys[:2])]
-        + [f"{figures[key][c]:.6g}" for key in keys[2:]]
+        [name, *(f"{figures[key][c]:.6f}" for key in decimals)]
+        + [f"{figures[key][c]:.6g}" for key in ("sigma_a_per_mm", "sigma_s_per_mm")]
         for c, name in enumerate(figures["channels"])
     ]
     published = figures["approximations"]
@@ -162,12 +178,14 @@ def _text(figures: dict[str, Any]) -> str:
         [name, *(_given(published[key], figures["reflectance_asked"], c) for key in _PUBLISHED)]
         for c, name in enumerate(figures["channels"])
     ]
+    what = "base colour" if is_diffuse else "diffuse reflectance"
     return "\n".join(
         [
             f"{figures['name']}: eta {figures['eta']:g}, could reflect up to "
-            f"{math.floor(1e6 * figures['largest_reflectance']) / 1e6:g}",
+            f"{math.floor(1e6 * figures['largest_reflectance']) / 1e6:g} under {figures['light']} "
+            "light",
             table(heads, rows),
-            "approximate albedos, the diffuse reflectance they really have, and its error:",
+            f"approximate albedos, the {what} they really have, and its error:",
             table(more_heads, more_rows),
         ]
     )

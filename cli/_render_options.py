@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from ._options import Length
-from ._scene import MADE, Size
+from ._scene import FILE_OPTIONS, MADE, Size
 
 _OPTIONS = (
     click.option(
@@ -31,6 +31,7 @@ _OPTIONS = (
         metavar="MM",
         help="Your own file: size of its pixels, unless its header says.",
     ),
+    *FILE_OPTIONS,
     click.option(
         "--angle",
         "angle_degrees",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,29 @@ EDGE_DEGREES = 30.0
 _ROWS = 512
 _MOST_ROWS = 1080  # of a head whose size is not given
 _COUNT = re.compile("0*[1-9][0-9]{0,8}")  # a picture of more columns than that has no memory
+
+
+FILE_OPTIONS = (
+    click.option(
+        "--layer",
+        metavar="NAME",
+        help="Your own EXR: the layer to read, such as ViewLayer.Combined.  [default: R, G, B "
+        "without a layer, or the only layer with them]",
+    ),
+    click.option(
+        "--mask",
+        type=click.Choice(["alpha"]),
+        help="Your own file: only what its alpha covers by half or more is the object, lit and "
+        "judged.  [default: all of it]",
+    ),
+)
+
+
+def file_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """Add the options of pictures from files."""
+    for option in reversed(FILE_OPTIONS):
+        command = option(command)
+    return command
 
 
 class Size(click.ParamType[tuple[int, int]]):
@@ -44,12 +67,17 @@ class Size(click.ParamType[tuple[int, int]]):
 
 @dataclass(frozen=True)
 class Picture:
-    """What was asked for; ``own`` has the options of single made pictures that were given."""
+    """What was asked for; ``own`` has the options of single made pictures that were given.
+
+    ``layer`` and ``mask`` are for files: which layer of an EXR, and what the mask is.
+    """
 
     irradiance: str
     size: tuple[int, int] | None
     mm_per_pixel: float | None
     own: Mapping[str, Any]
+    layer: str | None = None
+    mask: str | None = None
 
     @property
     def is_made(self) -> bool:
@@ -83,6 +111,7 @@ def made_scene(picture: Picture, mm_per_pixel: float, common: Common) -> Scene:
             f"--mm-per-pixel is for pictures from files; {picture.irradiance} is made on the "
             "kernel's pixels."
         )
+    check_file_options(picture.layer, picture.mask, has_file=False)
     height, width = picture.size or _default_size(picture, mm_per_pixel, common)
     own, known = dict(picture.own), options_of(picture.irradiance)
     for key, value in own.items():
@@ -132,7 +161,7 @@ def read_scene(picture: Picture, otherwise: float | None, common: Common) -> Sce
         raise click.UsageError(
             f"--{given[0].split('_')[0]} is for made pictures ({', '.join(MADE)}); leave it out."
         )
-    image = load_image(picture.irradiance)
+    image = load_image(picture.irradiance, layer=picture.layer)
     for note in image.notes:
         say(common, f"{picture.irradiance}: {note}")
     pitch = picture.mm_per_pixel or image.mm_per_pixel or otherwise
@@ -140,4 +169,11 @@ def read_scene(picture: Picture, otherwise: float | None, common: Common) -> Sce
         raise RenderError(
             f"{picture.irradiance} does not say how large its pixels are; give --mm-per-pixel."
         )
-    return Scene(image.name, image.pixels, pitch)
+    return Scene.from_image(image, pitch, alpha_is_mask=picture.mask == "alpha")
+
+
+def check_file_options(layer: str | None, mask: str | None, *, has_file: bool) -> None:
+    """Refuse options of pictures from files where there are none."""
+    for option, value in (("--layer", layer), ("--mask", mask)):
+        if value is not None and not has_file:
+            raise click.UsageError(f"{option} is for pictures from files; leave it out.")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +15,17 @@ from ._compiling import say_if_compiling
 from ._deon_skin import DEON_SKIN
 from ._options import Common, Length, common_options
 from ._report import binary_stdin, binary_stdout, finish, percent, say
-from ._scene import EDGE_DEGREES, MADE, Picture, Size, made_options, made_scene, read_scene
+from ._scene import (
+    EDGE_DEGREES,
+    MADE,
+    Picture,
+    Size,
+    check_file_options,
+    file_options,
+    made_options,
+    made_scene,
+    read_scene,
+)
 
 if TYPE_CHECKING:
     from sssfit.compare.choose import Choice, Step
@@ -97,6 +108,7 @@ class Distance(Length):
     help=f"Picture to judge by: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG file. The "
     f"edge is at {EDGE_DEGREES:g} degrees.",
 )
+@file_options
 @click.option(
     "-o",
     "--output",
@@ -114,6 +126,8 @@ def choose(
     tolerance: float,
     tolerance_of: str,
     irradiance: str,
+    layer: str | None,
+    mask: str | None,
     output: str | None,
     force: bool,
     common: Common,
@@ -140,12 +154,14 @@ def choose(
     from sssfit.compare.choose import choose as choose_kernel
     from sssfit.compare.choose import mm_per_pixel_at
 
+    picture = Picture(irradiance, None, None, made_options(irradiance), layer, mask)
+    check_file_options(layer, mask, has_file=not picture.is_made)
     source = _source(material)
     pitch = mm_per_pixel_at(distance_mm, fov_degrees, resolution[0])
     path = None if output == "-" else Path(output or f"{_stem(material, source)}{_ENDING}")
     profile_path = _beside(path, material)
     with _held(path, profile_path, force=force):
-        scene = None if irradiance == "head" else _scene(irradiance, pitch, resolution, common)
+        scene = None if irradiance == "head" else _scene(picture, pitch, resolution, common)
         _say_first(source, common)
         choice = choose_kernel(
             source,
@@ -203,13 +219,12 @@ def _beside(path: Path | None, name: str) -> Path | None:
     return path.with_name(f"{stem}.profile.npz")
 
 
-def _scene(irradiance: str, pitch: float, resolution: tuple[int, int], common: Common) -> Scene:
+def _scene(picture: Picture, pitch: float, resolution: tuple[int, int], common: Common) -> Scene:
     """Make or read what the choice is judged on; a file that does not say has the pitch."""
-    picture = Picture(irradiance, None, None, {})
     if not picture.is_made:
         return read_scene(picture, pitch, common)
     size = min(resolution[0], 512), min(resolution[1], 512)
-    return made_scene(Picture(irradiance, size, None, made_options(irradiance)), pitch, common)
+    return made_scene(replace(picture, size=size), pitch, common)
 
 
 def _say_first(source: Material | Profile, common: Common) -> None:

@@ -62,6 +62,8 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
         given["cost"],
         given["force"],
         common,
+        given["layer"],
+        given["mask"],
     )
     if material is None:
         compare_all(Path(given["output"] or "."), wish)
@@ -146,8 +148,8 @@ def _check_sheets(material: str | None, asked: Mapping[str, str], given: Mapping
     """Refuse what does not go with a sheet."""
     if material is None and set(asked) != {"editing"}:
         raise click.UsageError("name one MATERIAL; only --editing needs none.")
-    others = ("every", "only", "pictures", "size", "chart", "table", "budget_chart", "output")
-    for key in others:
+    pictures = ("pictures", "size", "layer", "mask")
+    for key in ("every", "only", *pictures, "chart", "table", "budget_chart", "output"):
         if given[key]:
             raise click.UsageError(
                 f"{_option(key)} does not go with --{next(iter(asked))}; leave it out."

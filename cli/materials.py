@@ -34,6 +34,15 @@ if TYPE_CHECKING:
     help="Its mean free paths, 1 / (sigma_a + sigma_s); one serves all channels.",
 )
 @click.option("--eta", type=float, metavar="N", help="Its refractive index.")
+@click.option(
+    "--light",
+    type=click.Choice(["diffuse", "normal"]),
+    default="normal",
+    show_default=True,
+    help="The light that A,B,... are meant for. normal: a beam along the normal, as in profiles; "
+    "diffuse: the same radiance from everywhere above, as base colours mean it, and shares of the "
+    "light that enters.",
+)
 @click.option("--name", metavar="NAME", help="Its name.  [default: that of FILE]")
 @click.option(
     "--channels", metavar="A,B,...", help="Names of its channels.  [default: R,G,B for three]"
@@ -58,7 +67,7 @@ def materials(
     MATERIAL is one of their names, the path of a TOML file, or - for standard input.
     --from-reflectance turns the exact solver round: it finds the albedos, for isotropic
     scattering, whose total diffuse reflectance is what was asked for, and prints what the
-    approximate inversions of renderers would have given.
+    approximate inversions of renderers would have given. Give --light diffuse with a base colour.
 
     \b
       sssfit materials skin1                        coefficients, mean free paths, grid

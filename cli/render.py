@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
     from sssfit.compare.judge import Judgement
     from sssfit.kernel import SeparableKernel
+    from sssfit.render.scene import Scene
 
     FloatArray = npt.NDArray[np.float64]
 
@@ -57,6 +58,8 @@ def render(
     irradiance: str,
     size: tuple[int, int] | None,
     mm_per_pixel: float | None,
+    layer: str | None,
+    mask: str | None,
     border: str,
     screen: bool,
     follow: str | None,
@@ -75,7 +78,8 @@ def render(
     KERNEL is a .kernel.json file, or - for stdin; by default the newest of this folder. The result
     is radiant exitance in linear light. Made pictures have the kernel's pixels; a file of your own
     (EXR, HDR, TIFF, PNG) has to have them too. The truth is the same picture convolved with the
-    whole 2D kernel of the profile; Delta E 2000 is of both in sRGB at the exposure.
+    whole 2D kernel of the profile; Delta E 2000 is of both in sRGB at the exposure. The alpha of
+    your file goes into the result and the truth as it is.
 
     \b
       sssfit render skin1.svd3.kernel.json --irradiance head -o out.exr
@@ -84,7 +88,7 @@ def render(
       sssfit render --screen --irradiance head
     """
     _check_options(screen, follow, profile or truth or difference or structure)
-    picture = Picture(irradiance, size, mm_per_pixel, own)
+    picture = Picture(irradiance, size, mm_per_pixel, own, layer, mask)
     name, loaded = _kernel(kernel, common)
     path = _target(name, picture, output)
     targets = {"picture": path} if path else {}
@@ -106,7 +110,7 @@ def render(
 
             settings |= {"exposure": exposure, "structure": structure}
             result = judge(scene, loaded, source, **settings)
-        _write(result, loaded, targets, exposure, common)
+        _write(result, scene, loaded, targets, exposure, common)
     figures = {
         "command": "render",
         "output": [*(["-"] if path is None else []), *map(str, targets.values())],
@@ -168,6 +172,7 @@ def _held(paths: Sequence[Path], *, force: bool) -> Iterator[None]:
 
 def _write(
     result: Judgement,
+    scene: Scene,
     kernel: SeparableKernel,
     targets: dict[str, Path],
     exposure: float | None,
@@ -184,11 +189,23 @@ def _write(
         "channels": kernel.channels,
         "mm_per_pixel": kernel.mm_per_pixel,
     }
+    alpha = _alpha(scene, kernel, common)
     if "picture" not in targets:
-        save_image(binary_stdout(), result.picture, format="exr", **settings)
+        save_image(binary_stdout(), result.picture, format="exr", **settings, **alpha)
         binary_stdout().flush()
     shown = exposure or (result.score.exposure if result.score else auto_exposure(result.picture))
     for what, path in targets.items():
         factor = shown if image_format(path) == "png" else 1.0
-        for note in save_image(path, pictures[what], exposure=factor, **settings):
+        own = {} if what == "difference" else alpha
+        for note in save_image(path, pictures[what], exposure=factor, **settings, **own):
             say(common, f"{path}: {note}")
+
+
+def _alpha(scene: Scene, kernel: SeparableKernel, common: Common) -> dict[str, Any]:
+    """Return what `save_image` takes of the picture's alpha, where a file can hold it."""
+    if scene.alpha is None:
+        return {}
+    if len(kernel.channels) not in (1, 3) or "A" in kernel.channels:
+        say(common, f"alpha left out beside the channels {', '.join(kernel.channels)}")
+        return {}
+    return {"alpha": scene.alpha, "alpha_is_multiplied": scene.alpha_is_multiplied}

@@ -1,10 +1,16 @@
 """The files pictures come from and go to: formats by ending, and by what the file begins with."""
 
+import contextlib
+import os
 import struct
+import sys
+import threading
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import BinaryIO
 
+from sssfit._material_checks import printable, shown
 from sssfit.errors import FileError
 from sssfit.files import reason
 
@@ -20,6 +26,8 @@ _MAGIC = {
     "tiff": (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"),
     "png": (_PNG,),
 }
+_STDERR = threading.Lock()  # two at once would put the wrong stderr back
+_LONGEST_CALLED = 400  # characters of a path in messages
 _CRC_BLOCK = 1 << 20  # bytes held at a time while a chunk is summed
 
 
@@ -35,17 +43,26 @@ def image_format(target: str | Path | BinaryIO) -> str:
         raise FileError(f"a stream has no ending; name a format: {', '.join(FORMATS)}.")
     if (chosen := _ENDINGS.get(Path(target).suffix.lower())) is None:
         raise FileError(
-            f"{target}: pictures are written as EXR, TIFF or 16-bit PNG; end it in .exr, .tif or "
-            ".png."
+            f"{called(Path(target))}: pictures are written as EXR, TIFF or 16-bit PNG; end it in "
+            ".exr, .tif or .png."
         )
     return chosen
 
 
-def is_image_file(path: Path) -> bool:
+def as_path(path: object) -> Path:
+    """Return the path of a picture; refuse what cannot be one."""
+    if not isinstance(path, str | os.PathLike) or isinstance(os.fspath(path), bytes):
+        raise FileError(f"{shown(path)} is no path; name an EXR, HDR, TIFF or PNG file.")
+    if "\0" in (text := os.fspath(path)):
+        raise FileError(f"{shown(text)} holds a null character, which no file's name does.")
+    return Path(text)
+
+
+def is_image_file(path: str | Path) -> bool:
     """Tell whether a file begins as EXR, Radiance HDR, TIFF or PNG files do."""
     try:
-        return _format_of(path) is not None
-    except OSError:
+        return _format_of(as_path(path)) is not None
+    except (OSError, FileError):
         return False
 
 
@@ -57,23 +74,49 @@ def found_format(path: Path) -> str:
     FileError
         Missing, unreadable, a folder or device, empty, or of another format.
     """
-    if path.exists() and not path.is_file():
-        raise FileError(f"{path} is a folder or a device; name an EXR, HDR, TIFF or PNG file.")
+    name = called(path)
     try:
+        if path.exists() and not path.is_file():
+            raise FileError(f"{name} is a folder or a device; name an EXR, HDR, TIFF or PNG file.")
         found = _format_of(path)
         is_empty = path.stat().st_size == 0
     except OSError as error:
-        raise FileError(f"{path} cannot be read: {reason(error)}.") from error
+        raise FileError(f"{name} cannot be read: {reason(error)}.") from error
     if found is None:
         what = "is empty" if is_empty else "is not an EXR, HDR, TIFF or PNG file"
-        raise FileError(f"{path} {what}; name a picture in one of these formats.")
+        raise FileError(f"{name} {what}; name a picture in one of these formats.")
     return found
 
 
-def check_png(path: Path) -> None:
-    """Check a PNG's chunks against their own sums.
+def called(path: Path) -> str:
+    """Return a path as it stands in messages: on one line, its middle left out where it is long."""
+    text = printable(str(path))
+    half = _LONGEST_CALLED // 2
+    return text if len(text) <= _LONGEST_CALLED else f"{text[:half]}...{text[-half:]}"
 
-    libpng does so too, but writes lines of its own to stderr about what it finds.
+
+@contextlib.contextmanager
+def without_lines_of_libpng() -> Iterator[None]:
+    """Keep stderr to ourselves: libpng writes its errors there, and then hands them on as well."""
+    with _STDERR:
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            sys.stderr.flush()
+        try:
+            kept = os.dup(2)
+        except OSError:  # closed: there is nothing to keep clean
+            yield
+            return
+        try:
+            with Path(os.devnull).open("wb") as nowhere:
+                os.dup2(nowhere.fileno(), 2)
+            yield
+        finally:
+            os.dup2(kept, 2)
+            os.close(kept)
+
+
+def check_png(path: Path) -> None:
+    """Check a PNG's chunks against their own sums, which libpng does for some of them only.
 
     Raises
     ------
@@ -85,9 +128,9 @@ def check_png(path: Path) -> None:
             stream.seek(len(_PNG))
             is_whole = _chunks_are_whole(stream)
     except OSError as error:
-        raise FileError(f"{path} cannot be read: {reason(error)}.") from error
+        raise FileError(f"{called(path)} cannot be read: {reason(error)}.") from error
     if not is_whole:
-        raise FileError(f"{path} is damaged or cut short; write or copy it again.")
+        raise FileError(f"{called(path)} is damaged or cut short; write or copy it again.")
 
 
 def _chunks_are_whole(stream: BinaryIO) -> bool:

@@ -1,5 +1,7 @@
 """Pictures from files, through OpenImageIO: whole, turned upright, linear."""
 
+import contextlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -7,7 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit._image_choice import FULL_SCALE, Choice, check_kind, check_size, choose
-from sssfit._image_files import check_png, found_format
+from sssfit._image_files import called, check_png, found_format, without_lines_of_libpng
+from sssfit._image_header import Header, read_header
+from sssfit._image_primaries import matrix_to_bt709
 from sssfit._image_srgb import srgb_decode
 from sssfit._material_checks import printable
 from sssfit.errors import FileError
@@ -21,42 +25,78 @@ FloatArray = npt.NDArray[np.float64]
 # In EXR headers, as text: so that a written picture can be read again without naming its scale.
 SCALE_KEY = "sssfit:mm_per_pixel"
 _LONGEST_REASON = 120
+# TIFF's numbers; how libtiff ends its word on one that it lacks.
+_COMPRESSIONS = {
+    32946: "deflate",
+    34661: "JBIG",
+    34712: "JPEG 2000",
+    34887: "LERC",
+    34925: "LZMA",
+    50000: "Zstandard (zstd)",
+    50001: "WebP",
+    50002: "JPEG XL",
+    52546: "JPEG XL",
+}
+_NOT_BUILT = ("compression support is not configured", "decoding is not implemented")
 
 
-def read_image(path: Path, largest_bytes: float) -> dict[str, Any]:
+def read_image(path: Path, layer: str | None, largest_bytes: float) -> dict[str, Any]:
     """Return the fields of an `Image`; see `sssfit.image.load_image`."""
-    if found_format(path) == "png":
+    format = found_format(path)
+    if format == "png":
         check_png(path)
+    header = read_header(path, format)
     try:
-        choice, stored = _stored(path, largest_bytes)
-        whole = _upright(_in_window(stored, choice.spec), choice.spec)
-        pixels, alpha, done = _linear(whole, choice)
-        scale = finite_number(choice.spec.get_string_attribute(SCALE_KEY)) or 0.0
+        with without_lines_of_libpng() if format == "png" else contextlib.nullcontext():
+            choice, stored = _stored(path, layer, largest_bytes)
+        spec = choice.spec
+        whole = _upright(_in_window(stored, spec), spec)
+        colour, alpha, is_multiplied, done = _linear(whole, choice)
+        light, divided = _without_factors(colour, header)
+        primaries = header.primaries or _chromaticities(spec)
+        pixels, converted = _in_our_primaries(light, choice, primaries, path)
+        scale = finite_number(spec.get_string_attribute(SCALE_KEY)) or 0.0
         return {
             "pixels": pixels,
             "channels": choice.names,
             "mm_per_pixel": scale if scale > 0.0 else None,
             "alpha": alpha,
+            "alpha_is_multiplied": is_multiplied,
             "name": path.name,
-            "notes": (*choice.notes, *_about_file(choice.spec), *done),
+            "notes": (
+                *(*choice.notes, *_about_file(spec), *done),
+                *(*divided, *converted),
+            ),
         }
     except UnicodeDecodeError:  # bytes of a damaged header, in what the library hands on or says
-        raise FileError(f"{path} is damaged (a word in its header is not text).") from None
+        raise FileError(f"{called(path)} is damaged (a word in its header is not text).") from None
 
 
-def _stored(path: Path, largest_bytes: float) -> tuple[Choice, npt.NDArray[Any]]:
+def _stored(path: Path, layer: str | None, largest_bytes: float) -> tuple[Choice, npt.NDArray[Any]]:
     """Return what is read of a file, and its numbers as they lie there."""
     source = _open(path)
     try:
-        choice = choose(source, path)
+        choice = choose(source, path, layer)
         check_kind(choice, path)
         check_size(choice, path, largest_bytes)
         stored = source.read_image(choice.part, 0, *choice.span, "unknown")
         if stored is None:
-            raise FileError(f"{path} is damaged or cut short ({_one_line(source.geterror())}).")
+            raise _unreadable(path, choice.spec, one_line(source.geterror()))
         return choice, stored
     finally:
         source.close()
+
+
+def _unreadable(path: Path, spec: "ImageSpec", words: str) -> FileError:
+    """Tell a compression that the library was built without from a damaged file."""
+    if not words.endswith(_NOT_BUILT):
+        return FileError(f"{called(path)} is damaged or cut short ({words}).")
+    code = spec.get_int_attribute("tiff:Compression")
+    name = _COMPRESSIONS.get(code, f"scheme {code}")
+    return FileError(
+        f"{called(path)} is compressed by {name}, which the reader of pictures was built without; "
+        "save it with LZW, ZIP or no compression."
+    )
 
 
 def _open(path: Path) -> "ImageInput":
@@ -68,15 +108,15 @@ def _open(path: Path) -> "ImageInput":
     try:
         source = OpenImageIO.ImageInput.open(str(path), config)
     except TypeError:  # what a name that is not UTF-8 becomes
-        raise FileError(
-            f"{printable(str(path))} has a name that is not UTF-8; rename it."
-        ) from None
+        raise FileError(f"{called(path)} has a name that is not UTF-8; rename it.") from None
     if source is None:
-        raise FileError(f"{path} is damaged or cut short ({_one_line(OpenImageIO.geterror())}).")
+        raise FileError(
+            f"{called(path)} is damaged or cut short ({one_line(OpenImageIO.geterror())})."
+        )
     return source
 
 
-def _one_line(text: str) -> str:
+def one_line(text: str) -> str:
     """Shorten what the library says to one line."""
     line = printable(text.strip().partition("\n")[0]).rstrip(".")
     return line if len(line) <= _LONGEST_REASON else f"{line[:_LONGEST_REASON]}..."
@@ -129,28 +169,76 @@ def _about_file(spec: "ImageSpec") -> list[str]:
     return notes
 
 
+def _without_factors(colour: FloatArray, header: Header) -> tuple[FloatArray, list[str]]:
+    """Take the factors of a Radiance header out of the light, and say which."""
+    notes = []
+    if header.exposure != 1.0:
+        notes.append(f"divided by the exposure of {header.exposure:.4g} in its header")
+    if set(header.correction) != {1.0}:
+        words = " ".join(f"{each:.4g}" for each in header.correction)
+        notes.append(f"divided by the colour correction of {words} in its header")
+    if not notes:
+        return colour, []
+    with np.errstate(over="ignore"):  # what becomes infinite is refused later
+        return colour / (header.exposure * np.array(header.correction)), notes
+
+
+def _chromaticities(spec: "ImageSpec") -> tuple[float, ...] | None:
+    """Return those of an EXR's header; None where there are none, or they are something else."""
+    found = spec.getattribute("chromaticities")
+    is_usual = isinstance(found, tuple) and len(found) == 8
+    return tuple(float(each) for each in found) if is_usual else None
+
+
 def _linear(
     whole: npt.NDArray[Any], choice: Choice
-) -> tuple[FloatArray, FloatArray | None, list[str]]:
-    """Return linear colour, alpha, and what was done, in words."""
+) -> tuple[FloatArray, FloatArray | None, bool, list[str]]:
+    """Return linear colour, alpha, whether it is in the colour, and what was done, in words."""
     spec, first = choice.spec, choice.span[0]
     colour = _as_float64(whole[..., [place - first for place in choice.colours]])
-    alpha, notes = None, []
+    alpha, is_multiplied, notes = None, False, []
     if choice.alpha is not None:
         alpha = _as_float64(whole[..., choice.alpha - first])
         is_multiplied = not spec.get_int_attribute("oiio:UnassociatedAlpha")
         notes.append(_about_alpha(is_multiplied, choice.bits))
         if is_multiplied and choice.bits:  # the curve of sRGB belongs to the colour without alpha
             safe = np.where(alpha > 0.0, alpha, 1.0)[..., None]
-            colour = np.minimum(colour / safe, 1.0)
-    if choice.bits is None:
-        return colour, alpha, notes
+            colour, is_multiplied = np.minimum(colour / safe, 1.0), False
     space = spec.get_string_attribute("oiio:ColorSpace")
+    if choice.bits is None:
+        if space and not space.startswith("lin"):
+            notes.append(f"colour space {printable(space)} of the file taken for linear")
+        return colour, alpha, is_multiplied, notes
     if space.startswith("lin"):
-        return colour, alpha, [*notes, f"{choice.bits}-bit, linear as the file says"]
+        return colour, alpha, is_multiplied, [*notes, f"{choice.bits}-bit, linear as the file says"]
     if gamma := spec.get_float_attribute("oiio:Gamma"):
         notes.append(f"gamma {gamma:.3g} of the file taken for sRGB")
-    return srgb_decode(colour), alpha, [*notes, f"{choice.bits}-bit sRGB decoded to linear"]
+    elif space and not space.startswith("srgb"):
+        notes.append(f"colour space {printable(space)} of the file taken for sRGB")
+    notes.append(f"{choice.bits}-bit sRGB decoded to linear")
+    return srgb_decode(colour), alpha, is_multiplied, notes
+
+
+def _in_our_primaries(
+    colour: FloatArray, choice: Choice, primaries: Sequence[float] | None, path: Path
+) -> tuple[FloatArray, list[str]]:
+    """Return R, G, B in the primaries of sRGB, and what was done, in words.
+
+    A colour outside the triangle of ours would have negative light, which no surface receives.
+    """
+    if primaries is None or choice.names != ("R", "G", "B"):
+        return colour, []
+    if (matrix := matrix_to_bt709(primaries, called(path))) is None:
+        return colour, []
+    words = " ".join(f"{each:.4g}" for each in primaries)
+    notes = [f"converted from the chromaticities {words} to those of sRGB"]
+    converted = colour @ matrix.T
+    is_outside = (converted < 0.0) & (colour >= 0.0).all(axis=-1, keepdims=True)
+    if is_outside.any():
+        notes.append(
+            f"{int(is_outside.sum())} of {colour.size} values outside sRGB's triangle set to 0"
+        )
+    return np.where(is_outside, 0.0, converted), notes
 
 
 def _as_float64(stored: npt.NDArray[Any]) -> FloatArray:

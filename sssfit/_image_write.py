@@ -1,5 +1,6 @@
 """Pictures to bytes, through OpenImageIO; the same picture gives the same bytes."""
 
+import contextlib
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
@@ -8,7 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._image_read import SCALE_KEY
+from sssfit._image_files import without_lines_of_libpng
+from sssfit._image_read import SCALE_KEY, one_line
 from sssfit.errors import FileError
 from sssfit.files import reason
 
@@ -22,8 +24,10 @@ def image_bytes(
     format: str,
     channels: Sequence[str],
     mm_per_pixel: float | None,
+    has_alpha: bool,
+    is_multiplied: bool,
 ) -> bytes:
-    """Return the whole file of (H, W, C) float32, or uint16 for PNG.
+    """Return the whole file of (H, W, C) float32, or uint16 for PNG; alpha is the last channel.
 
     The library writes to names only, so a folder of our own takes the file first.
 
@@ -39,7 +43,9 @@ def image_bytes(
         width, height, count, pixels.dtype.name.replace("float32", "float")
     )
     spec.channelnames = tuple(channels)
-    spec.alpha_channel = -1
+    spec.alpha_channel = count - 1 if has_alpha else -1
+    if has_alpha and not is_multiplied:
+        spec.attribute("oiio:UnassociatedAlpha", 1)  # what it gets is what it writes
     if format == "png":
         spec.attribute("oiio:ColorSpace", "srgb_rec709_scene")
     else:
@@ -55,8 +61,13 @@ def image_bytes(
             # Other layouts in memory are refused.
             packed = np.ascontiguousarray(pixels)
             assert target is not None  # these formats are part of the library
-            if not (target.open(str(path), spec) and target.write_image(packed) and target.close()):
-                raise FileError(f"the picture cannot be written: {target.geterror().strip()}.")
+            with without_lines_of_libpng() if format == "png" else contextlib.nullcontext():
+                is_written = (
+                    target.open(str(path), spec) and target.write_image(packed) and target.close()
+                )
+            if not is_written:
+                said = one_line(target.geterror())
+                raise FileError(f"the picture cannot be written: {said}.")
             return path.read_bytes()
     except OSError as error:
         raise FileError(f"the picture cannot be written: {reason(error)}.") from error

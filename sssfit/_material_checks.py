@@ -144,6 +144,12 @@ def check_texts(name: object, source: object) -> None:
         )
     if not isinstance(source, str):
         raise MaterialError(f"source = {shown(source)} is not a text; write it in quotes.")
+    try:
+        source.encode()
+    except UnicodeEncodeError:
+        raise MaterialError(
+            f"source = {shown(source)} has characters that UTF-8 does not; type them again."
+        ) from None
 
 
 def check_channels(channels: object) -> None:
@@ -162,6 +168,15 @@ def check_channels(channels: object) -> None:
             raise MaterialError(f"channels[{k}] = {shown(channel)}; expected a name in quotes.")
         if channel in channels[:k]:
             raise MaterialError(f"channels[{k}] = {shown(channel)} is there twice; rename one.")
+
+
+def check_layers(layers: object, kind: type) -> None:
+    """Check for a list of layers and nothing else."""
+    if not isinstance(layers, (list, tuple)):
+        raise MaterialError(f"layers = {shown(layers)}; expected a list of layers.")
+    for k, layer in enumerate(layers):
+        if not isinstance(layer, kind):
+            raise MaterialError(f"layers[{k}] = {shown(layer)}; expected a Layer.")
 
 
 def check_stack(layers: Sequence["Layer"], channels: Sequence[str], eta_below: float) -> None:

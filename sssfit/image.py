@@ -1,7 +1,8 @@
 """Pictures of linear light, to and from EXR, TIFF and PNG files; Radiance HDR is read too.
 
 What is read is known by its content. 8- and 16-bit pictures are decoded from sRGB, floating point
-is linear as it stands; what was done to a file's numbers stands in `Image.notes`.
+is linear; light comes back in the primaries of sRGB. What was done to a file's numbers stands in
+`Image.notes`.
 """
 
 import dataclasses
@@ -13,13 +14,23 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit._image_choice import LARGEST_BYTES
-from sssfit._image_files import FORMATS, image_format, is_image_file
+from sssfit._image_files import FORMATS, as_path, called, image_format, is_image_file
 from sssfit._image_read import read_image
 from sssfit._image_srgb import srgb_decode, srgb_encode
-from sssfit._image_values import as_float32, channel_names, check_values, png_codes
+from sssfit._image_values import (
+    as_float32,
+    as_format_has_it,
+    as_light,
+    channel_names,
+    check_alpha,
+    check_values,
+    png_codes,
+    positive,
+)
 from sssfit._image_write import image_bytes
-from sssfit.errors import FileError
-from sssfit.files import write_atomically
+from sssfit._material_checks import shown
+from sssfit.errors import FileError, RenderError
+from sssfit.files import reason, write_atomically
 
 __all__ = [
     "Image",
@@ -48,38 +59,66 @@ class Image:
         Size of a pixel; None where the file does not say.
     alpha : array (H, W), optional
         Coverage, kept apart from the colour.
+    alpha_is_multiplied : bool
+        Whether ``pixels`` hold the light times the coverage, as in an EXR.
     name : str
         The file's name without its folder.
     notes : tuple of str
         What was done to the file's numbers, in words for stderr.
+
+    Raises
+    ------
+    RenderError
+        An array does not hold real numbers, or has another shape.
     """
 
     pixels: FloatArray
     channels: tuple[str, ...]
     mm_per_pixel: float | None = None
     alpha: FloatArray | None = None
+    alpha_is_multiplied: bool = False
     name: str = ""
     notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        for field in ("pixels", "alpha"):
-            if (values := getattr(self, field)) is not None:
-                kept = np.array(values, dtype=np.float64, order="C")
-                kept.setflags(write=False)
-                object.__setattr__(self, field, kept)
+        self._store("pixels", 3)
+        if self.alpha is not None:
+            self._store("alpha", 2)
+            if self.alpha.shape != self.pixels.shape[:2]:
+                raise RenderError(
+                    f"alpha of shape {self.alpha.shape} for a picture of {self.pixels.shape[:2]}; "
+                    "expected the same rows and columns."
+                )
+
+    def _store(self, field: str, dimensions: int) -> None:
+        """Keep an array read-only, in the order of C."""
+        kept = np.array(as_light(getattr(self, field), field), order="C")
+        if kept.ndim != dimensions:
+            raise RenderError(
+                f"{field} of shape {kept.shape}; expected {dimensions} dimensions: rows, columns"
+                f"{' and channels' if dimensions == 3 else ''}."
+            )
+        kept.setflags(write=False)
+        object.__setattr__(self, field, kept)
 
 
-def load_image(path: str | Path, *, largest_bytes: float = LARGEST_BYTES) -> Image:
+def load_image(
+    path: str | Path, *, layer: str | None = None, largest_bytes: float = LARGEST_BYTES
+) -> Image:
     """Read a picture as linear light.
 
-    EXR: R, G, B of the first part that has them, else Y, else all channels; its window of data is
-    put into the picture's, black around. Palettes become RGB, grey stays one channel.
+    EXR: R, G, B of the first part that has them, or of the only layer that has, else Y, else all
+    channels; its window of data is put into the picture's, black around. Palettes become RGB, grey
+    stays one channel. Primaries other than those of sRGB are converted, white staying white: the
+    chromaticities of an EXR, PRIMARIES of a Radiance file, cHRM of a PNG. Values that would fall
+    below 0 then are set to 0. Radiance's EXPOSURE and COLORCORR are taken out of the light.
 
     Parameters
     ----------
     path : str or Path
-        An EXR, Radiance HDR, TIFF or PNG file, whatever its ending. The EXPOSURE line of an HDR
-        file is not heeded.
+        An EXR, Radiance HDR, TIFF or PNG file, by its content and not by its ending.
+    layer : str, optional
+        Of an EXR: what stands before the last dot in its channels' names, or the name of a part.
     largest_bytes : float [bytes]
         Refuse pictures that would need more to be rendered, 32 bytes for each of their values.
 
@@ -87,17 +126,26 @@ def load_image(path: str | Path, *, largest_bytes: float = LARGEST_BYTES) -> Ima
     -------
     Image
         8- and 16-bit numbers sRGB-decoded (IEC 61966-2-1) unless the file says that they are
-        linear, floating point as it stands; turned upright.
+        linear; turned upright.
 
     Raises
     ------
     FileError
-        Missing, unreadable, damaged, cut short or of another format.
+        Missing, unreadable, damaged, cut short, of another format, or compressed in a way that
+        the library was built without.
     RenderError
-        Too large, without channels that can be used, or with NaN, infinite or negative values.
+        Too large, without channels that can be used, with several layers and none of them named,
+        or with NaN, infinite or negative values.
     """
-    image = Image(**read_image(Path(path), largest_bytes))
-    check_values(image.pixels, image.channels, str(path), negative=False)
+    source = as_path(path)
+    largest = positive(largest_bytes, "largest_bytes")
+    if layer is not None and not isinstance(layer, str):
+        raise RenderError(f"layer = {shown(layer)}; expected a name.")
+    image = Image(**read_image(source, layer, largest))
+    origin = called(source)
+    check_values(image.pixels, image.channels, origin, negative=False)
+    if image.alpha is not None:
+        check_values(image.alpha[..., None], ("alpha",), origin, negative=True)
     return image
 
 
@@ -109,11 +157,14 @@ def save_image(
     format: str | None = None,
     exposure: float = 1.0,
     mm_per_pixel: float | None = None,
+    alpha: npt.ArrayLike | None = None,
+    alpha_is_multiplied: bool = False,
 ) -> tuple[str, ...]:
     """Write linear light: float32 to EXR or TIFF as it is, 16-bit sRGB to PNG.
 
-    A PNG holds ``exposure`` times the light, clipped to 0 to 1 and sRGB-encoded. Files are written
-    whole or not at all, and the same picture gives the same bytes.
+    A PNG holds ``exposure`` times the light, clipped to 0 to 1 and sRGB-encoded. With alpha, an EXR
+    holds the light times it and a PNG the light without it, as these formats have it; a TIFF says
+    which. Files are written whole or not at all, and the same picture gives the same bytes.
 
     Parameters
     ----------
@@ -129,6 +180,10 @@ def save_image(
         Factor for PNG; the other formats keep the light as it is.
     mm_per_pixel : float, optional [mm]
         Kept in the header of an EXR, from where `load_image` takes it.
+    alpha : array (H, W), optional
+        Coverage, for pictures of 1 or 3 channels.
+    alpha_is_multiplied : bool
+        Whether ``pixels`` hold the light times the coverage.
 
     Returns
     -------
@@ -144,19 +199,38 @@ def save_image(
     """
     chosen = format or image_format(target)
     if chosen not in FORMATS:
-        raise FileError(f"format {chosen!r}: pictures are written as {', '.join(FORMATS)}.")
-    light = np.asarray(pixels, dtype=np.float64)
+        raise FileError(f"format {shown(chosen)}: pictures are written as {', '.join(FORMATS)}.")
+    light = as_light(pixels, "the picture")
+    exposure = positive(exposure, "exposure")
+    pitch = None if mm_per_pixel is None else positive(mm_per_pixel, "mm_per_pixel")
     names = channel_names(light, channels, chosen)
     check_values(light, names, "the picture", negative=True)
+    coverage = None if alpha is None else check_alpha(alpha, light, names)
+    light, is_multiplied, done = as_format_has_it(light, coverage, alpha_is_multiplied, chosen)
     values: npt.NDArray[np.uint16] | npt.NDArray[np.float32]
-    notes: tuple[str, ...] = ()
+    clipped: tuple[str, ...] = ()
     if chosen == "png":
-        values, notes = png_codes(light, exposure)
+        values, clipped = png_codes(light, exposure, coverage)
     else:
-        values = as_float32(light, exposure)
-    data = image_bytes(values, format=chosen, channels=names, mm_per_pixel=mm_per_pixel)
+        values = as_float32(light, exposure, coverage)
+    data = image_bytes(
+        values,
+        format=chosen,
+        channels=names if coverage is None else (*names, "A"),
+        mm_per_pixel=pitch,
+        has_alpha=coverage is not None,
+        is_multiplied=is_multiplied,
+    )
     if isinstance(target, str | Path):
-        write_atomically(Path(target), lambda stream: stream.write(data))
+        _write(as_path(target), data)
     else:
         target.write(data)
-    return notes
+    return (*done, *clipped)
+
+
+def _write(path: Path, data: bytes) -> None:
+    """Write the whole file or nothing."""
+    try:
+        write_atomically(path, lambda stream: stream.write(data))
+    except OSError as error:  # a name that no file system takes
+        raise FileError(f"{called(path)} cannot be written: {reason(error)}.") from None

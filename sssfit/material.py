@@ -37,6 +37,7 @@ from sssfit._material_checks import (
     FloatArray,
     check_channels,
     check_clear_or_not,
+    check_layers,
     check_lengths,
     check_not_per_cm,
     check_stack,
@@ -185,6 +186,7 @@ class Material:
     def __post_init__(self) -> None:
         check_texts(self.name, self.source)
         check_channels(self.channels)
+        check_layers(self.layers, Layer)
         _store(self, channels=tuple(self.channels), layers=tuple(self.layers))
         for key in ("eta_above", "eta_below"):
             _store(self, **{key: number(key, getattr(self, key), "eta")})
@@ -338,6 +340,8 @@ def parse_material(text: str, origin: str) -> Material:
         One line with the origin, the key, what it holds, what was expected and what to do.
     """
     with located(f"{printable(origin)}: "):
+        if not isinstance(text, str):
+            raise MaterialError(f"{shown(text)} is not a text; expected the TOML of a material.")
         head, tables = read_tables(text)
         dense = head.pop("dense", False)
         layers = tuple(_layer_from_table(table, where, dense=dense) for where, table in tables)

@@ -1,7 +1,9 @@
 """Slow, literal oracles, written apart from the library and sharing no code with it.
 
 - ``scalar_walk``: one photon at a time, in double precision, every collision booked as it happens.
-- ``chandrasekhar_total``: total reflectance of an index-matched half space from the H function.
+- ``chandrasekhar_total``, ``chandrasekhar_diffuse_total``: total reflectance of an index-matched
+  half space from the H function, for normal and for diffuse light; ``diffuse_light_walk`` for the
+  latter under a surface, ``duntley_specular`` for what that reflects itself.
 - ``single_scattering_cumulative``: photons that leave after exactly one collision.
 - ``xoshiro128pp``: the generator in Python integers.
 """
@@ -96,11 +98,10 @@ def scalar_walk(seed, photons, albedo, mean_free_path, eta, dr, annuli):
     return bins, squares, hits, once, once_squares, absorbed, unfinished, roulette
 
 
-def chandrasekhar_total(albedo, nodes=200):
-    """1 - H(1) sqrt(1 - albedo): normal incidence, index-matched, isotropic scattering.
+def _chandrasekhar_h(albedo, nodes):
+    """H on Gauss nodes (Chandrasekhar 1960, Radiative Transfer, chapter V): mu, weights, H.
 
-    H from its equation 1/H(mu) = sqrt(1-a) + a/2 int_0^1 mu' H(mu') / (mu + mu') dmu', iterated
-    on Gauss nodes (Chandrasekhar 1960, Radiative Transfer, chapter V).
+    1/H(mu) = sqrt(1-a) + a/2 int_0^1 mu' H(mu') / (mu + mu') dmu', iterated.
     """
     x, w = np.polynomial.legendre.leggauss(nodes)
     mu, weights = (x + 1.0) / 2.0, w / 2.0
@@ -112,8 +113,72 @@ def chandrasekhar_total(albedo, nodes=200):
         if np.max(np.abs(new - h)) < 1e-14:
             break
         h = (h + new) / 2.0
+    return mu, weights, h
+
+
+def chandrasekhar_total(albedo, nodes=200):
+    """1 - H(1) sqrt(1 - albedo): normal incidence, index-matched, isotropic scattering."""
+    mu, weights, h = _chandrasekhar_h(albedo, nodes)
+    root = math.sqrt(1.0 - albedo)
     h_one = 1.0 / (root + albedo / 2.0 * np.sum(weights * mu * h / (1.0 + mu)))
     return 1.0 - h_one * root
+
+
+def chandrasekhar_diffuse_total(albedo, nodes=200):
+    """1 - 2 sqrt(1 - albedo) int_0^1 H(mu) mu dmu: the same under diffuse light from above."""
+    mu, weights, h = _chandrasekhar_h(albedo, nodes)
+    return 1.0 - 2.0 * math.sqrt(1.0 - albedo) * np.sum(weights * mu * h)
+
+
+def duntley_specular(eta):
+    """Fresnel's reflectance of diffuse light from outside (Duntley 1942, J. Opt. Soc. Am. 32)."""
+    n, squared = eta, eta * eta
+    return (
+        0.5
+        + (n - 1.0) * (3.0 * n + 1.0) / (6.0 * (n + 1.0) ** 2)
+        + squared * (squared - 1.0) ** 2 / (squared + 1.0) ** 3 * math.log((n - 1.0) / (n + 1.0))
+        - 2.0 * n**3 * (squared + 2.0 * n - 1.0) / ((squared + 1.0) * (n**4 - 1.0))
+        + 8.0 * n**4 * (n**4 + 1.0) / ((squared + 1.0) * (n**4 - 1.0) ** 2) * math.log(n)
+    )
+
+
+@numba.njit(error_model="numpy")
+def diffuse_light_walk(seed, photons, albedo, eta):
+    """Photons of diffuse light, one by one, all weights 1 or 0: what becomes of each.
+
+    The directions outside are those of uniform radiance, cosine sqrt(u); surface, flights and
+    absorption are drawn. Returns the numbers of photons reflected at the surface, and of those
+    that entered and left again.
+    """
+    np.random.seed(seed)
+    specular = left = 0
+    for _ in range(photons):
+        cos_out = math.sqrt(1.0 - np.random.random())
+        cos_in = math.sqrt(1.0 - (1.0 - cos_out * cos_out) / (eta * eta))
+        r_s = (cos_out - eta * cos_in) / (cos_out + eta * cos_in)
+        r_p = (eta * cos_out - cos_in) / (eta * cos_out + cos_in)
+        if np.random.random() < (r_s * r_s + r_p * r_p) / 2.0:
+            specular += 1
+            continue
+        z, uz = 0.0, cos_in
+        while True:
+            z -= uz * math.log(1.0 - np.random.random())
+            if z < 0.0:
+                sin_t = eta * math.sqrt(max(0.0, 1.0 - uz * uz))
+                reflectance = 1.0
+                if sin_t < 1.0:
+                    cos_t = math.sqrt(1.0 - sin_t * sin_t)
+                    r_s = (eta * -uz - cos_t) / (eta * -uz + cos_t)
+                    r_p = (-uz - eta * cos_t) / (-uz + eta * cos_t)
+                    reflectance = (r_s * r_s + r_p * r_p) / 2.0
+                if np.random.random() >= reflectance:
+                    left += 1
+                    break
+                z = -z  # a mirror: what is left of the flight goes down as far
+            if np.random.random() >= albedo:
+                break
+            uz = 2.0 * np.random.random() - 1.0
+    return specular, left
 
 
 def fresnel(cos_inside, eta):

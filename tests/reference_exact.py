@@ -73,6 +73,17 @@ def escape(depth, k, eta):
     return 0.5 * _over_directions(integrand, eta)
 
 
+def single_scattering_of_diffuse(eta):
+    """Once scattered, of diffuse light of 1, for albedo 1: 4 eta^2 int E^2 dz, E by its definition.
+
+    Radiance 1/pi outside is eta^2 (1 - R_F)/pi inside (Snell); 2 pi of it over dmu are collisions.
+    """
+    value, _ = integrate.quad(
+        lambda z: 4.0 * eta**2 * escape(z, 0.0, eta) ** 2, 0.0, 40.0, epsabs=1e-10, limit=200
+    )
+    return value
+
+
 def double_scattering(k, eta, nodes=14):
     """Rhat of light scattered twice, for albedo 1: int int C0(z') [K_d + K_r] E(z) dz' dz.
 

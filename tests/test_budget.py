@@ -20,6 +20,7 @@ from sssfit.compare.judge import judge
 from sssfit.compare.metrics import COLOUR_FIGURES
 from sssfit.errors import FitError, KernelError, RenderError, SimulationError
 from sssfit.fit import fit_svd
+from sssfit.kernel import SeparableKernel
 from sssfit.material import load_material, parse_material
 from sssfit.profile import Profile
 from sssfit.render.irradiance import make_scene
@@ -399,3 +400,25 @@ def test_wrong_usage_is_one_line(capsys, arguments, code, says):
     found, printed = run(capsys, *arguments)
     assert found == code
     assert says in printed.err
+
+
+@pytest.mark.parametrize(
+    ("sign", "steps"),
+    # .3 / .5 of 255 is 153, .1237 / .5 is 63.09; of 127 they are 76.2 and 31.4.
+    [(1.0, [63.0, 153.0, 255.0, 153.0, 63.0]), (-1.0, [-31.0, -76.0, -127.0, -76.0, -31.0])],
+)
+def test_8_bits_are_whole_steps_of_the_largest_weight(sign, steps):
+    kernel = SeparableKernel(
+        method="by hand",
+        mm_per_pixel=0.1,
+        channels=("Y",),
+        signs=np.ones((1, 1)),
+        weights=sign * np.array([0.1237, 0.3, 0.5, 0.3, 0.1237])[None, :, None],
+        relative_frobenius_error=np.zeros(1),
+        energy_error=np.zeros(1),
+        scale=np.ones(1),
+        parameters={},
+        meta={},
+    )
+    found = stored(kernel, "8-bit").weights.ravel() / 0.5 * max(np.abs(steps))
+    np.testing.assert_allclose(found, steps, rtol=0, atol=1e-9)

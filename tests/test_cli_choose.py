@@ -172,6 +172,38 @@ def test_a_picture_of_ones_own_takes_the_pitch():
     assert figures["pictures"][0]["mm_per_pixel"] == figures["mm_per_pixel"]
 
 
+def test_layer_and_mask_of_a_file_change_what_is_judged(monkeypatch):
+    from sssfit.compare import choose as module
+
+    seen = []
+
+    def stop(material, *, scene, **settings):
+        seen.append(scene)
+        raise RenderError("seen")
+
+    monkeypatch.setattr(module, "choose", stop)
+    pixels = np.random.default_rng(1).random((16, 16, 7))
+    names = ["a.R", "a.G", "a.B", "b.R", "b.G", "b.B", "b.A"]
+    pixels[:, :8, 6], pixels[:, 8:, 6] = 0.25, 1.0
+    save_image("mine.exr", pixels, channels=names, mm_per_pixel=0.5)
+    given = ("skin1", *SMALL, "--irradiance", "mine.exr", "--layer", "b")
+    for options in ((), ("--mask", "alpha")):
+        assert CliRunner().invoke(cli, ["choose", *given, *options]).exit_code == 1
+    plain, masked = seen
+    np.testing.assert_allclose(plain.irradiance, pixels[..., 3:6], rtol=1e-6)
+    assert plain.mask is None
+    assert masked.mask.tolist() == [[0] * 8 + [1] * 8] * 16
+    np.testing.assert_allclose(masked.irradiance[:, 8:], pixels[:, 8:, 3:6], rtol=1e-6)
+
+
+@pytest.mark.parametrize("option", [("--layer", "a"), ("--mask", "alpha")])
+@pytest.mark.parametrize("picture", ["head", "disk"])
+def test_options_of_files_are_not_for_made_pictures(capsys, option, picture):
+    status, lines = failed(capsys, "skin1", *SMALL, "--irradiance", picture, *option)
+    assert status == 2
+    assert f"{option[0]} is for pictures from files" in lines[-1]
+
+
 def test_the_kernel_goes_to_stdout_and_words_to_stderr():
     result = ended("skin1", *EDGE, "-o", "-", "-v")
     assert json.loads(result.stdout)["format"] == "sssfit.kernel/1"

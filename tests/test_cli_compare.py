@@ -18,6 +18,7 @@ from sssfit.cli._compare_table import is_table_file
 from sssfit.cli._options import Common
 from sssfit.compare import pareto
 from sssfit.compare.candidates import candidates
+from sssfit.errors import RenderError
 from sssfit.image import save_image
 from sssfit.material import load_material
 from sssfit.render.irradiance import make_scene
@@ -149,6 +150,31 @@ def test_a_picture_brings_its_pixel_size(run, tmp_path):
     ]
     again = json.loads(run("skin1", "--picture", "mine.exr", "--mm-per-pixel", "3", "--json"))
     assert again["mm_per_pixel"] == 3.0
+
+
+def test_layer_and_mask_of_a_file(run, tmp_path, monkeypatch):
+    seen = []
+
+    def stop(profile, scenes, mm_per_pixel, wish):
+        seen.append(scenes)
+        raise RenderError("seen")
+
+    monkeypatch.setattr("sssfit.cli._compare_pareto._compared", stop)
+    pixels = np.random.default_rng(1).random((16, 16, 7))
+    names = ["a.R", "a.G", "a.B", "b.R", "b.G", "b.B", "b.A"]
+    pixels[:, :8, 6], pixels[:, 8:, 6] = 0.25, 1.0
+    save_image(tmp_path / "mine.exr", pixels, channels=names, mm_per_pixel=2.0)
+    given = ("skin1", "--only", "kernels", "--picture", "mine.exr,disk", "--size", "16x16")
+    for options in (("--layer", "b"), ("--layer", "b", "--mask", "alpha")):
+        run(*given, *options, status=1)
+    (plain, disk), (masked, masked_disk) = seen
+    np.testing.assert_allclose(plain.irradiance, pixels[..., 3:6], rtol=1e-6)
+    assert plain.mask is None
+    assert masked.mask.tolist() == [[0] * 8 + [1] * 8] * 16
+    assert disk.mask is masked_disk.mask is None
+    for option in (("--layer", "b"), ("--mask", "alpha")):
+        words = run("skin1", "--picture", "disk", *option, status=2)
+        assert f"{option[0]} is for pictures from files" in words
 
 
 def test_a_picture_without_pixel_size_or_of_one_colour_is_refused(run, tmp_path):

@@ -243,3 +243,37 @@ def test_no_color_is_honoured_on_a_terminal(tmp_path):
     assert not [
         each for each in colours if re.search(rb"[\[;](?:3[0-8]|4[0-8]|9\d|10\d)[;m]", each)
     ]
+
+
+MATPLOTLIBRC = "no_such_key: 5\nbackend: nonsense\nfont.size: large?\n"
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"HOME": "{there}/file", "MPLCONFIGDIR": "{there}/file/x"},  # nowhere to keep its fonts
+        {"MPLBACKEND": "nonsense"},
+        {"MPLBACKEND": ""},
+        {"MPLCONFIGDIR": "{there}/config"},
+    ],
+)
+@pytest.mark.parametrize(
+    "module",
+    ["sssfit.chart", "colour"],  # what draws, and what judges colours: both import matplotlib
+)
+def test_matplotlib_says_nothing_and_draws_without_a_display(tmp_path, changed, module):
+    (tmp_path / "file").write_text("in the way of a folder")
+    (tmp_path / "config").mkdir()
+    (tmp_path / "config" / "matplotlibrc").write_text(MATPLOTLIBRC)
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("MPL")}
+    environment |= {key: value.format(there=tmp_path) for key, value in changed.items()}
+    body = f"""
+    import importlib
+    importlib.import_module("{module}")
+    from matplotlib import font_manager
+    import matplotlib
+    print(matplotlib.get_backend().lower())
+    """
+    with start(body, env=environment) as program:
+        out, err = program.communicate()
+    assert (program.returncode, out.strip(), err) == (0, "agg", "")

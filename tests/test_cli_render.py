@@ -1,5 +1,6 @@
 """``sssfit render``: pictures out, figures of what was lost, one line for what is wrong."""
 
+import dataclasses
 import json
 import shutil
 from pathlib import Path
@@ -10,6 +11,7 @@ import pytest
 from reference_pixels import make_profile
 
 from sssfit.cli import main
+from sssfit.compare.judge import judge
 from sssfit.fit import fit_svd
 from sssfit.image import load_image, save_image
 from sssfit.kernel import SeparableKernel
@@ -214,6 +216,91 @@ def test_a_file_must_say_its_pixels(run):
     status, _, words = run("render", "--irradiance", "mine.png", "--mm-per-pixel", ".3")
     assert status == 1
     assert "fit the kernel at" in words
+
+
+COVERED = np.repeat([[0.0, 0.25, 0.75, 1.0]], 10, axis=1).repeat(24, axis=0)
+
+
+def lit(channels=3):
+    """A picture of light with alpha; no two pixels alike."""
+    return np.random.default_rng(1).random((24, 40, channels))
+
+
+@pytest.mark.parametrize("ending", ["exr", "tif", "png"])
+def test_alpha_of_a_file_goes_into_the_result_and_the_truth(run, folder, ending):
+    save_image("mine.png", lit(), alpha=COVERED)
+    kernel = SeparableKernel.load(KERNEL)
+    light = load_image("mine.png").pixels
+    plain = render_separable(Scene("mine", light, 0.2), kernel)
+    files = ("-o", f"out.{ending}", "--truth", f"true.{ending}", "--difference", "lost.exr")
+    given = ("--irradiance", "mine.png", "--mm-per-pixel", 0.2, "--exposure", 1)
+    status, _, words = run("render", *given, *files)
+    assert status == 0, words
+    found, truth = load_image(f"out.{ending}"), load_image(f"true.{ending}")
+    for each in (found, truth):
+        np.testing.assert_allclose(each.alpha, COVERED, atol=1e-5)
+    wanted = plain * COVERED[..., None] if ending == "exr" else plain
+    np.testing.assert_allclose(found.pixels, np.clip(wanted, 0.0, None), atol=2e-5)
+    assert load_image("lost.exr").alpha is None
+    assert ("multiplied by alpha" in words) is (ending == "exr")
+
+
+def test_alpha_serves_as_the_mask(run, folder):
+    save_image("mine.exr", lit(), alpha=COVERED, mm_per_pixel=0.2)
+    inside = COVERED >= 0.5
+    scene = Scene("mine", np.where(inside[..., None], lit(), 0.0), 0.2, mask=inside)
+    kernel, profile = SeparableKernel.load(KERNEL), Profile.load("wax.profile.npz")
+    result = judge(scene, kernel, profile)
+    status, out, _ = run(
+        "render", "--irradiance", "mine.exr", "--mask", "alpha", "-o", "out.tif", "--json"
+    )
+    assert status == 0
+    figures = json.loads(out)
+    assert figures["delta_e_2000_mean"] == pytest.approx(result.score.delta_e_2000_mean, rel=1e-3)
+    found = load_image("out.tif")
+    np.testing.assert_allclose(found.pixels, result.picture, atol=1e-6)
+    assert (found.pixels[~inside] == 0.0).all()
+    np.testing.assert_allclose(found.alpha, COVERED)
+    status, out, _ = run("render", "--irradiance", "mine.exr", "-o", "all.tif", "--json")
+    whole = json.loads(out)["delta_e_2000_mean"]
+    assert abs(whole - figures["delta_e_2000_mean"]) > 0.01
+
+
+def test_a_layer_of_a_file_is_chosen(run, folder):
+    two = np.concatenate((lit(), 0.5 * lit()[:, ::-1]), axis=2)
+    names_of_two = [f"{layer}.{channel}" for layer in ("a", "b") for channel in "RGB"]
+    save_image("mine.exr", two, channels=names_of_two, mm_per_pixel=0.2)
+    status, _, words = run("render", "--irradiance", "mine.exr")
+    assert status == 1
+    assert "has the layers a, b; name the one" in words
+    assert run("render", "--irradiance", "mine.exr", "--layer", "b", "-o", "out.exr")[0] == 0
+    light = np.float32(two[..., 3:]).astype(float)
+    wanted = render_separable(Scene("mine", light, 0.2), SeparableKernel.load(KERNEL))
+    np.testing.assert_allclose(load_image("out.exr").pixels, wanted, atol=1e-6)
+
+
+def test_options_of_files_are_refused_where_they_would_do_nothing(run, folder):
+    for option in (("--layer", "a"), ("--mask", "alpha")):
+        status, _, words = run("render", "--irradiance", "disk", *SIZE, *option)
+        assert status == 2
+        assert f"{option[0]} is for pictures from files" in words
+    save_image("mine.exr", lit(), mm_per_pixel=0.2)
+    status, _, words = run("render", "--irradiance", "mine.exr", "--mask", "alpha")
+    assert status == 1
+    assert "mine.exr has no alpha that could be the mask" in words
+
+
+def test_alpha_that_no_file_can_hold_is_left_out(run, folder):
+    profile = Profile.load("wax.profile.npz")
+    two = dataclasses.replace(
+        fit_svd(profile, rank=1, mm_per_pixel=0.2).kernel, channels=("A", "R", "G")
+    )
+    two.save("odd.kernel.json")
+    (folder / "wax.profile.npz").unlink()  # its channels are others
+    save_image("mine.exr", lit(1), alpha=COVERED, mm_per_pixel=0.2)
+    status, _, words = run("render", "odd.kernel.json", "--irradiance", "mine.exr", "-o", "out.exr")
+    assert status == 0, words
+    assert "alpha left out beside the channels A, R, G" in words
 
 
 def test_foreign_files_stay(run, folder):

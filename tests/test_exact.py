@@ -2,6 +2,7 @@
 
 import threading
 import warnings
+from dataclasses import replace
 
 import checks
 import checks_exact
@@ -15,15 +16,21 @@ from sssfit.errors import SimulationError, SssfitWarning, StoppedError
 from sssfit.grid import make_grid
 from sssfit.material import Layer, Material, load_material
 from sssfit.profile import Profile
-from sssfit.simulate._depth import decay_rate, respond
+from sssfit.simulate import exact
+from sssfit.simulate._depth import _Equation, decay_rate, respond, respond_to_diffuse_light
 from sssfit.simulate._mixture import mixture_of
-from sssfit.simulate._single import single_scattering_beyond
+from sssfit.simulate._single import (
+    single_scattering_beyond,
+    single_scattering_of_diffuse_light,
+)
+from sssfit.simulate._surface import entering
 from sssfit.simulate.exact import (
     _LEVELS,
     _Answer,
     _errors,
     _stderr,
     diffuse_reflectance,
+    entering_light,
     simulate_exact,
     simulate_exact_many,
 )
@@ -37,6 +44,65 @@ def test_totals_are_chandrasekhars():
     np.testing.assert_allclose(diffuse_reflectance(albedos, 1.0), theory, rtol=0, atol=1e-8)
     profile = simulate_exact(checks.medium(1.0 - np.array(albedos), np.array(albedos), 1.0))
     np.testing.assert_allclose(profile.diffuse_reflectance, theory, rtol=0, atol=1e-5)
+
+
+def test_totals_under_diffuse_light_are_chandrasekhars():
+    albedos = [0.0, 0.1, 0.5, 0.9, 0.99, 0.999]
+    theory = [reference.chandrasekhar_diffuse_total(each) for each in albedos]
+    found = diffuse_reflectance(albedos, 1.0, light="diffuse")
+    np.testing.assert_allclose(found, theory, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize(("eta", "albedo", "seed"), [(1.3, 0.9, 1), (1.3, 0.5, 2), (2.0, 0.9, 3)])
+def test_totals_under_diffuse_light_are_a_literal_walks(eta, albedo, seed):
+    photons = 2_000_000
+    specular, left = np.array(reference.diffuse_light_walk(seed, photons, albedo, eta)) / photons
+    for share, expected in (
+        (specular, 1.0 - entering_light(eta, "diffuse")),
+        (left, diffuse_reflectance([albedo], eta, light="diffuse")[0]),
+    ):
+        stderr = np.sqrt(share * (1.0 - share) / photons)
+        assert abs(share - expected) < checks.LIMIT * stderr
+
+
+@pytest.mark.parametrize("eta", [1.001, 1.1, 1.3, 1.5, 2.0, 4.0])
+def test_the_surface_reflects_of_diffuse_light_what_duntley_says(eta):
+    assert 1.0 - entering_light(eta, "diffuse") == pytest.approx(
+        reference.duntley_specular(eta), abs=1e-10
+    )
+    assert entering_light(eta) == pytest.approx(1.0 - ((eta - 1.0) / (eta + 1.0)) ** 2, abs=1e-15)
+
+
+@pytest.mark.parametrize("eta", [1.0, 1.0001, 1.3, 2.0, 4.0])
+def test_energy_of_diffuse_light_is_conserved_at_every_albedo(eta):
+    albedos = np.array([0.0, 0.001, 0.3, 0.9, 0.999, 0.99999, 1.0 - 1e-12, 1.0])
+    response = respond_to_diffuse_light(eta, albedos, _LEVELS[3].depth)
+    total = diffuse_reflectance(albedos, eta, light="diffuse")
+    np.testing.assert_allclose(
+        total + response.absorbed, entering_light(eta, "diffuse"), rtol=0, atol=5e-8
+    )
+
+
+def test_single_scattering_of_diffuse_light_is_its_closed_form():
+    assert single_scattering_of_diffuse_light(1.0) == pytest.approx(
+        2.0 / 3.0 * (1.0 - np.log(2.0)), abs=1e-10
+    )
+    for eta in (1.3, 2.0):
+        # At albedo 1e-7 what is scattered twice is some 1e-7 of what is scattered once.
+        found = diffuse_reflectance([1e-7], eta, light="diffuse")[0] / 1e-7
+        assert found == pytest.approx(reference_exact.single_scattering_of_diffuse(eta), rel=1e-6)
+
+
+def test_light_along_the_normal_and_view_along_it_change_places():
+    # Helmholtz: what leaves along the normal under diffuse light is R_d of a beam along it.
+    eta, albedo = 1.3, 0.9
+    equation = _Equation.of(0.0, eta, _LEVELS[2].depth)
+    depths, weights = equation.panels.nodes.ravel(), equation.panels.weights.ravel()
+    seen = replace(equation, escape=entering(eta) * np.exp(-depths) / (4.0 * eta**2))
+    first = 4.0 * eta**2 * equation.escape
+    multiple = seen.solve(first, np.array([albedo])).multiple[0]
+    once = albedo * np.sum(weights * first * seen.escape)
+    assert multiple + once == pytest.approx(diffuse_reflectance([albedo], eta)[0], abs=1e-7)
 
 
 def test_total_is_giovanellis():
@@ -167,6 +233,24 @@ def test_standard_errors_cover_annuli_and_sums():
     # Annuli differ by -0.1, 0.1, 0.1 and what lies beyond by -0.1, while F is off by 0.1 at most.
     np.testing.assert_allclose(stderr, 0.1)
     assert (np.sqrt(np.cumsum(stderr**2)) >= np.maximum.accumulate(errors)).all()
+
+
+def test_the_error_is_never_below_the_energy_that_is_missing():
+    answer = _Answer(np.array([1.0, 0.7, 0.4, 0.1]), 0.0, 0.05)
+    np.testing.assert_array_equal(_errors(answer, answer), 0.05)
+
+
+def test_energy_that_is_missing_counts_as_error(monkeypatch):
+    material = checks.medium(0.3, 0.7, 1.3)
+    total = simulate_exact(material).diffuse_reflectance[0]
+    # Three thousandths of the light are said to have come in that neither leave nor are absorbed.
+    monkeypatch.setattr(exact, "entering", lambda eta: entering(eta) + 0.003)
+    profile = simulate_exact(material, tolerance=0.1)
+    assert profile.meta["relative_error"] == pytest.approx(0.003 / total, rel=1e-3)
+    np.testing.assert_allclose(profile.meta["energy_balance_stderr"], 0.003, rtol=1e-3)
+    assert (profile.diffuse_reflectance_stderr >= 0.00299).all()
+    with pytest.raises(SimulationError, match="cannot be met"):
+        simulate_exact(material, tolerance=0.01)
 
 
 def test_similarity_is_on_record():
@@ -305,10 +389,20 @@ def test_a_material_that_is_none_is_refused():
         simulate_exact("skin1")
 
 
+@pytest.mark.parametrize("light", ["normal", "diffuse"])
 @pytest.mark.parametrize(("albedo", "eta"), [(1.1, 1.3), (-0.1, 1.3), (np.nan, 1.3), (0.5, 0.9)])
-def test_totals_out_of_range_are_refused(albedo, eta):
+def test_totals_out_of_range_are_refused(albedo, eta, light):
     with pytest.raises(SimulationError, match="expected"):
-        diffuse_reflectance([albedo], eta)
+        diffuse_reflectance([albedo], eta, light=light)
+
+
+def test_a_light_of_another_name_is_refused():
+    for call in (
+        lambda: diffuse_reflectance([0.5], 1.3, light="x"),
+        lambda: entering_light(1, "x"),
+    ):
+        with pytest.raises(SimulationError, match=r"light = 'x'; expected normal or diffuse\."):
+            call()
 
 
 def test_it_can_be_stopped():

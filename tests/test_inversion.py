@@ -4,6 +4,7 @@ import io
 import json
 import sys
 
+import checks
 import numpy as np
 import pytest
 import reference
@@ -14,13 +15,14 @@ from sssfit.cli import main
 from sssfit.errors import MaterialError
 from sssfit.material import load_material, parse_material
 from sssfit.simulate import simulate_exact
-from sssfit.simulate.exact import diffuse_reflectance
+from sssfit.simulate.exact import LIGHTS, diffuse_reflectance, entering_light
 from sssfit.simulate.inversion import (
     chiang_albedo,
     invert_reflectance,
     largest_reflectance,
     material_from_reflectance,
     published_inversions,
+    reflectance_of,
     van_de_hulst_albedo,
 )
 
@@ -117,10 +119,101 @@ def test_van_de_hulsts_inverse_undoes_his_formula(g):
     np.testing.assert_allclose(van_de_hulst_albedo(colour, g), albedo, atol=5e-5)
 
 
-def test_the_published_ones_come_with_what_they_really_reflect():
-    for each in published_inversions([0.44, 0.23], 1.3).values():
-        np.testing.assert_array_equal(each.reflectance, diffuse_reflectance(each.albedo, 1.3))
-        assert (each.reflectance < [0.40, 0.20]).all()  # neither knows of the surface
+@pytest.mark.parametrize(
+    ("light", "published"),
+    # R / (1 - R_sp) and the two published formulas, by hand; under diffuse light R is that share.
+    [
+        ("normal", {"van_de_hulst": [0.883040, 0.669708, 0.470580]}),
+        ("diffuse", {"van_de_hulst": [0.878312, 0.663546, 0.464995]}),
+    ],
+)
+def test_the_published_albedos_of_skin(light, published):
+    asked = [0.44, 0.23, 0.13]
+    found = published_inversions(asked, 1.3, light=light)
+    np.testing.assert_allclose(found["van_de_hulst"].albedo, published["van_de_hulst"], atol=5e-7)
+    a = np.array(asked)
+    chiang = 1 - np.exp(-5.09406 * a + 2.61188 * a**2 - 4.31805 * a**3)
+    np.testing.assert_allclose(found["chiang2016"].albedo, chiang, atol=1e-15)
+
+
+def test_what_the_published_ones_really_reflect_is_a_literal_walks():
+    photons = 200_000
+    for seed, found in enumerate(published_inversions([0.44, 0.23, 0.13], 1.3).values()):
+        bins, squares, *_, roulette = reference.scalar_walk(
+            seed, photons, found.albedo, np.ones(3), 1.3, 1.0, 1
+        )
+        total = bins.sum(axis=0) / photons
+        variance = squares.sum(axis=0) / photons - total**2 + roulette / photons
+        sigmas = (found.reflectance - total) / np.sqrt(variance / photons)
+        assert np.abs(sigmas).max() < checks.LIMIT
+
+
+@pytest.mark.parametrize(
+    ("light", "theory"),
+    [
+        ("normal", reference.chandrasekhar_total),
+        ("diffuse", reference.chandrasekhar_diffuse_total),
+    ],
+)
+def test_what_they_reflect_without_a_surface_is_chandrasekhars(light, theory):
+    for found in published_inversions([0.44, 0.23, 0.13], 1.0, light=light).values():
+        expected = [theory(each) for each in found.albedo]
+        np.testing.assert_allclose(found.reflectance, expected, rtol=0, atol=1e-7)
+
+
+def test_the_published_ones_are_right_for_diffuse_light_and_no_surface():
+    asked = np.array([0.44, 0.23, 0.13])
+    errors = {}
+    for light, eta in (("diffuse", 1.0), ("normal", 1.0), ("normal", 1.3)):
+        found = published_inversions(asked, eta, light=light)
+        errors[light, eta] = np.array([each.reflectance / asked - 1.0 for each in found.values()])
+    assert np.abs(errors["diffuse", 1.0]).max() < 0.02
+    assert -0.21 < errors["normal", 1.0].min() < errors["normal", 1.0].max() < -0.13
+    assert errors["normal", 1.3].max() < -0.40  # what is left is the surface's
+
+
+def test_van_de_hulsts_albedos_under_diffuse_light():
+    # Computed apart, with the H function.
+    albedo = van_de_hulst_albedo(np.array([0.1, 0.3, 0.5]))
+    np.testing.assert_allclose(
+        reflectance_of(albedo, 1.0, "diffuse"), [0.10178, 0.30172, 0.50076], rtol=0, atol=5e-6
+    )
+
+
+def test_half_under_diffuse_light_without_a_surface():
+    (albedo,) = invert_reflectance([0.5], 1.0, light="diffuse").albedo
+    assert albedo == pytest.approx(0.911336, abs=5e-7)
+    assert reference.chandrasekhar_diffuse_total(albedo) == pytest.approx(0.5, abs=1e-7)
+
+
+def test_under_diffuse_light_a_base_colour_comes_back_from_what_enters():
+    colours, eta, photons = [0.44, 0.23, 0.13], 1.3, 1_000_000
+    for seed, (albedo, colour) in enumerate(
+        zip(invert_reflectance(colours, eta, light="diffuse").albedo, colours, strict=True)
+    ):
+        specular, left = reference.diffuse_light_walk(seed, photons, albedo, eta)
+        entered = photons - specular
+        sigma = np.sqrt(colour * (1.0 - colour) / entered)
+        assert abs(left / entered - colour) < checks.LIMIT * sigma
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+@pytest.mark.parametrize("eta", [1.0, 1.3, 2.0])
+def test_black_and_white_under_either_light(light, eta):
+    most = largest_reflectance(eta, light)
+    assert most == pytest.approx(entering_light(eta) if light == "normal" else 1.0, abs=1e-15)
+    found = invert_reflectance([0.0, most], eta, light=light)
+    np.testing.assert_allclose(found.albedo, [0.0, 1.0], rtol=0, atol=1e-7)
+
+
+def test_white_is_the_largest_base_colour_and_lights_have_names():
+    with pytest.raises(
+        MaterialError, match=r"1\.01 cannot be reached; under diffuse light the lar"
+    ):
+        invert_reflectance([1.01], 1.3, light="diffuse")
+    for call in (invert_reflectance, published_inversions):
+        with pytest.raises(MaterialError, match=r"light = 'moon'; expected normal or diffuse\."):
+            call([0.4], 1.3, light="moon")
 
 
 def test_a_material_says_what_was_asked_for_and_reflects_it():
@@ -165,6 +258,35 @@ def test_json_has_the_figures(run):
     np.testing.assert_allclose(figures["reflectance"], [0.44, 0.23, 0.13], atol=1e-6)
     assert figures["albedo"] == pytest.approx(invert_reflectance([0.44, 0.23, 0.13], 1.3).albedo)
     assert set(figures["approximations"]) == {"chiang2016", "van_de_hulst"}
+
+
+def test_light_is_chosen(run, tmp_path):
+    status, out, _ = run(*ASKED, "--eta", "1.3", "--light", "diffuse", "-o", "mine.toml", "--json")
+    assert status == 0
+    figures = json.loads(out)
+    assert (figures["light"], figures["largest_reflectance"]) == ("diffuse", 1.0)
+    colours = [0.44, 0.23, 0.13]
+    expected = invert_reflectance(colours, 1.3, light="diffuse").albedo
+    np.testing.assert_allclose(figures["albedo"], expected, rtol=1e-12)
+    np.testing.assert_allclose(figures["reflectance"], colours, atol=1e-6)
+    totals = simulate_exact(load_material(tmp_path / "mine.toml")).diffuse_reflectance
+    np.testing.assert_allclose(figures["reflectance_normal"], totals, atol=1e-5)
+    published = published_inversions(colours, 1.3, light="diffuse")
+    for key, each in published.items():
+        assert figures["approximations"][key]["reflectance"] == pytest.approx(each.reflectance)
+    assert "base colour under diffuse light 0.44, 0.23, 0.13" in source_of_file(tmp_path)
+    _, out, _ = run(*ASKED, "--eta", "1.3", "--light", "diffuse", "-o", "mine.toml")
+    assert "could reflect up to 1 under diffuse light" in out
+    row = out.splitlines()[2].split()
+    assert row[:4] == ["R", "0.440000", f"{totals[0]:.6f}", f"{expected[0]:.6f}"]
+    _, out, _ = run(*ASKED, "--eta", "1.3", "-o", "mine.toml", "--json")
+    assert json.loads(out)["light"] == "normal"
+    run(*ASKED, "--eta", "1.3", "--light", "normal", "-o", "mine.toml", "--json")
+    assert "diffuse reflectance 0.44, 0.23, 0.13" in source_of_file(tmp_path)
+
+
+def source_of_file(folder):
+    return load_material(folder / "mine.toml").source
 
 
 def test_percents_units_and_one_mean_free_path_for_all(run, tmp_path):
@@ -222,6 +344,8 @@ def test_only_files_of_its_own_are_replaced(run, tmp_path):
         (ASKED, 2, "needs --mean-free-path and --eta"),
         ((*ASKED[:2], "--eta", "1.3"), 2, "needs --mean-free-path and --eta"),
         (("--eta", "1.3"), 2, "--eta is for --from-reflectance"),
+        (("--light", "diffuse"), 2, "--light is for --from-reflectance"),
+        ((*ASKED, "--eta", "1.3", "--light", "moon"), 2, "'moon' is not one of"),
         (("skin1", "-o", "a.toml"), 2, "--output is for --from-reflectance"),
         (("skin1", *ASKED, "--eta", "1.3"), 2, "makes a material; name none"),
         ((*ASKED, "--eta", "1.3", "--toml"), 2, "makes a material; name none"),

@@ -578,3 +578,36 @@ def test_round_trips_give_an_equal_material(material):
 def test_shipped_files_equal_their_own_toml():
     for name in material_names():
         assert parse_material(load_material(name).to_toml(), "x.toml") == load_material(name)
+
+
+LAYER = Layer(1.3, 0.0, [0.1], [0.9])
+
+
+@pytest.mark.parametrize(
+    ("layers", "words"),
+    [
+        (None, "layers = None; expected a list of layers"),
+        ("L", "layers = 'L'; expected a list of layers"),
+        (LAYER, "expected a list of layers"),
+        ((5,), r"layers\[0\] = 5; expected a Layer"),
+        ((LAYER, "L"), r"layers\[1\] = 'L'; expected a Layer"),
+        (({"eta": 1.3},), r"layers\[0\] = \{'eta': 1\.3\}; expected a Layer"),
+    ],
+)
+def test_a_stack_is_of_layers(layers, words):
+    with pytest.raises(MaterialError, match=words) as caught:
+        Material("x", ("c",), layers)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("text", [None, 5, b"x = 1", ["x"]])
+def test_what_is_no_text_is_no_material(text):
+    with pytest.raises(MaterialError, match=r"here: .* is not a text; expected the TOML"):
+        parse_material(text, "here")
+
+
+def test_a_source_can_be_written():
+    with pytest.raises(
+        MaterialError, match=r"source = '\\udc80' has characters that UTF-8 does not"
+    ):
+        Material("x", ("c",), (LAYER,), source="\udc80")

@@ -1,14 +1,21 @@
 """What a kernel is applied to: an irradiance picture, with its geometry where it has one."""
 
 import dataclasses
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from sssfit._image_values import as_light, positive
 from sssfit.errors import RenderError
 
+if TYPE_CHECKING:
+    from sssfit.image import Image
+
 FloatArray = npt.NDArray[np.float64]
+
+_MOST_OBJECTS = 2**31 - 1  # numbers of 32 bits
+_HALF = 0.5  # of coverage: a pixel of an outline belongs to what covers more of it
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -37,6 +44,10 @@ class Scene:
         How far light travels inside the object to this point from the light's side.
     back_irradiance : array (H, W, C) or (H, W, 1), optional
         Irradiance where that light enters.
+    alpha : array (H, W), optional
+        Coverage of a picture from a file: carried along for what is written, never blurred.
+    alpha_is_multiplied : bool
+        Whether the irradiance holds the light times the coverage.
 
     Raises
     ------
@@ -53,19 +64,61 @@ class Scene:
     specular: FloatArray | None = None
     thickness_mm: FloatArray | None = None
     back_irradiance: FloatArray | None = None
+    alpha: FloatArray | None = None
+    alpha_is_multiplied: bool = False
+
+    @classmethod
+    def from_image(
+        cls, image: "Image", mm_per_pixel: float, *, alpha_is_mask: bool = False
+    ) -> "Scene":
+        """Return a picture from a file as irradiance on a flat surface.
+
+        Parameters
+        ----------
+        image : Image
+            Of ``sssfit.image.load_image``.
+        mm_per_pixel : float [mm]
+        alpha_is_mask : bool
+            The object is what alpha covers by half or more: there the light is taken without
+            alpha; all else is dark and of mask 0.
+
+        Raises
+        ------
+        RenderError
+            Alpha is to be the mask, and there is none, or it covers nothing.
+        """
+        # Renderers' filters leave some alpha a little below 0.
+        alpha = None if image.alpha is None else np.maximum(image.alpha, 0.0)
+        if not alpha_is_mask:
+            return cls(
+                image.name,
+                image.pixels,
+                mm_per_pixel,
+                alpha=alpha,
+                alpha_is_multiplied=image.alpha_is_multiplied,
+            )
+        if alpha is None:
+            raise RenderError(f"{image.name} has no alpha that could be the mask.")
+        inside = alpha >= _HALF
+        if not inside.any():
+            raise RenderError(
+                f"{image.name}: alpha is under {_HALF:g} everywhere; nothing is left."
+            )
+        share = np.where(inside, alpha, 1.0) if image.alpha_is_multiplied else 1.0
+        light = np.where(inside[..., None], image.pixels / np.expand_dims(share, -1), 0.0)
+        return cls(image.name, light, mm_per_pixel, mask=inside.astype(np.int32), alpha=alpha)
 
     def __post_init__(self) -> None:
-        if np.ndim(self.irradiance) != 3 or 0 in np.shape(self.irradiance):
+        shape = as_light(self.irradiance, f"{self.name}: irradiance").shape
+        if len(shape) != 3 or 0 in shape:
             raise RenderError(
-                f"{self.name}: irradiance of shape {np.shape(self.irradiance)}; expected rows, "
-                "columns and channels, at least one of each."
+                f"{self.name}: irradiance of shape {shape}; expected rows, columns and channels, "
+                "at least one of each."
             )
-        if not (np.isfinite(self.mm_per_pixel) and self.mm_per_pixel > 0.0):
-            raise RenderError(
-                f"{self.name}: mm_per_pixel = {self.mm_per_pixel:g}; expected a length above 0."
-            )
+        positive(self.mm_per_pixel, f"{self.name}: mm_per_pixel")
         for field in ("irradiance", "specular", "thickness_mm", "back_irradiance", "depth_mm"):
             self._store(field, np.float64)
+        self._store("alpha", np.float64)
         self._store("mask", np.int32)
 
     def _store(self, field: str, dtype: npt.DTypeLike) -> None:
@@ -73,7 +126,7 @@ class Scene:
         given = getattr(self, field)
         if given is None:
             return
-        values = np.array(given, dtype=dtype)
+        values = as_light(given, f"{self.name}: {field}")
         if values.shape[:2] != np.shape(self.irradiance)[:2]:
             raise RenderError(
                 f"{self.name}: {field} is {values.shape[:2]} and irradiance "
@@ -87,8 +140,13 @@ class Scene:
             raise RenderError(
                 f"{self.name}: {field} has {count} {what} values; expected numbers from 0 up."
             )
-        values.setflags(write=False)
-        object.__setattr__(self, field, values)
+        if field == "mask" and ((values % 1.0 != 0.0) | (values > _MOST_OBJECTS)).any():
+            raise RenderError(
+                f"{self.name}: mask holds other values than whole numbers up to {_MOST_OBJECTS}."
+            )
+        kept = values.astype(dtype)
+        kept.setflags(write=False)
+        object.__setattr__(self, field, kept)
 
     def corner(self, pixels: int) -> "Scene":
         """Return the scene's upper left corner, so many pixels wide and high."""

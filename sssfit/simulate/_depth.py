@@ -118,33 +118,68 @@ def respond(k: float, eta: float, albedos: FloatArray, resolution: Resolution) -
     Response
         For a beam of energy 1 that meets the surface along the normal.
     """
-    panels = _panels(math.sqrt(1.0 + k * k), resolution)
-    z, weights = panels.nodes.ravel(), panels.weights.ravel()
-    escape, tables = _tables(k, eta, panels, resolution)
-    matrix = kernel_matrix(
-        panels.edges,
-        panels.nodes,
-        panels.weights,
-        panels.barycentric,
-        np.stack(gauss(resolution.rule), axis=1),
-        math.sqrt(1.0 + k * k),
-        is_matched(eta),
-        tables,
-    )
-    first = entering(eta) * np.exp(-z)
-    below = panels.edges[-1] - z
-    multiple, absorbed = np.empty(len(albedos)), np.empty(len(albedos))
-    for i, albedo in enumerate(albedos):
-        nu = math.hypot(k, decay_rate(albedo))
-        system = np.eye(z.size) - albedo * matrix
-        tail = np.outer(_tail(below, k, nu), panels.last_value)
-        system[:, -resolution.order :] -= albedo * tail
-        density = np.linalg.solve(system, first)
-        deepest = float(panels.last_value @ density[-resolution.order :])
-        deep = deepest * (1.0 - albedo) / nu if nu > 0.0 else 0.0
-        multiple[i] = albedo * np.sum(weights * (density - first) * escape)
-        absorbed[i] = (1.0 - albedo) * np.sum(weights * density) + deep
-    return Response(multiple, absorbed)
+    equation = _Equation.of(k, eta, resolution)
+    return equation.solve(entering(eta) * np.exp(-equation.panels.nodes.ravel()), albedos)
+
+
+def respond_to_diffuse_light(eta: float, albedos: FloatArray, resolution: Resolution) -> Response:
+    """Solve the depth equation for light of the same radiance from everywhere above.
+
+    Parameters are those of `respond`. Light of radiance 1/pi brings energy 1 to a unit of area; in
+    the cone below it is eta^2 (1 - R_F)/pi, so that its first collisions have the density
+    4 eta^2 E(z) (docs/theory.md).
+    """
+    equation = _Equation.of(0.0, eta, resolution)
+    return equation.solve(4.0 * eta**2 * equation.escape, albedos)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Equation:
+    """The depth equation of one wavenumber and index on its nodes (N), whatever light comes in.
+
+    ``escape`` (N,) is E at the nodes, ``matrix`` (N, N) the integral over K_d + K_r on the panels.
+    """
+
+    wavenumber: float
+    panels: _Panels
+    escape: FloatArray
+    matrix: FloatArray
+
+    @classmethod
+    def of(cls, k: float, eta: float, resolution: Resolution) -> "_Equation":
+        """Set it up."""
+        panels = _panels(math.sqrt(1.0 + k * k), resolution)
+        escape, tables = _tables(k, eta, panels, resolution)
+        matrix = kernel_matrix(
+            panels.edges,
+            panels.nodes,
+            panels.weights,
+            panels.barycentric,
+            np.stack(gauss(resolution.rule), axis=1),
+            math.sqrt(1.0 + k * k),
+            is_matched(eta),
+            tables,
+        )
+        return cls(k, panels, escape, matrix)
+
+    def solve(self, first: FloatArray, albedos: FloatArray) -> Response:
+        """Solve for a density (N,) of first collisions, which falls at least like exp(-z)."""
+        panels, k = self.panels, self.wavenumber
+        z, weights = panels.nodes.ravel(), panels.weights.ravel()
+        order = panels.last_value.size
+        below = panels.edges[-1] - z
+        multiple, absorbed = np.empty(len(albedos)), np.empty(len(albedos))
+        for i, albedo in enumerate(albedos):
+            nu = math.hypot(k, decay_rate(albedo))
+            system = np.eye(z.size) - albedo * self.matrix
+            tail = np.outer(_tail(below, k, nu), panels.last_value)
+            system[:, -order:] -= albedo * tail
+            density = np.linalg.solve(system, first)
+            deepest = float(panels.last_value @ density[-order:])
+            deep = deepest * (1.0 - albedo) / nu if nu > 0.0 else 0.0
+            multiple[i] = albedo * np.sum(weights * (density - first) * self.escape)
+            absorbed[i] = (1.0 - albedo) * np.sum(weights * density) + deep
+        return Response(multiple, absorbed)
 
 
 def _panels(kappa: float, resolution: Resolution) -> _Panels:

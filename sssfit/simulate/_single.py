@@ -14,9 +14,10 @@ import math
 
 import numpy as np
 
-from sssfit.simulate._surface import FloatArray, entering, transmitted
+from sssfit.simulate._surface import Cone, FloatArray, entering, transmitted
 
 _REACH = 3.2  # the rule's last nodes lie 1e-16 of the range from its ends
+_DIRECTIONS = 96
 _RADII_AT_ONCE = 8192  # 8 MB of exponents at a time for 128 directions
 
 
@@ -49,6 +50,17 @@ def single_scattering_beyond(radii_mfp: FloatArray, eta: float, step: float) -> 
         for first in range(0, len(radii_mfp), _RADII_AT_ONCE)
     ]
     return np.concatenate(parts)
+
+
+def single_scattering_of_diffuse_light(eta: float) -> float:
+    """Return what leaves, once scattered, of light of the same radiance from everywhere above.
+
+    eta^2 int int (1 - R_F(mu)) (1 - R_F(mu')) mu mu' / (mu + mu') dmu dmu' over the cone, for
+    albedo 1 and incident light of 1. Without a surface that is 2/3 (1 - ln 2).
+    """
+    cone = Cone.of(eta, _DIRECTIONS)
+    part = cone.weight * cone.cosine
+    return eta**2 * float(part @ (1.0 / np.add.outer(cone.cosine, cone.cosine)) @ part)
 
 
 def _angles(eta: float, step: float) -> tuple[FloatArray, FloatArray]:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 FloatArray = npt.NDArray[np.float64]
 
 MATCHED = 1e-9  # relative indices nearer to 1 reflect less than 1e-18: no surface at all
+_DIRECTIONS = 96  # 1e-13 of Duntley's closed form for indices from 1.0001 to 4
 
 
 def is_matched(eta: float) -> bool:
@@ -24,6 +25,15 @@ def is_matched(eta: float) -> bool:
 def entering(eta: float) -> float:
     """Share 1 - R_sp of a normally incident beam that gets in."""
     return 1.0 - ((eta - 1.0) / (eta + 1.0)) ** 2
+
+
+def entering_of_diffuse(eta: float) -> float:
+    """Share 1 - R_sp that gets in of light of the same radiance from everywhere above.
+
+    R_sp = 2 int_0^1 R_F(mu) mu dmu outside; by Snell's law mu dmu is eta^2 times that inside.
+    """
+    cone = Cone.of(eta, _DIRECTIONS)
+    return 2.0 * eta**2 * float(cone.weight @ cone.cosine)
 
 
 def transmitted(cosine: FloatArray, eta: float) -> FloatArray:

@@ -17,6 +17,7 @@ import math
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -27,7 +28,13 @@ from sssfit.errors import SimulationError, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
-from sssfit.simulate._depth import Resolution, Response, decay_rate, respond
+from sssfit.simulate._depth import (
+    Resolution,
+    Response,
+    decay_rate,
+    respond,
+    respond_to_diffuse_light,
+)
 from sssfit.simulate._deterministic import (
     computed_profile,
     energies_from_beyond,
@@ -36,9 +43,15 @@ from sssfit.simulate._deterministic import (
 )
 from sssfit.simulate._mixture import mixture_of
 from sssfit.simulate._semi_infinite import relative_eta
-from sssfit.simulate._single import single_scattering_beyond
-from sssfit.simulate._surface import FloatArray, entering
+from sssfit.simulate._single import (
+    single_scattering_beyond,
+    single_scattering_of_diffuse_light,
+)
+from sssfit.simulate._surface import FloatArray, entering, entering_of_diffuse
 from sssfit.threads import available_cores
+
+Light = Literal["normal", "diffuse"]
+LIGHTS: tuple[Light, ...] = get_args(Light)
 
 DEFAULT_TOLERANCE = 1e-4
 _LARGEST_ETA = 4.0
@@ -162,8 +175,10 @@ def is_solver_compiled() -> bool:
     return compiled_before("transport", "kernel_matrix")
 
 
-def diffuse_reflectance(albedo: npt.ArrayLike, eta: float) -> FloatArray:
-    """Return the total diffuse reflectance of a half space for normally incident light.
+def diffuse_reflectance(
+    albedo: npt.ArrayLike, eta: float, *, light: Light = "normal"
+) -> FloatArray:
+    """Return the total diffuse reflectance of a half space.
 
     Parameters
     ----------
@@ -171,27 +186,44 @@ def diffuse_reflectance(albedo: npt.ArrayLike, eta: float) -> FloatArray:
         0 to 1.
     eta : float
         Relative refractive index, 1 to 4.
+    light : "normal" or "diffuse"
+        What it is lit by: a beam along the normal, or the same radiance from everywhere above.
 
     Returns
     -------
     (N,) array
-        Good to 1e-8; specular reflection is not part of it: albedo 1 gives 1 - R_sp.
+        A share of the incident light, good to 1e-8 (5e-8 for indices from 1 to 1.001); specular
+        reflection is not part of it: albedo 1 gives `entering_light`.
 
     Raises
     ------
     SimulationError
-        An albedo or index out of range.
+        An albedo or index out of range, or a light of another name.
     """
     albedos = np.atleast_1d(np.asarray(albedo, dtype=np.float64))
     if not ((albedos >= 0.0) & (albedos <= 1.0)).all():
         raise SimulationError(f"albedo = {albedo!r}; expected numbers from 0 to 1.")
-    if not 1.0 <= eta <= _LARGEST_ETA:
-        raise SimulationError(f"eta = {eta:g}; expected a relative refractive index from 1 to 4.")
+    _check_light(eta, light)
     level = _LEVELS[3]
-    once = single_scattering_beyond(np.zeros(1), eta, level.single_step)[0]
     with threadpool_limits(1, user_api="blas"):
-        total: FloatArray = albedos * once + respond(0.0, eta, albedos, level.depth).multiple
+        if light == "diffuse":
+            once = single_scattering_of_diffuse_light(eta)
+            response = respond_to_diffuse_light(eta, albedos, level.depth)
+        else:
+            once = float(single_scattering_beyond(np.zeros(1), eta, level.single_step)[0])
+            response = respond(0.0, eta, albedos, level.depth)
+    total: FloatArray = albedos * once + response.multiple
     return total
+
+
+def entering_light(eta: float, light: Light = "normal") -> float:
+    """Return 1 - R_sp, the share of the incident light that the surface lets in.
+
+    Parameters and errors are those of `diffuse_reflectance`. R_sp is ((eta - 1)/(eta + 1))^2 for
+    normal light; for diffuse light 2 int_0^1 R_F(mu) mu dmu seen from outside (Duntley 1942).
+    """
+    _check_light(eta, light)
+    return entering_of_diffuse(eta) if light == "diffuse" else entering(eta)
 
 
 @dataclass(frozen=True, slots=True)
@@ -367,6 +399,14 @@ def _check_settings(tolerance: float, threads: int) -> None:
         raise SimulationError(f"tolerance = {tolerance}; give a share of the total, 0 to 1.")
     if threads < 1:
         raise SimulationError(f"threads = {threads}; give at least 1.")
+
+
+def _check_light(eta: float, light: str) -> None:
+    """Refuse an index out of range and a light that is not known."""
+    if not 1.0 <= eta <= _LARGEST_ETA:
+        raise SimulationError(f"eta = {eta:g}; expected a relative refractive index from 1 to 4.")
+    if light not in LIGHTS:
+        raise SimulationError(f"light = {light!r}; expected {' or '.join(LIGHTS)}.")
 
 
 def _check_medium(material: Material) -> None:

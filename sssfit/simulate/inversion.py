@@ -1,10 +1,12 @@
 """Albedo inversion: from the diffuse reflectance that an artist asks for to a material that has it.
 
-The total diffuse reflectance R of a homogeneous half space depends on its albedo a and refractive
-index alone. The exact solver gives R(a) to 1e-8, and a root finder turns it round. In
-s = sqrt(1 - a), R is smooth and nearly straight all the way to s = 0, where in a its slope is
-infinite. The approximations that renderers use stand beside it: they are formulas, and forget the
-index or were fitted to walks of one setting. Next: ``sssfit.simulate.exact``.
+The total diffuse reflectance R of a homogeneous half space depends on its albedo a, its refractive
+index and the light that falls on it. What is asked for is R under normally incident light, as the
+profile of a pencil beam has it, or a base colour: the share that comes back of diffuse light that
+entered, R_d / (1 - R_sp), as a renderer shows it in a white furnace. The exact solver gives R(a) to
+1e-8, and a root finder turns it round. In s = sqrt(1 - a), R is smooth and nearly straight all the
+way to s = 0, where in a its slope is infinite. The formulas that renderers use stand beside it:
+they are right for diffuse light and no surface. Next: ``sssfit.simulate.exact``.
 
 Not imported with the other methods: scipy.optimize takes 0.2 s to load.
 """
@@ -21,30 +23,64 @@ from sssfit import __version__
 from sssfit._material_checks import check_channels, check_texts, number
 from sssfit.errors import MaterialError, SimulationError
 from sssfit.material import Layer, Material
-from sssfit.simulate.exact import diffuse_reflectance
+from sssfit.simulate.exact import LIGHTS, Light, diffuse_reflectance, entering_light
 
 FloatArray = npt.NDArray[np.float64]
 
 _CLOSE = 1e-8  # in reflectance; what the exact solver itself is good for
+_ASKED = {"normal": "diffuse reflectance", "diffuse": "base colour under diffuse light"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inversion:
     """Albedos (C,) that a method finds for diffuse reflectances, and what these really reflect.
 
-    ``reflectance`` (C,) is that of the exact solver; for the exact inversion it is what was asked.
+    ``reflectance`` (C,) is that of the exact solver, under the same light; for the exact inversion
+    it is what was asked.
     """
 
     albedo: FloatArray
     reflectance: FloatArray
 
 
-def largest_reflectance(eta: float) -> float:
-    """Return 1 - ((eta - 1) / (eta + 1))^2: all that enters comes back where nothing absorbs."""
-    return 1.0 - ((eta - 1.0) / (eta + 1.0)) ** 2
+def reflectance_of(albedo: npt.ArrayLike, eta: float, light: Light = "normal") -> FloatArray:
+    """Return what is asked for in an inversion, by the exact solver.
+
+    Parameters
+    ----------
+    albedo : (C,)
+        0 to 1; g = 0.
+    eta : float
+        Refractive index relative to what is above.
+    light : "normal" or "diffuse"
+        "normal": the total diffuse reflectance R_d under light along the normal, a share of the
+        incident light. "diffuse": the base colour R_d / (1 - R_sp), R_d and R_sp under the same
+        radiance from everywhere above; a share of the light that enters.
+
+    Returns
+    -------
+    (C,) array
+
+    Raises
+    ------
+    SimulationError
+        An argument out of range.
+    """
+    total = diffuse_reflectance(albedo, eta, light=light)
+    return total / entering_light(eta, light) if light == "diffuse" else total
 
 
-def invert_reflectance(reflectance: npt.ArrayLike, eta: float) -> Inversion:
+def largest_reflectance(eta: float, light: Light = "normal") -> float:
+    """Return `reflectance_of` albedo 1, where all light that enters comes back.
+
+    1 - ((eta - 1) / (eta + 1))^2 under normal light, 1 under diffuse light.
+    """
+    return 1.0 if light == "diffuse" else 1.0 - ((eta - 1.0) / (eta + 1.0)) ** 2
+
+
+def invert_reflectance(
+    reflectance: npt.ArrayLike, eta: float, *, light: Light = "normal"
+) -> Inversion:
     """Find the albedos of total diffuse reflectances, g = 0, by the exact solver.
 
     Solves R(1 - s^2) = reflectance for s in [0, 1], all channels at once, to 1e-8 in R.
@@ -52,9 +88,11 @@ def invert_reflectance(reflectance: npt.ArrayLike, eta: float) -> Inversion:
     Parameters
     ----------
     reflectance : (C,) [1]
-        Share of the incident light, specular reflectance not included; 0 to 1 - specular.
+        As in `reflectance_of`: from 0 to `largest_reflectance`.
     eta : float
         Refractive index relative to what is above.
+    light : "normal" or "diffuse"
+        Which light the reflectance is meant for; base colours mean diffuse light.
 
     Returns
     -------
@@ -63,20 +101,23 @@ def invert_reflectance(reflectance: npt.ArrayLike, eta: float) -> Inversion:
     Raises
     ------
     MaterialError
-        A reflectance that no albedo gives; the message names the largest that one does.
+        A reflectance that no albedo gives; the message names the largest that one does. A light
+        of another name.
 
     Examples
     --------
     >>> invert_reflectance([0.44], 1.3).albedo.round(4)
     array([0.9605])
+    >>> invert_reflectance([0.44], 1.3, light="diffuse").albedo.round(4)
+    array([0.954])
     """
-    asked = _reachable(reflectance, eta)
-    darkest, brightest = diffuse_reflectance(np.array([0.0, 1.0]), eta)
+    asked = _reachable(reflectance, eta, light)
+    darkest, brightest = reflectance_of(np.array([0.0, 1.0]), eta, light)
     # The solver's last digits may put its own ends a hair inside; the root is then that end.
     aim = np.clip(asked, darkest, brightest)
 
     def excess(s: FloatArray, /, wanted: FloatArray) -> FloatArray:
-        return diffuse_reflectance(1.0 - s**2, eta) - wanted
+        return reflectance_of(1.0 - s**2, eta, light) - wanted
 
     ends = np.zeros_like(aim), np.ones_like(aim)
     found = find_root(excess, ends, args=(aim,), tolerances={"fatol": _CLOSE})
@@ -85,18 +126,20 @@ def invert_reflectance(reflectance: npt.ArrayLike, eta: float) -> Inversion:
     return Inversion(1.0 - np.asarray(found.x) ** 2, aim + np.asarray(found.f_x))
 
 
-def published_inversions(reflectance: npt.ArrayLike, eta: float) -> dict[str, Inversion]:
+def published_inversions(
+    reflectance: npt.ArrayLike, eta: float, *, light: Light = "normal"
+) -> dict[str, Inversion]:
     """Return what the approximate inversions of renderers give, and what that really reflects.
 
     Parameters and errors are those of `invert_reflectance`; keys are "chiang2016" and
-    "van_de_hulst".
+    "van_de_hulst". The latter takes the share of the light that enters.
     """
-    asked = _reachable(reflectance, eta)
+    asked = _reachable(reflectance, eta, light)
     found = {
         "chiang2016": chiang_albedo(asked),
-        "van_de_hulst": van_de_hulst_albedo(asked / largest_reflectance(eta)),
+        "van_de_hulst": van_de_hulst_albedo(asked / largest_reflectance(eta, light)),
     }
-    real = diffuse_reflectance(np.concatenate(list(found.values())), eta)
+    real = reflectance_of(np.concatenate(list(found.values())), eta, light)
     return {
         key: Inversion(albedo, reflectance)
         for (key, albedo), reflectance in zip(
@@ -137,6 +180,7 @@ def material_from_reflectance(
     *,
     name: str,
     channels: Sequence[str],
+    light: Light = "normal",
 ) -> Material:
     """Make the half space, g = 0, whose total diffuse reflectance is what was asked for.
 
@@ -150,11 +194,13 @@ def material_from_reflectance(
     name : str
     channels : sequence of str
         C names.
+    light : "normal" or "diffuse"
+        As in `invert_reflectance`.
 
     Returns
     -------
     Material
-        Its ``source`` says which reflectance was asked for.
+        Its ``source`` says which reflectance was asked for, and under which light.
 
     Raises
     ------
@@ -163,7 +209,7 @@ def material_from_reflectance(
     """
     check_texts(name, "")  # all that can be wrong is said before the seconds of work
     check_channels(channels)
-    asked = _reachable(reflectance, eta)
+    asked = _reachable(reflectance, eta, light)
     paths_mm = np.atleast_1d(np.asarray(mean_free_path_mm, dtype=np.float64))
     if paths_mm.size not in (1, asked.size) or paths_mm.ndim > 1:
         raise MaterialError(
@@ -174,25 +220,30 @@ def material_from_reflectance(
         raise MaterialError(
             f"mean free paths {paths_mm.tolist()}; expected lengths above 0, in mm."
         )
-    albedo = invert_reflectance(asked, eta).albedo
+    albedo = invert_reflectance(asked, eta, light=light).albedo
     words = ", ".join(f"{each:g}" for each in asked)
     return Material(
         name,
         tuple(channels),
         (Layer(eta, np.zeros_like(albedo), (1.0 - albedo) / paths_mm, albedo / paths_mm),),
-        source=f"diffuse reflectance {words} by exact albedo inversion, sssfit {__version__}",
+        source=f"{_ASKED[light]} {words} by exact albedo inversion, sssfit {__version__}",
     )
 
 
-def _reachable(reflectance: npt.ArrayLike, eta: float) -> FloatArray:
+def _reachable(reflectance: npt.ArrayLike, eta: float, light: str) -> FloatArray:
     """Return the reflectances as an array (C,); refuse those that no albedo gives."""
     asked = np.atleast_1d(np.asarray(reflectance, dtype=np.float64))
     if asked.ndim > 1 or asked.size == 0:
         raise MaterialError(f"reflectance has shape {asked.shape}; expected one number a channel.")
-    most = largest_reflectance(number("eta", eta))
+    if light not in LIGHTS:
+        raise MaterialError(f"light = {light!r}; expected {' or '.join(LIGHTS)}.")
+    if number("eta", eta) < 1.0:  # a material may have less; the exact solver takes no less
+        raise MaterialError(f"eta = {eta:g}; expected a relative refractive index from 1 to 4.")
+    most = largest_reflectance(eta, light)
+    where = "under diffuse light" if light == "diffuse" else f"at eta = {eta:g}"
     for k in np.flatnonzero(~((asked >= 0.0) & (asked <= most))):
         raise MaterialError(
-            f"reflectance[{k}] = {asked[k]:g} cannot be reached; at eta = {eta:g} the largest is "
+            f"reflectance[{k}] = {asked[k]:g} cannot be reached; {where} the largest is "
             f"{math.floor(1e6 * most) / 1e6:g}, where nothing is absorbed, and the smallest 0."
         )
     return asked
