@@ -36,7 +36,7 @@ percent; in brackets what the kernel does not have):
 
 {budgets}
 
-![Error budget of wholemilk on disk, edge and head](wholemilk-budget.png)
+![Error budget of wholemilk on disk, edge, points and head](wholemilk-budget.png)
 
 The order is what to act on. For skin1 and ketchup that is rank alone: 1e6 photons and half floats
 do not show. For wholemilk it is the grid, from which 2.7 % of red is missing: give
