@@ -269,8 +269,11 @@ def test_it_ends_with_a_verdict_of_two_lines(run, few):
 
 
 def test_the_verdict_says_from_where_on_nothing_shows(run):
-    given = ("--only", "kernels", "--picture", "head", "--size", "32x32", "--mm-per-pixel")
-    far, near = (run("skin1", *given, pitch).splitlines()[-1] for pitch in ("12", "2.5"))
+    given = ("--only", "kernels", "--size", "32x32")
+    far, near = (
+        run("skin1", *given, "--picture", picture, "--mm-per-pixel", pitch).splitlines()[-1]
+        for picture, pitch in (("head", "12"), ("points", "1"))
+    )
     assert far.endswith("on, 95 % of every picture are within a Delta E of 1.")
     assert near.endswith("none has 95 % of every picture within a Delta E of 1.")
 
