@@ -219,7 +219,7 @@ def test_the_edge_at_45_degrees(skin1):
     assert set(cells) - {""} == set(material_names())
     for name in ("skin1", "marble"):
         profile = exact(name)
-        kernel = fit_preintegrated(profile, mm_per_pixel=0.1).kernel
+        kernel = fit_preintegrated(profile, energy="keep", mm_per_pixel=0.1).kernel
         x, found = np.arange(kernel.pixels), []
         for c in range(3):
             whole = full_kernel(profile.quadrant_kernel(0.1, kernel.half_pixels, channel=c))
