@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ._compare_input import material_of
 from ._compiling import say_if_compiling
-from ._figure import chart_output
+from ._figure import chart_path, write_chart
 from ._options import Common
 from ._report import percent, table
 
@@ -35,16 +33,18 @@ class BudgetRequest:
     settings: Mapping[str, Any]
     model: str | None
     chart: str | None
-    force: bool
 
 
 def compare_budget(
     material: str, scenes: Sequence[Scene], request: BudgetRequest, common: Common
 ) -> tuple[dict[str, Any], str]:
-    """Make the budget of a material on each picture, draw it if asked to; figures and text."""
-    with _chart(request) as draw:
-        budgets = _budgets(material, scenes, request, common)
-        draw(budgets)
+    """Make the budget of a material on each picture, draw it if asked to; figures and text.
+
+    The chart's file is held by the caller.
+    """
+    budgets = _budgets(material, scenes, request, common)
+    if request.chart is not None:
+        _draw(budgets, request.chart)
     return _figures(budgets), "\n\n".join(_text(each) for each in budgets)
 
 
@@ -67,25 +67,10 @@ def _figures(budgets: Sequence[Budget]) -> dict[str, Any]:
     }
 
 
-@contextlib.contextmanager
-def _chart(request: BudgetRequest) -> Iterator[Callable[[Sequence[Budget]], object]]:
-    """Hold the chart's file and yield what draws into it; without a file nothing is drawn."""
-    if request.chart is None:
-        yield len
-        return
-    from sssfit._chart_files import chart_format
-
-    if request.chart != "-":
-        chart_format(request.chart)
-    path = None if request.chart == "-" else Path(request.chart)
-    with chart_output(path, force=request.force) as save:
-        yield lambda budgets: _draw(budgets, save)
-
-
-def _draw(budgets: Sequence[Budget], save: Callable[[Any], None]) -> None:
+def _draw(budgets: Sequence[Budget], name: str) -> None:
     from sssfit.chart import budget_figure
 
-    save(budget_figure(budgets))
+    write_chart(budget_figure(budgets), chart_path(name))
 
 
 def _budgets(

@@ -109,7 +109,9 @@ _OPTIONS = (
         help="Where --all puts NAME-pareto.png and NAME-pareto.md.  [default: here]",
     ),
     click.option(
-        "--force", is_flag=True, help="Replace files that are no charts or tables of ours."
+        "--force",
+        is_flag=True,
+        help="Replace an input, or files that are not our charts or tables.",
     ),
 )
 

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 from ._compare_input import profile_of, scenes_of
 from ._compare_table import FORMATS, figures_of, is_table_file, table_text, text_of
-from ._figure import chart_output
+from ._figure import chart_path, held_charts, write_chart
 from ._options import Common
+from ._outputs import check_distinct, held
 from ._progress import step_progress
 from ._report import finish, say, table
 
@@ -64,10 +65,12 @@ class Outputs:
 
 
 def compare_one(name: str, outputs: Outputs, wish: Wish) -> tuple[dict[str, Any], str]:
-    """Compare the kernels of a material or profile, write what is wanted; figures and text."""
-    with _held([outputs], wish):
-        comparison = _compared(profile_of(name, wish.common), *wish.scenes, wish)
-        _write(comparison, outputs, wish)
+    """Compare the kernels of a material or profile, write what is wanted; figures and text.
+
+    The outputs are held by the caller.
+    """
+    comparison = _compared(profile_of(name, wish.common), *wish.scenes, wish)
+    _write(comparison, outputs, wish)
     figures = {
         "error": wish.error,
         "cost": wish.cost,
@@ -97,7 +100,7 @@ def compare_all(folder: Path, wish: Wish) -> None:
     outputs = [Outputs(f"{stem}.png", f"{stem}.md") for stem in stems]
     done: list[tuple[Comparison, Outputs]] = []
     failed: list[str] = []
-    with _held(outputs, wish):
+    with held_outputs([f"{stem}.png" for stem in stems], [f"{stem}.md" for stem in stems], wish):
         scenes, pitch = wish.scenes
         for name, each in zip(names, outputs, strict=True):
             try:
@@ -131,33 +134,25 @@ def _compared(
 
 
 @contextlib.contextmanager
-def _held(outputs: Sequence[Outputs], wish: Wish) -> Iterator[None]:
+def held_outputs(
+    charts: Sequence[str], tables: Sequence[str], wish: Wish, *, inputs: Sequence[str] = ()
+) -> Iterator[None]:
     """Check that everything can be written, and keep other runs off it, before the work begins."""
-    with contextlib.ExitStack() as stack:
-        for each in outputs:
-            if each.chart is not None:
-                _hold_chart(each.chart, stack, wish)
-            if each.table is not None:
-                _hold_table(Path(each.table), stack, wish)
-        yield
-
-
-def _hold_chart(name: str, stack: contextlib.ExitStack, wish: Wish) -> None:
-    from sssfit._chart_files import chart_format
-
-    if name != "-":
-        chart_format(name)
-    stack.enter_context(chart_output(None if name == "-" else Path(name), force=wish.force))
-
-
-def _hold_table(path: Path, stack: contextlib.ExitStack, wish: Wish) -> None:
     from sssfit.errors import FileError
-    from sssfit.files import check_output, locked
 
-    if path.suffix.lower() not in FORMATS:
-        raise FileError(f"{path}: tables are Markdown, CSV or JSON; end it in .md, .csv or .json.")
-    check_output(path, is_table_file, force=wish.force)
-    stack.enter_context(locked(path))
+    for name in tables:
+        if Path(name).suffix.lower() not in FORMATS:
+            raise FileError(
+                f"{name}: tables are Markdown, CSV or JSON; end it in .md, .csv or .json."
+            )
+    drawn, written = [chart_path(each) for each in charts], [Path(each) for each in tables]
+    check_distinct([each for each in (*drawn, *written) if each is not None])
+    read = [*inputs, *wish.pictures]
+    with (
+        held_charts(drawn, inputs=read, force=wish.force),
+        held(written, is_table_file, inputs=read, force=wish.force),
+    ):
+        yield
 
 
 def _write(comparison: Comparison, outputs: Outputs, wish: Wish) -> None:
@@ -173,16 +168,9 @@ def _write(comparison: Comparison, outputs: Outputs, wish: Wish) -> None:
 
 
 def _draw(comparison: Comparison, name: str, wish: Wish) -> None:
-    from sssfit.chart import pareto_figure, save_figure
+    from sssfit.chart import pareto_figure
 
-    from ._report import binary_stdout
-
-    figure = pareto_figure(comparison, error=wish.error, cost=wish.cost)
-    if name == "-":
-        save_figure(figure, binary_stdout(), format="png")
-        binary_stdout().flush()
-    else:
-        save_figure(figure, name)
+    write_chart(pareto_figure(comparison, error=wish.error, cost=wish.cost), chart_path(name))
 
 
 def _report(done: Sequence[tuple[Comparison, Outputs]], wish: Wish) -> None:

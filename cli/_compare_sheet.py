@@ -10,7 +10,7 @@ import click
 
 from ._compare_input import material_of
 from ._compiling import say_if_compiling
-from ._figure import chart_output
+from ._figure import chart_path, write_chart
 from ._options import Common
 from ._report import finish, table
 
@@ -26,40 +26,34 @@ _PER_DECADE = 2
 _COLOURS = ("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99", "share_above_1")
 
 
-def chart_sheet(
-    profile: Profile, output: str, mm_per_pixel: float | None, common: Common, *, force: bool
-) -> None:
+def chart_sheet(profile: Profile, output: str, mm_per_pixel: float | None, common: Common) -> None:
     """Draw a contact sheet of a profile's kernels; ``-`` is PNG on stdout."""
-    path = _path(output)
-    with chart_output(path, force=force) as save:
-        from sssfit.compare.sheet import compute_sheet
+    from sssfit.compare.sheet import compute_sheet
 
-        given: dict[str, Any] = {} if mm_per_pixel is None else {"mm_per_pixel": mm_per_pixel}
-        sheet = compute_sheet(profile, threads=common.threads, **given)
+    given: dict[str, Any] = {} if mm_per_pixel is None else {"mm_per_pixel": mm_per_pixel}
+    sheet = compute_sheet(profile, threads=common.threads, **given)
 
-        from sssfit.chart import sheet_figure
+    from sssfit.chart import sheet_figure
 
-        save(sheet_figure(sheet))
+    path = chart_path(output)
+    write_chart(sheet_figure(sheet), path)
     _finish(path, _sheet_figures(sheet), _sheet_text, common)
 
 
-def chart_editing(output: str, common: Common, *, force: bool) -> None:
+def chart_editing(output: str, common: Common) -> None:
     """Draw the 2012 model edited by hand; ``-`` is PNG on stdout."""
-    path = _path(output)
-    with chart_output(path, force=force) as save:
-        from sssfit.compare.editing import compute_editing
+    from sssfit.compare.editing import compute_editing
 
-        editing = compute_editing(threads=common.threads)
+    editing = compute_editing(threads=common.threads)
 
-        from sssfit.chart import editing_figure
+    from sssfit.chart import editing_figure
 
-        save(editing_figure(editing))
+    path = chart_path(output)
+    write_chart(editing_figure(editing), path)
     _finish(path, _editing_figures(editing), _editing_text, common)
 
 
-def chart_convergence(
-    name: str, output: str, photons: int | None, common: Common, *, force: bool
-) -> None:
+def chart_convergence(name: str, output: str, photons: int | None, common: Common) -> None:
     """Draw a simulation's error against its price; ``-`` is PNG on stdout.
 
     ``photons`` is the largest number walked.
@@ -73,18 +67,17 @@ def chart_convergence(
             f"{material.name} is not one half space: walks are held against the exact solution, "
             "and only half spaces have one; name another material."
         )
-    path = _path(output)
-    with chart_output(path, force=force) as save:
-        from sssfit.compare.convergence import compute_convergence
+    from sssfit.compare.convergence import compute_convergence
 
-        say_if_compiling(common, walk=material, solver=True)
-        found = compute_convergence(
-            material, photons=numbers, first_seed=common.seed, threads=common.threads
-        )
+    say_if_compiling(common, walk=material, solver=True)
+    found = compute_convergence(
+        material, photons=numbers, first_seed=common.seed, threads=common.threads
+    )
 
-        from sssfit.chart import convergence_figure
+    from sssfit.chart import convergence_figure
 
-        save(convergence_figure(found))
+    path = chart_path(output)
+    write_chart(convergence_figure(found), path)
     _finish(path, _convergence_figures(found), _convergence_text, common)
 
 
@@ -96,16 +89,6 @@ def photon_numbers(most: int) -> tuple[int, ...]:
     while (number := round(_LEAST_PHOTONS * 10 ** (len(numbers) / _PER_DECADE))) <= most:
         numbers.append(number)
     return tuple(numbers)
-
-
-def _path(output: str) -> Path | None:
-    """None is stdout."""
-    from sssfit._chart_files import chart_format
-
-    if output == "-":
-        return None
-    chart_format(output)  # before anything is computed
-    return Path(output)
 
 
 def _finish(

@@ -20,10 +20,15 @@ _HEADS = (
     *("kernel", "passes", "weights", "s/Mpixel", "Delta E", "95th", "99th", "above 1"),
     *("relative L2", "PSNR, dB", "energy drift", "asymmetry"),
 )
-_MARKDOWN_TITLE = ": kernels by error and cost"
 _COST_WORDS = {"weights": "weights a pixel", "passes": "passes", "seconds": "s a megapixel"}
 _ERROR_WORDS = {"delta-e": "Mean Delta E", "l2": "Relative L2"}
-_OWN_BEGIN = {".md": b"# ", ".csv": b"material,picture,label,", ".json": b'{"command": "compare"'}
+_FORMAT = "sssfit.table/1"
+# What our files begin with, and are known by.
+_MARKS = {
+    ".md": f"<!-- {_FORMAT} -->\n",
+    ".csv": f"# {_FORMAT}\n",
+    ".json": f'{{"format": "{_FORMAT}"',
+}
 
 
 def row_figures(row: KernelRow, comparison: Comparison) -> dict[str, Any]:
@@ -115,28 +120,24 @@ def _error(value: float, error: str) -> str:
 def table_text(comparison: Comparison, ending: str, error: str, cost: str) -> str:
     """Return the content of a table file."""
     if ending == ".md":
-        return _markdown(comparison, error, cost)
+        return _MARKS[ending] + _markdown(comparison, error, cost)
     if ending == ".csv":
-        return _csv(comparison)
-    return json.dumps(plain({"command": "compare", **figures_of(comparison)}), allow_nan=False)
+        return _MARKS[ending] + _csv(comparison)
+    whole = {"format": _FORMAT, "command": "compare", **figures_of(comparison)}
+    return json.dumps(plain(whole), allow_nan=False)
 
 
 def is_table_file(path: Path) -> bool:
-    """Tell whether a file begins as our tables do."""
-    try:
-        with path.open("rb") as stream:
-            line = stream.readline(1024)
-    except OSError:
-        return False
-    begins = line.startswith(_OWN_BEGIN.get(path.suffix.lower(), b"\0"))
-    is_markdown = path.suffix.lower() == ".md"
-    return begins and (not is_markdown or _MARKDOWN_TITLE.encode() in line)
+    """Tell whether a file is a table that we wrote."""
+    from sssfit.files import has_mark
+
+    return has_mark(path, {mark.encode(): b"" for mark in _MARKS.values()})
 
 
 def _markdown(comparison: Comparison, error: str, cost: str) -> str:
     """Write a table for each picture; the front in bold."""
     name = comparison.profile.material_name or "profile"
-    parts = [f"# {name}{_MARKDOWN_TITLE}", _setting(comparison)]
+    parts = [f"# {name}: kernels by error and cost", _setting(comparison)]
     head = f"| {' | '.join(_HEADS)} |\n|---|{(len(_HEADS) - 1) * '---:|'}"
     for picture in comparison.pictures:
         rows = _sorted(comparison, picture, error, cost)

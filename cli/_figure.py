@@ -3,32 +3,46 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from ._outputs import held
 from ._report import binary_stdout
 
 
 @contextlib.contextmanager
-def chart_output(path: Path | None, *, force: bool) -> Iterator[Callable[[Any], None]]:
+def chart_output(
+    path: Path | None, *, inputs: Iterable[str | Path | None], force: bool
+) -> Iterator[Callable[[Any], None]]:
     """Hold an output and yield what writes a matplotlib Figure to it; None is PNG on stdout."""
-    from sssfit._chart_files import is_chart_file
-    from sssfit.files import check_output, locked
+    with held_charts([path], inputs=inputs, force=force):
+        yield lambda figure: write_chart(figure, path)
 
-    def save(figure: Any) -> None:
-        from sssfit.chart import save_figure
 
+def held_charts(
+    paths: Sequence[Path | None], *, inputs: Iterable[str | Path | None], force: bool
+) -> contextlib.AbstractContextManager[None]:
+    """Hold the outputs of charts; formats are known by their endings."""
+    from sssfit._chart_files import chart_format, is_chart_file
+
+    for path in paths:
         if path is not None:
-            save_figure(figure, path)
-            return
-        save_figure(figure, binary_stdout(), format="png")
-        binary_stdout().flush()
+            chart_format(path)
+    return held(paths, is_chart_file, inputs=inputs, force=force)
 
-    if path is None:
-        binary_stdout()  # closed: said now and not after the drawing
-        yield save
+
+def write_chart(figure: Any, path: Path | None) -> None:
+    """Write a figure to a file that is held; None is PNG on stdout."""
+    from sssfit.chart import save_figure
+
+    if path is not None:
+        save_figure(figure, path)
         return
-    check_output(path, is_chart_file, force=force)
-    with locked(path):
-        yield save
+    save_figure(figure, binary_stdout(), format="png")
+    binary_stdout().flush()
+
+
+def chart_path(name: str) -> Path | None:
+    """``-`` is stdout."""
+    return None if name == "-" else Path(name)

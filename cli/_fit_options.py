@@ -57,8 +57,9 @@ _OPTIONS = (
     ),
     click.option(
         "--target",
-        type=click.Choice(["line", "kernel"]),
-        help="artist: fit the line integral or the 2D kernel.  [default: line]",
+        type=click.Choice(["line", "kernel", "picture"]),
+        help="artist: fit the line integral, the 2D kernel, or what is seen of a disk, an edge and "
+        "a head, in some 5 s.  [default: line]",
     ),
     click.option(
         "--near",

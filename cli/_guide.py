@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ._figure import chart_output
+from ._memory import check_memory
 from ._options import Common
 from ._report import finish, table
 
@@ -28,7 +29,8 @@ def chart_guide(
 
     ``settings`` are keywords of `compute_guide`; None is its default.
     """
-    with chart_output(path, force=force) as save:
+    check_memory("figures", common.threads)
+    with chart_output(path, inputs=[name], force=force) as save:
         from sssfit.compare import compute_guide
 
         given = {key: value for key, value in settings.items() if value is not None}
@@ -55,6 +57,9 @@ def _figures(guide: Guide) -> dict[str, Any]:
         "misplaced": guide.misplaced,
         "relative_frobenius_error": guide.relative_frobenius_error,
         "weighted_residual": guide.weighted_residual,
+        "preintegrated_misplaced": guide.preintegrated_misplaced,
+        "preintegrated_frobenius_error": guide.preintegrated_errors[0],
+        "preintegrated_weighted_residual": guide.preintegrated_errors[1],
     }
 
 
@@ -71,8 +76,9 @@ def _text(guide: Guide) -> str:
         [f"{k:g}", *(f"{100.0 * each[i]:.2f} %" for each in columns)]
         for i, k in enumerate(guide.ks)
     ]
+    line = (guide.preintegrated[0], guide.preintegrated_misplaced, *guide.preintegrated_errors)
+    rows.append(["pre-integrated", *(f"{100.0 * each:.2f} %" for each in line)])
     return (
         f"Channel {guide.profile.channels[guide.channel]}; {guide.pixels} x {guide.pixels} pixels "
-        f"of {guide.mm_per_pixel:.4g} mm; pre-integrated middle pixel "
-        f"{100.0 * guide.preintegrated[0]:.2f} %\n{table(heads, rows)}"
+        f"of {guide.mm_per_pixel:.4g} mm\n{table(heads, rows)}"
     )

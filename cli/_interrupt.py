@@ -1,20 +1,91 @@
-"""Ctrl-C and SIGTERM as a request to end well: the first one is noted, the second one ends."""
+"""Ctrl-C and SIGTERM: the first asks for an orderly end, the second ends the program at once.
+
+The first raises KeyboardInterrupt in the main thread, or is noted where a verb saves what it has
+done (`asked_to_stop`). Python code hears a signal only between two of its own instructions, and the
+main thread may be inside compiled code for minutes. So the second signal is heard by a thread that
+waits at the pipe into which Python's C handler writes; it removes temporary files and locks and
+ends the process with 130. Where even that thread cannot run, because compiled code keeps Python's
+global lock, the kernel ends the process: with glibc a signal's handler is good for one signal until
+the thread renews it (System V semantics).
+
+Nothing heavy is imported here: the handlers stand before the command line itself is imported.
+"""
 
 import contextlib
+import functools
+import os
+import select
 import signal
+import sys
+import threading
 from collections.abc import Callable, Iterator
-from types import FrameType
+from types import FrameType, TracebackType
+from typing import Any, NoReturn
+
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
+_STATUS = 130
+_STDERR = 2
+_SHOW_CURSOR = b"\x1b[?25h"  # a progress bar hides it
+
+# Whether the first signal has arrived; from then on the listening thread alone acts.
+_heard = threading.Event()
+_listening = threading.Event()
+
+
+class Interrupts:
+    """The program's handling of signals, from `take` to `give_back`; one at a time."""
+
+    def __init__(self) -> None:
+        self._before: dict[signal.Signals, Any] = {}
+        self._hooks = sys.excepthook, sys.unraisablehook
+
+    def take(self) -> None:
+        """Handle SIGINT and SIGTERM from here on, unless they are ignored (``nohup``, ``&``)."""
+        _heard.clear()
+        reader, self._writer = os.pipe()
+        if sys.platform != "win32":
+            os.set_blocking(self._writer, False)
+        self._wakeup = signal.set_wakeup_fd(self._writer, warn_on_full_buffer=False)
+        for number in _SIGNALS:
+            if signal.getsignal(number) is not signal.SIG_IGN:
+                self._before[number] = signal.signal(number, _raise)
+        sys.excepthook, sys.unraisablehook = self._uncaught, self._unraisable
+        threading.Thread(target=_listen, args=(reader,), daemon=True).start()
+        _listening.set()
+        _reset_on_delivery()
+
+    def give_back(self) -> None:
+        """Put the former handlers back: the caller goes on."""
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
+        sys.excepthook, sys.unraisablehook = self._hooks
+        signal.set_wakeup_fd(self._wakeup)
+        _listening.clear()
+        os.close(self._writer)  # which ends the thread
+
+    def _uncaught(
+        self, kind: type[BaseException], error: BaseException, traceback: TracebackType | None
+    ) -> None:
+        """End without a traceback where nothing was left to catch an interruption."""
+        if issubclass(kind, KeyboardInterrupt):
+            _end(b"\nInterrupted.\n")
+        self._hooks[0](kind, error, traceback)
+
+    def _unraisable(self, ignored: "sys.UnraisableHookArgs") -> None:
+        """End where Python would print an interruption and forget it: in a clean-up of its own."""
+        if issubclass(ignored.exc_type, KeyboardInterrupt):
+            _end(b"\nInterrupted.\n")
+        self._hooks[1](ignored)
 
 
 @contextlib.contextmanager
 def asked_to_stop() -> Iterator[Callable[[], bool]]:
     """Yield a function that tells whether SIGINT or SIGTERM has arrived since.
 
-    After the first signal the former handlers stand again, so an impatient second Ctrl-C ends the
-    process at once; files are renamed into place whole, so even that leaves no half-written one.
+    After the first signal the former handlers stand again.
     """
     asked = False
-    before: dict[signal.Signals, signal._HANDLER] = {}
+    before: dict[signal.Signals, Any] = {}
 
     def restore() -> None:
         for number, handler in before.items():
@@ -23,11 +94,83 @@ def asked_to_stop() -> Iterator[Callable[[], bool]]:
     def note(_signal: int, _frame: FrameType | None) -> None:
         nonlocal asked
         asked = True
+        _heard.set()
         restore()
 
-    for number in (signal.SIGINT, signal.SIGTERM):
-        before[number] = signal.signal(number, note)
+    for number in _SIGNALS:
+        if signal.getsignal(number) is not signal.SIG_IGN:
+            before[number] = signal.signal(number, note)
+    if _listening.is_set():
+        _reset_on_delivery()
     try:
         yield lambda: asked
     finally:
         restore()
+
+
+def _raise(_signal: int, frame: FrameType | None) -> None:
+    """Interrupt the main thread; the second time the listening thread is about to end us."""
+    if _heard.is_set():
+        return
+    _heard.set()
+    if _is_importing(frame):
+        _end(b"\nInterrupted.\n")
+    raise KeyboardInterrupt
+
+
+def _is_importing(frame: FrameType | None) -> bool:
+    """Whether a module is being imported: compiled ones print or swallow what is raised in them."""
+    while frame is not None:
+        if frame.f_code.co_filename.startswith("<frozen importlib"):
+            return True
+        frame = frame.f_back
+    return False
+
+
+def _listen(reader: int) -> None:
+    """Count the signals that arrive; end the process at the second, end at a closed pipe."""
+    count = 0
+    while arrived := os.read(reader, 64):
+        count += sum(number in _SIGNALS for number in arrived)
+        if count >= 2:
+            _end(b"\nInterrupted twice: ended at once.\n")
+        _reset_on_delivery()
+    os.close(reader)
+
+
+def _end(line: bytes) -> NoReturn:
+    """End this process here and now, without temporary files, locks or a hidden cursor."""
+    files = sys.modules.get("sssfit.files")
+    if remove := getattr(files, "remove_unfinished", None):
+        remove()
+    with contextlib.suppress(OSError, ValueError):  # stderr is closed
+        # A full pipe that nobody reads is not worth waiting for.
+        if sys.platform == "win32" or select.select([], [_STDERR], [], 0.0)[1]:
+            os.write(_STDERR, (_SHOW_CURSOR if os.isatty(_STDERR) else b"") + line)
+    os._exit(_STATUS)
+
+
+def _reset_on_delivery() -> None:
+    """Let the kernel end the process at the signal after the next, until this is called again."""
+    if (found := _system_v()) is None:
+        return
+    install, handler = found
+    for number in _SIGNALS:
+        if callable(signal.getsignal(number)):
+            install(number, handler)
+
+
+@functools.cache
+def _system_v() -> tuple[Callable[[int, int], int], int] | None:
+    """Return glibc's ``sysv_signal`` and Python's own C handler; None with other libraries."""
+    if not sys.platform.startswith("linux"):
+        return None
+    import ctypes
+
+    install = getattr(ctypes.CDLL(None), "sysv_signal", None)
+    if install is None:
+        return None
+    install.argtypes, install.restype = (ctypes.c_int, ctypes.c_void_p), ctypes.c_void_p
+    handler = install(signal.SIGTERM, signal.SIG_IGN)  # the same for all signals
+    install(signal.SIGTERM, handler)
+    return install, handler

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ._compiling import say_if_compiling
+from ._memory import check_memory
 from ._options import Common
+from ._outputs import held
 from ._report import binary_stdout, finish, table
 
 if TYPE_CHECKING:
@@ -40,13 +40,14 @@ class Wish:
 
 def write_material(wish: Wish, common: Common) -> None:
     """Invert, write the TOML, and print what was found beside the published approximations."""
+    check_memory("inversion", common.threads)
     if wish.mean_free_path is None or wish.eta is None:
         raise click.UsageError("--from-reflectance needs --mean-free-path and --eta.")
     channels = _channels(wish)
     name = wish.name or _name_of(wish.output)
     path = None if wish.output == "-" else Path(wish.output or f"{name}.toml")
 
-    with _held(path, force=wish.force):
+    with held([path], _is_ours, inputs=[], force=wish.force, named=("a material", ".toml")):
         say_if_compiling(common, solver=True)
         material, figures = _inverted(
             wish.from_reflectance, wish.mean_free_path, wish.eta, wish.light, name, channels
@@ -118,21 +119,6 @@ def _name_of(output: str | None) -> str:
     return "from-reflectance" if output in (None, "-") else Path(str(output)).stem
 
 
-@contextlib.contextmanager
-def _held(path: Path | None, *, force: bool) -> Iterator[None]:
-    """Check the output and hold it before the work; None is stdout."""
-    from sssfit.files import check_ending, check_output, locked
-
-    if path is None:
-        binary_stdout()  # closed: said now and not after the work
-        yield
-        return
-    check_ending(path, "a material", ".toml")
-    check_output(path, _is_ours, force=force)
-    with locked(path):
-        yield
-
-
 def _write(material: Material, path: Path | None) -> None:
     """To the file, whole or not at all; to stdout where there is none."""
     from sssfit.files import write_atomically
@@ -147,11 +133,9 @@ def _write(material: Material, path: Path | None) -> None:
 
 def _is_ours(path: Path) -> bool:
     """Whether a file begins with the line that says who made it."""
-    try:
-        with path.open("rb") as stream:
-            return stream.read(len(_OURS)) == _OURS.encode()
-    except OSError:
-        return False
+    from sssfit.files import has_mark
+
+    return has_mark(path, {_OURS.encode(): b""})
 
 
 def _text(figures: dict[str, Any]) -> str:

@@ -11,6 +11,7 @@ import click
 from ._compiling import say_if_compiling
 from ._deon_skin import DEON_SKIN
 from ._figure import chart_output
+from ._memory import check_memory
 from ._options import Common
 from ._report import finish, table
 
@@ -26,11 +27,12 @@ def chart_models(
     name: str, output: str | None, photons: int | None, common: Common, *, force: bool
 ) -> None:
     """Draw a material by every method; a profile of a photon walk stands for material and walk."""
+    check_memory("figures", common.threads)
     material, walk = _read(name)
     if walk is not None and photons is not None:
         raise click.UsageError("--photons is for a walk that is yet to be; leave it out.")
     path = None if output == "-" else Path(output or f"{material.name}.models.png")
-    with chart_output(path, force=force) as save:
+    with chart_output(path, inputs=[name], force=force) as save:
         comparison = _compared(material, walk, photons, common)
 
         from sssfit.chart import models_figure
@@ -43,7 +45,7 @@ def chart_models(
 
 def _read(name: str) -> tuple[Material, Profile | None]:
     """Return a material and, where it was a profile of a walk that was named, the walk."""
-    from sssfit._chart_data import material_of
+    from sssfit._profile_radii import material_of
     from sssfit.errors import ProfileError
     from sssfit.material import load_material
     from sssfit.profile import Profile
@@ -54,7 +56,8 @@ def _read(name: str) -> tuple[Material, Profile | None]:
         return load_material(name), None
     profile = Profile.load(name)
     material = material_of(profile)
-    if material is None or profile.meta.get("method") != "montecarlo":
+    is_walk = profile.meta.get("method") == "montecarlo" and profile.photons is not None
+    if material is None or not is_walk or profile.channels != material.channels:
         raise ProfileError(
             f"{name} is no photon walk of a known material; name a material, or a profile by "
             "`sssfit simulate`."

@@ -9,6 +9,8 @@ from typing import Any
 
 import click
 
+from ._memory import check_memory
+
 _MM_PER_UNIT = {"": 1.0, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 
 
@@ -53,6 +55,7 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
         seed: int,
         **kwargs: Any,
     ) -> Any:
+        check_memory(command.__name__.rstrip("_"), threads)
         common = Common(quiet, verbose, as_json, threads, seed)
         return command(*args, common=common, **kwargs)
 

@@ -68,6 +68,19 @@ _OPTIONS = (
         help="head: from the eye to the face.  [default: 600]",
     ),
     click.option(
+        "--light",
+        "light_degrees",
+        type=click.FLOAT,
+        metavar="DEGREES",
+        help="head: how far to the left of the view axis the key light is, behind the head beyond "
+        "90.  [default: 45; with --transmit 170]",
+    ),
+    click.option(
+        "--transmit",
+        is_flag=True,
+        help="head: add the key light that comes through ears and nose, as far as the kernel says.",
+    ),
+    click.option(
         "--border",
         type=click.Choice(["mirror", "clamp", "zero"]),
         default="mirror",

@@ -9,9 +9,14 @@ from typing import TYPE_CHECKING, Any
 from ._report import percent, table
 
 if TYPE_CHECKING:
+    import numpy as np
+    import numpy.typing as npt
+
     from sssfit.compare.judge import Judgement
     from sssfit.kernel import SeparableKernel
     from sssfit.render.scene import Scene
+
+    FloatArray = npt.NDArray[np.float64]
 
 _SCORES = (
     *("rmse", "relative_l2", "maximum", "psnr_db", "energy_drift"),
@@ -20,8 +25,13 @@ _SCORES = (
 )
 
 
-def figures_of(result: Judgement, scene: Scene, kernel: SeparableKernel) -> dict[str, Any]:
-    """Everything that is printed, as ``--json`` has it; null where nothing was measured."""
+def figures_of(
+    result: Judgement, scene: Scene, kernel: SeparableKernel, through: FloatArray | None
+) -> dict[str, Any]:
+    """Everything that is printed, as ``--json`` has it; null where nothing was measured.
+
+    ``through`` (H, W, C) is what arrives through the object, where that was asked for.
+    """
     cost = result.cost
     return {
         "material": kernel.meta.get("material"),
@@ -36,6 +46,7 @@ def figures_of(result: Judgement, scene: Scene, kernel: SeparableKernel) -> dict
         "taps_per_pixel": cost.taps_per_pixel,
         "kernel_bytes": cost.kernel_bytes,
         "seconds_per_megapixel": cost.seconds_per_megapixel,
+        "transmitted_maximum": None if through is None else through.max(axis=(0, 1)),
         "radial_asymmetry": result.asymmetry,
         "true_radial_asymmetry": result.true_asymmetry,
         **{key: getattr(result.score, key, None) for key in _SCORES},
@@ -53,6 +64,10 @@ def text_of(figures: Mapping[str, Any]) -> str:
         f"cost: {figures['passes']} passes, {figures['taps_per_pixel']} weights a pixel, "
         f"{figures['kernel_bytes']:,} bytes, {figures['seconds_per_megapixel']:.2g} s a megapixel",
     ]
+    if figures["transmitted_maximum"] is not None:
+        most = zip(figures["channels"], figures["transmitted_maximum"], strict=True)
+        words = ", ".join(f"{name} {value:.3g}" for name, value in most)
+        lines.append(f"through the object at most: {words}, face on the key light is 1")
     if figures["rmse"] is not None:
         lines += _measured(figures)
     return "\n".join([*lines, f"Wrote {', '.join(figures['output'])}"])

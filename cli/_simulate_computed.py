@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from ._compiling import say_if_compiling
 from ._methods import METHODS
+from ._outputs import PROFILE, held
 from ._report import say
-from ._simulate_outputs import held, write_profile
+from ._simulate_outputs import write_profile
 from ._simulate_report import figures_of, report
 from ._simulate_run import Request, Walk
 
@@ -33,11 +34,15 @@ def run_computed(
     After Ctrl-C or SIGTERM what was written by then stays; nothing half done is worth keeping.
     """
     from sssfit.errors import StoppedError
+    from sssfit.profile import is_profile_file
 
     from ._interrupt import asked_to_stop
 
     rows: dict[int, dict[str, Any]] = {}
-    with asked_to_stop() as stop, held(targets, force=request.force):
+    outputs = held(
+        targets, is_profile_file, inputs=request.inputs, force=request.force, named=PROFILE
+    )
+    with asked_to_stop() as stop, outputs:
         if method == "exact":
             say_if_compiling(request.common, solver=True)
         for group, settings in jobs:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -29,22 +28,6 @@ def profile_paths(
         folder, kind = Path(output or "."), "" if method == "montecarlo" else f".{method}"
         return [folder / f"{each.name}{kind}.profile.npz" for each in materials]
     return [Path(output)]
-
-
-@contextlib.contextmanager
-def held(paths: Sequence[Path | None], *, force: bool) -> Iterator[None]:
-    """Check every output, and hold it from other runs, before the work begins."""
-    from sssfit.files import check_ending, check_output, locked
-    from sssfit.profile import is_profile_file
-
-    with contextlib.ExitStack() as locks:
-        if None in paths:
-            binary_stdout()  # closed: said now and not after the work
-        for path in filter(None, paths):
-            check_ending(path, "a profile", ".npz")
-            check_output(path, is_profile_file, force=force)
-            locks.enter_context(locked(path))
-        yield
 
 
 def write_profile(profile: Profile, path: Path | None) -> None:

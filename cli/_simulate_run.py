@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from ._compiling import say_if_compiling
 from ._options import Common
+from ._outputs import PROFILE, held
 from ._report import say
-from ._simulate_outputs import held, write_profile
+from ._simulate_outputs import write_profile
 from ._simulate_report import figures_of, report
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ class Request:
     force: bool
     several: bool
     common: Common
+    inputs: tuple[str, ...] = ()
     checkpoint_every: float = 0.0
     resume: bool = False
 
@@ -49,11 +51,16 @@ def run_walks(
 ) -> None:
     """Walk, write each profile as its walk ends, and report; a target None is stdout."""
     from sssfit.errors import StoppedError
+    from sssfit.profile import is_profile_file
 
     from ._interrupt import asked_to_stop
 
     rows: dict[int, _Outcome] = {}
-    with asked_to_stop() as stop, held(targets, force=request.force):
+    outputs = held(
+        targets, is_profile_file, inputs=request.inputs, force=request.force, named=PROFILE
+    )
+    with asked_to_stop() as stop, outputs:
+        _check_checkpoints([targets[group[0]] for group, _ in walks], request)
         for group, settings in walks:
             own = [materials[k] for k in group], [targets[k] for k in group], settings
             try:
@@ -120,14 +127,28 @@ def _walk_group(
     return [_outcome(*each, seconds, goes_on) for each in zip(profiles, targets, strict=True)]
 
 
+def _check_checkpoints(targets: list[Path | None], request: Request) -> None:
+    """Refuse to save a walk over a file of somebody else's; going on from one is refused anyway."""
+    from sssfit.files import check_output
+    from sssfit.simulate import is_checkpoint_file
+
+    for target in targets:
+        if target is not None and not request.resume:
+            path = _checkpoint_path(target)
+            check_output(path, is_checkpoint_file, force=request.force, inputs=request.inputs)
+
+
+def _checkpoint_path(target: Path) -> Path:
+    return target.with_name(f"{target.name}.checkpoint")
+
+
 def _checkpoint(target: Path | None, request: Request) -> Checkpoint | None:
     """Beside the walk's first output, and so under its lock; none where that is stdout."""
     from sssfit.simulate import Checkpoint
 
     if target is None:
         return None
-    path = target.with_name(f"{target.name}.checkpoint")
-    return Checkpoint(path, request.checkpoint_every, resume=request.resume)
+    return Checkpoint(_checkpoint_path(target), request.checkpoint_every, resume=request.resume)
 
 
 def _finished(

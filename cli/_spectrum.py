@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ._figure import chart_output
+from ._memory import check_memory
 from ._options import Common
 from ._report import finish, table
 
@@ -26,7 +27,8 @@ def chart_spectrum(
     force: bool,
 ) -> None:
     """Draw the spectrum of a profile's kernel and put it into figures; no path is stdout."""
-    with chart_output(path, force=force) as save:
+    check_memory("figures", common.threads)
+    with chart_output(path, inputs=[name], force=force) as save:
         from sssfit.compare import compute_spectrum
 
         spectrum = compute_spectrum(profile, mm_per_pixel=mm_per_pixel)

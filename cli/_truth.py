@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,32 +13,31 @@ if TYPE_CHECKING:
     from sssfit.kernel import SeparableKernel
     from sssfit.profile import Profile
 
-_SAME = ("material_sha256", "method", "photons", "seed")
-
 
 def true_profile(
     kernel: SeparableKernel, name: str, given: str | None, common: Common
 ) -> tuple[Profile | None, str | None]:
-    """Return the kernel's profile and its file: the one given, else the newest that fits.
+    """Return the kernel's profile and its file: the one given, else the one it was fitted to.
 
-    A profile fits if it is of the same material by the same method, photons and seed. It is looked
-    for beside the kernel and in the current folder; where there is none, that is said.
+    That is the profile whose light has the fingerprint that the kernel recorded, from whatever
+    program; of several the newest. It is looked for beside the kernel and in the current folder;
+    where there is none, what is there in its place is said.
     """
     from sssfit.profile import Profile
 
     if given is not None:
-        return Profile.load(given), given
+        profile = Profile.load(given)
+        if kernel.meta.get("profile_sha256") not in (None, profile.sha256):
+            say(common, f"{given} is not the profile that {name} was fitted to.")
+        return profile, given
     folders = {Path(), Path() if name == "-" else Path(name).parent}
-    files = [path for folder in folders for path in folder.glob("*.profile.npz")]
-    for path in sorted(files, key=lambda each: each.stat().st_mtime_ns, reverse=True):
-        profile = _read(path)
-        if profile is not None and _is_source(profile, kernel):
+    files = [path for folder in folders for path in folder.glob("*.npz") if path.is_file()]
+    files.sort(key=lambda each: each.stat().st_mtime_ns, reverse=True)
+    profiles = [(path, found) for path in files if (found := _read(path)) is not None]
+    for path, profile in profiles:
+        if profile.sha256 == kernel.meta.get("profile_sha256"):
             return profile, str(path)
-    say(
-        common,
-        f"No profile here that {name} was fitted to, so nothing is measured: name it with "
-        "--profile.",
-    )
+    say(common, _missing(kernel, name, profiles))
     return None, None
 
 
@@ -52,8 +52,26 @@ def _read(path: Path) -> Profile | None:
         return None
 
 
-def _is_source(profile: Profile, kernel: SeparableKernel) -> bool:
-    """Whether a kernel's provenance is this profile's."""
-    names = {"method": "profile_method"}
-    same = all(profile.meta.get(key) == kernel.meta.get(names.get(key, key)) for key in _SAME)
-    return same and profile.material_name == kernel.meta.get("material")
+def _missing(kernel: SeparableKernel, name: str, profiles: Sequence[tuple[Path, Profile]]) -> str:
+    """Say why nothing is measured: the kernel records no profile, or it changed, or is not here."""
+    from sssfit._material_checks import printable
+    from sssfit.fit._target import name_of
+
+    kernel_file, end = printable(name), "so nothing is measured"
+    if kernel.meta.get("profile_sha256") is None:
+        return (
+            f"{kernel_file} does not record which profile it was fitted to, {end}: fit it again, "
+            "or name the profile with --profile."
+        )
+    made_as = (kernel.meta.get("material"), kernel.meta.get("profile_method"))
+    for path, profile in profiles:
+        if (name_of(profile), profile.meta.get("method")) == made_as:
+            return (
+                f"{printable(str(path))} is a profile of {made_as[0]} by the same method, but not "
+                f"the one that {kernel_file} was fitted to, or it has changed since, {end}: fit "
+                "the kernel again, or name its profile with --profile."
+            )
+    return (
+        f"No profile here is the one that {kernel_file} was fitted to, {end}: name it with "
+        "--profile."
+    )

@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     "  [default: NAME.profile.png, NAME.spectrum.png, NAME.guide.png,"
     " MATERIAL.models.png]",
 )
-@click.option("--force", is_flag=True, help="Replace a file that is not a chart.")
+@click.option("--force", is_flag=True, help="Replace an input, or a file that is not our chart.")
 @common_options
 def chart(
     profile: str | None,
@@ -84,7 +84,8 @@ def chart(
     squares and of its absolute values; how many terms leave an error of 1 %.
 
     With --guide, for each k, the guide function of the guided fit, the residual that the fit leaves
-    of one channel, and its pass beside the pre-integrated one.
+    of one channel, and its pass beside the pre-integrated one; and the same of that one, under a
+    guide function that has it for the best.
 
     With --models PROFILE is a material, or a profile of the photon walk, which then need not be
     walked again: the exact solution, the walk and the diffusion models in one figure, and how far
@@ -123,7 +124,7 @@ def chart(
         settings = {"mm_per_pixel": mm_per_pixel, "ks": ks, "channel": channel}
         chart_guide(name, loaded, path, settings, common, force=force)
         return
-    with chart_output(path, force=force) as save:
+    with chart_output(path, inputs=[name], force=force) as save:
         from sssfit.chart import profile_figure
 
         save(profile_figure(loaded))

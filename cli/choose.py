@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,6 +12,7 @@ from ._choose_report import figures_of, step_line, text_of
 from ._compiling import say_if_compiling
 from ._deon_skin import DEON_SKIN
 from ._options import Common, Length, common_options
+from ._outputs import KERNEL, PROFILE, held
 from ._report import binary_stdin, binary_stdout, finish, percent, say
 from ._scene import (
     EDGE_DEGREES,
@@ -116,7 +115,9 @@ class Distance(Length):
     help="Kernel file, - for stdout; the profile goes beside it.  "
     "[default: MATERIAL.chosen.kernel.json]",
 )
-@click.option("--force", is_flag=True, help="Replace files that are not a kernel or profile.")
+@click.option(
+    "--force", is_flag=True, help="Replace an input, or files that are not our kernel or profile."
+)
 @common_options
 def choose(
     material: str,
@@ -153,6 +154,8 @@ def choose(
     """
     from sssfit.compare.choose import choose as choose_kernel
     from sssfit.compare.choose import mm_per_pixel_at
+    from sssfit.kernel import is_kernel_file
+    from sssfit.profile import is_profile_file
 
     picture = Picture(irradiance, None, None, made_options(irradiance), layer, mask)
     check_file_options(layer, mask, has_file=not picture.is_made)
@@ -160,7 +163,11 @@ def choose(
     pitch = mm_per_pixel_at(distance_mm, fov_degrees, resolution[0])
     path = None if output == "-" else Path(output or f"{_stem(material, source)}{_ENDING}")
     profile_path = _beside(path, material)
-    with _held(path, profile_path, force=force):
+    read, beside = [material, irradiance], [] if profile_path is None else [profile_path]
+    with (
+        held([path], is_kernel_file, inputs=read, force=force, named=KERNEL),
+        held(beside, is_profile_file, inputs=read, force=force, named=PROFILE),
+    ):
         scene = None if irradiance == "head" else _scene(picture, pitch, resolution, common)
         _say_first(source, common)
         choice = choose_kernel(
@@ -254,25 +261,6 @@ def _say_first(source: Material | Profile, common: Common) -> None:
 def _say_step(step: Step, common: Common) -> None:
     if common.verbose:
         say(common, step_line(step))
-
-
-@contextlib.contextmanager
-def _held(path: Path | None, profile_path: Path | None, *, force: bool) -> Iterator[None]:
-    """Check that kernel and profile can be written there, and keep other runs off them."""
-    from sssfit.files import check_ending, check_output, locked
-    from sssfit.kernel import is_kernel_file
-    from sssfit.profile import is_profile_file
-
-    with contextlib.ExitStack() as stack:
-        if path is None:
-            binary_stdout()  # closed: said now and not after the work
-        else:
-            check_ending(path, "a kernel", ".json")
-        for each, is_own in ((path, is_kernel_file), (profile_path, is_profile_file)):
-            if each is not None:
-                check_output(each, is_own, force=force)
-                stack.enter_context(locked(each))
-        yield
 
 
 def _write(choice: Choice, path: Path | None, profile_path: Path | None) -> list[str]:

@@ -10,9 +10,10 @@ import click
 
 from ._compare_budget import BudgetRequest, compare_budget
 from ._compare_options import PICTURES, compare_options
-from ._compare_pareto import Outputs, Wish, compare_all, compare_one
+from ._compare_pareto import Outputs, Wish, compare_all, compare_one, held_outputs
 from ._compare_sheet import chart_convergence, chart_editing, chart_sheet
 from ._deon_skin import DEON_SKIN
+from ._figure import chart_path, held_charts
 from ._fits import own_settings
 from ._options import Common, common_options
 from ._report import finish, say
@@ -70,10 +71,13 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
         return
     request = _request(context, given)
     kernels = budget = None
-    if given["only"] != "budget":
-        kernels = compare_one(material, Outputs(given["chart"], given["table"]), wish)
-    if given["only"] != "kernels":
-        budget = _budget(material, request, wish, only=given["only"] == "budget")
+    charts = [given[key] for key in ("chart", "budget_chart") if given[key]]
+    tables = [given["table"]] if given["table"] else []
+    with held_outputs(charts, tables, wish, inputs=[material]):
+        if given["only"] != "budget":
+            kernels = compare_one(material, Outputs(given["chart"], given["table"]), wish)
+        if given["only"] != "kernels":
+            budget = _budget(material, request, wish, only=given["only"] == "budget")
     _report([budget, kernels], given, common)
 
 
@@ -86,7 +90,6 @@ def _request(context: click.Context, given: Mapping[str, Any]) -> BudgetRequest:
         own_settings(context, given["method"], terms),
         given["model"],
         given["budget_chart"],
-        given["force"],
     )
 
 
@@ -130,18 +133,17 @@ def _sheets(
     material: str | None, asked: Mapping[str, str], given: Mapping[str, Any], common: Common
 ) -> None:
     """Draw the sheets that were asked for."""
-    force = given["force"]
-    if "sheet" in asked:
-        from ._compare_input import profile_of
+    paths = [chart_path(each) for each in asked.values()]
+    with held_charts(paths, inputs=[material], force=given["force"]):
+        if "sheet" in asked:
+            from ._compare_input import profile_of
 
-        profile = profile_of(str(material), common)
-        chart_sheet(profile, asked["sheet"], given["mm_per_pixel"], common, force=force)
-    if "editing" in asked:
-        chart_editing(asked["editing"], common, force=force)
-    if "convergence" in asked:
-        chart_convergence(
-            str(material), asked["convergence"], given["photons"], common, force=force
-        )
+            profile = profile_of(str(material), common)
+            chart_sheet(profile, asked["sheet"], given["mm_per_pixel"], common)
+        if "editing" in asked:
+            chart_editing(asked["editing"], common)
+        if "convergence" in asked:
+            chart_convergence(str(material), asked["convergence"], given["photons"], common)
 
 
 def _check_sheets(material: str | None, asked: Mapping[str, str], given: Mapping[str, Any]) -> None:

@@ -8,10 +8,10 @@ from typing import Any
 import click
 
 from ._options import Common, common_options
+from ._outputs import held
 from ._report import binary_stdin, binary_stdout, finish, newest
 
 _ENDINGS = (".npz", ".json", ".profile", ".kernel")
-_MARK = b"Subsurface scattering kernel: "  # how the comment of an exported kernel begins
 
 
 @click.command()
@@ -30,7 +30,9 @@ _MARK = b"Subsurface scattering kernel: "  # how the comment of an exported kern
     metavar="FILE",
     help="Where it goes, - for stdout.  [default: NAME.FORMAT]",
 )
-@click.option("--force", is_flag=True, help="Replace a file that sssfit did not write.")
+@click.option(
+    "--force", is_flag=True, help="Replace an input, or a file that sssfit did not write."
+)
 @common_options
 def export(file: str | None, form: str, output: str | None, force: bool, common: Common) -> None:
     """Write FILE in a form for other programs.
@@ -49,7 +51,7 @@ def export(file: str | None, form: str, output: str | None, force: bool, common:
     """
     name, text, figures = (_table if form == "csv" else _kernel)(file, form, common)
     path = _target(name, form, output)
-    _write(text.encode(), path, form, force=force)
+    _write(text.encode(), path, form, name, force=force)
     figures = {"command": "export", "output": [str(path or "-")], "format": form, **figures}
     what = "table" if form == "csv" else "kernel"
     finish(common, figures, f"Wrote {path or f'the {what} to stdout'}", to_stderr=path is None)
@@ -96,25 +98,19 @@ def _target(name: str, form: str, output: str | None) -> Path | None:
     return Path(f"{stem}.{form}")
 
 
-def _is_own(form: str, path: Path) -> bool:
-    """Whether a file is an export of that form."""
+def _write(content: bytes, path: Path | None, form: str, name: str, *, force: bool) -> None:
+    """To the file, whole or not at all; to stdout where there is none."""
+    from sssfit.export import is_hlsl_file
+    from sssfit.files import write_atomically
+    from sssfit.kernel import is_kernel_file
     from sssfit.profile_csv import is_profile_csv
 
-    if form == "csv":
-        return is_profile_csv(path)
-    with path.open("rb") as file:
-        return _MARK in file.read(100)
-
-
-def _write(content: bytes, path: Path | None, form: str, *, force: bool) -> None:
-    """To the file, whole or not at all; to stdout where there is none."""
-    from sssfit.files import check_ending, check_output, locked, write_atomically
-
-    if path is None:
+    own = {"hlsl": is_hlsl_file, "json": is_kernel_file, "csv": is_profile_csv}
+    with held(
+        [path], own[form], inputs=[name], force=force, named=(f"--format {form}", f".{form}")
+    ):
+        if path is not None:
+            write_atomically(path, lambda stream: stream.write(content))
+            return
         binary_stdout().write(content)
         binary_stdout().flush()
-        return
-    check_ending(path, f"--format {form}", f".{form}")
-    check_output(path, lambda each: _is_own(form, each), force=force)
-    with locked(path):
-        write_atomically(path, lambda stream: stream.write(content))

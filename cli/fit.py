@@ -10,6 +10,7 @@ import click
 from ._fit_options import fit_options
 from ._fits import FITS, fit_lines, own_settings
 from ._options import Common, Length, common_options
+from ._outputs import KERNEL, held
 from ._report import binary_stdin, binary_stdout, finish, newest, percent, table
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ class Support(Length):
     metavar="FILE",
     help="Where the kernel goes, - for stdout.  [default: PROFILE.METHOD.kernel.json]",
 )
-@click.option("--force", is_flag=True, help="Replace a file that is not a kernel.")
+@click.option("--force", is_flag=True, help="Replace an input, or a file that is not our kernel.")
 @common_options
 @click.pass_context
 def fit(
@@ -81,6 +82,7 @@ def fit(
     \b
       sssfit fit --method svd --rank 3
       sssfit fit skin1.exact.profile.npz --method gaussians --terms 6 --mm-per-pixel 0.1
+      sssfit fit --method artist --target picture --mm-per-pixel 0.3
       sssfit fit --method falloff --width .014 --strength .78,.70,.75 --falloff .57,.13,.08
     """
     if listing:
@@ -92,11 +94,23 @@ def fit(
     name = profile or str(newest(common, "*.profile.npz", "sssfit simulate skin1"))
     source = _load(name)
     path = _target(name, source, method, settings, output)
-    settings |= {"mm_per_pixel": mm_per_pixel, "normalize": normalize}
+    settings |= _judge(settings) | {"mm_per_pixel": mm_per_pixel, "normalize": normalize}
+    from sssfit.kernel import is_kernel_file
+
     settings["support_mm"] = None if support == "auto" else support
-    result = _fit_and_write(source, method, settings, path, force=force)
+    with held([path], is_kernel_file, inputs=[name], force=force, named=KERNEL):
+        result = _fit_and_write(source, method, settings, path)
     figures = _figures(result, name, path)
     finish(common, figures, _text(result, figures), to_stderr=path is None)
+
+
+def _judge(settings: dict[str, Any]) -> dict[str, Any]:
+    """Return what judges pictures, if they are the target: the fits by themselves render none."""
+    if settings.get("target") != "picture":
+        return {}
+    from sssfit.compare.pictures import picture_error
+
+    return {"target": picture_error}
 
 
 def _load(name: str) -> Profile:
@@ -106,23 +120,16 @@ def _load(name: str) -> Profile:
 
 
 def _fit_and_write(
-    profile: Profile, method: str, settings: dict[str, Any], path: Path | None, *, force: bool
+    profile: Profile, method: str, settings: dict[str, Any], path: Path | None
 ) -> FitResult:
-    """Hold the output, fit, write; nothing is written where the fit fails."""
-    from sssfit.files import check_ending, check_output, locked
+    """Fit and write; nothing is written where the fit fails."""
     from sssfit.fit import METHODS
-    from sssfit.kernel import is_kernel_file
 
+    result = METHODS[method].fit(profile, **settings)
     if path is None:
-        stream = binary_stdout()
-        result = METHODS[method].fit(profile, **settings)
-        result.kernel.write(stream)
-        stream.flush()
-        return result
-    check_ending(path, "a kernel", ".json")
-    check_output(path, is_kernel_file, force=force)
-    with locked(path):
-        result = METHODS[method].fit(profile, **settings)
+        result.kernel.write(binary_stdout())
+        binary_stdout().flush()
+    else:
         result.kernel.save(path)
     return result
 

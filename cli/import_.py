@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ import click
 
 from ._mci import is_mci
 from ._options import Common, common_options
+from ._outputs import PROFILE, held
 from ._report import binary_stdin, binary_stdout, finish, table
 
 if TYPE_CHECKING:
@@ -48,7 +50,7 @@ _OF_TABLES = {"quantity": "--quantity", "unit": "--unit", "density_unit": "--den
     metavar="FILE",
     help="Where the profile goes, - for stdout.  [default: NAME.profile.npz]",
 )
-@click.option("--force", is_flag=True, help="Replace a file that is not a profile.")
+@click.option("--force", is_flag=True, help="Replace an input, or a file that is not our profile.")
 @common_options
 def import_(
     files: tuple[str, ...],
@@ -84,7 +86,7 @@ def import_(
         raise click.UsageError("name the profile of several files with -o.")
     profile = _read(files, of_table, channels)
     path = _target(files[0], output)
-    _write(profile, path, force=force)
+    _write(profile, path, files, force=force)
     figures = {"command": "import", "output": [str(path or "-")], **_figures(profile)}
     wrote = f"Wrote {path or 'the profile to stdout'}"
     finish(common, figures, f"{_text(profile)}\n{wrote}", to_stderr=path is None)
@@ -144,19 +146,16 @@ def _target(name: str, output: str | None) -> Path | None:
     return Path(f"{'stdin' if name == '-' else Path(name).stem}.profile.npz")
 
 
-def _write(profile: Profile, path: Path | None, *, force: bool) -> None:
+def _write(profile: Profile, path: Path | None, files: Sequence[str], *, force: bool) -> None:
     """To the file, whole or not at all; to stdout where there is none."""
-    from sssfit.files import check_ending, check_output, locked
     from sssfit.profile import is_profile_file
 
-    if path is None:
+    with held([path], is_profile_file, inputs=files, force=force, named=PROFILE):
+        if path is not None:
+            profile.save(path)
+            return
         profile.write(binary_stdout())
         binary_stdout().flush()
-        return
-    check_ending(path, "a profile", ".npz")
-    check_output(path, is_profile_file, force=force)
-    with locked(path):
-        profile.save(path)
 
 
 def _figures(profile: Profile) -> dict[str, Any]:

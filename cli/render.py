@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from ._options import Common, common_options
+from ._outputs import held
 from ._render_options import picture_options
 from ._render_report import figures_of, text_of
 from ._report import binary_stdin, binary_stdout, finish, newest, say
@@ -25,6 +24,10 @@ if TYPE_CHECKING:
     from sssfit.render.scene import Scene
 
     FloatArray = npt.NDArray[np.float64]
+
+
+# Of the head's key light: behind both ears.
+_BEHIND_DEGREES = 170.0
 
 
 @click.command()
@@ -51,7 +54,7 @@ if TYPE_CHECKING:
 )
 @click.option("--truth", metavar="FILE", help="Write the true picture as well.")
 @click.option("--difference", metavar="FILE", help="Write the absolute difference as well.")
-@click.option("--force", is_flag=True, help="Replace a file that is not a picture.")
+@click.option("--force", is_flag=True, help="Replace an input, or a file that is not our picture.")
 @common_options
 def render(
     kernel: str | None,
@@ -61,6 +64,7 @@ def render(
     layer: str | None,
     mask: str | None,
     border: str,
+    transmit: bool,
     screen: bool,
     follow: str | None,
     profile: str | None,
@@ -86,15 +90,29 @@ def render(
       sssfit render --irradiance edge --angle 45 --size 256x256
       sssfit render --irradiance mine.png --mm-per-pixel 0.1 -o mine.tif --difference lost.png
       sssfit render --screen --irradiance head
+      sssfit render --irradiance head --transmit -o ears.png
     """
+    from sssfit.image import image_format, is_image_file
+
     _check_options(screen, follow, profile or truth or difference or structure)
+    if transmit:
+        own = _lit_from_behind(irradiance, own)
     picture = Picture(irradiance, size, mm_per_pixel, own, layer, mask)
     name, loaded = _kernel(kernel, common)
     path = _target(name, picture, output)
     targets = {"picture": path} if path else {}
     targets |= {k: Path(v) for k, v in (("truth", truth), ("difference", difference)) if v}
-    with _held(list(targets.values()), force=force):
+    for each in targets.values():
+        image_format(each)
+    outputs = [*targets.values(), *([None] if path is None else [])]
+    with held(outputs, is_image_file, inputs=[name, irradiance, profile], force=force):
         scene = make_or_read(picture, loaded.mm_per_pixel, common)
+        through = None
+        if transmit:
+            from sssfit.render.transmittance import transmitted, with_transmitted
+
+            through = transmitted(scene, loaded)
+            scene = scene if screen else with_transmitted(scene, loaded)
         source, source_name = (
             (None, None) if screen else true_profile(loaded, name, profile, common)
         )
@@ -118,9 +136,17 @@ def render(
         "profile": source_name,
         "border": border,
         "follow": (follow or "gaussian") if screen else None,
-        **figures_of(result, scene, loaded),
+        **figures_of(result, scene, loaded, through),
     }
     finish(common, figures, text_of(figures), to_stderr=path is None)
+
+
+def _lit_from_behind(irradiance: str, own: dict[str, Any]) -> dict[str, Any]:
+    """Return the head's options with light through it, its key light behind unless it is given."""
+    if irradiance != "head":
+        raise click.UsageError("--transmit is for the head; leave it out.")
+    light = own["light_degrees"]
+    return {**own, "transmit": True, "light_degrees": _BEHIND_DEGREES if light is None else light}
 
 
 def _check_options(screen: bool, follow: str | None, compared: object) -> None:
@@ -150,24 +176,6 @@ def _target(name: str, picture: Picture, output: str | None) -> Path | None:
         return None if output == "-" else Path(output)
     stem = "stdin" if name == "-" else Path(name).name.removesuffix(".json").removesuffix(".kernel")
     return Path(f"{stem}.{picture.name}.exr")
-
-
-@contextlib.contextmanager
-def _held(paths: Sequence[Path], *, force: bool) -> Iterator[None]:
-    """Check that pictures can be written there, and keep other runs off them."""
-    from sssfit.files import check_output, locked
-    from sssfit.image import image_format, is_image_file
-
-    if not paths:
-        binary_stdout()  # closed: said now and not after the work
-    if len({path.resolve() for path in paths}) < len(paths):
-        raise click.UsageError("two of -o, --truth and --difference name the same file.")
-    with contextlib.ExitStack() as stack:
-        for path in paths:
-            image_format(path)
-            check_output(path, is_image_file, force=force)
-            stack.enter_context(locked(path))
-        yield
 
 
 def _write(

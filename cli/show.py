@@ -75,8 +75,8 @@ def _material_figures(profile: Profile) -> dict[str, Any] | None:
 
     No layers where only a name is known; null where there is not even that.
     """
-    from sssfit._chart_data import material_of
     from sssfit._material_checks import printable
+    from sssfit._profile_radii import material_of
 
     material = material_of(profile)
     if material is not None:

@@ -103,7 +103,7 @@ class Radius(Length):
     is_flag=True,
     help="montecarlo: go on where a killed or interrupted run was saved.",
 )
-@click.option("--force", is_flag=True, help="Replace a file that is not a profile.")
+@click.option("--force", is_flag=True, help="Replace an input, or a file that is not our profile.")
 @common_options
 @click.pass_context
 def simulate(
@@ -156,7 +156,7 @@ def simulate(
     targets = profile_paths(materials, method, output, several=several)
     if walk.get("resume") and targets == [None]:
         raise click.UsageError("--resume needs a file to go on beside; leave -o - out.")
-    request = Request(force, several, common, **walk)
+    request = Request(force, several, common, inputs=(material,) if material else (), **walk)
     if method == "montecarlo":
         run_walks(materials, targets, jobs, request)
     else:

@@ -11,36 +11,12 @@ import numpy as np
 
 from sssfit._profile_bins import Bins, FloatArray
 from sssfit._profile_radii import energy_radii_mm
-from sssfit.errors import MaterialError
-from sssfit.material import Material
 from sssfit.profile import Profile
 
 _IMAGE_SHARE_COLOUR, _IMAGE_SHARE_GREY = 0.75, 0.95
 _IMAGE_ROWS, _IMAGE_COLUMNS = 201, 501  # wider than any panel, 130 an inch
 _EXPOSED_AT = 0.35  # of the half height
 _NOTHING = 1e-200  # 1/mm: stands for 0 under a logarithm
-
-
-def mean_free_paths_mm(profile: Profile) -> FloatArray | None:
-    """Mean free path of each channel (C,) [mm] in the material's top layer; None if unknown."""
-    material = material_of(profile)
-    if material is None or material.n_channels != profile.n_channels:
-        return None
-    if len(material.layers) > 1:
-        return None  # there is no one mean free path
-    paths_mm = material.layers[0].mean_free_path_mm
-    return paths_mm if np.isfinite(paths_mm).all() else None
-
-
-def material_of(profile: Profile) -> Material | None:
-    """Return the material a profile says it was made from; None where it holds none."""
-    record = profile.meta.get("material")
-    if not isinstance(record, dict):
-        return None
-    try:
-        return Material.from_dict(record)
-    except MaterialError:
-        return None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

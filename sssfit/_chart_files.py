@@ -4,8 +4,15 @@ from pathlib import Path
 from typing import BinaryIO
 
 from sssfit.errors import FileError
+from sssfit.files import has_mark
 
 FORMATS = ("png", "svg", "pdf")
+MAKER = "sssfit chart"
+_MARKS = {
+    b"\x89PNG\r\n\x1a\n": b"tEXtSoftware\0" + MAKER.encode(),
+    b"<?xml": f"<dc:title>{MAKER}</dc:title>".encode(),
+    b"%PDF-": f"/Creator ({MAKER})".encode(),
+}
 
 
 def chart_format(target: str | Path | BinaryIO) -> str:
@@ -29,11 +36,5 @@ def known_format(name: str, origin: str) -> str:
 
 
 def is_chart_file(path: Path) -> bool:
-    """Tell whether a file begins as PNG, SVG or PDF files do."""
-    try:
-        with path.open("rb") as stream:
-            head = stream.read(1024)
-    except OSError:
-        return False
-    is_svg = head.lstrip().startswith((b"<?xml", b"<svg")) and b"svg" in head
-    return is_svg or head.startswith((b"\x89PNG\r\n\x1a\n", b"%PDF-"))
+    """Tell whether a file is a chart that we wrote, by what PNG, SVG and PDF say of their maker."""
+    return has_mark(path, _MARKS)

@@ -6,21 +6,21 @@ The record comes from ``sssfit.compare.guide``, which has computed everything.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
-from matplotlib.colors import Normalize, SymLogNorm
+from matplotlib.colors import LogNorm, Normalize, SymLogNorm
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
-from sssfit._chart_data import material_of
 from sssfit._chart_page import chart_style, draw_footnotes, draw_text, name_axes, new_figure
 from sssfit._chart_style import COLOURS, LEFT, LINE_WIDTH, RIGHT, WIDTH_INCHES, Style
 from sssfit._chart_text import kernel_subtitle, shortened
 from sssfit._profile_bins import FloatArray
+from sssfit._profile_radii import material_of
 from sssfit.profile import full_kernel
 
 if TYPE_CHECKING:
@@ -38,17 +38,30 @@ _TABLE_INCHES = 0.165
 _COLUMNS = (0.25, 0.44, 0.61, 0.80)  # of the width: the table's figures
 _HEADS = ("middle pixel of the pass", "energy misplaced", "Frobenius error", "misfit weighted by Γ")
 _DECADES = 5  # of the residual, on either side of what is drawn linearly
+_GUIDE_DECADES = 3  # of the guide functions, below and above their value halfway out
 _PASS_DECADES = 6
 _GREY = "#666666"
 _NOTE = (
     "Residual: 2D kernel less a aᵀ, as a share of the channel's energy; red where the fit has too "
     "little light, blue where it has too much. Misplaced: half the sum of |residual|. Misfit: "
-    "Γ residual² over Γ kernel², summed. The first step of a pass is its middle pixel."
+    "Γ residual² over Γ kernel², summed. Γ is drawn over its value on the diagonal halfway out; "
+    "Γₚ = 1/(a(x) a(y)) of the pre-integrated pass has that pass for its best (S.8). The first "
+    "step of a pass is its middle pixel."
 )
 
 
+class _Row(NamedTuple):
+    """One line of panels; no guided pass beside the pre-integrated one in its own."""
+
+    guide: str
+    name: str
+    gamma: FloatArray
+    residual: FloatArray
+    guided: FloatArray | None = None
+
+
 def guide_figure(guide: Guide) -> Figure:
-    """Draw the guide function, what the fit leaves, and its pass; a row for each k.
+    """Draw guide function, what is left, and the pass: pre-integrated first, then a row for each k.
 
     Parameters
     ----------
@@ -57,21 +70,26 @@ def guide_figure(guide: Guide) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        8 inches wide. Gamma over its largest, and the residual R_d - a a^T as a share of the
-        channel's energy in each pixel, over mm: symmetric and logarithmic, one scale for all rows.
-        a / sum(a) per mm over the distance from the middle, with the pre-integrated pass.
+        8 inches wide. Gamma, logarithmic, over its value on the diagonal halfway out, and the
+        residual R_d - a a^T as a share of the channel's energy in each pixel, over mm: symmetric
+        and logarithmic, one scale for all rows. a / sum(a) per mm over the distance from the
+        middle, with the pre-integrated pass.
     """
-    head = 0.95 + _TABLE_INCHES * (len(guide.ks) + 1) + 0.12
-    height = head + _ROW_INCHES * len(guide.ks) + _BAR_DOWN + _FOOT_INCHES
+    rows = _rows(guide)
+    head = 0.95 + _TABLE_INCHES * len(rows) + 0.12
+    height = head + _ROW_INCHES * len(rows) + _BAR_DOWN + _FOOT_INCHES
     with chart_style():
         figure = new_figure(height)
         _draw_head(figure, guide)
         draw_footnotes(figure, [_NOTE])
-        shades = Normalize(0.0, 1.0), _scale(guide.residual)
-        for row in range(len(guide.ks)):
-            down = head + _ROW_INCHES * row
-            _draw_row(figure, guide, row, down, shades)
-        below = head + _ROW_INCHES * len(guide.ks) + _BAR_DOWN
+        shades = (
+            LogNorm(10.0**-_GUIDE_DECADES, 10.0**_GUIDE_DECADES),
+            _scale(np.stack([each.residual for each in rows])),
+        )
+        for i, row in enumerate(rows):
+            place = head + _ROW_INCHES * i, i == 1, i == len(rows) - 1
+            _draw_row(figure, guide, row, place, shades)
+        below = head + _ROW_INCHES * len(rows) + _BAR_DOWN
         _draw_bars(figure, below, shades)
     return figure
 
@@ -91,41 +109,62 @@ def _draw_head(figure: Figure, guide: Guide) -> None:
             draw_text(figure, down, each, left=left, size=8)
 
 
+def _rows(guide: Guide) -> list[_Row]:
+    """Return what is drawn: the pre-integrated pass with its Gamma_p, then the fits."""
+    line = _Row("Γₚ", "pre-integrated", guide.preintegrated_gamma, guide.preintegrated_residual)
+    fits = [
+        _Row(f"Γ, k = {k:g}", f"k = {k:g}", guide.gamma[i], guide.residual[i], guide.passes[i])
+        for i, k in enumerate(guide.ks)
+    ]
+    return [line, *fits]
+
+
 def _table(guide: Guide) -> list[tuple[str, list[str]]]:
     """Name and figures of each line."""
+    line = guide.preintegrated[0], guide.preintegrated_misplaced, *guide.preintegrated_errors
     columns = (
         guide.centre_share,
         guide.misplaced,
         guide.relative_frobenius_error,
         guide.weighted_residual,
     )
-    rows = [
-        (f"k = {k:g}", [f"{100.0 * each[i]:.1f} %" for each in columns])
-        for i, k in enumerate(guide.ks)
-    ]
-    return [*rows, ("pre-integrated", [f"{100.0 * guide.preintegrated[0]:.1f} %", "", "", ""])]
+    figures = [("pre-integrated", line)]
+    figures += [(f"k = {k:g}", tuple(e[i] for e in columns)) for i, k in enumerate(guide.ks)]
+    return [(name, [f"{100.0 * each:.1f} %" for each in row]) for name, row in figures]
 
 
 def _draw_row(
-    figure: Figure, guide: Guide, row: int, down: float, shades: tuple[Normalize, SymLogNorm]
+    figure: Figure,
+    guide: Guide,
+    row: _Row,
+    place: tuple[float, bool, bool],
+    shades: tuple[LogNorm, SymLogNorm],
 ) -> None:
-    """Draw Gamma, residual and pass for one k, their top so many inches down the page."""
-    is_last = row == len(guide.ks) - 1
+    """Draw a row's panels; ``place`` is inches down the page, whether with the legend, the last."""
+    down, is_keyed, is_last = place
     x_label = "x (mm)" if is_last else ""
-    k = f"k = {guide.ks[row]:g}"
     first, second = (_panel(figure, left, down) for left in (LEFT * WIDTH_INCHES, _SECOND))
     third = _panel(figure, _THIRD, down, RIGHT * WIDTH_INCHES - _THIRD)
-    _draw_image(first, guide, guide.gamma[row], shades[0], "cividis")
-    _draw_image(second, guide, guide.residual[row], shades[1], "RdBu_r")
-    _draw_pass(third, guide, row)
-    name_axes(first, f"guide function Γ, {k}", x_label, "y (mm)")
-    name_axes(second, f"residual, {k}", x_label, "")
-    name_axes(third, f"pass, {k}", "distance from the middle (mm)" if is_last else "", "")
+    _draw_image(first, guide, _over_halfway(row.gamma), shades[0], "cividis")
+    _draw_image(second, guide, row.residual, shades[1], "RdBu_r")
+    _draw_pass(third, guide, row.guided)
+    if is_keyed:
+        third.legend(loc="lower left", fontsize=7.5, reverse=True)
+    name_axes(first, f"guide function {row.guide}", x_label, "y (mm)")
+    name_axes(second, f"residual, {row.name}", x_label, "")
+    name_axes(third, f"pass, {row.name}", "distance from the middle (mm)" if is_last else "", "")
     third.set_ylabel("share per mm")
     third.yaxis.set_label_coords(-0.16, 0.5)  # the same in all rows
     second.tick_params(labelleft=False)
     for each in (first, second, third):
         each.tick_params(labelbottom=is_last)
+
+
+def _over_halfway(gamma: FloatArray) -> FloatArray:
+    """Return a guide function over its value on the diagonal halfway out, where it has one."""
+    diagonal = np.diagonal(gamma)[: gamma.shape[0] // 2 + 1]
+    known = diagonal[np.isfinite(diagonal) & (diagonal > 0.0)]
+    return gamma / known[-1] if known.size else gamma
 
 
 def _panel(figure: Figure, left: float, down: float, width: float = _IMAGE_INCHES) -> Axes:
@@ -149,7 +188,7 @@ def _draw_image(
         axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
 
 
-def _draw_pass(axes: Axes, guide: Guide, row: int) -> None:
+def _draw_pass(axes: Axes, guide: Guide, guided: FloatArray | None) -> None:
     """Step from pixel to pixel; the middle one, from 0 to half a pixel, reaches the left edge."""
     pitch = guide.mm_per_pixel
     edges = pitch * (np.arange(guide.preintegrated.size + 1) - 0.5)
@@ -164,7 +203,8 @@ def _draw_pass(axes: Axes, guide: Guide, row: int) -> None:
         label="pre-integrated",
         **line,
     )
-    axes.stairs(guide.passes[row] / pitch, edges, color=COLOURS[2], lw=1.4, label="guided", **line)
+    if guided is not None:
+        axes.stairs(guided / pitch, edges, color=COLOURS[2], lw=1.4, label="guided", **line)
     axes.set_xscale("log")
     axes.set_yscale("log", nonpositive="clip")
     axes.set_xlim(edges[0], edges[-1])
@@ -173,8 +213,6 @@ def _draw_pass(axes: Axes, guide: Guide, row: int) -> None:
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_minor_formatter(NullFormatter())
-    if row == 0:
-        axes.legend(loc="lower left", fontsize=7.5, reverse=True)
 
 
 def _scale(residual: FloatArray) -> SymLogNorm:
@@ -184,14 +222,14 @@ def _scale(residual: FloatArray) -> SymLogNorm:
     return SymLogNorm(linear, vmin=-most, vmax=most, base=10)
 
 
-def _draw_bars(figure: Figure, down: float, shades: tuple[Normalize, SymLogNorm]) -> None:
+def _draw_bars(figure: Figure, down: float, shades: tuple[LogNorm, SymLogNorm]) -> None:
     """Explain the colours of both columns of images, under them."""
     height = figure.get_figheight()
     bottom, tall = 1 - (down + _BAR_INCHES) / height, _BAR_INCHES / height
     lefts = LEFT, _SECOND / WIDTH_INCHES
     wide, wider = (_IMAGE_INCHES + each for each in (0.0, _BAR_WIDER))
     for norm, shown, left, width, name in (
-        (shades[0], "cividis", lefts[0], wide, "Γ over its largest"),
+        (shades[0], "cividis", lefts[0], wide, "Γ over Γ halfway out"),
         (shades[1], "RdBu_r", lefts[1], wider, "energy per pixel, of the channel's"),
     ):
         cax = figure.add_axes((left, bottom, width / WIDTH_INCHES, tall))

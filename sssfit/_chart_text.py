@@ -53,7 +53,9 @@ def kernel_subtitle(profile: Profile, pixels: int, mm_per_pixel: float) -> str:
     meta = profile.meta
     parts = [method_name(meta["method"])] if meta.get("method") else []
     parts.append(f"{pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm")
-    return " · ".join([*parts, f"sssfit {shortened(str(meta['version']))}"])
+    if version := meta.get("version"):
+        parts.append(f"sssfit {shortened(version)}")
+    return " · ".join(parts)
 
 
 def method_name(method: object) -> str:

@@ -2,7 +2,7 @@
 
 A kernel is a function of the profile *and* the pitch: near the beam R_d ~ 1/r has no value to
 sample and its square no integral. Every weight here is an integral over a pixel, in closed form, of
-flat annuli (``sssfit._jit.pixels``), the innermost ones subdivided first.
+flat annuli (``sssfit._jit.pixels``), each cut into parts by the monotone interpolation of F first.
 """
 
 import math
@@ -21,6 +21,11 @@ FloatArray = npt.NDArray[np.float64]
 # at p = .1 dr it is .008.
 SUBDIVIDED_ANNULI = 10
 PARTS_PER_ANNULUS = 64
+# The steps between flat annuli are noise in pixels as wide as they are. R_d falls by 1/j over the
+# jth of even annuli, so that parts in proportion to 1/j are all alike. skin1's kernel at p = dr is
+# off by 1.2e-3 of its norm with steps from the eleventh annulus on and by 4e-5 with these parts;
+# beyond the 320th, two parts take a pixel's error from 1 % or less to a quarter of it.
+LEAST_PARTS = 2
 
 _LARGEST_KERNEL_BYTES = 2e9
 
@@ -47,20 +52,29 @@ def cumulative_at(
 def flat_annuli(
     r_edges_mm: FloatArray, annulus_energy: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Edges (m+1,) and densities (m, C) [1/mm^2] with the innermost annuli subdivided."""
-    n_split = min(SUBDIVIDED_ANNULI, len(annulus_energy))
-    t = np.arange(1, PARTS_PER_ANNULUS + 1) / PARTS_PER_ANNULUS
-    width = np.diff(r_edges_mm[: n_split + 1])[:, None]
-    inner_edges = r_edges_mm[:n_split, None] + width * t
-    inner_edges[:, -1] = r_edges_mm[1 : n_split + 1]
-    slopes = _slopes(r_edges_mm, annulus_energy)[: n_split + 1]
-    rise = (width * slopes[:-1])[:, None], (width * slopes[1:])[:, None]
-    grown = _growth(t[:, None], annulus_energy[:n_split, None], *rise)
-    grown[:, -1] = annulus_energy[:n_split]
-    inner_energy = np.diff(grown, axis=1, prepend=0.0).reshape(-1, annulus_energy.shape[1])
-    edges = np.concatenate(([0.0], inner_edges.ravel(), r_edges_mm[n_split + 1 :]))
-    energy = np.concatenate((inner_energy, annulus_energy[n_split:]))
+    """Edges (m+1,) and densities (m, C) [1/mm^2] of the annuli, each cut into flat parts."""
+    parts = _parts(len(annulus_energy))
+    annulus = np.repeat(np.arange(parts.size), parts)
+    last = np.cumsum(parts) - 1
+    t = (np.arange(annulus.size) - (last - parts)[annulus]) / parts[annulus]
+    width, slopes = np.diff(r_edges_mm), _slopes(r_edges_mm, annulus_energy)
+    local_width = width[annulus][:, None]
+    rise = local_width * slopes[annulus], local_width * slopes[annulus + 1]
+    grown = _growth(t[:, None], annulus_energy[annulus], *rise)
+    grown[last] = annulus_energy
+    energy = np.diff(grown, axis=0, prepend=0.0)
+    energy[last[:-1] + 1] = grown[last[:-1] + 1]  # the first part of each begins at 0
+    edges = np.concatenate(([0.0], r_edges_mm[annulus] + width[annulus] * t))
+    edges[last + 1] = r_edges_mm[1:]
     return edges, energy / annulus_areas(edges)[:, None]
+
+
+def _parts(annuli: int) -> npt.NDArray[np.intp]:
+    """Return how many parts each annulus is cut into (n,): 64 of the first ten, then ever fewer."""
+    share = SUBDIVIDED_ANNULI / np.arange(1, annuli + 1)
+    parts = np.ceil(PARTS_PER_ANNULUS * np.minimum(share, 1.0)).astype(np.intp)
+    at_least: npt.NDArray[np.intp] = np.maximum(parts, min(LEAST_PARTS, PARTS_PER_ANNULUS))
+    return at_least
 
 
 def _growth(t: FloatArray, energy: FloatArray, rise0: FloatArray, rise1: FloatArray) -> FloatArray:

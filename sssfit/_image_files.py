@@ -12,7 +12,7 @@ from typing import BinaryIO
 
 from sssfit._material_checks import printable, shown
 from sssfit.errors import FileError
-from sssfit.files import reason
+from sssfit.files import has_mark, reason
 
 # What is written, by ending.
 _ENDINGS = {".exr": "exr", ".tif": "tiff", ".tiff": "tiff", ".png": "png"}
@@ -28,6 +28,15 @@ _MAGIC = {
 }
 _STDERR = threading.Lock()  # two at once would put the wrong stderr back
 _LONGEST_CALLED = 400  # characters of a path in messages
+# How pictures that we write name their maker; PNG has it in its Exif, which is TIFF's.
+MAKER = "sssfit picture"
+_MARKS = {
+    begin: b"Software\0string\0\x0e\0\0\0" + MAKER.encode()
+    if name == "exr"
+    else MAKER.encode() + b"\0"
+    for name, begins in _MAGIC.items()
+    for begin in begins
+}
 _CRC_BLOCK = 1 << 20  # bytes held at a time while a chunk is summed
 
 
@@ -59,10 +68,10 @@ def as_path(path: object) -> Path:
 
 
 def is_image_file(path: str | Path) -> bool:
-    """Tell whether a file begins as EXR, Radiance HDR, TIFF or PNG files do."""
+    """Tell whether a file is a picture that we wrote, by what it says of its maker."""
     try:
-        return _format_of(as_path(path)) is not None
-    except (OSError, FileError):
+        return has_mark(as_path(path), _MARKS)
+    except FileError:
         return False
 
 

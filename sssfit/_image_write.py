@@ -1,18 +1,16 @@
 """Pictures to bytes, through OpenImageIO; the same picture gives the same bytes."""
 
 import contextlib
-import tempfile
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._image_files import without_lines_of_libpng
+from sssfit._image_files import MAKER, without_lines_of_libpng
 from sssfit._image_read import SCALE_KEY, one_line
 from sssfit.errors import FileError
-from sssfit.files import reason
+from sssfit.files import reason, temporary_folder
 
 # The library would put in the time of writing, and a picture made twice would differ.
 _DATE = "1980:01:01 00:00:00"
@@ -43,6 +41,7 @@ def image_bytes(
         width, height, count, pixels.dtype.name.replace("float32", "float")
     )
     spec.channelnames = tuple(channels)
+    spec.attribute("Software", MAKER)
     spec.alpha_channel = count - 1 if has_alpha else -1
     if has_alpha and not is_multiplied:
         spec.attribute("oiio:UnassociatedAlpha", 1)  # what it gets is what it writes
@@ -55,8 +54,8 @@ def image_bytes(
     if format == "exr" and mm_per_pixel is not None:
         spec.attribute(SCALE_KEY, repr(float(mm_per_pixel)))
     try:
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / f"picture.{format}"
+        with temporary_folder() as folder:
+            path = folder / f"picture.{format}"
             target = OpenImageIO.ImageOutput.create(str(path))
             # Other layouts in memory are refused.
             packed = np.ascontiguousarray(pixels)

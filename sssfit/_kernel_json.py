@@ -9,28 +9,23 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
+import numpy.typing as npt
 
+from sssfit import _kernel_schema
 from sssfit._material_checks import shown
 from sssfit.errors import KernelError
-from sssfit.files import reason
+from sssfit.files import has_mark, read_at_most, reason
 
 if TYPE_CHECKING:
     from sssfit.kernel import SeparableKernel
+
+FloatArray = npt.NDArray[np.float64]
 
 FORMAT = "sssfit.kernel/1"
 _MARK = b'"sssfit.kernel/'  # by which a file is ours, however damaged
 _REMEDY = "name a .kernel.json file, as `sssfit fit` writes it"
 MOST_BYTES = 500_000_000  # 16000 pixels, 10 terms and 64 channels are 200 MB
-_TYPES: dict[str, type | tuple[type, ...]] = {
-    "method": str,
-    "mm_per_pixel": (int, float),
-    "channels": list,
-    "terms": list,
-    "errors": dict,
-    "scale": list,
-    "parameters": dict,
-    "meta": dict,
-}
+_ROUNDING = 1e-9  # relative; sums of pixels may be taken in another order
 
 
 def content(kernel: "SeparableKernel") -> dict[str, Any]:
@@ -72,30 +67,32 @@ def unpack(source: str | Path | BinaryIO, origin: str) -> dict[str, Any]:
     Raises
     ------
     KernelError
-        One line that names the origin.
+        One line that names the origin and the place in the file.
     """
     whole = _parsed(_read(source, origin), origin)
-    _check_types(whole, origin)
-    terms, errors = whole["terms"], whole["errors"]
     try:
-        fields = {key: whole[key] for key in ("method", "channels", "parameters", "meta")}
-        return fields | {
-            "mm_per_pixel": float(whole["mm_per_pixel"]),
-            "signs": np.array([term["sign"] for term in terms], dtype=np.float64),
-            "weights": np.array([term["weights"] for term in terms], dtype=np.float64),
-            "relative_frobenius_error": _or_nan(errors["relative_frobenius"]),
-            "energy_error": _or_nan(errors["energy"]),
-            "scale": np.array(whole["scale"], dtype=np.float64),
-        }
-    except (KeyError, TypeError, ValueError) as error:
-        detail = str(error).splitlines()[0][:80]
-        raise KernelError(f"{origin}: the kernel is damaged ({detail}); make it again.") from None
+        _kernel_schema.check(whole, _kernel_schema.schema())
+        _check_sizes(whole)
+        signs = np.array([term["sign"] for term in whole["terms"]], dtype=np.float64)
+        weights = np.array([term["weights"] for term in whole["terms"]], dtype=np.float64)
+        _check_derived(whole, signs, weights)
+    except KernelError as error:
+        raise KernelError(f"{origin}: {error} Fit the kernel again.") from None
+    errors = whole["errors"]
+    fields = {key: whole[key] for key in ("method", "channels", "parameters", "meta")}
+    return fields | {
+        "mm_per_pixel": float(whole["mm_per_pixel"]),
+        "signs": signs,
+        "weights": weights,
+        "relative_frobenius_error": _or_nan(errors["relative_frobenius"]),
+        "energy_error": _or_nan(errors["energy"]),
+        "scale": np.array(whole["scale"], dtype=np.float64),
+    }
 
 
 def is_kernel_file(path: Path) -> bool:
-    """Whether a file is a kernel of any version, by its first bytes."""
-    with path.open("rb") as file:
-        return _MARK in file.read(200)
+    """Whether a file is a kernel of any version, by the format it names."""
+    return has_mark(path, {b"{": b'"format": "sssfit.kernel/'})
 
 
 def _read(source: str | Path | BinaryIO, origin: str) -> bytes:
@@ -103,9 +100,9 @@ def _read(source: str | Path | BinaryIO, origin: str) -> bytes:
     try:
         if isinstance(source, str | Path):
             with Path(source).open("rb") as file:
-                text = file.read(MOST_BYTES + 1)
+                text = read_at_most(file, MOST_BYTES + 1)
         else:
-            text = source.read(MOST_BYTES + 1)
+            text = read_at_most(source, MOST_BYTES + 1)
     except OSError as error:
         raise KernelError(f"{origin}: {reason(error)}.") from None
     if len(text) > MOST_BYTES:
@@ -116,10 +113,12 @@ def _read(source: str | Path | BinaryIO, origin: str) -> bytes:
 def _parsed(text: bytes, origin: str) -> Mapping[str, Any]:
     """Parse JSON and look at its format."""
     try:
-        whole = json.loads(text)
+        whole = json.loads(text, object_pairs_hook=_once_each, parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
         if _MARK not in text:
             raise KernelError(f"{origin}: not a kernel; {_REMEDY}.") from None
+        if isinstance(error, KernelError):
+            raise KernelError(f"{origin}: {error}; fit the kernel again.") from None
         how = "; save it as UTF-8" if isinstance(error, UnicodeDecodeError) else ", or cut short"
         raise KernelError(
             f"{origin}: the kernel is damaged (not valid JSON{how}); make it again."
@@ -133,19 +132,59 @@ def _parsed(text: bytes, origin: str) -> Mapping[str, Any]:
     raise KernelError(f"{origin}: not a kernel{said}; {_REMEDY}.")
 
 
-def _check_types(whole: Mapping[str, Any], origin: str) -> None:
-    """Refuse a kernel that lacks a key or has something else under it."""
-    for key, expected in _TYPES.items():
-        if key not in whole:
-            raise KernelError(f"{origin}: the kernel has no {key}; make it again.")
-        if not isinstance(whole[key], expected):
-            found = type(whole[key]).__name__
+def _once_each(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Make an object, in which JSON itself would allow a key twice."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise KernelError(f"{shown(twice)} is there twice")
+    return found
+
+
+def _no_number(text: str) -> float:
+    raise KernelError(f"it holds {text}, which is not a number of JSON")
+
+
+def _check_sizes(whole: Mapping[str, Any]) -> None:
+    """Hold every list against the channels, and the terms against one another."""
+    channels, terms = len(whole["channels"]), whole["terms"]
+    pixels = len(terms[0]["weights"])
+    lists = {"energy": whole["energy"], "scale": whole["scale"]}
+    lists |= {f"errors.{name}": whole["errors"][name] for name in ("relative_frobenius", "energy")}
+    for t, term in enumerate(terms):
+        lists[f"terms[{t}].sign"] = term["sign"]
+        if len(term["weights"]) != pixels:
             raise KernelError(
-                f"{origin}: the kernel is damaged ({key} is of type {found}); make it again."
+                f"terms[{t}].weights has {len(term['weights'])} pixels; expected {pixels}, as in "
+                "terms[0]."
             )
-    if not all(isinstance(each, str) for each in whole["channels"]):
+        lists |= {f"terms[{t}].weights[{k}]": each for k, each in enumerate(term["weights"])}
+    for path, values in lists.items():
+        if len(values) != channels:
+            raise KernelError(
+                f"{path} has {len(values)} entries; expected {channels}, one for each channel."
+            )
+
+
+def _check_derived(whole: Mapping[str, Any], signs: FloatArray, weights: FloatArray) -> None:
+    """Hold what the file says of its terms against the terms."""
+    terms, pixels = weights.shape[:2]
+    support_mm = (pixels - 1) // 2 * float(whole["mm_per_pixel"])
+    counts = {"rank": (whole["rank"], terms), "pixels": (whole["pixels"], pixels)}
+    for name, (said, found) in counts.items():
+        if said != found:
+            raise KernelError(f"{name} = {said}, but the terms have {found}.")
+    if abs(whole["support_mm"] - support_mm) > _ROUNDING * support_mm:
         raise KernelError(
-            f"{origin}: the kernel is damaged (channels are not names); make it again."
+            f"support_mm = {whole['support_mm']}, but {pixels} pixels of {whole['mm_per_pixel']} "
+            f"mm reach {support_mm:.9g} mm."
+        )
+    energy = np.sum(signs * np.sum(weights, axis=1) ** 2, axis=0)
+    rounding = _ROUNDING * np.sum(np.sum(np.abs(weights), axis=1) ** 2, axis=0)
+    for c in np.flatnonzero(~(np.abs(whole["energy"] - energy) <= rounding)):
+        raise KernelError(
+            f"energy[{c}] = {whole['energy'][c]}, but the terms add up to {energy[c]:.9g}."
         )
 
 

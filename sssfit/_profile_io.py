@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from sssfit._material_checks import shown
 from sssfit.errors import ProfileError
-from sssfit.files import reason
+from sssfit.files import read_at_most, reason
 
 FORMAT = "sssfit.profile/1"
 REQUIRED = (
@@ -40,8 +40,10 @@ OPTIONAL = (
     "beyond_grid_transmittance_stderr",
 )
 
-# The largest profile of the paper's materials is 0.3 MB; 2 GB is a zip bomb or somebody else's.
-_LARGEST_FILE_BYTES = 2_000_000_000
+# The largest profile of the paper's materials is 0.3 MB, the largest there may be (64 channels of
+# 100 000 annuli, all arrays) 410 MB; more is a zip bomb or somebody else's.
+_LARGEST_FILE_BYTES = 500_000_000
+_LARGEST_META_BYTES = 16_000_000  # numpy's text has 4 bytes a character
 _REMEDY = "write it again with `sssfit simulate`, or name a .profile.npz file"
 _FOREIGN = "name a .profile.npz file, as `sssfit simulate` and `sssfit import` write it"
 # By either a file is ours, however damaged: the first member's name, or the format in its JSON,
@@ -87,7 +89,7 @@ def unpack(
             with Path(source).open("rb") as stream:
                 return _unpack_known(stream)
         # A pipe cannot seek, an archive's directory is at its end.
-        return _unpack_known(io.BytesIO(source.read(_LARGEST_FILE_BYTES)))
+        return _unpack_known(io.BytesIO(read_at_most(source, _LARGEST_FILE_BYTES)))
     except ProfileError as error:
         remedy = _FOREIGN if str(error).startswith("is not ") else _REMEDY
         raise ProfileError(f"{origin} {error}; {remedy}.") from None
@@ -174,31 +176,38 @@ def _file_format(meta: Mapping[str, Any]) -> str:
 
 
 def _read_meta(archive: zipfile.ZipFile) -> dict[str, Any]:
-    meta = json.loads(str(_read_npy(archive, "meta", "U")))
+    meta = json.loads(str(read_npy(archive, "meta", "U", _LARGEST_META_BYTES)))
     if not isinstance(meta, dict):
         raise ProfileError("is not a profile: its 'meta' is not a JSON object")
     return meta
 
 
 def _read_float(archive: zipfile.ZipFile, name: str) -> FloatArray:
-    return _read_npy(archive, name, "f").astype(np.float64, order="C")
+    return read_npy(archive, name, "f", _LARGEST_FILE_BYTES).astype(np.float64, order="C")
 
 
-def _read_npy(archive: zipfile.ZipFile, name: str, kind: str) -> npt.NDArray[Any]:
-    """Read one .npy member whose header must agree with its length, before it is believed."""
+def read_npy(archive: zipfile.ZipFile, name: str, kind: str, most_bytes: int) -> npt.NDArray[Any]:
+    """Read one .npy member whose header must agree with its length, before it is believed.
+
+    ``kind`` is "f" for float64 or "U" for text. A ProfileError continues a sentence that names the
+    file; other damage raises anything that zipfile, zlib and numpy's header parser raise.
+    """
     member = archive.getinfo(f"{name}.npy")
-    if member.file_size > _LARGEST_FILE_BYTES:
-        raise ProfileError(f"declares {member.file_size / 1e9:.3g} GB for {name}")
-    stream = io.BytesIO(archive.read(member))
-    if np.lib.format.read_magic(stream) != (1, 0):
-        raise ProfileError(f"holds {name} in an unknown .npy version")
-    shape, fortran_order, dtype = np.lib.format.read_array_header_1_0(stream)
-    if dtype.kind != kind or (kind == "f" and dtype.itemsize != 8):
-        wanted = "float64" if kind == "f" else "text"
-        raise ProfileError(f"holds {name} as {dtype} where {wanted} was expected")
-    content = stream.read()
-    if math.prod(shape) * dtype.itemsize != len(content):
-        raise ProfileError(f"holds {len(content)} bytes of {name} where its header says {shape}")
+    if member.file_size > most_bytes:
+        raise ProfileError(
+            f"declares {member.file_size:,} bytes of {name}, more than {most_bytes:,}"
+        )
+    with archive.open(member) as stream:
+        if np.lib.format.read_magic(stream) != (1, 0):
+            raise ProfileError(f"holds {name} in an unknown .npy version")
+        shape, fortran_order, dtype = np.lib.format.read_array_header_1_0(stream)
+        if dtype.kind != kind or (kind == "f" and dtype.itemsize != 8):
+            wanted = "float64" if kind == "f" else "text"
+            raise ProfileError(f"holds {name} as {dtype} where {wanted} was expected")
+        length = member.file_size - stream.tell()
+        if min(shape, default=0) < 0 or math.prod(shape) * dtype.itemsize != length:
+            raise ProfileError(f"holds {length} bytes of {name} where its header says {shape}")
+        content = stream.read()
     return np.ndarray(shape, dtype, content, order="F" if fortran_order else "C")
 
 

@@ -1,4 +1,4 @@
-"""Radii that hold a given share of a profile's energy: what charts and summaries are scaled by."""
+"""Lengths of a profile that charts, fits and summaries are scaled by: radii and free paths."""
 
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
@@ -7,6 +7,8 @@ import numpy as np
 
 from sssfit import _disks
 from sssfit._disks import FloatArray
+from sssfit.errors import MaterialError
+from sssfit.material import Material
 
 if TYPE_CHECKING:
     from sssfit.profile import Profile
@@ -53,3 +55,25 @@ def _radius_in(r_edges_mm: FloatArray, energy: FloatArray, annulus: int, wanted:
     radii_mm = np.linspace(r_edges_mm[annulus], r_edges_mm[annulus + 1], _PARTS + 1)
     grown = _disks.cumulative_at(*near, radii_mm)[:, 0] - energy[first:annulus].sum()
     return float(np.interp(wanted, grown, radii_mm))
+
+
+def mean_free_paths_mm(profile: "Profile") -> FloatArray | None:
+    """Mean free path of each channel (C,) [mm] in the material's top layer; None if unknown."""
+    material = material_of(profile)
+    if material is None or material.n_channels != profile.n_channels:
+        return None
+    if len(material.layers) > 1:
+        return None  # there is no one mean free path
+    paths_mm = material.layers[0].mean_free_path_mm
+    return paths_mm if np.isfinite(paths_mm).all() else None
+
+
+def material_of(profile: "Profile") -> Material | None:
+    """Return the material a profile says it was made from; None where it holds none."""
+    record = profile.meta.get("material")
+    if not isinstance(record, dict):
+        return None
+    try:
+        return Material.from_dict(record)
+    except MaterialError:
+        return None

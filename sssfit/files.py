@@ -5,11 +5,14 @@ reader sees the old file or the new one and never a part of either.
 """
 
 import contextlib
+import errno
 import glob
 import os
+import shutil
+import stat
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import BinaryIO
 
@@ -27,12 +30,60 @@ _UMASK = os.umask(0)
 os.umask(_UMASK)
 
 
+_MARK_BYTES = 65_536  # as far as a mark may lie from either end of a file
+
+_READ_BYTES = 1 << 20
+
+# Temporary files and folders, and locks, of this process at this moment.
+_unfinished: set[Path] = set()
+
+
 def reason(error: OSError) -> str:
     """Say an operating-system error in lower case, without its number."""
     return (error.strerror or str(error)).lower()
 
 
-def check_output(path: Path, is_own: Callable[[Path], bool], *, force: bool = False) -> None:
+def has_mark(path: Path, marks: Mapping[bytes, bytes]) -> bool:
+    """Tell whether a file says of itself that we wrote it.
+
+    Parameters
+    ----------
+    path : Path
+        A file of any kind, or none.
+    marks : mapping
+        From what a format's files begin with, to what ours have near their beginning or end.
+    """
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(_MARK_BYTES)
+            if (size := path.stat().st_size) > _MARK_BYTES:
+                stream.seek(max(_MARK_BYTES, size - _MARK_BYTES))
+            tail = stream.read(_MARK_BYTES)
+    except OSError:
+        return False
+    found = (mark for begin, mark in marks.items() if head.startswith(begin))
+    return any(mark in head or mark in tail for mark in found)
+
+
+def read_at_most(stream: BinaryIO, most: int) -> bytes:
+    """Read a stream to its end, but no more than so many bytes.
+
+    ``stream.read(most)`` would first make room for all of them: 2 GB for a profile of 0.3 MB.
+    """
+    parts: list[bytes] = []
+    while most > 0 and (part := stream.read(min(most, _READ_BYTES))):
+        parts.append(part)
+        most -= len(part)
+    return b"".join(parts)
+
+
+def check_output(
+    path: Path,
+    is_own: Callable[[Path], bool],
+    *,
+    force: bool = False,
+    inputs: Iterable[str | Path] = (),
+) -> None:
     """Refuse an output that could not be written, before hours are spent on its content.
 
     Parameters
@@ -40,15 +91,18 @@ def check_output(path: Path, is_own: Callable[[Path], bool], *, force: bool = Fa
     path : Path
         Where the output is to go.
     is_own : callable
-        Whether an existing file is of the format about to replace it.
+        Whether an existing file is one of ours, of the kind about to replace it.
     force : bool
-        Replace a foreign file as well.
+        Replace a foreign or write-protected file, or an input, as well.
+    inputs : iterable of str or Path
+        What is read, ``-`` for stdin; names of what is not a file are passed over.
 
     Raises
     ------
     FileError
-        The folder is missing or not writable, or the file is somebody else's.
+        The folder is missing or not writable, or the file is an input, or somebody else's.
     """
+    _check_target(path)
     path = _followed(path)
     folder = path.parent
     if not folder.is_dir():
@@ -57,15 +111,61 @@ def check_output(path: Path, is_own: Callable[[Path], bool], *, force: bool = Fa
         raise FileError(f"{path} is a folder; name a file in it with -o.")
     if path.exists() and not path.is_file():
         raise FileError(f"{path} is not an ordinary file; name one with -o, or - for stdout.")
-    if path.exists() and not force and not is_own(path):
-        raise FileError(
-            f"{path} exists and is not a file of this format; "
-            "choose another name with -o, or replace it with --force."
-        )
+    if path.exists():
+        _check_replaceable(path, is_own, force, inputs)
     with _clear_errors(path):
         handle, probe = _temporary(path)
         os.close(handle)
         probe.unlink()
+
+
+def is_same_file(one: Path, other: Path) -> bool:
+    """Tell whether two names lead to one file, which need not be there yet."""
+    with contextlib.suppress(OSError):
+        return one.samefile(other)
+    return os.path.normcase(os.path.realpath(one)) == os.path.normcase(os.path.realpath(other))
+
+
+def _check_target(path: Path) -> None:
+    """Refuse a symbolic link that leads round in a circle."""
+    try:
+        path.stat()
+    except OSError as error:
+        if error.errno == errno.ELOOP:
+            raise FileError(f"{path} is a link that leads back to itself; name a file.") from None
+
+
+def _check_replaceable(
+    path: Path, is_own: Callable[[Path], bool], force: bool, inputs: Iterable[str | Path]
+) -> None:
+    """Refuse to replace what its owner may want to keep; some things even by force."""
+    remedy = "choose another name with -o, or replace it with --force."
+    if not force:
+        if _is_among(path, inputs):
+            raise FileError(f"{path} is read as an input as well; {remedy}")
+        if not is_own(path):
+            raise FileError(f"{path} exists and was not written by sssfit as such a file; {remedy}")
+        if not os.access(path, os.W_OK):
+            raise FileError(f"{path} is write-protected; {remedy}")
+    folder = path.parent.stat()
+    if sys.platform == "win32" or not folder.st_mode & stat.S_ISVTX:
+        return
+    if os.geteuid() not in (0, folder.st_uid, path.stat().st_uid):
+        raise FileError(
+            f"{path} belongs to somebody else, and only the owner may replace a file in "
+            f"{path.parent}; choose another name with -o."
+        )
+
+
+def _is_among(path: Path, inputs: Iterable[str | Path]) -> bool:
+    """Whether a file is one of these, by whatever name, link or stream they lead to it."""
+    here = path.stat()
+    for each in inputs:
+        with contextlib.suppress(OSError, ValueError):  # the name of a material, a closed stdin
+            there = os.fstat(0) if str(each) == "-" else Path(each).stat()
+            if os.path.samestat(here, there):
+                return True
+    return False
 
 
 # Endings that promise a format; a name without one of them promises nothing.
@@ -107,6 +207,7 @@ def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
     path = _followed(path)
     with _clear_errors(path):
         handle, temporary = _temporary(path)
+        _unfinished.add(temporary)
         try:
             with os.fdopen(handle, "wb") as stream:
                 write(stream)
@@ -118,6 +219,32 @@ def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
         except BaseException:
             temporary.unlink(missing_ok=True)
             raise
+        finally:
+            _unfinished.discard(temporary)
+
+
+@contextlib.contextmanager
+def temporary_folder() -> Iterator[Path]:
+    """Make a folder outside the user's own, removed again also where the process ends at once."""
+    with tempfile.TemporaryDirectory() as name:
+        _unfinished.add(Path(name))
+        try:
+            yield Path(name)
+        finally:
+            _unfinished.discard(Path(name))
+
+
+def remove_unfinished() -> None:
+    """Delete temporary files and locks of this process, which is about to end at once.
+
+    Other threads may still be writing: what is not yet renamed into place goes, what is stays.
+    """
+    for path in tuple(_unfinished):
+        with contextlib.suppress(OSError):
+            if path.is_dir():
+                shutil.rmtree(path)
+            else:
+                path.unlink()
 
 
 def remove_leftovers(path: Path) -> None:
@@ -147,6 +274,7 @@ def locked(path: Path) -> Iterator[None]:
     lock_path = path.with_name(f".{path.name}.lock")
     with _clear_errors(path):
         handle = _open_locked(lock_path, path)
+    _unfinished.add(lock_path)
     try:
         remove_leftovers(path)
         yield
@@ -154,6 +282,7 @@ def locked(path: Path) -> Iterator[None]:
         # Unlink before the lock is let go: a waiting process then notices that its file is gone.
         with contextlib.suppress(OSError):
             lock_path.unlink()
+        _unfinished.discard(lock_path)
         os.close(handle)
 
 

@@ -4,19 +4,19 @@ The 2D kernel of channel c is K[i, j] = sum_t s_tc w_tc[i] w_tc[j], s = +1 or -1
 horizontal pass and the same pass vertically. Weights are energies of pixels (integrals, not
 samples), so sums of them are energies too. A kernel belongs to its pitch in mm per pixel.
 
-``_kernel_json`` has the file format; ``sssfit/kernel.schema.json`` is its JSON Schema.
+``_kernel_json`` has the file format, ``sssfit/kernel.schema.json`` its JSON Schema;
+``_kernel_checks`` refuses what is no kernel.
 """
 
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any, BinaryIO, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from sssfit import _kernel_json
+from sssfit import _kernel_checks, _kernel_json
 from sssfit._kernel_json import FORMAT, is_kernel_file
 from sssfit.errors import KernelError
 from sssfit.files import write_atomically
@@ -54,14 +54,16 @@ class SeparableKernel:
         What to multiply the 2D kernel with to have the profile's energy back: 1 unless the fit was
         normalised; then the kernel's energy is 1 and this is the albedo an engine multiplies in.
     parameters : mapping
-        What the method found, for JSON: variances, weights, widths.
+        What the method found by channel, for JSON: variances, weights, widths.
     meta : mapping
-        Provenance, for JSON: material, sha256, profile method, version, settings.
+        Provenance, for JSON; all of it may be missing: material (a name), material_sha256,
+        profile_sha256 (`Profile.sha256`), profile_method, photons, seed, version, settings.
 
     Raises
     ------
     KernelError
-        A field has the wrong shape or is not a number.
+        A field has the wrong shape, is not a number, is beyond single precision, or cannot be
+        kept as JSON.
     """
 
     method: str
@@ -76,42 +78,9 @@ class SeparableKernel:
     meta: Mapping[str, Any]
 
     def __post_init__(self) -> None:
-        arrays = ("signs", "weights", "relative_frobenius_error", "energy_error", "scale")
-        for name in arrays:
-            value = np.array(getattr(self, name), dtype=np.float64)
-            value.setflags(write=False)
+        given = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        for name, value in _kernel_checks.checked(given).items():
             object.__setattr__(self, name, value)
-        object.__setattr__(self, "mm_per_pixel", float(self.mm_per_pixel))
-        object.__setattr__(self, "channels", tuple(self.channels))
-        for name in ("parameters", "meta"):
-            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
-        self._check()
-
-    def _check(self) -> None:
-        """Refuse what is no kernel."""
-        if not (np.isfinite(self.mm_per_pixel) and self.mm_per_pixel > 0.0):
-            raise KernelError(f"mm_per_pixel = {self.mm_per_pixel}; expected a length above 0.")
-        if self.weights.ndim != 3 or 0 in self.weights.shape or self.weights.shape[1] % 2 == 0:
-            raise KernelError(
-                f"weights have shape {self.weights.shape}; expected (terms, pixels, channels) with "
-                "an odd number of pixels."
-            )
-        terms, _, channels = self.weights.shape
-        if len(self.channels) != channels:
-            raise KernelError(f"{len(self.channels)} channel names for {channels} channels.")
-        shapes = {"signs": (terms, channels), "scale": (channels,)}
-        shapes |= {"relative_frobenius_error": (channels,), "energy_error": (channels,)}
-        for name, shape in shapes.items():
-            if getattr(self, name).shape != shape:
-                raise KernelError(
-                    f"{name} has shape {getattr(self, name).shape}; expected {shape}."
-                )
-        if not np.isfinite(self.weights).all() or not np.isfinite(self.scale).all():
-            raise KernelError("weights and scale have to be numbers, and some are not.")
-        if not np.isin(self.signs, (-1.0, 1.0)).all():
-            raise KernelError("signs have to be +1 or -1.")
-        if not np.array_equal(self.weights, self.weights[:, ::-1]):
-            raise KernelError("weights are not symmetric about the middle pixel.")
 
     def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
         # A mapping proxy cannot be pickled; worker processes and deep copies need the record.

@@ -9,6 +9,8 @@ profile conserves energy by construction. The annulus tallies are those of Wang,
 """
 
 import dataclasses
+import hashlib
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, BinaryIO, Self
@@ -111,6 +113,18 @@ class Profile:
     def photons(self) -> int | None:
         """Number of photon walks behind the energies; None where nothing was sampled."""
         return self.meta.get("photons")
+
+    @property
+    def sha256(self) -> str:
+        """Fingerprint of what fits and true pictures are made from, by which kernels name it.
+
+        Radii, energies on the grid and beyond, channels; no provenance, so that the same light is
+        the same profile, by whatever program and version.
+        """
+        digest = hashlib.sha256(json.dumps(self.channels).encode())
+        for each in (self.r_edges_mm, self.annulus_energy, self.beyond_grid):
+            digest.update(each.astype("<f8").tobytes())
+        return digest.hexdigest()
 
     @property
     def total_on_grid(self) -> FloatArray:
@@ -221,9 +235,10 @@ class Profile:
     def flat_annuli(self) -> tuple[FloatArray, FloatArray]:
         """Return the flat annuli that lines and pixels are integrated from.
 
-        The profile's own, the innermost ten cut into equal parts by the monotone interpolation of
-        F: R_d ~ 1/r near the beam. Energies between the original edges are unchanged. Returns the
-        edges (m+1,) [mm] and the densities between them (m, C) [1/mm^2].
+        The profile's own, cut into equal parts by the monotone interpolation of F: the innermost
+        ten into 64 each, where R_d ~ 1/r is steep, those further out into fewer, and all of them
+        into two at least. Energies between the original edges are unchanged. Returns the edges
+        (m+1,) [mm] and the densities between them (m, C) [1/mm^2].
         """
         return _disks.flat_annuli(self.r_edges_mm, self.annulus_energy)
 

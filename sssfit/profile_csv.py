@@ -36,6 +36,7 @@ import numpy.typing as npt
 from sssfit import __version__, _disks
 from sssfit._material_checks import check_channels, printable, shown
 from sssfit.errors import MaterialError, ProfileError, SssfitWarning
+from sssfit.files import has_mark
 from sssfit.profile import FORMAT, Profile
 from sssfit.text import finite_number, read_text, tenfold_number
 
@@ -168,9 +169,11 @@ def csv_text(profile: Profile) -> str:
     Raises
     ------
     ProfileError
-        A channel's name cannot head a column.
+        A channel's name cannot head a column, or its energies could not be read back: one is below
+        0, or they add up to more than 1.
     """
     _check_names(profile.channels)
+    _check_energies(profile)
     stream = io.StringIO()
     stream.write(f"{_MARK}\n# quantity = energy: the share of the incident light that leaves ")
     stream.write("between the r_mm of the line before and r_mm; inf: beyond the grid\n")
@@ -192,11 +195,7 @@ def csv_text(profile: Profile) -> str:
 
 def is_profile_csv(path: Path) -> bool:
     """Tell whether a file is a table that `csv_text` wrote."""
-    try:
-        with path.open("rb") as stream:
-            return stream.read(len(_MARK)) == _MARK.encode()
-    except OSError:
-        return False
+    return has_mark(path, {_MARK.encode(): b""})
 
 
 @dataclass(frozen=True, slots=True)
@@ -481,6 +480,25 @@ def _check_names(channels: Sequence[str]) -> None:
             raise ProfileError(
                 f"channel {shown(name)}: a column of that name would not be a channel; rename it."
             )
+
+
+def _check_energies(profile: Profile) -> None:
+    """Refuse energies that reading the table would refuse."""
+    energy = np.vstack((profile.annulus_energy, profile.beyond_grid))
+    if (energy < 0.0).any():
+        k, c = (int(each[0]) for each in np.nonzero(energy < 0.0))
+        raise ProfileError(
+            f"channel {shown(profile.channels[c])} has the negative energy {energy[k, c]:.6g} in "
+            f"line {k + 1} of the table; expected energies from 0 up: measured noise has to be cut "
+            "at 0."
+        )
+    total = profile.diffuse_reflectance
+    worst = int(np.argmax(total))
+    if total[worst] > 1.0 + _ABOVE_ONE:
+        raise ProfileError(
+            f"channel {shown(profile.channels[worst])} adds up to {total[worst]:.6g} of 1 that "
+            "arrives, which a table would not be read back with; check the profile's unit."
+        )
 
 
 def _provenance(profile: Profile) -> str:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
 from sssfit.errors import SssfitError
-from sssfit.files import reason
+from sssfit.files import read_at_most, reason
 
 # A million absorption boxes of an MCML run are 13 MB of text.
 MOST_BYTES = 500_000_000
@@ -123,8 +123,8 @@ def _bytes(source: str | Path | BinaryIO) -> bytes:
     """All of it, or one byte more than is allowed."""
     if isinstance(source, str | Path):
         with Path(source).open("rb") as stream:
-            return stream.read(MOST_BYTES + 1)
-    return source.read(MOST_BYTES + 1)
+            return read_at_most(stream, MOST_BYTES + 1)
+    return read_at_most(source, MOST_BYTES + 1)
 
 
 def finite_number(word: str) -> float | None:

@@ -42,3 +42,15 @@ def first_meeting(field, distance, x, y, step):
         middle = 0.5 * (low + high)
         low, high = (low, middle) if above(middle)[0] <= 0.0 else (middle, high)
     return -ray[2] * high
+
+
+def first_run(front, back, point, light, step, gap):
+    """Where a march from a point is first between two fields, from and to, and whether again."""
+    t = np.arange(0.5 * step, 600.0, step)
+    x, y, z = (point[k] + t * light[k] for k in range(3))
+    inside = np.flatnonzero((z <= height_at(*front, x, y)) & (z >= height_at(*back, x, y)))
+    if inside.size == 0:
+        return -1.0, -1.0, False
+    breaks = np.flatnonzero(np.diff(inside) * step > gap)
+    last = inside[breaks[0]] if breaks.size else inside[-1]
+    return t[inside[0]] - 0.5 * step, t[last] + 0.5 * step, breaks.size > 0

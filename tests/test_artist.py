@@ -1,5 +1,7 @@
 """The two-Gaussian kernel: refits what it is made of, takes what is set by hand."""
 
+import time
+
 import numpy as np
 import pytest
 from reference_pixels import make_profile
@@ -166,9 +168,48 @@ def test_its_pass_is_the_preintegrated_one_of_two_gaussians():
         ({"near_mm2": 0.0, "far_mm2": 1.0, "weight": 0.1}, "variances above 0"),
         ({"near_mm2": 1.0, "far_mm2": np.nan, "weight": 0.1}, "one finite number"),
         ({"near_mm2": 1.0, "far_mm2": 1.0, "weight": 1.1}, "shares from 0 to 1"),
-        ({"target": "disk"}, 'target = "disk"'),
+        ({"target": "disk"}, 'target = "disk"; expected "line", "kernel" or a function that'),
+        ({"target": "picture"}, 'target = "picture"; expected "line", "kernel" or a function that'),
     ],
 )
 def test_bad_settings_are_one_line(skin1, settings, words):
     with pytest.raises(FitError, match=words):
         fit_artist(skin1, mm_per_pixel=0.3, **settings)
+
+
+def test_seconds_are_those_of_all_of_the_fit(skin1, monkeypatch):
+    def slow(pixels):
+        time.sleep(0.3)
+        return lambda x: float(x[0].sum())
+
+    monkeypatch.setattr("sssfit.fit.artist._MOST_EVALUATIONS", 20)
+    result = fit_artist(skin1, mm_per_pixel=0.5, target=slow)
+    assert result.seconds > 0.3
+    assert result.evaluations == (47,) * 3  # 27 starts, and 20 more
+    assert result.stop_reasons == ("stopped after 20 evaluations, the best of them kept",) * 3
+
+
+def test_what_judges_pictures_gets_the_numbers_of_all_channels():
+    energy = np.outer(np.full(20, 0.02), [1.0, 0.0, 0.5])
+    profile = make_profile(np.arange(21) * 0.1, energy)
+    best, seen = np.array([[0.3, 0.0, 0.7], [-2.0, 0.0, -1.0], [-0.5, 0.0, 0.5]]), []
+
+    def judge(pixels):
+        assert pixels.profile is profile
+        assert pixels.mm_per_pixel == 0.2
+
+        def error(x):
+            seen.append(x)
+            return float(((x - best)[:, [0, 2]] ** 2).sum())
+
+        return error
+
+    kernel = fit_artist(profile, mm_per_pixel=0.2, target=judge).kernel
+    assert all(each[:, 1].tolist() == [1.0, 0.0, 0.0] for each in seen)  # the one without light
+    assert set(kernel.parameters) == {"c0", "c2"}
+    for c in (0, 2):
+        found = kernel.parameters[f"c{c}"]
+        x = np.array((found["weight"], np.log(found["near_mm2"]), np.log(found["far_mm2"])))
+        np.testing.assert_allclose(x, best[:, c], atol=0.05)
+    assert kernel.meta["settings"]["target"] == "picture"
+    np.testing.assert_allclose(kernel.energy, profile.diffuse_reflectance, rtol=1e-12)

@@ -110,7 +110,9 @@ def test_chart_and_tables_are_written(run, tmp_path):
     assert (tmp_path / "c.png").read_bytes().startswith(b"\x89PNG")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["c.png", "t.csv", "t.json", "t.md"]
     rows = json.loads((tmp_path / "t.json").read_text())["rows"]
-    lines = list(csv.DictReader(io.StringIO((tmp_path / "t.csv").read_text())))
+    mark, _, table = (tmp_path / "t.csv").read_text().partition("\n")
+    assert mark == "# sssfit.table/1"
+    lines = list(csv.DictReader(io.StringIO(table)))
     assert [line["label"] for line in lines] == [row["label"] for row in rows]
     for line, row in zip(lines, rows, strict=True):
         assert float(line["relative_l2"]) == row["relative_l2"]
@@ -314,7 +316,7 @@ def test_foreign_files_stay(run, tmp_path):
         (tmp_path / name).write_text("# mine\n")
         option = "--chart" if name == "c.png" else "--table"
         line = one_line(run("skin1", *SMALL, option, name, status=1))
-        assert "is not a file of this format" in line
+        assert "exists and was not written by sssfit" in line
         assert (tmp_path / name).read_text() == "# mine\n"
     run("skin1", *SMALL, "--table", "t.md", "--force")
     run("skin1", *SMALL, "--table", "t.md")

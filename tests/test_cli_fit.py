@@ -38,7 +38,11 @@ def test_a_session_from_profile_to_shader(folder):
     kernel = SeparableKernel.load("wax.preintegrated.kernel.json")
     assert kernel.mm_per_pixel == pytest.approx(0.1)
     assert ended("export", "--format", "hlsl").exit_code == 0
-    assert (folder / "wax.preintegrated.hlsl").read_text().startswith("// Subsurface")
+    assert (
+        (folder / "wax.preintegrated.hlsl")
+        .read_text()
+        .startswith("// sssfit.hlsl/1\n// Subsurface")
+    )
     assert ended("export", "--format", "json").exit_code == 0
     assert json.loads((folder / "wax.preintegrated.json").read_text())["pixels"] == kernel.pixels
 

@@ -152,7 +152,7 @@ def test_a_foreign_file_is_replaced_by_force_only(folder, run):
     (folder / "notes.txt").write_text("mine")
     status, _, err = run(*FIT, "-o", "notes.txt")
     assert status == 1
-    assert "notes.txt exists and is not a file of this format; choose another" in err
+    assert "notes.txt exists and was not written by sssfit as such a file; choose another" in err
     assert (folder / "notes.txt").read_text() == "mine"
     profile = (folder / "wax.profile.npz").read_bytes()
     assert run(*FIT, "-o", "wax.profile.npz")[0] == 1

@@ -201,7 +201,7 @@ def test_import_through_pipes(tmp_path, content):
         (("a.mco", "-o", "no/x.npz"), 1, "there is no folder no"),
         (("none.mco",), 1, "none.mco cannot be read: no such file"),
         (("cut.mco",), 1, "cut.mco: ends after line"),
-        (("a.mco", "-o", "notes"), 1, "exists and is not a file of this format"),
+        (("a.mco", "-o", "notes"), 1, "exists and was not written by sssfit"),
         (("a.mco", "-o", "mine.csv"), 1, "mine.csv ends in .csv, and a profile is written"),
     ],
 )

@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+import os
 import shutil
 from pathlib import Path
 
@@ -16,9 +17,13 @@ from sssfit.fit import fit_svd
 from sssfit.image import load_image, save_image
 from sssfit.kernel import SeparableKernel
 from sssfit.profile import Profile
+from sssfit.render.head import head_scene
+from sssfit.render.irradiance import make_scene
 from sssfit.render.reference import render_reference
 from sssfit.render.scene import Scene
+from sssfit.render.screen import render_screen
 from sssfit.render.separable import render_separable
+from sssfit.render.transmittance import with_transmitted
 
 KERNEL = "wax.svd2.kernel.json"
 SIZE = ("--size", "40x24")
@@ -117,13 +122,109 @@ def test_without_its_profile_the_cost_is_all_that_is_measured(run):
     assert "profile" in words
 
 
-def test_a_profile_of_another_run_is_not_taken_for_the_kernels(run):
+OTHERS = {
+    "material": {"name": "lard"},
+    "material_sha256": "0123",
+    "method": "montecarlo",
+    "photons": 10_000,
+    "seed": 7,
+}
+
+
+@pytest.mark.parametrize("key", list(OTHERS))
+def test_a_profile_that_differs_in_one_thing_is_not_the_kernels(run, key):
+    """It is newer than the kernel's own, and all light lies elsewhere: another error."""
     profile = Profile.load("wax.profile.npz")
-    profile.save("first.profile.npz")
-    Path("wax.profile.npz").unlink()
+    wanted = json.loads(run("render", "--irradiance", "edge", *SIZE, "--json")[1])
+    energy = profile.annulus_energy[::-1].copy()
+    meta = {**profile.meta, key: OTHERS[key]}
+    make_profile(profile.r_edges_mm, energy, meta=meta).save("other.profile.npz")
+    newest = Path("wax.profile.npz").stat().st_mtime + 60.0
+    os.utime("other.profile.npz", (newest, newest))
+    found = json.loads(run("render", "--irradiance", "edge", *SIZE, "--json")[1])
+    assert found["profile"] == "wax.profile.npz"
+    assert found["rmse"] == wanted["rmse"]
+
+
+def test_without_another_the_same_profile_is_found_under_any_name(run):
+    Path("wax.profile.npz").rename("first.profile.npz")
     run("simulate", "skin1", "--method", "dipole", "-o", "last.profile.npz")
-    _, out, _ = run("render", "--irradiance", "edge", *SIZE, "--json")
-    assert json.loads(out)["profile"] == "first.profile.npz"
+    status, out, _ = run("render", "--irradiance", "edge", *SIZE, "--json")
+    figures = json.loads(out)
+    assert status == 0
+    assert figures["profile"] == "first.profile.npz"
+    scene = make_scene("edge", height=24, width=40, mm_per_pixel=0.2)
+    truth = render_reference(scene, Profile.load("first.profile.npz"))
+    lost = render_separable(scene, SeparableKernel.load(KERNEL)) - truth
+    assert figures["rmse"] == pytest.approx(np.sqrt(np.mean(lost**2)), rel=1e-9)
+
+
+TABLE = "r_mm,red,green\n0.2,0.2,0.1\n0.4,0.1,0.04\n0.8,0.05,0.01\n1.2,0.02,0.004\ninf,0.01,0\n"
+
+
+def profile_found(run, kernel):
+    """What `render` measures a kernel against, and what it says on stderr."""
+    arguments = ("render", kernel, "--irradiance", "edge", *SIZE, "-o", "out.exr", "--json")
+    status, out, words = run(*arguments)
+    assert status == 0, words
+    return json.loads(out)["profile"], words
+
+
+def test_a_kernel_of_any_profile_finds_it_again(run, folder):
+    Path("table.csv").write_text(TABLE)
+    Path("other.csv").write_text(TABLE.replace("0.2,0.2", "0.2,0.3"))
+    walk = ("--photons", "2000", "-q")
+    for arguments in (
+        ("import", "table.csv", "--quantity", "energy"),
+        ("import", "other.csv", "--quantity", "energy"),
+        ("simulate", "deon-skin", "--radius", "4", "-o", "deon-skin.profile.npz"),
+        ("simulate", "skin1", "--method", "dipole", "-o", "dipole.npz"),
+        ("simulate", "skin1", *walk),
+        ("simulate", "skin1", *walk, "--seed", "2", "-o", "two.profile.npz"),
+    ):
+        assert run(*arguments)[0] == 0
+    for name in ("table.profile", "other.profile", "deon-skin.profile", "dipole", "skin1.profile"):
+        fit = ("fit", f"{name}.npz", "--method", "preintegrated", "--mm-per-pixel", ".4")
+        status, _, words = run(*fit, "-o", "k.json")
+        assert status == 0, words
+        assert SeparableKernel.load("k.json").meta["profile_sha256"] == (
+            Profile.load(f"{name}.npz").sha256
+        )
+        assert profile_found(run, "k.json") == (f"{name}.npz", "")
+
+
+def test_a_profile_under_another_name_or_in_the_kernels_folder_is_found(run, folder):
+    (folder / "deep").mkdir()
+    Path(KERNEL).rename(folder / "deep" / KERNEL)
+    Path("wax.profile.npz").rename(folder / "deep" / "moved.npz")
+    found, _ = profile_found(run, f"deep/{KERNEL}")
+    assert found == str(Path("deep") / "moved.npz")
+
+
+def test_a_profile_that_has_changed_since_is_not_measured_against(run):
+    profile = Profile.load("wax.profile.npz")
+    make_profile(profile.r_edges_mm, 0.9 * profile.annulus_energy).save("wax.profile.npz")
+    found, words = profile_found(run, KERNEL)
+    assert found is None
+    assert words == (
+        "wax.profile.npz is a profile of test by the same method, but not the one that "
+        f"{KERNEL} was fitted to, or it has changed since, so nothing is measured: fit the kernel "
+        "again, or name its profile with --profile.\n"
+    )
+    given = ("--profile", "wax.profile.npz", "-o", "out.exr", "--json")
+    status, out, words = run("render", KERNEL, "--irradiance", "edge", *SIZE, *given)
+    assert status == 0
+    assert json.loads(out)["rmse"] > 0.0
+    assert words == f"wax.profile.npz is not the profile that {KERNEL} was fitted to.\n"
+
+
+def test_a_kernel_without_a_record_of_its_profile_says_so(run):
+    whole = json.loads(Path(KERNEL).read_text())
+    del whole["meta"]["profile_sha256"]
+    Path("old.kernel.json").write_text(json.dumps(whole))
+    found, words = profile_found(run, "old.kernel.json")
+    assert found is None
+    assert "old.kernel.json does not record which profile it was fitted to" in words
 
 
 def test_screen_space_needs_depth_and_measures_nothing(run):
@@ -309,3 +410,84 @@ def test_foreign_files_stay(run, folder):
     assert status == 1
     assert "--force" in words
     assert (folder / "notes.exr").read_text() == "mine"
+
+
+@pytest.fixture
+def coarse(folder):
+    """A kernel on pixels so wide that a small picture shows the ears; red reaches the furthest."""
+    r = np.linspace(0.0, 16.0, 161)
+    energy = np.diff(0.5 - 0.5 * np.exp(-r[:, None] / (2.4, 1.2, 0.6)), axis=0)
+    make_profile(r, energy).save("wide.profile.npz")
+    profile = Profile.load("wide.profile.npz")
+    fit_svd(profile, rank=2, mm_per_pixel=2.0).kernel.save("coarse.kernel.json")
+    (folder / "wax.profile.npz").unlink()
+    return "coarse.kernel.json"
+
+
+HEAD = ("--irradiance", "head", "--size", "90x90")
+
+
+def test_transmitted_light_is_what_the_library_adds(run, coarse):
+    kernel = SeparableKernel.load(coarse)
+    arguments = ("render", coarse, *HEAD, "--transmit", "--light", "160", "--json", "-o", "a.exr")
+    status, out, _ = run(*arguments)
+    assert status == 0
+    scene = head_scene(height=90, width=90, mm_per_pixel=2.0, light_degrees=160.0, transmit=True)
+    lit = with_transmitted(scene, kernel)
+    shown = render_separable(lit, kernel) * (scene.mask > 0)[..., None]
+    np.testing.assert_allclose(load_image("a.exr").pixels, shown, rtol=1e-6, atol=1e-9)
+    figures = json.loads(out)
+    through = lit.irradiance - scene.irradiance
+    np.testing.assert_allclose(figures["transmitted_maximum"], through.max(axis=(0, 1)))
+    # The truth has the same light to blur: what is left is the kernel's.
+    profile = Profile.load("wide.profile.npz")
+    error = (shown - render_reference(lit, profile))[scene.mask > 0]
+    assert figures["rmse"] == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-6)
+
+
+def test_ears_glow_red_under_a_light_from_behind(run, coarse):
+    assert run("render", coarse, *HEAD, "--light", "170", "-o", "dark.exr")[0] == 0
+    status, out, _ = run("render", coarse, *HEAD, "--transmit", "-o", "glow.exr")
+    assert status == 0
+    assert "through the object at most: R 0." in " ".join(out.split()).replace("c0", "R")
+    dark, glow = (load_image(f"{name}.exr").pixels for name in ("dark", "glow"))
+    added = glow - dark
+    # Depth 82 mm behind the face: 78 mm to either side are 34 pixels.
+    for column in (45 - 34, 45 + 34):
+        ear = added[39:44, column]
+        assert (ear[:, 0] > 0.01).all()
+        share = ear / dark[39:44, column]
+        assert (share[:, 0] > share[:, 2]).all(), "red comes further than blue"
+    assert np.abs(added[30:60, 30:60]).max() < 1e-3, "nothing through the middle of the face"
+    # The eye of a reader: the ears are the brightest that was added, and they are red.
+    at = np.unravel_index(added[..., 0].argmax(), added.shape[:2])
+    assert 25 < abs(at[1] - 45) < 42
+
+
+def test_transmitted_light_in_screen_space(run, coarse):
+    kernel = SeparableKernel.load(coarse)
+    options = ("--screen", "--transmit", "-o", "a.exr")
+    assert run("render", coarse, *HEAD, *options)[0] == 0
+    scene = head_scene(height=90, width=90, mm_per_pixel=2.0, light_degrees=170.0, transmit=True)
+    np.testing.assert_allclose(
+        load_image("a.exr").pixels, render_screen(scene, kernel), rtol=1e-6, atol=1e-9
+    )
+
+
+@pytest.mark.parametrize(
+    ("options", "word"),
+    [
+        (("--irradiance", "disk", "--transmit"), "--transmit is for the head"),
+        (("--irradiance", "disk", "--light", "20"), "--light is not for disk"),
+        (("--irradiance", "mine.png", "--transmit"), "--transmit is for the head"),
+        ((*HEAD, "--light", "190"), "light_degrees = 190; expected -180 to 180"),
+    ],
+)
+def test_light_that_a_picture_does_not_have_is_refused(run, folder, options, word):
+    before = names(folder)
+    save_image("mine.png", np.ones((4, 4, 3)), exposure=0.5)
+    status, _, err = run("render", KERNEL, *options, "-o", "a.exr")
+    assert status in (1, 2)
+    assert word in " ".join(err.split())
+    assert "Traceback" not in err
+    assert names(folder) == sorted([*before, "mine.png"])

@@ -189,6 +189,11 @@ def test_chart_draws_the_newest_profile_to_stdout(folder):
 def test_chart_reads_a_pipe_and_replaces_a_chart_of_the_same_name(folder):
     (folder / "skin1.profile.png").write_bytes(b"\x89PNG\r\n\x1a\n and an old picture")
     content = (folder / "skin1.profile.npz").read_bytes()
+    assert sssfit(folder, "chart", "-", given=content).returncode == 1  # not a chart of ours
+    ours = sssfit(
+        folder, "chart", "--spectrum", "skin1.profile.npz", "-o", "skin1.profile.png", "--force"
+    )
+    assert ours.returncode == 0
     run = sssfit(folder, "chart", "-", given=content)
     assert run.stdout == b"Wrote skin1.profile.png\n", run.stderr
     assert (folder / "skin1.profile.png").stat().st_size > 50_000

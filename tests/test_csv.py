@@ -148,7 +148,8 @@ NAMES = st.text(
 @st.composite
 def profiles(draw):
     names = draw(st.lists(NAMES, min_size=1, max_size=4, unique=True))
-    edges_mm = draw(st.lists(st.floats(1e-300, 1e12), min_size=1, max_size=8, unique=True))
+    radii_mm = st.lists(st.floats(1e-12, 1e12), min_size=1, max_size=8, unique=True)
+    edges_mm = draw(radii_mm.filter(lambda each: (np.diff(np.log(np.sort(each))) > 1e-8).all()))
     energies = st.floats(0, 1 / 9)
     errors = st.one_of(st.just(np.nan), st.floats(0, 1e9))
     shape = len(edges_mm) + 1, len(names)
@@ -430,3 +431,17 @@ def test_cut_and_flipped_tables_are_refused_in_one_line_or_make_another():
             said = refusal_or_nothing(trial)
             assert said == "" or said.startswith("a.csv")
             assert "\n" not in said
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"annulus_energy": [[0.1], [-0.02]]}, "negative energy -0.02 in line 2 of the table"),
+        ({"beyond_grid": [-0.01]}, "negative energy -0.01 in line 3 of the table"),
+        ({"beyond_grid": [0.9]}, "adds up to 1.1 of 1 that arrives"),
+    ],
+)
+def test_a_table_that_could_not_be_read_back_is_not_written(changes, said):
+    fields = {"r_edges_mm": [0.0, 1.0, 2.0], "annulus_energy": [[0.1], [0.1]]} | changes
+    with pytest.raises(ProfileError, match=said):
+        csv_text(make_profile(**fields))

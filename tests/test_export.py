@@ -1,39 +1,49 @@
 """Exported kernels: the numbers are the kernel's, the comment says what they are."""
 
+import io
 import json
 import re
+from pathlib import Path
 
+import jsonschema
 import numpy as np
 import pytest
 from reference_pixels import make_profile
 
+import sssfit
 from sssfit.export import hlsl, json_document
 from sssfit.fit import fit_preintegrated
 from sssfit.kernel import SeparableKernel
 
+SCHEMA = json.loads((Path(sssfit.__file__).parent / "kernel.schema.json").read_text("utf-8"))
 
-def small_kernel(channels=3, terms=2, pixels=5):
-    """Weights that are no round numbers, signs of both kinds."""
+
+def small_kernel(channels=3, terms=2, pixels=5, **changes):
+    """Weights that are no round numbers, signs of both kinds, other figures for every channel."""
     rng = np.random.default_rng(5)
     half = rng.random((terms, pixels // 2 + 1, channels)) / 7.0
-    return SeparableKernel(
-        method="svd",
-        mm_per_pixel=0.1,
-        channels=tuple(f"c{k}" for k in range(channels)),
-        signs=np.where(np.arange(terms)[:, None] % 2, -1.0, 1.0) * np.ones(channels),
-        weights=np.concatenate((half[:, :0:-1], half), axis=1),
-        relative_frobenius_error=np.full(channels, 0.25),
-        energy_error=np.full(channels, np.nan),
-        scale=np.ones(channels),
-        parameters={},
-        meta={
+    each = np.arange(channels)
+    fields = {
+        "method": "svd",
+        "mm_per_pixel": 0.1372549,
+        "channels": tuple(f"c{k}" for k in range(channels)),
+        "signs": np.where((np.arange(terms)[:, None] + each) % 2, -1.0, 1.0),
+        "weights": np.concatenate((half[:, :0:-1], half), axis=1),
+        "relative_frobenius_error": 0.0251 + 0.0113 * each,
+        "energy_error": 0.00317 - 0.00229 * each,
+        "scale": 0.4321 * 0.57**each,
+        "parameters": {},
+        "meta": {
             "material": "wax",
             "material_sha256": "0123456789abcdef0123",
             "profile_method": "montecarlo",
             "photons": 10_000_000,
+            "seed": 7,
             "version": "0.1.0",
+            "settings": {"rank": 2, "energy": "rescale"},
         },
-    )
+    }
+    return SeparableKernel(**(fields | changes))
 
 
 def numbers_of(text, name):
@@ -45,32 +55,128 @@ def numbers_of(text, name):
     ]
 
 
+def comment_of(text):
+    """The comment of HLSL as one line, without its marks."""
+    lines = text.split("static const")[0].splitlines()
+    assert all(line.startswith("// ") for line in lines)
+    return " ".join(line.removeprefix("// ") for line in lines)
+
+
+def said(comment, what):
+    """The numbers that a comment says of something, in the order of the channels."""
+    return [float(each) for each in re.search(rf"{what}: ([^;]*?)[.;]( |$)", comment)[1].split(",")]
+
+
 @pytest.mark.parametrize("channels", [1, 2, 3, 4, 5])
-def test_hlsl_holds_the_kernel_in_single_precision(channels):
+def test_hlsl_holds_every_constant_in_single_precision(channels):
     kernel = small_kernel(channels)
     text = hlsl(kernel)
     shape = kernel.weights.shape
-    weights = np.array(numbers_of(text, "SSS_WEIGHTS")).reshape(shape)
-    np.testing.assert_array_equal(weights.astype(np.float32), kernel.weights.astype(np.float32))
-    signs = np.array(numbers_of(text, "SSS_SIGN")).reshape(shape[0], channels)
-    np.testing.assert_array_equal(signs, kernel.signs)
-    assert f"SSS_TERMS = {shape[0]};" in text
-    assert f"SSS_PIXELS = {shape[1]};" in text
+    for name, values in (
+        ("SSS_WEIGHTS", kernel.weights),
+        ("SSS_SIGN", kernel.signs),
+        ("SSS_SCALE", kernel.scale),
+        ("SSS_MM_PER_PIXEL", np.array(kernel.mm_per_pixel)),
+        ("SSS_TERMS", np.array(2.0)),
+        ("SSS_PIXELS", np.array(5.0)),
+    ):
+        found = np.array(numbers_of(text, name)).reshape(values.shape)
+        np.testing.assert_array_equal(found.astype(np.float32), values.astype(np.float32), name)
+    assert len(set(numbers_of(text, "SSS_SCALE"))) == channels
+    kind, each = ("float", f"[{channels}]") if channels > 4 else (f"float{channels}", "")
+    kind = "float" if channels == 1 else kind
+    assert f"static const {kind} SSS_SCALE{each} = " in text
+    assert f"static const {kind} SSS_SIGN[2]{each} = {{" in text
+    assert f"static const {kind} SSS_WEIGHTS[2][{shape[1]}]{each} = {{" in text
     assert text.count("{") == text.count("}")
+    assert text.count("static const") == 6
 
 
-def test_comment_says_what_the_numbers_are():
-    text = hlsl(small_kernel())
-    for part in ("wax", "0123456789abcdef", "svd", "0.1 mm", "10,000,000 photons", "energy error"):
-        assert part in text.split("static const")[0]
-    assert "unknown" in text  # an energy error that is NaN
+@pytest.mark.parametrize("channels", [1, 3, 5])
+@pytest.mark.parametrize("form", ["hlsl", "json"])
+def test_the_comment_has_every_figure_of_every_channel(channels, form):
+    kernel = small_kernel(channels)
+    comment = (
+        comment_of(hlsl(kernel))
+        if form == "hlsl"
+        else " ".join(json.loads(json_document(kernel))["comment"])
+    )
+    for what, values in (
+        ("Energy of the 2D kernel", kernel.energy),
+        ("Multiply by", kernel.scale),
+        ("Relative Frobenius error", kernel.relative_frobenius_error),
+        ("energy error", kernel.energy_error),
+    ):
+        assert len(set(values)) == channels
+        np.testing.assert_allclose(said(comment, what), values, rtol=5e-6)
+    for part in (
+        "kernel: wax, sha256 0123456789abcdef.",
+        "Profile: montecarlo, 10,000,000 photons, seed 7.",
+        "Fit: svd, 2 separable terms (rank 2, energy rescale). sssfit 0.1.0.",
+        f"5 pixels of 0.1372549 mm, the middle one on the axis; channels "
+        f"{', '.join(kernel.channels)}.",
+    ):
+        assert part in comment
 
 
-def test_json_document_is_the_kernel_and_a_comment():
-    kernel = small_kernel()
-    whole = json.loads(json_document(kernel))
+def test_what_is_not_known_is_said_to_be_unknown():
+    unknown = {"relative_frobenius_error": [0.1, np.nan, 0.3], "energy_error": [np.nan] * 3}
+    comment = comment_of(hlsl(small_kernel(**unknown, meta={})))
+    assert (
+        "kernel: unknown material. Profile: unknown. Fit: svd, 2 separable terms. sssf" in comment
+    )
+    assert "Relative Frobenius error: 0.1, unknown, 0.3; energy error: unknown, unknown" in comment
+
+
+def test_faint_channels_are_not_rounded_away():
+    faint = small_kernel()
+    faint = small_kernel(weights=faint.weights * 1e-8, scale=[1.0, 1e-14, 1e-30])
+    comment = comment_of(hlsl(faint))
+    np.testing.assert_allclose(said(comment, "Energy of the 2D kernel"), faint.energy, rtol=5e-6)
+    assert said(comment, "Multiply by") == [1.0, 1e-14, 1e-30]
+
+
+def test_no_text_can_leave_the_comment():
+    settings = {"note": "a\n#error b\u2028c\x1b[0m\\", "list\r": ["x\ny"]}
+    text = hlsl(small_kernel(meta={"settings": settings}))
+    for line in text.splitlines():
+        assert re.match(r"// |static const |    |\};$", line), line
+        assert line.isprintable()
+        assert not line.endswith("\\")  # would join the next line to the comment
+    assert "#error" not in text.split("static const", 1)[1]
+
+
+def test_numbers_at_the_ends_of_single_precision_are_written():
+    ends = np.array([[1e18, 1.2e-38, 1e-46], [-1e18, 0.1, -0.0]])
+    kernel = small_kernel(weights=np.stack([ends] * 3).transpose(1, 0, 2), scale=[1, 0, 0.5])
+    found = np.array(numbers_of(hlsl(kernel), "SSS_WEIGHTS")).reshape(2, 3, 3)
+    expected = kernel.weights.astype(np.float32)
+    expected[:, :, 2][expected[:, :, 2] < 1e-38] = 0.0
+    np.testing.assert_array_equal(found.astype(np.float32), expected)
+    assert np.isfinite(found.astype(np.float32)).all()
+
+
+def test_json_document_is_the_kernel_and_a_comment_and_obeys_the_schema():
+    kernel = small_kernel(signs=np.ones((2, 3)))
+    text = json_document(kernel)
+    whole = json.loads(text)
+    jsonschema.validate(whole, SCHEMA)
+    again = SeparableKernel.read(io.BytesIO(text.encode()))
+    np.testing.assert_array_equal(again.scale, kernel.scale)
     assert whole.pop("comment")[0].startswith("Subsurface scattering kernel: wax")
     assert whole == kernel.to_dict()
+    # By the record's own fields too, so that no name stands for another's numbers.
+    np.testing.assert_array_equal(whole["scale"], kernel.scale)
+    np.testing.assert_array_equal(whole["errors"]["energy"], kernel.energy_error)
+    np.testing.assert_array_equal(
+        whole["errors"]["relative_frobenius"], kernel.relative_frobenius_error
+    )
+    np.testing.assert_allclose(whole["energy"], [kernel.full(c).sum() for c in range(3)])
+    assert whole["mm_per_pixel"] == 0.1372549
+    assert whole["support_mm"] == 2 * 0.1372549
+    for term, signs, weights in zip(whole["terms"], kernel.signs, kernel.weights, strict=True):
+        assert term["sign"] == signs.tolist()
+        assert term["weights"] == weights.tolist()
 
 
 def test_the_same_kernel_gives_the_same_text():

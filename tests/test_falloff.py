@@ -2,6 +2,7 @@
 
 import math
 import runpy
+import time
 from pathlib import Path
 
 import numpy as np
@@ -185,3 +186,12 @@ def test_bad_settings_are_one_line(skin, settings, words):
 def test_the_documented_section_is_up_to_date():
     page = (ROOT / "docs" / "fits.md").read_text(encoding="utf-8")
     assert MADE["section"]() in page, "run: python docs/make_falloff.py"
+
+
+def test_seconds_are_those_of_all_of_the_fit(skin, monkeypatch):
+    def slow(*arguments):
+        time.sleep(0.1)
+        return fit_scale(*arguments)
+
+    monkeypatch.setattr("sssfit.fit.falloff.fit_scale", slow)
+    assert fit_falloff(skin, mm_per_pixel=1.0, support_mm=5.0).seconds > 0.3

@@ -9,7 +9,7 @@ from reference_pixels import make_profile
 
 from sssfit.cli import main
 from sssfit.errors import FitError, SssfitError, SssfitWarning
-from sssfit.fit import METHODS, _doubts, fit_preintegrated, fit_svd, make_target
+from sssfit.fit import METHODS, _doubts, fit_svd, make_target
 from sssfit.fit._energy import factor_to
 from sssfit.fit._result import ChannelFit, fit_channels
 from sssfit.kernel import SeparableKernel
@@ -143,10 +143,9 @@ def test_a_support_without_light_is_refused():
 
 
 def test_errors_that_are_no_numbers_are_refused():
-    kernel = fit_preintegrated(ring()).kernel
-    whole = dict(zip(SeparableKernel.__slots__, kernel.__reduce__()[1], strict=True))
+    _doubts.check_finite("test", "preintegrated", np.zeros(1), np.ones(1))
     with pytest.raises(FitError, match="test: the errors of the preintegrated kernel are not fin"):
-        _doubts.check_finite("test", SeparableKernel(**whole | {"energy_error": [np.inf]}))
+        _doubts.check_finite("test", "preintegrated", np.zeros(1), np.array([np.inf]))
 
 
 def test_by_default_a_small_kernel_has_fewer_terms():

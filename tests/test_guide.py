@@ -52,6 +52,17 @@ def test_the_record_is_what_the_fits_left(skin1, guide):
         whole = kernel.weights[0, :, 1]
         assert guide.centre_share[i] == pytest.approx(whole[kernel.half_pixels] / whole.sum())
     assert guide.ks == (0.0, 1.55, 4.0)
+    line = guide.preintegrated
+    left = wanted - energy * full_kernel(line[:, None] * line)
+    np.testing.assert_allclose(full_kernel(guide.preintegrated_residual), left / energy, atol=1e-15)
+    assert guide.preintegrated_misplaced == pytest.approx(0.5 * np.abs(left).sum() / energy)
+    weights = full_kernel(guide.preintegrated_gamma)
+    assert guide.preintegrated_errors == pytest.approx(
+        (
+            np.linalg.norm(left) / np.linalg.norm(wanted),
+            np.sum(weights * left**2) / np.sum(weights * wanted**2),
+        )
+    )
     np.testing.assert_allclose(guide.gamma.max(axis=(1, 2)), 1.0)
 
 
@@ -59,6 +70,38 @@ def test_the_pass_beside_it_is_the_preintegrated_one(skin1, guide):
     line = fit_preintegrated(skin1, mm_per_pixel=0.3).kernel.weights[0, :, 1]
     half = len(line) // 2
     np.testing.assert_allclose(guide.preintegrated, line[half:] / line.sum(), rtol=1e-12)
+
+
+@pytest.mark.parametrize(("channel", "outside"), [("R", 3e-4), ("G", 3e-5), ("B", 3e-5)])
+def test_the_preintegrated_pass_is_the_best_under_gamma_p(skin1, channel, outside):
+    # Eq. S.8, from a flat start; red's support leaves .1 % of the light out, and with it of rows.
+    found = compute_guide(skin1, mm_per_pixel=0.5, ks=(0,), channel=channel)
+    target = make_target(skin1, 0.5)
+    c = "RGB".index(channel)
+    start = np.full(found.preintegrated.size, 1.0 / found.pixels)
+    best = rank_one(target.quadrant(c) / target.total[c], found.preintegrated_gamma, start)
+    apart = 0.5 * target.copies @ np.abs(best.x - found.preintegrated)
+    assert apart < outside
+    # No other rank one is nearer under it, of whatever sum: the first singular vector is a_p.
+    root = np.sqrt(target.quadrant(c) @ target.copies)
+    weighted = full_kernel(target.quadrant(c) / (root[:, None] * root))
+    values, vectors = np.linalg.eigh(weighted)
+    whole = np.concatenate((root[:0:-1], root))
+    np.testing.assert_allclose(np.abs(vectors[:, -1]), whole / np.linalg.norm(whole), atol=1e-9)
+    assert values[-1] == pytest.approx(1.0, rel=1e-9)
+
+
+def test_gamma_p_of_rows_without_light_is_not_drawn():
+    energy = np.concatenate((np.full((20, 1), 0.01), np.zeros((20, 1))))
+    found = compute_guide(
+        make_profile(np.arange(41) * 0.1, energy), ks=(1,), mm_per_pixel=0.3, support_mm=4.0
+    )
+    dark = found.preintegrated == 0.0
+    assert 0 < dark.sum() < dark.size
+    assert np.isnan(found.preintegrated_gamma[dark]).all()
+    assert np.isfinite(found.preintegrated_gamma[~dark][:, ~dark]).all()
+    assert np.isfinite(found.preintegrated_errors).all()
+    assert_legible(lambda: guide_figure(found))
 
 
 @pytest.mark.parametrize("channel", ["R", "G", "B"])
@@ -73,7 +116,7 @@ def test_k_0_leaves_its_residual_farther_out_than_k_4(skin1, channel):
         within = np.cumsum(np.abs(residual[off_axes][order]))
         reach.append(distance[off_axes][order][np.searchsorted(within, 0.9 * within[-1])])
     assert reach[0] > reach[1]
-    assert found.misplaced[0] < found.misplaced[1]  # near light is most of the light
+    assert found.preintegrated_misplaced < found.misplaced.min()
 
 
 def test_the_spike_of_a_guide_sampled_on_the_axis_is_the_known_one(skin1):
@@ -101,20 +144,25 @@ def images(figure):
 def test_what_is_drawn_is_what_was_computed(guide):
     figure = guide_figure(guide)
     drawn = images(figure)
-    assert len(drawn) == 6
+    assert len(drawn) == 8
     reach = 0.5 * guide.pixels * 0.3
-    for i in range(3):
+    guides = [guide.preintegrated_gamma, *guide.gamma]
+    residuals = [guide.preintegrated_residual, *guide.residual]
+    for i, (gamma_of, residual) in enumerate(zip(guides, residuals, strict=True)):
+        halfway = gamma_of[len(gamma_of) // 2, len(gamma_of) // 2]
         for image, quadrant in zip(
-            drawn[2 * i : 2 * i + 2], (guide.gamma[i], guide.residual[i]), strict=True
+            drawn[2 * i : 2 * i + 2], (gamma_of / halfway, residual), strict=True
         ):
             np.testing.assert_array_equal(image.get_array(), full_kernel(quadrant))
             assert image.get_extent() == [-reach, reach, -reach, reach]
     residuals = drawn[1::2]
-    most = np.abs(guide.residual).max()
+    most = max(np.abs(guide.residual).max(), np.abs(guide.preintegrated_residual).max())
     for image in residuals:
         assert image.get_clim() == (-most, most)
         assert image.norm(0.0) == pytest.approx(0.5)
-    passes = [axes.patches for axes in figure.axes if axes.patches]
+    alone, *passes = (axes.patches for axes in figure.axes if axes.patches)
+    assert len(alone) == 1
+    np.testing.assert_allclose(alone[0].get_data().values, guide.preintegrated / 0.3)
     for patches, guided in zip(passes, guide.passes, strict=True):
         line, fitted = (each.get_data().values for each in patches)
         np.testing.assert_allclose(line, guide.preintegrated / 0.3)
@@ -223,6 +271,9 @@ def test_the_verb_draws_the_newest_profile_and_tabulates_it(run, tmp_path, guide
         guide.weighted_residual,
     )
     assert line.split() == ["1.55", *" ".join(f"{100 * each[1]:.2f} %" for each in figures).split()]
+    (line,) = [each for each in out.splitlines() if each.startswith("pre-integrated ")]
+    known = (guide.preintegrated[0], guide.preintegrated_misplaced, *guide.preintegrated_errors)
+    assert line.split()[1::2] == [f"{100 * each:.2f}" for each in known]
 
 
 def test_the_verb_gives_json(run, guide):
@@ -236,6 +287,9 @@ def test_the_verb_gives_json(run, guide):
     assert (figures["pixels"], figures["k"]) == (guide.pixels, [4, 0])
     np.testing.assert_allclose(figures["centre_share"], guide.centre_share[[2, 0]])
     np.testing.assert_allclose(figures["misplaced"], guide.misplaced[[2, 0]])
+    names = ("centre_share", "misplaced", "frobenius_error", "weighted_residual")
+    known = (guide.preintegrated[0], guide.preintegrated_misplaced, *guide.preintegrated_errors)
+    np.testing.assert_allclose([figures[f"preintegrated_{name}"] for name in names], known)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """The guided fit against literal sums, another optimiser, the SVD, and its own purpose."""
 
+import dataclasses
 import warnings
 
 import numpy as np
@@ -10,7 +11,15 @@ from scipy.optimize import LinearConstraint, check_grad, minimize
 
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import fit_guided, fit_preintegrated, make_target, support_of
-from sssfit.fit.guided import _levels, _misfit, _refined, gamma, guided_target, rank_one
+from sssfit.fit.guided import (
+    _levels,
+    _misfit,
+    _refined,
+    fit_one_pass,
+    gamma,
+    guided_target,
+    rank_one,
+)
 from sssfit.material import load_material
 from sssfit.simulate import simulate_exact
 
@@ -144,6 +153,62 @@ def test_small_k_is_better_near_the_beam_and_large_k_far_from_it(skin1, channel)
         left[k] = [np.linalg.norm((found - wanted)[ring]) for ring in rings]
     assert left[0][0] < 0.5 * left[4][0]
     assert left[4][1] < 0.5 * left[0][1]
+
+
+def distance_from_preintegrated(profile, k, channel, support_mm):
+    """Half the sum of the differences of two passes of sum 1."""
+    settings = {"mm_per_pixel": 0.3, "support_mm": support_mm}
+    fits = (
+        quiet(fit_guided, profile, k=k, **settings),
+        quiet(fit_preintegrated, profile, **settings),
+    )
+    passes = [
+        fit.kernel.weights[0, :, channel] / fit.kernel.weights[0, :, channel].sum() for fit in fits
+    ]
+    return 0.5 * np.abs(passes[0] - passes[1]).sum()
+
+
+@pytest.mark.parametrize("support_mm", [6.0, 12.0, 21.4])
+def test_of_skin1s_red_k_0_is_nearest_to_the_preintegrated_pass(skin1, support_mm):
+    # docs/fits.md has the distances of all channels; 1.55, the k that the paper draws, was called
+    # the nearest.
+    found = [distance_from_preintegrated(skin1, k, 0, support_mm) for k in (0, 0.5, 1, 1.55, 2)]
+    assert found[0] == min(found)
+    assert found[3] > 1.4 * found[0]
+
+
+def test_k_and_b_refer_to_each_channels_mean_free_path(skin1):
+    fitted = quiet(fit_guided, skin1, mm_per_pixel=0.3, support_mm=12.0)
+    extents = [each["extent_mm"] for each in fitted.kernel.parameters.values()]
+    paths_mm = load_material("skin1").layers[0].mean_free_path_mm
+    np.testing.assert_allclose(extents, 12.15 * paths_mm / paths_mm[0], rtol=1e-12)
+    # A channel alone, on the support that is its extent, is fitted as beside the others.
+    target = make_target(skin1, 0.3, 12.0)
+    alone = fit_one_pass(target, 1, extents[1], 1.55, 50.0, 1.0)
+    np.testing.assert_array_equal(alone.half[0], fitted.kernel.weights[0, 40:, 1])
+    wider = fit_one_pass(target, 1, extents[0], 1.55, 50.0, 1.0)
+    assert np.abs(wider.half[0] - alone.half[0]).max() > 0.01 * alone.half[0].max()
+
+
+def test_gamma_of_an_extent_is_that_of_more_pixels():
+    # x = 1 at 6.5 pixels of a support of 10.5: the inner part of it is Gamma over 6.5 pixels.
+    inner, whole = gamma(6, 2.0, 50.0), gamma(10, 2.0, 50.0, extent=6.5 / 10.5)
+    np.testing.assert_allclose(whole[:7, :7], inner, rtol=2e-3)
+    assert whole[10, 10] > 2.0 * whole[6, 6]
+
+
+def test_without_mean_free_paths_the_support_serves_all_channels(profile):
+    fitted = quiet(fit_guided, profile, mm_per_pixel=0.4, support_mm=6.0)
+    for found in fitted.kernel.parameters.values():
+        assert found["extent_mm"] == pytest.approx(6.2)
+
+
+def test_the_longest_mean_free_path_is_that_of_a_lit_channel(skin1):
+    energy = skin1.annulus_energy * (0.0, 1.0, 1.0)
+    dark = dataclasses.replace(skin1, annulus_energy=energy, beyond_grid=np.zeros(3))
+    fitted = quiet(fit_guided, dark, mm_per_pixel=0.3, support_mm=6.0)
+    assert fitted.kernel.parameters["G"]["extent_mm"] == pytest.approx(6.15)
+    assert 4.0 < fitted.kernel.parameters["B"]["extent_mm"] < 5.0
 
 
 def test_levels_keep_their_stop_reasons(profile):

@@ -3,6 +3,7 @@
 import errno
 import io
 import os
+import random
 import shutil
 import subprocess
 import sys
@@ -163,3 +164,70 @@ def test_without_a_folder_the_walk_is_compiled_anew_and_right(tmp_path):
     expected = simulate_montecarlo(load_material("skin1"), photons=1000).annulus_energy
     np.testing.assert_array_equal(np.frombuffer(bytes.fromhex(energy)), expected.ravel())
     assert (tmp_path / "file").read_bytes() == b""
+
+
+# Damage. In a process of its own: before the files had checksums, a flipped bit crashed it.
+
+FLIPS = """
+import random, sys
+from pathlib import Path
+from sssfit import _jit
+
+folder, chance = Path(sys.argv[1]), random.Random(1)
+_jit._CACHE_FOLDER = str(folder)
+
+def tripled(x):
+    return 3 * x + 1
+
+def run():
+    compiled = _jit.jit(tripled)
+    assert compiled(2) == 7
+    return sum(compiled.stats.cache_hits.values())
+
+assert (run(), run()) == (0, 1)
+files = sorted(each for each in folder.rglob("*") if each.is_file())
+whole = {each: each.read_bytes() for each in files}
+for file in files:
+    size = len(whole[file])
+    damaged = [whole[file][:k] for k in (0, 1, 31, 32, 33, size - 1)]
+    for place in (0, 31, 32, size - 1, *(chance.randrange(size) for _ in range(40))):
+        content = bytearray(whole[file])
+        content[place] ^= 1 << chance.randrange(8)
+        damaged.append(bytes(content))
+    for content in damaged:
+        file.write_bytes(content)
+        assert run() == 0, (file.name, len(content))  # compiled again, not loaded
+        assert run() == 1  # and mended
+        assert sorted(each for each in folder.rglob("*") if each.is_file()) == files
+        for each in files:
+            each.write_bytes(whole[each])
+print(*(each.suffix for each in files), len(damaged))
+"""
+
+
+def test_a_flipped_bit_in_any_file_is_compiled_again(tmp_path):
+    (tmp_path / "flips.py").write_text(FLIPS, encoding="utf-8")
+    (tmp_path / "cache").mkdir()
+    ended = subprocess.run(
+        [sys.executable, tmp_path / "flips.py", tmp_path / "cache"],
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert ended.stdout.split() == [".nbc", ".nbi", "50"]
+
+
+@pytest.mark.slow
+def test_a_flipped_bit_in_the_cache_of_the_walk_changes_nothing(tmp_path):
+    cache = tmp_path / "cache"
+    expected = python(WALK, NUMBA_CACHE_DIR=str(cache))
+    whole = {each: each.read_bytes() for each in cache.rglob("*.nb?")}
+    chance = random.Random(2)
+    for file in [*whole, *chance.choices(list(whole), k=20)]:
+        content = bytearray(whole[file])
+        content[chance.randrange(len(content))] ^= 1 << chance.randrange(8)
+        file.write_bytes(content)
+        assert python(WALK, NUMBA_CACHE_DIR=str(cache)) == expected
+        for each, bytes_of_it in whole.items():
+            each.write_bytes(bytes_of_it)

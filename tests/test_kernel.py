@@ -59,6 +59,8 @@ def assert_same_bits(ours, theirs):
 
 
 numbers = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e150, max_value=1e150)
+shares = st.floats(-1e15, 1e15)
+labels = st.text(min_size=1, max_size=12).filter(lambda t: t.isprintable() and t.strip() == t)
 json_values = st.recursive(
     st.none() | st.booleans() | st.integers(-(2**60), 2**60) | numbers | st.text(max_size=8),
     lambda inner: (
@@ -66,6 +68,7 @@ json_values = st.recursive(
     ),
     max_leaves=6,
 )
+json_objects = st.dictionaries(st.text(max_size=5), json_values, max_size=2)
 
 
 @st.composite
@@ -74,15 +77,15 @@ def kernels(draw):
     shape = (terms, half, channels)
     errors = arrays(float, channels, elements=st.floats(0.0, 1e9) | st.just(np.nan))
     return kernel_of(
-        draw(arrays(float, shape, elements=numbers)),
+        draw(arrays(float, shape, elements=shares)),
         draw(arrays(float, (terms, channels), elements=st.sampled_from((-1.0, 1.0)))),
-        method=draw(st.text(max_size=12)),
+        method=draw(labels),
         mm_per_pixel=draw(st.floats(1e-12, 1e12)),
-        channels=tuple(draw(st.lists(st.text(max_size=6), min_size=channels, max_size=channels))),
+        channels=tuple(draw(st.lists(labels, min_size=channels, max_size=channels, unique=True))),
         relative_frobenius_error=draw(errors),
         energy_error=draw(errors),
-        scale=draw(arrays(float, channels, elements=numbers)),
-        parameters=draw(st.dictionaries(st.text(max_size=5), json_values, max_size=3)),
+        scale=draw(arrays(float, channels, elements=st.floats(0.0, 1e6))),
+        parameters=draw(st.dictionaries(st.text(max_size=5), json_objects, max_size=3)),
         meta=draw(st.dictionaries(st.text(max_size=5), json_values, max_size=3)),
     )
 
@@ -97,6 +100,21 @@ def test_a_file_gives_the_same_bits_back_and_obeys_the_schema(kernel):
     jsonschema.validate(json.loads(written), SCHEMA)
 
 
+# What sssfit._kernel_schema looks at; the rest are words for people.
+KNOWN_KEYWORDS = {
+    *("$schema", "title", "description", "const", "enum", "type", "pattern", "minimum", "maximum"),
+    *("minItems", "maxItems", "uniqueItems", "items", "required", "properties"),
+    "additionalProperties",
+}
+
+
+def keywords_of(rules):
+    """Every keyword of a schema and of those within."""
+    inner = [*rules.get("properties", {}).values()]
+    inner += [rules[name] for name in ("items", "additionalProperties") if name in rules]
+    return set(rules).union(*map(keywords_of, inner))
+
+
 def test_the_schema_is_one_and_refuses_what_is_no_kernel():
     jsonschema.Draft202012Validator.check_schema(SCHEMA)
     assert SCHEMA["title"] == FORMAT
@@ -105,6 +123,7 @@ def test_the_schema_is_one_and_refuses_what_is_no_kernel():
     for key in SCHEMA["required"]:
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate({name: good[name] for name in good if name != key}, SCHEMA)
+    assert keywords_of(SCHEMA) <= KNOWN_KEYWORDS
     for changes in ({"mm_per_pixel": 0}, {"terms": []}, {"rank": 0}, {"format": "sssfit.kernel/2"}):
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate(good | changes, SCHEMA)
@@ -189,11 +208,60 @@ def test_a_kernel_cannot_be_changed():
         ({"weights": np.ones((0, 3, 1))}, "weights have shape (0, 3, 1)"),
         ({"weights": np.ones((1, 3))}, "weights have shape (1, 3)"),
         ({"weights": np.array([[[1.0], [2.0], [3.0]]])}, "not symmetric"),
-        ({"weights": np.full((1, 3, 1), np.nan)}, "have to be numbers"),
-        ({"scale": [np.inf]}, "have to be numbers"),
+        ({"weights": np.full((1, 3, 1), np.nan)}, "weights holds nan at [0, 0, 0]; expected"),
+        ({"weights": np.full((1, 3, 1), 1e200)}, "weights holds 1e+200 at [0, 0, 0]; expected"),
+        ({"weights": np.full((2, 31, 1), 9e17), "signs": [[1], [-1]]}, "beyond single precision"),
+        ({"weights": np.full((1, 3, 1), 1e10), "scale": [1e18]}, "weights add up to 9e+38"),
+        ({"weights": [[["1"], ["2"], ["1"]]]}, "weights is not an array of numbers"),
+        ({"weights": [[[1], [True], [1]]]}, "weights is not an array of numbers"),
+        ({"weights": [[[1], [2, 3], [1]]]}, "weights is not an array of numbers"),
+        ({"weights": [[[1], [10**400], [1]]]}, "weights is not an array of numbers"),
+        ({"weights": None}, "weights is not an array of numbers"),
+        ({"scale": [np.inf]}, "scale holds inf at [0]; expected numbers from 0 to 1e+18"),
+        ({"scale": [-1.0]}, "scale holds -1.0 at [0]"),
+        ({"scale": "one"}, "scale is not an array of numbers"),
+        ({"signs": [[True]]}, "signs is not an array of numbers"),
+        ({"relative_frobenius_error": [-0.1]}, "relative_frobenius_error holds -0.1 at [0]"),
+        ({"relative_frobenius_error": [np.inf]}, "relative_frobenius_error holds inf at [0]"),
+        ({"energy_error": [-np.inf]}, "energy_error holds -inf at [0]"),
+        ({"mm_per_pixel": "wide"}, "mm_per_pixel is not an array of numbers"),
+        ({"mm_per_pixel": "0.1"}, "mm_per_pixel is not an array of numbers"),
+        ({"mm_per_pixel": True}, "mm_per_pixel is not an array of numbers"),
+        ({"mm_per_pixel": [0.1]}, "mm_per_pixel = [0.1]; expected a length above 0"),
+        ({"mm_per_pixel": 1e-60}, "mm_per_pixel = 1e-60; expected a length above 0, from 1e-12"),
+        ({"method": "svd\n#error"}, r"method = 'svd\n#error'; expected a text that prints on one"),
+        ({"method": None}, "method = None; expected a text"),
+        ({"channels": ("R\n",)}, r"channels[0] = 'R\n'; expected a name"),
+        ({"channels": (7,)}, "channels[0] = 7; expected a name"),
+        ({"channels": 7}, "channels = 7; expected a list of names"),
+        ({"channels": "R"}, "channels = 'R'; expected a list of names"),
+        ({"meta": None}, "meta = None; expected a mapping"),
+        ({"meta": {"version": "1\n2"}}, r"meta.version = '1\n2'; expected a text that prints"),
+        ({"meta": {"material": "a\u2028b"}}, r"meta.material = 'a\u2028b'; expected a text"),
+        ({"meta": {"material": {}}}, "meta.material = {}; expected a text"),
+        ({"meta": {"photons": "many"}}, "meta.photons = 'many'; expected a whole number"),
+        ({"meta": {"settings": 3}}, "meta.settings = 3; expected a mapping"),
+        ({"meta": {"settings": {"k": np.nan}}}, "meta.settings.k = nan is not a finite number"),
+        ({"meta": {"profile_sha256": "xyz"}}, "meta.profile_sha256 = 'xyz'; expected hexadecimal"),
+        ({"parameters": [1]}, "parameters = [1]; expected a mapping"),
+        ({"parameters": {"c0": 3}}, "parameters.c0 = 3; expected a mapping"),
+        ({"parameters": {"c0": {"v": "\udcff"}}}, "parameters.c0.v holds half of a character"),
+        ({"parameters": {"c0": {"variances_mm2": [1, -1]}}}, "expected variances above 0"),
+        ({"parameters": {"c0": {"variances_mm2": 1}}}, "variances_mm2 = 1; expected a list of num"),
+        ({"parameters": {"c0": {"weights": ["1"]}}}, "parameters.c0.weights is not an array"),
+        ({"parameters": {"c0": {"near_mm2": [1]}}}, "near_mm2 = [1]; expected a number"),
+        (
+            {"parameters": {"c0": {"variances_mm2": [1], "weights": [1, 2]}}},
+            "parameters.c0: variances_mm2 and weights differ in number",
+        ),
         ({"scale": [1.0, 1.0]}, "scale has shape (2,); expected (1,)"),
         ({"signs": [[0.5]]}, "signs have to be +1 or -1"),
         ({"channels": ("R", "G")}, "2 channel names for 1 channels"),
+        (
+            {"weights": np.ones((1, 3, 2)), "signs": [[1, 1]], "scale": [1, 1]}
+            | {"relative_frobenius_error": [0, 0], "energy_error": [0, 0], "channels": ("R", "R")},
+            "channels[1] = 'R' is there twice",
+        ),
     ],
 )
 def test_what_is_no_kernel_is_one_clear_line(changes, fragment):
@@ -243,16 +311,76 @@ def damaged():
         "terms are null": None,
     }.items():
         yield name, changed(terms=terms), ""
-    yield "errors are null", changed(errors=None), "damaged"
-    yield "errors lack one", changed(errors={"energy": [0.0, 0.0]}), "relative_frobenius"
-    yield "pitch", changed(mm_per_pixel="wide"), "damaged"
+    yield "errors are null", changed(errors=None), "errors = null; expected an object"
+    yield "errors lack one", changed(errors={"energy": [0, 0]}), "errors has no relative_frobenius"
+    yield "pitch", changed(mm_per_pixel="wide"), "mm_per_pixel = 'wide'; expected a finite number"
+    yield "no pitch", changed(mm_per_pixel=True), "mm_per_pixel = true; expected a finite number"
+    yield "huge pitch", changed(mm_per_pixel=10**400), "mm_per_pixel = 1000"
     yield "negative pitch", changed(mm_per_pixel=-1.0), "mm_per_pixel = -1.0"
-    yield "parameters", changed(parameters=3), "damaged"
-    yield "meta", changed(meta=["a"]), "damaged"
-    yield "channels", changed(channels=7), "damaged"
-    yield "channel names", changed(channels=[1, 2]), "damaged"
-    yield "method", changed(method=5), "damaged"
-    yield "NaN", bytes_of(kernel_of(np.ones((1, 2, 1)))).replace(b"1.0", b"NaN"), ""
+    yield "parameters", changed(parameters=3), "parameters = 3; expected an object"
+    yield "a parameter", changed(parameters={"c0": [1]}), "parameters.c0 = [1]; expected an object"
+    yield "meta", changed(meta=["a"]), "meta = ['a']; expected an object"
+    yield "meta NaN", changed(meta={"gain": np.nan}), "it holds NaN, which is not a number of JSON"
+    yield "meta inf", changed(meta={"gain": -np.inf}), "it holds -Infinity"
+    yield "photons", changed(meta={"photons": "1e7"}), "meta.photons = '1e7'; expected a whole"
+    yield "no photons", changed(meta={"photons": 0}), "meta.photons = 0; expected 1 to 1e+18"
+    yield "digits", changed(meta={"photons": 10**400}), "meta.photons = 1000"
+    yield "version", changed(meta={"version": "0\n#error"}), r"meta.version = '0\n#error'; expected"
+    yield "material", changed(meta={"material": "\u2029"}), "meta.material = '\\u2029'; expected"
+    yield "surrogate", changed(meta={"material": "\ud800"}), "half of a character"
+    yield "settings", changed(meta={"settings": "all"}), "meta.settings = 'all'; expected an object"
+    yield "channels", changed(channels=7), "channels = 7; expected a list"
+    yield "channel names", changed(channels=[1, 2]), "channels[0] = 1; expected a text"
+    yield "lines", changed(channels=["R", "G\n"]), r"channels[1] = 'G\n'; expected a text that prin"
+    yield "twice", changed(channels=["R", "R"]), "channels = ['R', 'R'] has an entry twice"
+    yield "too few", changed(channels=["R"]), "energy has 2 entries; expected 1, one for each chan"
+    yield (
+        "65 channels",
+        changed(channels=[str(k) for k in range(65)]),
+        "65 entries; expected 1 to 6",
+    )
+    yield "method", changed(method=5), "method = 5; expected a text"
+    yield (
+        "lines of method",
+        changed(method="svd\r"),
+        r"method = 'svd\r'; expected a text that print",
+    )
+    yield "rank", changed(rank=3), "rank = 3, but the terms have 2"
+    yield "no rank", changed(rank=2.5), "rank = 2.5; expected a whole number"
+    yield "pixels", changed(pixels=7), "pixels = 7, but the terms have 5"
+    yield (
+        "support",
+        changed(support_mm=1.0),
+        "support_mm = 1.0, but 5 pixels of 0.1 mm reach 0.2 mm",
+    )
+    yield "energy", changed(energy=[50.0, 51.0]), "energy[1] = 51.0, but the terms add up to 50"
+    yield "no energy", changed(energy=[50.0, "50"]), "energy[1] = '50'; expected a finite number"
+    yield "scale", changed(scale=[1, -1]), "scale[1] = -1; expected 0 to 1e+18"
+    yield "scales", changed(scale=[1, 1, 1]), "scale has 3 entries; expected 2"
+    yield (
+        "two keys",
+        b'{"format": "sssfit.kernel/1", "rank": 1, "rank": 2}',
+        "'rank' is there twice",
+    )
+    many = [row[:] for row in term["weights"]]
+    many[3][1] = 1e200
+    yield "1e200", changed(terms=[term | {"weights": many}]), "terms[0].weights[3][1] = 1e+200; exp"
+    many = [row[:] for row in term["weights"]]
+    many[3][1] = True
+    yield (
+        "true",
+        changed(terms=[term | {"weights": many}]),
+        "terms[0].weights[3][1] = true; expecte",
+    )
+    many[3] = [1.0]
+    yield "a row", changed(terms=[term | {"weights": many}]), "terms[0].weights[3] has 1 entries"
+    yield (
+        "a term",
+        changed(terms=[term, term | {"weights": many[:3]}]),
+        "terms[1].weights has 3 pix",
+    )
+    yield "a sign", changed(terms=[term | {"sign": [1, True]}]), "terms[0].sign[1] = true; expected"
+    yield "NaN", bytes_of(kernel_of(np.ones((1, 2, 1)))).replace(b"1.0", b"NaN"), "it holds NaN"
 
 
 @pytest.mark.parametrize(

@@ -1,6 +1,7 @@
 """Long runs: saved now and then, killed at any moment, resumed to the same bits."""
 
 import contextlib
+import dataclasses
 import errno
 import itertools
 import json
@@ -215,6 +216,82 @@ def test_foreign_files_are_one_line(tmp_path):
         skin1(photons=200_000, checkpoint=path)
 
 
+@pytest.fixture(scope="module")
+def left(tmp_path_factory):
+    """The bytes of a checkpoint of skin1."""
+    path = tmp_path_factory.mktemp("left") / "c"
+    leave_checkpoint(path)
+    return path.read_bytes()
+
+
+def edited(path, change):
+    """A checkpoint rewritten by hand: ``change`` takes its meta and its arrays by name."""
+    with np.load(path) as members:
+        arrays = dict(members)
+    meta = json.loads(str(arrays.pop("meta")))
+    change(meta, arrays)
+    with path.open("wb") as stream:
+        np.savez(stream, meta=np.array(json.dumps(meta)), **arrays)
+
+
+def put(name, value):
+    """Replace a field of the meta, or one sum of a ledger."""
+
+    def change(meta, arrays):
+        if name in arrays:
+            arrays[name].flat[1] = value
+        else:
+            meta[name] = value
+
+    return change
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (put("settings", {"seed": "1\n2"}), r"seed = 1\n2 (now 1); material = None"),
+        (put("settings", {"seed": 1}), "c is a damaged checkpoint; delete it"),
+        (put("photons", -16384), "photons = -16384, expected whole batches of 16384"),
+        (put("photons", 16384.0), "photons = 16384.0, expected whole batches"),
+        (put("photons", True), "photons = True, expected whole batches"),
+        (put("photons", "16384"), "photons = '16384', expected whole batches"),
+        (put("photons", 16384 * 10**400), "photons = 1638400"),
+        (put("flights", -1), "flights = -1, expected a whole number from 0 up"),
+        (put("flights", None), "flights = None"),
+        (put("least_error", "low"), "least_error = 'low'"),
+        (put("least_error", float("nan")), "least_error = nan"),
+        (put("least_error", -1.0), "least_error = -1.0"),
+        (put("seconds", float("inf")), "seconds = inf"),
+        (put("seconds", -5.0), "seconds = -5.0"),
+        (put("ledger_bins", -1.0), r"ledger_bins holds -1.0 at [0, 1], expected 0 to "),
+        (put("ledger_bins", 1e300), r"ledger_bins holds 1e+300 at [0, 1]"),
+        (put("ledger_absorbed", np.inf), "ledger_absorbed holds inf at [1]"),
+        (put("ledger_unfinished", np.nan), "ledger_unfinished holds nan"),
+        (put("ledger_roulette", -1e300), "ledger_roulette holds -1e+300"),
+        (lambda _, arrays: arrays.update(ledger_absorbed=np.zeros(2)), "absorbed has shape (2,)"),
+        (
+            lambda _, arrays: arrays.update(ledger_absorbed=np.zeros(3, int)),
+            "c is a damaged checkpoint; delete it",
+        ),
+        (
+            lambda _, arrays: arrays.update(ledger_absorbed=np.zeros(10**7)),
+            "c is a damaged checkpoint; delete it",
+        ),
+        (lambda _, arrays: arrays.pop("ledger_bins"), "c is a damaged checkpoint; delete it"),
+        (lambda _, arrays: arrays.update(more=np.zeros(2)), "c is a damaged checkpoint; delete it"),
+    ],
+)
+def test_an_edited_checkpoint_is_one_line_that_names_the_fault(tmp_path, left, change, said):
+    path = tmp_path / "c"
+    path.write_bytes(left)
+    edited(path, change)
+    with pytest.raises((FileError, SimulationError)) as caught:
+        skin1(photons=200_000, checkpoint=path)
+    assert str(caught.value).startswith(f"{path} ")
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
 def test_a_full_disk_costs_the_checkpoint_and_not_the_run(tmp_path, monkeypatch):
     path = tmp_path / "c"
     leave_checkpoint(path)
@@ -314,6 +391,18 @@ def test_a_damaged_or_edited_profile_is_not_finished(run, tmp_path):
     (tmp_path / PROFILE).write_bytes(whole.replace(b'"seed": 1', b'"seed": x'))
     assert run("skin1", "--photons", "2e4", "--resume", "--force")[0] == 0
     assert (tmp_path / PROFILE).read_bytes() == whole
+
+
+@pytest.mark.parametrize("name", ["relative_error", "energy_balance_stderr", "material"])
+def test_a_profile_without_a_figure_of_its_walk_is_not_finished(run, tmp_path, name):
+    run("skin1", "--photons", "2e3")
+    profile = Profile.load(PROFILE)
+    meta = {key: value for key, value in profile.meta.items() if key != name}
+    dataclasses.replace(profile, meta=meta).save(PROFILE)
+    status, _, err = run("skin1", "--photons", "2e3", "--resume")
+    assert status == 0
+    assert "There is no" in err
+    assert dict(Profile.load(PROFILE).meta) == dict(profile.meta)
 
 
 def test_a_checkpoint_is_gone_on_from_and_removed(run, tmp_path):

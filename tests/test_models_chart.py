@@ -1,5 +1,6 @@
 """Profile models against the exact solution: the comparison's figures, its chart, its verb."""
 
+import dataclasses
 import io
 import itertools
 import json
@@ -12,6 +13,7 @@ from figures import assert_legible
 from matplotlib.colors import to_hex
 from matplotlib.patches import StepPatch
 
+from sssfit._chart_text import kernel_subtitle
 from sssfit.chart import models_figure, profile_figure, save_figure
 from sssfit.cli import main
 from sssfit.compare import compare_models
@@ -302,6 +304,21 @@ def test_bad_input_is_one_clear_line(run, tmp_path, skin1, arguments, status, fr
     if status == 1:
         assert err.count("\n") == 1
     assert not list(tmp_path.glob("*.png"))
+
+
+def test_a_walk_edited_to_have_no_photons_is_no_walk(run, tmp_path, skin1):
+    walk = skin1.walk.profile
+    dataclasses.replace(walk, meta={**walk.meta, "photons": None}).save(tmp_path / "w.profile.npz")
+    status, _, err = run("--models", "w.profile.npz")
+    assert (status, err.count("\n")) == (1, 1)
+    assert "is no photon walk of a known material" in err
+
+
+def test_charts_do_without_a_version_or_method(skin1):
+    walk = skin1.walk.profile
+    meta = {key: walk.meta[key] for key in ("format", "channels", "photons")}
+    bare = dataclasses.replace(walk, meta=meta)
+    assert kernel_subtitle(bare, 5, 0.1) == "5 x 5 pixels of 0.1 mm"
 
 
 def test_the_profile_chart_of_a_computed_profile_names_its_errors(skin1):

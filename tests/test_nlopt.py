@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from sssfit.errors import FitError
-from sssfit.fit._nlopt import _WORDS, minimise
+from sssfit.fit._nlopt import _WORDS, minimise, minimise_by_simplex
 
 ANYWHERE = {"lower": np.full(2, -np.inf), "upper": np.full(2, np.inf)}
 
@@ -74,3 +74,44 @@ def test_an_error_of_the_objective_itself_is_not_swallowed():
 def test_every_status_of_nlopt_has_words():
     named = {name for name in _WORDS if isinstance(getattr(nlopt, name, None), int)}
     assert named == set(_WORDS)
+
+
+SIMPLEX = {"step": 0.5, "change": 1e-6, "value_change": 1e-12, "most_evaluations": 2000}
+
+
+def valley(x):
+    """Rosenbrock's, 0 at (1, 1)."""
+    return float(100.0 * (x[1] - x[0] ** 2) ** 2 + (1.0 - x[0]) ** 2)
+
+
+def test_the_simplex_finds_the_end_of_a_valley_without_a_gradient():
+    wide = {"lower": np.full(2, -np.inf), "upper": np.full(2, np.inf)}
+    found = minimise_by_simplex(valley, np.array((-1.2, 1.0)), **wide, **SIMPLEX)
+    np.testing.assert_allclose(found.x, 1.0, atol=1e-5)
+    assert found.value == valley(found.x)
+    assert found.stop_reason == "converged: the simplex has shrunk to a point"
+
+
+def test_the_simplex_stays_within_bounds():
+    seen = []
+
+    def watched(x):
+        seen.append(x.copy())
+        return valley(x)
+
+    lower, upper = np.array((-2.0, -0.5)), np.array((0.5, 3.0))
+    found = minimise_by_simplex(watched, np.array((9.0, 9.0)), lower=lower, upper=upper, **SIMPLEX)
+    assert (np.array(seen) >= lower).all()
+    assert (np.array(seen) <= upper).all()
+    np.testing.assert_allclose(found.x, (0.5, 0.25), atol=1e-5)
+    assert found.evaluations == len(seen)
+
+
+def test_the_simplex_says_where_it_was_stopped():
+    wide = {"lower": np.full(2, -np.inf), "upper": np.full(2, np.inf)}
+    few = SIMPLEX | {"most_evaluations": 25}
+    found = minimise_by_simplex(valley, np.array((-1.2, 1.0)), **wide, **few)
+    assert (
+        found.stop_reason == f"stopped after {found.evaluations} evaluations, the best of them kept"
+    )
+    assert found.evaluations < 30

@@ -1,6 +1,7 @@
 """The profile record, its statistics, its file, and what a damaged file says."""
 
 import copy
+import dataclasses
 import io
 import json
 import os
@@ -13,6 +14,7 @@ from reference_pixels import make_profile, one_over_r_profile, walk_tallies
 
 from sssfit import _profile_io
 from sssfit.errors import FileError, ProfileError
+from sssfit.material import Layer, load_material
 from sssfit.profile import FORMAT, Profile, is_profile_file
 
 META = {
@@ -42,6 +44,14 @@ def full_profile(**changes):
         "meta": META,
     }
     return Profile(**(fields | changes))
+
+
+def nested(depth):
+    """A list in a list in a list."""
+    value = []
+    for _ in range(depth):
+        value = [value]
+    return {"deep": value}
 
 
 def field_values(profile):
@@ -190,7 +200,7 @@ def test_errors_of_sums_without_photons_or_with_one():
         ({"r_edges_mm": [0.0, 1.0, 2.0, 3.0, np.inf]}, "not strictly increasing"),
         ({"r_edges_mm": [0.1, 1.0, 2.0, 3.0, 4.0]}, "starts at 0.1"),
         ({"beyond_grid": [0.0]}, "beyond_grid has shape (1,); expected (2,)"),
-        ({"beyond_grid": None}, "beyond_grid has shape ()"),
+        ({"beyond_grid": None}, "beyond_grid is not an array of numbers"),
         ({"specular_reflectance": [0.1]}, "specular_reflectance has shape (1,)"),
         ({"absorbed": [0.1, 0.2]}, "absorbed has shape (2,)"),
         ({"unfinished": [0.1, np.inf]}, "unfinished holds inf"),
@@ -203,9 +213,52 @@ def test_errors_of_sums_without_photons_or_with_one():
         ),
         ({"meta": {}}, "meta has format None"),
         ({"meta": META | {"channels": ["R"]}}, "expected a list of 2 names"),
-        ({"meta": META | {"photons": 0}}, "photons 0"),
+        ({"meta": META | {"photons": 0}}, "meta.photons = 0"),
         ({"meta": META | {"when": io}}, "meta cannot be kept as JSON"),
         ({"meta": META | {"gain": float("nan")}}, "meta cannot be kept as JSON"),
+        ({"meta": META | {"gain": float("nan")}}, "meta.gain = nan is not a finite number"),
+        ({"meta": None}, "meta = None; expected a mapping"),
+        ({"meta": META | {"settings": {"a": [1, 10**400]}}}, "meta.settings.a[1] = 1000"),
+        ({"meta": META | {"settings": {"a": "\ud800"}}}, "meta.settings.a holds half of a char"),
+        ({"meta": META | {"settings": {3: 1}}}, "meta.settings has the key 3"),
+        ({"meta": META | {"settings": [1]}}, "meta.settings = [1]; expected a mapping"),
+        ({"meta": META | {"settings": nested(5000)}}, "nested too deep"),
+        ({"meta": META | {"photons": "many"}}, "meta.photons = 'many'; expected a whole number"),
+        ({"meta": META | {"photons": True}}, "meta.photons = True"),
+        ({"meta": META | {"photons": 1e7}}, "meta.photons = 10000000.0"),
+        ({"meta": META | {"photons": 10**400}}, "meta.photons = 1000"),
+        ({"meta": META | {"seed": -1}}, "meta.seed = -1"),
+        ({"meta": META | {"seed": "1"}}, "meta.seed = '1'"),
+        (
+            {"meta": META | {"version": "1\n2"}},
+            r"meta.version = '1\n2'; expected a text that print",
+        ),
+        ({"meta": META | {"version": 1}}, "meta.version = 1"),
+        ({"meta": META | {"method": "a\x1b[31m"}}, "meta.method"),
+        ({"meta": META | {"channels": ["R", "R"]}}, "channels[1] = 'R' is there twice"),
+        ({"meta": META | {"channels": ["R", "G\n"]}}, r"channels[1] = 'G\n'; expected a name"),
+        ({"meta": META | {"channels": ["R", 1]}}, "channels[1] = 1; expected a name"),
+        ({"meta": META | {"material": "skin1"}}, "meta.material = 'skin1'; expected a mapping"),
+        ({"meta": META | {"material_sha256": 5}}, "meta.material_sha256 = 5"),
+        ({"meta": META | {"material_sha256": "5"}}, "meta.material is not a material"),
+        ({"meta": META | {"relative_error": "low"}}, "meta.relative_error = 'low'"),
+        ({"meta": META | {"relative_error": -0.1}}, "meta.relative_error = -0.1"),
+        ({"meta": META | {"energy_balance_stderr": [0.1]}}, "for each of 2 channels"),
+        ({"meta": META | {"energy_balance_stderr": ["a", True]}}, "meta.energy_balance_stderr ="),
+        ({"annulus_energy": np.full((4, 2), "0.1")}, "annulus_energy is not an array of numbers"),
+        ({"annulus_energy": np.full((4, 2), True)}, "annulus_energy is not an array of numbers"),
+        ({"annulus_energy": np.full((4, 2), 1j)}, "annulus_energy is not an array of numbers"),
+        ({"beyond_grid": [0.1, True]}, "beyond_grid is not an array of numbers"),
+        ({"beyond_grid": [0.1, "0.1"]}, "beyond_grid is not an array of numbers"),
+        ({"beyond_grid": [0.1, 10**400]}, "beyond_grid is not an array of numbers"),
+        ({"beyond_grid": [[0.1], 0.1]}, "beyond_grid is not an array of numbers"),
+        ({"annulus_energy": np.full((4, 2), -1e200)}, "annulus_energy holds -1e+200 at [0, 0]"),
+        ({"annulus_energy_stderr": np.full((4, 2), 1e200)}, "holds 1e+200 at [0, 0]"),
+        ({"absorbed": np.full((1, 2), 1e200)}, "absorbed holds 1e+200"),
+        ({"specular_reflectance": 1.5}, "specular_reflectance = 1.5; expected 0 to 1"),
+        ({"r_edges_mm": [0.0, 1e-300, 2.0, 3.0, 4.0]}, "expected radii from 1e-12 to 1e+12 mm"),
+        ({"r_edges_mm": [0.0, 1.0, 2.0, 3.0, 1e300]}, "expected radii from 1e-12 to 1e+12 mm"),
+        ({"r_edges_mm": [0.0, 1.0, np.nextafter(1.0, 2.0), 3.0, 4.0]}, "[1] and [2] are 2.2e-16"),
     ],
 )
 def test_fields_that_do_not_fit_are_refused_in_one_line(changes, said):
@@ -213,6 +266,41 @@ def test_fields_that_do_not_fit_are_refused_in_one_line(changes, said):
         full_profile(**changes)
     assert said in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_coefficients_must_be_those_of_the_fingerprint():
+    material = load_material("skin1")
+    material = dataclasses.replace(
+        material,
+        channels=("R", "G"),
+        layers=(Layer(1.3, [0.0, 0.0], [0.1, 0.2], [1.0, 2.0]),),
+    )
+    record = material.to_dict()
+    good = META | {"material": record, "material_sha256": material.sha256}
+    assert full_profile(meta=good).meta["material_sha256"] == material.sha256
+    edited = copy.deepcopy(record)
+    edited["layers"][0]["sigma_a_per_mm"][1] *= 2.0
+    with pytest.raises(ProfileError, match=r"meta.material_sha256 is not that of meta.material"):
+        full_profile(meta=good | {"material": edited})
+    with pytest.raises(ProfileError, match=r"meta.channels = \['G', 'R'\], but meta.material has"):
+        full_profile(meta=good | {"channels": ["G", "R"]})
+
+
+def test_the_fingerprint_is_that_of_the_light():
+    profile = full_profile()
+    assert len(profile.sha256) == 64
+    assert full_profile(meta=META | {"version": "9", "photons": 7}).sha256 == profile.sha256
+    assert full_profile(absorbed=np.zeros((0, 2))).sha256 == profile.sha256
+    assert pickle.loads(pickle.dumps(profile)).sha256 == profile.sha256
+    assert Profile.read(io.BytesIO(contents(profile))).sha256 == profile.sha256
+    changed = [
+        {"annulus_energy": profile.annulus_energy * np.nextafter(1.0, 2.0)},
+        {"beyond_grid": [0.01, 0.021]},
+        {"r_edges_mm": [0.0, 0.1, 0.3, 1.0, 4.5]},
+        {"meta": META | {"channels": ["R", "B"]}},
+    ]
+    found = {full_profile(**each).sha256 for each in changed}
+    assert len(found | {profile.sha256}) == 5
 
 
 def test_records_can_be_copied_and_sent_to_other_processes():
@@ -304,6 +392,13 @@ def archive(**changes):
     return buffer.getvalue()
 
 
+def edited_meta(old, new):
+    """The text of the meta as somebody edited it."""
+    text = json.dumps(META)
+    assert old in text
+    return np.array(text.replace(old, new))
+
+
 def damaged_header():
     """A member whose header claims 8 TB, in a file of a few kB."""
     plain = archive()
@@ -349,9 +444,15 @@ def bomb():
             "is not a profile: it has format 'sssfit.kernel/1'",
         ),
         (damaged_header(), " is damaged; write it again with"),
-        (bomb(), "more than the 2 GB"),
+        (bomb(), "more than the 0.5 GB"),
+        (archive(meta=edited_meta('"photons": 1000', '"photons": "1000"')), "meta.photons = '10"),
+        (archive(meta=edited_meta('"photons": 1000', '"gain": NaN')), "meta.gain = nan"),
+        (archive(meta=edited_meta("1000", "1" * 400)), "meta.photons = 1111"),
+        (archive(meta=edited_meta("1000", "1" * 5000)), " is damaged; write it again with"),
+        (archive(meta=edited_meta("montecarlo", "\\udfff")), "half of a character"),
+        (archive(meta=np.array(" " * 5_000_000)), "20,000,128 bytes of meta, more than 16,000"),
     ],
-    ids=range(22),
+    ids=range(28),
 )
 def test_unusable_files_are_refused_in_one_line_that_names_them(tmp_path, content, said):
     path = tmp_path / "bad.profile.npz"

@@ -195,13 +195,31 @@ def test_no_light_crosses_the_mask(rng, follow):
 def test_what_is_no_object_comes_back_as_it_was(rng):
     shape = (6, 8)
     mask, depth = rng.integers(0, 2, shape), rng.uniform(200.0, 300.0, shape)
-    depth[2, 3], depth[mask == 0] = np.inf, 0.0
+    mask[2, 3], mask[4, 5], mask[1, 1] = 1, 2, 0
+    depth[mask == 0] = 0.0
+    # In the mask, but the eye meets nothing there: this is no object either.
+    depth[2, 3] = depth[4, 5] = np.inf
     irradiance = rng.random((*shape, 1))
     out = render_screen(make_scene(irradiance, depth, mask=mask), random_kernel(rng))
-    nothing = (mask == 0) | np.isinf(depth)
-    expected = np.broadcast_to(irradiance, out.shape)[nothing]
-    np.testing.assert_array_equal(out[nothing], expected)
+    for nothing in (mask == 0, np.isinf(depth)):
+        assert nothing.any()
+        expected = np.broadcast_to(irradiance, out.shape)[nothing]
+        np.testing.assert_array_equal(out[nothing], expected)
+    objects = (mask > 0) & np.isfinite(depth)
+    assert (out[objects] != irradiance[objects]).all()
     assert np.isfinite(out).all()
+
+
+def test_no_light_comes_from_a_pixel_of_infinite_depth(rng):
+    irradiance, depth = rng.random((1, 9, 1)), np.full((1, 9), DISTANCE_MM)
+    depth[0, 4] = np.inf
+    kernel = gaussian_kernel(1.0, half=3)
+    mask = np.ones((1, 9), int)
+    dark = render_screen(make_scene(irradiance, depth, mask=mask), kernel)
+    irradiance[0, 4] = 1000.0
+    bright = render_screen(make_scene(irradiance, depth, mask=mask), kernel)
+    np.testing.assert_array_equal(np.delete(dark, 4, axis=1), np.delete(bright, 4, axis=1))
+    assert bright[0, 4, 0] == 1000.0
 
 
 def test_scale_zero_leaves_a_pixel_unblurred(rng):
@@ -284,8 +302,8 @@ def test_variances_come_from_the_kernel(rng):
 
 
 def test_the_lerp_ends_where_the_listing_ends_it_for_table_1():
-    # RR-02-12: s = saturate(300 D sssWidth |dz|) (appendix A) at the width of table 1, and 20 degrees
-    # of the released shader. The outermost sample lies 2 sssWidth away and stands for 3 mm of skin.
+    # RR-02-12: s = saturate(300 D sssWidth |dz|) (appendix A), the width of table 1, and the
+    # released shader's 20 degrees. The outermost sample, 2 sssWidth away, is for 3 mm of skin.
     width = 0.014
     end = 1.0 / (300.0 / math.tan(math.radians(0.5 * 20.0)) * width)
     red = [weights[0] for weights in shapes.SKIN_WEIGHTS]

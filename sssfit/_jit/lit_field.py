@@ -5,10 +5,15 @@ wide on the plane z = 0. The key light is directional: a point is lit if the ray
 nothing. Five samples a pixel (its centre and four rooks), and sixteen more where they disagree
 about what is seen or lit, so that the edges of shadows have no steps.
 
+A light that stands behind the field is blocked by the body between its front and its back: see
+``sssfit._jit.solid``; for other lights the field is a front alone, and nothing passes behind it.
+
 A field is the tuple (heights, inner, levels, maxima, x0, y0, spacing): ``inner`` is above 0 where
-an object of its own, label 2, lies in the surface of label 1. A view is (mm_per_pixel, distance,
-floor): what lies below the floor is background. A lamp is (direction to the key light, to the fill
-light, their strengths and the ambient light's, exponent, reflectance at normal incidence).
+an object of its own, label 2, lies in the surface of label 1. A body is (the field seen, the
+one that casts shadows from outside it, the solid, whether the key light stands behind). A view is
+(mm_per_pixel, distance, floor): what lies below the floor is background. A lamp is (direction to
+the key light, to the fill light, their strengths and the ambient light's, exponent, reflectance at
+normal incidence).
 """
 
 import math
@@ -17,16 +22,19 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit._jit import jit, jit_inline
-from sssfit._jit.heightfield import bilinear, clip_axis, first_hit, normal_at
+from sssfit._jit.heightfield import Vector, bilinear, clip_axis, first_hit, normal_at
+from sssfit._jit.solid import GAP_MM, Solid, first_run, outward
 
 FloatArray = npt.NDArray[np.float64]
-Vector = tuple[float, float, float]
 Field = tuple[FloatArray, FloatArray, npt.NDArray[np.int64], FloatArray, float, float, float]
+Body = tuple[Field, Field, Solid, bool]
 View = tuple[float, float, float]
 Lamp = tuple[Vector, Vector, Vector, float, float]
 
 # Clear of the patch that the light's ray starts on [mm]; the finest cells are 0.02 mm and more.
 LIFT_MM = 1e-3
+# The same off the body's own, coarser front, along the normal: pores are 0.1 mm deep.
+OFF_BODY_MM = 0.3
 # Rooks: no two in a row or a column, so edges along either axis have five steps, not three.
 FIRST = np.array([(0.5, 0.5), (0.1, 0.3), (0.7, 0.1), (0.9, 0.7), (0.3, 0.9)])
 MORE = np.array([((i % 4 + 0.5) / 4.0, (i // 4 + 0.5) / 4.0) for i in range(16)])
@@ -68,6 +76,24 @@ def in_shadow(fine: Field, coarse: Field, point: Vector, light: Vector) -> bool:
 
 
 @jit_inline
+def behind_body(solid: Solid, point: Vector, normal: Vector, light: Vector) -> bool:
+    """Whether the ray toward the light runs through the body."""
+    off = (
+        point[0] + OFF_BODY_MM * normal[0],
+        point[1] + OFF_BODY_MM * normal[1],
+        point[2] + OFF_BODY_MM * normal[2],
+    )
+    return first_run(solid, off, light, np.empty(6))[1] >= 0.0
+
+
+@jit_inline
+def surface_normal(fine: Field, point: Vector) -> Vector:
+    """Return the unit normal of the surface at a point, toward the eye's side."""
+    x, y = (point[0] - fine[4]) / fine[6], (point[1] - fine[5]) / fine[6]
+    return normal_at(fine[0], fine[6], x, y)
+
+
+@jit_inline
 def shine(normal: Vector, light: Vector, eye: Vector, exponent: float, face_on: float) -> float:
     """Blinn and Phong's highlight, times pi: the exitance of a matt surface as bright.
 
@@ -85,19 +111,23 @@ def shine(normal: Vector, light: Vector, eye: Vector, exponent: float, face_on: 
 
 
 @jit_inline
-def light_point(
-    fine: Field, coarse: Field, point: Vector, eye: Vector, lamp: Lamp
-) -> tuple[float, float, bool]:
+def light_point(body: Body, point: Vector, eye: Vector, lamp: Lamp) -> tuple[float, float, bool]:
     """Irradiance and highlight of a point, and whether the key light is blocked."""
+    fine, coarse, solid, is_behind = body
     key, fill, strengths, exponent, face_on = lamp
-    x, y = (point[0] - fine[4]) / fine[6], (point[1] - fine[5]) / fine[6]
-    normal = normal_at(fine[0], fine[6], x, y)
+    normal = surface_normal(fine, point)
     weak = strengths[1] * max(dot(normal, fill), 0.0)
     # The ambient light is a sky: twice as strong on what looks up as on what looks ahead.
     irradiance = weak + strengths[2] * 0.5 * (1.0 + normal[1])
     highlight = weak * shine(normal, fill, eye, exponent, face_on)
     cosine = dot(normal, key)
-    if cosine <= 0.0 or in_shadow(fine, coarse, point, key):
+    if cosine <= 0.0:
+        return irradiance, highlight, True
+    if is_behind:
+        blocked = behind_body(solid, point, normal, key)
+    else:
+        blocked = in_shadow(fine, coarse, point, key)
+    if blocked:
         return irradiance, highlight, True
     irradiance += strengths[0] * cosine
     highlight += strengths[0] * cosine * shine(normal, key, eye, exponent, face_on)
@@ -122,8 +152,7 @@ def look(fine: Field, view: View, across: float, up: float) -> tuple[int, Vector
 
 @jit
 def gather(
-    fine: Field,
-    coarse: Field,
+    body: Body,
     view: View,
     lamp: Lamp,
     corner: tuple[float, float],
@@ -134,9 +163,9 @@ def gather(
     count, irradiance, highlight, blocked = 0, 0.0, 0.0, 0
     for k in range(samples.shape[0]):
         across, up = corner[0] + samples[k, 0], corner[1] - samples[k, 1]
-        seen, point, eye = look(fine, view, across, up)
+        seen, point, eye = look(body[0], view, across, up)
         if seen == label:
-            e, h, shadow = light_point(fine, coarse, point, eye, lamp)
+            e, h, shadow = light_point(body, point, eye, lamp)
             count += 1
             irradiance += e
             highlight += h
@@ -147,8 +176,7 @@ def gather(
 
 @jit
 def light_rows(
-    fine: Field,
-    coarse: Field,
+    body: Body,
     view: View,
     lamp: Lamp,
     smooth: bool,
@@ -163,15 +191,50 @@ def light_rows(
     for i in range(rows[0], rows[1]):
         for j in range(width):
             corner = (j - 0.5 * width, 0.5 * height - i)
-            label, point, _ = look(fine, view, corner[0] + 0.5, corner[1] - 0.5)
+            label, point, _ = look(body[0], view, corner[0] + 0.5, corner[1] - 0.5)
             if label == 0:
                 continue
             labels[i, j] = label
             depth[i, j] = view[1] - point[2]
             first = FIRST if smooth else FIRST[:1]
-            count, e, h, agree = gather(fine, coarse, view, lamp, corner, first, label)
+            count, e, h, agree = gather(body, view, lamp, corner, first, label)
             if smooth and not agree:
-                more, f, g, _ = gather(fine, coarse, view, lamp, corner, MORE, label)
+                more, f, g, _ = gather(body, view, lamp, corner, MORE, label)
                 count, e, h = count + more, e + f, h + g
             irradiance[i, j] = e / count
             specular[i, j] = h / count
+
+
+@jit
+def through_rows(
+    fine: Field,
+    solid: Solid,
+    view: View,
+    light: Vector,
+    rows: tuple[int, int],
+    thickness: FloatArray,
+    behind: FloatArray,
+) -> None:
+    """Fill a range of rows: mm that light runs inside to a pixel's centre, cosine where it enters.
+
+    Only to points that face away from the light: others it reaches through air, if at all. The
+    cosine is 0 where another part of the body shadows the place.
+    """
+    height, width = thickness.shape
+    cuts = np.empty(6)
+    for i in range(rows[0], rows[1]):
+        for j in range(width):
+            label, point, _ = look(fine, view, j - 0.5 * width + 0.5, 0.5 * height - i - 0.5)
+            if label == 0 or dot(surface_normal(fine, point), light) > 0.0:
+                continue
+            start, stop, again = first_run(solid, point, light, cuts)
+            if stop < 0.0 or start > GAP_MM:  # the smooth solid is not at this place
+                continue
+            thickness[i, j] = stop - start
+            if not again:
+                entry = (
+                    point[0] + stop * light[0],
+                    point[1] + stop * light[1],
+                    point[2] + stop * light[2],
+                )
+                behind[i, j] = max(dot(outward(solid, entry), light), 0.0)

@@ -1,8 +1,13 @@
 """What the guided fit looks at and what it leaves: Gamma, residual and pass, for several k.
 
-Supplement figure S.1 (Jimenez et al. 2015, "Separable Subsurface Scattering") draws Gamma for
-k = 1.55; here each k has its own, with the fit that follows from it. ``sssfit.chart`` draws the
-record.
+Supplement figure S.1 (Jimenez et al. 2015, "Separable Subsurface Scattering") draws Gamma_p, under
+which the pre-integrated pass is the optimum, and Gamma for k = 1.55; here each k has its own, with
+the fit that follows from it. ``sssfit.chart`` draws the record.
+
+Eq. S.8 asks for a Gamma_p and leaves open which of many. With Gamma_p(x, y) = 1 / (a_p(x) a_p(y))
+and a = a_p u the objective is that of the best rank one of R_d / sqrt(a_p a_p), whose rows, times
+sqrt(a_p), add up to sqrt(a_p): that is its first singular vector, and u = 1 the optimum of all, not
+only a point where the slope is 0.
 """
 
 import warnings
@@ -14,11 +19,11 @@ import numpy as np
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import FitResult, fit_guided
 from sssfit.fit._target import Target
-from sssfit.fit.guided import NEUTRAL, gamma, guided_target
+from sssfit.fit.guided import DRAWN_K, extents_of, gamma, guided_target
 from sssfit.profile import Profile
 from sssfit.shapes import FloatArray
 
-DRAWN = (0.0, NEUTRAL, 4.0)  # the paper's nearest, its drawn and its farthest
+DRAWN = (0.0, DRAWN_K, 4.0)  # the paper's nearest light, what it draws, its farthest light
 MOST = 4
 
 
@@ -42,8 +47,12 @@ class Guide:
         a / sum(a), middle first.
     preintegrated : array (h+1,) [1]
         The same of the profile integrated along lines.
+    preintegrated_gamma, preintegrated_residual : array (h+1, h+1) [1]
+        Gamma_p, over its largest, NaN in rows without light; what the pre-integrated pass leaves.
     relative_frobenius_error, weighted_residual : array (K,) [1]
         ||R_d - a a^T|| / ||R_d||; sum Gamma (R_d - a a^T)^2 over sum Gamma R_d^2.
+    preintegrated_errors : tuple of two floats [1]
+        The same of the pre-integrated pass, weighted by Gamma_p.
     """
 
     profile: Profile
@@ -54,8 +63,11 @@ class Guide:
     residual: FloatArray
     passes: FloatArray
     preintegrated: FloatArray
+    preintegrated_gamma: FloatArray
+    preintegrated_residual: FloatArray
     relative_frobenius_error: FloatArray
     weighted_residual: FloatArray
+    preintegrated_errors: tuple[float, float]
 
     @property
     def pixels(self) -> int:
@@ -72,6 +84,12 @@ class Guide:
         """Half the sum of |residual| over all pixels, for each k (K,)."""
         copies = np.where(np.arange(self.preintegrated.size) == 0, 1.0, 2.0)
         return 0.5 * np.asarray(np.abs(self.residual) @ copies @ copies)
+
+    @property
+    def preintegrated_misplaced(self) -> float:
+        """The same of the pre-integrated pass."""
+        copies = np.where(np.arange(self.preintegrated.size) == 0, 1.0, 2.0)
+        return 0.5 * float(np.abs(self.preintegrated_residual) @ copies @ copies)
 
 
 def compute_guide(
@@ -119,10 +137,15 @@ def compute_guide(
             fit_guided(profile, mm_per_pixel=target.mm_per_pixel, support_mm=support_mm, k=k)
             for k in ks
         ]
-    wanted = target.quadrant(c)
-    guides = np.stack([gamma(target.half_pixels, k) for k in ks])
-    halves = np.stack([_half(fit, c) for fit in fits])
+    wanted = target.quadrant(c) / target.total[c]
+    support_mm = target.mm_per_pixel * (target.half_pixels + 0.5)
+    extent = extents_of(target)[c] / support_mm
+    guides = np.stack([gamma(target.half_pixels, k, extent=extent) for k in ks])
+    halves = np.stack([_half(fit, c) for fit in fits]) / np.sqrt(target.total[c])
     line = target.half_line()[:, c]
+    line = line / (target.copies @ line)
+    guide_of_line = _gamma_p(wanted @ target.copies)
+    left_by_line = wanted - line[:, None] * line
     found = [fit.kernel.parameters[profile.channels[c]] for fit in fits]
     return Guide(
         profile,
@@ -130,12 +153,33 @@ def compute_guide(
         target.mm_per_pixel,
         tuple(float(k) for k in ks),
         guides / guides.max(axis=(1, 2), keepdims=True),
-        (wanted - halves[:, :, None] * halves[:, None, :]) / target.total[c],
+        wanted - halves[:, :, None] * halves[:, None, :],
         halves / (halves @ target.copies)[:, None],
-        line / (target.copies @ line),
+        line,
+        guide_of_line,
+        left_by_line,
         np.array([fit.relative_frobenius_error[c] for fit in fits]),
         np.array([each["weighted_residual"] for each in found]),
+        (
+            _share(left_by_line, wanted, np.ones_like(wanted)) ** 0.5,
+            _share(left_by_line, wanted, np.nan_to_num(guide_of_line)),
+        ),
     )
+
+
+def _gamma_p(line: FloatArray) -> FloatArray:
+    """Return 1 / (a_p a_p) of rows (h+1,) over its largest; NaN where a row has no light."""
+    lit = np.where(line > 0.0, line, np.nan)
+    least = float(np.nanmin(lit))
+    guide: FloatArray = (least / lit[:, None]) * (least / lit)
+    return guide
+
+
+def _share(left: FloatArray, wanted: FloatArray, weights: FloatArray) -> float:
+    """Return sum weights left^2 over sum weights wanted^2, over the plane."""
+    copies = np.where(np.arange(len(wanted)) == 0, 1.0, 2.0)
+    parts = [copies @ (weights * each**2) @ copies for each in (left, wanted)]
+    return float(parts[0] / parts[1])
 
 
 def _chosen(target: Target, channel: str | None) -> int:

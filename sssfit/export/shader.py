@@ -3,12 +3,16 @@
 Numbers are single precision, written with the fewest digits that read back to the same bits.
 """
 
+from pathlib import Path
+
 import numpy as np
 import numpy.typing as npt
 
 from sssfit.export._comment import description
+from sssfit.files import has_mark
 from sssfit.kernel import SeparableKernel
 
+MARK = "// sssfit.hlsl/1"  # by which a file is known to be ours, and may be replaced
 _WIDEST_VECTOR = 4  # float4; kernels of more channels become arrays of floats
 
 
@@ -21,7 +25,7 @@ def hlsl(kernel: SeparableKernel) -> str:
     is_vector = channels <= _WIDEST_VECTOR
     kind = f"float{channels}" if 1 < channels <= _WIDEST_VECTOR else "float"
     last = "" if is_vector else f"[{channels}]"
-    lines = [f"// {line}" for line in description(kernel)]
+    lines = [MARK, *(f"// {line}" for line in description(kernel))]
     lines += [
         f"static const uint SSS_TERMS = {terms};",
         f"static const uint SSS_PIXELS = {pixels};",
@@ -35,6 +39,11 @@ def hlsl(kernel: SeparableKernel) -> str:
     for weights in kernel.weights:
         lines += ["    {", *(f"        {_value(each, kind)}," for each in weights), "    },"]
     return "\n".join([*lines, "};", ""])
+
+
+def is_hlsl_file(path: Path) -> bool:
+    """Whether a file is shader source that `hlsl` wrote."""
+    return has_mark(path, {MARK.encode(): b""})
 
 
 def _value(values: npt.NDArray[np.float64], kind: str) -> str:

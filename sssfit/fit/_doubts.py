@@ -13,13 +13,12 @@ from sssfit.kernel import SeparableKernel
 _MOST_ENERGY_ERROR = 0.1
 
 
-def check_finite(what: str, kernel: SeparableKernel) -> None:
-    """Refuse a kernel whose errors are no numbers; its weights cannot be (`SeparableKernel`)."""
-    errors = np.concatenate((kernel.relative_frobenius_error, kernel.energy_error))
+def check_finite(what: str, method: str, *errors: FloatArray) -> None:
+    """Refuse a fit whose errors (C,) are not numbers."""
     if not np.isfinite(errors).all():
         raise FitError(
-            f"{what}: the errors of the {kernel.method} kernel are not finite; try a larger "
-            "support or another method."
+            f"{what}: the errors of the {method} kernel are not finite; try a larger support or "
+            "another method."
         )
 
 

@@ -109,6 +109,8 @@ def fit_channels(
         if (energy[~empty] <= 0.0).any():
             raise FitError(f"{name}: the {method} kernel has no energy that could be made 1.")
         scale = np.where(empty, 1.0, energy)
+    energy_error = np.where(empty, 0.0, energy / np.where(empty, 1.0, target.total) - 1.0)
+    check_finite(name, method, errors, energy_error)
     kernel = SeparableKernel(
         method=method,
         mm_per_pixel=target.mm_per_pixel,
@@ -116,12 +118,11 @@ def fit_channels(
         signs=signs,
         weights=np.concatenate((half[:, :0:-1], half), axis=1) / np.sqrt(scale),
         relative_frobenius_error=errors,
-        energy_error=np.where(empty, 0.0, energy / np.where(empty, 1.0, target.total) - 1.0),
+        energy_error=energy_error,
         scale=scale,
         parameters=_parameters(fits, target.profile.channels),
         meta=_provenance(target, settings, normalize=normalize),
     )
-    check_finite(name, kernel)
     if is_fitted:
         warn_of_misfit(name, kernel, keeps_energy=keeps_energy)
     return FitResult(
@@ -202,6 +203,7 @@ def _provenance(target: Target, settings: Mapping[str, Any], *, normalize: bool)
     return {
         "material": target.name,
         "material_sha256": meta.get("material_sha256"),
+        "profile_sha256": target.profile.sha256,
         "profile_method": meta.get("method", "unknown"),
         "photons": meta.get("photons"),
         "seed": meta.get("seed"),

@@ -4,8 +4,13 @@ a_m(x) = w G(x, v_near) + (1 - w) G(x, v_far) per channel (Jimenez et al. 2015, 
 Subsurface Scattering", supplement E). A shader multiplies each sample by
 exp(-d_z^2 / (2 max(v_near, v_far))) for the depth between it and the middle; that variance goes
 into the kernel's parameters.
+
+Least squares fit one channel at a time to its line integral or to its 2D kernel. What a picture
+shows depends on all channels at once, and this room renders none: a caller hands in what judges
+their numbers (`sssfit.compare.pictures`).
 """
 
+import functools
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -15,7 +20,7 @@ import numpy as np
 
 from sssfit.errors import FitError
 from sssfit.fit._by_hand import per_channel
-from sssfit.fit._nlopt import Minimum, minimise
+from sssfit.fit._nlopt import Minimum, minimise, minimise_by_simplex
 from sssfit.fit._passes import gaussian_pixels, kernel_misfit, line_misfit, of_unit_sum
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
 from sssfit.fit._target import FloatArray, Target, make_target
@@ -23,9 +28,18 @@ from sssfit.profile import Profile
 
 _WIDTHS = 10  # tried for each Gaussian, all pairs, before the best are refined
 _REFINED = 3
+# Starts of the search by pictures, for all channels alike: log(w / (1 - w)), and the logs of v_near
+# and v_far over the square of the radius within which half of the channel's energy lies.
+_SHARES = (-1.0, 0.0, 1.0)
+_NEAR = (-3.0, -1.5, 0.0)
+_FAR = (1.0, 2.0, 3.0)
+_STEP, _CHANGE, _VALUE_CHANGE = 0.5, 0.02, 1e-3  # of the same; and of a Delta E
+_MOST_EVALUATIONS = 1000
 
 PerChannel = float | Sequence[float]
 Misfit = Callable[[FloatArray], tuple[float, FloatArray]]
+# From the kernel's pixels to a function of (w, log v_near, log v_far) by channel (3, C).
+PictureTarget = Callable[[Target], Callable[[FloatArray], float]]
 
 
 def fit_artist(
@@ -34,12 +48,12 @@ def fit_artist(
     mm_per_pixel: float | None = None,
     support_mm: float | None = None,
     normalize: bool = False,
-    target: Literal["line", "kernel"] = "line",
+    target: Literal["line", "kernel"] | PictureTarget = "line",
     near_mm2: PerChannel | None = None,
     far_mm2: PerChannel | None = None,
     weight: PerChannel | None = None,
 ) -> FitResult:
-    """Fit two Gaussians per channel by least squares, or take those that are given.
+    """Fit two Gaussians per channel, or take those that are given.
 
     The pass has the profile's energy, whatever the support cuts off.
 
@@ -50,9 +64,12 @@ def fit_artist(
         Pixels; see ``sssfit.fit.make_target``.
     normalize : bool
         Unit energy for every channel, the energy kept apart.
-    target : str
+    target : str or callable
         What to be near to: "line", the profile integrated along lines, which is what a long
-        straight edge sees; or "kernel", all pixels of the 2D kernel.
+        straight edge sees; "kernel", all pixels of the 2D kernel; both by least squares. Or
+        pictures: a function such as ``sssfit.compare.pictures.picture_error`` that takes the
+        `Target` and returns one from (w, log v_near, log v_far) by channel (3, C) to a Delta E,
+        which Nelder and Mead's simplex minimises over the numbers of all channels at once.
     near_mm2, far_mm2 : float or one per channel, optional [mm^2]
         Variances per axis, set by hand; with ``weight`` or not at all.
     weight : float or one per channel, optional
@@ -69,19 +86,30 @@ def fit_artist(
     FitError, ProfileError
         The profile, the pixels or a setting is of no use.
     """
-    if target not in ("line", "kernel"):
-        raise FitError(f'target = "{target}"; expected "line" or "kernel".')
+    if not callable(target) and target not in ("line", "kernel"):
+        raise FitError(
+            f'target = "{target}"; expected "line", "kernel" or a function that judges pictures.'
+        )
     pixels = make_target(profile, mm_per_pixel, support_mm)
     by_hand = _by_hand(near_mm2, far_mm2, weight, profile.channels)
+
+    @functools.cache  # with the first channel, so that the seconds are those of the fit
+    def by_pictures() -> list[Minimum]:
+        assert callable(target)
+        return fit_to_pictures(pixels, target(pixels))
 
     def fit_channel(channel: int) -> ChannelFit:
         if by_hand is not None:
             x = by_hand[:, channel]
             return _channel_fit(pixels, channel, x, "set by hand", 0)
-        found = fit_two_gaussians(pixels.edges_mm(), _misfit_of(pixels, channel, target))
+        if callable(target):
+            found = by_pictures()[channel]
+        else:
+            found = fit_two_gaussians(pixels.edges_mm(), _misfit_of(pixels, channel, target))
         return _channel_fit(pixels, channel, found.x, found.stop_reason, found.evaluations)
 
-    settings = {"target": target, "by_hand": by_hand is not None}
+    named = "picture" if callable(target) else target
+    settings = {"target": named, "by_hand": by_hand is not None}
     return fit_channels(
         pixels,
         "artist",
@@ -120,8 +148,7 @@ def fit_two_gaussians(edges_mm: FloatArray, misfit: Misfit) -> Minimum:
         value, gradient = misfit(half)
         return value, slopes @ gradient
 
-    # A tenth of a pixel is a point, and twice the support is flat.
-    log_v = 2.0 * np.log(np.array((0.2 * edges_mm[1], 2.0 * edges_mm[-1])))
+    log_v = _log_variances(edges_mm)
     pairs = itertools.combinations(np.linspace(log_v[0], log_v[1], _WIDTHS + 2)[1:-1], 2)
     starts = [np.array((w, *pair)) for pair in pairs for w in (0.25, 0.5, 0.75)]
     starts.sort(key=lambda x: objective(x)[0])
@@ -131,6 +158,75 @@ def fit_two_gaussians(edges_mm: FloatArray, misfit: Misfit) -> Minimum:
     best = min(found, key=lambda each: each.value)
     evaluations = len(starts) + sum(each.evaluations for each in found)
     return Minimum(_near_first(best.x), best.value, evaluations, best.stop_reason)
+
+
+def fit_to_pictures(pixels: Target, objective: Callable[[FloatArray], float]) -> list[Minimum]:
+    """Minimise over (w, log v_near, log v_far) of all channels at once; one `Minimum` a channel.
+
+    Parameters
+    ----------
+    pixels : Target
+    objective : callable
+        From these numbers by channel (3, C) to how far off pictures are. Channels without light are
+        handed in as 1, 0, 0 and not fitted.
+    """
+    lit = np.flatnonzero(~pixels.is_empty)
+    log_v = _log_variances(pixels.edges_mm())
+
+    def by_channel(x: FloatArray) -> FloatArray:
+        values: FloatArray = np.zeros((3, pixels.is_empty.size))
+        values[0] = 1.0
+        values[:, lit] = x.reshape(3, lit.size)
+        values[0, lit] = 1.0 / (1.0 + np.exp(-values[0, lit]))
+        return values
+
+    def of_shape(shape: tuple[float, ...]) -> FloatArray:
+        sizes = 2.0 * np.log(_half_energy_radii(pixels)[lit])
+        return np.concatenate((np.full(lit.size, shape[0]), shape[1] + sizes, shape[2] + sizes))
+
+    starts = [of_shape(each) for each in itertools.product(_SHARES, _NEAR, _FAR)]
+    found = minimise_by_simplex(
+        lambda x: objective(by_channel(x)),
+        min(starts, key=lambda x: objective(by_channel(x))),
+        step=_STEP,
+        lower=np.repeat((-np.inf, log_v[0], log_v[0]), lit.size),
+        upper=np.repeat((np.inf, log_v[1], log_v[1]), lit.size),
+        change=_CHANGE,
+        value_change=_VALUE_CHANGE,
+        most_evaluations=_MOST_EVALUATIONS,
+    )
+    evaluations = len(starts) + found.evaluations
+    return [
+        Minimum(_near_first(x), found.value, evaluations, found.stop_reason)
+        for x in by_channel(found.x).T
+    ]
+
+
+def artist_pass(pixels: Target, channel: int, x: FloatArray) -> FloatArray:
+    """Return the half line (h+1,) of (w, log v_near, log v_far), of the channel's energy."""
+    half, _ = of_unit_sum(*two_gaussians(pixels.edges_mm(), x))
+    return math.sqrt(float(pixels.total[channel])) * half
+
+
+def _log_variances(edges_mm: FloatArray) -> FloatArray:
+    """Return the least and the largest log of a variance: a tenth of a pixel, twice the support.
+
+    The one is a point in its pixel, the other flat over all of them.
+    """
+    limits: FloatArray = 2.0 * np.log(np.array((0.2 * edges_mm[1], 2.0 * edges_mm[-1])))
+    return limits
+
+
+def _half_energy_radii(pixels: Target) -> FloatArray:
+    """Return the radius within which half of the energy on the grid lies (C,) [mm]."""
+    profile = pixels.profile
+    within = profile.cumulative
+    return np.array(
+        [
+            np.interp(0.5 * each[-1], each, profile.r_edges_mm) if each[-1] > 0.0 else 0.0
+            for each in within.T
+        ]
+    )
 
 
 def _misfit_of(pixels: Target, channel: int, target: str) -> Misfit:
@@ -152,12 +248,11 @@ def _channel_fit(
     pixels: Target, channel: int, x: FloatArray, stop_reason: str, evaluations: int
 ) -> ChannelFit:
     """Return the pass with the profile's energy, and its parameters."""
-    half, _ = of_unit_sum(*two_gaussians(pixels.edges_mm(), x))
-    scale = math.sqrt(float(pixels.total[channel]))
+    half = artist_pass(pixels, channel, x)
     near, far = (float(each) for each in np.exp(x[1:]))
     parameters = {"near_mm2": near, "far_mm2": far, "weight": float(x[0])}
     parameters["depth_variance_mm2"] = max(near, far)
-    return ChannelFit(np.ones(1), scale * half[None], stop_reason, evaluations, parameters)
+    return ChannelFit(np.ones(1), half[None], stop_reason, evaluations, parameters)
 
 
 def _by_hand(

@@ -14,6 +14,7 @@ t and falloff f, and p the red channel of d'Eon's six-Gaussian skin (Jimenez, Ja
 - delta is the middle pixel: the strength belongs to the pitch. In small pixels it is 1.
 """
 
+import functools
 import itertools
 import math
 from collections.abc import Sequence
@@ -30,7 +31,7 @@ from sssfit.fit._target import FloatArray, make_target
 from sssfit.profile import Profile
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS
 
-STRETCH = 127.8
+STRETCH = 127.7
 
 _SIGMAS_MM = np.sqrt(SKIN_VARIANCES_MM2)
 _RED = np.array([row[0] for row in SKIN_WEIGHTS])
@@ -85,11 +86,20 @@ def fit_falloff(
     target = make_target(profile, mm_per_pixel, support_mm)
     given = _by_hand(width, strength, falloff, profile.channels)
     edges, total = target.edges_mm(), target.total
-    sampled = {int(c): target.quadrant(int(c)) / total[c] for c in np.flatnonzero(~target.is_empty)}
-    found = {} if given is not None else {c: fit_scale(q, edges) for c, q in sampled.items()}
-    values = _named(found, profile.n_channels) if given is None else given
+    lit = [int(c) for c in np.flatnonzero(~target.is_empty)]
+
+    def quadrant_of(channel: int) -> FloatArray:
+        return target.quadrant(channel) / float(total[channel])
+
+    @functools.cache  # with the first channel, so that the seconds are those of the fit
+    def all_channels() -> tuple[dict[int, Minimum], FloatArray]:
+        if given is not None:
+            return {}, given
+        found = {c: fit_scale(quadrant_of(c), edges) for c in lit}
+        return found, _named(found, profile.n_channels)
 
     def fit_channel(channel: int) -> ChannelFit:
+        found, values = all_channels()
         w, t, f = (float(each) for each in values[:, channel])
         half, _ = stretched_skin(np.array((t, math.log(scale_of(w, f)))), edges)
         minimum = found.get(channel)
@@ -102,7 +112,7 @@ def fit_falloff(
                 "width": w,
                 "strength": t,
                 "falloff": f,
-                "misfit": sampled_misfit(half, sampled[channel])[0],
+                "misfit": sampled_misfit(half, quadrant_of(channel))[0],
             },
         )
 

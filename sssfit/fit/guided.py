@@ -1,10 +1,11 @@
 """The guided kernel: one pass, fitted where a guide function says that it matters.
 
 Minimise over a the sum of Gamma (R_d - a a^T)^2 subject to (sum a)^2 = ||R_d||_1, with
-Gamma(x, y; k) = (x^2 + y^2)^(k/2) (1 - exp(-b x^2)) (1 - exp(-b y^2)), x and y from -1 to 1 over
-the support (Jimenez et al. 2015, "Separable Subsurface Scattering", supplement eqs. S.7 to S.9):
-k = 0 favours light near the beam, k = 4 far light. Sequential quadratic programming, coarse to
-fine.
+Gamma(x, y; k) = (x^2 + y^2)^(k/2) (1 - exp(-b x^2)) (1 - exp(-b y^2)) (Jimenez et al. 2015,
+"Separable Subsurface Scattering", supplement eqs. S.7 to S.9): k = 0 favours light near the beam,
+k = 4 far light. x and y are 1 at the channel's own extent, in proportion to its mean free path, so
+that k and b say the same for a narrow channel as for a wide one; docs/fits.md has what else was
+tried. Sequential quadratic programming, coarse to fine.
 
 Gamma vanishes along the axes, so that the middle pixel a(0) is all but free: it takes up whatever
 energy the rest does not want and becomes a spike, which is reported and can be bounded.
@@ -16,13 +17,16 @@ from typing import Any
 
 import numpy as np
 
+from sssfit._profile_radii import mean_free_paths_mm
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._nlopt import Function, Minimum, minimise
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
 from sssfit.fit._target import FloatArray, Target, make_target
 from sssfit.profile import Profile
 
-NEUTRAL = 1.55  # the k that the paper draws, nearest to the pre-integrated kernel
+# The k that the paper draws Gamma for (figure S.1b). The pass nearest to the pre-integrated one is
+# not this one for every channel: k = 0 for skin1's red, see docs/fits.md.
+DRAWN_K = 1.55
 MOST_PIXELS = 513
 _COARSEST = 8  # pixels on either side at the first level: each level has twice those of the last
 _SPIKE = (
@@ -37,7 +41,7 @@ def fit_guided(
     mm_per_pixel: float | None = None,
     support_mm: float | None = None,
     normalize: bool = False,
-    k: float = NEUTRAL,
+    k: float = DRAWN_K,
     b: float = 50.0,
     centre_bound: float | None = None,
 ) -> FitResult:
@@ -54,15 +58,16 @@ def fit_guided(
     k : float
         0 (near scattering) to 4 (far scattering).
     b : float
-        How close to the axes Gamma vanishes: within some 1/sqrt(b) of the support.
+        How close to the axes Gamma vanishes: within some 1/sqrt(b) of the channel's extent.
     centre_bound : float, optional
         Largest share of sum(a) that the middle pixel may hold, above 0 and up to 1.
 
     Returns
     -------
     FitResult
-        One term. By channel the parameters hold ``centre_share`` = a(0) / sum(a), that of the
-        pre-integrated pass, the share of sum Gamma R_d^2 that is left, and how each level ended.
+        One term. By channel the parameters hold ``extent_mm``, where x = 1 in Gamma,
+        ``centre_share`` = a(0) / sum(a), that of the pre-integrated pass, the share of
+        sum Gamma R_d^2 that is left, and how each level ended.
 
     Raises
     ------
@@ -78,10 +83,11 @@ def fit_guided(
 
     _check_settings(k, b, centre_bound)
     target = guided_target(profile, mm_per_pixel, support_mm)
+    extents_mm = extents_of(target)
     most = 1.0 if centre_bound is None else centre_bound
 
     def fit_channel(channel: int) -> ChannelFit:
-        return _fit_channel(target, channel, k, b, most)
+        return fit_one_pass(target, channel, extents_mm[channel], k, b, most)
 
     # Matrices of at most 257 x 257: a second thread only waits for the first.
     with threadpool_limits(1, user_api="blas"):
@@ -96,15 +102,31 @@ def fit_guided(
     return result
 
 
-def gamma(half_pixels: int, k: float, b: float = 50.0) -> FloatArray:
+def extents_of(target: Target) -> FloatArray:
+    """Return where x = 1 in each channel's Gamma (C,) [mm]: the support, by mean free path.
+
+    The support reaches to the outer edges of its pixels, and belongs to the lit channel of the
+    longest mean free path. Of a profile that names no mean free paths (a table, a stack of layers)
+    all channels have the support, as in the supplement.
+    """
+    support_mm = target.mm_per_pixel * (target.half_pixels + 0.5)
+    paths_mm = mean_free_paths_mm(target.profile)
+    if paths_mm is None:
+        return np.full(target.profile.n_channels, support_mm)
+    return np.asarray(support_mm * paths_mm / paths_mm[~target.is_empty].max())
+
+
+def gamma(half_pixels: int, k: float, b: float = 50.0, extent: float = 1.0) -> FloatArray:
     """Mean of Gamma over every pixel of a quadrant (h+1, h+1), both axes included: eq. S.9.
 
-    The support reaches from -1 to 1, so that pixel i covers (i - 1/2, i + 1/2) / (h + 1/2).
+    ``extent`` is where x = 1, as a share of the support's h + 1/2 pixels: pixel i covers
+    (i - 1/2, i + 1/2) / ((h + 1/2) extent).
     """
-    order = max(4, math.ceil(_ACROSS / (half_pixels + 1)))
+    unit = (half_pixels + 0.5) * extent  # pixels
+    order = max(4, math.ceil(_ACROSS / max(unit, 1.0)))
     nodes, weights = np.polynomial.legendre.leggauss(order)
     pixels = np.arange(half_pixels + 1)[:, None]
-    square = (((pixels + 0.5 * nodes) / (half_pixels + 0.5)) ** 2).ravel()
+    square = (((pixels + 0.5 * nodes) / unit) ** 2).ravel()
     rising = -np.expm1(-b * square)
     values = (square[:, None] + square) ** (0.5 * k) * rising[:, None] * rising
     blocks = values.reshape(half_pixels + 1, order, half_pixels + 1, order)
@@ -178,9 +200,15 @@ def _sum_is(wanted: float, weights: FloatArray) -> Function:
     return equality
 
 
-def _fit_channel(target: Target, channel: int, k: float, b: float, most: float) -> ChannelFit:
-    """Fit level by level; energies as shares of the channel's, so that sum(a) = 1."""
+def fit_one_pass(
+    target: Target, channel: int, extent_mm: float, k: float, b: float, most: float
+) -> ChannelFit:
+    """Fit a channel level by level; energies as shares of its own, so that sum(a) = 1.
+
+    ``extent_mm`` is where x = 1 in Gamma, ``most`` the largest share of the middle pixel.
+    """
     total = float(target.total[channel])
+    extent = float(extent_mm / (target.mm_per_pixel * (target.half_pixels + 0.5)))
     levels: list[dict[str, Any]] = []
     found: Minimum | None = None
     for half in _levels(target.half_pixels):
@@ -190,7 +218,7 @@ def _fit_channel(target: Target, channel: int, k: float, b: float, most: float) 
         start = line if found is None else _refined(found.x, half)
         found = rank_one(
             level.quadrant(channel) / total,
-            gamma(half, k, b),
+            gamma(half, k, b, extent),
             _on_the_sum(start, most),
             centre_bound=most if half else 1.0,
         )
@@ -208,6 +236,7 @@ def _fit_channel(target: Target, channel: int, k: float, b: float, most: float) 
         found.stop_reason,
         evaluations=sum(level["evaluations"] for level in levels),
         parameters={
+            "extent_mm": float(extent_mm),
             "centre_share": float(found.x[0]),
             "preintegrated_centre_share": float(line[0] / (level.copies @ line)),
             "weighted_residual": found.value,

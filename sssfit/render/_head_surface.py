@@ -1,19 +1,20 @@
 """The head as a height field: the forms, the fine relief, and the grids they are sampled on."""
 
 import math
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from sssfit.render._field import HeightField
+from sssfit.render._field import HeightField, Solid
 from sssfit.render._head_detail import detail
 from sssfit.render._head_face import face
-from sssfit.render._head_shape import FLOOR_MM, FloatArray
+from sssfit.render._head_shape import FLOOR_MM, FloatArray, back
 
 # Half width of the bust, its lower end and the crown: nothing outside is modelled [mm].
 BUST_WIDTH_MM, BUST_LOW_MM, BUST_HIGH_MM = 230.0, -260.0, 136.0
 # Of the grid that casts shadows from outside the picture.
 COARSE_MM = 0.8
+# Of the body that light runs through: an ear is 3 mm thick and its rim 3 mm wide.
+SOLID_MM = 0.5
 # Nodes of the picture's own grid at most: 8e6 take about 0.3 GB with their tables.
 MAX_NODES = 8e6
 STRIP = 32
@@ -41,7 +42,13 @@ def head_field(
         # A little below the floor, so that no ray comes to rest on it.
         heights[part], eyes[part] = np.maximum(z, FLOOR_MM - 10.0), inside
 
-    with ThreadPoolExecutor(threads) as pool:
+    # Before the threads, which need them all.
+    import scipy.interpolate
+    import scipy.ndimage  # noqa: F401
+
+    from sssfit._jit import skin_noise, thread_pool  # noqa: F401
+
+    with thread_pool(threads) as pool:
         list(pool.map(strip, range(0, y.size, STRIP)))
     return HeightField(heights, float(x[0]), float(y[0]), spacing_mm, eyes)
 
@@ -51,6 +58,25 @@ def bust(spacing_mm: float, detail_mm: float, threads: int) -> HeightField:
     x = nodes(-BUST_WIDTH_MM, BUST_WIDTH_MM, spacing_mm)
     y = nodes(BUST_LOW_MM, BUST_HIGH_MM, spacing_mm)
     return head_field(x, y, spacing_mm, detail_mm, threads)
+
+
+def body(threads: int) -> Solid:
+    """Return all that is modelled with its back, smooth: what light runs through."""
+    front = bust(SOLID_MM, 0.0, threads)
+    rows, columns = front.heights.shape
+    x = front.x0_mm + SOLID_MM * np.arange(columns, dtype=np.float64)
+    y = front.y0_mm + SOLID_MM * np.arange(rows, dtype=np.float64)
+    behind = np.empty_like(front.heights)
+
+    def strip(first: int) -> None:
+        part = slice(first, first + STRIP)
+        behind[part] = back(x[None, :], y[part, None])
+
+    from sssfit._jit import thread_pool
+
+    with thread_pool(threads) as pool:
+        list(pool.map(strip, range(0, rows, STRIP)))
+    return Solid(front.heights, behind, front.x0_mm, front.y0_mm, SOLID_MM)
 
 
 def seen_part(

@@ -144,7 +144,8 @@ class Scene:
             raise RenderError(
                 f"{self.name}: mask holds other values than whole numbers up to {_MOST_OBJECTS}."
             )
-        kept = values.astype(dtype)
+        # Row after row, in any case: sums over pixels in another order round otherwise.
+        kept = values.astype(dtype, order="C")
         kept.setflags(write=False)
         object.__setattr__(self, field, kept)
 

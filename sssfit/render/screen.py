@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit._jit import screen as compiled
+from sssfit._jit import thread_pool
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
 from sssfit.render._checks import thread_count
@@ -132,7 +133,7 @@ def _blurred(
     """Return the sum of the kernel's terms (N, C), each a horizontal and a vertical pass."""
     picture = np.ascontiguousarray(lit.reshape(-1, lit.shape[2]))
     total = np.zeros_like(picture)
-    with ThreadPoolExecutor(threads) as pool:
+    with thread_pool(threads) as pool:
         for signs, weights in zip(kernel.signs, kernel.weights, strict=True):
             across = _pass(pool, picture, weights, view, vertical=False)
             total += signs * _pass(pool, across, weights, view, vertical=True)

@@ -111,6 +111,7 @@ def apply_passes(
     array (H, W, C)
         In the pixels' precision.
     """
+    from sssfit._jit import thread_pool
     from sssfit._jit.passes import pass_across, pass_down  # numba: 0.4 s
 
     height, width = pixels.shape[:2]
@@ -124,7 +125,7 @@ def apply_passes(
     planes = np.empty((channels, height + 1, width), pixels.dtype)
     planes[:, height] = 0.0  # what lies outside a black border
     out = np.zeros((height, width, channels), pixels.dtype)
-    with ThreadPoolExecutor(thread_count(threads), thread_name_prefix="sssfit-passes") as pool:
+    with thread_pool(thread_count(threads), "sssfit-passes") as pool:
         for t in range(len(weights)):
             _share(pool, height, pass_across, pixels, columns, across[t], reach[t], planes)
             _share(pool, height, pass_down, planes, rows, down[t], reach[t], out)

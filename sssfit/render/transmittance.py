@@ -1,14 +1,25 @@
-"""Light through thin slabs (ears, nostrils), from the Gaussians that a kernel was fitted with.
+"""Light through thin slabs (ears, nostrils), from the kernel that blurs it.
 
-T(s) = sum_i w_i exp(-s^2 / (2 v_i)) is the share that arrives of what enters on the far side, s
-the distance it travels inside (Jimenez, Whelan, Sundstedt, Gutierrez 2010, "Real-time realistic
-skin translucency"; Jimenez, Jarabo, Gutierrez 2012, "Separable subsurface scattering", section 4).
-Each Gaussian is its own over the plane, with the part of its exponent that belongs to the depth.
+T(s) is the share that arrives of what enters on the far side, s the distance it travels inside. For
+a sum of Gaussians
+
+    T(s) = sum_i w_i exp(-s^2 / (2 v_i)),
+
+each Gaussian as it is over the plane, v_i its variance per axis, with the part of its exponent
+that belongs to the depth (Jimenez, Jarabo, Gutierrez 2012, "Separable subsurface scattering",
+section 4). That exponent is ours: the listing of Jimenez, Whelan, Sundstedt, Gutierrez 2010,
+"Real-time realistic skin translucency", has exp(-s^2 / v_i) over the same variances, and its light
+reaches 1 / sqrt 2 as far (``PUBLISHED``).
+
+The sum is also the share of the reflected light that leaves more than s from where it enters:
+exp(-s^2 / (2 v)) is what one Gaussian has beyond the radius s. So every kernel has a T, made of
+Gaussians or not: `beyond`.
 
 The weights are shares: they add up to 1 and T(0) = 1. The blur that follows has the energy of the
 diffuse reflectance; with energies as weights that would be counted twice.
 """
 
+import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
@@ -21,9 +32,16 @@ from sssfit.render.scene import Scene
 
 FloatArray = npt.NDArray[np.float64]
 
+# c of exp(-s^2 / (c v)): what a Gaussian of variance v has beyond s, and the 2010 listing's.
+OURS, PUBLISHED = 2.0, 1.0
+
 
 def transmittance(
-    thickness_mm: npt.ArrayLike, variances_mm2: npt.ArrayLike, weights: npt.ArrayLike
+    thickness_mm: npt.ArrayLike,
+    variances_mm2: npt.ArrayLike,
+    weights: npt.ArrayLike,
+    *,
+    widths: float = OURS,
 ) -> FloatArray:
     """Return T(s) = sum_i w_i exp(-s^2 / (2 v_i)) for each thickness and channel.
 
@@ -35,6 +53,8 @@ def transmittance(
         Of G Gaussians, per axis, above 0.
     weights : array (G, C)
         Shares of the light; `gaussians_of` has them with sum 1.
+    widths : float
+        c of exp(-s^2 / (c v_i)), above 0: ``OURS``, 2, or for comparison ``PUBLISHED``, 1.
 
     Returns
     -------
@@ -45,7 +65,7 @@ def transmittance(
     RenderError
         Shapes that do not fit, a variance that is not above 0, a thickness below 0 or NaN.
     """
-    s = np.asarray(thickness_mm, dtype=np.float64)
+    s = _thickness(thickness_mm)
     variances = np.asarray(variances_mm2, dtype=np.float64)
     shares = np.asarray(weights, dtype=np.float64)
     if variances.ndim != 2 or variances.shape != shares.shape:
@@ -55,12 +75,69 @@ def transmittance(
         )
     if not ((variances > 0.0) & np.isfinite(variances) & np.isfinite(shares)).all():
         raise RenderError("variances have to be above 0 and weights numbers, and some are not.")
-    if not (s >= 0.0).all():
-        raise RenderError("thickness_mm has values that are negative or NaN; expected 0 and up.")
+    if not (np.isfinite(widths) and widths > 0.0):
+        raise RenderError(f"widths = {widths:g}; expected a number above 0, such as 2.")
     total = np.zeros((*s.shape, shares.shape[1]))
     for variance, share in zip(variances, shares, strict=True):
-        total += share * np.exp(-np.square(s)[..., None] / (2.0 * variance))
+        total += share * np.exp(-np.square(s)[..., None] / (widths * variance))
     return total
+
+
+def _thickness(thickness_mm: npt.ArrayLike) -> FloatArray:
+    """Return thicknesses as float64, or refuse them."""
+    s = np.asarray(thickness_mm, dtype=np.float64)
+    if not (s >= 0.0).all():
+        raise RenderError("thickness_mm has values that are negative or NaN; expected 0 and up.")
+    return s
+
+
+def beyond(kernel: SeparableKernel, thickness_mm: npt.ArrayLike) -> FloatArray:
+    """Return the share of a round kernel's light beyond the radius s, from its line integral.
+
+    With a(x) the integral of R_d over y, Abel's integral of it over the plane outside s is
+
+        T(s) = 2 int_s^inf a(x) x / sqrt(x^2 - s^2) dx / int a dx,
+
+    in closed form for a line of pixels, a(x) constant in each. Exact for a pre-integrated pass; a
+    kernel that is not round has the T of the round one with its line. 0 where negative terms would
+    make it less.
+
+    Parameters
+    ----------
+    kernel : SeparableKernel
+    thickness_mm : array (...) [mm]
+        From 0 up, infinite where nothing comes through.
+
+    Returns
+    -------
+    array (..., C)
+        Channels without light are 0.
+
+    Raises
+    ------
+    RenderError
+        A thickness below 0 or NaN.
+    """
+    s = _thickness(thickness_mm)[..., None]
+    line = kernel.line[kernel.half_pixels :]
+    edges_mm = kernel.mm_per_pixel * (np.arange(len(line)) + 0.5)
+    # By parts: a falls by a step at each outer edge of a pixel, and sqrt(x^2 - s^2) is the rest.
+    steps = line - np.concatenate((line[1:], np.zeros((1, line.shape[1]))))
+    total = np.zeros((*s.shape[:-1], line.shape[1]))
+    for edge_mm, step in zip(edges_mm, steps, strict=True):
+        within = np.minimum(s, edge_mm)
+        total += step * np.sqrt((edge_mm - within) * (edge_mm + within))
+    energy = kernel.mm_per_pixel * kernel.line.sum(axis=0)
+    share = np.divide(2.0 * total, energy, out=np.zeros_like(total), where=energy > 0.0)
+    lit: FloatArray = np.maximum(share, 0.0)
+    return lit
+
+
+def through(kernel: SeparableKernel, thickness_mm: npt.ArrayLike) -> FloatArray:
+    """Return T(s) of a kernel (..., C): by its Gaussians where it has them, else by `beyond`."""
+    if any(_gaussians(kernel.parameters.get(name))[0] for name in kernel.channels):
+        return transmittance(thickness_mm, *gaussians_of(kernel))
+    return beyond(kernel, thickness_mm)
 
 
 def gaussians_of(kernel: SeparableKernel) -> tuple[FloatArray, FloatArray]:
@@ -114,7 +191,7 @@ def transmitted(scene: Scene, kernel: SeparableKernel) -> FloatArray | None:
     Raises
     ------
     RenderError
-        One of the two buffers is missing, or the kernel has no Gaussians.
+        One of the two buffers is missing, or a channel's Gaussians have no positive sum.
     """
     if scene.thickness_mm is None and scene.back_irradiance is None:
         return None
@@ -124,4 +201,27 @@ def transmitted(scene: Scene, kernel: SeparableKernel) -> FloatArray | None:
             f"{scene.name}: light through the object needs thickness_mm and back_irradiance, and "
             f"{missing} is missing; give both or neither."
         )
-    return scene.back_irradiance * transmittance(scene.thickness_mm, *gaussians_of(kernel))
+    arrives = np.zeros((scene.height, scene.width, len(kernel.channels)))
+    lit = (scene.back_irradiance > 0.0).any(axis=2)  # of most pixels nothing is lit behind
+    arrives[lit] = scene.back_irradiance[lit] * through(kernel, scene.thickness_mm[lit])
+    return arrives
+
+
+def with_transmitted(scene: Scene, kernel: SeparableKernel) -> Scene:
+    """Return the scene with what arrives through the object in its irradiance, (H, W, C).
+
+    For renderers that look at the irradiance alone; thickness and back irradiance are used up.
+
+    Raises
+    ------
+    RenderError
+        The scene has neither of the two buffers, or as `transmitted`.
+    """
+    arrives = transmitted(scene, kernel)
+    if arrives is None:
+        raise RenderError(
+            f"{scene.name} has no thickness and no light behind it; transmitted light needs both."
+        )
+    return dataclasses.replace(
+        scene, irradiance=scene.irradiance + arrives, thickness_mm=None, back_irradiance=None
+    )

@@ -1,6 +1,6 @@
 """Material to profile: one method, one file, one signature ``simulate_x(material, ...)``."""
 
-from sssfit.simulate._checkpoint import EVERY_SECONDS, Checkpoint
+from sssfit.simulate._checkpoint import EVERY_SECONDS, Checkpoint, is_checkpoint_file
 from sssfit.simulate._deterministic import Named
 from sssfit.simulate._finished import is_complete, is_finished
 from sssfit.simulate._run import Progress
@@ -22,6 +22,7 @@ __all__ = [
     "Checkpoint",
     "Named",
     "Progress",
+    "is_checkpoint_file",
     "is_compiled",
     "is_complete",
     "is_finished",

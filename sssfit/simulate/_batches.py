@@ -14,6 +14,7 @@ FloatArray = npt.NDArray[np.float64]
 # 16384 photons of skin1 take 4 ms, of an absorption-free medium of eta 1.3 half a second: short
 # enough for Ctrl-C, long enough that dealing out a batch (some 0.1 ms) does not show.
 BATCH_PHOTONS = 16_384
+MAX_PHOTONS = 10**12
 
 
 @dataclass(slots=True)

@@ -14,7 +14,8 @@ import io
 import json
 import math
 import warnings
-from collections.abc import Mapping, Sequence
+import zipfile
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
@@ -24,13 +25,13 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit._jit import source_key
-from sssfit._material_checks import shown
-from sssfit._profile_io import is_marked
+from sssfit._material_checks import printable, shown
+from sssfit._profile_io import is_marked, read_npy
 from sssfit.errors import FileError, SimulationError, SssfitWarning
-from sssfit.files import reason, remove_leftovers, write_atomically
+from sssfit.files import has_mark, reason, remove_leftovers, write_atomically
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
-from sssfit.simulate._batches import BATCH_PHOTONS, Tally
+from sssfit.simulate._batches import BATCH_PHOTONS, MAX_PHOTONS, Tally
 
 FORMAT = "sssfit.checkpoint/1"
 # By either a file is ours, however damaged; both stand uncompressed.
@@ -38,6 +39,8 @@ _MARKS = (b"ledger_absorbed.npy", "sssfit.checkpoint/".encode("utf-32-le"))
 # At most so much is lost; skin1's takes 1 ms to write, the largest (64 channels of 100 000
 # annuli, 100 MB) a quarter of a second.
 EVERY_SECONDS = 30.0
+_MOST_META_BYTES = 16_000_000  # numpy's text has 4 bytes a character
+_HEADER_BYTES = 10_000  # numpy's own limit
 
 
 @dataclass(slots=True)
@@ -159,6 +162,11 @@ class Checkpoint:
         self._saved_at = perf_counter()
 
 
+def is_checkpoint_file(path: Path) -> bool:
+    """Tell whether a file is a checkpoint of any version, or what damage has left of one."""
+    return has_mark(path, {b"PK": _MARKS[1]})
+
+
 def settings_of(
     materials: Sequence[Material], grids: Sequence[RadialGrid], seed: int
 ) -> dict[str, str]:
@@ -192,26 +200,40 @@ def _write(path: Path, state: State, settings: Mapping[str, str]) -> None:
 
 def _load(path: Path, empty: Tally, settings: Mapping[str, str]) -> State:
     """Fill ``empty`` with what the file holds, if it was made with the same settings."""
-    meta, arrays = _read(path)
-    if meta.get("format") != FORMAT:
-        raise FileError(
-            f"{path} has format {shown(meta.get('format'))}, not {FORMAT!r}; {_REMEDY}."
-        )
-    _check_settings(path, meta.get("settings"), settings)
+    mine = {f"ledger_{name}": each for name, each in empty.ledger._asdict().items()}
+    with _opened(path) as archive:
+        meta = dict(json.loads(str(read_npy(archive, "meta", "U", _MOST_META_BYTES))))
+        if meta.get("format") != FORMAT:
+            raise FileError(
+                f"{path} has format {shown(meta.get('format'))}, not {FORMAT!r}; {_REMEDY}."
+            )
+        _check_settings(path, meta.get("settings"), settings)
+        if {*archive.namelist()} != {f"{name}.npy" for name in [*mine, "meta"]}:
+            raise _damaged(path)
+        arrays = {
+            name: read_npy(archive, name, "f", each.nbytes + _HEADER_BYTES)
+            for name, each in mine.items()
+        }
     try:
-        return _filled(empty, meta, arrays)
-    except (KeyError, TypeError, ValueError):
-        raise _damaged(path) from None
+        state = _checked_state(empty, meta)
+        for name, each in mine.items():
+            _check_sums(name, arrays[name], each, state.tally.photons)
+            each[...] = arrays[name]
+    except ValueError as fault:
+        raise FileError(f"{path} is damaged or was edited: {fault}; {_REMEDY}.") from None
+    return state
 
 
-def _read(path: Path) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
+@contextlib.contextmanager
+def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
+    """Open the archive, and say in one line what goes wrong with it."""
     try:
-        with path.open("rb") as stream, np.load(stream, allow_pickle=False) as members:
-            arrays = dict(members.items())
-        meta = json.loads(str(arrays.pop("meta")))
-        return dict(meta), arrays
+        with zipfile.ZipFile(path) as archive:
+            yield archive
     except OSError as error:
         raise FileError(f"{path} cannot be read: {reason(error)}.") from error
+    except (FileError, SimulationError):
+        raise
     except Exception as error:
         # zipfile, zlib, numpy's header parser and json raise a dozen unrelated types on damage.
         with contextlib.suppress(OSError), path.open("rb") as stream:
@@ -220,25 +242,44 @@ def _read(path: Path) -> tuple[dict[str, Any], dict[str, npt.NDArray[Any]]]:
         raise _damaged(path) from error
 
 
-def _filled(empty: Tally, meta: Mapping[str, Any], arrays: Mapping[str, Any]) -> State:
-    """Copy what was read into the sums; raise what a wrong type, shape or name raises."""
-    ledger = {f"ledger_{name}": each for name, each in empty.ledger._asdict().items()}
-    if set(arrays) != set(ledger) or meta["photons"] % BATCH_PHOTONS or meta["photons"] <= 0:
-        raise ValueError
-    for name, mine in ledger.items():
-        if arrays[name].shape != mine.shape or arrays[name].dtype != mine.dtype:
-            raise ValueError
-        mine[...] = arrays[name]
-    empty.photons, empty.flights = int(meta["photons"]), int(meta["flights"])
-    return State(empty, float(meta["least_error"]), float(meta["seconds"]))
+def _checked_state(empty: Tally, meta: Mapping[str, Any]) -> State:
+    """Put the counts and figures of a checkpoint into a state; a ValueError says what is wrong."""
+    photons, flights = meta.get("photons"), meta.get("flights")
+    if type(photons) is not int or photons % BATCH_PHOTONS or not 0 < photons <= MAX_PHOTONS:
+        raise ValueError(f"photons = {shown(photons)}, expected whole batches of {BATCH_PHOTONS}")
+    if type(flights) is not int or not 0 <= flights < 2**63:
+        raise ValueError(f"flights = {shown(flights)}, expected a whole number from 0 up")
+    least_error, seconds = meta.get("least_error"), meta.get("seconds")
+    if type(least_error) is not float or not least_error >= 0.0:
+        raise ValueError(f"least_error = {shown(least_error)}, expected a number from 0 up")
+    if type(seconds) is not float or not 0.0 <= seconds < math.inf:
+        raise ValueError(f"seconds = {shown(seconds)}, expected a finite number from 0 up")
+    empty.photons, empty.flights = photons, flights
+    return State(empty, least_error, seconds)
+
+
+def _check_sums(name: str, sums: npt.NDArray[Any], mine: npt.NDArray[Any], photons: int) -> None:
+    """Refuse sums that no walk can have: a photon weighs 1, and roulette adds 1e-3 of it at most.
+
+    Only what roulette added may be below 0.
+    """
+    if sums.shape != mine.shape:
+        raise ValueError(f"{name} has shape {sums.shape}, expected {mine.shape}")
+    most = 2.0 * photons
+    least = -most if name == "ledger_roulette" else 0.0
+    if (bad := ~((sums >= least) & (sums <= most))).any():
+        at = np.argwhere(bad)[0].tolist()
+        raise ValueError(
+            f"{name} holds {sums[bad].flat[0]} at {at}, expected {least:g} to {most:g}"
+        )
 
 
 def _check_settings(path: Path, there: Any, here: Mapping[str, str]) -> None:
     """Name every setting in which a checkpoint differs from the run that is to go on from it."""
-    if not isinstance(there, dict):
+    if not (isinstance(there, dict) and all(isinstance(each, str) for each in there.values())):
         raise _damaged(path)
     differing = [
-        f"{name} = {there.get(name)} (now {here.get(name)})"
+        f"{_short(name)} = {_short(there.get(name))} (now {_short(here.get(name))})"
         for name in {**here, **there}
         if there.get(name) != here.get(name)
     ]
@@ -247,6 +288,11 @@ def _check_settings(path: Path, there: Any, here: Mapping[str, str]) -> None:
             f"{path} was made with other settings: {'; '.join(differing)}. Give the same, or "
             "start anew without --resume."
         )
+
+
+def _short(text: str | None) -> str:
+    """Give what a file says on one line: many materials in a walk would fill a page."""
+    return printable(str(text))[:200]
 
 
 _REMEDY = "delete it, or start anew without --resume"

@@ -10,10 +10,10 @@ from sssfit.errors import SimulationError
 from sssfit.grid import make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
+from sssfit.simulate._batches import MAX_PHOTONS
 from sssfit.simulate._run import Ending
 
 DEFAULT_PHOTONS = 10_000_000
-MAX_PHOTONS = 10**12
 
 
 def ending_of(photons: int | None, target_error: float | None) -> Ending:
@@ -91,6 +91,8 @@ def is_finished(
         meta.get("method") == "montecarlo"
         and meta.get("settings") == expected
         and meta.get("material_sha256") == material.sha256
+        and profile.material_name == material.name
+        and {"relative_error", "energy_balance_stderr"} <= meta.keys()
         and (meta.get("seed"), meta.get("version")) == (seed, __version__)
         and (auto or profile.n_annuli == grid.annuli)
         and is_complete(profile)

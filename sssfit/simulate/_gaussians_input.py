@@ -60,7 +60,7 @@ def checked_numbers(
 
 def _numbers(key: str, values: npt.ArrayLike) -> FloatArray:
     try:
-        return np.asarray(values, dtype=np.float64)
+        return np.asarray(values, dtype=np.float64, order="C")
     except (TypeError, ValueError):
         raise SimulationError(
             f"{key} = {shown(values)} are not numbers; expected rows of equal length."

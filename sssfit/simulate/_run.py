@@ -7,11 +7,12 @@ after whole batches, at numbers of batches fixed beforehand.
 import math
 from collections import deque
 from collections.abc import Callable, Generator, Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future
 from contextlib import closing
 from dataclasses import dataclass
 from time import perf_counter
 
+from sssfit._jit import thread_pool
 from sssfit.errors import SimulationError
 from sssfit.simulate._batches import BATCH_PHOTONS, FloatArray, Tally, Walk, relative_errors
 from sssfit.simulate._checkpoint import Checkpoint, State
@@ -154,7 +155,7 @@ def _in_order(
     """Tallies of the batches yet to do in their order, while a few more are on their way."""
     batches = iter(range(photons_done // BATCH_PHOTONS, -(-task.photons // BATCH_PHOTONS)))
     pending: deque[Future[Tally]] = deque()
-    with ThreadPoolExecutor(threads, thread_name_prefix="sssfit-walk") as pool:
+    with thread_pool(threads, "sssfit-walk") as pool:
         try:
             stopped = False
             while True:

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
-from sssfit._jit import compiled_before
+from sssfit._jit import compiled_before, thread_pool
 from sssfit.errors import SimulationError, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
@@ -162,7 +162,9 @@ def simulate_exact_many(
     profiles: dict[int, Profile] = {}
     # One BLAS thread for each of ours: matrices of 100 to 400 rows gain nothing from more, and
     # where another process keeps a core busy its waiting threads made skin1 take 14 s, not 1.8.
-    with ThreadPoolExecutor(threads) as pool, threadpool_limits(1, user_api="blas"):
+    from scipy import optimize, special  # noqa: F401 (before the threads, which need them)
+
+    with thread_pool(threads) as pool, threadpool_limits(1, user_api="blas"):
         for eta, group in groups.items():
             own = [materials[k] for k in group], [grids[k] for k in group]
             found = _solve_group(eta, *own, tolerance, _Workers(pool, stop))

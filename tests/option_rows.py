@@ -1,0 +1,1034 @@
+"""A row for every option of every verb: a value other than its default, and the library's result.
+
+A new option takes one row in the dict of its verb; `test_cli_options` reads the options from
+click's own objects and fails where one has no row. Options that all verbs share are in
+``COMMANDS``, ``SEEDS``, ``THREADS`` and ``VERBOSE``.
+"""
+
+import contextlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import cli_world as world
+import numpy as np
+from cli_world import DR_MM, GRID, PHOTONS, RADIUS_MM, Ran, called, kernel, picture, profile, wax
+
+from sssfit import fit
+from sssfit.compare.judge import judge, judge_in_screen_space
+from sssfit.compare.metrics import auto_exposure
+from sssfit.export import json_document
+from sssfit.image import load_image
+from sssfit.mci import load_mci
+from sssfit.mco import join_channels, load_mco
+from sssfit.profile_csv import csv_text, load_csv
+from sssfit.render.irradiance import make_scene
+from sssfit.render.reference import render_reference
+from sssfit.render.scene import Scene
+from sssfit.render.separable import render_separable
+from sssfit.simulate import Checkpoint, simulate_burley, simulate_dipole
+
+
+@dataclass(frozen=True)
+class Row:
+    """One option.
+
+    ``command`` lacks the option. ``given`` sets it to a value other than its default; where it
+    begins with the verb, it is a whole command. ``seen`` of that run has to equal ``library``, and
+    has to differ from ``seen`` without the option. ``default`` is the documented default as it
+    would be typed: giving it changes nothing. ``words`` is how the help describes the default where
+    it does not name a value.
+    """
+
+    command: str
+    given: str
+    seen: Callable[[Ran], Any]
+    library: Callable[[], Any]
+    default: str = ""
+    words: str = ""
+
+
+# What is looked at
+
+
+def made_profile(ran: Ran) -> Any:
+    return ran.profile
+
+
+def made_kernel(ran: Ran) -> Any:
+    return ran.kernel
+
+
+def made_picture(ran: Ran) -> Any:
+    return ran.picture
+
+
+def calls(ran: Ran) -> Any:
+    """What the library was called with, but for charts."""
+    return tuple(each for each in ran.calls if not each[0].endswith("_figure"))
+
+
+def drawn(ran: Ran) -> Any:
+    """What a chart was drawn of."""
+    return [noted for name, noted in ran.calls if name.endswith("_figure")]
+
+
+def names(ran: Ran) -> Any:
+    return sorted(ran.written)
+
+
+def status(ran: Ran) -> Any:
+    return ran.status
+
+
+def fields(*keys: str) -> Callable[[Ran], Any]:
+    """Figures of the JSON object."""
+    return lambda ran: [ran.figures[key] for key in keys]
+
+
+def is_written(*endings: str) -> Callable[[Ran], Any]:
+    """The files that begin as they should."""
+    begins = {"png": b"\x89PNG", "svg": b"<?xml", "csv": b"material,", "npz": b"PK"}
+    return lambda ran: [
+        name
+        for name, data in sorted(ran.written.items())
+        if name.endswith(endings) and data.startswith(begins[name.rsplit(".", 1)[1]])
+    ]
+
+
+# simulate
+
+_WALK = f"simulate wax.toml {GRID} --photons {PHOTONS} -o x.profile.npz"
+_BURLEY = f"simulate wax.toml --method burley {GRID}"
+
+
+def _walk(*materials: Any, every: float = 30.0, **settings: Any) -> Any:
+    """The recorded call of the library, which is told of the grid and 4000 photons at least."""
+    given = {"photons": PHOTONS, "dr_mm": DR_MM, "radius_mm": RADIUS_MM} | settings
+    name = "sssfit.simulate.simulate_montecarlo_many"
+    return called(
+        name, list(materials or [wax()]), checkpoint=Checkpoint(Path("x"), every), **given
+    )
+
+
+def _content(made: Any) -> Any:
+    return world.content_of(made)
+
+
+_GRID = {"dr_mm": DR_MM, "radius_mm": RADIUS_MM}
+
+SIMULATE = {
+    "--all": Row(
+        _BURLEY,
+        f"simulate --all --method burley {GRID}",
+        names,
+        lambda: ["marble.burley.profile.npz", "skin1.burley.profile.npz"],
+    ),
+    "--method": Row(
+        f"simulate wax.toml {GRID} -o x.profile.npz",
+        "--method dipole",
+        made_profile,
+        lambda: _content(simulate_dipole(wax(), **_GRID)),
+        default="montecarlo",
+    ),
+    "--run": Row(
+        "simulate two.mci -o out",
+        "simulate two.mci --run 2",
+        names,
+        lambda: [f"{load_mci(world.files() / 'two.mci')[1].material.name}.profile.npz"],
+    ),
+    "--photons": Row(
+        f"simulate wax.toml {GRID}", "--photons 3000", calls, lambda: _walk(photons=3000), "1e7"
+    ),
+    "--target-error": Row(_WALK, "--target-error 20%", calls, lambda: _walk(target_error=0.2)),
+    "--tolerance": Row(
+        f"simulate wax.toml --method exact {GRID}",
+        "--tolerance 2%",
+        calls,
+        lambda: called("sssfit.simulate.simulate_exact_many", [wax()], tolerance=0.02, **_GRID),
+        default="0.01%",
+    ),
+    "--mapping": Row(
+        _BURLEY,
+        "--mapping diffuse",
+        made_profile,
+        lambda: _content(simulate_burley(wax(), mapping="diffuse", **_GRID)),
+        default="perpendicular",
+    ),
+    "--dr": Row(
+        "simulate wax.toml --method burley",
+        "--dr .25",
+        made_profile,
+        lambda: _content(simulate_burley(wax(), dr_mm=0.25)),
+        default=f"{float(wax().layers[0].mean_free_path_mm.min()) / 20!r}",
+        words="MFP_min / 20; deon-skin: 0.008",
+    ),
+    "--radius": Row(
+        "simulate wax.toml --method burley",
+        "--radius 7.5",
+        made_profile,
+        lambda: _content(simulate_burley(wax(), radius_mm=7.5)),
+        default=f"{32 * float(wax().layers[0].mean_free_path_mm.max())!r}",
+        words="32 MFP_max; deon-skin: 17.2",
+    ),
+    "--output": Row(
+        _BURLEY,
+        "-o x.profile.npz",
+        names,
+        lambda: ["x.profile.npz"],
+        default="wax.burley.profile.npz",
+        words="MATERIAL.profile.npz, MATERIAL.METHOD.profile.npz",
+    ),
+    "--checkpoint-every": Row(
+        _WALK, "--checkpoint-every 7", calls, lambda: _walk(every=7.0), default="30.0"
+    ),
+    # The profile is there, and of this very walk.
+    "--resume": Row(
+        f"simulate wax.toml {GRID} --photons {PHOTONS} --json",
+        "--resume",
+        lambda ran: (ran.figures["finished_before"], names(ran)),
+        lambda: (True, []),
+    ),
+    "--force": Row(
+        f"{_BURLEY} -o foreign.npz", "--force", is_written("npz"), lambda: ["foreign.npz"]
+    ),
+}
+
+# fit
+
+
+def _fit(method: str, **settings: Any) -> Callable[[], Any]:
+    return lambda: world.weights_of(
+        world.quietly(fit.METHODS[method].fit, profile(), **settings).kernel
+    )
+
+
+def _fitted(
+    option: str, value: str, method: str, default: str = "", words: str = "", **own: Any
+) -> Row:
+    """An option of a method, by what the fit makes of it."""
+    command = f"fit wax.profile.npz --method {method} --mm-per-pixel .4"
+    library = _fit(method, mm_per_pixel=0.4, **own)
+    return Row(command, f"{option} {value}".strip(), made_kernel, library, default, words)
+
+
+_HAND = {"near_mm2": [0.2, 0.1, 0.05], "far_mm2": [2.0, 1.0, 0.7], "weight": [0.4, 0.5, 0.6]}
+_SKIN = {"width": 0.3, "strength": [0.8, 0.7, 0.75], "falloff": [0.6, 0.2, 0.1]}
+
+
+def _by_hand(option: str, other: str, method: str, usual: dict[str, Any], **own: Any) -> Row:
+    """A value set by hand: all of them go together, so the others stand beside it."""
+    typed = {
+        key.removesuffix("_mm2"): str(value).strip("[]").replace(" ", "")
+        for key, value in usual.items()
+    }
+    command = f"fit wax.profile.npz --method {method} --mm-per-pixel .4 " + " ".join(
+        f"--{key} {value}" for key, value in typed.items()
+    )
+    given = f"{option} {other}"  # click takes the last
+    return Row(command, given, made_kernel, _fit(method, mm_per_pixel=0.4, **(usual | own)))
+
+
+FIT = {
+    "--list": Row(
+        "fit wax.profile.npz --method svd",
+        "fit --list",
+        lambda ran: [line.split()[0] for line in ran.stdout.splitlines()],
+        lambda: list(fit.METHODS),
+    ),
+    "--method": Row(
+        "fit wax.profile.npz --method svd",
+        "--method burley",
+        made_kernel,
+        lambda: _fit("burley")(),
+    ),
+    "--mm-per-pixel": Row(
+        "fit wax.profile.npz --method svd",
+        "--mm-per-pixel .5",
+        made_kernel,
+        _fit("svd", mm_per_pixel=0.5),
+        default=f"{DR_MM}",
+        words="the profile's first annulus",
+    ),
+    "--support": _fitted("--support", "2.1", "svd", "auto", support_mm=2.1),
+    "--normalize": _fitted("--normalize", "", "preintegrated", normalize=True),
+    "--rank": _fitted("--rank", "2", "svd", "3", rank=2),
+    "--energy": _fitted("--energy", "keep", "svd", "rescale", energy="keep"),
+    "--terms": _fitted("--terms", "2", "gaussians", "4", terms=2),
+    "--signed": _fitted("--signed", "", "gaussians", signed=True),
+    "--free-energy": _fitted("--free-energy", "", "gaussians", free_energy=True),
+    "--k": _fitted("--k", "3", "guided", "1.55", k=3.0),
+    "--b": _fitted("--b", "5", "guided", "50", b=5.0),
+    "--centre-bound": _fitted("--centre-bound", ".1", "guided", "1.0", "none", centre_bound=0.1),
+    "--target": _fitted("--target", "kernel", "artist", "line", target="kernel"),
+    "--near": _by_hand("--near", ".3", "artist", _HAND, near_mm2=0.3),
+    "--far": _by_hand("--far", "3,4,5", "artist", _HAND, far_mm2=[3.0, 4.0, 5.0]),
+    "--weight": _by_hand("--weight", ".2,.3,.9", "artist", _HAND, weight=[0.2, 0.3, 0.9]),
+    "--width": _by_hand("--width", ".2", "falloff", _SKIN, width=0.2),
+    "--strength": _by_hand("--strength", ".5,.6,.9", "falloff", _SKIN, strength=[0.5, 0.6, 0.9]),
+    "--falloff": _by_hand("--falloff", ".3,.4,.5", "falloff", _SKIN, falloff=[0.3, 0.4, 0.5]),
+    "--output": Row(
+        "fit wax.profile.npz --method svd",
+        "-o x.kernel.json",
+        names,
+        lambda: ["x.kernel.json"],
+        default="wax.svd3.kernel.json",
+        words="PROFILE.METHOD.kernel.json",
+    ),
+    "--force": Row(
+        "fit wax.profile.npz --method svd -o foreign.json",
+        "--force",
+        names,
+        lambda: ["foreign.json"],
+    ),
+}
+
+# pictures from files
+
+_LAYER = "R, G, B without a layer, or the only layer with them"
+_ALPHA = "all of it"
+
+
+def _from_file(mm_per_pixel: float, layer: str, *, alpha_is_mask: bool = False) -> Scene:
+    """A layer of the EXR with two, as the library reads it in the folder of the files."""
+    with contextlib.chdir(world.files()):
+        image = load_image("layers.exr", layer=layer)
+    return Scene.from_image(image, mm_per_pixel, alpha_is_mask=alpha_is_mask)
+
+
+# render
+
+_SIZE = "--size 24x16"
+
+
+def _scene(name: str, **own: Any) -> Scene:
+    return make_scene(name, height=16, width=24, mm_per_pixel=kernel().mm_per_pixel, **own)
+
+
+def _rendered(scene: Scene, **settings: Any) -> Any:
+    return np.float32(judge(scene, kernel(), **settings).picture)
+
+
+def _lit(name: str, option: str, value: str, default: str = "", words: str = "", **own: Any) -> Row:
+    """An option of a made picture."""
+    command = f"render --irradiance {name} {_SIZE}"
+    library = lambda: _rendered(_scene(name, **own))  # noqa: E731
+    return Row(command, f"{option} {value}", made_picture, library, default, words)
+
+
+def _measured(**settings: Any) -> Any:
+    """Figures of a disk."""
+    score = judge(_scene("disk"), kernel(), profile(), **settings).score
+    assert score is not None
+    return [score.delta_e_2000_mean, score.exposure, score.ssim, score.flip]
+
+
+_FIGURES = fields("delta_e_2000_mean", "exposure", "ssim", "flip")
+_DISK = f"render --irradiance disk {_SIZE}"
+
+_LAYERS = f"render --irradiance layers.exr --mm-per-pixel {DR_MM} -o x.exr"
+
+RENDER = {
+    "--irradiance": Row(
+        f"render {_SIZE}",
+        "--irradiance stripes",
+        made_picture,
+        lambda: _rendered(_scene("stripes")),
+        default="head",
+    ),
+    "--size": Row(
+        "render --irradiance stripes",
+        "--size 20x8",
+        made_picture,
+        lambda: _rendered(make_scene("stripes", height=8, width=20, mm_per_pixel=DR_MM)),
+        default="512x512",
+        words="512x512; head: the whole face, up to 1080x1080",
+    ),
+    "--mm-per-pixel": Row(
+        "render --irradiance bare.exr",
+        f"--mm-per-pixel {DR_MM}",
+        lambda ran: ran.status or ran.picture,
+        lambda: _rendered(Scene("bare", picture(), DR_MM)),
+    ),
+    "--layer": Row(
+        f"{_LAYERS} --layer near",
+        "--layer far",
+        made_picture,
+        lambda: _rendered(_from_file(DR_MM, "far")),
+        words=_LAYER,
+    ),
+    "--mask": Row(
+        f"{_LAYERS} --layer far",
+        "--mask alpha",
+        made_picture,
+        lambda: _rendered(_from_file(DR_MM, "far", alpha_is_mask=True)),
+        words=_ALPHA,
+    ),
+    "--angle": _lit("edge", "--angle", "30", "0", angle_degrees=30.0),
+    "--radius": _lit("disk", "--radius", "1.1", radius_mm=1.1),
+    "--period": _lit("stripes", "--period", "2.5", period_mm=2.5),
+    "--spacing": _lit("points", "--spacing", "1.3", spacing_mm=1.3),
+    "--distance": _lit("head", "--distance", "30cm", "600", distance_mm=300.0),
+    "--border": Row(
+        _DISK.replace("disk", "edge"),
+        "--border zero",
+        made_picture,
+        lambda: _rendered(_scene("edge"), border="zero"),
+        default="mirror",
+    ),
+    "--screen": Row(
+        f"render --irradiance head {_SIZE}",
+        "--screen",
+        made_picture,
+        lambda: np.float32(judge_in_screen_space(_scene("head"), kernel()).picture),
+    ),
+    "--follow": Row(
+        "render --irradiance head --size 48x48 --distance 200 --screen",
+        "--follow none",
+        made_picture,
+        lambda: np.float32(
+            judge_in_screen_space(
+                make_scene("head", height=48, width=48, mm_per_pixel=DR_MM, distance_mm=200.0),
+                kernel(),
+                follow="none",
+            ).picture
+        ),
+        default="gaussian",
+    ),
+    "--profile": Row(
+        f"{_DISK} --json",
+        "--profile plate.profile.npz",
+        fields("rmse"),
+        lambda: [judge(_scene("disk"), kernel(), world.plate_profile()).score.rmse],
+        default="wax.profile.npz",
+        words="the profile here that the kernel was fitted to",
+    ),
+    "--exposure": Row(
+        f"{_DISK} --json",
+        "--exposure 3",
+        _FIGURES,
+        lambda: _measured(exposure=3.0),
+        default=repr(auto_exposure(render_reference(_scene("disk"), profile()))),
+        words="from the true picture",
+    ),
+    "--structure": Row(
+        f"{_DISK} --json", "--structure", _FIGURES, lambda: _measured(structure=True)
+    ),
+    "--output": Row(
+        _DISK,
+        "-o x.exr",
+        names,
+        lambda: ["x.exr"],
+        default="wax.svd2.disk.exr",
+        words="KERNEL.PICTURE.exr",
+    ),
+    "--truth": Row(
+        f"{_DISK} -o x.tif",
+        "--truth true.exr",
+        lambda ran: "true.exr" in ran.written and ran.picture,
+        lambda: np.float32(render_reference(_scene("disk"), profile())),
+    ),
+    "--difference": Row(
+        f"{_DISK} -o x.tif",
+        "--difference lost.exr",
+        lambda ran: "lost.exr" in ran.written and ran.picture,
+        lambda: np.float32(
+            abs(
+                render_separable(_scene("disk"), kernel())
+                - render_reference(_scene("disk"), profile())
+            )
+        ),
+    ),
+    "--force": Row(f"{_DISK} -o foreign.exr", "--force", names, lambda: ["foreign.exr"]),
+}
+
+# compare
+
+_KERNELS = "compare wax.profile.npz --only kernels --size 24x16"
+_BUDGET = "compare wax.toml --only budget --size 24x16 --picture disk"
+
+
+def _pictures(
+    *pictures: str, size: tuple[int, int] = (16, 24), mm_per_pixel: float = 0.3
+) -> list[Scene]:
+    height, width = size
+    return [
+        make_scene(name, height=height, width=width, mm_per_pixel=mm_per_pixel) for name in pictures
+    ]
+
+
+def _compared(scenes: list[Scene], mm_per_pixel: float = 0.3) -> Any:
+    return called("sssfit.compare.compare_kernels", profile(), scenes, mm_per_pixel=mm_per_pixel)
+
+
+def _budgeted(**settings: Any) -> Any:
+    given = {"photons": 1_000_000, "settings": None} | settings
+    return called("sssfit.compare.budget.error_budgets", wax(), _pictures("disk"), **given)
+
+
+def _converged(**settings: Any) -> Any:
+    return called("sssfit.compare.convergence.compute_convergence", wax(), **settings)
+
+
+_OF_LAYERS = "compare wax.profile.npz --only kernels --picture layers.exr --mm-per-pixel .4"
+_BOTH = "compare wax.toml --size 24x16 --picture disk"
+_CONVERGENCE = "compare wax.toml --convergence c.png"
+
+
+def front(error: str, cost: str) -> Any:
+    """Picture and kernel of the rows that are on a front, and its names."""
+    rows = world.comparison().rows
+    found = {(row.picture, row.label) for row in rows if (error, cost) in row.fronts}
+    return [found, error, cost, error, cost]
+
+
+def _front(ran: Ran) -> Any:
+    """The same as the table for people has it, the words under it, and those of the chart."""
+    found, name = set(), ""
+    for line in ran.stdout.splitlines():
+        if ", exposure " in line:
+            name = line.split(",")[0]
+        if line.startswith("* ") and "  " in line[2:].strip():
+            found.add((name, line[2:].split("  ")[0]))
+    words = ran.stdout.rsplit("error (", 1)[1]
+    (chart,) = drawn(ran)
+    named = [words.split(")")[0], words.split("cost (")[1].split(")")[0]]
+    return [found, *named, chart["error"], chart["cost"]]
+
+
+COMPARE = {
+    "--all": Row(
+        _KERNELS,
+        "compare --all --size 24x16 -o out",
+        names,
+        lambda: [
+            f"out/{name}-pareto.{end}" for name in ("marble", "skin1") for end in ("md", "png")
+        ],
+    ),
+    "--only": Row(
+        _BOTH,
+        "--only kernels",
+        lambda ran: [name for name, _ in calls(ran)],
+        lambda: ["simulate_exact", "compare_kernels"],
+        words="both",
+    ),
+    "--picture": Row(
+        _KERNELS,
+        "--picture points --picture edge,disk",
+        calls,
+        lambda: _compared(_pictures("points", "edge", "disk")),
+        default="disk,edge,head",
+    ),
+    "--mm-per-pixel": Row(
+        _KERNELS,
+        "--mm-per-pixel .45",
+        calls,
+        lambda: _compared(_pictures("disk", "edge", "head", mm_per_pixel=0.45), 0.45),
+        default="0.3",
+        words="what your own file says, else 0.3",
+    ),
+    "--size": Row(
+        "compare wax.profile.npz --only kernels --picture disk,edge",
+        "--size 20x10",
+        calls,
+        lambda: _compared(_pictures("disk", "edge", size=(10, 20))),
+        default="512x512",
+    ),
+    "--layer": Row(
+        f"{_OF_LAYERS} --layer near",
+        "--layer far",
+        calls,
+        lambda: _compared([_from_file(0.4, "far")], 0.4),
+        words=_LAYER,
+    ),
+    "--mask": Row(
+        f"{_OF_LAYERS} --layer far",
+        "--mask alpha",
+        calls,
+        lambda: _compared([_from_file(0.4, "far", alpha_is_mask=True)], 0.4),
+        words=_ALPHA,
+    ),
+    "--chart": Row(_KERNELS, "--chart c.png", is_written("png"), lambda: ["c.png"]),
+    "--table": Row(_KERNELS, "--table t.csv", is_written("csv"), lambda: ["t.csv"]),
+    "--error": Row(
+        f"{_KERNELS} --chart c.png",
+        "--error l2",
+        _front,
+        lambda: front("l2", "weights"),
+        default="delta-e",
+    ),
+    "--cost": Row(
+        f"{_KERNELS} --chart c.png",
+        "--cost passes",
+        _front,
+        lambda: front("delta-e", "passes"),
+        default="weights",
+    ),
+    "--budget-chart": Row(_BUDGET, "--budget-chart b.png", is_written("png"), lambda: ["b.png"]),
+    "--photons": Row(_BUDGET, "--photons 2e4", calls, lambda: _budgeted(photons=20_000), "1e6"),
+    "--method": Row(
+        _BUDGET, "--method artist", calls, lambda: _budgeted(method="artist"), default="svd"
+    ),
+    "--rank": Row(
+        _BUDGET,
+        "--rank 2",
+        lambda ran: [ran.stdout.split(" terms")[0].rsplit(" ")[-1]],
+        lambda: [str(world.budgets(2)[0].kernel.rank)],
+        default="3",
+    ),
+    "--terms": Row(
+        f"{_BUDGET} --method gaussians",
+        "--terms 2",
+        calls,
+        lambda: _budgeted(method="gaussians", settings={"terms": 2}),
+        words="4",
+    ),
+    "--model": Row(
+        _BUDGET,
+        "--model burley",
+        calls,
+        lambda: _budgeted(model="burley"),
+        words="of the photon walk",
+    ),
+    "--sheet": Row(
+        "compare wax.profile.npz --sheet s.png",
+        "--sheet t.png --mm-per-pixel .4",
+        lambda ran: (calls(ran), names(ran)),
+        lambda: (
+            called("sssfit.compare.sheet.compute_sheet", profile(), mm_per_pixel=0.4),
+            ["t.png"],
+        ),
+    ),
+    "--editing": Row(
+        _KERNELS,
+        "compare --editing e.png",
+        lambda ran: (calls(ran), names(ran)),
+        lambda: (called("sssfit.compare.editing.compute_editing"), ["e.png"]),
+    ),
+    "--convergence": Row(
+        _CONVERGENCE,
+        "compare wax.toml --convergence d.png --photons 1e5",
+        lambda ran: (calls(ran), names(ran)),
+        lambda: (_converged(photons=[10_000, 31_623, 100_000]), ["d.png"]),
+    ),
+    "--output": Row(
+        "compare --all --size 24x16",
+        "-o out",
+        names,
+        lambda: [
+            f"out/{name}-pareto.{end}" for name in ("marble", "skin1") for end in ("md", "png")
+        ],
+        default=".",
+        words="here",
+    ),
+    "--force": Row(
+        f"{_KERNELS} --table foreign.csv", "--force", is_written("csv"), lambda: ["foreign.csv"]
+    ),
+}
+
+
+# choose
+
+
+_PITCH = 2.0 * 600.0 * np.tan(np.radians(15.0)) / 1080  # mm, of the default view
+
+
+def _chosen(
+    distance_mm: float = 600.0, fov: float = 30.0, frame=(1080, 1920), scene=None, **own: Any
+) -> Any:
+    pitch = 2.0 * distance_mm * np.tan(np.radians(fov) / 2.0) / frame[0]
+    if isinstance(scene, Scene):
+        own["scene"] = scene
+    elif scene:
+        own["scene"] = make_scene(scene, height=512, width=512, mm_per_pixel=pitch)
+    return called(
+        "sssfit.compare.choose.choose",
+        wax(),
+        mm_per_pixel=pitch,
+        distance_mm=distance_mm,
+        frame=frame,
+        **own,
+    )
+
+
+def _rounded(ran_calls: Any) -> Any:
+    """The pitches to 12 digits: the view's own formula rounds in another order."""
+    found = []
+    for name, noted in ran_calls:
+        pitch = float(f"{noted['mm_per_pixel']:.12g}")
+        scene = noted["scene"] and (
+            *noted["scene"][:2],
+            float(f"{noted['scene'][2]:.12g}"),
+            noted["scene"][3],
+        )
+        found.append((name, noted | {"mm_per_pixel": pitch, "scene": scene}))
+    return found
+
+
+def _asked(ran: Ran) -> Any:
+    return _rounded(calls(ran))
+
+
+_CHOOSE = "choose wax.toml"
+
+CHOOSE = {
+    "--distance": Row(
+        _CHOOSE, "--distance 25cm", _asked, lambda: _rounded(_chosen(250.0)), default="0.6m"
+    ),
+    "--fov": Row(_CHOOSE, "--fov 45", _asked, lambda: _rounded(_chosen(fov=45.0)), default="30.0"),
+    "--resolution": Row(
+        _CHOOSE,
+        "--resolution 640x360",
+        _asked,
+        lambda: _rounded(_chosen(frame=(360, 640))),
+        default="1920x1080",
+    ),
+    "--tolerance": Row(
+        _CHOOSE, "--tolerance .7", _asked, lambda: _rounded(_chosen(tolerance=0.7)), default="1.0"
+    ),
+    "--irradiance": Row(
+        _CHOOSE,
+        "--irradiance edge",
+        _asked,
+        lambda: _rounded(_chosen(scene="edge")),
+        default="head",
+    ),
+    "--layer": Row(
+        f"{_CHOOSE} --irradiance layers.exr --layer near",
+        "--layer far",
+        _asked,
+        lambda: _rounded(_chosen(scene=_from_file(_PITCH, "far"))),
+        words=_LAYER,
+    ),
+    "--mask": Row(
+        f"{_CHOOSE} --irradiance layers.exr --layer far",
+        "--mask alpha",
+        _asked,
+        lambda: _rounded(_chosen(scene=_from_file(_PITCH, "far", alpha_is_mask=True))),
+        words=_ALPHA,
+    ),
+    "--output": Row(
+        _CHOOSE,
+        "-o x.kernel.json",
+        names,
+        lambda: ["x.kernel.json"],
+        default="wax.chosen.kernel.json",
+        words="MATERIAL.chosen.kernel.json",
+    ),
+    "--force": Row(f"{_CHOOSE} -o foreign.json", "--force", names, lambda: ["foreign.json"]),
+}
+
+# materials
+
+_MAKE = "materials --from-reflectance .4,.2,.1 --mean-free-path 1.3,.9,.7 --eta 1.3"
+
+
+def _inverted(**settings: Any) -> Any:
+    given = {
+        "reflectance": [0.4, 0.2, 0.1],
+        "mean_free_path_mm": [1.3, 0.9, 0.7],
+        "eta": 1.3,
+        "name": "from-reflectance",
+        "channels": ["R", "G", "B"],
+    } | settings
+    return called("sssfit.simulate.inversion.material_from_reflectance", **given)
+
+
+MATERIALS = {
+    "--toml": Row("materials wax.toml", "--toml", lambda ran: ran.stdout, lambda: wax().to_toml()),
+    "--from-reflectance": Row(
+        _MAKE,
+        "--from-reflectance 50%,.2,.1",
+        calls,
+        lambda: _inverted(reflectance=[0.5, 0.2, 0.1]),
+    ),
+    "--mean-free-path": Row(
+        _MAKE, "--mean-free-path 2", calls, lambda: _inverted(mean_free_path_mm=[2.0])
+    ),
+    "--light": Row(
+        _MAKE, "--light diffuse", calls, lambda: _inverted(light="diffuse"), default="normal"
+    ),
+    "--eta": Row(_MAKE, "--eta 1.4", calls, lambda: _inverted(eta=1.4)),
+    "--name": Row(
+        f"{_MAKE} -o x.toml",
+        "--name lard",
+        calls,
+        lambda: _inverted(name="lard"),
+        default="x",
+        words="that of FILE",
+    ),
+    "--channels": Row(
+        _MAKE,
+        "--channels a,b,c",
+        calls,
+        lambda: _inverted(channels=["a", "b", "c"]),
+        default="R,G,B",
+        words="R,G,B for three",
+    ),
+    "--output": Row(
+        f"{_MAKE} --name lard",
+        "-o x.toml",
+        names,
+        lambda: ["x.toml"],
+        default="lard.toml",
+        words="NAME.toml",
+    ),
+    "--force": Row(f"{_MAKE} -o foreign.toml", "--force", names, lambda: ["foreign.toml"]),
+}
+
+# import, export
+
+_MCO = "import r.mco g.mco -o x.profile.npz --channels a,b"
+
+
+def _joined(*channels: str) -> Any:
+    found = [load_mco(world.files() / f"{name}.mco") for name in "rg"]
+    return _content(join_channels(found, channels))
+
+
+def _table(name: str, **settings: Any) -> Any:
+    return _content(world.quietly(load_csv, world.files() / name, **settings))
+
+
+IMPORT = {
+    "--quantity": Row(
+        "import bare.csv -o x.profile.npz",
+        "--quantity density",
+        lambda ran: ran.status or ran.profile,
+        lambda: _table("bare.csv", quantity="density"),
+        words="what its own comment says",
+    ),
+    "--unit": Row(
+        "import plain.csv --quantity density -o x.profile.npz",
+        "--unit cm",
+        lambda ran: ran.status or ran.profile,
+        lambda: _table("plain.csv", quantity="density", unit="cm"),
+    ),
+    "--density-unit": Row(
+        "import bare.csv --quantity density -o x.profile.npz",
+        "--density-unit cm",
+        made_profile,
+        lambda: _table("bare.csv", quantity="density", density_unit="cm"),
+        default="mm",
+        words="the unit of its radii",
+    ),
+    "--channels": Row(
+        _MCO,
+        "--channels left,right",
+        made_profile,
+        lambda: _joined("left", "right"),
+        default="a,b",
+        words="R,G,B for three",
+    ),
+    "--output": Row(
+        "import table.csv",
+        "-o x.profile.npz",
+        names,
+        lambda: ["x.profile.npz"],
+        default="table.profile.npz",
+        words="NAME.profile.npz",
+    ),
+    "--force": Row(
+        "import table.csv -o foreign.npz", "--force", is_written("npz"), lambda: ["foreign.npz"]
+    ),
+}
+
+
+def _exported(ran: Ran) -> Any:
+    (data,) = ran.written.values()
+    return data.decode()
+
+
+EXPORT = {
+    "--format": Row(
+        "export wax.svd2.kernel.json --format hlsl",
+        "--format json",
+        _exported,
+        lambda: json_document(kernel()),
+    ),
+    "--output": Row(
+        "export --format csv",
+        "-o x.csv",
+        lambda ran: (names(ran), _exported(ran)),
+        lambda: (["x.csv"], csv_text(profile())),
+        default="wax.csv",
+        words="NAME.FORMAT",
+    ),
+    "--force": Row(
+        "export wax.profile.npz --format csv -o foreign.csv",
+        "--force",
+        names,
+        lambda: ["foreign.csv"],
+    ),
+}
+
+# chart
+
+_GUIDE = "chart wax.profile.npz --guide --json"
+_SPECTRUM = "chart wax.profile.npz --spectrum --json"
+
+
+def _guided(**settings: Any) -> Any:
+    from sssfit.compare import compute_guide
+
+    found = world.quietly(compute_guide, profile(), **settings)
+    channel = found.profile.channels[found.channel]
+    return [channel, found.mm_per_pixel, list(found.ks), found.misplaced.tolist()]
+
+
+_GUIDES = fields("channel", "mm_per_pixel", "k", "misplaced")
+
+
+def _charted(kind: str) -> Callable[[Ran], Any]:
+    return lambda ran: [kind in ran.figures, is_written("png")(ran)]
+
+
+CHART = {
+    "--models": Row(
+        "chart wax.profile.npz --json",
+        "--models",
+        _charted("rows"),
+        lambda: [True, ["wax.models.png"]],
+    ),
+    "--spectrum": Row(
+        "chart wax.profile.npz --json",
+        "--spectrum",
+        _charted("eigenvalues"),
+        lambda: [True, ["wax.spectrum.png"]],
+    ),
+    "--guide": Row(
+        "chart wax.profile.npz --json",
+        "--guide",
+        _charted("misplaced"),
+        lambda: [True, ["wax.guide.png"]],
+    ),
+    "--mm-per-pixel": Row(
+        _GUIDE,
+        "--mm-per-pixel .5",
+        _GUIDES,
+        lambda: _guided(mm_per_pixel=0.5),
+        default=f"{DR_MM}",
+        words="the profile's first annulus",
+    ),
+    "--k": Row(_GUIDE, "--k 1,2", _GUIDES, lambda: _guided(ks=[1.0, 2.0]), default="0,1.55,4"),
+    "--channel": Row(
+        _GUIDE,
+        "--channel G",
+        _GUIDES,
+        lambda: _guided(channel="G"),
+        default="R",
+        words="the first that returns light",
+    ),
+    "--photons": Row(
+        "chart wax.toml --models",
+        "--photons 2e4",
+        calls,
+        lambda: called("sssfit.compare.compare_models", wax(), photons=20_000),
+        default="1e7",
+    ),
+    "--output": Row(
+        "chart wax.profile.npz",
+        "-o x.svg",
+        is_written("svg", "png"),
+        lambda: ["x.svg"],
+        default="wax.profile.png",
+        words="NAME.profile.png, NAME.spectrum.png, NAME.guide.png, MATERIAL.models.png",
+    ),
+    "--force": Row("chart -o foreign.png", "--force", is_written("png"), lambda: ["foreign.png"]),
+}
+
+ROWS: dict[str, dict[str, Row]] = {
+    "materials": MATERIALS,
+    "simulate": SIMULATE,
+    "fit": FIT,
+    "render": RENDER,
+    "compare": COMPARE,
+    "choose": CHOOSE,
+    "import": IMPORT,
+    "export": EXPORT,
+    "chart": CHART,
+    "show": {},
+}
+
+# A quick command of each verb, for what all verbs have in common.
+COMMANDS = {
+    "materials": "materials wax.toml",
+    "simulate": _WALK,
+    "fit": "fit --method preintegrated",
+    "render": _DISK,
+    "compare": _BOTH,
+    "choose": _CHOOSE,
+    "import": "import table.csv",
+    "export": "export --format csv",
+    "chart": "chart",
+    "show": "show",
+}
+
+# Where --seed has something to do; elsewhere nothing is random and results do not depend on it.
+SEEDS = {
+    "simulate": Row(_WALK, "--seed 5", calls, lambda: _walk(seed=5)),
+    "render": Row(
+        f"render --irradiance noise {_SIZE}",
+        "--seed 5",
+        made_picture,
+        lambda: _rendered(_scene("noise", seed=5)),
+    ),
+    "compare": Row(_BUDGET, "--seed 5", calls, lambda: _budgeted(seed=5)),
+    "compare --convergence": Row(
+        f"{_CONVERGENCE} --photons 1e5",
+        "--seed 5",
+        calls,
+        lambda: _converged(photons=[10_000, 31_623, 100_000], first_seed=5),
+    ),
+    "compare --picture noise": Row(
+        f"{_KERNELS} --picture noise",
+        "--seed 5",
+        calls,
+        lambda: _compared([make_scene("noise", height=16, width=24, mm_per_pixel=0.3, seed=5)]),
+    ),
+    "choose": Row(_CHOOSE, "--seed 5", _asked, lambda: _rounded(_chosen(seed=5))),
+    "chart": Row(
+        "chart wax.toml --models",
+        "--seed 5",
+        calls,
+        lambda: called("sssfit.compare.compare_models", wax(), seed=5),
+    ),
+}
+
+# What --threads reaches; elsewhere there is one thread.
+THREADS = {
+    "simulate": Row(_WALK, "--threads 1", calls, lambda: _walk(threads=1)),
+    "compare": Row(_BUDGET, "--threads 1", calls, lambda: _budgeted(threads=1)),
+    "choose": Row(_CHOOSE, "--threads 1", _asked, lambda: _rounded(_chosen(threads=1))),
+    "chart": Row(
+        "chart wax.toml --models",
+        "--threads 1",
+        calls,
+        lambda: called("sssfit.compare.compare_models", wax(), threads=1),
+    ),
+}
+
+VERBOSE = {"choose"}  # where --verbose has something to say
+
+# Commands that write one file; with the last word replaced by - it goes to stdout.
+STREAMS = (
+    f"{_BURLEY} -o x.profile.npz",
+    "fit wax.profile.npz --method svd -o x.kernel.json",
+    f"{_DISK} -o x.exr",
+    f"{_CHOOSE} -o x.kernel.json",
+    "import table.csv -o x.profile.npz",
+    "export --format csv -o x.csv",
+    "export --format hlsl -o x.hlsl",
+    "export --format json -o x.json",
+    "chart wax.profile.npz -o x.png",
+    "chart wax.profile.npz --spectrum -o x.png",
+    "chart wax.profile.npz --guide -o x.png",
+    "chart wax.profile.npz --models -o x.png",
+    f"{_MAKE} --name lard -o x.toml",
+    f"{_KERNELS} --chart x.png",
+    f"{_BUDGET} --budget-chart x.png",
+    "compare wax.profile.npz --sheet x.png",
+    "compare --editing x.png",
+    "compare wax.toml --convergence x.png",
+)
