@@ -149,13 +149,13 @@ materials:
 
 
 def section():
-    """Return the section of docs/fits.md, with its marks."""
+    """Return the section's text."""
     names = material_names()
     with warnings.catch_warnings(), threadpool_limits(1, user_api="blas"):
         warnings.simplefilter("ignore", SssfitWarning)
         found = np.stack([scores(load_material(name)) for name in names])
         nearest = nearest_table(load_material("skin1"))
-    text = TEXT.format(
+    return TEXT.format(
         date=datetime.date.today().isoformat(),
         ks=" | ".join(f"k = {k:g}" for k in KS),
         bars="---|" * len(KS),
@@ -165,7 +165,6 @@ def section():
         picture_bars="---|" * len(PICTURES),
         scored="\n".join(score_table(found)),
     )
-    return text
 
 
 def main():
