@@ -10,9 +10,9 @@ import click
 from ._compare_input import MM_PER_PIXEL
 from ._fits import FITS
 from ._options import Count, Length, WholeRange
-from ._scene import FILE_OPTIONS, MADE, Size
+from ._scene import EDGE_DEGREES, FILE_OPTIONS, MADE, Size
 
-PICTURES = "disk,edge,head"
+PICTURES = "disk,edge,points,head"
 
 _OPTIONS = (
     click.option("--all", "every", is_flag=True, help="All materials that ship with sssfit."),
@@ -26,8 +26,8 @@ _OPTIONS = (
         "pictures",
         metavar="NAME|FILE,...",
         multiple=True,
-        help=f"What is lit: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG files."
-        f"  [default: {PICTURES}]",
+        help=f"What is lit: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG files. The edge "
+        f"is at {EDGE_DEGREES:g} degrees.  [default: {PICTURES}]",
     ),
     click.option(
         "--mm-per-pixel",

@@ -43,7 +43,7 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
         default=1,
         show_default=True,
         metavar="N",
-        help="Seed of whatever is random.",
+        help="Random seed.",
     )
     @functools.wraps(command)
     def wrapper(
