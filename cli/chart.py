@@ -11,7 +11,7 @@ from ._figure import chart_output
 from ._guide import chart_guide
 from ._kernel_chart import chart_kernel
 from ._models import chart_models
-from ._options import Common, Count, Length, ListOf, common_options
+from ._options import Common, Count, Length, ListOf, Number, common_options
 from ._report import finish, newest, say
 from ._spectrum import chart_spectrum
 
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 @click.option(
     "--k",
     "ks",
-    type=ListOf(click.FLOAT),
+    type=ListOf(Number()),
     metavar="0..4,...",
     help="One to four values, with --guide.  [default: 0,1.55,4]",
 )

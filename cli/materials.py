@@ -7,7 +7,7 @@ from click.core import ParameterSource
 
 from ._deon_skin import DEON_SKIN, show_deon_skin
 from ._invert import Wish, write_material
-from ._options import Common, Length, ListOf, Reflectance, common_options
+from ._options import Common, Length, ListOf, Number, Reflectance, common_options
 from ._report import finish, table
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     metavar="MM,MM,...",
     help="Its mean free paths, 1 / (sigma_a + sigma_s); one serves all channels.",
 )
-@click.option("--eta", type=float, metavar="N", help="Its refractive index.")
+@click.option("--eta", type=Number(), metavar="N", help="Its refractive index.")
 @click.option(
     "--light",
     type=click.Choice(["diffuse", "normal"]),

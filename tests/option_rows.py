@@ -28,6 +28,7 @@ from sssfit.render.irradiance import make_scene
 from sssfit.render.reference import render_reference
 from sssfit.render.scene import Scene
 from sssfit.render.separable import render_separable
+from sssfit.render.transmittance import with_transmitted
 from sssfit.simulate import Checkpoint, simulate_burley, simulate_dipole
 
 
@@ -90,7 +91,12 @@ def fields(*keys: str) -> Callable[[Ran], Any]:
 
 def is_written(*endings: str) -> Callable[[Ran], Any]:
     """The files that begin as they should."""
-    begins = {"png": b"\x89PNG", "svg": b"<?xml", "csv": b"material,", "npz": b"PK"}
+    begins = {
+        "png": b"\x89PNG",
+        "svg": b"<?xml",
+        "csv": b"# sssfit.table/1\nmaterial,",
+        "npz": b"PK",
+    }
     return lambda ran: [
         name
         for name, data in sorted(ran.written.items())
@@ -330,6 +336,12 @@ _DISK = f"render --irradiance disk {_SIZE}"
 
 _LAYERS = f"render --irradiance layers.exr --mm-per-pixel {DR_MM} -o x.exr"
 
+
+def _lit_through() -> Scene:
+    """The head lit from 170 degrees off the eye, and what comes through it."""
+    return with_transmitted(_scene("head", light_degrees=170.0, transmit=True), world.gaussians())
+
+
 RENDER = {
     "--irradiance": Row(
         f"render {_SIZE}",
@@ -383,6 +395,13 @@ RENDER = {
         "--screen",
         made_picture,
         lambda: np.float32(judge_in_screen_space(_scene("head"), kernel()).picture),
+    ),
+    "--light": _lit("head", "--light", "100", "45", light_degrees=100.0),
+    "--transmit": Row(
+        f"render wax.gaussians2.kernel.json --irradiance head {_SIZE}",
+        "--transmit",
+        made_picture,
+        lambda: np.float32(judge(_lit_through(), world.gaussians()).picture),
     ),
     "--follow": Row(
         "render --irradiance head --size 48x48 --distance 200 --screen",

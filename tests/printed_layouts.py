@@ -312,6 +312,11 @@ def rendering(f: Figures) -> list[Any]:
             *(f["passes"], f["taps_per_pixel"], f["kernel_bytes"], f["seconds_per_megapixel"]),
         ),
     ]
+    if f["transmitted_maximum"] is not None:
+        most = by_channel(f, ["transmitted_maximum"])
+        words = "through the object at most: " + ", ".join("{} {}" for _ in most)
+        values = [value for pair in most for value in pair]
+        parts.append(Words(words + ", face on the key light is 1", *values))
     return [*parts, *(_lost(f) if f["rmse"] is not None else []), wrote(f)]
 
 
@@ -917,6 +922,7 @@ PRINTED: dict[str, Layout] = {
     "render --irradiance disk --size 24x16 --structure": rendering,
     "render --irradiance edge --size 24x16 --border zero": rendering,
     "render --irradiance head --size 24x16 --screen": rendering,
+    "render wax.gaussians2.kernel.json --irradiance head --size 48x48 --transmit": rendering,
     "compare wax.profile.npz --only kernels --size 24x16": comparison,
     "compare wax.profile.npz --only kernels --size 24x16 --error l2 --cost passes": comparison,
     "compare wax.toml --only budget --rank 2 --size 24x16": comparison,

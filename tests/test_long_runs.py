@@ -506,7 +506,7 @@ def test_a_checkpoint_is_gone_on_from_and_removed(run, tmp_path):
         (("--photons", "2e4"), 1, "more than the 20,000 asked for"),
         (("-o", "-"), 2, "--resume needs a file"),
         (("--checkpoint-every", "-1"), 2, "--checkpoint-every"),
-        (("--checkpoint-every", "nan"), 1, "give a time from 0 s up"),
+        (("--checkpoint-every", "nan"), 2, "'nan' is not a finite number."),
         (("--target-error", "0"), 2, "'0' is not a share between 0 and 100 %"),
         (("--target-error", "100%"), 2, "'100%' is not a share"),
         (("--target-error", "few"), 2, "'few' is not a share"),

@@ -61,7 +61,7 @@ class Ending:
         if self.target_error is None or math.isinf(error):
             return self.photons
         ratio = max(1.0, error / self.target_error)
-        return min(self.photons, math.ceil(photons_done * ratio * ratio))
+        return math.ceil(min(float(self.photons), photons_done * ratio * ratio))
 
 
 def is_check(photons: int) -> bool:
