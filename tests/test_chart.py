@@ -239,7 +239,9 @@ def odd_profiles():
         "1 annulus": lambda: hand_made(exponential(2, n=1)),
         "below zero": lambda: hand_made(exponential(2) - 1e-6),
         "uneven annuli": lambda: hand_made(exponential(3, n=50), np.geomspace(1, 21, 51) - 1),
-        "unknown meta": lambda: hand_made(exponential(3), method="$?", material="$x", version="$"),
+        "unknown meta": lambda: hand_made(
+            exponential(3), method="$?", material={"name": "$x"}, version="$"
+        ),
     }
 
 
