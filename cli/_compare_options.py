@@ -9,7 +9,7 @@ import click
 
 from ._compare_input import MM_PER_PIXEL
 from ._fits import FITS
-from ._options import Count, Length
+from ._options import Count, Length, WholeRange
 from ._scene import EDGE_DEGREES, FILE_OPTIONS, MADE, Size
 
 PICTURES = "disk,edge,points,head"
@@ -79,10 +79,10 @@ _OPTIONS = (
         help="The kernel whose budget it is.",
     ),
     click.option(
-        "--rank", type=click.IntRange(1, 1000), metavar="N", help="Its rank, svd.  [default: 3]"
+        "--rank", type=WholeRange(1, 1000), metavar="N", help="Its rank, svd.  [default: 3]"
     ),
     click.option(
-        "--terms", type=click.IntRange(1, 10), metavar="N", help="Its Gaussians.  [default: 4]"
+        "--terms", type=WholeRange(1, 10), metavar="N", help="Its Gaussians.  [default: 4]"
     ),
     click.option(
         "--model",

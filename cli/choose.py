@@ -11,7 +11,7 @@ import click
 from ._choose_report import figures_of, step_line, text_of
 from ._compiling import say_if_compiling
 from ._deon_skin import DEON_SKIN
-from ._options import Common, Length, common_options
+from ._options import Common, Length, Number, NumberRange, common_options
 from ._outputs import KERNEL, PROFILE, held
 from ._report import binary_stdin, binary_stdout, finish, percent, say
 from ._scene import (
@@ -69,7 +69,7 @@ class Distance(Length):
 @click.option(
     "--fov",
     "fov_degrees",
-    type=click.FloatRange(0.0, 180.0, min_open=True, max_open=True),
+    type=NumberRange(0.0, 180.0, min_open=True, max_open=True),
     default=30.0,
     show_default=True,
     metavar="DEGREES",
@@ -85,7 +85,7 @@ class Distance(Length):
 )
 @click.option(
     "--tolerance",
-    type=click.FLOAT,
+    type=Number(),
     default=1.0,
     show_default=True,
     metavar="DELTA-E",

@@ -16,6 +16,7 @@ import numpy as np
 from cli_world import DR_MM, GRID, PHOTONS, RADIUS_MM, Ran, called, kernel, picture, profile, wax
 
 from sssfit import fit
+from sssfit.compare import view_kernel
 from sssfit.compare.judge import judge, judge_in_screen_space
 from sssfit.compare.metrics import auto_exposure
 from sssfit.export import json_document
@@ -27,6 +28,7 @@ from sssfit.render.irradiance import make_scene
 from sssfit.render.reference import render_reference
 from sssfit.render.scene import Scene
 from sssfit.render.separable import render_separable
+from sssfit.render.transmittance import with_transmitted
 from sssfit.simulate import Checkpoint, simulate_burley, simulate_dipole
 
 
@@ -334,6 +336,12 @@ _DISK = f"render --irradiance disk {_SIZE}"
 
 _LAYERS = f"render --irradiance layers.exr --mm-per-pixel {DR_MM} -o x.exr"
 
+
+def _lit_through() -> Scene:
+    """The head lit from 170 degrees off the eye, and what comes through it."""
+    return with_transmitted(_scene("head", light_degrees=170.0, transmit=True), world.gaussians())
+
+
 RENDER = {
     "--irradiance": Row(
         f"render {_SIZE}",
@@ -387,6 +395,13 @@ RENDER = {
         "--screen",
         made_picture,
         lambda: np.float32(judge_in_screen_space(_scene("head"), kernel()).picture),
+    ),
+    "--light": _lit("head", "--light", "100", "45", light_degrees=100.0),
+    "--transmit": Row(
+        f"render wax.gaussians2.kernel.json --irradiance head {_SIZE}",
+        "--transmit",
+        made_picture,
+        lambda: np.float32(judge(_lit_through(), world.gaussians()).picture),
     ),
     "--follow": Row(
         "render --irradiance head --size 48x48 --distance 200 --screen",
@@ -938,7 +953,18 @@ CHART = {
         _GUIDES,
         lambda: _guided(channel="G"),
         default="R",
-        words="the first that returns light",
+        words="the first that returns light; of a kernel up to three",
+    ),
+    "--profile": Row(
+        "chart wax.svd2.kernel.json --json",
+        "--profile plate.profile.npz",
+        fields("profile", "misplaced"),
+        lambda: [
+            "plate.profile.npz",
+            view_kernel(kernel(), world.plate_profile()).misplaced.tolist(),
+        ],
+        default="wax.profile.npz",
+        words="found beside it or here by its fingerprint",
     ),
     "--photons": Row(
         "chart wax.toml --models",
@@ -953,7 +979,8 @@ CHART = {
         is_written("svg", "png"),
         lambda: ["x.svg"],
         default="wax.profile.png",
-        words="NAME.profile.png, NAME.spectrum.png, NAME.guide.png, MATERIAL.models.png",
+        words="NAME.profile.png, NAME.kernel.png, NAME.material.png, NAME.checkpoint.png, "
+        "NAME.spectrum.png, NAME.guide.png, MATERIAL.models.png",
     ),
     "--force": Row("chart -o foreign.png", "--force", is_written("png"), lambda: ["foreign.png"]),
 }

@@ -1,5 +1,6 @@
 """What every verb prints, line by line, in terms of its JSON object: see ``printed``."""
 
+import json
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -311,6 +312,11 @@ def rendering(f: Figures) -> list[Any]:
             *(f["passes"], f["taps_per_pixel"], f["kernel_bytes"], f["seconds_per_megapixel"]),
         ),
     ]
+    if f["transmitted_maximum"] is not None:
+        most = by_channel(f, ["transmitted_maximum"])
+        words = "through the object at most: " + ", ".join("{} {}" for _ in most)
+        values = [value for pair in most for value in pair]
+        parts.append(Words(words + ", face on the key light is 1", *values))
     return [*parts, *(_lost(f) if f["rmse"] is not None else []), wrote(f)]
 
 
@@ -733,11 +739,12 @@ def spectrum(f: Figures) -> list[Any]:
 def guide(f: Figures) -> list[Any]:
     keys = ("centre_share", "misplaced", "relative_frobenius_error", "weighted_residual")
     rows = [[k, *(Percent(f[key][i]) for key in keys)] for i, k in enumerate(f["k"])]
+    names = ("centre_share", "misplaced", "frobenius_error", "weighted_residual")
+    rows.append(["pre-integrated", *(Percent(f[f"preintegrated_{name}"]) for name in names)])
     return [
         Words(
-            "Channel {}; {} x {} pixels of {} mm; pre-integrated middle pixel {}",
+            "Channel {}; {} x {} pixels of {} mm",
             *(f["channel"], f["pixels"], f["pixels"], f["mm_per_pixel"]),
-            Percent(f["preintegrated_centre_share"]),
         ),
         Table(["k", "middle pixel", "misplaced", "Frobenius error", "weighted misfit"], rows),
         wrote(f),
@@ -766,7 +773,76 @@ def models(f: Figures) -> list[Any]:
     ]
 
 
+def kernel_chart(f: Figures) -> list[Any]:
+    rows = [
+        [
+            *(name, f["energy"][c], Percent(f["energy_error"][c])),
+            *(Percent(f["relative_frobenius_error"][c]), Percent(f["misplaced"][c])),
+        ]
+        for c, name in enumerate(f["channels"])
+    ]
+    return [
+        Words(
+            "{}, rank {}, {} x {} pixels of {} mm; against {}",
+            *(f["method"], f["rank"], f["pixels"], f["pixels"], f["mm_per_pixel"], f["profile"]),
+        ),
+        Table(["channel", "energy", "energy error", "Frobenius error", "misplaced"], rows),
+        wrote(f),
+    ]
+
+
 # show
+
+
+def kernel_shown(f: Figures) -> list[Any]:
+    settings = "".join(f", {key} {_plain(value)}" for key, value in f["settings"].items())
+    channels = [
+        [
+            *(name, f["energy"][c], f["scale"][c]),
+            *(Percent(f["relative_frobenius_error"][c]), Percent(f["energy_error"][c])),
+        ]
+        for c, name in enumerate(f["channels"])
+    ]
+    terms = [
+        [
+            f"{name} {t + 1}",
+            "+" if f["sign"][t][c] > 0 else "-",
+            *(f["term_energy"][t][c], f["middle_weight"][t][c]),
+        ]
+        for c, name in enumerate(f["channels"])
+        for t in range(f["rank"])
+    ]
+    heads = ["channel", "energy", "scale", "Frobenius error", "energy error"]
+    return [
+        Words("{}: separable kernel ({})", f["file"], f["format"]),
+        Words("material  {}", f["material"]),
+        Words(
+            "profile   {}, {} photons, seed {}, sha256 {}",
+            *(f["profile_method"], f["photons"], f["seed"], f["profile_sha256"][:16]),
+        ),
+        Words(
+            "fit       {}, {} terms" + settings + ", sssfit {}",
+            *(f["method"], f["rank"], f["version"]),
+        ),
+        Words(
+            "pixels    {} x {} of {} mm, the outermost {} mm from the axis",
+            *(f["pixels"], f["pixels"], f["mm_per_pixel"], f["support_mm"]),
+        ),
+        Table(heads, channels, alike=("scale",)),
+        Table(["channel, term", "sign", "energy", "middle pixel of the pass"], terms, ("sign",)),
+        Words("the fit found"),
+        *(
+            Words(
+                "{}:  eigenvalues [{}, {}]  scaled_by {}",
+                *(name, *found["eigenvalues"], found["scaled_by"]),
+            )
+            for name, found in f["parameters"].items()
+        ),
+    ]
+
+
+def _plain(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value)
 
 
 def shown(f: Figures) -> list[Any]:
@@ -887,6 +963,7 @@ PRINTED: dict[str, Layout] = {
     "render --irradiance disk --size 24x16 --structure": rendering,
     "render --irradiance edge --size 24x16 --border zero": rendering,
     "render --irradiance head --size 24x16 --screen": rendering,
+    "render wax.gaussians2.kernel.json --irradiance head --size 48x48 --transmit": rendering,
     "compare wax.profile.npz --only kernels --size 24x16": comparison,
     "compare wax.profile.npz --only kernels --size 24x16 --error l2 --cost passes": comparison,
     "compare wax.toml --only budget --rank 2 --size 24x16": comparison,
@@ -909,6 +986,11 @@ PRINTED: dict[str, Layout] = {
     "chart wax.profile.npz --spectrum": spectrum,
     "chart wax.profile.npz --guide": guide,
     "chart wax.toml --models": models,
+    "chart wax.svd2.kernel.json": kernel_chart,
+    "chart wax.toml": written,
+    "show wax.svd2.kernel.json": kernel_shown,
+    "show wax.toml": one_material,
+    "show plate.toml": one_material,
     "show wax.profile.npz": shown,
     "show plate.profile.npz": shown,
 }

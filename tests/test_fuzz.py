@@ -392,9 +392,8 @@ LIKELY = {
     "size": ("8x6", "3x3"),
     "count": ("2", "1000", "1e3"),
     "share": ("10%", "0.5"),
-    "integer range": ("1", "2", "3"),
-    "float": ("0.5", "1", "1.4"),
-    "float range": ("0.5", "30"),
+    "whole number": ("1", "2", "3"),
+    "number": ("0.5", "1", "1.4", "30"),
     "text": (
         "disk",
         "edge",
