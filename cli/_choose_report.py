@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from ._report import percent
+
 if TYPE_CHECKING:
     from sssfit.compare.choose import Choice, PhotonNeed, Step
 
@@ -204,7 +206,7 @@ def _loss(step: Step) -> str:
     """Say how far colours are off: mean and percentiles of Delta E, and how many pixels show."""
     return (
         f"Delta E {step.delta_e_2000_mean:.3g} (95 % of pixels within {step.delta_e_2000_p95:.3g}, "
-        f"99 % within {step.delta_e_2000_p99:.3g}; {100.0 * step.share_above_1:.2g} % above 1)"
+        f"99 % within {step.delta_e_2000_p99:.3g}; {percent(step.share_above_1, '.2g')} above 1)"
     )
 
 

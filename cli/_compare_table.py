@@ -197,7 +197,7 @@ def _cells(row: KernelRow, mark: str) -> list[str]:
         _or_dash(row.delta_e_2000_mean, ".3f"),
         _or_dash(row.delta_e_2000_p95, ".2f"),
         _or_dash(row.delta_e_2000_p99, ".2f"),
-        _or_dash(100.0 * row.share_above_1, ".1f", " %"),
+        "-" if math.isnan(row.share_above_1) else percent(row.share_above_1, ".3g"),
         f"{100.0 * row.relative_l2:.3g} %",
         f"{row.psnr_db:.1f}",
         percent(drift),
@@ -205,9 +205,9 @@ def _cells(row: KernelRow, mark: str) -> list[str]:
     ]
 
 
-def _or_dash(value: float, digits: str, unit: str = "") -> str:
+def _or_dash(value: float, digits: str) -> str:
     """Write a figure; a dash where there is none."""
-    return "-" if math.isnan(value) else f"{value:{digits}}{unit}"
+    return "-" if math.isnan(value) else f"{value:{digits}}"
 
 
 def _setting(comparison: Comparison) -> str:

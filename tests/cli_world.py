@@ -360,16 +360,16 @@ def small_choice(_real, given):
 
 
 def under_a_pixel() -> Any:
-    return choose.Choice(choice().profile, 30.0, 7.0)
+    return choose.Choice(choice().profile, 30.0, 7.0, "p95")
 
 
 def head_under_a_pixel() -> Any:
-    return choose.Choice(choice().profile, 30.0, 7.0, choice().scenes)
+    return choose.Choice(choice().profile, 30.0, 7.0, "mean", choice().scenes)
 
 
 def no_blur_is_within() -> Any:
     nothing = replace(choice().steps[0], within=True)
-    return choose.Choice(choice().profile, 0.5, 9.0, choice().scenes, (nothing,), nothing)
+    return choose.Choice(choice().profile, 0.5, 9.0, "p99", choice().scenes, (nothing,), nothing)
 
 
 def other_reasons() -> Any:
@@ -379,7 +379,7 @@ def other_reasons() -> Any:
         found.photons,
         photons=None,
         counts=(10_000, 100_000),
-        delta_e_2000_mean=(1.75, 1.25),
+        errors=(1.75, 1.25),
         seconds=(0.5, 1.5),
         truth_method="montecarlo",
     )
@@ -388,11 +388,12 @@ def other_reasons() -> Any:
     return replace(
         found,
         tolerance=found.tolerance + 0.0625,
-        cheaper=replace(found.cheaper, delta_e_2000_mean=0.5, within=False),
+        cheaper=replace(found.cheaper, error=0.5, within=False),
         dearer=(*found.dearer, replace(found.dearer[0], within=False)),
         steps=(*found.steps, replace(found.chosen, option=guided)),
         photons=photons,
         too_narrow=(5, 9),
+        unfitted=("gaussians 3", "gaussians 4"),
     )
 
 

@@ -473,8 +473,10 @@ def _pictures(
     *pictures: str, size: tuple[int, int] = (16, 24), mm_per_pixel: float = 0.3
 ) -> list[Scene]:
     height, width = size
+    own = {"edge": {"angle_degrees": 30.0}}
     return [
-        make_scene(name, height=height, width=width, mm_per_pixel=mm_per_pixel) for name in pictures
+        make_scene(name, height=height, width=width, mm_per_pixel=mm_per_pixel, **own.get(name, {}))
+        for name in pictures
     ]
 
 
@@ -538,13 +540,13 @@ COMPARE = {
         "--picture points --picture edge,disk",
         calls,
         lambda: _compared(_pictures("points", "edge", "disk")),
-        default="disk,edge,head",
+        default="disk,edge,points,head",
     ),
     "--mm-per-pixel": Row(
         _KERNELS,
         "--mm-per-pixel .45",
         calls,
-        lambda: _compared(_pictures("disk", "edge", "head", mm_per_pixel=0.45), 0.45),
+        lambda: _compared(_pictures("disk", "edge", "points", "head", mm_per_pixel=0.45), 0.45),
         default="0.3",
         words="what your own file says, else 0.3",
     ),
@@ -661,7 +663,8 @@ def _chosen(
     if isinstance(scene, Scene):
         own["scene"] = scene
     elif scene:
-        own["scene"] = make_scene(scene, height=512, width=512, mm_per_pixel=pitch)
+        angle = {"angle_degrees": 30.0} if scene == "edge" else {}
+        own["scene"] = make_scene(scene, height=512, width=512, mm_per_pixel=pitch, **angle)
     return called(
         "sssfit.compare.choose.choose",
         wax(),
@@ -707,6 +710,13 @@ CHOOSE = {
     "--tolerance": Row(
         _CHOOSE, "--tolerance .7", _asked, lambda: _rounded(_chosen(tolerance=0.7)), default="1.0"
     ),
+    "--tolerance-of": Row(
+        _CHOOSE,
+        "--tolerance-of p99",
+        _asked,
+        lambda: _rounded(_chosen(tolerance_of="p99")),
+        default="p95",
+    ),
     "--irradiance": Row(
         _CHOOSE,
         "--irradiance edge",
@@ -732,11 +742,16 @@ CHOOSE = {
         _CHOOSE,
         "-o x.kernel.json",
         names,
-        lambda: ["x.kernel.json"],
+        lambda: ["x.kernel.json", "x.profile.npz"],
         default="wax.chosen.kernel.json",
         words="MATERIAL.chosen.kernel.json",
     ),
-    "--force": Row(f"{_CHOOSE} -o foreign.json", "--force", names, lambda: ["foreign.json"]),
+    "--force": Row(
+        f"{_CHOOSE} -o foreign.json",
+        "--force",
+        names,
+        lambda: ["foreign.json", "foreign.profile.npz"],
+    ),
 }
 
 # materials
