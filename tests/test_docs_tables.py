@@ -22,9 +22,10 @@ from sssfit.compare.guide import compute_guide
 from sssfit.compare.sheet import compute_sheet
 from sssfit.compare.spectrum import compute_spectrum
 from sssfit.errors import SssfitWarning
-from sssfit.fit import METHODS, fit_gaussians, fit_preintegrated, fit_svd
+from sssfit.fit import fit_gaussians, fit_preintegrated, fit_svd
 from sssfit.material import load_material, material_names
 from sssfit.profile import full_kernel
+from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS
 from sssfit.simulate import (
     simulate_burley,
     simulate_deon_skin,
@@ -307,16 +308,14 @@ def misplaced(model, true, channel):
     return 0.5 * np.abs(shares[0] - shares[1]).sum()
 
 
-@pytest.mark.filterwarnings("ignore::sssfit.errors.SssfitWarning")
-def test_errors_of_all_methods(skin1):
-    rows = {row[0]: row[1:] for row in table_with("benchmarks-fit.md", "material, method", "mm")}
-    assert len(rows) == len(METHODS) * len(material_names())
-    for method in ("svd", "gaussians", "preintegrated", "artist", "burley"):
-        fitted = METHODS[method].fit(skin1, mm_per_pixel=0.1)
-        cells = rows[f"skin1, {method}"]
-        assert numbers(cells[1]) == [fitted.kernel.rank]
-        for cell, error in zip(cells[2:5], fitted.relative_frobenius_error, strict=True):
-            assert float(cell) == pytest.approx(100.0 * error, rel=6e-3)
+def test_light_through_slabs():
+    ours, listing = table_with("screen-space.md", "s (mm)")
+    (heads,) = [rows[0] for _, _, rows in EVERY if rows[0][0] == "s (mm)"]
+    red, variances = np.array(SKIN_WEIGHTS)[:, 0], np.array(SKIN_VARIANCES_MM2)
+    for k, s_mm in enumerate(map(float, heads[1:]), start=1):
+        for row, widths in ((ours, 2.0), (listing, 1.0)):
+            through = red @ np.exp(-(s_mm**2) / (widths * variances))
+            assert_cell(row[k], 100.0 * through)
 
 
 def test_figures_of_the_contact_sheet(skin1):
