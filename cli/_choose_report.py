@@ -5,8 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from ._report import percent
+
 if TYPE_CHECKING:
     from sssfit.compare.choose import Choice, PhotonNeed, Step
+
+_FIGURES = {"p95": "95th percentile", "p99": "99th percentile", "mean": "mean"}
 
 
 def figures_of(choice: Choice) -> dict[str, Any]:
@@ -18,6 +22,7 @@ def figures_of(choice: Choice) -> dict[str, Any]:
         "mm_per_pixel": choice.mm_per_pixel,
         "support_mm": choice.support_mm,
         "tolerance": choice.tolerance,
+        "tolerance_of": choice.tolerance_of,
         "pictures": [
             {
                 "irradiance": each.name,
@@ -42,6 +47,7 @@ def figures_of(choice: Choice) -> dict[str, Any]:
         "cheaper": _row(choice.cheaper),
         "dearer": [_row(each) for each in choice.dearer],
         "too_narrow": list(choice.too_narrow),
+        "unfitted": list(choice.unfitted),
         "photons": _photons(choice.photons),
         "rows": [_row(each) for each in choice.steps],
     }
@@ -49,6 +55,8 @@ def figures_of(choice: Choice) -> dict[str, Any]:
 
 def _row(step: Step | None) -> dict[str, Any] | None:
     """One step; method null is no blur."""
+    from sssfit.compare.metrics import COLOUR_FIGURES
+
     if step is None:
         return None
     option = step.option
@@ -61,8 +69,8 @@ def _row(step: Step | None) -> dict[str, Any] | None:
         "support_mm": option and option.support_mm,
         "pixels": option.pixels if option else 1,
         "taps_per_pixel": step.taps_per_pixel,
-        "delta_e_2000_mean": step.delta_e_2000_mean,
-        "delta_e_2000_p99": step.delta_e_2000_p99,
+        "error": step.error,
+        **{key: getattr(step, key) for key in COLOUR_FIGURES},
         "mm_per_pixel": step.mm_per_pixel,
         "within": step.within,
     }
@@ -74,7 +82,7 @@ def _photons(need: PhotonNeed | None) -> dict[str, Any] | None:
     return {
         "photons": need.photons,
         "tried": list(need.counts),
-        "delta_e_2000_mean": list(need.delta_e_2000_mean),
+        "errors": list(need.errors),
         "seconds": list(need.seconds),
         "profile_seconds": need.truth_seconds,
     }
@@ -83,7 +91,7 @@ def _photons(need: PhotonNeed | None) -> dict[str, Any] | None:
 def step_line(step: Step) -> str:
     """Write a step as a line: what it is, what it costs, what it loses."""
     return (
-        f"{_what(step)}: {step.taps_per_pixel} weights, Delta E {step.delta_e_2000_mean:.3g}, "
+        f"{_what(step)}: {step.taps_per_pixel} weights, {_loss(step)}, "
         f"{'within' if step.within else 'not enough'}"
     )
 
@@ -92,10 +100,11 @@ def text_of(choice: Choice, written: Sequence[str], figures: Mapping[str, Any]) 
     """Write the choice first, then why neither less nor more."""
     where = (
         f"{figures['material']} at {figures['distance_mm'] / 1000.0:g} m, {choice.mm_per_pixel:.4g}"
-        f" mm per pixel, mean Delta E within {choice.tolerance:g}:"
+        f" mm per pixel, {_FIGURES[choice.tolerance_of]} of Delta E within {choice.tolerance:g}:"
     )
     lines = [where, *(_no_blur(choice) if choice.fit is None else _kernel(choice)), *_seen(choice)]
-    return "\n".join([*lines, f"Wrote {written[0]}" if written else "No kernel is written."])
+    wrote = f"Wrote {', '.join(written)}" if written else "No kernel is written."
+    return "\n".join([*lines, wrote])
 
 
 def _no_blur(choice: Choice) -> list[str]:
@@ -129,15 +138,15 @@ def _kernel(choice: Choice) -> list[str]:
         why = _why(choice, choice.cheaper)
         lines.append(f"cheaper is not enough: {_beside(choice.cheaper, chosen)}{why}")
     lines += [
-        f"dearer {'is not needed' if each.within else 'is no better'}: {_beside(each, chosen)}"
+        f"dearer {'is not needed' if each.within else 'is not enough'}: {_beside(each, chosen)}"
         for each in choice.dearer
     ]
     return [*lines, *_untried(choice), *_photon_lines(choice.photons)]
 
 
 def _why(choice: Choice, step: Step) -> str:
-    """Say why a step is out although its Delta E is within: wider views have 95 % of it."""
-    if step.within or step.delta_e_2000_mean > choice.tolerance:
+    """Say why a step is out although its error is within: wider views have 95 % of it."""
+    if step.within or step.error > choice.tolerance:
         return ""
     return f", on a wider view, which may have {choice.wider_tolerance:.3g}"
 
@@ -151,6 +160,8 @@ def _untried(choice: Choice) -> list[str]:
             f"not tried: kernels of {', '.join(map(str, choice.too_narrow))} pixels, to which even "
             "the true one cannot be cut"
         )
+    if choice.unfitted:
+        lines.append(f"cannot be fitted to this profile: {', '.join(choice.unfitted)}")
     if not any(each.candidate.method == "guided" for each in tried):
         lines.append(
             "not tried: guided fits, for their time, where another pass will do or one is wide"
@@ -168,9 +179,7 @@ def _photon_lines(need: PhotonNeed | None) -> list[str]:
         enough = f"a walk of {need.photons:.0e} photons would do"
     tried = ", ".join(
         f"{count:.0e} Delta E {error:.3g} in {seconds:.1f} s"
-        for count, error, seconds in zip(
-            need.counts, need.delta_e_2000_mean, need.seconds, strict=True
-        )
+        for count, error, seconds in zip(need.counts, need.errors, need.seconds, strict=True)
     )
     by = "needs none" if need.truth_method == "exact" else "is the truth here"
     text = f"photons: {enough} ({tried}); {need.truth_method} {by}, {need.truth_seconds:.1f} s"
@@ -194,7 +203,11 @@ def _what(step: Step) -> str:
 
 
 def _loss(step: Step) -> str:
-    return f"Delta E {step.delta_e_2000_mean:.3g} (99th percentile {step.delta_e_2000_p99:.3g})"
+    """Say how far colours are off: mean and percentiles of Delta E, and how many pixels show."""
+    return (
+        f"Delta E {step.delta_e_2000_mean:.3g} (95 % of pixels within {step.delta_e_2000_p95:.3g}, "
+        f"99 % within {step.delta_e_2000_p99:.3g}; {percent(step.share_above_1, '.2g')} above 1)"
+    )
 
 
 def _beside(step: Step, chosen: Step) -> str:

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from ._compare_input import material_of
 from ._compiling import say_if_compiling
-from ._deon_skin import DEON_SKIN
 from ._figure import chart_path, write_chart
 from ._options import Common
 from ._report import percent, table
@@ -17,8 +17,11 @@ if TYPE_CHECKING:
     from sssfit.compare.budget import Budget, Cause
     from sssfit.render.scene import Scene
 
-_HEADS = ["", "Delta E mean", "p99", "relative L2", "largest drift", "of the whole"]
-_SCORES = ("delta_e_2000_mean", "delta_e_2000_p99", "relative_l2", "energy_drift")
+_HEADS = ["", "Delta E mean", "p95", "p99", "relative L2", "largest drift", "of the whole"]
+_SCORES = (
+    *("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99", "share_above_1"),
+    *("relative_l2", "energy_drift"),
+)
 
 
 @dataclass(frozen=True)
@@ -75,14 +78,10 @@ def _budgets(
 ) -> list[Budget]:
     """Read the material and take the errors of its pictures apart."""
     from sssfit.compare.budget import error_budgets
-    from sssfit.errors import ProfileError
-    from sssfit.material import load_material
 
     from ._progress import walk_progress
 
-    if name == DEON_SKIN:
-        raise ProfileError(f"{name} has no coefficients for other methods; name a material.")
-    material = load_material(name)
+    material = material_of(name, "a budget")
     say_if_compiling(common, walk=material, solver=True)
     with walk_progress(material.name, quiet=common.quiet) as show:
         return error_budgets(
@@ -144,10 +143,11 @@ def _line(budget: Budget, cause: Cause) -> list[str]:
     name = cause.name if cause.is_in_whole else f"({cause.name})"
     score = cause.score
     if score is None:
-        return [name, cause.hint, "", "", "", ""]
+        return [name, cause.hint, "", "", "", "", ""]
     return [
         name,
         _number(score.delta_e_2000_mean, ".4f"),
+        _number(score.delta_e_2000_p95, ".3f"),
         _number(score.delta_e_2000_p99, ".3f"),
         f"{100.0 * score.relative_l2:.4f} %",
         percent(max(score.energy_drift, key=abs), "+.3f"),

@@ -12,9 +12,10 @@ from ._compiling import say_if_compiling
 from ._deon_skin import DEON_SKIN
 from ._options import Common
 from ._report import binary_stdin
-from ._scene import MADE, Picture, check_file_options, make_or_read
+from ._scene import MADE, Picture, check_file_options, made_options, make_or_read
 
 if TYPE_CHECKING:
+    from sssfit.material import Material
     from sssfit.profile import Profile
     from sssfit.render.scene import Scene
 
@@ -35,6 +36,21 @@ def profile_of(name: str, common: Common) -> Profile:
 
         return simulate_deon_skin()
     return _exact(name, common)
+
+
+def material_of(name: str, what: str) -> Material:
+    """Load a material; of a profile, which has no light to trace, say what ``what`` needs."""
+    from sssfit.errors import ProfileError
+    from sssfit.material import load_material
+
+    if name == DEON_SKIN:
+        raise ProfileError(f"{name} has no coefficients to simulate with; name a material.")
+    if name.endswith(".npz"):
+        raise ProfileError(
+            f"{name} is a profile, and {what} simulates a material: name that, such as skin1 or a "
+            ".toml file of your own."
+        )
+    return load_material(name)
 
 
 def _exact(name: str, common: Common) -> Profile:
@@ -84,6 +100,6 @@ def scenes_of(
     return [
         read[name]
         if name in read
-        else make_or_read(Picture(name, size or _SIZE, None, {}), pitch, common)
+        else make_or_read(Picture(name, size or _SIZE, None, made_options(name)), pitch, common)
         for name in pictures
     ], pitch

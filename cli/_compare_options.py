@@ -9,10 +9,10 @@ import click
 
 from ._compare_input import MM_PER_PIXEL
 from ._fits import FITS
-from ._options import Count, Length
-from ._scene import FILE_OPTIONS, MADE, Size
+from ._options import Count, Length, WholeRange
+from ._scene import EDGE_DEGREES, FILE_OPTIONS, MADE, Size
 
-PICTURES = "disk,edge,head"
+PICTURES = "disk,edge,points,head"
 
 _OPTIONS = (
     click.option("--all", "every", is_flag=True, help="All materials that ship with sssfit."),
@@ -26,8 +26,8 @@ _OPTIONS = (
         "pictures",
         metavar="NAME|FILE,...",
         multiple=True,
-        help=f"What is lit: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG files."
-        f"  [default: {PICTURES}]",
+        help=f"What is lit: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG files. The edge "
+        f"is at {EDGE_DEGREES:g} degrees.  [default: {PICTURES}]",
     ),
     click.option(
         "--mm-per-pixel",
@@ -79,10 +79,10 @@ _OPTIONS = (
         help="The kernel whose budget it is.",
     ),
     click.option(
-        "--rank", type=click.IntRange(1, 1000), metavar="N", help="Its rank, svd.  [default: 3]"
+        "--rank", type=WholeRange(1, 1000), metavar="N", help="Its rank, svd.  [default: 3]"
     ),
     click.option(
-        "--terms", type=click.IntRange(1, 10), metavar="N", help="Its Gaussians.  [default: 4]"
+        "--terms", type=WholeRange(1, 10), metavar="N", help="Its Gaussians.  [default: 4]"
     ),
     click.option(
         "--model",

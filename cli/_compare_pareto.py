@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -70,8 +71,20 @@ def compare_one(name: str, outputs: Outputs, wish: Wish) -> tuple[dict[str, Any]
     """
     comparison = _compared(profile_of(name, wish.common), *wish.scenes, wish)
     _write(comparison, outputs, wish)
-    figures = {"error": wish.error, "cost": wish.cost, **figures_of(comparison)}
+    figures = {
+        "error": wish.error,
+        "cost": wish.cost,
+        **figures_of(comparison),
+        "verdict": _verdict_figures(comparison, wish),
+    }
     return figures, text_of(comparison, wish.error, wish.cost)
+
+
+def _verdict_figures(comparison: Comparison, wish: Wish) -> list[dict[str, Any]]:
+    """Return what the verdict is made from, cheapest first."""
+    from sssfit.compare.comparison import verdicts
+
+    return [dataclasses.asdict(each) for each in verdicts(comparison, wish.error, wish.cost)]
 
 
 def compare_all(folder: Path, wish: Wish) -> None:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ._compare_input import material_of
 from ._compiling import say_if_compiling
-from ._deon_skin import DEON_SKIN
 from ._figure import chart_path, write_chart
 from ._options import Common
 from ._report import finish, table
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 MOST_PHOTONS = 10**7
 _LEAST_PHOTONS = 10_000
 _PER_DECADE = 2
+_COLOURS = ("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99", "share_above_1")
 
 
 def chart_sheet(profile: Profile, output: str, mm_per_pixel: float | None, common: Common) -> None:
@@ -58,12 +59,14 @@ def chart_convergence(name: str, output: str, photons: int | None, common: Commo
     ``photons`` is the largest number walked.
     """
     from sssfit.errors import SimulationError
-    from sssfit.material import load_material
 
-    if name == DEON_SKIN:
-        raise SimulationError(f"{name} has no coefficients to simulate with; name a material.")
     numbers = photon_numbers(photons or MOST_PHOTONS)
-    material = load_material(name)
+    material = material_of(name, "a convergence")
+    if not material.is_semi_infinite:
+        raise SimulationError(
+            f"{material.name} is not one half space: walks are held against the exact solution, "
+            "and only half spaces have one; name another material."
+        )
     from sssfit.compare.convergence import compute_convergence
 
     say_if_compiling(common, walk=material, solver=True)
@@ -114,8 +117,7 @@ def _sheet_figures(sheet: Sheet) -> dict[str, Any]:
             {
                 "label": row.label,
                 "passes": row.passes,
-                "delta_e_2000_mean": [each.score.delta_e_2000_mean for each in row.panels],
-                "delta_e_2000_p99": [each.score.delta_e_2000_p99 for each in row.panels],
+                **{key: [getattr(each.score, key) for each in row.panels] for key in _COLOURS},
                 "relative_l2": [each.score.relative_l2 for each in row.panels],
             }
             for row in sheet.rows
@@ -144,14 +146,12 @@ def _editing_figures(editing: Editing) -> dict[str, Any]:
     """Figures of edits."""
     return {
         "mm_per_pixel": editing.mm_per_pixel,
-        "original_delta_e_2000_mean": editing.original_score.delta_e_2000_mean,
-        "original_delta_e_2000_p99": editing.original_score.delta_e_2000_p99,
+        **{f"original_{key}": getattr(editing.original_score, key) for key in _COLOURS},
         "rows": [
             {
                 "label": each.label,
                 **each.settings,
-                "delta_e_2000_mean": each.panel.score.delta_e_2000_mean,
-                "delta_e_2000_p99": each.panel.score.delta_e_2000_p99,
+                **{key: getattr(each.panel.score, key) for key in _COLOURS},
             }
             for each in editing.edits
         ],

@@ -13,13 +13,15 @@ from typing import TYPE_CHECKING, Any
 from ._report import percent, plain, table
 
 if TYPE_CHECKING:
-    from sssfit.compare.comparison import Comparison, KernelRow, Picture
+    from sssfit.compare.comparison import Comparison, KernelRow, Picture, Verdict
 
 FORMATS = (".md", ".csv", ".json")
 _HEADS = (
-    *("kernel", "passes", "weights", "s/Mpixel", "Delta E", "99th", "relative L2", "PSNR, dB"),
-    *("energy drift", "asymmetry"),
+    *("kernel", "passes", "weights", "s/Mpixel", "Delta E", "95th", "99th", "above 1"),
+    *("relative L2", "PSNR, dB", "energy drift", "asymmetry"),
 )
+_COST_WORDS = {"weights": "weights a pixel", "passes": "passes", "seconds": "s a megapixel"}
+_ERROR_WORDS = {"delta-e": "Mean Delta E", "l2": "Relative L2"}
 _FORMAT = "sssfit.table/1"
 # What our files begin with, and are known by.
 _MARKS = {
@@ -32,10 +34,11 @@ _MARKS = {
 def row_figures(row: KernelRow, comparison: Comparison) -> dict[str, Any]:
     """Everything of a row, as ``--json`` has it; null where nothing was measured."""
     from sssfit.compare.comparison import COSTS, ERRORS
+    from sssfit.compare.metrics import COLOUR_FIGURES
 
     keys = (
-        *("picture", "label", "method", "rank", "settings", "delta_e_2000_mean"),
-        *("delta_e_2000_p99", "relative_l2", "rmse", "psnr_db", "energy_drift"),
+        *("picture", "label", "method", "rank", "settings", *COLOUR_FIGURES),
+        *("relative_l2", "rmse", "psnr_db", "energy_drift"),
         *("radial_asymmetry", "passes", "taps_per_pixel", "kernel_bytes", "taps"),
         *("seconds_per_megapixel", "fit_seconds", "relative_frobenius_error", "stop_reasons"),
     )
@@ -75,12 +78,43 @@ def text_of(comparison: Comparison, error: str, cost: str) -> str:
         parts.append(f"{_picture_line(picture)}\n{table(['  kernel', *_HEADS[1:]], cells)}")
     parts.append(f"* {_front(error, cost)}")
     parts += left_out_lines(comparison)
+    parts.append("\n".join(verdict_lines(comparison, error, cost)))
     return "\n\n".join(parts)
 
 
 def left_out_lines(comparison: Comparison) -> list[str]:
     """Say which candidates could not be fitted, and why."""
     return [f"Left out {label}: {reason}" for label, reason in comparison.left_out]
+
+
+def verdict_lines(comparison: Comparison, error: str, cost: str) -> list[str]:
+    """Say in two lines which kernel to take for which budget, and how near that comes."""
+    from sssfit.compare.comparison import verdicts
+
+    found = verdicts(comparison, error, cost)
+    first, *others = found
+    more = "".join(f", {each.label} from {each.cost:g}" for each in others)
+    cheapest, closest = first, found[-1]
+    far = f"{cheapest.label} {_error(cheapest.error, error)} ({cheapest.picture})"
+    near = f"{closest.label} {_error(closest.error, error)} ({closest.picture})"
+    both = f"the cheapest, {far}; the closest, {near}" if others else f"cheapest and closest, {far}"
+    return [
+        f"Take {first.label} for {first.cost:g} {_COST_WORDS[cost]}{more}: over the pictures, no "
+        "other is as near for as little.",
+        f"{_ERROR_WORDS[error]} on the worst picture: {both}; {_unseen(found)}.",
+    ]
+
+
+def _unseen(found: Sequence[Verdict]) -> str:
+    """Name the cheapest whose error 95 % of the pixels of every picture do not show."""
+    for each in found:
+        if each.delta_e_2000_p95 <= 1.0:
+            return f"from {each.label} on, 95 % of every picture are within a Delta E of 1"
+    return "none has 95 % of every picture within a Delta E of 1"
+
+
+def _error(value: float, error: str) -> str:
+    return f"{100.0 * value:.3g} %" if error == "l2" else f"{value:.3g}"
 
 
 def table_text(comparison: Comparison, ending: str, error: str, cost: str) -> str:
@@ -111,6 +145,7 @@ def _markdown(comparison: Comparison, error: str, cost: str) -> str:
         parts.append(f"## {_picture_line(picture)}\n\n" + "\n".join([head, *lines]))
     parts.append(f"Bold: {_front(error, cost)}.")
     parts += left_out_lines(comparison)
+    parts.append("\n".join(verdict_lines(comparison, error, cost)))
     return "\n\n".join(parts) + "\n"
 
 
@@ -160,7 +195,9 @@ def _cells(row: KernelRow, mark: str) -> list[str]:
         f"{row.taps_per_pixel}",
         f"{row.seconds_per_megapixel:.2g}",
         _or_dash(row.delta_e_2000_mean, ".3f"),
+        _or_dash(row.delta_e_2000_p95, ".2f"),
         _or_dash(row.delta_e_2000_p99, ".2f"),
+        "-" if math.isnan(row.share_above_1) else percent(row.share_above_1, ".3g"),
         f"{100.0 * row.relative_l2:.3g} %",
         f"{row.psnr_db:.1f}",
         percent(drift),

@@ -7,15 +7,15 @@ from typing import Any
 
 import click
 
-from ._options import ListOf
+from ._options import ListOf, Number, WholeRange
 
-_NUMBER = click.FLOAT
+_NUMBER = Number()
 _PER_CHANNEL = ListOf(_NUMBER)
 
 _OPTIONS = (
     click.option(
         "--rank",
-        type=click.IntRange(1, 1000),
+        type=WholeRange(1, 1000),
         metavar="N",
         help="svd: number of terms.  [default: 3]",
     ),
@@ -27,7 +27,7 @@ _OPTIONS = (
     ),
     click.option(
         "--terms",
-        type=click.IntRange(1, 10),
+        type=WholeRange(1, 10),
         metavar="N",
         help="gaussians: how many.  [default: 4]",
     ),

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 # Heads the files we make: only a file that begins with it is replaced without --force.
 _OURS = "# Made by `sssfit materials --from-reflectance`, which may replace this file;"
+_DARK = 1e-9  # a reflectance that no relative error is given for: the fits were not made for it
 _PUBLISHED = {"chiang2016": "Chiang et al. 2016", "van_de_hulst": "van de Hulst"}
 
 
@@ -178,5 +179,6 @@ def _text(figures: dict[str, Any]) -> str:
 def _given(published: dict[str, Any], asked: list[float], channel: int) -> str:
     """Albedo, reflectance and its relative error."""
     gives = published["reflectance"][channel]
-    error = f" ({100.0 * (gives / asked[channel] - 1.0):+#.3g} %)" if asked[channel] else ""
+    is_dark = asked[channel] < _DARK
+    error = "" if is_dark else f" ({100.0 * (gives / asked[channel] - 1.0):+#.3g} %)"
     return f"{published['albedo'][channel]:.6f}, {gives:.6f}{error}"

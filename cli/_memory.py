@@ -1,4 +1,4 @@
-"""The memory this process may use: too little for a verb is said before anything is loaded.
+"""What a process is given: too little memory, or nonsense, is said before anything is loaded.
 
 Under such a limit (``ulimit -v``, a batch system's) compiled libraries do not raise MemoryError: at
 400 MB scipy's BLAS tried for ever to get its buffers, at 520 MB the process ended in a segmentation
@@ -8,6 +8,7 @@ fault. So the limit is compared with what a verb's libraries and threads take, a
 from __future__ import annotations
 
 import errno
+import os
 import sys
 
 import click
@@ -60,6 +61,21 @@ def check_memory(what: str, threads: int | None) -> None:
         raise click.ClickException(
             f"this process may use {limit / 1e6:.0f} MB of memory (ulimit -v), and this takes "
             f"about {needed} MB; raise the limit{hint}."
+        )
+
+
+def check_threads_of_numba() -> None:
+    """Refuse, in one line, a number of threads that numba would not be imported with.
+
+    Raises
+    ------
+    click.ClickException
+        NUMBA_NUM_THREADS is no whole number above 0.
+    """
+    given = os.environ.get("NUMBA_NUM_THREADS")
+    if given is not None and not (given.strip().isdecimal() and int(given)):
+        raise click.ClickException(
+            f"NUMBA_NUM_THREADS = {given!r}; set it to a whole number from 1 up, or unset it."
         )
 
 

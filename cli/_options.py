@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from ._memory import check_memory
+from ._memory import check_memory, check_threads_of_numba
 
 _MM_PER_UNIT = {"": 1.0, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 
@@ -33,17 +33,17 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
     @click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")
     @click.option(
         "--threads",
-        type=click.IntRange(1, 1024),
+        type=WholeRange(1, 1024),
         metavar="N",
         help="Threads to use; results do not depend on it.  [default: all cores]",
     )
     @click.option(
         "--seed",
-        type=click.IntRange(0, 2**63 - 1),
+        type=WholeRange(0, 2**63 - 1),
         default=1,
         show_default=True,
         metavar="N",
-        help="Seed of whatever is random.",
+        help="Random seed.",
     )
     @functools.wraps(command)
     def wrapper(
@@ -55,11 +55,46 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
         seed: int,
         **kwargs: Any,
     ) -> Any:
+        check_threads_of_numba()
         check_memory(command.__name__.rstrip("_"), threads)
         common = Common(quiet, verbose, as_json, threads, seed)
         return command(*args, common=common, **kwargs)
 
     return wrapper
+
+
+class WholeRange(click.IntRange):
+    """A range of whole numbers, named as such in the line said about what is not one."""
+
+    name = "whole number"
+
+
+class Number(click.types.FloatParamType):
+    """A finite number; float("nan") compares as no limit expects."""
+
+    name = "number"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Parse ``value``; a usage error (exit 2) names what was expected."""
+        number: float = super().convert(value, param, ctx)
+        if not math.isfinite(number):
+            self.fail(f"{value!r} is not a finite number.", param, ctx)
+        return number
+
+
+class NumberRange(click.FloatRange):
+    """A range of finite numbers."""
+
+    name = "number"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Parse ``value``; a usage error (exit 2) names what was expected."""
+        number: float = super().convert(Number().convert(value, param, ctx), param, ctx)
+        return number
 
 
 class Length(click.ParamType[float]):

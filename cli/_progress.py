@@ -7,7 +7,11 @@ from collections.abc import Callable, Iterator
 from datetime import timedelta
 from typing import TYPE_CHECKING
 
+_PIPED_COLUMNS = 80
+
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from sssfit.simulate import Progress as WalkProgress
 
 
@@ -17,7 +21,6 @@ def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[["WalkProgres
     if quiet:
         yield None
         return
-    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
     bar = Progress(
@@ -27,7 +30,7 @@ def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[["WalkProgres
         TextColumn("{task.fields[rate]}"),
         TextColumn("error {task.fields[error]}"),
         TextColumn("{task.fields[left]}"),
-        console=Console(stderr=True),
+        console=_console(),
     )
     task = bar.add_task(label, total=None, rate="", error="-", left="")
     first: list[WalkProgress] = []
@@ -52,6 +55,14 @@ def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[["WalkProgres
     finally:
         if bar.live.is_started:
             bar.stop()
+
+
+def _console() -> "Console":
+    """Return stderr; where it is no terminal, COLUMNS must not cut the one line short."""
+    from rich.console import Console
+
+    is_terminal = sys.stderr is not None and sys.stderr.isatty()
+    return Console(stderr=True, width=None if is_terminal else _PIPED_COLUMNS)
 
 
 @contextlib.contextmanager

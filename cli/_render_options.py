@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from ._options import Length
+from ._options import Length, Number
 from ._scene import FILE_OPTIONS, MADE, Size
 
 _OPTIONS = (
@@ -35,7 +35,7 @@ _OPTIONS = (
     click.option(
         "--angle",
         "angle_degrees",
-        type=click.FLOAT,
+        type=Number(),
         metavar="DEGREES",
         help="edge, stripes: the direction of their normal.  [default: 0]",
     ),

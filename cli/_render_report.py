@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 _SCORES = (
     *("rmse", "relative_l2", "maximum", "psnr_db", "energy_drift"),
-    *("delta_e_2000_mean", "delta_e_2000_p99", "exposure", "ssim", "flip"),
+    *("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99", "share_above_1"),
+    *("exposure", "ssim", "flip"),
 )
 
 
@@ -101,6 +102,8 @@ def _colours(figures: Mapping[str, Any]) -> str:
     if math.isnan(figures["delta_e_2000_mean"]):
         return f"no Delta E: {len(figures['channels'])} channels are no colour"
     return (
-        f"Delta E 2000 mean {figures['delta_e_2000_mean']:.3g}, 99th percentile "
-        f"{figures['delta_e_2000_p99']:.3g}, at exposure {figures['exposure']:.4g}"
+        f"Delta E 2000 mean {figures['delta_e_2000_mean']:.3g}, 95th percentile "
+        f"{figures['delta_e_2000_p95']:.3g}, 99th {figures['delta_e_2000_p99']:.3g}, "
+        f"{percent(figures['share_above_1'], '.2g')} of pixels above 1, at exposure "
+        f"{figures['exposure']:.4g}"
     )

@@ -9,13 +9,15 @@ from typing import Any, BinaryIO
 
 import click
 
+from sssfit.text import printable
+
 from ._options import Common
 
 
 def say(common: Common, line: str) -> None:
     """Put a word on stderr, unless -q."""
     if not common.quiet:
-        click.echo(line, err=True)
+        click.echo(printable(line), err=True)
 
 
 def finish(
@@ -28,7 +30,15 @@ def finish(
     if common.json:
         click.echo(json.dumps(plain(figures), allow_nan=False), err=to_stderr)
     elif not common.quiet:
-        click.echo(text, err=to_stderr)
+        click.echo(_legible(text, figures), err=to_stderr)
+
+
+def _legible(text: str, figures: Mapping[str, Any]) -> str:
+    """Escape what would move the cursor; a name that holds a newline stays on its line."""
+    for name in (*figures.get("output", ()), *figures.values()):
+        if isinstance(name, str) and "\n" in name:
+            text = text.replace(name, printable(name))
+    return "\n".join(printable(line) for line in text.split("\n"))
 
 
 def newest(common: Common, pattern: str, made_by: str) -> Path:

@@ -13,6 +13,7 @@ from typing import NoReturn, TextIO
 import click
 
 from sssfit.errors import SssfitError, SssfitWarning
+from sssfit.text import printable
 
 from ._group import cli
 from ._memory import is_out_of_memory
@@ -78,8 +79,6 @@ def _refuse(error: click.ClickException) -> NoReturn:
 
 def _one_line(text: str) -> str:
     """Escape what would move the cursor or the line, and cut the middle out of what is too long."""
-    from sssfit._material_checks import printable
-
     line = printable(text)
     half = _LONGEST_LINE // 2
     return line if len(line) <= _LONGEST_LINE else f"{line[:half]} ... {line[-half:]}"
@@ -99,11 +98,14 @@ def _show_warning(
     file: TextIO | None = None,  # noqa: ARG001 (part of the protocol)
     line: str | None = None,
 ) -> None:
-    """Print our own warnings as one line, others as Python would."""
-    if issubclass(category, SssfitWarning):
+    """Print a warning as one line; of others than ours what they begin with, and their kind."""
+    if os.environ.get("SSSFIT_TRACEBACK"):
+        click.echo(warnings.formatwarning(message, category, filename, lineno, line), err=True)
+    elif issubclass(category, SssfitWarning):
         click.echo(f"Warning: {_one_line(str(message))}", err=True)
     else:
-        click.echo(warnings.formatwarning(message, category, filename, lineno, line), err=True)
+        words = str(message).strip().partition("\n")[0]  # numba's go on with a traceback
+        click.echo(f"Warning: {_one_line(words)} ({category.__name__})", err=True)
 
 
 def _keep_matplotlib_quiet() -> None:

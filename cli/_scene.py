@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,8 +18,11 @@ if TYPE_CHECKING:
     from sssfit.render.scene import Scene
 
 MADE = ("head", "disk", "edge", "separable", "stripes", "points", "noise", "highlights")
+# Of the edge that kernels are compared on: along an axis a pre-integrated one is exact.
+EDGE_DEGREES = 30.0
 _ROWS = 512
 _MOST_ROWS = 1080  # of a head whose size is not given
+_COUNT = re.compile("0*[1-9][0-9]{0,8}")  # a picture of more columns than that has no memory
 
 
 FILE_OPTIONS = (
@@ -56,7 +60,7 @@ class Size(click.ParamType[tuple[int, int]]):
         if isinstance(value, tuple):
             return value
         width, _, height = str(value).lower().partition("x")
-        if not (width.isdecimal() and height.isdecimal() and int(width) and int(height)):
+        if not all(_COUNT.fullmatch(each) for each in (width, height)):
             self.fail(f"{value!r} is not a size in pixels, such as 1920x1080.", param, ctx)
         return int(height), int(width)
 
@@ -84,6 +88,11 @@ class Picture:
     def name(self) -> str:
         """For file names."""
         return self.irradiance if self.is_made else Path(self.irradiance).stem
+
+
+def made_options(name: str) -> dict[str, Any]:
+    """Options of the made pictures that kernels are compared on."""
+    return {"angle_degrees": EDGE_DEGREES} if name == "edge" else {}
 
 
 def make_or_read(picture: Picture, mm_per_pixel: float, common: Common) -> Scene:

@@ -1,25 +1,27 @@
-"""``sssfit choose``: the cheapest kernel that a scene can do with."""
+"""``sssfit choose``: the cheapest kernel whose error a scene does not show."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ._choose_report import figures_of, step_line, text_of
 from ._compiling import say_if_compiling
 from ._deon_skin import DEON_SKIN
-from ._options import Common, Length, common_options
-from ._outputs import KERNEL, held
-from ._report import binary_stdout, finish, say
+from ._options import Common, Length, Number, NumberRange, common_options
+from ._outputs import KERNEL, PROFILE, held
+from ._report import binary_stdin, binary_stdout, finish, percent, say
 from ._scene import (
+    EDGE_DEGREES,
     MADE,
     Picture,
     Size,
     check_file_options,
     file_options,
+    made_options,
     made_scene,
     read_scene,
 )
@@ -27,7 +29,30 @@ from ._scene import (
 if TYPE_CHECKING:
     from sssfit.compare.choose import Choice, Step
     from sssfit.material import Material
+    from sssfit.profile import Profile
     from sssfit.render.scene import Scene
+
+_PROFILE_ENDING, _ENDING = ".npz", ".chosen.kernel.json"
+_WORTH_A_NOTE = 1e-3  # of the light
+
+
+class Distance(Length):
+    """A camera's distance: no nearer than a head can be seen from."""
+
+    name = "distance"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Parse ``value``; of a plain number that is too small, ask whether it was metres."""
+        from sssfit.render.head import MIN_DISTANCE_MM
+
+        number = super().convert(value, param, ctx)
+        if number < MIN_DISTANCE_MM:
+            plain = str(value).strip()[-1:].isdigit()
+            hint = f"a plain number is mm: did you mean {value}m?" if plain else "move away."
+            self.fail(f"{number:g} mm is nearer than {MIN_DISTANCE_MM:g} mm; {hint}", param, ctx)
+        return number
 
 
 @click.command()
@@ -35,16 +60,16 @@ if TYPE_CHECKING:
 @click.option(
     "--distance",
     "distance_mm",
-    type=Length(),
+    type=Distance(),
     default="0.6m",
     show_default=True,
     metavar="LENGTH",
-    help="From the eye to the surface.",
+    help="Camera distance.",
 )
 @click.option(
     "--fov",
     "fov_degrees",
-    type=click.FloatRange(0.0, 180.0, min_open=True, max_open=True),
+    type=NumberRange(0.0, 180.0, min_open=True, max_open=True),
     default=30.0,
     show_default=True,
     metavar="DEGREES",
@@ -60,27 +85,39 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--tolerance",
-    type=click.FLOAT,
+    type=Number(),
     default=1.0,
     show_default=True,
     metavar="DELTA-E",
-    help="Largest mean CIE Delta E 2000 against the true 2D kernel.",
+    help="Largest CIE Delta E 2000 against the true 2D kernel.",
+)
+@click.option(
+    "--tolerance-of",
+    type=click.Choice(["p95", "p99", "mean"]),
+    default="p95",
+    show_default=True,
+    help="What has to be within it: a percentile over the picture, or the mean, which hides the "
+    "pixels that are far off.",
 )
 @click.option(
     "--irradiance",
     default="head",
     show_default=True,
     metavar="NAME|FILE",
-    help=f"What it is judged on: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG file.",
+    help=f"Picture to judge by: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG file. The "
+    f"edge is at {EDGE_DEGREES:g} degrees.",
 )
 @file_options
 @click.option(
     "-o",
     "--output",
     metavar="FILE",
-    help="Where the kernel goes, - for stdout.  [default: MATERIAL.chosen.kernel.json]",
+    help="Kernel file, - for stdout; the profile goes beside it.  "
+    "[default: MATERIAL.chosen.kernel.json]",
 )
-@click.option("--force", is_flag=True, help="Replace an input, or a file that is not our kernel.")
+@click.option(
+    "--force", is_flag=True, help="Replace an input, or files that are not our kernel or profile."
+)
 @common_options
 def choose(
     material: str,
@@ -88,6 +125,7 @@ def choose(
     fov_degrees: float,
     resolution: tuple[int, int],
     tolerance: float,
+    tolerance_of: str,
     irradiance: str,
     layer: str | None,
     mask: str | None,
@@ -95,55 +133,97 @@ def choose(
     force: bool,
     common: Common,
 ) -> None:
-    """Find the cheapest kernel for MATERIAL that the scene shows no difference to, and write it.
+    """Choose the cheapest kernel whose error the scene does not show, and save it.
 
-    Distance, field of view and rows give the size of a pixel on the surface. Every method and
-    number of terms is tried on it, each at seven supports, from no blur at all upwards by the
-    weights it applies to a pixel, until the mean Delta E of the picture is within --tolerance. The
-    picture is the middle of
-    the frame, 512 x 512 pixels at most; where it shows less than 88 mm of the head, the choice
-    has to hold on wider views, up to 88 mm, as well.
+    Tries every method and rank at seven supports, cheapest first, and stops at the first whose
+    Delta E is within --tolerance. Cost is weights applied to a pixel. By default 95 % of the pixels
+    have to be within a Delta E of 1, about what an eye can tell side by side.
+
+    Distance, field of view and rows give the size of a pixel. The picture is the middle of the
+    frame, 512 x 512 pixels at most. A close-up of the head, less than 88 mm across, has to hold on
+    wider views as well.
+
+    MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or a .profile.npz
+    file, - for one on stdin. The profile of a material is saved beside its kernel.
 
     \b
       sssfit choose skin1 --distance 0.6m --fov 30 --resolution 1920x1080
       sssfit choose marble --distance 2m --tolerance 0.5 --irradiance edge
+      sssfit choose slab.profile.npz --tolerance-of mean --tolerance 0.3
       sssfit choose mine.toml --irradiance mine.exr -v
     """
     from sssfit.compare.choose import choose as choose_kernel
     from sssfit.compare.choose import mm_per_pixel_at
     from sssfit.kernel import is_kernel_file
-    from sssfit.material import load_material
+    from sssfit.profile import is_profile_file
 
-    if material == DEON_SKIN:
-        raise click.UsageError(
-            f"{material} has no coefficients, and choose needs a material: `sssfit materials` "
-            "lists them."
-        )
-    picture = Picture(irradiance, None, None, {}, layer, mask)
+    picture = Picture(irradiance, None, None, made_options(irradiance), layer, mask)
     check_file_options(layer, mask, has_file=not picture.is_made)
-    loaded = load_material(material)
+    source = _source(material)
     pitch = mm_per_pixel_at(distance_mm, fov_degrees, resolution[0])
-    path = None if output == "-" else Path(output or f"{loaded.name}.chosen.kernel.json")
-    with held([path], is_kernel_file, inputs=[material, irradiance], force=force, named=KERNEL):
+    path = None if output == "-" else Path(output or f"{_stem(material, source)}{_ENDING}")
+    profile_path = _beside(path, material)
+    read, beside = [material, irradiance], [] if profile_path is None else [profile_path]
+    with (
+        held([path], is_kernel_file, inputs=read, force=force, named=KERNEL),
+        held(beside, is_profile_file, inputs=read, force=force, named=PROFILE),
+    ):
         scene = None if irradiance == "head" else _scene(picture, pitch, resolution, common)
-        _say_first(loaded, common)
+        _say_first(source, common)
         choice = choose_kernel(
-            loaded,
+            source,
             mm_per_pixel=pitch,
             scene=scene,
             distance_mm=distance_mm,
             frame=resolution,
             tolerance=tolerance,
+            tolerance_of=tolerance_of,
             seed=common.seed,
             threads=common.threads,
             progress=lambda step: _say_step(step, common),
         )
-        written = _write(choice, path)
+        written = _write(choice, path, profile_path)
     view = {"distance_mm": distance_mm, "fov_degrees": fov_degrees, "resolution": resolution[::-1]}
     figures = {"command": "choose", "output": written, **view, **figures_of(choice)}
     finish(common, figures, text_of(choice, written, figures), to_stderr=written == ["-"])
     if not written and path is not None and path.exists():
-        say(common, f"{path} is of an earlier run, and not needed here.")
+        say(common, f"{path} is from an earlier run; this view needs no kernel.")
+
+
+def _source(name: str) -> Material | Profile:
+    """Read a profile, or load a material."""
+    from sssfit.material import load_material
+    from sssfit.profile import Profile
+
+    if name == DEON_SKIN:
+        from sssfit.simulate import simulate_deon_skin
+
+        return simulate_deon_skin()
+    if name == "-":
+        return Profile.read(binary_stdin(), "stdin")
+    return Profile.load(name) if name.endswith(_PROFILE_ENDING) else load_material(name)
+
+
+def _stem(name: str, source: Material | Profile) -> str:
+    """Return what the kernel's file is called after."""
+    from sssfit.material import Material
+
+    if isinstance(source, Material):
+        return source.name
+    if name == "-":
+        return source.material_name or "stdin"
+    return Path(name).name.removesuffix(_PROFILE_ENDING).removesuffix(".profile")
+
+
+def _beside(path: Path | None, name: str) -> Path | None:
+    """Where the profile goes; None for stdout, and where it was read from a file.
+
+    Not under the name that `sssfit simulate` gives: a longer walk may lie there.
+    """
+    if path is None or name == "-" or name.endswith(_PROFILE_ENDING):
+        return None
+    stem = path.name.removesuffix(".json").removesuffix(".kernel")
+    return path.with_name(f"{stem}.profile.npz")
 
 
 def _scene(picture: Picture, pitch: float, resolution: tuple[int, int], common: Common) -> Scene:
@@ -154,17 +234,27 @@ def _scene(picture: Picture, pitch: float, resolution: tuple[int, int], common: 
     return made_scene(replace(picture, size=size), pitch, common)
 
 
-def _say_first(material: Material, common: Common) -> None:
-    """Say what takes longest."""
+def _say_first(source: Material | Profile, common: Common) -> None:
+    """Say what takes longest, and what a profile cannot tell."""
     from sssfit.compare.choose import is_exact
+    from sssfit.profile import Profile
 
-    if is_exact(material):
+    if isinstance(source, Profile):
+        missing = source.beyond_grid.sum() / max(source.diffuse_reflectance.sum(), 1e-300)
+        if missing > _WORTH_A_NOTE:
+            say(
+                common,
+                f"{percent(missing, '.2g')} of the light lies beyond the profile's grid, where the "
+                "true picture lacks it and a kernel does not: simulate with a larger radius.",
+            )
+        return
+    if is_exact(source):
         say_if_compiling(common, solver=True)
         return
-    say_if_compiling(common, walk=material)
+    say_if_compiling(common, walk=source)
     say(
         common,
-        f"{material.name} is no half space with g = 0: tracing 1e7 photons for its true profile.",
+        f"{source.name} has no exact solution: tracing 1e7 photons for its true profile.",
     )
 
 
@@ -173,13 +263,15 @@ def _say_step(step: Step, common: Common) -> None:
         say(common, step_line(step))
 
 
-def _write(choice: Choice, path: Path | None) -> list[str]:
-    """Write the kernel, where one is needed; return where it went."""
+def _write(choice: Choice, path: Path | None, profile_path: Path | None) -> list[str]:
+    """Write the kernel, where one is needed, and the profile; return where they went."""
     if choice.fit is None:
         return []
     if path is None:
         choice.fit.kernel.write(binary_stdout())
         binary_stdout().flush()
         return ["-"]
+    if profile_path is not None:
+        choice.profile.save(profile_path)
     choice.fit.kernel.save(path)
-    return [str(path)]
+    return [str(each) for each in (path, profile_path) if each is not None]

@@ -100,7 +100,7 @@ def _budget(
     from sssfit.errors import SimulationError
 
     if not only and (material.endswith(".npz") or material in ("-", DEON_SKIN)):
-        say(wish.common, f"No budget: {material} has no coefficients to simulate with.")
+        say(wish.common, f"No budget: {material} is a profile, and a budget simulates a material.")
         return None
     try:
         return compare_budget(material, wish.scenes[0], request, wish.common)

@@ -7,7 +7,7 @@ from click.core import ParameterSource
 
 from ._deon_skin import DEON_SKIN, show_deon_skin
 from ._invert import Wish, write_material
-from ._options import Common, Length, ListOf, Reflectance, common_options
+from ._options import Common, Length, ListOf, Number, Reflectance, common_options
 from ._report import finish, table
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     metavar="MM,MM,...",
     help="Its mean free paths, 1 / (sigma_a + sigma_s); one serves all channels.",
 )
-@click.option("--eta", type=float, metavar="N", help="Its refractive index.")
+@click.option("--eta", type=Number(), metavar="N", help="Its refractive index.")
 @click.option(
     "--light",
     type=click.Choice(["diffuse", "normal"]),
@@ -137,8 +137,13 @@ def _show(common: Common, name_or_path: str) -> None:
     from sssfit.material import load_material
 
     material = load_material(name_or_path)
-    figures = {"command": "materials", "output": [], **_figures(material), **_content(material)}
-    finish(common, figures, _text(material))
+    figures = {"command": "materials", "output": [], **material_figures(material)}
+    finish(common, figures, material_text(material))
+
+
+def material_figures(material: "Material") -> dict[str, Any]:
+    """Everything that is printed of one material, as ``--json`` has it."""
+    return {**_figures(material), **_content(material)}
 
 
 def _figures(material: "Material") -> dict[str, Any]:
@@ -186,7 +191,7 @@ def _grid(material: "Material") -> "RadialGrid | None":
         return None
 
 
-def _text(material: "Material") -> str:
+def material_text(material: "Material") -> str:
     """Return the page a person reads."""
     from sssfit._material_checks import printable
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ._options import Common, common_options
+from ._options import Common, NumberRange, common_options
 from ._outputs import held
 from ._render_options import picture_options
 from ._render_report import figures_of, text_of
@@ -40,7 +40,7 @@ _BEHIND_DEGREES = 170.0
 )
 @click.option(
     "--exposure",
-    type=click.FloatRange(min=0.0, min_open=True),
+    type=NumberRange(min=0.0, min_open=True),
     metavar="FACTOR",
     help="Of Delta E and of PNG files.  [default: from the true picture]",
 )

@@ -1,4 +1,4 @@
-"""``sssfit show``: what a file holds, in figures."""
+"""``sssfit show``: what a file of ours holds, in figures; a profile's are here."""
 
 from __future__ import annotations
 
@@ -7,11 +7,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ._options import Common, common_options
-from ._report import binary_stdin, finish, newest, table
+from ._report import finish, newest, table
 
 if TYPE_CHECKING:
     from sssfit.material import Material
     from sssfit.profile import Profile
+    from sssfit.simulate import SoFar
+
+    from ._any_file import Found
 
 _SHARES = (0.5, 0.9, 0.99)
 
@@ -20,20 +23,72 @@ _SHARES = (0.5, 0.9, 0.99)
 @click.argument("file", required=False)
 @common_options
 def show(file: str | None, common: Common) -> None:
-    """Print what FILE holds: provenance, grid, energies with standard errors.
+    """Print what FILE holds: a profile, a kernel, a material or the checkpoint of a walk.
 
-    FILE is a .profile.npz file, or - for stdin; by default the newest of this folder.
+    FILE is any of these, whatever its name, or - for stdin; by default the newest .profile.npz of
+    this folder.
 
     \b
-      sssfit show skin1.profile.npz
+      sssfit show skin1.profile.npz              provenance, grid, energies, standard errors
+      sssfit show skin1.svd3.kernel.json         pixels, energies, errors, terms
+      sssfit show mine.toml                      coefficients, mean free paths
+      sssfit show skin1.profile.npz.checkpoint   the profile so far
       sssfit simulate skin1 -o - | sssfit show - --json
     """
-    from sssfit.profile import Profile
+    from ._any_file import read_any
 
     name = file or str(newest(common, "*.profile.npz", "sssfit simulate skin1"))
-    profile = Profile.read(binary_stdin(), "stdin") if name == "-" else Profile.load(name)
-    figures = {"command": "show", "output": [], "file": name, **_figures(profile)}
-    finish(common, figures, _text(figures))
+    figures, text = _shown(read_any(name), name)
+    finish(common, {"command": "show", "output": [], "file": name, **figures}, text)
+
+
+def _shown(found: Found, name: str) -> tuple[dict[str, Any], str]:
+    """Return the figures of what was found, and the page for people."""
+    from sssfit.kernel import SeparableKernel
+    from sssfit.material import Material
+    from sssfit.profile import Profile
+
+    if isinstance(found, Profile):
+        figures = _figures(found)
+        return figures, f"{name}: diffuse reflectance profile ({figures['format']})\n" + _text(
+            figures
+        )
+    if isinstance(found, SeparableKernel):
+        from ._show_kernel import kernel_figures, kernel_text
+
+        figures = kernel_figures(found)
+        return figures, f"{name}: separable kernel ({figures['format']})\n" + kernel_text(figures)
+    if isinstance(found, Material):
+        from .materials import material_figures, material_text
+
+        return {"kind": "material", **material_figures(found)}, material_text(found)
+    figures = _checkpoint_figures(found)
+    return figures, f"{name}: checkpoint of a photon walk\n" + _checkpoint_text(figures)
+
+
+def _checkpoint_figures(found: SoFar) -> dict[str, Any]:
+    """Where the walk stands, and the figures of its profiles so far."""
+    profiles = [_figures(each) for each in found.profiles]
+    return {
+        "kind": "checkpoint",
+        "photons": found.profiles[0].photons,
+        "flights": found.flights,
+        "seconds": found.seconds,
+        "relative_error": found.relative_error,
+        "profiles": profiles,
+    }
+
+
+def _checkpoint_text(figures: dict[str, Any]) -> str:
+    """Write the same for people: the walk, then the page of each profile."""
+    return "\n".join(
+        [
+            f"so far    {figures['photons']:,} photons, {figures['flights']:,} flights, "
+            f"{figures['seconds']:.1f} s; --resume goes on from there",
+            f"error     {100.0 * figures['relative_error']:.3g} % of F(r), in the worst channel",
+            *(f"\n{_text(each)}" for each in figures["profiles"]),
+        ]
+    )
 
 
 def _figures(profile: Profile) -> dict[str, Any]:
@@ -43,6 +98,7 @@ def _figures(profile: Profile) -> dict[str, Any]:
     meta = profile.meta
     radii_mm = energy_radii_mm(profile, _SHARES)
     return {
+        "kind": "profile",
         "format": meta["format"],
         "material": _material_figures(profile),
         "method": meta.get("method"),
@@ -133,7 +189,6 @@ def _head(figures: dict[str, Any]) -> str:
     walks = "no photons" if photons is None else f"{photons:,} photons, seed {figures['seed']}"
     width = f"{figures['dr_mm']:.4g} mm" if figures["uniform"] else "varying width"
     return (
-        f"{figures['file']}: diffuse reflectance profile ({figures['format']})\n"
         f"material  {name}{source}\n"
         f"method    {figures['method'] or 'unknown'}, {walks}, "
         f"sssfit {figures['version'] or 'version unknown'}\n"

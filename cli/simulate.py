@@ -8,7 +8,7 @@ import click
 
 from ._mci import is_mci, load_runs
 from ._methods import MAPPINGS, METHODS, method_for, method_lines, own_options
-from ._options import Common, Count, Length, Share, common_options
+from ._options import Common, Count, Length, NumberRange, Share, WholeRange, common_options
 from ._simulate_computed import run_computed
 from ._simulate_outputs import profile_paths
 from ._simulate_run import Request, Walk, run_walks
@@ -38,7 +38,7 @@ class Radius(Length):
     metavar="METHOD",
     help="How; the methods are listed below.",
 )
-@click.option("--run", type=click.IntRange(1), metavar="N", help="Of an .mci, this run only.")
+@click.option("--run", type=WholeRange(1), metavar="N", help="Of an .mci, this run only.")
 @click.option(
     "--photons",
     type=Count(2, 10**12),
@@ -92,7 +92,7 @@ class Radius(Length):
 )
 @click.option(
     "--checkpoint-every",
-    type=click.FloatRange(min=0),
+    type=NumberRange(min=0),
     default=30.0,
     show_default=True,
     metavar="SECONDS",

@@ -4,21 +4,19 @@ python docs/make_cost.py
 """
 
 import time
-from pathlib import Path
 
 import numpy as np
+from sections import put_section
 
 from sssfit.compare.cost import seconds_per_megapixel
 from sssfit.render.separable import apply_passes
 
-ROOT = Path(__file__).parents[1]
 HEIGHT, WIDTH, CHANNELS = 1080, 1920, 3
 SAMPLES = (9, 17, 33)
 REPEATS, ROUNDS = 12, 4  # in turns: what else the machine does then hits all alike
 # RR-02-12: table 2, GTX 580, GTX 470 and GT 130M, close; figure 5, GTX 470, all at 1080p.
 PAPER_PASSES_MS = {"GTX 580": (1.05, 3.07), "GTX 470": (4.6, 10.38), "GT 130M": (13.66, 40.02)}
 PAPER_SAMPLES_MS = (1.02, 1.77, 3.15)
-START, END = "<!-- made by docs/make_cost.py -->", "<!-- end of make_cost.py -->"
 
 TEXT = """## Cost beside the papers' own ratios
 
@@ -90,11 +88,7 @@ def section():
 
 def main():
     """Put the section in its place."""
-    path = ROOT / "docs" / "how-to-choose.md"
-    before, _, rest = path.read_text(encoding="utf-8").partition(START)
-    after = rest.partition(END)[2] or "\n"
-    text = f"{before.rstrip()}\n\n{START}\n\n{section()}\n{END}{after}"
-    path.write_text(text, encoding="utf-8")
+    put_section("how-to-choose.md", "docs/make_cost.py", section())
 
 
 if __name__ == "__main__":

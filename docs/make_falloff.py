@@ -4,10 +4,10 @@ python docs/make_falloff.py
 """
 
 import math
-from pathlib import Path
 
 import numpy as np
 from scipy.optimize import minimize_scalar
+from sections import put_section
 
 from sssfit.fit import fit_falloff, make_target
 from sssfit.fit.falloff import (
@@ -19,12 +19,10 @@ from sssfit.fit.falloff import (
 )
 from sssfit.simulate import simulate_deon_skin
 
-ROOT = Path(__file__).parents[1]
 TABLE_1 = {"width": 0.014, "strength": (0.78, 0.70, 0.75), "falloff": (0.57, 0.13, 0.08)}
 PITCHES_MM = (0.1, 0.2, 0.3, 0.4, 0.5, 0.7, 1.0)
 PITCH_MM = 0.5  # in smaller pixels the delta of table 1 is too dense for any length
 SUPPORT_MM = 8.0
-START, END = "<!-- made by docs/make_falloff.py -->", "<!-- end of make_falloff.py -->"
 
 TEXT = """## The 2012 model's unit of length
 
@@ -141,12 +139,7 @@ def row(name, parameters, left):
 
 def main():
     """Put the section in its place."""
-    path = ROOT / "docs" / "fits.md"
-    page = path.read_text(encoding="utf-8") if path.exists() else "# Fits\n"
-    before, _, rest = page.partition(START)
-    after = rest.partition(END)[2] or "\n"
-    text = f"{before.rstrip()}\n\n{START}\n\n{section()}\n{END}{after}"
-    path.write_text(text, encoding="utf-8")
+    put_section("fits.md", "docs/make_falloff.py", section())
 
 
 if __name__ == "__main__":

@@ -7,9 +7,9 @@ Minutes: 66 fits for each of three rules that say where x = 1 in the guide funct
 
 import datetime
 import warnings
-from pathlib import Path
 
 import numpy as np
+from sections import put_section
 from threadpoolctl import threadpool_limits
 
 from sssfit.compare.metrics import measure
@@ -23,8 +23,6 @@ from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
 from sssfit.simulate import simulate_exact
 
-ROOT = Path(__file__).parents[1]
-START, END = "<!-- made by docs/make_guided.py -->", "<!-- end of make_guided.py -->"
 KS = (0.0, 0.5, 1.0, 1.55, 2.0, 3.0, 4.0)
 SCORED_KS = (0.0, 0.5, 1.0, 1.55, 2.0, 4.0)
 HALF = 72  # pixels at least .3 mm wide; no guided fit here takes a second
@@ -151,13 +149,13 @@ materials:
 
 
 def section():
-    """Return the section of docs/fits.md, with its marks."""
+    """Return the section's text."""
     names = material_names()
     with warnings.catch_warnings(), threadpool_limits(1, user_api="blas"):
         warnings.simplefilter("ignore", SssfitWarning)
         found = np.stack([scores(load_material(name)) for name in names])
         nearest = nearest_table(load_material("skin1"))
-    text = TEXT.format(
+    return TEXT.format(
         date=datetime.date.today().isoformat(),
         ks=" | ".join(f"k = {k:g}" for k in KS),
         bars="---|" * len(KS),
@@ -167,15 +165,11 @@ def section():
         picture_bars="---|" * len(PICTURES),
         scored="\n".join(score_table(found)),
     )
-    return f"{START}\n\n{text}\n{END}"
 
 
 def main():
-    """Put the section between its marks."""
-    page = ROOT / "docs" / "fits.md"
-    text = page.read_text(encoding="utf-8")
-    before, _, rest = text.partition(START)
-    page.write_text(before + section() + rest.partition(END)[2], encoding="utf-8")
+    """Put the section in its place."""
+    put_section("fits.md", "docs/make_guided.py", section())
 
 
 if __name__ == "__main__":

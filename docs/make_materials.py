@@ -4,7 +4,8 @@ python docs/make_materials.py
 """
 
 import time
-from pathlib import Path
+
+from sections import DOCS, marked_page
 
 from sssfit.material import load_material, material_names
 from sssfit.simulate import simulate_montecarlo
@@ -60,7 +61,8 @@ def main():
     simulate_montecarlo(load_material("skin1"), photons=1000)
     page = HEAD + f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}\n"
     page += "".join(line for name in material_names() for line in rows(name))
-    Path(__file__).with_name("materials.md").write_text(page)
+    text = marked_page("docs/make_materials.py", page)
+    (DOCS / "materials.md").write_text(text, encoding="utf-8")
 
 
 if __name__ == "__main__":

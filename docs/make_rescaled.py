@@ -3,9 +3,10 @@
 python docs/make_rescaled.py
 """
 
-from pathlib import Path
+from sections import put_section
 
 from sssfit.compare.candidates import Candidate
+from sssfit.compare.judged import border_of, judged_scene
 from sssfit.compare.metrics import auto_exposure, measure
 from sssfit.compare.sheet import MM_PER_PIXEL, PIXELS, SCENES
 from sssfit.fit import support_of
@@ -15,10 +16,8 @@ from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
 from sssfit.simulate import simulate_exact
 
-ROOT = Path(__file__).parents[1]
 MATERIALS = ("skin1", "marble", "ketchup", "wholemilk")
 RANKS = range(1, 7)
-START, END = "<!-- made by docs/make_rescaled.py -->", "<!-- end of make_rescaled.py -->"
 
 TEXT = """## Is SVD rescaled the better one to look at?
 
@@ -35,7 +34,7 @@ With {most} terms the worst of all cases is {worst_rescaled:.2f} rescaled, {wors
 {worst_gaussians:.2f} by Gaussians.
 
 **Light beyond the grid.** Rescaled kernels put it back, too near; kept ones leave it out; in the
-truth it sees the mean of the picture. With {most} terms, on the head:
+truth it sees the mean of the picture, and black around the disk. With {most} terms, on the head:
 
 | | energy beyond the grid, R G B | rescaled | kept |
 |---|---|---|---|
@@ -48,17 +47,19 @@ def judged(material):
     profile = simulate_exact(load_material(material))
     support = support_of(profile)
     found = {}
-    scenes = [
-        make_scene(each, height=PIXELS, width=PIXELS, mm_per_pixel=MM_PER_PIXEL) for each in SCENES
-    ]
-    truths = [render_reference(each, profile) for each in scenes]
+    size = {"height": PIXELS, "width": PIXELS, "mm_per_pixel": MM_PER_PIXEL}
+    scenes = [judged_scene(make_scene(each, **size), profile) for each in SCENES]
+    truths = [render_reference(each, profile, border=border_of(each)) for each in scenes]
     for n in RANKS:
         kernels = [each.fit(profile, MM_PER_PIXEL, support).kernel for each in methods(n)]
         for scene, truth in zip(scenes, truths, strict=True):
             exposure = auto_exposure(truth, scene.mask)
             found[scene.name, n] = tuple(
                 measure(
-                    render_separable(scene, kernel), truth, exposure=exposure, mask=scene.mask
+                    render_separable(scene, kernel, border=border_of(scene)),
+                    truth,
+                    exposure=exposure,
+                    mask=scene.mask,
                 ).delta_e_2000_mean
                 for kernel in kernels
             )
@@ -123,11 +124,7 @@ def section():
 
 def main():
     """Put the section in its place."""
-    path = ROOT / "docs" / "how-to-choose.md"
-    before, _, rest = path.read_text(encoding="utf-8").partition(START)
-    after = rest.partition(END)[2] or "\n"
-    text = f"{before.rstrip()}\n\n{START}\n\n{section()}\n{END}{after}"
-    path.write_text(text, encoding="utf-8")
+    put_section("how-to-choose.md", "docs/make_rescaled.py", section())
 
 
 if __name__ == "__main__":

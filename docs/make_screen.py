@@ -3,9 +3,8 @@
 python docs/make_screen.py
 """
 
-from pathlib import Path
-
 import numpy as np
+from sections import put_section
 
 from sssfit.fit import fit_artist
 from sssfit.material import load_material
@@ -15,8 +14,6 @@ from sssfit.render.screen import render_screen
 from sssfit.shapes import gaussian_line_integral
 from sssfit.simulate import simulate_exact
 
-ROOT = Path(__file__).parents[1]
-START, END = "<!-- made by docs/make_screen.py -->", "<!-- end of make_screen.py -->"
 SLOPES = (0, 15, 30, 45, 60, 75)
 STEPS_MM = (0.2, 0.5, 1, 2, 5, 10)
 FAR_MM = 1e7  # seen from so far that a slope is the same for all pixels
@@ -168,11 +165,7 @@ def section():
 
 def main():
     """Put the section in its place."""
-    path = ROOT / "docs" / "screen-space.md"
-    page = path.read_text(encoding="utf-8")
-    before, _, rest = page.partition(START)
-    after = rest.partition(END)[2]
-    path.write_text(f"{before}{START}\n\n{section()}\n{END}{after}", encoding="utf-8")
+    put_section("screen-space.md", "docs/make_screen.py", section())
 
 
 if __name__ == "__main__":

@@ -15,6 +15,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 import checks  # noqa: E402
 import checks_exact  # noqa: E402
 import checks_layers  # noqa: E402
+from sections import marked_page  # noqa: E402
 
 FULL = 100_000_000
 
@@ -119,7 +120,8 @@ def main():
         page += f"| {each.what} | {each.ours} | {each.theirs} | {each.sigmas:+.2f} |\n"
     page += tables(photons) + TAIL
     if photons == FULL:
-        (ROOT / "docs" / "verification.md").write_text(page)
+        text = marked_page("docs/make_verification.py", page)
+        (ROOT / "docs" / "verification.md").write_text(text, encoding="utf-8")
     else:
         sys.stdout.write(page)
 

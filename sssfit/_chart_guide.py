@@ -5,23 +5,21 @@ The record comes from ``sssfit.compare.guide``, which has computed everything.
 
 from __future__ import annotations
 
-import math
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colorbar import Colorbar
-from matplotlib.colors import LogNorm, Normalize, SymLogNorm
+from matplotlib.colors import LogNorm, SymLogNorm
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from sssfit._chart_page import chart_style, draw_footnotes, draw_text, name_axes, new_figure
+from sssfit._chart_panels import draw_plane, place_panel, signed_norm, tick_powers
 from sssfit._chart_style import COLOURS, LEFT, LINE_WIDTH, RIGHT, WIDTH_INCHES, Style
 from sssfit._chart_text import kernel_subtitle, shortened
 from sssfit._profile_bins import FloatArray
 from sssfit._profile_radii import material_of
-from sssfit.profile import full_kernel
 
 if TYPE_CHECKING:
     from sssfit.compare.guide import Guide
@@ -37,7 +35,6 @@ _FOOT_INCHES = 1.05  # under the bars: their numbers and names, and three lines 
 _TABLE_INCHES = 0.165
 _COLUMNS = (0.25, 0.44, 0.61, 0.80)  # of the width: the table's figures
 _HEADS = ("middle pixel of the pass", "energy misplaced", "Frobenius error", "misfit weighted by Γ")
-_DECADES = 5  # of the residual, on either side of what is drawn linearly
 _GUIDE_DECADES = 3  # of the guide functions, below and above their value halfway out
 _PASS_DECADES = 6
 _GREY = "#666666"
@@ -84,7 +81,7 @@ def guide_figure(guide: Guide) -> Figure:
         draw_footnotes(figure, [_NOTE])
         shades = (
             LogNorm(10.0**-_GUIDE_DECADES, 10.0**_GUIDE_DECADES),
-            _scale(np.stack([each.residual for each in rows])),
+            signed_norm(np.stack([each.residual for each in rows])),
         )
         for i, row in enumerate(rows):
             place = head + _ROW_INCHES * i, i == 1, i == len(rows) - 1
@@ -143,10 +140,12 @@ def _draw_row(
     """Draw a row's panels; ``place`` is inches down the page, whether with the legend, the last."""
     down, is_keyed, is_last = place
     x_label = "x (mm)" if is_last else ""
-    first, second = (_panel(figure, left, down) for left in (LEFT * WIDTH_INCHES, _SECOND))
-    third = _panel(figure, _THIRD, down, RIGHT * WIDTH_INCHES - _THIRD)
-    _draw_image(first, guide, _over_halfway(row.gamma), shades[0], "cividis")
-    _draw_image(second, guide, row.residual, shades[1], "RdBu_r")
+    lefts, square = (LEFT * WIDTH_INCHES, _SECOND), (_IMAGE_INCHES, _IMAGE_INCHES)
+    first, second = (place_panel(figure, left, down, *square) for left in lefts)
+    third = place_panel(figure, _THIRD, down, RIGHT * WIDTH_INCHES - _THIRD, _IMAGE_INCHES)
+    half_mm = 0.5 * guide.pixels * guide.mm_per_pixel
+    draw_plane(first, _over_halfway(row.gamma), half_mm, shades[0], "cividis")
+    draw_plane(second, row.residual, half_mm, shades[1], "RdBu_r")
     _draw_pass(third, guide, row.guided)
     if is_keyed:
         third.legend(loc="lower left", fontsize=7.5, reverse=True)
@@ -165,27 +164,6 @@ def _over_halfway(gamma: FloatArray) -> FloatArray:
     diagonal = np.diagonal(gamma)[: gamma.shape[0] // 2 + 1]
     known = diagonal[np.isfinite(diagonal) & (diagonal > 0.0)]
     return gamma / known[-1] if known.size else gamma
-
-
-def _panel(figure: Figure, left: float, down: float, width: float = _IMAGE_INCHES) -> Axes:
-    """Add axes as tall as the images, all in inches from the top left corner."""
-    height = figure.get_figheight()
-    box = (left / WIDTH_INCHES, 1 - (down + _IMAGE_INCHES) / height, width / WIDTH_INCHES)
-    return figure.add_axes((*box, _IMAGE_INCHES / height))
-
-
-def _draw_image(
-    axes: Axes, guide: Guide, quadrant: FloatArray, norm: Normalize, shades: str
-) -> None:
-    """Show the whole plane of a quadrant."""
-    reach = 0.5 * guide.pixels * guide.mm_per_pixel
-    extent = (-reach, reach, -reach, reach)
-    axes.imshow(
-        full_kernel(quadrant), norm=norm, cmap=shades, extent=extent, interpolation="nearest"
-    )
-    axes.grid(visible=False)
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MaxNLocator(5, steps=[1, 2, 5, 10]))
 
 
 def _draw_pass(axes: Axes, guide: Guide, guided: FloatArray | None) -> None:
@@ -215,13 +193,6 @@ def _draw_pass(axes: Axes, guide: Guide, guided: FloatArray | None) -> None:
         axis.set_minor_formatter(NullFormatter())
 
 
-def _scale(residual: FloatArray) -> SymLogNorm:
-    """One scale for all rows: linear about 0, then the decades up to the largest."""
-    most = float(np.abs(residual).max()) or 1.0
-    linear = 10.0 ** (math.floor(math.log10(most)) - _DECADES)
-    return SymLogNorm(linear, vmin=-most, vmax=most, base=10)
-
-
 def _draw_bars(figure: Figure, down: float, shades: tuple[LogNorm, SymLogNorm]) -> None:
     """Explain the colours of both columns of images, under them."""
     height = figure.get_figheight()
@@ -237,17 +208,7 @@ def _draw_bars(figure: Figure, down: float, shades: tuple[LogNorm, SymLogNorm]) 
         bar.set_label(name)
         bar.ax.xaxis.set_major_formatter("{x:g}")
         if isinstance(norm, SymLogNorm):
-            _tick_powers(bar, round(math.log10(norm.linthresh)))
-
-
-def _tick_powers(bar: Colorbar, linear: int) -> None:
-    """Write 0 and two powers of ten on either side; linear within 10^``linear``."""
-    powers = linear + 2, linear + _DECADES
-    ticks = [10.0**each for each in powers]
-    words = [f"10^{{{each}}}" for each in powers]
-    bar.set_ticks([-ticks[1], -ticks[0], 0.0, *ticks])
-    bar.set_ticklabels([f"$-{words[1]}$", f"$-{words[0]}$", "0", *(f"${each}$" for each in words)])
-    bar.ax.minorticks_off()
+            tick_powers(bar, norm)
 
 
 def _title(guide: Guide) -> str:

@@ -266,13 +266,16 @@ def _notes(comparison: Comparison, error: str, cost: str) -> list[str]:
     if cost != "seconds":
         third += " Of one cost they stand side by side, to the right of it."
     notes = [f"{first} {second} {third}"]
-    if any(picture.name == "edge" for picture in comparison.pictures):
-        notes.append("Along an axis, as the made edge is, a pre-integrated kernel is exact.")
+    if any(picture.name in ("disk", "edge") for picture in comparison.pictures):
+        notes.append(
+            f"Of disk and edge, what is within {comparison.support_mm:.3g} mm of light or border "
+            "counts: the reach of 99.9 % of the profile."
+        )
     if comparison.missing_share.max() >= _WORTH_A_NOTE:
         notes.append(
             f"Beyond the profile's grid lies up to {100.0 * comparison.missing_share.max():.2g} % "
-            "of a channel's light: true pictures lack it, kernels but those with energy kept do "
-            "not."
+            "of a channel's light: true pictures have it spread evenly, around a disk not at all; "
+            "kernels but those with energy kept have it near the beam."
         )
     if comparison.left_out:
         notes.append(f"Could not be fitted: {', '.join(name for name, _ in comparison.left_out)}.")

@@ -121,6 +121,7 @@ def _notes(sheet: Sheet) -> list[str]:
     weight = " ".join(f"{each:g}" for each in sheet.production["weight"])
     return [
         "SVD is rescaled to the profile's energy. Each picture is exposed as its truth: 99 % of it "
-        f"below 0.8. Production: {', '.join(values)} mm², weight {weight}, by hand: the fit's "
+        f"below 0.8. Of disk and edge, what is within {sheet.support_mm:.3g} mm of light or border "
+        f"counts. Production: {', '.join(values)} mm², weight {weight}, by hand: the fit's "
         "narrowest near for all channels, twice its far.",
     ]

@@ -25,6 +25,8 @@ _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 def title(profile: Profile) -> str:
     """Name the material."""
     name, what = profile.material_name, "diffuse reflectance profile"
+    if profile.meta.get("checkpoint"):
+        what += " so far"
     return f"{shortened(name, 24)}: {what}" if name else what.capitalize()
 
 

@@ -128,7 +128,8 @@ def png_codes(
     light: FloatArray, exposure: float, alpha: FloatArray | None = None
 ) -> tuple[npt.NDArray[np.uint16], tuple[str, ...]]:
     """Return 16-bit sRGB codes, those of alpha as shares behind them; how many were clipped."""
-    exposed = exposure * light
+    with np.errstate(over="ignore"):  # infinite light is clipped as well
+        exposed = exposure * light
     clipped = int(((exposed < -_ROUNDING) | (exposed > 1.0 + _ROUNDING)).sum())
     codes = np.rint(_CODES * srgb_encode(np.clip(exposed, 0.0, 1.0))).astype(np.uint16)
     said = f"{clipped} of {light.size} values clipped to 0 to 1"

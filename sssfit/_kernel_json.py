@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 
 FORMAT = "sssfit.kernel/1"
-_MARK = b'"sssfit.kernel/'  # by which a file is ours, however damaged
+MARK = b'"sssfit.kernel/'  # by which a file is ours, however damaged
 _REMEDY = "name a .kernel.json file, as `sssfit fit` writes it"
 MOST_BYTES = 500_000_000  # 16000 pixels, 10 terms and 64 channels are 200 MB
 _ROUNDING = 1e-9  # relative; sums of pixels may be taken in another order
@@ -115,7 +115,7 @@ def _parsed(text: bytes, origin: str) -> Mapping[str, Any]:
     try:
         whole = json.loads(text, object_pairs_hook=_once_each, parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
-        if _MARK not in text:
+        if MARK not in text:
             raise KernelError(f"{origin}: not a kernel; {_REMEDY}.") from None
         if isinstance(error, KernelError):
             raise KernelError(f"{origin}: {error}; fit the kernel again.") from None

@@ -48,7 +48,7 @@ _REMEDY = "write it again with `sssfit simulate`, or name a .profile.npz file"
 _FOREIGN = "name a .profile.npz file, as `sssfit simulate` and `sssfit import` write it"
 # By either a file is ours, however damaged: the first member's name, or the format in its JSON,
 # four bytes a letter. Both stand uncompressed, one near the beginning and one near the end.
-_MARKS = (b"r_edges_mm.npy", "sssfit.profile/".encode("utf-32-le"))
+MARKS = (b"r_edges_mm.npy", "sssfit.profile/".encode("utf-32-le"))
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -118,7 +118,7 @@ def _unpack_known(stream: BinaryIO) -> tuple[dict[str, FloatArray], dict[str, An
             raise
         # zipfile, zlib, struct, numpy's header parser and json raise a dozen unrelated types on
         # damaged bytes (RuntimeError for a flipped encryption bit, MemoryError, RecursionError).
-        if not is_marked(stream, _MARKS):
+        if not is_marked(stream, MARKS):
             raise ProfileError("is not a profile") from None
         raise ProfileError("is damaged") from error
 

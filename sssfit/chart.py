@@ -3,7 +3,8 @@
 `profile_figure` draws a profile as the plots of "Separable Subsurface Scattering", Jimenez et al.
 2015, supplement G: 2 pi r R_d linear and logarithmic, R_d against mean free paths, and the 2D
 profile. `models_figure` draws profile models against the exact solution, `spectrum_figure`
-the singular values of a profile's kernel, `guide_figure` what guided fits look at and leave.
+the singular values of a profile's kernel, `guide_figure` what guided fits look at and leave,
+`kernel_figure` a kernel beside its profile.
 `pareto_figure` draws kernels by error and cost, `budget_figure` why a kernel's picture is not the
 true one, `sheet_figure` kernels' pictures beside their differences, `editing_figure` edits of the
 2012 model, `convergence_figure` a simulation's error over its price. `save_figure` writes PNG, SVG
@@ -34,6 +35,8 @@ from sssfit._chart_data import Picture, drawn_radius_mm, picture
 from sssfit._chart_editing import editing_figure
 from sssfit._chart_files import FORMATS, MAKER, chart_format, is_chart_file, known_format
 from sssfit._chart_guide import guide_figure
+from sssfit._chart_kernel import kernel_figure
+from sssfit._chart_material import material_figure
 from sssfit._chart_models import models_figure
 from sssfit._chart_page import (
     TEXT_INCHES,
@@ -75,6 +78,8 @@ __all__ = [
     "editing_figure",
     "guide_figure",
     "is_chart_file",
+    "kernel_figure",
+    "material_figure",
     "models_figure",
     "pareto_figure",
     "profile_figure",

@@ -16,6 +16,7 @@ import numpy as np
 from cli_world import DR_MM, GRID, PHOTONS, RADIUS_MM, Ran, called, kernel, picture, profile, wax
 
 from sssfit import fit
+from sssfit.compare import view_kernel
 from sssfit.compare.judge import judge, judge_in_screen_space
 from sssfit.compare.metrics import auto_exposure
 from sssfit.export import json_document
@@ -27,6 +28,7 @@ from sssfit.render.irradiance import make_scene
 from sssfit.render.reference import render_reference
 from sssfit.render.scene import Scene
 from sssfit.render.separable import render_separable
+from sssfit.render.transmittance import with_transmitted
 from sssfit.simulate import Checkpoint, simulate_burley, simulate_dipole
 
 
@@ -89,7 +91,12 @@ def fields(*keys: str) -> Callable[[Ran], Any]:
 
 def is_written(*endings: str) -> Callable[[Ran], Any]:
     """The files that begin as they should."""
-    begins = {"png": b"\x89PNG", "svg": b"<?xml", "csv": b"material,", "npz": b"PK"}
+    begins = {
+        "png": b"\x89PNG",
+        "svg": b"<?xml",
+        "csv": b"# sssfit.table/1\nmaterial,",
+        "npz": b"PK",
+    }
     return lambda ran: [
         name
         for name, data in sorted(ran.written.items())
@@ -329,6 +336,12 @@ _DISK = f"render --irradiance disk {_SIZE}"
 
 _LAYERS = f"render --irradiance layers.exr --mm-per-pixel {DR_MM} -o x.exr"
 
+
+def _lit_through() -> Scene:
+    """The head lit from 170 degrees off the eye, and what comes through it."""
+    return with_transmitted(_scene("head", light_degrees=170.0, transmit=True), world.gaussians())
+
+
 RENDER = {
     "--irradiance": Row(
         f"render {_SIZE}",
@@ -382,6 +395,13 @@ RENDER = {
         "--screen",
         made_picture,
         lambda: np.float32(judge_in_screen_space(_scene("head"), kernel()).picture),
+    ),
+    "--light": _lit("head", "--light", "100", "45", light_degrees=100.0),
+    "--transmit": Row(
+        f"render wax.gaussians2.kernel.json --irradiance head {_SIZE}",
+        "--transmit",
+        made_picture,
+        lambda: np.float32(judge(_lit_through(), world.gaussians()).picture),
     ),
     "--follow": Row(
         "render --irradiance head --size 48x48 --distance 200 --screen",
@@ -453,8 +473,10 @@ def _pictures(
     *pictures: str, size: tuple[int, int] = (16, 24), mm_per_pixel: float = 0.3
 ) -> list[Scene]:
     height, width = size
+    own = {"edge": {"angle_degrees": 30.0}}
     return [
-        make_scene(name, height=height, width=width, mm_per_pixel=mm_per_pixel) for name in pictures
+        make_scene(name, height=height, width=width, mm_per_pixel=mm_per_pixel, **own.get(name, {}))
+        for name in pictures
     ]
 
 
@@ -518,13 +540,13 @@ COMPARE = {
         "--picture points --picture edge,disk",
         calls,
         lambda: _compared(_pictures("points", "edge", "disk")),
-        default="disk,edge,head",
+        default="disk,edge,points,head",
     ),
     "--mm-per-pixel": Row(
         _KERNELS,
         "--mm-per-pixel .45",
         calls,
-        lambda: _compared(_pictures("disk", "edge", "head", mm_per_pixel=0.45), 0.45),
+        lambda: _compared(_pictures("disk", "edge", "points", "head", mm_per_pixel=0.45), 0.45),
         default="0.3",
         words="what your own file says, else 0.3",
     ),
@@ -641,7 +663,8 @@ def _chosen(
     if isinstance(scene, Scene):
         own["scene"] = scene
     elif scene:
-        own["scene"] = make_scene(scene, height=512, width=512, mm_per_pixel=pitch)
+        angle = {"angle_degrees": 30.0} if scene == "edge" else {}
+        own["scene"] = make_scene(scene, height=512, width=512, mm_per_pixel=pitch, **angle)
     return called(
         "sssfit.compare.choose.choose",
         wax(),
@@ -687,6 +710,13 @@ CHOOSE = {
     "--tolerance": Row(
         _CHOOSE, "--tolerance .7", _asked, lambda: _rounded(_chosen(tolerance=0.7)), default="1.0"
     ),
+    "--tolerance-of": Row(
+        _CHOOSE,
+        "--tolerance-of p99",
+        _asked,
+        lambda: _rounded(_chosen(tolerance_of="p99")),
+        default="p95",
+    ),
     "--irradiance": Row(
         _CHOOSE,
         "--irradiance edge",
@@ -712,11 +742,16 @@ CHOOSE = {
         _CHOOSE,
         "-o x.kernel.json",
         names,
-        lambda: ["x.kernel.json"],
+        lambda: ["x.kernel.json", "x.profile.npz"],
         default="wax.chosen.kernel.json",
         words="MATERIAL.chosen.kernel.json",
     ),
-    "--force": Row(f"{_CHOOSE} -o foreign.json", "--force", names, lambda: ["foreign.json"]),
+    "--force": Row(
+        f"{_CHOOSE} -o foreign.json",
+        "--force",
+        names,
+        lambda: ["foreign.json", "foreign.profile.npz"],
+    ),
 }
 
 # materials
@@ -918,7 +953,18 @@ CHART = {
         _GUIDES,
         lambda: _guided(channel="G"),
         default="R",
-        words="the first that returns light",
+        words="the first that returns light; of a kernel up to three",
+    ),
+    "--profile": Row(
+        "chart wax.svd2.kernel.json --json",
+        "--profile plate.profile.npz",
+        fields("profile", "misplaced"),
+        lambda: [
+            "plate.profile.npz",
+            view_kernel(kernel(), world.plate_profile()).misplaced.tolist(),
+        ],
+        default="wax.profile.npz",
+        words="found beside it or here by its fingerprint",
     ),
     "--photons": Row(
         "chart wax.toml --models",
@@ -933,7 +979,8 @@ CHART = {
         is_written("svg", "png"),
         lambda: ["x.svg"],
         default="wax.profile.png",
-        words="NAME.profile.png, NAME.spectrum.png, NAME.guide.png, MATERIAL.models.png",
+        words="NAME.profile.png, NAME.kernel.png, NAME.material.png, NAME.checkpoint.png, "
+        "NAME.spectrum.png, NAME.guide.png, MATERIAL.models.png",
     ),
     "--force": Row("chart -o foreign.png", "--force", is_written("png"), lambda: ["foreign.png"]),
 }

@@ -52,7 +52,7 @@ class Table:
     """A table: its heads, and the values of its rows.
 
     Columns in which all rows print the same, where a swap would not be seen, are refused unless
-    they hold nothing or are named in ``alike``.
+    they hold nothing but rounding or are named in ``alike``.
     """
 
     def __init__(
@@ -71,10 +71,15 @@ class Table:
                 assert agrees(cell, value), f"{cells[0]}, {head}: {cell!r} is not {value!r}"
         for k, head in enumerate(self.heads):
             column = {row[k] for row in printed[1:] if len(row) > k}
-            is_empty = all(row[k] is None for row in self.rows)
+            is_empty = all(is_nothing(row[k]) for row in self.rows)
             told_apart = is_empty or len(column) > 1 or len(self.rows) < 2 or head in self.alike
             assert told_apart, f"all rows have the same {head}: swaps would not be seen"
         return lines[1 + len(self.rows) :]
+
+
+def is_nothing(value: Any) -> bool:
+    """Whether there is no value, or one that is but rounding."""
+    return value is None or (isinstance(value, Percent) and abs(value.share or 0.0) < 1e-9)
 
 
 def cells_of(line: str) -> list[str]:

@@ -2,11 +2,13 @@
 
 import functools
 import json
+from fractions import Fraction
 
 import numpy as np
 import pytest
 from figures import assert_legible
 from matplotlib.figure import Figure
+from reference_render import random_kernel
 
 from sssfit.chart import budget_figure
 from sssfit.cli import main
@@ -15,7 +17,7 @@ from sssfit.compare._budget_profiles import make_sources
 from sssfit.compare._storage import stored
 from sssfit.compare.budget import error_budget, error_budgets
 from sssfit.compare.judge import judge
-from sssfit.compare.metrics import measure
+from sssfit.compare.metrics import COLOUR_FIGURES
 from sssfit.errors import FitError, KernelError, RenderError, SimulationError
 from sssfit.fit import fit_svd
 from sssfit.kernel import SeparableKernel
@@ -24,14 +26,15 @@ from sssfit.profile import Profile
 from sssfit.render.irradiance import make_scene
 from sssfit.render.reference import render_reference
 from sssfit.render.scene import Scene
+from sssfit.render.separable import render_separable
 from sssfit.simulate import simulate_exact, simulate_montecarlo
 
 PHOTONS = 100_000
 MATERIALS = ("skin1", "wholemilk", "ketchup")
 
 
-def scene_of(name="edge", size=64, mm_per_pixel=1.0):
-    return make_scene(name, height=size, width=size, mm_per_pixel=mm_per_pixel)
+def scene_of(name="edge", size=64, mm_per_pixel=1.0, **options):
+    return make_scene(name, height=size, width=size, mm_per_pixel=mm_per_pixel, **options)
 
 
 def noise_scene(size=12, mm_per_pixel=0.3):
@@ -110,7 +113,7 @@ def test_separability_and_the_grid_are_what_judge_finds_for_the_exact_profile(mi
     for found in milk:
         profile = exact_of(found.material.name)
         kernel = fit_svd(profile, rank=3, mm_per_pixel=1.0).kernel
-        judged = judge(found.scene, kernel).picture
+        judged = render_separable(found.scene, kernel)
         parts = ("separability", "energy beyond the grid")
         ours = sum(cause(found, name).difference for name in parts)
         np.testing.assert_allclose(found.truth + ours, judged, rtol=0, atol=1e-12)
@@ -121,7 +124,7 @@ def test_separability_alone_is_judges_score_where_no_light_is_beyond(budget):
         pytest.skip("light lies beyond the grid")
     profile = exact_of(budget.material.name)
     kernel = fit_svd(profile, rank=3, mm_per_pixel=1.0).kernel
-    judged = measure(judge(budget.scene, kernel).picture, budget.truth)
+    judged = judge(budget.scene, kernel, truth=budget.truth).score
     ours = cause(budget, "separability").score
     # 1e-6 of the light is not on the grid; Delta E is of some 100 steps of lightness.
     assert ours.delta_e_2000_mean == pytest.approx(judged.delta_e_2000_mean, abs=1e-3)
@@ -225,15 +228,27 @@ def test_stored_weights_are_steps_of_their_format():
     bound = np.maximum(2.0**-11 * abs(kernel.weights), 2.0**-25)
     assert (abs(half - kernel.weights) <= bound).all()
     assert (half != kernel.weights).any()
-    byte = stored(kernel, "8-bit").weights
-    for c in range(3):
-        largest = abs(kernel.weights[:, :, c]).max()
-        steps = byte[:, :, c] / largest * 127.0
-        assert kernel.weights[:, :, c].min() < 0.0
-        np.testing.assert_allclose(steps, np.round(steps), atol=1e-9)
-        assert abs(byte - kernel.weights)[:, :, c].max() <= 0.5 / 127.0 * largest * (1.0 + 1e-9)
     with pytest.raises(KernelError, match=r"4-bit.*float64, float32, half, 8-bit"):
         stored(kernel, "4-bit")
+
+
+def test_bytes_have_a_scale_a_channel_and_a_sign_only_where_it_is_needed():
+    # By hand: the largest weight is 1, 2 and 0; a channel without negative weights has 255 steps.
+    middle = [0.4, 1.0, 0.4], [0.3, 2.0, 0.3], [0.0, 0.0, 0.0]
+    second = [0.12, 0.0, 0.12], [-0.7, 0.9, -0.7], [0.0, 0.0, 0.0]
+    weights = np.array([middle, second]).transpose(0, 2, 1)
+    found = stored(random_kernel(2, 1, 3, 1, weights=weights), "8-bit").weights
+    expected = {
+        (0, 0, 0): Fraction(102, 255),
+        (0, 1, 0): Fraction(1),
+        (1, 0, 0): Fraction(31, 255),  # 30.6
+        (0, 0, 1): Fraction(2 * 19, 127),  # 19.05
+        (1, 0, 1): Fraction(-2 * 44, 127),  # -44.45
+        (1, 1, 1): Fraction(2 * 57, 127),  # 57.15
+    }
+    for place, value in expected.items():
+        assert found[place] == pytest.approx(float(value), rel=1e-12), place
+    assert not found[:, :, 2].any()
 
 
 def test_a_model_takes_the_walks_place():
@@ -271,8 +286,10 @@ def test_bad_input_is_one_line():
     with pytest.raises(SimulationError, match=r"g = 0\.8; .*leave g out"):
         error_budget(forward, noise_scene())
     slab = parse_material(skin1.to_toml() + "thickness_mm = 5.0\n", "slab.toml")
-    with pytest.raises(SimulationError, match="one layer without a bottom"):
-        error_budget(slab, noise_scene())
+    both = parse_material(forward.to_toml() + "thickness_mm = 5.0\n", "both.toml")
+    for each in (slab, both):  # no advice on g, which would not be enough
+        with pytest.raises(SimulationError, match=r"is not one half space.*profile of its photon"):
+            error_budget(each, noise_scene())
     with pytest.raises(FitError, match="rank"):
         error_budget(skin1, noise_scene(), photons=1000, settings={"rank": 1000})
 
@@ -291,6 +308,22 @@ def test_the_chart_is_legible_and_shares_are_stacked(milk):
     drawn = [label.get_text() for label in alone.get_yticklabels()]
     assert drawn[:2] == [each.name for each in milk[0].causes[:2]]
     assert "(dipole instead of exact)" in drawn
+
+
+def test_a_million_photons_unless_told_otherwise(monkeypatch, capsys):
+    asked = []
+
+    def error_budgets_of(material, scenes, **settings):
+        asked.append((settings["photons"], settings["seed"]))
+        raise SimulationError("enough")
+
+    monkeypatch.setattr("sssfit.compare.budget.error_budgets", error_budgets_of)
+    run(capsys, "skin1", "--only", "budget", *("--picture", "disk", "--size", "8x8"))
+    given = ("--photons", "2e4", "--seed", "3", "--picture", "disk", "--size", "8x8")
+    run(capsys, "skin1", "--only", "budget", *given)
+    assert asked == [(1_000_000, 1), (20_000, 3)]
+    found = error_budgets(load_material("skin1"), [noise_scene(4)])
+    assert found[0].photons == 1_000_000
 
 
 def run(capsys, *arguments):
@@ -314,12 +347,13 @@ def test_the_command_prints_what_the_library_finds(tmp_path, monkeypatch, capsys
     )
     code, printed = run(capsys, *given, "--mm-per-pixel", "1", "--budget-chart", "b.png", "--json")
     assert code == 0
+    tilted = scene_of(angle_degrees=30.0)
+    found = error_budget(load_material("skin1"), tilted, photons=PHOTONS)
     whole = json.loads(printed.out)
     assert whole["output"] == ["b.png"]
     assert whole["rows"] == []
     figures = whole["budget"]
     assert (tmp_path / "b.png").read_bytes().startswith(b"\x89PNG")
-    found = budget_of("skin1")
     rows = {row["cause"]: row for row in figures["rows"] if row["picture"] == "edge"}
     assert {row["picture"] for row in figures["rows"]} == {"edge", "disk"}
     for each in (*found.causes, found.whole, found.interaction):
@@ -329,7 +363,8 @@ def test_the_command_prints_what_the_library_finds(tmp_path, monkeypatch, capsys
             assert row["delta_e_2000_mean"] is None
             assert row["hint"] == "not made yet"
             continue
-        assert row["delta_e_2000_mean"] == each.score.delta_e_2000_mean
+        for key in COLOUR_FIGURES:
+            assert row[key] == getattr(each.score, key)
         assert row["energy_drift"] == each.score.energy_drift.tolist()
         assert row["share_of_whole"] == found.share(each)
 
@@ -356,6 +391,8 @@ def test_the_command_writes_a_table_and_what_to_do(tmp_path, monkeypatch, capsys
         (("skin1", "--only", "budget", "--rank", "2", "--method", "burley"), 2, "--rank is for"),
         (("skin1", "--only", "budget", "--picture", "edge,"), 2, "no picture ''"),
         (("deon-skin", "--only", "budget"), 1, "deon-skin has no coefficients"),
+        (("a.profile.npz", "--only", "budget"), 1, "is a profile, and a budget simulates"),
+        (("a.profile.npz", "--convergence", "c.png"), 1, "is a profile, and a convergence"),
         (("skin1", "--only", "budget", "--budget-chart", "b.txt"), 1, "b.txt"),
     ],
 )

@@ -12,7 +12,14 @@ from matplotlib.patches import StepPatch
 from sssfit._chart_data import picture
 from sssfit._chart_text import count, shortened, with_error
 from sssfit._profile_bins import LEAST_HITS, effective_hits, merged
-from sssfit.chart import FORMATS, chart_format, is_chart_file, profile_figure, save_figure
+from sssfit.chart import (
+    FORMATS,
+    chart_format,
+    is_chart_file,
+    material_figure,
+    profile_figure,
+    save_figure,
+)
 from sssfit.errors import FileError
 from sssfit.material import Layer, Material, load_material
 from sssfit.profile import Profile
@@ -232,7 +239,9 @@ def odd_profiles():
         "1 annulus": lambda: hand_made(exponential(2, n=1)),
         "below zero": lambda: hand_made(exponential(2) - 1e-6),
         "uneven annuli": lambda: hand_made(exponential(3, n=50), np.geomspace(1, 21, 51) - 1),
-        "unknown meta": lambda: hand_made(exponential(3), method=["?"], material="$x", seed={}),
+        "unknown meta": lambda: hand_made(
+            exponential(3), method="$?", material={"name": "$x"}, version="$"
+        ),
     }
 
 
@@ -302,3 +311,70 @@ def test_numbers_read_as_people_write_them():
     assert shortened("a" * 12) == "a" * 12
     assert shortened("near-infrared-850nm") == "near-…-850nm"
     assert shortened("near-infrared-940nm") == "near-…-940nm"
+
+
+def test_a_profile_so_far_says_so():
+    texts = [each.get_text() for each in profile_figure(hand_made(exponential(1))).texts]
+    assert texts[0] == "Diffuse reflectance profile"
+    so_far = profile_figure(hand_made(exponential(1), checkpoint="sssfit.checkpoint/1"))
+    assert so_far.texts[0].get_text() == "Diffuse reflectance profile so far"
+
+
+# Materials
+
+
+def points(axes):
+    """The values of each line of points."""
+    return [np.asarray(each.get_ydata()) for each in axes.lines]
+
+
+def test_a_material_is_drawn_by_its_coefficients():
+    layers = (
+        Layer(1.4, 0.9, [0.2, 0.1], [20.0, 10.0], 0.5),
+        Layer(1.33, 0.0, [0.0, 0.0], [0.0, 0.0], 1.0),  # clear
+        Layer(1.4, 0.5, [0.0, 0.3], [4.0, 2.0]),
+    )
+    figure = material_figure(Material("stack", ("red", "blue"), layers, source="made up"))
+    coefficients, path, absorption = figure.axes
+    found = points(coefficients)
+    np.testing.assert_allclose(found, [[2, 1], [0.2, 0.1], [2, 1], [np.nan, 0.3]])
+    np.testing.assert_allclose(points(path), [[1 / 2.2, 1 / 1.1], [1 / 2, 1 / 1.3]])
+    shares = [[0.2 / 20.2, 0.1 / 10.1], [np.nan, 0.3 / 2.3]]
+    np.testing.assert_allclose(points(absorption), shares, rtol=1e-12)
+    assert [each.get_ylabel() for each in figure.axes] == ["1/mm", "mm", "1 - albedo"]
+    for axes in figure.axes:
+        assert axes.get_yscale() == "log"
+        assert [each.get_text() for each in axes.get_xticklabels()] == ["red", "blue"]
+    labels = [each.get_text() for each in figure.legends[0].get_texts()]
+    assert labels == ["layer 1: 0.5 mm, eta 1.4", "layer 3: semi-infinite, eta 1.4"]
+    texts = [each.get_text() for each in figure.texts]
+    assert texts[:2] == [
+        "stack: material",
+        "3 layers, half space below · made up · specular reflectance 0.02778",
+    ]
+    assert "1 clear layer without absorption or scattering." in texts
+
+
+def odd_materials():
+    wavelengths = [f"{400 + 5 * k} nm" for k in range(64)]
+    channels = ("near-infrared-850nm", "Wm@$漢" * 10)
+    layers = tuple(Layer(1.3, 0.08 * k, [0.1 + k, 2.0], [1.0, 3.0], 0.1 + k) for k in range(12))
+    return {
+        "skin1": lambda: load_material("skin1"),
+        "64 channels": lambda: spectrum(wavelengths, "m" * 100),
+        "12 layers": lambda: Material("many", channels, layers, source="$x" * 90),
+        "no absorption": lambda: Material("white", ("a",), (Layer(1.0, 0.0, [0.0], [1.0]),)),
+        "no scattering": lambda: Material("black", ("a",), (Layer(1.0, 0.0, [1.0], [0.0]),)),
+    }
+
+
+@pytest.mark.parametrize("name", odd_materials())
+def test_charts_of_materials_are_legible_and_the_same_each_time(name):
+    material = odd_materials()[name]()
+    assert_legible(lambda: material_figure(material))
+    written = []
+    for _ in range(2):
+        stream = io.BytesIO()
+        save_figure(material_figure(material), stream, format="svg")
+        written.append(stream.getvalue())
+    assert written[0] == written[1]

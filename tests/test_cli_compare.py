@@ -3,21 +3,29 @@
 import csv
 import io
 import json
+import math
 import os
+import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from sssfit.cli import main
+from sssfit.cli._compare_input import scenes_of
+from sssfit.cli._compare_options import PICTURES
 from sssfit.cli._compare_table import is_table_file
+from sssfit.cli._options import Common
 from sssfit.compare import pareto
 from sssfit.compare.candidates import candidates
 from sssfit.errors import RenderError
 from sssfit.image import save_image
 from sssfit.material import load_material
+from sssfit.render.irradiance import make_scene
 from sssfit.simulate import exact, simulate_exact
 
 SMALL = ("--picture", "disk", "--size", "32x32", "--mm-per-pixel", "2.5")
+COMMON = Common(quiet=True, verbose=False, json=False, threads=None, seed=1)
 SLAB = (
     "eta = 1.3\ng = 0\nsigma_a_per_mm = [0.1, 0.1, 0.1]\nsigma_s_per_mm = [9, 9, 9]\n"
     "thickness_mm = 2\n"
@@ -214,7 +222,76 @@ def test_a_slab_needs_its_photons_walked(run, tmp_path):
     (tmp_path / "slab.toml").write_text(SLAB)
     line = one_line(run("slab.toml", *SMALL, status=1))
     assert "slab is not one half space" in line
-    assert "compare slab.profile.npz" in line
+    # What it advises is done, and works.
+    (advised,) = re.findall(r"compare (\S+\.profile\.npz)", line)
+    with pytest.raises(SystemExit) as ended:
+        main(["simulate", "slab.toml", "--photons", "1000", "-q"])
+    assert ended.value.code == 0
+    assert "Take " in run(advised, *SMALL)
+
+
+@pytest.mark.parametrize("option", [("--only", "budget"), ("--convergence", "c.png")])
+def test_a_stack_is_told_what_the_next_command_takes(run, tmp_path, option):
+    toml = SLAB.replace("g = 0", "g = 0.8")
+    (tmp_path / "forward.toml").write_text(toml)
+    line = one_line(run("forward.toml", "-q", *option, status=1))
+    assert "forward is not one half space" in line
+    for other in ("leave g out", "multipole"):
+        assert other not in line
+
+
+def test_it_ends_with_a_verdict_of_two_lines(run, few):
+    given = (*SMALL, "--picture", "edge,points")
+    figures = json.loads(run("skin1", *given, "--json"))
+    first, second = run("skin1", *given).splitlines()[-2:]
+    by_label = {}
+    for row in figures["rows"]:
+        by_label.setdefault(row["label"], []).append(row)
+    typical = {
+        label: math.prod(row["delta_e_2000_mean"] for row in rows) ** (1 / 3)
+        for label, rows in by_label.items()
+    }
+    weights = {label: rows[0]["taps_per_pixel"] for label, rows in by_label.items()}
+    front = [
+        label
+        for label in by_label
+        if not any(
+            weights[other] <= weights[label] and typical[other] < typical[label]
+            for other in by_label
+        )
+    ]
+    front.sort(key=weights.get)
+    assert [each["label"] for each in figures["verdict"]] == front
+    assert len(front) >= 2
+    assert first.startswith(f"Take {front[0]} for {weights[front[0]]} weights a pixel, {front[1]}")
+    for place, label in (("the cheapest", front[0]), ("the closest", front[-1])):
+        worst = max(by_label[label], key=lambda row: row["delta_e_2000_mean"])
+        error = f"{worst['delta_e_2000_mean']:.3g} ({worst['picture']})"
+        assert f"{place}, {label} {error}" in second
+
+
+def test_the_verdict_says_from_where_on_nothing_shows(run):
+    given = ("--only", "kernels", "--size", "32x32")
+    far, near = (
+        run("skin1", *given, "--picture", picture, "--mm-per-pixel", pitch).splitlines()[-1]
+        for picture, pitch in (("head", "12"), ("points", "1"))
+    )
+    assert far.endswith("on, 95 % of every picture are within a Delta E of 1.")
+    assert near.endswith("none has 95 % of every picture within a Delta E of 1.")
+
+
+def test_default_pictures_have_no_method_at_home_on_all():
+    scenes, pitch = scenes_of(PICTURES.split(","), (64, 64), None, COMMON)
+    assert [each.name for each in scenes] == ["disk", "edge", "points", "head"]
+    tilted = make_scene("edge", height=64, width=64, mm_per_pixel=pitch, angle_degrees=30.0)
+    np.testing.assert_array_equal(scenes[1].irradiance, tilted.irradiance)
+
+
+@pytest.mark.parametrize("seed", [1, 5])
+def test_noise_has_the_seed_that_was_asked_for(seed):
+    (scene,), pitch = scenes_of(["noise"], (16, 16), None, replace(COMMON, seed=seed))
+    wanted = make_scene("noise", height=16, width=16, mm_per_pixel=pitch, seed=seed)
+    np.testing.assert_array_equal(scene.irradiance, wanted.irradiance)
 
 
 def test_profiles_without_a_colour_need_the_other_error(run, tmp_path):

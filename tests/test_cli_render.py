@@ -16,6 +16,7 @@ from sssfit.compare.judge import judge
 from sssfit.fit import fit_svd
 from sssfit.image import load_image, save_image
 from sssfit.kernel import SeparableKernel
+from sssfit.material import load_material
 from sssfit.profile import Profile
 from sssfit.render.head import head_scene
 from sssfit.render.irradiance import make_scene
@@ -122,12 +123,13 @@ def test_without_its_profile_the_cost_is_all_that_is_measured(run):
     assert "profile" in words
 
 
+LARD = dataclasses.replace(load_material("skin1"), name="wax", channels=("c0", "c1", "c2"))
 OTHERS = {
-    "material": {"name": "lard"},
-    "material_sha256": "0123",
-    "method": "montecarlo",
-    "photons": 10_000,
-    "seed": 7,
+    "material": {"material": {"name": "lard"}},
+    "material_sha256": {"material": LARD.to_dict(), "material_sha256": LARD.sha256},
+    "method": {"method": "montecarlo"},
+    "photons": {"photons": 10_000},
+    "seed": {"seed": 7},
 }
 
 
@@ -137,7 +139,7 @@ def test_a_profile_that_differs_in_one_thing_is_not_the_kernels(run, key):
     profile = Profile.load("wax.profile.npz")
     wanted = json.loads(run("render", "--irradiance", "edge", *SIZE, "--json")[1])
     energy = profile.annulus_energy[::-1].copy()
-    meta = {**profile.meta, key: OTHERS[key]}
+    meta = {**profile.meta, **OTHERS[key]}
     make_profile(profile.r_edges_mm, energy, meta=meta).save("other.profile.npz")
     newest = Path("wax.profile.npz").stat().st_mtime + 60.0
     os.utime("other.profile.npz", (newest, newest))

@@ -2,6 +2,7 @@
 
 import math
 import warnings
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -161,6 +162,19 @@ def test_published_optima_of_the_dipole_of_marble(marble, free_energy):
                 total = marble.diffuse_reflectance[1]
                 assert sum(found["weights"]) == pytest.approx(total, rel=1e-12)
                 assert total / entering == pytest.approx(0.791, abs=5e-4)
+
+
+def test_worst_dipoles_are_those_of_the_docs():
+    page = (Path(__file__).parents[1] / "docs" / "fits.md").read_text(encoding="utf-8")
+    table = page.partition("| Gaussians | constrained | free |")[2].split("\n\n")[0]
+    cells = [line.strip("|").split("|") for line in table.splitlines()[2:]]
+    assert [int(each[0]) for each in cells] == [2, 4, 6]
+    for terms, *both in cells:
+        for free_energy, cell in zip((False, True), both, strict=True):
+            value, name = cell.split()
+            found = errors(fit(fine_dipole(name.strip("()")), int(terms), free_energy=free_energy))
+            unit = 10.0 ** -len(value.partition(".")[2])
+            assert 100.0 * max(found) == pytest.approx(float(value), abs=0.501 * unit)
 
 
 def test_worst_of_the_33_dipoles_of_all_materials():

@@ -26,6 +26,7 @@ from sssfit.profile import Profile
 from sssfit.simulate import (
     Checkpoint,
     is_complete,
+    read_checkpoint,
     simulate_montecarlo,
     simulate_montecarlo_many,
 )
@@ -292,6 +293,86 @@ def test_an_edited_checkpoint_is_one_line_that_names_the_fault(tmp_path, left, c
     assert "\n" not in str(caught.value)
 
 
+def without_the_label(meta, _):
+    """A checkpoint of the time when it held no materials."""
+    del meta["materials"]
+
+
+def with_another_grid(meta, _):
+    meta["settings"]["annuli"] = "5000"
+
+
+def with_another_albedo(meta, _):
+    meta["materials"][0]["layers"][0]["sigma_s_per_mm"][0] = 0.75
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (without_the_label, "was saved by a version that did not keep the materials in it"),
+        (put("materials", []), "is damaged or was edited: its materials and grids"),
+        (put("materials", [{"name": "a\nb"}]), "is damaged or was edited: its materials"),
+        (put("materials", 7), "is damaged or was edited: its materials"),
+        (with_another_albedo, "is damaged or was edited: material = 'skin1 (sha256"),
+        (with_another_grid, "ledger_bins has shape (3711, 2), expected (15003, 2)"),
+        (put("photons", 5), "photons = 5, expected whole batches of 16384"),
+        (put("format", "sssfit.checkpoint/2"), "has format 'sssfit.checkpoint/2'"),
+    ],
+)
+def test_what_no_walk_left_makes_no_profile(tmp_path, left, change, said):
+    path = tmp_path / "c"
+    path.write_bytes(left)
+    edited(path, change)
+    with path.open("rb") as stream:
+        for source, origin in ((path, str(path)), (stream, "stdin")):
+            with pytest.raises(FileError) as caught:
+                read_checkpoint(source, origin)
+            assert str(caught.value).startswith(f"{origin} ")
+            assert said in str(caught.value)
+            assert "\n" not in str(caught.value)
+
+
+def test_a_checkpoint_makes_the_profile_of_a_run_that_ended_there(tmp_path):
+    path = tmp_path / "c"
+    done = leave_checkpoint(path)
+    ended = skin1(photons=done)
+    found = read_checkpoint(path)
+    (profile,) = found.profiles
+    assert same_bits(profile, ended)
+    assert profile.photons == done
+    assert profile.meta["checkpoint"] == "sssfit.checkpoint/1"
+    assert profile.meta["version"] == ended.meta["version"]
+    assert found.relative_error == ended.meta["relative_error"]
+    assert found.flights > done
+    assert found.seconds > 0.0
+
+
+def test_a_checkpoint_has_all_materials_of_its_walk(tmp_path):
+    path = tmp_path / "c"
+    materials = [load_material("skin1"), load_material("ketchup")]
+    stopped = simulate_montecarlo_many(
+        materials, photons=10**9, threads=1, stop=stopping_after(2), checkpoint=Checkpoint(path)
+    )
+    found = read_checkpoint(path).profiles
+    assert [each.material_name for each in found] == ["skin1", "ketchup"]
+    assert all(map(same_bits, found, stopped))
+
+
+def test_a_checkpoint_of_another_version_says_so(tmp_path, monkeypatch):
+    path = tmp_path / "c"
+    monkeypatch.setattr("sssfit.simulate._checkpoint.source_key", lambda: "0.0-abc")
+    leave_checkpoint(path)
+    assert read_checkpoint(path).profiles[0].meta["version"] is None
+
+
+@pytest.mark.parametrize("content", [b"", b"PK\x03\x04", b"\x89PNG\r\n", b"[1]"])
+def test_foreign_files_are_not_checkpoints(tmp_path, content):
+    path = tmp_path / "c"
+    path.write_bytes(content)
+    with pytest.raises(FileError, match="c is not a checkpoint"):
+        read_checkpoint(path)
+
+
 def test_a_full_disk_costs_the_checkpoint_and_not_the_run(tmp_path, monkeypatch):
     path = tmp_path / "c"
     leave_checkpoint(path)
@@ -425,7 +506,7 @@ def test_a_checkpoint_is_gone_on_from_and_removed(run, tmp_path):
         (("--photons", "2e4"), 1, "more than the 20,000 asked for"),
         (("-o", "-"), 2, "--resume needs a file"),
         (("--checkpoint-every", "-1"), 2, "--checkpoint-every"),
-        (("--checkpoint-every", "nan"), 1, "give a time from 0 s up"),
+        (("--checkpoint-every", "nan"), 2, "'nan' is not a finite number."),
         (("--target-error", "0"), 2, "'0' is not a share between 0 and 100 %"),
         (("--target-error", "100%"), 2, "'100%' is not a share"),
         (("--target-error", "few"), 2, "'few' is not a share"),

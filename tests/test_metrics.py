@@ -10,6 +10,7 @@ import reference_delta_e as reference
 
 from sssfit.compare import Cost, auto_exposure, cost_of, flip, measure, seconds_per_megapixel, ssim
 from sssfit.compare._delta_e import BLOCK_PIXELS, _load_colour, delta_e_2000, lab
+from sssfit.compare.metrics import COLOUR_FIGURES
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
 
@@ -45,8 +46,8 @@ def test_identical_pictures_differ_in_nothing(channels):
     assert score.psnr_db == np.inf
     assert not score.energy_drift.any()
     assert score.ssim == pytest.approx(1.0, abs=1e-12)
-    colours = [score.delta_e_2000_mean, score.delta_e_2000_p99, score.flip]
-    np.testing.assert_array_equal(colours, [0.0] * 3 if channels in (1, 3) else [np.nan] * 3)
+    colours = [*(getattr(score, key) for key in COLOUR_FIGURES), score.flip]
+    np.testing.assert_array_equal(colours, [0.0 if channels in (1, 3) else np.nan] * 5)
 
 
 def test_a_mask_gives_the_figures_of_the_cropped_picture():
@@ -118,7 +119,19 @@ def test_mean_and_percentile_are_of_what_a_display_shows():
     ]
     score = measure(image, truth, exposure=1.7)
     assert score.delta_e_2000_mean == pytest.approx(np.mean(expected), rel=1e-9)
+    assert score.delta_e_2000_p95 == pytest.approx(np.percentile(expected, 95), rel=1e-9)
     assert score.delta_e_2000_p99 == pytest.approx(np.percentile(expected, 99), rel=1e-9)
+    assert score.share_above_1 == np.mean(np.array(expected) > 1.0)
+
+
+def test_the_share_above_1_counts_pixels():
+    truth = np.full((4, 25, 1), 0.2)
+    image = truth.copy()
+    image[0, :3] = 0.4  # far above 1
+    image[1, :2] = 0.2001  # far below 1
+    score = measure(image, truth, exposure=1.0)
+    assert score.share_above_1 == 0.03
+    assert score.delta_e_2000_p95 < 0.1 < 1.0 < score.delta_e_2000_p99
 
 
 def test_one_channel_is_grey():

@@ -15,7 +15,8 @@ from sssfit.compare.candidates import Candidate, candidates
 from sssfit.compare.comparison import COSTS, ERRORS, check_error
 from sssfit.compare.front import pareto_front
 from sssfit.compare.judge import judge
-from sssfit.compare.metrics import measure
+from sssfit.compare.judged import border_of, judged_scene
+from sssfit.compare.metrics import COLOUR_FIGURES, measure
 from sssfit.compare.pareto import check_scenes, compare_kernels
 from sssfit.errors import FitError, RenderError
 from sssfit.material import load_material
@@ -89,12 +90,15 @@ def test_rows_are_what_judge_and_measure_say(skin1, scenes, comparison):
     for candidate in SOME:
         fit = candidate.fit(skin1, PITCH, None)
         for scene in scenes:
-            row, alone = next(rows), judge(scene, fit.kernel, skin1)
-            truth = render_reference(scene, skin1)
-            score = measure(render_separable(scene, fit.kernel), truth, mask=scene.mask)
+            row, shown = next(rows), judged_scene(scene, skin1)
+            border = {"disk": "zero", "head": "mirror"}[scene.name]
+            alone = judge(shown, fit.kernel, skin1, border=border)
+            truth = render_reference(shown, skin1, border=border)
+            picture = render_separable(shown, fit.kernel, border=border)
+            score = measure(picture, truth, mask=shown.mask)
             assert (row.label, row.method) == (candidate.label, candidate.method)
             assert (row.picture, row.rank) == (scene.name, fit.kernel.rank)
-            keys = ("delta_e_2000_mean", "delta_e_2000_p99", "relative_l2", "rmse", "psnr_db")
+            keys = (*COLOUR_FIGURES, "relative_l2", "rmse", "psnr_db")
             for key in keys:
                 assert getattr(row, key) == getattr(alone.score, key) == getattr(score, key)
             np.testing.assert_array_equal(row.energy_drift, score.energy_drift)
@@ -113,7 +117,9 @@ def test_rows_are_what_judge_and_measure_say(skin1, scenes, comparison):
 
 def test_pictures_are_named_with_the_exposure_of_their_truth(skin1, scenes, comparison):
     for scene, picture in zip(scenes, comparison.pictures, strict=True):
-        score = judge(scene, SOME[0].fit(skin1, PITCH, None).kernel, skin1).score
+        shown = judged_scene(scene, skin1)
+        kernel = SOME[0].fit(skin1, PITCH, None).kernel
+        score = judge(shown, kernel, skin1, border=border_of(shown)).score
         assert dataclasses.astuple(picture) == (scene.name, 64, 64, score.exposure)
 
 

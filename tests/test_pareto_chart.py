@@ -107,7 +107,7 @@ def test_title_and_notes_say_what_was_compared(comparison):
         f"{comparison.pixels} x {comparison.pixels} pixels of 2 mm",
         "disk, 32 × 32 pixels, " + exposure,  # noqa: RUF001
         f"passes times the {comparison.pixels} pixels of a pass",
-        "as the made edge is",
+        "Of disk and edge, what is within 21.4 mm of light or border counts",
     ):
         assert part in text
     threads = pareto_figure(dataclasses.replace(comparison, threads=1), cost="seconds")

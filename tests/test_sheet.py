@@ -16,6 +16,7 @@ from sssfit.cli import main
 from sssfit.compare._panels import lightness, make_panel
 from sssfit.compare.editing import EDITS, TABLE_1, compute_editing
 from sssfit.compare.judge import judge
+from sssfit.compare.judged import border_of, judged_scene
 from sssfit.compare.metrics import measure
 from sssfit.compare.pictures import picture_error
 from sssfit.compare.sheet import compute_sheet, production_look
@@ -91,7 +92,8 @@ def test_figures_are_those_of_direct_calls(skin1, sheet, label, method, settings
     row = row_of(sheet, label)
     for name, panel in zip(sheet.scenes, row.panels, strict=True):
         scene = make_scene(name, height=PIXELS, width=PIXELS, mm_per_pixel=PITCH)
-        found = judge(scene, kernel, skin1)
+        shown = judged_scene(scene, skin1)
+        found = judge(shown, kernel, skin1, border=border_of(shown))
         assert panel.score.delta_e_2000_mean == pytest.approx(found.score.delta_e_2000_mean)
         assert panel.score.exposure == pytest.approx(found.score.exposure)
         assert row.passes == found.cost.passes
@@ -106,14 +108,15 @@ def test_the_true_kernel_is_no_different_from_itself(sheet):
 def test_the_input_is_the_irradiance_times_the_albedo(skin1, sheet):
     scene = make_scene("edge", height=PIXELS, width=PIXELS, mm_per_pixel=PITCH)
     truth = render_reference(scene, skin1)
-    expected = measure(scene.irradiance * skin1.diffuse_reflectance, truth)
+    mask = judged_scene(scene, skin1).mask
+    expected = measure(scene.irradiance * skin1.diffuse_reflectance, truth, mask=mask)
     panel = sheet.rows[0].panels[sheet.scenes.index("edge")]
     assert panel.score.delta_e_2000_mean == pytest.approx(expected.delta_e_2000_mean)
 
 
 def test_codes_are_those_of_a_file(skin1, sheet, tmp_path):
     scene = make_scene("disk", height=PIXELS, width=PIXELS, mm_per_pixel=PITCH)
-    truth = render_reference(scene, skin1)
+    truth = render_reference(scene, skin1, border="zero")
     save_image(
         tmp_path / "truth.png",
         truth,

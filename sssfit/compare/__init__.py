@@ -5,6 +5,7 @@ from sssfit.compare.comparison import Comparison, KernelRow
 from sssfit.compare.cost import Cost, cost_of, seconds_per_megapixel
 from sssfit.compare.front import pareto_front
 from sssfit.compare.guide import Guide, compute_guide
+from sssfit.compare.kernel_view import KernelView, view_kernel
 from sssfit.compare.metrics import ImageScore, auto_exposure, measure
 from sssfit.compare.models import ModelComparison, ModelCurve, compare_models
 from sssfit.compare.pareto import compare_kernels
@@ -17,6 +18,7 @@ __all__ = [
     "Guide",
     "ImageScore",
     "KernelRow",
+    "KernelView",
     "ModelComparison",
     "ModelCurve",
     "Spectrum",
@@ -33,4 +35,5 @@ __all__ = [
     "radial_asymmetry",
     "seconds_per_megapixel",
     "ssim",
+    "view_kernel",
 ]

@@ -93,7 +93,7 @@ def make_sources(
     SimulationError
         A material that the exact solver does not cover, or settings out of range.
     """
-    _check_isotropic(material)
+    _check_solvable(material)
     grid = make_grid(material, radius_mm=radius_mm)
     exact = exact_with_all_light(material, grid, reach_mm, threads=threads)
     wide_mm = radius_of(RadialGrid(grid.dr_mm, exact.n_annuli))
@@ -115,15 +115,20 @@ def make_sources(
     return Sources(exact, walk, models, grid.annuli)
 
 
-def _check_isotropic(material: Material) -> None:
-    """Refuse anisotropic scattering: the exact solver reduces it, and the walk does not."""
-    for layer in material.layers:
-        if np.any(layer.g != 0.0):
-            worst = float(layer.g[np.argmax(np.abs(layer.g))])
-            raise SimulationError(
-                f"{material.name}: g = {worst:g}; an error budget needs a truth, and the exact "
-                "solver has one for g = 0: give sigma_s (1 - g) as sigma_s_per_mm and leave g out."
-            )
+def _check_solvable(material: Material) -> None:
+    """Refuse what has no exact solution; one with g is reduced, and the walk's is not."""
+    if not material.is_semi_infinite:
+        raise SimulationError(
+            f"{material.name} is not one half space, and an error budget needs the exact solution, "
+            "which others do not have: compare kernels on the profile of its photon walk instead."
+        )
+    g = material.layers[0].g
+    if np.any(g != 0.0):
+        raise SimulationError(
+            f"{material.name}: g = {g[np.argmax(np.abs(g))]:g}; an error budget needs a truth, and "
+            "the exact solver has one for g = 0: give sigma_s (1 - g) as sigma_s_per_mm and leave "
+            "g out."
+        )
 
 
 def picture_reach_mm(height: int, width: int, mm_per_pixel: float) -> float:

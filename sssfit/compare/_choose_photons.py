@@ -25,8 +25,9 @@ class PhotonNeed:
         The fewest of ``COUNTS``; None where none would do.
     counts : tuple of int
         What was tried, up to that.
-    delta_e_2000_mean : tuple of float
-        Of the worst view by each; inf where the profile cannot be fitted.
+    errors : tuple of float
+        Of the worst view by each, in the figure the tolerance is of; inf where the profile cannot
+        be fitted.
     seconds : tuple of float [s]
         That each took, compilation included.
     truth_method : str
@@ -37,44 +38,44 @@ class PhotonNeed:
 
     photons: int | None
     counts: tuple[int, ...]
-    delta_e_2000_mean: tuple[float, ...]
+    errors: tuple[float, ...]
     seconds: tuple[float, ...]
     truth_method: str
     truth_seconds: float
 
 
 def photons_needed(
-    material: Material,
-    option: Option,
-    views: Views,
-    tolerance: float,
-    seed: int,
-    truth_seconds: float,
-) -> PhotonNeed:
-    """Trace 1e4 photons, ten times as many, ..., until the option is within the tolerance."""
+    material: Material | None, option: Option, views: Views, seed: int, truth_seconds: float
+) -> PhotonNeed | None:
+    """Trace 1e4 photons, ten times as many, ..., until the option is within the tolerance.
+
+    None without a material to walk through.
+    """
+    if material is None:
+        return None
+    walked = views.profile.photons
+    if walked is not None:
+        # The truth is itself a walk: of the same seed, a shorter one would be a part of it.
+        seed ^= 1
     errors: list[float] = []
     seconds: list[float] = []
-    method = str(views.profile.meta.get("method"))
-    # The truth of a slab is itself a walk of the last count.
-    counts = COUNTS if views.profile.photons is None else COUNTS[:-1]
+    enough = walked
+    counts = [each for each in COUNTS if walked is None or each < walked]
     for photons in counts:
         begun = time.perf_counter()
-        errors.append(_error(material, option, views, tolerance, photons, seed))
+        errors.append(_error(material, option, views, photons, seed))
         seconds.append(time.perf_counter() - begun)
-        if errors[-1] <= tolerance:
+        if errors[-1] <= views.tolerance:
+            enough = photons
             break
-    enough = counts[len(errors) - 1] if errors[-1] <= tolerance else None
-    if enough is None and views.profile.photons is not None:
-        enough = views.profile.photons
+    method = str(views.profile.meta.get("method"))
     return PhotonNeed(
-        enough, counts[: len(errors)], tuple(errors), tuple(seconds), method, truth_seconds
+        enough, tuple(counts[: len(errors)]), tuple(errors), tuple(seconds), method, truth_seconds
     )
 
 
-def _error(
-    material: Material, option: Option, views: Views, tolerance: float, photons: int, seed: int
-) -> float:
-    """Return the mean Delta E of the worst view; what would be warned of is in it."""
+def _error(material: Material, option: Option, views: Views, photons: int, seed: int) -> float:
+    """Return the error of the worst view; what would be warned of is in it."""
     truth = views.profile
     radius_mm = radius_of(RadialGrid(float(truth.r_edges_mm[1]), truth.n_annuli))
     with warnings.catch_warnings():
@@ -83,6 +84,6 @@ def _error(
             material, photons=photons, seed=seed, radius_mm=radius_mm, threads=views.threads
         )
         try:
-            return views.score_of_option(option, tolerance, walk, wider=1.0)[0]
+            return views.score_of_option(option, walk, wider=1.0).error
         except FitError:  # a dark channel that no photon came back in
             return float("inf")

@@ -48,20 +48,25 @@ def make_panel(
     *,
     exposure: float,
     mask: npt.NDArray[np.int32] | None = None,
+    counts: npt.NDArray[np.int32] | None = None,
+    shown_part: tuple[slice, slice] = (slice(None), slice(None)),
 ) -> Panel:
     """Hold a picture (H, W, C) against a truth; C is 1 (grey) or 3.
+
+    ``mask`` (H, W) is the outline outside which no difference is drawn, ``counts`` the pixels that
+    the score is of, the mask's by default. Only ``shown_part`` of rows and columns is drawn.
 
     Raises
     ------
     RenderError
         As `measure`.
     """
-    score = measure(picture, truth, exposure=exposure, mask=mask)
+    score = measure(picture, truth, exposure=exposure, mask=mask if counts is None else counts)
     ours, true = (shown(each, exposure) for each in (picture, truth))
     difference = lightness(ours) - lightness(true)
     if mask is not None:
         difference = np.where(mask > 0, difference, 0.0)
-    return Panel(srgb_encode(ours), difference, score)
+    return Panel(srgb_encode(ours[shown_part]), difference[shown_part], score)
 
 
 def lightness(linear: FloatArray) -> FloatArray:

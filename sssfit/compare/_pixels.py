@@ -99,5 +99,6 @@ def check_exposure(exposure: float) -> float:
 
 def shown(pixels: FloatArray, exposure: float) -> FloatArray:
     """Return what a display has to show: exposed, cut to [0, 1], grey as three channels."""
-    cut: FloatArray = np.clip(pixels * exposure, 0.0, 1.0)
+    with np.errstate(over="ignore"):  # infinite light is cut to 1 as well
+        cut: FloatArray = np.clip(pixels * exposure, 0.0, 1.0)
     return np.repeat(cut, 3, axis=-1) if cut.shape[-1] == 1 else cut

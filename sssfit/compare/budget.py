@@ -17,15 +17,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.compare._all_light import radius_of
 from sssfit.compare._budget_causes import Cause, Switches, causes_of, everything
 from sssfit.compare._budget_profiles import MODELS, make_sources, picture_reach_mm
 from sssfit.compare._pixels import selected_pixels, selection
 from sssfit.compare._storage import STORAGES
 from sssfit.compare.candidates import Candidate
+from sssfit.compare.judged import judged_scene
 from sssfit.compare.metrics import ImageScore
 from sssfit.errors import RenderError, SimulationError
+from sssfit.grid import make_grid
 from sssfit.kernel import SeparableKernel
 from sssfit.material import Material
+from sssfit.render._made_edges import DISK_RADIUS_MM
 from sssfit.render.scene import Scene
 from sssfit.simulate import Progress
 
@@ -139,7 +143,8 @@ def error_budgets(
     material : Material
         A homogeneous half space with g = 0: what the exact solver covers.
     scenes : sequence of Scene
-        Flat, all of the same pixel size; their profiles and kernels are shared.
+        Flat, all of the same pixel size; their profiles and kernels are shared. What counts of
+        them says `judged_scene`.
     photons, seed, progress
         Of the photon walk; see ``simulate_montecarlo``.
     radius_mm : float, optional [mm]
@@ -168,7 +173,8 @@ def error_budgets(
         No such fit or storage.
     """
     _check(scenes, model)
-    reach_mm = max(picture_reach_mm(each.height, each.width, each.mm_per_pixel) for each in scenes)
+    grid_mm = radius_of(make_grid(material, radius_mm=radius_mm))
+    reach_mm = max(_reach_mm(each, grid_mm) for each in scenes)
     sources = make_sources(
         material,
         reach_mm,
@@ -190,7 +196,17 @@ def error_budgets(
         "storage": storage,
         "kernel": switches.whole_stored,
     }
-    return [_budget(material, scene, switches, threads, about) for scene in scenes]
+    judged = [judged_scene(each, switches.on_grid) for each in scenes]
+    return [_budget(material, scene, switches, threads, about) for scene in judged]
+
+
+def _reach_mm(scene: Scene, grid_mm: float) -> float:
+    """Return how far two pixels can be apart [mm]; disks are enlarged by what their light takes."""
+    least = math.ceil(2.0 * (DISK_RADIUS_MM + grid_mm) / scene.mm_per_pixel)
+    height, width = (
+        max(each, least) if scene.name == "disk" else each for each in (scene.height, scene.width)
+    )
+    return picture_reach_mm(height, width, scene.mm_per_pixel)
 
 
 def _budget(

@@ -3,14 +3,16 @@
 ``sssfit.compare.pareto`` fills them.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.compare.front import pareto_front
 from sssfit.errors import RenderError
+from sssfit.fit import support_of
 from sssfit.profile import Profile
 
 FloatArray = npt.NDArray[np.float64]
@@ -18,6 +20,7 @@ FloatArray = npt.NDArray[np.float64]
 # What a front can be of: the names of the command line, and the rows' fields.
 ERRORS = {"delta-e": "delta_e_2000_mean", "l2": "relative_l2"}
 COSTS = {"passes": "passes", "weights": "taps_per_pixel", "seconds": "seconds_per_megapixel"}
+_LEAST_ERROR = 1e-9  # what a geometric mean takes for none
 _COLOURED = (1, 3)  # channels that have a colour, or are grey
 
 
@@ -44,7 +47,8 @@ class KernelRow:
     settings : mapping
         Keywords of the fit.
     picture : str
-    delta_e_2000_mean, delta_e_2000_p99, relative_l2, rmse, psnr_db : float
+    delta_e_2000_mean, delta_e_2000_p95, delta_e_2000_p99, share_above_1 : float
+    relative_l2, rmse, psnr_db : float
     energy_drift : array (C,)
         As in `ImageScore`.
     radial_asymmetry : array (C,)
@@ -70,7 +74,9 @@ class KernelRow:
     settings: Mapping[str, Any]
     picture: str
     delta_e_2000_mean: float
+    delta_e_2000_p95: float
     delta_e_2000_p99: float
+    share_above_1: float
     relative_l2: float
     rmse: float
     psnr_db: float
@@ -141,6 +147,11 @@ class Comparison:
         beyond = self.profile.beyond_grid
         return np.divide(beyond, total, out=np.zeros_like(total), where=total > 0.0)
 
+    @property
+    def support_mm(self) -> float:
+        """Radius that keeps 99.9 % of every channel [mm]: how far a disk or an edge counts."""
+        return support_of(self.profile)
+
     def rows_of(self, picture: str) -> list[KernelRow]:
         """Rows of one picture."""
         return [row for row in self.rows if row.picture == picture]
@@ -149,6 +160,59 @@ class Comparison:
         """Rows of a picture that none of its rows beats, cheapest first."""
         found = [row for row in self.rows_of(picture) if (error, cost) in row.fronts]
         return sorted(found, key=lambda row: row.cost(cost))
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """A kernel on all pictures together.
+
+    Parameters
+    ----------
+    label : str
+    cost : float
+        As a front counts it.
+    typical_error : float
+        Geometric mean over the pictures, so that all weigh alike: the errors of points are ten
+        times those of a head.
+    error : float
+        The largest over the pictures.
+    picture : str
+        Where that is.
+    delta_e_2000_p95 : float
+        Largest over the pictures.
+    """
+
+    label: str
+    cost: float
+    typical_error: float
+    error: float
+    picture: str
+    delta_e_2000_p95: float
+
+
+def verdicts(comparison: Comparison, error: str, cost: str) -> list[Verdict]:
+    """Return the kernels that no other beats in typical error and cost, cheapest first."""
+    by_label: dict[str, list[KernelRow]] = {}
+    for row in comparison.rows:
+        by_label.setdefault(row.label, []).append(row)
+    found = [_verdict(rows, error, cost) for rows in by_label.values()]
+    on_front = pareto_front([each.cost for each in found], [each.typical_error for each in found])
+    front = [each for each, is_on in zip(found, on_front, strict=True) if is_on]
+    return sorted(front, key=lambda each: each.cost)
+
+
+def _verdict(rows: Sequence[KernelRow], error: str, cost: str) -> Verdict:
+    """Sum up one kernel's rows."""
+    errors = [row.error(error) for row in rows]
+    worst = int(np.argmax(errors))
+    return Verdict(
+        label=rows[0].label,
+        cost=rows[0].rounded_cost(cost),
+        typical_error=float(np.exp(np.mean(np.log(np.maximum(errors, _LEAST_ERROR))))),
+        error=errors[worst],
+        picture=rows[worst].picture,
+        delta_e_2000_p95=max(row.delta_e_2000_p95 for row in rows),
+    )
 
 
 def check_error(error: str, channels: int) -> None:

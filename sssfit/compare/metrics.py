@@ -20,9 +20,13 @@ from sssfit.compare._pixels import (
     selection,
 )
 
-__all__ = ["ImageScore", "auto_exposure", "measure"]
+__all__ = ["COLOUR_FIGURES", "ImageScore", "auto_exposure", "measure"]
 
 FloatArray = npt.NDArray[np.float64]
+
+JUST_NOTICEABLE = 1.0  # Delta E that eyes tell side by side
+# Of an `ImageScore`; the rows of comparisons and choices have the same.
+COLOUR_FIGURES = ("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99", "share_above_1")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,9 +45,13 @@ class ImageScore:
         20 log10(peak / rmse), peak the largest value of the truth; inf for identical pictures.
     energy_drift : array (C,) [1]
         sum(image) / sum(truth) - 1; black channels as in ``relative_l2``.
-    delta_e_2000_mean, delta_e_2000_p99 : float [1]
-        CIE Delta E 2000 at the exposure, linear sRGB under D65, its mean and its 99th percentile.
-        One channel is taken for grey; NaN for 2 channels and for more than 3, which have no colour.
+    delta_e_2000_mean, delta_e_2000_p95, delta_e_2000_p99 : float [1]
+        CIE Delta E 2000 at the exposure, linear sRGB under D65: its mean, its 95th and its 99th
+        percentile. One channel is taken for grey; NaN for 2 channels and for more than 3, which
+        have no colour.
+    share_above_1 : float [1]
+        Share of the pixels whose Delta E is above 1, about what an eye can tell side by side; NaN
+        where there is no colour.
     exposure : float [1 / as the pictures]
         What both were multiplied with before they were cut to [0, 1] and looked at.
     ssim, flip : float, optional [1]
@@ -56,7 +64,9 @@ class ImageScore:
     psnr_db: float
     energy_drift: FloatArray
     delta_e_2000_mean: float
+    delta_e_2000_p95: float
     delta_e_2000_p99: float
+    share_above_1: float
     exposure: float
     ssim: float | None = None
     flip: float | None = None
@@ -104,12 +114,10 @@ def measure(
     selected = selection(mask, pictures[1])
     pixels, true = (selected_pixels(picture, selected) for picture in pictures)
     exposure = exposure_of(true) if exposure is None else check_exposure(exposure)
-    mean, p99 = _colour_differences(pixels, true, exposure)
     return ImageScore(
         **_differences(pixels, true),
         energy_drift=_ratio(pixels.sum(axis=0) - true.sum(axis=0), true.sum(axis=0)),
-        delta_e_2000_mean=mean,
-        delta_e_2000_p99=p99,
+        **_colour_differences(pixels, true, exposure),
         exposure=exposure,
         **(_structure(*pictures, exposure, mask) if structure else {}),
     )
@@ -143,14 +151,15 @@ def _ratio(part: npt.ArrayLike, whole: npt.ArrayLike) -> FloatArray:
     return np.where(np.equal(part, 0.0), 0.0, ratio)
 
 
-def _colour_differences(
-    pixels: FloatArray, true: FloatArray, exposure: float
-) -> tuple[float, float]:
-    """Return mean and 99th percentile of Delta E 2000 of pixels (N, C)."""
+def _colour_differences(pixels: FloatArray, true: FloatArray, exposure: float) -> dict[str, float]:
+    """Return the figures of Delta E 2000 of pixels (N, C)."""
     if pixels.shape[1] not in (1, 3):
-        return np.nan, np.nan
+        return dict.fromkeys(COLOUR_FIGURES, np.nan)
     differences = delta_e_2000(pixels, true, exposure)
-    return float(differences.mean()), float(np.percentile(differences, 99.0))
+    p95, p99 = np.percentile(differences, [95.0, 99.0])
+    above = np.count_nonzero(differences > JUST_NOTICEABLE) / differences.size
+    figures = (differences.mean(), p95, p99, above)
+    return {key: float(each) for key, each in zip(COLOUR_FIGURES, figures, strict=True)}
 
 
 def _structure(

@@ -17,7 +17,8 @@ from sssfit.compare.candidates import candidates as every_candidate
 from sssfit.compare.comparison import COSTS, ERRORS, Comparison, KernelRow, Picture
 from sssfit.compare.front import pareto_front
 from sssfit.compare.judge import Judgement, judge
-from sssfit.compare.metrics import auto_exposure
+from sssfit.compare.judged import border_of, judged_scene
+from sssfit.compare.metrics import COLOUR_FIGURES, auto_exposure
 from sssfit.errors import FitError, RenderError
 from sssfit.fit import FitResult, make_target
 from sssfit.profile import Profile
@@ -50,7 +51,7 @@ def compare_kernels(
     profile : Profile
         What is fitted, and what the true pictures are made from.
     scenes : sequence of Scene
-        On pixels of ``mm_per_pixel``, of different names.
+        On pixels of ``mm_per_pixel``, of different names; what counts of them says `judged_scene`.
     mm_per_pixel, support_mm : float [mm]
         As `make_target`.
     candidates : sequence of Candidate, optional
@@ -76,8 +77,13 @@ def compare_kernels(
     target = make_target(profile, mm_per_pixel, support_mm)
     pixels = 2 * target.half_pixels + 1
     wanted = every_candidate(pixels) if candidates is None else tuple(candidates)
-    truths = [render_reference(scene, profile, threads=threads) for scene in scenes]
-    exposures = [auto_exposure(t, s.mask) for t, s in zip(truths, scenes, strict=True)]
+    judged_scenes = [judged_scene(scene, profile) for scene in scenes]
+    borders = [border_of(scene) for scene in judged_scenes]
+    truths = [
+        render_reference(scene, profile, border=border, threads=threads)
+        for scene, border in zip(judged_scenes, borders, strict=True)
+    ]
+    exposures = [auto_exposure(t, s.mask) for t, s in zip(truths, judged_scenes, strict=True)]
     judged: list[_Judged] = []
     left_out: list[tuple[str, str]] = []
     for done, candidate in enumerate(wanted):
@@ -89,8 +95,10 @@ def compare_kernels(
             left_out.append((candidate.label, str(error)))
             continue
         scores = [
-            judge(scene, fit.kernel, truth=truth, exposure=exposure, threads=threads)
-            for scene, truth, exposure in zip(scenes, truths, exposures, strict=True)
+            judge(scene, fit.kernel, truth=truth, border=border, exposure=exposure, threads=threads)
+            for scene, truth, border, exposure in zip(
+                judged_scenes, truths, borders, exposures, strict=True
+            )
         ]
         judged.append((candidate, fit, scores))
     if not judged:
@@ -185,8 +193,7 @@ def _rows(
                 rank=fit.kernel.rank,
                 settings=candidate.settings,
                 picture=scene.name,
-                delta_e_2000_mean=each.score.delta_e_2000_mean,
-                delta_e_2000_p99=each.score.delta_e_2000_p99,
+                **{key: getattr(each.score, key) for key in COLOUR_FIGURES},
                 relative_l2=each.score.relative_l2,
                 rmse=each.score.rmse,
                 psnr_db=each.score.psnr_db,

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from sssfit.compare._panels import Panel, check_colours, make_panel
 from sssfit.compare.candidates import MOST_TERMS, Candidate
 from sssfit.compare.cost import cost_of
+from sssfit.compare.judged import border_of, judged_scene
 from sssfit.compare.metrics import auto_exposure
 from sssfit.compare.pictures import picture_error
 from sssfit.fit import support_of
@@ -196,11 +197,17 @@ class _Easel:
     ) -> None:
         self._albedo = profile.diffuse_reflectance
         self._threads = threads
-        self._scenes: list[Scene] = [
+        asked = [
             make_scene(name, height=pixels, width=pixels, mm_per_pixel=mm_per_pixel)
             for name in names
         ]
-        self.truths = [render_reference(scene, profile, threads=threads) for scene in self._scenes]
+        self._outlines = [scene.mask for scene in asked]
+        self._scenes: list[Scene] = [judged_scene(scene, profile) for scene in asked]
+        self._parts = [(_middle(s.height, pixels), _middle(s.width, pixels)) for s in self._scenes]
+        self.truths = [
+            render_reference(scene, profile, border=border_of(scene), threads=threads)
+            for scene in self._scenes
+        ]
         self.exposures = tuple(
             auto_exposure(truth, scene.mask)
             for truth, scene in zip(self.truths, self._scenes, strict=True)
@@ -213,7 +220,10 @@ class _Easel:
     def rendered(self, kernel: SeparableKernel) -> list[FloatArray]:
         """Return the pictures by a kernel."""
         return [
-            np.asarray(render_separable(scene, kernel, threads=self._threads), dtype=np.float64)
+            np.asarray(
+                render_separable(scene, kernel, border=border_of(scene), threads=self._threads),
+                dtype=np.float64,
+            )
             for scene in self._scenes
         ]
 
@@ -222,9 +232,24 @@ class _Easel:
     ) -> SheetRow:
         """Hold a picture of each scene against its truth."""
         panels = [
-            make_panel(picture, truth, exposure=exposure, mask=scene.mask)
-            for picture, truth, exposure, scene in zip(
-                pictures, self.truths, self.exposures, self._scenes, strict=True
+            make_panel(
+                picture,
+                truth,
+                exposure=exposure,
+                mask=outline,
+                counts=scene.mask,
+                shown_part=part,
+            )
+            for picture, truth, exposure, outline, scene, part in zip(
+                *(pictures, self.truths, self.exposures, self._outlines),
+                *(self._scenes, self._parts),
+                strict=True,
             )
         ]
         return SheetRow(label, passes, tuple(panels))
+
+
+def _middle(size: int, pixels: int) -> slice:
+    """Return the middle pixels of an enlarged picture: those that were asked for."""
+    first = (size - pixels) // 2
+    return slice(first, first + pixels)

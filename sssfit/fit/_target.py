@@ -21,6 +21,7 @@ FloatArray = npt.NDArray[np.float64]
 KEPT = 0.999  # support "auto": share of every channel's on-grid energy within it
 _FAINTEST = 1e-145  # energy: squares of fainter pixels are 0, and errors relative to them nothing
 _MOST_BYTES = 2e9
+_LEAST_MM, _MOST_MM = 1e-12, 1e12  # of a kernel's pixels
 _WIDEST = 1e15  # pixels: beyond it the fit is refused for memory anyway; keeps floor() finite
 
 
@@ -96,8 +97,11 @@ def make_target(
     pitch = float(profile.r_edges_mm[1] if mm_per_pixel is None else mm_per_pixel)
     support = support_of(profile) if support_mm is None else float(support_mm)
     for name, value in (("mm_per_pixel", pitch), ("support", support)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise FitError(f"{name} = {value:g}; expected a length in mm above 0.")
+        if not _LEAST_MM <= value <= _MOST_MM:
+            raise FitError(
+                f"{name} = {value:g}; expected a length in mm above 0, from {_LEAST_MM:g} to "
+                f"{_MOST_MM:g}."
+            )
     # 1e-9 keeps a ratio that is whole but for its last bits from losing a pixel.
     half = math.floor(min(support / pitch, _WIDEST) + 1e-9)
     if half == 0:

@@ -31,7 +31,7 @@ from sssfit.fit._target import FloatArray, make_target
 from sssfit.profile import Profile
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS
 
-STRETCH = 127.8
+STRETCH = 127.7
 
 _SIGMAS_MM = np.sqrt(SKIN_VARIANCES_MM2)
 _RED = np.array([row[0] for row in SKIN_WEIGHTS])

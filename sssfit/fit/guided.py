@@ -32,6 +32,8 @@ _COARSEST = 8  # pixels on either side at the first level: each level has twice 
 _SPIKE = (
     0.25  # of sum(a): a middle pixel above it, and twice the pre-integrated one's, is warned of
 )
+_LEAST_B, _MOST_B = 1e-3, 1e9  # beyond, Gamma is 0 or 1 to rounding
+_LEAST_BOUND = 1e-9
 _ACROSS = 64  # quadrature nodes of Gamma along a half line, at least: the steps are 1/7 wide
 
 
@@ -280,10 +282,14 @@ def _on_the_sum(a: FloatArray, most: float) -> FloatArray:
 def _check_settings(k: float, b: float, centre_bound: float | None) -> None:
     if not 0.0 <= k <= 4.0:
         raise FitError(f"k = {k:g} is outside [0, 4]; 0 favours near scattering, 4 far scattering.")
-    if not (math.isfinite(b) and b > 0.0):
-        raise FitError(f"b = {b:g}; expected a number above 0, such as 50.")
-    if centre_bound is not None and not 0.0 < centre_bound <= 1.0:
-        raise FitError(f"centre_bound = {centre_bound:g}; expected a share above 0, up to 1.")
+    if not _LEAST_B <= b <= _MOST_B:
+        raise FitError(
+            f"b = {b:g}; expected a number above 0, from {_LEAST_B:g} to {_MOST_B:g}, such as 50."
+        )
+    if centre_bound is not None and not _LEAST_BOUND <= centre_bound <= 1.0:
+        raise FitError(
+            f"centre_bound = {centre_bound:g}; expected a share from {_LEAST_BOUND:g} to 1."
+        )
 
 
 def guided_target(profile: Profile, mm_per_pixel: float | None, support_mm: float | None) -> Target:

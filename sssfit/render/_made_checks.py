@@ -6,6 +6,7 @@ from sssfit.errors import RenderError
 
 # A render holds some 120 bytes a pixel of RGB, and 8 GB is its limit: said before a head is made,
 # which takes half a minute for 11000 x 11000.
+_MOST = 1e12  # mm, degrees or pieces
 MAX_PIXELS = 60_000_000
 
 
@@ -34,9 +35,11 @@ def check_size(name: str, height: int, width: int, mm_per_pixel: float) -> None:
 
 
 def check_above(name: str, option: str, value: float, least: float) -> None:
-    """Refuse all but a finite number above ``least``."""
-    if not (math.isfinite(value) and value > least):
-        raise RenderError(f"{name}: {option} = {value:g}; expected a number above {least:g}.")
+    """Refuse all but a number above ``least``, within what pixels can be counted in."""
+    if not least < value <= _MOST:
+        raise RenderError(
+            f"{name}: {option} = {value:g}; expected a number above {least:g}, up to {_MOST:g}."
+        )
 
 
 def check_range(name: str, option: str, value: float, low: float, high: float) -> None:
@@ -46,9 +49,11 @@ def check_range(name: str, option: str, value: float, low: float, high: float) -
 
 
 def check_finite(name: str, option: str, value: float) -> None:
-    """Refuse NaN and infinity."""
-    if not math.isfinite(value):
-        raise RenderError(f"{name}: {option} = {value:g}; expected a finite number.")
+    """Refuse NaN, infinity, and what no pixels can be counted in."""
+    if not abs(value) <= _MOST:
+        raise RenderError(
+            f"{name}: {option} = {value:g}; expected a finite number, up to {_MOST:g}."
+        )
 
 
 def check_period(name: str, period_mm: float, mm_per_pixel: float) -> None:

@@ -8,6 +8,9 @@ from sssfit.render.scene import Scene
 
 FloatArray = npt.NDArray[np.float64]
 
+# Whatever the picture, so that a kernel's error does not depend on the picture's size.
+DISK_RADIUS_MM = 19.2
+
 
 def middle_out(pixels: int) -> FloatArray:
     """Coordinates of pixel centres from the middle of the picture, in pixels."""
@@ -67,10 +70,14 @@ def half_plane_coverage(distance: FloatArray, angle_degrees: float) -> FloatArra
 
 
 def disk(*, height: int, width: int, mm_per_pixel: float, radius_mm: float | None = None) -> Scene:
-    """White disk in the middle of black; its radius is a quarter of the smaller side by default."""
+    """White disk in the middle of black.
+
+    Its radius is 19.2 mm by default, and a quarter of the smaller side where that does not fit.
+    """
     check_size("disk", height, width, mm_per_pixel)
     if radius_mm is None:
-        radius_mm = 0.25 * min(height, width) * mm_per_pixel
+        side_mm = min(height, width) * mm_per_pixel
+        radius_mm = DISK_RADIUS_MM if side_mm >= 2.0 * DISK_RADIUS_MM else 0.25 * side_mm
     check_above("disk", "radius_mm", radius_mm, 0.0)
     area = disk_coverage(middle_out(width), middle_out(height), radius_mm / mm_per_pixel)
     return Scene("disk", area[..., None], mm_per_pixel)

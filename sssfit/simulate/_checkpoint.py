@@ -3,7 +3,8 @@
 A checkpoint is what a shorter run would have ended with: the ledger summed over whole batches, the
 photons in it, and a fingerprint of what decides the bits of these batches. How many more are to
 follow is not part of that: a run may be resumed with more photons or a smaller target error, and
-ends in the same bits as one that was asked for that from the start.
+ends in the same bits as one that was asked for that from the start. The materials are kept in full,
+so that ``_so_far`` can make profiles of the sums without them.
 
 Which run may write a checkpoint is settled by the lock on the output it belongs to (see
 ``sssfit.files.locked``); nothing here locks.
@@ -19,7 +20,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from time import perf_counter
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
@@ -35,7 +36,7 @@ from sssfit.simulate._batches import BATCH_PHOTONS, MAX_PHOTONS, Tally
 
 FORMAT = "sssfit.checkpoint/1"
 # By either a file is ours, however damaged; both stand uncompressed.
-_MARKS = (b"ledger_absorbed.npy", "sssfit.checkpoint/".encode("utf-32-le"))
+CHECKPOINT_MARKS = (b"ledger_absorbed.npy", "sssfit.checkpoint/".encode("utf-32-le"))
 # At most so much is lost; skin1's takes 1 ms to write, the largest (64 channels of 100 000
 # annuli, 100 MB) a quarter of a second.
 EVERY_SECONDS = 30.0
@@ -90,6 +91,7 @@ class Checkpoint:
     every_seconds: float = EVERY_SECONDS
     resume: bool = True
     _settings: Mapping[str, str] = field(init=False, default_factory=dict)
+    _materials: Sequence[Material] = field(init=False, default=())
     _is_ours: bool = field(init=False, default=False)
     _has_failed: bool = field(init=False, default=False)
     _saved_at: float = field(init=False, default=0.0)
@@ -100,7 +102,9 @@ class Checkpoint:
                 f"a checkpoint every {self.every_seconds} s; give a time from 0 s up."
             )
 
-    def begin(self, empty: Tally, settings: Mapping[str, str]) -> State:
+    def begin(
+        self, empty: Tally, settings: Mapping[str, str], materials: Sequence[Material]
+    ) -> State:
         """Return where to begin: at what was saved with the same ``settings``, or at ``empty``.
 
         Raises
@@ -111,7 +115,8 @@ class Checkpoint:
             It was made with other settings; the message names them.
         """
         remove_leftovers(self.path)
-        self._settings, self._saved_at = settings, perf_counter()
+        self._settings, self._materials = settings, materials
+        self._saved_at = perf_counter()
         self._is_ours = self.resume and self.path.exists()
         if self._is_ours:
             return _load(self.path, empty, settings)
@@ -147,7 +152,7 @@ class Checkpoint:
 
     def _save(self, state: State) -> None:
         try:
-            _write(self.path, state, self._settings)
+            _write(self.path, state, self._settings, self._materials)
         except FileError as error:
             if not self._has_failed:
                 warnings.warn(
@@ -164,7 +169,7 @@ class Checkpoint:
 
 def is_checkpoint_file(path: Path) -> bool:
     """Tell whether a file is a checkpoint of any version, or what damage has left of one."""
-    return has_mark(path, {b"PK": _MARKS[1]})
+    return has_mark(path, {b"PK": CHECKPOINT_MARKS[1]})
 
 
 def settings_of(
@@ -181,11 +186,14 @@ def settings_of(
     }
 
 
-def _write(path: Path, state: State, settings: Mapping[str, str]) -> None:
+def _write(
+    path: Path, state: State, settings: Mapping[str, str], materials: Sequence[Material]
+) -> None:
     """Write the whole file or nothing."""
     meta = {
         "format": FORMAT,
         "settings": dict(settings),
+        "materials": [each.to_dict() for each in materials],
         "photons": state.tally.photons,
         "flights": state.tally.flights,
         "least_error": state.least_error,
@@ -200,60 +208,94 @@ def _write(path: Path, state: State, settings: Mapping[str, str]) -> None:
 
 def _load(path: Path, empty: Tally, settings: Mapping[str, str]) -> State:
     """Fill ``empty`` with what the file holds, if it was made with the same settings."""
-    mine = {f"ledger_{name}": each for name, each in empty.ledger._asdict().items()}
-    with _opened(path) as archive:
-        meta = dict(json.loads(str(read_npy(archive, "meta", "U", _MOST_META_BYTES))))
-        if meta.get("format") != FORMAT:
-            raise FileError(
-                f"{path} has format {shown(meta.get('format'))}, not {FORMAT!r}; {_REMEDY}."
-            )
-        _check_settings(path, meta.get("settings"), settings)
-        if {*archive.namelist()} != {f"{name}.npy" for name in [*mine, "meta"]}:
-            raise _damaged(path)
-        arrays = {
-            name: read_npy(archive, name, "f", each.nbytes + _HEADER_BYTES)
-            for name, each in mine.items()
-        }
-    try:
-        state = _checked_state(empty, meta)
-        for name, each in mine.items():
-            _check_sums(name, arrays[name], each, state.tally.photons)
-            each[...] = arrays[name]
-    except ValueError as fault:
-        raise FileError(f"{path} is damaged or was edited: {fault}; {_REMEDY}.") from None
-    return state
+    with opened(path, str(path)) as archive:
+        meta = read_meta(archive)
+        _check_settings(path, meta["settings"], settings)
+        return read_state(archive, meta, empty)
 
 
 @contextlib.contextmanager
-def _opened(path: Path) -> Iterator[zipfile.ZipFile]:
-    """Open the archive, and say in one line what goes wrong with it."""
+def opened(source: Path | BinaryIO, origin: str) -> Iterator[zipfile.ZipFile]:
+    """Open a checkpoint, and say in one line that begins with ``origin`` what is wrong with it."""
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(source) as archive:
             yield archive
     except OSError as error:
-        raise FileError(f"{path} cannot be read: {reason(error)}.") from error
-    except (FileError, SimulationError):
+        raise FileError(f"{origin} cannot be read: {reason(error)}.") from error
+    except CheckpointError as fault:
+        raise FileError(f"{origin} {fault}; {_REMEDY}.") from None
+    except SimulationError:
         raise
     except Exception as error:
         # zipfile, zlib, numpy's header parser and json raise a dozen unrelated types on damage.
-        with contextlib.suppress(OSError), path.open("rb") as stream:
-            if not is_marked(stream, _MARKS):
-                raise FileError(f"{path} is not a checkpoint; {_REMEDY}.") from None
-        raise _damaged(path) from error
+        is_ours = True
+        with contextlib.suppress(OSError), _rewound(source) as stream:
+            is_ours = is_marked(stream, CHECKPOINT_MARKS)
+        what = "is a damaged checkpoint" if is_ours else "is not a checkpoint"
+        raise FileError(f"{origin} {what}; {_REMEDY}.") from error
+
+
+def read_meta(archive: zipfile.ZipFile) -> dict[str, Any]:
+    """Read what a checkpoint says of itself; raise a CheckpointError or what damage does."""
+    meta = dict(json.loads(str(read_npy(archive, "meta", "U", _MOST_META_BYTES))))
+    if meta.get("format") != FORMAT:
+        raise CheckpointError(f"has format {shown(meta.get('format'))}, not {FORMAT!r}")
+    settings = meta.get("settings")
+    if not (isinstance(settings, dict) and all(isinstance(x, str) for x in settings.values())):
+        raise CheckpointError("is a damaged checkpoint")
+    return meta
+
+
+def read_state(archive: zipfile.ZipFile, meta: Mapping[str, Any], empty: Tally) -> State:
+    """Fill ``empty`` with the sums in a checkpoint; raise a CheckpointError or what damage does."""
+    mine = {f"ledger_{name}": each for name, each in empty.ledger._asdict().items()}
+    if {*archive.namelist()} != {f"{name}.npy" for name in [*mine, "meta"]}:
+        raise CheckpointError("is a damaged checkpoint")
+    arrays = {
+        name: read_npy(archive, name, "f", each.nbytes + _HEADER_BYTES)
+        for name, each in mine.items()
+    }
+    state = _checked_state(empty, meta)
+    for name, each in mine.items():
+        _check_sums(name, arrays[name], each, state.tally.photons)
+        each[...] = arrays[name]
+    return state
+
+
+class CheckpointError(Exception):
+    """What is wrong with a checkpoint, to stand after its name in a message."""
+
+    @classmethod
+    def of(cls, detail: str) -> "CheckpointError":
+        """Make the fault of a value that no run writes."""
+        return cls(f"is damaged or was edited: {detail}")
+
+
+@contextlib.contextmanager
+def _rewound(source: Path | BinaryIO) -> Iterator[BinaryIO]:
+    """Lend a file's or stream's bytes from their beginning."""
+    if isinstance(source, Path):
+        with source.open("rb") as stream:
+            yield stream
+    else:
+        source.seek(0)
+        yield source
 
 
 def _checked_state(empty: Tally, meta: Mapping[str, Any]) -> State:
-    """Put the counts and figures of a checkpoint into a state; a ValueError says what is wrong."""
+    """Put the counts and figures of a checkpoint into a state; raise what is wrong as an error."""
     photons, flights = meta.get("photons"), meta.get("flights")
     if type(photons) is not int or photons % BATCH_PHOTONS or not 0 < photons <= MAX_PHOTONS:
-        raise ValueError(f"photons = {shown(photons)}, expected whole batches of {BATCH_PHOTONS}")
+        raise CheckpointError.of(
+            f"photons = {shown(photons)}, expected whole batches of {BATCH_PHOTONS}"
+        )
     if type(flights) is not int or not 0 <= flights < 2**63:
-        raise ValueError(f"flights = {shown(flights)}, expected a whole number from 0 up")
+        raise CheckpointError.of(f"flights = {shown(flights)}, expected a whole number from 0 up")
     least_error, seconds = meta.get("least_error"), meta.get("seconds")
     if type(least_error) is not float or not least_error >= 0.0:
-        raise ValueError(f"least_error = {shown(least_error)}, expected a number from 0 up")
+        raise CheckpointError.of(f"least_error = {shown(least_error)}, expected a number from 0 up")
     if type(seconds) is not float or not 0.0 <= seconds < math.inf:
-        raise ValueError(f"seconds = {shown(seconds)}, expected a finite number from 0 up")
+        raise CheckpointError.of(f"seconds = {shown(seconds)}, expected a finite number from 0 up")
     empty.photons, empty.flights = photons, flights
     return State(empty, least_error, seconds)
 
@@ -264,20 +306,18 @@ def _check_sums(name: str, sums: npt.NDArray[Any], mine: npt.NDArray[Any], photo
     Only what roulette added may be below 0.
     """
     if sums.shape != mine.shape:
-        raise ValueError(f"{name} has shape {sums.shape}, expected {mine.shape}")
+        raise CheckpointError.of(f"{name} has shape {sums.shape}, expected {mine.shape}")
     most = 2.0 * photons
     least = -most if name == "ledger_roulette" else 0.0
     if (bad := ~((sums >= least) & (sums <= most))).any():
         at = np.argwhere(bad)[0].tolist()
-        raise ValueError(
+        raise CheckpointError.of(
             f"{name} holds {sums[bad].flat[0]} at {at}, expected {least:g} to {most:g}"
         )
 
 
-def _check_settings(path: Path, there: Any, here: Mapping[str, str]) -> None:
+def _check_settings(path: Path, there: Mapping[str, str], here: Mapping[str, str]) -> None:
     """Name every setting in which a checkpoint differs from the run that is to go on from it."""
-    if not (isinstance(there, dict) and all(isinstance(each, str) for each in there.values())):
-        raise _damaged(path)
     differing = [
         f"{_short(name)} = {_short(there.get(name))} (now {_short(here.get(name))})"
         for name in {**here, **there}
@@ -296,7 +336,3 @@ def _short(text: str | None) -> str:
 
 
 _REMEDY = "delete it, or start anew without --resume"
-
-
-def _damaged(path: Path) -> FileError:
-    return FileError(f"{path} is a damaged checkpoint; {_REMEDY}.")

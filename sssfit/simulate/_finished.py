@@ -13,6 +13,8 @@ from sssfit.profile import Profile
 from sssfit.simulate._batches import MAX_PHOTONS
 from sssfit.simulate._run import Ending
 
+# A total of R is left with sqrt((1/R - 1) / N) by N photons: 1e-7 for .99 and the most photons.
+LEAST_TARGET = 1e-7
 DEFAULT_PHOTONS = 10_000_000
 
 
@@ -29,8 +31,11 @@ def ending_of(photons: int | None, target_error: float | None) -> Ending:
     photons = whole("photons", photons)
     if not 2 <= photons <= MAX_PHOTONS:
         raise SimulationError(f"photons = {photons}; give a whole number from 2 to 1e12.")
-    if target_error is not None and not 0.0 < target_error < 1.0:
-        raise SimulationError(f"target_error = {target_error}; give a share between 0 and 1.")
+    if target_error is not None and not LEAST_TARGET <= target_error < 1.0:
+        raise SimulationError(
+            f"target_error = {target_error}; give a share from {LEAST_TARGET:g}, which takes 1e12 "
+            "photons or more, to 1."
+        )
     return Ending(photons, target_error)
 
 

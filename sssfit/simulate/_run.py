@@ -61,7 +61,7 @@ class Ending:
         if self.target_error is None or math.isinf(error):
             return self.photons
         ratio = max(1.0, error / self.target_error)
-        return min(self.photons, math.ceil(photons_done * ratio * ratio))
+        return math.ceil(min(float(self.photons), photons_done * ratio * ratio))
 
 
 def is_check(photons: int) -> bool:
@@ -126,7 +126,7 @@ def run(
     ending = Ending(task.photons, target_error)
     state = State(task.empty_tally())
     if checkpoint:
-        state = checkpoint.begin(state.tally, settings or {})
+        state = checkpoint.begin(state.tally, settings or {}, task.materials)
         _check_still_to_do(checkpoint, state, ending)
     watch = _Watch(task, ending, state, progress)
     if state.tally.photons:

@@ -216,9 +216,9 @@ def material_from_reflectance(
             f"{paths_mm.size} mean free paths for {asked.size} reflectances; give as many, or one "
             "for all."
         )
-    if not (np.isfinite(paths_mm) & (paths_mm > 0.0)).all():
+    if not ((paths_mm >= 1e-9) & (paths_mm <= 1e9)).all():  # of coefficients of a material
         raise MaterialError(
-            f"mean free paths {paths_mm.tolist()}; expected lengths above 0, in mm."
+            f"mean free paths {paths_mm.tolist()}; expected lengths from 1e-9 to 1e9 mm."
         )
     albedo = invert_reflectance(asked, eta, light=light).albedo
     words = ", ".join(f"{each:g}" for each in asked)

@@ -153,7 +153,7 @@ def simulate_montecarlo_many(
     list of Profile
         In the order of ``materials``; their noise is correlated.
     """
-    _check_media(materials)
+    check_media(materials)
     ending = ending_of(photons, target_error)
     seed = whole("seed", seed)
     threads = available_cores() if threads is None else whole("threads", threads)
@@ -165,7 +165,7 @@ def simulate_montecarlo_many(
         grids = _auto_grids(materials, dr_mm, seed, threads, stop)
     else:
         grids = [make_grid(each, dr_mm=dr_mm, radius_mm=radius_mm) for each in materials]
-    task = _walk(materials, grids, seed, ending.photons)
+    task = make_walk(materials, grids, seed, ending.photons)
     tally = run(
         task,
         threads,
@@ -184,7 +184,7 @@ def simulate_montecarlo_many(
     return [profile_of(task, tally, k, ending, error, trim=auto) for k in range(len(materials))]
 
 
-def _check_media(materials: Sequence[Material]) -> None:
+def check_media(materials: Sequence[Material]) -> None:
     """Refuse what this walk does not model, naming what would do."""
     if not materials:
         raise SimulationError("no material given; name at least one.")
@@ -236,7 +236,7 @@ def is_compiled(material: Material) -> bool:
     return compiled_before("semi_infinite" if is_plain(material) else "layered")
 
 
-def _walk(
+def make_walk(
     materials: Sequence[Material], grids: Sequence[RadialGrid], seed: int, photons: int
 ) -> Walk:
     """Choose the walk that models no more than the material needs."""
@@ -273,7 +273,7 @@ def _auto_grids(
     """
     grids = [make_grid(each, dr_mm=dr_mm) for each in materials]
     while True:
-        task = _walk(materials, grids, seed, PILOT_PHOTONS)
+        task = make_walk(materials, grids, seed, PILOT_PHOTONS)
         tally = run(task, threads, stop=stop)
         if tally.photons < 2:
             raise StoppedError("stopped before a single batch of photons was done.")

@@ -20,7 +20,7 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "bench")]
 
-from bench_walk import command, markdown, processor, seconds  # noqa: E402
+from bench_walk import command, markdown, processor, seconds, write_page  # noqa: E402
 
 import sssfit  # noqa: E402
 from sssfit.material import load_material, material_names  # noqa: E402
@@ -112,7 +112,7 @@ def main():
     options = parser.parse_args()
     text = page(options.small)
     if options.write:
-        (ROOT / "docs" / "benchmarks-exact.md").write_text(text)
+        write_page("benchmarks-exact.md", Path(__file__), text)
     else:
         sys.stdout.write(text)
 

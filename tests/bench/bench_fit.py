@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "bench")]
 
 from bench_exact import timed  # noqa: E402
-from bench_walk import markdown, processor  # noqa: E402
+from bench_walk import markdown, processor, write_page  # noqa: E402
 
 import sssfit  # noqa: E402
 from sssfit.errors import SssfitWarning  # noqa: E402
@@ -142,7 +142,7 @@ def main():
     options = parser.parse_args()
     text = page(options.small)
     if options.write:
-        (ROOT / "docs" / "benchmarks-fit.md").write_text(text)
+        write_page("benchmarks-fit.md", Path(__file__), text)
     else:
         sys.stdout.write(text)
 

@@ -27,7 +27,7 @@ ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "bench")]
 
 from bench_exact import timed  # noqa: E402
-from bench_walk import markdown, processor  # noqa: E402
+from bench_walk import markdown, processor, write_page  # noqa: E402
 
 import sssfit  # noqa: E402
 from sssfit.render.reference import convolve, padded_shape  # noqa: E402
@@ -185,7 +185,7 @@ def main():
     options = parser.parse_args()
     text = page(options.small)
     if options.write:
-        (ROOT / "docs" / "benchmarks-render.md").write_text(text)
+        write_page("benchmarks-render.md", Path(__file__), text)
     else:
         sys.stdout.write(text)
 

@@ -21,9 +21,10 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).parents[2]
-sys.path.insert(0, str(ROOT / "tests"))
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "docs")]
 
 import reference  # noqa: E402
+from sections import DOCS, marked_page  # noqa: E402
 
 import sssfit  # noqa: E402
 from sssfit.grid import paper_grid  # noqa: E402
@@ -219,6 +220,13 @@ def page(small):
     return "\n\n".join(sections) + "\n"
 
 
+def write_page(name, script, text):
+    """Write a page of docs, with the date and the command of its making."""
+    place = script.resolve().relative_to(ROOT).as_posix()
+    page = marked_page(place, text, f"python {place} --write")
+    (DOCS / name).write_text(page, encoding="utf-8")
+
+
 def main():
     """Print the page, or write it."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -227,7 +235,7 @@ def main():
     options = parser.parse_args()
     text = page(options.small)
     if options.write:
-        (ROOT / "docs" / "benchmarks.md").write_text(text)
+        write_page("benchmarks.md", Path(__file__), text)
     else:
         sys.stdout.write(text)
 

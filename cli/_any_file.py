@@ -1,0 +1,141 @@
+"""Files of every kind that sssfit writes, known by what is in them and not by their names."""
+
+from __future__ import annotations
+
+import io
+import re
+from pathlib import Path
+from typing import TYPE_CHECKING, BinaryIO, TypeAlias
+
+from ._report import binary_stdin
+
+if TYPE_CHECKING:
+    from sssfit.kernel import SeparableKernel
+    from sssfit.material import Material
+    from sssfit.profile import Profile
+    from sssfit.simulate import SoFar
+
+    Found: TypeAlias = Profile | SeparableKernel | Material | SoFar
+
+_KINDS = (
+    "a profile (.profile.npz), a kernel (.kernel.json), a material (.toml) or a walk's checkpoint "
+    "(.checkpoint)"
+)
+_MOST_BYTES = 500_000_000  # the most that a file of ours may have
+# What every material has: a table of layers or a coefficient, if by a name that has to be mended.
+_MATERIAL = re.compile(r"^\s*(\[\[layers\]\]|[\"']?(sigma|mu)_?[as])", re.MULTILINE | re.IGNORECASE)
+
+
+def read_any(name: str) -> Found:
+    """Read a file, ``-`` for stdin, or a material that ships with sssfit.
+
+    Raises
+    ------
+    SssfitError
+        One line: not a file of ours, or one of ours that is damaged.
+    """
+    from sssfit.material import load_material, material_names
+
+    if name == "-":
+        return _read(_stdin(), "stdin")
+    path = Path(name)
+    if name in material_names() and not path.exists():
+        return load_material(name)
+    _check_ordinary(name, path)
+    return _read(path, name)
+
+
+def _read(source: Path | io.BytesIO, origin: str) -> Found:
+    """Read what the content says it is."""
+    from sssfit.kernel import SeparableKernel
+    from sssfit.profile import Profile
+    from sssfit.simulate import read_checkpoint
+
+    kind = _kind(source, origin)
+    if kind == "profile":
+        return Profile.read(source, origin)
+    if kind == "kernel":
+        return SeparableKernel.read(source, origin)
+    if kind == "checkpoint":
+        return read_checkpoint(source, origin)
+    return _material(source, origin)
+
+
+def _material(source: Path | io.BytesIO, origin: str) -> Material:
+    from sssfit._material_toml import decode
+    from sssfit.errors import MaterialError
+    from sssfit.material import load_material, parse_material
+
+    if isinstance(source, Path):
+        return load_material(source)
+    with decode(source.getvalue()).hinting(MaterialError) as content:
+        return parse_material(content, origin)
+
+
+def _stdin() -> io.BytesIO:
+    """Take all of stdin, which cannot seek, up to the most that a file of ours may have."""
+    from sssfit.errors import FileError
+    from sssfit.files import read_at_most
+
+    content = read_at_most(binary_stdin(), _MOST_BYTES + 1)
+    if len(content) > _MOST_BYTES:
+        raise FileError(f"stdin has over {_MOST_BYTES:,} bytes; expected {_KINDS}.")
+    return io.BytesIO(content)
+
+
+def _check_ordinary(name: str, path: Path) -> None:
+    """Refuse what is not there, folders, devices and pipes."""
+    from sssfit._material_toml import did_you_mean
+    from sssfit.errors import FileError
+    from sssfit.files import reason
+    from sssfit.material import material_names
+
+    try:
+        path.stat()
+    except (OSError, ValueError) as error:  # ValueError: a null character
+        why = reason(error) if isinstance(error, OSError) else str(error)
+        near = did_you_mean(name, material_names()).strip()
+        raise FileError(f"{name} cannot be read: {why}.{f' {near}' if near else ''}") from None
+    if path.is_dir():
+        raise FileError(f"{name} is a folder; name a file in it.")
+    if not path.is_file():
+        raise FileError(f"{name} is not an ordinary file; use - to read a pipe.")
+
+
+def _kind(source: Path | io.BytesIO, origin: str) -> str:
+    """Tell a file's kind by the marks in it."""
+    from sssfit.errors import FileError
+    from sssfit.files import reason
+
+    if not isinstance(source, Path):
+        kind = _kind_of_stream(source)
+        source.seek(0)
+    else:
+        try:
+            with source.open("rb") as stream:
+                kind = _kind_of_stream(stream)
+        except OSError as error:
+            raise FileError(f"{origin} cannot be read: {reason(error)}.") from error
+    if kind is None:
+        raise FileError(f"{origin} is not a sssfit file; expected {_KINDS}.")
+    return kind
+
+
+def _kind_of_stream(stream: BinaryIO) -> str | None:
+    """Return a kind, or None for what is foreign."""
+    from sssfit import _kernel_json, _profile_io
+    from sssfit._material_toml import MOST_BYTES
+    from sssfit.simulate import CHECKPOINT_MARKS
+    from sssfit.text import decode
+
+    marks = {
+        "kernel": (_kernel_json.MARK,),
+        "profile": _profile_io.MARKS,
+        "checkpoint": CHECKPOINT_MARKS,
+    }
+    for kind, each in marks.items():
+        if _profile_io.is_marked(stream, each):
+            return kind
+    stream.seek(0)
+    text = decode(stream.read(MOST_BYTES))
+    return "material" if text is not None and _MATERIAL.search(text.content) else None

@@ -1,0 +1,87 @@
+"""Which pixels of a made disk or edge count, so that the picture's size does not change a figure.
+
+Far from a border every kernel that keeps energy is right: the more of that a picture has, the
+smaller its mean. 512 x 512 pixels of .3 mm gave a fourth of the Delta E of 200 x 200.
+"""
+
+import dataclasses
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.fit import support_of
+from sssfit.profile import Profile
+from sssfit.render._made_edges import DISK_RADIUS_MM
+from sssfit.render.scene import Scene
+
+BoolArray = npt.NDArray[np.bool_]
+
+
+def judged_scene(scene: Scene, profile: Profile) -> Scene:
+    """Return a scene with a mask of the pixels that count; others than disk and edge as they are.
+
+    With R the radius that keeps 99.9 % of the profile's widest channel: of a disk, pixels within R
+    of a lit one, for which the picture is enlarged by black where a disk of the usual radius fits
+    and its light does not; of an edge, pixels within R of it on either side, and, where there is
+    room, R or more from the picture's ends along it, where a mirror bends it.
+
+    Parameters
+    ----------
+    scene : Scene
+        With a mask of its own it is returned as it is.
+    profile : Profile
+    """
+    if scene.mask is not None or scene.name not in ("disk", "edge"):
+        return scene
+    reach = support_of(profile) / scene.mm_per_pixel
+    if scene.name == "disk":
+        scene = _enlarged(scene, reach)
+    light = scene.irradiance[..., 0]
+    counts = _within(light > 0.0, reach)
+    if scene.name == "edge":
+        counts &= _within(light < light.max(), reach) & _off_ends(light, reach)
+    return dataclasses.replace(scene, mask=counts.astype(np.int32))
+
+
+def border_of(scene: Scene) -> str:
+    """Return how a made picture goes on past its rim: around a disk it is black, without end.
+
+    With mirrors, light beyond the profile's grid would be the picture's mean, and 2.2 % of marble's
+    red is there: on 200 x 200 pixels of .3 mm its kernels had twice the Delta E of 512 x 512.
+    """
+    return "zero" if scene.mask is not None and scene.name == "disk" else "mirror"
+
+
+def _within(chosen: BoolArray, reach: float) -> BoolArray:
+    """Tell which pixels are within so many pixels of a chosen one."""
+    from scipy.ndimage import distance_transform_edt  # .1 s that other comparisons do not need
+
+    near: BoolArray = distance_transform_edt(~chosen) <= reach
+    return near
+
+
+def _enlarged(scene: Scene, reach: float) -> Scene:
+    """Put black around a disk until its light has so many pixels to go."""
+    lit = scene.irradiance[..., 0] > 0.0
+    if (lit.any(axis=0).sum() + 1) * scene.mm_per_pixel < 2.0 * DISK_RADIUS_MM:
+        return scene
+    wanted = math.ceil(reach) + 1
+    pads = []
+    for axis in (0, 1):
+        places = np.flatnonzero(lit.any(axis=1 - axis))
+        room = min(int(places[0]), lit.shape[axis] - 1 - int(places[-1]))
+        pads.append((max(wanted - room, 0),) * 2)
+    return dataclasses.replace(scene, irradiance=np.pad(scene.irradiance, (*pads, (0, 0))))
+
+
+def _off_ends(light: npt.NDArray[np.float64], reach: float) -> BoolArray:
+    """Tell which pixels are off the two sides of the picture that the edge runs into."""
+    across = abs(light[:, -1].mean() - light[:, 0].mean())
+    up = abs(light[-1].mean() - light[0].mean())
+    axis = 0 if across >= up else 1
+    size, inset = light.shape[axis], math.ceil(reach)
+    kept = np.ones(size, dtype=np.bool_)
+    if 2 * inset < size:
+        kept[:inset] = kept[size - inset :] = False
+    return np.broadcast_to(kept[:, None] if axis == 0 else kept[None, :], light.shape)

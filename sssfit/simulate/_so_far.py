@@ -1,0 +1,118 @@
+"""What a photon walk has found so far: the profiles that a run would have given that ended there.
+
+A run saves its sums in a checkpoint (``_checkpoint``); a profile is made of them as it is at the
+end of a run, by ``_assemble``.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from sssfit._jit import source_key
+from sssfit._material_checks import shown
+from sssfit.errors import MaterialError, SimulationError
+from sssfit.grid import RadialGrid
+from sssfit.material import Material
+from sssfit.profile import Profile
+from sssfit.simulate._assemble import profile_of
+from sssfit.simulate._batches import MAX_PHOTONS, Walk, relative_errors
+from sssfit.simulate._checkpoint import (
+    FORMAT,
+    CheckpointError,
+    opened,
+    read_meta,
+    read_state,
+    settings_of,
+)
+from sssfit.simulate._run import Ending
+from sssfit.simulate.montecarlo import check_media, make_walk
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SoFar:
+    """Where a walk stood when its checkpoint was saved.
+
+    Parameters
+    ----------
+    profiles : tuple of Profile
+        One for each material of the walk; ``meta["checkpoint"]`` has the format they came from,
+        and ``meta["version"]`` is None where another version of the walk made the sums.
+    flights : int
+        Free paths walked.
+    seconds : float [s]
+        Time of all sittings.
+    relative_error : float
+        Largest standard error of F(r), as a share of F at the last edge, of the worst channel.
+    """
+
+    profiles: tuple[Profile, ...]
+    flights: int
+    seconds: float
+    relative_error: float
+
+
+def read_checkpoint(source: str | Path | BinaryIO, origin: str | None = None) -> SoFar:
+    """Read a checkpoint from a path or a binary stream that can seek, and make its profiles.
+
+    Error messages call it ``origin``: if not given the path, or "the checkpoint" for a stream. A
+    grid whose radius was to be found ("auto") is not trimmed yet.
+
+    Raises
+    ------
+    FileError
+        One line that names the origin: missing, damaged, edited, foreign, of another format, or
+        saved before checkpoints kept their materials.
+    """
+    if isinstance(source, str | Path):
+        source, origin = Path(source), origin or str(source)
+    with opened(source, origin or "the checkpoint") as archive:
+        meta = read_meta(archive)
+        walk = _walk_of(meta)
+        state = read_state(archive, meta, walk.empty_tally())
+    tally, error = state.tally, float(relative_errors(walk, state.tally).max())
+    ending = Ending(tally.photons)
+    profiles = [
+        profile_of(walk, tally, k, ending, error, trim=False) for k in range(len(walk.materials))
+    ]
+    is_current = meta["settings"]["version"] == source_key()
+    return SoFar(
+        tuple(_marked(each, is_current=is_current) for each in profiles),
+        tally.flights,
+        state.seconds,
+        error,
+    )
+
+
+def _walk_of(meta: Mapping[str, Any]) -> Walk:
+    """Return the walk that a checkpoint is of; its materials must be those it was begun with."""
+    settings, records = meta["settings"], meta.get("materials")
+    if records is None:
+        raise CheckpointError("was saved by a version that did not keep the materials in it")
+    try:
+        materials = [Material.from_dict(each) for each in records]
+        grids, seed = _grids(settings), int(settings["seed"])
+        check_media(materials)
+        expected = settings_of(materials, grids, seed)
+    except (KeyError, TypeError, ValueError, MaterialError, SimulationError) as error:
+        raise CheckpointError.of(
+            f"its materials and grids ({shown(str(error))}) are not a walk's"
+        ) from None
+    for name in ("material", "dr_mm", "annuli", "photons in a batch"):
+        if settings.get(name) != expected[name]:
+            raise CheckpointError.of(
+                f"{name} = {shown(settings.get(name))}, expected {shown(expected[name])}"
+            )
+    return make_walk(materials, grids, seed, MAX_PHOTONS)
+
+
+def _grids(settings: Mapping[str, str]) -> Sequence[RadialGrid]:
+    """Return the grid of each material."""
+    widths, counts = (settings[name].split(", ") for name in ("dr_mm", "annuli"))
+    return [RadialGrid(float(a), int(b)) for a, b in zip(widths, counts, strict=True)]
+
+
+def _marked(profile: Profile, *, is_current: bool) -> Profile:
+    """Note where a profile comes from, and not our version where the sums are another's."""
+    meta = {**profile.meta, "checkpoint": FORMAT}
+    return replace(profile, meta=meta if is_current else {**meta, "version": None})
