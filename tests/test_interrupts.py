@@ -9,6 +9,7 @@ import textwrap
 import time
 
 import numpy as np
+import processes
 import pytest
 from reference_pixels import make_profile
 
@@ -66,15 +67,8 @@ KEEPS_LOCK = {"compiled, lock kept", "one instruction of Python"}
 
 
 def start(program, folder, *arguments):
-    """Start Python; SIGINT may come ignored to the test, and must not to the child."""
-    return subprocess.Popen(
-        [sys.executable, "-c", program, *arguments],
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    )
+    """Start Python."""
+    return processes.start([sys.executable, "-c", program, *arguments], cwd=folder)
 
 
 def start_trial(body, folder):
@@ -154,11 +148,9 @@ def test_what_is_under_way_is_removed_by_the_second_signal(tmp_path):
 
 
 def test_ignored_signals_stay_ignored(tmp_path):
-    process = subprocess.Popen(
+    process = processes.start(
         [sys.executable, "-c", TRIAL.format(body="    click.echo('ready')\n    input()")],
         stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_IGN),
     )
     assert process.stdout.readline() == "ready\n"
