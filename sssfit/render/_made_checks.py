@@ -7,6 +7,7 @@ from sssfit.errors import RenderError
 # A render holds some 120 bytes a pixel of RGB, and 8 GB is its limit: said before a head is made,
 # which takes half a minute for 11000 x 11000.
 _MOST = 1e12  # mm, degrees or pieces
+_LEAST_MM = 1e-12  # of a pixel, as in the fits: a made head of 1e-320 mm a pixel took minutes
 MAX_PIXELS = 60_000_000
 
 
@@ -32,6 +33,7 @@ def check_size(name: str, height: int, width: int, mm_per_pixel: float) -> None:
             f"render; make it no larger than {MAX_PIXELS:.0e} pixels."
         )
     check_above(name, "mm_per_pixel", mm_per_pixel, 0.0)
+    check_range(name, "mm_per_pixel", mm_per_pixel, _LEAST_MM, _MOST)
 
 
 def check_above(name: str, option: str, value: float, least: float) -> None:
