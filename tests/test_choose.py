@@ -348,7 +348,7 @@ def test_a_profile_is_its_own_truth(skin1, choice, monkeypatch):
     found = choose(given, mm_per_pixel=0.6, frame=FRAME)
     assert found.profile is given
     assert found.steps == choice.steps  # skin1's grid has all of the light
-    nameless = replace(given, meta={**given.meta, "material": None})
+    nameless = replace(given, meta={**given.meta, "material": None, "material_sha256": None})
     assert choose(nameless, mm_per_pixel=0.6, frame=FRAME).chosen == choice.chosen
 
 
@@ -357,7 +357,10 @@ def test_walks_are_held_against_transport_alone(skin1):
     assert material_of(exact) == skin1
     assert material_of(simulate_dipole(skin1)) is None
     assert material_of(simulate_deon_skin()) is None
-    assert material_of(replace(exact, meta={**exact.meta, "material": None})) is None
+    assert (
+        material_of(replace(exact, meta={**exact.meta, "material": None, "material_sha256": None}))
+        is None
+    )
 
 
 def test_pixels_from_the_frame():
