@@ -21,8 +21,6 @@ from ._memory import is_out_of_memory
 _LONGEST_LINE = 1000  # a path may be 4096 characters, an option's value anything
 _OUT_OF_MEMORY = "out of memory: use a smaller grid or picture, fewer channels or --threads."
 
-_LONGEST_LINE = 1000  # a path may be 4096 characters, an option's value anything
-
 
 def run(args: Sequence[str] | None) -> NoReturn:
     """Run the command line and exit."""

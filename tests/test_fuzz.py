@@ -131,6 +131,7 @@ TRIALS = {
         ("simulate", "{}", "--method", "dipole", "-o", "out.npz"),
         ("materials", "{}"),
         ("simulate", "-", *FEW, "-o", "out.npz"),
+        ("show", "{}"),
     ),
     "stack.toml": (("simulate", "{}", *FEW, "-o", "out.npz"), ("materials", "{}", "--json")),
     "x.mci": (("simulate", "{}", *FEW, "-o", "out.npz"),),
@@ -151,11 +152,15 @@ TRIALS = {
         ("export", "{}", "--format", "hlsl", "-o", "out.hlsl"),
         ("export", "{}", "--format", "json", "-o", "out.json"),
         ("export", "-", "--format", "hlsl", "-o", "out.hlsl"),
+        ("show", "{}"),
+        ("show", "{}", "--json"),
+        ("chart", "{}", "-o", "out.png"),
         ("render", "{}", "--irradiance", "disk", "--size", "16x12", "-o", "out.exr"),
         ("render", "{}", "--screen", "--size", "12x12", "-o", "out.exr"),
     ),
     "skin1.profile.npz.checkpoint": (
         ("simulate", "skin1", "--dr", "0.4", "--radius", "8", "--photons", "70000", "--resume"),
+        ("show", "{}"),
     ),
 }
 RARE = "chart"  # takes ten times as long as the others

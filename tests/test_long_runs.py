@@ -315,6 +315,7 @@ def with_another_albedo(meta, _):
         (put("materials", 7), "is damaged or was edited: its materials"),
         (with_another_albedo, "is damaged or was edited: material = 'skin1 (sha256"),
         (with_another_grid, "ledger_bins has shape (3711, 2), expected (15003, 2)"),
+        (lambda meta, _: meta["settings"].update(seed="-1"), "seed = -1, expected 0 to 2^64 - 1"),
         (put("photons", 5), "photons = 5, expected whole batches of 16384"),
         (put("format", "sssfit.checkpoint/2"), "has format 'sssfit.checkpoint/2'"),
     ],
@@ -362,6 +363,13 @@ def test_a_checkpoint_of_another_version_says_so(tmp_path, monkeypatch):
     path = tmp_path / "c"
     monkeypatch.setattr("sssfit.simulate._checkpoint.source_key", lambda: "0.0-abc")
     leave_checkpoint(path)
+    assert read_checkpoint(path).profiles[0].meta["version"] is None
+
+
+def test_a_checkpoint_that_does_not_say_its_version_is_of_another(tmp_path, left):
+    path = tmp_path / "c"
+    path.write_bytes(left)
+    edited(path, lambda meta, _: meta["settings"].pop("version"))
     assert read_checkpoint(path).profiles[0].meta["version"] is None
 
 

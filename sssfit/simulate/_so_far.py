@@ -75,7 +75,7 @@ def read_checkpoint(source: str | Path | BinaryIO, origin: str | None = None) ->
     profiles = [
         profile_of(walk, tally, k, ending, error, trim=False) for k in range(len(walk.materials))
     ]
-    is_current = meta["settings"]["version"] == source_key()
+    is_current = meta["settings"].get("version") == source_key()
     return SoFar(
         tuple(_marked(each, is_current=is_current) for each in profiles),
         tally.flights,
@@ -103,6 +103,8 @@ def _walk_of(meta: Mapping[str, Any]) -> Walk:
             raise CheckpointError.of(
                 f"{name} = {shown(settings.get(name))}, expected {shown(expected[name])}"
             )
+    if not 0 <= seed < 2**64:
+        raise CheckpointError.of(f"seed = {seed}, expected 0 to 2^64 - 1")
     return make_walk(materials, grids, seed, MAX_PHOTONS)
 
 
