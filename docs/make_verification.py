@@ -66,7 +66,7 @@ last column.
 TAIL = """
 ## Beyond this page
 
-Two things take minutes and are not comparisons; `pytest -m slow` runs them.
+These take minutes and are not comparisons; `pytest -m slow` runs them.
 
 - `pytest -m slow tests/test_long_runs.py` kills a run 100 times at random moments (start-up,
   between batches, while a checkpoint or the profile is written) and resumes it each time; every
@@ -75,6 +75,12 @@ Two things take minutes and are not comparisons; `pytest -m slow` runs them.
 - `pytest -m slow tests/test_layers.py -k "split or turned or shared or sample or giovanelli"`: a
   slab split in four, a stack turned over, shared walks, MCML's own sample at 3e7 photons. On
   2026-11-22 it passed in 4 min 44 s.
+- `pytest -m slow tests/test_fuzz.py`: 8800 damaged files (material, stack, `.mci`, `.mco`, table,
+  profile, kernel, checkpoint; 1100 of each) and 1200 lists of options, chosen by hypothesis, the
+  same in every run. Exit status 0, 1 or 2; a failure is one line on stderr and leaves the folder as
+  it was; what a success wrote is read back, kernels by their schema, HLSL number by number. A run
+  of options that is still going after 2 s is interrupted, and has to say so. On 2026-11-27 all
+  10 000 passed.
 """
 
 
