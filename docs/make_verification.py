@@ -15,7 +15,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 import checks  # noqa: E402
 import checks_exact  # noqa: E402
 import checks_layers  # noqa: E402
-from sections import marked_page  # noqa: E402
+from sections import put_section  # noqa: E402
 
 FULL = 100_000_000
 
@@ -63,20 +63,6 @@ last column.
 |---|---|---|---|---|---|
 """
 
-TAIL = """
-## Beyond this page
-
-Two things take minutes and are not comparisons; `pytest -m slow` runs them.
-
-- `pytest -m slow tests/test_long_runs.py` kills a run 100 times at random moments (start-up,
-  between batches, while a checkpoint or the profile is written) and resumes it each time; every
-  chain of kills must end in the bytes of an undisturbed run. On 2026-11-22 it passed, together with
-  the largest kernels of `tests/test_pixels.py`, in 6 min 17 s.
-- `pytest -m slow tests/test_layers.py -k "split or turned or shared or sample or giovanelli"`: a
-  slab split in four, a stack turned over, shared walks, MCML's own sample at 3e7 photons. On
-  2026-11-22 it passed in 4 min 44 s.
-"""
-
 
 def figures(photons):
     """All comparisons, as they are done."""
@@ -118,10 +104,9 @@ def main():
     )
     for each in figures(photons):
         page += f"| {each.what} | {each.ours} | {each.theirs} | {each.sigmas:+.2f} |\n"
-    page += tables(photons) + TAIL
+    page += tables(photons)
     if photons == FULL:
-        text = marked_page("docs/make_verification.py", page)
-        (ROOT / "docs" / "verification.md").write_text(text, encoding="utf-8")
+        put_section("verification.md", "docs/make_verification.py", page)
     else:
         sys.stdout.write(page)
 
