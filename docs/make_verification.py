@@ -15,7 +15,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 import checks  # noqa: E402
 import checks_exact  # noqa: E402
 import checks_layers  # noqa: E402
-from sections import marked_page  # noqa: E402
+from sections import put_section  # noqa: E402
 
 FULL = 100_000_000
 
@@ -63,26 +63,6 @@ last column.
 |---|---|---|---|---|---|
 """
 
-TAIL = """
-## Beyond this page
-
-These take minutes and are not comparisons; `pytest -m slow` runs them.
-
-- `pytest -m slow tests/test_long_runs.py` kills a run 100 times at random moments (start-up,
-  between batches, while a checkpoint or the profile is written) and resumes it each time; every
-  chain of kills must end in the bytes of an undisturbed run. On 2026-11-22 it passed, together with
-  the largest kernels of `tests/test_pixels.py`, in 6 min 17 s.
-- `pytest -m slow tests/test_layers.py -k "split or turned or shared or sample or giovanelli"`: a
-  slab split in four, a stack turned over, shared walks, MCML's own sample at 3e7 photons. On
-  2026-11-22 it passed in 4 min 44 s.
-- `pytest -m slow tests/test_fuzz.py`: 8800 damaged files (material, stack, `.mci`, `.mco`, table,
-  profile, kernel, checkpoint; 1100 of each) and 1200 lists of options, chosen by hypothesis, the
-  same in every run. Exit status 0, 1 or 2; a failure is one line on stderr and leaves the folder as
-  it was; what a success wrote is read back, kernels by their schema, HLSL number by number. A run
-  of options that is still going after 2 s is interrupted, and has to say so. On 2026-11-27 all
-  10 000 passed.
-"""
-
 
 def figures(photons):
     """All comparisons, as they are done."""
@@ -124,10 +104,9 @@ def main():
     )
     for each in figures(photons):
         page += f"| {each.what} | {each.ours} | {each.theirs} | {each.sigmas:+.2f} |\n"
-    page += tables(photons) + TAIL
+    page += tables(photons)
     if photons == FULL:
-        text = marked_page("docs/make_verification.py", page)
-        (ROOT / "docs" / "verification.md").write_text(text, encoding="utf-8")
+        put_section("verification.md", "docs/make_verification.py", page)
     else:
         sys.stdout.write(page)
 
