@@ -350,7 +350,7 @@ def test_only_files_of_its_own_are_replaced(run, tmp_path):
         (("skin1", *ASKED, "--eta", "1.3"), 2, "makes a material; name none"),
         ((*ASKED, "--eta", "1.3", "--toml"), 2, "makes a material; name none"),
         ((*ASKED, "--eta", "1.3", "--channels", "a,b"), 2, "2 names for 3 reflectances"),
-        ((*ASKED, "--eta", "thick"), 2, "'thick' is not a valid float"),
+        ((*ASKED, "--eta", "thick"), 2, "'thick' is not a valid number"),
         ((*ASKED, "--eta", "0.4"), 1, "eta = 0.4 is out of range"),
         ((*ASKED, "--eta", "0.5"), 1, "eta = 0.5; expected a relative refractive index from 1 to"),
         (("--from-reflectance", "a,b,c", *ASKED[2:], "--eta", "1.3"), 2, "'a' is not a refl"),
