@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -34,25 +34,7 @@ if TYPE_CHECKING:
 
 _PROFILE_ENDING, _ENDING = ".npz", ".chosen.kernel.json"
 _WORTH_A_NOTE = 1e-3  # of the light
-
-
-class Distance(Length):
-    """A camera's distance: no nearer than a head can be seen from."""
-
-    name = "distance"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """Parse ``value``; of a plain number that is too small, ask whether it was metres."""
-        from sssfit.render.head import MIN_DISTANCE_MM
-
-        number = super().convert(value, param, ctx)
-        if number < MIN_DISTANCE_MM:
-            plain = str(value).strip()[-1:].isdigit()
-            hint = f"a plain number is mm: did you mean {value}m?" if plain else "move away."
-            self.fail(f"{number:g} mm is nearer than {MIN_DISTANCE_MM:g} mm; {hint}", param, ctx)
-        return number
+_MOST_METRES = 9.0  # 1cm is 10 mm and was not meant in metres
 
 
 @click.command()
@@ -60,7 +42,7 @@ class Distance(Length):
 @click.option(
     "--distance",
     "distance_mm",
-    type=Distance(),
+    type=Length(),
     default="0.6m",
     show_default=True,
     metavar="LENGTH",
@@ -157,6 +139,7 @@ def choose(
     from sssfit.kernel import is_kernel_file
     from sssfit.profile import is_profile_file
 
+    _check_distance(distance_mm)
     picture = Picture(irradiance, None, None, made_options(irradiance), layer, mask)
     check_file_options(layer, mask, has_file=not picture.is_made)
     source = _source(material)
@@ -188,6 +171,18 @@ def choose(
     finish(common, figures, text_of(choice, written, figures), to_stderr=written == ["-"])
     if not written and path is not None and path.exists():
         say(common, f"{path} is from an earlier run; this view needs no kernel.")
+
+
+def _check_distance(distance_mm: float) -> None:
+    """Refuse a camera nearer than the head can be seen from; the number may have meant metres."""
+    from sssfit.render.head import MIN_DISTANCE_MM
+
+    if distance_mm < MIN_DISTANCE_MM:
+        metres = f"a plain number is mm: did you mean {distance_mm:g}m?"
+        raise click.UsageError(
+            f"--distance: {distance_mm:g} mm is nearer than {MIN_DISTANCE_MM:g} mm; "
+            f"{metres if distance_mm <= _MOST_METRES else 'move away.'}"
+        )
 
 
 def _source(name: str) -> Material | Profile:

@@ -268,7 +268,7 @@ FALLOFF = ("--method", "falloff")
         (("--method", "svd", "--rank", "0"), 2, "0 is not in the range"),
         (("--method", "guided", "--k", "4.01"), 1, "k = 4.01 is outside [0, 4]"),
         (("--method", "guided", "--k", "-1"), 1, "k = -1 is outside [0, 4]"),
-        (("--method", "guided", "--k", "nan"), 1, "k = nan is outside [0, 4]"),
+        (("--method", "guided", "--k", "nan"), 2, "'nan' is not"),
         (("--method", "guided", "--b", "0"), 1, "b = 0; expected a number above 0"),
         (("--method", "guided", "--centre-bound", "2"), 1, "centre_bound = 2; expected a share"),
         (("--method", "svd", "--mm-per-pixel", "0"), 2, "'0' is not a length above 0"),

@@ -298,7 +298,7 @@ def test_the_verb_gives_json(run, guide):
         (("--guide", "--spectrum"), 2, "--spectrum and --guide are two charts"),
         (("--k", "1"), 2, "--k is for the fits of --guide"),
         (("--spectrum", "--channel", "R"), 2, "--channel is for the fits of --guide"),
-        (("--guide", "--k", "near"), 2, "'near' is not a valid float"),
+        (("--guide", "--k", "near"), 2, "'near' is not a finite number"),
         (("--guide", "--mm-per-pixel", "1", "--k", "4.5"), 1, "k = 4.5 is outside [0, 4]"),
         (("--guide", "--mm-per-pixel", "1", "--channel", "X"), 1, "there is no channel X"),
         (("--guide", "--mm-per-pixel", ".02"), 1, "up to 513 pixels"),
