@@ -23,7 +23,7 @@ _HEAD_INCHES = 0.98
 _LABEL_INCHES = 1.15  # a row's name, right of the margin
 _ROW_GAP_INCHES = 0.2  # holds the figures under the pictures
 _APART_INCHES, _PAIR_APART_INCHES = 0.03, 0.1
-_FOOT_INCHES = 1.0
+_FOOT_INCHES = 1.16
 _LEFT_INCHES = 0.2
 _GREY = "#444444"
 
