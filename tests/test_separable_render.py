@@ -98,10 +98,11 @@ def test_full_rank_svd_equals_the_true_kernel():
     expected = convolve(scene.irradiance, profile.quadrant_kernel(0.25, 12))
     found = render_separable(scene, fitted)
     # Eigenvalues are known to eps times the largest of them, and there are 13.
-    assert np.abs(found - expected).max() <= 13 * 13 * 2.0**-52
-    # and one term less does not
+    limit = 13 * 13 * 2.0**-52
+    assert np.abs(found - expected).max() <= limit
+    # and one term less is no matter of rounding: the least eigenvalue shows, 4e-10 of the light
     less = fit_svd(profile, rank=12, energy="keep", mm_per_pixel=0.25, support_mm=3.0).kernel
-    assert np.abs(render_separable(scene, less) - expected).max() > 1e-9
+    assert np.abs(render_separable(scene, less) - expected).max() > 1000.0 * limit
 
 
 @pytest.mark.parametrize("normalize", [False, True])
