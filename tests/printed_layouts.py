@@ -149,6 +149,9 @@ def simulation(f: Figures) -> list[Any]:
 
 
 def _heading(f: Figures, rows: list[Figures]) -> Words:
+    if "rows" in f and not rows[0]["photons"]:
+        worst = max(rows, key=lambda row: row["relative_error"])
+        return Words("{} materials: {}", len(rows), _how(worst))
     if "rows" in f:
         counts = sorted({row["photons"] for row in rows})
         how = Words(
@@ -252,16 +255,16 @@ def _beyond(rows: list[Figures]) -> list[Words]:
 
 
 def _target(rows: list[Figures]) -> list[Words]:
-    target, reached = rows[0]["target_error"], rows[0]["relative_error"]
+    target = rows[0]["target_error"]
     if target is None:
         return []
+    reached = max(row["relative_error"] for row in rows)
+    photons = list(dict.fromkeys(row["photons"] for row in rows))
+    counts = Words(" and ".join("{}" for _ in photons), *photons)
     return [
         Words(
             "target error {} of F at the last edge: {} with {} photons, {} reached",
-            Percent(target),
-            "met" if reached < target else "NOT MET",
-            rows[0]["photons"],
-            Percent(reached),
+            *(Percent(target), "met" if reached < target else "NOT MET", counts, Percent(reached)),
         )
     ]
 
@@ -954,6 +957,7 @@ PRINTED: dict[str, Layout] = {
     "simulate plate.toml --photons 3000 --dr .2 --radius 4": simulation,
     "simulate wax.toml --target-error 20% --dr .5 --radius 9": simulation,
     "simulate --all --photons 3000 --dr .5 --radius 20": simulation,
+    "simulate --all --target-error 20% --dr .5 --radius 20": simulation,
     "simulate wax.toml --method exact": simulation,
     "simulate wax.toml --method burley --mapping diffuse --dr .3 --radius 8": simulation,
     "simulate wax.toml --method dipole --dr .3 --radius 8": simulation,

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from reference_pixels import make_profile
+from scipy.signal import convolve2d
 
 import sssfit.compare._all_light as all_light
 import sssfit.compare._choose_truth as truths
@@ -15,7 +16,7 @@ from sssfit.compare import _choose_photons as photon_walks
 from sssfit.compare._choose_options import SHARES, Option, supports
 from sssfit.compare._choose_photons import photons_needed
 from sssfit.compare._choose_truth import material_of
-from sssfit.compare._choose_views import Views
+from sssfit.compare._choose_views import TOLERANCES, Views
 from sssfit.compare.candidates import candidates
 from sssfit.compare.choose import choose, is_exact, mm_per_pixel_at
 from sssfit.compare.metrics import COLOUR_FIGURES, measure
@@ -202,6 +203,31 @@ def test_a_wider_view_may_not_take_all_of_the_tolerance(skin1, monkeypatch, erro
         assert seen[-1] == errors.index(worst)  # looks no further
     # For a walk's noise the wider views have all of it.
     assert views.score_of_option(None, wider=1.0).within == (max(errors) <= 1.0)
+
+
+def cut_again(profile, half, scene):
+    """A picture by the profile's 2D kernel on 2h+1 pixels a side, with all of its energy."""
+    quadrant = profile.quadrant_kernel(scene.mm_per_pixel, half)
+    padded = np.pad(scene.irradiance[..., 0], half, mode="symmetric")
+    channels = []
+    for c, energy in enumerate(profile.diffuse_reflectance):
+        kernel = np.pad(quadrant[:, :, c], ((half, 0), (half, 0)), mode="reflect")
+        channels.append(energy / kernel.sum() * convolve2d(padded, kernel, mode="valid"))
+    return np.stack(channels, axis=2)
+
+
+@pytest.mark.parametrize("of", TOLERANCES)
+def test_a_cut_kernel_keeps_its_energy(skin1, of):
+    profile = simulate_exact(skin1)
+    scene = make_scene("edge", height=24, width=40, mm_per_pixel=1.0, angle_degrees=30.0)
+    truth = render_reference(scene, profile)
+    views = Views(profile, [scene], None, tolerance=1.0, tolerance_of=of)
+    found = []
+    for half in (1, 4, 12):
+        score = measure(cut_again(profile, half, scene), truth)
+        found.append(views.error_of_cut(half))
+        assert found[-1] == pytest.approx(getattr(score, TOLERANCES[of]), rel=1e-6)
+    assert found == sorted(found, reverse=True)
 
 
 def test_supports_keep_their_share_of_every_channel(skin1):

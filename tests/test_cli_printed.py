@@ -111,26 +111,48 @@ def test_a_table_has_all_its_rows_and_they_differ():
 
 def test_what_went_wrong_in_a_walk_is_printed(capsys):
     """Energy lost in one channel of one material, walks cut off, a target that was not met."""
-    from sssfit.cli._options import Common
-    from sssfit.cli._simulate_report import figures_of, report
+    from sssfit.cli._simulate_report import figures_of
 
     rows = [
-        figures_of(each, 0.25) | {"path": f"{each.material_name}.npz"}
+        figures_of(each, 0.25) | {"path": f"{each.material_name}.npz", "target_error": 0.2}
         for each in (world.profile(), world.profile())
     ]
+    rows[0]["relative_error"] = 0.125
     rows[1] |= {
         "material": "lard",
         "energy_balance": [1e-4, -3e-3, 2e-4],
         "energy_balance_stderr": [2e-4, 4e-4, 6e-4],
         "unfinished": [1.25e-4, 2.5e-4, 3.75e-4],
+        "relative_error": 0.375,
     }
-    for as_json in (True, False):
-        common = Common(quiet=False, verbose=False, json=as_json, threads=None, seed=1)
-        report([dict(row) for row in rows], several=True, common=common, interrupted=False)
-    first, _, text = capsys.readouterr().out.partition("\n")
+    figures, text = reported(rows, capsys)
     assert (
         "NOT WITHIN the run's own error: -3.0e-03, standard error 4e-04 (worst channel, lard G)"
         in text
     )
     assert "unfinished, at most: 0.000375" in text
-    check(text, simulation(json.loads(first)))
+    assert "NOT MET with 4,000 photons, 37.5 % reached" in text  # by the worst of the materials
+    check(text, simulation(figures))
+
+
+def test_of_several_computed_materials_the_worst_error_is_printed(capsys):
+    from sssfit.cli._simulate_report import figures_of
+
+    rows = [figures_of(world.exact_profile(), 0.25) | {"path": f"{k}.npz"} for k in range(3)]
+    for row, error in zip(rows, (2e-5, 7e-5, 4e-5), strict=True):
+        row |= {"material": f"wax {error}", "relative_error": error}
+    figures, text = reported(rows, capsys)
+    assert text.startswith("3 materials: exact to 0.007 % of the total")
+    check(text, simulation(figures))
+
+
+def reported(rows, capsys):
+    """The JSON object and the text of a run of several materials."""
+    from sssfit.cli._options import Common
+    from sssfit.cli._simulate_report import report
+
+    for as_json in (True, False):
+        common = Common(quiet=False, verbose=False, json=as_json, threads=None, seed=1)
+        report([dict(row) for row in rows], several=True, common=common, interrupted=False)
+    first, _, text = capsys.readouterr().out.partition("\n")
+    return json.loads(first), text

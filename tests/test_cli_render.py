@@ -13,6 +13,7 @@ from reference_pixels import make_profile
 
 from sssfit.cli import main
 from sssfit.compare.judge import judge
+from sssfit.compare.metrics import auto_exposure
 from sssfit.fit import fit_svd
 from sssfit.image import load_image, save_image
 from sssfit.kernel import SeparableKernel
@@ -227,6 +228,28 @@ def test_a_kernel_without_a_record_of_its_profile_says_so(run):
     found, words = profile_found(run, "old.kernel.json")
     assert found is None
     assert "old.kernel.json does not record which profile it was fitted to" in words
+
+
+@pytest.mark.parametrize("how", ["measured", "without a profile", "in screen space"])
+@pytest.mark.parametrize("exposure", [None, 0.3])
+def test_a_png_has_the_exposure_that_was_given_or_that_of_its_own(run, how, exposure):
+    options = ("--size", "48x48", *(("--screen",) if how == "in screen space" else ()))
+    if how != "measured":
+        Path("wax.profile.npz").unlink()
+    given = () if exposure is None else ("--exposure", exposure)
+    truth = ("--truth", "true.exr") if how == "measured" else ()
+    assert run("render", *options, "-o", "light.exr", *truth)[0] == 0
+    assert run("render", *options, *given, "-o", "shown.png")[0] == 0
+    light = load_image("light.exr").pixels
+    # The true picture sets it, so that all are seen alike; the picture itself where there is none.
+    factor = exposure or auto_exposure(load_image("true.exr").pixels if truth else light, outline())
+    expected = np.clip(factor * light, 0.0, 1.0)
+    np.testing.assert_allclose(load_image("shown.png").pixels, expected, atol=5e-5)
+
+
+def outline():
+    """The mask of the head of 48 x 48 pixels."""
+    return make_scene("head", height=48, width=48, mm_per_pixel=0.2).mask
 
 
 def test_screen_space_needs_depth_and_measures_nothing(run):

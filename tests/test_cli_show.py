@@ -1,5 +1,6 @@
 """``sssfit show`` and ``sssfit chart`` as a user meets them: files, pipes, --json, refusals."""
 
+import dataclasses
 import io
 import itertools
 import json
@@ -242,7 +243,9 @@ def test_radii_of_a_channel_without_energy_are_unknown(foreign):
 
 @pytest.fixture(scope="module")
 def kernel(profile):
-    return fit_svd(profile, rank=3, mm_per_pixel=0.5, normalize=True).kernel
+    """Of unit energy but for the signs, of which every channel has another one negative."""
+    fitted = fit_svd(profile, rank=3, mm_per_pixel=0.5, normalize=True).kernel
+    return dataclasses.replace(fitted, signs=1.0 - 2.0 * np.eye(3)[::-1])
 
 
 @pytest.fixture
@@ -334,6 +337,8 @@ def test_every_figure_of_a_kernel_is_in_json(run, tmp_path, profile, kernel):
     assert figures["sign"] == kernel.signs.tolist()
     sums = kernel.weights.sum(axis=1)
     np.testing.assert_allclose(figures["term_energy"], kernel.signs * sums**2, rtol=1e-14)
+    assert (np.array(figures["term_energy"]) < 0).sum() == 3
+    np.testing.assert_allclose(np.sum(figures["term_energy"], axis=0), figures["energy"])
     assert figures["middle_weight"] == kernel.weights[:, kernel.pixels // 2].tolist()
     assert figures["parameters"] == json.loads(json.dumps(dict(kernel.parameters)))
 

@@ -128,6 +128,12 @@ def test_what_is_not_known_is_said_to_be_unknown():
     assert "Relative Frobenius error: 0.1, unknown, 0.3; energy error: unknown, unknown" in comment
 
 
+def test_a_seed_of_0_is_a_seed():
+    small = small_kernel()
+    comment = comment_of(hlsl(small_kernel(meta={**small.meta, "seed": 0})))
+    assert "Profile: montecarlo, 10,000,000 photons, seed 0." in comment
+
+
 def test_faint_channels_are_not_rounded_away():
     faint = small_kernel()
     faint = small_kernel(weights=faint.weights * 1e-8, scale=[1.0, 1e-14, 1e-30])

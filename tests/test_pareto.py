@@ -2,6 +2,7 @@
 
 import dataclasses
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from reference_pixels import make_profile
 
 from sssfit.compare import pareto
 from sssfit.compare.candidates import Candidate, candidates
-from sssfit.compare.comparison import COSTS, ERRORS, check_error
+from sssfit.compare.comparison import COSTS, ERRORS, check_error, verdicts
 from sssfit.compare.front import pareto_front
 from sssfit.compare.judge import judge
 from sssfit.compare.judged import border_of, judged_scene
@@ -138,6 +139,31 @@ def test_fronts_are_those_of_each_picture(comparison):
                 # Not beaten by the figures as measured either, which are not rounded.
                 exact = [row.cost(cost) for row in front], [row.error(error) for row in front]
                 assert all(literal_front(*exact))
+
+
+@pytest.mark.parametrize("cost", COSTS)
+@pytest.mark.parametrize("error", ERRORS)
+def test_verdicts_weigh_all_pictures_alike_and_name_the_worst(comparison, error, cost):
+    wanted = []
+    for candidate in SOME:
+        rows = [row for row in comparison.rows if row.label == candidate.label]
+        worst = max(rows, key=lambda row: row.error(error))
+        wanted.append(
+            {
+                "label": candidate.label,
+                "cost": rows[0].rounded_cost(cost),
+                "typical_error": math.prod(row.error(error) for row in rows) ** (1 / len(rows)),
+                "error": worst.error(error),
+                "picture": worst.picture,
+                "delta_e_2000_p95": max(row.delta_e_2000_p95 for row in rows),
+            }
+        )
+    front = literal_front(*([each[key] for each in wanted] for key in ("cost", "typical_error")))
+    wanted = [each for each, is_on in zip(wanted, front, strict=True) if is_on]
+    wanted.sort(key=lambda each: each["cost"])
+    for each in wanted:
+        each["typical_error"] = pytest.approx(each["typical_error"], rel=1e-12)
+    assert [dataclasses.asdict(each) for each in verdicts(comparison, error, cost)] == wanted
 
 
 def test_the_same_call_gives_the_same_rows_but_for_seconds(skin1, scenes, comparison):
