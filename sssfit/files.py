@@ -4,6 +4,7 @@ Writes go to a temporary file beside the target, are flushed to the disk and ren
 reader sees the old file or the new one and never a part of either.
 """
 
+import atexit
 import contextlib
 import errno
 import glob
@@ -245,6 +246,10 @@ def remove_unfinished() -> None:
                 shutil.rmtree(path)
             else:
                 path.unlink()
+
+
+# Python 3.11 does not wait at its end for a thread whose `join` a signal interrupted (bpo-46726).
+atexit.register(remove_unfinished)
 
 
 def remove_leftovers(path: Path) -> None:

@@ -19,6 +19,7 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
 
 TRIAL = """
 import click
+import sys
 from pathlib import Path
 from sssfit.cli import cli, main
 
@@ -26,7 +27,9 @@ from sssfit.cli import cli, main
 def trial():
 {body}
 
-main(["trial"])
+# As the console script does: with arguments of its own `main` would give the signals back.
+sys.argv = ["sssfit", "trial"]
+main()
 """
 COMPILED = """
 import numba
@@ -112,39 +115,47 @@ def test_ctrl_c_and_then_sigterm_end_it_as_well(tmp_path):
     assert end_of(process, within=1.0)[0] == 130
 
 
-def test_what_is_under_way_is_removed_by_the_second_signal(tmp_path):
-    body = """
-    import threading
-    from sssfit import files
+WRITING = """
+import threading
+from sssfit import files
 
-    def stuck(stream):
-        stream.write(b"half")
-        threading.Event().wait()
+def stuck(stream):
+    stream.write(b"half")
+    threading.Event().wait()
 
-    def write():
-        with files.locked(Path("out")), files.temporary_folder() as folder:
-            (folder / "picture").write_bytes(b"half")
-            Path("told").write_text(str(folder))
-            files.write_atomically(Path("out"), stuck)
+def write():
+    with files.locked(Path("out")), files.temporary_folder() as folder:
+        (folder / "picture").write_bytes(b"half")
+        Path("told").write_text(str(folder))
+        files.write_atomically(Path("out"), stuck)
 
-    thread = threading.Thread(target=write)
-    thread.start()
-    while not list(Path().glob(".out.*.tmp")):
-        pass
-    click.echo("ready")
-    thread.join()
-    """
+thread = threading.Thread(target=write)
+thread.start()
+while not list(Path().glob(".out.*.tmp")):
+    pass
+click.echo("ready")
+thread.join()
+"""
+
+
+@pytest.mark.parametrize("apart_seconds", [0.0, 0.0005, 0.001, 0.002, 0.004, 0.3])
+def test_what_is_under_way_is_removed_by_the_second_signal(tmp_path, apart_seconds):
     (tmp_path / "out").write_bytes(b"old")
-    process = start_trial(body, tmp_path)
+    process = start_trial(WRITING, tmp_path)
     folder = (tmp_path / "told").read_text()
     assert os.path.isdir(folder)  # noqa: PTH112
     process.send_signal(signal.SIGTERM)
+    time.sleep(apart_seconds)
     process.send_signal(signal.SIGINT)
     assert end_of(process, within=1.0)[0] in (130, -signal.SIGINT, -signal.SIGTERM)
     if process.returncode == 130:
-        assert sorted(each.name for each in tmp_path.iterdir()) == ["out", "told"]
-        assert not os.path.exists(folder)  # noqa: PTH110
+        assert_nothing_is_left(tmp_path, folder)
     assert (tmp_path / "out").read_bytes() == b"old"
+
+
+def assert_nothing_is_left(tmp_path, folder):
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["out", "told"]
+    assert not os.path.exists(folder)  # noqa: PTH110
 
 
 def test_ignored_signals_stay_ignored(tmp_path):
