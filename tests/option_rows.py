@@ -19,6 +19,7 @@ from sssfit import fit
 from sssfit.compare import view_kernel
 from sssfit.compare.judge import judge, judge_in_screen_space
 from sssfit.compare.metrics import auto_exposure
+from sssfit.compare.pictures import picture_error
 from sssfit.export import json_document
 from sssfit.image import load_image
 from sssfit.mci import load_mci
@@ -1055,6 +1056,12 @@ THREADS = {
         lambda: called("sssfit.compare.compare_models", wax(), threads=1),
     ),
 }
+
+# Options that several methods take; the tables above have the other ones.
+FITS = {
+    f"--energy of {method}": _fitted("--energy", "keep", method, energy="keep")
+    for method in ("preintegrated", "burley", "gaussians")
+} | {"--target picture": _fitted("--target", "picture", "artist", target=picture_error)}
 
 VERBOSE = {"choose"}  # where --verbose has something to say
 

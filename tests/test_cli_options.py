@@ -9,7 +9,7 @@ import cli_world as world
 import click
 import numpy as np
 import pytest
-from option_rows import COMMANDS, ROWS, SEEDS, STREAMS, THREADS, VERBOSE
+from option_rows import COMMANDS, FITS, ROWS, SEEDS, STREAMS, THREADS, VERBOSE
 
 from sssfit.cli import cli
 from sssfit.cli._options import common_options
@@ -83,6 +83,11 @@ def test_an_option_does_what_the_library_does_with_its_value(verb, option):
 @pytest.mark.parametrize(("option", "name", "row"), RANDOM + THREADED)
 def test_seed_and_threads_reach_the_library(option, name, row):
     check(row)
+
+
+@pytest.mark.parametrize("name", list(FITS))
+def test_an_option_of_several_methods_reaches_each_of_them(name):
+    check(FITS[name])
 
 
 def documented(option):
