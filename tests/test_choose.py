@@ -16,7 +16,7 @@ from sssfit.compare import _choose_photons as photon_walks
 from sssfit.compare._choose_options import SHARES, Option, supports
 from sssfit.compare._choose_photons import photons_needed
 from sssfit.compare._choose_truth import material_of
-from sssfit.compare._choose_views import TOLERANCES, Views
+from sssfit.compare._choose_views import TOLERANCES, Views, checked_scene, head_scenes
 from sssfit.compare.candidates import candidates
 from sssfit.compare.choose import choose, is_exact, mm_per_pixel_at
 from sssfit.compare.metrics import COLOUR_FIGURES, measure
@@ -88,6 +88,26 @@ def test_nothing_cheaper_that_was_tried_will_do(choice):
     assert cheaper[0].option is None
     assert not any(each.within for each in cheaper)
     assert all(each.error > choice.tolerance for each in cheaper)
+
+
+def best(steps):
+    """The step of the least error among those of one cost."""
+    assert len({each.taps_per_pixel for each in steps}) == 1
+    assert len({each.error for each in steps}) > 1
+    return min(steps, key=lambda each: each.error)
+
+
+def test_of_steps_of_one_cost_the_best_is_named(choice):
+    by_cost = {}
+    for each in choice.steps:
+        by_cost.setdefault(each.taps_per_pixel, []).append(each)
+    below = max(cost for cost in by_cost if cost < choice.chosen.taps_per_pixel)
+    assert choice.cheaper == best(by_cost[below])
+    within = [each for each in choice.steps if each.within]
+    same = [each for each in within if each.taps_per_pixel == choice.chosen.taps_per_pixel]
+    assert choice.chosen == min(same, key=lambda each: each.error)
+    others = [each for each in within if each != choice.chosen]
+    assert choice.runner_up == min(others, key=lambda each: (each.taps_per_pixel, each.error))
 
 
 def test_unless_told_otherwise_95_percent_of_the_pixels_are_within_1(choice):
@@ -289,6 +309,24 @@ def test_cost_never_rises_with_distance_for_any_material(name, tolerance, monkey
     quick(monkeypatch)
     found = list(costs(name, np.geomspace(100.0, 50_000.0, 16), tolerance, 256))
     assert found == sorted(found, reverse=True)
+
+
+@pytest.mark.parametrize(
+    ("frame", "rows", "columns"), [((96, 128), 96, 128), ((90, 700), 90, 512), ((700, 90), 512, 90)]
+)
+def test_the_head_is_the_middle_of_the_frame(frame, rows, columns):
+    (scene,) = head_scenes(1.0, 600.0, frame, None)
+    wanted = make_scene("head", height=rows, width=columns, mm_per_pixel=1.0, distance_mm=600.0)
+    np.testing.assert_array_equal(scene.irradiance, wanted.irradiance)
+    np.testing.assert_array_equal(scene.mask, wanted.mask)
+
+
+def test_of_a_picture_of_ones_own_the_middle_counts():
+    rng = np.random.default_rng(4)
+    light, mask = rng.random((520, 600, 1)), rng.integers(0, 2, (520, 600))
+    kept = checked_scene(Scene("own", light, 0.6, mask=mask), 0.6)
+    np.testing.assert_array_equal(kept.irradiance, light[4:516, 44:556])
+    np.testing.assert_array_equal(kept.mask, mask[4:516, 44:556])
 
 
 def test_a_close_up_has_to_hold_on_the_wider_view(skin1, monkeypatch):

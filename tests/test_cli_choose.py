@@ -120,17 +120,39 @@ def test_which_figure_the_tolerance_is_of():
     assert loose["chosen"]["taps_per_pixel"] < tight["chosen"]["taps_per_pixel"]
 
 
-@pytest.mark.parametrize("seed", [1, 4])
-def test_the_seed_is_that_of_noise_and_of_walks(monkeypatch, seed):
+@pytest.fixture
+def asked(monkeypatch):
+    """Run the verb up to the choice; give what the choice was asked for."""
     seen = {}
 
     def choose_kernel(source, **settings):
         seen.update(settings)
         raise RenderError("enough")
 
+    def call(*arguments):
+        assert CliRunner().invoke(cli, ["choose", *arguments]).exit_code == 1
+        return seen
+
     monkeypatch.setattr("sssfit.compare.choose.choose", choose_kernel)
-    given = ("skin1", *SMALL, "--irradiance", "noise", "--seed", str(seed))
-    assert CliRunner().invoke(cli, ["choose", *given]).exit_code == 1
+    return call
+
+
+@pytest.mark.parametrize(
+    ("frame", "rows", "columns"),
+    [("96x64", 64, 96), ("700x300", 300, 512), ("300x700", 512, 300), ("900x800", 512, 512)],
+)
+def test_a_made_picture_is_the_middle_of_the_frame(asked, frame, rows, columns):
+    seen = asked("skin1", "--resolution", frame, "--irradiance", "edge")
+    assert (seen["scene"].height, seen["scene"].width) == (rows, columns)
+    wanted = make_scene(
+        "edge", height=rows, width=columns, mm_per_pixel=seen["mm_per_pixel"], angle_degrees=30.0
+    )
+    np.testing.assert_array_equal(seen["scene"].irradiance, wanted.irradiance)
+
+
+@pytest.mark.parametrize("seed", [1, 4])
+def test_the_seed_is_that_of_noise_and_of_walks(asked, seed):
+    seen = asked("skin1", *SMALL, "--irradiance", "noise", "--seed", str(seed))
     wanted = make_scene(
         "noise", height=128, width=128, mm_per_pixel=seen["mm_per_pixel"], seed=seed
     )

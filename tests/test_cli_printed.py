@@ -1,15 +1,20 @@
-"""Every figure that is printed is the figure of --json of the same run, cell by cell."""
+"""Every figure that is printed is that of --json of the same run, and that is the file's own."""
 
 import csv
 import io
 import json
 
 import cli_world as world
+import numpy as np
 import pytest
 from printed import Exact, Percent, Rough, Table, Words, agrees, check
 from printed_layouts import PRINTED, markdown, simulation
 
+from sssfit._profile_radii import energy_radii_mm
 from sssfit.cli import cli
+from sssfit.cli._report import plain
+from sssfit.kernel import SeparableKernel
+from sssfit.profile import Profile
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -23,6 +28,125 @@ def test_what_is_printed_is_what_json_has(command):
     ran = world.run(command, both=True)
     assert ran.status == 0, ran.stdout + ran.stderr
     check(ran.text, PRINTED[command](ran.figures))
+
+
+# The figures of a profile, by their names in JSON; from the arrays where it has them.
+FIGURES = {
+    "channels": lambda made: made.channels,
+    "method": lambda made: made.meta["method"],
+    "photons": lambda made: made.meta["photons"],
+    "seed": lambda made: made.meta["seed"],
+    "annuli": lambda made: len(made.r_edges_mm) - 1,
+    "dr_mm": lambda made: made.r_edges_mm[1],
+    "radius_mm": lambda made: made.r_edges_mm[-1],
+    "diffuse_reflectance": lambda made: made.annulus_energy.sum(axis=0) + made.beyond_grid,
+    "diffuse_reflectance_stderr": lambda made: made.diffuse_reflectance_stderr,
+    "specular_reflectance": lambda made: made.specular_reflectance,
+    "beyond_grid": lambda made: made.beyond_grid,
+    "absorbed": lambda made: sum(made.absorbed) if len(made.absorbed) else None,
+    "absorbed_by_layer": lambda made: made.absorbed if len(made.absorbed) else None,
+    "transmittance": lambda made: through(made),
+    "transmitted": lambda made: through(made),
+    "transmittance_stderr": lambda made: made.transmittance_stderr,
+    "unfinished": lambda made: made.unfinished,
+    "energy_balance": lambda made: made.energy_balance,
+    "energy_balance_stderr": lambda made: made.meta.get("energy_balance_stderr"),
+    "relative_error": lambda made: made.meta["relative_error"],
+    "radius_of_50_percent_mm": lambda made: energy_radii_mm(made, [0.5])[0],
+    "radius_of_90_percent_mm": lambda made: energy_radii_mm(made, [0.9])[0],
+    "radius_of_99_percent_mm": lambda made: energy_radii_mm(made, [0.99])[0],
+    "empty_annuli": lambda made: (
+        None if made.photons is None else (made.annulus_energy == 0.0).sum(axis=0)
+    ),
+}
+
+
+# And those of a kernel; the energies are sums over all of its pixels.
+KERNEL_FIGURES = {
+    "channels": lambda made: made.channels,
+    "method": lambda made: made.method,
+    "rank": lambda made: len(made.signs),
+    "pixels": lambda made: made.weights.shape[1],
+    "mm_per_pixel": lambda made: made.mm_per_pixel,
+    "support_mm": lambda made: made.weights.shape[1] // 2 * made.mm_per_pixel,
+    "energy": lambda made: [made.full(c).sum() for c in range(len(made.channels))],
+    "scale": lambda made: made.scale,
+    "relative_frobenius_error": lambda made: made.relative_frobenius_error,
+    "energy_error": lambda made: made.energy_error,
+    "sign": lambda made: made.signs,
+    "term_energy": lambda made: [
+        [sign * np.outer(half, half).sum() for sign, half in zip(signs, term.T, strict=True)]
+        for signs, term in zip(made.signs, made.weights, strict=True)
+    ],
+    "middle_weight": lambda made: [term[len(term) // 2] for term in made.weights],
+    "parameters": lambda made: made.parameters,
+    "settings": lambda made: made.meta["settings"],
+    **{
+        key: lambda made, key=key: made.meta[key]
+        for key in ("material", "profile_method", "photons", "seed", "version", "profile_sha256")
+    },
+}
+
+
+def through(made):
+    """What leaves at the bottom; None where there is none."""
+    below = made.annulus_transmittance
+    return None if below is None else below.sum(axis=0) + made.beyond_grid_transmittance
+
+
+# Those that are of the run, and those that are words.
+OTHERS = {
+    "show": {"kind", "format", "file", "material", "version", "uniform"},
+    "simulate": {"material", "seconds", "photons_per_second", "target_error", "finished_before"},
+    "import": {"material", "source"},
+    "fit": {"profile", "taps", "evaluations", "stop_reason", "seconds"},
+}
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "show wax.profile.npz",
+        "show plate.profile.npz",  # of layers, and light comes through
+        "simulate wax.toml --photons 4000 --dr .2 --radius 6 -o made.npz",
+        "simulate plate.toml --photons 3000 --dr .2 --radius 4",
+        "simulate plate.toml --method multipole --dr .3 --radius 8",
+        "simulate wax.toml --method dipole --dr .3 --radius 8",
+        "import table.csv",
+        "import r.mco g.mco --channels a,b -o made.npz",
+        "show wax.svd2.kernel.json",
+        "show wax.gaussians2.kernel.json",
+        "fit wax.profile.npz --method svd --rank 2 --energy keep --mm-per-pixel .4",
+        "fit wax.profile.npz --method gaussians --terms 2 --mm-per-pixel .4 --normalize",
+    ],
+)
+def test_the_figures_of_json_are_those_of_the_file(command):
+    ran = world.run(command, both=True)
+    verb, name, *_ = command.split()
+    is_kernel = verb == "fit" or name.endswith(".kernel.json")
+    load = SeparableKernel.load if is_kernel else Profile.load
+    made = (
+        load(world.files() / name)
+        if verb == "show"
+        else ran.loaded(load, ".kernel.json" if is_kernel else ".npz")
+    )
+    known = KERNEL_FIGURES if is_kernel else FIGURES
+    figures = {key: each for key, each in ran.figures.items() if key in known}
+    assert ran.figures.keys() <= {*known, *OTHERS[verb], "command", "output"}
+    for key, figure in figures.items():
+        wanted = plain(known[key](made))
+        assert same(figure, wanted), f"{key}: {figure} is not {wanted}"
+
+
+def same(found, wanted):
+    """Whether figures of JSON are equal but for rounding in sums."""
+    if isinstance(found, dict) and isinstance(wanted, dict):
+        return found.keys() == wanted.keys() and all(same(found[k], wanted[k]) for k in wanted)
+    if isinstance(found, list) and isinstance(wanted, list):
+        return len(found) == len(wanted) and all(map(same, found, wanted))
+    if isinstance(found, float) and isinstance(wanted, (int, float)):
+        return found == pytest.approx(wanted, rel=1e-9, abs=1e-15)
+    return found == wanted
 
 
 def test_tables_in_files_are_those_of_json():

@@ -1,5 +1,6 @@
 """Exported kernels: the numbers are the kernel's, the comment says what they are."""
 
+import dataclasses
 import io
 import json
 import re
@@ -183,6 +184,16 @@ def test_json_document_is_the_kernel_and_a_comment_and_obeys_the_schema():
     for term, signs, weights in zip(whole["terms"], kernel.signs, kernel.weights, strict=True):
         assert term["sign"] == signs.tolist()
         assert term["weights"] == weights.tolist()
+
+
+def test_names_in_any_letters_are_legible_in_every_form():
+    words = ("gemäß", "Müllers Haut", "Maß", "größer", "rötlich", "緑", "μ")
+    meta = {"material": words[1], "settings": {words[2]: words[3]}}
+    kernel = dataclasses.replace(small_kernel(method=words[0], meta=meta), channels=words[4:])
+    file = io.BytesIO()
+    kernel.write(file)
+    for text in (hlsl(kernel), json_document(kernel), file.getvalue().decode()):
+        assert not [each for each in words if each not in text]
 
 
 def test_the_same_kernel_gives_the_same_text():

@@ -353,6 +353,18 @@ def damaged():
         changed(support_mm=1.0),
         "support_mm = 1.0, but 5 pixels of 0.1 mm reach 0.2 mm",
     )
+    yield (
+        "a smaller support",
+        changed(support_mm=0.1),
+        "support_mm = 0.1, but 5 pixels of 0.1 mm reach 0.2 mm",
+    )
+    yield "a lower rank", changed(rank=1), "rank = 1, but the terms have 2"
+    yield "fewer pixels", changed(pixels=3), "pixels = 3, but the terms have 5"
+    yield (
+        "less energy",
+        changed(energy=[49.0, 50.0]),
+        "energy[0] = 49.0, but the terms add up to 50",
+    )
     yield "energy", changed(energy=[50.0, 51.0]), "energy[1] = 51.0, but the terms add up to 50"
     yield "no energy", changed(energy=[50.0, "50"]), "energy[1] = '50'; expected a finite number"
     yield "scale", changed(scale=[1, -1]), "scale[1] = -1; expected 0 to 1e+18"

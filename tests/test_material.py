@@ -396,11 +396,11 @@ def test_byte_order_mark_and_windows_lines_are_read(tmp_path):
 
 def test_letters_of_windows_never_stop_a_material(tmp_path):
     path = tmp_path / "mine.toml"
-    text = '# µa à 633 nm…\r\nsource = "Müller"\r\n' + SKIN.replace("\n", "\r\n")
+    text = '# µa… à 633 nm\r\nsource = "Müllers “Haut”, 5 €"\r\n' + SKIN.replace("\n", "\r\n")
     for encoding in ("utf-8", "utf-8-sig", "cp1252", "utf-16", "utf-16-le", "utf-16-be"):
         path.write_bytes(text.encode(encoding))
         material = load_material(path)
-        assert material.source == "Müller", encoding
+        assert material.source == "Müllers “Haut”, 5 €", encoding
         assert material.layers == parse_material(SKIN, "mine.toml").layers
     path.write_bytes(text.replace("1.3", "1.3°").encode("cp1252"))
     with pytest.raises(MaterialError, match=r"not valid TOML.*save it as UTF-8\.$"):

@@ -30,8 +30,13 @@ def block(name, values, form="{:12.4E}", per_line=1):
     return "\n".join([f"{name} #of what, [unit]", *lines, ""])
 
 
-def mco_text(*, layers=LAYERS, below=BELOW, n_r=N_R, dr_cm=DR_CM, name="skin.mco", **blocks):
-    """What MCML 1.2.2 would write of these energies, blocks replaced or, by None, left out."""
+def mco_text(
+    *, layers=LAYERS, outside=(1, 1), below=BELOW, n_r=N_R, dr_cm=DR_CM, name="skin.mco", **blocks
+):
+    """What MCML 1.2.2 would write of these energies, blocks replaced or, by None, left out.
+
+    ``outside`` has n above and below the layers.
+    """
     area_cm2 = 2 * np.pi * (np.arange(N_R) + 0.5) * DR_CM**2
     rat = [SPECULAR, REFLECTED.sum(), IN_LAYERS.sum(), below.sum()]
     written = {
@@ -57,9 +62,9 @@ def mco_text(*, layers=LAYERS, below=BELOW, n_r=N_R, dr_cm=DR_CM, name="skin.mco
         f"{N_Z}\t{n_r}\t{N_A}\t# No. of dz, dr, da.\n",
         f"{len(layers)}\t\t\t\t\t# Number of layers",
         "#n\tmua\tmus\tg\td\t# One line for each layer",
-        "1\t\t\t\t\t# n for medium above",
+        f"{outside[0]}\t\t\t\t\t# n for medium above",
         *layers,
-        "1\t\t\t\t\t# n for medium below\n",
+        f"{outside[1]}\t\t\t\t\t# n for medium below\n",
     ]
     return "\n".join([*head, *filter(None, (written | blocks).values())])
 
@@ -169,7 +174,7 @@ def test_comments_may_stand_before_the_version(tmp_path):
 
 
 def test_letters_of_windows_never_stop_an_output(tmp_path):
-    text = mco_text(name="peau_brûlée.mco").replace("# dz, dr", "# dz, dr, à 633 nm")
+    text = mco_text(name="peau_brûlée.mco").replace("# dz, dr", "# dz, dr… à 633 nm")
     path = tmp_path / "a.mco"
     for encoding in ("utf-8", "utf-8-sig", "cp1252", "utf-16", "utf-16-le", "utf-16-be"):
         path.write_bytes(text.replace("\n", "\r\n").encode(encoding))
@@ -227,6 +232,13 @@ def test_channels_are_joined():
         (mco_text(), ["R", ""], "channels[1] = ''; expected a name"),
         (mco_text(layers=("1.5 1 100 0.9 0.1", LAYERS[1])), ["R", "G"], "b.mco has other layers"),
         (mco_text(layers=("1.4 1 100 0.9 0.2", LAYERS[1])), ["R", "G"], "b.mco has other layers"),
+        (mco_text(outside=(1.33, 1)), ["R", "G"], "b.mco has other layers"),
+        (mco_text(outside=(1, 1.33)), ["R", "G"], "b.mco has other layers"),
+        (
+            mco_text(layers=(*LAYERS, LAYERS[1]), A_l=block("A_l", [*IN_LAYERS[:1], 0.1, 0.05988])),
+            ["R", "G"],
+            "b.mco has other layers",
+        ),
         (mco_text(RAT="RAT\n0.0281\n0.3\n0.57222\n0.1\n"), ["R", "G"], "b.mco has other layers"),
         (
             mco_text(
