@@ -236,6 +236,12 @@ CALLS = {
     "--centre-bound": "fit wax.profile.npz --method guided -o k.json",
     "--b": "fit wax.profile.npz --method guided -o k.json",
     "--k": "fit wax.profile.npz --method guided -o k.json",
+    "--near": "fit wax.profile.npz --method artist --far 1 --weight .5 -o k.json",
+    "--far": "fit wax.profile.npz --method artist --near 1 --weight .5 -o k.json",
+    "--weight": "fit wax.profile.npz --method artist --near 1 --far 2 -o k.json",
+    "--width": "fit wax.profile.npz --method falloff --strength .5 --falloff 1 -o k.json",
+    "--strength": "fit wax.profile.npz --method falloff --width .02 --falloff 1 -o k.json",
+    "--falloff": "fit wax.profile.npz --method falloff --width .02 --strength .5 -o k.json",
     "--mm-per-pixel": "fit wax.profile.npz --method svd -o k.json",
     "--support": "fit wax.profile.npz --method svd -o k.json",
     "--mean-free-path": "materials --from-reflectance .4 --channels a --eta 1.3 -o m.toml",
@@ -260,6 +266,8 @@ def test_numbers_at_the_end_of_their_range(folder, capfd, option):
         if ended.value.code:
             assert len([line for line in err if line.startswith("Error: ")]) == 1, err
             assert "internal error" not in err[-1]
+        assert not [line for line in err if "RuntimeWarning" in line], (value, err)
+        if ended.value.code:
             assert not [line for line in err if "Warning" in line], (value, err)
         for path in ("o.npz", "k.json", "m.toml", "p.png", "p.exr"):
             Path(path).unlink(missing_ok=True)
