@@ -46,7 +46,8 @@ def write_material(wish: Wish, common: Common) -> None:
         raise click.UsageError("--from-reflectance needs --mean-free-path and --eta.")
     channels = _channels(wish)
     name = wish.name or _name_of(wish.output)
-    path = None if wish.output == "-" else Path(wish.output or f"{name}.toml")
+    asked = f"{name}.toml" if wish.output is None else wish.output
+    path = None if asked == "-" else Path(asked)
 
     with held([path], _is_ours, inputs=[], force=wish.force, named=("a material", ".toml")):
         say_if_compiling(common, solver=True)
@@ -110,14 +111,15 @@ def _channels(wish: Wish) -> list[str]:
         return names
     if count != 3:
         raise click.UsageError(
-            f"--from-reflectance has {count} values; name their channels with --channels."
+            f"--from-reflectance has {count} value{'s' * (count != 1)}; name their channels with "
+            "--channels."
         )
     return ["R", "G", "B"]
 
 
 def _name_of(output: str | None) -> str:
     """Name the material after its file."""
-    return "from-reflectance" if output in (None, "-") else Path(str(output)).stem
+    return "from-reflectance" if output in (None, "", "-") else Path(str(output)).stem
 
 
 def _write(material: Material, path: Path | None) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ._figure import chart_output
+from ._memory import check_memory
 from ._options import Common
 from ._report import finish, percent, table
 from ._truth import true_profile
@@ -27,6 +28,7 @@ def chart_kernel(
     force: bool,
 ) -> None:
     """Draw a kernel and put it into figures; ``given`` is its profile's file, no path is stdout."""
+    check_memory("kernel chart", common.threads)
     profile, source = true_profile(kernel, name, given, common)
     with chart_output(path, inputs=[name, source], force=force) as save:
         from sssfit.compare import view_kernel

@@ -20,10 +20,13 @@ if sys.platform != "win32":
 _NEEDED_MB = {
     "simulate": 620,
     "fit": 650,
+    "picture fit": 980,
     "render": 800,
     "compare": 1080,
     "choose": 880,
-    "chart": 350,
+    "chart": 570,
+    "kernel chart": 710,
+    "show": 460,
     "figures": 680,  # of chart --models, --spectrum and --guide
     "inversion": 700,
 }
@@ -31,7 +34,7 @@ _OTHER_MB = 280
 # Of a thread: its stack, and what the C library sets aside for it. Without threads of our own a
 # core has BLAS's buffers.
 _THREAD_MB, _CORE_MB = 75, 6
-_THREADED = {"simulate", "render", "compare", "choose", "figures"}
+_THREADED = {"simulate", "picture fit", "render", "compare", "choose", "figures"}
 
 _NO_MORE = ("allocate memory", "can't start new thread", "failed to map segment")
 

@@ -31,7 +31,8 @@ def chart_models(
     material, walk = _read(name)
     if walk is not None and photons is not None:
         raise click.UsageError("--photons is for a walk that is yet to be; leave it out.")
-    path = None if output == "-" else Path(output or f"{material.name}.models.png")
+    asked = f"{material.name}.models.png" if output is None else output
+    path = None if asked == "-" else Path(asked)
     with chart_output(path, inputs=[name], force=force) as save:
         comparison = _compared(material, walk, photons, common)
 

@@ -162,14 +162,15 @@ def read_scene(picture: Picture, otherwise: float | None, common: Common) -> Sce
             f"--{given[0].split('_')[0]} is for made pictures ({', '.join(MADE)}); leave it out."
         )
     image = load_image(picture.irradiance, layer=picture.layer)
-    for note in image.notes:
-        say(common, f"{picture.irradiance}: {note}")
     pitch = picture.mm_per_pixel or image.mm_per_pixel or otherwise
     if pitch is None:
         raise RenderError(
             f"{picture.irradiance} does not say how large its pixels are; give --mm-per-pixel."
         )
-    return Scene.from_image(image, pitch, alpha_is_mask=picture.mask == "alpha")
+    scene = Scene.from_image(image, pitch, alpha_is_mask=picture.mask == "alpha")
+    for note in image.notes:
+        say(common, f"{picture.irradiance}: {note}")
+    return scene
 
 
 def check_file_options(layer: str | None, mask: str | None, *, has_file: bool) -> None:

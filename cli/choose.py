@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 _PROFILE_ENDING, _ENDING = ".npz", ".chosen.kernel.json"
 _WORTH_A_NOTE = 1e-3  # of the light
-_MOST_METRES = 9.0  # 1cm is 10 mm and was not meant in metres
+_METRES = (0.1, 9.0)  # plain numbers that may have been meant in metres; 1cm is 10 mm and was not
 
 
 @click.command()
@@ -144,7 +144,7 @@ def choose(
     check_file_options(layer, mask, has_file=not picture.is_made)
     source = _source(material)
     pitch = mm_per_pixel_at(distance_mm, fov_degrees, resolution[0])
-    path = None if output == "-" else Path(output or f"{_stem(material, source)}{_ENDING}")
+    path = None if output == "-" else _output_path(output, material, source)
     profile_path = _beside(path, material)
     read, beside = [material, irradiance], [] if profile_path is None else [profile_path]
     with (
@@ -181,8 +181,13 @@ def _check_distance(distance_mm: float) -> None:
         metres = f"a plain number is mm: did you mean {distance_mm:g}m?"
         raise click.UsageError(
             f"--distance: {distance_mm:g} mm is nearer than {MIN_DISTANCE_MM:g} mm; "
-            f"{metres if distance_mm <= _MOST_METRES else 'move away.'}"
+            f"{metres if _METRES[0] <= distance_mm <= _METRES[1] else 'move away.'}"
         )
+
+
+def _output_path(output: str | None, material: str, source: Material | Profile) -> Path:
+    """Return where the kernel goes: where it was asked for, or a name of the material's."""
+    return Path(f"{_stem(material, source)}{_ENDING}" if output is None else output)
 
 
 def _source(name: str) -> Material | Profile:

@@ -9,6 +9,7 @@ import click
 
 from ._fit_options import fit_options
 from ._fits import FITS, fit_lines, own_settings
+from ._memory import check_memory
 from ._options import Common, Length, common_options
 from ._outputs import KERNEL, held
 from ._report import binary_stdin, binary_stdout, finish, newest, percent, table
@@ -94,7 +95,10 @@ def fit(
     name = profile or str(newest(common, "*.profile.npz", "sssfit simulate skin1"))
     source = _load(name)
     path = _target(name, source, method, settings, output)
-    settings |= _judge(settings) | {"mm_per_pixel": mm_per_pixel, "normalize": normalize}
+    settings |= _judge(settings, common.threads) | {
+        "mm_per_pixel": mm_per_pixel,
+        "normalize": normalize,
+    }
     from sssfit.kernel import is_kernel_file
 
     settings["support_mm"] = None if support == "auto" else support
@@ -104,10 +108,11 @@ def fit(
     finish(common, figures, _text(result, figures), to_stderr=path is None)
 
 
-def _judge(settings: dict[str, Any]) -> dict[str, Any]:
+def _judge(settings: dict[str, Any], threads: int | None) -> dict[str, Any]:
     """Return what judges pictures, if they are the target: the fits by themselves render none."""
     if settings.get("target") != "picture":
         return {}
+    check_memory("picture fit", threads)
     from sssfit.compare.pictures import picture_error
 
     return {"target": picture_error}

@@ -117,7 +117,7 @@ def parse_csv(
     ([0.0, 0.5, 2.0], [0.16])
     """
     table = _Table(text, printable(origin), unit)
-    quantity = table.checked_quantity(quantity)
+    quantity = table.checked_quantity(quantity, density_unit or table.unit)
     channels = table.channels()
     per_unit = _density_unit(density_unit, quantity, table.unit)
     radii_mm, values = table.numbers(quantity, 0 if per_unit is None else -2 * _TO_MM[per_unit])
@@ -278,13 +278,17 @@ class _Table:
             )
         return given or named
 
-    def checked_quantity(self, given: str | None) -> str:
-        """Return what the numbers are, by the caller or by the table's own comment."""
-        quantity = given or self._said
+    def checked_quantity(self, given: str | None, per_unit: str) -> str:
+        """Return what the numbers are, by the caller or by the table's own comment.
+
+        ``per_unit`` is the unit that densities would be per square of.
+        """
+        quantity, radius = given or self._said, self.radius_name
         if quantity is None:
             raise ProfileError(
                 f"{self.origin} does not say what its numbers are; give --quantity density (R_d "
-                "in 1/mm^2 at the radius r_mm) or --quantity energy (of the annulus out to r_mm)."
+                f"in 1/{per_unit}^2 at the radius {radius}) or --quantity energy (of the annulus "
+                f"out to {radius})."
             )
         if quantity not in QUANTITIES or (self._said or quantity) != quantity:
             other = self._said not in (None, quantity)

@@ -166,6 +166,8 @@ def test_its_pass_is_the_preintegrated_one_of_two_gaussians():
         ({"near_mm2": 1.0}, "weight and far_mm2 missing"),
         ({"near_mm2": (1.0, 2.0), "far_mm2": 1.0, "weight": 0.1}, "one for each of R, G, B"),
         ({"near_mm2": 0.0, "far_mm2": 1.0, "weight": 0.1}, "variances above 0"),
+        ({"near_mm2": 1e-320, "far_mm2": 1.0, "weight": 0.1}, "from 1e-18 to 1e.18"),
+        ({"near_mm2": 1.0, "far_mm2": 1e308, "weight": 0.1}, "variances above 0, from 1e-18"),
         ({"near_mm2": 1.0, "far_mm2": np.nan, "weight": 0.1}, "one finite number"),
         ({"near_mm2": 1.0, "far_mm2": 1.0, "weight": 1.1}, "shares from 0 to 1"),
         ({"target": "disk"}, 'target = "disk"; expected "line", "kernel" or a function that'),

@@ -248,6 +248,20 @@ def test_a_table_in_cm_is_converted(run):
     assert json.loads(out)["diffuse_reflectance"] == figures["diffuse_reflectance"]
 
 
+def test_the_question_what_numbers_are_names_the_units_of_the_table(run):
+    table = str(DATA / "low-albedo-cm.csv")
+    asked = "give --quantity density (R_d in 1/{}^2 at the radius {}) or --quantity energy (of the "
+    for name, options, unit in (
+        ("r_cm", (), "cm"),
+        ("r_cm", ("--density-unit", "mm"), "mm"),
+        ("r", ("--unit", "m"), "m"),
+    ):
+        Path("asked.csv").write_text(Path(table).read_text().replace("r_cm", name))
+        status, _, err = run("import", "asked.csv", *options)
+        assert status == 1
+        assert asked.format(unit, name) in err
+
+
 def test_lost_energy_and_gaps_are_said_on_import(run):
     Path("a.mco").write_text(mco_text(RAT="RAT\n0.01\n0.3\n0.2\n0.1\n", A_l="A_l\n0.1\n0.1\n"))
     status, _, err = run("import", "a.mco", "-q")

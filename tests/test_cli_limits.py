@@ -102,11 +102,40 @@ def test_the_limits_at_which_it_spun_or_crashed(folder):
 
 
 @posix
+@pytest.mark.parametrize("megabytes", [460, 500, 560])
+def test_the_limits_at_which_charts_of_kernels_spun(folder, megabytes):
+    ended = sssfit(folder, "chart", "wax.kernel.json", megabytes=megabytes)
+    assert ended.returncode == 1
+    assert ended.stderr.startswith(f"Error: this process may use {megabytes} MB of memory")
+    assert ended.stderr.count("\n") == 1
+
+
+PICTURE_FIT = ("wax.profile.npz", "--method", "artist", "--target", "picture", "-q")
+
+
+@posix
+@pytest.mark.parametrize("megabytes", [700, 800, 900])
+def test_the_limits_at_which_fits_to_pictures_crashed(folder, megabytes):
+    ended = sssfit(folder, "fit", *PICTURE_FIT, "--threads", "2", megabytes=megabytes)
+    assert ended.returncode == 1
+    assert ended.stderr.startswith(f"Error: this process may use {megabytes} MB of memory")
+    assert ended.stderr.count("\n") == 1
+
+
+ALL_LIMITS = [
+    *VERBS.items(),
+    ("chart", ("wax.kernel.json", "-q")),
+    ("show", ("wax.kernel.json", "-q")),
+    ("fit", PICTURE_FIT),
+]
+
+
+@posix
 @pytest.mark.slow
-@pytest.mark.parametrize("verb", VERBS)
-def test_any_limit_gives_a_result_or_one_line(folder, verb):
+@pytest.mark.parametrize(("verb", "arguments"), ALL_LIMITS)
+def test_any_limit_gives_a_result_or_one_line(folder, verb, arguments):
     for megabytes in range(200, 2001, 50):
-        ended = sssfit(folder, verb, *VERBS[verb], megabytes=megabytes)
+        ended = sssfit(folder, verb, *arguments, megabytes=megabytes)
         assert (ended.returncode, ended.stderr.count("\n")) in ((0, 0), (1, 1)), megabytes
         shutil.rmtree(folder / "__pycache__", ignore_errors=True)
 
@@ -236,6 +265,12 @@ CALLS = {
     "--centre-bound": "fit wax.profile.npz --method guided -o k.json",
     "--b": "fit wax.profile.npz --method guided -o k.json",
     "--k": "fit wax.profile.npz --method guided -o k.json",
+    "--near": "fit wax.profile.npz --method artist --far 1 --weight .5 -o k.json",
+    "--far": "fit wax.profile.npz --method artist --near 1 --weight .5 -o k.json",
+    "--weight": "fit wax.profile.npz --method artist --near 1 --far 2 -o k.json",
+    "--width": "fit wax.profile.npz --method falloff --strength .5 --falloff 1 -o k.json",
+    "--strength": "fit wax.profile.npz --method falloff --width .02 --falloff 1 -o k.json",
+    "--falloff": "fit wax.profile.npz --method falloff --width .02 --strength .5 -o k.json",
     "--mm-per-pixel": "fit wax.profile.npz --method svd -o k.json",
     "--support": "fit wax.profile.npz --method svd -o k.json",
     "--mean-free-path": "materials --from-reflectance .4 --channels a --eta 1.3 -o m.toml",
@@ -260,6 +295,8 @@ def test_numbers_at_the_end_of_their_range(folder, capfd, option):
         if ended.value.code:
             assert len([line for line in err if line.startswith("Error: ")]) == 1, err
             assert "internal error" not in err[-1]
+        assert not [line for line in err if "RuntimeWarning" in line], (value, err)
+        if ended.value.code:
             assert not [line for line in err if "Warning" in line], (value, err)
         for path in ("o.npz", "k.json", "m.toml", "p.png", "p.exr"):
             Path(path).unlink(missing_ok=True)

@@ -339,6 +339,7 @@ def test_a_file_must_say_its_pixels(run):
     status, _, words = run("render", "--irradiance", "mine.png")
     assert status == 1
     assert "--mm-per-pixel" in words
+    assert "decoded to linear" not in words  # how it was read, where nothing comes of it
     status, _, words = run("render", "--irradiance", "mine.png", "--mm-per-pixel", ".3")
     assert status == 1
     assert "fit the kernel at" in words

@@ -168,6 +168,11 @@ def test_a_channel_without_light():
     assert result.stop_reasons[0] == "the channel returns no light"
 
 
+def test_a_pass_of_which_its_pixels_hold_nothing_is_refused(skin):
+    with pytest.raises(FitError, match="so wide that its pixels hold nothing of it"):
+        fit_falloff(skin, mm_per_pixel=1e-3, support_mm=0.02, width=1e9, strength=1.0, falloff=1e6)
+
+
 @pytest.mark.parametrize(
     ("settings", "words"),
     [
@@ -175,7 +180,10 @@ def test_a_channel_without_light():
         ({"width": 0.0, "strength": 0.5, "falloff": 0.5}, "one number above 0"),
         ({"width": (1.0, 2.0, 3.0), "strength": 0.5, "falloff": 0.5}, "for all channels"),
         ({"width": 0.014, "strength": 1.2, "falloff": 0.5}, "shares from 0 to 1"),
-        ({"width": 0.014, "strength": 0.5, "falloff": -0.1}, "from 0 up"),
+        ({"width": 0.014, "strength": 0.5, "falloff": -0.1}, "numbers from 0 to 1e.06"),
+        ({"width": 0.014, "strength": 0.5, "falloff": 1e308}, "numbers from 0 to 1e.06"),
+        ({"width": 1e308, "strength": 0.5, "falloff": 0.5}, "from 1e-09 to 1e.09"),
+        ({"width": 1e-320, "strength": 0.5, "falloff": 0.5}, "from 1e-09 to 1e.09"),
     ],
 )
 def test_bad_settings_are_one_line(skin, settings, words):

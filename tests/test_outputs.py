@@ -261,6 +261,28 @@ def test_a_foreign_checkpoint_stays(run, folder):
 # What a file system can say before the work
 
 
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "simulate wax.toml --photons 2000",
+        "fit wax.profile.npz --method svd --rank 1",
+        "render wax.kernel.json --irradiance disk --size 8x8",
+        "choose wax.toml --irradiance disk",
+        "import wax.csv",
+        "export wax.kernel.json --format hlsl",
+        "chart wax.profile.npz",
+        "chart --models wax.toml",
+        "materials --from-reflectance .4 --channels a --mean-free-path 1 --eta 1.3",
+    ],
+)
+def test_an_empty_name_is_no_output(run, folder, arguments):
+    before = contents(folder)
+    status, _, err = run(arguments, "-o", "")  # as a script gives it whose variable is not set
+    assert (status, err.count("\n")) == (1, 1)
+    assert err.startswith("Error: ")
+    assert contents(folder) == before
+
+
 @posix
 def test_links_round_in_a_circle_are_refused(run, folder):
     Path("a.npz").symlink_to("b.npz")

@@ -70,7 +70,12 @@ def mm_per_pixel_at(distance_mm: float, fov_degrees: float, rows: int) -> float:
     if not LEAST_MM_PER_PIXEL <= pitch < math.inf:
         raise RenderError(
             f"{distance_mm:g} mm away, {fov_degrees:g} degrees on {rows:.7g} rows make pixels of "
-            f"{pitch:.3g} mm; expected {LEAST_MM_PER_PIXEL:g} mm, the wavelength of light, or more."
+            f"{pitch:.3g} mm; expected "
+            + (
+                f"{LEAST_MM_PER_PIXEL:g} mm, the wavelength of light, or more."
+                if math.isfinite(pitch)
+                else "a finite length, from less far away."
+            )
         )
     return pitch
 

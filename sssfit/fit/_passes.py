@@ -5,6 +5,7 @@ What the artist's and the 2012 model share. A pass covers a half line of pixels,
 
 import numpy as np
 
+from sssfit.errors import FitError
 from sssfit.fit._target import FloatArray
 from sssfit.shapes import gaussian_line_integral
 
@@ -31,9 +32,17 @@ def gaussian_pixels(edges_mm: FloatArray, sigmas_mm: FloatArray) -> tuple[FloatA
 
 
 def of_unit_sum(half: FloatArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Scale a half line (h+1,) and its derivatives (m, h+1) to a whole pass of sum 1."""
+    """Scale a half line (h+1,) and its derivatives (m, h+1) to a whole pass of sum 1.
+
+    Raises
+    ------
+    FitError
+        A line so wide beside its pixels that nothing of it lies in them.
+    """
     copies = np.where(np.arange(half.size) == 0, 1.0, 2.0)
     total = copies @ half
+    if total == 0.0:
+        raise FitError("the pass is so wide that its pixels hold nothing of it; make it narrower.")
     half = half / total
     return half, (slopes - np.outer(slopes @ copies, half)) / total
 

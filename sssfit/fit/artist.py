@@ -35,6 +35,7 @@ _NEAR = (-3.0, -1.5, 0.0)
 _FAR = (1.0, 2.0, 3.0)
 _STEP, _CHANGE, _VALUE_CHANGE = 0.5, 0.02, 1e-3  # of the same; and of a Delta E
 _MOST_EVALUATIONS = 1000
+_LEAST_MM2, _MOST_MM2 = 1e-18, 1e18  # by hand; files hold no more, and squares of less overflow
 
 PerChannel = float | Sequence[float]
 Misfit = Callable[[FloatArray], tuple[float, FloatArray]]
@@ -267,6 +268,9 @@ def _by_hand(
         return None
     if ((values[0] < 0.0) | (values[0] > 1.0)).any():
         raise FitError(f"weight = {weight}; expected shares from 0 to 1.")
-    if (values[1:] <= 0.0).any():
-        raise FitError(f"near_mm2 = {near_mm2}, far_mm2 = {far_mm2}; expected variances above 0.")
+    if ((values[1:] < _LEAST_MM2) | (values[1:] > _MOST_MM2)).any():
+        raise FitError(
+            f"near_mm2 = {near_mm2}, far_mm2 = {far_mm2}; expected variances above 0, from "
+            f"{_LEAST_MM2:g} to {_MOST_MM2:g} mm^2."
+        )
     return np.concatenate((values[:1], np.log(values[1:])))

@@ -36,6 +36,7 @@ STRETCH = 127.7
 _SIGMAS_MM = np.sqrt(SKIN_VARIANCES_MM2)
 _RED = np.array([row[0] for row in SKIN_WEIGHTS])
 _LEAST_FALLOFF = 0.001
+_WIDTHS, _MOST_FALLOFF = (1e-9, 1e9), 1e6  # by hand; beyond them squares leave double precision
 _DENSE = 8  # pixels that are all samples; farther out they lie an eighth of their distance apart
 _SCALES = 24  # tried with each of some strengths, before the best are refined
 _STRENGTHS = (0.25, 0.5, 0.75, 1.0)
@@ -206,10 +207,14 @@ def _by_hand(
     values = per_channel(given, channels)
     if values is None:
         return None
-    if (values[0] <= 0.0).any() or (values[0] != values[0, 0]).any():
-        raise FitError(f"width = {width}; expected one number above 0 for all channels.")
+    least, most = _WIDTHS
+    if (values[0] != values[0, 0]).any() or not least <= values[0, 0] <= most:
+        raise FitError(
+            f"width = {width}; expected one number above 0 for all channels, from {least:g} to "
+            f"{most:g}."
+        )
     if ((values[1] < 0.0) | (values[1] > 1.0)).any():
         raise FitError(f"strength = {strength}; expected shares from 0 to 1.")
-    if (values[2] < 0.0).any():
-        raise FitError(f"falloff = {falloff}; expected numbers from 0 up.")
+    if ((values[2] < 0.0) | (values[2] > _MOST_FALLOFF)).any():
+        raise FitError(f"falloff = {falloff}; expected numbers from 0 to {_MOST_FALLOFF:g}.")
     return values
