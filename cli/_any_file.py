@@ -62,9 +62,9 @@ def _read(source: Path | io.BytesIO, origin: str) -> Found:
 
 
 def _material(source: Path | io.BytesIO, origin: str) -> Material:
-    from sssfit._material_toml import decode
     from sssfit.errors import MaterialError
     from sssfit.material import load_material, parse_material
+    from sssfit.material.toml import decode
 
     if isinstance(source, Path):
         return load_material(source)
@@ -85,10 +85,10 @@ def _stdin() -> io.BytesIO:
 
 def _check_ordinary(name: str, path: Path) -> None:
     """Refuse what is not there, folders, devices and pipes."""
-    from sssfit._material_toml import did_you_mean
     from sssfit.errors import FileError
     from sssfit.files import reason
     from sssfit.material import material_names
+    from sssfit.material.toml import did_you_mean
 
     try:
         path.stat()
@@ -123,18 +123,19 @@ def _kind(source: Path | io.BytesIO, origin: str) -> str:
 
 def _kind_of_stream(stream: BinaryIO) -> str | None:
     """Return a kind, or None for what is foreign."""
-    from sssfit import _kernel_json, _profile_io
-    from sssfit._material_toml import MOST_BYTES
+    from sssfit.kernel import json as kernel_json
+    from sssfit.material.toml import MOST_BYTES
+    from sssfit.profile import npz
     from sssfit.simulate import CHECKPOINT_MARKS
     from sssfit.text import decode
 
     marks = {
-        "kernel": (_kernel_json.MARK,),
-        "profile": _profile_io.MARKS,
+        "kernel": (kernel_json.MARK,),
+        "profile": npz.MARKS,
         "checkpoint": CHECKPOINT_MARKS,
     }
     for kind, each in marks.items():
-        if _profile_io.is_marked(stream, each):
+        if npz.is_marked(stream, each):
             return kind
     stream.seek(0)
     text = decode(stream.read(MOST_BYTES))

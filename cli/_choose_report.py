@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ._report import percent
 
 if TYPE_CHECKING:
-    from sssfit.compare.choose import Choice, PhotonNeed, Step
+    from sssfit.choose.choice import Choice, PhotonNeed, Step
 
 _FIGURES = {"p95": "95th percentile", "p99": "99th percentile", "mean": "mean"}
 
@@ -55,7 +55,7 @@ def figures_of(choice: Choice) -> dict[str, Any]:
 
 def _row(step: Step | None) -> dict[str, Any] | None:
     """One step; method null is no blur."""
-    from sssfit.compare.metrics import COLOUR_FIGURES
+    from sssfit.measure.score import COLOUR_FIGURES
 
     if step is None:
         return None

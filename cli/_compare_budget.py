@@ -15,7 +15,7 @@ from ._report import percent, table
 
 if TYPE_CHECKING:
     from sssfit.compare.budget import Budget, Cause
-    from sssfit.render.scene import Scene
+    from sssfit.scene.record import Scene
 
 _HEADS = ["", "Delta E mean", "p95", "p99", "relative L2", "largest drift", "of the whole"]
 _SCORES = (
@@ -68,7 +68,7 @@ def _figures(budgets: Sequence[Budget]) -> dict[str, Any]:
 
 
 def _draw(budgets: Sequence[Budget], name: str) -> None:
-    from sssfit.chart import budget_figure
+    from sssfit.chart.budget import budget_figure
 
     write_chart(budget_figure(budgets), chart_path(name))
 

@@ -17,7 +17,7 @@ from ._scene import MADE, Picture, check_file_options, made_options, make_or_rea
 if TYPE_CHECKING:
     from sssfit.material import Material
     from sssfit.profile import Profile
-    from sssfit.render.scene import Scene
+    from sssfit.scene.record import Scene
 
 MM_PER_PIXEL = 0.3  # of made pictures: skin1's whole kernel is 143 pixels
 _SIZE = (512, 512)

@@ -21,7 +21,7 @@ from ._report import finish, say, table
 if TYPE_CHECKING:
     from sssfit.compare.comparison import Comparison
     from sssfit.profile import Profile
-    from sssfit.render.scene import Scene
+    from sssfit.scene.record import Scene
 
 
 @dataclass(frozen=True)
@@ -168,7 +168,7 @@ def _write(comparison: Comparison, outputs: Outputs, wish: Wish) -> None:
 
 
 def _draw(comparison: Comparison, name: str, wish: Wish) -> None:
-    from sssfit.chart import pareto_figure
+    from sssfit.chart.pareto import pareto_figure
 
     write_chart(pareto_figure(comparison, error=wish.error, cost=wish.cost), chart_path(name))
 

@@ -33,7 +33,7 @@ def chart_sheet(profile: Profile, output: str, mm_per_pixel: float | None, commo
     given: dict[str, Any] = {} if mm_per_pixel is None else {"mm_per_pixel": mm_per_pixel}
     sheet = compute_sheet(profile, threads=common.threads, **given)
 
-    from sssfit.chart import sheet_figure
+    from sssfit.chart.sheet import sheet_figure
 
     path = chart_path(output)
     write_chart(sheet_figure(sheet), path)
@@ -46,7 +46,7 @@ def chart_editing(output: str, common: Common) -> None:
 
     editing = compute_editing(threads=common.threads)
 
-    from sssfit.chart import editing_figure
+    from sssfit.chart.editing import editing_figure
 
     path = chart_path(output)
     write_chart(editing_figure(editing), path)
@@ -74,7 +74,7 @@ def chart_convergence(name: str, output: str, photons: int | None, common: Commo
         material, photons=numbers, first_seed=common.seed, threads=common.threads
     )
 
-    from sssfit.chart import convergence_figure
+    from sssfit.chart.convergence import convergence_figure
 
     path = chart_path(output)
     write_chart(convergence_figure(found), path)

@@ -34,7 +34,7 @@ _MARKS = {
 def row_figures(row: KernelRow, comparison: Comparison) -> dict[str, Any]:
     """Everything of a row, as ``--json`` has it; null where nothing was measured."""
     from sssfit.compare.comparison import COSTS, ERRORS
-    from sssfit.compare.metrics import COLOUR_FIGURES
+    from sssfit.measure.score import COLOUR_FIGURES
 
     keys = (
         *("picture", "label", "method", "rank", "settings", *COLOUR_FIGURES),

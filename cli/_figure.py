@@ -24,7 +24,7 @@ def held_charts(
     paths: Sequence[Path | None], *, inputs: Iterable[str | Path | None], force: bool
 ) -> contextlib.AbstractContextManager[None]:
     """Hold the outputs of charts; formats are known by their endings."""
-    from sssfit._chart_files import chart_format, is_chart_file
+    from sssfit.chart.files import chart_format, is_chart_file
 
     for path in paths:
         if path is not None:
@@ -34,7 +34,7 @@ def held_charts(
 
 def write_chart(figure: Any, path: Path | None) -> None:
     """Write a figure to a file that is held; None is PNG on stdout."""
-    from sssfit.chart import save_figure
+    from sssfit.chart.page import save_figure
 
     if path is not None:
         save_figure(figure, path)

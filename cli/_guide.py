@@ -36,7 +36,7 @@ def chart_guide(
         given = {key: value for key, value in settings.items() if value is not None}
         guide = compute_guide(profile, **given)
 
-        from sssfit.chart import guide_figure
+        from sssfit.chart.guide import guide_figure
 
         save(guide_figure(guide))
     output = "-" if path is None else str(path)

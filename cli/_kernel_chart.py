@@ -35,7 +35,7 @@ def chart_kernel(
 
         view = view_kernel(kernel, profile, channels=None if channel is None else [channel])
 
-        from sssfit.chart import kernel_figure
+        from sssfit.chart.kernel import kernel_figure
 
         save(kernel_figure(view))
     figures = {

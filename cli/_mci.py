@@ -22,7 +22,7 @@ def load_runs(
     file's own stand for those that were not given.
     """
     from sssfit.errors import MaterialError
-    from sssfit.mci import load_mci
+    from sssfit.formats.mci import load_mci
 
     runs = load_mci(path)
     if number is not None:

@@ -36,7 +36,7 @@ def chart_models(
     with chart_output(path, inputs=[name], force=force) as save:
         comparison = _compared(material, walk, photons, common)
 
-        from sssfit.chart import models_figure
+        from sssfit.chart.models import models_figure
 
         save(models_figure(comparison))
     figures = {"command": "chart", "output": [str(path or "-")], **_figures(comparison)}
@@ -46,10 +46,10 @@ def chart_models(
 
 def _read(name: str) -> tuple[Material, Profile | None]:
     """Return a material and, where it was a profile of a walk that was named, the walk."""
-    from sssfit._profile_radii import material_of
     from sssfit.errors import ProfileError
     from sssfit.material import load_material
     from sssfit.profile import Profile
+    from sssfit.profile.bins import material_of
 
     if name == DEON_SKIN:
         raise ProfileError(f"{name} has no coefficients for other methods; name a material.")

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from sssfit.compare.judge import Judgement
     from sssfit.kernel import SeparableKernel
-    from sssfit.render.scene import Scene
+    from sssfit.scene.record import Scene
 
     FloatArray = npt.NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from typing import Any, BinaryIO
 
 import click
 
-from sssfit.text import printable
+from sssfit.messages import printable
 
 from ._options import Common
 

@@ -13,7 +13,7 @@ from typing import NoReturn, TextIO
 import click
 
 from sssfit.errors import SssfitError, SssfitWarning
-from sssfit.text import printable
+from sssfit.messages import printable
 
 from ._group import cli
 from ._memory import is_out_of_memory

@@ -15,7 +15,7 @@ from ._options import Common
 from ._report import say
 
 if TYPE_CHECKING:
-    from sssfit.render.scene import Scene
+    from sssfit.scene.record import Scene
 
 MADE = ("head", "disk", "edge", "separable", "stripes", "points", "noise", "highlights")
 # Of the edge that kernels are compared on: along an axis a pre-integrated one is exact.
@@ -104,7 +104,7 @@ def make_or_read(picture: Picture, mm_per_pixel: float, common: Common) -> Scene
 
 def made_scene(picture: Picture, mm_per_pixel: float, common: Common) -> Scene:
     """Make the picture on these pixels."""
-    from sssfit.render.irradiance import make_scene, options_of
+    from sssfit.scene.made import make_scene, options_of
 
     if picture.mm_per_pixel is not None:
         raise click.UsageError(
@@ -130,7 +130,7 @@ def _default_size(picture: Picture, mm_per_pixel: float, common: Common) -> tupl
     """512 x 512; for a head as many rows as it takes, up to 1080."""
     if picture.irradiance != "head":
         return _ROWS, _ROWS
-    from sssfit.render.head import whole_face_mm_per_pixel
+    from sssfit.scene.head import whole_face_mm_per_pixel
 
     # The face takes the more rows, the smaller a pixel.
     wanted = math.ceil(whole_face_mm_per_pixel(1, 1) / mm_per_pixel)
@@ -147,8 +147,8 @@ def _default_size(picture: Picture, mm_per_pixel: float, common: Common) -> tupl
 def read_scene(picture: Picture, otherwise: float | None, common: Common) -> Scene:
     """Read the picture; ``otherwise`` is the size of its pixels where nothing says it."""
     from sssfit.errors import RenderError
-    from sssfit.image import load_image
-    from sssfit.render.scene import Scene
+    from sssfit.formats.pictures import load_image
+    from sssfit.scene.record import Scene
 
     if not Path(picture.irradiance).exists():
         raise click.UsageError(

@@ -122,7 +122,7 @@ def _value(value: Any) -> str:
 
 
 def _name(value: object, unknown: str) -> str:
-    from sssfit._material_checks import printable
+    from sssfit.messages import printable
 
     return unknown if value is None else printable(str(value))
 

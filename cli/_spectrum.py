@@ -33,7 +33,7 @@ def chart_spectrum(
 
         spectrum = compute_spectrum(profile, mm_per_pixel=mm_per_pixel)
 
-        from sssfit.chart import spectrum_figure
+        from sssfit.chart.spectrum import spectrum_figure
 
         save(spectrum_figure(spectrum))
     output = "-" if path is None else str(path)

@@ -54,8 +54,8 @@ def _read(path: Path) -> Profile | None:
 
 def _missing(kernel: SeparableKernel, name: str, profiles: Sequence[tuple[Path, Profile]]) -> str:
     """Say why nothing is measured: the kernel records no profile, or it changed, or is not here."""
-    from sssfit._material_checks import printable
     from sssfit.fit._target import name_of
+    from sssfit.messages import printable
 
     kernel_file, end = printable(name), "so nothing is measured"
     if kernel.meta.get("profile_sha256") is None:

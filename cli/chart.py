@@ -119,7 +119,7 @@ def chart(
       sssfit chart --guide skin1.profile.npz --mm-per-pixel 0.1
       sssfit chart --models skin1
     """
-    from sssfit._chart_files import chart_format
+    from sssfit.chart.files import chart_format
 
     if output not in (None, "-"):
         chart_format(str(output))  # before anything is read or drawn
@@ -171,7 +171,8 @@ def _chart_whole(
     material = shown.name if isinstance(shown, Material) else shown.material_name
     path = _target(name, material, output, kind)
     with chart_output(path, inputs=[name], force=force) as save:
-        from sssfit.chart import material_figure, profile_figure
+        from sssfit.chart.material import material_figure
+        from sssfit.chart.profile import profile_figure
 
         save(material_figure(shown) if isinstance(shown, Material) else profile_figure(shown))
     figures = {
@@ -206,7 +207,7 @@ def _profile(found: Found, name: str, option: str) -> Profile:
 
 def _stem(kernel: SeparableKernel) -> str | None:
     """Name a kernel that came without a name; None where its material could not be a file's."""
-    from sssfit._material_checks import is_name
+    from sssfit.material.checks import is_name
 
     material = kernel.meta.get("material")
     return f"{material}.{kernel.method}" if is_name(material) else None

@@ -27,10 +27,10 @@ from ._scene import (
 )
 
 if TYPE_CHECKING:
-    from sssfit.compare.choose import Choice, Step
+    from sssfit.choose.choice import Choice, Step
     from sssfit.material import Material
     from sssfit.profile import Profile
-    from sssfit.render.scene import Scene
+    from sssfit.scene.record import Scene
 
 _PROFILE_ENDING, _ENDING = ".npz", ".chosen.kernel.json"
 _WORTH_A_NOTE = 1e-3  # of the light
@@ -134,8 +134,8 @@ def choose(
       sssfit choose slab.profile.npz --tolerance-of mean --tolerance 0.3
       sssfit choose mine.toml --irradiance mine.exr -v
     """
-    from sssfit.compare.choose import choose as choose_kernel
-    from sssfit.compare.choose import mm_per_pixel_at
+    from sssfit.choose.choice import choose as choose_kernel
+    from sssfit.choose.choice import mm_per_pixel_at
     from sssfit.kernel import is_kernel_file
     from sssfit.profile import is_profile_file
 
@@ -175,7 +175,7 @@ def choose(
 
 def _check_distance(distance_mm: float) -> None:
     """Refuse a camera nearer than the head can be seen from; the number may have meant metres."""
-    from sssfit.render.head import MIN_DISTANCE_MM
+    from sssfit.scene.head import MIN_DISTANCE_MM
 
     if distance_mm < MIN_DISTANCE_MM:
         metres = f"a plain number is mm: did you mean {distance_mm:g}m?"
@@ -236,7 +236,7 @@ def _scene(picture: Picture, pitch: float, resolution: tuple[int, int], common: 
 
 def _say_first(source: Material | Profile, common: Common) -> None:
     """Say what takes longest, and what a profile cannot tell."""
-    from sssfit.compare.choose import is_exact
+    from sssfit.choose.choice import is_exact
     from sssfit.profile import Profile
 
     if isinstance(source, Profile):

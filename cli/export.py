@@ -59,8 +59,8 @@ def export(file: str | None, form: str, output: str | None, force: bool, common:
 
 def _table(file: str | None, _form: str, common: Common) -> tuple[str, str, dict[str, Any]]:
     """Return the profile's name, its table and its figures."""
+    from sssfit.formats.csv import csv_text
     from sssfit.profile import Profile
-    from sssfit.profile_csv import csv_text
 
     name = file or str(newest(common, "*.profile.npz", "sssfit simulate skin1"))
     profile = Profile.read(binary_stdin(), "stdin") if name == "-" else Profile.load(name)
@@ -102,8 +102,8 @@ def _write(content: bytes, path: Path | None, form: str, name: str, *, force: bo
     """To the file, whole or not at all; to stdout where there is none."""
     from sssfit.export import is_hlsl_file
     from sssfit.files import write_atomically
+    from sssfit.formats.csv import is_profile_csv
     from sssfit.kernel import is_kernel_file
-    from sssfit.profile_csv import is_profile_csv
 
     own = {"hlsl": is_hlsl_file, "json": is_kernel_file, "csv": is_profile_csv}
     with held(

@@ -95,8 +95,8 @@ def import_(
 def _read(files: tuple[str, ...], of_table: dict[str, str | None], channels: str | None) -> Profile:
     """Tell the formats apart by what the files hold, and read them."""
     from sssfit.errors import ProfileError
-    from sssfit.mco import is_mco, join_channels, parse_mco
-    from sssfit.profile_csv import parse_csv
+    from sssfit.formats.csv import parse_csv
+    from sssfit.formats.mco import is_mco, join_channels, parse_mco
 
     origins = ["stdin" if name == "-" else name for name in files]
     texts = [_text_of(name, origin) for name, origin in zip(files, origins, strict=True)]

@@ -193,7 +193,7 @@ def _grid(material: "Material") -> "RadialGrid | None":
 
 def material_text(material: "Material") -> str:
     """Return the page a person reads."""
-    from sssfit._material_checks import printable
+    from sssfit.messages import printable
 
     grid = _grid(material)
     lines = [

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
     from sssfit.compare.judge import Judgement
     from sssfit.kernel import SeparableKernel
-    from sssfit.render.scene import Scene
+    from sssfit.scene.record import Scene
 
     FloatArray = npt.NDArray[np.float64]
 
@@ -92,7 +92,7 @@ def render(
       sssfit render --screen --irradiance head
       sssfit render --irradiance head --transmit -o ears.png
     """
-    from sssfit.image import image_format, is_image_file
+    from sssfit.formats.pictures import image_format, is_image_file
 
     _check_options(screen, follow, profile or truth or difference or structure)
     if transmit:
@@ -187,8 +187,8 @@ def _write(
     common: Common,
 ) -> None:
     """Write the picture, and the truth and the difference where they are wanted."""
-    from sssfit.compare.metrics import auto_exposure
-    from sssfit.image import image_format, save_image
+    from sssfit.formats.pictures import image_format, save_image
+    from sssfit.measure.score import auto_exposure
 
     pictures = {"picture": result.picture}
     if result.truth is not None:

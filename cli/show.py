@@ -93,7 +93,7 @@ def _checkpoint_text(figures: dict[str, Any]) -> str:
 
 def _figures(profile: Profile) -> dict[str, Any]:
     """Everything that is printed, as ``--json`` has it; null where a profile does not say."""
-    from sssfit._profile_radii import energy_radii_mm
+    from sssfit.profile.bins import energy_radii_mm
 
     meta = profile.meta
     radii_mm = energy_radii_mm(profile, _SHARES)
@@ -131,8 +131,8 @@ def _material_figures(profile: Profile) -> dict[str, Any] | None:
 
     No layers where only a name is known; null where there is not even that.
     """
-    from sssfit._material_checks import printable
-    from sssfit._profile_radii import material_of
+    from sssfit.messages import printable
+    from sssfit.profile.bins import material_of
 
     material = material_of(profile)
     if material is not None:

@@ -5,10 +5,10 @@ python docs/make_choices.py
 
 from sections import put_section
 
+from sssfit.choose.choice import choose, mm_per_pixel_at
 from sssfit.compare.budget import error_budget
-from sssfit.compare.choose import choose, mm_per_pixel_at
 from sssfit.material import load_material
-from sssfit.render.irradiance import make_scene
+from sssfit.scene.made import make_scene
 
 DISTANCES_M = (0.3, 0.6, 1.5, 5.0, 20.0)
 TOLERANCES = (("p95", 1.0), ("p95", 0.3), ("mean", 1.0))

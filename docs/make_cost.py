@@ -8,7 +8,7 @@ import time
 import numpy as np
 from sections import put_section
 
-from sssfit.compare.cost import seconds_per_megapixel
+from sssfit.measure.cost import seconds_per_megapixel
 from sssfit.render.separable import apply_passes
 
 HEIGHT, WIDTH, CHANNELS = 1080, 1920, 3

@@ -12,15 +12,15 @@ import numpy as np
 from sections import put_section
 from threadpoolctl import threadpool_limits
 
-from sssfit.compare.metrics import measure
 from sssfit.errors import SssfitWarning
 from sssfit.fit import make_target, support_of
 from sssfit.fit._result import fit_channels
 from sssfit.fit.guided import extents_of, fit_one_pass
 from sssfit.material import load_material, material_names
-from sssfit.render.irradiance import make_scene
+from sssfit.measure.score import measure
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
+from sssfit.scene.made import make_scene
 from sssfit.simulate import simulate_exact
 
 KS = (0.0, 0.5, 1.0, 1.55, 2.0, 3.0, 4.0)

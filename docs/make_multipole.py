@@ -18,7 +18,7 @@ sys.path.insert(0, str(ROOT / "tests"))
 
 import checks_models  # noqa: E402
 
-from sssfit._chart_style import COLOURS, RC  # noqa: E402
+from sssfit.chart.page import COLOURS, RC  # noqa: E402
 
 FULL = 10_000_000
 NAMES = {"R_d": "reflected", "T": "transmitted"}

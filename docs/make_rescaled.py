@@ -7,13 +7,13 @@ from sections import put_section
 
 from sssfit.compare.candidates import Candidate
 from sssfit.compare.judged import border_of, judged_scene
-from sssfit.compare.metrics import auto_exposure, measure
 from sssfit.compare.sheet import MM_PER_PIXEL, PIXELS, SCENES
 from sssfit.fit import support_of
 from sssfit.material import load_material
-from sssfit.render.irradiance import make_scene
+from sssfit.measure.score import auto_exposure, measure
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
+from sssfit.scene.made import make_scene
 from sssfit.simulate import simulate_exact
 
 MATERIALS = ("skin1", "marble", "ketchup", "wholemilk")

@@ -8,9 +8,8 @@ from sections import put_section
 
 from sssfit.fit import fit_artist
 from sssfit.material import load_material
-from sssfit.render._view import lerp_falloff
-from sssfit.render.scene import Scene
-from sssfit.render.screen import render_screen
+from sssfit.render.screen import lerp_falloff, render_screen
+from sssfit.scene.record import Scene
 from sssfit.shapes import gaussian_line_integral
 from sssfit.simulate import simulate_exact
 

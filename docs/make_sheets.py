@@ -10,14 +10,12 @@ import sys
 from PIL import Image
 from sections import DOCS, put_section
 
-from sssfit.chart import (
-    budget_figure,
-    convergence_figure,
-    editing_figure,
-    pareto_figure,
-    save_figure,
-    sheet_figure,
-)
+from sssfit.chart.budget import budget_figure
+from sssfit.chart.convergence import convergence_figure
+from sssfit.chart.editing import editing_figure
+from sssfit.chart.page import save_figure
+from sssfit.chart.pareto import pareto_figure
+from sssfit.chart.sheet import sheet_figure
 from sssfit.compare.budget import error_budgets
 from sssfit.compare.comparison import verdicts
 from sssfit.compare.convergence import compute_convergence
@@ -25,7 +23,7 @@ from sssfit.compare.editing import compute_editing
 from sssfit.compare.pareto import compare_kernels
 from sssfit.compare.sheet import compute_sheet
 from sssfit.material import load_material
-from sssfit.render.irradiance import make_scene
+from sssfit.scene.made import make_scene
 from sssfit.simulate import simulate_exact
 
 PAGE = "how-to-choose.md"

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sssfit._material_checks import shown
 from sssfit.errors import SimulationError
 from sssfit.material import Material
+from sssfit.messages import shown
 
 MOST_ANNULI = 100_000  # 80 times skin1's; three channels of sums and squares are then 5 MB a thread
 _RINGS_PER_MFP = 20  # of the shortest mean free path

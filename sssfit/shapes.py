@@ -10,7 +10,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from sssfit.arrays import FloatArray
 
 # Six Gaussians for the skin of a face, d'Eon, Luebke, Enderton 2007, "Efficient rendering of human
 # skin": variances per axis [mm^2], and weights of R, G, B (6, 3) that add up to 1 in each.

@@ -1,9 +1,8 @@
 """Text files of other programs: read whole, known to be text, their numbers taken strictly.
 
-The three formats that come in this way are MCML's input (``sssfit.mci``) and output
-(``sssfit.mco``) and tables of a profile (``sssfit.profile_csv``); materials (``sssfit.material``)
-share the decoding. UTF-8 is what is meant; UTF-16 and the Western code page of Windows are what
-editors there also write, and are read: names and comments may hold any letter, numbers are ASCII.
+``sssfit.formats`` and ``sssfit.material`` read their files by it. UTF-8 is what is meant; UTF-16
+and the Western code page of Windows are what editors there also write, and are read: names and
+comments may hold any letter, numbers are ASCII.
 """
 
 import codecs
@@ -18,6 +17,7 @@ from typing import BinaryIO, NamedTuple
 
 from sssfit.errors import SssfitError
 from sssfit.files import read_at_most, reason
+from sssfit.messages import printable
 
 # A million absorption boxes of an MCML run are 13 MB of text.
 MOST_BYTES = 500_000_000
@@ -140,8 +140,3 @@ def tenfold_number(word: str, power: int) -> float:
     """
     # Not for 0, which may be written 0e999999999999999999999, beyond what Decimal knows.
     return float(Decimal(word).scaleb(power)) if finite_number(word) else 0.0
-
-
-def printable(text: str) -> str:
-    """Escape what does not print (newlines too), so that ``text`` can stand inside a message."""
-    return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)

@@ -5,7 +5,7 @@ import zlib
 
 import numpy as np
 
-from sssfit import image
+from sssfit.formats import pictures as image
 
 
 def picture(rows=5, columns=7, channels=3):

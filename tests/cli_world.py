@@ -28,18 +28,19 @@ from test_mci import file_text, run_text
 from test_mco import BELOW, DR_CM, IN_LAYERS, N_R, REFLECTED, SPECULAR, block, mco_text
 
 from sssfit import compare, simulate
+from sssfit.choose import choice as choose
 from sssfit.cli import cli
-from sssfit.compare import budget, choose, convergence, editing, pareto, sheet
+from sssfit.compare import budget, convergence, editing, pareto, sheet
 from sssfit.compare.candidates import Candidate, candidates
 from sssfit.errors import SssfitWarning
 from sssfit.fit import fit_gaussians, fit_svd
-from sssfit.image import load_image, save_image
+from sssfit.formats.csv import csv_text
+from sssfit.formats.pictures import load_image, save_image
 from sssfit.kernel import SeparableKernel
 from sssfit.material import Material, parse_material
 from sssfit.profile import Profile
-from sssfit.profile_csv import csv_text
-from sssfit.render.irradiance import make_scene
-from sssfit.render.scene import Scene
+from sssfit.scene.made import make_scene
+from sssfit.scene.record import Scene
 from sssfit.simulate import Checkpoint, inversion, simulate_montecarlo
 from sssfit.simulate._finished import DEFAULT_PHOTONS
 
@@ -494,14 +495,14 @@ STAND_INS = {
     "sssfit.simulate.inversion.material_from_reflectance": (
         lambda _, given: inverted(given["light"])
     ),
-    "sssfit.compare.choose.choose": small_choice,
+    "sssfit.choose.choice.choose": small_choice,
     "sssfit.compare.compare_kernels": small_comparison,
     "sssfit.compare.budget.error_budgets": lambda _, given: budgets(rank_of(given)),
     "sssfit.compare.compare_models": lambda *_: models(),
     "sssfit.compare.sheet.compute_sheet": lambda *_: small_sheet(),
     "sssfit.compare.editing.compute_editing": lambda *_: small_editing(),
     "sssfit.compare.convergence.compute_convergence": lambda *_: small_convergence(),
-    **{f"sssfit.chart.{kind}_figure": blank for kind in _CHARTS},
+    **{f"sssfit.chart.{kind}.{kind}_figure": blank for kind in _CHARTS},
 }
 
 

@@ -18,8 +18,15 @@ from pathlib import Path
 
 # What verbs import when they are run.
 _LOADED = (
-    *("sssfit.chart", "sssfit.compare", "sssfit.export", "sssfit.fit", "sssfit.mci", "sssfit.mco"),
-    *("sssfit.profile_csv", "sssfit.render.screen", "sssfit.simulate", "sssfit.cli"),
+    *("sssfit.chart.profile", "sssfit.compare", "sssfit.export", "sssfit.fit"),
+    *(
+        "sssfit.formats.mci",
+        "sssfit.formats.mco",
+        "sssfit.formats.csv",
+        "sssfit.render.screen",
+        "sssfit.simulate",
+        "sssfit.cli",
+    ),
     *("colour", "matplotlib.pyplot", "scipy.sparse.linalg", "OpenImageIO"),
 )
 

@@ -18,18 +18,18 @@ from cli_world import DR_MM, GRID, PHOTONS, RADIUS_MM, Ran, called, kernel, pict
 from sssfit import fit
 from sssfit.compare import view_kernel
 from sssfit.compare.judge import judge, judge_in_screen_space
-from sssfit.compare.metrics import auto_exposure
 from sssfit.compare.pictures import picture_error
 from sssfit.export import json_document
-from sssfit.image import load_image
-from sssfit.mci import load_mci
-from sssfit.mco import join_channels, load_mco
-from sssfit.profile_csv import csv_text, load_csv
-from sssfit.render.irradiance import make_scene
+from sssfit.formats.csv import csv_text, load_csv
+from sssfit.formats.mci import load_mci
+from sssfit.formats.mco import join_channels, load_mco
+from sssfit.formats.pictures import load_image
+from sssfit.measure.score import auto_exposure
 from sssfit.render.reference import render_reference
-from sssfit.render.scene import Scene
 from sssfit.render.separable import render_separable
 from sssfit.render.transmittance import with_transmitted
+from sssfit.scene.made import make_scene
+from sssfit.scene.record import Scene
 from sssfit.simulate import Checkpoint, simulate_burley, simulate_dipole
 
 
@@ -667,7 +667,7 @@ def _chosen(
         angle = {"angle_degrees": 30.0} if scene == "edge" else {}
         own["scene"] = make_scene(scene, height=512, width=512, mm_per_pixel=pitch, **angle)
     return called(
-        "sssfit.compare.choose.choose",
+        "sssfit.choose.choice.choose",
         wax(),
         mm_per_pixel=pitch,
         distance_mm=distance_mm,

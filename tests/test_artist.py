@@ -10,7 +10,7 @@ from scipy.optimize import check_grad
 
 from sssfit.errors import FitError
 from sssfit.fit import fit_artist, fit_preintegrated, make_target
-from sssfit.fit._passes import gaussian_pixels, kernel_misfit, line_misfit, of_unit_sum
+from sssfit.fit._by_hand import gaussian_pixels, kernel_misfit, line_misfit, of_unit_sum
 from sssfit.fit.artist import fit_two_gaussians, two_gaussians
 from sssfit.material import load_material
 from sssfit.shapes import gaussian_cdf, gaussian_marginal

@@ -10,23 +10,22 @@ from figures import assert_legible
 from matplotlib.figure import Figure
 from reference_render import random_kernel
 
-from sssfit.chart import budget_figure
+from sssfit.chart.budget import budget_figure
 from sssfit.cli import main
-from sssfit.compare._budget_causes import true_picture
+from sssfit.compare._budget_causes import stored, true_picture
 from sssfit.compare._budget_profiles import make_sources
-from sssfit.compare._storage import stored
 from sssfit.compare.budget import error_budget, error_budgets
 from sssfit.compare.judge import judge
-from sssfit.compare.metrics import COLOUR_FIGURES
 from sssfit.errors import FitError, KernelError, RenderError, SimulationError
 from sssfit.fit import fit_svd
 from sssfit.kernel import SeparableKernel
 from sssfit.material import load_material, parse_material
+from sssfit.measure.score import COLOUR_FIGURES
 from sssfit.profile import Profile
-from sssfit.render.irradiance import make_scene
 from sssfit.render.reference import render_reference
-from sssfit.render.scene import Scene
 from sssfit.render.separable import render_separable
+from sssfit.scene.made import make_scene
+from sssfit.scene.record import Scene
 from sssfit.simulate import simulate_exact, simulate_montecarlo
 
 PHOTONS = 100_000

@@ -9,20 +9,16 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import StepPatch
 
-from sssfit._chart_data import picture
-from sssfit._chart_text import count, shortened, with_error
-from sssfit._profile_bins import LEAST_HITS, effective_hits, merged
-from sssfit.chart import (
-    FORMATS,
-    chart_format,
-    is_chart_file,
-    material_figure,
-    profile_figure,
-    save_figure,
-)
+from sssfit.chart.data import picture
+from sssfit.chart.files import FORMATS, chart_format, is_chart_file
+from sssfit.chart.material import material_figure
+from sssfit.chart.page import save_figure
+from sssfit.chart.profile import profile_figure
+from sssfit.chart.text import count, shortened, with_error
 from sssfit.errors import FileError
 from sssfit.material import Layer, Material, load_material
 from sssfit.profile import Profile
+from sssfit.profile.bins import LEAST_HITS, effective_hits, merged
 from sssfit.simulate import simulate_montecarlo
 
 SIGNATURES = {"png": b"\x89PNG\r\n\x1a\n", "svg": b"<?xml", "pdf": b"%PDF-"}

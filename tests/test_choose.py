@@ -9,25 +9,24 @@ import pytest
 from reference_pixels import make_profile
 from scipy.signal import convolve2d
 
+import sssfit.choose.choice as rooms
+import sssfit.choose.truth as truths
 import sssfit.compare._all_light as all_light
-import sssfit.compare._choose_truth as truths
-import sssfit.compare.choose as rooms
-from sssfit.compare import _choose_photons as photon_walks
-from sssfit.compare._choose_options import SHARES, Option, supports
-from sssfit.compare._choose_photons import photons_needed
-from sssfit.compare._choose_truth import material_of
-from sssfit.compare._choose_views import TOLERANCES, Views, checked_scene, head_scenes
+from sssfit.choose import truth as photon_walks
+from sssfit.choose.choice import choose, is_exact, mm_per_pixel_at
+from sssfit.choose.options import SHARES, Option, supports
+from sssfit.choose.truth import material_of, photons_needed
+from sssfit.choose.views import TOLERANCES, Views, checked_scene, head_scenes
 from sssfit.compare.candidates import candidates
-from sssfit.compare.choose import choose, is_exact, mm_per_pixel_at
-from sssfit.compare.metrics import COLOUR_FIGURES, measure
 from sssfit.errors import FitError, RenderError, SimulationError, SssfitError
 from sssfit.fit import METHODS
 from sssfit.material import Layer, Material, load_material, material_names
+from sssfit.measure.score import COLOUR_FIGURES, measure
 from sssfit.profile import Profile
-from sssfit.render.irradiance import make_scene
 from sssfit.render.reference import render_reference
-from sssfit.render.scene import Scene
 from sssfit.render.separable import render_separable
+from sssfit.scene.made import make_scene
+from sssfit.scene.record import Scene
 from sssfit.simulate import (
     simulate_deon_skin,
     simulate_dipole,

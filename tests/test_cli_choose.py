@@ -9,12 +9,12 @@ from click.testing import CliRunner
 
 from sssfit.cli import cli, main
 from sssfit.errors import RenderError
-from sssfit.image import save_image
+from sssfit.formats.csv import parse_csv
+from sssfit.formats.pictures import save_image
 from sssfit.kernel import SeparableKernel
 from sssfit.material import load_material
 from sssfit.profile import Profile
-from sssfit.profile_csv import parse_csv
-from sssfit.render.irradiance import make_scene
+from sssfit.scene.made import make_scene
 from sssfit.simulate import simulate_exact
 
 # A tolerance that short searches end within.
@@ -133,7 +133,7 @@ def asked(monkeypatch):
         assert CliRunner().invoke(cli, ["choose", *arguments]).exit_code == 1
         return seen
 
-    monkeypatch.setattr("sssfit.compare.choose.choose", choose_kernel)
+    monkeypatch.setattr("sssfit.choose.choice.choose", choose_kernel)
     return call
 
 
@@ -195,7 +195,7 @@ def test_a_picture_of_ones_own_takes_the_pitch():
 
 
 def test_layer_and_mask_of_a_file_change_what_is_judged(monkeypatch):
-    from sssfit.compare import choose as module
+    from sssfit.choose import choice as module
 
     seen = []
 

@@ -19,9 +19,9 @@ from sssfit.cli._options import Common
 from sssfit.compare import pareto
 from sssfit.compare.candidates import candidates
 from sssfit.errors import RenderError
-from sssfit.image import save_image
+from sssfit.formats.pictures import save_image
 from sssfit.material import load_material
-from sssfit.render.irradiance import make_scene
+from sssfit.scene.made import make_scene
 from sssfit.simulate import exact, simulate_exact
 
 SMALL = ("--picture", "disk", "--size", "32x32", "--mm-per-pixel", "2.5")

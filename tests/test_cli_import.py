@@ -12,7 +12,7 @@ from test_mci import file_text, run_text
 from test_mco import mco_text
 
 from sssfit.cli import main
-from sssfit.mci import parse_mci
+from sssfit.formats.mci import parse_mci
 from sssfit.profile import Profile
 from sssfit.simulate import simulate_montecarlo
 

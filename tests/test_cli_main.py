@@ -259,7 +259,7 @@ MATPLOTLIBRC = "no_such_key: 5\nbackend: nonsense\nfont.size: large?\n"
 )
 @pytest.mark.parametrize(
     "module",
-    ["sssfit.chart", "colour"],  # what draws, and what judges colours: both import matplotlib
+    ["sssfit.chart.page", "colour"],  # what draws, and what judges colours: both import matplotlib
 )
 def test_matplotlib_says_nothing_and_draws_without_a_display(tmp_path, changed, module):
     (tmp_path / "file").write_text("in the way of a folder")

@@ -10,11 +10,11 @@ import pytest
 from printed import Exact, Percent, Rough, Table, Words, agrees, check
 from printed_layouts import PRINTED, markdown, simulation
 
-from sssfit._profile_radii import energy_radii_mm
 from sssfit.cli import cli
 from sssfit.cli._report import plain
 from sssfit.kernel import SeparableKernel
 from sssfit.profile import Profile
+from sssfit.profile.bins import energy_radii_mm
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -13,19 +13,19 @@ from reference_pixels import make_profile
 
 from sssfit.cli import main
 from sssfit.compare.judge import judge
-from sssfit.compare.metrics import auto_exposure
 from sssfit.fit import fit_svd
-from sssfit.image import load_image, save_image
+from sssfit.formats.pictures import load_image, save_image
 from sssfit.kernel import SeparableKernel
 from sssfit.material import load_material
+from sssfit.measure.score import auto_exposure
 from sssfit.profile import Profile
-from sssfit.render.head import head_scene
-from sssfit.render.irradiance import make_scene
 from sssfit.render.reference import render_reference
-from sssfit.render.scene import Scene
 from sssfit.render.screen import render_screen
 from sssfit.render.separable import render_separable
 from sssfit.render.transmittance import with_transmitted
+from sssfit.scene.head import head_scene
+from sssfit.scene.made import make_scene
+from sssfit.scene.record import Scene
 
 KERNEL = "wax.svd2.kernel.json"
 SIZE = ("--size", "40x24")

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 
 from sssfit import __version__
-from sssfit._profile_radii import energy_radii_mm
 from sssfit.cli import main
 from sssfit.fit import fit_gaussians, fit_svd
 from sssfit.material import Layer, Material, load_material
 from sssfit.profile import Profile
+from sssfit.profile.bins import energy_radii_mm
 from sssfit.simulate import Checkpoint, simulate_montecarlo, simulate_montecarlo_many
 
 

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from figures import assert_legible
 
-from sssfit.chart import convergence_figure, save_figure
+from sssfit.chart.convergence import convergence_figure
+from sssfit.chart.page import save_figure
 from sssfit.cli import main
 from sssfit.compare.convergence import compute_convergence, error_of, fit_line
 from sssfit.errors import SimulationError

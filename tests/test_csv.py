@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from reference_pixels import make_profile
 
 from sssfit.errors import ProfileError, SssfitWarning
+from sssfit.formats.csv import csv_text, is_profile_csv, load_csv, parse_csv
 from sssfit.material import load_material
 from sssfit.profile import FORMAT
-from sssfit.profile_csv import csv_text, is_profile_csv, load_csv, parse_csv
 from sssfit.simulate import simulate_montecarlo
 
 DATA = Path(__file__).parent / "data"

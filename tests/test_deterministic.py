@@ -5,12 +5,13 @@ import io
 import numpy as np
 import pytest
 
-from sssfit.chart import profile_figure, save_figure
+from sssfit.chart.page import save_figure
+from sssfit.chart.profile import profile_figure
 from sssfit.errors import SimulationError
+from sssfit.formats.csv import csv_text, parse_csv
 from sssfit.grid import RadialGrid
 from sssfit.material import load_material
 from sssfit.profile import Profile
-from sssfit.profile_csv import csv_text, parse_csv
 from sssfit.simulate._deterministic import (
     computed_profile,
     energies_from_beyond,

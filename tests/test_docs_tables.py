@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from checks_models import BEYOND, DIFFUSE, multipole_against_walk
 
+from sssfit.choose.choice import choose, mm_per_pixel_at
 from sssfit.cli._methods import METHODS as SIMULATIONS
-from sssfit.compare.choose import choose, mm_per_pixel_at
 from sssfit.compare.editing import compute_editing
 from sssfit.compare.guide import compute_guide
 from sssfit.compare.sheet import compute_sheet

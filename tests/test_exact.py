@@ -18,8 +18,8 @@ from sssfit.material import Layer, Material, load_material
 from sssfit.profile import Profile
 from sssfit.simulate import exact
 from sssfit.simulate._depth import _Equation, decay_rate, respond, respond_to_diffuse_light
-from sssfit.simulate._mixture import mixture_of
-from sssfit.simulate._single import (
+from sssfit.simulate._mixture import (
+    mixture_of,
     single_scattering_beyond,
     single_scattering_of_diffuse_light,
 )

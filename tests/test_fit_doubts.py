@@ -9,11 +9,11 @@ from reference_pixels import make_profile
 
 from sssfit.cli import main
 from sssfit.errors import FitError, SssfitError, SssfitWarning
-from sssfit.fit import METHODS, _doubts, fit_svd, make_target
-from sssfit.fit._energy import factor_to
-from sssfit.fit._result import ChannelFit, fit_channels
+from sssfit.fit import METHODS, fit_svd, make_target
+from sssfit.fit import _result as _doubts
+from sssfit.fit._result import ChannelFit, factor_to, fit_channels
+from sssfit.formats.csv import parse_csv
 from sssfit.kernel import SeparableKernel
-from sssfit.profile_csv import parse_csv
 from sssfit.simulate import simulate_dipole, simulate_montecarlo
 
 EDGES = np.linspace(0.0, 5.0, 51)

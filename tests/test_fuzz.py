@@ -36,11 +36,11 @@ import sssfit
 from sssfit.cli import cli, main
 from sssfit.errors import SssfitError
 from sssfit.fit import fit_svd
-from sssfit.image import load_image, save_image
+from sssfit.formats.csv import csv_text, parse_csv
+from sssfit.formats.pictures import load_image, save_image
 from sssfit.kernel import SeparableKernel
 from sssfit.material import load_material
 from sssfit.profile import Profile
-from sssfit.profile_csv import csv_text, parse_csv
 from sssfit.simulate import Checkpoint, simulate_montecarlo
 
 SCHEMA = json.loads((Path(sssfit.__file__).parent / "kernel.schema.json").read_text("utf-8"))

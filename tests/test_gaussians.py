@@ -23,7 +23,7 @@ import sssfit.fit._gaussians_annuli as annuli_module
 from sssfit import shapes
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import METHODS, fit_gaussians, make_target
-from sssfit.fit._gaussians_rings import rings
+from sssfit.fit._gaussians_search import rings
 from sssfit.grid import make_grid
 from sssfit.material import load_material, material_names
 from sssfit.simulate.dipole import simulate_dipole

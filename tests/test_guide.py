@@ -9,7 +9,8 @@ import pytest
 from figures import assert_legible
 from reference_pixels import make_profile, one_over_r_profile
 
-from sssfit.chart import guide_figure, save_figure
+from sssfit.chart.guide import guide_figure
+from sssfit.chart.page import save_figure
 from sssfit.cli import main
 from sssfit.compare import compute_guide
 from sssfit.errors import FitError, SssfitWarning

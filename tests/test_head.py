@@ -5,12 +5,10 @@ import pytest
 from reference_head import blocked, first_meeting, height_at
 
 from sssfit.errors import RenderError
-from sssfit.render._field import HeightField, Lamps, light_field
-from sssfit.render._head_detail import _roughness
-from sssfit.render._head_face import EYE_X, EYE_Y, face
-from sssfit.render._head_shape import FLOOR_MM
-from sssfit.render._head_surface import bust
-from sssfit.render.head import FACE_HEIGHT_MM, head_scene, whole_face_mm_per_pixel
+from sssfit.scene._field import HeightField, Lamps, light_field
+from sssfit.scene._head_shape import FLOOR_MM
+from sssfit.scene._head_surface import EYE_X, EYE_Y, _roughness, bust, face
+from sssfit.scene.head import FACE_HEIGHT_MM, head_scene, whole_face_mm_per_pixel
 
 KEY = (-0.579227965, 0.573576436, 0.579227965)
 KEY = tuple(np.array(KEY) / np.linalg.norm(KEY))

@@ -6,10 +6,10 @@ from reference_head import first_run, height_at
 from test_head import SEEN, plane_point
 
 from sssfit.errors import RenderError
-from sssfit.render._field import HeightField, Lamps, Solid, light_field, light_through
-from sssfit.render._head_shape import EAR_MM, FLOOR_MM
-from sssfit.render._head_surface import SOLID_MM, body
-from sssfit.render.head import _toward, head_scene
+from sssfit.scene._field import HeightField, Lamps, Solid, light_field, light_through
+from sssfit.scene._head_shape import EAR_MM, FLOOR_MM
+from sssfit.scene._head_surface import SOLID_MM, body
+from sssfit.scene.head import _toward, head_scene
 
 DISTANCE = SEEN["distance_mm"]
 STEP_MM, GAP_MM = 0.02, 0.5

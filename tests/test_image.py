@@ -11,8 +11,8 @@ import OpenEXR
 import pytest
 from checks_image import chunk, exr, hdr, load_bytes, picture, png, read_png, tiff
 
-from sssfit import image
 from sssfit.errors import FileError, RenderError, SssfitError
+from sssfit.formats import pictures as image
 
 ENDINGS = ("exr", "tif", "png")
 HALF_A_CODE = 0.5 / 65535

@@ -9,9 +9,9 @@ import OpenEXR
 import pytest
 from checks_image import chunk, exr, hdr, load_bytes, picture, png, read_png, tiff
 
-from sssfit import image
 from sssfit.errors import FileError, RenderError, SssfitError
-from sssfit.render.scene import Scene
+from sssfit.formats import pictures as image
+from sssfit.scene.record import Scene
 
 DATA = Path(__file__).parent / "data"
 # SMPTE ST 2065-1, ACES S-2014-004 and ITU-R BT.2020-2.

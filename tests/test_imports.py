@@ -15,29 +15,14 @@ HEAVY = {"numpy", "numba", "scipy", "colour", "matplotlib", "rich", "OpenImageIO
 
 # A room may import from rooms before it in this list, never from one after it.
 ROOMS = [
-    *(
-        "errors",
-        "files",
-        "threads",
-        "shapes",
-        "text",
-        "material",
-        "grid",
-        "mci",
-        "profile",
-        "mco",
-        "profile_csv",
-        "kernel",
-        "image",
-    ),
-    *("simulate", "fit", "render", "compare", "export", "chart", "cli"),
+    *("errors", "messages", "files", "text", "threads", "arrays", "shapes"),
+    *("material", "grid", "profile", "kernel", "formats", "scene"),
+    *("simulate", "fit", "render", "measure", "compare", "choose", "export", "chart", "cli"),
 ]
-# Files that serve one room and do not say so by their name, as _profile_io does.
-BACK_ROOMS = {"_disks": "profile"}
 # What verbs ask of the chart's room before there is anything to draw; quick to import.
-LIGHT_CHART_FILES = {"_chart_data", "_chart_files"}
+LIGHT_CHART_FILES = {"data", "files"}
 # The compiled layer stands beside the list: these rooms may use it, and it uses none of them.
-ROOMS_ON_JIT = {"profile", "simulate", "render"}
+ROOMS_ON_JIT = {"profile", "scene", "simulate", "render"}
 # Neighbours that hand records on and know nothing of each other.
 APART = {"simulate", "fit", "render"}
 JIT_MAY_IMPORT = {"numpy", "numba", "math", "sssfit"} | set(sys.stdlib_module_names)
@@ -76,12 +61,8 @@ def imports(path: Path) -> Iterator[str]:
 
 
 def room_of(module: str) -> str:
-    """``simulate`` of ``sssfit.simulate.montecarlo``, ``profile`` of ``sssfit._profile_io``."""
-    room = module.split(".")[1]
-    if room in BACK_ROOMS:
-        return BACK_ROOMS[room]
-    served = room.removeprefix("_").partition("_")[0]
-    return served if room.startswith("_") and served in ROOMS else room
+    """``simulate`` of ``sssfit.simulate.montecarlo``."""
+    return module.split(".")[1]
 
 
 def module_of(path: Path) -> str:

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from sssfit.errors import RenderError
-from sssfit.render._made_edges import disk_coverage, half_plane_coverage, middle_out
-from sssfit.render.irradiance import MADE, make_scene, options_of
+from sssfit.scene.made import MADE, make_scene, options_of
+from sssfit.scene.patterns import disk_coverage, half_plane_coverage, middle_out
 
 SIZE = {"height": 60, "width": 80, "mm_per_pixel": 0.5}
 

@@ -9,10 +9,10 @@ from sssfit.compare.judge import judge, timed
 from sssfit.errors import RenderError
 from sssfit.fit import fit_svd
 from sssfit.profile import full_kernel
-from sssfit.render.irradiance import make_scene
 from sssfit.render.reference import render_reference
-from sssfit.render.scene import Scene
 from sssfit.render.separable import render_separable
+from sssfit.scene.made import make_scene
+from sssfit.scene.record import Scene
 from sssfit.simulate import simulate_dipole
 
 

@@ -10,8 +10,8 @@ from sssfit.compare.judged import border_of, judged_scene
 from sssfit.compare.pareto import compare_kernels
 from sssfit.fit import support_of
 from sssfit.material import load_material
-from sssfit.render.irradiance import make_scene
-from sssfit.render.scene import Scene
+from sssfit.scene.made import make_scene
+from sssfit.scene.record import Scene
 from sssfit.simulate import simulate_exact
 
 PITCH = 1.2

@@ -11,7 +11,8 @@ from matplotlib.patches import StepPatch
 from reference_pixels import make_profile, one_over_r_centre_pixel, one_over_r_profile
 from scipy.integrate import dblquad
 
-from sssfit.chart import kernel_figure, save_figure
+from sssfit.chart.kernel import kernel_figure
+from sssfit.chart.page import save_figure
 from sssfit.cli import main
 from sssfit.compare import view_kernel
 from sssfit.errors import KernelError

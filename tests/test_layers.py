@@ -16,8 +16,8 @@ from scipy.integrate import quad
 
 from sssfit._jit import layered, sampling
 from sssfit.errors import SssfitWarning
+from sssfit.formats.mci import load_mci
 from sssfit.grid import RadialGrid, paper_grid
-from sssfit.mci import load_mci
 from sssfit.simulate import shared_walks, simulate_montecarlo
 from sssfit.simulate._layered import LayeredWalk, alike_channels
 from sssfit.simulate._run import run

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sssfit.errors import MaterialError
+from sssfit.formats.mci import load_mci, parse_mci
 from sssfit.material import load_material
-from sssfit.mci import load_mci, parse_mci
 
 SAMPLE = Path(__file__).parent / "data" / "sample.mci"
 RUN = """\

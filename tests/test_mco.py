@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from sssfit.errors import ProfileError, SssfitWarning
+from sssfit.formats.mco import is_mco, join_channels, load_mco, parse_mco
 from sssfit.material import Material
-from sssfit.mco import is_mco, join_channels, load_mco, parse_mco
 from sssfit.profile import Profile
 
 DATA = Path(__file__).parent / "data"

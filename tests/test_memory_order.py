@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from reference_pixels import make_profile, one_over_r_profile
 
-from sssfit.compare.asymmetry import asymmetry_by_radius, radial_asymmetry
-from sssfit.compare.metrics import auto_exposure, measure
 from sssfit.fit import METHODS, fit_svd
 from sssfit.kernel import SeparableKernel
+from sssfit.measure.asymmetry import asymmetry_by_radius, radial_asymmetry
+from sssfit.measure.score import auto_exposure, measure
 from sssfit.profile import full_kernel
 from sssfit.render.reference import convolve, render_reference
-from sssfit.render.scene import Scene
 from sssfit.render.screen import render_screen
 from sssfit.render.separable import apply_passes, render_separable
 from sssfit.render.transmittance import transmittance
+from sssfit.scene.record import Scene
 from sssfit.simulate import simulate_gaussians
 
 SHAPE = (61, 47, 3)

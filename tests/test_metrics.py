@@ -9,10 +9,10 @@ import pytest
 import reference_delta_e as reference
 
 from sssfit.compare import Cost, auto_exposure, cost_of, flip, measure, seconds_per_megapixel, ssim
-from sssfit.compare._delta_e import BLOCK_PIXELS, _load_colour, delta_e_2000, lab
-from sssfit.compare.metrics import COLOUR_FIGURES
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
+from sssfit.measure.delta_e import BLOCK_PIXELS, _load_colour, delta_e_2000, lab
+from sssfit.measure.score import COLOUR_FIGURES
 
 PAIRS = np.loadtxt(
     Path(__file__).parent / "data" / "ciede2000.csv", delimiter=",", skiprows=1, ndmin=2

@@ -13,8 +13,10 @@ from figures import assert_legible
 from matplotlib.colors import to_hex
 from matplotlib.patches import StepPatch
 
-from sssfit._chart_text import kernel_subtitle
-from sssfit.chart import models_figure, profile_figure, save_figure
+from sssfit.chart.models import models_figure
+from sssfit.chart.page import save_figure
+from sssfit.chart.profile import profile_figure
+from sssfit.chart.text import kernel_subtitle
 from sssfit.cli import main
 from sssfit.compare import compare_models
 from sssfit.errors import SimulationError, SssfitWarning

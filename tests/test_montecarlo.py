@@ -18,8 +18,8 @@ import reference
 from sssfit.errors import SimulationError, SssfitWarning
 from sssfit.material import load_material, material_names
 from sssfit.simulate import simulate_montecarlo, simulate_montecarlo_many
-from sssfit.simulate._assemble import AUTO_BEYOND
 from sssfit.simulate._batches import BATCH_PHOTONS
+from sssfit.simulate._finished import AUTO_BEYOND
 from sssfit.simulate._run import run
 from sssfit.simulate._semi_infinite import SemiInfiniteWalk, roulette_schedule
 

@@ -16,7 +16,7 @@ from scipy.interpolate import CubicSpline
 from sssfit.errors import SimulationError, SssfitWarning
 from sssfit.material import load_material
 from sssfit.simulate import simulate_dipole, simulate_multipole
-from sssfit.simulate._hankel import cumulative_from_transform
+from sssfit.simulate.multipole import cumulative_from_transform
 
 
 def entering(eta):

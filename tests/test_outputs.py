@@ -12,16 +12,16 @@ from matplotlib.figure import Figure
 from reference_pixels import make_profile
 
 from sssfit import files
-from sssfit._chart_files import is_chart_file
-from sssfit.chart import save_figure
+from sssfit.chart.files import is_chart_file
+from sssfit.chart.page import save_figure
 from sssfit.cli import main
 from sssfit.errors import FileError
 from sssfit.export import hlsl, is_hlsl_file
 from sssfit.fit import fit_svd
-from sssfit.image import is_image_file, save_image
+from sssfit.formats.csv import csv_text, is_profile_csv
+from sssfit.formats.pictures import is_image_file, save_image
 from sssfit.kernel import SeparableKernel, is_kernel_file
 from sssfit.profile import is_profile_file
-from sssfit.profile_csv import csv_text, is_profile_csv
 
 posix = pytest.mark.skipif(os.name != "posix", reason="links, pipes and modes are POSIX")
 

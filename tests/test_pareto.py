@@ -13,18 +13,17 @@ from reference_pixels import make_profile
 
 from sssfit.compare import pareto
 from sssfit.compare.candidates import Candidate, candidates
-from sssfit.compare.comparison import COSTS, ERRORS, check_error, verdicts
-from sssfit.compare.front import pareto_front
+from sssfit.compare.comparison import COSTS, ERRORS, check_error, pareto_front, verdicts
 from sssfit.compare.judge import judge
 from sssfit.compare.judged import border_of, judged_scene
-from sssfit.compare.metrics import COLOUR_FIGURES, measure
 from sssfit.compare.pareto import check_scenes, compare_kernels
 from sssfit.errors import FitError, RenderError
 from sssfit.material import load_material
-from sssfit.render.irradiance import make_scene
+from sssfit.measure.score import COLOUR_FIGURES, measure
 from sssfit.render.reference import render_reference
-from sssfit.render.scene import Scene
 from sssfit.render.separable import render_separable
+from sssfit.scene.made import make_scene
+from sssfit.scene.record import Scene
 from sssfit.simulate import simulate_exact
 
 PITCH = 1.0

@@ -7,15 +7,14 @@ import numpy as np
 import pytest
 from figures import assert_legible, drawn_texts
 
-from sssfit._chart_labels import place_labels
-from sssfit._chart_page import chart_style, new_figure
-from sssfit.chart import pareto_figure, save_figure
+from sssfit.chart.page import chart_style, new_figure, save_figure
+from sssfit.chart.pareto import pareto_figure, place_labels
 from sssfit.compare.candidates import Candidate
 from sssfit.compare.comparison import COSTS, ERRORS
 from sssfit.compare.pareto import compare_kernels
 from sssfit.errors import RenderError
 from sssfit.material import load_material
-from sssfit.render.irradiance import make_scene
+from sssfit.scene.made import make_scene
 from sssfit.simulate import simulate_exact
 
 PITCH = 2.0

@@ -9,15 +9,15 @@ from reference_pixels import make_profile
 
 from sssfit.cli import main
 from sssfit.compare.judge import judge
-from sssfit.compare.metrics import measure
 from sssfit.compare.pictures import PIXELS, picture_error
 from sssfit.errors import RenderError
 from sssfit.fit import fit_artist, make_target
 from sssfit.kernel import SeparableKernel
 from sssfit.material import load_material
-from sssfit.render.irradiance import make_scene
+from sssfit.measure.score import measure
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
+from sssfit.scene.made import make_scene
 from sssfit.shapes import gaussian_cdf
 from sssfit.simulate import simulate_exact
 

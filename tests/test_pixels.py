@@ -19,10 +19,10 @@ from reference_pixels import (
 from scipy.integrate import dblquad
 from scipy.special import erf
 
-from sssfit import _disks
 from sssfit._jit import pixels
 from sssfit.errors import ProfileError
 from sssfit.profile import full_kernel
+from sssfit.profile import pixels as integrals
 
 NOISY = make_profile(
     np.concatenate(([0.0], np.cumsum(np.random.default_rng(5).uniform(0.5, 1.5, 14)))),
@@ -66,7 +66,7 @@ def test_segment_of_a_half_disk():
 
 
 def test_line_of_one_disk_is_its_edge_spread(monkeypatch):
-    monkeypatch.setattr(_disks, "PARTS_PER_ANNULUS", 1)
+    monkeypatch.setattr(integrals, "PARTS_PER_ANNULUS", 1)
     disk = make_profile([0.0, 2.5], [[0.7]])
     line = disk.line_kernel(0.3)[:, 0]
     h = len(line) // 2
@@ -169,7 +169,7 @@ def test_steps_between_annuli_do_not_show_in_the_pixels(pitch_mm):
 
 
 def test_flat_annuli_would_starve_the_centre_pixel(monkeypatch):
-    monkeypatch.setattr(_disks, "PARTS_PER_ANNULUS", 1)
+    monkeypatch.setattr(integrals, "PARTS_PER_ANNULUS", 1)
     profile = one_over_r_profile(40, 1.0, [1e6])
     share = profile.quadrant_kernel(1.0, 0)[0, 0, 0] / profile.cumulative[1, 0]
     # Not 1/pi to the last digit: the pixel's corners reach into the second annulus.

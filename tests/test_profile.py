@@ -12,10 +12,9 @@ import numpy as np
 import pytest
 from reference_pixels import make_profile, one_over_r_profile, walk_tallies
 
-from sssfit import _profile_io
 from sssfit.errors import FileError, ProfileError
 from sssfit.material import Layer, load_material
-from sssfit.profile import FORMAT, Profile, is_profile_file
+from sssfit.profile import FORMAT, Profile, is_profile_file, npz
 
 META = {
     "format": FORMAT,
@@ -55,7 +54,7 @@ def nested(depth):
 
 
 def field_values(profile):
-    names = [*_profile_io.REQUIRED, *_profile_io.OPTIONAL]
+    names = [*npz.REQUIRED, *npz.OPTIONAL]
     return {name: getattr(profile, name) for name in names}
 
 

@@ -17,7 +17,7 @@ from test_docs import code_blocks
 
 from sssfit.fit import fit_svd
 from sssfit.material import Layer, Material
-from sssfit.render.irradiance import make_scene
+from sssfit.scene.made import make_scene
 from sssfit.simulate import simulate_burley, simulate_dipole, simulate_exact, simulate_montecarlo
 from sssfit.simulate.exact import diffuse_reflectance
 

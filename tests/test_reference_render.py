@@ -10,7 +10,7 @@ from sssfit.profile import full_kernel
 from sssfit.render import _checks
 from sssfit.render.borders import BORDERS, source_indices
 from sssfit.render.reference import convolve, reference_quadrant, render_reference
-from sssfit.render.scene import Scene
+from sssfit.scene.record import Scene
 
 borders = pytest.mark.parametrize("border", BORDERS)
 EPS = np.finfo(np.float64).eps

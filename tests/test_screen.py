@@ -11,9 +11,8 @@ from reference_screen import exact_pass, pixels_per_mm, slow_flat, slow_screen
 from sssfit import shapes
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
-from sssfit.render._view import LERP_SIGMAS, lerp_falloff, second_moments
-from sssfit.render.scene import Scene
-from sssfit.render.screen import render_screen
+from sssfit.render.screen import LERP_SIGMAS, lerp_falloff, render_screen, second_moments
+from sssfit.scene.record import Scene
 
 ROOT = Path(__file__).parents[1]
 PITCH_MM, DISTANCE_MM = 0.5, 300.0

@@ -13,8 +13,8 @@ from sssfit.fit import fit_preintegrated, fit_svd
 from sssfit.render import _checks
 from sssfit.render.borders import BORDERS
 from sssfit.render.reference import convolve, reference_quadrant
-from sssfit.render.scene import Scene
 from sssfit.render.separable import apply_passes, render_separable
+from sssfit.scene.record import Scene
 
 borders = pytest.mark.parametrize("border", BORDERS)
 precisions = pytest.mark.parametrize("dtype", [np.float32, np.float64])

@@ -10,23 +10,25 @@ import pytest
 from figures import assert_legible
 from reference_pixels import make_profile, one_over_r_profile
 
-from sssfit._image_srgb import srgb_encode
-from sssfit.chart import editing_figure, save_figure, sheet_figure
+from sssfit.chart.editing import editing_figure
+from sssfit.chart.page import save_figure
+from sssfit.chart.sheet import sheet_figure
 from sssfit.cli import main
 from sssfit.compare._panels import lightness, make_panel
 from sssfit.compare.editing import EDITS, TABLE_1, compute_editing
 from sssfit.compare.judge import judge
 from sssfit.compare.judged import border_of, judged_scene
-from sssfit.compare.metrics import measure
 from sssfit.compare.pictures import picture_error
 from sssfit.compare.sheet import compute_sheet, production_look
 from sssfit.errors import RenderError, SssfitWarning
 from sssfit.fit import METHODS, fit_artist, fit_falloff, support_of
-from sssfit.image import load_image, save_image
+from sssfit.formats.colours import srgb_encode
+from sssfit.formats.pictures import load_image, save_image
 from sssfit.material import load_material
-from sssfit.render.irradiance import make_scene
+from sssfit.measure.score import measure
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
+from sssfit.scene.made import make_scene
 from sssfit.simulate import simulate_deon_skin, simulate_exact
 
 PITCH, PIXELS = 0.6, 40

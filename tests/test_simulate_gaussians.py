@@ -9,8 +9,8 @@ from scipy.integrate import quad
 from sssfit import shapes
 from sssfit.errors import SimulationError
 from sssfit.fit import fit_falloff, fit_gaussians
+from sssfit.formats.csv import parse_csv
 from sssfit.profile import Profile
-from sssfit.profile_csv import parse_csv
 from sssfit.simulate import DEON_SKIN, simulate_deon_skin, simulate_gaussians
 
 # Written out once more, from the paper's table: variance [mm^2], then R, G, B.

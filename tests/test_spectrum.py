@@ -11,7 +11,8 @@ from matplotlib.colors import to_hex
 from reference_pixels import make_profile, one_over_r_profile
 
 from sssfit import shapes
-from sssfit.chart import save_figure, spectrum_figure
+from sssfit.chart.page import save_figure
+from sssfit.chart.spectrum import spectrum_figure
 from sssfit.cli import main
 from sssfit.compare import compute_spectrum
 from sssfit.errors import SssfitWarning

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._image_srgb import srgb_encode
-from sssfit.compare._pixels import shown
-from sssfit.compare.metrics import ImageScore, measure
+from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
-
-FloatArray = npt.NDArray[np.float64]
+from sssfit.formats.colours import srgb_encode
+from sssfit.measure.delta_e import shown
+from sssfit.measure.score import ImageScore, measure
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # Y of linear sRGB, IEC 61966-2-1
 _COLOURS = (1, 3)

@@ -15,27 +15,25 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from sssfit.arrays import FloatArray
 from sssfit.compare._all_light import radius_of
-from sssfit.compare._budget_causes import Cause, Switches, causes_of, everything
+from sssfit.compare._budget_causes import STORAGES, Cause, Switches, causes_of, everything
 from sssfit.compare._budget_profiles import MODELS, make_sources, picture_reach_mm
-from sssfit.compare._pixels import selected_pixels, selection
-from sssfit.compare._storage import STORAGES
 from sssfit.compare.candidates import Candidate
 from sssfit.compare.judged import judged_scene
-from sssfit.compare.metrics import ImageScore
 from sssfit.errors import RenderError, SimulationError
 from sssfit.grid import make_grid
 from sssfit.kernel import SeparableKernel
 from sssfit.material import Material
-from sssfit.render._made_edges import DISK_RADIUS_MM
-from sssfit.render.scene import Scene
+from sssfit.measure.delta_e import selected_pixels, selection
+from sssfit.measure.score import ImageScore
+from sssfit.scene.patterns import DISK_RADIUS_MM
+from sssfit.scene.record import Scene
 from sssfit.simulate import Progress
 
 __all__ = ["MODELS", "STORAGES", "Budget", "Cause", "error_budget", "error_budgets"]
 
-FloatArray = npt.NDArray[np.float64]
 
 PHOTONS = 1_000_000
 
@@ -113,7 +111,7 @@ def error_budget(material: Material, scene: Scene, **settings: Any) -> Budget:
     Examples
     --------
     >>> from sssfit.material import load_material
-    >>> from sssfit.render.irradiance import make_scene
+    >>> from sssfit.scene.made import make_scene
     >>> scene = make_scene("disk", height=64, width=64, mm_per_pixel=0.5)
     >>> budget = error_budget(load_material("skin1"), scene, photons=100_000)
     >>> [each.name for each in budget.causes if each.is_in_whole][:2]

@@ -12,12 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError
 from sssfit.material import Material
 from sssfit.profile import Profile
 from sssfit.simulate import simulate_exact, simulate_montecarlo
-
-FloatArray = npt.NDArray[np.float64]
 
 PHOTONS = (10_000, 31_623, 100_000, 316_228, 1_000_000, 3_162_278, 10_000_000)
 SEEDS = 6  # the slope's standard error is then .025

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from sssfit.compare._panels import Panel, make_panel
-from sssfit.compare.metrics import ImageScore, auto_exposure, measure
 from sssfit.fit import fit_falloff
+from sssfit.measure.score import ImageScore, auto_exposure, measure
 from sssfit.profile import Profile
-from sssfit.render.irradiance import make_scene
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
+from sssfit.scene.made import make_scene
 from sssfit.simulate import simulate_deon_skin
 
 # The delta in the model is one pixel: docs/fits.md, on STRETCH, says why 0.5 mm.

@@ -16,12 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sssfit.arrays import FloatArray
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import FitResult, fit_guided
 from sssfit.fit._target import Target
 from sssfit.fit.guided import DRAWN_K, extents_of, gamma, guided_target
 from sssfit.profile import Profile
-from sssfit.shapes import FloatArray
 
 DRAWN = (0.0, DRAWN_K, 4.0)  # the paper's nearest light, what it draws, its farthest light
 MOST = 4

@@ -5,20 +5,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from sssfit.compare.asymmetry import radial_asymmetry
-from sssfit.compare.cost import Cost, cost_of, seconds_per_megapixel
-from sssfit.compare.metrics import ImageScore, measure
+from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
+from sssfit.measure.asymmetry import radial_asymmetry
+from sssfit.measure.cost import Cost, cost_of, seconds_per_megapixel
+from sssfit.measure.score import ImageScore, measure
 from sssfit.profile import Profile, full_kernel
 from sssfit.render.reference import render_reference
-from sssfit.render.scene import Scene
 from sssfit.render.screen import render_screen
 from sssfit.render.separable import render_separable
-
-FloatArray = npt.NDArray[np.float64]
+from sssfit.scene.record import Scene
 
 _FROM_PIXELS = 4  # skin1's round kernel has .06 from the first circle on, .003 from the fourth on
 _CORNER = 8  # pixels

@@ -10,12 +10,11 @@ import math
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.arrays import BoolArray
 from sssfit.fit import support_of
 from sssfit.profile import Profile
-from sssfit.render._made_edges import DISK_RADIUS_MM
-from sssfit.render.scene import Scene
-
-BoolArray = npt.NDArray[np.bool_]
+from sssfit.scene.patterns import DISK_RADIUS_MM
+from sssfit.scene.record import Scene
 
 
 def judged_scene(scene: Scene, profile: Profile) -> Scene:

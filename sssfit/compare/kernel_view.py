@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from sssfit.arrays import FloatArray
 from sssfit.errors import KernelError
 from sssfit.kernel import SeparableKernel
 from sssfit.profile import Profile
-from sssfit.shapes import FloatArray
 
 MOST_CHANNELS = 3
 # Of an image's edge: more than a chart prints, so that a kernel of 16 000 pixels makes no more.

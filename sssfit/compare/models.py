@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._profile_bins import merged
+from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError
 from sssfit.material import Material
 from sssfit.profile import Profile
+from sssfit.profile.bins import merged
 from sssfit.simulate import (
     Progress,
     simulate_burley,
@@ -24,8 +25,6 @@ from sssfit.simulate import (
     simulate_exact,
     simulate_montecarlo,
 )
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,7 +1,7 @@
 """Speed against accuracy: every kernel that can be fitted, judged on the same pictures.
 
 A row is one kernel on one picture. Errors are against the picture by the profile's whole 2D kernel;
-`sssfit.compare.front` says which rows are worth their cost, `sssfit.chart` draws them.
+`sssfit.compare.comparison` says which rows are worth their cost, `sssfit.chart` draws them.
 """
 
 import dataclasses
@@ -11,21 +11,21 @@ from time import perf_counter
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.compare._pixels import selected_pixels, selection
 from sssfit.compare.candidates import Candidate
 from sssfit.compare.candidates import candidates as every_candidate
-from sssfit.compare.comparison import COSTS, ERRORS, Comparison, KernelRow, Picture
-from sssfit.compare.front import pareto_front
+from sssfit.compare.comparison import COSTS, ERRORS, Comparison, KernelRow, Picture, pareto_front
 from sssfit.compare.judge import Judgement, judge
 from sssfit.compare.judged import border_of, judged_scene
-from sssfit.compare.metrics import COLOUR_FIGURES, auto_exposure
 from sssfit.errors import FitError, RenderError
 from sssfit.fit import FitResult, make_target
+from sssfit.measure.delta_e import selected_pixels, selection
+from sssfit.measure.score import COLOUR_FIGURES, auto_exposure
 from sssfit.profile import Profile
-from sssfit.render._checks import check_channels, thread_count
+from sssfit.render._checks import check_channels
 from sssfit.render.reference import render_reference
-from sssfit.render.scene import Scene
 from sssfit.render.separable import render_separable
+from sssfit.scene.record import Scene
+from sssfit.threads import thread_count
 
 Report = Callable[[int, int, str], None]
 _Judged = tuple[Candidate, FitResult, Sequence[Judgement]]

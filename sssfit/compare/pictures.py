@@ -9,21 +9,18 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from sssfit.compare._delta_e import delta_e_2000
+from sssfit.arrays import BoolArray, FloatArray
 from sssfit.compare._panels import check_colours
-from sssfit.compare.metrics import auto_exposure
 from sssfit.fit._target import Target
 from sssfit.fit.artist import artist_pass
+from sssfit.measure.delta_e import delta_e_2000
+from sssfit.measure.score import auto_exposure
 from sssfit.profile import Profile
 from sssfit.render.borders import source_indices
-from sssfit.render.irradiance import make_scene
 from sssfit.render.reference import render_reference
-from sssfit.render.scene import Scene
-
-FloatArray = npt.NDArray[np.float64]
-BoolArray = npt.NDArray[np.bool_]
+from sssfit.scene.made import make_scene
+from sssfit.scene.record import Scene
 
 PIXELS = 67  # rows and columns: 60 mm of skin1, between the eyes and the mouth
 _SUPPORT_PIXELS = 24  # at most so many make up the half width of a kernel

@@ -9,23 +9,21 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from sssfit.arrays import FloatArray
 from sssfit.compare._panels import Panel, check_colours, make_panel
 from sssfit.compare.candidates import MOST_TERMS, Candidate
-from sssfit.compare.cost import cost_of
 from sssfit.compare.judged import border_of, judged_scene
-from sssfit.compare.metrics import auto_exposure
 from sssfit.compare.pictures import picture_error
 from sssfit.fit import support_of
 from sssfit.kernel import SeparableKernel
+from sssfit.measure.cost import cost_of
+from sssfit.measure.score import auto_exposure
 from sssfit.profile import Profile
-from sssfit.render.irradiance import make_scene
 from sssfit.render.reference import render_reference
-from sssfit.render.scene import Scene
 from sssfit.render.separable import render_separable
-
-FloatArray = npt.NDArray[np.float64]
+from sssfit.scene.made import make_scene
+from sssfit.scene.record import Scene
 
 SCENES = ("disk", "edge", "head")
 MM_PER_PIXEL = 0.3  # a head 0.6 m away on 1080 rows
@@ -100,7 +98,7 @@ def compute_sheet(
     pixels : int
         Rows and columns.
     scenes : sequence of str
-        Of ``sssfit.render.irradiance.MADE``; the edge is upright, as in the paper's figure.
+        Of ``sssfit.scene.made.MADE``; the edge is upright, as in the paper's figure.
     most_terms : int
         Of Gaussians and SVD.
     threads : int, optional

@@ -9,14 +9,12 @@ of the sum of absolute values. ``sssfit.chart`` draws the record.
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
+from sssfit.arrays import FloatArray
 from sssfit.fit import make_target
 from sssfit.fit.svd import all_eigenvalues
 from sssfit.profile import Profile
-
-FloatArray = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,9 +1,54 @@
 """A kernel as a JSON document: the kernel file itself, with what it is in words."""
 
 import json
+import math
+from collections.abc import Sequence
 
-from sssfit.export._comment import description
 from sssfit.kernel import SeparableKernel
+from sssfit.messages import printable
+
+_ROUNDING = 1e-12
+
+
+def description(kernel: SeparableKernel) -> list[str]:
+    """Return the lines of the comment; nothing in them depends on the clock or the machine.
+
+    What is text comes out on one line: a newline would end a shader's comment.
+    """
+    meta = kernel.meta
+    photons = f", {meta['photons']:,} photons" if meta.get("photons") is not None else ""
+    photons += f", seed {meta['seed']}" if meta.get("seed") is not None else ""
+    settings = ", ".join(f"{key} {value}" for key, value in meta.get("settings", {}).items())
+    sha = f", sha256 {meta['material_sha256'][:16]}" if meta.get("material_sha256") else ""
+    terms = f"{kernel.rank} separable term{'s' if kernel.rank > 1 else ''}"
+    fit = f"{kernel.method}, {terms}{f' ({settings})' if settings else ''}"
+    lines = [
+        f"Subsurface scattering kernel: {meta.get('material') or 'unknown material'}{sha}.",
+        f"Profile: {meta.get('profile_method') or 'unknown'}{photons}. Fit: {fit}. "
+        f"sssfit {meta.get('version') or '(unknown)'}.",
+        f"{kernel.pixels} pixels of {kernel.mm_per_pixel:.9g} mm, the middle one on the axis; "
+        f"channels {', '.join(kernel.channels)}.",
+        "K[i][j] = sum over terms of sign * weight[i] * weight[j]: a horizontal pass and the same "
+        "pass vertically,",
+        "then the sum over terms. Weights are energies of pixels (dimensionless), linear light.",
+        f"Energy of the 2D kernel: {_values(kernel.energy.tolist())}.",
+        f"Multiply by: {_values(kernel.scale.tolist())}.",
+        f"Relative Frobenius error: {_errors(kernel.relative_frobenius_error.tolist())}; "
+        f"energy error: {_errors(kernel.energy_error.tolist())}.",
+    ]
+    return [printable(line) for line in lines]
+
+
+def _values(values: Sequence[float]) -> str:
+    return ", ".join(f"{each + 0.0:.6g}" for each in values)  # not -0
+
+
+def _errors(values: Sequence[float]) -> str:
+    """Write an error for each channel; rounding of sums of pixels is 0."""
+    return ", ".join(
+        "unknown" if math.isnan(each) else f"{0.0 if abs(each) < _ROUNDING else each:.6g}"
+        for each in values
+    )
 
 
 def json_document(kernel: SeparableKernel) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.export._comment import description
+from sssfit.export.document import description
 from sssfit.files import has_mark
 from sssfit.kernel import SeparableKernel
 

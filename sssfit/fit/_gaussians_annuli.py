@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.fit._target import FloatArray
+from sssfit.arrays import FloatArray
 
 # Signed weights may cancel: two of +-1e8 on variances that hardly differ were seen to fit the noise
 # of photons. Their absolute sum may be this many times the energy.

@@ -13,11 +13,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from sssfit.arrays import FloatArray
 from sssfit.errors import FitError
 
-FloatArray = npt.NDArray[np.float64]
 Function = Callable[[FloatArray], tuple[float, FloatArray]]
 
 FEASIBLE = 1e-9  # a point counts where the equality holds to this

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._material_checks import printable
+from sssfit.arrays import FloatArray
 from sssfit.errors import FitError, SssfitWarning
+from sssfit.messages import printable
 from sssfit.profile import Profile
-
-FloatArray = npt.NDArray[np.float64]
 
 KEPT = 0.999  # support "auto": share of every channel's on-grid energy within it
 _FAINTEST = 1e-145  # energy: squares of fainter pixels are 0, and errors relative to them nothing

@@ -18,12 +18,18 @@ from typing import Literal
 
 import numpy as np
 
+from sssfit.arrays import FloatArray
 from sssfit.errors import FitError
-from sssfit.fit._by_hand import per_channel
+from sssfit.fit._by_hand import (
+    gaussian_pixels,
+    kernel_misfit,
+    line_misfit,
+    of_unit_sum,
+    per_channel,
+)
 from sssfit.fit._nlopt import Minimum, minimise, minimise_by_simplex
-from sssfit.fit._passes import gaussian_pixels, kernel_misfit, line_misfit, of_unit_sum
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
-from sssfit.fit._target import FloatArray, Target, make_target
+from sssfit.fit._target import Target, make_target
 from sssfit.profile import Profile
 
 _WIDTHS = 10  # tried for each Gaussian, all pairs, before the best are refined

@@ -17,11 +17,11 @@ import math
 
 import numpy as np
 
+from sssfit.arrays import FloatArray
 from sssfit.errors import FitError
-from sssfit.fit._energy import restores
 from sssfit.fit._nlopt import root
-from sssfit.fit._result import ChannelFit, FitResult, fit_channels
-from sssfit.fit._target import FloatArray, make_target
+from sssfit.fit._result import ChannelFit, FitResult, fit_channels, restores
+from sssfit.fit._target import make_target
 from sssfit.profile import Profile
 from sssfit.shapes import diffusion_cdf, diffusion_line_integral
 

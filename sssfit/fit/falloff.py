@@ -22,12 +22,12 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.arrays import FloatArray
 from sssfit.errors import FitError
-from sssfit.fit._by_hand import per_channel
+from sssfit.fit._by_hand import gaussian_pixels, kernel_misfit, of_unit_sum, per_channel
 from sssfit.fit._nlopt import Minimum, minimise
-from sssfit.fit._passes import gaussian_pixels, kernel_misfit, of_unit_sum
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
-from sssfit.fit._target import FloatArray, make_target
+from sssfit.fit._target import make_target
 from sssfit.profile import Profile
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS
 

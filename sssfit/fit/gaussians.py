@@ -14,7 +14,7 @@ pitch. The exception are profiles with R_d ~ 1/r near the beam, where the integr
 limit as annuli narrow; these are looked at as finely as the pixels are, and a warning says so.
 
 Next: ``_gaussians_annuli.py`` has the objective, ``_gaussians_search.py`` the search,
-``_gaussians_rings.py`` what is looked at how finely.
+``_gaussians_search.py`` what is looked at how finely.
 """
 
 import math
@@ -25,11 +25,9 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from sssfit.errors import FitError, SssfitWarning
-from sssfit.fit._energy import factor_to, restores
 from sssfit.fit._gaussians_annuli import make_annuli
-from sssfit.fit._gaussians_rings import is_steep, rings
-from sssfit.fit._gaussians_search import Found, search
-from sssfit.fit._result import ChannelFit, FitResult, fit_channels
+from sssfit.fit._gaussians_search import Found, is_steep, rings, search
+from sssfit.fit._result import ChannelFit, FitResult, factor_to, fit_channels, restores
 from sssfit.fit._target import Target, make_target, name_of
 from sssfit.profile import Profile
 from sssfit.shapes import gaussian_line_integral

@@ -17,12 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from sssfit._profile_radii import mean_free_paths_mm
+from sssfit.arrays import FloatArray
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._nlopt import Function, Minimum, minimise
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
-from sssfit.fit._target import FloatArray, Target, make_target
+from sssfit.fit._target import Target, make_target
 from sssfit.profile import Profile
+from sssfit.profile.bins import mean_free_paths_mm
 
 # The k that the paper draws Gamma for (figure S.1b). The pass nearest to the pre-integrated one is
 # not this one for every channel: k = 0 for skin1's red, see docs/fits.md.

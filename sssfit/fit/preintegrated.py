@@ -13,8 +13,7 @@ import math
 
 import numpy as np
 
-from sssfit.fit._energy import restores
-from sssfit.fit._result import ChannelFit, FitResult, fit_channels
+from sssfit.fit._result import ChannelFit, FitResult, fit_channels, restores
 from sssfit.fit._target import make_target
 from sssfit.profile import Profile
 

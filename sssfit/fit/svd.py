@@ -18,10 +18,17 @@ import operator
 
 import numpy as np
 
+from sssfit.arrays import FloatArray
 from sssfit.errors import FitError
-from sssfit.fit._energy import factor_to, restores
-from sssfit.fit._result import ChannelFit, FitResult, fit_channels, frobenius_error
-from sssfit.fit._target import FloatArray, Target, make_target
+from sssfit.fit._result import (
+    ChannelFit,
+    FitResult,
+    factor_to,
+    fit_channels,
+    frobenius_error,
+    restores,
+)
+from sssfit.fit._target import Target, make_target
 from sssfit.profile import Profile
 
 _USUAL_RANK = 3

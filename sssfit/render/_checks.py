@@ -1,26 +1,10 @@
 """What all renderers refuse, and how they say it."""
 
-import operator
-
 from sssfit.errors import RenderError
-from sssfit.threads import available_cores
 
 # Work space above which a picture is refused: the reference of 4096 x 4096 RGB with a kernel of
 # 8191 x 8191 pixels takes 4.6 GB, that of 20000 x 20000 with any kernel more than 9.
 LARGEST_BYTES = 8e9
-
-
-def thread_count(threads: int | None) -> int:
-    """Return the number of threads to use: all cores there are where none is named."""
-    if threads is None:
-        return available_cores()
-    try:
-        count = operator.index(threads)
-    except TypeError:
-        count = 0
-    if count < 1:
-        raise RenderError(f"threads = {threads!r}; expected a whole number from 1 up.")
-    return count
 
 
 def check_channels(picture: int, kernel: int) -> None:

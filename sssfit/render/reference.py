@@ -12,13 +12,14 @@ import dataclasses
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._disks import checked_support
+from sssfit.arrays import FloatArray
 from sssfit.profile import Profile
-from sssfit.render._checks import check_channels, check_memory, thread_count
+from sssfit.profile.pixels import checked_support
+from sssfit.render._checks import check_channels, check_memory
 from sssfit.render.borders import source_indices
-from sssfit.render.scene import Scene
+from sssfit.scene.record import Scene
+from sssfit.threads import thread_count
 
-FloatArray = npt.NDArray[np.float64]
 ComplexArray = npt.NDArray[np.complex128]
 
 _LEAST_REACH = 256

@@ -24,16 +24,185 @@ import numpy.typing as npt
 
 from sssfit._jit import screen as compiled
 from sssfit._jit import thread_pool
+from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
-from sssfit.render._checks import thread_count
-from sssfit.render._view import make_view
-from sssfit.render.scene import Scene
 from sssfit.render.transmittance import transmitted
+from sssfit.scene.record import Scene
+from sssfit.threads import thread_count
+
+FOLLOW = {"none": compiled.FLAT, "lerp": compiled.LERP, "gaussian": compiled.GAUSSIAN}
+LOST = {"none": compiled.NOWHERE, "middle": compiled.MIDDLE, "mean": compiled.MEAN}
+BORDER = {"mirror": compiled.MIRROR, "clamp": compiled.CLAMP, "zero": compiled.ZERO}
+
+# The lerp's end in standard deviations of the kernel; docs/screen-space.md derives it.
+LERP_SIGMAS = 3.8
+_FARTHEST = 1e9  # pixels from the middle to a sample; far below where indices overflow
+
+
+def make_view(
+    scene: Scene,
+    kernel: SeparableKernel,
+    *,
+    follow: str,
+    lost: str | None,
+    depth_variance_mm2: float | Sequence[float] | None,
+    falloff_per_mm: float | None,
+    scale: npt.ArrayLike | None,
+    border: str,
+) -> compiled.View:
+    """Return the buffers of a pass; arguments as `render_screen` has them.
+
+    Raises
+    ------
+    RenderError
+        The scene has no depth, or a setting is of no use.
+    """
+    for word, name, known in (
+        ("follow", follow, FOLLOW),
+        ("border", border, BORDER),
+        ("lost", "mean" if lost is None else lost, LOST),
+    ):
+        if name not in known:
+            raise RenderError(f"{word} = {name!r}; expected one of {', '.join(known)}.")
+    mask = objects(scene)
+    depth_mm = depths(scene, mask)
+    sizes = _sizes(scale, mask.shape)
+    rate, stretch = _factor(kernel, follow, depth_variance_mm2, falloff_per_mm, sizes)
+    chosen = ("middle" if follow == "lerp" else "mean") if lost is None else lost
+    return compiled.View(
+        depth_mm=depth_mm.ravel(),
+        mask=mask.ravel(),
+        step=_steps(scene, kernel, depth_mm, sizes).ravel(),
+        stretch=stretch.ravel(),
+        rate=rate,
+        width=scene.width,
+        height=scene.height,
+        follow=FOLLOW[follow],
+        lost=LOST[chosen],
+        border=BORDER[border],
+    )
+
+
+def _factor(
+    kernel: SeparableKernel,
+    follow: str,
+    depth_variance_mm2: float | Sequence[float] | None,
+    falloff_per_mm: float | None,
+    sizes: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """Return the rates (C,) at which light is lost with depth, and the stretch of depth (H, W)."""
+    rate, stretch = np.zeros(len(kernel.channels)), np.ones(sizes.shape)
+    if follow == "gaussian":
+        rate = 0.5 / depth_variances(kernel, depth_variance_mm2)
+        # A kernel of half the size has a quarter of the variance.
+        stretch = np.divide(1.0, sizes, out=np.zeros(sizes.shape), where=sizes > 0.0)
+    elif follow == "lerp":
+        rate[:] = lerp_falloff(kernel) if falloff_per_mm is None else falloff_per_mm
+        if not (rate >= 0.0).all():
+            raise RenderError(f"falloff_per_mm = {falloff_per_mm}; expected a number from 0 up.")
+    return rate, stretch
+
+
+def objects(scene: Scene) -> npt.NDArray[np.int32]:
+    """Return the mask (H, W): 1 everywhere without one, and 0 where the eye meets nothing."""
+    mask = np.ones((scene.height, scene.width), np.int32) if scene.mask is None else scene.mask
+    there = True if scene.depth_mm is None else np.isfinite(scene.depth_mm)
+    return np.where(there, mask, 0).astype(np.int32)
+
+
+def depths(scene: Scene, mask: npt.NDArray[np.int32]) -> FloatArray:
+    """Return the depth (H, W) [mm] of all objects; 1 where there is none and it is not read."""
+    if scene.depth_mm is None or scene.distance_mm is None:
+        missing = "depth_mm" if scene.depth_mm is None else "distance_mm"
+        raise RenderError(
+            f"{scene.name}: rendering in screen space needs {missing}, and the scene has none; "
+            "give depth_mm and distance_mm, or render it flat."
+        )
+    if not (np.isfinite(scene.distance_mm) and scene.distance_mm > 0.0):
+        raise RenderError(
+            f"{scene.name}: distance_mm = {scene.distance_mm:g}; expected a length above 0."
+        )
+    depth_mm: FloatArray = np.where(mask > 0, scene.depth_mm, 1.0)
+    if (depth_mm <= 0.0).any():
+        raise RenderError(
+            f"{scene.name}: depth_mm is 0 in {int((depth_mm <= 0.0).sum())} pixels of objects; "
+            "expected distances from the eye above 0, or mask 0 where nothing is."
+        )
+    return depth_mm
+
+
+def depth_variances(
+    kernel: SeparableKernel, given_mm2: float | Sequence[float] | None
+) -> FloatArray:
+    """Return the variances (C,) [mm^2] of the depth factor.
+
+    What is given, or the kernel's ``depth_variance_mm2`` (the artist's larger Gaussian), or the
+    kernel's own second moment per axis, which for a single Gaussian is the same.
+    """
+    if given_mm2 is not None:
+        values = np.asarray(given_mm2, dtype=np.float64)
+        if values.shape not in ((), (len(kernel.channels),)) or not (values > 0.0).all():
+            raise RenderError(
+                f"depth_variance_mm2 = {given_mm2}; expected a variance above 0, one or "
+                f"{len(kernel.channels)}."
+            )
+        return np.broadcast_to(values, (len(kernel.channels),))
+    moments = second_moments(kernel)
+    for c, name in enumerate(kernel.channels):
+        moments[c] = kernel.parameters.get(name, {}).get("depth_variance_mm2", moments[c])
+    return moments
+
+
+def second_moments(kernel: SeparableKernel) -> FloatArray:
+    """Return the 2D kernel's variance along an axis (C,) [mm^2], of absolute weights.
+
+    Terms of minus sign would let it fall below 0. At least that of a pixel, p^2 / 12.
+    """
+    x = kernel.mm_per_pixel * np.arange(-kernel.half_pixels, kernel.half_pixels + 1)
+    line = np.abs(kernel.line)
+    energy = line.sum(axis=0)
+    moment = np.divide(x**2 @ line, energy, out=np.zeros_like(energy), where=energy > 0.0)
+    at_least: FloatArray = np.maximum(moment, kernel.mm_per_pixel**2 / 12.0)
+    return at_least
+
+
+def lerp_falloff(kernel: SeparableKernel) -> float:
+    """Return the lerp's falloff [1/mm]: complete at `LERP_SIGMAS` of the widest channel."""
+    return float(1.0 / (LERP_SIGMAS * np.sqrt(second_moments(kernel).max())))
+
+
+def _sizes(scale: npt.ArrayLike | None, shape: tuple[int, ...]) -> FloatArray:
+    """Return the map of kernel sizes (H, W)."""
+    if scale is None:
+        return np.ones(shape)
+    sizes = np.asarray(scale, dtype=np.float64)
+    if sizes.shape not in ((), shape):
+        raise RenderError(f"scale has shape {sizes.shape}; expected a number or {shape}.")
+    if not (np.isfinite(sizes) & (sizes >= 0.0)).all():
+        raise RenderError("scale has values that are negative, infinite or NaN; expected 0 and up.")
+    return np.broadcast_to(sizes, shape)
+
+
+def _steps(
+    scene: Scene, kernel: SeparableKernel, depth_mm: FloatArray, sizes: FloatArray
+) -> FloatArray:
+    """Return the pixels from one sample to the next (H, W)."""
+    assert scene.distance_mm is not None  # `depths` has looked
+    # Multiplied out first, so that a plane at distance_mm has steps of exactly 1.
+    with np.errstate(over="ignore"):  # refused below
+        nearer = kernel.mm_per_pixel * scene.distance_mm / (depth_mm * scene.mm_per_pixel)
+        steps: FloatArray = nearer * sizes
+    if not (steps.max() * kernel.half_pixels < _FARTHEST):
+        raise RenderError(
+            f"{scene.name}: at depth {depth_mm.min():g} mm the kernel would reach "
+            f"{steps.max() * kernel.half_pixels:.3g} pixels; expected mm in depth_mm and scale."
+        )
+    return steps
+
 
 __all__ = ["render_screen"]
 
-FloatArray = npt.NDArray[np.float64]
 
 _BLOCK = 16_384  # pixels a thread takes at a time: some 10 ms, and no wait at the end
 

@@ -26,11 +26,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
-from sssfit.render.scene import Scene
-
-FloatArray = npt.NDArray[np.float64]
+from sssfit.scene.record import Scene
 
 # c of exp(-s^2 / (c v)): what a Gaussian of variance v has beyond s, and the 2010 listing's.
 OURS, PUBLISHED = 2.0, 1.0

@@ -4,12 +4,10 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from sssfit.arrays import FloatArray
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
-
-FloatArray = npt.NDArray[np.float64]
 
 # 16384 photons of skin1 take 4 ms, of an absorption-free medium of eta 1.3 half a second: short
 # enough for Ctrl-C, long enough that dealing out a batch (some 0.1 ms) does not show.

@@ -26,12 +26,12 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit._jit import source_key
-from sssfit._material_checks import printable, shown
-from sssfit._profile_io import is_marked, read_npy
 from sssfit.errors import FileError, SimulationError, SssfitWarning
 from sssfit.files import has_mark, reason, remove_leftovers, write_atomically
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
+from sssfit.messages import printable, shown
+from sssfit.profile.npz import is_marked, read_npy
 from sssfit.simulate._batches import BATCH_PHOTONS, MAX_PHOTONS, Tally
 
 FORMAT = "sssfit.checkpoint/1"

@@ -32,7 +32,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sssfit._jit.transport import NEGLIGIBLE, Tables, kernel_matrix
-from sssfit.simulate._surface import Cone, FloatArray, entering, gauss, is_matched
+from sssfit.arrays import FloatArray
+from sssfit.simulate._surface import Cone, entering, gauss, is_matched
 
 _DEPTH = 26.0  # of the last panel: what does not fall like exp(-nu z) is exp(-26) = 5e-12 there
 _WIDEST = 2.5  # panel: C0 = exp(-z) needs it

@@ -12,15 +12,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from sssfit import __version__
+from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError, SssfitWarning
 from sssfit.grid import RadialGrid
 from sssfit.material import Layer, Material
 from sssfit.profile import FORMAT, Profile
-
-FloatArray = npt.NDArray[np.float64]
 
 ROUNDING = 1e-12  # F may fall by this share of the total: sums of a few thousand terms, rounded
 

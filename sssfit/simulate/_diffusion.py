@@ -9,12 +9,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError
 from sssfit.material import Layer
-
-FloatArray = npt.NDArray[np.float64]
 
 # The polynomials for F_dr are within 0.006 of the integral here, and over 1 from 3.9 on.
 LEAST_ETA, MOST_ETA = 0.5, 2.5

@@ -15,8 +15,6 @@ from sssfit.grid import RadialGrid
 from sssfit.material import Material
 from sssfit.simulate._batches import BATCH_PHOTONS, Sums, Tally
 
-FloatArray = npt.NDArray[np.float64]
-
 
 @dataclass(frozen=True, slots=True)
 class LayeredWalk:

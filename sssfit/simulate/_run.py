@@ -13,8 +13,9 @@ from dataclasses import dataclass
 from time import perf_counter
 
 from sssfit._jit import thread_pool
+from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError
-from sssfit.simulate._batches import BATCH_PHOTONS, FloatArray, Tally, Walk, relative_errors
+from sssfit.simulate._batches import BATCH_PHOTONS, Tally, Walk, relative_errors
 from sssfit.simulate._checkpoint import Checkpoint, State
 
 REPORT_SECONDS = 0.1

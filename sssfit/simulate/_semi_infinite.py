@@ -7,11 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit._jit import semi_infinite as walk
+from sssfit.arrays import FloatArray
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
 from sssfit.simulate._batches import BATCH_PHOTONS, Sums, Tally
-
-FloatArray = npt.NDArray[np.float64]
 
 ROULETTE_THRESHOLD = 1e-4  # MCML's; of the largest channel's weight
 ROULETTE_LEVELS = 30  # one walk in 1e30 survives so many

@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from sssfit._jit import source_key
-from sssfit._material_checks import shown
 from sssfit.errors import MaterialError, SimulationError
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
+from sssfit.messages import shown
 from sssfit.profile import Profile
-from sssfit.simulate._assemble import profile_of
 from sssfit.simulate._batches import MAX_PHOTONS, Walk, relative_errors
 from sssfit.simulate._checkpoint import (
     FORMAT,
@@ -25,6 +24,7 @@ from sssfit.simulate._checkpoint import (
     read_state,
     settings_of,
 )
+from sssfit.simulate._finished import profile_of
 from sssfit.simulate._run import Ending
 from sssfit.simulate.montecarlo import check_media, make_walk
 

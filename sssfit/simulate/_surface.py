@@ -9,9 +9,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from sssfit.arrays import FloatArray
 
 MATCHED = 1e-9  # relative indices nearer to 1 reflect less than 1e-18: no surface at all
 _DIRECTIONS = 96  # 1e-13 of Duntley's closed form for indices from 1.0001 to 4

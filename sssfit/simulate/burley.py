@@ -12,6 +12,7 @@ from types import MappingProxyType
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError
 from sssfit.grid import make_grid
 from sssfit.material import Layer, Material
@@ -30,8 +31,6 @@ from sssfit.simulate._deterministic import (
 )
 from sssfit.simulate._semi_infinite import relative_eta
 from sssfit.simulate.exact import diffuse_reflectance
-
-FloatArray = npt.NDArray[np.float64]
 
 MAPPINGS: Mapping[str, Callable[[npt.ArrayLike], FloatArray]] = MappingProxyType(
     {

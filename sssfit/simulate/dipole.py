@@ -15,8 +15,8 @@ Next: ``multipole.py`` for slabs and stacks, ``docs/theory.md`` for where it fai
 """
 
 import numpy as np
-import numpy.typing as npt
 
+from sssfit.arrays import FloatArray
 from sssfit.grid import make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
@@ -29,8 +29,6 @@ from sssfit.simulate._diffusion import (
     mismatch_by_polynomial,
 )
 from sssfit.simulate._semi_infinite import relative_eta
-
-FloatArray = npt.NDArray[np.float64]
 
 
 def simulate_dipole(

@@ -24,6 +24,7 @@ import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
 from sssfit._jit import compiled_before, thread_pool
+from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
@@ -41,13 +42,13 @@ from sssfit.simulate._deterministic import (
     half_space,
     warn_of_similarity,
 )
-from sssfit.simulate._mixture import mixture_of
-from sssfit.simulate._semi_infinite import relative_eta
-from sssfit.simulate._single import (
+from sssfit.simulate._mixture import (
+    mixture_of,
     single_scattering_beyond,
     single_scattering_of_diffuse_light,
 )
-from sssfit.simulate._surface import FloatArray, entering, entering_of_diffuse
+from sssfit.simulate._semi_infinite import relative_eta
+from sssfit.simulate._surface import entering, entering_of_diffuse
 from sssfit.threads import available_cores
 
 Light = Literal["normal", "diffuse"]

@@ -20,12 +20,11 @@ import numpy.typing as npt
 from scipy.optimize.elementwise import find_root
 
 from sssfit import __version__
-from sssfit._material_checks import check_channels, check_texts, number
+from sssfit.arrays import FloatArray, check_names
 from sssfit.errors import MaterialError, SimulationError
 from sssfit.material import Layer, Material
+from sssfit.material.checks import check_texts, number
 from sssfit.simulate.exact import LIGHTS, Light, diffuse_reflectance, entering_light
-
-FloatArray = npt.NDArray[np.float64]
 
 _CLOSE = 1e-8  # in reflectance; what the exact solver itself is good for
 _ASKED = {"normal": "diffuse reflectance", "diffuse": "base colour under diffuse light"}
@@ -208,7 +207,7 @@ def material_from_reflectance(
         As `invert_reflectance`, or lists that differ in length, or a value that no material has.
     """
     check_texts(name, "")  # all that can be wrong is said before the seconds of work
-    check_channels(channels)
+    check_names(channels)
     asked = _reachable(reflectance, eta, light)
     paths_mm = np.atleast_1d(np.asarray(mean_free_path_mm, dtype=np.float64))
     if paths_mm.size not in (1, asked.size) or paths_mm.ndim > 1:

@@ -21,10 +21,9 @@ from sssfit.errors import SimulationError, SssfitWarning, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
-from sssfit.simulate._assemble import AUTO_BEYOND, profile_of, share_beyond
 from sssfit.simulate._batches import Walk, relative_errors
 from sssfit.simulate._checkpoint import Checkpoint, settings_of
-from sssfit.simulate._finished import ending_of, whole
+from sssfit.simulate._finished import AUTO_BEYOND, ending_of, profile_of, share_beyond, whole
 from sssfit.simulate._layered import LayeredWalk
 from sssfit.simulate._run import Ending, Progress, run
 from sssfit.simulate._semi_infinite import SemiInfiniteWalk, relative_eta

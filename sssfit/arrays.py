@@ -1,0 +1,147 @@
+"""What records hold, whoever made them: arrays of numbers, names of channels, JSON, provenance.
+
+Files edited by hand and records made in Python pass the same checks; each caller names the error
+to raise.
+"""
+
+import math
+import re
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.errors import MaterialError, SssfitError
+from sssfit.messages import shown
+
+FloatArray = npt.NDArray[np.float64]
+BoolArray = npt.NDArray[np.bool_]
+
+MOST_CHANNELS = 64
+_MOST_PHOTONS = 10**18  # a million times what one run may have
+_SHA256 = re.compile(r"[0-9a-f]{1,64}")
+
+
+def number_array(name: str, value: object, error: type[SssfitError]) -> FloatArray:
+    """Return a read-only float64 copy: a frozen record alone does not guard its arrays' contents.
+
+    Texts and booleans are not numbers, although numpy would convert them.
+    """
+    try:
+        array = np.array(value, dtype=np.float64, order="C") if _is_numeric(value) else None
+    except (TypeError, ValueError, OverflowError):  # an integer of 400 digits
+        array = None
+    if array is None:
+        raise error(f"{name} is not an array of numbers.")
+    array.flags.writeable = False
+    return array
+
+
+def json_object(name: str, value: object, error: type[SssfitError]) -> Mapping[str, Any]:
+    """Return a read-only copy, as a file will hold it: a tuple becomes a list."""
+    if not isinstance(value, Mapping):
+        raise error(f"{name} = {shown(value)}; expected a mapping.")
+    try:
+        return MappingProxyType(_json_value(name, value))
+    except RecursionError:
+        raise error(f"{name} cannot be kept as JSON: it is nested too deep.") from None
+    except ValueError as fault:
+        raise error(f"{name} cannot be kept as JSON: {fault}.") from None
+
+
+def check_names(channels: object, error: type[SssfitError] = MaterialError) -> None:
+    """Check for 1 to 64 distinct names."""
+    if not isinstance(channels, (list, tuple)):
+        raise error(f"channels = {shown(channels)}; expected a list of 1 to {MOST_CHANNELS} names.")
+    if not 1 <= len(channels) <= MOST_CHANNELS:
+        raise error(
+            f"channels = {shown(list(channels))} has {len(channels)} names; expected 1 to "
+            f"{MOST_CHANNELS}."
+        )
+    for k, channel in enumerate(channels):
+        if not _is_label(channel):
+            raise error(f"channels[{k}] = {shown(channel)}; expected a name in quotes.")
+        if channel in channels[:k]:
+            raise error(f"channels[{k}] = {shown(channel)} is there twice; rename one.")
+
+
+def check_label(name: str, value: object, error: type[SssfitError]) -> None:
+    """Check for a text that prints on one line: a newline would end a shader's comment."""
+    if not isinstance(value, str) or not value.isprintable() or not value.strip():
+        raise error(f"{name} = {shown(value)}; expected a text that prints on one line.")
+
+
+def check_provenance(meta: Mapping[str, Any], error: type[SssfitError]) -> None:
+    """Check the fields of provenance that others read; each may be missing or None."""
+    for name in ("method", "profile_method", "version"):
+        if meta.get(name) is not None:
+            check_label(f"meta.{name}", meta[name], error)
+    for name in ("material_sha256", "profile_sha256"):
+        value = meta.get(name)
+        if value is not None and not (isinstance(value, str) and _SHA256.fullmatch(value)):
+            raise error(f"meta.{name} = {shown(value)}; expected hexadecimal digits or null.")
+    for name, least, most in (("photons", 1, _MOST_PHOTONS), ("seed", 0, 2**64 - 1)):
+        value = meta.get(name)
+        if value is not None and not (type(value) is int and least <= value <= most):
+            raise error(
+                f"meta.{name} = {shown(value)}; expected a whole number from {least} to "
+                f"{most:.6g}, or null."
+            )
+    settings = meta.get("settings", {})
+    if not isinstance(settings, Mapping):
+        raise error(f"meta.settings = {shown(settings)}; expected a mapping.")
+
+
+def _is_numeric(value: object) -> bool:
+    """Whether every element is a number; looks at each one unless numpy's type says so."""
+    if isinstance(value, np.ndarray) and value.dtype.kind in "iuf":
+        return True
+    kinds = set(map(type, np.array(value, dtype=object).ravel()))
+    numbers = (int, float, np.integer, np.floating)
+    return all(issubclass(kind, numbers) and kind is not bool for kind in kinds)
+
+
+def _json_value(path: str, value: object) -> Any:
+    """Copy what JSON can hold; a ValueError names the place of what it cannot."""
+    if isinstance(value, Mapping):
+        return {_json_key(path, key): _json_value(f"{path}.{key}", value[key]) for key in value}
+    if isinstance(value, (list, tuple)):
+        return [_json_value(f"{path}[{k}]", each) for k, each in enumerate(value)]
+    if isinstance(value, str):
+        return _json_text(path, value)
+    if value is None or isinstance(value, bool):
+        return value
+    if not isinstance(value, (int, float)):
+        raise ValueError(f"{path} is of type {type(value).__name__}")  # noqa: TRY004 (one for all)
+    if not _is_finite(value):
+        raise ValueError(f"{path} = {shown(value)} is not a finite number")
+    return int(value) if isinstance(value, int) else float(value)
+
+
+def _json_key(path: str, key: object) -> str:
+    if not isinstance(key, str):
+        raise ValueError(f"{path} has the key {shown(key)}, not a text")  # noqa: TRY004
+    return _json_text(path, key)
+
+
+def _json_text(path: str, text: str) -> str:
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        raise ValueError(f"{path} holds half of a character, {shown(text)}") from None
+    return str(text)
+
+
+def _is_finite(value: float) -> bool:
+    """Whether a number is finite as a float64; an integer of 400 digits is not."""
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
+
+
+def _is_label(text: object) -> bool:
+    """Whether a text can head a column."""
+    return isinstance(text, str) and text.isprintable() and text.strip() == text != ""

@@ -1,0 +1,239 @@
+"""An error budget as a figure: `budget_figure`.
+
+The records come from ``sssfit.compare.budget``, which has computed everything. Delta E of causes do
+not add up, so they stand side by side; shares of the squared error do, so these are stacked.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from sssfit.chart.page import (
+    COLOURS,
+    LEFT,
+    RIGHT,
+    Style,
+    chart_style,
+    draw_footnotes,
+    draw_text,
+    drawable,
+    name_axes,
+    new_figure,
+    tick,
+)
+from sssfit.chart.text import count, shortened
+
+if TYPE_CHECKING:
+    from sssfit.compare.budget import Budget, Cause
+
+_BAR_INCHES = 0.3  # a picture's stacked bar
+_ROW_INCHES = 0.23  # a cause's line of markers
+_NAMES = 0.3  # of the width: where panels begin, right of the causes' names
+_HEAD_INCHES, _LEGEND_INCHES, _GAP_INCHES, _AXIS_INCHES = 0.62, 0.42, 0.62, 0.12
+_LEAST = 1e-4  # Delta E, or relative L2 in percent: smaller ones are drawn at the edge
+_WRITTEN_PERCENT = 6.0  # a share that has room for its figure in the bar
+# Okabe and Ito 2008, "Color Universal Design", with hatches that tell them apart in grey.
+_FILLS = (
+    ("#0072b2", ""),
+    ("#e69f00", "////"),
+    ("#56b4e9", ".."),
+    ("#cc79a7", "xx"),
+    ("#009e73", "\\\\\\\\"),
+    ("#bbbbbb", ""),
+)
+_MARKERS = "os^Dv"
+_PICTURES = (*COLOURS, "#cc79a7", "#444444")
+_NOTES = (
+    "Alone: one cause switched on against the exact profile's whole 2D kernel. Filled: mean over "
+    "the picture; hollow: 99th percentile. In brackets: alternatives, not in the kernel's error.",
+    "Shares: of the squared difference from the true picture, <cause, all> / <all, all>; they add "
+    "up to 100 %, below 0 where a cause makes up for others. Means and percentiles do not add up.",
+)
+
+
+def budget_figure(budgets: Budget | Sequence[Budget]) -> Figure:
+    """Draw which cause makes how much of a kernel's error, on one picture or several.
+
+    Parameters
+    ----------
+    budgets : Budget or sequence of Budget
+        Of one material and kernel; the first five are drawn.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        8 inches wide: a stacked bar for each picture, shares [%] of the squared error; under it,
+        for each cause alone, Delta E 2000 on a logarithmic axis, or relative L2 [%] where channels
+        have no colour.
+    """
+    given = list(budgets) if isinstance(budgets, Sequence) else [budgets]
+    shown, names = given[: len(_MARKERS)], _names(given[0])
+    bars, rows = _BAR_INCHES * len(shown), _ROW_INCHES * len(names)
+    with chart_style():
+        upper = _HEAD_INCHES + _LEGEND_INCHES + _AXIS_INCHES
+        lower = upper + bars + _GAP_INCHES + _LEGEND_INCHES - 0.12
+        figure = new_figure(lower + rows + 1.25)
+        _draw_head(figure, given[0])
+        draw_footnotes(figure, [*_NOTES, *_left_out(given)])
+        stacked = _panel(figure, upper, bars)
+        alone = _panel(figure, lower, rows)
+        _draw_shares(stacked, shown)
+        _draw_alone(alone, shown, names)
+    return figure
+
+
+def _panel(figure: Figure, down: float, tall: float) -> Axes:
+    """Add axes right of the names, so many inches down the page."""
+    height = figure.get_figheight()
+    return figure.add_axes((_NAMES, 1 - (down + tall) / height, RIGHT - _NAMES, tall / height))
+
+
+def _draw_head(figure: Figure, budget: Budget) -> None:
+    """Title and provenance."""
+    name = shortened(budget.material.name, 24)
+    draw_text(
+        figure,
+        0.16,
+        f"{name}: why the kernel's picture is not the true one",
+        size=12,
+        weight="bold",
+    )
+    source = budget.model or f"{count(budget.photons)} photons, seed {budget.seed}"
+    kernel, scene = budget.kernel, budget.scene
+    words = [
+        f"{source}, grid to {budget.radius_mm:.3g} mm",
+        f"{kernel.method}, {kernel.rank} term{'s' * (kernel.rank > 1)} on {kernel.pixels} pixels "
+        f"of {scene.mm_per_pixel:.4g} mm",
+        f"pictures {scene.width} x {scene.height}",
+    ]
+    draw_text(figure, 0.41, " · ".join(words))
+
+
+def _names(budget: Budget) -> list[tuple[str, str]]:
+    """Causes from the top down with the text beside them, then what they make together."""
+    measured = [each for each in budget.causes if each.score is not None]
+    inside = [(each.name, each.name) for each in measured if each.is_in_whole]
+    others = [(each.name, f"({each.name})") for each in measured if not each.is_in_whole]
+    together = [(each.name, each.name) for each in (budget.interaction, budget.whole)]
+    return [*inside, *together, *others]
+
+
+def _draw_shares(axes: Axes, budgets: Sequence[Budget]) -> None:
+    """Stack signed shares: those below 0 to the left."""
+    parts = [name for name, _ in _names(budgets[0]) if _is_part(budgets[0], name)]
+    fills = dict(zip(parts, _FILLS, strict=False))
+    fills[budgets[0].interaction.name] = _FILLS[-1]
+    for row, budget in enumerate(budgets):
+        ends = {1.0: 0.0, -1.0: 0.0}  # what is stacked so far on either side of 0
+        for name in parts:
+            percent = 100.0 * budget.share(_cause(budget, name))
+            if math.isnan(percent) or percent == 0.0:
+                continue
+            side = math.copysign(1.0, percent)
+            colour, hatch = fills[name]
+            style: Style = {"color": colour, "hatch": hatch, "edgecolor": "white", "linewidth": 0.6}
+            axes.barh(row, percent, 0.72, left=ends[side], **style)
+            if abs(percent) >= _WRITTEN_PERCENT:
+                _write_share(axes, row, ends[side] + 0.5 * percent, percent)
+            ends[side] += percent
+    axes.set_ylim(len(budgets) - 0.5, -0.5)
+    axes.set_yticks(range(len(budgets)), [drawable(shortened(b.scene.name, 24)) for b in budgets])
+    axes.axvline(0.0, color="#444444", lw=0.6)
+    axes.grid(visible=False, axis="y")
+    tick(axes.xaxis)
+    name_axes(axes, "", "share of the squared error (%)", "")
+    swatches = [
+        Patch(facecolor=fills[each][0], hatch=fills[each][1], edgecolor="white", label=each)
+        for each in parts
+    ]
+    _legend(axes, "(a) shares by cause", swatches, 3)
+
+
+def _write_share(axes: Axes, row: int, middle: float, percent: float) -> None:
+    """Put a share's figure into its part of the bar, on white: hatches are under it."""
+    box: Style = {"facecolor": "white", "edgecolor": "none", "pad": 1.2, "alpha": 0.9}
+    words = f"{percent:.0f} %"
+    axes.text(middle, row, words, ha="center", va="center", fontsize=7.5, bbox=box)
+
+
+def _draw_alone(axes: Axes, budgets: Sequence[Budget], names: Sequence[tuple[str, str]]) -> None:
+    """Draw a line a cause, a marker for each picture; hollow is the 99th percentile."""
+    is_seen = all(not math.isnan(b.whole.score.delta_e_2000_mean) for b in budgets if b.whole.score)
+    for k, budget in enumerate(budgets):
+        for row, (name, _) in enumerate(names):
+            values = _figures(_cause(budget, name), is_seen=is_seen)
+            place = row + 0.7 * (k - 0.5 * (len(budgets) - 1)) / len(budgets)
+            drawn = [max(each, _LEAST) for each in values]
+            line: Style = {"color": _PICTURES[k], "marker": _MARKERS[k], "markersize": 4.5, "lw": 0}
+            axes.plot(drawn[:1], [place], clip_on=False, zorder=3, **line)
+            axes.plot(drawn[1:], [place] * (len(drawn) - 1), mfc="white", clip_on=False, **line)
+    axes.set_xscale("log")
+    axes.set_xlim(left=_LEAST)
+    axes.set_ylim(len(names) - 0.5, -0.5)
+    axes.set_yticks(range(len(names)), [text for _, text in names])
+    axes.xaxis.set_major_formatter("{x:g}")
+    if is_seen:
+        axes.axvline(1.0, color="#444444", lw=0.8, ls=(0, (4, 1.6)), zorder=1)
+    unit = "Delta E 2000 (dashed: 1)" if is_seen else "relative L2 (%)"
+    name_axes(axes, "", f"{unit}; smaller than {_LEAST:g} at the left edge", "")
+    handles = [
+        Line2D([], [], lw=0, color=_PICTURES[k], marker=_MARKERS[k], markersize=4.5, label=label)
+        for k, label in enumerate(drawable(shortened(b.scene.name, 24)) for b in budgets)
+    ]
+    _legend(axes, "(b) each cause alone", handles, len(handles))
+
+
+def _legend(axes: Axes, title: str, handles: Sequence[Patch | Line2D], columns: int) -> None:
+    """Put a title at the left margin over a panel, and a legend beside it."""
+    figure = axes.get_figure(root=True)
+    if figure is None:
+        return
+    box = axes.get_position()
+    tall = figure.get_size_inches()[1]
+    top = box.y1 + (_LEGEND_INCHES if columns == 3 and len(handles) > 3 else 0.24) / tall
+    figure.text(LEFT, top - 0.07 / tall, title, va="center", fontweight="bold")
+    legend = figure.legend(
+        handles=list(handles),
+        ncols=columns,
+        loc="upper left",
+        bbox_to_anchor=(box.x0, top),
+        borderaxespad=0,
+        borderpad=0,
+        columnspacing=1.5,
+        fontsize=7.5,
+    )
+    for text in legend.get_texts():
+        text.set_parse_math(False)
+
+
+def _figures(cause: Cause, *, is_seen: bool) -> list[float]:
+    """Mean and 99th percentile of Delta E, or relative L2 in percent."""
+    if cause.score is None:
+        return [math.nan]
+    if not is_seen:
+        return [100.0 * cause.score.relative_l2]
+    return [cause.score.delta_e_2000_mean, cause.score.delta_e_2000_p99]
+
+
+def _cause(budget: Budget, name: str) -> Cause:
+    """Find a cause, the interaction or the whole."""
+    every = (*budget.causes, budget.interaction, budget.whole)
+    return next(each for each in every if each.name == name)
+
+
+def _is_part(budget: Budget, name: str) -> bool:
+    """Whether it is stacked: in the whole, and not the whole itself."""
+    return name != budget.whole.name and _cause(budget, name).is_in_whole
+
+
+def _left_out(budgets: Sequence[Budget]) -> list[str]:
+    """Say how many pictures are not drawn."""
+    more = len(budgets) - len(_MARKERS)
+    return [f"{more} more pictures are not drawn."] if more > 0 else []

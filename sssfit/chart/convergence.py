@@ -1,0 +1,114 @@
+"""Error of a simulation against photons and seconds, as a figure: `convergence_figure`.
+
+The record comes from ``sssfit.compare.convergence``, which has computed everything.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
+
+from sssfit.chart.page import (
+    COLOURS,
+    LEFT,
+    RIGHT,
+    Style,
+    chart_style,
+    draw_footnotes,
+    draw_text,
+    name_axes,
+    new_figure,
+)
+from sssfit.chart.text import shortened
+
+if TYPE_CHECKING:
+    from sssfit.compare.convergence import Convergence
+
+_HEIGHT_INCHES, _HEAD_INCHES = 4.2, 0.98
+_WALK: Style = {"color": COLOURS[0], "marker": "o", "markersize": 4, "linestyle": "none"}
+_EXACT: Style = {"color": COLOURS[2], "marker": "s", "markersize": 5, "linestyle": "none"}
+_HOLLOW: Style = _EXACT | {"markerfacecolor": "white"}
+
+
+def convergence_figure(found: Convergence) -> Figure:
+    """Draw the walk's error over photons, and both methods' over seconds.
+
+    Parameters
+    ----------
+    found : Convergence
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        8 inches wide; errors of F(r) as a share of the total, logarithmic on both axes.
+    """
+    with chart_style():
+        figure = new_figure(_HEIGHT_INCHES)
+        _draw_head(figure, found)
+        bottom = draw_footnotes(figure, [_NOTE])
+        left, right = figure.subplots(1, 2, sharey=True)
+        top = 1 - _HEAD_INCHES / _HEIGHT_INCHES
+        figure.subplots_adjust(LEFT, bottom, RIGHT, top, wspace=0.08)
+        _draw_photons(left, found)
+        _draw_seconds(right, found)
+        error = "error of F(r), share of the total"
+        name_axes(left, "(a) photon walk", "photons", error)
+        name_axes(right, "(b) both methods", "seconds, without compiling", "")
+        for axes in (left, right):
+            axes.set_xscale("log")
+            axes.set_yscale("log")
+            axes.xaxis.set_major_locator(LogLocator(numticks=9))
+            axes.yaxis.set_major_locator(LogLocator(numticks=9))
+            axes.xaxis.set_minor_formatter(NullFormatter())
+            axes.yaxis.set_minor_formatter(NullFormatter())
+            axes.legend(loc="lower left", fontsize=7.5)
+    return figure
+
+
+_NOTE = (
+    "Error: the largest |F - exact F| at an annulus edge, of the worst channel; F is the energy "
+    "that leaves within r. Estimate: the exact method's difference to the next coarser resolution. "
+    "Each walk has a seed of its own."
+)
+
+
+def _draw_head(figure: Figure, found: Convergence) -> None:
+    """Title, what the truth is, and the slope."""
+    name = shortened(found.exact.material_name or "", 24)
+    title = f"{name}: what accuracy costs the simulation".lstrip(": ")
+    draw_text(figure, 0.16, title, size=12, weight="bold")
+    estimate = found.resolutions[-1].estimate
+    version = found.exact.meta.get("version")
+    truth = f"against the exact solution, itself good to {estimate:.1g} of the total"
+    draw_text(figure, 0.41, f"{truth} · sssfit {version}")
+    line = found.line
+    words = f"fitted slope {line.slope:.3f} ± {line.slope_stderr:.3f}; theory -0.5"
+    draw_text(figure, 0.64, words, color="#444444")
+
+
+def _draw_photons(axes: Axes, found: Convergence) -> None:
+    """Draw walks, the line through them, and one of slope -1/2 through their middle."""
+    photons = np.array([each.photons for each in found.walks], dtype=np.float64)
+    errors = np.array([each.error for each in found.walks])
+    ends = np.array([photons.min(), photons.max()])
+    middle = np.exp(np.log(photons).mean()), np.exp(np.log(errors).mean())
+    half = middle[1] * (ends / middle[0]) ** -0.5
+    slope = f"fitted, slope {found.line.slope:.3f}"
+    axes.plot(ends, half, color="black", ls=(0, (4, 3)), lw=1.0, zorder=3, label="slope -1/2")
+    axes.plot(ends, found.line.at(ends), color=COLOURS[0], lw=2.2, alpha=0.6, label=slope)
+    axes.plot(photons, errors, label="photon walks", **_WALK)
+
+
+def _draw_seconds(axes: Axes, found: Convergence) -> None:
+    """Draw both methods by what they took; hollow: the exact method's own estimate."""
+    seconds = [each.seconds for each in found.walks]
+    axes.plot(seconds, [each.error for each in found.walks], label="photon walks", **_WALK)
+    known = [(each.seconds, each.error) for each in found.resolutions if each.error is not None]
+    if known:
+        axes.plot(*zip(*known, strict=True), label="exact, error", **_EXACT)
+    own = [(each.seconds, each.estimate) for each in found.resolutions]
+    axes.plot(*zip(*own, strict=True), label="exact, its estimate", **_HOLLOW)

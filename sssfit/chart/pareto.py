@@ -1,0 +1,379 @@
+"""Speed against accuracy of kernels, as a figure: `pareto_figure`.
+
+The record comes from ``sssfit.compare.pareto``, which has computed everything;
+``sssfit.chart.pareto`` finds room for the labels.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
+from matplotlib.transforms import Bbox
+
+from sssfit.chart.page import (
+    COLOURS,
+    LEFT,
+    RIGHT,
+    TEXT_INCHES,
+    Style,
+    chart_style,
+    draw_footnotes,
+    draw_text,
+    drawable,
+    inches,
+    name_axes,
+    new_figure,
+)
+from sssfit.chart.text import kernel_subtitle, shortened
+
+if TYPE_CHECKING:
+    from sssfit.compare.comparison import Comparison, KernelRow, Picture
+
+
+_SIZE = 7.5  # points
+_LINE_INCHES = 0.125
+_LABEL_GAP_INCHES = 0.06  # from the middle of a marker
+_ASIDE_INCHES = 0.03  # from the upright through a point, where lines of other labels are
+_MARKER_INCHES = 0.045  # its half width
+_FARTHEST = 8  # lines down that a label is moved at most
+
+
+def place_labels(
+    axes: Axes,
+    points: Sequence[tuple[float, float]],
+    labels: Sequence[str],
+    *,
+    level: float | None = None,
+) -> None:
+    """Write a label below and left of each point of a falling front, where nothing else can be.
+
+    A label that would meet another goes further down, with a line to its point. Limits and place of
+    the axes have to be final.
+
+    Parameters
+    ----------
+    axes : Axes
+    points : sequence of (x, y)
+        In data, x rising and y falling.
+    labels : sequence of str
+    level : float, optional
+        A horizontal line in data that labels stay off.
+    """
+    dpi = axes.figure.dpi
+    pixels = [axes.transData.transform(point) / dpi for point in points]
+    taken = [_marker(x, y) for x, y in pixels]
+    panel = axes.get_window_extent()
+    rim = Bbox.from_extents(*(each / dpi for each in panel.extents))
+    if level is not None:
+        height = axes.transData.transform((points[0][0], level))[1] / dpi
+        taken.append(Bbox.from_extents(rim.x0, height - 0.01, rim.x1, height + 0.01))
+    for (x, y), label in zip(pixels, labels, strict=True):
+        box = _free(x, y, inches(label, _SIZE), taken, rim)
+        if box is None:
+            continue  # the table has it
+        taken.append(box)
+        _write(axes, (x, y), box, label)
+
+
+def _free(x: float, y: float, width: float, taken: Sequence[Bbox], rim: Bbox) -> Bbox | None:
+    """Return the first place in inches that is inside the rim and meets nothing."""
+    for box in _places(x, y, width):
+        inside = box.x0 >= rim.x0 and box.x1 <= rim.x1 and box.y0 >= rim.y0 and box.y1 <= rim.y1
+        if inside and not any(box.overlaps(other) for other in taken):
+            return box
+    return None
+
+
+def _places(x: float, y: float, width: float) -> Iterator[Bbox]:
+    """Yield places by preference: below, ending or beginning at the point, then further down."""
+    for line in range(_FARTHEST):
+        top = y - _LABEL_GAP_INCHES - line * _LINE_INCHES
+        for left in (x - width - _ASIDE_INCHES, x - 0.5 * width, x + _ASIDE_INCHES):
+            yield Bbox.from_bounds(left, top - _LINE_INCHES, width, _LINE_INCHES)
+
+
+def _marker(x: float, y: float) -> Bbox:
+    half = _MARKER_INCHES
+    return Bbox.from_bounds(x - half, y - half, 2 * half, 2 * half)
+
+
+def _write(axes: Axes, point: tuple[float, float], box: Bbox, label: str) -> None:
+    """Write a label into its box, in inches, and tie it to a point that is not next to it."""
+    figure = axes.figure
+    to_data = figure.dpi_scale_trans
+    middle = 0.5 * (box.y0 + box.y1)
+    axes.text(
+        box.x0,
+        middle,
+        drawable(label),
+        size=_SIZE,
+        va="center_baseline",
+        transform=to_data,
+        parse_math=False,
+        zorder=4,
+    )
+    if point[1] - box.y1 > _LINE_INCHES:
+        ends = [point[0], min(max(point[0], box.x0), box.x1)], [point[1], box.y1]
+        axes.plot(*ends, color="#999999", lw=0.5, transform=to_data, zorder=2)
+
+
+_HEAD_INCHES = 1.24  # title, provenance, two rows of legend and the first panel's title
+_PANEL_INCHES = 2.05
+_GAP_INCHES = 0.30
+# Those of `COLOURS` and four more of Okabe and Ito, which the colour-blind tell apart too.
+_METHODS: dict[str, tuple[str, str, str]] = {
+    "svd": ("SVD", COLOURS[2], "o"),
+    "gaussians": ("sum of Gaussians", COLOURS[0], "s"),
+    "preintegrated": ("pre-integrated", COLOURS[1], "^"),
+    "guided": ("guided", "#cc79a7", "D"),
+    "artist": ("artist", "#e69f00", "v"),
+    "falloff": ("falloff", "#56b4e9", "P"),
+    "burley": ("Burley", "#000000", "X"),
+}
+_GREY = "#666666"
+_FAINT = 0.35
+_MOST_TICKS = 8
+_LANE_INCHES = 0.1  # between points of the same cost
+_JUST_NOTICEABLE = 1.0  # Delta E
+_NOTICED: Style = {"color": _GREY, "lw": 0.8, "ls": (0, (4, 2))}
+_WORTH_A_NOTE = 1e-3  # of the light
+_LEAST = {"delta-e": 1e-3, "l2": 1e-5}  # smaller errors are drawn there
+_ERRORS = {"delta-e": "mean ΔE 2000", "l2": "relative L2 error"}
+_COSTS = {
+    "passes": "one-dimensional passes over the picture",
+    "weights": "weights applied to a pixel, in all passes",
+    "seconds": "seconds per megapixel, measured",
+}
+
+
+def pareto_figure(
+    comparison: Comparison, *, error: str = "delta-e", cost: str = "weights"
+) -> Figure:
+    """Draw errors over costs, a panel for each picture, with the front as a step line.
+
+    Parameters
+    ----------
+    comparison : Comparison
+    error : str
+        "delta-e" or "l2".
+    cost : str
+        "passes", "weights" or "seconds".
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        8 inches wide, 2.35 inches a picture; both axes logarithmic, of all panels the same.
+
+    Raises
+    ------
+    RenderError
+        Delta E of other than 1 or 3 channels.
+    """
+    from sssfit.compare.comparison import check_error
+
+    check_error(error, comparison.profile.n_channels)
+    notes = _notes(comparison, error, cost)
+    many = len(comparison.pictures)
+    foot = 0.6 + 0.145 * (len(notes) + 2)
+    height = _HEAD_INCHES + many * (_PANEL_INCHES + _GAP_INCHES) - _GAP_INCHES + foot
+    with chart_style():
+        figure = new_figure(height)
+        _draw_head(figure, comparison, error, cost)
+        bottom = draw_footnotes(figure, notes)
+        panels = figure.subplots(many, 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+        gap = _GAP_INCHES / _PANEL_INCHES
+        figure.subplots_adjust(LEFT, bottom, RIGHT, 1 - _HEAD_INCHES / height, hspace=gap)
+        _limit(panels[-1], comparison, error, cost)
+        for axes, picture in zip(panels, comparison.pictures, strict=True):
+            _draw_panel(axes, comparison, picture, error, cost)
+            name_axes(axes, _panel_title(picture), "", _ERRORS[error])
+        panels[-1].set_xlabel(_COSTS[cost])
+    return figure
+
+
+def _draw_head(figure: Figure, comparison: Comparison, error: str, cost: str) -> None:
+    """Title, provenance, and a legend of the methods that are drawn."""
+    draw_text(figure, 0.16, _title(comparison, error, cost), size=12, weight="bold")
+    where = kernel_subtitle(comparison.profile, comparison.pixels, comparison.mm_per_pixel)
+    draw_text(figure, 0.41, where)
+    handles = [
+        *_method_handles(comparison),
+        Line2D([], [], color=_GREY, lw=1.0, label="Pareto front"),
+    ]
+    if error == "delta-e":
+        handles.append(Line2D([], [], label="ΔE 1, just noticeable", **_NOTICED))
+    figure.legend(
+        handles=handles,
+        ncols=math.ceil(len(handles) / 2),
+        loc="upper left",
+        bbox_to_anchor=(LEFT, 1 - 0.6 / figure.get_figheight()),
+        borderaxespad=0,
+        borderpad=0,
+        handlelength=1.6,
+        handletextpad=0.4,
+        columnspacing=1.8,
+        fontsize=8,
+    )
+
+
+def _method_handles(comparison: Comparison) -> list[Line2D]:
+    """Return a marker for each method there is, and for kernels that keep the fit's energy."""
+    drawn = {row.method: row for row in comparison.rows}
+    kept = next((row for row in comparison.rows if _is_kept(row)), None)
+    handles = [
+        Line2D([], [], label=_METHODS[method][0], **_style(drawn[method], is_kept=False))
+        for method in _METHODS
+        if method in drawn
+    ]
+    if kept is not None:
+        name = f"{_METHODS[kept.method][0]}, energy kept"
+        handles.insert(1, Line2D([], [], label=name, **_style(kept, is_kept=True)))
+    return handles
+
+
+def _draw_panel(
+    axes: Axes, comparison: Comparison, picture: Picture, error: str, cost: str
+) -> None:
+    """Draw one picture's points: the front in full, the others faint."""
+    rows, front = comparison.rows_of(picture.name), comparison.front(picture.name, error, cost)
+    lanes = [0] * len(rows) if cost == "seconds" else _lanes(rows, front, cost)
+    low, high = axes.get_xlim()
+    lane = (high / low) ** (_LANE_INCHES / TEXT_INCHES)
+    for row, number in zip(rows, lanes, strict=True):
+        x, y = _point(row, error, cost)
+        alpha = 1.0 if row in front else _FAINT
+        axes.plot(x * lane**number, y, alpha=alpha, **_style(row, is_kept=_is_kept(row)))
+    if error == "delta-e":
+        axes.axhline(_JUST_NOTICEABLE, zorder=1, **_NOTICED)
+    points = [_point(row, error, cost) for row in front]
+    if not points:
+        return
+    x_front, y_front = (list(each) for each in zip(*points, strict=True))
+    style: Style = {"where": "post", "color": _GREY, "lw": 1.0, "zorder": 2}
+    axes.step([*x_front, high], [*y_front, y_front[-1]], **style)
+    level = _JUST_NOTICEABLE if error == "delta-e" else None
+    place_labels(axes, points, [row.label for row in front], level=level)
+
+
+def _lanes(rows: Sequence[KernelRow], front: Sequence[KernelRow], cost: str) -> list[int]:
+    """Return how far to the right each row stands of its cost, so that equal costs are apart.
+
+    The front stands where its cost is; of the others each method has a lane of its own.
+    """
+    lanes = []
+    for row in rows:
+        beside = [each for each in rows if each.cost(cost) == row.cost(cost) and each not in front]
+        kinds = sorted({_kind(each) for each in beside})
+        lanes.append(0 if row in front else 1 + kinds.index(_kind(row)))
+    return lanes
+
+
+def _kind(row: KernelRow) -> tuple[int, bool]:
+    """Order of a row's method in the legend."""
+    known = list(_METHODS)
+    return known.index(row.method) if row.method in known else len(known), _is_kept(row)
+
+
+def _is_kept(row: KernelRow) -> bool:
+    """Whether the energy is as the fit left it, and not the profile's."""
+    return row.settings.get("energy") == "keep"
+
+
+def _style(row: KernelRow, *, is_kept: bool) -> Style:
+    """Colour and marker of a row's method; hollow where the energy is as the fit left it."""
+    _, colour, marker = _METHODS.get(row.method, (row.method, _GREY, "*"))
+    return {
+        "color": colour,
+        "marker": marker,
+        "ms": 5,
+        "mew": 0.9,
+        "ls": "none",
+        "zorder": 3,
+        "markerfacecolor": "white" if is_kept else colour,
+    }
+
+
+def _point(row: KernelRow, error: str, cost: str) -> tuple[float, float]:
+    """Where a row is drawn; an error too small for the axis at its foot."""
+    return row.cost(cost), max(row.error(error), _LEAST[error])
+
+
+def _limit(axes: Axes, comparison: Comparison, error: str, cost: str) -> None:
+    """Set the axes that all panels share, with room for labels at the left and below."""
+    points = [_point(row, error, cost) for row in comparison.rows]
+    costs = [x for x, _ in points]
+    errors = [y for _, y in points if math.isfinite(y)] or [1.0]
+    axes.set_xscale("log")
+    axes.set_yscale("log")
+    most = max(max(costs), 1.5 * min(costs))
+    axes.set_xlim(min(costs) * (min(costs) / most) ** 0.16, most * (most / min(costs)) ** 0.08)
+    top = max(*errors, 1.3 * _JUST_NOTICEABLE) if error == "delta-e" else max(errors)
+    least = min(*errors, top / 10.0)
+    axes.set_ylim(least * (least / top) ** 0.16, top * (top / least) ** 0.06)
+    axes.yaxis.set_major_locator(LogLocator(numticks=6))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    if cost == "seconds" or len(set(costs)) > _MOST_TICKS:
+        axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5), numticks=12))
+    else:
+        axes.xaxis.set_major_locator(FixedLocator(sorted(set(costs))))
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+
+
+def _title(comparison: Comparison, error: str, cost: str) -> str:
+    """Name the material and what is held against what."""
+    name = comparison.profile.material_name
+    what = f"{_ERRORS[error]} against {'time' if cost == 'seconds' else cost}"
+    return f"{shortened(name, 24)}: {what}" if name else what.capitalize()
+
+
+def _panel_title(picture: Picture) -> str:
+    """Name the picture, its size and how bright it is looked at."""
+    size = f"{picture.width} × {picture.height} pixels"  # noqa: RUF001 (a product)
+    return f"{shortened(picture.name, 24)}, {size}, exposure {picture.exposure:.3g}"
+
+
+def _notes(comparison: Comparison, error: str, cost: str) -> list[str]:
+    """Say what errors and costs are, and who is not drawn."""
+    first = {
+        "delta-e": "ΔE 2000 of the picture by the kernel against that by the profile's whole 2D "
+        "kernel, in sRGB at the exposure.",
+        "l2": "Relative L2 of linear light against the picture by the profile's whole 2D kernel.",
+    }[error]
+    second = {
+        "passes": "Passes: two a term, one along x and one along y.",
+        "weights": f"Weights: passes times the {comparison.pixels} pixels of a pass; one weight "
+        "serves all channels. No bilinear taps, zeros counted.",
+        "seconds": f"Seconds: wall time on {_threads(comparison)} of this machine, float64, all "
+        "channels, the least of several. The front is of two digits; zeros at a pass's "
+        "ends cost nothing.",
+    }[cost]
+    third = "Faint: another kernel is no worse in both."
+    if cost != "seconds":
+        third += " Of one cost they stand side by side, to the right of it."
+    notes = [f"{first} {second} {third}"]
+    if any(picture.name in ("disk", "edge") for picture in comparison.pictures):
+        notes.append(
+            f"Of disk and edge, what is within {comparison.support_mm:.3g} mm of light or border "
+            "counts: the reach of 99.9 % of the profile."
+        )
+    if comparison.missing_share.max() >= _WORTH_A_NOTE:
+        notes.append(
+            f"Beyond the profile's grid lies up to {100.0 * comparison.missing_share.max():.2g} % "
+            "of a channel's light: true pictures have it spread evenly, around a disk not at all; "
+            "kernels but those with energy kept have it near the beam."
+        )
+    if comparison.left_out:
+        notes.append(f"Could not be fitted: {', '.join(name for name, _ in comparison.left_out)}.")
+    return notes
+
+
+def _threads(comparison: Comparison) -> str:
+    return "1 thread" if comparison.threads == 1 else f"{comparison.threads} threads"

@@ -1,0 +1,161 @@
+"""The singular values of a profile's kernel, as a figure: `spectrum_figure`.
+
+The record comes from ``sssfit.compare.spectrum``, which has computed everything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+
+from sssfit.arrays import FloatArray
+from sssfit.chart.page import (
+    COLOURS,
+    LEFT,
+    LINE_STYLES,
+    RC,
+    RIGHT,
+    WIDTH_INCHES,
+    Style,
+    chart_style,
+    draw_footnotes,
+    draw_text,
+    fitting,
+    name_axes,
+    new_figure,
+)
+from sssfit.chart.text import kernel_subtitle, shortened, spread
+
+if TYPE_CHECKING:
+    from sssfit.compare.spectrum import Spectrum
+
+HEIGHT_INCHES = 4.4
+_MOST_CHANNELS = 3
+_MOST_TERMS = 12
+_DECADES = 6  # of a share that are drawn at most
+_MARKERS = "os^"
+_ROW_INCHES = 0.165
+_COLUMNS = (0.30, 0.50, 0.70)  # of the width: the legend's figures
+_HEADS = ("first value, squared", "first value, absolute", "terms for an error of 1 %")
+
+
+def spectrum_figure(spectrum: Spectrum) -> Figure:
+    """Draw what share of the kernel each singular value has, in both readings of "energy".
+
+    Parameters
+    ----------
+    spectrum : Spectrum
+        Of more than three channels the first, the middle and the last one are drawn.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        8 x 4.4 inches: shares [%] of the sum of squares and of the sum of absolute values over the
+        number of the term, logarithmic; hollow where the eigenvalue is negative.
+    """
+    shown = spread(spectrum.profile.n_channels, _MOST_CHANNELS)
+    with chart_style():
+        figure = new_figure(HEIGHT_INCHES)
+        top = _draw_head(figure, spectrum, shown)
+        bottom = draw_footnotes(figure, _notes(spectrum, shown))
+        left, right = figure.subplots(1, 2, sharey=True)
+        figure.subplots_adjust(LEFT, bottom, RIGHT, top, wspace=0.08)
+        _draw_shares(left, spectrum, spectrum.squared_share, shown)
+        _draw_shares(right, spectrum, spectrum.absolute_share, shown)
+        term = "term, largest first"
+        name_axes(left, "(a) of the sum of squares", term, "share of the kernel (%)")
+        name_axes(right, "(b) of the sum of absolute values", term, "")
+        _limit(left, spectrum, shown)
+    return figure
+
+
+def _draw_head(figure: Figure, spectrum: Spectrum, shown: Sequence[int]) -> float:
+    """Title, provenance and a legend with figures; the height of what is left, as a fraction."""
+    draw_text(figure, 0.16, _title(spectrum), size=12, weight="bold")
+    draw_text(
+        figure, 0.41, kernel_subtitle(spectrum.profile, spectrum.pixels, spectrum.mm_per_pixel)
+    )
+    grey: Style = {"color": "#444444", "size": 8}
+    down = 0.68
+    for left, head in zip(_COLUMNS, _HEADS, strict=True):
+        draw_text(figure, down, head, left=left, **grey)
+    for k, channel in enumerate(shown):
+        down += _ROW_INCHES
+        y = 1 - down / HEIGHT_INCHES
+        x = [LEFT, LEFT + 0.025, LEFT + 0.05]
+        figure.add_artist(Line2D(x, [y] * 3, markevery=[1], **_style(k)))
+        whole = spectrum.profile.channels[channel]
+        room = WIDTH_INCHES * (_COLUMNS[0] - LEFT - 0.06) - 0.1
+        name = fitting([shortened(whole), shortened(whole, 6)], RC["font.size"], room)
+        draw_text(figure, down, name, left=LEFT + 0.06)
+        for left, figure_text in zip(_COLUMNS, _row(spectrum, channel), strict=True):
+            draw_text(figure, down, figure_text, left=left, size=8)
+    return 1 - (down + 0.42) / HEIGHT_INCHES
+
+
+def _style(k: int) -> Style:
+    """Colour, dashes and marker of the k-th channel drawn: told apart without colour as well."""
+    return {
+        "color": COLOURS[k],
+        "linestyle": LINE_STYLES[k],
+        "marker": _MARKERS[k],
+        "markersize": 4.5,
+        "lw": 1.0,
+    }
+
+
+def _draw_shares(axes: Axes, spectrum: Spectrum, shares: FloatArray, shown: Sequence[int]) -> None:
+    """One line a channel; hollow markers for negative eigenvalues."""
+    terms = np.arange(1, min(_MOST_TERMS, len(shares)) + 1)
+    for k, channel in enumerate(shown):
+        percent = 100.0 * shares[: terms.size, channel]
+        values = spectrum.values[: terms.size, channel]
+        axes.plot(terms, np.where(percent > 0.0, percent, np.nan), **_style(k))
+        below = np.where(values < 0.0, percent, np.nan)
+        hollow = _style(k) | {"linestyle": "none", "markerfacecolor": "white", "zorder": 3}
+        axes.plot(terms, below, **hollow)
+    axes.set_yscale("log", nonpositive="clip")
+    axes.set_xlim(0.5, max(terms[-1], 2) + 0.5)
+    axes.xaxis.set_major_locator(MaxNLocator(12, integer=True))
+
+
+def _limit(axes: Axes, spectrum: Spectrum, shown: Sequence[int]) -> None:
+    """Set the axis that both panels share: percent, six decades at most."""
+    squared = 100.0 * spectrum.squared_share[:_MOST_TERMS, shown]
+    least = float(squared[squared > 0.0].min(initial=100.0))
+    axes.set_ylim(max(least / 2.0, 10.0 ** (2 - _DECADES)), 160.0)
+    axes.yaxis.set_major_locator(LogLocator(numticks=8))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _title(spectrum: Spectrum) -> str:
+    """Name the material."""
+    name, what = spectrum.profile.material_name, "energy of the kernel's singular values"
+    return f"{shortened(name, 24)}: {what}" if name else what.capitalize()
+
+
+def _row(spectrum: Spectrum, channel: int) -> list[str]:
+    """Figures of one channel in the legend."""
+    first = (spectrum.squared_share[0, channel], spectrum.absolute_share[0, channel])
+    if not first[0] > 0.0:
+        return ["returns no light", "", ""]
+    return [*(f"{100.0 * each:.1f} %" for each in first), str(spectrum.rank_for(0.01, channel))]
+
+
+def _notes(spectrum: Spectrum, shown: Sequence[int]) -> list[str]:
+    """Say what is drawn, and what is left out."""
+    notes = [
+        "Term: a horizontal and a vertical pass. The squares that N terms leave are the square of "
+        "the relative Frobenius error of the best N-term kernel. Hollow: negative eigenvalue."
+    ]
+    left = spectrum.profile.n_channels - len(shown)
+    if left:
+        notes.append(f"{left} channels between these are not drawn.")
+    return notes

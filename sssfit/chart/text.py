@@ -1,0 +1,184 @@
+"""What a chart says about a profile in words and numbers."""
+
+import math
+
+import numpy as np
+
+from sssfit.arrays import FloatArray
+from sssfit.chart.data import Picture
+from sssfit.profile import Profile
+from sssfit.profile.bins import LEAST_HITS
+
+WEIGHTED = r"$2\pi r\,R_d$ (1/mm)"
+_METHODS = {
+    "montecarlo": "Monte Carlo",
+    "exact": "Exact solution",
+    "dipole": "Dipole",
+    "dipole-grosjean": "Dipole, Grosjean's D",
+    "multipole": "Multipole",
+    "burley": "Normalised diffusion",
+    "gaussians": "Sum of Gaussians",
+}
+_MOST_IN_LEGEND = 8
+_SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+
+
+def title(profile: Profile) -> str:
+    """Name the material."""
+    name, what = profile.material_name, "diffuse reflectance profile"
+    if profile.meta.get("checkpoint"):
+        what += " so far"
+    return f"{shortened(name, 24)}: {what}" if name else what.capitalize()
+
+
+def legend_title(profile: Profile) -> str:
+    """Say what stands beside the channels."""
+    if not (profile.diffuse_reflectance_stderr > 0).any():
+        return "Total diffuse reflectance"
+    kind = "estimated" if profile.photons is None else "standard"
+    return f"Total diffuse reflectance ± {kind} error"
+
+
+def subtitle(profile: Profile) -> str:
+    """Say how the profile was made, and on what grid."""
+    meta = profile.meta
+    parts = [method_name(meta.get("method"))] if meta.get("method") else []
+    if profile.photons is not None:
+        parts.append(f"{count(profile.photons)} photons, seed {meta.get('seed', 'unknown')}")
+    parts.append(grid(profile))
+    if version := meta.get("version"):
+        parts.append(f"sssfit {shortened(str(version))}")
+    return " · ".join(parts)
+
+
+def kernel_subtitle(profile: Profile, pixels: int, mm_per_pixel: float) -> str:
+    """Say which pixels a profile's kernel is on, and how the profile was made."""
+    meta = profile.meta
+    parts = [method_name(meta["method"])] if meta.get("method") else []
+    parts.append(f"{pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm")
+    if version := meta.get("version"):
+        parts.append(f"sssfit {shortened(version)}")
+    return " · ".join(parts)
+
+
+def method_name(method: object) -> str:
+    """Name a method for people."""
+    return _METHODS.get(str(method), shortened(str(method)))
+
+
+def grid(profile: Profile) -> str:
+    """Say how many annuli there are, how wide if all are, and how far they reach."""
+    width_mm = np.diff(profile.r_edges_mm)
+    spacing = f" of {width_mm[0]:.4g} mm" if np.allclose(width_mm, width_mm[0]) else ""
+    return f"{profile.n_annuli} annuli{spacing} to r = {profile.r_edges_mm[-1]:.4g} mm"
+
+
+def count(number: int) -> str:
+    """Write a count: 10⁷, 2.5×10⁶, or in full where three digits are not enough."""
+    exponent = len(str(number)) - 1
+    mantissa = number / 10**exponent
+    if exponent < 4 or round(mantissa, 2) * 10**exponent != number:
+        return f"{number:,}"
+    power = "10" + str(exponent).translate(_SUPERSCRIPTS)
+    return power if mantissa == 1 else f"{mantissa:g}×{power}"  # noqa: RUF001 (a product)
+
+
+def channel_label(profile: Profile, channel: int, *, is_drawn: bool) -> str:
+    """Name a channel with its total diffuse reflectance and standard error."""
+    total = with_error(
+        float(profile.diffuse_reflectance[channel]),
+        float(profile.diffuse_reflectance_stderr[channel]),
+    )
+    label = f"{shortened(profile.channels[channel])}  {total}"
+    return label if is_drawn else f"{label} (too few photons to draw)"
+
+
+def in_legend(n_channels: int) -> list[int]:
+    """Channels that the legend names: all, or eight spread from the first to the last."""
+    return spread(n_channels, _MOST_IN_LEGEND)
+
+
+def spread(n_channels: int, most: int) -> list[int]:
+    """All channels, or so many of them spread from the first to the last."""
+    if n_channels <= most:
+        return list(range(n_channels))
+    return [int(each) for each in np.linspace(0, n_channels - 1, most).round()]
+
+
+def with_error(value: float, stderr: float) -> str:
+    """Write a value and its standard error, two digits of which set the decimals."""
+    if not stderr > 0:
+        return f"{value:.4g}"
+    decimals = min(max(1 - math.floor(math.log10(stderr)), 0), 12)
+    return f"{value:.{decimals}f} ± {stderr:.{decimals}f}"
+
+
+def shortened(name: str, longest: int = 12) -> str:
+    """Keep a name from running out of its place: its beginning and its end stay.
+
+    Names that have to be told apart differ at the end more often than not: infrared-850nm.
+    """
+    if len(name) <= longest:
+        return name
+    head = (longest - 1) // 2
+    return f"{name[:head]}…{name[len(name) - (longest - 1 - head) :]}"
+
+
+def footnotes(profile: Profile, image: str) -> list[str]:
+    """Say what the curves leave out and what they and the ``image`` mean."""
+    notes = [
+        f"Beyond the grid (r > {profile.r_edges_mm[-1]:.4g} mm): {_beyond(profile)} of diffuse. "
+        f"Specular reflectance ({profile.specular_reflectance:.4g}) is not included.",
+    ]
+    if profile.photons is not None:
+        notes.append(
+            f"Steps: means over annuli merged to {LEAST_HITS} effective photons or more; curves "
+            "end where there are too few. Bands: ±1 standard error."
+        )
+    if profile.n_channels > _MOST_IN_LEGEND:
+        others = profile.n_channels - _MOST_IN_LEGEND
+        notes.append(f"Thin lines: the {others} channels not named above, without bands.")
+    return [*notes, image] if image else notes
+
+
+def image_note(profile: Profile, image: Picture) -> str:
+    """Say how the 2D profile became colours or shades."""
+    if profile.n_channels != 3:
+        return ""
+    named = "" if profile.channels == ("R", "G", "B") else " of the channels as R, G, B"
+    return (
+        f"(d): linear light{named}, tone curve x/(1 + x) with x = 1 at "
+        f"{image.exposure_per_mm2:.2g}/mm², encoded as sRGB."
+    )
+
+
+def path_label(profile: Profile, paths_mm: FloatArray) -> str:
+    """Name the axis in mean free paths, with the lengths where they fit."""
+    if profile.n_channels > 4:
+        return "r (mean free paths)"
+    lengths = ", ".join(
+        f"{shortened(name)} {_digits(path_mm)}"
+        for name, path_mm in zip(profile.channels, paths_mm, strict=True)
+    )
+    # 48 letters are as wide as the panel.
+    return f"r (mean free paths: {lengths} mm)" if len(lengths) <= 26 else "r (mean free paths)"
+
+
+def _beyond(profile: Profile) -> str:
+    """Each channel's share beyond the grid; of many, the largest."""
+    diffuse = profile.diffuse_reflectance
+    shares = np.divide(profile.beyond_grid, diffuse, out=np.zeros_like(diffuse), where=diffuse > 0)
+    if profile.n_channels <= 4:
+        pairs = zip(profile.channels, shares, strict=True)
+        return ", ".join(f"{shortened(name)} {_percent(share)}" for name, share in pairs)
+    worst = int(np.argmax(shares))
+    return f"at most {_percent(shares[worst])} ({shortened(profile.channels[worst])})"
+
+
+def _digits(value: float) -> str:
+    """Three significant digits, trailing zeros too."""
+    return f"{value:#.3g}".rstrip(".")
+
+
+def _percent(share: float) -> str:
+    return "<0.0001 %" if 0 < share < 1e-6 else f"{100.0 * share:.2g} %"

@@ -1,0 +1,1 @@
+"""The cheapest kernel for a material, a view and a tolerance."""

@@ -1,0 +1,1 @@
+"""Files of other programs: MCML's, tables in CSV, pictures."""

@@ -1,0 +1,241 @@
+"""MCML input files (``.mci``): the runs they describe, as materials and grids in mm.
+
+The format is that of MCML 1.2.2: L. Wang, S. L. Jacques, "Monte Carlo modeling of light transport
+in multi-layered tissues in standard C" (the manual), 1992-1995, section 9.1; Wang, Jacques, Zheng,
+Computer Methods and Programs in Biomedicine 47, 1995. A file holds a version (1.0), the number of
+runs, and for each run from the top down::
+
+    skin.mco  A                  # output file, format: A is ASCII
+    1000000                      # photons
+    0.01  0.01                   # dz dr [cm]
+    40  50  1                    # number of dz, dr, da
+    2                            # number of layers
+    1.0                          # n above
+    1.37  1  100  0.9  0.1       # n mua mus g d of each layer: 1/cm, 1/cm, 1, cm
+    1.37  1  10   0    1E8
+    1.0                          # n below
+
+Only ratios of refractive indices count, so n may be below 1; g = 1 is no scattering at all. What
+MCML writes in turn is read by ``sssfit.formats.mco``.
+"""
+
+import math
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+
+from sssfit.errors import MaterialError, SssfitError
+from sssfit.formats._mci_lines import INPUT_COMMENT, Line, Lines, other_version
+from sssfit.grid import MOST_ANNULI, RadialGrid
+from sssfit.material import Layer, Material
+from sssfit.material.checks import LEAST_ETA, MOST_ETA
+from sssfit.messages import printable, shown
+from sssfit.text import read_text
+
+CHANNEL = "mono"
+SEMI_INFINITE_CM = 1e6  # 10 km; the manual writes 1E8 cm, "Separable Subsurface Scattering" 1e7
+
+_MOST = 10**12
+_LENGTH = "a length above 0, in cm"
+_COEFFICIENT = "a number of 0 or more, in 1/cm"
+_INDEX = f"a refractive index from {LEAST_ETA} to {MOST_ETA}"
+
+# The columns of a layer's line: name, what will do, what to say was expected, power of ten to mm.
+_COLUMNS: tuple[tuple[str, Callable[[float], bool], str, int], ...] = (
+    ("n", lambda v: LEAST_ETA <= v <= MOST_ETA, _INDEX, 0),
+    ("mua", lambda v: 0 <= v <= 1e9, _COEFFICIENT, -1),
+    ("mus", lambda v: 0 <= v <= 1e9, _COEFFICIENT, -1),
+    ("g", lambda v: -1 < v <= 1, "a number above -1 and up to 1", 0),
+    ("d", lambda v: 1e-9 < v < 1e300, _LENGTH, 1),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class MciRun:
+    """One run of an MCML input file.
+
+    Parameters
+    ----------
+    material : Material
+        Of one channel, "mono", named after the output file. A last layer of 1e6 cm or more is
+        semi-infinite, and the index given for what lies below it is ignored.
+    grid : RadialGrid
+        As many annuli as the file has dr. MCML counts what leaves further out into the last one; a
+        profile keeps it apart.
+    photons : int
+        Photons to trace.
+    output : str
+        The output file as MCML would name it.
+    depth_bins, angle_bins : int
+        MCML's numbers of dz and da, by which its output is laid out; nothing here depends on them.
+    """
+
+    material: Material
+    grid: RadialGrid
+    photons: int
+    output: str
+    depth_bins: int
+    angle_bins: int
+
+
+def load_mci(path: str | Path) -> tuple[MciRun, ...]:
+    """Read the runs of an MCML input file; see `parse_mci`."""
+    text = read_text(path, str(path), expected="an MCML input file", error=MaterialError)
+    with text.hinting(MaterialError) as content:
+        return parse_mci(content, str(path))
+
+
+def parse_mci(text: str, origin: str) -> tuple[MciRun, ...]:
+    r"""Read the runs of an MCML input file from its text.
+
+    Parameters
+    ----------
+    text : str
+        The whole file, lines ending in newline characters.
+    origin : str
+        The file it came from: stands first in every message.
+
+    Returns
+    -------
+    tuple of MciRun
+        In the order of the file; at least one.
+
+    Raises
+    ------
+    MaterialError
+        One line with the origin, the line's number, what it holds and what was expected.
+
+    Examples
+    --------
+    >>> text = "1.0\n1\nskin.mco A\n1000\n0.1 0.1\n1 50 1\n1\n1.0\n1.4 1.5 100 0.9 1E8\n1.0"
+    >>> run, = parse_mci(text, "skin.mci")
+    >>> run.material.layers[0].sigma_a_per_mm.tolist(), run.grid.dr_mm
+    ([0.15], 1.0)
+    """
+    lines = Lines(text, origin, comment=INPUT_COMMENT, error=MaterialError)
+    _take_version(lines)
+    count_line = lines.take_words("the number of runs")
+    count = lines.whole(count_line, 0, "the number of runs", _MOST)
+    runs: dict[str, MciRun] = {}
+    for k in range(1, count + 1):
+        at = lines.peek()
+        which = f"run {k} of {count}"
+        run = read_run(lines, which, f"{Path(origin).name}, {which} (MCML)")
+        if run.material.name.lower() in runs:  # and some file systems know no capitals
+            raise lines.failure(
+                at.number if at else 0,
+                f"run {k} writes {shown(run.output)}, and an earlier run has the same name; give "
+                "every run an output file of its own.",
+            )
+        runs[run.material.name.lower()] = run
+    if (extra := lines.peek()) is not None:
+        raise lines.failure(
+            extra.number,
+            f"{shown(' '.join(extra.words))} follows the last run; line {count_line.number} "
+            f"announces {count}. Raise that number, or put a # before what is a comment.",
+        )
+    return tuple(runs.values())
+
+
+def _take_version(lines: Lines) -> None:
+    """Take the first line; one without a version is a foreign file's."""
+    line = lines.take("the file version, 1.0")
+    if (version := other_version(line.words[0])) is not None:
+        raise lines.failure(
+            line.number,
+            f"this is a file of MCML {version}; only the input of MCML 1 (version 1.0) is read. "
+            "Write its layers in that form.",
+        )
+    if line.words != ("1.0",):
+        raise lines.failure(
+            line.number,
+            f"not an MCML input file: it begins with {shown(' '.join(line.words))}; expected the "
+            "file version, 1.0.",
+        )
+
+
+def read_run(lines: Lines, which: str, source: str) -> MciRun:
+    """Take the lines of one run, which MCML's output repeats; ``which`` names it in messages."""
+    head = lines.take_words(f"the output file of {which}", "its format A")
+    output, form = head.words
+    if form.upper() not in ("A", "B"):
+        raise lines.failure(head.number, f"the format is {shown(form)}; expected A or B.")
+    at = lines.take_words("the number of photons")
+    photons = lines.whole(at, 0, "the number of photons", _MOST)
+    at = lines.take_words("dz", "dr")
+    lines.real(at, 0, "dz", _is_spacing, _LENGTH)
+    dr_mm = lines.real(at, 1, "dr", _is_spacing, _LENGTH, tenfold=1)
+    names = ("number of dz", "number of dr", "number of da")
+    at = lines.take_words(*names)
+    n_z, n_r, n_a = (lines.whole(at, k, name, MOST_ANNULI) for k, name in enumerate(names))
+    layers, eta_above, eta_below = _read_stack(lines)
+    try:
+        material = Material(
+            name=_name_of(output),
+            channels=(CHANNEL,),
+            layers=layers,
+            source=printable(source),
+            eta_above=eta_above,
+            eta_below=eta_below,
+        )
+    except SssfitError as error:
+        raise lines.failure(head.number, f"{which}: {error}") from None
+    return MciRun(material, RadialGrid(dr_mm, n_r), photons, output, n_z, n_a)
+
+
+def _read_stack(lines: Lines) -> tuple[tuple[Layer, ...], float, float]:
+    """Take the number of layers, n above, the layers and n below."""
+    at = lines.take_words("the number of layers")
+    count = lines.whole(at, 0, "the number of layers", MOST_ANNULI)
+    at = lines.take_words("n above the layers")
+    eta_above = lines.real(at, 0, "n above", *_COLUMNS[0][1:3])
+    layers = tuple(_read_layer(lines, k, count) for k in range(1, count + 1))
+    at = lines.take_words("n below the layers")
+    eta_below = lines.real(at, 0, "n below", *_COLUMNS[0][1:3])
+    return layers, eta_above, eta_below if math.isfinite(layers[-1].thickness_mm) else 1.0
+
+
+def _read_layer(lines: Lines, k: int, count: int) -> Layer:
+    """Take the line of layer k of ``count``, from 1."""
+    line = lines.take_words(*(f"{column[0]} of layer {k} of {count}" for column in _COLUMNS))
+    eta, sigma_a, sigma_s, g, thickness_mm = (
+        lines.real(line, c, name, allowed, expected, tenfold=tenfold)
+        for c, (name, allowed, expected, tenfold) in enumerate(_COLUMNS)
+    )
+    if thickness_mm >= 10.0 * SEMI_INFINITE_CM:
+        _check_ground(lines, line, k, count, is_clear=sigma_a + sigma_s == 0)
+        thickness_mm = math.inf
+    try:
+        coefficients = np.array([sigma_a]), np.array([sigma_s])
+        return Layer(eta, np.array([g]), *coefficients, thickness_mm)
+    except MaterialError as error:
+        raise lines.failure(line.number, f"layer {k}, in mm: {error}") from None
+
+
+def _check_ground(lines: Lines, line: Line, k: int, count: int, *, is_clear: bool) -> None:
+    """Refuse a layer without a bottom where there can be none."""
+    if k < count:
+        raise lines.failure(
+            line.number,
+            f"d = {shown(line.words[4])} of layer {k} of {count}; only the last layer may be "
+            f"{SEMI_INFINITE_CM:g} cm thick or more, semi-infinite. Are there more layers?",
+        )
+    if is_clear:
+        raise lines.failure(
+            line.number,
+            f"layer {k} is clear (mua = mus = 0) and has no bottom; leave it out and give its n = "
+            f"{line.words[0]} as n below.",
+        )
+
+
+def _is_spacing(value: float) -> bool:
+    return 1e-9 <= value <= 1e9
+
+
+def _name_of(output: str) -> str:
+    """Name a material after the output file, with what file names here may hold."""
+    stem = PurePosixPath(output.replace("\\", "/")).stem
+    return re.sub(r"[^A-Za-z0-9._+-]", "_", stem).lstrip("._+-")[:100] or "mcml"

@@ -1,0 +1,199 @@
+"""The file of a separable kernel: JSON that a person can read and a shader author can parse.
+
+Numbers are written as the shortest decimals that read back to the same bits.
+"""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+
+from sssfit.arrays import FloatArray
+from sssfit.errors import KernelError
+from sssfit.files import has_mark, read_at_most, reason
+from sssfit.kernel import schema
+from sssfit.messages import shown
+
+if TYPE_CHECKING:
+    from sssfit.kernel import SeparableKernel
+
+
+FORMAT = "sssfit.kernel/1"
+MARK = b'"sssfit.kernel/'  # by which a file is ours, however damaged
+_REMEDY = "name a .kernel.json file, as `sssfit fit` writes it"
+MOST_BYTES = 500_000_000  # 16000 pixels, 10 terms and 64 channels are 200 MB
+_ROUNDING = 1e-9  # relative; sums of pixels may be taken in another order
+
+
+def content(kernel: "SeparableKernel") -> dict[str, Any]:
+    """Return what the file holds; NaN becomes None."""
+    return {
+        "format": FORMAT,
+        "method": kernel.method,
+        "rank": kernel.rank,
+        "mm_per_pixel": kernel.mm_per_pixel,
+        "pixels": kernel.pixels,
+        "support_mm": kernel.support_mm,
+        "channels": list(kernel.channels),
+        "energy": kernel.energy.tolist(),
+        "scale": kernel.scale.tolist(),
+        "errors": {
+            "relative_frobenius": _or_none(kernel.relative_frobenius_error),
+            "energy": _or_none(kernel.energy_error),
+        },
+        "parameters": dict(kernel.parameters),
+        "meta": dict(kernel.meta),
+        "terms": [
+            {"sign": [int(each) for each in signs], "weights": weights.tolist()}
+            for signs, weights in zip(kernel.signs, kernel.weights, strict=True)
+        ],
+    }
+
+
+def pack(kernel: "SeparableKernel") -> bytes:
+    """Return the bytes of the file: one line for each key, one for each term."""
+    whole = content(kernel)
+    terms = ",\n  ".join(_line(each) for each in whole.pop("terms"))
+    lines = [f"{_line(key)}: {_line(value)}" for key, value in whole.items()]
+    return ("{\n " + ",\n ".join([*lines, f'"terms": [\n  {terms}\n ]']) + "\n}\n").encode()
+
+
+def unpack(source: str | Path | BinaryIO, origin: str) -> dict[str, Any]:
+    """Return the fields of a kernel from a path or a binary stream.
+
+    Raises
+    ------
+    KernelError
+        One line that names the origin and the place in the file.
+    """
+    whole = _parsed(_read(source, origin), origin)
+    try:
+        schema.check(whole, schema.schema())
+        _check_sizes(whole)
+        signs = np.array([term["sign"] for term in whole["terms"]], dtype=np.float64)
+        weights = np.array([term["weights"] for term in whole["terms"]], dtype=np.float64)
+        _check_derived(whole, signs, weights)
+    except KernelError as error:
+        raise KernelError(f"{origin}: {error} Fit the kernel again.") from None
+    errors = whole["errors"]
+    fields = {key: whole[key] for key in ("method", "channels", "parameters", "meta")}
+    return fields | {
+        "mm_per_pixel": float(whole["mm_per_pixel"]),
+        "signs": signs,
+        "weights": weights,
+        "relative_frobenius_error": _or_nan(errors["relative_frobenius"]),
+        "energy_error": _or_nan(errors["energy"]),
+        "scale": np.array(whole["scale"], dtype=np.float64),
+    }
+
+
+def is_kernel_file(path: Path) -> bool:
+    """Whether a file is a kernel of any version, by the format it names."""
+    return has_mark(path, {b"{": b'"format": "sssfit.kernel/'})
+
+
+def _read(source: str | Path | BinaryIO, origin: str) -> bytes:
+    """Read it all, up to a limit."""
+    try:
+        if isinstance(source, str | Path):
+            with Path(source).open("rb") as file:
+                text = read_at_most(file, MOST_BYTES + 1)
+        else:
+            text = read_at_most(source, MOST_BYTES + 1)
+    except OSError as error:
+        raise KernelError(f"{origin}: {reason(error)}.") from None
+    if len(text) > MOST_BYTES:
+        raise KernelError(f"{origin}: over {MOST_BYTES:,} bytes; this is not a kernel file.")
+    return text
+
+
+def _parsed(text: bytes, origin: str) -> Mapping[str, Any]:
+    """Parse JSON and look at its format."""
+    try:
+        whole = json.loads(text, object_pairs_hook=_once_each, parse_constant=_no_number)
+    except (ValueError, RecursionError) as error:
+        if MARK not in text:
+            raise KernelError(f"{origin}: not a kernel; {_REMEDY}.") from None
+        if isinstance(error, KernelError):
+            raise KernelError(f"{origin}: {error}; fit the kernel again.") from None
+        how = "; save it as UTF-8" if isinstance(error, UnicodeDecodeError) else ", or cut short"
+        raise KernelError(
+            f"{origin}: the kernel is damaged (not valid JSON{how}); make it again."
+        ) from None
+    found = whole.get("format") if isinstance(whole, dict) else None
+    if found == FORMAT:
+        return dict(whole)
+    if isinstance(found, str) and found.startswith("sssfit.kernel/"):
+        raise KernelError(f"{origin}: format {shown(found)}; expected {FORMAT!r}.")
+    said = "" if found is None else f": it has format {shown(found)}"
+    raise KernelError(f"{origin}: not a kernel{said}; {_REMEDY}.")
+
+
+def _once_each(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Make an object, in which JSON itself would allow a key twice."""
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        names = [name for name, _ in pairs]
+        twice = next(name for name in names if names.count(name) > 1)
+        raise KernelError(f"{shown(twice)} is there twice")
+    return found
+
+
+def _no_number(text: str) -> float:
+    raise KernelError(f"it holds {text}, which is not a number of JSON")
+
+
+def _check_sizes(whole: Mapping[str, Any]) -> None:
+    """Hold every list against the channels, and the terms against one another."""
+    channels, terms = len(whole["channels"]), whole["terms"]
+    pixels = len(terms[0]["weights"])
+    lists = {"energy": whole["energy"], "scale": whole["scale"]}
+    lists |= {f"errors.{name}": whole["errors"][name] for name in ("relative_frobenius", "energy")}
+    for t, term in enumerate(terms):
+        lists[f"terms[{t}].sign"] = term["sign"]
+        if len(term["weights"]) != pixels:
+            raise KernelError(
+                f"terms[{t}].weights has {len(term['weights'])} pixels; expected {pixels}, as in "
+                "terms[0]."
+            )
+        lists |= {f"terms[{t}].weights[{k}]": each for k, each in enumerate(term["weights"])}
+    for path, values in lists.items():
+        if len(values) != channels:
+            raise KernelError(
+                f"{path} has {len(values)} entries; expected {channels}, one for each channel."
+            )
+
+
+def _check_derived(whole: Mapping[str, Any], signs: FloatArray, weights: FloatArray) -> None:
+    """Hold what the file says of its terms against the terms."""
+    terms, pixels = weights.shape[:2]
+    support_mm = (pixels - 1) // 2 * float(whole["mm_per_pixel"])
+    counts = {"rank": (whole["rank"], terms), "pixels": (whole["pixels"], pixels)}
+    for name, (said, found) in counts.items():
+        if said != found:
+            raise KernelError(f"{name} = {said}, but the terms have {found}.")
+    if abs(whole["support_mm"] - support_mm) > _ROUNDING * support_mm:
+        raise KernelError(
+            f"support_mm = {whole['support_mm']}, but {pixels} pixels of {whole['mm_per_pixel']} "
+            f"mm reach {support_mm:.9g} mm."
+        )
+    energy = np.sum(signs * np.sum(weights, axis=1) ** 2, axis=0)
+    rounding = _ROUNDING * np.sum(np.sum(np.abs(weights), axis=1) ** 2, axis=0)
+    for c in np.flatnonzero(~(np.abs(whole["energy"] - energy) <= rounding)):
+        raise KernelError(
+            f"energy[{c}] = {whole['energy'][c]}, but the terms add up to {energy[c]:.9g}."
+        )
+
+
+def _line(value: Any) -> str:
+    return json.dumps(value, allow_nan=False, ensure_ascii=False)
+
+
+def _or_none(values: Any) -> list[float | None]:
+    return [float(each) if np.isfinite(each) else None for each in values]
+
+
+def _or_nan(values: list[float | None]) -> Any:
+    return np.array([np.nan if each is None else each for each in values], dtype=np.float64)

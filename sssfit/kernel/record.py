@@ -1,0 +1,173 @@
+"""Separable kernels: what a shader convolves with, as signed pairs of one-dimensional passes.
+
+The 2D kernel of channel c is K[i, j] = sum_t s_tc w_tc[i] w_tc[j], s = +1 or -1: every term is a
+horizontal pass and the same pass vertically. Weights are energies of pixels (integrals, not
+samples), so sums of them are energies too. A kernel belongs to its pitch in mm per pixel.
+
+``json`` has the file format, ``sssfit/kernel.schema.json`` its JSON Schema;
+``checks`` refuses what is not a kernel.
+"""
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, BinaryIO, Self
+
+import numpy as np
+
+from sssfit.arrays import FloatArray
+from sssfit.errors import KernelError
+from sssfit.files import write_atomically
+from sssfit.kernel import checks
+from sssfit.kernel import json as kernel_json
+from sssfit.kernel.json import FORMAT, is_kernel_file
+
+__all__ = ["FORMAT", "SeparableKernel", "is_kernel_file"]
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class SeparableKernel:
+    """A signed sum of separable terms per channel, on pixels.
+
+    T terms, P = 2 h + 1 pixels, C channels, the channel axis last. Arrays are stored as read-only
+    float64.
+
+    Parameters
+    ----------
+    method : str
+        The fit that made it, as the command line names it.
+    mm_per_pixel : float [mm]
+        Pitch; pixel h is centred on the axis.
+    channels : tuple of str
+        C names.
+    signs : array (T, C)
+        +1 or -1.
+    weights : array (T, P, C)
+        The passes; symmetric about the middle pixel.
+    relative_frobenius_error : array (C,)
+        ||K - target|| / ||target|| over the support; NaN where it was not fitted to a profile.
+    energy_error : array (C,)
+        Energy of the kernel against the profile's diffuse reflectance, as a share of the latter:
+        what lies beyond the grid and beyond the support counts. NaN as above.
+    scale : array (C,)
+        What to multiply the 2D kernel with to have the profile's energy back: 1 unless the fit was
+        normalised; then the kernel's energy is 1 and this is the albedo an engine multiplies in.
+    parameters : mapping
+        What the method found by channel, for JSON: variances, weights, widths.
+    meta : mapping
+        Provenance, for JSON; all of it may be missing: material (a name), material_sha256,
+        profile_sha256 (`Profile.sha256`), profile_method, photons, seed, version, settings.
+
+    Raises
+    ------
+    KernelError
+        A field has the wrong shape, is not a number, is beyond single precision, or cannot be
+        kept as JSON.
+    """
+
+    method: str
+    mm_per_pixel: float
+    channels: tuple[str, ...]
+    signs: FloatArray
+    weights: FloatArray
+    relative_frobenius_error: FloatArray
+    energy_error: FloatArray
+    scale: FloatArray
+    parameters: Mapping[str, Any]
+    meta: Mapping[str, Any]
+
+    def __post_init__(self) -> None:
+        given = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        for name, value in checks.checked(given).items():
+            object.__setattr__(self, name, value)
+
+    def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
+        # A mapping proxy cannot be pickled; worker processes and deep copies need the record.
+        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        plain = {"parameters": dict(self.parameters), "meta": dict(self.meta)}
+        return type(self), tuple((values | plain).values())
+
+    @property
+    def rank(self) -> int:
+        """Number of separable terms T."""
+        return len(self.weights)
+
+    @property
+    def half_pixels(self) -> int:
+        """Pixels h on either side of the middle one."""
+        return (self.pixels - 1) // 2
+
+    @property
+    def pixels(self) -> int:
+        """Number of pixels P of a pass."""
+        return int(self.weights.shape[1])
+
+    @property
+    def support_mm(self) -> float:
+        """Distance of the outermost pixel centre from the axis [mm]."""
+        return self.half_pixels * self.mm_per_pixel
+
+    @property
+    def energy(self) -> FloatArray:
+        """Sum of the 2D kernel over all pixels (C,); ``scale`` times this is in the profile's."""
+        total: FloatArray = np.sum(self.signs * np.sum(self.weights, axis=1) ** 2, axis=0)
+        return total
+
+    @property
+    def line(self) -> FloatArray:
+        """Sum of the 2D kernel along one axis (P, C): what a long straight edge sees."""
+        sums = self.signs * np.sum(self.weights, axis=1)
+        along: FloatArray = np.einsum("tc,tpc->pc", sums, self.weights)
+        return along
+
+    def quadrant(self, channel: int) -> FloatArray:
+        """Return one quadrant of the 2D kernel with both its axes, (h+1, h+1)."""
+        half = self.weights[:, self.half_pixels :, channel]
+        quadrant: FloatArray = (half * self.signs[:, channel, None]).T @ half
+        return quadrant
+
+    def full(self, channel: int) -> FloatArray:
+        """Return the 2D kernel of a channel, (P, P)."""
+        passes = self.weights[:, :, channel]
+        kernel: FloatArray = (passes * self.signs[:, channel, None]).T @ passes
+        return kernel
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the kernel as its file holds it."""
+        return kernel_json.content(self)
+
+    def write(self, stream: BinaryIO) -> None:
+        """Write JSON to a binary stream; the same kernel gives the same bytes."""
+        stream.write(kernel_json.pack(self))
+
+    def save(self, path: str | Path) -> None:
+        """Write the kernel to ``path`` (by custom ``NAME.kernel.json``), whole or not at all.
+
+        Raises
+        ------
+        FileError
+            The file cannot be written; an older one at ``path`` is untouched.
+        """
+        write_atomically(Path(path), self.write)
+
+    @classmethod
+    def read(cls, source: str | Path | BinaryIO, origin: str | None = None) -> Self:
+        """Read a kernel from a path or a binary stream; numbers come back bit for bit.
+
+        Raises
+        ------
+        KernelError
+            One line that names the origin: missing, damaged, foreign, or of another version.
+        """
+        if origin is None:
+            origin = str(source) if isinstance(source, str | Path) else "the kernel"
+        fields = kernel_json.unpack(source, origin)
+        try:
+            return cls(**fields)
+        except KernelError as error:
+            raise KernelError(f"{origin}: {error}") from None
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a kernel file; see `read`."""
+        return cls.read(path)

@@ -1,0 +1,5 @@
+"""Materials: absorption and scattering per channel and layer, from TOML or made in Python."""
+
+from sssfit.material.record import Layer, Material, load_material, material_names, parse_material
+
+__all__ = ["Layer", "Material", "load_material", "material_names", "parse_material"]

@@ -1,0 +1,382 @@
+"""Materials: how much a medium absorbs and scatters, loaded from TOML and checked.
+
+A ``Material`` is one or more ``Layer`` records from the top down, each with coefficients per colour
+channel in 1/mm. Eleven measured ones ship with sssfit (Jensen et al. 2001); a file of your own has
+the same form::
+
+    name = "skin1"
+    source = "Jensen et al. 2001"
+    channels = ["R", "G", "B"]
+    eta = 1.3
+    g = 0.0
+    sigma_a_per_mm = [0.032, 0.17, 0.48]
+    sigma_s_per_mm = [0.74, 0.88, 1.01]
+
+A stack has ``[[layers]]`` tables in place of the coefficients, from the top down, each with its
+``thickness_mm``, and ``eta_above`` and ``eta_below`` above them.
+
+Similarity theory reduces anisotropic scattering to sigma_s' = (1 - g) sigma_s; the mean free paths
+here, which lay out grids, are the reduced ones. Next: ``sssfit.grid``, ``sssfit.simulate``.
+"""
+
+import hashlib
+import json
+import math
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sssfit.arrays import FloatArray, check_names
+from sssfit.errors import MaterialError
+from sssfit.material.checks import (
+    DENSE_PER_MM,
+    check_clear_or_not,
+    check_layers,
+    check_lengths,
+    check_not_per_cm,
+    check_stack,
+    check_texts,
+    located,
+    number,
+    numbers,
+)
+from sssfit.material.toml import (
+    MOST_BYTES,
+    decode,
+    default_channels,
+    did_you_mean,
+    is_path,
+    read_tables,
+    read_text,
+    write_toml,
+)
+from sssfit.messages import printable, shown
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layer:
+    """One homogeneous layer of C channels.
+
+    Parameters
+    ----------
+    eta : float
+        Refractive index, 0.5 to 4, the same for all channels; only ratios of indices count.
+    g : (C,) or float
+        Mean cosine of scattering, above -1 to 1; above 0 is forward. One number serves all. 1 is
+        no scattering at all, and becomes sigma_s = 0 and g = 0 in that channel.
+    sigma_a_per_mm, sigma_s_per_mm : (C,)
+        Absorption and scattering coefficients [1/mm]. Both 0: the layer is clear in that channel.
+    thickness_mm : float
+        Thickness [mm]; infinite (the default) for the ground below everything.
+
+    Raises
+    ------
+    MaterialError
+        A value is not a number, is out of range, or the lists differ in length.
+    """
+
+    eta: float
+    g: FloatArray
+    sigma_a_per_mm: FloatArray
+    sigma_s_per_mm: FloatArray
+    thickness_mm: float = math.inf
+
+    def __post_init__(self) -> None:
+        sigma_a = numbers("sigma_a_per_mm", self.sigma_a_per_mm, "sigma")
+        is_list = isinstance(self.g, (list, tuple, np.ndarray))
+        _store(self, eta=number("eta", self.eta), sigma_a_per_mm=sigma_a)
+        _store(self, g=numbers("g", self.g if is_list else [number("g", self.g)] * sigma_a.size))
+        _store(self, sigma_s_per_mm=numbers("sigma_s_per_mm", self.sigma_s_per_mm, "sigma"))
+        _store(self, thickness_mm=number("thickness_mm", self.thickness_mm))
+        check_lengths(self)
+        scatters = self.g < 1
+        _store(self, g=_read_only(np.where(scatters, self.g, 0.0)))
+        _store(self, sigma_s_per_mm=_read_only(np.where(scatters, self.sigma_s_per_mm, 0.0)))
+        check_clear_or_not(self)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Layer) and self.to_dict() == other.to_dict()
+
+    def __hash__(self) -> int:
+        return hash(json.dumps(self.to_dict()))
+
+    @property
+    def sigma_t_per_mm(self) -> FloatArray:
+        """Extinction sigma_a + sigma_s [1/mm], (C,)."""
+        return self.sigma_a_per_mm + self.sigma_s_per_mm
+
+    @property
+    def albedo(self) -> FloatArray:
+        """Single-scattering albedo sigma_s / sigma_t, (C,); 0 where the layer is clear."""
+        sigma_t = self.sigma_t_per_mm
+        return np.divide(
+            self.sigma_s_per_mm, sigma_t, out=np.zeros_like(sigma_t), where=sigma_t > 0
+        )
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether no channel is absorbed or scattered (glass, say)."""
+        return not self.sigma_t_per_mm.any()
+
+    @property
+    def reduced_sigma_s_per_mm(self) -> FloatArray:
+        """Reduced scattering sigma_s' = (1 - g) sigma_s [1/mm], (C,)."""
+        return (1 - self.g) * self.sigma_s_per_mm
+
+    @property
+    def reduced_sigma_t_per_mm(self) -> FloatArray:
+        """Reduced extinction sigma_a + (1 - g) sigma_s [1/mm], (C,)."""
+        return self.sigma_a_per_mm + self.reduced_sigma_s_per_mm
+
+    @property
+    def mean_free_path_mm(self) -> FloatArray:
+        """Reduced mean free path 1 / (sigma_a + (1 - g) sigma_s) [mm], (C,); inf where clear."""
+        sigma_t = self.reduced_sigma_t_per_mm
+        return np.divide(1.0, sigma_t, out=np.full_like(sigma_t, math.inf), where=sigma_t > 0)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the layer as JSON can hold it; an infinite thickness is None."""
+        return {
+            "eta": self.eta,
+            "g": self.g.tolist(),
+            "sigma_a_per_mm": self.sigma_a_per_mm.tolist(),
+            "sigma_s_per_mm": self.sigma_s_per_mm.tolist(),
+            "thickness_mm": self.thickness_mm if math.isfinite(self.thickness_mm) else None,
+        }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Material:
+    """A stack of layers under one name.
+
+    Parameters
+    ----------
+    name : str
+        Becomes part of file names: letters, digits and ``._+-``, a letter or digit first.
+    channels : tuple of str
+        1 to 64 distinct names, in the order of the coefficients.
+    layers : tuple of Layer
+        From the top down; only the last may be semi-infinite, and it must not be clear then.
+    source : str
+        Where the coefficients come from; for people, not part of ``sha256``.
+    eta_above, eta_below : float
+        Refractive indices of what lies above the first and below the last layer.
+
+    Raises
+    ------
+    MaterialError
+        The layers do not fit the channels or one another, or a name cannot be used.
+    """
+
+    name: str
+    channels: tuple[str, ...]
+    layers: tuple[Layer, ...]
+    source: str = ""
+    eta_above: float = 1.0
+    eta_below: float = 1.0
+
+    def __post_init__(self) -> None:
+        check_texts(self.name, self.source)
+        check_names(self.channels)
+        check_layers(self.layers, Layer)
+        _store(self, channels=tuple(self.channels), layers=tuple(self.layers))
+        for key in ("eta_above", "eta_below"):
+            _store(self, **{key: number(key, getattr(self, key), "eta")})
+        check_stack(self.layers, self.channels, self.eta_below)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Material) and self.to_dict() == other.to_dict()
+
+    def __hash__(self) -> int:
+        return hash(self.sha256)
+
+    @property
+    def n_channels(self) -> int:
+        """Number of channels C."""
+        return len(self.channels)
+
+    @property
+    def is_semi_infinite(self) -> bool:
+        """Whether this is one homogeneous layer without a bottom."""
+        return len(self.layers) == 1 and math.isinf(self.layers[0].thickness_mm)
+
+    @property
+    def first_scattering_layer(self) -> int:
+        """Number of clear layers on top: the walk begins below them."""
+        return next(k for k, layer in enumerate(self.layers) if not layer.is_clear)
+
+    @property
+    def specular_reflectance(self) -> float:
+        """Fresnel reflectance at normal incidence of all interfaces above the first matter.
+
+        ((n1 - n0) / (n1 + n0))^2 for one; clear layers on top add theirs, multiple reflections
+        between them included: R = R1 + (1 - R1)^2 R2 / (1 - R1 R2) (Wang, Jacques, Zheng 1995,
+        eq. 3.4 for one such layer).
+        """
+        total = 0.0
+        above = self.eta_above
+        for layer in self.layers[: self.first_scattering_layer + 1]:
+            one = ((layer.eta - above) / (layer.eta + above)) ** 2
+            total += (1.0 - total) ** 2 * one / (1.0 - total * one)
+            above = layer.eta
+        return total
+
+    @property
+    def sha256(self) -> str:
+        """Fingerprint of name, channels, indices and coefficients, however they were written."""
+        content = self.to_dict()
+        del content["source"]
+        return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the material as JSON can hold it, for ``from_dict``."""
+        return {
+            "name": self.name,
+            "source": self.source,
+            "channels": list(self.channels),
+            "eta_above": self.eta_above,
+            "eta_below": self.eta_below,
+            "layers": [layer.to_dict() for layer in self.layers],
+        }
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> "Material":
+        """Rebuild what ``to_dict`` gave.
+
+        Raises
+        ------
+        MaterialError
+            ``content`` is not of that form, or its values fail the checks.
+        """
+        try:
+            layers = tuple(_layer_from_dict(layer) for layer in content["layers"])
+            return cls(**{**content, "layers": layers})
+        except (KeyError, TypeError) as error:
+            raise MaterialError(
+                f"a material's record is damaged ({printable(str(error))}); make it again."
+            ) from None
+
+    def to_toml(self) -> str:
+        """Return the material's TOML; ``parse_material`` reads back an equal material."""
+        head: dict[str, Any] = {"name": self.name, "source": self.source}
+        head["channels"] = self.channels
+        for key in ("eta_above", "eta_below"):
+            if getattr(self, key) != 1.0:
+                head[key] = getattr(self, key)
+        if any((layer.reduced_sigma_t_per_mm > DENSE_PER_MM).any() for layer in self.layers):
+            head["dense"] = True
+        return write_toml(head, [_layer_table(layer) for layer in self.layers])
+
+
+def load_material(name_or_path: str | Path) -> Material:
+    """Load a material that ships with sssfit, a TOML file, or standard input.
+
+    Parameters
+    ----------
+    name_or_path : str or Path
+        A shipped name (see ``material_names``); a path, recognised by its ``.toml``, a separator,
+        or being there; ``-`` for standard input.
+
+    Raises
+    ------
+    MaterialError
+        There is no such material, or the file cannot be read or used; one line says which and why.
+
+    Examples
+    --------
+    >>> load_material("skin1").layers[0].sigma_s_per_mm.tolist()
+    [0.74, 0.88, 1.01]
+    """
+    wanted = str(name_or_path)
+    if wanted == "-":
+        if sys.stdin is None:
+            raise MaterialError("stdin is closed; name a material or a file instead of -.")
+        with located("stdin: "):
+            text = decode(sys.stdin.buffer.read(MOST_BYTES + 1))
+        with text.hinting(MaterialError) as content:
+            return parse_material(content, "stdin")
+    if not isinstance(name_or_path, Path) and wanted in material_names():
+        shipped = resources.files("sssfit.materials") / f"{wanted}.toml"
+        return parse_material(shipped.read_text("utf-8"), f"{wanted}.toml")
+    if isinstance(name_or_path, Path) or is_path(wanted):
+        with located(f"{printable(wanted)}: "):
+            text = read_text(Path(wanted))
+        with text.hinting(MaterialError) as content:
+            return parse_material(content, wanted)
+    raise MaterialError(
+        f"there is no material {shown(wanted)}; {did_you_mean(wanted, material_names())}"
+        "`sssfit materials` lists those there are, and a file of your own ends in .toml."
+    )
+
+
+@cache
+def material_names() -> tuple[str, ...]:
+    """Return the names of the materials that ship with sssfit, sorted."""
+    files = resources.files("sssfit.materials").iterdir()
+    return tuple(sorted(f.name[:-5] for f in files if f.name.endswith(".toml")))
+
+
+def parse_material(text: str, origin: str) -> Material:
+    """Read a material from the text of its TOML.
+
+    Parameters
+    ----------
+    text : str
+        The TOML.
+    origin : str
+        The file it came from: stands first in every message, and its stem is the default name.
+
+    Raises
+    ------
+    MaterialError
+        One line with the origin, the key, what it holds, what was expected and what to do.
+    """
+    with located(f"{printable(origin)}: "):
+        if not isinstance(text, str):
+            raise MaterialError(f"{shown(text)} is not a text; expected the TOML of a material.")
+        head, tables = read_tables(text)
+        dense = head.pop("dense", False)
+        layers = tuple(_layer_from_table(table, where, dense=dense) for where, table in tables)
+        head.setdefault("name", Path(origin).stem)
+        if "channels" not in head:
+            head["channels"] = default_channels(layers[0].g.size)
+        return Material(layers=layers, **head)
+
+
+def _layer_from_table(table: Mapping[str, Any], where: str, *, dense: bool) -> Layer:
+    """Build a layer of a file."""
+    with located(where):
+        layer = Layer(**table)
+        if not dense:
+            check_not_per_cm(layer)
+        return layer
+
+
+def _layer_from_dict(content: Mapping[str, Any]) -> Layer:
+    thickness = content["thickness_mm"]
+    return Layer(**{**content, "thickness_mm": math.inf if thickness is None else thickness})
+
+
+def _layer_table(layer: Layer) -> dict[str, Any]:
+    """Return a layer as a file holds it: no infinite thickness, one g where all are equal."""
+    table = {key: value for key, value in layer.to_dict().items() if value is not None}
+    if len(set(table["g"])) == 1:
+        table["g"] = table["g"][0]
+    return table
+
+
+def _read_only(array: FloatArray) -> FloatArray:
+    array.setflags(write=False)
+    return array
+
+
+def _store(record: object, **values: Any) -> None:
+    """Set fields of a frozen record while it is being made."""
+    for key, value in values.items():
+        object.__setattr__(record, key, value)

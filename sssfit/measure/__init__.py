@@ -1,0 +1,1 @@
+"""How far a picture is from the true one, and what a kernel costs."""

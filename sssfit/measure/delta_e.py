@@ -1,0 +1,154 @@
+"""What every measure asks of two pictures first: checks, the exposure, what a display shows."""
+
+from types import ModuleType
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.arrays import BoolArray, FloatArray
+from sssfit.errors import RenderError
+
+# Blocks that stay in the cache: 1080p takes 0.7 s so, 2 s in blocks of 65536 and 4 s whole.
+BLOCK_PIXELS = 16384
+
+
+def delta_e_2000(image: FloatArray, truth: FloatArray, exposure: float = 1.0) -> FloatArray:
+    """Return CIE Delta E 2000 of pixels, k_L = k_C = k_H = 1.
+
+    Parameters
+    ----------
+    image, truth : array (N, 3) or (N, 1)
+        Linear sRGB or grey.
+    exposure : float
+        Factor before pixels are cut to [0, 1].
+
+    Returns
+    -------
+    array (N,)
+
+    References
+    ----------
+    G. Sharma, W. Wu, E. N. Dalal, "The CIEDE2000 color-difference formula: implementation notes,
+    supplementary test data, and mathematical observations", Color Research and Application 30(1),
+    2005, equations 2 to 22.
+    """
+    delta_e = _load_colour().difference.delta_E_CIE2000
+    differences = np.empty(len(image))
+    for start in range(0, len(image), BLOCK_PIXELS):
+        block = slice(start, start + BLOCK_PIXELS)
+        colour, true = (lab(shown(pixels[block], exposure)) for pixels in (image, truth))
+        differences[block] = delta_e(colour, true)
+    return differences
+
+
+def lab(pixels: FloatArray) -> FloatArray:
+    """Return CIE L, a, b of linear sRGB pixels (N, 3)."""
+    colour = _load_colour()
+    srgb = colour.RGB_COLOURSPACES["sRGB"]
+    # From the primaries, not the standard's table: its four digits give white b = 0.01.
+    to_xyz = colour.normalised_primary_matrix(srgb.primaries, srgb.whitepoint)
+    colours: FloatArray = np.asarray(colour.XYZ_to_Lab(pixels @ to_xyz.T, srgb.whitepoint))
+    return colours
+
+
+def _load_colour() -> ModuleType:
+    """Import colour-science: 0.8 s for any of its parts, so only when colours are compared."""
+    with np.printoptions():  # at its import it sets how all of numpy prints, to the way of 1.13
+        import colour
+    return colour
+
+
+# The largest channel and not the luminance: red is 1.7 times the luminance of skin1, and with that
+# at 0.8 all of the red that light has left would have been cut off.
+AUTO_VALUE, AUTO_PERCENTILE = 0.8, 99.0
+
+
+def check_pair(image: npt.ArrayLike, truth: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
+    """Return both pictures as float64 (H, W, C) or refuse them."""
+    pictures = np.asarray(image, dtype=np.float64), np.asarray(truth, dtype=np.float64)
+    if pictures[0].shape != pictures[1].shape:
+        raise RenderError(
+            f"image is {pictures[0].shape} and truth {pictures[1].shape}; expected the same rows, "
+            "columns and channels."
+        )
+    for name, picture in zip(("image", "truth"), pictures, strict=True):
+        check_picture(name, picture)
+    return pictures
+
+
+def check_picture(name: str, picture: FloatArray) -> None:
+    """Refuse what is no picture; negative pixels are allowed, kernels with negative terms ring."""
+    if picture.ndim != 3 or 0 in picture.shape:
+        raise RenderError(
+            f"{name} has shape {picture.shape}; expected rows, columns and channels, at least one "
+            "of each."
+        )
+    bad = picture.size - int(np.count_nonzero(np.isfinite(picture)))
+    if bad:
+        raise RenderError(f"{name} has {bad} NaN or infinite values; expected numbers.")
+
+
+def selection(mask: npt.ArrayLike | None, picture: FloatArray) -> BoolArray:
+    """Return which pixels (H, W) count: those of a mask above 0, all without one."""
+    if mask is None:
+        return np.ones(picture.shape[:2], dtype=np.bool_)
+    selected = np.asarray(mask) > 0
+    if selected.shape != picture.shape[:2]:
+        raise RenderError(
+            f"mask is {selected.shape} and the picture {picture.shape[:2]}; expected the same rows "
+            "and columns."
+        )
+    if not selected.any():
+        raise RenderError("mask has no pixel above 0; expected some of the object, or no mask.")
+    return selected
+
+
+def selected_pixels(picture: FloatArray, selected: BoolArray) -> FloatArray:
+    """Return pixels (N, C) of a picture, without a copy where all are selected."""
+    return picture.reshape(-1, picture.shape[-1]) if selected.all() else picture[selected]
+
+
+def auto_exposure(truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> float:
+    """Return the factor that brings the 99th percentile of the largest channel to 0.8.
+
+    It depends on the truth alone, so that every picture held against it is seen alike. Black
+    pixels are left out: a small lit object is exposed as if it filled the picture.
+
+    Parameters
+    ----------
+    truth : array (H, W, C)
+        Linear light.
+    mask : array (H, W), optional
+        Only pixels above 0 count.
+
+    Raises
+    ------
+    RenderError
+        No pixel is lit, or truth or mask is of no use.
+    """
+    picture = np.asarray(truth, dtype=np.float64)
+    check_picture("truth", picture)
+    return exposure_of(selected_pixels(picture, selection(mask, picture)))
+
+
+def exposure_of(pixels: FloatArray) -> float:
+    """Return `auto_exposure` of pixels (N, C)."""
+    largest = pixels.max(axis=-1)
+    lit = largest[largest > np.finfo(np.float64).tiny]  # of less, the inverse overflows
+    if lit.size == 0:
+        raise RenderError("truth is black: no exposure can be found; give one.")
+    return float(AUTO_VALUE / np.percentile(lit, AUTO_PERCENTILE))
+
+
+def check_exposure(exposure: float) -> float:
+    """Return an exposure that was given, or refuse it."""
+    if not (np.isfinite(exposure) and exposure > 0.0):
+        raise RenderError(f"exposure = {exposure:g}; expected a factor above 0.")
+    return float(exposure)
+
+
+def shown(pixels: FloatArray, exposure: float) -> FloatArray:
+    """Return what a display has to show: exposed, cut to [0, 1], grey as three channels."""
+    with np.errstate(over="ignore"):  # infinite light is cut to 1 as well
+        cut: FloatArray = np.clip(pixels * exposure, 0.0, 1.0)
+    return np.repeat(cut, 3, axis=-1) if cut.shape[-1] == 1 else cut

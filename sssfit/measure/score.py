@@ -1,0 +1,175 @@
+"""How far a rendered picture is from the true one: in energy, in colour as seen, in structure.
+
+RMSE, relative L2, maximum, PSNR and energy drift are of linear light as it is. CIE Delta E 2000,
+SSIM and FLIP are of what a display shows, at a stated exposure. `structure` has the last two, which
+need the extra ``metrics``; `asymmetry` looks at a kernel alone and `cost` at its price.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.arrays import FloatArray
+from sssfit.measure.delta_e import (
+    auto_exposure,
+    check_exposure,
+    check_pair,
+    delta_e_2000,
+    exposure_of,
+    selected_pixels,
+    selection,
+)
+
+__all__ = ["COLOUR_FIGURES", "ImageScore", "auto_exposure", "measure"]
+
+
+JUST_NOTICEABLE = 1.0  # Delta E that eyes tell side by side
+# Of an `ImageScore`; the rows of comparisons and choices have the same.
+COLOUR_FIGURES = ("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99", "share_above_1")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ImageScore:
+    """A picture held against the true one; N pixels that count, C channels.
+
+    Parameters
+    ----------
+    rmse : float [as the pictures]
+        sqrt(mean((image - truth)^2)) over pixels and channels.
+    relative_l2 : float [1]
+        ||image - truth|| / ||truth||; 0 where both are black, inf where only the truth is.
+    maximum : float [as the pictures]
+        The largest |image - truth|.
+    psnr_db : float [dB]
+        20 log10(peak / rmse), peak the largest value of the truth; inf for identical pictures.
+    energy_drift : array (C,) [1]
+        sum(image) / sum(truth) - 1; black channels as in ``relative_l2``.
+    delta_e_2000_mean, delta_e_2000_p95, delta_e_2000_p99 : float [1]
+        CIE Delta E 2000 at the exposure, linear sRGB under D65: its mean, its 95th and its 99th
+        percentile. One channel is taken for grey; NaN for 2 channels and for more than 3, which
+        have no colour.
+    share_above_1 : float [1]
+        Share of the pixels whose Delta E is above 1, about what an eye can tell side by side; NaN
+        where there is no colour.
+    exposure : float [1 / as the pictures]
+        What both were multiplied with before they were cut to [0, 1] and looked at.
+    ssim, flip : float, optional [1]
+        See ``sssfit.measure.structure``; None unless asked for.
+    """
+
+    rmse: float
+    relative_l2: float
+    maximum: float
+    psnr_db: float
+    energy_drift: FloatArray
+    delta_e_2000_mean: float
+    delta_e_2000_p95: float
+    delta_e_2000_p99: float
+    share_above_1: float
+    exposure: float
+    ssim: float | None = None
+    flip: float | None = None
+
+    def __post_init__(self) -> None:
+        drift = np.array(self.energy_drift, dtype=np.float64)
+        drift.setflags(write=False)
+        object.__setattr__(self, "energy_drift", drift)
+
+
+def measure(
+    image: npt.ArrayLike,
+    truth: npt.ArrayLike,
+    *,
+    exposure: float | None = None,
+    mask: npt.ArrayLike | None = None,
+    structure: bool = False,
+) -> ImageScore:
+    """Return how far ``image`` is from ``truth``.
+
+    Parameters
+    ----------
+    image, truth : array (H, W, C)
+        Linear light. Negative pixels count as they are, and as black where they are looked at.
+    exposure : float, optional
+        Factor before display; `auto_exposure` of the truth unless given.
+    mask : array (H, W), optional
+        Restricts every figure to pixels above 0.
+    structure : bool
+        SSIM and FLIP too; they need the extra ``metrics``. FLIP is NaN where Delta E is.
+
+    Raises
+    ------
+    RenderError
+        The pictures differ in shape or hold NaN, the mask fits neither or is empty, the exposure is
+        not above 0, or the truth is black and none was given.
+
+    Examples
+    --------
+    >>> score = measure([[[0.5], [0.25]]], [[[0.5], [0.5]]])
+    >>> score.maximum, score.energy_drift.tolist(), round(score.psnr_db, 2)
+    (0.25, [-0.25], 9.03)
+    """
+    pictures = check_pair(image, truth)
+    selected = selection(mask, pictures[1])
+    pixels, true = (selected_pixels(picture, selected) for picture in pictures)
+    exposure = exposure_of(true) if exposure is None else check_exposure(exposure)
+    return ImageScore(
+        **_differences(pixels, true),
+        energy_drift=_ratio(pixels.sum(axis=0) - true.sum(axis=0), true.sum(axis=0)),
+        **_colour_differences(pixels, true, exposure),
+        exposure=exposure,
+        **(_structure(*pictures, exposure, mask) if structure else {}),
+    )
+
+
+def _differences(pixels: FloatArray, true: FloatArray) -> dict[str, float]:
+    """Return the figures of linear light for pixels (N, C)."""
+    difference = pixels - true
+    rmse = _root_mean_square(difference)
+    peak = float(true.max())
+    with np.errstate(divide="ignore"):  # identical: inf; a black truth: -inf
+        psnr = np.inf if rmse == 0.0 else 20.0 * np.log10(max(peak, 0.0) / rmse)
+    return {
+        "rmse": rmse,
+        "relative_l2": float(_ratio(rmse, _root_mean_square(true))),
+        "maximum": float(max(difference.max(), -difference.min())),
+        "psnr_db": float(psnr),
+    }
+
+
+def _root_mean_square(values: FloatArray) -> float:
+    """Return sqrt(mean(values^2)) without a second array of squares."""
+    flat = values.reshape(-1)
+    return float(np.sqrt(np.dot(flat, flat) / flat.size))
+
+
+def _ratio(part: npt.ArrayLike, whole: npt.ArrayLike) -> FloatArray:
+    """Divide; 0 / 0 is 0 (nothing was lost), x / 0 is inf with the sign of x."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.divide(part, whole)
+    return np.where(np.equal(part, 0.0), 0.0, ratio)
+
+
+def _colour_differences(pixels: FloatArray, true: FloatArray, exposure: float) -> dict[str, float]:
+    """Return the figures of Delta E 2000 of pixels (N, C)."""
+    if pixels.shape[1] not in (1, 3):
+        return dict.fromkeys(COLOUR_FIGURES, np.nan)
+    differences = delta_e_2000(pixels, true, exposure)
+    p95, p99 = np.percentile(differences, [95.0, 99.0])
+    above = np.count_nonzero(differences > JUST_NOTICEABLE) / differences.size
+    figures = (differences.mean(), p95, p99, above)
+    return {key: float(each) for key, each in zip(COLOUR_FIGURES, figures, strict=True)}
+
+
+def _structure(
+    image: FloatArray, truth: FloatArray, exposure: float, mask: npt.ArrayLike | None
+) -> dict[str, float]:
+    """Return SSIM and FLIP of whole pictures."""
+    from sssfit.measure.structure import flip, ssim
+
+    coloured = image.shape[2] in (1, 3)
+    return {
+        "ssim": ssim(image, truth, exposure, mask=mask),
+        "flip": flip(image, truth, exposure, mask=mask) if coloured else np.nan,
+    }

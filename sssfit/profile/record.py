@@ -1,0 +1,366 @@
+"""A diffuse reflectance profile R_d(r), kept as the energy in annuli around a pencil beam.
+
+Energies, not densities: F(r) = int_0^r 2 pi r' R_d(r') dr' is then known exactly at the annulus
+edges, whatever R_d does inside (near the beam it behaves like 1/r), and every kernel made from the
+profile conserves energy by construction. The annulus tallies are those of Wang, Jacques and Zheng,
+"MCML - Monte Carlo modeling of light transport in multi-layered tissues", 1995.
+
+``pixels`` has its integrals, ``npz`` its file, ``checks`` what it must satisfy.
+"""
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, BinaryIO, Self
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.arrays import FloatArray
+from sssfit.errors import ProfileError
+from sssfit.files import write_atomically
+from sssfit.material.checks import is_name
+from sssfit.profile import checks, npz
+from sssfit.profile import pixels as integrals
+from sssfit.profile.npz import FORMAT, is_profile_file
+from sssfit.profile.pixels import full_kernel
+
+__all__ = ["FORMAT", "Profile", "full_kernel", "is_profile_file"]
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class Profile:
+    """Energy that leaves a material in annuli around the point where a pencil beam enters it.
+
+    A beam of weight 1 enters at normal incidence; all energies are fractions of it. n annuli, C
+    channels, the channel axis last. Arrays are stored as read-only float64.
+
+    Parameters
+    ----------
+    r_edges_mm : array (n+1,) [mm]
+        Radii of the annulus edges; the first is 0, strictly increasing.
+    annulus_energy : array (n, C) [1]
+        Diffusely reflected energy in each annulus.
+    annulus_energy_stderr : array (n, C) [1]
+        Standard error of each; NaN where there is none.
+    beyond_grid, beyond_grid_stderr : array (C,) [1]
+        Energy reflected beyond the last edge, and its standard error (NaN where there is none).
+    specular_reflectance : float [1]
+        Mirror reflection at entry, not part of the diffuse energies.
+    absorbed : array (layers, C) [1]
+        Energy absorbed in each layer, from the top down; no layers where it is not known.
+    unfinished : array (C,) [1]
+        Energy of walks stopped at the collision cap.
+    annulus_transmittance : array (n, C) [1] or None
+        Energy that leaves through the bottom, by annulus; None for a semi-infinite material.
+    meta : mapping
+        Provenance that JSON can hold: ``format`` ("sssfit.profile/1"), ``channels`` (C names),
+        ``material``, ``method``, ``photons`` (number of walks, None where nothing is sampled),
+        ``seed``, ``version``, settings.
+    beyond_grid_transmittance : array (C,) [1] or None
+        Energy that leaves through the bottom beyond the last edge; None where
+        ``annulus_transmittance`` is, or where it is not known.
+    annulus_transmittance_stderr : array (n, C) [1] or None
+    beyond_grid_transmittance_stderr : array (C,) [1] or None
+        Standard errors of the two.
+
+    Raises
+    ------
+    ProfileError
+        A field has the wrong shape, is not a number, or meta does not describe it.
+    """
+
+    r_edges_mm: FloatArray
+    annulus_energy: FloatArray
+    annulus_energy_stderr: FloatArray
+    beyond_grid: FloatArray
+    beyond_grid_stderr: FloatArray
+    specular_reflectance: float
+    absorbed: FloatArray
+    unfinished: FloatArray
+    annulus_transmittance: FloatArray | None
+    meta: Mapping[str, Any]
+    beyond_grid_transmittance: FloatArray | None = None
+    annulus_transmittance_stderr: FloatArray | None = None
+    beyond_grid_transmittance_stderr: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        given = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        for name, value in checks.checked(given).items():
+            object.__setattr__(self, name, value)
+
+    def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
+        # A mapping proxy cannot be pickled; worker processes and deep copies need the record.
+        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return type(self), tuple((values | {"meta": dict(self.meta)}).values())
+
+    @property
+    def n_annuli(self) -> int:
+        """Number of annuli on the grid."""
+        return len(self.annulus_energy)
+
+    @property
+    def n_channels(self) -> int:
+        """Number of channels."""
+        return int(self.annulus_energy.shape[1])
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels."""
+        return tuple(self.meta["channels"])
+
+    @property
+    def photons(self) -> int | None:
+        """Number of photon walks behind the energies; None where nothing was sampled."""
+        return self.meta.get("photons")
+
+    @property
+    def sha256(self) -> str:
+        """Fingerprint of what fits and true pictures are made from, by which kernels name it.
+
+        Radii, energies on the grid and beyond, channels; no provenance, so that the same light is
+        the same profile, by whatever program and version.
+        """
+        digest = hashlib.sha256(json.dumps(self.channels).encode())
+        for each in (self.r_edges_mm, self.annulus_energy, self.beyond_grid):
+            digest.update(each.astype("<f8").tobytes())
+        return digest.hexdigest()
+
+    @property
+    def total_on_grid(self) -> FloatArray:
+        """Energy reflected within the last edge (C,)."""
+        total: FloatArray = self.annulus_energy.sum(axis=0)
+        return total
+
+    @property
+    def diffuse_reflectance(self) -> FloatArray:
+        """Energy reflected diffusely, on the grid and beyond (C,); specular is not part of it."""
+        return self.total_on_grid + self.beyond_grid
+
+    @property
+    def diffuse_reflectance_stderr(self) -> FloatArray:
+        """Standard error of `diffuse_reflectance` (C,); see `cumulative_stderr`."""
+        energy = np.vstack((self.annulus_energy, self.beyond_grid))
+        stderr = np.vstack((self.annulus_energy_stderr, self.beyond_grid_stderr))
+        of_total: FloatArray = _stderr_of_sums(energy, stderr, self.photons)[-1]
+        return of_total
+
+    @property
+    def transmittance(self) -> FloatArray | None:
+        """Energy that leaves through the bottom, on the grid and beyond (C,), or None.
+
+        Light that crosses a slab without a collision is part of it.
+        """
+        if self.annulus_transmittance is None:
+            return None
+        total: FloatArray = self.annulus_transmittance.sum(axis=0)
+        beyond = self.beyond_grid_transmittance
+        return total if beyond is None else total + beyond
+
+    @property
+    def transmittance_stderr(self) -> FloatArray | None:
+        """Standard error of `transmittance` (C,), or None; as `diffuse_reflectance_stderr`."""
+        on_grid, beyond = self.annulus_transmittance_stderr, self.beyond_grid_transmittance_stderr
+        if self.annulus_transmittance is None or on_grid is None or beyond is None:
+            return None
+        energy = self.annulus_transmittance
+        if self.beyond_grid_transmittance is not None:
+            energy = np.vstack((energy, self.beyond_grid_transmittance))
+            on_grid = np.vstack((on_grid, beyond))
+        of_total: FloatArray = _stderr_of_sums(energy, on_grid, self.photons)[-1]
+        return of_total
+
+    @property
+    def material_name(self) -> str | None:
+        """Name of the material, or of what else the profile was made from; None if unknown.
+
+        A profile may have a name and no coefficients. Names that no file could have count as none.
+        """
+        record = self.meta.get("material")
+        name = record.get("name") if isinstance(record, Mapping) else None
+        return name if is_name(name) else None
+
+    @property
+    def energy_balance(self) -> FloatArray:
+        """Sum of all energies - 1 (C,): 0 but for roulette's noise and rounding.
+
+        Specular + diffuse + absorbed + unfinished (+ transmitted) - 1; NaN where it is not known
+        what was absorbed.
+        """
+        if len(self.absorbed) == 0:
+            return np.full(self.n_channels, np.nan)
+        reflected = self.specular_reflectance + self.diffuse_reflectance
+        balance: FloatArray = reflected + self.absorbed.sum(axis=0) + self.unfinished - 1.0
+        transmitted = self.transmittance
+        return balance if transmitted is None else balance + transmitted
+
+    @property
+    def cumulative(self) -> FloatArray:
+        """F(r) = int_0^r 2 pi r' R_d dr' at the annulus edges (n+1, C); the first row is 0."""
+        return integrals.cumulative(self.annulus_energy)
+
+    @property
+    def cumulative_stderr(self) -> FloatArray:
+        """Standard error of `cumulative` (n+1, C).
+
+        A photon of N lands in at most one annulus, so annuli are anticorrelated and their
+        variances do not add. The walk's s_i^2 = (S2_i/N - e_i^2)/(N-1) gives back the sum of
+        squared weights S2_i = N ((N-1) s_i^2 + e_i^2), and these do add:
+        Var F_k = (sum_{i<k} S2_i/N - F_k^2)/(N-1). Without photons they add.
+        """
+        stderr = _stderr_of_sums(self.annulus_energy, self.annulus_energy_stderr, self.photons)
+        return np.concatenate((np.zeros((1, self.n_channels)), stderr))
+
+    @property
+    def reflectance_per_mm2(self) -> FloatArray:
+        """Mean of R_d over each annulus (n, C) [1/mm^2]: energy over area."""
+        return self.annulus_energy / integrals.annulus_areas(self.r_edges_mm)[:, None]
+
+    @property
+    def reflectance_per_mm2_stderr(self) -> FloatArray:
+        """Standard error of `reflectance_per_mm2` (n, C) [1/mm^2]."""
+        return self.annulus_energy_stderr / integrals.annulus_areas(self.r_edges_mm)[:, None]
+
+    def cumulative_at(self, r_mm: npt.ArrayLike) -> FloatArray:
+        """Return F at any radius: exact at the edges, smooth and monotone between them.
+
+        Takes radii (...) [mm] from 0 up, beyond the last edge F stays at its last value; returns
+        (..., C). Raises ProfileError for a radius that is negative or NaN.
+        """
+        radii_mm = np.minimum(np.asarray(r_mm, dtype=np.float64), self.r_edges_mm[-1])
+        if not (radii_mm >= 0).all():
+            raise ProfileError("r_mm holds a negative radius or NaN; expected radii from 0 up.")
+        return integrals.cumulative_at(self.r_edges_mm, self.annulus_energy, radii_mm)
+
+    def flat_annuli(self) -> tuple[FloatArray, FloatArray]:
+        """Return the flat annuli that lines and pixels are integrated from.
+
+        The profile's own, cut into equal parts by the monotone interpolation of F: the innermost
+        ten into 64 each, where R_d ~ 1/r is steep, those further out into fewer, and all of them
+        into two at least. Energies between the original edges are unchanged. Returns the edges
+        (m+1,) [mm] and the densities between them (m, C) [1/mm^2].
+        """
+        return integrals.flat_annuli(self.r_edges_mm, self.annulus_energy)
+
+    def line_kernel(self, mm_per_pixel: float, half_pixels: int | None = None) -> FloatArray:
+        """Pre-integrated kernel: R_d integrated over y, and over each pixel in x.
+
+        a_k = int_{(k-1/2)p}^{(k+1/2)p} int R_d(x, y) dy dx: eq. S.5 of the supplement of Jimenez
+        et al., "Separable Subsurface Scattering", 2015, in closed form from the areas that disks
+        share with a strip. What lies beyond the grid is not part of it.
+
+        Parameters
+        ----------
+        mm_per_pixel : float [mm]
+            Pitch p; the middle pixel is centred on the beam.
+        half_pixels : int, optional
+            Pixels h on either side; by default the fewest that cover the grid.
+
+        Returns
+        -------
+        array (2h+1, C) [1]
+            Energy in each strip.
+
+        Raises
+        ------
+        ProfileError
+            A pitch or size that is not one, or a kernel of more than 2 GB a channel.
+        """
+        return integrals.line_kernel(
+            self.r_edges_mm, self.annulus_energy, mm_per_pixel, half_pixels
+        )
+
+    def quadrant_kernel(
+        self,
+        mm_per_pixel: float,
+        half_pixels: int | None = None,
+        *,
+        channel: int | None = None,
+    ) -> FloatArray:
+        """Energy in square pixels, one quadrant of the kernel with both its axes.
+
+        Pixel (i, k) covers [(i-1/2)p, (i+1/2)p] x [(k-1/2)p, (k+1/2)p]; [0, 0] is the centre pixel
+        and holds all of its energy. Symmetric; `full_kernel` unfolds it. The row sums of a kernel
+        that covers the grid are those of `line_kernel`. A pitch below a third of the first annulus
+        asks for more than the profile holds: the centre pixel of R_d ~ 1/r then lacks over 0.1 %.
+
+        Parameters
+        ----------
+        mm_per_pixel : float [mm]
+            Pitch p.
+        half_pixels : int, optional
+            Pixels h beyond the centre; by default the fewest that cover the grid.
+        channel : int, optional
+            Only this channel, without a channel axis: a third of the memory for RGB.
+
+        Returns
+        -------
+        array (h+1, h+1, C), or (h+1, h+1) with ``channel`` [1]
+            Energy in each pixel.
+
+        Raises
+        ------
+        ProfileError
+            A pitch, size or channel that is not one, or a kernel of more than 2 GB a channel.
+        """
+        if channel is None:
+            energy = self.annulus_energy
+        elif channel in range(self.n_channels):
+            energy = self.annulus_energy[:, channel : channel + 1]
+        else:
+            raise ProfileError(f"channel = {channel}; expected 0 to {self.n_channels - 1}.")
+        quadrant = integrals.quadrant_kernel(self.r_edges_mm, energy, mm_per_pixel, half_pixels)
+        return quadrant if channel is None else quadrant[:, :, 0]
+
+    def write(self, stream: BinaryIO) -> None:
+        """Write the profile to a binary stream; the same content gives the same bytes."""
+        arrays = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        stream.write(npz.pack(arrays, arrays.pop("meta")))
+
+    def save(self, path: str | Path) -> None:
+        """Write the profile to ``path`` (by custom ``NAME.profile.npz``), whole or not at all.
+
+        Raises
+        ------
+        FileError
+            The file cannot be written; an older one at ``path`` is untouched.
+        """
+        write_atomically(Path(path), self.write)
+
+    @classmethod
+    def read(cls, source: str | Path | BinaryIO, origin: str | None = None) -> Self:
+        """Read a profile from a path or a binary stream (which need not be able to seek).
+
+        Error messages call it ``origin``: if not given the path, or "the profile" for a stream.
+
+        Raises
+        ------
+        ProfileError
+            One line that names the origin: missing, damaged, foreign, or of another version.
+        """
+        if origin is None:
+            origin = str(source) if isinstance(source, str | Path) else "the profile"
+        arrays, meta = npz.unpack(source, origin)
+        fields: dict[str, Any] = {"annulus_transmittance": None, **arrays, "meta": meta}
+        try:
+            return cls(**fields)
+        except ProfileError as error:
+            raise ProfileError(f"{origin}: {error}") from None
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a profile file; see `read`."""
+        return cls.read(path)
+
+
+def _stderr_of_sums(energy: FloatArray, stderr: FloatArray, photons: int | None) -> FloatArray:
+    """Return the standard error of the running sums (n, C); see `Profile.cumulative_stderr`."""
+    if photons is None:
+        return np.sqrt(np.cumsum(stderr**2, axis=0))
+    if photons == 1:
+        return np.full(energy.shape, np.nan)
+    mean_square = np.cumsum((photons - 1) * stderr**2 + energy**2, axis=0)
+    variance = (mean_square - np.cumsum(energy, axis=0) ** 2) / (photons - 1)
+    return np.sqrt(np.maximum(variance, 0.0))  # rounding may leave -1e-17 where all weights agree

@@ -1,0 +1,1 @@
+"""What kernels are applied to: pictures of irradiance and what lies under each pixel."""

@@ -1,0 +1,145 @@
+"""A lit head: a face-like height field of real size, seen in perspective under a sharp light.
+
+Its forms are in `_head_shape` and `_head_face`, its fine relief in `_head_detail`; `_field` lights
+it. Grey: what arrives at the surface, not what a painted face sends back. Nothing is measured from
+a person.
+"""
+
+import math
+from typing import Any
+
+from sssfit.scene._field import Lamps, light_field, light_through
+from sssfit.scene._head_shape import FLOOR_MM
+from sssfit.scene._head_surface import COARSE_MM, body, bust, seen_part
+from sssfit.scene.patterns import check_range, check_size
+from sssfit.scene.record import Scene
+from sssfit.threads import thread_count
+
+# Of the picture that holds the face with a margin, around its middle [mm].
+FACE_HEIGHT_MM, FACE_WIDTH_MM = 210.0, 165.0
+# The tip of the nose stands out 22 mm; nearer than this the ears are no longer seen.
+MIN_DISTANCE_MM = 100.0
+# Up to here from the view axis the key light sees the front alone; beyond, the whole body casts
+# shadows.
+FRONT_DEGREES = 85.0
+
+
+def whole_face_mm_per_pixel(height: int, width: int) -> float:
+    """Smallest ``mm_per_pixel`` at which the face, chin to hairline and cheek to cheek, fits."""
+    check_size("head", height, width, 1.0)
+    return max(FACE_HEIGHT_MM / height, FACE_WIDTH_MM / width)
+
+
+def _toward(side_degrees: float, up_degrees: float) -> tuple[float, float, float]:
+    """Return the unit vector that many degrees to the left of the view axis and above it."""
+    side, up = math.radians(side_degrees), math.radians(up_degrees)
+    return -math.sin(side) * math.cos(up), math.sin(up), math.cos(side) * math.cos(up)
+
+
+def _opposite(side_degrees: float, up_degrees: float) -> tuple[float, float, float]:
+    """Return the direction of the fill light: on the other side of the face, before it."""
+    before = math.copysign(min(abs(side_degrees), 180.0 - abs(side_degrees)), side_degrees)
+    return _toward(-0.8 * before, 0.3 * up_degrees)
+
+
+def head_scene(
+    *,
+    height: int,
+    width: int,
+    mm_per_pixel: float,
+    distance_mm: float = 600.0,
+    light_degrees: float = 45.0,
+    light_up_degrees: float = 35.0,
+    fill: float = 0.06,
+    ambient: float = 0.05,
+    detail_mm: float = 0.1,
+    smooth: bool = True,
+    transmit: bool = False,
+    threads: int | None = None,
+) -> Scene:
+    """Light the head and look at it.
+
+    Parameters
+    ----------
+    height, width : int
+        Pixels. The middle of the picture is between nose and eyes; what does not fit is cut off.
+    mm_per_pixel : float [mm]
+        Of the plane at ``distance_mm``, which goes through the front of the cheeks: the tip of the
+        nose is 22 mm before it, the ears are 80 mm behind.
+    distance_mm : float [mm]
+        From the eye to that plane, 100 or more.
+    light_degrees : float [degrees]
+        How far to the left of the view axis the key light is, -180 to 180; it stands behind the
+        head beyond 90.
+    light_up_degrees : float [degrees]
+        How far above, -85 to 85. Face on, the key light gives an irradiance of 1.
+    fill, ambient : float
+        Irradiance of a weak light from the other side and of a sky above; neither casts shadows.
+    detail_mm : float [mm]
+        Depth of a pore, 0 to 0.5; wrinkles, lips and brows go with it. Relief finer than three
+        nodes of the grid (2.25 pixels) is left out.
+    smooth : bool
+        Average 5 to 21 samples a pixel; without it a pixel is what its centre sees.
+    transmit : bool
+        Give the scene ``thickness_mm`` and ``back_irradiance`` of the key light, too.
+    threads : int, optional
+        All cores by default. The result does not depend on it.
+
+    Returns
+    -------
+    Scene
+        Irradiance averaged over what the pixel shows of its own object, specular (a highlight of
+        Blinn and Phong, as exitance of a matt surface as bright), depth of the pixel's centre, and
+        mask: 1 skin, 2 eyeballs, 0 background, where there is no light and depth is inf. With
+        ``transmit``, for pixels whose surface faces away from the key light: how far it runs inside
+        the head to the pixel's centre, and its irradiance where it enters, in shadow 0. Both are 0
+        elsewhere. An ear is 3 mm thick.
+
+    Raises
+    ------
+    RenderError
+        A value out of its range.
+    """
+    check_size("head", height, width, mm_per_pixel)
+    check_range("head", "distance_mm", distance_mm, MIN_DISTANCE_MM, 1e6)
+    check_range("head", "light_degrees", light_degrees, -180.0, 180.0)
+    check_range("head", "light_up_degrees", light_up_degrees, -85.0, 85.0)
+    for option, light in (("fill", fill), ("ambient", ambient)):
+        check_range("head", option, light, 0.0, 1.0)
+    check_range("head", "detail_mm", detail_mm, 0.0, 0.5)
+    cores = thread_count(threads)
+    view = (height, width, mm_per_pixel, distance_mm)
+    fine, whole = seen_part(*view, detail_mm, cores)
+    key = _toward(light_degrees, light_up_degrees)
+    is_behind = abs(light_degrees) > FRONT_DEGREES
+    solid = body(cores) if transmit or is_behind else None
+    seeing: dict[str, Any] = {
+        "shape": (height, width),
+        "mm_per_pixel": mm_per_pixel,
+        "distance_mm": distance_mm,
+        "floor_mm": FLOOR_MM,
+        "threads": cores,
+    }
+    seen = light_field(
+        fine,
+        Lamps(key, _opposite(light_degrees, light_up_degrees), (1.0, fill, ambient)),
+        coarse=None if whole else bust(COARSE_MM, 0.0, cores),
+        behind=solid if is_behind else None,
+        smooth=smooth,
+        **seeing,
+    )
+    thickness, back = None, None
+    if transmit and solid is not None:
+        thickness, cosines = light_through(fine, solid, key, **seeing)
+        back = cosines[..., None]
+    return Scene(
+        "head",
+        seen.irradiance[..., None],
+        mm_per_pixel,
+        distance_mm=distance_mm,
+        depth_mm=seen.depth_mm,
+        mask=seen.labels,
+        specular=seen.specular[..., None],
+        thickness_mm=thickness,
+        back_irradiance=back,
+    )
