@@ -4,7 +4,7 @@ import click
 
 from ._methods import METHODS
 from ._options import Common
-from ._report import finish, table
+from ._output import finish, table
 
 DEON_SKIN = METHODS["gaussians"].makes
 
