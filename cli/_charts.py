@@ -11,15 +11,13 @@ from ._output import columns, number, say, table
 from ._progress import say_if_compiling, walk_progress
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from sssfit.kernel import SeparableKernel
     from sssfit.material import Material
     from sssfit.profile import Profile
     from sssfit.simulate import SoFar
 
-    # What was drawn, its figures for --json, and the same for people.
-    Drawn: TypeAlias = tuple[Figure, dict[str, Any], str]
+    # A matplotlib Figure, its figures for --json, and the same for people.
+    Drawn: TypeAlias = tuple[Any, dict[str, Any], str]
 
 _ERRORS = ("total_error", "cumulative_error", "l2_error")
 

@@ -2,11 +2,12 @@
 
 import click
 
-from ._methods import METHODS
+from sssfit.methods import SIMULATIONS
+
 from ._options import Common
 from ._output import finish, table
 
-DEON_SKIN = METHODS["gaussians"].makes
+DEON_SKIN = SIMULATIONS["gaussians"].makes
 
 
 def show_deon_skin(common: Common, *, as_toml: bool) -> None:

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._methods import METHODS
+from sssfit.methods import SIMULATIONS
+
 from ._options import Common
 from ._output import PROFILE, held, say, write
 from ._progress import say_if_compiling, walk_progress
@@ -117,11 +118,10 @@ def _computed(
     stop: Callable[[], bool],
 ) -> list[_Outcome]:
     """One call of the method's function; those that share work between materials can be stopped."""
-    from sssfit import simulate
     from sssfit.errors import StoppedError
 
-    method, begun = METHODS[request.method], time.perf_counter()
-    function = getattr(simulate, method.function)
+    method, begun = SIMULATIONS[request.method], time.perf_counter()
+    function = method.load()
     if method.shares:
         profiles = list(function(materials, stop=stop, **settings))
     elif stop():

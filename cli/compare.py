@@ -8,12 +8,14 @@ from typing import Any
 
 import click
 
+from sssfit.methods import FITS
+
 from ._compare_budget import BudgetRequest, compare_budget
 from ._compare_options import PICTURES, compare_options
 from ._compare_pareto import Outputs, Wish, compare_all, compare_one, held_outputs
 from ._compare_sheet import chart_convergence, chart_editing, chart_sheet
 from ._deon_skin import DEON_SKIN
-from ._fits import own_settings
+from ._methods import own_settings
 from ._options import Common, common_options
 from ._output import finish, held_charts, say, target
 
@@ -86,7 +88,7 @@ def _request(context: click.Context, given: Mapping[str, Any]) -> BudgetRequest:
     return BudgetRequest(
         given["photons"] or _PHOTONS,
         given["method"],
-        own_settings(context, given["method"], terms),
+        own_settings(context, FITS, given["method"], terms),
         given["model"],
         given["budget_chart"],
     )

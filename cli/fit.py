@@ -6,10 +6,11 @@ from typing import Any
 
 import click
 
-from ._fit_options import fit_options
-from ._fits import FITS, fit_lines, own_settings
+from sssfit.methods import FITS, lines_of, settings_of
+
 from ._input import load, profile_name
 from ._memory import check_memory
+from ._methods import method_options, own_settings
 from ._options import Common, Length, common_options
 from ._output import KERNEL, columns, finish_one, held, stem_of, target, write
 
@@ -24,7 +25,7 @@ class Support(Length):
         return value if value == "auto" else super().convert(value, param, ctx)
 
 
-@click.command(epilog="\b\nMethods:\n" + fit_lines())
+@click.command(epilog="\b\nMethods:\n" + lines_of(FITS))
 @click.argument("profile", required=False)
 @click.option("--list", "listing", is_flag=True, help="Print the methods, a line each.")
 @click.option("--method", type=click.Choice(list(FITS)), help="How; --list says what each does.")
@@ -45,7 +46,7 @@ class Support(Length):
 @click.option(
     "--normalize", is_flag=True, help="Unit energy for every channel; its energy is kept apart."
 )
-@fit_options
+@method_options(FITS)
 @click.option(
     "-o",
     "--output",
@@ -82,7 +83,7 @@ def fit(
       sssfit fit --method falloff --width .014 --strength .78,.70,.75 --falloff .57,.13,.08
     """
     if listing:
-        click.echo(fit_lines())
+        click.echo(lines_of(FITS))
         return
     if method is None:
         raise click.UsageError("name a --method; `sssfit fit --list` has them.")
@@ -90,11 +91,11 @@ def fit(
     from sssfit.kernel import is_kernel_file
     from sssfit.profile import Profile
 
-    settings = own_settings(context, method, given)
+    settings = own_settings(context, FITS, method, given)
     name = profile_name(profile, common)
     source = load(Profile, name)
-    fit, stem = FITS[method], stem_of(name, source.material_name)
-    count = settings.get(fit.counted, fit.count) if fit.counted else ""
+    counted, stem = FITS[method].counted, stem_of(name, source.material_name)
+    count = settings.get(counted, settings_of(FITS)[counted][0].words) if counted else ""
     path = target(output, f"{stem}.{method}{count}.kernel.json")
     settings |= _judge(settings, common.threads) | {
         "mm_per_pixel": mm_per_pixel,

@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sssfit.methods import SIMULATIONS, lines_of
+
 from ._input import is_mci
-from ._methods import MAPPINGS, METHODS, method_for, method_lines, own_options
-from ._options import Common, Count, Length, NumberRange, Share, WholeRange, common_options
+from ._methods import method_for, method_options, own_settings
+from ._options import Common, Length, WholeRange, common_options
 from ._simulate_run import Job, Request, run
 
 if TYPE_CHECKING:
@@ -28,49 +30,19 @@ class Radius(Length):
         return value if value == "auto" else super().convert(value, param, ctx)
 
 
-@click.command(epilog=method_lines())
+@click.command(epilog="\b\nMethods:\n" + lines_of(SIMULATIONS))
 @click.argument("material", required=False)
 @click.option("--all", "every", is_flag=True, help="All materials that ship with sssfit.")
 @click.option(
     "--method",
-    type=click.Choice(list(METHODS)),
+    type=click.Choice(list(SIMULATIONS)),
     default="montecarlo",
     show_default=True,
     metavar="METHOD",
     help="How; the methods are listed below.",
 )
 @click.option("--run", "number", type=WholeRange(1), metavar="N", help="Of an .mci, this run only.")
-@click.option(
-    "--photons",
-    type=Count(2, 10**12),
-    metavar="N",
-    help="montecarlo: photons to trace; every photon serves all channels."
-    "  [default: 1e7; with --target-error no limit]",
-)
-@click.option(
-    "--target-error",
-    type=Share(),
-    metavar="SHARE",
-    help="montecarlo: end when no channel's F(r) has a standard error above this share of F at the "
-    "last edge, such as 0.5%.",
-)
-@click.option(
-    "--tolerance",
-    type=Share(),
-    default="0.01%",
-    show_default=True,
-    metavar="SHARE",
-    help="exact: largest error of F(r), as a share of the total.",
-)
-@click.option(
-    "--mapping",
-    type=click.Choice(MAPPINGS),
-    default=MAPPINGS[0],
-    show_default=True,
-    metavar="FIT",
-    help="burley: which published fit gives s: perpendicular (light from straight above), diffuse "
-    "(from everywhere), or diffuse-mfp (from the diffuse mean free path).",
-)
+@method_options(SIMULATIONS)
 @click.option(
     "--dr",
     type=Length(),
@@ -90,19 +62,6 @@ class Radius(Length):
     metavar="FILE",
     help="Where the profile goes, - for stdout; with --all a folder."
     "  [default: MATERIAL.profile.npz, MATERIAL.METHOD.profile.npz]",
-)
-@click.option(
-    "--checkpoint-every",
-    type=NumberRange(min=0),
-    default=30.0,
-    show_default=True,
-    metavar="SECONDS",
-    help="montecarlo: how often FILE.checkpoint is saved, from which --resume goes on.",
-)
-@click.option(
-    "--resume",
-    is_flag=True,
-    help="montecarlo: go on where a killed or interrupted run was saved.",
 )
 @click.option("--force", is_flag=True, help="Replace an input, or a file that is not our profile.")
 @common_options
@@ -144,7 +103,7 @@ def simulate(
     if number is not None and not is_mci(material):
         raise click.UsageError("--run chooses a run of an MCML input file, .mci.")
     method = method_for(context, method, material)
-    own = own_options(context, method, own)
+    own = own_settings(context, SIMULATIONS, method, own)
     if radius == "auto" and method != "montecarlo":
         raise click.UsageError("--radius auto is for --method montecarlo; give a length.")
     walk = {key: own.pop(key) for key in ("checkpoint_every", "resume") if key in own}
@@ -154,7 +113,7 @@ def simulate(
     targets = _targets(materials, method, output, several=several)
     if walk.get("resume") and targets == [None]:
         raise click.UsageError("--resume needs a file to go on beside; leave -o - out.")
-    inputs = (material,) if material and METHODS[method].makes is None else ()
+    inputs = (material,) if material and SIMULATIONS[method].makes is None else ()
     run(materials, targets, jobs, Request(method, force, several, common, inputs, **walk))
 
 
@@ -162,7 +121,7 @@ def _of_common(method: str, common: Common) -> dict[str, Any]:
     """Return the common options that the method's function takes; a walk's threads come later."""
     if method == "montecarlo":
         return {"seed": common.seed}
-    return {"threads": common.threads} if METHODS[method].shares else {}
+    return {"threads": common.threads} if SIMULATIONS[method].shares else {}
 
 
 def _jobs(
@@ -172,25 +131,25 @@ def _jobs(
     from sssfit.material import load_material, material_names
     from sssfit.simulate import DEON_SKIN, shared_walks
 
-    if METHODS[method].makes is not None:
+    if SIMULATIONS[method].makes is not None:
         return [DEON_SKIN], [([0], settings)]
     if material is not None and is_mci(material):
-        materials, each = _runs_of(material, number, settings)
+        materials, each = _runs_of(material, number, method, settings)
         return materials, [([k], own) for k, own in enumerate(each)]
     names = material_names() if material is None else (material,)
     materials = [load_material(name) for name in names]
-    shares = METHODS[method].shares
+    shares = SIMULATIONS[method].shares
     groups = shared_walks(materials) if shares else [[k] for k in range(len(materials))]
     return materials, [(group, settings) for group in groups]
 
 
 def _runs_of(
-    path: str, number: int | None, given: dict[str, Any]
+    path: str, number: int | None, method: str, given: dict[str, Any]
 ) -> tuple[list[Material], list[dict[str, Any]]]:
     """Return the materials of the runs of a file, or of one, and what to simulate each with.
 
-    ``given`` holds dr_mm and radius_mm, and photons for a walk, as the options have them; the
-    file's own stand for those that were not given.
+    ``given`` holds dr_mm and radius_mm, and photons or a target error if these were given; the
+    file's own stand for those that were not.
     """
     from sssfit.errors import MaterialError
     from sssfit.formats.mci import load_mci
@@ -209,7 +168,7 @@ def _runs_of(
         for run in runs
     ]
     # A target error alone decides when a walk ends; then the file's photons are no limit either.
-    if "photons" in given and given["photons"] is None and given["target_error"] is None:
+    if method == "montecarlo" and not {"photons", "target_error"} & given.keys():
         for run, own in zip(runs, settings, strict=True):
             own["photons"] = run.photons
     return [run.material for run in runs], settings
