@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sssfit.messages import columns, table
+
 from ._input import profile_name, read_any
 from ._options import Common, common_options
-from ._output import columns, finish, table
+from ._output import finish
 
 if TYPE_CHECKING:
     from ._input import Found
