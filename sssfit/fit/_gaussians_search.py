@@ -79,7 +79,7 @@ def search(annuli: Annuli, terms: int, least_mm2: float, most_mm2: float) -> Fou
     """
     bounds = float(np.log(least_mm2)), float(np.log(most_mm2))
     best, evaluations, reason = None, 0, ""
-    for number in range(1, terms + 1):
+    for _ in range(terms):
         starts = _starts(None if best is None else best.log_variances, bounds)
         found, settled, count = _best_of(annuli, starts, bounds)
         evaluations += count
