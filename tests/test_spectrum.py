@@ -201,7 +201,7 @@ def test_the_verb_gives_json(run, spectrum):
         (("--spectrum", "--mm-per-pixel", "0"), 2, "not a length above 0"),
         (("--spectrum", "there.profile.npz"), 1, "there.profile.npz"),
         (("--spectrum", "-o", "a.jpg"), 1, ".png, .svg or .pdf"),
-        (("--spectrum", "--mm-per-pixel", "1e-5", "-q"), 1, "use a larger mm_per_pixel"),
+        (("--spectrum", "--mm-per-pixel", "1e-5", "-q"), 1, "use a larger --mm-per-pixel"),
     ],
 )
 def test_bad_input_is_one_clear_line(run, tmp_path, arguments, status, fragment):

@@ -118,7 +118,7 @@ def minimise(
     if watch.x is None:
         raise FitError(
             f"the optimiser met no usable point ({reason}); expected finite energies and settings: "
-            "try a larger mm_per_pixel or another method."
+            "try a larger `mm_per_pixel` or another method."
         )
     return Minimum(watch.x, watch.value, watch.evaluations, reason)
 

@@ -39,8 +39,8 @@ def factor_to(
     if min(within, wanted) <= 0.0:
         raise FitError(
             f"channel {target.profile.channels[channel]}: the terms have the energy {within:.3g} "
-            f"within the support, which cannot be scaled to {wanted:.3g}; use energy = "
-            '"keep", another number of terms or a larger support.'
+            f"within the support, which cannot be scaled to {wanted:.3g}; use "
+            '`energy = "keep"`, another number of terms or a larger support.'
         )
     return wanted / within
 

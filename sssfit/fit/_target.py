@@ -106,7 +106,7 @@ def make_target(
     if half == 0:
         warnings.warn(
             f"a pixel of {pitch:g} mm is wider than the support of {support:.4g} mm: the kernel is "
-            "a single pixel, which blurs nothing; use a smaller mm_per_pixel.",
+            "a single pixel, which blurs nothing; use a smaller `mm_per_pixel`.",
             SssfitWarning,
             stacklevel=3,
         )
@@ -134,7 +134,7 @@ def _check_memory(target: Target) -> None:
         raise FitError(
             f"a kernel of {pixels} x {pixels} pixels of {target.mm_per_pixel:.4g} mm would need "
             f"{size / 1e9:.3g} GB of memory a channel, and {_MOST_BYTES / 1e9:.3g} GB is the "
-            "most: use a larger mm_per_pixel or a smaller support."
+            "most: use a larger `mm_per_pixel` or a smaller support."
         )
 
 

@@ -309,7 +309,7 @@ def guided_target(profile: Profile, mm_per_pixel: float | None, support_mm: floa
         f"{pitch:.4g} mm"
     )
     if mm_per_pixel is not None:
-        raise FitError(f"{what}: use mm_per_pixel = {enough:.3g} or more, or a smaller support.")
+        raise FitError(f"{what}: use `mm_per_pixel = {enough:.3g}` or more, or a smaller support.")
     warnings.warn(f"{what}: pixels of {enough:.3g} mm are used.", SssfitWarning, stacklevel=3)
     return make_target(profile, enough, support_mm)
 
