@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ._compiling import say_if_compiling
 from ._deon_skin import DEON_SKIN
+from ._input import load
 from ._options import Common
-from ._report import binary_stdin
+from ._progress import say_if_compiling
 from ._scene import MADE, Picture, check_file_options, made_options, make_or_read
 
 if TYPE_CHECKING:
@@ -27,10 +27,8 @@ def profile_of(name: str, common: Common) -> Profile:
     """Read a profile, ``-`` for stdin, or make the exact one of a material."""
     from sssfit.profile import Profile
 
-    if name == "-":
-        return Profile.read(binary_stdin(), "stdin")
-    if name.endswith(".npz"):
-        return Profile.load(name)
+    if name == "-" or name.endswith(".npz"):
+        return load(Profile, name)
     if name == DEON_SKIN:
         from sssfit.simulate import simulate_deon_skin
 

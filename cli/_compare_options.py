@@ -7,8 +7,9 @@ from typing import Any
 
 import click
 
+from sssfit.methods import FITS
+
 from ._compare_input import MM_PER_PIXEL
-from ._fits import FITS
 from ._options import Count, Length, WholeRange
 from ._scene import EDGE_DEGREES, FILE_OPTIONS, MADE, Size
 

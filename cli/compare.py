@@ -8,15 +8,16 @@ from typing import Any
 
 import click
 
+from sssfit.methods import FITS
+
 from ._compare_budget import BudgetRequest, compare_budget
 from ._compare_options import PICTURES, compare_options
 from ._compare_pareto import Outputs, Wish, compare_all, compare_one, held_outputs
 from ._compare_sheet import chart_convergence, chart_editing, chart_sheet
 from ._deon_skin import DEON_SKIN
-from ._figure import chart_path, held_charts
-from ._fits import own_settings
+from ._methods import own_settings
 from ._options import Common, common_options
-from ._report import finish, say
+from ._output import finish, held_charts, say, target
 
 _BUDGET = ("photons", "method", "rank", "terms", "model")
 _SHEETS = ("sheet", "editing", "convergence")
@@ -87,7 +88,7 @@ def _request(context: click.Context, given: Mapping[str, Any]) -> BudgetRequest:
     return BudgetRequest(
         given["photons"] or _PHOTONS,
         given["method"],
-        own_settings(context, given["method"], terms),
+        own_settings(context, FITS, given["method"], terms),
         given["model"],
         given["budget_chart"],
     )
@@ -133,7 +134,7 @@ def _sheets(
     material: str | None, asked: Mapping[str, str], given: Mapping[str, Any], common: Common
 ) -> None:
     """Draw the sheets that were asked for."""
-    paths = [chart_path(each) for each in asked.values()]
+    paths = [target(each) for each in asked.values()]
     with held_charts(paths, inputs=[material], force=given["force"]):
         if "sheet" in asked:
             from ._compare_input import profile_of

@@ -244,9 +244,9 @@ def finishing(both: bool):
     if not both:
         yield
         return
-    from sssfit.cli import _report
+    from sssfit.cli import _output
 
-    real = _report.finish
+    real = _output.finish
 
     def twice(common, figures, text, *, to_stderr=False):
         for as_json in (True, False):

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.compare._panels import Panel, check_colours, make_panel
 from sssfit.compare.candidates import MOST_TERMS, Candidate
 from sssfit.compare.judged import border_of, judged_scene
@@ -18,7 +18,7 @@ from sssfit.compare.pictures import picture_error
 from sssfit.fit import support_of
 from sssfit.kernel import SeparableKernel
 from sssfit.measure.cost import cost_of
-from sssfit.measure.score import auto_exposure
+from sssfit.measure.score import COLOUR_FIGURES, auto_exposure
 from sssfit.profile import Profile
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
@@ -46,6 +46,12 @@ class SheetRow:
     label: str
     passes: int | None
     panels: tuple[Panel, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return label, passes and the figures of the score, a value for each scene."""
+        keys = (*COLOUR_FIGURES, "relative_l2")
+        scores = {key: [getattr(each.score, key) for each in self.panels] for key in keys}
+        return plain({"label": self.label, "passes": self.passes, **scores})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,6 +83,21 @@ class Sheet:
     exposures: tuple[float, ...]
     rows: tuple[SheetRow, ...]
     production: Mapping[str, tuple[float, ...]]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures of the sheet as JSON has them, a row for each kernel."""
+        return plain(
+            {
+                "material": self.profile.material_name,
+                "mm_per_pixel": self.mm_per_pixel,
+                "pixels": self.pixels,
+                "support_mm": self.support_mm,
+                "scenes": self.scenes,
+                "exposures": self.exposures,
+                "production": self.production,
+                "rows": [each.to_dict() for each in self.rows],
+            }
+        )
 
 
 def compute_sheet(

@@ -1,7 +1,8 @@
 """Profile to kernel: one method, one file, one signature ``fit_x(profile, ...) -> FitResult``.
 
-``METHODS`` has them by the names of the command line. Every ``fit_x`` takes a profile and
-``mm_per_pixel``, ``support_mm`` and ``normalize`` by keyword, beside settings of its own.
+``METHODS`` has them by the names of the command line, from the entries in ``sssfit.methods``. Every
+``fit_x`` takes a profile and ``mm_per_pixel``, ``support_mm`` and ``normalize`` by keyword, beside
+settings of its own.
 
 The package is the function `fit` as well: ``sssfit.fit(profile, "svd", rank=3)``.
 """
@@ -25,6 +26,7 @@ from sssfit.fit.preintegrated import fit_preintegrated
 from sssfit.fit.svd import fit_svd
 from sssfit.kernel import SeparableKernel
 from sssfit.messages import shown
+from sssfit.methods import FITS
 from sssfit.profile import Profile
 
 __all__ = [
@@ -52,27 +54,7 @@ class FitMethod:
     summary: str
 
 
-METHODS = {
-    "svd": FitMethod(
-        fit_svd, "rank N: the largest terms of the singular value decomposition; the smallest error"
-    ),
-    "gaussians": FitMethod(
-        fit_gaussians, "1 to 10 passes: a sum of Gaussians, best for the profile, r-weighted"
-    ),
-    "preintegrated": FitMethod(
-        fit_preintegrated, "one pass: the profile integrated along lines; exact for axis edges"
-    ),
-    "guided": FitMethod(
-        fit_guided, "one pass fitted under a guide function: near (k = 0) to far (k = 4) scattering"
-    ),
-    "artist": FitMethod(fit_artist, "one pass of two Gaussians per channel, fitted or set by hand"),
-    "falloff": FitMethod(
-        fit_falloff, "one pass, red skin stretched: width, strength and falloff, fitted or by hand"
-    ),
-    "burley": FitMethod(
-        fit_burley, "one pass: normalised diffusion, a shape per channel, as engines take it"
-    ),
-}
+METHODS = {name: FitMethod(each.load(), each.summary) for name, each in FITS.items()}
 
 
 def fit(profile: Profile | str | Path, method: str = "svd", **settings: Any) -> SeparableKernel:

@@ -20,7 +20,7 @@ from sssfit.simulate._checkpoint import (
     is_checkpoint_file,
 )
 from sssfit.simulate._deterministic import Named
-from sssfit.simulate._finished import is_complete, is_finished
+from sssfit.simulate._finished import is_complete, is_finished, run_figures
 from sssfit.simulate._run import Progress
 from sssfit.simulate._so_far import SoFar, read_checkpoint
 from sssfit.simulate.burley import simulate_burley
@@ -50,6 +50,7 @@ __all__ = [
     "is_finished",
     "is_solver_compiled",
     "read_checkpoint",
+    "run_figures",
     "shared_walks",
     "simulate",
     "simulate_burley",
