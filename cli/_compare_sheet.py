@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from sssfit.compare.convergence import Convergence
     from sssfit.compare.editing import Editing
     from sssfit.compare.sheet import Sheet
+    from sssfit.fit import Pitch
     from sssfit.profile import Profile
 
 MOST_PHOTONS = 10**7
@@ -26,12 +27,11 @@ _PER_DECADE = 2
 _COLOURS = ("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99", "share_above_1")
 
 
-def chart_sheet(profile: Profile, output: str, mm_per_pixel: float | None, common: Common) -> None:
+def chart_sheet(profile: Profile, output: str, mm_per_pixel: Pitch | None, common: Common) -> None:
     """Draw a contact sheet of a profile's kernels; ``-`` is PNG on stdout."""
     from sssfit.compare.sheet import compute_sheet
 
-    given: dict[str, Any] = {} if mm_per_pixel is None else {"mm_per_pixel": mm_per_pixel}
-    sheet = compute_sheet(profile, threads=common.threads, **given)
+    sheet = compute_sheet(profile, mm_per_pixel=mm_per_pixel, threads=common.threads)
 
     from sssfit.chart.sheet import sheet_figure
 

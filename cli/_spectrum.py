@@ -12,6 +12,7 @@ from ._report import finish, table
 
 if TYPE_CHECKING:
     from sssfit.compare import Spectrum
+    from sssfit.fit import Pitch
     from sssfit.profile import Profile
 
 _MOST = 12  # terms in figures; the chart shows as many
@@ -21,7 +22,7 @@ def chart_spectrum(
     name: str,
     profile: Profile,
     path: Path | None,
-    mm_per_pixel: float | None,
+    mm_per_pixel: Pitch | None,
     common: Common,
     *,
     force: bool,

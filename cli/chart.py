@@ -11,11 +11,12 @@ from ._figure import chart_output
 from ._guide import chart_guide
 from ._kernel_chart import chart_kernel
 from ._models import chart_models
-from ._options import Common, Count, Length, ListOf, Number, common_options
+from ._options import Common, Count, LengthOr, ListOf, Number, common_options
 from ._report import finish, newest, say
 from ._spectrum import chart_spectrum
 
 if TYPE_CHECKING:
+    from sssfit.fit import Pitch
     from sssfit.kernel import SeparableKernel
     from sssfit.material import Material
     from sssfit.profile import Profile
@@ -35,10 +36,10 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--mm-per-pixel",
-    type=Length(),
-    metavar="MM",
-    help="Pixels of the kernel, with --spectrum or --guide."
-    "  [default: the profile's first annulus]",
+    type=LengthOr("profile"),
+    metavar="MM|profile",
+    help="Pixels of the kernel, with --spectrum or --guide; profile is the width of the profile's "
+    "first annulus.  [default: 0.3]",
 )
 @click.option(
     "--k",
@@ -79,7 +80,7 @@ def chart(
     models: bool,
     spectrum: bool,
     guide: bool,
-    mm_per_pixel: float | None,
+    mm_per_pixel: Pitch | None,
     ks: list[float] | None,
     channel: str | None,
     profile: str | None,

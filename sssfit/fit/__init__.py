@@ -1,14 +1,15 @@
 """Profile to kernel: one method, one file, one signature ``fit_x(profile, ...) -> FitResult``.
 
 ``METHODS`` has them by the names of the command line. Every ``fit_x`` takes a profile and
-``mm_per_pixel``, ``support_mm`` and ``normalize`` by keyword, beside settings of its own.
+``mm_per_pixel`` (0.3 by default), ``support_mm`` and ``normalize`` by keyword, beside settings of
+its own.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from sssfit.fit._result import FitResult
-from sssfit.fit._target import make_target, support_of
+from sssfit.fit._target import MM_PER_PIXEL, Pitch, make_target, pitch_of, support_of
 from sssfit.fit.artist import fit_artist
 from sssfit.fit.burley import fit_burley
 from sssfit.fit.falloff import fit_falloff
@@ -19,8 +20,10 @@ from sssfit.fit.svd import fit_svd
 
 __all__ = [
     "METHODS",
+    "MM_PER_PIXEL",
     "FitMethod",
     "FitResult",
+    "Pitch",
     "fit_artist",
     "fit_burley",
     "fit_falloff",
@@ -29,6 +32,7 @@ __all__ = [
     "fit_preintegrated",
     "fit_svd",
     "make_target",
+    "pitch_of",
     "support_of",
 ]
 
