@@ -28,6 +28,7 @@ from ._progress import step_progress
 
 if TYPE_CHECKING:
     from sssfit.compare.comparison import Comparison
+    from sssfit.fit import Pitch
     from sssfit.profile import Profile
     from sssfit.scene.record import Scene
 
@@ -38,21 +39,23 @@ class Wish:
 
     pictures: Sequence[str]
     size: tuple[int, int] | None
-    mm_per_pixel: float | None
+    mm_per_pixel: Pitch | None
     error: str
     cost: str
     force: bool
     common: Common
     layer: str | None = None
     mask: str | None = None
+    profile: Profile | None = None  # where the pitch is that of a profile, it has been read
 
     @cached_property
     def scenes(self) -> tuple[list[Scene], float]:
         """Make or read the pictures, once; the size of their pixels [mm]."""
+        pitch = None if self.mm_per_pixel is None else float(self.mm_per_pixel)
         return scenes_of(
             self.pictures,
             self.size,
-            self.mm_per_pixel,
+            pitch,
             self.common,
             layer=self.layer,
             mask=self.mask,
@@ -77,7 +80,8 @@ def compare_one(name: str, outputs: Outputs, wish: Wish) -> tuple[dict[str, Any]
 
     The outputs are held by the caller.
     """
-    comparison = _compared(profile_of(name, wish.common), *wish.scenes, wish)
+    profile = profile_of(name, wish.common) if wish.profile is None else wish.profile
+    comparison = _compared(profile, *wish.scenes, wish)
     _write(comparison, outputs, wish)
     figures = {
         "error": wish.error,

@@ -14,6 +14,7 @@ from ._output import finish, table, target, write_chart
 from ._progress import say_if_compiling
 
 if TYPE_CHECKING:
+    from sssfit.fit import Pitch
     from sssfit.profile import Profile
 
 MOST_PHOTONS = 10**7
@@ -21,12 +22,11 @@ _LEAST_PHOTONS = 10_000
 _PER_DECADE = 2
 
 
-def chart_sheet(profile: Profile, output: str, mm_per_pixel: float | None, common: Common) -> None:
+def chart_sheet(profile: Profile, output: str, mm_per_pixel: Pitch | None, common: Common) -> None:
     """Draw a contact sheet of a profile's kernels; ``-`` is PNG on stdout."""
     from sssfit.compare.sheet import compute_sheet
 
-    given: dict[str, Any] = {} if mm_per_pixel is None else {"mm_per_pixel": mm_per_pixel}
-    sheet = compute_sheet(profile, threads=common.threads, **given)
+    sheet = compute_sheet(profile, mm_per_pixel=mm_per_pixel, threads=common.threads)
 
     from sssfit.chart.sheet import sheet_figure
 

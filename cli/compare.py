@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -70,6 +71,8 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
     if material is None:
         compare_all(Path(given["output"] or "."), wish)
         return
+    if wish.mm_per_pixel == "profile":
+        wish = _on_pixels_of_the_profile(material, wish)
     request = _request(context, given)
     kernels = budget = None
     charts = [given[key] for key in ("chart", "budget_chart") if given[key]]
@@ -80,6 +83,16 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
         if given["only"] != "kernels":
             budget = _budget(material, request, wish, only=given["only"] == "budget")
     _report([budget, kernels], given, common)
+
+
+def _on_pixels_of_the_profile(material: str, wish: Wish) -> Wish:
+    """Read the profile first, for its pitch."""
+    from sssfit.fit import pitch_of
+
+    from ._compare_input import profile_of
+
+    profile = profile_of(material, wish.common)
+    return dataclasses.replace(wish, profile=profile, mm_per_pixel=pitch_of(profile, "profile"))
 
 
 def _request(context: click.Context, given: Mapping[str, Any]) -> BudgetRequest:
@@ -168,6 +181,8 @@ def _check(material: str | None, given: Mapping[str, Any]) -> None:
         raise click.UsageError("name one MATERIAL or profile, or give --all.")
     if given["every"] and (given["chart"] or given["table"]):
         raise click.UsageError("--all names its charts and tables; leave --chart and --table out.")
+    if given["every"] and given["mm_per_pixel"] == "profile":
+        raise click.UsageError("the pictures of --all share their pixels; give a length in mm.")
     if given["output"] is not None and not given["every"]:
         raise click.UsageError("-o is the folder of --all; name files by --chart and --table.")
     without_budget = given["every"] or given["only"] == "kernels"

@@ -108,7 +108,7 @@ def test_readme_session_ends_in_shader_source(tmp_path):
     commands = (["simulate", "skin1", "--method", "exact"], fit[1:], ["export", "--format", "hlsl"])
     printed = [printed_by(each, tmp_path) for each in commands]
     assert figures_of(printed[1]) == figures_of(code_blocks("text")[4])
-    assert "SSS_WEIGHTS[3][427]" in (tmp_path / "skin1.exact.svd3.hlsl").read_text()
+    assert "SSS_WEIGHTS[3][143]" in (tmp_path / "skin1.exact.svd3.hlsl").read_text()
     (render,) = commands_of("sssfit render")
     assert figures_of(printed_by(render[1:], tmp_path)) == figures_of(code_blocks("text")[5])
 

@@ -23,7 +23,7 @@ from sssfit.simulate.exact import diffuse_reflectance
 
 SKIN1 = Layer(1.3, np.zeros(3), np.array([0.032, 0.17, 0.48]), np.array([0.74, 0.88, 1.01]))
 SPECULAR = (0.3 / 2.3) ** 2
-PITCH = 0.1
+PITCH = 0.3
 PYTHON, WALK, EXACT, INVERSION, FIT, RENDER = code_blocks("text")
 MCML = Path(__file__).parent / "data" / "mcml_skin1_chicken1_ketchup.npz"
 SIGMAS = 4.5
@@ -128,10 +128,11 @@ def test_the_inversion_is_right_by_walking_photons():
         assert published[:, place + 1] == pytest.approx(error, abs=0.051)
 
 
-def kernel_of(profile, half, samples=6):
-    """Energy of pixels (P, P, C): F's slope over 2 pi r at points in each, the middle one the rest.
+def kernel_of(profile, half, samples=12):
+    """Energy of pixels (P, P, C): F's slope over 2 pi r at points in each; the middle one by rings.
 
-    Near the axis R_d ~ 1/r is no sum of points: pixels under a millimetre have 16 times as many.
+    Near the axis R_d ~ 1/r is no sum of points: the pixels beside it have 8 times as many, and of
+    the middle one each ring counts by the share of it that lies in the square.
     """
     slopes = [PchipInterpolator(profile.r_edges_mm, f).derivative() for f in profile.cumulative.T]
 
@@ -145,15 +146,22 @@ def kernel_of(profile, half, samples=6):
         return blocks.sum(axis=(1, 3)) * (PITCH / count) ** 2
 
     kernel = energies(half, samples)
-    near, fine = 8, energies(8, 96)
+    near, fine = 3, energies(3, 96)
     middle = slice(half - near, half + near + 1)
     kernel[middle, middle] = fine
+    inner, corner = 0.5 * PITCH, np.sqrt(0.5) * PITCH
+    step = (corner - inner) / 2000
+    r = inner + step * (np.arange(2000) + 0.5)
+    within = 1.0 - 4.0 / np.pi * np.arccos(inner / r)
+    for c, slope in enumerate(slopes):
+        whole = slope.antiderivative()(inner) - slope.antiderivative()(0.0)
+        kernel[half, half, c] = whole + step * np.sum(within * slope(r))
     return kernel
 
 
 @pytest.fixture(scope="module")
 def true_kernel(exact):
-    return kernel_of(exact, 213)
+    return kernel_of(exact, 71)
 
 
 def test_errors_of_the_fit_are_those_of_numpys_eigenvalues(exact, true_kernel):
@@ -162,7 +170,7 @@ def test_errors_of_the_fit_are_those_of_numpys_eigenvalues(exact, true_kernel):
         np.argmax((exact.cumulative >= 0.999 * exact.cumulative[-1]).all(axis=1))
     ]
     pixels = 2 * int(support / PITCH) + 1
-    assert f"skin1: svd, 3 terms, {pixels} pixels of 0.1 mm" in FIT
+    assert f"skin1: svd, 3 terms, {pixels} pixels of 0.3 mm" in FIT
     assert FIT.count(f"the largest 3 of {(pixels + 1) // 2} eigenvalues") == 3
     for c, (frobenius, energy_error, energy, *_) in enumerate(printed):
         kernel = true_kernel[:, :, c]
@@ -179,12 +187,12 @@ def test_errors_of_the_fit_are_those_of_numpys_eigenvalues(exact, true_kernel):
 
 
 def test_the_rendering_is_scipys(exact, true_kernel):
-    scene = make_scene("head", height=512, width=512, mm_per_pixel=PITCH)
+    scene = make_scene("head", height=700, width=700, mm_per_pixel=PITCH)
     kernel = fit_svd(exact, rank=3, mm_per_pixel=PITCH).kernel
     light = scene.irradiance[:, :, 0]
-    around = np.pad(light, 213, mode="symmetric")
+    around = np.pad(light, 71, mode="symmetric")
     inside = scene.mask > 0
-    truth, picture = np.empty((512, 512, 3)), np.zeros((512, 512, 3))
+    truth, picture = np.empty((700, 700, 3)), np.zeros((700, 700, 3))
     for c in range(3):
         truth[:, :, c] = signal.fftconvolve(around, true_kernel[:, :, c], mode="valid")
         for sign, weights in zip(kernel.signs[:, c], kernel.weights[:, :, c], strict=True):
@@ -198,7 +206,7 @@ def test_the_rendering_is_scipys(exact, true_kernel):
     assert number_after("largest", RENDER) == pytest.approx(np.abs(difference).max(), rel=0.02)
     psnr = 20.0 * np.log10(truth[inside].max() / rmse)
     assert number_after("PSNR", RENDER) == pytest.approx(psnr, abs=0.1)
-    assert f"{2 * 3} passes, {2 * 3 * 427} weights a pixel, {3 * 427 * 3 * 4:,} bytes" in RENDER
+    assert f"{2 * 3} passes, {2 * 3 * 143} weights a pixel, {3 * 143 * 3 * 4:,} bytes" in RENDER
 
     exposure = number_after("at exposure", RENDER)
     some = np.random.default_rng(1).choice(np.flatnonzero(inside), 3000, replace=False)

@@ -20,7 +20,7 @@ import numpy as np
 from sssfit.arrays import FloatArray, plain
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import FitResult, fit_guided
-from sssfit.fit._target import Target
+from sssfit.fit._target import Pitch, Target
 from sssfit.fit.guided import DRAWN_K, extents_of, gamma, guided_target
 from sssfit.profile import Profile
 
@@ -117,7 +117,7 @@ def compute_guide(
     *,
     ks: Sequence[float] = DRAWN,
     channel: str | None = None,
-    mm_per_pixel: float | None = None,
+    mm_per_pixel: Pitch | None = None,
     support_mm: float | None = None,
 ) -> Guide:
     """Fit the guided kernel for each k, and keep what it looked at and what it left.

@@ -1,8 +1,8 @@
 """Profile to kernel: one method, one file, one signature ``fit_x(profile, ...) -> FitResult``.
 
 ``METHODS`` has them by the names of the command line, from the entries in ``sssfit.methods``. Every
-``fit_x`` takes a profile and ``mm_per_pixel``, ``support_mm`` and ``normalize`` by keyword, beside
-settings of its own.
+``fit_x`` takes a profile and ``mm_per_pixel`` (0.3 by default), ``support_mm`` and ``normalize`` by
+keyword, beside settings of its own.
 
 The package is the function `fit` as well: ``sssfit.fit(profile, "svd", rank=3)``.
 """
@@ -16,7 +16,7 @@ from typing import Any
 
 from sssfit.errors import FitError
 from sssfit.fit._result import FitResult
-from sssfit.fit._target import make_target, support_of
+from sssfit.fit._target import MM_PER_PIXEL, Pitch, make_target, pitch_of, support_of
 from sssfit.fit.artist import fit_artist
 from sssfit.fit.burley import fit_burley
 from sssfit.fit.falloff import fit_falloff
@@ -31,8 +31,10 @@ from sssfit.profile import Profile
 
 __all__ = [
     "METHODS",
+    "MM_PER_PIXEL",
     "FitMethod",
     "FitResult",
+    "Pitch",
     "fit",
     "fit_artist",
     "fit_burley",
@@ -42,6 +44,7 @@ __all__ = [
     "fit_preintegrated",
     "fit_svd",
     "make_target",
+    "pitch_of",
     "support_of",
 ]
 
