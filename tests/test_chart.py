@@ -4,7 +4,7 @@ import io
 
 import numpy as np
 import pytest
-from figures import assert_legible
+from figures import assert_legible, words_of
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import StepPatch
@@ -105,7 +105,7 @@ def test_neighbours_among_many_channels_differ_in_dashes(n_channels):
 
 
 def test_title_and_caption_say_where_the_profile_comes_from(skin1):
-    texts = " ".join(each.get_text() for each in profile_figure(skin1).texts)
+    texts = words_of(profile_figure(skin1))
     for words in (
         "skin1: diffuse reflectance profile",
         "Monte Carlo · 10⁵ photons, seed 1",
@@ -120,7 +120,7 @@ def test_title_and_caption_say_where_the_profile_comes_from(skin1):
 def test_light_beyond_the_grid_is_in_the_caption():
     profile = simulate_montecarlo(load_material("wholemilk"), photons=20_000)
     share = 100 * profile.beyond_grid / profile.diffuse_reflectance
-    texts = " ".join(each.get_text() for each in profile_figure(profile).texts)
+    texts = words_of(profile_figure(profile))
     assert f"R {share[0]:.2g} %, G {share[1]:.2g} %, B {share[2]:.2g} % of diffuse" in texts
     assert share[0] > 2
 

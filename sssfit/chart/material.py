@@ -100,8 +100,6 @@ def _draw_head(figure: Figure, material: Material, handles: Sequence[Line2D], co
         handlelength=2.8,
         columnspacing=1.5,
     )
-    for text in legend.get_texts():
-        text.set_parse_math(False)
 
 
 def _columns(labels: Sequence[str]) -> int:
@@ -162,7 +160,7 @@ def _name_channels(axes: Axes, channels: Sequence[str]) -> None:
     names = [shortened(each) for each in channels]
     widest = 0.12 + max(inches(each, RC["xtick.labelsize"]) for each in names)
     shown = spread(len(names), max(int(_WIDTH_INCHES / widest), 1))
-    axes.set_xticks(shown, [drawable(names[k]) for k in shown], parse_math=False)
+    axes.set_xticks(shown, [drawable(names[k]) for k in shown])
     most = len(names) - 1
     beside = max(0.5, most * 0.5 * widest / (_WIDTH_INCHES - widest))  # half of the outer names
     axes.set_xlim(-beside, most + beside)

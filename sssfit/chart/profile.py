@@ -105,8 +105,6 @@ def _draw_head(figure: Figure, profile: Profile, bins: list[Bins]) -> float:
         handlelength=2.8,
         columnspacing=1.5,
     )
-    for text in legend.get_texts():
-        text.set_parse_math(False)
     rows = math.ceil(len(labels) / columns)
     return 1 - (0.98 + 0.18 * rows) / HEIGHT_INCHES
 
