@@ -99,7 +99,7 @@ def new_page(
 
 
 def _rest(figure: Figure | SubFigure) -> SubFigure:
-    """What the title, notes and legends of a figure leave of it."""
+    """Return what the title, notes and legends of a figure leave of it."""
     return cast(SubFigure, figure.subfigures())
 
 
