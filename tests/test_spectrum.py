@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
-from figures import assert_legible
+from figures import assert_legible, words_of
 from matplotlib.colors import to_hex
 from reference_pixels import make_profile, one_over_r_profile
 
@@ -97,7 +97,7 @@ def test_what_is_drawn_is_what_was_computed(spectrum):
             np.testing.assert_allclose(line.get_ydata(), 100 * shares[:12, c])
         assert len({to_hex(each.get_color()) for each in lines}) == 3
         assert len({each.get_marker() for each in lines}) == 3
-    texts = " ".join(each.get_text() for each in figure.texts)
+    texts = words_of(figure)
     for words in (
         "skin1: energy of the kernel's singular values",
         "Exact solution",

@@ -209,8 +209,6 @@ def _legend(axes: Axes, title: str, handles: Sequence[Patch | Line2D], columns: 
         columnspacing=1.5,
         fontsize=7.5,
     )
-    for text in legend.get_texts():
-        text.set_parse_math(False)
 
 
 def _figures(cause: Cause, *, is_seen: bool) -> list[float]:

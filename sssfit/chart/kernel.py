@@ -191,8 +191,6 @@ def _draw_terms(figure: Figure, labels: Sequence[str], columns: int, down: float
         handlelength=2.8,
         columnspacing=1.5,
     )
-    for text in legend.get_texts():
-        text.set_parse_math(False)
 
 
 def _term_style(term: int, terms: int) -> Style:
