@@ -1,4 +1,4 @@
-"""docs/architecture.md is true: its picture has every room, imports point down it, its paths exist."""
+"""docs/architecture.md is true: every room is in its picture, imports point down, paths exist."""
 
 import re
 from itertools import pairwise
@@ -12,7 +12,7 @@ PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
 
 
 def picture() -> dict[str, int]:
-    """The line of each room in the picture, counted from the top; words stand in the right column."""
+    """The line of each room in the picture, from the top; the right column holds words."""
     (drawn,) = re.findall(r"^```text\n(.*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
     return {
         room: number for number, line in enumerate(drawn.splitlines()) for room in line[:38].split()

@@ -167,3 +167,29 @@ def test_no_file_names_a_package_host_or_a_path_of_some_machine():
         for pattern in (PACKAGE_HOST, MACHINE_PATH):
             found = pattern.search(text)
             assert found is None, f"{path.relative_to(ROOT)}: {found and found[0]}"
+
+
+DECISION = re.compile(r"^\*\*(\d{4}-\d\d-\d\d)\. (.+?\?)\*\* (.+)$")
+
+
+def decisions() -> list[str]:
+    """The entries of docs/decisions.md, each on one line."""
+    page = (ROOT / "docs" / "decisions.md").read_text(encoding="utf-8")
+    paragraphs = re.split(r"\n\n+", page.strip())
+    return [" ".join(each.split()) for each in paragraphs if not each.startswith("#")][1:]
+
+
+def test_decisions_are_dated_and_take_three_sentences_at_most():
+    for each in decisions():
+        match = DECISION.match(each)
+        assert match, f"expected **DATE. Question?** Answer: {each[:60]}"
+        answer = re.sub(r"\b(et al|eq|vs|e\.g|i\.e)\.", r"\1", match[3])
+        sentences = re.split(r"[.?!](?= [A-Z`\"|\d])", answer)
+        assert len(sentences) <= 3, f"{len(sentences)} sentences: {match[2]}"
+
+
+def test_decisions_name_files_that_are_there():
+    page = (ROOT / "docs" / "decisions.md").read_text(encoding="utf-8")
+    paths = re.findall(r"\b(?:sssfit|cli|docs|tests)/[\w/-]+(?:\.\w+)?", page)
+    assert len(paths) > 5
+    assert [path for path in paths if not (ROOT / path).exists()] == []
