@@ -19,8 +19,8 @@ _WIDEST_VECTOR = 4  # float4; kernels of more channels become arrays of floats
 def hlsl(kernel: SeparableKernel) -> str:
     """Return HLSL: constant arrays of the signs and weights of each term.
 
-    Weights are indexed by term and pixel. Up to four channels are one float to float4; more channels
-    are a third index.
+    Weights are indexed by term and pixel. Up to four channels are one float to float4; more
+    channels take a third index.
     """
     terms, pixels, channels = kernel.weights.shape
     is_vector = channels <= _WIDEST_VECTOR
