@@ -19,12 +19,12 @@ from ._simulate_run import Request, Walk
 if TYPE_CHECKING:
     from sssfit.material import Material
     from sssfit.profile import Profile
-    from sssfit.simulate import Named
+    from sssfit.simulate import ProfileSource
 
 
 def run_computed(
     method: str,
-    materials: Sequence[Material | Named],
+    materials: Sequence[Material | ProfileSource],
     targets: list[Path | None],
     jobs: list[Walk],
     request: Request,
@@ -62,7 +62,7 @@ def run_computed(
 
 def _computed(
     method: str,
-    materials: Sequence[Material | Named],
+    materials: Sequence[Material | ProfileSource],
     settings: dict[str, Any],
     stop: Callable[[], bool],
 ) -> list[Profile]:
@@ -81,7 +81,7 @@ def _computed(
 
 
 def _report(
-    rows: dict[int, dict[str, Any]], materials: Sequence[Material | Named], request: Request
+    rows: dict[int, dict[str, Any]], materials: Sequence[Material | ProfileSource], request: Request
 ) -> None:
     """Print the figures; say what was not done, and exit 130 in that case."""
     missing = [each.name for k, each in enumerate(materials) if k not in rows]

@@ -13,11 +13,11 @@ from ._report import binary_stdout
 if TYPE_CHECKING:
     from sssfit.material import Material
     from sssfit.profile import Profile
-    from sssfit.simulate import Named
+    from sssfit.simulate import ProfileSource
 
 
 def profile_paths(
-    materials: Sequence[Material | Named], method: str, output: str | None, *, several: bool
+    materials: Sequence[Material | ProfileSource], method: str, output: str | None, *, several: bool
 ) -> list[Path | None]:
     """Where each profile goes; None is stdout. Methods but the first put their name into it."""
     if output == "-":

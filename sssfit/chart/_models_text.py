@@ -1,4 +1,4 @@
-"""What the figure of profile models says in words and numbers."""
+"""The text of the figure of profile models."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MINUS = "\N{MINUS SIGN}"
 
 
 def models_title(comparison: ModelComparison) -> str:
-    """Name the material, and what the models are held against."""
+    """Name the material and the reference of the models."""
     truth = "isotropic scattering" if is_similar(comparison) else "the exact solution"
     return f"{shortened(comparison.material.name, 20)}: models against {truth}"
 

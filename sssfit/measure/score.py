@@ -31,7 +31,7 @@ COLOUR_FIGURES = ("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99", "
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImageScore:
-    """A picture held against the true one; N pixels that count, C channels.
+    """A picture compared with the true one; N pixels that count, C channels.
 
     Parameters
     ----------

@@ -6,7 +6,7 @@ from sssfit.simulate._checkpoint import (
     Checkpoint,
     is_checkpoint_file,
 )
-from sssfit.simulate._deterministic import Named
+from sssfit.simulate._deterministic import ProfileSource
 from sssfit.simulate._finished import is_complete, is_finished
 from sssfit.simulate._run import Progress
 from sssfit.simulate._so_far import SoFar, read_checkpoint
@@ -27,7 +27,7 @@ __all__ = [
     "DEON_SKIN",
     "EVERY_SECONDS",
     "Checkpoint",
-    "Named",
+    "ProfileSource",
     "Progress",
     "SoFar",
     "is_checkpoint_file",
