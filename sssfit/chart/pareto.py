@@ -327,7 +327,7 @@ def _limit(axes: Axes, comparison: Comparison, error: str, cost: str) -> None:
 
 
 def _title(comparison: Comparison, error: str, cost: str) -> str:
-    """Name the material and what is held against what."""
+    """Name the material and the axes."""
     name = comparison.profile.material_name
     what = f"{_ERRORS[error]} against {'time' if cost == 'seconds' else cost}"
     return f"{shortened(name, 24)}: {what}" if name else what.capitalize()

@@ -1,4 +1,4 @@
-"""What the guided fit looks at and what it leaves: Gamma, residual and pass, for several k.
+"""The guided fit for several k: guide function Gamma, residual and pass.
 
 Supplement figure S.1 (Jimenez et al. 2015, "Separable Subsurface Scattering") draws Gamma_p, under
 which the pre-integrated pass is the optimum, and Gamma for k = 1.55; here each k has its own, with
@@ -137,7 +137,7 @@ def compute_guide(
     Raises
     ------
     FitError, ProfileError
-        The profile, the channel, the pixels or a k is of no use.
+        Invalid profile, channel, pixels or k.
 
     Examples
     --------

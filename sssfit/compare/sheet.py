@@ -127,27 +127,27 @@ def compute_sheet(
     Raises
     ------
     FitError, RenderError
-        Pixels, profile or scenes are of no use.
+        Invalid pixels, profile or scenes.
     """
     check_colours("the profile", profile.n_channels)
     support = support_of(profile)
     pitch = pitch_of(profile, mm_per_pixel)
-    easel = _Easel(profile, tuple(scenes), pitch, pixels, threads)
+    panels = _PanelRenderer(profile, tuple(scenes), pitch, pixels, threads)
     line = Candidate("Artist-friendly, line fit", "artist", 1)
     fitted = line.fit(profile, pitch, support).kernel
     production = production_look(fitted)
-    rows = [easel.row("Input, times albedo", easel.inputs())]
+    rows = [panels.row("Input, times albedo", panels.inputs())]
     for candidate in _kernels(min(most_terms, fitted.pixels // 2 + 1), line, production):
         kernel = candidate.fit(profile, pitch, support).kernel
-        rows.append(easel.row(candidate.label, easel.rendered(kernel), cost_of(kernel).passes))
-    rows.append(easel.row("True kernel", easel.truths))
+        rows.append(panels.row(candidate.label, panels.rendered(kernel), cost_of(kernel).passes))
+    rows.append(panels.row("True kernel", panels.truths))
     return Sheet(
         profile=profile,
         mm_per_pixel=pitch,
         pixels=pixels,
         support_mm=support,
         scenes=tuple(scenes),
-        exposures=easel.exposures,
+        exposures=panels.exposures,
         rows=tuple(rows),
         production=production,
     )
@@ -204,7 +204,7 @@ def _typed(value: float) -> float:
     return float(f"{value:.2g}")
 
 
-class _Easel:
+class _PanelRenderer:
     """Scenes with their truths, and the panels of pictures of them."""
 
     def __init__(
@@ -250,7 +250,7 @@ class _Easel:
     def row(
         self, label: str, pictures: Sequence[FloatArray], passes: int | None = None
     ) -> SheetRow:
-        """Hold a picture of each scene against its truth."""
+        """Compare a picture of each scene with its truth."""
         panels = [
             make_panel(
                 picture,

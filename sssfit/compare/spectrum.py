@@ -89,7 +89,7 @@ def compute_spectrum(
     Raises
     ------
     FitError, ProfileError
-        The profile, the pitch or the support is of no use.
+        Invalid profile, pitch or support.
 
     Examples
     --------

@@ -59,7 +59,7 @@ _FINISHED = 2  # of the starts, the best ones, go on to the end
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Found:
+class GaussianSum:
     """The best sum: ascending variances (N,) [mm^2], weights (N,) as shares of the on-grid energy.
 
     ``error`` is relative; ``stop_reason`` says in words why it ended.
@@ -72,7 +72,7 @@ class Found:
     stop_reason: str
 
 
-def search(annuli: Annuli, terms: int, least_mm2: float, most_mm2: float) -> Found:
+def search(annuli: Annuli, terms: int, least_mm2: float, most_mm2: float) -> GaussianSum:
     """Find up to ``terms`` Gaussians with variances between two limits [mm^2].
 
     Fewer where another one does not lower the error.
@@ -87,7 +87,7 @@ def search(annuli: Annuli, terms: int, least_mm2: float, most_mm2: float) -> Fou
             kept = len(best.weights)
             reason = f"{kept} of {terms} terms are enough: one more does not lower the error"
             break
-        best = _without_idle(found)
+        best = _without_zero_weights(found)
         reason = "converged" if settled else f"stopped after {_MOST_EVALUATIONS} evaluations"
         if best.cost <= _MET:
             reason = f"{len(best.weights)} of {terms} terms meet the profile to rounding"
@@ -95,7 +95,9 @@ def search(annuli: Annuli, terms: int, least_mm2: float, most_mm2: float) -> Fou
     assert best is not None
     if "terms" not in reason and len(best.weights) < terms:
         reason += f"; {len(best.weights)} of {terms} terms have a weight"
-    return Found(np.exp(best.log_variances), best.weights, best.cost**0.5, evaluations, reason)
+    return GaussianSum(
+        np.exp(best.log_variances), best.weights, best.cost**0.5, evaluations, reason
+    )
 
 
 def _starts(log_variances: FloatArray | None, bounds: tuple[float, float]) -> list[FloatArray]:
@@ -158,7 +160,7 @@ class _Seen:
         return self._point.jacobian
 
 
-def _without_idle(point: Point) -> Point:
+def _without_zero_weights(point: Point) -> Point:
     """Leave out Gaussians of weight 0 and put the others in ascending order."""
     order = np.argsort(point.log_variances)
     kept = order[point.weights[order] != 0.0]

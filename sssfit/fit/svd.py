@@ -71,7 +71,7 @@ def fit_svd(
     Raises
     ------
     FitError, ProfileError
-        The rank, the profile, the pitch or the support is of no use.
+        Invalid rank, profile, pitch or support.
     """
     target = make_target(profile, mm_per_pixel, support_mm)
     rank = _checked_rank(rank, target)

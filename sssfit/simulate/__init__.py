@@ -19,7 +19,7 @@ from sssfit.simulate._checkpoint import (
     Checkpoint,
     is_checkpoint_file,
 )
-from sssfit.simulate._deterministic import Named
+from sssfit.simulate._deterministic import ProfileSource
 from sssfit.simulate._finished import is_complete, is_finished, run_figures
 from sssfit.simulate._run import Progress
 from sssfit.simulate._so_far import SoFar, read_checkpoint
@@ -41,7 +41,7 @@ __all__ = [
     "EVERY_SECONDS",
     "METHODS",
     "Checkpoint",
-    "Named",
+    "ProfileSource",
     "Progress",
     "SoFar",
     "is_checkpoint_file",
