@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from sssfit.profile import Profile
     from sssfit.scene.record import Scene
 
-MM_PER_PIXEL = 0.3  # of made pictures: skin1's whole kernel is 143 pixels
 _SIZE = (512, 512)
 
 
@@ -94,6 +93,8 @@ def scenes_of(
         name: make_or_read(Picture(name, None, mm_per_pixel, {}, layer, mask), 0.0, common)
         for name in files
     }
+    from sssfit.fit import MM_PER_PIXEL
+
     pitch = next((each.mm_per_pixel for each in read.values()), mm_per_pixel or MM_PER_PIXEL)
     return [
         read[name]

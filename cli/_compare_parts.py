@@ -27,6 +27,7 @@ from ._progress import say_if_compiling, step_progress, walk_progress
 
 if TYPE_CHECKING:
     from sssfit.compare.comparison import Comparison
+    from sssfit.profile import Profile
     from sssfit.scene.record import Scene
 
 PICTURES = "disk,edge,points,head"
@@ -35,9 +36,22 @@ _PHOTONS = 10**6
 Part = tuple[dict[str, Any], str]  # figures, and the same for people
 
 
-def scenes_asked(given: Mapping[str, Any], common: Common) -> tuple[list[Scene], float]:
-    """Make or read the pictures that were asked for; the size of their pixels [mm]."""
-    options = given["size"], given["mm_per_pixel"], common
+def first_read(name: str, given: Mapping[str, Any], common: Common) -> Profile | None:
+    """Return the profile where the pictures are made on its pixels, so that it is read first."""
+    return profile_of(name, common) if given["mm_per_pixel"] == "profile" else None
+
+
+def scenes_asked(
+    given: Mapping[str, Any], common: Common, profile: Profile | None = None
+) -> tuple[list[Scene], float]:
+    """Make or read the pictures that were asked for; the size of their pixels [mm].
+
+    ``profile`` is there where its pixels were asked for.
+    """
+    from sssfit.fit import pitch_of
+
+    pitch = given["mm_per_pixel"] if profile is None else pitch_of(profile, "profile")
+    options = given["size"], pitch, common
     return scenes_of(names_of(given), *options, layer=given["layer"], mask=given["mask"])
 
 
@@ -74,13 +88,15 @@ def held_outputs(
 
 
 def compared(
-    name: str, scenes: tuple[list[Scene], float], given: Mapping[str, Any], common: Common
+    profile: Profile,
+    scenes: tuple[list[Scene], float],
+    given: Mapping[str, Any],
+    common: Common,
 ) -> Comparison:
-    """Fit and judge every kernel of a material or profile, with a progress bar in a terminal."""
+    """Fit and judge every kernel of a profile, with a progress bar in a terminal."""
     from sssfit.compare import compare_kernels
     from sssfit.compare.comparison import check_error
 
-    profile = profile_of(name, common)
     check_error(given["error"], profile.n_channels)
     with step_progress(profile.material_name or "profile", quiet=common.quiet) as show:
         return compare_kernels(
@@ -138,10 +154,12 @@ def fronts(
         [each for each in column if each] for column in zip(*outputs.values(), strict=True)
     )
     with held_outputs(charts, tables, given, inputs=() if given["every"] else list(outputs)):
-        scenes = scenes_asked(given, common)
+        first = None if given["every"] else first_read(next(iter(outputs)), given, common)
+        scenes = scenes_asked(given, common, first)
         for name, (chart, table) in outputs.items():
             try:
-                done.append(compared(name, scenes, given, common))
+                profile = first or profile_of(name, common)
+                done.append(compared(profile, scenes, given, common))
                 write_kernels(done[-1], given, chart, table)
             except SssfitError as error:
                 if not given["every"]:
@@ -240,8 +258,8 @@ def sheet(name: str, given: Mapping[str, Any], common: Common) -> None:
 
     path, pitch = target(given["chart"]), given["mm_per_pixel"]
     with held_charts([path], inputs=[name], force=given["force"]):
-        own: dict[str, Any] = {} if pitch is None else {"mm_per_pixel": pitch}
-        found = compute_sheet(profile_of(name, common), threads=common.threads, **own)
+        profile = profile_of(name, common)
+        found = compute_sheet(profile, mm_per_pixel=pitch, threads=common.threads)
         write_chart(sheet_figure(found), path)
     told = found.to_dict()
     finish_one(common, "compare", path, told, sheet_text(told), "a PNG")

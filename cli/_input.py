@@ -88,7 +88,7 @@ def read_any(name: str) -> Found:
     path = Path(name)
     if name in material_names() and not path.exists():
         return load_material(name)
-    _check_ordinary(name, path)
+    _check_regular_file(name, path)
     return _read(path, name)
 
 
@@ -130,7 +130,7 @@ def _stdin() -> io.BytesIO:
     return io.BytesIO(content)
 
 
-def _check_ordinary(name: str, path: Path) -> None:
+def _check_regular_file(name: str, path: Path) -> None:
     """Refuse what is not there, folders, devices and pipes."""
     from sssfit.errors import FileError
     from sssfit.files import reason

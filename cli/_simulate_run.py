@@ -19,12 +19,12 @@ from ._simulate_report import report
 if TYPE_CHECKING:
     from sssfit.material import Material
     from sssfit.profile import Profile
-    from sssfit.simulate import Checkpoint, Named, Progress
+    from sssfit.simulate import Checkpoint, ProfileSource, Progress
 
 
 # Indices of the materials that share a run, and the keywords of the method's function.
 Job = tuple[list[int], dict[str, Any]]
-Made = Sequence["Material | Named"]
+Made = Sequence["Material | ProfileSource"]
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ from ._charts import (
 )
 from ._input import profile_name, read_any
 from ._memory import check_memory
-from ._options import Common, Count, Length, ListOf, Number, common_options
+from ._options import Common, Count, LengthOr, ListOf, Number, common_options
 from ._output import finish_one, held_charts, stem_of, target, write_chart
 from ._truth import true_profile
 
@@ -41,10 +41,10 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--mm-per-pixel",
-    type=Length(),
-    metavar="MM",
-    help="Pixels of the kernel, with --spectrum or --guide."
-    "  [default: the profile's first annulus]",
+    type=LengthOr("profile"),
+    metavar="MM|profile",
+    help="Pixels of the kernel, with --spectrum or --guide; profile is the width of the profile's "
+    "first annulus.  [default: 0.3]",
 )
 @click.option(
     "--k",

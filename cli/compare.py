@@ -10,10 +10,12 @@ import click
 
 from sssfit.methods import FITS
 
+from ._compare_input import profile_of
 from ._compare_options import compare_options
 from ._compare_parts import (
     budget,
     compared,
+    first_read,
     fronts,
     held_outputs,
     kernels,
@@ -80,9 +82,11 @@ def _budget_and_kernels(
     charts = [given[key] for key in ("chart", "budget_chart") if given[key]]
     tables = [given["table"]] if given["table"] else []
     with held_outputs(charts, tables, given, inputs=[material]):
-        scenes = scenes_asked(given, common)
+        first = first_read(material, given, common)
+        scenes = scenes_asked(given, common, first)
         if given["what"] != "budget":
-            comparison = compared(material, scenes, given, common)
+            profile = first or profile_of(material, common)
+            comparison = compared(profile, scenes, given, common)
             write_kernels(comparison, given, given["chart"], given["table"])
             figures, text = kernels(comparison, given)
             texts.append(text)
@@ -106,6 +110,8 @@ def _check(material: str | None, given: Mapping[str, Any]) -> None:
         raise click.UsageError("--all is for --what front; name one MATERIAL.")
     if given["every"] and (given["chart"] or given["table"]):
         raise click.UsageError("--all names its charts and tables; leave --chart and --table out.")
+    if given["every"] and given["mm_per_pixel"] == "profile":
+        raise click.UsageError("the pictures of --all share their pixels; give a length in mm.")
     if given["output"] is not None and not given["every"]:
         raise click.UsageError("-o is the folder of --all; name files by --chart and --table.")
     idle = list(_OF_BUDGETS) if given["every"] or what not in (None, "budget") else []

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -81,14 +82,14 @@ def render(
 
     KERNEL is a .kernel.json file, or - for stdin; by default the newest of this folder. The result
     is radiant exitance in linear light. Made pictures have the kernel's pixels; a file of your own
-    (EXR, HDR, TIFF, PNG) has to have them too. The truth is the same picture convolved with the
-    whole 2D kernel of the profile; Delta E 2000 is of both in sRGB at the exposure. The alpha of
-    your file goes into the result and the truth as it is.
+    (EXR, HDR, TIFF, PNG) has to have them too, except with --screen. The truth is the same picture
+    convolved with the whole 2D kernel of the profile; Delta E 2000 is of both in sRGB at the
+    exposure. The alpha of your file goes into the result and the truth as it is.
 
     \b
       sssfit render skin1.svd3.kernel.json --irradiance head -o out.exr
       sssfit render --irradiance edge --angle 45 --size 256x256
-      sssfit render --irradiance mine.png --mm-per-pixel 0.1 -o mine.tif --difference lost.png
+      sssfit render --irradiance mine.png --mm-per-pixel 0.3 -o mine.tif --difference lost.png
       sssfit render --screen --irradiance head
       sssfit render --irradiance head --transmit -o ears.png
     """
@@ -108,7 +109,7 @@ def render(
         image_format(each)
     outputs = [*targets.values(), *([None] if path is None else [])]
     with held(outputs, is_image_file, inputs=[name, irradiance, profile], force=force):
-        scene = make_or_read(picture, loaded.mm_per_pixel, common)
+        scene = make_or_read(*_on_pixels(picture, loaded, screen=screen), common)
         through = None
         if transmit:
             from sssfit.render.transmittance import transmitted, with_transmitted
@@ -141,6 +142,18 @@ def render(
         **figures_of(result, scene, loaded, through),
     }
     finish(common, figures, text_of(figures), to_stderr=path is None)
+
+
+def _on_pixels(picture: Picture, kernel: SeparableKernel, *, screen: bool) -> tuple[Picture, float]:
+    """Return what to make or read, and the size of a made picture's pixels [mm].
+
+    Convolved as it is, a kernel has the picture's pixels; a screen's may have any.
+    """
+    if not (screen and picture.is_made):
+        return picture, kernel.mm_per_pixel
+    from sssfit.fit import MM_PER_PIXEL
+
+    return dataclasses.replace(picture, mm_per_pixel=None), picture.mm_per_pixel or MM_PER_PIXEL
 
 
 def _lit_from_behind(irradiance: str, own: dict[str, Any]) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from ._simulate_run import Job, Request, run
 
 if TYPE_CHECKING:
     from sssfit.material import Material
-    from sssfit.simulate import Named
+    from sssfit.simulate import ProfileSource
 
 
 class Radius(Length):
@@ -126,7 +126,7 @@ def _of_common(method: str, common: Common) -> dict[str, Any]:
 
 def _jobs(
     method: str, material: str | None, number: int | None, settings: dict[str, Any]
-) -> tuple[Sequence[Material | Named], list[Job]]:
+) -> tuple[Sequence[Material | ProfileSource], list[Job]]:
     """Load what is asked for; each job has the indices of its materials and its settings."""
     from sssfit.material import load_material, material_names
     from sssfit.simulate import DEON_SKIN, shared_walks
@@ -175,7 +175,7 @@ def _runs_of(
 
 
 def _targets(
-    materials: Sequence[Material | Named], method: str, output: str | None, *, several: bool
+    materials: Sequence[Material | ProfileSource], method: str, output: str | None, *, several: bool
 ) -> list[Path | None]:
     """Where each profile goes; None is stdout. Methods but the first put their name into it."""
     if output == "-":

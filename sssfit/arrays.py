@@ -1,4 +1,4 @@
-"""What records hold, whoever made them: arrays of numbers, names of channels, JSON, provenance.
+"""Checks of what records hold: arrays of numbers, names of channels, JSON, provenance.
 
 Files edited by hand and records made in Python pass the same checks; each caller names the error
 to raise.

@@ -1,4 +1,4 @@
-"""What a chart draws of a profile beside its bins: how far, in which unit, and a 2D image.
+"""What a chart draws of a profile besides its bins: range, unit, and a 2D image.
 
 Nothing here knows matplotlib; ``sssfit.chart`` draws.
 """

@@ -1,4 +1,4 @@
-"""No more than a scene needs: the cheapest kernel whose picture stays within a tolerance.
+"""The cheapest kernel whose picture stays within a tolerance.
 
 What is judged is CIE Delta E 2000 of a picture against the profile's own 2D kernel, its 95th
 percentile unless another figure is asked for (``views``); what counts as cheap is weights
@@ -7,7 +7,7 @@ clock, so the same seed gives the same choice.
 
 No blur at all is tried first, then every option in the order of its cost until one will do. Left
 out are supports too narrow for any kernel: those to which the profile's own kernel cannot be cut
-(its energy kept) without leaving the tolerance, but for the widest of them.
+(its energy kept) without leaving the tolerance, except for the widest of them.
 """
 
 import math
@@ -338,7 +338,7 @@ class _Search:
         if nothing is not None and nothing.within:
             return Choice(*given, steps=tuple(self.steps), chosen=nothing)
         every = supports(views.profile, pitch)
-        kept = self._wide_enough(every)
+        kept = self._useful_supports(every)
         found = options(kept, pitch)
         chosen, runner_up = self._cheapest(found)
         if chosen is None or chosen.option is None:
@@ -390,8 +390,8 @@ class _Search:
             within=found.within,
         )
 
-    def _wide_enough(self, found: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-        """Leave out supports to which even the true kernel cannot be cut, but for the widest.
+    def _useful_supports(self, found: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+        """Leave out supports to which even the true kernel cannot be cut, except for the widest.
 
         That one is kept so that the next cheaper step is one that was tried.
         """

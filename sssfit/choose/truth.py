@@ -1,4 +1,4 @@
-"""How few photons would have done: walks of growing length, fitted as the choice was."""
+"""How many photons are enough: walks of growing length, fitted like the chosen kernel."""
 
 import math
 import time
@@ -56,7 +56,7 @@ def is_exact(material: Material) -> bool:
 
 
 def material_of(source: Material | Profile) -> Material | None:
-    """Return the material that walks can be held against the profile of.
+    """Return the material whose walks can be compared with the profile.
 
     None for a profile without coefficients behind it, and for one that is not by transport: a
     model's error would be taken for noise.

@@ -22,7 +22,7 @@ from sssfit.simulate import simulate_exact, simulate_montecarlo
 PHOTONS = (10_000, 31_623, 100_000, 316_228, 1_000_000, 3_162_278, 10_000_000)
 SEEDS = 6  # the slope's standard error is then .025
 # One for each of the exact method's resolutions that take seconds; the last is what others are
-# held against. The next one, 3e-7, takes 15 s.
+# compared with. The next one, 3e-7, takes 15 s.
 TOLERANCES = (1e-4, 5e-6, 2e-6)
 
 
@@ -59,7 +59,7 @@ class ExactRun:
     estimate : float [1]
         The method's own: its difference to the next coarser resolution.
     error : float, optional [1]
-        As that of a walk; None for the finest resolution, which the others are held against.
+        As that of a walk; None for the finest resolution, which the others are compared with.
     """
 
     tolerance: float
@@ -95,7 +95,7 @@ class Convergence:
     Parameters
     ----------
     exact : Profile
-        What all are held against.
+        The reference for all.
     walks : tuple of WalkRun
     resolutions : tuple of ExactRun
     line : Line
@@ -206,7 +206,7 @@ def error_of(profile: Profile, exact: Profile) -> float:
 def fit_line(photons: Sequence[int], errors: Sequence[float]) -> Line:
     """Put a line through logarithms; every point counts alike.
 
-    The largest deviation of F has, over its expectation, the same distribution whatever the number
+    The largest deviation of F has, over its expectation, the same distribution for any number
     of photons: its logarithm scatters alike everywhere, and plain least squares is right.
     """
     x, y = np.log10(np.asarray(photons, dtype=np.float64)), np.log10(errors)

@@ -48,7 +48,7 @@ class Edit:
     settings : mapping
         width, strength and falloff.
     panel : Panel
-        Held against the original.
+        Compared with the original.
     """
 
     label: str
@@ -112,7 +112,7 @@ def compute_editing(
     Raises
     ------
     FitError, RenderError
-        Pixels of no use.
+        Invalid pixels.
     """
     profile = simulate_deon_skin()
     scene = make_scene("head", height=height, width=width, mm_per_pixel=mm_per_pixel)

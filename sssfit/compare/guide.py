@@ -1,4 +1,4 @@
-"""What the guided fit looks at and what it leaves: Gamma, residual and pass, for several k.
+"""The guided fit for several k: guide function Gamma, residual and pass.
 
 Supplement figure S.1 (Jimenez et al. 2015, "Separable Subsurface Scattering") draws Gamma_p, under
 which the pre-integrated pass is the optimum, and Gamma for k = 1.55; here each k has its own, with
@@ -20,7 +20,7 @@ import numpy as np
 from sssfit.arrays import FloatArray, plain
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import FitResult, fit_guided
-from sssfit.fit._target import Target
+from sssfit.fit._target import Pitch, Target
 from sssfit.fit.guided import DRAWN_K, extents_of, gamma, guided_target
 from sssfit.profile import Profile
 
@@ -117,7 +117,7 @@ def compute_guide(
     *,
     ks: Sequence[float] = DRAWN,
     channel: str | None = None,
-    mm_per_pixel: float | None = None,
+    mm_per_pixel: Pitch | None = None,
     support_mm: float | None = None,
 ) -> Guide:
     """Fit the guided kernel for each k, and keep what it looked at and what it left.
@@ -137,7 +137,7 @@ def compute_guide(
     Raises
     ------
     FitError, ProfileError
-        The profile, the channel, the pixels or a k is of no use.
+        Invalid profile, channel, pixels or k.
 
     Examples
     --------

@@ -1,4 +1,4 @@
-"""A kernel on a picture, held against the truth: what it shows, loses and costs."""
+"""A kernel on a picture, compared with the truth: what it shows, loses and costs."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -182,7 +182,7 @@ def judge_in_screen_space(
     border: str = "mirror",
     threads: int | None = None,
 ) -> Judgement:
-    """Render a scene as a shader does; there is no truth in perspective to hold it against.
+    """Render a scene as a shader does; in perspective there is no truth to compare it with.
 
     Parameters and errors are those of `render_screen`.
     """

@@ -204,7 +204,7 @@ def _grid_of(walk: Profile) -> tuple[float, float]:
     if walk.photons is None or not np.allclose(width_mm, width_mm[0], rtol=1e-6):
         raise SimulationError(
             "models are compared on a photon walk's grid, and this profile has no photons or "
-            "annuli of varying width; walk the material anew."
+            "annuli of varying width; simulate the material again."
         )
     return float(walk.r_edges_mm[1]), float(walk.r_edges_mm[-1])
 
@@ -218,7 +218,7 @@ def _cuts(walk: Profile, channel: int) -> npt.NDArray[np.intp]:
 
 
 def _curve(profile: Profile, exact: Profile, cuts: list[npt.NDArray[np.intp]]) -> ModelCurve:
-    """Hold one profile against the exact one."""
+    """Compare one profile with the exact one."""
     energy = [np.diff(profile.cumulative[cut, c]) for c, cut in enumerate(cuts)]
     truth = [np.diff(exact.cumulative[cut, c]) for c, cut in enumerate(cuts)]
     stderr = [_stderr_of_bins(profile, c, cut) for c, cut in enumerate(cuts)]

@@ -13,7 +13,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from sssfit.arrays import FloatArray, plain
-from sssfit.fit import make_target
+from sssfit.fit import Pitch, make_target
 from sssfit.fit.svd import all_eigenvalues
 from sssfit.profile import Profile
 
@@ -75,7 +75,7 @@ class Spectrum:
 
 
 def compute_spectrum(
-    profile: Profile, *, mm_per_pixel: float | None = None, support_mm: float | None = None
+    profile: Profile, *, mm_per_pixel: Pitch | None = None, support_mm: float | None = None
 ) -> Spectrum:
     """Return the singular values of the kernel that fits aim at.
 
@@ -89,7 +89,7 @@ def compute_spectrum(
     Raises
     ------
     FitError, ProfileError
-        The profile, the pitch or the support is of no use.
+        Invalid profile, pitch or support.
 
     Examples
     --------

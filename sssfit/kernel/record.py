@@ -5,7 +5,7 @@ horizontal pass and the same pass vertically. Weights are energies of pixels (in
 samples), so sums of them are energies too. A kernel belongs to its pitch in mm per pixel.
 
 ``json`` has the file format, ``sssfit/kernel.schema.json`` its JSON Schema;
-``checks`` refuses what is not a kernel.
+``checks`` refuses everything else.
 """
 
 import dataclasses

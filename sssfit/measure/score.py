@@ -37,7 +37,7 @@ SCORE_FIGURES = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImageScore:
-    """A picture held against the true one; N pixels that count, C channels.
+    """A picture compared with the true one; N pixels that count, C channels.
 
     Parameters
     ----------

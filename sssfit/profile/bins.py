@@ -1,4 +1,4 @@
-"""Annuli of a profile merged until each holds enough photons to say something.
+"""Annuli of a profile, merged until each holds enough photons for a useful error.
 
 A simulated profile has noise that grows outwards; charts and comparisons look at means over bins
 with a known error. Without photons the annuli stay as they are.

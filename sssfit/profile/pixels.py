@@ -179,7 +179,7 @@ def checked_support(
     if size > _LARGEST_KERNEL_BYTES:
         raise ProfileError(
             f"a kernel of {across:.6g} pixels each way would take {size:.3g} bytes a "
-            f"channel, more than {_LARGEST_KERNEL_BYTES:.3g}; use a larger mm_per_pixel or a "
+            f"channel, more than {_LARGEST_KERNEL_BYTES:.3g}; use a larger `mm_per_pixel` or a "
             "smaller half_pixels."
         )
     return pitch_mm, _covering_half(r_last_mm, pitch_mm) if half is None else half

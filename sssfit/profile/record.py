@@ -1,7 +1,7 @@
 """A diffuse reflectance profile R_d(r), kept as the energy in annuli around a pencil beam.
 
 Energies, not densities: F(r) = int_0^r 2 pi r' R_d(r') dr' is then known exactly at the annulus
-edges, whatever R_d does inside (near the beam it behaves like 1/r), and every kernel made from the
+edges, independent of R_d inside (near the beam it behaves like 1/r), and every kernel made from the
 profile conserves energy by construction. The annulus tallies are those of Wang, Jacques and Zheng,
 "MCML - Monte Carlo modeling of light transport in multi-layered tissues", 1995.
 
@@ -125,7 +125,7 @@ class Profile:
         """Fingerprint of what fits and true pictures are made from, by which kernels name it.
 
         Radii, energies on the grid and beyond, channels; no provenance, so that the same light is
-        the same profile, by whatever program and version.
+        the same profile, from any program and version.
         """
         digest = hashlib.sha256(json.dumps(self.channels).encode())
         for each in (self.r_edges_mm, self.annulus_energy, self.beyond_grid):
@@ -199,7 +199,7 @@ class Profile:
 
     @property
     def energy_balance(self) -> FloatArray:
-        """Sum of all energies - 1 (C,): 0 but for roulette's noise and rounding.
+        """Sum of all energies - 1 (C,): 0 except for roulette's noise and rounding.
 
         Specular + diffuse + absorbed + unfinished (+ transmitted) - 1; NaN where it is not known
         what was absorbed.

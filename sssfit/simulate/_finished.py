@@ -1,4 +1,4 @@
-"""What a profile says of how it was asked for, and whether a run has nothing left to do."""
+"""What a profile records about its run, and whether a run is already finished."""
 
 import math
 import operator

@@ -1,4 +1,4 @@
-"""What a photon walk has found so far: the profiles that a run would have given that ended there.
+"""The profiles of an unfinished photon walk, as if the run had ended at its checkpoint.
 
 A run saves its sums in a checkpoint (``_checkpoint``); a profile is made of them as it is at the
 end of a run, by ``_assemble``.
