@@ -539,7 +539,8 @@ def test_a_checkpoint_cut_in_half_is_one_line(run, tmp_path):
     status, out, err = run("skin1", "--resume")
     assert (status, out) == (1, "")
     assert err == (
-        f"Error: {CHECKPOINT} is a damaged checkpoint; delete it, or start a new run without --resume.\n"
+        f"Error: {CHECKPOINT} is a damaged checkpoint; delete it, or start a new run without "
+        "--resume.\n"
     )
 
 
