@@ -16,7 +16,6 @@ import pytest
 from checks_models import BEYOND, DIFFUSE, multipole_against_walk
 
 from sssfit.choose.choice import choose, mm_per_pixel_at
-from sssfit.cli._methods import METHODS as SIMULATIONS
 from sssfit.compare.editing import compute_editing
 from sssfit.compare.guide import compute_guide
 from sssfit.compare.sheet import compute_sheet
@@ -24,6 +23,7 @@ from sssfit.compare.spectrum import compute_spectrum
 from sssfit.errors import SssfitWarning
 from sssfit.fit import fit_gaussians, fit_preintegrated, fit_svd
 from sssfit.material import load_material, material_names
+from sssfit.methods import SIMULATIONS
 from sssfit.profile import full_kernel
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS
 from sssfit.simulate import (

@@ -96,7 +96,7 @@ def test_outputs_are_checked_before_the_work(tmp_path, monkeypatch):
     files.check_output(tmp_path / "theirs.npz", own)
     files.check_output(tmp_path / "theirs.npz", foreign, force=True)
     for path, fragment in (
-        (tmp_path / "theirs.npz", "--force"),
+        (tmp_path / "theirs.npz", "`force = True`"),
         (tmp_path / "missing" / "a.npz", "there is no folder"),
         (tmp_path, "is a folder"),
     ):

@@ -59,7 +59,7 @@ PROFILES = {
     "faint": lambda: make_profile(EDGES, 1e-140 * SMOOTH[:, None]),
 }
 # (mm per pixel, support): the profile's own, wide pixels, a support that cuts, a single pixel.
-PIXELS = [(None, None), (0.9, None), (0.2, 1.5), (300.0, None)]
+PIXELS = [("profile", None), (0.9, None), (0.2, 1.5), (300.0, None)]
 OWN = {"svd": {"rank": 1}, "gaussians": {"terms": 2}}
 
 
@@ -88,7 +88,7 @@ def test_a_kernel_is_near_or_warned_about_or_refused(method, kind):
 
 def fit_a_dim_spike(profile):
     """A method that is off in shape and in energy, as none of ours is by itself."""
-    target = make_target(profile)
+    target = make_target(profile, "profile")
 
     def fit_channel(channel):
         half = np.zeros((2, target.half_pixels + 1))
@@ -112,9 +112,10 @@ def test_what_the_warnings_say():
 
 
 def test_an_energy_that_was_not_asked_for_is_not_warned_about():
-    fit_svd(ring(), rank=1, energy="keep")  # loses half of it; warnings are errors here
+    # loses half of it; warnings are errors here
+    fit_svd(ring(), rank=1, energy="keep", mm_per_pixel="profile")
     hand = {"width": 0.5, "strength": 0.1, "falloff": 1.0}
-    METHODS["falloff"].fit(ring(), **hand)
+    METHODS["falloff"].fit(ring(), mm_per_pixel="profile", **hand)
 
 
 def test_terms_that_cancel_cannot_be_scaled():
@@ -139,7 +140,7 @@ def test_a_support_without_light_is_refused():
         ):
             method.fit(ring(), support_mm=1.0, mm_per_pixel=0.1)
         with pytest.raises(FitError, match="use a larger support, or set the channel to 0"):
-            method.fit(make_profile(EDGES, 1e-300 * SMOOTH[:, None]))
+            method.fit(make_profile(EDGES, 1e-300 * SMOOTH[:, None]), mm_per_pixel="profile")
 
 
 def test_errors_that_are_no_numbers_are_refused():
@@ -154,7 +155,7 @@ def test_by_default_a_small_kernel_has_fewer_terms():
     assert one.rank == one.pixels == 1
     np.testing.assert_allclose(one.weights**2, SMOOTH.sum(), rtol=1e-12)
     assert one.meta["settings"]["rank"] == 1
-    assert fit_svd(make_profile(EDGES, SMOOTH[:, None])).kernel.rank == 3
+    assert fit_svd(make_profile(EDGES, SMOOTH[:, None]), mm_per_pixel="profile").kernel.rank == 3
 
 
 def test_imported_profiles_go_by_their_file(tmp_path):
@@ -163,7 +164,7 @@ def test_imported_profiles_go_by_their_file(tmp_path):
     for name, method in METHODS.items():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SssfitWarning)
-            kernel = method.fit(profile, **OWN.get(name, {})).kernel
+            kernel = method.fit(profile, mm_per_pixel="profile", **OWN.get(name, {})).kernel
         assert kernel.meta["material"] == "a.csv"
 
 
@@ -178,7 +179,7 @@ def run(tmp_path, monkeypatch, capfd):
     def call(profile, *arguments):
         profile.save("wax.profile.npz")
         with pytest.raises(SystemExit) as ending:
-            main(["fit", "wax.profile.npz", *arguments])
+            main(["fit", "wax.profile.npz", "--mm-per-pixel", "profile", *arguments])
         kernels = [path.name for path in tmp_path.glob("*.kernel.json")]
         return ending.value.code, capfd.readouterr().err, kernels
 

@@ -180,7 +180,7 @@ def _legend_columns(labels: Sequence[str]) -> int:
 def _draw_terms(figure: Figure, labels: Sequence[str], columns: int, down: float) -> None:
     """Explain the lines of the passes, so many inches down the page."""
     handles = [Line2D([], [], **_term_style(t, len(labels))) for t in range(len(labels))]
-    legend = figure.legend(
+    figure.legend(
         handles,
         [drawable(each) for each in labels],
         ncols=columns,
@@ -191,8 +191,6 @@ def _draw_terms(figure: Figure, labels: Sequence[str], columns: int, down: float
         handlelength=2.8,
         columnspacing=1.5,
     )
-    for text in legend.get_texts():
-        text.set_parse_math(False)
 
 
 def _term_style(term: int, terms: int) -> Style:

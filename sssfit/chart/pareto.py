@@ -115,7 +115,6 @@ def _write(axes: Axes, point: tuple[float, float], box: Bbox, label: str) -> Non
         size=_SIZE,
         va="center_baseline",
         transform=to_data,
-        parse_math=False,
         zorder=4,
     )
     if point[1] - box.y1 > _LINE_INCHES:

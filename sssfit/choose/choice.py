@@ -13,10 +13,11 @@ out are supports too narrow for any kernel: those to which the profile's own ker
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.choose.options import (
     Option,
     by_cost,
@@ -96,6 +97,26 @@ class Step:
         """In words, without the support."""
         return "no blur" if self.option is None else self.option.candidate.label
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return a row of ``sssfit choose --json``; without a method it is no blur."""
+        option = self.option
+        return plain(
+            {
+                "label": self.label,
+                "method": option and option.candidate.method,
+                "rank": option.candidate.terms if option else 0,
+                "settings": option.candidate.settings if option else {},
+                "share": option and option.share,
+                "support_mm": option and option.support_mm,
+                "pixels": option.pixels if option else 1,
+                "taps_per_pixel": self.taps_per_pixel,
+                "error": self.error,
+                **{key: getattr(self, key) for key in COLOUR_FIGURES},
+                "mm_per_pixel": self.mm_per_pixel,
+                "within": self.within,
+            }
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Choice:
@@ -160,6 +181,53 @@ class Choice:
     def support_mm(self) -> float:
         """Radius that keeps 99.9 % of every channel [mm]."""
         return support_of(self.profile)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures that ``sssfit choose --json`` prints; no kernel where none is needed.
+
+        ``rows`` has every step that was tried, in order.
+        """
+        steps = {"chosen": self.chosen, "runner_up": self.runner_up, "cheaper": self.cheaper}
+        return plain(
+            {
+                "material": self.profile.material_name,
+                "profile_method": self.profile.meta.get("method"),
+                "mm_per_pixel": self.mm_per_pixel,
+                "support_mm": self.support_mm,
+                "tolerance": self.tolerance,
+                "tolerance_of": self.tolerance_of,
+                "pictures": [
+                    {
+                        "irradiance": each.name,
+                        "width": each.width,
+                        "height": each.height,
+                        "mm_per_pixel": each.mm_per_pixel,
+                    }
+                    for each in self.scenes
+                ],
+                "kernel": self._kernel_figures(),
+                **{key: each and each.to_dict() for key, each in steps.items()},
+                "dearer": [each.to_dict() for each in self.dearer],
+                "too_narrow": self.too_narrow,
+                "unfitted": self.unfitted,
+                "photons": self.photons and self.photons.to_dict(),
+                "rows": [each.to_dict() for each in self.steps],
+            }
+        )
+
+    def _kernel_figures(self) -> dict[str, Any] | None:
+        """Return what was fitted, and what it takes; None where no blur is needed."""
+        if self.fit is None:
+            return None
+        kernel = self.fit.kernel
+        return {
+            "method": kernel.method,
+            "rank": kernel.rank,
+            "pixels": kernel.pixels,
+            "support_mm": kernel.support_mm,
+            "seconds_per_megapixel": self.seconds_per_megapixel,
+            "relative_frobenius_error": self.fit.relative_frobenius_error,
+        }
 
 
 def choose(

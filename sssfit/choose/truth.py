@@ -5,9 +5,11 @@ import time
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from sssfit.arrays import plain
 from sssfit.choose.options import Option
 from sssfit.choose.views import Views
 from sssfit.compare._all_light import exact_with_all_light, radius_of
@@ -116,6 +118,18 @@ class PhotonNeed:
     seconds: tuple[float, ...]
     truth_method: str
     truth_seconds: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as ``sssfit choose --json`` has them; None for an error of inf."""
+        return plain(
+            {
+                "photons": self.photons,
+                "tried": self.counts,
+                "errors": self.errors,
+                "seconds": self.seconds,
+                "profile_seconds": self.truth_seconds,
+            }
+        )
 
 
 def photons_needed(

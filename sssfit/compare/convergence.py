@@ -7,12 +7,13 @@ method's is set by its resolution. ``sssfit.chart`` draws the record.
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.errors import SimulationError
 from sssfit.material import Material
 from sssfit.profile import Profile
@@ -105,6 +106,18 @@ class Convergence:
     walks: tuple[WalkRun, ...]
     resolutions: tuple[ExactRun, ...]
     line: Line
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the slope and the figures of every walk and resolution."""
+        return plain(
+            {
+                "material": self.exact.material_name,
+                "slope": self.line.slope,
+                "slope_stderr": self.line.slope_stderr,
+                "rows": [asdict(each) for each in self.walks],
+                "exact": [asdict(each) for each in self.resolutions],
+            }
+        )
 
 
 def compute_convergence(

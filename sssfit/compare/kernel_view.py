@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.errors import KernelError
 from sssfit.kernel import SeparableKernel
 from sssfit.profile import Profile
@@ -68,6 +68,24 @@ class KernelView:
     energy_error: FloatArray
     relative_frobenius_error: FloatArray
     misplaced: FloatArray | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures of ``sssfit chart --json`` of a kernel: a value for each channel."""
+        kernel = self.kernel
+        return plain(
+            {
+                "material": kernel.meta.get("material"),
+                "method": kernel.method,
+                "rank": kernel.rank,
+                "pixels": kernel.pixels,
+                "mm_per_pixel": kernel.mm_per_pixel,
+                "channels": [kernel.channels[c] for c in self.channels],
+                "energy": self.energy,
+                "energy_error": self.energy_error,
+                "relative_frobenius_error": self.relative_frobenius_error,
+                "misplaced": self.misplaced,
+            }
+        )
 
 
 def view_kernel(

@@ -8,11 +8,12 @@ the exact solution there. Totals, F(r) and the L2 error use the annuli as they a
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.errors import SimulationError
 from sssfit.material import Material
 from sssfit.profile import Profile
@@ -63,6 +64,19 @@ class ModelCurve:
         """Name of the method."""
         return str(self.profile.meta["method"])
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the method's figures; errors are shares, against the exact solution."""
+        return plain(
+            {
+                "method": self.method,
+                "diffuse_reflectance": self.profile.diffuse_reflectance,
+                "diffuse_reflectance_stderr": self.profile.diffuse_reflectance_stderr,
+                "total_error": self.total_error,
+                "cumulative_error": self.cumulative_error,
+                "l2_error": self.l2_error,
+            }
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelComparison:
@@ -89,6 +103,22 @@ class ModelComparison:
     def walk(self) -> ModelCurve:
         """The photon walk."""
         return self.curves[1]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures of ``sssfit chart --models --json``, a row for each method."""
+        walk = self.walk.profile
+        return plain(
+            {
+                "material": self.material.name,
+                "channels": self.material.channels,
+                "photons": walk.photons,
+                "seed": walk.meta.get("seed"),
+                "annuli": walk.n_annuli,
+                "dr_mm": float(walk.r_edges_mm[1]),
+                "radius_mm": float(walk.r_edges_mm[-1]),
+                "rows": [each.to_dict() for each in self.curves],
+            }
+        )
 
 
 def compare_models(

@@ -118,7 +118,7 @@ def minimise(
     if tracked.x is None:
         raise FitError(
             f"the optimiser met no usable point ({reason}); expected finite energies and settings: "
-            "try a larger mm_per_pixel or another method."
+            "try a larger `mm_per_pixel` or another method."
         )
     return Minimum(tracked.x, tracked.value, tracked.evaluations, reason)
 

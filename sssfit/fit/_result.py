@@ -12,7 +12,7 @@ import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
 from sssfit import __version__
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._target import Target
 from sssfit.kernel import SeparableKernel
@@ -39,8 +39,8 @@ def factor_to(
     if min(within, wanted) <= 0.0:
         raise FitError(
             f"channel {target.profile.channels[channel]}: the terms have the energy {within:.3g} "
-            f"within the support, which cannot be scaled to {wanted:.3g}; use energy = "
-            '"keep", another number of terms or a larger support.'
+            f"within the support, which cannot be scaled to {wanted:.3g}; use "
+            '`energy = "keep"`, another number of terms or a larger support.'
         )
     return wanted / within
 
@@ -126,6 +126,30 @@ class FitResult:
     def energy_error(self) -> FloatArray:
         """Kernel's energy against the profile's diffuse reflectance, as a share of it (C,)."""
         return self.kernel.energy_error
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures that ``sssfit fit --json`` prints: lists and numbers."""
+        kernel = self.kernel
+        return plain(
+            {
+                "material": kernel.meta["material"],
+                "channels": kernel.channels,
+                "method": kernel.method,
+                "rank": kernel.rank,
+                "mm_per_pixel": kernel.mm_per_pixel,
+                "support_mm": kernel.support_mm,
+                "pixels": kernel.pixels,
+                "taps": None,
+                "relative_frobenius_error": self.relative_frobenius_error,
+                "energy_error": self.energy_error,
+                "energy": kernel.energy,
+                "scale": kernel.scale,
+                "evaluations": self.evaluations,
+                "stop_reason": self.stop_reasons,
+                "seconds": self.seconds,
+                "parameters": kernel.parameters,
+            }
+        )
 
 
 def fit_channels(

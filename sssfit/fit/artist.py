@@ -29,7 +29,7 @@ from sssfit.fit._by_hand import (
 )
 from sssfit.fit._nlopt import Minimum, minimise, minimise_by_simplex
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
-from sssfit.fit._target import Target, make_target
+from sssfit.fit._target import Pitch, Target, make_target
 from sssfit.profile import Profile
 
 _WIDTHS = 10  # tried for each Gaussian, all pairs, before the best are refined
@@ -52,7 +52,7 @@ PictureTarget = Callable[[Target], Callable[[FloatArray], float]]
 def fit_artist(
     profile: Profile,
     *,
-    mm_per_pixel: float | None = None,
+    mm_per_pixel: Pitch | None = None,
     support_mm: float | None = None,
     normalize: bool = False,
     target: Literal["line", "kernel"] | PictureTarget = "line",

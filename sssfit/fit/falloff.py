@@ -27,7 +27,7 @@ from sssfit.errors import FitError
 from sssfit.fit._by_hand import gaussian_pixels, kernel_misfit, of_unit_sum, per_channel
 from sssfit.fit._nlopt import Minimum, minimise
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
-from sssfit.fit._target import make_target
+from sssfit.fit._target import Pitch, make_target
 from sssfit.profile import Profile
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS
 
@@ -48,7 +48,7 @@ PerChannel = float | Sequence[float]
 def fit_falloff(
     profile: Profile,
     *,
-    mm_per_pixel: float | None = None,
+    mm_per_pixel: Pitch | None = None,
     support_mm: float | None = None,
     normalize: bool = False,
     width: float | None = None,

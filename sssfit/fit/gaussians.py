@@ -28,7 +28,7 @@ from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._gaussians_annuli import make_annuli
 from sssfit.fit._gaussians_search import GaussianSum, is_steep, rings, search
 from sssfit.fit._result import ChannelFit, FitResult, factor_to, fit_channels, restores
-from sssfit.fit._target import Target, make_target, name_of
+from sssfit.fit._target import Pitch, Target, make_target, name_of
 from sssfit.profile import Profile
 from sssfit.shapes import gaussian_line_integral
 
@@ -45,7 +45,7 @@ def fit_gaussians(
     signed: bool = False,
     free_energy: bool = False,
     energy: str = "rescale",
-    mm_per_pixel: float | None = None,
+    mm_per_pixel: Pitch | None = None,
     support_mm: float | None = None,
     normalize: bool = False,
 ) -> FitResult:

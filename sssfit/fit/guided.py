@@ -21,7 +21,7 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._nlopt import Function, Minimum, minimise
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
-from sssfit.fit._target import Target, make_target
+from sssfit.fit._target import Pitch, Target, make_target
 from sssfit.profile import Profile
 from sssfit.profile.bins import mean_free_paths_mm
 
@@ -41,7 +41,7 @@ _ACROSS = 64  # quadrature nodes of Gamma along a half line, at least: the steps
 def fit_guided(
     profile: Profile,
     *,
-    mm_per_pixel: float | None = None,
+    mm_per_pixel: Pitch | None = None,
     support_mm: float | None = None,
     normalize: bool = False,
     k: float = DRAWN_K,
@@ -54,8 +54,8 @@ def fit_guided(
     ----------
     profile : Profile
     mm_per_pixel, support_mm : float, optional [mm]
-        Pixels, 513 at most; see ``sssfit.fit.make_target``. By default the first annulus's width,
-        or the least with which 513 pixels suffice.
+        Pixels, 513 at most; see ``sssfit.fit.make_target``. By default, and for "profile", the
+        least with which 513 pixels suffice where that is more.
     normalize : bool
         Unit energy for every channel, the energy kept apart.
     k : float
@@ -293,7 +293,7 @@ def _check_settings(k: float, b: float, centre_bound: float | None) -> None:
         )
 
 
-def guided_target(profile: Profile, mm_per_pixel: float | None, support_mm: float | None) -> Target:
+def guided_target(profile: Profile, mm_per_pixel: Pitch | None, support_mm: float | None) -> Target:
     """Choose pixels as `make_target` does, but no more than 513, and name a pitch that will do.
 
     Raises FitError where a pitch was given that takes more; warns where the default was widened.
@@ -308,8 +308,8 @@ def guided_target(profile: Profile, mm_per_pixel: float | None, support_mm: floa
         f"the guided fit takes up to {MOST_PIXELS} pixels, and the support is {pixels} pixels of "
         f"{pitch:.4g} mm"
     )
-    if mm_per_pixel is not None:
-        raise FitError(f"{what}: use mm_per_pixel = {enough:.3g} or more, or a smaller support.")
+    if mm_per_pixel not in (None, "profile"):
+        raise FitError(f"{what}: use `mm_per_pixel = {enough:.3g}` or more, or a smaller support.")
     warnings.warn(f"{what}: pixels of {enough:.3g} mm are used.", SssfitWarning, stacklevel=3)
     return make_target(profile, enough, support_mm)
 

@@ -153,7 +153,7 @@ def _take_version(lines: Lines) -> None:
         raise lines.failure(
             line.number,
             f"this is a file of MCML {version}; only the output of MCML 1 (version A1) is read. "
-            "Write its layers as an input file of MCML 1, and `sssfit simulate` walks them.",
+            "Write its layers as an input file of MCML 1 (.mci) and simulate that.",
         )
     if line.words != ("A1",):
         raise lines.failure(

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 FORMAT = "sssfit.kernel/1"
 MARK = b'"sssfit.kernel/'  # by which a file is ours, however damaged
-_REMEDY = "name a .kernel.json file, as `sssfit fit` writes it"
+_REMEDY = "name a .kernel.json file, as sssfit writes it"
 MOST_BYTES = 500_000_000  # 16000 pixels, 10 terms and 64 channels are 200 MB
 _ROUNDING = 1e-9  # relative; sums of pixels may be taken in another order
 

@@ -311,7 +311,7 @@ def load_material(name_or_path: str | Path) -> Material:
             return parse_material(content, wanted)
     raise MaterialError(
         f"there is no material {shown(wanted)}; {did_you_mean(wanted, material_names())}"
-        "`sssfit materials` lists those there are, and a file of your own ends in .toml."
+        "`material_names()` lists those there are, and a file of your own ends in .toml."
     )
 
 

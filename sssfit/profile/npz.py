@@ -45,8 +45,8 @@ OPTIONAL = (
 # 100 000 annuli, all arrays) 410 MB; more is a zip bomb or somebody else's.
 _LARGEST_FILE_BYTES = 500_000_000
 _LARGEST_META_BYTES = 16_000_000  # numpy's text has 4 bytes a character
-_REMEDY = "write it again with `sssfit simulate`, or name a .profile.npz file"
-_FOREIGN = "name a .profile.npz file, as `sssfit simulate` and `sssfit import` write it"
+_REMEDY = "write it again, or name another .profile.npz file"
+_FOREIGN = "name a .profile.npz file, as sssfit writes it"
 # By either a file is ours, however damaged: the first member's name, or the format in its JSON,
 # four bytes a letter. Both stand uncompressed, one near the beginning and one near the end.
 MARKS = (b"r_edges_mm.npy", "sssfit.profile/".encode("utf-32-le"))

@@ -123,7 +123,7 @@ class Checkpoint:
         if self.path.exists():
             warnings.warn(
                 f"starting a new run beside {self.path}, which an earlier run left; it is kept "
-                "until this run's own first checkpoint (--resume would continue from it).",
+                "until this run's own first checkpoint (`resume = True` would continue from it).",
                 SssfitWarning,
                 stacklevel=6,
             )
@@ -326,7 +326,7 @@ def _check_settings(path: Path, there: Mapping[str, str], here: Mapping[str, str
     if differing:
         raise SimulationError(
             f"{path} was made with other settings: {'; '.join(differing)}. Give the same, or "
-            "start a new run without --resume."
+            "start a new run with `resume = False`."
         )
 
 
@@ -335,4 +335,4 @@ def _short(text: str | None) -> str:
     return printable(str(text))[:200]
 
 
-_REMEDY = "delete it, or start a new run without --resume"
+_REMEDY = "delete it, or start a new run with `resume = False`"

@@ -184,8 +184,8 @@ def _check_not_finished(checkpoint: Checkpoint, state: State, ending: Ending) ->
     else:
         return
     raise SimulationError(
-        f"{checkpoint.path} holds {done:,} photons, {why}; take them all with --photons {done} "
-        "alone, or start a new run without --resume."
+        f"{checkpoint.path} holds {done:,} photons, {why}; take them all with "
+        f"`photons = {done}` alone, or start a new run with `resume = False`."
     )
 
 
@@ -196,5 +196,6 @@ def _check_target_is_reachable(task: Walk, photons: int, errors: FloatArray) -> 
     if silent:
         raise SimulationError(
             f"{photons:,} photons returned nothing within the grid in {', '.join(silent)}: no "
-            "target error is in reach; widen the grid with --radius, or leave --target-error out."
+            "target error is in reach; widen the grid with `radius_mm`, or leave "
+            "`target_error` out."
         )

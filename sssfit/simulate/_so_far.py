@@ -51,6 +51,17 @@ class SoFar:
     seconds: float
     relative_error: float
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures that ``sssfit show --json`` prints, with those of every profile."""
+        return {
+            "kind": "checkpoint",
+            "photons": self.profiles[0].photons,
+            "flights": self.flights,
+            "seconds": self.seconds,
+            "relative_error": self.relative_error,
+            "profiles": [each.to_dict() for each in self.profiles],
+        }
+
 
 def read_checkpoint(source: str | Path | BinaryIO, origin: str | None = None) -> SoFar:
     """Read a checkpoint from a path or a binary stream that can seek, and make its profiles.

@@ -294,7 +294,7 @@ def _warn_target(ending: Ending, photons: int, error: float) -> None:
     if target is not None and photons == ending.photons and error >= target:
         warnings.warn(
             f"{photons:,} photons were done before the target error of {100.0 * target:g} % was "
-            f"met; {100.0 * error:.2g} % was reached: give more --photons, or leave them out.",
+            f"met; {100.0 * error:.2g} % was reached: give more `photons`, or leave them out.",
             SssfitWarning,
             stacklevel=4,
         )
