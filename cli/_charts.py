@@ -11,6 +11,7 @@ from ._output import columns, number, say, table
 from ._progress import say_if_compiling, walk_progress
 
 if TYPE_CHECKING:
+    from sssfit.fit import Pitch
     from sssfit.kernel import SeparableKernel
     from sssfit.material import Material
     from sssfit.profile import Profile
@@ -80,7 +81,7 @@ def draw_kernel(
     )
 
 
-def draw_spectrum(name: str, profile: Profile, mm_per_pixel: float | None) -> Drawn:
+def draw_spectrum(name: str, profile: Profile, mm_per_pixel: Pitch | None) -> Drawn:
     """Draw the spectrum of a profile's kernel."""
     from sssfit.chart.spectrum import spectrum_figure
     from sssfit.compare import compute_spectrum

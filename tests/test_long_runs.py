@@ -395,7 +395,7 @@ def test_a_full_disk_costs_the_checkpoint_and_not_the_run(tmp_path, monkeypatch)
     assert names(tmp_path) == ["c"]
 
 
-def test_starting_anew_is_said_and_the_old_work_kept_until_there_is_new(tmp_path):
+def test_a_new_start_is_said_and_the_old_work_kept_until_there_is_new(tmp_path):
     path = tmp_path / "c"
     leave_checkpoint(path, batches=8)
     before = path.read_bytes()

@@ -72,7 +72,7 @@ def test_the_command_line_knows_every_argument_that_a_message_marks():
         ("use `dr_mm = 0.5` or more", "use --dr 0.5 or more"),
         ('give `quantity = "density"` (R_d)', "give --quantity density (R_d)"),
         ("replace it with `force = True`.", "replace it with --force."),
-        ("start anew with `resume = False`.", "start anew without --resume."),
+        ("start a new run with `resume = False`.", "start a new run without --resume."),
         ("with `photons = 20000` alone", "with --photons 20000 alone"),
         ("fit it at `mm_per_pixel = 0.3`.", "fit it at --mm-per-pixel 0.3."),
         ("`material_names()` lists them", "`sssfit materials` lists them"),
