@@ -23,11 +23,11 @@ from sssfit.measure.delta_e import auto_exposure
 from sssfit.measure.score import measure
 from sssfit.scene.made import make_scene
 
-MM_PER_PIXEL = 0.3
+MM_PER_PIXEL = 0.3  # the default
 CROP = (slice(205, 595), slice(170, 530))  # from the brow to the chin
 SESSION = (
     ("simulate", "skin1", "--method", "exact"),
-    ("fit", "--method", "svd", "--rank", "3", "--mm-per-pixel", str(MM_PER_PIXEL)),
+    ("fit", "--method", "svd", "--rank", "3"),
     ("render", "--irradiance", "head", "-o", "kernel.exr", "--truth", "truth.exr"),
 )
 GAP, LABEL = 8, 34  # pixels

@@ -123,7 +123,7 @@ class Checkpoint:
         if self.path.exists():
             warnings.warn(
                 f"starting a new run beside {self.path}, which an earlier run left; it is kept "
-                "until this run's own first checkpoint (`resume = True` would go on from it).",
+                "until this run's own first checkpoint (`resume = True` would continue from it).",
                 SssfitWarning,
                 stacklevel=6,
             )
