@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ._compare_input import material_of
-from ._compiling import say_if_compiling
-from ._figure import chart_path, write_chart
 from ._options import Common
-from ._report import percent, table
+from ._output import number, table, target, write_chart
+from ._progress import say_if_compiling
 
 if TYPE_CHECKING:
     from sssfit.compare.budget import Budget, Cause
     from sssfit.scene.record import Scene
 
 _HEADS = ["", "Delta E mean", "p95", "p99", "relative L2", "largest drift", "of the whole"]
-_SCORES = (
-    *("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99", "share_above_1"),
-    *("relative_l2", "energy_drift"),
-)
 
 
 @dataclass(frozen=True)
@@ -45,32 +39,15 @@ def compare_budget(
     budgets = _budgets(material, scenes, request, common)
     if request.chart is not None:
         _draw(budgets, request.chart)
-    return _figures(budgets), "\n\n".join(_text(each) for each in budgets)
-
-
-def _figures(budgets: Sequence[Budget]) -> dict[str, Any]:
-    """Everything that is printed, as ``--json`` has it."""
-    first = budgets[0]
-    return {
-        "material": first.material.name,
-        "channels": first.material.channels,
-        "method": first.kernel.method,
-        "rank": first.kernel.rank,
-        "model": first.model,
-        "storage": first.storage,
-        "photons": first.photons,
-        "seed": first.seed,
-        "mm_per_pixel": first.scene.mm_per_pixel,
-        "radius_mm": first.radius_mm,
-        "beyond_grid": first.beyond_grid,
-        "rows": [row for each in budgets for row in _rows(each)],
-    }
+    each = [budget.to_dict() for budget in budgets]
+    figures = {**each[0], "rows": [row for one in each for row in one["rows"]]}
+    return figures, "\n\n".join(_text(each) for each in budgets)
 
 
 def _draw(budgets: Sequence[Budget], name: str) -> None:
     from sssfit.chart.budget import budget_figure
 
-    write_chart(budget_figure(budgets), chart_path(name))
+    write_chart(budget_figure(budgets), target(name))
 
 
 def _budgets(
@@ -95,23 +72,6 @@ def _budgets(
             threads=common.threads,
             progress=show,
         )
-
-
-def _rows(budget: Budget) -> list[dict[str, Any]]:
-    """Figures of every cause, of the whole and of the interaction; null for what is not made."""
-    return [
-        {
-            "picture": budget.scene.name,
-            "width": budget.scene.width,
-            "height": budget.scene.height,
-            "cause": each.name,
-            "in_whole": each.is_in_whole,
-            **{key: getattr(each.score, key, None) for key in _SCORES},
-            "share_of_whole": budget.share(each),
-            "hint": each.hint,
-        }
-        for each in (*budget.causes, budget.interaction, budget.whole)
-    ]
 
 
 def _text(budget: Budget) -> str:
@@ -146,18 +106,13 @@ def _line(budget: Budget, cause: Cause) -> list[str]:
         return [name, cause.hint, "", "", "", "", ""]
     return [
         name,
-        _number(score.delta_e_2000_mean, ".4f"),
-        _number(score.delta_e_2000_p95, ".3f"),
-        _number(score.delta_e_2000_p99, ".3f"),
+        number(score.delta_e_2000_mean, ".4f"),
+        number(score.delta_e_2000_p95, ".3f"),
+        number(score.delta_e_2000_p99, ".3f"),
         f"{100.0 * score.relative_l2:.4f} %",
-        percent(max(score.energy_drift, key=abs), "+.3f"),
-        percent(budget.share(cause), "+.1f") if cause.is_in_whole else "",
+        number(max(score.energy_drift, key=abs), "+.3f%"),
+        number(budget.share(cause), "+.1f%|nan %") if cause.is_in_whole else "",
     ]
-
-
-def _number(value: float, digits: str) -> str:
-    """Write a figure; a dash for channels that have no colour."""
-    return "-" if math.isnan(value) else f"{value:{digits}}"
 
 
 def _advice(inside: Sequence[Cause]) -> str:

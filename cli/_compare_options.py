@@ -7,9 +7,9 @@ from typing import Any
 
 import click
 
-from ._compare_input import MM_PER_PIXEL
-from ._fits import FITS
-from ._options import Count, Length, WholeRange
+from sssfit.methods import FITS
+
+from ._options import Count, LengthOr, WholeRange
 from ._scene import EDGE_DEGREES, FILE_OPTIONS, MADE, Size
 
 PICTURES = "disk,edge,points,head"
@@ -31,9 +31,10 @@ _OPTIONS = (
     ),
     click.option(
         "--mm-per-pixel",
-        type=Length(),
-        metavar="MM",
-        help=f"Size of all pixels.  [default: what your own file says, else {MM_PER_PIXEL}]",
+        type=LengthOr("profile"),
+        metavar="MM|profile",
+        help="Size of all pixels; profile is the width of the profile's first annulus."
+        "  [default: what your own file says, else 0.3]",
     ),
     click.option(
         "--size",

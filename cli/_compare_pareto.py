@@ -11,15 +11,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ._compare_input import profile_of, scenes_of
-from ._compare_table import FORMATS, figures_of, is_table_file, table_text, text_of
-from ._figure import chart_path, held_charts, write_chart
+from ._compare_table import FORMATS, is_table_file, table_text, text_of
 from ._options import Common
-from ._outputs import check_distinct, held
+from ._output import (
+    check_distinct,
+    finish,
+    held,
+    held_charts,
+    say,
+    table,
+    target,
+    write,
+    write_chart,
+)
 from ._progress import step_progress
-from ._report import finish, say, table
 
 if TYPE_CHECKING:
     from sssfit.compare.comparison import Comparison
+    from sssfit.fit import Pitch
     from sssfit.profile import Profile
     from sssfit.scene.record import Scene
 
@@ -30,21 +39,23 @@ class Wish:
 
     pictures: Sequence[str]
     size: tuple[int, int] | None
-    mm_per_pixel: float | None
+    mm_per_pixel: Pitch | None
     error: str
     cost: str
     force: bool
     common: Common
     layer: str | None = None
     mask: str | None = None
+    profile: Profile | None = None  # where the pitch is that of a profile, it has been read
 
     @cached_property
     def scenes(self) -> tuple[list[Scene], float]:
         """Make or read the pictures, once; the size of their pixels [mm]."""
+        pitch = None if self.mm_per_pixel is None else float(self.mm_per_pixel)
         return scenes_of(
             self.pictures,
             self.size,
-            self.mm_per_pixel,
+            pitch,
             self.common,
             layer=self.layer,
             mask=self.mask,
@@ -69,12 +80,13 @@ def compare_one(name: str, outputs: Outputs, wish: Wish) -> tuple[dict[str, Any]
 
     The outputs are held by the caller.
     """
-    comparison = _compared(profile_of(name, wish.common), *wish.scenes, wish)
+    profile = profile_of(name, wish.common) if wish.profile is None else wish.profile
+    comparison = _compared(profile, *wish.scenes, wish)
     _write(comparison, outputs, wish)
     figures = {
         "error": wish.error,
         "cost": wish.cost,
-        **figures_of(comparison),
+        **comparison.to_dict(),
         "verdict": _verdict_figures(comparison, wish),
     }
     return figures, text_of(comparison, wish.error, wish.cost)
@@ -145,7 +157,7 @@ def held_outputs(
             raise FileError(
                 f"{name}: tables are Markdown, CSV or JSON; end it in .md, .csv or .json."
             )
-    drawn, written = [chart_path(each) for each in charts], [Path(each) for each in tables]
+    drawn, written = [target(each) for each in charts], [Path(each) for each in tables]
     check_distinct([each for each in (*drawn, *written) if each is not None])
     read = [*inputs, *wish.pictures]
     with (
@@ -157,20 +169,18 @@ def held_outputs(
 
 def _write(comparison: Comparison, outputs: Outputs, wish: Wish) -> None:
     """Write chart and table, each whole or not at all; they are held by now."""
-    from sssfit.files import write_atomically
-
     if outputs.chart is not None:
         _draw(comparison, outputs.chart, wish)
     if outputs.table is not None:
         path = Path(outputs.table)
         text = table_text(comparison, path.suffix.lower(), wish.error, wish.cost)
-        write_atomically(path, lambda stream: stream.write(text.encode()))
+        write(text.encode(), path)
 
 
 def _draw(comparison: Comparison, name: str, wish: Wish) -> None:
     from sssfit.chart.pareto import pareto_figure
 
-    write_chart(pareto_figure(comparison, error=wish.error, cost=wish.cost), chart_path(name))
+    write_chart(pareto_figure(comparison, error=wish.error, cost=wish.cost), target(name))
 
 
 def _report(done: Sequence[tuple[Comparison, Outputs]], wish: Wish) -> None:
@@ -196,7 +206,7 @@ def _report(done: Sequence[tuple[Comparison, Outputs]], wish: Wish) -> None:
         "error": wish.error,
         "cost": wish.cost,
         "materials": [comparison.profile.material_name for comparison, _ in done],
-        "rows": [row for comparison, _ in done for row in figures_of(comparison)["rows"]],
+        "rows": [row for comparison, _ in done for row in comparison.to_dict()["rows"]],
     }
     heads = ["material", "picture", f"front of {wish.error} by {wish.cost}, cheapest first"]
     text = f"{table(heads, cells)}\nWrote {', '.join(figures['output'])}"

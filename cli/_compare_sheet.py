@@ -9,35 +9,30 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ._compare_input import material_of
-from ._compiling import say_if_compiling
-from ._figure import chart_path, write_chart
 from ._options import Common
-from ._report import finish, table
+from ._output import finish, table, target, write_chart
+from ._progress import say_if_compiling
 
 if TYPE_CHECKING:
-    from sssfit.compare.convergence import Convergence
-    from sssfit.compare.editing import Editing
-    from sssfit.compare.sheet import Sheet
+    from sssfit.fit import Pitch
     from sssfit.profile import Profile
 
 MOST_PHOTONS = 10**7
 _LEAST_PHOTONS = 10_000
 _PER_DECADE = 2
-_COLOURS = ("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99", "share_above_1")
 
 
-def chart_sheet(profile: Profile, output: str, mm_per_pixel: float | None, common: Common) -> None:
+def chart_sheet(profile: Profile, output: str, mm_per_pixel: Pitch | None, common: Common) -> None:
     """Draw a contact sheet of a profile's kernels; ``-`` is PNG on stdout."""
     from sssfit.compare.sheet import compute_sheet
 
-    given: dict[str, Any] = {} if mm_per_pixel is None else {"mm_per_pixel": mm_per_pixel}
-    sheet = compute_sheet(profile, threads=common.threads, **given)
+    sheet = compute_sheet(profile, mm_per_pixel=mm_per_pixel, threads=common.threads)
 
     from sssfit.chart.sheet import sheet_figure
 
-    path = chart_path(output)
+    path = target(output)
     write_chart(sheet_figure(sheet), path)
-    _finish(path, _sheet_figures(sheet), _sheet_text, common)
+    _finish(path, sheet.to_dict(), _sheet_text, common)
 
 
 def chart_editing(output: str, common: Common) -> None:
@@ -48,9 +43,9 @@ def chart_editing(output: str, common: Common) -> None:
 
     from sssfit.chart.editing import editing_figure
 
-    path = chart_path(output)
+    path = target(output)
     write_chart(editing_figure(editing), path)
-    _finish(path, _editing_figures(editing), _editing_text, common)
+    _finish(path, editing.to_dict(), _editing_text, common)
 
 
 def chart_convergence(name: str, output: str, photons: int | None, common: Common) -> None:
@@ -76,9 +71,9 @@ def chart_convergence(name: str, output: str, photons: int | None, common: Commo
 
     from sssfit.chart.convergence import convergence_figure
 
-    path = chart_path(output)
+    path = target(output)
     write_chart(convergence_figure(found), path)
-    _finish(path, _convergence_figures(found), _convergence_text, common)
+    _finish(path, found.to_dict(), _convergence_text, common)
 
 
 def photon_numbers(most: int) -> tuple[int, ...]:
@@ -103,28 +98,6 @@ def _finish(
     finish(common, figures, words, to_stderr=path is None)
 
 
-def _sheet_figures(sheet: Sheet) -> dict[str, Any]:
-    """Figures of a contact sheet, a row a kernel."""
-    return {
-        "material": sheet.profile.material_name,
-        "mm_per_pixel": sheet.mm_per_pixel,
-        "pixels": sheet.pixels,
-        "support_mm": sheet.support_mm,
-        "scenes": sheet.scenes,
-        "exposures": sheet.exposures,
-        "production": sheet.production,
-        "rows": [
-            {
-                "label": row.label,
-                "passes": row.passes,
-                **{key: [getattr(each.score, key) for each in row.panels] for key in _COLOURS},
-                "relative_l2": [each.score.relative_l2 for each in row.panels],
-            }
-            for row in sheet.rows
-        ],
-    }
-
-
 def _sheet_text(figures: dict[str, Any]) -> str:
     """Write mean Delta E for people."""
     rows = [
@@ -142,22 +115,6 @@ def _sheet_text(figures: dict[str, Any]) -> str:
     )
 
 
-def _editing_figures(editing: Editing) -> dict[str, Any]:
-    """Figures of edits."""
-    return {
-        "mm_per_pixel": editing.mm_per_pixel,
-        **{f"original_{key}": getattr(editing.original_score, key) for key in _COLOURS},
-        "rows": [
-            {
-                "label": each.label,
-                **each.settings,
-                **{key: getattr(each.panel.score, key) for key in _COLOURS},
-            }
-            for each in editing.edits
-        ],
-    }
-
-
 def _editing_text(figures: dict[str, Any]) -> str:
     """Write Delta E to the original for people."""
     rows = [
@@ -171,19 +128,6 @@ def _editing_text(figures: dict[str, Any]) -> str:
         f"{figures['original_delta_e_2000_mean']:.3g}, 99th percentile "
         f"{figures['original_delta_e_2000_p99']:.3g}"
     )
-
-
-def _convergence_figures(found: Convergence) -> dict[str, Any]:
-    """Figures of walks and resolutions."""
-    walk = ("photons", "seed", "seconds", "error")
-    exact = ("tolerance", "seconds", "estimate", "error")
-    return {
-        "material": found.exact.material_name,
-        "slope": found.line.slope,
-        "slope_stderr": found.line.slope_stderr,
-        "rows": [{key: getattr(each, key) for key in walk} for each in found.walks],
-        "exact": [{key: getattr(each, key) for key in exact} for each in found.resolutions],
-    }
 
 
 def _convergence_text(figures: dict[str, Any]) -> str:

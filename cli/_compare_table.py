@@ -5,12 +5,11 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._report import percent, plain, table
+from ._output import number, table
 
 if TYPE_CHECKING:
     from sssfit.compare.comparison import Comparison, KernelRow, Picture, Verdict
@@ -29,44 +28,6 @@ _MARKS = {
     ".csv": f"# {_FORMAT}\n",
     ".json": f'{{"format": "{_FORMAT}"',
 }
-
-
-def row_figures(row: KernelRow, comparison: Comparison) -> dict[str, Any]:
-    """Everything of a row, as ``--json`` has it; null where nothing was measured."""
-    from sssfit.compare.comparison import COSTS, ERRORS
-    from sssfit.measure.score import COLOUR_FIGURES
-
-    keys = (
-        *("picture", "label", "method", "rank", "settings", *COLOUR_FIGURES),
-        *("relative_l2", "rmse", "psnr_db", "energy_drift"),
-        *("radial_asymmetry", "passes", "taps_per_pixel", "kernel_bytes", "taps"),
-        *("seconds_per_megapixel", "fit_seconds", "relative_frobenius_error", "stop_reasons"),
-    )
-    on_front = {error: {cost: (error, cost) in row.fronts for cost in COSTS} for error in ERRORS}
-    return {
-        "material": comparison.profile.material_name,
-        **{key: getattr(row, key) for key in keys},
-        "on_front": on_front,
-    }
-
-
-def figures_of(comparison: Comparison) -> dict[str, Any]:
-    """Everything of a comparison, as ``--json`` has it."""
-    return {
-        "material": comparison.profile.material_name,
-        "profile_method": comparison.profile.meta.get("method"),
-        "channels": comparison.profile.channels,
-        "mm_per_pixel": comparison.mm_per_pixel,
-        "pixels": comparison.pixels,
-        "threads": comparison.threads,
-        "pictures": [
-            {key: getattr(each, key) for key in ("name", "width", "height", "exposure")}
-            for each in comparison.pictures
-        ],
-        "missing_share": comparison.missing_share,
-        "left_out": [{"label": label, "reason": why} for label, why in comparison.left_out],
-        "rows": [row_figures(row, comparison) for row in comparison.rows],
-    }
 
 
 def text_of(comparison: Comparison, error: str, cost: str) -> str:
@@ -123,8 +84,8 @@ def table_text(comparison: Comparison, ending: str, error: str, cost: str) -> st
         return _MARKS[ending] + _markdown(comparison, error, cost)
     if ending == ".csv":
         return _MARKS[ending] + _csv(comparison)
-    whole = {"format": _FORMAT, "command": "compare", **figures_of(comparison)}
-    return json.dumps(plain(whole), allow_nan=False)
+    whole = {"format": _FORMAT, "command": "compare", **comparison.to_dict()}
+    return json.dumps(whole, allow_nan=False)
 
 
 def is_table_file(path: Path) -> bool:
@@ -156,10 +117,7 @@ def _markdown_row(row: KernelRow, is_on_front: bool) -> str:
 
 def _csv(comparison: Comparison) -> str:
     """All rows, what there is by channel in columns of its own."""
-    lines = [
-        _flat(plain(row_figures(row, comparison)), comparison.profile.channels)
-        for row in comparison.rows
-    ]
+    lines = [_flat(row, comparison.profile.channels) for row in comparison.to_dict()["rows"]]
     stream = io.StringIO()
     writer = csv.DictWriter(stream, list(lines[0]), lineterminator="\n")
     writer.writeheader()
@@ -194,20 +152,15 @@ def _cells(row: KernelRow, mark: str) -> list[str]:
         f"{row.passes}",
         f"{row.taps_per_pixel}",
         f"{row.seconds_per_megapixel:.2g}",
-        _or_dash(row.delta_e_2000_mean, ".3f"),
-        _or_dash(row.delta_e_2000_p95, ".2f"),
-        _or_dash(row.delta_e_2000_p99, ".2f"),
-        "-" if math.isnan(row.share_above_1) else percent(row.share_above_1, ".3g"),
+        number(row.delta_e_2000_mean, ".3f"),
+        number(row.delta_e_2000_p95, ".2f"),
+        number(row.delta_e_2000_p99, ".2f"),
+        number(row.share_above_1, ".3g%"),
         f"{100.0 * row.relative_l2:.3g} %",
         f"{row.psnr_db:.1f}",
-        percent(drift),
-        _or_dash(float(row.radial_asymmetry.max()), ".2g"),
+        number(drift, "+.2g%"),
+        number(float(row.radial_asymmetry.max()), ".2g"),
     ]
-
-
-def _or_dash(value: float, digits: str) -> str:
-    """Write a figure; a dash where there is none."""
-    return "-" if math.isnan(value) else f"{value:{digits}}"
 
 
 def _setting(comparison: Comparison) -> str:
@@ -218,7 +171,7 @@ def _setting(comparison: Comparison) -> str:
     return (
         f"{profile.material_name or 'profile'}, {profile.meta.get('method') or 'no method'}: "
         f"kernels of {comparison.pixels} pixels of {comparison.mm_per_pixel:.4g} mm against the "
-        f"whole 2D kernel, which lacks up to {percent(missing, '.2g')} of a channel's light beyond "
+        f"whole 2D kernel, which lacks up to {number(missing, '.2g%')} of a channel's light beyond "
         f"the grid; seconds on {threads}, float64"
     )
 

@@ -114,8 +114,26 @@ class Length(click.ParamType[float]):
         except ValueError:
             number = math.nan
         if not (math.isfinite(number) and number > 0):
-            self.fail(f"{value!r} is not a length above 0, such as 0.05, 3cm or 0.6m.", param, ctx)
+            self.fail(f"{value!r} is not {self.expected()}.", param, ctx)
         return number
+
+    def expected(self) -> str:
+        """Return what a value may be."""
+        return "a length above 0, such as 0.05, 3cm or 0.6m"
+
+
+class LengthOr(Length):
+    """A length, or one word that comes through as it is."""
+
+    def __init__(self, word: str) -> None:
+        self.word = word
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Parse ``value``; a usage error (exit 2) names what was expected."""
+        return value if value == self.word else super().convert(value, param, ctx)
+
+    def expected(self) -> str:
+        return f"{super().expected()}, or {self.word}"
 
 
 class Count(click.ParamType[int]):

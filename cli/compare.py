@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
+from sssfit.methods import FITS
+
 from ._compare_budget import BudgetRequest, compare_budget
 from ._compare_options import PICTURES, compare_options
 from ._compare_pareto import Outputs, Wish, compare_all, compare_one, held_outputs
 from ._compare_sheet import chart_convergence, chart_editing, chart_sheet
 from ._deon_skin import DEON_SKIN
-from ._figure import chart_path, held_charts
-from ._fits import own_settings
+from ._methods import own_settings
 from ._options import Common, common_options
-from ._report import finish, say
+from ._output import finish, held_charts, say, target
 
 _BUDGET = ("photons", "method", "rank", "terms", "model")
 _SHEETS = ("sheet", "editing", "convergence")
@@ -69,6 +71,8 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
     if material is None:
         compare_all(Path(given["output"] or "."), wish)
         return
+    if wish.mm_per_pixel == "profile":
+        wish = _on_pixels_of_the_profile(material, wish)
     request = _request(context, given)
     kernels = budget = None
     charts = [given[key] for key in ("chart", "budget_chart") if given[key]]
@@ -81,13 +85,23 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
     _report([budget, kernels], given, common)
 
 
+def _on_pixels_of_the_profile(material: str, wish: Wish) -> Wish:
+    """Read the profile first, for its pitch."""
+    from sssfit.fit import pitch_of
+
+    from ._compare_input import profile_of
+
+    profile = profile_of(material, wish.common)
+    return dataclasses.replace(wish, profile=profile, mm_per_pixel=pitch_of(profile, "profile"))
+
+
 def _request(context: click.Context, given: Mapping[str, Any]) -> BudgetRequest:
     """Put together what the budget needs."""
     terms = {key: given[key] for key in ("rank", "terms")}
     return BudgetRequest(
         given["photons"] or _PHOTONS,
         given["method"],
-        own_settings(context, given["method"], terms),
+        own_settings(context, FITS, given["method"], terms),
         given["model"],
         given["budget_chart"],
     )
@@ -133,7 +147,7 @@ def _sheets(
     material: str | None, asked: Mapping[str, str], given: Mapping[str, Any], common: Common
 ) -> None:
     """Draw the sheets that were asked for."""
-    paths = [chart_path(each) for each in asked.values()]
+    paths = [target(each) for each in asked.values()]
     with held_charts(paths, inputs=[material], force=given["force"]):
         if "sheet" in asked:
             from ._compare_input import profile_of
@@ -167,6 +181,8 @@ def _check(material: str | None, given: Mapping[str, Any]) -> None:
         raise click.UsageError("name one MATERIAL or profile, or give --all.")
     if given["every"] and (given["chart"] or given["table"]):
         raise click.UsageError("--all names its charts and tables; leave --chart and --table out.")
+    if given["every"] and given["mm_per_pixel"] == "profile":
+        raise click.UsageError("the pictures of --all share their pixels; give a length in mm.")
     if given["output"] is not None and not given["every"]:
         raise click.UsageError("-o is the folder of --all; name files by --chart and --table.")
     without_budget = given["every"] or given["only"] == "kernels"

@@ -8,7 +8,7 @@ from click.core import ParameterSource
 from ._deon_skin import DEON_SKIN, show_deon_skin
 from ._invert import Wish, write_material
 from ._options import Common, Length, ListOf, Number, Reflectance, common_options
-from ._report import finish, table
+from ._output import finish, table
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

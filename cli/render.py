@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from ._input import kernel_name, load
 from ._options import Common, NumberRange, common_options
-from ._outputs import held
+from ._output import binary_stdout, finish, held, say, stem_of, target
 from ._render_options import picture_options
 from ._render_report import figures_of, text_of
-from ._report import binary_stdin, binary_stdout, finish, newest, say
 from ._scene import Picture, make_or_read
 from ._truth import true_profile
 
@@ -81,32 +82,34 @@ def render(
 
     KERNEL is a .kernel.json file, or - for stdin; by default the newest of this folder. The result
     is radiant exitance in linear light. Made pictures have the kernel's pixels; a file of your own
-    (EXR, HDR, TIFF, PNG) has to have them too. The truth is the same picture convolved with the
-    whole 2D kernel of the profile; Delta E 2000 is of both in sRGB at the exposure. The alpha of
-    your file goes into the result and the truth as it is.
+    (EXR, HDR, TIFF, PNG) has to have them too, except with --screen. The truth is the same picture
+    convolved with the whole 2D kernel of the profile; Delta E 2000 is of both in sRGB at the
+    exposure. The alpha of your file goes into the result and the truth as it is.
 
     \b
       sssfit render skin1.svd3.kernel.json --irradiance head -o out.exr
       sssfit render --irradiance edge --angle 45 --size 256x256
-      sssfit render --irradiance mine.png --mm-per-pixel 0.1 -o mine.tif --difference lost.png
+      sssfit render --irradiance mine.png --mm-per-pixel 0.3 -o mine.tif --difference lost.png
       sssfit render --screen --irradiance head
       sssfit render --irradiance head --transmit -o ears.png
     """
     from sssfit.formats.pictures import image_format, is_image_file
+    from sssfit.kernel import SeparableKernel
 
     _check_options(screen, follow, profile or truth or difference or structure)
     if transmit:
         own = _lit_from_behind(irradiance, own)
     picture = Picture(irradiance, size, mm_per_pixel, own, layer, mask)
-    name, loaded = _kernel(kernel, common)
-    path = _target(name, picture, output)
+    name = kernel_name(kernel, common)
+    loaded = load(SeparableKernel, name)
+    path = target(output, f"{stem_of(name)}.{picture.name}.exr")
     targets = {"picture": path} if path else {}
     targets |= {k: Path(v) for k, v in (("truth", truth), ("difference", difference)) if v}
     for each in targets.values():
         image_format(each)
     outputs = [*targets.values(), *([None] if path is None else [])]
     with held(outputs, is_image_file, inputs=[name, irradiance, profile], force=force):
-        scene = make_or_read(picture, loaded.mm_per_pixel, common)
+        scene = make_or_read(*_on_pixels(picture, loaded, screen=screen), common)
         through = None
         if transmit:
             from sssfit.render.transmittance import transmitted, with_transmitted
@@ -141,6 +144,18 @@ def render(
     finish(common, figures, text_of(figures), to_stderr=path is None)
 
 
+def _on_pixels(picture: Picture, kernel: SeparableKernel, *, screen: bool) -> tuple[Picture, float]:
+    """Return what to make or read, and the size of a made picture's pixels [mm].
+
+    Convolved as it is, a kernel has the picture's pixels; a screen's may have any.
+    """
+    if not (screen and picture.is_made):
+        return picture, kernel.mm_per_pixel
+    from sssfit.fit import MM_PER_PIXEL
+
+    return dataclasses.replace(picture, mm_per_pixel=None), picture.mm_per_pixel or MM_PER_PIXEL
+
+
 def _lit_from_behind(irradiance: str, own: dict[str, Any]) -> dict[str, Any]:
     """Return the head's options with light through it, its key light behind unless it is given."""
     if irradiance != "head":
@@ -158,24 +173,6 @@ def _check_options(screen: bool, follow: str | None, compared: object) -> None:
         )
     if follow and not screen:
         raise click.UsageError("--follow is for --screen; leave it out.")
-
-
-def _kernel(given: str | None, common: Common) -> tuple[str, SeparableKernel]:
-    """Return the kernel's name and the kernel; by default the newest of this folder."""
-    from sssfit.kernel import SeparableKernel
-
-    name = given or str(newest(common, "*.kernel.json", "sssfit fit --method svd --rank 3"))
-    if name == "-":
-        return name, SeparableKernel.read(binary_stdin(), "stdin")
-    return name, SeparableKernel.load(name)
-
-
-def _target(name: str, picture: Picture, output: str | None) -> Path | None:
-    """Where the picture goes; None is stdout. By default the current folder, under both names."""
-    if output is not None:
-        return None if output == "-" else Path(output)
-    stem = "stdin" if name == "-" else Path(name).name.removesuffix(".json").removesuffix(".kernel")
-    return Path(f"{stem}.{picture.name}.exr")
 
 
 def _write(

@@ -1,4 +1,4 @@
-"""Files on disk: nothing half-written, nothing foreign overwritten, no two runs on one output.
+"""Files on disk: atomic writes, no overwriting of foreign files, one run per output.
 
 Writes go to a temporary file beside the target, are flushed to the disk and renamed over it, so a
 reader sees the old file or the new one and never a part of either.
@@ -159,7 +159,7 @@ def _check_replaceable(
 
 
 def _is_among(path: Path, inputs: Iterable[str | Path]) -> bool:
-    """Whether a file is one of these, by whatever name, link or stream they lead to it."""
+    """Whether a file is one of these, by any name, link or stream."""
     here = path.stat()
     for each in inputs:
         with contextlib.suppress(OSError, ValueError):  # the name of a material, a closed stdin

@@ -123,7 +123,7 @@ def grid_of_lengths(
             f"{whose}annuli {dr:g} mm wide do not fit into a radius of {radius:g} mm; use a "
             "smaller `dr_mm` or a larger `radius_mm` (both in mm)."
         )
-    # 1e-9 keeps a ratio that is whole but for its last bits from gaining a ring.
+    # 1e-9: a ratio that is whole except for its last bits must not gain a ring.
     annuli = max(1, math.ceil(radius / dr - 1e-9))
     _check_count(annuli, dr, whose, why)
     return RadialGrid(dr, annuli)

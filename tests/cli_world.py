@@ -85,13 +85,13 @@ def plate_profile() -> Profile:
 @functools.cache
 def kernel() -> SeparableKernel:
     """Its energy is not the profile's, so that drifts of the channels differ."""
-    return fit_svd(profile(), rank=2, energy="keep").kernel
+    return fit_svd(profile(), rank=2, energy="keep", mm_per_pixel="profile").kernel
 
 
 @functools.cache
 def gaussians() -> SeparableKernel:
     """A kernel that says what goes through a thin body."""
-    return quietly(fit_gaussians, profile(), terms=2).kernel
+    return quietly(fit_gaussians, profile(), terms=2, mm_per_pixel="profile").kernel
 
 
 @functools.cache
@@ -244,9 +244,9 @@ def finishing(both: bool):
     if not both:
         yield
         return
-    from sssfit.cli import _report
+    from sssfit.cli import _output
 
-    real = _report.finish
+    real = _output.finish
 
     def twice(common, figures, text, *, to_stderr=False):
         for as_json in (True, False):

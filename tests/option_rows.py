@@ -256,8 +256,7 @@ FIT = {
         "--mm-per-pixel .5",
         made_kernel,
         _fit("svd", mm_per_pixel=0.5),
-        default=f"{DR_MM}",
-        words="the profile's first annulus",
+        default="0.3",
     ),
     "--support": _fitted("--support", "2.1", "svd", "auto", support_mm=2.1),
     "--normalize": _fitted("--normalize", "", "preintegrated", normalize=True),
@@ -338,6 +337,11 @@ _DISK = f"render --irradiance disk {_SIZE}"
 _LAYERS = f"render --irradiance layers.exr --mm-per-pixel {DR_MM} -o x.exr"
 
 
+def _head_on_screen(height: int, width: int, **own: Any) -> Scene:
+    """The made head, on the default pixels of a screen."""
+    return make_scene("head", height=height, width=width, mm_per_pixel=0.3, **own)
+
+
 def _lit_through() -> Scene:
     """The head lit from 170 degrees off the eye, and what comes through it."""
     return with_transmitted(_scene("head", light_degrees=170.0, transmit=True), world.gaussians())
@@ -364,6 +368,7 @@ RENDER = {
         f"--mm-per-pixel {DR_MM}",
         lambda ran: ran.status or ran.picture,
         lambda: _rendered(Scene("bare", picture(), DR_MM)),
+        words="0.3 with --screen, else the kernel's",
     ),
     "--layer": Row(
         f"{_LAYERS} --layer near",
@@ -395,7 +400,7 @@ RENDER = {
         f"render --irradiance head {_SIZE}",
         "--screen",
         made_picture,
-        lambda: np.float32(judge_in_screen_space(_scene("head"), kernel()).picture),
+        lambda: np.float32(judge_in_screen_space(_head_on_screen(16, 24), kernel()).picture),
     ),
     "--light": _lit("head", "--light", "100", "45", light_degrees=100.0),
     "--transmit": Row(
@@ -410,9 +415,7 @@ RENDER = {
         made_picture,
         lambda: np.float32(
             judge_in_screen_space(
-                make_scene("head", height=48, width=48, mm_per_pixel=DR_MM, distance_mm=200.0),
-                kernel(),
-                follow="none",
+                _head_on_screen(48, 48, distance_mm=200.0), kernel(), follow="none"
             ).picture
         ),
         default="gaussian",
@@ -944,8 +947,7 @@ CHART = {
         "--mm-per-pixel .5",
         _GUIDES,
         lambda: _guided(mm_per_pixel=0.5),
-        default=f"{DR_MM}",
-        words="the profile's first annulus",
+        default="0.3",
     ),
     "--k": Row(_GUIDE, "--k 1,2", _GUIDES, lambda: _guided(ks=[1.0, 2.0]), default="0,1.55,4"),
     "--channel": Row(

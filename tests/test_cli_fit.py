@@ -36,7 +36,7 @@ def failed(capsys, *arguments):
 def test_a_session_from_profile_to_shader(folder):
     assert ended("fit", "--method", "preintegrated").exit_code == 0
     kernel = SeparableKernel.load("wax.preintegrated.kernel.json")
-    assert kernel.mm_per_pixel == pytest.approx(0.1)
+    assert kernel.mm_per_pixel == 0.3
     assert ended("export", "--format", "hlsl").exit_code == 0
     assert (
         (folder / "wax.preintegrated.hlsl")
@@ -45,6 +45,16 @@ def test_a_session_from_profile_to_shader(folder):
     )
     assert ended("export", "--format", "json").exit_code == 0
     assert json.loads((folder / "wax.preintegrated.json").read_text())["pixels"] == kernel.pixels
+
+
+def test_the_pitch_of_the_profile_on_request(folder):
+    own = ended("fit", "--method", "preintegrated", "--mm-per-pixel", "profile", "--json")
+    assert json.loads(own.stdout)["mm_per_pixel"] == pytest.approx(0.1)
+    wrong = ended("fit", "--method", "preintegrated", "--mm-per-pixel", "kernel")
+    assert wrong.exit_code == 2
+    assert "'kernel' is not a length above 0, such as 0.05, 3cm or 0.6m, or profile." in (
+        " ".join(wrong.stderr.split())
+    )
 
 
 def test_json_has_the_figures(folder):

@@ -492,7 +492,7 @@ def test_ears_glow_red_under_a_light_from_behind(run, coarse):
 
 def test_transmitted_light_in_screen_space(run, coarse):
     kernel = SeparableKernel.load(coarse)
-    options = ("--screen", "--transmit", "-o", "a.exr")
+    options = ("--screen", "--mm-per-pixel", "2", "--transmit", "-o", "a.exr")
     assert run("render", coarse, *HEAD, *options)[0] == 0
     scene = head_scene(height=90, width=90, mm_per_pixel=2.0, light_degrees=170.0, transmit=True)
     np.testing.assert_allclose(

@@ -8,7 +8,7 @@ import math
 
 import numpy as np
 import pytest
-from figures import assert_legible
+from figures import assert_legible, words_of
 
 from sssfit.chart.convergence import convergence_figure
 from sssfit.chart.page import save_figure
@@ -125,7 +125,7 @@ def test_what_is_drawn_is_what_was_computed(found):
         right.lines[2].get_ydata(), [each.estimate for each in found.resolutions]
     )
     words = f"fitted slope {found.line.slope:.3f} ± {found.line.slope_stderr:.3f}"
-    assert any(words in each.get_text() for each in figure.texts)
+    assert words in words_of(figure)
 
 
 def test_the_chart_is_legible_and_gives_the_same_bytes(found):

@@ -26,8 +26,8 @@ from sssfit.simulate._mixture import (
 )
 from sssfit.simulate.exact import (
     _LEVELS,
-    _Answer,
     _errors,
+    _Solution,
     _stderr,
     diffuse_reflectance,
     entering_light,
@@ -225,8 +225,8 @@ def test_error_is_kept_as_standard_error():
 
 
 def test_standard_errors_cover_annuli_and_sums():
-    fine = _Answer(np.array([1.0, 0.7, 0.4, 0.1]), 0.0, 0.0)
-    coarse = _Answer(np.array([1.0, 0.6, 0.4, 0.2]), 0.0, 0.0)
+    fine = _Solution(np.array([1.0, 0.7, 0.4, 0.1]), 0.0, 0.0)
+    coarse = _Solution(np.array([1.0, 0.6, 0.4, 0.2]), 0.0, 0.0)
     errors = _errors(fine, coarse)
     np.testing.assert_allclose(errors, [0.1, 0.0, 0.1, 0.0], atol=1e-15)
     stderr = _stderr(fine, coarse, errors)
@@ -236,7 +236,7 @@ def test_standard_errors_cover_annuli_and_sums():
 
 
 def test_the_error_is_never_below_the_energy_that_is_missing():
-    answer = _Answer(np.array([1.0, 0.7, 0.4, 0.1]), 0.0, 0.05)
+    answer = _Solution(np.array([1.0, 0.7, 0.4, 0.1]), 0.0, 0.05)
     np.testing.assert_array_equal(_errors(answer, answer), 0.05)
 
 

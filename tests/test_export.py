@@ -203,5 +203,5 @@ def test_the_same_kernel_gives_the_same_text():
 
 def test_a_fitted_kernel_is_exported():
     profile = make_profile(np.linspace(0.0, 2.0, 21), np.full((20, 2), 0.01))
-    text = hlsl(fit_preintegrated(profile).kernel)
+    text = hlsl(fit_preintegrated(profile, mm_per_pixel="profile").kernel)
     assert "float2 SSS_WEIGHTS[1]" in text

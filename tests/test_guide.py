@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
-from figures import assert_legible
+from figures import assert_legible, words_of
 from reference_pixels import make_profile, one_over_r_profile
 
 from sssfit.chart.guide import guide_figure
@@ -168,7 +168,7 @@ def test_what_is_drawn_is_what_was_computed(guide):
         line, fitted = (each.get_data().values for each in patches)
         np.testing.assert_allclose(line, guide.preintegrated / 0.3)
         np.testing.assert_allclose(fitted, guided / 0.3)
-    texts = " ".join(each.get_text() for each in figure.texts)
+    texts = words_of(figure)
     for words in (
         "skin1, G: guide function and residual",
         "Exact solution",
@@ -189,13 +189,18 @@ ODD = {
     "noise": lambda: compute_guide(
         make_profile(
             np.arange(41) * 0.1, np.random.default_rng(2).exponential(size=(40, 1)) / 150.0
-        )
+        ),
+        mm_per_pixel="profile",
     ),
-    "one k": lambda: compute_guide(one_over_r_profile(40, 0.1, [0.4]), ks=[2]),
-    "four": lambda: compute_guide(one_over_r_profile(40, 0.1, [0.4]), ks=[0, 1, 2, 4]),
+    "one k": lambda: compute_guide(
+        one_over_r_profile(40, 0.1, [0.4]), ks=[2], mm_per_pixel="profile"
+    ),
+    "four": lambda: compute_guide(
+        one_over_r_profile(40, 0.1, [0.4]), ks=[0, 1, 2, 4], mm_per_pixel="profile"
+    ),
     "one pixel": lambda: compute_guide(one_over_r_profile(10, 0.1, [0.4]), mm_per_pixel=9),
-    "small": lambda: compute_guide(one_over_r_profile(40, 1e-4, [4e-4])),
-    "long names": lambda: compute_guide(long_names()),
+    "small": lambda: compute_guide(one_over_r_profile(40, 1e-4, [4e-4]), mm_per_pixel="profile"),
+    "long names": lambda: compute_guide(long_names(), mm_per_pixel="profile"),
 }
 
 
@@ -239,9 +244,9 @@ def test_bad_settings_are_one_line(settings, words):
     names = {"channels": ["c0", "c1"]}
     meta = dict(one_over_r_profile(10, 0.1, [0.4]).meta) | names
     profile = make_profile(np.arange(11) * 0.1, np.outer(np.full(10, 0.05), [0.0, 1.0]), meta=meta)
-    assert compute_guide(profile).channel == 1
+    assert compute_guide(profile, mm_per_pixel="profile").channel == 1
     with pytest.raises(FitError, match=words):
-        compute_guide(profile, **settings)
+        compute_guide(profile, mm_per_pixel="profile", **settings)
 
 
 @pytest.fixture

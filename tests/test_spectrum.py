@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
-from figures import assert_legible
+from figures import assert_legible, words_of
 from matplotlib.colors import to_hex
 from reference_pixels import make_profile, one_over_r_profile
 
@@ -39,7 +39,7 @@ def noisy_profile(channels):
 
 def test_shares_are_those_of_numpys_singular_values():
     profile = noisy_profile(2)
-    found = compute_spectrum(profile, support_mm=4.0)
+    found = compute_spectrum(profile, support_mm=4.0, mm_per_pixel="profile")
     for c in range(2):
         singular = np.linalg.svd(
             full_kernel(profile.quadrant_kernel(0.1, 40, channel=c)), compute_uv=False
@@ -97,7 +97,7 @@ def test_what_is_drawn_is_what_was_computed(spectrum):
             np.testing.assert_allclose(line.get_ydata(), 100 * shares[:12, c])
         assert len({to_hex(each.get_color()) for each in lines}) == 3
         assert len({each.get_marker() for each in lines}) == 3
-    texts = " ".join(each.get_text() for each in figure.texts)
+    texts = words_of(figure)
     for words in (
         "skin1: energy of the kernel's singular values",
         "Exact solution",
@@ -109,7 +109,7 @@ def test_what_is_drawn_is_what_was_computed(spectrum):
 
 
 def test_negative_eigenvalues_are_hollow():
-    found = compute_spectrum(noisy_profile(1), support_mm=4.0)
+    found = compute_spectrum(noisy_profile(1), support_mm=4.0, mm_per_pixel="profile")
     _, hollow = spectrum_figure(found).axes[1].lines
     drawn = np.isfinite(np.asarray(hollow.get_ydata(), dtype=float))
     np.testing.assert_array_equal(drawn, found.values[:12, 0] < 0.0)
@@ -118,19 +118,23 @@ def test_negative_eigenvalues_are_hollow():
 
 def odd_spectra():
     return {
-        "noise": lambda: compute_spectrum(noisy_profile(3)),
-        "one channel": lambda: compute_spectrum(one_over_r_profile(40, 0.1, [0.4])),
-        "64 channels": lambda: compute_spectrum(noisy_profile(64)),
+        "noise": lambda: compute_spectrum(noisy_profile(3), mm_per_pixel="profile"),
+        "one channel": lambda: compute_spectrum(
+            one_over_r_profile(40, 0.1, [0.4]), mm_per_pixel="profile"
+        ),
+        "64 channels": lambda: compute_spectrum(noisy_profile(64), mm_per_pixel="profile"),
         "one pixel": lambda: compute_spectrum(one_over_r_profile(10, 0.1, [0.4]), mm_per_pixel=9),
         "a dark channel": lambda: compute_spectrum(
-            make_profile(np.arange(11) * 0.1, np.outer(np.full(10, 0.05), [1.0, 0.0]))
+            make_profile(np.arange(11) * 0.1, np.outer(np.full(10, 0.05), [1.0, 0.0])),
+            mm_per_pixel="profile",
         ),
         "long names": lambda: compute_spectrum(
             make_profile(
                 np.arange(11) * 0.1,
                 np.full((10, 3), 0.05),
                 meta=dict(noisy_profile(1).meta) | {"channels": ["W" * 60, "m" * 60, "@" * 60]},
-            )
+            ),
+            mm_per_pixel="profile",
         ),
     }
 

@@ -39,7 +39,7 @@ from sssfit.files import has_mark
 from sssfit.messages import printable, shown
 from sssfit.profile import FORMAT, Profile
 from sssfit.profile import pixels as integrals
-from sssfit.text import finite_number, read_text, tenfold_number
+from sssfit.text import decimal_shifted, finite_number, read_text
 
 QUANTITIES = ("density", "energy")
 
@@ -345,7 +345,7 @@ class _Table:
         return np.array(radii_mm), np.array(rows)
 
     def _radius(self, line: _Line, cell: str, before: Sequence[float], quantity: str) -> float:
-        """Read a radius and hold it against those before it."""
+        """Read a radius and compare it with those before it."""
         name = self.radius_name
         if cell.lower() in ("inf", "+inf", "infinity"):
             if quantity == "density":
@@ -362,7 +362,7 @@ class _Table:
                 line, f"{shown(cell)}; expected a radius in {self.unit}, {expected}.", name
             )
         if before and radius_mm <= before[-1]:
-            last = tenfold_number(repr(before[-1]), -_TO_MM[self.unit])
+            last = decimal_shifted(repr(before[-1]), -_TO_MM[self.unit])
             raise self._failure(
                 line, f"{shown(cell)} is not above the {last!r} before it; sort by r.", name
             )
@@ -384,7 +384,7 @@ class _Table:
             raise self._failure(line, "the cell is empty; leave out lines that have gaps.", name)
         if finite_number(cell) is None:
             raise self._failure(line, f"{shown(cell)} is not a finite number such as 1.5e-3.", name)
-        return tenfold_number(cell, power)
+        return decimal_shifted(cell, power)
 
 
 def _density_unit(given: str | None, quantity: str, unit: str) -> str | None:
@@ -461,7 +461,7 @@ def _warn_of_gap(profile: Profile, radii_mm: FloatArray, table: _Table) -> None:
     total = profile.diffuse_reflectance
     share = np.divide(inside, total, out=np.zeros_like(total), where=total > 0)
     worst = int(np.argmax(share))
-    first = tenfold_number(repr(first_mm), -_TO_MM[table.unit])
+    first = decimal_shifted(repr(first_mm), -_TO_MM[table.unit])
     warnings.warn(
         f"{table.origin} begins at r = {first:g} {table.unit}: what leaves nearer to the beam is "
         f"not in it. Taken as flat there, {shown(profile.channels[worst])} has {inside[worst]:.3g} "

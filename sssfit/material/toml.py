@@ -73,7 +73,7 @@ def is_path(wanted: str) -> bool:
 
 
 def read_text(path: Path) -> Text:
-    """Read a material file, and no more than ``MOST_BYTES`` of whatever it turns out to be."""
+    """Read a material file, at most ``MOST_BYTES`` of it."""
     try:
         is_folder = path.is_dir()
         content = b"" if is_folder else _first_bytes(path)

@@ -2,7 +2,7 @@
 
 The same content gives the same bytes: members are stored in a fixed order, uncompressed (zlib
 builds differ in their output) and with a fixed date. Reading trusts nothing: sizes are checked
-before anything is allocated, and whatever a damaged file makes the parsers raise leaves here as one
+before anything is allocated, and every exception that a damaged file causes leaves here as one
 line that names the file.
 """
 
@@ -84,7 +84,7 @@ def unpack(
     """
     try:
         if isinstance(source, str | Path):
-            _check_ordinary(Path(source))
+            _check_regular_file(Path(source))
             with Path(source).open("rb") as stream:
                 return _unpack_known(stream)
         # A pipe cannot seek, an archive's directory is at its end.
@@ -157,7 +157,7 @@ def _unpack_stream(stream: BinaryIO) -> tuple[dict[str, FloatArray], dict[str, A
     return arrays, meta
 
 
-def _check_ordinary(path: Path) -> None:
+def _check_regular_file(path: Path) -> None:
     """Refuse devices, which may never end, and pipes, which have no end to begin a zip from."""
     if path.is_dir():
         raise ProfileError("is a folder")

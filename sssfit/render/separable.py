@@ -46,7 +46,7 @@ def render_separable(
     border : str
         One of ``sssfit.render.borders.BORDERS``.
     threads : int, optional
-        By default all cores; the same bits whatever their number.
+        By default all cores; the result does not depend on their number.
     dtype : float64 or float32
         Precision of the sums and of the result.
 

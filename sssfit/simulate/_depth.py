@@ -139,7 +139,7 @@ def respond_to_diffuse_light(eta: float, albedos: FloatArray, resolution: Resolu
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Equation:
-    """The depth equation of one wavenumber and index on its nodes (N), whatever light comes in.
+    """The depth equation of one wavenumber and index on its nodes (N), for any incident light.
 
     ``escape`` (N,) is E at the nodes, ``matrix`` (N, N) the integral over K_d + K_r on the panels.
     """
@@ -216,7 +216,7 @@ def _tables(
     per_log = 3.0 / resolution.step
     entries = int(math.log(_BEYOND / kappa / shortest) * per_log) + 4
     distances = shortest * np.exp(np.arange(entries) / per_log)
-    direct = _over_w(distances, k, lambda tau, _: np.ones_like(tau))
+    direct = _integrate_over_w(distances, k, lambda tau, _: np.ones_like(tau))
     z = panels.nodes.ravel()
     if is_matched(eta):
         return _matched_escape(z, k), (direct, math.log(shortest), per_log, np.zeros(4), 1.0)
@@ -246,15 +246,15 @@ def _over_cone(distances: FloatArray, k: float, cone: Cone, weight: FloatArray) 
 
 def _matched_escape(z: FloatArray, k: float) -> FloatArray:
     """Return E without a surface: z/2 int (p - 1) exp(-tau z) dw, p = sqrt(tau^2 - k^2), (n,)."""
-    return z * _over_w(z, k, lambda _, p: p - 1.0)
+    return z * _integrate_over_w(z, k, lambda _, p: p - 1.0)
 
 
 def _tail(below: FloatArray, k: float, nu: float) -> FloatArray:
     """Integrate K_d(d + t) exp(-nu t) over t > 0 for nodes at distance d above the last edge."""
-    return _over_w(below, k, lambda tau, _: 1.0 / (tau + nu))
+    return _integrate_over_w(below, k, lambda tau, _: 1.0 / (tau + nu))
 
 
-def _over_w(distances: FloatArray, k: float, function: _OfTau) -> FloatArray:
+def _integrate_over_w(distances: FloatArray, k: float, function: _OfTau) -> FloatArray:
     """Return 1/2 int_{w0}^inf function(tau, p) exp(-d tau) dw for distances above 0, (n,).
 
     tau = (e^w + k^2 e^-w)/2 and p = (e^w - k^2 e^-w)/2.

@@ -1,8 +1,8 @@
-"""What the diffusion models share: coefficients of the diffusion equation and of its boundary.
+"""Coefficients of the diffusion equation and of its boundary, for all diffusion models.
 
 Scattering enters as sigma_s' = (1 - g) sigma_s: diffusion sees directions only by their mean, so
-for these models g other than 0 is no further approximation. The boundary condition is A: flux lost
-through the surface puts the fluence's zero at 2 A D outside it, further for a denser medium.
+for these models g other than 0 needs no further approximation. The boundary condition is A: flux
+lost through the surface puts the fluence's zero at 2 A D outside it, further for a denser medium.
 """
 
 import math

@@ -115,7 +115,7 @@ def mixture_of(wavenumbers: FloatArray, transform: FloatArray, slowest: float) -
     rates = slowest + np.concatenate(([0.0], np.geomspace(0.01 * slowest, steepest, count)))
     terms = rates**2 / (wavenumbers[:, None] ** 2 + rates**2)
     scale = 1.0 + wavenumbers
-    # Neighbouring rates are all but equal: without the ridge the active set can cycle for ever
+    # Neighbouring rates are almost equal: without the ridge the active set can cycle for ever
     # (seen where the solver's own error is 1e-13). It adds 1e-11 to the misfit.
     ridge = _RIDGE * np.eye(rates.size)
     rows = np.concatenate((terms * scale[:, None], ridge))

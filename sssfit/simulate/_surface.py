@@ -1,4 +1,4 @@
-"""The surface seen from inside: which directions get out, and how much of the light in them.
+"""The surface seen from inside: which directions leave, and how much of their light.
 
 Light at cosine mu to the normal leaves a medium of relative index eta if mu > mu_c =
 sqrt(1 - 1/eta^2); Fresnel's equations for unpolarised light give the share. Integrals over this

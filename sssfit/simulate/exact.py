@@ -259,8 +259,8 @@ class _Channel:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Answer:
-    """What leaves beyond each radius (n+1,), what is absorbed, and the known part of the error."""
+class _Solution:
+    """Energy beyond each radius (n+1,), absorbed energy, and the known part of the error."""
 
     beyond: FloatArray
     absorbed: float
@@ -298,7 +298,7 @@ def _solve_group(
 
 def _solve(
     eta: float, channels: Sequence[_Channel], level: _Level, workers: _Workers
-) -> list[_Answer]:
+) -> list[_Solution]:
     """Solve all channels at one resolution."""
     albedos, places = np.unique([each.albedo for each in channels], return_inverse=True)
     rates = [decay_rate(albedo) for albedo in albedos]
@@ -316,7 +316,7 @@ def _solve(
         beyond = channel.albedo * once + mixture.beyond(channel.radii_mfp)
         absorbed = float(responses[0].absorbed[place])
         balance = abs(float(beyond[0]) + absorbed - normal_transmittance(eta)) - _ROUNDING
-        answers.append(_Answer(beyond, absorbed, max(balance, mixture.misfit)))
+        answers.append(_Solution(beyond, absorbed, max(balance, mixture.misfit)))
     return answers
 
 
@@ -328,7 +328,7 @@ def _wavenumbers(slowest: float, level: _Level) -> FloatArray:
     return wavenumbers
 
 
-def _errors(fine: _Answer, coarse: _Answer) -> FloatArray:
+def _errors(fine: _Solution, coarse: _Solution) -> FloatArray:
     """Error of F at the edges but the first (r = 0), and of the total; (n+1,)."""
     difference = fine.beyond - coarse.beyond
     of_cumulative = np.abs(difference[0] - difference[1:])
@@ -337,13 +337,13 @@ def _errors(fine: _Answer, coarse: _Answer) -> FloatArray:
     return least
 
 
-def _share(errors: FloatArray, answer: _Answer) -> float:
+def _share(errors: FloatArray, answer: _Solution) -> float:
     """Return the largest error as a share of the total; 0 where nothing scatters."""
     total = float(answer.beyond[0])
     return float(np.max(errors)) / total if total > 0.0 else 0.0
 
 
-def _stderr(fine: _Answer, coarse: _Answer, errors: FloatArray) -> FloatArray:
+def _stderr(fine: _Solution, coarse: _Solution, errors: FloatArray) -> FloatArray:
     """Errors of the annuli and beyond the grid, (n+1,), whose squares add up to those of F.
 
     None is under the annulus's own difference, nor the sum up to any edge under F's error there.
@@ -358,8 +358,8 @@ def _stderr(fine: _Answer, coarse: _Answer, errors: FloatArray) -> FloatArray:
 def _profiles(
     materials: Sequence[Material],
     grids: Sequence[RadialGrid],
-    fine: Sequence[_Answer],
-    coarse: Sequence[_Answer],
+    fine: Sequence[_Solution],
+    coarse: Sequence[_Solution],
     errors: Sequence[FloatArray],
     tolerance: float,
 ) -> list[Profile]:

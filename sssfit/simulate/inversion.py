@@ -1,4 +1,4 @@
-"""Albedo inversion: from the diffuse reflectance that an artist asks for to a material that has it.
+"""Albedo inversion: from a diffuse reflectance to a material that has it.
 
 The total diffuse reflectance R of a homogeneous half space depends on its albedo a, its refractive
 index and the light that falls on it. What is asked for is R under normally incident light, as the

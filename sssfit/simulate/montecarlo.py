@@ -60,7 +60,7 @@ def simulate_montecarlo(
     photons : int, optional
         Number of walks, 2 to 1e12; by default the paper's 1e7, with a target error 1e12.
     seed : int
-        Same seed, same bits, whatever the number of threads.
+        The same seed gives the same bits on any number of threads.
     threads : int, optional
         Threads to use; all cores by default.
     dr_mm : float, optional

@@ -60,7 +60,7 @@ def whole_fit_rows(small):
     rows = []
     for name in ("skin1", "ketchup"):
         profile = simulate_exact(load_material(name))
-        pitch = 0.5 if small else None
+        pitch = 0.5 if small else "profile"
         reach = float(profile.r_edges_mm[-1])
         pixels_mm = {"mm_per_pixel": pitch, "support_mm": reach}
         took, found = timed(lambda p=profile, m=pixels_mm: fit_svd(p, rank=RANK, **m))

@@ -10,7 +10,7 @@ from reference_pixels import make_profile
 from sssfit.cli import main
 from sssfit.errors import FitError, SssfitError, SssfitWarning
 from sssfit.fit import METHODS, fit_svd, make_target
-from sssfit.fit import _result as _doubts
+from sssfit.fit import _result as fit_result
 from sssfit.fit._result import ChannelFit, factor_to, fit_channels
 from sssfit.formats.csv import parse_csv
 from sssfit.kernel import SeparableKernel
@@ -59,13 +59,13 @@ PROFILES = {
     "faint": lambda: make_profile(EDGES, 1e-140 * SMOOTH[:, None]),
 }
 # (mm per pixel, support): the profile's own, wide pixels, a support that cuts, a single pixel.
-PIXELS = [(None, None), (0.9, None), (0.2, 1.5), (300.0, None)]
+PIXELS = [("profile", None), (0.9, None), (0.2, 1.5), (300.0, None)]
 OWN = {"svd": {"rank": 1}, "gaussians": {"terms": 2}}
 
 
 @pytest.mark.parametrize("kind", PROFILES)
 @pytest.mark.parametrize("method", METHODS)
-def test_a_kernel_is_near_or_doubted_or_refused(method, kind):
+def test_a_kernel_is_near_or_warned_about_or_refused(method, kind):
     profile = PROFILES[kind]()
     for pitch, support in PIXELS[:1] if kind == "64 channels" else PIXELS:
         with warnings.catch_warnings(record=True) as caught:
@@ -82,13 +82,13 @@ def test_a_kernel_is_near_or_doubted_or_refused(method, kind):
         assert np.isfinite(energies).all()
         said = " ".join(str(each.message) for each in caught)
         assert (errors <= 1.0).all() or "than no kernel at all" in said
-        assert (np.abs(energies) <= 0.1).all() or "has not the profile's energy" in said
+        assert (np.abs(energies) <= 0.1).all() or "does not preserve the profile's energy" in said
         assert result.kernel.pixels > 1 or "is a single pixel" in said
 
 
 def fit_a_dim_spike(profile):
     """A method that is off in shape and in energy, as none of ours is by itself."""
-    target = make_target(profile)
+    target = make_target(profile, "profile")
 
     def fit_channel(channel):
         half = np.zeros((2, target.half_pixels + 1))
@@ -98,7 +98,7 @@ def fit_a_dim_spike(profile):
     return fit_channels(target, "burley", fit_channel, settings={})
 
 
-def test_what_the_doubts_say():
+def test_what_the_warnings_say():
     with pytest.warns(SssfitWarning) as caught:
         fit_a_dim_spike(many_channels())
     said = str(caught[0].message)
@@ -106,15 +106,16 @@ def test_what_the_doubts_say():
     assert caught[0].filename == __file__
     assert said.startswith("test: the burley kernel is farther from the profile than no kernel")
     assert "(c0 " in said
-    assert "has not the profile's energy (c0 -20" in said
+    assert "does not preserve the profile's energy (c0 -20" in said
     assert said.count("and 59 more)") == 2
     assert said.endswith("try a larger support, more terms or another method.")
 
 
-def test_an_energy_that_was_not_asked_for_is_not_doubted():
-    fit_svd(ring(), rank=1, energy="keep")  # loses half of it; warnings are errors here
+def test_an_energy_that_was_not_asked_for_is_not_warned_about():
+    # loses half of it; warnings are errors here
+    fit_svd(ring(), rank=1, energy="keep", mm_per_pixel="profile")
     hand = {"width": 0.5, "strength": 0.1, "falloff": 1.0}
-    METHODS["falloff"].fit(ring(), **hand)
+    METHODS["falloff"].fit(ring(), mm_per_pixel="profile", **hand)
 
 
 def test_terms_that_cancel_cannot_be_scaled():
@@ -139,13 +140,13 @@ def test_a_support_without_light_is_refused():
         ):
             method.fit(ring(), support_mm=1.0, mm_per_pixel=0.1)
         with pytest.raises(FitError, match="use a larger support, or set the channel to 0"):
-            method.fit(make_profile(EDGES, 1e-300 * SMOOTH[:, None]))
+            method.fit(make_profile(EDGES, 1e-300 * SMOOTH[:, None]), mm_per_pixel="profile")
 
 
 def test_errors_that_are_no_numbers_are_refused():
-    _doubts.check_finite("test", "preintegrated", np.zeros(1), np.ones(1))
+    fit_result.check_finite("test", "preintegrated", np.zeros(1), np.ones(1))
     with pytest.raises(FitError, match="test: the errors of the preintegrated kernel are not fin"):
-        _doubts.check_finite("test", "preintegrated", np.zeros(1), np.array([np.inf]))
+        fit_result.check_finite("test", "preintegrated", np.zeros(1), np.array([np.inf]))
 
 
 def test_by_default_a_small_kernel_has_fewer_terms():
@@ -154,7 +155,7 @@ def test_by_default_a_small_kernel_has_fewer_terms():
     assert one.rank == one.pixels == 1
     np.testing.assert_allclose(one.weights**2, SMOOTH.sum(), rtol=1e-12)
     assert one.meta["settings"]["rank"] == 1
-    assert fit_svd(make_profile(EDGES, SMOOTH[:, None])).kernel.rank == 3
+    assert fit_svd(make_profile(EDGES, SMOOTH[:, None]), mm_per_pixel="profile").kernel.rank == 3
 
 
 def test_imported_profiles_go_by_their_file(tmp_path):
@@ -163,7 +164,7 @@ def test_imported_profiles_go_by_their_file(tmp_path):
     for name, method in METHODS.items():
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SssfitWarning)
-            kernel = method.fit(profile, **OWN.get(name, {})).kernel
+            kernel = method.fit(profile, mm_per_pixel="profile", **OWN.get(name, {})).kernel
         assert kernel.meta["material"] == "a.csv"
 
 
@@ -178,7 +179,7 @@ def run(tmp_path, monkeypatch, capfd):
     def call(profile, *arguments):
         profile.save("wax.profile.npz")
         with pytest.raises(SystemExit) as ending:
-            main(["fit", "wax.profile.npz", *arguments])
+            main(["fit", "wax.profile.npz", "--mm-per-pixel", "profile", *arguments])
         kernels = [path.name for path in tmp_path.glob("*.kernel.json")]
         return ending.value.code, capfd.readouterr().err, kernels
 
