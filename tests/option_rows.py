@@ -770,6 +770,7 @@ def _inverted(**settings: Any) -> Any:
         "eta": 1.3,
         "name": "from-reflectance",
         "channels": ["R", "G", "B"],
+        "light": "normal",
     } | settings
     return called("sssfit.simulate.inversion.material_from_reflectance", **given)
 
@@ -786,9 +787,26 @@ MATERIALS = {
         _MAKE, "--mean-free-path 2", calls, lambda: _inverted(mean_free_path_mm=[2.0])
     ),
     "--light": Row(
-        _MAKE, "--light diffuse", calls, lambda: _inverted(light="diffuse"), default="normal"
+        _MAKE,
+        "--light diffuse",
+        calls,
+        lambda: _inverted(light="diffuse"),
+        default="normal",
+        words="diffuse for sRGB colours, else normal",
     ),
-    "--eta": Row(_MAKE, "--eta 1.4", calls, lambda: _inverted(eta=1.4)),
+    "--srgb": Row(
+        _MAKE.replace(".4,.2,.1", "1,0,1"),
+        "--srgb",
+        calls,
+        lambda: _inverted(reflectance="#010001", light="diffuse"),
+    ),
+    "--eta": Row(
+        _MAKE.replace(" --eta 1.3", ""),
+        "--eta 1.5",
+        calls,
+        lambda: _inverted(eta=1.5),
+        default="1.4",
+    ),
     "--name": Row(
         f"{_MAKE} -o x.toml",
         "--name lard",
