@@ -15,6 +15,7 @@ PICTURES = "disk,edge,points,head"
 
 _OPTIONS = (
     click.option("--all", "every", is_flag=True, help="All materials that ship with sssfit."),
+    click.option("--paper", is_flag=True, help="The eleven of them that the SSSS paper has."),
     click.option(
         "--only",
         type=click.Choice(["budget", "kernels"]),
@@ -106,7 +107,7 @@ _OPTIONS = (
         "-o",
         "--output",
         metavar="FOLDER",
-        help="Where --all puts NAME-pareto.png and NAME-pareto.md.  [default: here]",
+        help="Where --all and --paper put NAME-pareto.png and NAME-pareto.md.  [default: here]",
     ),
     click.option(
         "--force",

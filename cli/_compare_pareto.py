@@ -91,15 +91,15 @@ def _verdict_figures(comparison: Comparison, wish: Wish) -> list[dict[str, Any]]
     return [dataclasses.asdict(each) for each in verdicts(comparison, wish.error, wish.cost)]
 
 
-def compare_all(folder: Path, wish: Wish) -> None:
-    """Compare the kernels of every shipped material, with a chart and a table for each.
+def compare_all(folder: Path, wish: Wish, *, paper: bool) -> None:
+    """Compare the kernels of every shipped material, or the paper's: a chart and a table for each.
 
     A material that fails is named at the end; the others are done.
     """
     from sssfit.errors import FitError, SssfitError
     from sssfit.material import material_names
 
-    names = material_names()
+    names = material_names(paper=paper)
     stems = [folder / f"{name}-pareto" for name in names]
     outputs = [Outputs(f"{stem}.png", f"{stem}.md") for stem in stems]
     done: list[tuple[Comparison, Outputs]] = []

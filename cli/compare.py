@@ -68,7 +68,7 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
         given["mask"],
     )
     if material is None:
-        compare_all(Path(given["output"] or "."), wish)
+        compare_all(Path(given["output"] or "."), wish, paper=given["paper"])
         return
     if wish.mm_per_pixel == "profile":
         wish = _on_pixels_of_the_profile(material, wish)
@@ -164,7 +164,7 @@ def _check_sheets(material: str | None, asked: Mapping[str, str], given: Mapping
     if material is None and set(asked) != {"editing"}:
         raise click.UsageError("name one MATERIAL; only --editing needs none.")
     pictures = ("pictures", "size", "layer", "mask")
-    for key in ("every", "only", *pictures, "chart", "table", "budget_chart", "output"):
+    for key in ("every", "paper", "only", *pictures, "chart", "table", "budget_chart", "output"):
         if given[key]:
             raise click.UsageError(
                 f"{_option(key)} does not go with --{next(iter(asked))}; leave it out."
@@ -176,15 +176,16 @@ def _check_sheets(material: str | None, asked: Mapping[str, str], given: Mapping
 
 def _check(material: str | None, given: Mapping[str, Any]) -> None:
     """Refuse options that do not go together, or that would do nothing."""
-    if (material is None) != given["every"]:
-        raise click.UsageError("name one MATERIAL or profile, or give --all.")
-    if given["every"] and (given["chart"] or given["table"]):
+    if [material is not None, given["every"], given["paper"]].count(True) != 1:
+        raise click.UsageError("name one MATERIAL or profile, or give --all or --paper.")
+    several = material is None
+    if several and (given["chart"] or given["table"]):
         raise click.UsageError("--all names its charts and tables; leave --chart and --table out.")
-    if given["every"] and given["mm_per_pixel"] == "profile":
+    if several and given["mm_per_pixel"] == "profile":
         raise click.UsageError("the pictures of --all share their pixels; give a length in mm.")
-    if given["output"] is not None and not given["every"]:
+    if given["output"] is not None and not several:
         raise click.UsageError("-o is the folder of --all; name files by --chart and --table.")
-    without_budget = given["every"] or given["only"] == "kernels"
+    without_budget = several or given["only"] == "kernels"
     idle = ["budget_chart", "photons", "rank", "terms", "model"] if without_budget else []
     idle += ["chart", "table"] if given["only"] == "budget" else []
     for key in idle:

@@ -8,7 +8,16 @@ import click
 
 from ._mci import is_mci, load_runs
 from ._methods import MAPPINGS, METHODS, method_for, method_lines, own_options
-from ._options import Common, Count, Length, NumberRange, Share, WholeRange, common_options
+from ._options import (
+    Common,
+    Count,
+    Length,
+    LengthOr,
+    NumberRange,
+    Share,
+    WholeRange,
+    common_options,
+)
 from ._simulate_computed import run_computed
 from ._simulate_outputs import profile_paths
 from ._simulate_run import Request, Walk, run_walks
@@ -17,19 +26,10 @@ if TYPE_CHECKING:
     from sssfit.material import Material
 
 
-class Radius(Length):
-    """A length, or the word auto."""
-
-    name = "radius"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Let ``auto`` through."""
-        return value if value == "auto" else super().convert(value, param, ctx)
-
-
 @click.command(epilog=method_lines())
 @click.argument("material", required=False)
 @click.option("--all", "every", is_flag=True, help="All materials that ship with sssfit.")
+@click.option("--paper", is_flag=True, help="The eleven of them that the SSSS paper has.")
 @click.option(
     "--method",
     type=click.Choice(list(METHODS)),
@@ -78,7 +78,7 @@ class Radius(Length):
 )
 @click.option(
     "--radius",
-    type=Radius(),
+    type=LengthOr("auto"),
     metavar="MM|auto",
     help="Grid radius; auto (montecarlo) grows it until under 0.1 % of any channel lies beyond."
     "  [default: 32 MFP_max; deon-skin: 17.2]",
@@ -111,6 +111,7 @@ def simulate(
     /,
     material: str | None,
     every: bool,
+    paper: bool,
     method: str,
     run: int | None,
     dr: float | None,
@@ -138,8 +139,8 @@ def simulate(
       sssfit simulate tissue.mci --run 2
       sssfit simulate deon-skin
     """
-    if (material is None) != every:
-        raise click.UsageError("name one MATERIAL, or give --all.")
+    if [material is not None, every, paper].count(True) != 1:
+        raise click.UsageError("name one MATERIAL, or give --all or --paper.")
     if run is not None and not is_mci(material):
         raise click.UsageError("--run chooses a run of an MCML input file, .mci.")
     method = method_for(context, method, material)
@@ -151,8 +152,8 @@ def simulate(
     if METHODS[method].makes is not None:
         _make(method, settings, output, Request(force, several=False, common=common))
         return
-    materials, jobs = _jobs(material, run, settings, shares=METHODS[method].shares)
-    several = every or len(materials) > 1
+    materials, jobs = _jobs(material, run, settings, shares=METHODS[method].shares, paper=paper)
+    several = every or paper or len(materials) > 1
     targets = profile_paths(materials, method, output, several=several)
     if walk.get("resume") and targets == [None]:
         raise click.UsageError("--resume needs a file to go on beside; leave -o - out.")
@@ -179,7 +180,7 @@ def _of_common(method: str, common: Common) -> dict[str, Any]:
 
 
 def _jobs(
-    material: str | None, run: int | None, settings: dict[str, Any], *, shares: bool
+    material: str | None, run: int | None, settings: dict[str, Any], *, shares: bool, paper: bool
 ) -> tuple[list[Material], list[Walk]]:
     """Load what is asked for; each job has the indices of its materials and its settings."""
     from sssfit.material import load_material, material_names
@@ -188,7 +189,7 @@ def _jobs(
     if material is not None and is_mci(material):
         materials, each = load_runs(material, run, settings)
         return materials, [([k], own) for k, own in enumerate(each)]
-    names = material_names() if material is None else (material,)
+    names = material_names(paper=paper) if material is None else (material,)
     materials = [load_material(name) for name in names]
     groups = shared_walks(materials) if shares else [[k] for k in range(len(materials))]
     return materials, [(group, settings) for group in groups]

@@ -133,6 +133,12 @@ SIMULATE = {
         names,
         lambda: ["marble.burley.profile.npz", "skin1.burley.profile.npz"],
     ),
+    "--paper": Row(
+        _BURLEY,
+        f"simulate --paper --method burley {GRID} -o out",
+        names,
+        lambda: ["out/marble.burley.profile.npz"],
+    ),
     "--method": Row(
         f"simulate wax.toml {GRID} -o x.profile.npz",
         "--method dipole",
@@ -531,6 +537,12 @@ COMPARE = {
         lambda: [
             f"out/{name}-pareto.{end}" for name in ("marble", "skin1") for end in ("md", "png")
         ],
+    ),
+    "--paper": Row(
+        _KERNELS,
+        "compare --paper --size 24x16 -o out",
+        names,
+        lambda: [f"out/marble-pareto.{end}" for end in ("md", "png")],
     ),
     "--only": Row(
         _BOTH,
