@@ -26,8 +26,8 @@ _OPTIONS = (
         "pictures",
         metavar="NAME|FILE,...",
         multiple=True,
-        help=f"What is lit: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG files. The edge "
-        f"is at {EDGE_DEGREES:g} degrees.  [default: {PICTURES}]",
+        help=f"What is lit: {', '.join(MADE)}, or your own EXR, HDR, TIFF, PNG, JPG or TGA "
+        f"files. The edge is at {EDGE_DEGREES:g} degrees.  [default: {PICTURES}]",
     ),
     click.option(
         "--mm-per-pixel",

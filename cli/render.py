@@ -82,9 +82,9 @@ def render(
 
     KERNEL is a .kernel.json file, or - for stdin; by default the newest of this folder. The result
     is radiant exitance in linear light. Made pictures have the kernel's pixels; a file of your own
-    (EXR, HDR, TIFF, PNG) has to have them too, except with --screen. The truth is the same picture
-    convolved with the whole 2D kernel of the profile; Delta E 2000 is of both in sRGB at the
-    exposure. The alpha of your file goes into the result and the truth as it is.
+    (EXR, HDR, TIFF, PNG, JPG, TGA) has to have them too, except with --screen. The truth is the
+    same picture convolved with the whole 2D kernel of the profile; Delta E 2000 is of both in sRGB
+    at the exposure. The alpha of your file goes into the result and the truth as it is.
 
     \b
       sssfit render skin1.svd3.kernel.json --irradiance head -o out.exr
