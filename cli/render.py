@@ -55,6 +55,21 @@ _BEHIND_DEGREES = 170.0
 )
 @click.option("--truth", metavar="FILE", help="Write the true picture as well.")
 @click.option("--difference", metavar="FILE", help="Write the absolute difference as well.")
+@click.option(
+    "--gain",
+    type=NumberRange(min=0.0, min_open=True),
+    default=1.0,
+    show_default=True,
+    metavar="FACTOR",
+    help="--difference: magnify it.",
+)
+@click.option(
+    "--difference-map",
+    type=click.Choice(["signed", "absolute"]),
+    help="--difference: in false colours. signed: luminance, blue where the kernel is darker, red "
+    "where it is brighter; absolute: the largest of the channels, violet to yellow. The scale is "
+    "printed; it ends at the largest difference over --gain.",
+)
 @click.option("--force", is_flag=True, help="Replace an input, or a file that is not our picture.")
 @common_options
 def render(
@@ -74,6 +89,8 @@ def render(
     output: str | None,
     truth: str | None,
     difference: str | None,
+    gain: float,
+    difference_map: str | None,
     force: bool,
     common: Common,
     **own: Any,
@@ -96,6 +113,8 @@ def render(
     from sssfit.formats.pictures import image_format, is_image_file
 
     _check_options(screen, follow, profile or truth or difference or structure)
+    if difference is None and (difference_map or gain != 1.0):
+        raise click.UsageError("--gain and --difference-map are for --difference; name its file.")
     if transmit:
         own = _lit_from_behind(irradiance, own)
     picture = Picture(irradiance, size, mm_per_pixel, own, layer, mask)
@@ -129,7 +148,8 @@ def render(
 
             settings |= {"exposure": exposure, "structure": structure}
             result = judge(scene, loaded, source, **settings)
-        _write(result, scene, loaded, targets, exposure, common)
+        lost = _lost(result, gain, difference_map) if difference else {}
+        _write(result, lost, scene, loaded, targets, exposure, common)
     figures = {
         "command": "render",
         "output": [*(["-"] if path is None else []), *map(str, targets.values())],
@@ -138,6 +158,7 @@ def render(
         "border": border,
         "follow": (follow or "gaussian") if screen else None,
         **figures_of(result, scene, loaded, through),
+        **{f"difference_{key}": lost.get(key) for key in ("gain", "map", "of", "end")},
     }
     finish(common, figures, text_of(figures), to_stderr=path is None)
 
@@ -191,8 +212,21 @@ def _target(name: str, picture: Picture, output: str | None) -> Path | None:
     return Path(f"{stem}.{picture.name}.exr")
 
 
+def _lost(result: Judgement, gain: float, kind: str | None) -> dict[str, Any]:
+    """Return the difference as it is written, and what the report says of it."""
+    from sssfit.measure.difference import difference_map, magnified_difference
+
+    assert result.truth is not None  # without a profile the option was refused
+    if kind is None:
+        pixels = magnified_difference(result.picture, result.truth, gain=gain)
+        return {"pixels": pixels, "gain": gain}
+    drawn = difference_map(result.picture, result.truth, kind=kind, gain=gain)
+    return {"pixels": drawn.pixels, "gain": gain, "map": kind, "of": drawn.what, "end": drawn.end}
+
+
 def _write(
     result: Judgement,
+    lost: dict[str, Any],
     scene: Scene,
     kernel: SeparableKernel,
     targets: dict[str, Path],
@@ -203,9 +237,8 @@ def _write(
     from sssfit.formats.pictures import image_format, save_image
     from sssfit.measure.score import auto_exposure
 
-    pictures = {"picture": result.picture}
-    if result.truth is not None:
-        pictures |= {"truth": result.truth, "difference": abs(result.picture - result.truth)}
+    pictures: dict[str, Any] = {"picture": result.picture, "truth": result.truth}
+    pictures["difference"] = lost.get("pixels")
     settings: dict[str, Any] = {
         "channels": kernel.channels,
         "mm_per_pixel": kernel.mm_per_pixel,
@@ -216,9 +249,11 @@ def _write(
         binary_stdout().flush()
     shown = exposure or (result.score.exposure if result.score else auto_exposure(result.picture))
     for what, path in targets.items():
-        factor = shown if image_format(path) == "png" else 1.0
-        own = {} if what == "difference" else alpha
-        for note in save_image(path, pictures[what], exposure=factor, **settings, **own):
+        own = settings | (alpha if what != "difference" else {})
+        own["exposure"] = shown if image_format(path) == "png" else 1.0
+        if what == "difference" and "map" in lost:  # its colours are no light
+            own |= {"exposure": 1.0, "channels": ("R", "G", "B")}
+        for note in save_image(path, pictures[what], **own):
             say(common, f"{path}: {note}")
 
 

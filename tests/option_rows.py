@@ -24,6 +24,7 @@ from sssfit.formats.csv import csv_text, load_csv
 from sssfit.formats.mci import load_mci
 from sssfit.formats.mco import join_channels, load_mco
 from sssfit.formats.pictures import load_image
+from sssfit.measure.difference import difference_map, magnified_difference
 from sssfit.measure.score import auto_exposure
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
@@ -353,6 +354,11 @@ def _lit_through() -> Scene:
     return with_transmitted(_scene("head", light_degrees=170.0, transmit=True), world.gaussians())
 
 
+def _pair() -> tuple[Any, Any]:
+    """The disk as the kernel has it, and as the profile has it."""
+    return render_separable(_scene("disk"), kernel()), render_reference(_scene("disk"), profile())
+
+
 RENDER = {
     "--irradiance": Row(
         f"render {_SIZE}",
@@ -469,6 +475,19 @@ RENDER = {
                 - render_reference(_scene("disk"), profile())
             )
         ),
+    ),
+    "--gain": Row(
+        f"{_DISK} -o x.tif --difference lost.exr",
+        "--gain 4",
+        made_picture,
+        lambda: np.float32(magnified_difference(*_pair(), gain=4.0)),
+        default="1.0",
+    ),
+    "--difference-map": Row(
+        f"{_DISK} -o x.tif --difference lost.exr",
+        "--difference-map absolute",
+        made_picture,
+        lambda: np.float32(difference_map(*_pair(), kind="absolute").pixels),
     ),
     "--force": Row(f"{_DISK} -o foreign.exr", "--force", names, lambda: ["foreign.exr"]),
 }
