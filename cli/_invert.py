@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ._compiling import say_if_compiling
+from sssfit.messages import table
+
 from ._memory import check_memory
 from ._options import Common
-from ._outputs import held
-from ._report import binary_stdout, finish, table
+from ._output import binary_stdout, finish, held
+from ._progress import say_if_compiling
 
 if TYPE_CHECKING:
     from sssfit.material import Material

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ._options import Common
-from ._report import say
+from ._output import say
 
 if TYPE_CHECKING:
     from sssfit.scene.record import Scene

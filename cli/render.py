@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ._input import kernel_name, load
 from ._options import Common, NumberRange, common_options
-from ._outputs import held
+from ._output import binary_stdout, finish, held, say, stem_of, target
 from ._render_options import picture_options
 from ._render_report import figures_of, text_of
-from ._report import binary_stdin, binary_stdout, finish, newest, say
 from ._scene import Picture, make_or_read
 from ._truth import true_profile
 
@@ -111,6 +111,7 @@ def render(
       sssfit render --irradiance head --transmit -o ears.png
     """
     from sssfit.formats.pictures import image_format, is_image_file
+    from sssfit.kernel import SeparableKernel
 
     _check_options(screen, follow, profile or truth or difference or structure)
     if difference is None and (difference_map or gain != 1.0):
@@ -118,8 +119,9 @@ def render(
     if transmit:
         own = _lit_from_behind(irradiance, own)
     picture = Picture(irradiance, size, mm_per_pixel, own, layer, mask)
-    name, loaded = _kernel(kernel, common)
-    path = _target(name, picture, output)
+    name = kernel_name(kernel, common)
+    loaded = load(SeparableKernel, name)
+    path = target(output, f"{stem_of(name)}.{picture.name}.exr")
     targets = {"picture": path} if path else {}
     targets |= {k: Path(v) for k, v in (("truth", truth), ("difference", difference)) if v}
     for each in targets.values():
@@ -192,24 +194,6 @@ def _check_options(screen: bool, follow: str | None, compared: object) -> None:
         )
     if follow and not screen:
         raise click.UsageError("--follow is for --screen; leave it out.")
-
-
-def _kernel(given: str | None, common: Common) -> tuple[str, SeparableKernel]:
-    """Return the kernel's name and the kernel; by default the newest of this folder."""
-    from sssfit.kernel import SeparableKernel
-
-    name = given or str(newest(common, "*.kernel.json", "sssfit fit --method svd --rank 3"))
-    if name == "-":
-        return name, SeparableKernel.read(binary_stdin(), "stdin")
-    return name, SeparableKernel.load(name)
-
-
-def _target(name: str, picture: Picture, output: str | None) -> Path | None:
-    """Where the picture goes; None is stdout. By default the current folder, under both names."""
-    if output is not None:
-        return None if output == "-" else Path(output)
-    stem = "stdin" if name == "-" else Path(name).name.removesuffix(".json").removesuffix(".kernel")
-    return Path(f"{stem}.{picture.name}.exr")
 
 
 def _lost(result: Judgement, gain: float, kind: str | None) -> dict[str, Any]:

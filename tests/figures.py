@@ -3,6 +3,7 @@
 import itertools
 import warnings
 
+from matplotlib.legend import Legend
 from matplotlib.text import Text
 
 
@@ -38,6 +39,18 @@ def drawn_texts(figure):
         if each.get_visible() and each.get_text().strip() and each not in hidden
     ]
     return [(each.get_text(), each.get_window_extent(renderer)) for each in texts]
+
+
+def words_of(figure):
+    """All text from the top down, so that notes read as they were written."""
+    texts = sorted(drawn_texts(figure), key=lambda each: -each[1].y1)
+    return " ".join(text for text, _ in texts)
+
+
+def legends_of(figure):
+    """The legends of the page, which stand over its panels."""
+    inside = {axes.get_legend() for axes in figure.axes}
+    return [each for each in figure.findobj(Legend) if each not in inside]
 
 
 def is_axes(artist):

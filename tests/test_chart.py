@@ -4,7 +4,7 @@ import io
 
 import numpy as np
 import pytest
-from figures import assert_legible
+from figures import assert_legible, drawn_texts, legends_of, words_of
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import StepPatch
@@ -99,13 +99,13 @@ def test_channels_differ_in_dashes_and_colour(skin1_figure):
 
 @pytest.mark.parametrize("n_channels", [5, 64])
 def test_neighbours_among_many_channels_differ_in_dashes(n_channels):
-    legend = profile_figure(hand_made(exponential(n_channels, n=20))).legends[0]
+    (legend,) = legends_of(profile_figure(hand_made(exponential(n_channels, n=20))))
     styles = [(str(each.get_linestyle()), to_hex(each.get_color())) for each in legend.get_lines()]
     assert len(set(styles)) == len(styles) == min(n_channels, 8)
 
 
 def test_title_and_caption_say_where_the_profile_comes_from(skin1):
-    texts = " ".join(each.get_text() for each in profile_figure(skin1).texts)
+    texts = words_of(profile_figure(skin1))
     for words in (
         "skin1: diffuse reflectance profile",
         "Monte Carlo · 10⁵ photons, seed 1",
@@ -120,13 +120,13 @@ def test_title_and_caption_say_where_the_profile_comes_from(skin1):
 def test_light_beyond_the_grid_is_in_the_caption():
     profile = simulate_montecarlo(load_material("wholemilk"), photons=20_000)
     share = 100 * profile.beyond_grid / profile.diffuse_reflectance
-    texts = " ".join(each.get_text() for each in profile_figure(profile).texts)
+    texts = words_of(profile_figure(profile))
     assert f"R {share[0]:.2g} %, G {share[1]:.2g} %, B {share[2]:.2g} % of diffuse" in texts
     assert share[0] > 2
 
 
 def test_legend_gives_totals_with_errors(skin1, skin1_figure):
-    labels = [each.get_text() for each in skin1_figure.legends[0].get_texts()]
+    labels = [each.get_text() for each in legends_of(skin1_figure)[0].get_texts()]
     total, stderr = skin1.diffuse_reflectance[0], skin1.diffuse_reflectance_stderr[0]
     assert labels[0] == f"R  {total:.4f} ± {stderr:.4f}"
 
@@ -310,10 +310,9 @@ def test_numbers_read_as_people_write_them():
 
 
 def test_a_profile_so_far_says_so():
-    texts = [each.get_text() for each in profile_figure(hand_made(exponential(1))).texts]
-    assert texts[0] == "Diffuse reflectance profile"
-    so_far = profile_figure(hand_made(exponential(1), checkpoint="sssfit.checkpoint/1"))
-    assert so_far.texts[0].get_text() == "Diffuse reflectance profile so far"
+    for meta, title in (({}, ""), ({"checkpoint": "sssfit.checkpoint/1"}, " so far")):
+        figure = profile_figure(hand_made(exponential(1), **meta))
+        assert drawn_texts(figure)[0][0] == f"Diffuse reflectance profile{title}"
 
 
 # Materials
@@ -341,14 +340,13 @@ def test_a_material_is_drawn_by_its_coefficients():
     for axes in figure.axes:
         assert axes.get_yscale() == "log"
         assert [each.get_text() for each in axes.get_xticklabels()] == ["red", "blue"]
-    labels = [each.get_text() for each in figure.legends[0].get_texts()]
+    labels = [each.get_text() for each in legends_of(figure)[0].get_texts()]
     assert labels == ["layer 1: 0.5 mm, eta 1.4", "layer 3: semi-infinite, eta 1.4"]
-    texts = [each.get_text() for each in figure.texts]
-    assert texts[:2] == [
-        "stack: material",
-        "3 layers, half space below · made up · specular reflectance 0.02778",
-    ]
-    assert "1 clear layer without absorption or scattering." in texts
+    words = words_of(figure)
+    assert words.startswith(
+        "stack: material 3 layers, half space below · made up · specular reflectance 0.02778 "
+    )
+    assert words.endswith("1 clear layer without absorption or scattering.")
 
 
 def odd_materials():

@@ -15,14 +15,15 @@ from processes import start
 
 from sssfit import simulate
 from sssfit.cli import cli, main
-from sssfit.cli._methods import MAPPINGS, METHODS
 from sssfit.material import load_material, material_names
+from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile
 from sssfit.simulate import burley, exact
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
 COMMAND = [sys.executable, "-m", "sssfit.cli", "simulate"]
-COMPUTED = [name for name, each in METHODS.items() if name != "montecarlo" and not each.makes]
+(MAPPINGS,) = (each.among for each in SIMULATIONS["burley"].settings)
+COMPUTED = [name for name, each in SIMULATIONS.items() if name != "montecarlo" and not each.makes]
 GRID = ("--dr", "0.25", "--radius", "5")
 SLAB = "eta = 1.3\ng = 0\nsigma_a_per_mm = [0.1, 0.1, 0.1]\nsigma_s_per_mm = [9, 9, 9]\n"
 
@@ -54,9 +55,9 @@ def run(tmp_path, monkeypatch, capfd):
 def test_the_table_of_methods_is_true():
     options = {each.name for each in cli.commands["simulate"].params}
     lines = cli.commands["simulate"].epilog.splitlines()
-    for name, method in METHODS.items():
-        assert callable(getattr(simulate, method.function))
-        assert set(method.options) <= options
+    for name, method in SIMULATIONS.items():
+        assert callable(method.load())
+        assert {each.name for each in method.settings} <= options
         assert any(line.split()[0] == name and method.summary in line for line in lines[2:])
     assert tuple(burley.MAPPINGS) == MAPPINGS
 

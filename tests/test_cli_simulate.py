@@ -14,10 +14,10 @@ import pytest
 
 from sssfit.cli import main
 from sssfit.cli._interrupt import asked_to_stop
-from sssfit.cli._simulate_report import _energy, figures_of
+from sssfit.cli._simulate_report import _energy
 from sssfit.material import load_material
 from sssfit.profile import Profile
-from sssfit.simulate import simulate_montecarlo
+from sssfit.simulate import run_figures, simulate_montecarlo
 from sssfit.simulate._batches import BATCH_PHOTONS
 from sssfit.simulate._semi_infinite import SemiInfiniteWalk
 
@@ -115,7 +115,7 @@ def test_seconds_are_those_of_the_walk(run, monkeypatch):
 @pytest.mark.parametrize(("sigmas", "said"), [(4.0, "= 1 within"), (10.0, "= 1 NOT WITHIN")])
 def test_an_energy_balance_that_is_off_is_said(sigmas, said, sign):
     row, other = (
-        figures_of(simulate_montecarlo(load_material(name), photons=20_000), 1.0)
+        run_figures(simulate_montecarlo(load_material(name), photons=20_000), 1.0)
         for name in ("skin1", "apple")
     )
     assert "= 1 within the run's own error" in _energy([row])[1]

@@ -16,7 +16,6 @@ import pytest
 from checks_models import BEYOND, DIFFUSE, multipole_against_walk
 
 from sssfit.choose.choice import choose, mm_per_pixel_at
-from sssfit.cli._methods import METHODS as SIMULATIONS
 from sssfit.compare.editing import compute_editing
 from sssfit.compare.guide import compute_guide
 from sssfit.compare.sheet import compute_sheet
@@ -24,6 +23,7 @@ from sssfit.compare.spectrum import compute_spectrum
 from sssfit.errors import SssfitWarning
 from sssfit.fit import fit_gaussians, fit_preintegrated, fit_svd
 from sssfit.material import load_material, material_names
+from sssfit.methods import SIMULATIONS
 from sssfit.profile import full_kernel
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS
 from sssfit.simulate import (
@@ -35,7 +35,7 @@ from sssfit.simulate import (
 )
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 MADE = re.compile(r"<!-- made by (\S+)(?: (\w+))?, (\d{4}-\d\d-\d\d): (.+) -->")
 HELD = re.compile(r"<!-- held by (\S+)::(\w+) -->")
 
@@ -149,6 +149,37 @@ def test_a_section_goes_into_its_place(tmp_path, monkeypatch):
         f"<!-- made by docs/x.py, {today}: python docs/x.py -->\n\n| 3 |\n\n"
         "<!-- end of docs/x.py -->\n"
     )
+
+
+def rows_named(page, start):
+    """The cells of the rows of a page whose first cell begins so."""
+    return [
+        row
+        for place, _, rows in EVERY
+        if place.startswith(f"{page}:")
+        for row in rows
+        if row[0].startswith(start)
+    ]
+
+
+def test_readme_quotes_its_pages():
+    """The README's table has the figures of the pages it links, cell by cell."""
+    (total,) = rows_named("verification.md", "skin1 R: exact against the walk")
+    apart = [abs(float(row[3])) for row in table_with("verification.md", "comparison", "ours")]
+    (exact,) = rows_named("benchmarks-exact.md", "exact, tolerance 0.0001")
+    walk = table_with("benchmarks.md", "material", "one thread")[0]
+    (rank,) = rows_named("benchmarks-fit.md", "skin1")[:1]
+    passes = rows_named("benchmarks-render.md", "float32, one thread")[0]
+    expected = [
+        [total[1].partition(",")[0], total[2]],
+        [f"{max(apart):.2f}"],
+        [exact[2], exact[1]],
+        [walk[2]],
+        [rank[2]],
+        [passes[1]],
+    ]
+    rows = table_with("README.md", "What", "Figure")
+    assert [row[1].split(", ") for row in rows] == expected
 
 
 def test_names_are_in_the_program():

@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
-from figures import assert_legible
+from figures import assert_legible, words_of
 from reference_pixels import make_profile, one_over_r_profile
 
 from sssfit.chart.guide import guide_figure
@@ -168,7 +168,7 @@ def test_what_is_drawn_is_what_was_computed(guide):
         line, fitted = (each.get_data().values for each in patches)
         np.testing.assert_allclose(line, guide.preintegrated / 0.3)
         np.testing.assert_allclose(fitted, guided / 0.3)
-    texts = " ".join(each.get_text() for each in figure.texts)
+    texts = words_of(figure)
     for words in (
         "skin1, G: guide function and residual",
         "Exact solution",

@@ -451,9 +451,9 @@ def test_what_else_cannot_be_written(options, words):
 @pytest.mark.parametrize(
     ("path", "words"),
     [
-        (None, "None is no path"),
-        (5, "5 is no path"),
-        (b"a.png", "is no path"),
+        (None, "None is not a path"),
+        (5, "5 is not a path"),
+        (b"a.png", "is not a path"),
         ("a\0b.png", "holds a null character"),
         (5000 * "x" + ".png", r"^x{200}\.\.\.x{196}\.png cannot be .*name too long"),
         ("a\n\x1b[31mb.png", r"a\\n\\x1b\[31mb\.png cannot be read: no such file"),

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from figures import assert_legible
+from figures import assert_legible, words_of
 from matplotlib.patches import StepPatch
 from reference_pixels import make_profile, one_over_r_centre_pixel, one_over_r_profile
 from scipy.integrate import dblquad
@@ -233,7 +233,7 @@ def test_what_is_below_zero_is_grey_and_dotted(kernel):
     positive, below = steps(panels(drawn, "slices")[0])[:2]
     assert np.isnan(positive.get_data().values).all()
     assert (below.get_data().values > 0.0).any()
-    texts = " ".join(each.get_text() for each in drawn.texts)
+    texts = words_of(drawn)
     assert "Where the kernel is below 0, images are grey" in texts
     labels = [each.get_text() for each in drawn.legends[0].get_texts()]
     assert labels == ["term 1 (−)", "term 2 (−)", "term 3 (−)"]  # noqa: RUF001

@@ -323,7 +323,7 @@ BAD = {
     "name number": ("name = 3\n" + SKIN, "name = 3 ", "letters, digits"),
     "source number": ("source = 3\n" + SKIN, "source = 3 ", "in quotes"),
     # keys
-    "missing eta": (skin("eta = 1.3\n", ""), "eta is missing", "--toml` prints an example"),
+    "missing eta": (skin("eta = 1.3\n", ""), "eta is missing", "to_toml()` gives an example"),
     "missing g": (skin("g = 0.0\n", ""), "g is missing", "add g = 0.0"),
     "unknown": ("etta = 1\n" + SKIN, "etta = 1 is not a key", "did you mean eta?"),
     "unknown far": ("zzz = 1\n" + SKIN, "zzz = 1 is not a key", "Known keys: name, source"),
@@ -388,9 +388,9 @@ BAD = {
     ),
     "below nothing": ("eta_below = 1.4\n" + SKIN, "eta_below = 1.4, but", "a thickness_mm or"),
     # not a material at all
-    "empty": ("", "the file is empty", "prints an example"),
-    "blank": (" \n\t\n", "the file is empty", "prints an example"),
-    "comments only": ("# nothing\n", "eta is missing", "prints an example"),
+    "empty": ("", "the file is empty", "to_toml()` gives an example"),
+    "blank": (" \n\t\n", "the file is empty", "to_toml()` gives an example"),
+    "comments only": ("# nothing\n", "eta is missing", "to_toml()` gives an example"),
     "not TOML": ("eta = \n", "not valid TOML: Invalid value (at line 1, column 7)", "."),
     "key twice": ("eta = 1\neta = 2\n", "not valid TOML: Cannot overwrite", "line 2"),
     "control character": ("eta = 1\x01\n", "not valid TOML: ", "line 1, column 8"),
@@ -468,8 +468,8 @@ def test_dash_reads_standard_input(monkeypatch):
     [
         ("skni1", "did you mean skin1?"),
         ("SKIN1", "did you mean skin1?"),
-        ("unobtainium", "`sssfit materials` lists"),
-        ("", "`sssfit materials` lists"),
+        ("unobtainium", "`material_names()` lists"),
+        ("", "`material_names()` lists"),
         ("x" * 5000, "xxx...; "),
         ("a\nb\x00", "'a\\nb\\x00'; "),
     ],

@@ -9,7 +9,7 @@ import warnings
 
 import numpy as np
 import pytest
-from figures import assert_legible
+from figures import assert_legible, words_of
 from matplotlib.colors import to_hex
 from matplotlib.patches import StepPatch
 
@@ -174,7 +174,7 @@ def test_methods_differ_in_colour_and_dashes(figure):
 
 
 def test_the_legend_gives_totals_and_errors(skin1, figure):
-    texts = " ".join(each.get_text() for each in figure.texts)
+    texts = words_of(figure)
     total = skin1.exact.profile.diffuse_reflectance
     dipole = skin1.curves[2]
     error = f"{100 * dipole.total_error[1]:+.1f}"
@@ -328,5 +328,5 @@ def test_the_profile_chart_of_a_computed_profile_names_its_errors(skin1):
         (skin1.exact, ("Exact solution ·", "± estimated error")),
         (skin1.curves[4], ("Normalised diffusion ·",)),
     ):
-        texts = " ".join(each.get_text() for each in profile_figure(curve.profile).texts)
+        texts = words_of(profile_figure(curve.profile))
         assert all(each in texts for each in words)

@@ -5,7 +5,7 @@ import io
 
 import numpy as np
 import pytest
-from figures import assert_legible, drawn_texts
+from figures import assert_legible, drawn_texts, words_of
 
 from sssfit.chart.page import chart_style, new_figure, save_figure
 from sssfit.chart.pareto import pareto_figure, place_labels
@@ -31,12 +31,6 @@ def comparison():
 
 def panels_of(figure):
     return figure.axes
-
-
-def words_of(figure):
-    """All text from the top down, so that footnotes read as they were written."""
-    texts = sorted(drawn_texts(figure), key=lambda each: -each[1].y1)
-    return " ".join(text for text, _ in texts)
 
 
 def texts_in(axes):

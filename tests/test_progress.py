@@ -10,8 +10,8 @@ posix = pytest.mark.skipif(os.name != "posix", reason="Windows has no pseudo-ter
 BAR = "\N{BOX DRAWINGS HEAVY HORIZONTAL}"
 ERASED = "\x1b[2K"
 WALK = ["simulate", "skin1", "--photons", "3e4", "-o", "a.npz"]
-BUDGET = ["compare", "skin1", "--only", "budget", "--picture", "disk", "--size", "16x16"]
-KERNELS = ["compare", "skin1", "--only", "kernels", "--picture", "disk", "--size", "16x16"]
+BUDGET = ["compare", "skin1", "--what", "budget", "--picture", "disk", "--size", "16x16"]
+KERNELS = ["compare", "skin1", "--what", "kernels", "--picture", "disk", "--size", "16x16"]
 COMMANDS = [WALK, [*BUDGET, "--photons", "1e4"], [*KERNELS, "--mm-per-pixel", "4"]]
 
 

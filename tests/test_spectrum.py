@@ -6,7 +6,7 @@ import warnings
 
 import numpy as np
 import pytest
-from figures import assert_legible
+from figures import assert_legible, words_of
 from matplotlib.colors import to_hex
 from reference_pixels import make_profile, one_over_r_profile
 
@@ -97,7 +97,7 @@ def test_what_is_drawn_is_what_was_computed(spectrum):
             np.testing.assert_allclose(line.get_ydata(), 100 * shares[:12, c])
         assert len({to_hex(each.get_color()) for each in lines}) == 3
         assert len({each.get_marker() for each in lines}) == 3
-    texts = " ".join(each.get_text() for each in figure.texts)
+    texts = words_of(figure)
     for words in (
         "skin1: energy of the kernel's singular values",
         "Exact solution",
@@ -205,7 +205,7 @@ def test_the_verb_gives_json(run, spectrum):
         (("--spectrum", "--mm-per-pixel", "0"), 2, "not a length above 0"),
         (("--spectrum", "there.profile.npz"), 1, "there.profile.npz"),
         (("--spectrum", "-o", "a.jpg"), 1, ".png, .svg or .pdf"),
-        (("--spectrum", "--mm-per-pixel", "1e-5", "-q"), 1, "use a larger mm_per_pixel"),
+        (("--spectrum", "--mm-per-pixel", "1e-5", "-q"), 1, "use a larger --mm-per-pixel"),
     ],
 )
 def test_bad_input_is_one_clear_line(run, tmp_path, arguments, status, fragment):

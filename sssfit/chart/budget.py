@@ -199,7 +199,7 @@ def _legend(axes: Axes, title: str, handles: Sequence[Patch | Line2D], columns: 
     tall = figure.get_size_inches()[1]
     top = box.y1 + (_LEGEND_INCHES if columns == 3 and len(handles) > 3 else 0.24) / tall
     figure.text(LEFT, top - 0.07 / tall, title, va="center", fontweight="bold")
-    legend = figure.legend(
+    figure.legend(
         handles=list(handles),
         ncols=columns,
         loc="upper left",
@@ -209,8 +209,6 @@ def _legend(axes: Axes, title: str, handles: Sequence[Patch | Line2D], columns: 
         columnspacing=1.5,
         fontsize=7.5,
     )
-    for text in legend.get_texts():
-        text.set_parse_math(False)
 
 
 def _figures(cause: Cause, *, is_seen: bool) -> list[float]:

@@ -14,21 +14,17 @@ from matplotlib.ticker import LogLocator, NullFormatter
 
 from sssfit.chart.page import (
     COLOURS,
-    LEFT,
-    RIGHT,
     Style,
     chart_style,
-    draw_footnotes,
-    draw_text,
     name_axes,
-    new_figure,
+    new_page,
 )
 from sssfit.chart.text import shortened
 
 if TYPE_CHECKING:
     from sssfit.compare.convergence import Convergence
 
-_HEIGHT_INCHES, _HEAD_INCHES = 4.2, 0.98
+_HEIGHT_INCHES = 4.2
 _WALK: Style = {"color": COLOURS[0], "marker": "o", "markersize": 4, "linestyle": "none"}
 _EXACT: Style = {"color": COLOURS[2], "marker": "s", "markersize": 5, "linestyle": "none"}
 _HOLLOW: Style = _EXACT | {"markerfacecolor": "white"}
@@ -47,12 +43,8 @@ def convergence_figure(found: Convergence) -> Figure:
         8 inches wide; errors of F(r) as a share of the total, logarithmic on both axes.
     """
     with chart_style():
-        figure = new_figure(_HEIGHT_INCHES)
-        _draw_head(figure, found)
-        bottom = draw_footnotes(figure, [_NOTE])
-        left, right = figure.subplots(1, 2, sharey=True)
-        top = 1 - _HEAD_INCHES / _HEIGHT_INCHES
-        figure.subplots_adjust(LEFT, bottom, RIGHT, top, wspace=0.08)
+        figure, panels = new_page(_HEIGHT_INCHES, _title(found), _subtitle(found), [_NOTE])
+        left, right = panels.subplots(1, 2, sharey=True)
         _draw_photons(left, found)
         _draw_seconds(right, found)
         error = "error of F(r), share of the total"
@@ -65,7 +57,7 @@ def convergence_figure(found: Convergence) -> Figure:
             axes.yaxis.set_major_locator(LogLocator(numticks=9))
             axes.xaxis.set_minor_formatter(NullFormatter())
             axes.yaxis.set_minor_formatter(NullFormatter())
-            axes.legend(loc="lower left", fontsize=7.5)
+            axes.legend(loc="lower left")
     return figure
 
 
@@ -76,18 +68,20 @@ _NOTE = (
 )
 
 
-def _draw_head(figure: Figure, found: Convergence) -> None:
-    """Title, what the truth is, and the slope."""
+def _title(found: Convergence) -> str:
+    """Name the material."""
     name = shortened(found.exact.material_name or "", 24)
-    title = f"{name}: what accuracy costs the simulation".lstrip(": ")
-    draw_text(figure, 0.16, title, size=12, weight="bold")
-    estimate = found.resolutions[-1].estimate
-    version = found.exact.meta.get("version")
-    truth = f"against the exact solution, itself good to {estimate:.1g} of the total"
-    draw_text(figure, 0.41, f"{truth} · sssfit {version}")
-    line = found.line
-    words = f"fitted slope {line.slope:.3f} ± {line.slope_stderr:.3f}; theory -0.5"
-    draw_text(figure, 0.64, words, color="#444444")
+    return f"{name}: what accuracy costs the simulation".lstrip(": ")
+
+
+def _subtitle(found: Convergence) -> str:
+    """Say what the truth is, and the slope."""
+    line, estimate = found.line, found.resolutions[-1].estimate
+    return (
+        f"against the exact solution, itself good to {estimate:.1g} of the total · fitted slope "
+        f"{line.slope:.3f} ± {line.slope_stderr:.3f}; theory -0.5 · sssfit "
+        f"{found.exact.meta.get('version')}"
+    )
 
 
 def _draw_photons(axes: Axes, found: Convergence) -> None:

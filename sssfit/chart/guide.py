@@ -30,7 +30,6 @@ from sssfit.chart.page import (
 )
 from sssfit.chart.panels import draw_plane, place_panel, signed_norm, tick_powers
 from sssfit.chart.text import kernel_subtitle, shortened
-from sssfit.profile.bins import material_of
 
 if TYPE_CHECKING:
     from sssfit.compare.guide import Guide
@@ -224,7 +223,7 @@ def _draw_bars(figure: Figure, down: float, shades: tuple[LogNorm, SymLogNorm]) 
 
 def _title(guide: Guide) -> str:
     """Name the material and the channel."""
-    material = material_of(guide.profile)
+    material = guide.profile.material
     channel = shortened(guide.profile.channels[guide.channel])
     what = "guide function and residual of the guided kernel"
     return f"{shortened(material.name, 24) + ', ' if material else ''}{channel}: {what}"

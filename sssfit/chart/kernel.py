@@ -1,4 +1,4 @@
-"""A kernel beside the profile it stands for, as a figure: `kernel_figure`.
+"""A kernel beside the profile it was fitted to, as a figure: `kernel_figure`.
 
 The record comes from ``sssfit.compare.kernel_view``, which has computed everything.
 """
@@ -180,7 +180,7 @@ def _legend_columns(labels: Sequence[str]) -> int:
 def _draw_terms(figure: Figure, labels: Sequence[str], columns: int, down: float) -> None:
     """Explain the lines of the passes, so many inches down the page."""
     handles = [Line2D([], [], **_term_style(t, len(labels))) for t in range(len(labels))]
-    legend = figure.legend(
+    figure.legend(
         handles,
         [drawable(each) for each in labels],
         ncols=columns,
@@ -191,8 +191,6 @@ def _draw_terms(figure: Figure, labels: Sequence[str], columns: int, down: float
         handlelength=2.8,
         columnspacing=1.5,
     )
-    for text in legend.get_texts():
-        text.set_parse_math(False)
 
 
 def _term_style(term: int, terms: int) -> Style:
@@ -295,7 +293,7 @@ def _draw_row(
     for k, (title, images, is_signed) in enumerate(_planes(view)):
         axes = place_panel(figure, _left(k), down, _IMAGE_INCHES, _IMAGE_INCHES)
         shades = _SIGNED_SHADES if is_signed else _SHADES
-        seen = images[row] if is_signed else _lifted(images[row], norms[0])
+        seen = images[row] if is_signed else _clamped_to_scale(images[row], norms[0])
         axes.set_facecolor("#bbbbbb")  # seen where the logarithm has no value
         draw_plane(axes, seen, _half_mm(view), norms[is_signed], shades)
         titles = f"{title}, {name}", title
@@ -315,7 +313,7 @@ def _draw_row(
     axes.tick_params(which="both", labelbottom=is_last)
 
 
-def _lifted(image: FloatArray, norm: LogNorm) -> FloatArray:
+def _clamped_to_scale(image: FloatArray, norm: LogNorm) -> FloatArray:
     """Bring what is below a scale, but above 0, to its darkest shade; the rest is grey."""
     return np.where(image > 0.0, np.maximum(image, norm.vmin or 0.0), 0.0)
 

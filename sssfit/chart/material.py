@@ -7,30 +7,24 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogFormatterSciNotation, LogLocator
+from matplotlib.ticker import LogFormatter, LogLocator
 
 from sssfit.chart.page import (
     COLOURS,
-    LEFT,
     LINE_STYLES,
-    RC,
-    RIGHT,
-    TEXT_INCHES,
     Style,
+    add_legend,
     chart_style,
-    draw_footnotes,
-    draw_text,
     drawable,
-    inches,
     name_axes,
-    new_figure,
+    new_page,
 )
 from sssfit.chart.text import shortened, spread
 from sssfit.material import Layer, Material
 
-_PANEL_INCHES, _GAP = 2.0, 0.38  # the gap as a share of a panel's width
-_WIDTH_INCHES = TEXT_INCHES / (3 + 2 * _GAP)
-_LEGEND_INCHES = 0.18
+HEIGHT_INCHES = 3.9
+_LETTERS = 20  # of channels' names that stand beside each other under a panel
+_MOST_NAMES = 12  # that stand upright there
 _MOST_LAYERS = 6
 _FEW_CHANNELS = 4  # that many are points, more are lines through them
 _MARKERS = "os^Dv<"
@@ -55,17 +49,13 @@ def material_figure(material: Material) -> Figure:
     """
     matter = [k for k, layer in enumerate(material.layers) if not layer.is_clear]
     shown = [matter[k] for k in spread(len(matter), _MOST_LAYERS)]
-    handles = _handles(material, shown)
-    columns = _columns([str(each.get_label()) for each in handles])
-    notes = _notes(material, shown)
-    head = 0.88 + _LEGEND_INCHES * math.ceil(len(handles) / columns)
     with chart_style():
-        figure = new_figure(head + _PANEL_INCHES + 0.62 + 0.145 * len(notes))
-        height = figure.get_figheight()
-        _draw_head(figure, material, handles, columns)
-        bottom = draw_footnotes(figure, notes)
-        panels = figure.subplots(1, 3)
-        figure.subplots_adjust(LEFT, bottom, RIGHT, 1 - head / height, wspace=_GAP)
+        title = f"{shortened(material.name, 24)}: material"
+        notes = _notes(material, shown)
+        figure, below = new_page(HEIGHT_INCHES, title, _subtitle(material), notes)
+        handles = [Line2D([], [], **_style(k)) for k in range(len(shown))]
+        below = add_legend(below, handles, [_label(material, each) for each in shown])
+        panels = below.subplots(1, 3)
         for axes in panels:
             axes.set_yscale("log")
         for k, layer in enumerate(shown):
@@ -79,44 +69,15 @@ def material_figure(material: Material) -> Figure:
     return figure
 
 
-def _draw_head(figure: Figure, material: Material, handles: Sequence[Line2D], columns: int) -> None:
-    """Title, what the material is, and the legend."""
-    draw_text(figure, 0.16, f"{shortened(material.name, 24)}: material", size=12, weight="bold")
+def _subtitle(material: Material) -> str:
+    """Say what the material is."""
     count = len(material.layers)
     is_deep = math.isinf(material.layers[-1].thickness_mm)
     end = "half space" if is_deep and count == 1 else "half space below" if is_deep else "slab"
     parts = [f"{count} layer{'s' * (count > 1)}, {end}"]
     if material.source:
         parts.append(shortened(material.source, 40))
-    parts.append(f"specular reflectance {material.specular_reflectance:.4g}")
-    draw_text(figure, 0.41, " · ".join(parts))
-    legend = figure.legend(
-        handles=list(handles),
-        ncols=columns,
-        loc="upper left",
-        bbox_to_anchor=(LEFT, 1 - 0.56 / figure.get_figheight()),
-        borderaxespad=0,
-        borderpad=0.2,
-        handlelength=2.8,
-        columnspacing=1.5,
-    )
-    for text in legend.get_texts():
-        text.set_parse_math(False)
-
-
-def _columns(labels: Sequence[str]) -> int:
-    # 0.6 inches for the line and the gap between columns.
-    widest = 0.6 + max(inches(each, RC["font.size"]) for each in labels)
-    rows = math.ceil(len(labels) / max(int(TEXT_INCHES / widest), 1))
-    return math.ceil(len(labels) / rows)
-
-
-def _handles(material: Material, shown: Sequence[int]) -> list[Line2D]:
-    """Explain the layers."""
-    return [
-        Line2D([], [], label=drawable(_label(material, each)), **_style(k))
-        for k, each in enumerate(shown)
-    ]
+    return " · ".join([*parts, f"specular reflectance {material.specular_reflectance:.4g}"])
 
 
 def _label(material: Material, index: int) -> str:
@@ -158,14 +119,12 @@ def _draw_layer(panels: Sequence[Axes], layer: Layer, place: int) -> None:
 
 
 def _name_channels(axes: Axes, channels: Sequence[str]) -> None:
-    """Name as many channels as have room."""
-    names = [shortened(each) for each in channels]
-    widest = 0.12 + max(inches(each, RC["xtick.labelsize"]) for each in names)
-    shown = spread(len(names), max(int(_WIDTH_INCHES / widest), 1))
-    axes.set_xticks(shown, [drawable(names[k]) for k in shown], parse_math=False)
-    most = len(names) - 1
-    beside = max(0.5, most * 0.5 * widest / (_WIDTH_INCHES - widest))  # half of the outer names
-    axes.set_xlim(-beside, most + beside)
+    """Name the channels beside each other, or some of them upright where there is no room."""
+    names = [drawable(shortened(each)) for each in channels]
+    is_upright = sum(map(len, names)) > _LETTERS
+    shown = spread(len(names), _MOST_NAMES) if is_upright else range(len(names))
+    axes.set_xticks(shown, [names[k] for k in shown], rotation=90 if is_upright else 0)
+    axes.margins(x=0.5 / len(names))
 
 
 def _limit(axes: Axes) -> None:
@@ -177,7 +136,8 @@ def _limit(axes: Axes) -> None:
     axes.set_ylim(min(low / 1.5, middle / 3.2), max(high * 1.5, middle * 3.2))
     axes.yaxis.set_major_locator(LogLocator(numticks=6))
     axes.yaxis.set_minor_locator(LogLocator(subs=(2, 5)))
-    axes.yaxis.set_minor_formatter(LogFormatterSciNotation(minor_thresholds=(1.3, 1.3)))
+    axes.yaxis.set_major_formatter(LogFormatter())
+    axes.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1.3, 1.3)))
 
 
 def _notes(material: Material, shown: Sequence[int]) -> list[str]:

@@ -6,6 +6,7 @@ from ``sssfit.compare.models``, which has computed everything.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -14,37 +15,22 @@ import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, StrMethodFormatter
 
 from sssfit.arrays import FloatArray
-from sssfit.chart import _models_text as words
-from sssfit.chart.page import (
-    LEFT,
-    RC,
-    RIGHT,
-    TEXT_INCHES,
-    WIDTH_INCHES,
-    Style,
-    chart_style,
-    draw_footnotes,
-    draw_text,
-    drawable,
-    fitting,
-    new_figure,
-)
-from sssfit.chart.text import WEIGHTED, method_name, spread
+from sssfit.chart.page import Handle, Style, add_table, chart_style, name_axes, new_page
+from sssfit.chart.text import WEIGHTED, count, grid, method_name, shortened, spread
 
 if TYPE_CHECKING:
     from sssfit.compare.models import ModelComparison, ModelCurve
 
 HEIGHT_INCHES = 6.6
-_ROW_INCHES = 0.165
-_TABLE_LEFT = 0.37  # of the width: the legend's totals
 _MOST_COLUMNS = 3
 _DECADES = 5  # of 2 pi r R_d that are drawn at most
 _LINEAR_PERCENT, _LEAST_PERCENT, _MOST_PERCENT = 10.0, -100.0, 1000.0
 _TICKS_PERCENT = (-100, -10, 0, 10, 100, 1000)
+_MINUS = "\N{MINUS SIGN}"
 
 # Black, and of Okabe and Ito 2008: sky blue, vermillion, blue, bluish green; dashes tell them apart
 # without colour.
@@ -73,58 +59,43 @@ def models_figure(comparison: ModelComparison) -> Figure:
         [%] below, linear to 10 % and logarithmic beyond; totals and their errors in the legend.
     """
     shown = spread(comparison.material.n_channels, _MOST_COLUMNS)
-    room = TEXT_INCHES / len(shown) - 0.15
     with chart_style():
-        figure = new_figure(HEIGHT_INCHES)
-        top = _draw_head(figure, comparison, shown)
-        bottom = draw_footnotes(figure, words.model_notes(comparison, shown))
-        panels = figure.subplots(
+        title, subtitle = _title(comparison), _subtitle(comparison)
+        figure, below = new_page(HEIGHT_INCHES, title, subtitle, _notes(comparison, shown))
+        below = add_table(below, *_table(comparison, shown))
+        panels = below.subplots(
             2, len(shown), squeeze=False, sharex=True, sharey="row", height_ratios=(1.25, 1)
         )
-        figure.subplots_adjust(LEFT, bottom, RIGHT, top, wspace=0.08, hspace=0.1)
         for k, channel in enumerate(shown):
             _draw_densities(panels[0, k], comparison, channel)
-            title = fitting(words.panel_titles(comparison, channel), RC["font.size"], room)
-            panels[0, k].set_title(drawable(title), loc="left", parse_math=False)
+            name_axes(panels[0, k], _panel_title(comparison, channel), "", "")
             _draw_errors(panels[1, k], comparison, channel)
         _limit(panels, comparison, shown)
         panels[0, 0].set_ylabel(WEIGHTED)
         panels[1, 0].set_ylabel("relative error of $R_d$ (%)")
-        figure.align_ylabels(panels[:, 0])
+        below.align_ylabels(panels[:, 0])
     return figure
 
 
-def _draw_head(figure: Figure, comparison: ModelComparison, shown: Sequence[int]) -> float:
-    """Title, provenance and a legend with totals; the height of what is left, as a fraction."""
-    draw_text(figure, 0.16, words.models_title(comparison), size=12, weight="bold")
-    draw_text(figure, 0.41, words.models_subtitle(comparison))
-    grey: Style = {"color": "#444444", "size": 8}
-    down = 0.68
-    draw_text(figure, down, "Total diffuse reflectance, and its error", **grey)
-    columns = np.linspace(_TABLE_LEFT, RIGHT, len(shown) + 1)[:-1]
-    room = WIDTH_INCHES * (RIGHT - _TABLE_LEFT) / len(shown) - 0.05
-    for left, channel in zip(columns, shown, strict=True):
-        draw_text(figure, down, words.channel_name(comparison, channel), left=left, **grey)
-    for curve in comparison.curves:
-        down += _ROW_INCHES
-        _draw_sample(figure, curve.method, down)
-        draw_text(figure, down, method_name(curve.method), left=LEFT + 0.06)
-        for left, channel in zip(columns, shown, strict=True):
-            total = fitting(words.total_with_error(curve, channel), 8, room)
-            draw_text(figure, down, total, left=left, size=8)
-    return 1 - (down + 0.42) / HEIGHT_INCHES
+def _table(
+    comparison: ModelComparison, shown: Sequence[int]
+) -> tuple[list[str], list[tuple[str, list[str]]], list[Handle]]:
+    """Heads, a row for each method with its totals, and its line or, of the walk, its band."""
+    channels = [_channel_name(comparison, each) for each in shown]
+    rows = [
+        (method_name(curve.method), [_total_with_error(curve, each) for each in shown])
+        for curve in comparison.curves
+    ]
+    handles = [_handle(curve.method) for curve in comparison.curves]
+    return ["total diffuse reflectance (error)", *channels], rows, handles
 
 
-def _draw_sample(figure: Figure, method: str, inches_down: float) -> None:
-    """Draw a piece of the method's line, on its band for the walk, before its name."""
-    y = 1 - inches_down / HEIGHT_INCHES
-    style = _STYLES[method]
-    if method == "montecarlo":
-        half = 0.055 / HEIGHT_INCHES
-        band = Rectangle((LEFT, y - half), 0.05, 2 * half, lw=0, alpha=_BAND_ALPHA)
-        band.set_facecolor(style["color"])
-        figure.add_artist(band)
-    figure.add_artist(Line2D([LEFT, LEFT + 0.05], [y, y], **style))
+def _handle(method: str) -> Handle:
+    """Return a method's line, of the walk with its band."""
+    line = Line2D([], [], **_STYLES[method])
+    if method != "montecarlo":
+        return line
+    return Patch(facecolor=_STYLES[method]["color"], alpha=_BAND_ALPHA, lw=0), line
 
 
 def _draw_densities(axes: Axes, comparison: ModelComparison, channel: int) -> None:
@@ -205,4 +176,74 @@ def _limit(panels: npt.NDArray[Any], comparison: ModelComparison, shown: Sequenc
 
 def _signed(value: float, _: int) -> str:
     """Write a tick with its sign, 0 without."""
-    return f"{value:+g}".replace("-", words.MINUS) if value else "0"
+    return f"{value:+g}".replace("-", _MINUS) if value else "0"
+
+
+def _title(comparison: ModelComparison) -> str:
+    """Name the material, and what the models are held against."""
+    truth = "isotropic scattering" if _is_similar(comparison) else "the exact solution"
+    return f"{shortened(comparison.material.name, 20)}: models against {truth}"
+
+
+def _is_similar(comparison: ModelComparison) -> bool:
+    """Whether the exact solution is that of the similar isotropic medium: g is not 0."""
+    return bool(comparison.exact.profile.meta["settings"].get("similarity"))
+
+
+def _subtitle(comparison: ModelComparison) -> str:
+    """Say how the two profiles that need it were made, and on what grid."""
+    exact, walk = comparison.exact.profile, comparison.walk.profile
+    reached = 100.0 * float(exact.meta["relative_error"] or 0.0)
+    what = "Isotropic" if _is_similar(comparison) else "Exact"
+    return (
+        f"{what} to {reached:.1g} % of the total · {count(walk.photons or 0)} photons, seed "
+        f"{walk.meta.get('seed', 'unknown')} · {grid(walk)} · sssfit {exact.meta['version']}"
+    )
+
+
+def _channel_name(comparison: ModelComparison, channel: int) -> str:
+    """Name a channel."""
+    return shortened(comparison.material.channels[channel])
+
+
+def _panel_title(comparison: ModelComparison, channel: int) -> str:
+    """Name a channel, with albedo and mean free path, or why nothing is drawn."""
+    name, layer = _channel_name(comparison, channel), comparison.material.layers[0]
+    apart = " · " if len(name) <= 4 else "\n"  # a longer one leaves too little room beside it
+    if comparison.edges_mm[channel].size < 2:
+        return f"{name}{apart}too few photons to draw"
+    albedo, path_mm = layer.albedo[channel], layer.mean_free_path_mm[channel]
+    return f"{name}{apart}albedo {albedo:.4g} · MFP {path_mm:#.3g} mm"
+
+
+def _total_with_error(curve: ModelCurve, channel: int) -> str:
+    """Total diffuse reflectance, and how far it is from the exact one."""
+    total = float(curve.profile.diffuse_reflectance[channel])
+    error = 100.0 * float(curve.total_error[channel])
+    if curve.method == "exact" or math.isnan(error):
+        return f"{total:#.4g}"
+    if curve.method == "burley":
+        return f"{total:#.4g} (given)"
+    signed = f"{error:+.{2 if abs(error) < 1.0 else 1}f}".replace("-", _MINUS)
+    if curve.profile.photons is not None:
+        stderr = float(curve.profile.diffuse_reflectance_stderr[channel])
+        signed += f" ± {100.0 * stderr / total:.2f}"
+    return f"{total:#.4g} ({signed} %)"
+
+
+def _notes(comparison: ModelComparison, shown: Sequence[int]) -> list[str]:
+    """Say what the curves are means over, what the band is, and what is left out."""
+    notes = [
+        "Means over annuli merged until the walk has 100 effective photons in each; curves end "
+        "where it has too few. Band: ±1 standard error of the walk. Errors: linear within ±10 % "
+        "(grey), logarithmic beyond, above +1000 % not drawn. MFP: mean free path.",
+    ]
+    if _is_similar(comparison):
+        notes.append(
+            "g is not 0: the black curve solves for isotropic scattering of (1 - g) sigma_s, which "
+            "is an approximation. The walk follows g itself: where the two differ, trust the walk."
+        )
+    left = comparison.material.n_channels - len(shown)
+    if left:
+        notes.append(f"{left} channels between these are not drawn.")
+    return notes

@@ -115,7 +115,6 @@ def _write(axes: Axes, point: tuple[float, float], box: Bbox, label: str) -> Non
         size=_SIZE,
         va="center_baseline",
         transform=to_data,
-        parse_math=False,
         zorder=4,
     )
     if point[1] - box.y1 > _LINE_INCHES:
@@ -328,7 +327,7 @@ def _limit(axes: Axes, comparison: Comparison, error: str, cost: str) -> None:
 
 
 def _title(comparison: Comparison, error: str, cost: str) -> str:
-    """Name the material and what is held against what."""
+    """Name the material and the axes."""
     name = comparison.profile.material_name
     what = f"{_ERRORS[error]} against {'time' if cost == 'seconds' else cost}"
     return f"{shortened(name, 24)}: {what}" if name else what.capitalize()

@@ -3,13 +3,11 @@
 Supplement G: 2 pi r R_d linear and logarithmic, R_d against mean free paths, and the 2D profile.
 """
 
-import math
-
 import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogFormatterSciNotation, LogLocator
 
@@ -18,28 +16,19 @@ from sssfit.chart import text as words
 from sssfit.chart.data import Picture, drawn_radius_mm, picture
 from sssfit.chart.page import (
     COLOURS,
-    HEIGHT_INCHES,
-    LEFT,
     LINE_STYLES,
     LINE_WIDTH,
-    RC,
-    RIGHT,
-    ROW_GAP_INCHES,
-    TEXT_INCHES,
-    WIDTH_INCHES,
     Style,
+    add_legend,
     chart_style,
-    draw_footnotes,
-    draw_text,
-    drawable,
-    inches,
     name_axes,
-    new_figure,
+    new_page,
     tick,
 )
 from sssfit.profile import Profile
 from sssfit.profile.bins import Bins, mean_free_paths_mm, merged
 
+HEIGHT_INCHES = 6.0
 _UNWEIGHTED = r"$R_d$ (1/mm²)"
 _DECADES = 10  # most of a log axis: a profile without noise would go on to underflow
 _GREY_DECADES = 6
@@ -64,51 +53,27 @@ def profile_figure(profile: Profile) -> Figure:
     bins = [merged(profile, channel) for channel in range(profile.n_channels)]
     shown = picture(profile, bins)
     with chart_style():
-        figure = new_figure()
-        top = _draw_head(figure, profile, bins)
         notes = words.footnotes(profile, words.image_note(profile, shown))
-        bottom = draw_footnotes(figure, notes)
-        panels = figure.subplots(2, 2)
-        height = 0.5 * ((top - bottom) * HEIGHT_INCHES - ROW_GAP_INCHES)
-        rows_apart = ROW_GAP_INCHES / height
-        figure.subplots_adjust(LEFT, bottom, RIGHT, top, wspace=0.24, hspace=rows_apart)
+        figure, below = new_page(
+            HEIGHT_INCHES, words.title(profile), words.subtitle(profile), notes
+        )
+        below = _draw_legend(below, profile, bins)
+        panels = below.subplots(2, 2)
         _draw_linear(panels[0, 0], profile, bins)
         _draw_logarithmic(panels[0, 1], profile, bins)
         _draw_unweighted(panels[1, 0], profile, bins)
-        _draw_image(figure, panels[1, 1], profile, shown)
-        figure.align_ylabels(panels)
+        _draw_image(below, panels[1, 1], profile, shown)
+        below.align_ylabels(panels)
+        _cut_to_squares(figure, panels[1, 1], shown)
     return figure
 
 
-def _draw_head(figure: Figure, profile: Profile, bins: list[Bins]) -> float:
-    """Title, provenance and legend; the height of what is left, as a fraction."""
-    draw_text(figure, 0.16, words.title(profile), size=12, weight="bold")
-    draw_text(figure, 0.41, words.subtitle(profile))
-    draw_text(figure, 0.64, words.legend_title(profile), color="#444444", size=8)
+def _draw_legend(below: SubFigure, profile: Profile, bins: list[Bins]) -> SubFigure:
+    """Name channels and their totals; return what is left for panels."""
     shown = words.in_legend(profile.n_channels)
     handles = [Line2D([], [], **_line_style(k, profile.n_channels)) for k in shown]
-    labels = [
-        drawable(words.channel_label(profile, k, is_drawn=bool(bins[k].is_drawn.any())))
-        for k in shown
-    ]
-    # 0.6 inches for the line and the gap between columns.
-    widest = 0.6 + max(inches(label, RC["font.size"]) for label in labels)
-    columns = min(max(int(TEXT_INCHES / widest), 1), 4, len(labels))
-    legend = figure.legend(
-        handles,
-        labels,
-        ncols=columns,
-        loc="upper left",
-        bbox_to_anchor=(LEFT, 1 - 0.71 / HEIGHT_INCHES),
-        borderaxespad=0,
-        borderpad=0.2,
-        handlelength=2.8,
-        columnspacing=1.5,
-    )
-    for text in legend.get_texts():
-        text.set_parse_math(False)
-    rows = math.ceil(len(labels) / columns)
-    return 1 - (0.98 + 0.18 * rows) / HEIGHT_INCHES
+    labels = [words.channel_label(profile, k, is_drawn=bool(bins[k].is_drawn.any())) for k in shown]
+    return add_legend(below, handles, labels, title=words.legend_title(profile))
 
 
 def _line_style(channel: int, n_channels: int) -> Style:
@@ -205,9 +170,8 @@ def _limit_decades(axes: Axes, values: list[FloatArray]) -> float:
     return float(bottom)
 
 
-def _draw_image(figure: Figure, axes: Axes, profile: Profile, shown: Picture) -> None:
+def _draw_image(below: SubFigure, axes: Axes, profile: Profile, shown: Picture) -> None:
     """Fill the panel with the centre of R_d(x, y): in colour, or one channel in shades of grey."""
-    box = axes.get_position()
     if profile.n_channels == 3:
         axes.imshow(shown.screen_colours(), **_placed(shown))
         title = "(d) 2D profile, tone-mapped"
@@ -215,17 +179,21 @@ def _draw_image(figure: Figure, axes: Axes, profile: Profile, shown: Picture) ->
         peak = shown.per_mm2.max() or 1.0
         scale = LogNorm(max(shown.per_mm2.min(), peak * 10.0**-_GREY_DECADES), peak, clip=True)
         shades = axes.imshow(shown.per_mm2[:, :, 0], cmap="gray", norm=scale, **_placed(shown))
-        beside = axes.inset_axes((1.03, 0, 0.035, 1))
-        figure.colorbar(shades, cax=beside, label=_UNWEIGHTED)
-        axes.set_position((box.x0, box.y0, 0.81 * box.width, box.height))
+        below.colorbar(shades, ax=axes, label=_UNWEIGHTED, aspect=25)
         title = f"(d) log 2D profile of {words.shortened(profile.channels[0])}"
-    box = axes.get_position()
-    aspect = box.width * WIDTH_INCHES / (box.height * HEIGHT_INCHES)
-    axes.set_xlim(-aspect * shown.half_height_mm, aspect * shown.half_height_mm)
     axes.grid(visible=False)
     tick(axes.xaxis)
     tick(axes.yaxis)
     name_axes(axes, title, "x (mm)", "y (mm)")
+
+
+def _cut_to_squares(figure: Figure, axes: Axes, shown: Picture) -> None:
+    """Cut the picture, which is wider than its panel, until its pixels are square."""
+    if engine := figure.get_layout_engine():
+        engine.execute(figure)
+    box = axes.get_window_extent()
+    half_width_mm = shown.half_height_mm * box.width / box.height
+    axes.set_xlim(-half_width_mm, half_width_mm)
 
 
 def _placed(shown: Picture) -> Style:

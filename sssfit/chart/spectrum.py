@@ -17,18 +17,12 @@ from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormat
 from sssfit.arrays import FloatArray
 from sssfit.chart.page import (
     COLOURS,
-    LEFT,
     LINE_STYLES,
-    RC,
-    RIGHT,
-    WIDTH_INCHES,
     Style,
+    add_table,
     chart_style,
-    draw_footnotes,
-    draw_text,
-    fitting,
     name_axes,
-    new_figure,
+    new_page,
 )
 from sssfit.chart.text import kernel_subtitle, shortened, spread
 
@@ -40,9 +34,7 @@ _MOST_CHANNELS = 3
 _MOST_TERMS = 12
 _DECADES = 6  # of a share that are drawn at most
 _MARKERS = "os^"
-_ROW_INCHES = 0.165
-_COLUMNS = (0.30, 0.50, 0.70)  # of the width: the legend's figures
-_HEADS = ("first value, squared", "first value, absolute", "terms for an error of 1 %")
+_HEADS = ("", "first value, squared", "first value, absolute", "terms for an error of 1 %")
 
 
 def spectrum_figure(spectrum: Spectrum) -> Figure:
@@ -61,11 +53,12 @@ def spectrum_figure(spectrum: Spectrum) -> Figure:
     """
     shown = spread(spectrum.profile.n_channels, _MOST_CHANNELS)
     with chart_style():
-        figure = new_figure(HEIGHT_INCHES)
-        top = _draw_head(figure, spectrum, shown)
-        bottom = draw_footnotes(figure, _notes(spectrum, shown))
-        left, right = figure.subplots(1, 2, sharey=True)
-        figure.subplots_adjust(LEFT, bottom, RIGHT, top, wspace=0.08)
+        where = kernel_subtitle(spectrum.profile, spectrum.pixels, spectrum.mm_per_pixel)
+        notes = _notes(spectrum, shown)
+        figure, below = new_page(HEIGHT_INCHES, _title(spectrum), where, notes)
+        rows = [_row(spectrum, channel) for channel in shown]
+        handles = [Line2D([], [], **_style(k)) for k in range(len(shown))]
+        left, right = add_table(below, _HEADS, rows, handles).subplots(1, 2, sharey=True)
         _draw_shares(left, spectrum, spectrum.squared_share, shown)
         _draw_shares(right, spectrum, spectrum.absolute_share, shown)
         term = "term, largest first"
@@ -73,30 +66,6 @@ def spectrum_figure(spectrum: Spectrum) -> Figure:
         name_axes(right, "(b) of the sum of absolute values", term, "")
         _limit(left, spectrum, shown)
     return figure
-
-
-def _draw_head(figure: Figure, spectrum: Spectrum, shown: Sequence[int]) -> float:
-    """Title, provenance and a legend with figures; the height of what is left, as a fraction."""
-    draw_text(figure, 0.16, _title(spectrum), size=12, weight="bold")
-    draw_text(
-        figure, 0.41, kernel_subtitle(spectrum.profile, spectrum.pixels, spectrum.mm_per_pixel)
-    )
-    grey: Style = {"color": "#444444", "size": 8}
-    down = 0.68
-    for left, head in zip(_COLUMNS, _HEADS, strict=True):
-        draw_text(figure, down, head, left=left, **grey)
-    for k, channel in enumerate(shown):
-        down += _ROW_INCHES
-        y = 1 - down / HEIGHT_INCHES
-        x = [LEFT, LEFT + 0.025, LEFT + 0.05]
-        figure.add_artist(Line2D(x, [y] * 3, markevery=[1], **_style(k)))
-        whole = spectrum.profile.channels[channel]
-        room = WIDTH_INCHES * (_COLUMNS[0] - LEFT - 0.06) - 0.1
-        name = fitting([shortened(whole), shortened(whole, 6)], RC["font.size"], room)
-        draw_text(figure, down, name, left=LEFT + 0.06)
-        for left, figure_text in zip(_COLUMNS, _row(spectrum, channel), strict=True):
-            draw_text(figure, down, figure_text, left=left, size=8)
-    return 1 - (down + 0.42) / HEIGHT_INCHES
 
 
 def _style(k: int) -> Style:
@@ -141,12 +110,14 @@ def _title(spectrum: Spectrum) -> str:
     return f"{shortened(name, 24)}: {what}" if name else what.capitalize()
 
 
-def _row(spectrum: Spectrum, channel: int) -> list[str]:
-    """Figures of one channel in the legend."""
+def _row(spectrum: Spectrum, channel: int) -> tuple[str, list[str]]:
+    """Name and figures of one channel in the table."""
+    name = shortened(spectrum.profile.channels[channel])
     first = (spectrum.squared_share[0, channel], spectrum.absolute_share[0, channel])
     if not first[0] > 0.0:
-        return ["returns no light", "", ""]
-    return [*(f"{100.0 * each:.1f} %" for each in first), str(spectrum.rank_for(0.01, channel))]
+        return name, ["returns no light", "", ""]
+    shares = [f"{100.0 * each:.1f} %" for each in first]
+    return name, [*shares, str(spectrum.rank_for(0.01, channel))]
 
 
 def _notes(spectrum: Spectrum, shown: Sequence[int]) -> list[str]:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.compare._panels import Panel, check_colours, make_panel
 from sssfit.compare.candidates import MOST_TERMS, Candidate
 from sssfit.compare.judged import border_of, judged_scene
@@ -18,7 +18,7 @@ from sssfit.compare.pictures import picture_error
 from sssfit.fit import Pitch, pitch_of, support_of
 from sssfit.kernel import SeparableKernel
 from sssfit.measure.cost import cost_of
-from sssfit.measure.score import auto_exposure
+from sssfit.measure.score import COLOUR_FIGURES, auto_exposure
 from sssfit.profile import Profile
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
@@ -45,6 +45,12 @@ class SheetRow:
     label: str
     passes: int | None
     panels: tuple[Panel, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return label, passes and the figures of the score, a value for each scene."""
+        keys = (*COLOUR_FIGURES, "relative_l2")
+        scores = {key: [getattr(each.score, key) for each in self.panels] for key in keys}
+        return plain({"label": self.label, "passes": self.passes, **scores})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -77,6 +83,21 @@ class Sheet:
     rows: tuple[SheetRow, ...]
     production: Mapping[str, tuple[float, ...]]
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures of the sheet as JSON has them, a row for each kernel."""
+        return plain(
+            {
+                "material": self.profile.material_name,
+                "mm_per_pixel": self.mm_per_pixel,
+                "pixels": self.pixels,
+                "support_mm": self.support_mm,
+                "scenes": self.scenes,
+                "exposures": self.exposures,
+                "production": self.production,
+                "rows": [each.to_dict() for each in self.rows],
+            }
+        )
+
 
 def compute_sheet(
     profile: Profile,
@@ -106,27 +127,27 @@ def compute_sheet(
     Raises
     ------
     FitError, RenderError
-        Pixels, profile or scenes are of no use.
+        Invalid pixels, profile or scenes.
     """
     check_colours("the profile", profile.n_channels)
     support = support_of(profile)
     pitch = pitch_of(profile, mm_per_pixel)
-    easel = _Easel(profile, tuple(scenes), pitch, pixels, threads)
+    panels = _PanelRenderer(profile, tuple(scenes), pitch, pixels, threads)
     line = Candidate("Artist-friendly, line fit", "artist", 1)
     fitted = line.fit(profile, pitch, support).kernel
     production = production_look(fitted)
-    rows = [easel.row("Input, times albedo", easel.inputs())]
+    rows = [panels.row("Input, times albedo", panels.inputs())]
     for candidate in _kernels(min(most_terms, fitted.pixels // 2 + 1), line, production):
         kernel = candidate.fit(profile, pitch, support).kernel
-        rows.append(easel.row(candidate.label, easel.rendered(kernel), cost_of(kernel).passes))
-    rows.append(easel.row("True kernel", easel.truths))
+        rows.append(panels.row(candidate.label, panels.rendered(kernel), cost_of(kernel).passes))
+    rows.append(panels.row("True kernel", panels.truths))
     return Sheet(
         profile=profile,
         mm_per_pixel=pitch,
         pixels=pixels,
         support_mm=support,
         scenes=tuple(scenes),
-        exposures=easel.exposures,
+        exposures=panels.exposures,
         rows=tuple(rows),
         production=production,
     )
@@ -183,7 +204,7 @@ def _typed(value: float) -> float:
     return float(f"{value:.2g}")
 
 
-class _Easel:
+class _PanelRenderer:
     """Scenes with their truths, and the panels of pictures of them."""
 
     def __init__(
@@ -229,7 +250,7 @@ class _Easel:
     def row(
         self, label: str, pictures: Sequence[FloatArray], passes: int | None = None
     ) -> SheetRow:
-        """Hold a picture of each scene against its truth."""
+        """Compare a picture of each scene with its truth."""
         panels = [
             make_panel(
                 picture,

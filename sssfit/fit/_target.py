@@ -1,4 +1,4 @@
-"""What every fit aims at: the pixel-integrated kernel of a profile, on a pitch and a support.
+"""The target of every fit: the pixel-integrated kernel of a profile, on a pitch and a support.
 
 Never point samples: R_d ~ 1/r near the beam, and a sampled kernel's every figure would depend on
 where the samples fall. Quadrants are made a channel at a time: 1237 x 1237 pixels take 12 MB and
@@ -88,7 +88,7 @@ def make_target(
     Raises
     ------
     FitError
-        Energies that are NaN, negative or all zero; a pitch or support that is no length; a
+        Energies that are NaN, negative or all zero; a pitch or support that is not a length; a
         channel of whose light the support holds nothing; more than 2 GB for a channel.
 
     Warns
@@ -105,12 +105,12 @@ def make_target(
                 f"{name} = {value:g}; expected a length in mm above 0, from {_LEAST_MM:g} to "
                 f"{_MOST_MM:g}."
             )
-    # 1e-9 keeps a ratio that is whole but for its last bits from losing a pixel.
+    # 1e-9: a ratio that is whole except for its last bits must not lose a pixel.
     half = math.floor(min(support / pitch, _WIDEST) + 1e-9)
     if half == 0:
         warnings.warn(
             f"a pixel of {pitch:g} mm is wider than the support of {support:.4g} mm: the kernel is "
-            "a single pixel, which blurs nothing; use a smaller mm_per_pixel.",
+            "a single pixel, which blurs nothing; use a smaller `mm_per_pixel`.",
             SssfitWarning,
             stacklevel=3,
         )
@@ -152,7 +152,7 @@ def _check_memory(target: Target) -> None:
         raise FitError(
             f"a kernel of {pixels} x {pixels} pixels of {target.mm_per_pixel:.4g} mm would need "
             f"{size / 1e9:.3g} GB of memory a channel, and {_MOST_BYTES / 1e9:.3g} GB is the "
-            "most: use a larger mm_per_pixel or a smaller support."
+            "most: use a larger `mm_per_pixel` or a smaller support."
         )
 
 

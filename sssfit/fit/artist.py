@@ -1,4 +1,4 @@
-"""The artist-friendly kernel: two Gaussians in one pass, to be fitted or set by hand.
+"""The artist-friendly kernel: two Gaussians in one pass, fitted or set by hand.
 
 a_m(x) = w G(x, v_near) + (1 - w) G(x, v_far) per channel (Jimenez et al. 2015, "Separable
 Subsurface Scattering", supplement E). A shader multiplies each sample by
@@ -62,7 +62,7 @@ def fit_artist(
 ) -> FitResult:
     """Fit two Gaussians per channel, or take those that are given.
 
-    The pass has the profile's energy, whatever the support cuts off.
+    The pass has the profile's energy, including what the support cuts off.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def fit_artist(
     Raises
     ------
     FitError, ProfileError
-        The profile, the pixels or a setting is of no use.
+        Invalid profile, pixels or setting.
     """
     if not callable(target) and target not in ("line", "kernel"):
         raise FitError(

@@ -57,7 +57,7 @@ def fit_falloff(
 ) -> FitResult:
     """Fit width, strength and falloff to the 2D kernel, or take those that are given.
 
-    The pass has the profile's energy, whatever the support cuts off.
+    The pass has the profile's energy, including what the support cuts off.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def fit_falloff(
     Raises
     ------
     FitError, ProfileError
-        The profile, the pixels or a setting is of no use.
+        Invalid profile, pixels or setting.
     """
     target = make_target(profile, mm_per_pixel, support_mm)
     given = _by_hand(width, strength, falloff, profile.channels)

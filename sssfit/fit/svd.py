@@ -71,7 +71,7 @@ def fit_svd(
     Raises
     ------
     FitError, ProfileError
-        The rank, the profile, the pitch or the support is of no use.
+        Invalid rank, profile, pitch or support.
     """
     target = make_target(profile, mm_per_pixel, support_mm)
     rank = _checked_rank(rank, target)
@@ -182,6 +182,6 @@ def _checked_rank(rank: int | None, target: Target) -> int:
     if not 1 <= whole <= most:
         raise FitError(
             f"rank = {whole}; expected 1 to {most}: the kernel has {pixels} x {pixels} pixels and, "
-            "being even, no more terms. Use a smaller mm_per_pixel or a larger support."
+            "being even, no more terms. Use a smaller `mm_per_pixel` or a larger support."
         )
     return whole

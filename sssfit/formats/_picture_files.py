@@ -1,4 +1,4 @@
-"""The files pictures come from and go to: formats by ending, and by what the file begins with."""
+"""Picture files: their formats, by ending and by their first bytes."""
 
 import contextlib
 import math
@@ -172,7 +172,7 @@ def image_format(target: str | Path | BinaryIO) -> str:
 def as_path(path: object) -> Path:
     """Return the path of a picture; refuse what cannot be one."""
     if not isinstance(path, str | os.PathLike) or isinstance(os.fspath(path), bytes):
-        raise FileError(f"{shown(path)} is no path; name an {READ} file.")
+        raise FileError(f"{shown(path)} is not a path; name an {READ} file.")
     if "\0" in (text := os.fspath(path)):
         raise FileError(f"{shown(text)} holds a null character, which no file's name does.")
     return Path(text)

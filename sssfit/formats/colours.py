@@ -1,4 +1,4 @@
-"""A picture's values: what may be read, and what each format can hold."""
+"""A picture's colours: sRGB, primaries, and the values each format can hold."""
 
 import re
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Albedo inversion: from the diffuse reflectance that an artist asks for to a material that has it.
+"""Albedo inversion: from a diffuse reflectance to a material that has it.
 
 The total diffuse reflectance R of a homogeneous half space depends on its albedo a, its refractive
 index and the light that falls on it. What is asked for is R under normally incident light, as the
@@ -25,6 +25,7 @@ from sssfit.errors import MaterialError, RenderError, SimulationError
 from sssfit.formats.colours import linear_from_hex
 from sssfit.material import Layer, Material
 from sssfit.material.checks import check_texts, number
+from sssfit.optics import normal_transmittance
 from sssfit.simulate.exact import LIGHTS, Light, diffuse_reflectance, entering_light
 
 SKIN_ETA = 1.4  # d'Eon and Luebke 2007, GPU Gems 3, chapter 14: .028 at normal incidence
@@ -74,9 +75,9 @@ def reflectance_of(albedo: npt.ArrayLike, eta: float, light: Light = "normal") -
 def largest_reflectance(eta: float, light: Light = "normal") -> float:
     """Return `reflectance_of` albedo 1, where all light that enters comes back.
 
-    1 - ((eta - 1) / (eta + 1))^2 under normal light, 1 under diffuse light.
+    What of a normal beam is not reflected specularly; 1 under diffuse light.
     """
-    return 1.0 if light == "diffuse" else 1.0 - ((eta - 1.0) / (eta + 1.0)) ** 2
+    return 1.0 if light == "diffuse" else normal_transmittance(eta)
 
 
 def invert_reflectance(

@@ -1,13 +1,15 @@
-"""Files of every kind that sssfit writes, known by what is in them and not by their names."""
+"""What a verb reads: files by name, the newest here, stdin; any kind by what is in the file."""
 
 from __future__ import annotations
 
 import io
 import re
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, BinaryIO, TypeAlias
+from typing import TYPE_CHECKING, BinaryIO, TypeAlias, TypeVar
 
-from ._report import binary_stdin
+from ._options import Common
+from ._output import say
 
 if TYPE_CHECKING:
     from sssfit.kernel import SeparableKernel
@@ -25,6 +27,51 @@ _MOST_BYTES = 500_000_000  # the most that a file of ours may have
 # What every material has: a table of layers or a coefficient, if by a name that has to be mended.
 _MATERIAL = re.compile(r"^\s*(\[\[layers\]\]|[\"']?(sigma|mu)_?[as])", re.MULTILINE | re.IGNORECASE)
 
+_Record = TypeVar("_Record", "Profile", "SeparableKernel")
+
+
+def newest(common: Common, pattern: str, made_by: str) -> Path:
+    """Return the newest file of the current folder that matches, saying on stderr which."""
+    from sssfit.errors import FileError
+
+    found = [path for path in Path().glob(pattern) if path.is_file()]
+    if not found:
+        raise FileError(
+            f"there is no {pattern} in this folder: name one, or make one with `{made_by}`."
+        )
+    path = max(found, key=lambda each: each.stat().st_mtime_ns)
+    say(common, f"Using {path}, the newest {pattern} here.")
+    return path
+
+
+def profile_name(given: str | None, common: Common) -> str:
+    """Return the profile that was named, by default the newest of this folder."""
+    return given or str(newest(common, "*.profile.npz", "sssfit simulate skin1"))
+
+
+def kernel_name(given: str | None, common: Common) -> str:
+    """Return the kernel that was named, by default the newest of this folder."""
+    return given or str(newest(common, "*.kernel.json", "sssfit fit --method svd --rank 3"))
+
+
+def is_mci(name: str | None) -> bool:
+    """Whether a name given for a material means an MCML input file."""
+    return name is not None and name.lower().endswith(".mci")
+
+
+def load(kind: type[_Record], name: str) -> _Record:
+    """Read a profile or a kernel; ``-`` is stdin."""
+    return kind.read(binary_stdin(), "stdin") if name == "-" else kind.load(name)
+
+
+def binary_stdin() -> BinaryIO:
+    """Return stdin for bytes, or say in one line that it is closed."""
+    from sssfit.errors import FileError
+
+    if sys.stdin is None:
+        raise FileError("stdin is closed; name a file instead of -.")
+    return sys.stdin.buffer
+
 
 def read_any(name: str) -> Found:
     """Read a file, ``-`` for stdin, or a material that ships with sssfit.
@@ -41,7 +88,7 @@ def read_any(name: str) -> Found:
     path = Path(name)
     if name in material_names() and not path.exists():
         return load_material(name)
-    _check_ordinary(name, path)
+    _check_regular_file(name, path)
     return _read(path, name)
 
 
@@ -83,7 +130,7 @@ def _stdin() -> io.BytesIO:
     return io.BytesIO(content)
 
 
-def _check_ordinary(name: str, path: Path) -> None:
+def _check_regular_file(name: str, path: Path) -> None:
     """Refuse what is not there, folders, devices and pipes."""
     from sssfit.errors import FileError
     from sssfit.files import reason

@@ -1,22 +1,18 @@
-"""The rows of ``sssfit compare``: for programs, for people, and as Markdown, CSV or JSON files."""
-
-from __future__ import annotations
+"""Tables of a comparison of kernels: its rows as Markdown, CSV or JSON files, and in words."""
 
 import csv
 import io
 import json
-import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ._report import percent, plain, table
-
-if TYPE_CHECKING:
-    from sssfit.compare.comparison import Comparison, KernelRow, Picture, Verdict
+from sssfit.compare.comparison import Comparison, KernelRow, Picture, Verdict, verdicts
+from sssfit.files import has_mark
+from sssfit.messages import number
 
 FORMATS = (".md", ".csv", ".json")
-_HEADS = (
+HEADS = (
     *("kernel", "passes", "weights", "s/Mpixel", "Delta E", "95th", "99th", "above 1"),
     *("relative L2", "PSNR, dB", "energy drift", "asymmetry"),
 )
@@ -31,57 +27,6 @@ _MARKS = {
 }
 
 
-def row_figures(row: KernelRow, comparison: Comparison) -> dict[str, Any]:
-    """Everything of a row, as ``--json`` has it; null where nothing was measured."""
-    from sssfit.compare.comparison import COSTS, ERRORS
-    from sssfit.measure.score import COLOUR_FIGURES
-
-    keys = (
-        *("picture", "label", "method", "rank", "settings", *COLOUR_FIGURES),
-        *("relative_l2", "rmse", "psnr_db", "energy_drift"),
-        *("radial_asymmetry", "passes", "taps_per_pixel", "kernel_bytes", "taps"),
-        *("seconds_per_megapixel", "fit_seconds", "relative_frobenius_error", "stop_reasons"),
-    )
-    on_front = {error: {cost: (error, cost) in row.fronts for cost in COSTS} for error in ERRORS}
-    return {
-        "material": comparison.profile.material_name,
-        **{key: getattr(row, key) for key in keys},
-        "on_front": on_front,
-    }
-
-
-def figures_of(comparison: Comparison) -> dict[str, Any]:
-    """Everything of a comparison, as ``--json`` has it."""
-    return {
-        "material": comparison.profile.material_name,
-        "profile_method": comparison.profile.meta.get("method"),
-        "channels": comparison.profile.channels,
-        "mm_per_pixel": comparison.mm_per_pixel,
-        "pixels": comparison.pixels,
-        "threads": comparison.threads,
-        "pictures": [
-            {key: getattr(each, key) for key in ("name", "width", "height", "exposure")}
-            for each in comparison.pictures
-        ],
-        "missing_share": comparison.missing_share,
-        "left_out": [{"label": label, "reason": why} for label, why in comparison.left_out],
-        "rows": [row_figures(row, comparison) for row in comparison.rows],
-    }
-
-
-def text_of(comparison: Comparison, error: str, cost: str) -> str:
-    """Write a table for each picture, sorted by cost and error, the front marked with a star."""
-    parts = [_setting(comparison)]
-    for picture in comparison.pictures:
-        rows = _sorted(comparison, picture, error, cost)
-        cells = [_cells(row, "* " if (error, cost) in row.fronts else "  ") for row in rows]
-        parts.append(f"{_picture_line(picture)}\n{table(['  kernel', *_HEADS[1:]], cells)}")
-    parts.append(f"* {_front(error, cost)}")
-    parts += left_out_lines(comparison)
-    parts.append("\n".join(verdict_lines(comparison, error, cost)))
-    return "\n\n".join(parts)
-
-
 def left_out_lines(comparison: Comparison) -> list[str]:
     """Say which candidates could not be fitted, and why."""
     return [f"Left out {label}: {reason}" for label, reason in comparison.left_out]
@@ -89,8 +34,6 @@ def left_out_lines(comparison: Comparison) -> list[str]:
 
 def verdict_lines(comparison: Comparison, error: str, cost: str) -> list[str]:
     """Say in two lines which kernel to take for which budget, and how near that comes."""
-    from sssfit.compare.comparison import verdicts
-
     found = verdicts(comparison, error, cost)
     first, *others = found
     more = "".join(f", {each.label} from {each.cost:g}" for each in others)
@@ -123,43 +66,38 @@ def table_text(comparison: Comparison, ending: str, error: str, cost: str) -> st
         return _MARKS[ending] + _markdown(comparison, error, cost)
     if ending == ".csv":
         return _MARKS[ending] + _csv(comparison)
-    whole = {"format": _FORMAT, "command": "compare", **figures_of(comparison)}
-    return json.dumps(plain(whole), allow_nan=False)
+    whole = {"format": _FORMAT, "command": "compare", **comparison.to_dict()}
+    return json.dumps(whole, allow_nan=False)
 
 
 def is_table_file(path: Path) -> bool:
     """Tell whether a file is a table that we wrote."""
-    from sssfit.files import has_mark
-
     return has_mark(path, {mark.encode(): b"" for mark in _MARKS.values()})
 
 
 def _markdown(comparison: Comparison, error: str, cost: str) -> str:
     """Write a table for each picture; the front in bold."""
     name = comparison.profile.material_name or "profile"
-    parts = [f"# {name}: kernels by error and cost", _setting(comparison)]
-    head = f"| {' | '.join(_HEADS)} |\n|---|{(len(_HEADS) - 1) * '---:|'}"
+    parts = [f"# {name}: kernels by error and cost", setting_of(comparison)]
+    head = f"| {' | '.join(HEADS)} |\n|---|{(len(HEADS) - 1) * '---:|'}"
     for picture in comparison.pictures:
-        rows = _sorted(comparison, picture, error, cost)
+        rows = sorted_rows(comparison, picture, error, cost)
         lines = [_markdown_row(row, (error, cost) in row.fronts) for row in rows]
-        parts.append(f"## {_picture_line(picture)}\n\n" + "\n".join([head, *lines]))
-    parts.append(f"Bold: {_front(error, cost)}.")
+        parts.append(f"## {picture_line(picture)}\n\n" + "\n".join([head, *lines]))
+    parts.append(f"Bold: {front_words(error, cost)}.")
     parts += left_out_lines(comparison)
     parts.append("\n".join(verdict_lines(comparison, error, cost)))
     return "\n\n".join(parts) + "\n"
 
 
 def _markdown_row(row: KernelRow, is_on_front: bool) -> str:
-    label, *cells = _cells(row, "")
+    label, *cells = cells_of(row, "")
     return f"| {f'**{label}**' if is_on_front else label} | {' | '.join(cells)} |"
 
 
 def _csv(comparison: Comparison) -> str:
     """All rows, what there is by channel in columns of its own."""
-    lines = [
-        _flat(plain(row_figures(row, comparison)), comparison.profile.channels)
-        for row in comparison.rows
-    ]
+    lines = [_flat(row, comparison.profile.channels) for row in comparison.to_dict()["rows"]]
     stream = io.StringIO()
     writer = csv.DictWriter(stream, list(lines[0]), lineterminator="\n")
     writer.writeheader()
@@ -180,13 +118,13 @@ def _flat(figures: dict[str, Any], channels: Sequence[str]) -> dict[str, Any]:
     return flat
 
 
-def _sorted(comparison: Comparison, picture: Picture, error: str, cost: str) -> list[KernelRow]:
+def sorted_rows(comparison: Comparison, picture: Picture, error: str, cost: str) -> list[KernelRow]:
     """Rows of a picture by cost, then by error."""
     rows = comparison.rows_of(picture.name)
     return sorted(rows, key=lambda row: (row.rounded_cost(cost), row.error(error)))
 
 
-def _cells(row: KernelRow, mark: str) -> list[str]:
+def cells_of(row: KernelRow, mark: str) -> list[str]:
     """Figures of a row for people; drift and asymmetry of the worst channel."""
     drift = max(row.energy_drift.tolist(), key=abs)
     return [
@@ -194,23 +132,18 @@ def _cells(row: KernelRow, mark: str) -> list[str]:
         f"{row.passes}",
         f"{row.taps_per_pixel}",
         f"{row.seconds_per_megapixel:.2g}",
-        _or_dash(row.delta_e_2000_mean, ".3f"),
-        _or_dash(row.delta_e_2000_p95, ".2f"),
-        _or_dash(row.delta_e_2000_p99, ".2f"),
-        "-" if math.isnan(row.share_above_1) else percent(row.share_above_1, ".3g"),
+        number(row.delta_e_2000_mean, ".3f"),
+        number(row.delta_e_2000_p95, ".2f"),
+        number(row.delta_e_2000_p99, ".2f"),
+        number(row.share_above_1, ".3g%"),
         f"{100.0 * row.relative_l2:.3g} %",
         f"{row.psnr_db:.1f}",
-        percent(drift),
-        _or_dash(float(row.radial_asymmetry.max()), ".2g"),
+        number(drift, "+.2g%"),
+        number(float(row.radial_asymmetry.max()), ".2g"),
     ]
 
 
-def _or_dash(value: float, digits: str) -> str:
-    """Write a figure; a dash where there is none."""
-    return "-" if math.isnan(value) else f"{value:{digits}}"
-
-
-def _setting(comparison: Comparison) -> str:
+def setting_of(comparison: Comparison) -> str:
     """Say what was compared, on which pixels."""
     profile = comparison.profile
     threads = "1 thread" if comparison.threads == 1 else f"{comparison.threads} threads"
@@ -218,17 +151,17 @@ def _setting(comparison: Comparison) -> str:
     return (
         f"{profile.material_name or 'profile'}, {profile.meta.get('method') or 'no method'}: "
         f"kernels of {comparison.pixels} pixels of {comparison.mm_per_pixel:.4g} mm against the "
-        f"whole 2D kernel, which lacks up to {percent(missing, '.2g')} of a channel's light beyond "
+        f"whole 2D kernel, which lacks up to {number(missing, '.2g%')} of a channel's light beyond "
         f"the grid; seconds on {threads}, float64"
     )
 
 
-def _front(error: str, cost: str) -> str:
+def front_words(error: str, cost: str) -> str:
     """Say what is special about the rows that are marked."""
     return f"no other kernel of the picture has as small an error ({error}) at the cost ({cost})"
 
 
-def _picture_line(picture: Picture) -> str:
+def picture_line(picture: Picture) -> str:
     """Name a picture with its size and exposure."""
     size = f"{picture.width} x {picture.height} pixels"
     return f"{picture.name}, {size}, exposure {picture.exposure:.4g}"

@@ -10,7 +10,7 @@ from reference_pixels import make_profile
 from sssfit.cli import main
 from sssfit.errors import FitError, SssfitError, SssfitWarning
 from sssfit.fit import METHODS, fit_svd, make_target
-from sssfit.fit import _result as _doubts
+from sssfit.fit import _result as fit_result
 from sssfit.fit._result import ChannelFit, factor_to, fit_channels
 from sssfit.formats.csv import parse_csv
 from sssfit.kernel import SeparableKernel
@@ -65,7 +65,7 @@ OWN = {"svd": {"rank": 1}, "gaussians": {"terms": 2}}
 
 @pytest.mark.parametrize("kind", PROFILES)
 @pytest.mark.parametrize("method", METHODS)
-def test_a_kernel_is_near_or_doubted_or_refused(method, kind):
+def test_a_kernel_is_near_or_warned_about_or_refused(method, kind):
     profile = PROFILES[kind]()
     for pitch, support in PIXELS[:1] if kind == "64 channels" else PIXELS:
         with warnings.catch_warnings(record=True) as caught:
@@ -82,7 +82,7 @@ def test_a_kernel_is_near_or_doubted_or_refused(method, kind):
         assert np.isfinite(energies).all()
         said = " ".join(str(each.message) for each in caught)
         assert (errors <= 1.0).all() or "than no kernel at all" in said
-        assert (np.abs(energies) <= 0.1).all() or "has not the profile's energy" in said
+        assert (np.abs(energies) <= 0.1).all() or "does not preserve the profile's energy" in said
         assert result.kernel.pixels > 1 or "is a single pixel" in said
 
 
@@ -98,7 +98,7 @@ def fit_a_dim_spike(profile):
     return fit_channels(target, "burley", fit_channel, settings={})
 
 
-def test_what_the_doubts_say():
+def test_what_the_warnings_say():
     with pytest.warns(SssfitWarning) as caught:
         fit_a_dim_spike(many_channels())
     said = str(caught[0].message)
@@ -106,12 +106,12 @@ def test_what_the_doubts_say():
     assert caught[0].filename == __file__
     assert said.startswith("test: the burley kernel is farther from the profile than no kernel")
     assert "(c0 " in said
-    assert "has not the profile's energy (c0 -20" in said
+    assert "does not preserve the profile's energy (c0 -20" in said
     assert said.count("and 59 more)") == 2
     assert said.endswith("try a larger support, more terms or another method.")
 
 
-def test_an_energy_that_was_not_asked_for_is_not_doubted():
+def test_an_energy_that_was_not_asked_for_is_not_warned_about():
     # loses half of it; warnings are errors here
     fit_svd(ring(), rank=1, energy="keep", mm_per_pixel="profile")
     hand = {"width": 0.5, "strength": 0.1, "falloff": 1.0}
@@ -128,7 +128,7 @@ def test_terms_that_cancel_cannot_be_scaled():
     with pytest.raises(FitError, match=r"channel c0: the terms have the energy -2.43 within the"):
         factor_to(0.5, target, 0, np.array([1.0, -1.0]), half)
     with pytest.raises(
-        FitError, match=r"which cannot be scaled to -0.1; use energy = \"keep\", an"
+        FitError, match=r"which cannot be scaled to -0.1; use `energy = \"keep\"`, an"
     ):
         factor_to(-0.1, target, 0, np.array([-1.0, 1.0]), half)
 
@@ -144,9 +144,9 @@ def test_a_support_without_light_is_refused():
 
 
 def test_errors_that_are_no_numbers_are_refused():
-    _doubts.check_finite("test", "preintegrated", np.zeros(1), np.ones(1))
+    fit_result.check_finite("test", "preintegrated", np.zeros(1), np.ones(1))
     with pytest.raises(FitError, match="test: the errors of the preintegrated kernel are not fin"):
-        _doubts.check_finite("test", "preintegrated", np.zeros(1), np.array([np.inf]))
+        fit_result.check_finite("test", "preintegrated", np.zeros(1), np.array([np.inf]))
 
 
 def test_by_default_a_small_kernel_has_fewer_terms():
