@@ -202,6 +202,7 @@ def test_pictures_that_do_not_agree_are_refused(run, tmp_path):
     [
         ((), "name one MATERIAL"),
         (("skin1", "--all"), "name one MATERIAL"),
+        (("--paper", "--all"), "name one MATERIAL"),
         (("--all", "--chart", "c.png"), "leave --chart and --table out"),
         (("skin1", "-o", "folder"), "-o is the folder of --all"),
         (("--all", "--what", "sheet"), "--all is for --what front"),
@@ -353,7 +354,7 @@ def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch):
     monkeypatch.setattr(
         verb, "profile_of", lambda name, common: real(paths.get(name, name), common)
     )
-    monkeypatch.setattr(material, "material_names", lambda: ("marble", "skin1"))
+    monkeypatch.setattr(material, "material_names", lambda **_: ("marble", "skin1"))
     (tmp_path / "out").mkdir()
     err = run("--all", "-o", "out", *SMALL, status=1)
     assert "1 of 2 materials failed; marble: marble is not one half space" in err
@@ -366,7 +367,7 @@ def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch):
 def test_all_prints_the_fronts(run, tmp_path, monkeypatch):
     from sssfit import material
 
-    monkeypatch.setattr(material, "material_names", lambda: ("skin1", "marble"))
+    monkeypatch.setattr(material, "material_names", lambda **_: ("skin1", "marble"))
     lines = run("--all", *SMALL).splitlines()
     assert [line.split()[0] for line in lines[1:3]] == ["skin1", "marble"]
     names = [f"{name}-pareto.{end}" for name in ("skin1", "marble") for end in ("png", "md")]

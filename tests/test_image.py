@@ -9,7 +9,7 @@ import matplotlib.image
 import numpy as np
 import OpenEXR
 import pytest
-from checks_image import chunk, exr, hdr, load_bytes, picture, png, read_png, tiff
+from checks_image import chunk, exr, hdr, jpeg, load_bytes, picture, png, read_png, tga, tiff
 
 from sssfit.errors import FileError, RenderError, SssfitError
 from sssfit.formats import pictures as image
@@ -68,6 +68,63 @@ def test_8_bit_png_is_decoded_by_the_formula(tmp_path):
     np.testing.assert_allclose(found.pixels.ravel(), literal, rtol=1e-14)
     assert found.channels == ("Y",)
     assert found.notes == ("8-bit sRGB decoded to linear",)
+
+
+CODES = np.random.default_rng(5).integers(0, 256, (6, 5, 4)).astype(np.uint8)
+
+
+def decoded(codes):
+    return [literal_decode(code / 255) for code in np.ravel(codes)]
+
+
+@pytest.mark.parametrize("count", [1, 3, 4])
+@pytest.mark.parametrize("layout", [{}, {"bottom_up": True}, {"packed": True}, {"new": True}])
+def test_tga_is_decoded_by_the_formula(tmp_path, count, layout):
+    name = "a.dat" if "new" in layout else "a.TGA"  # the old form is known by its ending only
+    found = load_bytes(tmp_path, tga(CODES[..., :count], **layout), name)
+    np.testing.assert_allclose(
+        found.pixels.ravel(), decoded(CODES[..., : min(count, 3)]), rtol=1e-12
+    )
+    assert found.channels == (("Y",) if count == 1 else ("R", "G", "B"))
+    assert "8-bit sRGB decoded to linear" in found.notes
+    if count == 4:
+        np.testing.assert_array_equal(found.alpha, CODES[..., 3] / 255)
+        assert not found.alpha_is_multiplied
+    else:
+        assert found.alpha is None
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_jpeg_is_decoded_by_the_formula(tmp_path, count):
+    # Blocks of 8 pixels of one colour: what the format loses is the rounding of its own colours.
+    codes = CODES[:2, :3, :count].repeat(8, axis=0).repeat(8, axis=1)
+    jpeg(tmp_path / "a.jpg", codes)
+    found = image.load_image(tmp_path / "a.jpg")
+    assert found.pixels.shape == (16, 24, count)
+    off = 255 * image.srgb_encode(found.pixels) - codes
+    assert np.abs(off).max() <= 2.0
+    assert found.channels == (("Y",) if count == 1 else ("R", "G", "B"))
+    assert found.alpha is None
+    assert found.notes == ("8-bit sRGB decoded to linear",)
+
+
+def test_jpeg_is_turned_upright(tmp_path):
+    codes = CODES[:2, :3, :3].repeat(8, axis=0).repeat(8, axis=1)
+    jpeg(tmp_path / "a.jpeg", codes, Orientation=6)
+    found = image.load_image(tmp_path / "a.jpeg")
+    off = 255 * image.srgb_encode(found.pixels) - np.rot90(codes, -1)
+    assert np.abs(off).max() <= 2.0
+    assert "turned upright from orientation 6" in found.notes
+
+
+def test_a_jpeg_that_is_cut_short_or_damaged_is_not_guessed_at(tmp_path):
+    jpeg(tmp_path / "a.jpg", CODES[..., :3].repeat(8, axis=0).repeat(8, axis=1), quality=90)
+    data = (tmp_path / "a.jpg").read_bytes()
+    for part in (len(data) - 2, len(data) - 60, len(data) // 2):
+        with pytest.raises(FileError, match="damaged or cut short") as caught:
+            load_bytes(tmp_path, data[:part], "b.jpg")
+        assert "\n" not in str(caught.value)
+    assert load_bytes(tmp_path, data + b"more", "c.jpg").pixels.shape == (48, 40, 3)
 
 
 def test_png_by_hand(tmp_path):
@@ -304,10 +361,15 @@ def test_too_large_pictures_are_refused_by_their_header(tmp_path):
         image.load_image(tmp_path / "a.exr", largest_bytes=32 * 105 - 1)
 
 
-@pytest.mark.parametrize("ending", [*ENDINGS, "hdr"])
+@pytest.mark.parametrize("ending", [*ENDINGS, "hdr", "jpg", "tga"])
 def test_damage_is_one_line(tmp_path, ending, capfd):
     if ending == "hdr":
         data = hdr(np.full((5, 7, 4), 130), size=b"-Y 5 +X 7")
+    elif ending == "tga":
+        data = tga(CODES)
+    elif ending == "jpg":
+        jpeg(tmp_path / "a.jpg", CODES[..., :3].repeat(4, axis=0))
+        data = (tmp_path / "a.jpg").read_bytes()
     else:
         image.save_image(tmp_path / f"a.{ending}", picture())
         data = (tmp_path / f"a.{ending}").read_bytes()
@@ -325,7 +387,10 @@ def test_damage_is_one_line(tmp_path, ending, capfd):
 
 
 def test_what_is_no_picture(tmp_path):
-    for data, words in ((b"", "is empty"), (b"GIF89a", "is not an EXR, HDR, TIFF or PNG file")):
+    for data, words in (
+        (b"", "is empty"),
+        (b"GIF89a", "is not an EXR, HDR, TIFF, PNG, JPG or TGA file"),
+    ):
         with pytest.raises(FileError, match=rf"a\.exr {words}; name a picture"):
             load_bytes(tmp_path, data, "a.exr")
     with pytest.raises(FileError, match="is a folder or a device"):
