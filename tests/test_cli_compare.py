@@ -22,7 +22,7 @@ from sssfit.errors import RenderError
 from sssfit.formats.pictures import save_image
 from sssfit.material import load_material
 from sssfit.scene.made import make_scene
-from sssfit.simulate import exact, simulate_exact
+from sssfit.simulate import exact, simulate_dipole, simulate_exact
 
 SMALL = ("--picture", "disk", "--size", "32x32", "--mm-per-pixel", "2.5")
 COMMON = Common(quiet=True, verbose=False, json=False, threads=None, seed=1)
@@ -389,3 +389,22 @@ def test_the_front_of_one_material_is_its_line_of_all(run, tmp_path, monkeypatch
     assert one[-1] == "Wrote c.png, t.md"
     assert (tmp_path / "c.png").read_bytes() == (tmp_path / "skin1-pareto.png").read_bytes()
     assert "Wrote" not in run("skin1", "--what", "front", *SMALL)
+
+
+@pytest.mark.parametrize("what", ["kernels", "front"])
+def test_pictures_on_the_pixels_of_the_profile(run, tmp_path, what):
+    coarse = simulate_dipole(load_material("skin1"), dr_mm=2.5, radius_mm=40.0)
+    coarse.save(tmp_path / "p.profile.npz")
+    given = ("--what", what, "--picture", "disk", "--size", "32x32", "--json")
+    own, asked = (
+        json.loads(run("p.profile.npz", *given, "--mm-per-pixel", pitch))
+        for pitch in ("profile", "2.5")
+    )
+    for key in ("rows", "materials") if what == "front" else ("mm_per_pixel", "pixels", "pictures"):
+        if key == "rows":
+            pairs = zip(own[key], asked[key], strict=True)
+            assert all(a["relative_l2"] == b["relative_l2"] for a, b in pairs)
+        else:
+            assert own[key] == asked[key]
+    words = run("--all", *given[2:], "--mm-per-pixel", "profile", status=2)
+    assert "share their pixels" in words
