@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
 
+from sssfit.messages import columns, number, table
+
 from ._deon_skin import DEON_SKIN
 from ._options import Common
-from ._output import columns, number, say, table
+from ._output import say
 from ._progress import say_if_compiling, walk_progress
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ._output import number
+from sssfit.messages import number
 
 if TYPE_CHECKING:
     from sssfit.choose.choice import Choice, PhotonNeed, Step

@@ -35,8 +35,8 @@ def profile_of(name: str, common: Common) -> Profile:
     return _exact(name, common)
 
 
-def material_of(name: str, what: str) -> Material:
-    """Load a material; of a profile, which has no light to trace, say what ``what`` needs."""
+def material_of(name: str) -> Material:
+    """Load the material of a budget; a profile has no light to trace."""
     from sssfit.errors import ProfileError
     from sssfit.material import load_material
 
@@ -44,8 +44,8 @@ def material_of(name: str, what: str) -> Material:
         raise ProfileError(f"{name} has no coefficients to simulate with; name a material.")
     if name.endswith(".npz"):
         raise ProfileError(
-            f"{name} is a profile, and {what} simulates a material: name that, such as skin1 or a "
-            ".toml file of your own."
+            f"{name} is a profile, and a budget simulates a material: name that, such as skin1 or "
+            "a .toml file of your own."
         )
     return load_material(name)
 

@@ -9,17 +9,18 @@ import click
 
 from sssfit.methods import FITS
 
+from ._compare_parts import PICTURES
 from ._options import Count, LengthOr, WholeRange
 from ._scene import EDGE_DEGREES, FILE_OPTIONS, MADE, Size
-
-PICTURES = "disk,edge,points,head"
 
 _OPTIONS = (
     click.option("--all", "every", is_flag=True, help="All materials that ship with sssfit."),
     click.option(
-        "--only",
-        type=click.Choice(["budget", "kernels"]),
-        help="One of the two parts.  [default: both]",
+        "--what",
+        type=click.Choice(["front", "budget", "kernels", "sheet"]),
+        help="budget: why a kernel is off; kernels: every one by error and cost; front: those that "
+        "no other beats, a line a picture; sheet: pictures of all, drawn into --chart."
+        "  [default: budget and kernels]",
     ),
     click.option(
         "--picture",
@@ -46,8 +47,8 @@ _OPTIONS = (
     click.option(
         "--chart",
         metavar="FILE",
-        help="Draw the kernels by error and cost, as PNG, SVG or PDF by the ending; - for PNG on "
-        "stdout.",
+        help="Draw the kernels by error and cost, or the sheet, as PNG, SVG or PDF by the ending; "
+        "- for PNG on stdout.",
     ),
     click.option("--table", metavar="FILE", help="Write the kernels' rows, .md, .csv or .json."),
     click.option(
@@ -69,8 +70,7 @@ _OPTIONS = (
         "--photons",
         type=Count(2, 10**12),
         metavar="N",
-        help="Of the budget's photon walk, or the most of --convergence."
-        "  [default: 1e6; --convergence: 1e7]",
+        help="Of the budget's photon walk.  [default: 1e6]",
     ),
     click.option(
         "--method",
@@ -89,19 +89,6 @@ _OPTIONS = (
         "--model",
         type=click.Choice(["dipole", "dipole-grosjean", "burley"]),
         help="The budget of a kernel of this model.  [default: of the photon walk]",
-    ),
-    click.option(
-        "--sheet", metavar="FILE", help="Instead draw a contact sheet of every kernel's pictures."
-    ),
-    click.option(
-        "--editing",
-        metavar="FILE",
-        help="Instead draw the 2012 model edited by hand; needs no MATERIAL.",
-    ),
-    click.option(
-        "--convergence",
-        metavar="FILE",
-        help="Instead draw the simulation's error over photons and seconds.",
     ),
     click.option(
         "-o",

@@ -2,10 +2,11 @@
 
 import click
 
+from sssfit.messages import table
 from sssfit.methods import SIMULATIONS
 
 from ._options import Common
-from ._output import finish, table
+from ._output import finish
 
 DEON_SKIN = SIMULATIONS["gaussians"].makes
 

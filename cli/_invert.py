@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sssfit.messages import table
+
 from ._memory import check_memory
 from ._options import Common
-from ._output import binary_stdout, finish, held, table
+from ._output import binary_stdout, finish, held
 from ._progress import say_if_compiling
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""What a verb puts out: files held and written, results on stdout, words on stderr, tables."""
+"""What a verb puts out: files held and written, results on stdout, words on stderr."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class _Record(Protocol):
     def save(self, path: str | Path) -> None: ...
 
 
-# Words and figures
+# Words and results
 
 
 def say(common: Common, line: str) -> None:
@@ -66,46 +66,6 @@ def _legible(text: str, figures: Mapping[str, Any]) -> str:
         if isinstance(name, str) and "\n" in name:
             text = text.replace(name, printable(name))
     return "\n".join(printable(line) for line in text.split("\n"))
-
-
-def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Columns under their heads: the first flush left, the others flush right; no cut, no wrap."""
-    widths = [max(len(row[k]) for row in [header, *rows]) for k in range(len(header))]
-    lines = (
-        "  ".join(
-            cell.ljust(width) if k == 0 else cell.rjust(width)
-            for k, (cell, width) in enumerate(zip(row, widths, strict=True))
-        ).rstrip()
-        for row in [header, *rows]
-    )
-    return "\n".join(lines)
-
-
-def columns(head: str, names: Sequence[str], *each: tuple[str, Sequence[Any] | None, str]) -> str:
-    """Write a table of a row a name: heads with a unit, the values under them and their format.
-
-    A column without values is left out; see `number` for formats.
-    """
-    shown = [(title, values, form) for title, values, form in each if values is not None]
-    rows = [
-        [name, *(number(values[k], form) for _, values, form in shown)]
-        for k, name in enumerate(names)
-    ]
-    return table([head, *(title for title, _, _ in shown)], rows)
-
-
-def number(value: Any, form: str) -> str:
-    """Write a figure by a format; one that ends in % is of a share.
-
-    Shares below 1e-9 are rounding of sums of pixels: 0 %. What is not known is a dash, or what
-    stands behind a bar: ".3g%|unknown".
-    """
-    form, _, unknown = form.partition("|")
-    if value is None or value != value:
-        return unknown or "-"
-    if not form.endswith("%"):
-        return f"{value:{form}}"
-    return "0 %" if abs(value) < 1e-9 else f"{100.0 * value:{form[:-1]}} %"
 
 
 # Streams

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from ._output import columns, number
+from sssfit.messages import columns, number
 
 if TYPE_CHECKING:
     import numpy as np

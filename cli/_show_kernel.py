@@ -6,7 +6,7 @@ import json
 from collections.abc import Mapping
 from typing import Any
 
-from ._output import columns, table
+from sssfit.messages import columns, table
 
 
 def kernel_text(figures: Mapping[str, Any]) -> str:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from sssfit.messages import number, table
+
 from ._options import Common
-from ._output import finish, number, table
+from ._output import finish
 
 _NOTED_BEYOND = 1e-3  # share of a channel beyond the grid that is worth a remark
 _SIGMAS = 4.5  # a deviation beyond so many standard errors is no accident

@@ -8,11 +8,13 @@ from typing import TYPE_CHECKING
 
 import click
 
+from sssfit.messages import number
+
 from ._choose_report import step_line, text_of
 from ._deon_skin import DEON_SKIN
 from ._input import load
 from ._options import Common, Length, Number, NumberRange, common_options
-from ._output import KERNEL, PROFILE, finish, held, number, say, stem_of, target, write
+from ._output import KERNEL, PROFILE, finish, held, say, stem_of, target, write
 from ._progress import say_if_compiling
 from ._scene import (
     EDGE_DEGREES,

@@ -7,9 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sssfit.messages import columns
+
 from ._input import binary_stdin, is_mci
 from ._options import Common, common_options
-from ._output import PROFILE, columns, finish_one, held, target, write
+from ._output import PROFILE, finish_one, held, target, write
 
 if TYPE_CHECKING:
     from sssfit.profile import Profile

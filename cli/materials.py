@@ -5,10 +5,12 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from sssfit.messages import table
+
 from ._deon_skin import DEON_SKIN, show_deon_skin
 from ._invert import Wish, write_material
 from ._options import Common, Length, ListOf, Number, Reflectance, common_options
-from ._output import finish, table
+from ._output import finish
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

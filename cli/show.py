@@ -6,9 +6,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sssfit.messages import columns, table
+
 from ._input import profile_name, read_any
 from ._options import Common, common_options
-from ._output import columns, finish, table
+from ._output import finish
 
 if TYPE_CHECKING:
     from ._input import Found
@@ -138,7 +140,7 @@ def _energies(figures: dict[str, Any]) -> str:
         ("diffuse R", diffuse, ".6f"),
         ("+- stderr", figures["diffuse_reflectance_stderr"], ".1e"),
         ("beyond grid", beyond, ".2e"),
-        ("of diffuse", [s and f"{100.0 * s:.3f} %" for s in shares], ""),
+        ("of diffuse", [None if each is None else f"{100.0 * each:.3f} %" for each in shares], ""),
         ("absorbed", figures["absorbed"] or [None] * len(names), ".6f"),
         ("transmitted", figures["transmitted"], ".6f"),
         ("unfinished", figures["unfinished"], ".1e"),

@@ -483,8 +483,7 @@ def blank(*_) -> Figure:
 
 
 _CHARTS = (
-    *("profile", "kernel", "material", "pareto", "budget", "sheet", "editing", "convergence"),
-    *("models", "guide", "spectrum"),
+    *("profile", "kernel", "material", "pareto", "budget", "sheet", "models", "guide", "spectrum"),
 )
 STAND_INS = {
     "sssfit.simulate.simulate_montecarlo_many": few_photons,
@@ -500,8 +499,6 @@ STAND_INS = {
     "sssfit.compare.budget.error_budgets": lambda _, given: budgets(rank_of(given)),
     "sssfit.compare.compare_models": lambda *_: models(),
     "sssfit.compare.sheet.compute_sheet": lambda *_: small_sheet(),
-    "sssfit.compare.editing.compute_editing": lambda *_: small_editing(),
-    "sssfit.compare.convergence.compute_convergence": lambda *_: small_convergence(),
     **{f"sssfit.chart.{kind}.{kind}_figure": blank for kind in _CHARTS},
 }
 

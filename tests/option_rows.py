@@ -469,8 +469,8 @@ RENDER = {
 
 # compare
 
-_KERNELS = "compare wax.profile.npz --only kernels --size 24x16"
-_BUDGET = "compare wax.toml --only budget --size 24x16 --picture disk"
+_KERNELS = "compare wax.profile.npz --what kernels --size 24x16"
+_BUDGET = "compare wax.toml --what budget --size 24x16 --picture disk"
 
 
 def _pictures(
@@ -493,13 +493,8 @@ def _budgeted(**settings: Any) -> Any:
     return called("sssfit.compare.budget.error_budgets", wax(), _pictures("disk"), **given)
 
 
-def _converged(**settings: Any) -> Any:
-    return called("sssfit.compare.convergence.compute_convergence", wax(), **settings)
-
-
-_OF_LAYERS = "compare wax.profile.npz --only kernels --picture layers.exr --mm-per-pixel .4"
+_OF_LAYERS = "compare wax.profile.npz --what kernels --picture layers.exr --mm-per-pixel .4"
 _BOTH = "compare wax.toml --size 24x16 --picture disk"
-_CONVERGENCE = "compare wax.toml --convergence c.png"
 
 
 def front(error: str, cost: str) -> Any:
@@ -532,12 +527,12 @@ COMPARE = {
             f"out/{name}-pareto.{end}" for name in ("marble", "skin1") for end in ("md", "png")
         ],
     ),
-    "--only": Row(
+    "--what": Row(
         _BOTH,
-        "--only kernels",
+        "--what kernels",
         lambda ran: [name for name, _ in calls(ran)],
         lambda: ["simulate_exact", "compare_kernels"],
-        words="both",
+        words="budget and kernels",
     ),
     "--picture": Row(
         _KERNELS,
@@ -555,7 +550,7 @@ COMPARE = {
         words="what your own file says, else 0.3",
     ),
     "--size": Row(
-        "compare wax.profile.npz --only kernels --picture disk,edge",
+        "compare wax.profile.npz --what kernels --picture disk,edge",
         "--size 20x10",
         calls,
         lambda: _compared(_pictures("disk", "edge", size=(10, 20))),
@@ -616,27 +611,6 @@ COMPARE = {
         calls,
         lambda: _budgeted(model="burley"),
         words="of the photon walk",
-    ),
-    "--sheet": Row(
-        "compare wax.profile.npz --sheet s.png",
-        "--sheet t.png --mm-per-pixel .4",
-        lambda ran: (calls(ran), names(ran)),
-        lambda: (
-            called("sssfit.compare.sheet.compute_sheet", profile(), mm_per_pixel=0.4),
-            ["t.png"],
-        ),
-    ),
-    "--editing": Row(
-        _KERNELS,
-        "compare --editing e.png",
-        lambda ran: (calls(ran), names(ran)),
-        lambda: (called("sssfit.compare.editing.compute_editing"), ["e.png"]),
-    ),
-    "--convergence": Row(
-        _CONVERGENCE,
-        "compare wax.toml --convergence d.png --photons 1e5",
-        lambda ran: (calls(ran), names(ran)),
-        lambda: (_converged(photons=[10_000, 31_623, 100_000]), ["d.png"]),
     ),
     "--output": Row(
         "compare --all --size 24x16",
@@ -1025,12 +999,6 @@ SEEDS = {
         lambda: _rendered(_scene("noise", seed=5)),
     ),
     "compare": Row(_BUDGET, "--seed 5", calls, lambda: _budgeted(seed=5)),
-    "compare --convergence": Row(
-        f"{_CONVERGENCE} --photons 1e5",
-        "--seed 5",
-        calls,
-        lambda: _converged(photons=[10_000, 31_623, 100_000], first_seed=5),
-    ),
     "compare --picture noise": Row(
         f"{_KERNELS} --picture noise",
         "--seed 5",
@@ -1084,7 +1052,6 @@ STREAMS = (
     f"{_MAKE} --name lard -o x.toml",
     f"{_KERNELS} --chart x.png",
     f"{_BUDGET} --budget-chart x.png",
-    "compare wax.profile.npz --sheet x.png",
-    "compare --editing x.png",
-    "compare wax.toml --convergence x.png",
+    "compare wax.profile.npz --what sheet --chart x.png",
+    "compare wax.profile.npz --what front --size 24x16 --chart x.png",
 )

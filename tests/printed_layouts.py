@@ -537,7 +537,7 @@ def fronts(f: Figures) -> list[Any]:
             values = [value for row in on for value in (row["label"], row[ERRORS[f["error"]]])]
             rows.append([name, picture, Words(", ".join("{} {}" for _ in on), *values)])
     heads = ["material", "picture", f"front of {f['error']} by {f['cost']}, cheapest first"]
-    return [Table(heads, rows, alike=("material",)), wrote(f)]
+    return [Table(heads, rows, alike=("material",)), *([wrote(f)] if f["output"] else [])]
 
 
 def sheet(f: Figures) -> list[Any]:
@@ -548,18 +548,6 @@ def sheet(f: Figures) -> list[Any]:
             *(f["material"], f["pixels"], f["pixels"], f["mm_per_pixel"]),
         ),
         Table(["kernel", "passes", *f["scenes"]], rows),
-        wrote(f),
-    ]
-
-
-def editing(f: Figures) -> list[Any]:
-    rows = [[row["label"], row["delta_e_2000_mean"], row["delta_e_2000_p99"]] for row in f["rows"]]
-    return [
-        Table(["edit", "mean Delta E to the original", "99th percentile"], rows),
-        Words(
-            "The original against the 2D kernel of the six Gaussians: mean {}, 99th percentile {}",
-            *(f["original_delta_e_2000_mean"], f["original_delta_e_2000_p99"]),
-        ),
         wrote(f),
     ]
 
@@ -582,7 +570,6 @@ def convergence(f: Figures) -> list[Any]:
             *(f["material"], f["slope"], f["slope_stderr"]),
         ),
         Table(["run", "seconds", "error", "own estimate"], rows),
-        wrote(f),
     ]
 
 
@@ -968,15 +955,15 @@ PRINTED: dict[str, Layout] = {
     "render --irradiance edge --size 24x16 --border zero": rendering,
     "render --irradiance head --size 24x16 --screen": rendering,
     "render wax.gaussians2.kernel.json --irradiance head --size 48x48 --transmit": rendering,
-    "compare wax.profile.npz --only kernels --size 24x16": comparison,
-    "compare wax.profile.npz --only kernels --size 24x16 --error l2 --cost passes": comparison,
-    "compare wax.toml --only budget --rank 2 --size 24x16": comparison,
+    "compare wax.profile.npz --what kernels --size 24x16": comparison,
+    "compare wax.profile.npz --what kernels --size 24x16 --error l2 --cost passes": comparison,
+    "compare wax.toml --what budget --rank 2 --size 24x16": comparison,
     "compare wax.toml --size 24x16": comparison,
     "compare --all --size 24x16": fronts,
     "compare --all --size 24x16 --error l2 --cost passes": fronts,
-    "compare wax.profile.npz --sheet s.png": sheet,
-    "compare --editing e.png": editing,
-    "compare wax.toml --convergence c.png": convergence,
+    "compare wax.profile.npz --what sheet --chart s.png": sheet,
+    "compare wax.profile.npz --what front --size 24x16": fronts,
+    "compare wax.profile.npz --what front --size 24x16 --chart f.png --table f.md": fronts,
     "choose wax.toml": choice,
     "choose wax.toml --tolerance 6": choice,
     "choose wax.toml --tolerance 7": choice,

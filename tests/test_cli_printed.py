@@ -149,7 +149,7 @@ def same(found, wanted):
 
 
 def test_tables_in_files_are_those_of_json():
-    command = "compare wax.profile.npz --only kernels --size 24x16 --cost passes --table"
+    command = "compare wax.profile.npz --what kernels --size 24x16 --cost passes --table"
     ran = world.run(f"{command} t.md", both=True)
     text = ran.written["t.md"].decode()
     rows = [line for line in text.splitlines() if not line.startswith(("|---", "<!--"))]

@@ -142,8 +142,8 @@ ASKED = ("--from-reflectance", ".4,.3,.2", "--mean-free-path", "1", "--eta", "1.
         (("export", "t.kernel.json", "--format", "json", "-o", "x.hlsl"), ".json"),
         (("chart", "t.profile.npz", "-o", "x.json"), ".png"),
         (("render", "t.kernel.json", "-o", "x.json"), ".exr"),
-        (("compare", "skin1", "--only", "kernels", "--table", "x.npz"), ".md"),
-        (("compare", "skin1", "--only", "kernels", "--chart", "x.csv"), ".png"),
+        (("compare", "skin1", "--what", "kernels", "--table", "x.npz"), ".md"),
+        (("compare", "skin1", "--what", "kernels", "--chart", "x.csv"), ".png"),
     ],
 )
 def test_no_verb_writes_a_format_that_the_name_denies(

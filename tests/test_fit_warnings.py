@@ -128,7 +128,7 @@ def test_terms_that_cancel_cannot_be_scaled():
     with pytest.raises(FitError, match=r"channel c0: the terms have the energy -2.43 within the"):
         factor_to(0.5, target, 0, np.array([1.0, -1.0]), half)
     with pytest.raises(
-        FitError, match=r"which cannot be scaled to -0.1; use energy = \"keep\", an"
+        FitError, match=r"which cannot be scaled to -0.1; use `energy = \"keep\"`, an"
     ):
         factor_to(-0.1, target, 0, np.array([-1.0, 1.0]), half)
 

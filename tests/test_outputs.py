@@ -39,9 +39,8 @@ WRITES = {
         *(f"compare wax.profile.npz --chart {{}}.{each}" for each in ("png", "svg", "pdf")),
         *(f"compare wax.profile.npz --table {{}}.{each}" for each in ("md", "csv", "json")),
         "compare wax.toml --budget-chart {}.png",
-        "compare wax.profile.npz --sheet {}.png",
-        "compare --editing {}.svg",
-        "compare wax.toml --convergence {}.pdf",
+        "compare wax.profile.npz --what sheet --chart {}.png",
+        "compare wax.profile.npz --what front --chart {}.svg",
     ),
     "choose": ("choose wax.toml --irradiance disk -o {}.json",),
     "import": ("import wax.csv -o {}.npz",),
@@ -234,7 +233,6 @@ def test_two_outputs_into_one_file_are_refused(run, folder):
         "render wax.kernel.json --irradiance disk -o a.exr --truth ./a.exr",
         "render wax.kernel.json --irradiance disk --truth a.png --difference sub/../a.png",
         "compare wax.profile.npz --chart a.png --budget-chart a.png",
-        "compare wax.toml --sheet a.png --convergence a.png",
     ):
         (folder / "sub").mkdir(exist_ok=True)
         before = contents(folder)
@@ -245,7 +243,7 @@ def test_two_outputs_into_one_file_are_refused(run, folder):
 
 
 def test_a_budgets_chart_is_checked_before_the_kernels_are_compared(run, folder, monkeypatch):
-    monkeypatch.setattr("sssfit.cli.compare.compare_one", pytest.fail)
+    monkeypatch.setattr("sssfit.compare.compare_kernels", pytest.fail)
     (folder / "b.png").write_text("mine")
     assert run("compare wax.profile.npz --picture disk --budget-chart b.png")[0] == 1
 

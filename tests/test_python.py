@@ -11,6 +11,7 @@ import sssfit
 from sssfit.errors import FitError, MaterialError, RenderError, SimulationError
 from sssfit.fit import fit_svd
 from sssfit.formats.pictures import save_image
+from sssfit.methods import SIMULATIONS
 from sssfit.render.separable import render_separable
 from sssfit.simulate import simulate_burley, simulate_dipole, simulate_montecarlo
 
@@ -65,10 +66,19 @@ def test_the_walk_is_the_default_method():
     assert walked.sha256 == simulate_montecarlo(skin, photons=5000, seed=7).sha256
 
 
+@pytest.mark.parametrize("method", [name for name in SIMULATIONS if name != "gaussians"])
+def test_every_method_of_the_registry_is_a_name_to_simulate_by(method):
+    few = {"photons": 5000} if method == "montecarlo" else {}
+    found = sssfit.simulate("skin1", method, dr_mm=0.2, radius_mm=4.0, **few)
+    assert (found.meta["method"], found.n_annuli) == (method, 20)
+
+
 def test_skin_of_six_gaussians_has_its_own_method():
     assert sssfit.simulate("deon-skin").meta["method"] == "gaussians"
     with pytest.raises(SimulationError, match="deon-skin has no coefficients"):
         sssfit.simulate("deon-skin", "exact")
+    with pytest.raises(SimulationError, match="makes deon-skin only, and this is 'skin1'"):
+        sssfit.simulate("skin1", "gaussians")
 
 
 def test_a_profile_and_a_kernel_are_records_or_paths(profile, kernel, tmp_path):

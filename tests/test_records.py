@@ -57,7 +57,7 @@ def burley():
     return run_figures(simulate_burley(world.wax(), dr_mm=0.3, radius_mm=8.0), 0.25)
 
 
-SMALL = "compare wax.profile.npz --only kernels --size 24x16"
+SMALL = "compare wax.profile.npz --what kernels --size 24x16"
 # Commands, the dict of the record, and what the verb adds: facts of the run, not of the record.
 RECORDS = {
     "show wax.profile.npz": (lambda: world.profile().to_dict(), {"file"}),
@@ -105,7 +105,7 @@ def test_json_is_the_record_and_facts_of_the_run(command):
 
 
 def test_a_budget_of_several_pictures_has_the_rows_of_each():
-    printed = world.run("compare wax.toml --only budget --rank 2 --size 24x16 --json").figures
+    printed = world.run("compare wax.toml --what budget --rank 2 --size 24x16 --json").figures
     each = [budget.to_dict() for budget in world.budgets(2)]
     assert printed["budget"] == {**each[0], "rows": [row for one in each for row in one["rows"]]}
 

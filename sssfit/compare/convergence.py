@@ -120,6 +120,26 @@ class Convergence:
         )
 
 
+LEAST_PHOTONS = 10_000
+_PER_DECADE = 2
+
+
+def photon_numbers(most: int) -> tuple[int, ...]:
+    """Return two numbers of photons a decade, from 1e4 up to ``most``.
+
+    Raises
+    ------
+    SimulationError
+        Fewer than 1e5: no slope could be seen.
+    """
+    if most < 10 * LEAST_PHOTONS:
+        raise SimulationError(f"{most:,} photons are too few for a slope; expected 1e5 or more.")
+    numbers: list[int] = []
+    while (number := round(LEAST_PHOTONS * 10 ** (len(numbers) / _PER_DECADE))) <= most:
+        numbers.append(number)
+    return tuple(numbers)
+
+
 def compute_convergence(
     material: Material,
     *,

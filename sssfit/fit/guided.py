@@ -22,6 +22,7 @@ from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._nlopt import Function, Minimum, minimise
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
 from sssfit.fit._target import Pitch, Target, make_target
+from sssfit.optics import gauss_legendre
 from sssfit.profile import Profile
 from sssfit.profile.bins import mean_free_paths_mm
 
@@ -127,13 +128,13 @@ def gamma(half_pixels: int, k: float, b: float = 50.0, extent: float = 1.0) -> F
     """
     unit = (half_pixels + 0.5) * extent  # pixels
     order = max(4, math.ceil(_ACROSS / max(unit, 1.0)))
-    nodes, weights = np.polynomial.legendre.leggauss(order)
+    nodes, weights = gauss_legendre(order, -0.5, 0.5)
     pixels = np.arange(half_pixels + 1)[:, None]
-    square = (((pixels + 0.5 * nodes) / unit) ** 2).ravel()
+    square = (((pixels + nodes) / unit) ** 2).ravel()
     rising = -np.expm1(-b * square)
     values = (square[:, None] + square) ** (0.5 * k) * rising[:, None] * rising
     blocks = values.reshape(half_pixels + 1, order, half_pixels + 1, order)
-    mean: FloatArray = np.einsum("iajb,a,b->ij", blocks, 0.5 * weights, 0.5 * weights)
+    mean: FloatArray = np.einsum("iajb,a,b->ij", blocks, weights, weights)
     return mean
 
 

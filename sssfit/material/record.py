@@ -57,6 +57,7 @@ from sssfit.material.toml import (
     write_toml,
 )
 from sssfit.messages import printable, shown
+from sssfit.optics import normal_reflectance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -222,7 +223,7 @@ class Material:
         total = 0.0
         above = self.eta_above
         for layer in self.layers[: self.first_scattering_layer + 1]:
-            one = ((layer.eta - above) / (layer.eta + above)) ** 2
+            one = normal_reflectance(layer.eta, above)
             total += (1.0 - total) ** 2 * one / (1.0 - total * one)
             above = layer.eta
         return total

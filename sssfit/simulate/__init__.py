@@ -4,7 +4,6 @@ The package is the function `simulate` as well: ``sssfit.simulate("skin1")``.
 """
 
 import sys
-from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -12,6 +11,7 @@ from typing import Any
 from sssfit.errors import SimulationError
 from sssfit.material import Material, load_material
 from sssfit.messages import shown
+from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile
 from sssfit.simulate._checkpoint import (
     CHECKPOINT_MARKS,
@@ -39,7 +39,6 @@ __all__ = [
     "CHECKPOINT_MARKS",
     "DEON_SKIN",
     "EVERY_SECONDS",
-    "METHODS",
     "Checkpoint",
     "ProfileSource",
     "Progress",
@@ -65,15 +64,6 @@ __all__ = [
     "simulate_multipole",
 ]
 
-METHODS: dict[str, Callable[..., Profile]] = {
-    "montecarlo": simulate_montecarlo,
-    "exact": simulate_exact,
-    "dipole": simulate_dipole,
-    "dipole-grosjean": simulate_dipole_grosjean,
-    "multipole": simulate_multipole,
-    "burley": simulate_burley,
-}
-
 
 def simulate(
     material: Material | str | Path, method: str | None = None, **settings: Any
@@ -86,8 +76,8 @@ def simulate(
         The record, a shipped name, or the path of a TOML file, as `sssfit.load_material` takes it;
         or "deon-skin", the skin of six Gaussians, which has a profile and no coefficients.
     method : str, optional
-        A name of `METHODS`; by default "montecarlo", the photon walk, and "gaussians", its only
-        one, for "deon-skin".
+        A name of `sssfit.methods.SIMULATIONS`; by default "montecarlo", the photon walk, and for
+        "deon-skin" its only one, "gaussians".
     **settings
         Keyword arguments of the method's ``simulate_x``: ``photons``, ``seed``, ``dr_mm``, ...
 
@@ -98,19 +88,33 @@ def simulate(
     MaterialError
         There is no such material, or its file cannot be read.
     """
-    if isinstance(material, str) and material == DEON_SKIN.name:
-        if method not in (None, "gaussians"):
-            raise SimulationError(
-                f"{DEON_SKIN.name} has no coefficients, and method = {shown(method)} needs them; "
-                "leave the method out."
-            )
-        return simulate_deon_skin(**settings)
-    method = "montecarlo" if method is None else method
-    if not isinstance(method, str) or method not in METHODS:
-        raise SimulationError(f"method = {shown(method)}; expected one of {', '.join(METHODS)}.")
-    if isinstance(material, str | Path):
-        material = load_material(material)
-    return METHODS[method](material, **settings)
+    made = {each.makes: name for name, each in SIMULATIONS.items() if each.makes}
+    own = made.get(material) if isinstance(material, str) else None
+    if method is None:
+        method = own or "montecarlo"
+    if not isinstance(method, str) or method not in SIMULATIONS:
+        expected = ", ".join(SIMULATIONS)
+        raise SimulationError(f"method = {shown(method)}; expected one of {expected}.")
+    chosen = SIMULATIONS[method]
+    if own is not None and method != own:
+        raise SimulationError(
+            f"{material} has no coefficients, and the method {method} needs them; leave the method "
+            "out."
+        )
+    if own is None and chosen.makes is not None:
+        raise SimulationError(
+            f"the method {method} makes {chosen.makes} only, and this is {shown(material)}."
+        )
+    profiles = chosen.load()
+    if own is not None:
+        return _one(profiles(**settings))
+    record = load_material(material) if isinstance(material, str | Path) else material
+    return _one(profiles([record] if chosen.shares else record, **settings))
+
+
+def _one(found: Profile | list[Profile]) -> Profile:
+    """Return the profile of a method that takes one material, or several at once."""
+    return found[0] if isinstance(found, list) else found
 
 
 class _CallableRoom(ModuleType):

@@ -28,6 +28,7 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
+from sssfit.optics import normal_transmittance
 from sssfit.profile import Profile
 from sssfit.simulate._depth import (
     Resolution,
@@ -48,7 +49,7 @@ from sssfit.simulate._mixture import (
     single_scattering_of_diffuse_light,
 )
 from sssfit.simulate._semi_infinite import relative_eta
-from sssfit.simulate._surface import entering, entering_of_diffuse
+from sssfit.simulate._surface import entering_of_diffuse
 from sssfit.threads import available_cores
 
 Light = Literal["normal", "diffuse"]
@@ -226,7 +227,7 @@ def entering_light(eta: float, light: Light = "normal") -> float:
     normal light; for diffuse light 2 int_0^1 R_F(mu) mu dmu seen from outside (Duntley 1942).
     """
     _check_light(eta, light)
-    return entering_of_diffuse(eta) if light == "diffuse" else entering(eta)
+    return entering_of_diffuse(eta) if light == "diffuse" else normal_transmittance(eta)
 
 
 @dataclass(frozen=True, slots=True)
@@ -314,7 +315,7 @@ def _solve(
         once = single_scattering_beyond(channel.radii_mfp, eta, level.single_step)
         beyond = channel.albedo * once + mixture.beyond(channel.radii_mfp)
         absorbed = float(responses[0].absorbed[place])
-        balance = abs(float(beyond[0]) + absorbed - entering(eta)) - _ROUNDING
+        balance = abs(float(beyond[0]) + absorbed - normal_transmittance(eta)) - _ROUNDING
         answers.append(_Solution(beyond, absorbed, max(balance, mixture.misfit)))
     return answers
 

@@ -24,6 +24,7 @@ from sssfit.arrays import FloatArray, check_names
 from sssfit.errors import MaterialError, SimulationError
 from sssfit.material import Layer, Material
 from sssfit.material.checks import check_texts, number
+from sssfit.optics import normal_transmittance
 from sssfit.simulate.exact import LIGHTS, Light, diffuse_reflectance, entering_light
 
 _CLOSE = 1e-8  # in reflectance; what the exact solver itself is good for
@@ -72,9 +73,9 @@ def reflectance_of(albedo: npt.ArrayLike, eta: float, light: Light = "normal") -
 def largest_reflectance(eta: float, light: Light = "normal") -> float:
     """Return `reflectance_of` albedo 1, where all light that enters comes back.
 
-    1 - ((eta - 1) / (eta + 1))^2 under normal light, 1 under diffuse light.
+    What of a normal beam is not reflected specularly; 1 under diffuse light.
     """
-    return 1.0 if light == "diffuse" else 1.0 - ((eta - 1.0) / (eta + 1.0)) ** 2
+    return 1.0 if light == "diffuse" else normal_transmittance(eta)
 
 
 def invert_reflectance(

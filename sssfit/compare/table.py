@@ -1,21 +1,18 @@
-"""The rows of ``sssfit compare``: for programs, for people, and as Markdown, CSV or JSON files."""
-
-from __future__ import annotations
+"""Tables of a comparison of kernels: its rows as Markdown, CSV or JSON files, and in words."""
 
 import csv
 import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ._output import number, table
-
-if TYPE_CHECKING:
-    from sssfit.compare.comparison import Comparison, KernelRow, Picture, Verdict
+from sssfit.compare.comparison import Comparison, KernelRow, Picture, Verdict, verdicts
+from sssfit.files import has_mark
+from sssfit.messages import number
 
 FORMATS = (".md", ".csv", ".json")
-_HEADS = (
+HEADS = (
     *("kernel", "passes", "weights", "s/Mpixel", "Delta E", "95th", "99th", "above 1"),
     *("relative L2", "PSNR, dB", "energy drift", "asymmetry"),
 )
@@ -30,19 +27,6 @@ _MARKS = {
 }
 
 
-def text_of(comparison: Comparison, error: str, cost: str) -> str:
-    """Write a table for each picture, sorted by cost and error, the front marked with a star."""
-    parts = [_setting(comparison)]
-    for picture in comparison.pictures:
-        rows = _sorted(comparison, picture, error, cost)
-        cells = [_cells(row, "* " if (error, cost) in row.fronts else "  ") for row in rows]
-        parts.append(f"{_picture_line(picture)}\n{table(['  kernel', *_HEADS[1:]], cells)}")
-    parts.append(f"* {_front(error, cost)}")
-    parts += left_out_lines(comparison)
-    parts.append("\n".join(verdict_lines(comparison, error, cost)))
-    return "\n\n".join(parts)
-
-
 def left_out_lines(comparison: Comparison) -> list[str]:
     """Say which candidates could not be fitted, and why."""
     return [f"Left out {label}: {reason}" for label, reason in comparison.left_out]
@@ -50,8 +34,6 @@ def left_out_lines(comparison: Comparison) -> list[str]:
 
 def verdict_lines(comparison: Comparison, error: str, cost: str) -> list[str]:
     """Say in two lines which kernel to take for which budget, and how near that comes."""
-    from sssfit.compare.comparison import verdicts
-
     found = verdicts(comparison, error, cost)
     first, *others = found
     more = "".join(f", {each.label} from {each.cost:g}" for each in others)
@@ -90,28 +72,26 @@ def table_text(comparison: Comparison, ending: str, error: str, cost: str) -> st
 
 def is_table_file(path: Path) -> bool:
     """Tell whether a file is a table that we wrote."""
-    from sssfit.files import has_mark
-
     return has_mark(path, {mark.encode(): b"" for mark in _MARKS.values()})
 
 
 def _markdown(comparison: Comparison, error: str, cost: str) -> str:
     """Write a table for each picture; the front in bold."""
     name = comparison.profile.material_name or "profile"
-    parts = [f"# {name}: kernels by error and cost", _setting(comparison)]
-    head = f"| {' | '.join(_HEADS)} |\n|---|{(len(_HEADS) - 1) * '---:|'}"
+    parts = [f"# {name}: kernels by error and cost", setting_of(comparison)]
+    head = f"| {' | '.join(HEADS)} |\n|---|{(len(HEADS) - 1) * '---:|'}"
     for picture in comparison.pictures:
-        rows = _sorted(comparison, picture, error, cost)
+        rows = sorted_rows(comparison, picture, error, cost)
         lines = [_markdown_row(row, (error, cost) in row.fronts) for row in rows]
-        parts.append(f"## {_picture_line(picture)}\n\n" + "\n".join([head, *lines]))
-    parts.append(f"Bold: {_front(error, cost)}.")
+        parts.append(f"## {picture_line(picture)}\n\n" + "\n".join([head, *lines]))
+    parts.append(f"Bold: {front_words(error, cost)}.")
     parts += left_out_lines(comparison)
     parts.append("\n".join(verdict_lines(comparison, error, cost)))
     return "\n\n".join(parts) + "\n"
 
 
 def _markdown_row(row: KernelRow, is_on_front: bool) -> str:
-    label, *cells = _cells(row, "")
+    label, *cells = cells_of(row, "")
     return f"| {f'**{label}**' if is_on_front else label} | {' | '.join(cells)} |"
 
 
@@ -138,13 +118,13 @@ def _flat(figures: dict[str, Any], channels: Sequence[str]) -> dict[str, Any]:
     return flat
 
 
-def _sorted(comparison: Comparison, picture: Picture, error: str, cost: str) -> list[KernelRow]:
+def sorted_rows(comparison: Comparison, picture: Picture, error: str, cost: str) -> list[KernelRow]:
     """Rows of a picture by cost, then by error."""
     rows = comparison.rows_of(picture.name)
     return sorted(rows, key=lambda row: (row.rounded_cost(cost), row.error(error)))
 
 
-def _cells(row: KernelRow, mark: str) -> list[str]:
+def cells_of(row: KernelRow, mark: str) -> list[str]:
     """Figures of a row for people; drift and asymmetry of the worst channel."""
     drift = max(row.energy_drift.tolist(), key=abs)
     return [
@@ -163,7 +143,7 @@ def _cells(row: KernelRow, mark: str) -> list[str]:
     ]
 
 
-def _setting(comparison: Comparison) -> str:
+def setting_of(comparison: Comparison) -> str:
     """Say what was compared, on which pixels."""
     profile = comparison.profile
     threads = "1 thread" if comparison.threads == 1 else f"{comparison.threads} threads"
@@ -176,12 +156,12 @@ def _setting(comparison: Comparison) -> str:
     )
 
 
-def _front(error: str, cost: str) -> str:
+def front_words(error: str, cost: str) -> str:
     """Say what is special about the rows that are marked."""
     return f"no other kernel of the picture has as small an error ({error}) at the cost ({cost})"
 
 
-def _picture_line(picture: Picture) -> str:
+def picture_line(picture: Picture) -> str:
     """Name a picture with its size and exposure."""
     size = f"{picture.width} x {picture.height} pixels"
     return f"{picture.name}, {size}, exposure {picture.exposure:.4g}"
