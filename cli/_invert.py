@@ -27,7 +27,7 @@ _PUBLISHED = {"chiang2016": "Chiang et al. 2016", "van_de_hulst": "van de Hulst"
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class InversionRequest:
     """What the options ask for; None where they do not say."""
 
     from_reflectance: list[float]
@@ -40,20 +40,25 @@ class Wish:
     force: bool
 
 
-def write_material(wish: Wish, common: Common) -> None:
+def write_material(request: InversionRequest, common: Common) -> None:
     """Invert, write the TOML, and print what was found beside the published approximations."""
     check_memory("inversion", common.threads)
-    if wish.mean_free_path is None or wish.eta is None:
+    if request.mean_free_path is None or request.eta is None:
         raise click.UsageError("--from-reflectance needs --mean-free-path and --eta.")
-    channels = _channels(wish)
-    name = wish.name or _name_of(wish.output)
-    asked = f"{name}.toml" if wish.output is None else wish.output
+    channels = _channels(request)
+    name = request.name or _name_of(request.output)
+    asked = f"{name}.toml" if request.output is None else request.output
     path = None if asked == "-" else Path(asked)
 
-    with held([path], _is_ours, inputs=[], force=wish.force, named=("a material", ".toml")):
+    with held([path], _is_ours, inputs=[], force=request.force, named=("a material", ".toml")):
         say_if_compiling(common, solver=True)
         material, figures = _inverted(
-            wish.from_reflectance, wish.mean_free_path, wish.eta, wish.light, name, channels
+            request.from_reflectance,
+            request.mean_free_path,
+            request.eta,
+            request.light,
+            name,
+            channels,
         )
         _write(material, path)
     figures = {"command": "materials", "output": [str(path or "-")], **figures}
@@ -102,11 +107,11 @@ def _inverted(
     }
 
 
-def _channels(wish: Wish) -> list[str]:
+def _channels(request: InversionRequest) -> list[str]:
     """Names of the channels: R, G, B for three."""
-    count = len(wish.from_reflectance)
-    if wish.channels is not None:
-        names = [each.strip() for each in wish.channels.split(",")]
+    count = len(request.from_reflectance)
+    if request.channels is not None:
+        names = [each.strip() for each in request.channels.split(",")]
         if len(names) != count:
             raise click.UsageError(f"--channels has {len(names)} names for {count} reflectances.")
         return names
