@@ -97,7 +97,7 @@ def materials(
     elif as_toml:
         from sssfit.material import load_material
 
-        # TOML is UTF-8 whatever the terminal's encoding: bytes.
+        # TOML is UTF-8 on every terminal: bytes.
         click.echo(load_material(material).to_toml().encode(), nl=False)
     else:
         _show(common, material)
