@@ -185,7 +185,7 @@ def read_models(name: str) -> tuple[Material, Profile | None]:
     is_walk = profile.meta.get("method") == "montecarlo" and profile.photons is not None
     if material is None or not is_walk or profile.channels != material.channels:
         raise ProfileError(
-            f"{name} is no photon walk of a known material; name a material, or a profile by "
+            f"{name} is not a photon walk of a known material; name a material, or a profile by "
             "`sssfit simulate`."
         )
     return material, profile

@@ -32,7 +32,7 @@ _LIBRARIES = (
 @click.option("-v", "--verbose", is_flag=True, help="With --version: the libraries underneath.")
 @click.pass_context
 def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
-    """Subsurface scattering kernels: from a material to what a real-time shader can afford.
+    """Subsurface scattering kernels for real-time shaders, from a material's coefficients.
 
     A first session:
 
@@ -43,10 +43,10 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
       sssfit chart skin1.profile.npz        draw it: skin1.profile.png
       sssfit show skin1.profile.npz         its figures
       sssfit fit --method svd --rank 3      fit a separable kernel to it
-      sssfit render --irradiance head       see it on a lit head, and what it loses
+      sssfit render --irradiance head       see it on a lit head, with its error
       sssfit export --format hlsl           write it as shader source
-      sssfit compare skin1                  what every kernel of it loses and costs, and why
-      sssfit choose skin1 --distance 0.6m   the cheapest that a view can do with
+      sssfit compare skin1                  error and cost of every kernel, and the causes
+      sssfit choose skin1 --distance 0.6m   the cheapest kernel for a view
 
     Lengths are mm unless written with a unit (3cm, 0.6m). Every verb explains itself with --help.
     """

@@ -27,7 +27,7 @@ _PUBLISHED = {"chiang2016": "Chiang et al. 2016", "van_de_hulst": "van de Hulst"
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
+class InversionRequest:
     """What the options ask for; None where they do not say."""
 
     from_reflectance: list[float] | str
@@ -41,23 +41,23 @@ class Wish:
     force: bool
 
 
-def write_material(wish: Wish, common: Common) -> None:
+def write_material(request: InversionRequest, common: Common) -> None:
     """Invert, write the TOML, and print what was found beside the published approximations."""
     check_memory("inversion", common.threads)
-    if wish.mean_free_path is None:
+    if request.mean_free_path is None:
         raise click.UsageError("--from-reflectance needs --mean-free-path.")
-    asked_for = _asked(wish)
-    is_srgb = wish.srgb or isinstance(asked_for, str)
-    light = wish.light or ("diffuse" if is_srgb else "normal")
-    channels = _channels(wish, 3 if isinstance(asked_for, str) else len(asked_for))
-    name = wish.name or _name_of(wish.output)
-    asked = f"{name}.toml" if wish.output is None else wish.output
+    asked_for = _asked(request)
+    is_srgb = request.srgb or isinstance(asked_for, str)
+    light = request.light or ("diffuse" if is_srgb else "normal")
+    channels = _channels(request, 3 if isinstance(asked_for, str) else len(asked_for))
+    name = request.name or _name_of(request.output)
+    asked = f"{name}.toml" if request.output is None else request.output
     path = None if asked == "-" else Path(asked)
 
-    with held([path], _is_ours, inputs=[], force=wish.force, named=("a material", ".toml")):
+    with held([path], _is_ours, inputs=[], force=request.force, named=("a material", ".toml")):
         say_if_compiling(common, solver=True)
         material, figures = _inverted(
-            asked_for, wish.mean_free_path, wish.eta, light, name, channels
+            asked_for, request.mean_free_path, request.eta, light, name, channels
         )
         _write(material, path)
     figures = {"command": "materials", "output": [str(path or "-")], **figures}
@@ -108,10 +108,10 @@ def _inverted(
     }
 
 
-def _asked(wish: Wish) -> list[float] | str:
+def _asked(request: InversionRequest) -> list[float] | str:
     """Return linear reflectances, or the sRGB colour in hex, which the material's source names."""
-    given = wish.from_reflectance
-    if isinstance(given, str) or not wish.srgb:
+    given = request.from_reflectance
+    if isinstance(given, str) or not request.srgb:
         return given
     for each in given:
         if not (each.is_integer() and 0.0 <= each <= 255.0):
@@ -125,10 +125,10 @@ def _asked(wish: Wish) -> list[float] | str:
     return [float(srgb_decode(each / 255.0)) for each in given]
 
 
-def _channels(wish: Wish, count: int) -> list[str]:
+def _channels(request: InversionRequest, count: int) -> list[str]:
     """Names of the channels: R, G, B for three."""
-    if wish.channels is not None:
-        names = [each.strip() for each in wish.channels.split(",")]
+    if request.channels is not None:
+        names = [each.strip() for each in request.channels.split(",")]
         if len(names) != count:
             raise click.UsageError(f"--channels has {len(names)} names for {count} reflectances.")
         return names

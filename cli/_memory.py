@@ -83,7 +83,7 @@ def check_threads_of_numba() -> None:
 
 
 def is_out_of_memory(error: BaseException | None) -> bool:
-    """Tell whether an error comes from a lack of memory, whatever a library made of it."""
+    """Tell whether an error comes from a lack of memory, under any library's name for it."""
     while error is not None:
         if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
             return True

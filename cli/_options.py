@@ -28,8 +28,8 @@ class Common:
 def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add -q, -v, --json, --threads, --seed and hand them to the command as ``common``."""
 
-    @click.option("-q", "--quiet", is_flag=True, help="Say nothing but errors.")
-    @click.option("-v", "--verbose", is_flag=True, help="Say more.")
+    @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
+    @click.option("-v", "--verbose", is_flag=True, help="Print more.")
     @click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")
     @click.option(
         "--threads",

@@ -38,14 +38,14 @@ _OPTIONS = (
         "angle_degrees",
         type=Number(),
         metavar="DEGREES",
-        help="edge, stripes: the direction of their normal.  [default: 0]",
+        help="edge, stripes: direction of the normal.  [default: 0]",
     ),
     click.option(
         "--radius",
         "radius_mm",
         type=Length(),
         metavar="MM",
-        help="disk, highlights: of the disk, of a spot.",
+        help="disk, highlights: radius of the disk or of a spot.",
     ),
     click.option(
         "--period",
@@ -59,44 +59,44 @@ _OPTIONS = (
         "spacing_mm",
         type=Length(),
         metavar="MM",
-        help="points: from one to the next.",
+        help="points: distance between neighbours.",
     ),
     click.option(
         "--distance",
         "distance_mm",
         type=Length(),
         metavar="MM",
-        help="head: from the eye to the face.  [default: 600]",
+        help="head: camera distance.  [default: 600]",
     ),
     click.option(
         "--light",
         "light_degrees",
         type=click.FLOAT,
         metavar="DEGREES",
-        help="head: how far to the left of the view axis the key light is, behind the head beyond "
-        "90.  [default: 45; with --transmit 170]",
+        help="head: angle of the key light to the left of the view axis; beyond 90 it is behind "
+        "the head.  [default: 45; with --transmit 170]",
     ),
     click.option(
         "--transmit",
         is_flag=True,
-        help="head: add the key light that comes through ears and nose, as far as the kernel says.",
+        help="head: add the key light that the kernel lets through ears and nose.",
     ),
     click.option(
         "--border",
         type=click.Choice(["mirror", "clamp", "zero"]),
         default="mirror",
         show_default=True,
-        help="What lies beyond the picture's rim.",
+        help="Continuation of the picture beyond its border.",
     ),
     click.option(
         "--screen",
         is_flag=True,
-        help="As a shader does it: in perspective, by depth, within the mask; head only.",
+        help="Render like a shader: in perspective, by depth, within the mask; head only.",
     ),
     click.option(
         "--follow",
         type=click.Choice(["gaussian", "lerp", "none"]),
-        help="With --screen: what steps in depth do to a sample.  [default: gaussian]",
+        help="With --screen: how a depth difference weights a sample.  [default: gaussian]",
     ),
 )
 

@@ -92,11 +92,11 @@ def _report(rows: dict[int, _Outcome], materials: Made, request: Request) -> Non
     missing = ", ".join(each.name for k, each in enumerate(materials) if k not in rows)
     interrupted = bool(missing) or not all(each.is_complete for each in outcomes)
     if interrupted and request.is_walk:
-        how = "; --resume goes on from there" if any(each.goes_on for each in outcomes) else ""
+        how = "; --resume continues from there" if any(each.goes_on for each in outcomes) else ""
         left = f" Not begun: {missing}." if missing else ""
         say(
             request.common,
-            f"Interrupted: what was done by then is saved, with its true photon count{how}.{left}",
+            f"Interrupted: the photons traced so far are saved, with their true count{how}.{left}",
         )
     elif interrupted:
         say(request.common, f"Interrupted. Not done: {missing}.")
@@ -150,7 +150,7 @@ def _walk(
     if request.resume and checkpoint and not checkpoint.path.exists():
         if profiles := _finished(materials, targets, settings):
             return [_outcome(*each, None) for each in zip(profiles, targets, strict=True)]
-        say(request.common, f"There is no {checkpoint.path} to go on from: starting.")
+        say(request.common, f"No {checkpoint.path} to continue from: starting a new run.")
     profiles, seconds = _walked(materials, settings, request, checkpoint, stop)
     for profile, target in zip(profiles, targets, strict=True):
         try:
@@ -159,7 +159,7 @@ def _walk(
             if checkpoint is None or not checkpoint.is_ours():
                 raise
             raise FileError(
-                f"{str(error).rstrip('.')}; {checkpoint.path} is kept: --resume goes on from it."
+                f"{str(error).rstrip('.')}; {checkpoint.path} is kept: --resume continues from it."
             ) from None
     if checkpoint and is_complete(profiles[0]):
         checkpoint.remove()
@@ -226,7 +226,9 @@ def _walked(
 
         def note(now: Progress) -> None:
             if resumes and not last and checkpoint:
-                say(common, f"Going on from {checkpoint.path}: {now.photons_done:,} photons done.")
+                say(
+                    common, f"Continuing from {checkpoint.path}: {now.photons_done:,} photons done."
+                )
             last[:] = [now]
             if show:
                 show(now)

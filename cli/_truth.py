@@ -1,4 +1,4 @@
-"""Which profile a kernel was fitted to: what its pictures are held against."""
+"""Which profile a kernel was fitted to: the reference for its pictures."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def true_profile(
 ) -> tuple[Profile | None, str | None]:
     """Return the kernel's profile and its file: the one given, else the one it was fitted to.
 
-    That is the profile whose light has the fingerprint that the kernel recorded, from whatever
+    That is the profile whose light has the fingerprint that the kernel recorded, from any
     program; of several the newest. It is looked for beside the kernel and in the current folder;
     where there is none, what is there in its place is said.
     """

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 )
 @click.option("--spectrum", is_flag=True, help="Draw the energy of the kernel's singular values.")
 @click.option(
-    "--guide", is_flag=True, help="Draw the guide function beside what the guided fit leaves."
+    "--guide", is_flag=True, help="Draw the guide function beside the residual of the guided fit."
 )
 @click.option(
     "--mm-per-pixel",
@@ -56,19 +56,19 @@ if TYPE_CHECKING:
 @click.option(
     "--channel",
     metavar="NAME",
-    help="Which one, with --guide or of a kernel."
+    help="Channel to draw, with --guide or of a kernel."
     "  [default: the first that returns light; of a kernel up to three]",
 )
 @click.option(
     "--profile",
     metavar="FILE",
-    help="What a kernel was fitted to.  [default: found beside it or here by its fingerprint]",
+    help="Profile that a kernel was fitted to.  [default: found beside it or here, by its hash]",
 )
 @click.option(
     "--photons",
     type=Count(2, 10**12),
     metavar="N",
-    help="Of the photon walk, with --models.  [default: 1e7]",
+    help="Photons of the walk, with --models.  [default: 1e7]",
 )
 @click.option(
     "-o",
@@ -83,7 +83,7 @@ if TYPE_CHECKING:
 def chart(file: str | None, output: str | None, force: bool, common: Common, **given: Any) -> None:
     """Draw FILE: a profile, a kernel, a material or the checkpoint of a walk.
 
-    FILE is any of these, whatever its name, or - for stdin; by default the newest .profile.npz of
+    FILE is any of these, under any name, or - for stdin; by default the newest .profile.npz of
     this folder.
 
     A profile, and the profile so far of a checkpoint: 2 pi r R_d over r, linear and logarithmic;
@@ -96,11 +96,11 @@ def chart(file: str | None, output: str | None, force: bool, common: Common, **g
     squares and of its absolute values; how many terms leave an error of 1 %.
 
     With --guide, for each k, the guide function of the guided fit, the residual that the fit leaves
-    of one channel, and its pass beside the pre-integrated one; and the same of that one, under a
-    guide function that has it for the best.
+    of one channel, and its pass beside the pre-integrated one; and the same for the pre-integrated
+    pass, under the guide function for which it is optimal.
 
-    With --models FILE is a material, or a profile of the photon walk, which then need not be
-    walked again: the exact solution, the walk and the diffusion models in one figure, and how far
+    With --models FILE is a material, or a profile of the photon walk, which is then not simulated
+    again: the exact solution, the walk and the diffusion models in one figure, and how far
     each is from the exact solution. Only for one half space.
 
     \b
@@ -124,7 +124,9 @@ def chart(file: str | None, output: str | None, force: bool, common: Common, **g
         check_memory("figures", common.threads)
         material, walk = read_models(file)
         if walk is not None and given["photons"] is not None:
-            raise click.UsageError("--photons is for a walk that is yet to be; leave it out.")
+            raise click.UsageError(
+                "--photons is for a new walk, and FILE is already one; leave it out."
+            )
         path = target(output, f"{material.name}.models.png")
         draw: Callable[[], Drawn] = partial(draw_models, material, walk, given["photons"], common)
         inputs = [file]

@@ -80,8 +80,8 @@ _METRES = (0.1, 9.0)  # plain numbers that may have been meant in metres; 1cm is
     type=click.Choice(["p95", "p99", "mean"]),
     default="p95",
     show_default=True,
-    help="What has to be within it: a percentile over the picture, or the mean, which hides the "
-    "pixels that are far off.",
+    help="The figure to compare with it: a percentile over the picture, or the mean, which hides "
+    "the pixels that are far off.",
 )
 @click.option(
     "--irradiance",

@@ -36,12 +36,12 @@ _OF_BUDGETS = ("budget_chart", "photons", "rank", "terms", "model")
 @common_options
 @click.pass_context
 def compare(context: click.Context, /, material: str | None, common: Common, **given: Any) -> None:
-    """Say why a kernel of MATERIAL loses what it loses, and what every other would.
+    """Compare all kernels of MATERIAL by error and cost, and take an error apart by cause.
 
-    First the error budget: noise of the simulation, energy beyond the grid, separability, storage,
-    each switched on alone against the exact profile's whole 2D kernel, the largest first. Then
-    every method, rank and number of Gaussians on the pictures' pixels, with error and cost; a star
-    marks the Pareto front: no other kernel is better in both. Seconds are of this machine.
+    The error budget comes first: noise of the simulation, energy beyond the grid, separability and
+    storage, each alone against the exact profile's whole 2D kernel, largest first. Then come every
+    method, rank and number of Gaussians on the pictures' pixels, with error and cost. A star marks
+    the Pareto front: no other kernel is better in both. Seconds are those of this machine.
 
     MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or a .profile.npz
     file, - for one on stdin; a budget takes a half space with g = 0.

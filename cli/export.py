@@ -1,4 +1,4 @@
-"""``sssfit export``: what sssfit made, in a form for other programs."""
+"""``sssfit export``: kernels and profiles as files for other programs."""
 
 from __future__ import annotations
 
@@ -20,28 +20,28 @@ from ._output import finish_one, held, stem_of, target, write
     "form",
     type=click.Choice(["hlsl", "json", "csv"]),
     required=True,
-    help="What to write. hlsl: a kernel as shader source; json: a kernel as a document; csv: a "
+    help="Output format. hlsl: a kernel as shader source; json: a kernel as a document; csv: a "
     "profile as a table.",
 )
 @click.option(
     "-o",
     "--output",
     metavar="FILE",
-    help="Where it goes, - for stdout.  [default: NAME.FORMAT]",
+    help="Output file, - for stdout.  [default: NAME.FORMAT]",
 )
 @click.option(
     "--force", is_flag=True, help="Replace an input, or a file that sssfit did not write."
 )
 @common_options
 def export(file: str | None, form: str, output: str | None, force: bool, common: Common) -> None:
-    """Write FILE in a form for other programs.
+    """Export FILE for other programs.
 
     FILE is a .kernel.json file, for csv a .profile.npz file, or - for stdin; by default the newest
     of this folder. Shader source holds the signs and weights of every separable term, and a comment
     with material, fit, pixels, energy and errors. The table has the energy of each annulus and its
     standard error, against the annulus' outer edge r_mm (inf: beyond the grid), with every digit;
-    `sssfit import` reads it back. Specular reflectance, absorption and transmittance have no place
-    in it.
+    `sssfit import` reads it back. It leaves out specular reflectance, absorption and
+    transmittance.
 
     \b
       sssfit export --format hlsl

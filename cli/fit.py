@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 @click.command(epilog="\b\nMethods:\n" + lines_of(FITS))
 @click.argument("profile", required=False)
-@click.option("--list", "listing", is_flag=True, help="Print the methods, a line each.")
-@click.option("--method", type=click.Choice(list(FITS)), help="How; --list says what each does.")
+@click.option("--list", "listing", is_flag=True, help="List the methods.")
+@click.option("--method", type=click.Choice(list(FITS)), help="Fit method; --list describes each.")
 @click.option(
     "--mm-per-pixel",
     type=LengthOr("profile"),
@@ -39,7 +39,9 @@ if TYPE_CHECKING:
     help="Half width of the kernel; auto is the smallest that keeps 99.9 % of every channel.",
 )
 @click.option(
-    "--normalize", is_flag=True, help="Unit energy for every channel; its energy is kept apart."
+    "--normalize",
+    is_flag=True,
+    help="Scale every channel to unit energy, and store its energy as a factor.",
 )
 @method_options(FITS)
 @click.option(

@@ -32,7 +32,7 @@ _OF_TABLES = {"quantity": "--quantity", "unit": "--unit", "density_unit": "--den
 @click.option(
     "--quantity",
     type=click.Choice(["density", "energy"]),
-    help="What the numbers of a CSV are.  [default: what its own comment says]",
+    help="Meaning of the numbers of a CSV.  [default: what its own comment says]",
 )
 @click.option(
     "--unit",
@@ -65,7 +65,7 @@ def import_(
     common: Common,
     **of_table: str | None,
 ) -> None:
-    """Make a profile of FILE: a table (CSV), or what MCML wrote (.mco, ASCII); - for stdin.
+    """Convert FILE to a profile: a table (CSV) or MCML output (.mco, ASCII); - for stdin.
 
     A CSV has a header with r_mm (radii in mm, of any spacing) and one column a channel; r_um, r_cm
     and r_m are read as well and converted. X_stderr holds standard errors of X, and lines that
@@ -111,14 +111,18 @@ def _read(files: tuple[str, ...], of_table: dict[str, str | None], channels: str
     tables = [each for each, text in zip(origins, texts, strict=True) if not is_mco(text.content)]
     if not tables:
         if given := [option for key, option in _OF_TABLES.items() if of_table[key] is not None]:
-            raise click.UsageError(f"{given[0]} is for a CSV; an .mco says itself what it holds.")
+            raise click.UsageError(
+                f"{given[0]} is for a CSV; an .mco file states its own quantities."
+            )
         profiles = []
         for text, origin in zip(texts, origins, strict=True):
             with text.hinting(ProfileError) as content:
                 profiles.append(parse_mco(content, origin))
         return join_channels(profiles, _names(len(files), channels))
     if len(files) > 1:
-        raise ProfileError(f"{tables[0]} is no .mco; a CSV is imported alone, with all channels.")
+        raise ProfileError(
+            f"{tables[0]} is not an .mco file; a CSV is imported alone, with all channels."
+        )
     if channels is not None:
         raise click.UsageError("--channels is for .mco files; a CSV has names in its header.")
     with texts[0].hinting(ProfileError) as content:

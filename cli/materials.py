@@ -8,7 +8,7 @@ from click.core import ParameterSource
 from sssfit.messages import table
 
 from ._deon_skin import DEON_SKIN, show_deon_skin
-from ._invert import Wish, write_material
+from ._invert import InversionRequest, write_material
 from ._options import BaseColour, Common, Lengths, Number, common_options
 from ._output import finish
 
@@ -73,7 +73,7 @@ def materials(
     as_toml: bool,
     from_reflectance: list[float] | str | None,
     common: Common,
-    **wish: Any,
+    **request: Any,
 ) -> None:
     """List the materials that ship with sssfit, show one in full, or make one.
 
@@ -94,9 +94,9 @@ def materials(
     if from_reflectance is not None:
         if material is not None or as_toml:
             raise click.UsageError("--from-reflectance makes a material; name none with it.")
-        write_material(Wish(from_reflectance, **wish), common)
+        write_material(InversionRequest(from_reflectance, **request), common)
         return
-    for key in wish:
+    for key in request:
         if context.get_parameter_source(key) is ParameterSource.COMMANDLINE:
             raise click.UsageError(
                 f"--{key.replace('_', '-')} is for --from-reflectance; leave it out."
@@ -110,7 +110,7 @@ def materials(
     elif as_toml:
         from sssfit.material import load_material
 
-        # TOML is UTF-8 whatever the terminal's encoding: bytes.
+        # TOML is UTF-8 on every terminal: bytes.
         click.echo(load_material(material).to_toml().encode(), nl=False)
     else:
         _show(common, material)

@@ -1,4 +1,4 @@
-"""``sssfit render``: a kernel on a picture, and what it lost against the true 2D kernel."""
+"""``sssfit render``: a kernel on a picture, and its error against the true 2D kernel."""
 
 from __future__ import annotations
 
@@ -37,15 +37,15 @@ _BEHIND_DEGREES = 170.0
 @click.option(
     "--profile",
     metavar="FILE",
-    help="What to measure against.  [default: the profile here that the kernel was fitted to]",
+    help="Reference profile.  [default: the profile here that the kernel was fitted to]",
 )
 @click.option(
     "--exposure",
     type=NumberRange(min=0.0, min_open=True),
     metavar="FACTOR",
-    help="Of Delta E and of PNG files.  [default: from the true picture]",
+    help="Exposure for Delta E and PNG files.  [default: from the true picture]",
 )
-@click.option("--structure", is_flag=True, help='SSIM and FLIP too (needs "sssfit[metrics]").')
+@click.option("--structure", is_flag=True, help='Also SSIM and FLIP (needs "sssfit[metrics]").')
 @click.option(
     "-o",
     "--output",
@@ -95,7 +95,7 @@ def render(
     common: Common,
     **own: Any,
 ) -> None:
-    """Apply KERNEL to a picture of irradiance, and measure what it loses.
+    """Apply KERNEL to a picture of irradiance, and measure its error.
 
     KERNEL is a .kernel.json file, or - for stdin; by default the newest of this folder. The result
     is radiant exitance in linear light. Made pictures have the kernel's pixels; a file of your own

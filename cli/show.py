@@ -24,7 +24,7 @@ _SHARES = (0.5, 0.9, 0.99)
 def show(file: str | None, common: Common) -> None:
     """Print what FILE holds: a profile, a kernel, a material or the checkpoint of a walk.
 
-    FILE is any of these, whatever its name, or - for stdin; by default the newest .profile.npz of
+    FILE is any of these, under any name, or - for stdin; by default the newest .profile.npz of
     this folder.
 
     \b
@@ -68,7 +68,7 @@ def _checkpoint_text(figures: dict[str, Any]) -> str:
     return "\n".join(
         [
             f"so far    {figures['photons']:,} photons, {figures['flights']:,} flights, "
-            f"{figures['seconds']:.1f} s; --resume goes on from there",
+            f"{figures['seconds']:.1f} s; --resume continues from there",
             f"error     {100.0 * figures['relative_error']:.3g} % of F(r), in the worst channel",
             *(f"\n{_text(each)}" for each in figures["profiles"]),
         ]

@@ -30,9 +30,15 @@ if TYPE_CHECKING:
     default="montecarlo",
     show_default=True,
     metavar="METHOD",
-    help="How; the methods are listed below.",
+    help="Simulation method, as listed below.",
 )
-@click.option("--run", "number", type=WholeRange(1), metavar="N", help="Of an .mci, this run only.")
+@click.option(
+    "--run",
+    "number",
+    type=WholeRange(1),
+    metavar="N",
+    help="Simulate only this run of an .mci file.",
+)
 @method_options(SIMULATIONS)
 @click.option(
     "--dr",
@@ -75,11 +81,11 @@ def simulate(
     """Compute the diffuse reflectance profile of MATERIAL and write it.
 
     MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or - for stdin; or
-    an MCML input file, .mci: a profile a run, with its photons and grid where options give none.
-    The profile is R_d(r) per channel as energy in annuli with errors, for a normally incident
-    pencil beam, in mm. Ctrl-C saves what a photon walk has done, with its true photon count;
-    --resume goes on from there, or from the last checkpoint of a run that was killed, and ends in
-    the same bits as a run that was left alone.
+    an MCML input file (.mci), which gives one profile per run, with the file's photons and grid
+    unless options set them. The profile is R_d(r) per channel as energy in annuli with errors, for
+    a normally incident pencil beam, in mm. Ctrl-C saves the photons traced so far, with their true
+    count. --resume continues from there, or from the last checkpoint of a killed run, and ends in
+    the same bits as an undisturbed run.
 
     \b
       sssfit simulate skin1

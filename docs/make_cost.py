@@ -35,7 +35,7 @@ Six times the passes cost us {pass_ratio:.1f} times the time, and the report 2.3
 figures hold a fixed part, which it puts at .1 ms for two passes and .71 ms for six Gaussians where
 nothing scatters, and it does not say how many samples each Gaussian has. From 9 to 33 weights, 3.7
 times as many, we pay {sample_ratio:.1f} times and the report 3.1 times: here a pass costs much
-whatever its weights, so that fewer terms save more than shorter passes do.
+for any number of weights, so that fewer terms save more than shorter passes do.
 """
 
 

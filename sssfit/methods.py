@@ -99,18 +99,18 @@ SIMULATIONS: Mapping[str, Method] = {
             Setting(
                 "target_error",
                 "share",
-                "end when no channel's F(r) has a standard error above this share of F at the last "
-                "edge, such as 0.5%.",
+                "stop when every channel's F(r) has a standard error below this share of F at the "
+                "last edge, such as 0.5%.",
                 "SHARE",
             ),
             Setting(
                 "checkpoint_every",
                 "seconds",
-                "how often FILE.checkpoint is saved, from which --resume goes on.",
+                "time between saves of FILE.checkpoint, from which --resume continues.",
                 "SECONDS",
                 default=30.0,
             ),
-            Setting("resume", "flag", "go on where a killed or interrupted run was saved."),
+            Setting("resume", "flag", "continue a killed or interrupted run from its checkpoint."),
         ),
         shares=True,
     ),
@@ -164,8 +164,8 @@ SIMULATIONS: Mapping[str, Method] = {
 _ENERGY = Setting(
     "energy",
     "choice",
-    "scale the kernel to the diffuse reflectance, or keep what the support holds (svd: the least "
-    "error).",
+    "scale the kernel to the diffuse reflectance, or keep the energy within the support (svd: the "
+    "least error).",
     among=("rescale", "keep"),
     words="rescale",
 )
@@ -181,9 +181,9 @@ FITS: Mapping[str, Method] = {
         "sssfit.fit.gaussians:fit_gaussians",
         "1 to 10 passes: a sum of Gaussians, best for the profile, r-weighted",
         (
-            Setting("terms", "whole", "how many.", "N", (1, 10), words="4"),
+            Setting("terms", "whole", "number of Gaussians.", "N", (1, 10), words="4"),
             Setting("signed", "flag", "allow negative weights."),
-            Setting("free_energy", "flag", "do not hold the weights to the diffuse reflectance."),
+            Setting("free_energy", "flag", "leave the sum of the weights free."),
             _ENERGY,
         ),
         counted="terms",
@@ -201,7 +201,7 @@ FITS: Mapping[str, Method] = {
             Setting(
                 "b",
                 "number",
-                "how narrow the axes are that the guide leaves out.",
+                "narrowness of the axes that the guide function leaves out.",
                 "NUMBER",
                 words="50",
             ),
@@ -221,29 +221,29 @@ FITS: Mapping[str, Method] = {
             Setting(
                 "target",
                 "choice",
-                "fit the line integral, the 2D kernel, or what is seen of a disk, an edge and a "
-                "head, in some 5 s.",
+                "fit the line integral, the 2D kernel, or pictures of a disk, an edge and a head "
+                "(about 5 s).",
                 among=("line", "kernel", "picture"),
                 words="line",
             ),
             Setting(
                 "near",
                 "numbers",
-                "variance of the narrow Gaussian, one or a channel's each.",
+                "variance of the narrow Gaussian, one or one per channel.",
                 "MM2,...",
                 keyword="near_mm2",
             ),
             Setting(
                 "far",
                 "numbers",
-                "variance of the wide Gaussian, one or a channel's each.",
+                "variance of the wide Gaussian, one or one per channel.",
                 "MM2,...",
                 keyword="far_mm2",
             ),
             Setting(
                 "weight",
                 "numbers",
-                "share of the narrow Gaussian, one or a channel's each.",
+                "share of the narrow Gaussian, one or one per channel.",
                 "SHARE,...",
             ),
         ),
@@ -252,24 +252,24 @@ FITS: Mapping[str, Method] = {
         "sssfit.fit.falloff:fit_falloff",
         "one pass, red skin stretched: width, strength and falloff, fitted or by hand",
         (
-            Setting("width", "number", "one for all channels.", "W"),
+            Setting("width", "number", "width, the same for all channels.", "W"),
             Setting(
                 "strength",
                 "numbers",
-                "share that is blurred, one or a channel's each.",
+                "share that is blurred, one or one per channel.",
                 "T,...",
             ),
             Setting(
                 "falloff",
                 "numbers",
-                "a channel's width beside the others, one or a channel's each.",
+                "relative width of a channel, one or one per channel.",
                 "F,...",
             ),
         ),
     ),
     "burley": Method(
         "sssfit.fit.burley:fit_burley",
-        "one pass: normalised diffusion, a shape per channel, as engines take it",
+        "one pass: normalised diffusion, a shape per channel, as engines use it",
         (_ENERGY,),
     ),
 }

@@ -197,7 +197,7 @@ def test_import_through_pipes(tmp_path, content):
         (("a.mco", "g.mco"), 2, "name the profile of several files with -o"),
         (("a.mco", "g.mco", "-o", "x.npz"), 2, "give --channels with 2 names"),
         (("a.mco", "g.mco", "-o", "x.npz", "--channels", "R"), 1, "1 channel names"),
-        (("a.mco", "mine.csv", "-o", "x.npz"), 1, "mine.csv is no .mco"),
+        (("a.mco", "mine.csv", "-o", "x.npz"), 1, "mine.csv is not an .mco file"),
         (("a.mco", "-o", "no/x.npz"), 1, "there is no folder no"),
         (("none.mco",), 1, "none.mco cannot be read: no such file"),
         (("cut.mco",), 1, "cut.mco: ends after line"),

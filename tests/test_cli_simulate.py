@@ -248,7 +248,7 @@ def test_interrupted_runs_save_what_is_done(tmp_path, number):
     process.send_signal(number)
     out, err = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "Interrupted: what was done by then is saved" in err
+    assert "Interrupted: the photons traced so far are saved" in err
     figures = json.loads(out)
     assert figures["interrupted"] is True
     profile = Profile.load(tmp_path / "skin1.profile.npz")

@@ -261,3 +261,28 @@ def test_decisions_name_files_that_are_there():
     paths = re.findall(r"\b(?:sssfit|cli|docs|tests)/[\w/-]+(?:\.\w+)?", page)
     assert len(paths) > 5
     assert [path for path in paths if not (ROOT / path).exists()] == []
+
+
+# Phrases that stop a reader; what stands beside them reads at speed.
+ODD_PHRASES = {
+    r"of no use": "invalid",
+    r"ha(s|ve) not the": "does not ...",
+    r"\bto be had\b": "available",
+    r"\banew\b": "again",
+    r"leaves? off": "omits",
+    r"\bwhatever\b": "any, independent of",
+    r"held against": "compared with",
+}
+
+
+@pytest.mark.parametrize("phrase", ODD_PHRASES)
+def test_prose_is_plain(phrase):
+    places = [
+        f"{path.relative_to(ROOT)}: {line.strip()}"
+        for path in [ROOT / "README.md", ROOT / "CHANGELOG.md", ROOT / "CONTRIBUTING.md"]
+        + [path for room in ("sssfit", "cli") for path in (ROOT / room).rglob("*.py")]
+        + list(DOCS.rglob("*.md"))
+        for line in path.read_text(encoding="utf-8").splitlines()
+        if re.search(phrase, line, re.IGNORECASE)
+    ]
+    assert places == [], f"write {ODD_PHRASES[phrase]}"

@@ -437,7 +437,7 @@ def test_what_a_killed_write_left_is_cleared_away(tmp_path):
 def test_without_a_checkpoint_resume_starts(run, tmp_path):
     status, out, err = run("skin1", "--photons", "2e4", "--resume")
     assert status == 0
-    assert err.startswith(f"There is no {CHECKPOINT} to go on from: starting.\n")
+    assert err.startswith(f"No {CHECKPOINT} to continue from: starting a new run.\n")
     assert "Wrote skin1.profile.npz" in out
     assert names(tmp_path) == [PROFILE]
 
@@ -503,7 +503,7 @@ def test_a_checkpoint_is_gone_on_from_and_removed(run, tmp_path):
     done = leave_checkpoint(tmp_path / CHECKPOINT)
     status, out, err = run("skin1", "--photons", "3e5", "--resume", "--json")
     assert status == 0
-    assert err.startswith(f"Going on from {CHECKPOINT}: {done:,} photons done.\n")
+    assert err.startswith(f"Continuing from {CHECKPOINT}: {done:,} photons done.\n")
     assert json.loads(out)["photons"] == 300_000
     assert (tmp_path / PROFILE).read_bytes() == whole
     assert names(tmp_path) == [PROFILE]
@@ -565,7 +565,7 @@ def test_a_full_disk_at_the_end_is_one_line_and_resumed(run, tmp_path, monkeypat
     assert (status, out) == (1, "")
     assert err == (
         f"Error: {PROFILE} cannot be written: no space left on device; "
-        f"{CHECKPOINT} is kept: --resume goes on from it.\n"
+        f"{CHECKPOINT} is kept: --resume continues from it.\n"
     )
     assert names(tmp_path) == [CHECKPOINT]
     assert run("skin1", "--photons", "3e5", "--resume", "-q") == (0, "", "")
@@ -594,7 +594,7 @@ def test_interrupted_and_resumed(tmp_path):
     process.send_signal(signal.SIGTERM)
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130
-    assert "with its true photon count; --resume goes on from there." in err
+    assert "with their true count; --resume continues from there." in err
     assert names(tmp_path) == [PROFILE, CHECKPOINT]
     stopped = Profile.load(tmp_path / PROFILE)
     assert not is_complete(stopped)
@@ -602,7 +602,7 @@ def test_interrupted_and_resumed(tmp_path):
     process = start(tmp_path, *long, "--resume")
     _, err = process.communicate(timeout=120)
     assert process.returncode == 0
-    assert f"Going on from {CHECKPOINT}: {stopped.photons:,} photons done." in err
+    assert f"Continuing from {CHECKPOINT}: {stopped.photons:,} photons done." in err
     resumed = Profile.load(tmp_path / PROFILE)
     assert same_bits(resumed, skin1(target_error=0.001))
     assert names(tmp_path) == [PROFILE]
@@ -759,7 +759,7 @@ def test_a_walk_done_before_is_not_walked_again(run, tmp_path, monkeypatch):
     status, out, err = run("--paper", "--photons", "2000", "--resume")
     assert status == 0
     assert "Wrote marble.profile.npz\nFinished before, nothing to do: apple" in out
-    assert "There is no marble.profile.npz.checkpoint to go on from: starting." in err
+    assert "No marble.profile.npz.checkpoint to continue from: starting a new run." in err
     assert (tmp_path / "marble.profile.npz").read_bytes() == whole
 
 
@@ -803,7 +803,7 @@ def test_a_disk_that_fills_up_during_a_run(small_disk, undisturbed):
     assert err.count("Warning:") == err.count("no space left on device: the run goes on") == 1
     assert err.splitlines()[-1] == (
         f"Error: {PROFILE} cannot be written: no space left on device; "
-        f"{CHECKPOINT} is kept: --resume goes on from it."
+        f"{CHECKPOINT} is kept: --resume continues from it."
     )
     assert names(small_disk) == ["filler", CHECKPOINT]
     (small_disk / "filler").unlink()

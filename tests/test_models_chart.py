@@ -286,8 +286,8 @@ def test_the_verb_takes_a_profile_of_a_walk_and_its_grid(run, tmp_path):
         (("--models", "skin1", "-o", "a.jpg"), 1, ".png, .svg or .pdf"),
         (("--models", "skin1", "-o", "no/a.png"), 1, "there is no folder"),
         (("--models", "there.profile.npz"), 1, "there.profile.npz"),
-        (("--models", "exact.profile.npz"), 1, "is no photon walk of a known material"),
-        (("--models", "walk.profile.npz", "--photons", "5"), 2, "a walk that is yet to be"),
+        (("--models", "exact.profile.npz"), 1, "is not a photon walk of a known material"),
+        (("--models", "walk.profile.npz", "--photons", "5"), 2, "is for a new walk"),
         (("--models", "slab.toml"), 1, "finite thickness"),
     ],
 )
@@ -313,7 +313,7 @@ def test_a_walk_edited_to_have_no_photons_is_no_walk(run, tmp_path, skin1):
     dataclasses.replace(walk, meta={**walk.meta, "photons": None}).save(tmp_path / "w.profile.npz")
     status, _, err = run("--models", "w.profile.npz")
     assert (status, err.count("\n")) == (1, 1)
-    assert "is no photon walk of a known material" in err
+    assert "is not a photon walk of a known material" in err
 
 
 def test_charts_do_without_a_version_or_method(skin1):

@@ -180,7 +180,7 @@ def _signed(value: float, _: int) -> str:
 
 
 def _title(comparison: ModelComparison) -> str:
-    """Name the material, and what the models are held against."""
+    """Name the material and the reference of the models."""
     truth = "isotropic scattering" if _is_similar(comparison) else "the exact solution"
     return f"{shortened(comparison.material.name, 20)}: models against {truth}"
 

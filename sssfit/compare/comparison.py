@@ -18,10 +18,10 @@ from sssfit.profile import Profile
 
 
 def pareto_front(cost: npt.ArrayLike, error: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-    """Tell which points no other point beats.
+    """Tell which points no other point dominates.
 
-    A point is beaten by another that is no worse in both and better in one; of points that are
-    equal in both the first is kept. NaN and infinite points are on no front.
+    A point is dominated by another that is at least as good in both and better in one; of points
+    that are equal in both the first is kept. NaN and infinite points are never on the front.
 
     Parameters
     ----------

@@ -80,7 +80,7 @@ def fit(profile: Profile | str | Path, method: str = "svd", **settings: Any) -> 
     Raises
     ------
     FitError
-        There is no such method, or it cannot fit this profile with these settings.
+        Unknown method, or it cannot fit this profile with these settings.
     ProfileError
         The file cannot be read as a profile.
     """

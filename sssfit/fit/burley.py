@@ -1,4 +1,4 @@
-"""Normalised diffusion fitted to a profile: one shape s per channel, as engines take it.
+"""Normalised diffusion fitted to a profile: one shape s per channel, as engines use it.
 
 Christensen and Burley 2015, "Approximate reflectance profiles for efficient subsurface scattering":
 R_d(r) = A s (exp(-s r) + exp(-s r / 3)) / (8 pi r), with A the diffuse reflectance. A is the

@@ -14,7 +14,7 @@ density
 energy
     The share of the incident light that leaves in an annulus, whose outer edge is the radius and
     whose inner edge is that of the line before (0 for the first). A last line whose radius is inf
-    holds what leaves beyond.
+    holds the energy beyond.
 
 Radii may be unequally spaced. What we write is energy, with every digit: reading it gives the same
 bits of radii, energies and standard errors. Specular reflectance, absorption and transmittance have

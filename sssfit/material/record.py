@@ -287,7 +287,7 @@ def load_material(name_or_path: str | Path) -> Material:
     Raises
     ------
     MaterialError
-        There is no such material, or the file cannot be read or used; one line says which and why.
+        Unknown material, or its file cannot be read or is invalid.
 
     Examples
     --------

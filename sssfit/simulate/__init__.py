@@ -84,9 +84,9 @@ def simulate(
     Raises
     ------
     SimulationError
-        There is no such method, or it cannot treat this material with these settings.
+        Unknown method, or it cannot simulate this material with these settings.
     MaterialError
-        There is no such material, or its file cannot be read.
+        Unknown material, or its file cannot be read.
     """
     made = {each.makes: name for name, each in SIMULATIONS.items() if each.makes}
     own = made.get(material) if isinstance(material, str) else None

@@ -58,7 +58,7 @@ class State:
 
 @dataclass(slots=True)
 class Checkpoint:
-    """Where a walk saves its sums, how often, and whether it goes on from those found there.
+    """Where a walk saves its sums, how often, and whether it continues from saved ones.
 
     Parameters
     ----------
@@ -317,7 +317,7 @@ def _check_sums(name: str, sums: npt.NDArray[Any], mine: npt.NDArray[Any], photo
 
 
 def _check_settings(path: Path, there: Mapping[str, str], here: Mapping[str, str]) -> None:
-    """Name every setting in which a checkpoint differs from the run that is to go on from it."""
+    """Name every setting in which a checkpoint differs from the run that is to continue from it."""
     differing = [
         f"{_short(name)} = {_short(there.get(name))} (now {_short(here.get(name))})"
         for name in {**here, **there}

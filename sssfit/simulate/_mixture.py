@@ -60,7 +60,7 @@ def single_scattering_beyond(radii_mfp: FloatArray, eta: float, step: float) -> 
 
 
 def single_scattering_of_diffuse_light(eta: float) -> float:
-    """Return what leaves, once scattered, of light of the same radiance from everywhere above.
+    """Return the share that leaves, scattered once, of the same radiance from everywhere above.
 
     eta^2 int int (1 - R_F(mu)) (1 - R_F(mu')) mu mu' / (mu + mu') dmu dmu' over the cone, for
     albedo 1 and incident light of 1. Without a surface that is 2/3 (1 - ln 2).

@@ -75,7 +75,7 @@ def simulate_montecarlo(
         scatter are left out.
     checkpoint : Checkpoint or Path, optional
         Where to save the sums now and then, so that a run killed at any moment can go on and end
-        in the same bits; a path stands for ``Checkpoint(path)``, which goes on from what is there.
+        in the same bits; a path stands for ``Checkpoint(path)``, which continues an existing one.
         The file stays until the caller has saved the profile and calls ``Checkpoint.remove``.
     progress : callable, optional
         Called with a ``Progress`` some ten times a second.
@@ -93,7 +93,7 @@ def simulate_montecarlo(
         g beyond what the walk samples well, settings out of range or other than those of the
         checkpoint, or a target error with a channel that returns nothing within the grid.
     FileError
-        The checkpoint to go on from cannot be read, or is damaged or foreign.
+        The checkpoint to continue from cannot be read, or is damaged or foreign.
     StoppedError
         ``stop`` said so before a batch was done.
 

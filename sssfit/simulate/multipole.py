@@ -220,7 +220,8 @@ def _both_ways(
 ) -> tuple[FloatArray, FloatArray]:
     """Rhat and That (n, C) of the module's head for light from the side ``entered``.
 
-    The hyperbolic functions stand as falling exponentials: an infinite thickness is no exception.
+    The hyperbolic functions are written as falling exponentials, so an infinite thickness needs no
+    special case.
     """
     depth, near = medium.depth_mm, 2.0 * entered * medium.coefficient_mm
     far = 2.0 * other * medium.coefficient_mm
