@@ -1,6 +1,8 @@
 """Charts: what is drawn is what the profile holds, nothing is cut off, same input same bytes."""
 
+import ast
 import io
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import StepPatch
 
+from sssfit import chart
 from sssfit.chart.data import picture
 from sssfit.chart.files import FORMATS, chart_format, is_chart_file
 from sssfit.chart.material import material_figure
@@ -21,6 +24,7 @@ from sssfit.profile import Profile
 from sssfit.profile.bins import LEAST_HITS, effective_hits, merged
 from sssfit.simulate import simulate_montecarlo
 
+CHARTS = Path(chart.__file__).parent
 SIGNATURES = {"png": b"\x89PNG\r\n\x1a\n", "svg": b"<?xml", "pdf": b"%PDF-"}
 
 
@@ -313,6 +317,26 @@ def test_a_profile_so_far_says_so():
     for meta, title in (({}, ""), ({"checkpoint": "sssfit.checkpoint/1"}, " so far")):
         figure = profile_figure(hand_made(exponential(1), **meta))
         assert drawn_texts(figure)[0][0] == f"Diffuse reflectance profile{title}"
+
+
+@pytest.mark.parametrize("path", sorted(CHARTS.glob("*.py")), ids=lambda path: path.stem)
+def test_matplotlib_finds_the_places(path):
+    tree = ast.parse(path.read_text())
+    called = {node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+    assert not called & {"add_axes", "figtext", "subplots_adjust", "tight_layout"}
+
+
+def test_title_and_notes_stand_between_the_margins_and_wrap():
+    wide = spectrum([letter * 60 for letter in "Wm@"])
+    texts = drawn_texts(profile_figure(simulate_montecarlo(wide, photons=2000)))
+    width, margin = 1600, 20
+    (title,) = [box for text, box in texts if text.startswith("spectrum: diffuse")]
+    (notes,) = [box for text, box in texts if text.startswith("Beyond the grid")]
+    for box in (title, notes):
+        assert margin - 1 <= box.x0 < margin + 5
+        assert box.x1 <= width - margin + 1
+    assert notes.width > 0.9 * (width - 2 * margin)
+    assert notes.height > 4 * 7.5 / 72 * 200  # the first of three notes takes two lines
 
 
 # Materials

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from figures import assert_legible, words_of
+from figures import assert_legible, drawn_texts, legends_of, words_of
 from matplotlib.patches import StepPatch
 from reference_pixels import make_profile, one_over_r_centre_pixel, one_over_r_profile
 from scipy.integrate import dblquad
@@ -235,7 +235,7 @@ def test_what_is_below_zero_is_grey_and_dotted(kernel):
     assert (below.get_data().values > 0.0).any()
     texts = words_of(drawn)
     assert "Where the kernel is below 0, images are grey" in texts
-    labels = [each.get_text() for each in drawn.legends[0].get_texts()]
+    labels = [each.get_text() for each in legends_of(drawn)[1].get_texts()]
     assert labels == ["term 1 (−)", "term 2 (−)", "term 3 (−)"]  # noqa: RUF001
 
 
@@ -245,14 +245,14 @@ def test_signs_that_differ_between_channels_are_told(kernel):
     changed = SeparableKernel(
         **{name: getattr(kernel, name) for name in kernel.__slots__} | {"signs": signs}
     )
-    labels = [each.get_text() for each in kernel_figure(view_kernel(changed)).legends[0].texts]
+    _, terms = legends_of(kernel_figure(view_kernel(changed)))
+    labels = [each.get_text() for each in terms.get_texts()]
     assert labels[1] == "term 2 (c0 +, c1 +, c2 −)"  # noqa: RUF001
 
 
 def test_the_table_has_the_figures(figure, view):
-    texts = [each.get_text() for each in figure.texts]
-    assert texts[0] == "test: svd kernel, 3 terms"
-    assert "41 x 41 pixels of 0.25 mm" in texts[1]
+    assert words_of(figure).startswith("test: svd kernel, 3 terms 41 x 41 pixels of 0.25 mm")
+    texts = [text for text, _ in drawn_texts(figure)]
     for c in range(3):
         assert f"{view.energy[c]:.5f}" in texts
         assert f"{100 * view.relative_frobenius_error[c]:.2g} %" in texts

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from figures import assert_legible, drawn_texts, words_of
 
-from sssfit.chart.page import chart_style, new_figure, save_figure
+from sssfit.chart.page import lay_out, new_page, save_figure
 from sssfit.chart.pareto import pareto_figure, place_labels
 from sssfit.compare.candidates import Candidate
 from sssfit.compare.comparison import COSTS, ERRORS
@@ -184,10 +184,10 @@ def test_the_same_comparison_gives_the_same_bytes(comparison):
 def test_labels_never_meet_however_dense_the_front(many):
     rng = np.random.default_rng(many)
     x, y = np.sort(rng.uniform(0.5, 0.6, many)), np.sort(rng.uniform(0.4, 0.9, many))[::-1]
-    with chart_style():
-        figure = new_figure(3.0)
-        axes = figure.subplots()
+    with new_page(3.0, "labels", "a dense front") as (figure, below):
+        axes = below.subplots()
         axes.set(xlim=(0, 1), ylim=(0, 1))
+        lay_out(figure)
         names = [f"kernel {k}" for k in range(many)]
         place_labels(axes, list(zip(x, y, strict=True)), names, level=y[0] - 0.05)
     assert texts_in(axes)

@@ -7,7 +7,7 @@ import warnings
 
 import numpy as np
 import pytest
-from figures import assert_legible
+from figures import assert_legible, drawn_texts
 from reference_pixels import make_profile, one_over_r_profile
 
 from sssfit.chart.editing import editing_figure
@@ -218,7 +218,7 @@ def test_every_picture_is_drawn_with_its_delta_e(sheet):
     images = [each for axes in figure.axes for each in axes.images]
     assert len(images) == 2 * len(sheet.scenes) * len(sheet.rows)
     np.testing.assert_array_equal(images[1].get_array(), sheet.rows[0].panels[0].difference)
-    texts = [each.get_text() for each in figure.texts]
+    texts = [text for text, _ in drawn_texts(figure)]
     for row in sheet.rows[:-1]:
         for panel in row.panels:
             assert f"ΔE {panel.score.delta_e_2000_mean:.3g}" in texts

@@ -15,19 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from sssfit.chart.page import (
-    COLOURS,
-    LEFT,
-    RIGHT,
-    Style,
-    chart_style,
-    draw_footnotes,
-    draw_text,
-    drawable,
-    name_axes,
-    new_figure,
-    tick,
-)
+from sssfit.chart.page import COLOURS, Style, drawable, name_axes, new_page, tick
 from sssfit.chart.text import count, shortened
 
 if TYPE_CHECKING:
@@ -35,8 +23,6 @@ if TYPE_CHECKING:
 
 _BAR_INCHES = 0.3  # a picture's stacked bar
 _ROW_INCHES = 0.23  # a cause's line of markers
-_NAMES = 0.3  # of the width: where panels begin, right of the causes' names
-_HEAD_INCHES, _LEGEND_INCHES, _GAP_INCHES, _AXIS_INCHES = 0.62, 0.42, 0.62, 0.12
 _LEAST = 1e-4  # Delta E, or relative L2 in percent: smaller ones are drawn at the edge
 _WRITTEN_PERCENT = 6.0  # a share that has room for its figure in the bar
 # Okabe and Ito 2008, "Color Universal Design", with hatches that tell them apart in grey.
@@ -76,35 +62,22 @@ def budget_figure(budgets: Budget | Sequence[Budget]) -> Figure:
     given = list(budgets) if isinstance(budgets, Sequence) else [budgets]
     shown, names = given[: len(_MARKERS)], _names(given[0])
     bars, rows = _BAR_INCHES * len(shown), _ROW_INCHES * len(names)
-    with chart_style():
-        upper = _HEAD_INCHES + _LEGEND_INCHES + _AXIS_INCHES
-        lower = upper + bars + _GAP_INCHES + _LEGEND_INCHES - 0.12
-        figure = new_figure(lower + rows + 1.25)
-        _draw_head(figure, given[0])
-        draw_footnotes(figure, [*_NOTES, *_left_out(given)])
-        stacked = _panel(figure, upper, bars)
-        alone = _panel(figure, lower, rows)
+    notes = [*_NOTES, *_left_out(given)]
+    title, subtitle = _title(given[0]), _subtitle(given[0])
+    with new_page(3.2 + bars + rows, title, subtitle, notes) as (figure, below):
+        stacked, alone = below.subplots(2, height_ratios=(bars, rows))
         _draw_shares(stacked, shown)
         _draw_alone(alone, shown, names)
     return figure
 
 
-def _panel(figure: Figure, down: float, tall: float) -> Axes:
-    """Add axes right of the names, so many inches down the page."""
-    height = figure.get_figheight()
-    return figure.add_axes((_NAMES, 1 - (down + tall) / height, RIGHT - _NAMES, tall / height))
+def _title(budget: Budget) -> str:
+    """Name the material."""
+    return f"{shortened(budget.material.name, 24)}: why the kernel's picture is not the true one"
 
 
-def _draw_head(figure: Figure, budget: Budget) -> None:
-    """Title and provenance."""
-    name = shortened(budget.material.name, 24)
-    draw_text(
-        figure,
-        0.16,
-        f"{name}: why the kernel's picture is not the true one",
-        size=12,
-        weight="bold",
-    )
+def _subtitle(budget: Budget) -> str:
+    """Say what the kernel was made from, and what it is tried on."""
     source = budget.model or f"{count(budget.photons)} photons, seed {budget.seed}"
     kernel, scene = budget.kernel, budget.scene
     words = [
@@ -113,7 +86,7 @@ def _draw_head(figure: Figure, budget: Budget) -> None:
         f"of {scene.mm_per_pixel:.4g} mm",
         f"pictures {scene.width} x {scene.height}",
     ]
-    draw_text(figure, 0.41, " · ".join(words))
+    return " · ".join(words)
 
 
 def _names(budget: Budget) -> list[tuple[str, str]]:
@@ -191,23 +164,17 @@ def _draw_alone(axes: Axes, budgets: Sequence[Budget], names: Sequence[tuple[str
 
 
 def _legend(axes: Axes, title: str, handles: Sequence[Patch | Line2D], columns: int) -> None:
-    """Put a title at the left margin over a panel, and a legend beside it."""
-    figure = axes.get_figure(root=True)
-    if figure is None:
-        return
-    box = axes.get_position()
-    tall = figure.get_size_inches()[1]
-    top = box.y1 + (_LEGEND_INCHES if columns == 3 and len(handles) > 3 else 0.24) / tall
-    figure.text(LEFT, top - 0.07 / tall, title, va="center", fontweight="bold")
-    figure.legend(
+    """Put a title and a legend over a panel."""
+    axes.legend(
         handles=list(handles),
         ncols=columns,
-        loc="upper left",
-        bbox_to_anchor=(box.x0, top),
-        borderaxespad=0,
-        borderpad=0,
+        title=title,
+        alignment="left",
+        loc="lower left",
+        bbox_to_anchor=(0.0, 1.0),
+        borderaxespad=0.3,
+        borderpad=0.0,
         columnspacing=1.5,
-        fontsize=7.5,
     )
 
 

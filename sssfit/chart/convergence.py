@@ -10,16 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
 
-from sssfit.chart.page import (
-    COLOURS,
-    Style,
-    chart_style,
-    name_axes,
-    new_page,
-)
-from sssfit.chart.text import shortened
+from sssfit.chart.page import COLOURS, Style, name_axes, new_page, tick_decades
+from sssfit.chart.text import titled
 
 if TYPE_CHECKING:
     from sssfit.compare.convergence import Convergence
@@ -42,8 +35,8 @@ def convergence_figure(found: Convergence) -> Figure:
     matplotlib.figure.Figure
         8 inches wide; errors of F(r) as a share of the total, logarithmic on both axes.
     """
-    with chart_style():
-        figure, panels = new_page(_HEIGHT_INCHES, _title(found), _subtitle(found), [_NOTE])
+    title = titled(found.exact, "what accuracy costs the simulation")
+    with new_page(_HEIGHT_INCHES, title, _subtitle(found), [_NOTE]) as (figure, panels):
         left, right = panels.subplots(1, 2, sharey=True)
         _draw_photons(left, found)
         _draw_seconds(right, found)
@@ -53,10 +46,8 @@ def convergence_figure(found: Convergence) -> Figure:
         for axes in (left, right):
             axes.set_xscale("log")
             axes.set_yscale("log")
-            axes.xaxis.set_major_locator(LogLocator(numticks=9))
-            axes.yaxis.set_major_locator(LogLocator(numticks=9))
-            axes.xaxis.set_minor_formatter(NullFormatter())
-            axes.yaxis.set_minor_formatter(NullFormatter())
+            tick_decades(axes.xaxis, 9)
+            tick_decades(axes.yaxis, 9)
             axes.legend(loc="lower left")
     return figure
 
@@ -66,12 +57,6 @@ _NOTE = (
     "that leaves within r. Estimate: the exact method's difference to the next coarser resolution. "
     "Each walk has a seed of its own."
 )
-
-
-def _title(found: Convergence) -> str:
-    """Name the material."""
-    name = shortened(found.exact.material_name or "", 24)
-    return f"{name}: what accuracy costs the simulation".lstrip(": ")
 
 
 def _subtitle(found: Convergence) -> str:

@@ -5,31 +5,20 @@ The record comes from ``sssfit.compare.editing``, which has computed everything.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from matplotlib.figure import Figure
 
-from sssfit.chart.page import (
-    LEFT,
-    RIGHT,
-    WIDTH_INCHES,
-    chart_style,
-    draw_footnotes,
-    draw_text,
-    new_figure,
-)
-from sssfit.chart.panels import draw_bar, draw_difference, draw_picture
+from sssfit.chart.page import new_page
+from sssfit.chart.panels import draw_bar, new_mosaic, put_difference, put_picture
 
 if TYPE_CHECKING:
-    from sssfit.compare.editing import Edit, Editing
+    from sssfit.compare.editing import Editing
 
 AMPLIFIED = 10.0
-_HEAD_INCHES = 1.12
-_APART_INCHES = 0.12
-_WORDS_INCHES = 0.24  # under a row of pictures
-_FOOT_INCHES = 0.6
-_MOST_INCHES = 1.65  # 330 of the page's pixels
-_GREY = "#444444"
+_TITLE = "Six-Gaussian skin: the 2012 model edited by hand"
+_MOST_INCHES, _ROOM_INCHES = 1.8, 7.6  # of a picture, of a row of them
+_APART, _ROWS_APART = 0.05, 0.15  # of a picture; rows have figures between
 
 
 def editing_figure(editing: Editing) -> Figure:
@@ -44,55 +33,34 @@ def editing_figure(editing: Editing) -> Figure:
     matplotlib.figure.Figure
         8 inches wide; sRGB at one exposure, differences of lightness ten times amplified.
     """
-    count = len(editing.edits)
-    room = (RIGHT - LEFT) * WIDTH_INCHES - (count - 1) * _APART_INCHES
-    inches = min(room / count, _MOST_INCHES)
     rows, columns = editing.edits[0].panel.difference.shape
-    tall = inches * rows / columns
-    second = _HEAD_INCHES + tall + _WORDS_INCHES
-    with chart_style():
-        figure = new_figure(second + tall + _FOOT_INCHES)
-        _draw_head(figure, editing)
+    wide, tall = 1.0 + _APART, rows / columns + _ROWS_APART
+    width, height = wide * len(editing.edits) - _APART, 2.0 * tall - _ROWS_APART
+    inches = min(_ROOM_INCHES / width, _MOST_INCHES)
+    tall_inches = 1.95 + height * inches
+    with new_page(tall_inches, _TITLE, _subtitle(editing), _notes(editing)) as (figure, below):
+        axes = new_mosaic(below, width, height)
         for k, edit in enumerate(editing.edits):
-            left = LEFT * WIDTH_INCHES + k * (inches + _APART_INCHES)
-            _draw_edit(figure, edit, left, inches, is_original=k == 0)
+            put_picture(axes, wide * k, 0.0, edit.panel.codes)
             if k > 0:
-                difference = edit.panel.difference
-                draw_difference(figure, left, second, difference, inches, AMPLIFIED)
-        bar = LEFT * WIDTH_INCHES + 0.1, second + 0.5 * tall
-        draw_bar(figure, *bar, inches - 0.25, AMPLIFIED, "CIE L* less the original's")
-        draw_footnotes(figure, _notes(editing))
+                score = edit.panel.score
+                words = f"ΔE {score.delta_e_2000_mean:.2f}, p99 {score.delta_e_2000_p99:.1f}"
+                axes.text(wide * k, tall - 0.5 * _ROWS_APART, words, va="center")
+                put_difference(axes, wide * k, tall, edit.panel.difference, AMPLIFIED)
+        middles = [0.5 + wide * k for k in range(len(editing.edits))]
+        axes.set_xticks(middles, [each.label for each in editing.edits], weight="bold")
+        draw_bar(below, axes, AMPLIFIED, "CIE L* less the original's")
     return figure
 
 
-def _put(figure: Figure, down: float, text: str, left: float, **style: Any) -> None:
-    """Write a line, left in inches."""
-    draw_text(figure, down, text, left=left / WIDTH_INCHES, **style)
-
-
-def _draw_head(figure: Figure, editing: Editing) -> None:
-    """Title, provenance and what is shown."""
-    title = "Six-Gaussian skin: the 2012 model edited by hand"
-    draw_text(figure, 0.16, title, size=12, weight="bold")
+def _subtitle(editing: Editing) -> str:
+    """Say what is shown."""
     rows, columns = editing.edits[0].panel.difference.shape
-    version = editing.profile.meta.get("version")
-    pitch = f"{columns} x {rows} pixels of {editing.mm_per_pixel:g} mm"
-    draw_text(figure, 0.41, f"head, no texture · {pitch} · sssfit {version}")
-    below = f"below: difference of lightness to the original, amplified {AMPLIFIED:g} times"
-    draw_text(figure, 0.64, below, color=_GREY)
-
-
-def _draw_edit(
-    figure: Figure, edit: Edit, left: float, inches: float, *, is_original: bool
-) -> None:
-    """Draw one edit's name and picture, and its distance from the original."""
-    _put(figure, _HEAD_INCHES - 0.12, edit.label, left, weight="bold")
-    draw_picture(figure, left, _HEAD_INCHES, edit.panel.codes, inches)
-    tall = inches * edit.panel.difference.shape[0] / edit.panel.difference.shape[1]
-    score = edit.panel.score
-    if not is_original:
-        words = f"ΔE {score.delta_e_2000_mean:.2f}, p99 {score.delta_e_2000_p99:.1f}"
-        _put(figure, _HEAD_INCHES + tall + 0.12, words, left)
+    return (
+        f"head, no texture · {columns} x {rows} pixels of {editing.mm_per_pixel:g} mm · sssfit "
+        f"{editing.profile.meta.get('version')}\nbelow: difference of lightness to the original, "
+        f"amplified {AMPLIFIED:g} times"
+    )
 
 
 def _notes(editing: Editing) -> list[str]:

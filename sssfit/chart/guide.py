@@ -5,49 +5,45 @@ The record comes from ``sssfit.compare.guide``, which has computed everything.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, SymLogNorm
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.page import (
     COLOURS,
-    LEFT,
     LINE_WIDTH,
-    RIGHT,
-    WIDTH_INCHES,
     Style,
-    chart_style,
-    draw_footnotes,
-    draw_text,
+    add_table,
     name_axes,
-    new_figure,
+    new_page,
 )
-from sssfit.chart.panels import draw_plane, place_panel, signed_norm, tick_powers
+from sssfit.chart.panels import draw_plane, signed_norm, tick_powers
 from sssfit.chart.text import kernel_subtitle, shortened
 
 if TYPE_CHECKING:
     from sssfit.compare.guide import Guide
 
-_IMAGE_INCHES = 1.62  # a square
-_ROW_INCHES = _IMAGE_INCHES + 0.33
-_SECOND = LEFT * WIDTH_INCHES + _IMAGE_INCHES + 0.32  # from the left edge: the residual
-_THIRD = _SECOND + _IMAGE_INCHES + 0.72  # the pass
-_BAR_INCHES = 0.09
-_BAR_DOWN = 0.2  # under the last row: room for the name of x
-_BAR_WIDER = 0.46  # the residual's, whose numbers are long
-_FOOT_INCHES = 1.05  # under the bars: their numbers and names, and three lines of notes
-_TABLE_INCHES = 0.165
-_COLUMNS = (0.25, 0.44, 0.61, 0.80)  # of the width: the table's figures
-_HEADS = ("middle pixel of the pass", "energy misplaced", "Frobenius error", "misfit weighted by Γ")
+_ROW_INCHES, _LINE_INCHES = 2.05, 0.165  # of panels, of the table
+_WIDTHS = (1.0, 1.0, 1.75)  # of the columns, so that images fill theirs
+_HEADS = (
+    "",
+    "middle pixel of the pass",
+    "energy misplaced",
+    "Frobenius error",
+    "misfit weighted by Γ",
+)
 _GUIDE_DECADES = 3  # of the guide functions, below and above their value halfway out
 _PASS_DECADES = 6
 _GREY = "#666666"
+_DISTANCE = "distance from the middle (mm)"
 _NOTE = (
     "Residual: 2D kernel less a aᵀ, as a share of the channel's energy; red where the fit has too "
     "little light, blue where it has too much. Misplaced: half the sum of |residual|. Misfit: "
@@ -83,37 +79,25 @@ def guide_figure(guide: Guide) -> Figure:
         middle, with the pre-integrated pass.
     """
     rows = _rows(guide)
-    head = 0.95 + _TABLE_INCHES * len(rows) + 0.12
-    height = head + _ROW_INCHES * len(rows) + _BAR_DOWN + _FOOT_INCHES
-    with chart_style():
-        figure = new_figure(height)
-        _draw_head(figure, guide)
-        draw_footnotes(figure, [_NOTE])
+    where = kernel_subtitle(guide.profile, guide.pixels, guide.mm_per_pixel)
+    height = 2.05 + (_LINE_INCHES + _ROW_INCHES) * len(rows)
+    with new_page(height, _title(guide), where, [_NOTE]) as (figure, below):
+        below = add_table(below, _HEADS, _table(guide))
+        panels = below.subplots(
+            len(rows), len(_WIDTHS), squeeze=False, sharex="col", width_ratios=_WIDTHS
+        )
         shades = (
             LogNorm(10.0**-_GUIDE_DECADES, 10.0**_GUIDE_DECADES),
             signed_norm(np.stack([each.residual for each in rows])),
         )
-        for i, row in enumerate(rows):
-            place = head + _ROW_INCHES * i, i == 1, i == len(rows) - 1
-            _draw_row(figure, guide, row, place, shades)
-        below = head + _ROW_INCHES * len(rows) + _BAR_DOWN
-        _draw_bars(figure, below, shades)
+        for row, line in zip(rows, panels, strict=True):
+            _draw_row(line, guide, row, shades)
+        for axes, name in zip(panels[-1], ("x (mm)", "x (mm)", _DISTANCE), strict=True):
+            axes.set_xlabel(name)
+        panels[1, 2].legend(loc="lower left", reverse=True)
+        below.align_ylabels(panels[:, 2])
+        _draw_bars(below, panels, shades)
     return figure
-
-
-def _draw_head(figure: Figure, guide: Guide) -> None:
-    """Title, provenance and a table: a line for each k."""
-    draw_text(figure, 0.16, _title(guide), size=12, weight="bold")
-    draw_text(figure, 0.41, kernel_subtitle(guide.profile, guide.pixels, guide.mm_per_pixel))
-    down = 0.68
-    grey: Style = {"color": "#444444", "size": 8}
-    for left, head in zip(_COLUMNS, _HEADS, strict=True):
-        draw_text(figure, down, head, left=left, **grey)
-    for name, figures in _table(guide):
-        down += _TABLE_INCHES
-        draw_text(figure, down, name)
-        for left, each in zip(_COLUMNS, figures, strict=True):
-            draw_text(figure, down, each, left=left, size=8)
 
 
 def _rows(guide: Guide) -> list[_Row]:
@@ -141,32 +125,18 @@ def _table(guide: Guide) -> list[tuple[str, list[str]]]:
 
 
 def _draw_row(
-    figure: Figure,
-    guide: Guide,
-    row: _Row,
-    place: tuple[float, bool, bool],
-    shades: tuple[LogNorm, SymLogNorm],
+    panels: Sequence[Axes], guide: Guide, row: _Row, shades: tuple[LogNorm, SymLogNorm]
 ) -> None:
-    """Draw a row's panels; ``place`` is inches down the page, whether with the legend, the last."""
-    down, is_keyed, is_last = place
-    x_label = "x (mm)" if is_last else ""
-    lefts, square = (LEFT * WIDTH_INCHES, _SECOND), (_IMAGE_INCHES, _IMAGE_INCHES)
-    first, second = (place_panel(figure, left, down, *square) for left in lefts)
-    third = place_panel(figure, _THIRD, down, RIGHT * WIDTH_INCHES - _THIRD, _IMAGE_INCHES)
+    """Draw a row's panels."""
+    first, second, third = panels
     half_mm = 0.5 * guide.pixels * guide.mm_per_pixel
     draw_plane(first, _over_halfway(row.gamma), half_mm, shades[0], "cividis")
     draw_plane(second, row.residual, half_mm, shades[1], "RdBu_r")
     _draw_pass(third, guide, row.guided)
-    if is_keyed:
-        third.legend(loc="lower left", fontsize=7.5, reverse=True)
-    name_axes(first, f"guide function {row.guide}", x_label, "y (mm)")
-    name_axes(second, f"residual, {row.name}", x_label, "")
-    name_axes(third, f"pass, {row.name}", "distance from the middle (mm)" if is_last else "", "")
-    third.set_ylabel("share per mm")
-    third.yaxis.set_label_coords(-0.16, 0.5)  # the same in all rows
+    name_axes(first, f"guide function {row.guide}", "", "y (mm)")
+    name_axes(second, f"residual, {row.name}", "", "")
+    name_axes(third, f"pass, {row.name}", "", "share per mm")
     second.tick_params(labelleft=False)
-    for each in (first, second, third):
-        each.tick_params(labelbottom=is_last)
 
 
 def _over_halfway(gamma: FloatArray) -> FloatArray:
@@ -203,22 +173,17 @@ def _draw_pass(axes: Axes, guide: Guide, guided: FloatArray | None) -> None:
         axis.set_minor_formatter(NullFormatter())
 
 
-def _draw_bars(figure: Figure, down: float, shades: tuple[LogNorm, SymLogNorm]) -> None:
+def _draw_bars(
+    below: SubFigure, panels: npt.NDArray[Any], shades: tuple[LogNorm, SymLogNorm]
+) -> None:
     """Explain the colours of both columns of images, under them."""
-    height = figure.get_figheight()
-    bottom, tall = 1 - (down + _BAR_INCHES) / height, _BAR_INCHES / height
-    lefts = LEFT, _SECOND / WIDTH_INCHES
-    wide, wider = (_IMAGE_INCHES + each for each in (0.0, _BAR_WIDER))
-    for norm, shown, left, width, name in (
-        (shades[0], "cividis", lefts[0], wide, "Γ over Γ halfway out"),
-        (shades[1], "RdBu_r", lefts[1], wider, "energy per pixel, of the channel's"),
-    ):
-        cax = figure.add_axes((left, bottom, width / WIDTH_INCHES, tall))
-        bar = figure.colorbar(ScalarMappable(norm, shown), cax=cax, orientation="horizontal")
-        bar.set_label(name)
-        bar.ax.xaxis.set_major_formatter("{x:g}")
-        if isinstance(norm, SymLogNorm):
-            tick_powers(bar, norm)
+    place: Style = {"location": "bottom", "pad": 0.02, "aspect": 20}
+    first = below.colorbar(ScalarMappable(shades[0], "cividis"), ax=panels[:, 0], **place)
+    first.set_label("Γ over Γ halfway out")
+    first.ax.xaxis.set_major_formatter("{x:g}")
+    second = below.colorbar(ScalarMappable(shades[1], "RdBu_r"), ax=panels[:, 1], **place)
+    second.set_label("energy per pixel, of the channel's")
+    tick_powers(second, shades[1])
 
 
 def _title(guide: Guide) -> str:

@@ -1,4 +1,4 @@
-"""A kernel beside the profile it was fitted to, as a figure: `kernel_figure`.
+"""A kernel beside the profile it stands for, as a figure: `kernel_figure`.
 
 The record comes from ``sssfit.compare.kernel_view``, which has computed everything.
 """
@@ -6,65 +6,48 @@ The record comes from ``sssfit.compare.kernel_view``, which has computed everyth
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any, cast
 
 import matplotlib as mpl
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.cm import ScalarMappable
+from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LogNorm, Normalize, SymLogNorm
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
 from matplotlib.ticker import (
     FixedLocator,
     FuncFormatter,
     LogLocator,
-    NullFormatter,
 )
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.page import (
     COLOURS,
-    LEFT,
     LINE_STYLES,
     LINE_WIDTH,
-    RC,
-    RIGHT,
-    TEXT_INCHES,
-    WIDTH_INCHES,
     Style,
-    chart_style,
-    draw_footnotes,
-    draw_text,
-    drawable,
-    fitting,
-    inches,
+    add_legend,
+    add_table,
     name_axes,
-    new_figure,
+    new_page,
+    tick_decades,
 )
-from sssfit.chart.panels import draw_plane, place_panel, signed_norm, tick_powers
+from sssfit.chart.panels import draw_plane, signed_norm, tick_powers
 from sssfit.chart.text import count, method_name, shortened
 
 if TYPE_CHECKING:
     from sssfit.compare.kernel_view import KernelView
     from sssfit.kernel import SeparableKernel
 
-_LEFT_INCHES, _RIGHT_INCHES = LEFT * WIDTH_INCHES, RIGHT * WIDTH_INCHES
-_TABLE_INCHES, _LEGEND_INCHES = 0.165, 0.18
-_COLUMNS = (0.25, 0.42, 0.60, 0.79)  # of the width: the table's figures
-_PASS_INCHES, _PASS_GAP = 1.45, 0.12
-_IMAGE_INCHES, _IMAGE_GAP = 1.42, 0.1  # a square
-_ROW_INCHES = _IMAGE_INCHES + 0.33
-_SLICE_GAP = 0.66  # for the slices' numbers and name
-_BAR_INCHES = 0.09
-_BAR_DOWN = 0.6  # under the last row: room for the name of x
-_FOOT_INCHES = 0.7  # under the bars: their numbers and names, and a margin
-_NOTE_INCHES = 0.145
+_PASS_INCHES, _ROW_INCHES, _LINE_INCHES = 2.1, 1.76, 0.165  # of panels, of the table
+_WIDTHS = 4.4  # of planes and slices together, in images
 _MIDDLE = 0.2  # of a pixel: where the step of the middle one begins on a logarithmic axis
 _PASS_DECADES, _SLICE_DECADES, _IMAGE_DECADES, _DIFFERENCE_DECADES = 4, 7, 5, 3
-_SHADES, _SIGNED_SHADES = "cividis", "RdBu_r"
 _AXIS: Style = {"color": COLOURS[2], "linestyle": "-"}
 _DIAGONAL: Style = {"color": COLOURS[0], "linestyle": LINE_STYLES[1]}
 _PALE: Style = {"linestyle": "-", "lw": 3.2, "alpha": 0.3}
@@ -85,38 +68,18 @@ def kernel_figure(view: KernelView) -> Figure:
         difference in each pixel as a share of the channel's energy, and both along the axis and
         the diagonal. Without a profile only what is the kernel's.
     """
-    rows = len(view.channels)
-    labels = _term_labels(view)
-    columns = _legend_columns(labels)
-    passes = 1.04 + _TABLE_INCHES * rows + _LEGEND_INCHES * math.ceil(len(labels) / columns)
-    images = passes + _PASS_INCHES + 0.78
-    bars = images + _ROW_INCHES * (rows - 1) + _IMAGE_INCHES + _BAR_DOWN
-    notes = _notes(view)
-    with chart_style():
-        figure = new_figure(bars + _FOOT_INCHES + _NOTE_INCHES * len(notes))
-        _draw_head(figure, view)
-        draw_footnotes(figure, notes)
-        _draw_terms(figure, labels, columns, 0.84 + _TABLE_INCHES * rows)
-        _draw_passes(figure, view, passes)
-        norms = _image_norm(view), signed_norm(_or_zero(view.difference), _DIFFERENCE_DECADES)
-        for row in range(rows):
-            _draw_row(figure, view, row, images + _ROW_INCHES * row, norms)
-        _draw_bars(figure, view, bars, norms)
-    return figure
-
-
-def _draw_head(figure: Figure, view: KernelView) -> None:
-    """Title, provenance and a table: a line for each channel."""
-    kernel = view.kernel
-    draw_text(figure, 0.16, _title(kernel), size=12, weight="bold")
-    draw_text(figure, 0.41, _subtitle(kernel))
     heads, rows = _table(view)
-    for left, head in zip(_COLUMNS, heads, strict=True):
-        draw_text(figure, 0.68, head, left=left, color="#444444", size=8)
-    for k, (name, figures) in enumerate(rows, 1):
-        draw_text(figure, 0.68 + _TABLE_INCHES * k, name)
-        for left, each in zip(_COLUMNS, figures, strict=True):
-            draw_text(figure, 0.68 + _TABLE_INCHES * k, each, left=left, size=8)
+    labels = _term_labels(view)
+    planes = _ROW_INCHES * len(rows) + 0.9  # with their bars
+    height = 1.4 + _LINE_INCHES * (len(rows) + len(labels) / 2) + _PASS_INCHES + planes
+    title, subtitle = _title(view.kernel), _subtitle(view.kernel)
+    with new_page(height, title, subtitle, _notes(view)) as (figure, below):
+        handles = [Line2D([], [], **_term_style(t, len(labels))) for t in range(len(labels))]
+        below = add_legend(add_table(below, heads, rows), handles, labels)
+        upper, lower = cast(Any, below.subfigures(2, height_ratios=(_PASS_INCHES, planes)))
+        _draw_passes(upper, view)
+        _draw_planes(lower, view)
+    return figure
 
 
 def _title(kernel: SeparableKernel) -> str:
@@ -140,14 +103,14 @@ def _subtitle(kernel: SeparableKernel) -> str:
 
 def _table(view: KernelView) -> tuple[list[str], list[tuple[str, list[str]]]]:
     """Return the heads, and name and figures of each channel."""
-    heads = ["energy", "energy error", "Frobenius error", "energy misplaced"]
+    heads = ["", "energy", "energy error", "Frobenius error", "energy misplaced"]
     columns = (view.energy_error, view.relative_frobenius_error, view.misplaced)
     rows = []
     for k, c in enumerate(view.channels):
         shares = ["" if each is None else _percent(float(each[k])) for each in columns]
         name = shortened(view.kernel.channels[c])
         rows.append((name, [f"{view.energy[k]:.5f}", *shares]))
-    return heads if view.misplaced is not None else [*heads[:3], ""], rows
+    return heads if view.misplaced is not None else [*heads[:4], ""], rows
 
 
 def _percent(share: float) -> str:
@@ -170,29 +133,6 @@ def _term_labels(view: KernelView) -> list[str]:
     return labels
 
 
-def _legend_columns(labels: Sequence[str]) -> int:
-    # 0.6 inches for the line and the gap between columns.
-    widest = 0.6 + max(inches(each, RC["font.size"]) for each in labels)
-    rows = math.ceil(len(labels) / max(int(TEXT_INCHES / widest), 1))
-    return math.ceil(len(labels) / rows)
-
-
-def _draw_terms(figure: Figure, labels: Sequence[str], columns: int, down: float) -> None:
-    """Explain the lines of the passes, so many inches down the page."""
-    handles = [Line2D([], [], **_term_style(t, len(labels))) for t in range(len(labels))]
-    figure.legend(
-        handles,
-        [drawable(each) for each in labels],
-        ncols=columns,
-        loc="upper left",
-        bbox_to_anchor=(LEFT, 1 - down / figure.get_figheight()),
-        borderaxespad=0,
-        borderpad=0.2,
-        handlelength=2.8,
-        columnspacing=1.5,
-    )
-
-
 def _term_style(term: int, terms: int) -> Style:
     """Colour and dashes of a term: told apart without colour as well."""
     # The last tenth of viridis is too light on white.
@@ -201,15 +141,14 @@ def _term_style(term: int, terms: int) -> Style:
     return {"color": colour, "linestyle": LINE_STYLES[term % len(LINE_STYLES)], "lw": width}
 
 
-def _draw_passes(figure: Figure, view: KernelView, down: float) -> None:
+def _draw_passes(upper: SubFigure, view: KernelView) -> None:
     """Draw each channel's passes in a panel of its own, on scales that all share."""
-    kernel, n = view.kernel, len(view.channels)
+    kernel = view.kernel
     half = kernel.weights[:, kernel.half_pixels :][:, :, view.channels] / kernel.mm_per_pixel
-    width = (_RIGHT_INCHES - _LEFT_INCHES - _PASS_GAP * (n - 1)) / n
     edges = _edges(kernel.half_pixels, kernel.mm_per_pixel)
+    panels = upper.subplots(1, len(view.channels), sharex=True, sharey=True, squeeze=False)[0]
     for k, c in enumerate(view.channels):
-        left = _LEFT_INCHES + k * (width + _PASS_GAP)
-        axes = place_panel(figure, left, down, width, _PASS_INCHES)
+        axes = panels[k]
         # Scales first: a channel without light has nothing that a logarithmic one could fit.
         _scale_distance(axes, edges)
         _scale_passes(axes, half)
@@ -219,7 +158,6 @@ def _draw_passes(figure: Figure, view: KernelView, down: float) -> None:
             )
         title = f"passes, {shortened(kernel.channels[c])}"
         name_axes(axes, title, "distance from the middle (mm)", "" if k else "weight (1/mm)")
-        axes.tick_params(labelleft=k == 0)
 
 
 def _scale_passes(axes: Axes, values: FloatArray) -> None:
@@ -229,7 +167,7 @@ def _scale_passes(axes: Axes, values: FloatArray) -> None:
     if values.min() >= 0.0:
         axes.set_yscale("log", nonpositive="clip")
         axes.set_ylim(least, 2.0 * most)
-        _tick_decades(axes.yaxis, 6)
+        tick_decades(axes.yaxis, 6)
     else:
         axes.set_yscale("symlog", linthresh=least, linscale=0.5)
         axes.set_ylim(min(2.0 * float(values.min()), -least), 2.0 * most)
@@ -263,15 +201,7 @@ def _edges(half_pixels: int, pitch_mm: float) -> FloatArray:
 def _scale_distance(axes: Axes, edges: FloatArray) -> None:
     axes.set_xscale("log")
     axes.set_xlim(edges[0], edges[-1])
-    _tick_decades(axes.xaxis, 5)
-
-
-def _tick_decades(axis: Axis, most: int) -> None:
-    """Tick powers of ten; 2 and 5 have numbers too where an axis with limits is short."""
-    axis.set_major_locator(LogLocator(numticks=most))
-    axis.set_minor_locator(LogLocator(subs=(2, 5)))
-    low, high = axis.get_view_interval()
-    axis.set_minor_formatter("{x:g}" if math.log10(high / low) < 1.3 else NullFormatter())
+    tick_decades(axes.xaxis, 5)
 
 
 def _image_norm(view: KernelView) -> LogNorm:
@@ -284,33 +214,43 @@ def _or_zero(values: FloatArray | None) -> FloatArray:
     return np.zeros(1) if values is None else values
 
 
-def _draw_row(
-    figure: Figure, view: KernelView, row: int, down: float, norms: tuple[LogNorm, SymLogNorm]
-) -> None:
-    """Draw a channel's planes and slices, their top so many inches down the page."""
-    is_last = row == len(view.channels) - 1
-    name = shortened(view.kernel.channels[view.channels[row]])
-    for k, (title, images, is_signed) in enumerate(_planes(view)):
-        axes = place_panel(figure, _left(k), down, _IMAGE_INCHES, _IMAGE_INCHES)
-        shades = _SIGNED_SHADES if is_signed else _SHADES
-        seen = images[row] if is_signed else _clamped_to_scale(images[row], norms[0])
-        axes.set_facecolor("#bbbbbb")  # seen where the logarithm has no value
-        draw_plane(axes, seen, _half_mm(view), norms[is_signed], shades)
-        titles = f"{title}, {name}", title
-        title = fitting(titles, RC["axes.titlesize"], _IMAGE_INCHES)
-        name_axes(axes, title, "x (mm)" if is_last else "", "" if k else "y (mm)")
-        axes.tick_params(labelleft=k == 0, labelbottom=is_last)
-        ticks = [-_round(_half_mm(view)), 0.0, _round(_half_mm(view))]
-        axes.set_xticks(ticks)
-        axes.set_yticks(ticks)
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_formatter("{x:g}")
-    left = _left(len(list(_planes(view)))) - _IMAGE_GAP + _SLICE_GAP
-    axes = place_panel(figure, left, down, _RIGHT_INCHES - left, _IMAGE_INCHES)
-    _draw_slices(axes, view, row)
-    name_axes(axes, f"slices, {name}", "distance (mm)" if is_last else "", "")
-    axes.set_ylabel("per mm²")
-    axes.tick_params(which="both", labelbottom=is_last)
+def _draw_planes(lower: SubFigure, view: KernelView) -> None:
+    """Draw a row for each channel: its planes and slices; and the bars of colour under them."""
+    planes = list(_planes(view))
+    norms = _image_norm(view), signed_norm(_or_zero(view.difference), _DIFFERENCE_DECADES)
+    rows, widths = len(view.channels), [*[1.0] * len(planes), _WIDTHS - len(planes)]
+    panels = lower.subplots(rows, len(widths), squeeze=False, sharex="col", width_ratios=widths)
+    for row, channel in enumerate(view.channels):
+        name = shortened(view.kernel.channels[channel])
+        for axes, (title, images, is_signed) in zip(panels[row], planes, strict=False):
+            _draw_plane(axes, images[row], _half_mm(view), norms[is_signed])
+            if len(name) <= 6:  # a longer one has no room over an image
+                title += f", {name}"
+            name_axes(axes, title, "", "")
+        _draw_slices(panels[row, -1], view, row)
+        name_axes(panels[row, -1], f"slices, {name}", "", "per mm²")
+        panels[row, 0].set_ylabel("y (mm)")
+        panels[row, 0].tick_params(labelleft=True)
+    for axes in panels[-1]:
+        axes.set_xlabel("x (mm)")
+    panels[-1, -1].set_xlabel("distance (mm)")
+    _draw_bars(lower, panels, [is_signed for *_, is_signed in planes], norms)
+
+
+def _draw_plane(axes: Axes, image: FloatArray, half_mm: float, norm: Normalize) -> None:
+    """Draw a quadrant's whole plane, its numbers left to the first column."""
+    if isinstance(norm, LogNorm):
+        image = _clamped_to_scale(image, norm)
+    axes.set_facecolor("#bbbbbb")  # seen where the logarithm has no value
+    draw_plane(axes, image, half_mm, norm, _shades(norm))
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(FixedLocator([-_round(half_mm), 0.0, _round(half_mm)]))
+        axis.set_major_formatter("{x:g}")
+    axes.tick_params(labelleft=False)
+
+
+def _shades(norm: Normalize) -> str:
+    return "RdBu_r" if isinstance(norm, SymLogNorm) else "cividis"
 
 
 def _clamped_to_scale(image: FloatArray, norm: LogNorm) -> FloatArray:
@@ -325,11 +265,6 @@ def _planes(view: KernelView) -> Iterator[tuple[str, FloatArray, bool]]:
     yield "kernel", view.image, False
     if view.difference is not None:
         yield "difference", view.difference, True
-
-
-def _left(column: int) -> float:
-    """Where a column of images begins [inches]."""
-    return _LEFT_INCHES + column * (_IMAGE_INCHES + _IMAGE_GAP)
 
 
 def _half_mm(view: KernelView) -> float:
@@ -363,7 +298,7 @@ def _draw_slices(axes: Axes, view: KernelView, row: int) -> None:
     if view.true_axis is not None:
         axes.plot([], [], label="profile (wide)", **(_PALE | {"color": "#666666"}))
     if row == 0:
-        axes.legend(loc="lower left", fontsize=7.5, handlelength=2.4, labelspacing=0.25)
+        axes.legend(loc="lower left", handlelength=2.4, labelspacing=0.25)
 
 
 def _scale_slices(axes: Axes, view: KernelView) -> None:
@@ -375,7 +310,7 @@ def _scale_slices(axes: Axes, view: KernelView) -> None:
     every = (np.abs(view.axis), np.abs(view.diagonal), _or_zero(view.true_axis))
     most = max(float(each.max()) for each in every) or 1.0
     axes.set_ylim(most * 10.0**-_SLICE_DECADES, 3.0 * most)
-    _tick_decades(axes.yaxis, 5)
+    tick_decades(axes.yaxis, 5)
 
 
 def _draw_steps(axes: Axes, values: FloatArray, edges: FloatArray, style: Style) -> None:
@@ -385,33 +320,28 @@ def _draw_steps(axes: Axes, values: FloatArray, edges: FloatArray, style: Style)
 
 
 def _draw_bars(
-    figure: Figure, view: KernelView, down: float, norms: tuple[LogNorm, SymLogNorm]
+    lower: SubFigure,
+    panels: npt.NDArray[Any],
+    is_signed: list[bool],
+    norms: tuple[LogNorm, SymLogNorm],
 ) -> None:
     """Explain the colours of the images, under them."""
-    planes = [is_signed for *_, is_signed in _planes(view)]
-    plain = planes.count(False)
-    wide = _left(plain) - _IMAGE_GAP - _LEFT_INCHES
-    _draw_bar(figure, _LEFT_INCHES, down, wide, norms[0], "energy per mm²")
-    if any(planes):
-        left = _left(plain)
-        label = "difference: energy per pixel, of the channel's"
-        _draw_bar(figure, left + 0.12, down, _IMAGE_INCHES + 0.9, norms[1], label)
+    plain = is_signed.count(False)
+    bar = _bar(lower, panels[:, :plain], norms[0], "energy per mm²", extend="min")
+    bar.ax.xaxis.set_major_locator(LogLocator(numticks=4))
+    bar.ax.minorticks_off()
+    if any(is_signed):
+        label = "energy per pixel, of the channel's"
+        tick_powers(_bar(lower, panels[:, plain:-1], norms[1], label), norms[1])
 
 
-def _draw_bar(
-    figure: Figure, left: float, down: float, width: float, norm: Normalize, label: str
-) -> None:
-    axes = place_panel(figure, left, down, width, _BAR_INCHES)
-    shades = _SIGNED_SHADES if isinstance(norm, SymLogNorm) else _SHADES
-    extend = "neither" if isinstance(norm, SymLogNorm) else "min"
-    mappable = ScalarMappable(norm, shades)
-    bar = figure.colorbar(mappable, cax=axes, orientation="horizontal", extend=extend)
-    bar.set_label(label)
-    if isinstance(norm, SymLogNorm):
-        tick_powers(bar, norm)
-    else:
-        bar.ax.xaxis.set_major_locator(LogLocator(numticks=4))
-        bar.ax.minorticks_off()
+def _bar(
+    lower: SubFigure, beside: npt.NDArray[Any], norm: Normalize, label: str, **style: Any
+) -> Colorbar:
+    shades = ScalarMappable(norm, _shades(norm))
+    bar = lower.colorbar(shades, ax=beside, location="bottom", pad=0.03, aspect=20, **style)
+    bar.set_label(label, loc="left")  # a narrow one's runs on to the right, where nothing is
+    return bar
 
 
 def _notes(view: KernelView) -> list[str]:

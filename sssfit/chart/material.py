@@ -7,17 +7,16 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogFormatter, LogLocator
 
 from sssfit.chart.page import (
     COLOURS,
     LINE_STYLES,
     Style,
     add_legend,
-    chart_style,
     drawable,
     name_axes,
     new_page,
+    tick_decades,
 )
 from sssfit.chart.text import shortened, spread
 from sssfit.material import Layer, Material
@@ -49,10 +48,11 @@ def material_figure(material: Material) -> Figure:
     """
     matter = [k for k, layer in enumerate(material.layers) if not layer.is_clear]
     shown = [matter[k] for k in spread(len(matter), _MOST_LAYERS)]
-    with chart_style():
-        title = f"{shortened(material.name, 24)}: material"
-        notes = _notes(material, shown)
-        figure, below = new_page(HEIGHT_INCHES, title, _subtitle(material), notes)
+    title = f"{shortened(material.name, 24)}: material"
+    notes = _notes(material, shown)
+    names = [shortened(each) for each in material.channels]
+    height = HEIGHT_INCHES + (0.07 * max(map(len, names)) if _are_upright(names) else 0.0)
+    with new_page(height, title, _subtitle(material), notes) as (figure, below):
         handles = [Line2D([], [], **_style(k)) for k in range(len(shown))]
         below = add_legend(below, handles, [_label(material, each) for each in shown])
         panels = below.subplots(1, 3)
@@ -61,10 +61,10 @@ def material_figure(material: Material) -> Figure:
         for k, layer in enumerate(shown):
             _draw_layer(panels, material.layers[layer], k)
         titles = ("(a) sigma_s' and, hollow, sigma_a", "(b) mean free path", "(c) 1 - albedo")
-        names = ("1/mm", "mm", "1 - albedo")
-        for axes, title, name in zip(panels, titles, names, strict=True):
-            name_axes(axes, title, "channel", name)
-            _name_channels(axes, material.channels)
+        units = ("1/mm", "mm", "1 - albedo")
+        for axes, title, unit in zip(panels, titles, units, strict=True):
+            name_axes(axes, title, "channel", unit)
+            _name_channels(axes, names)
             _limit(axes)
     return figure
 
@@ -118,13 +118,18 @@ def _draw_layer(panels: Sequence[Axes], layer: Layer, place: int) -> None:
         axes.plot(np.arange(len(values)), np.where(is_drawn, values, np.nan), **style)
 
 
-def _name_channels(axes: Axes, channels: Sequence[str]) -> None:
-    """Name the channels beside each other, or some of them upright where there is no room."""
-    names = [drawable(shortened(each)) for each in channels]
-    is_upright = sum(map(len, names)) > _LETTERS
+def _are_upright(names: Sequence[str]) -> bool:
+    """Whether names have no room beside each other under a panel."""
+    return sum(map(len, names)) > _LETTERS
+
+
+def _name_channels(axes: Axes, names: Sequence[str]) -> None:
+    """Name the channels beside each other, or up to twelve of them upright."""
+    is_upright = _are_upright(names)
     shown = spread(len(names), _MOST_NAMES) if is_upright else range(len(names))
-    axes.set_xticks(shown, [names[k] for k in shown], rotation=90 if is_upright else 0)
-    axes.margins(x=0.5 / len(names))
+    rotation = 90 if is_upright else 0
+    axes.set_xticks(shown, [drawable(names[k]) for k in shown], rotation=rotation)
+    axes.margins(x=max(0.5 / len(names), 0.04))
 
 
 def _limit(axes: Axes) -> None:
@@ -134,10 +139,8 @@ def _limit(axes: Axes) -> None:
     low, high = (float(values.min()), float(values.max())) if values.size else (0.1, 1.0)
     middle = math.sqrt(low * high)
     axes.set_ylim(min(low / 1.5, middle / 3.2), max(high * 1.5, middle * 3.2))
-    axes.yaxis.set_major_locator(LogLocator(numticks=6))
-    axes.yaxis.set_minor_locator(LogLocator(subs=(2, 5)))
-    axes.yaxis.set_major_formatter(LogFormatter())
-    axes.yaxis.set_minor_formatter(LogFormatter(minor_thresholds=(1.3, 1.3)))
+    tick_decades(axes.yaxis, 6)
+    axes.yaxis.set_major_formatter("{x:g}")
 
 
 def _notes(material: Material, shown: Sequence[int]) -> list[str]:

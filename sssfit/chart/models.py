@@ -19,7 +19,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, StrMethodFormatter
 
 from sssfit.arrays import FloatArray
-from sssfit.chart.page import Handle, Style, add_table, chart_style, name_axes, new_page
+from sssfit.chart.page import Handle, Style, add_table, name_axes, new_page
 from sssfit.chart.text import WEIGHTED, count, grid, method_name, shortened, spread
 
 if TYPE_CHECKING:
@@ -59,9 +59,8 @@ def models_figure(comparison: ModelComparison) -> Figure:
         [%] below, linear to 10 % and logarithmic beyond; totals and their errors in the legend.
     """
     shown = spread(comparison.material.n_channels, _MOST_COLUMNS)
-    with chart_style():
-        title, subtitle = _title(comparison), _subtitle(comparison)
-        figure, below = new_page(HEIGHT_INCHES, title, subtitle, _notes(comparison, shown))
+    title, subtitle = _title(comparison), _subtitle(comparison)
+    with new_page(HEIGHT_INCHES, title, subtitle, _notes(comparison, shown)) as (figure, below):
         below = add_table(below, *_table(comparison, shown))
         panels = below.subplots(
             2, len(shown), squeeze=False, sharex=True, sharey="row", height_ratios=(1.25, 1)

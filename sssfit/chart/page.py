@@ -1,14 +1,16 @@
-"""The page a chart stands on: style, measured text, footnotes, axes with their names.
+"""The page a chart stands on: style, title, legend or table, notes, axes with their names.
 
 What every figure of ``sssfit.chart`` is drawn with; the words are in ``sssfit.chart.text``.
 """
 
 import contextlib
+import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib import font_manager
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -20,7 +22,8 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
 from matplotlib.legend_handler import HandlerBase
 from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator, StrMethodFormatter
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
+from matplotlib.transforms import Bbox
 
 from sssfit.chart.files import MAKER, chart_format, known_format
 from sssfit.files import write_atomically
@@ -28,10 +31,7 @@ from sssfit.files import write_atomically
 Style = dict[str, Any]
 Handle = Artist | tuple[Artist, ...]  # what stands in a legend: drawn over each other, if several
 
-WIDTH_INCHES, HEIGHT_INCHES, DPI = 8.0, 6.0, 200  # 1600 x 1200 pixels
-MARGIN_INCHES = 0.1
-LEFT, RIGHT = 0.092, 0.982  # of the width
-ROW_GAP_INCHES = 0.66
+WIDTH_INCHES, MARGIN_INCHES, DPI = 8.0, 0.1, 200  # 1600 pixels wide
 FONT = "DejaVu Sans"  # comes with matplotlib: the same glyphs on every machine
 LINE_WIDTH = 1.1  # points
 RC: Style = {
@@ -63,39 +63,49 @@ COLOURS = ("#d55e00", "#009e73", "#0072b2")
 LINE_STYLES: tuple[Any, ...] = ("-", (0, (4, 1.6)), (0, (6, 1.6, 1.2, 1.6)), (0, (1.2, 1.4)))
 
 
-TEXT_INCHES = (RIGHT - LEFT) * WIDTH_INCHES
 NOTE_SIZE, NOTE_COLOUR = 7.5, "#444444"
 
 
-def new_figure(height_inches: float = HEIGHT_INCHES) -> Figure:
-    """Make an empty page, 8 inches wide."""
-    figure = Figure(figsize=(WIDTH_INCHES, height_inches), dpi=DPI)
-    FigureCanvasAgg(figure)
-    return figure
+@contextlib.contextmanager
+def chart_style() -> Iterator[None]:
+    """Matplotlib's defaults and ours on top, whatever the user's matplotlibrc says."""
+    kept = {"backend", "backend_fallback", "interactive", "toolbar", "timezone"}
+    defaults = {key: value for key, value in mpl.rcParamsDefault.items() if key not in kept}
+    with mpl.rc_context(cast(Any, defaults | RC)):
+        yield
 
 
+@contextlib.contextmanager
 def new_page(
     height_inches: float, title: str, subtitle: str, notes: Sequence[str] = ()
-) -> tuple[Figure, SubFigure]:
+) -> Iterator[tuple[Figure, SubFigure]]:
     """Make a page, 8 inches wide, with its title and provenance at the head and notes at the foot.
 
-    Returns the figure, and what is left of it for `add_legend`, `add_table` and panels. Each takes
-    the head of a subfigure and leaves the rest: matplotlib lets nothing else share that place.
+    Yields the figure, and what is left of it for `add_legend`, `add_table` and panels. Each takes
+    the head of a subfigure and leaves the rest: matplotlib lets nothing else share that place. When
+    all is drawn, `lay_out` gives everything its place.
     """
+    with chart_style():
+        figure = _empty_page(height_inches)
+        page = _rest(figure)
+        left: Style = {"x": 0.0, "ha": "left", "wrap": True}
+        page.suptitle(drawable(title), fontsize=12, fontweight="bold", **left)
+        foot = "\n".join(drawable(each) for each in notes)
+        page.supxlabel(foot, fontsize=NOTE_SIZE, color=NOTE_COLOUR, **left)
+        below = _rest(page)
+        below.suptitle(drawable(subtitle), fontsize=RC["font.size"], **left)
+        yield figure, _rest(below)
+        lay_out(figure)
+
+
+def _empty_page(height_inches: float) -> Figure:
     margins = MARGIN_INCHES / WIDTH_INCHES, MARGIN_INCHES / height_inches
     layout = ConstrainedLayoutEngine(
-        rect=(*margins, 1 - 2 * margins[0], 1 - 2 * margins[1]), w_pad=0.05, h_pad=0.045
+        rect=(*margins, 1 - 2 * margins[0], 1 - 2 * margins[1]), w_pad=0.05, h_pad=0.06
     )
     figure = Figure(figsize=(WIDTH_INCHES, height_inches), dpi=DPI, layout=layout)
     FigureCanvasAgg(figure)
-    page = _rest(figure)
-    left: Style = {"x": 0.0, "ha": "left", "wrap": True}
-    page.suptitle(drawable(title), fontsize=12, fontweight="bold", **left)
-    foot = "\n".join(drawable(each) for each in notes)
-    page.supxlabel(foot, fontsize=NOTE_SIZE, color=NOTE_COLOUR, **left)
-    below = _rest(page)
-    below.suptitle(drawable(subtitle), fontsize=RC["font.size"], **left)
-    return figure, _rest(below)
+    return figure
 
 
 def _rest(figure: Figure | SubFigure) -> SubFigure:
@@ -108,8 +118,8 @@ def add_legend(
 ) -> SubFigure:
     """Explain handles at the head of a subfigure, in as many columns as fit; return the rest."""
     room = (WIDTH_INCHES - 2 * MARGIN_INCHES) * DPI
-    for columns in range(min(4, len(handles)), 0, -1):
-        legend = _draw_legend(below, handles, labels, columns, title)
+    for columns in range(min(5, len(handles)), 0, -1):
+        legend = _draw_legend(below, handles, labels, columns, title=title or None)
         if columns == 1 or legend.get_window_extent().width <= room:
             break
         legend.remove()
@@ -130,7 +140,9 @@ def add_table(
     cells = list(zip(heads, *([name, *figures] for name, figures in rows), strict=True))
     names = [blank, *(handles or [blank] * len(rows))]
     every = [*names, *[blank] * (len(names) * (len(cells) - 1))]
-    legend = _draw_legend(below, every, [each for column in cells for each in column], len(cells))
+    words = [each for column in cells for each in column]
+    apart = 0.8 if handles else 0.0
+    legend = _draw_legend(below, every, words, len(cells), handletextpad=apart)
     for head in legend.get_texts()[:: len(names)]:
         head.set_color(NOTE_COLOUR)
     return _rest(below)
@@ -158,14 +170,13 @@ def _draw_legend(
     handles: Sequence[Handle],
     labels: Sequence[str],
     columns: int,
-    title: str = "",
+    **style: Any,
 ) -> Legend:
     legend = below.legend(
         cast(Sequence[Artist], handles),  # matplotlib's stubs know of no tuples
         [drawable(each) for each in labels],
         ncols=columns,
         loc="outside upper left",
-        title=title or None,
         alignment="left",
         borderaxespad=0,
         borderpad=0.2,
@@ -173,65 +184,14 @@ def _draw_legend(
         handlelength=2.8,
         columnspacing=1.5,
         handler_map={_Blank: _NoRoom()},
+        **style,
     )
     legend.get_title().set_color(NOTE_COLOUR)
     return legend
 
 
-@contextlib.contextmanager
-def chart_style() -> Iterator[None]:
-    """Matplotlib's defaults and ours on top, independent of the user's matplotlibrc."""
-    kept = {"backend", "backend_fallback", "interactive", "toolbar", "timezone"}
-    defaults = {key: value for key, value in mpl.rcParamsDefault.items() if key not in kept}
-    with mpl.rc_context(cast(Any, defaults | RC)):
-        yield
-
-
-def draw_footnotes(figure: Figure, notes: Sequence[str]) -> float:
-    """Caption at the foot; the height where the panels may begin, as a fraction."""
-    height = figure.get_figheight()
-    lines = [line for note in notes for line in _wrapped(note, NOTE_SIZE)]
-    for k, line in enumerate(reversed(lines)):
-        draw_text(figure, height - 0.12 - 0.145 * k, line, size=NOTE_SIZE, color=NOTE_COLOUR)
-    return (0.6 + 0.145 * len(lines)) / height
-
-
-def _wrapped(text: str, size: float) -> list[str]:
-    """Break a text into lines of the figure's width."""
-    lines = [""]
-    for word in text.split():
-        longer = f"{lines[-1]} {word}".lstrip()
-        if inches(longer, size) <= TEXT_INCHES:
-            lines[-1] = longer
-        else:
-            lines.append(word)
-    return lines
-
-
-def inches(text: str, size: float) -> float:
-    """Width of a line of text at a font size in points."""
-    font = _font()
-    font.set_size(size, 720)  # at 72 dpi hinting widens a line by 3 %
-    font.set_text(drawable(text))
-    return float(font.get_width_height()[0] / 64 / 720)  # 26.6 fixed-point pixels
-
-
-def fitting(choices: Sequence[str], size: float, width_inches: float) -> str:
-    """Return the first text that is no wider, or the last where none fits."""
-    fits = (each for each in choices if inches(each, size) <= width_inches)
-    return next(fits, choices[-1])
-
-
 def _font() -> FT2Font:
     return font_manager.get_font(font_manager.findfont(FONT))
-
-
-def draw_text(
-    figure: Figure, inches_down: float, text: str, *, left: float = LEFT, **style: Any
-) -> None:
-    """Put a line at the left margin, or so far right of it as a share of the width."""
-    y = 1 - inches_down / figure.get_figheight()
-    figure.text(left, y, drawable(text), va="center", **style)
 
 
 def drawable(text: str) -> str:
@@ -247,11 +207,36 @@ def tick(axis: Axis) -> None:
     axis.set_major_formatter(StrMethodFormatter("{x:g}"))
 
 
+def tick_decades(axis: Axis, most: int) -> None:
+    """Tick powers of ten; 2 and 5 have numbers too where an axis with limits is short."""
+    axis.set_major_locator(LogLocator(numticks=most))
+    axis.set_minor_locator(LogLocator(subs=(2, 5)))
+    low, high = axis.get_view_interval()
+    axis.set_minor_formatter("{x:g}" if math.log10(high / low) < 1.3 else NullFormatter())
+
+
 def name_axes(axes: Axes, title: str, x_label: str, y_label: str) -> None:
     """Give a panel its title and labels; only the last may hold formulas."""
     axes.set_title(drawable(title), loc="left")
     axes.set_xlabel(drawable(x_label))
     axes.set_ylabel(y_label)
+
+
+def lay_out(figure: Figure) -> None:
+    """Give everything its place, once, so that the same figure has the same bytes.
+
+    Places differ by a rounding (2e-16) from run to run, and SVG names clips by a hash of them.
+    """
+    engine = figure.get_layout_engine()
+    if not isinstance(engine, ConstrainedLayoutEngine):
+        return
+    engine.execute(figure)
+    figure.set_layout_engine("none")
+    for each in figure.findobj(SubFigure):
+        each.bbox_relative.set_points(np.round(each.bbox_relative.get_points(), 9))
+    for axes in figure.axes:
+        points = axes.get_position(original=True).get_points()
+        axes.set_position(Bbox(np.round(points, 9)))
 
 
 def save_figure(

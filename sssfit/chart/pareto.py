@@ -1,7 +1,6 @@
 """Speed against accuracy of kernels, as a figure: `pareto_figure`.
 
-The record comes from ``sssfit.compare.pareto``, which has computed everything;
-``sssfit.chart.pareto`` finds room for the labels.
+The record comes from ``sssfit.compare.pareto``, which has computed everything.
 """
 
 from __future__ import annotations
@@ -18,113 +17,21 @@ from matplotlib.transforms import Bbox
 
 from sssfit.chart.page import (
     COLOURS,
-    LEFT,
-    RIGHT,
-    TEXT_INCHES,
+    RC,
     Style,
-    chart_style,
-    draw_footnotes,
-    draw_text,
+    add_legend,
     drawable,
-    inches,
+    lay_out,
     name_axes,
-    new_figure,
+    new_page,
 )
-from sssfit.chart.text import kernel_subtitle, shortened
+from sssfit.chart.text import kernel_subtitle, shortened, titled
 
 if TYPE_CHECKING:
     from sssfit.compare.comparison import Comparison, KernelRow, Picture
 
 
-_SIZE = 7.5  # points
-_LINE_INCHES = 0.125
-_LABEL_GAP_INCHES = 0.06  # from the middle of a marker
-_ASIDE_INCHES = 0.03  # from the upright through a point, where lines of other labels are
-_MARKER_INCHES = 0.045  # its half width
-_FARTHEST = 8  # lines down that a label is moved at most
-
-
-def place_labels(
-    axes: Axes,
-    points: Sequence[tuple[float, float]],
-    labels: Sequence[str],
-    *,
-    level: float | None = None,
-) -> None:
-    """Write a label below and left of each point of a falling front, where nothing else can be.
-
-    A label that would meet another goes further down, with a line to its point. Limits and place of
-    the axes have to be final.
-
-    Parameters
-    ----------
-    axes : Axes
-    points : sequence of (x, y)
-        In data, x rising and y falling.
-    labels : sequence of str
-    level : float, optional
-        A horizontal line in data that labels stay off.
-    """
-    dpi = axes.figure.dpi
-    pixels = [axes.transData.transform(point) / dpi for point in points]
-    taken = [_marker(x, y) for x, y in pixels]
-    panel = axes.get_window_extent()
-    rim = Bbox.from_extents(*(each / dpi for each in panel.extents))
-    if level is not None:
-        height = axes.transData.transform((points[0][0], level))[1] / dpi
-        taken.append(Bbox.from_extents(rim.x0, height - 0.01, rim.x1, height + 0.01))
-    for (x, y), label in zip(pixels, labels, strict=True):
-        box = _free(x, y, inches(label, _SIZE), taken, rim)
-        if box is None:
-            continue  # the table has it
-        taken.append(box)
-        _write(axes, (x, y), box, label)
-
-
-def _free(x: float, y: float, width: float, taken: Sequence[Bbox], rim: Bbox) -> Bbox | None:
-    """Return the first place in inches that is inside the rim and meets nothing."""
-    for box in _places(x, y, width):
-        inside = box.x0 >= rim.x0 and box.x1 <= rim.x1 and box.y0 >= rim.y0 and box.y1 <= rim.y1
-        if inside and not any(box.overlaps(other) for other in taken):
-            return box
-    return None
-
-
-def _places(x: float, y: float, width: float) -> Iterator[Bbox]:
-    """Yield places by preference: below, ending or beginning at the point, then further down."""
-    for line in range(_FARTHEST):
-        top = y - _LABEL_GAP_INCHES - line * _LINE_INCHES
-        for left in (x - width - _ASIDE_INCHES, x - 0.5 * width, x + _ASIDE_INCHES):
-            yield Bbox.from_bounds(left, top - _LINE_INCHES, width, _LINE_INCHES)
-
-
-def _marker(x: float, y: float) -> Bbox:
-    half = _MARKER_INCHES
-    return Bbox.from_bounds(x - half, y - half, 2 * half, 2 * half)
-
-
-def _write(axes: Axes, point: tuple[float, float], box: Bbox, label: str) -> None:
-    """Write a label into its box, in inches, and tie it to a point that is not next to it."""
-    figure = axes.figure
-    to_data = figure.dpi_scale_trans
-    middle = 0.5 * (box.y0 + box.y1)
-    axes.text(
-        box.x0,
-        middle,
-        drawable(label),
-        size=_SIZE,
-        va="center_baseline",
-        transform=to_data,
-        zorder=4,
-    )
-    if point[1] - box.y1 > _LINE_INCHES:
-        ends = [point[0], min(max(point[0], box.x0), box.x1)], [point[1], box.y1]
-        axes.plot(*ends, color="#999999", lw=0.5, transform=to_data, zorder=2)
-
-
-_HEAD_INCHES = 1.24  # title, provenance, two rows of legend and the first panel's title
-_PANEL_INCHES = 2.05
-_GAP_INCHES = 0.30
+_HEAD_INCHES, _PANEL_INCHES = 1.9, 2.3  # of title, legend and notes; of a panel
 # Those of `COLOURS` and four more of Okabe and Ito, which the colour-blind tell apart too.
 _METHODS: dict[str, tuple[str, str, str]] = {
     "svd": ("SVD", COLOURS[2], "o"),
@@ -138,7 +45,8 @@ _METHODS: dict[str, tuple[str, str, str]] = {
 _GREY = "#666666"
 _FAINT = 0.35
 _MOST_TICKS = 8
-_LANE_INCHES = 0.1  # between points of the same cost
+_LANE = 0.014  # of the panel's width, between points of the same cost
+_FARTHEST = 8  # lines down that a label is moved at most
 _JUST_NOTICEABLE = 1.0  # Delta E
 _NOTICED: Style = {"color": _GREY, "lw": 0.8, "ls": (0, (4, 2))}
 _WORTH_A_NOTE = 1e-3  # of the light
@@ -167,7 +75,7 @@ def pareto_figure(
     Returns
     -------
     matplotlib.figure.Figure
-        8 inches wide, 2.35 inches a picture; both axes logarithmic, of all panels the same.
+        8 inches wide, 2.3 inches a picture; both axes logarithmic, of all panels the same.
 
     Raises
     ------
@@ -177,48 +85,36 @@ def pareto_figure(
     from sssfit.compare.comparison import check_error
 
     check_error(error, comparison.profile.n_channels)
-    notes = _notes(comparison, error, cost)
-    many = len(comparison.pictures)
-    foot = 0.6 + 0.145 * (len(notes) + 2)
-    height = _HEAD_INCHES + many * (_PANEL_INCHES + _GAP_INCHES) - _GAP_INCHES + foot
-    with chart_style():
-        figure = new_figure(height)
-        _draw_head(figure, comparison, error, cost)
-        bottom = draw_footnotes(figure, notes)
-        panels = figure.subplots(many, 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-        gap = _GAP_INCHES / _PANEL_INCHES
-        figure.subplots_adjust(LEFT, bottom, RIGHT, 1 - _HEAD_INCHES / height, hspace=gap)
+    many, notes = len(comparison.pictures), _notes(comparison, error, cost)
+    where = kernel_subtitle(comparison.profile, comparison.pixels, comparison.mm_per_pixel)
+    height = _HEAD_INCHES + _PANEL_INCHES * many
+    with new_page(height, _title(comparison, error, cost), where, notes) as (figure, below):
+        handles = _handles(comparison, error)
+        below = add_legend(below, handles, [str(each.get_label()) for each in handles])
+        panels = below.subplots(many, 1, sharex=True, sharey=True, squeeze=False)[:, 0]
         _limit(panels[-1], comparison, error, cost)
         for axes, picture in zip(panels, comparison.pictures, strict=True):
             _draw_panel(axes, comparison, picture, error, cost)
             name_axes(axes, _panel_title(picture), "", _ERRORS[error])
         panels[-1].set_xlabel(_COSTS[cost])
+        lay_out(figure)
+        for axes, picture in zip(panels, comparison.pictures, strict=True):
+            front = comparison.front(picture.name, error, cost)
+            points = [_point(row, error, cost) for row in front]
+            level = _JUST_NOTICEABLE if error == "delta-e" else None
+            place_labels(axes, points, [row.label for row in front], level=level)
     return figure
 
 
-def _draw_head(figure: Figure, comparison: Comparison, error: str, cost: str) -> None:
-    """Title, provenance, and a legend of the methods that are drawn."""
-    draw_text(figure, 0.16, _title(comparison, error, cost), size=12, weight="bold")
-    where = kernel_subtitle(comparison.profile, comparison.pixels, comparison.mm_per_pixel)
-    draw_text(figure, 0.41, where)
+def _handles(comparison: Comparison, error: str) -> list[Line2D]:
+    """Explain the methods that are drawn, and the lines."""
     handles = [
         *_method_handles(comparison),
         Line2D([], [], color=_GREY, lw=1.0, label="Pareto front"),
     ]
     if error == "delta-e":
         handles.append(Line2D([], [], label="ΔE 1, just noticeable", **_NOTICED))
-    figure.legend(
-        handles=handles,
-        ncols=math.ceil(len(handles) / 2),
-        loc="upper left",
-        bbox_to_anchor=(LEFT, 1 - 0.6 / figure.get_figheight()),
-        borderaxespad=0,
-        borderpad=0,
-        handlelength=1.6,
-        handletextpad=0.4,
-        columnspacing=1.8,
-        fontsize=8,
-    )
+    return handles
 
 
 def _method_handles(comparison: Comparison) -> list[Line2D]:
@@ -243,7 +139,7 @@ def _draw_panel(
     rows, front = comparison.rows_of(picture.name), comparison.front(picture.name, error, cost)
     lanes = [0] * len(rows) if cost == "seconds" else _lanes(rows, front, cost)
     low, high = axes.get_xlim()
-    lane = (high / low) ** (_LANE_INCHES / TEXT_INCHES)
+    lane = (high / low) ** _LANE
     for row, number in zip(rows, lanes, strict=True):
         x, y = _point(row, error, cost)
         alpha = 1.0 if row in front else _FAINT
@@ -256,8 +152,64 @@ def _draw_panel(
     x_front, y_front = (list(each) for each in zip(*points, strict=True))
     style: Style = {"where": "post", "color": _GREY, "lw": 1.0, "zorder": 2}
     axes.step([*x_front, high], [*y_front, y_front[-1]], **style)
-    level = _JUST_NOTICEABLE if error == "delta-e" else None
-    place_labels(axes, points, [row.label for row in front], level=level)
+
+
+def place_labels(
+    axes: Axes,
+    points: Sequence[tuple[float, float]],
+    labels: Sequence[str],
+    *,
+    level: float | None = None,
+) -> None:
+    """Write a label below and left of each point of a falling front, where nothing else can be.
+
+    A label that would meet another goes further down, with a line to its point; one that finds no
+    room is left out. Limits and place of the axes have to be final.
+
+    Parameters
+    ----------
+    axes : Axes
+    points : sequence of (x, y)
+        In data, x rising and y falling.
+    labels : sequence of str
+    level : float, optional
+        A horizontal line in data that labels stay off.
+    """
+    panel, pixels = axes.get_window_extent(), axes.transData.transform
+    taken = [Bbox([pixel, pixel]).padded(0.045 * axes.figure.dpi) for pixel in map(pixels, points)]
+    if level is not None:
+        y = pixels((points[0][0], level))[1]
+        taken.append(Bbox.from_extents(panel.x0, y - 2.0, panel.x1, y + 2.0))
+    for point, label in zip(points, labels, strict=True):
+        style: Style = {"size": RC["xtick.labelsize"], "va": "top", "in_layout": False, "zorder": 4}
+        text = axes.annotate(
+            drawable(label), point, (0.0, 0.0), textcoords="offset points", **style
+        )
+        for line, right, side in _places():
+            text.set(position=(right, -4.3 - 9.0 * line), ha=side)
+            box = text.get_window_extent()
+            inside = panel.contains(*box.min) and panel.contains(*box.max)
+            if inside and not any(box.overlaps(other) for other in taken):
+                break
+        else:
+            text.remove()
+            continue
+        taken.append(box)
+        if line > 0:
+            _tie(axes, point, box)
+
+
+def _places() -> Iterator[tuple[int, float, str]]:
+    """Yield places by preference: lines down, points to the right, and where the label ends."""
+    for line in range(_FARTHEST):
+        yield from ((line, -2.0, "right"), (line, 0.0, "center"), (line, 2.0, "left"))
+
+
+def _tie(axes: Axes, point: tuple[float, float], box: Bbox) -> None:
+    """Join a point with its label, which is not next to it."""
+    x = min(max(axes.transData.transform(point)[0], box.x0), box.x1)
+    end = axes.transData.inverted().transform((x, box.y1))
+    axes.plot(*zip(point, end, strict=True), color="#999999", lw=0.5, zorder=2)
 
 
 def _lanes(rows: Sequence[KernelRow], front: Sequence[KernelRow], cost: str) -> list[int]:
@@ -328,9 +280,8 @@ def _limit(axes: Axes, comparison: Comparison, error: str, cost: str) -> None:
 
 def _title(comparison: Comparison, error: str, cost: str) -> str:
     """Name the material and the axes."""
-    name = comparison.profile.material_name
     what = f"{_ERRORS[error]} against {'time' if cost == 'seconds' else cost}"
-    return f"{shortened(name, 24)}: {what}" if name else what.capitalize()
+    return titled(comparison.profile, what)
 
 
 def _panel_title(picture: Picture) -> str:

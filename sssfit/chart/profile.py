@@ -20,7 +20,7 @@ from sssfit.chart.page import (
     LINE_WIDTH,
     Style,
     add_legend,
-    chart_style,
+    lay_out,
     name_axes,
     new_page,
     tick,
@@ -52,11 +52,9 @@ def profile_figure(profile: Profile) -> Figure:
     """
     bins = [merged(profile, channel) for channel in range(profile.n_channels)]
     shown = picture(profile, bins)
-    with chart_style():
-        notes = words.footnotes(profile, words.image_note(profile, shown))
-        figure, below = new_page(
-            HEIGHT_INCHES, words.title(profile), words.subtitle(profile), notes
-        )
+    notes = words.footnotes(profile, words.image_note(profile, shown))
+    title, subtitle = words.title(profile), words.subtitle(profile)
+    with new_page(HEIGHT_INCHES, title, subtitle, notes) as (figure, below):
         below = _draw_legend(below, profile, bins)
         panels = below.subplots(2, 2)
         _draw_linear(panels[0, 0], profile, bins)
@@ -64,7 +62,8 @@ def profile_figure(profile: Profile) -> Figure:
         _draw_unweighted(panels[1, 0], profile, bins)
         _draw_image(below, panels[1, 1], profile, shown)
         below.align_ylabels(panels)
-        _cut_to_squares(figure, panels[1, 1], shown)
+        lay_out(figure)
+        _cut_to_squares(panels[1, 1], shown)
     return figure
 
 
@@ -187,10 +186,8 @@ def _draw_image(below: SubFigure, axes: Axes, profile: Profile, shown: Picture) 
     name_axes(axes, title, "x (mm)", "y (mm)")
 
 
-def _cut_to_squares(figure: Figure, axes: Axes, shown: Picture) -> None:
+def _cut_to_squares(axes: Axes, shown: Picture) -> None:
     """Cut the picture, which is wider than its panel, until its pixels are square."""
-    if engine := figure.get_layout_engine():
-        engine.execute(figure)
     box = axes.get_window_extent()
     half_width_mm = shown.half_height_mm * box.width / box.height
     axes.set_xlim(-half_width_mm, half_width_mm)

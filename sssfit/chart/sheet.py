@@ -5,33 +5,21 @@ The record comes from ``sssfit.compare.sheet``, which has computed everything.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sssfit.chart.page import (
-    WIDTH_INCHES,
-    Style,
-    chart_style,
-    draw_footnotes,
-    draw_text,
-    new_figure,
-)
-from sssfit.chart.panels import draw_bar, draw_difference, draw_picture
-from sssfit.chart.text import method_name, shortened
+from sssfit.chart.page import RC, drawable, new_page
+from sssfit.chart.panels import draw_bar, new_mosaic, put_difference, put_picture
+from sssfit.chart.text import method_name, shortened, titled
 
 if TYPE_CHECKING:
     from sssfit.compare.sheet import Sheet, SheetRow
 
 AMPLIFIED = 10.0
-_MOST_INCHES = 1.0  # a picture: 200 of the page's pixels
-_HEAD_INCHES = 0.98
-_LABEL_INCHES = 1.15  # a row's name, right of the margin
-_ROW_GAP_INCHES = 0.2  # holds the figures under the pictures
-_APART_INCHES, _PAIR_APART_INCHES = 0.03, 0.1
-_FOOT_INCHES = 1.16
-_LEFT_INCHES = 0.2
-_GREY = "#444444"
+_MOST_INCHES, _ROOM_INCHES = 1.0, 6.5  # of a picture, 200 of the page's pixels; of a row of them
+_APART, _PAIRS_APART, _ROWS_APART = 0.03, 0.1, 0.22  # of a picture; rows have figures between
 
 
 def sheet_figure(sheet: Sheet) -> Figure:
@@ -47,40 +35,24 @@ def sheet_figure(sheet: Sheet) -> Figure:
         8 inches wide; pictures in sRGB at the truth's exposure. Differences are of lightness
         (CIE L*), ten times amplified: red is too bright, blue too dark.
     """
-    first = _LEFT_INCHES + _LABEL_INCHES
-    room = WIDTH_INCHES - 0.14 - first
-    gaps = len(sheet.scenes) * _APART_INCHES + (len(sheet.scenes) - 1) * _PAIR_APART_INCHES
-    inches = min((room - gaps) / (2 * len(sheet.scenes)), _MOST_INCHES)
-    step = inches + _ROW_GAP_INCHES
-    with chart_style():
-        figure = new_figure(_HEAD_INCHES + step * len(sheet.rows) + _FOOT_INCHES)
-        _draw_head(figure, sheet)
-        lefts = [
-            first + k * (2 * inches + _APART_INCHES + _PAIR_APART_INCHES)
-            for k in range(len(sheet.scenes))
-        ]
-        for scene, left in zip(sheet.scenes, lefts, strict=True):
-            _put(figure, _HEAD_INCHES - 0.1, scene, left, weight="bold")
+    wide, tall = 2.0 + _APART + _PAIRS_APART, 1.0 + _ROWS_APART
+    width, height = wide * len(sheet.scenes) - _PAIRS_APART, tall * len(sheet.rows)
+    inches = min(_ROOM_INCHES / width, _MOST_INCHES)
+    title = titled(sheet.profile, "what kernels show, and what each gets wrong")
+    with new_page(2.2 + height * inches, title, _subtitle(sheet), _notes(sheet)) as (figure, below):
+        axes = new_mosaic(below, width, height)
         for k, row in enumerate(sheet.rows):
-            _draw_row(figure, row, _HEAD_INCHES + step * k, lefts, inches)
-        bar = "CIE L* less that of the true kernel"
-        below = _HEAD_INCHES + step * len(sheet.rows) + 0.06
-        draw_bar(figure, first, below, 3.0, AMPLIFIED, bar)
-        draw_footnotes(figure, _notes(sheet))
+            _draw_row(axes, row, tall * k, wide)
+        middles = [1.0 + wide * k for k in range(len(sheet.scenes))]
+        axes.set_xticks(middles, [drawable(each) for each in sheet.scenes], weight="bold")
+        names = [drawable(_label(each)) for each in sheet.rows]
+        axes.set_yticks([0.5 + tall * k for k in range(len(names))], names)
+        draw_bar(below, axes, AMPLIFIED, "CIE L* less that of the true kernel")
     return figure
 
 
-def _put(figure: Figure, down: float, text: str, left: float = _LEFT_INCHES, **style: Any) -> None:
-    """Write a line, left in inches."""
-    draw_text(figure, down, text, left=left / WIDTH_INCHES, **style)
-
-
-def _draw_head(figure: Figure, sheet: Sheet) -> None:
-    """Title and provenance."""
-    name = sheet.profile.material_name
-    what = "what kernels show, and what each gets wrong"
-    title = f"{shortened(name, 24)}: {what}" if name else what.capitalize()
-    draw_text(figure, 0.16, title, size=12, weight="bold", left=_LEFT_INCHES / WIDTH_INCHES)
+def _subtitle(sheet: Sheet) -> str:
+    """Say what the pictures are, and what stands beside them."""
     meta = sheet.profile.meta
     side = sheet.pixels * sheet.mm_per_pixel
     parts = [
@@ -89,33 +61,28 @@ def _draw_head(figure: Figure, sheet: Sheet) -> None:
         f"kernels {2 * sheet.support_mm:.3g} mm wide",
         f"sssfit {shortened(str(meta.get('version', '')))}",
     ]
-    _put(figure, 0.41, " · ".join(parts))
-    words = f"right of each picture its difference of lightness, amplified {AMPLIFIED:g} times; "
-    words += "below, mean Delta E 2000"
-    _put(figure, 0.64, words, color=_GREY)
+    return (
+        f"{' · '.join(parts)}\nright of each picture its difference of lightness, amplified "
+        f"{AMPLIFIED:g} times; below, mean Delta E 2000"
+    )
 
 
-def _draw_row(
-    figure: Figure, row: SheetRow, down: float, lefts: list[float], inches: float
-) -> None:
-    """Draw one kernel's name, price, pictures and figures."""
-    for k, words in enumerate(_label(row)):
-        style: Style = {"color": _GREY} if k else {}
-        _put(figure, down + 0.1 + 0.15 * k, words, **style)
-    for left, panel in zip(lefts, row.panels, strict=True):
-        draw_picture(figure, left, down, panel.codes, inches)
-        right = left + inches + _APART_INCHES
-        draw_difference(figure, right, down, panel.difference, inches, AMPLIFIED)
-        figures = f"ΔE {panel.score.delta_e_2000_mean:.3g}"
-        if row.passes is not None or panel.score.delta_e_2000_mean > 0.0:
-            _put(figure, down + inches + 0.08, figures, left)
+def _draw_row(axes: Axes, row: SheetRow, down: float, wide: float) -> None:
+    """Draw one kernel's pictures and figures."""
+    for k, panel in enumerate(row.panels):
+        put_picture(axes, wide * k, down, panel.codes)
+        put_difference(axes, wide * k + 1.0 + _APART, down, panel.difference, AMPLIFIED)
+        error = panel.score.delta_e_2000_mean
+        if row.passes is not None or error > 0.0:
+            axes.text(
+                wide * k, down + 1.02, f"ΔE {error:.3g}", va="top", size=RC["xtick.labelsize"]
+            )
 
 
-def _label(row: SheetRow) -> list[str]:
+def _label(row: SheetRow) -> str:
     """Split a label at its comma, and say how many passes there are."""
-    name, _, rest = row.label.partition(", ")
-    lines = [name, rest] if rest else [name]
-    return [*lines, f"{row.passes} passes"] if row.passes is not None else lines
+    name = row.label.replace(", ", "\n")
+    return name if row.passes is None else f"{name}\n{row.passes} passes"
 
 
 def _notes(sheet: Sheet) -> list[str]:

@@ -20,11 +20,10 @@ from sssfit.chart.page import (
     LINE_STYLES,
     Style,
     add_table,
-    chart_style,
     name_axes,
     new_page,
 )
-from sssfit.chart.text import kernel_subtitle, shortened, spread
+from sssfit.chart.text import kernel_subtitle, shortened, spread, titled
 
 if TYPE_CHECKING:
     from sssfit.compare.spectrum import Spectrum
@@ -52,10 +51,10 @@ def spectrum_figure(spectrum: Spectrum) -> Figure:
         number of the term, logarithmic; hollow where the eigenvalue is negative.
     """
     shown = spread(spectrum.profile.n_channels, _MOST_CHANNELS)
-    with chart_style():
-        where = kernel_subtitle(spectrum.profile, spectrum.pixels, spectrum.mm_per_pixel)
-        notes = _notes(spectrum, shown)
-        figure, below = new_page(HEIGHT_INCHES, _title(spectrum), where, notes)
+    where = kernel_subtitle(spectrum.profile, spectrum.pixels, spectrum.mm_per_pixel)
+    title = titled(spectrum.profile, "energy of the kernel's singular values")
+    notes = _notes(spectrum, shown)
+    with new_page(HEIGHT_INCHES, title, where, notes) as (figure, below):
         rows = [_row(spectrum, channel) for channel in shown]
         handles = [Line2D([], [], **_style(k)) for k in range(len(shown))]
         left, right = add_table(below, _HEADS, rows, handles).subplots(1, 2, sharey=True)
@@ -102,12 +101,6 @@ def _limit(axes: Axes, spectrum: Spectrum, shown: Sequence[int]) -> None:
     axes.yaxis.set_major_locator(LogLocator(numticks=8))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
     axes.yaxis.set_minor_formatter(NullFormatter())
-
-
-def _title(spectrum: Spectrum) -> str:
-    """Name the material."""
-    name, what = spectrum.profile.material_name, "energy of the kernel's singular values"
-    return f"{shortened(name, 24)}: {what}" if name else what.capitalize()
 
 
 def _row(spectrum: Spectrum, channel: int) -> tuple[str, list[str]]:

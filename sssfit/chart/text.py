@@ -25,9 +25,13 @@ _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 def title(profile: Profile) -> str:
     """Name the material."""
-    name, what = profile.material_name, "diffuse reflectance profile"
-    if profile.meta.get("checkpoint"):
-        what += " so far"
+    so_far = " so far" if profile.meta.get("checkpoint") else ""
+    return titled(profile, f"diffuse reflectance profile{so_far}")
+
+
+def titled(profile: Profile, what: str) -> str:
+    """Say what is drawn of a profile, after its material's name where it has one."""
+    name = profile.material_name
     return f"{shortened(name, 24)}: {what}" if name else what.capitalize()
 
 
