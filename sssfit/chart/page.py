@@ -4,6 +4,7 @@ What every figure of ``sssfit.chart`` is drawn with; the words are in ``sssfit.c
 """
 
 import contextlib
+import io
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, cast
@@ -67,9 +68,18 @@ TEXT_INCHES = (RIGHT - LEFT) * WIDTH_INCHES
 NOTE_SIZE, NOTE_COLOUR = 7.5, "#444444"
 
 
+class _Page(Figure):
+    """A figure that a notebook shows as it is written, without a backend of matplotlib's."""
+
+    def _repr_png_(self) -> bytes:
+        stream = io.BytesIO()
+        save_figure(self, stream, format="png")
+        return stream.getvalue()
+
+
 def new_figure(height_inches: float = HEIGHT_INCHES) -> Figure:
     """Make an empty page, 8 inches wide."""
-    figure = Figure(figsize=(WIDTH_INCHES, height_inches), dpi=DPI)
+    figure = _Page(figsize=(WIDTH_INCHES, height_inches), dpi=DPI)
     FigureCanvasAgg(figure)
     return figure
 
@@ -86,7 +96,7 @@ def new_page(
     layout = ConstrainedLayoutEngine(
         rect=(*margins, 1 - 2 * margins[0], 1 - 2 * margins[1]), w_pad=0.05, h_pad=0.045
     )
-    figure = Figure(figsize=(WIDTH_INCHES, height_inches), dpi=DPI, layout=layout)
+    figure = _Page(figsize=(WIDTH_INCHES, height_inches), dpi=DPI, layout=layout)
     FigureCanvasAgg(figure)
     page = _rest(figure)
     left: Style = {"x": 0.0, "ha": "left", "wrap": True}
