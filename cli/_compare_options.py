@@ -15,6 +15,7 @@ from ._scene import EDGE_DEGREES, FILE_OPTIONS, MADE, Size
 
 _OPTIONS = (
     click.option("--all", "every", is_flag=True, help="All materials that ship with sssfit."),
+    click.option("--paper", is_flag=True, help="The eleven of them that the SSSS paper has."),
     click.option(
         "--what",
         type=click.Choice(["front", "budget", "kernels", "sheet"]),
@@ -27,8 +28,8 @@ _OPTIONS = (
         "pictures",
         metavar="NAME|FILE,...",
         multiple=True,
-        help=f"What is lit: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG files. The edge "
-        f"is at {EDGE_DEGREES:g} degrees.  [default: {PICTURES}]",
+        help=f"What is lit: {', '.join(MADE)}, or your own EXR, HDR, TIFF, PNG, JPG or TGA "
+        f"files. The edge is at {EDGE_DEGREES:g} degrees.  [default: {PICTURES}]",
     ),
     click.option(
         "--mm-per-pixel",
@@ -94,7 +95,7 @@ _OPTIONS = (
         "-o",
         "--output",
         metavar="FOLDER",
-        help="Where --all puts NAME-pareto.png and NAME-pareto.md.  [default: here]",
+        help="Where --all and --paper put NAME-pareto.png and NAME-pareto.md.  [default: here]",
     ),
     click.option(
         "--force",

@@ -12,21 +12,18 @@ from typing import TYPE_CHECKING
 from ._options import Common
 from ._output import say
 
-_PIPED_COLUMNS = 80
-
 if TYPE_CHECKING:
-    from rich.console import Console
-
     from sssfit.material import Material
     from sssfit.simulate import Progress as WalkProgress
 
 
 @contextlib.contextmanager
 def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[[WalkProgress], None] | None]:
-    """Yield a progress callback; None with ``quiet``. Piped, it leaves one line at the end."""
-    if quiet:
+    """Yield a progress callback; None unless in a terminal, where the bar goes once it is full."""
+    if not _is_shown(quiet):
         yield None
         return
+    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
     bar = Progress(
@@ -36,7 +33,8 @@ def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[[WalkProgress
         TextColumn("{task.fields[rate]}"),
         TextColumn("error {task.fields[error]}"),
         TextColumn("{task.fields[left]}"),
-        console=_console(),
+        console=Console(stderr=True),
+        transient=True,
     )
     task = bar.add_task(label, total=None, rate="", error="-", left="")
     first: list[WalkProgress] = []
@@ -63,18 +61,15 @@ def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[[WalkProgress
             bar.stop()
 
 
-def _console() -> Console:
-    """Return stderr; where it is no terminal, COLUMNS must not cut the one line short."""
-    from rich.console import Console
-
-    is_terminal = sys.stderr is not None and sys.stderr.isatty()
-    return Console(stderr=True, width=None if is_terminal else _PIPED_COLUMNS)
+def _is_shown(quiet: bool) -> bool:
+    """Tell whether somebody looks on: a bar that was redrawn is litter in a log."""
+    return not quiet and sys.stderr is not None and sys.stderr.isatty()
 
 
 @contextlib.contextmanager
 def step_progress(label: str, *, quiet: bool) -> Iterator[Callable[[int, int, str], None] | None]:
     """Yield a callback for (done, of how many, the next one's name); None unless in a terminal."""
-    if quiet or sys.stderr is None or not sys.stderr.isatty():
+    if not _is_shown(quiet):
         yield None
         return
     from rich.console import Console

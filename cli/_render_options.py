@@ -16,7 +16,7 @@ _OPTIONS = (
         default=MADE[0],
         show_default=True,
         metavar="NAME|FILE",
-        help=f"What is lit: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG file.",
+        help=f"What is lit: {', '.join(MADE)}, or your own EXR, HDR, TIFF, PNG, JPG or TGA file.",
     ),
     click.option(
         "--size",

@@ -58,6 +58,8 @@ def text_of(figures: Mapping[str, Any]) -> str:
         lines.append(f"through the object at most: {words}, face on the key light is 1")
     if figures["rmse"] is not None:
         lines += _measured(figures)
+    if figures["difference_gain"] is not None:
+        lines.append(_difference(figures))
     return "\n".join([*lines, f"Wrote {', '.join(figures['output'])}"])
 
 
@@ -80,6 +82,16 @@ def _measured(figures: Mapping[str, Any]) -> list[str]:
         ("of the true kernel", figures["true_radial_asymmetry"], ".3g"),
     )
     return [*lines, drifts]
+
+
+def _difference(figures: Mapping[str, Any]) -> str:
+    """Say what the written difference shows."""
+    kind, end = figures["difference_map"], f"{figures['difference_end'] or 0.0:.3g}"
+    if kind is None:
+        return f"difference: absolute, {figures['difference_gain']:.4g} times"
+    if kind == "signed":
+        return f"difference map: {figures['difference_of']}, blue -{end}, white 0, red {end}"
+    return f"difference map: {figures['difference_of']}, violet 0, green to yellow {end}"
 
 
 def _colours(figures: Mapping[str, Any]) -> str:

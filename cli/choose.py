@@ -88,8 +88,8 @@ _METRES = (0.1, 9.0)  # plain numbers that may have been meant in metres; 1cm is
     default="head",
     show_default=True,
     metavar="NAME|FILE",
-    help=f"Picture to judge by: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG file. The "
-    f"edge is at {EDGE_DEGREES:g} degrees.",
+    help=f"Picture to judge by: {', '.join(MADE)}, or your own EXR, HDR, TIFF, PNG, JPG or TGA "
+    f"file. The edge is at {EDGE_DEGREES:g} degrees.",
 )
 @file_options
 @click.option(

@@ -61,7 +61,7 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
         from sssfit.material import material_names
 
         folder = Path(given["output"] or ".")
-        stems = {name: folder / f"{name}-pareto" for name in material_names()}
+        stems = {name: folder / f"{name}-pareto" for name in material_names(paper=given["paper"])}
         fronts({name: (f"{each}.png", f"{each}.md") for name, each in stems.items()}, given, common)
     elif given["what"] == "front":
         fronts({material: (given["chart"], given["table"])}, given, common)
@@ -103,18 +103,18 @@ def _budget_and_kernels(
 
 def _check(material: str | None, given: Mapping[str, Any]) -> None:
     """Refuse options that do not go together, or that would do nothing."""
-    what = given["what"]
-    if (material is None) != given["every"]:
-        raise click.UsageError("name one MATERIAL or profile, or give --all.")
-    if given["every"] and what not in (None, "front"):
+    what, several = given["what"], material is None
+    if [not several, given["every"], given["paper"]].count(True) != 1:
+        raise click.UsageError("name one MATERIAL or profile, or give --all or --paper.")
+    if several and what not in (None, "front"):
         raise click.UsageError("--all is for --what front; name one MATERIAL.")
-    if given["every"] and (given["chart"] or given["table"]):
+    if several and (given["chart"] or given["table"]):
         raise click.UsageError("--all names its charts and tables; leave --chart and --table out.")
-    if given["every"] and given["mm_per_pixel"] == "profile":
+    if several and given["mm_per_pixel"] == "profile":
         raise click.UsageError("the pictures of --all share their pixels; give a length in mm.")
-    if given["output"] is not None and not given["every"]:
+    if given["output"] is not None and not several:
         raise click.UsageError("-o is the folder of --all; name files by --chart and --table.")
-    idle = list(_OF_BUDGETS) if given["every"] or what not in (None, "budget") else []
+    idle = list(_OF_BUDGETS) if several or what not in (None, "budget") else []
     idle += ["chart", "table"] if what == "budget" else []
     idle += ["pictures", "size", "layer", "mask", "table"] if what == "sheet" else []
     for key in idle:

@@ -12,7 +12,7 @@ from sssfit.methods import SIMULATIONS, lines_of
 
 from ._input import is_mci
 from ._methods import method_for, method_options, own_settings
-from ._options import Common, Length, WholeRange, common_options
+from ._options import Common, Length, LengthOr, WholeRange, common_options
 from ._simulate_run import Job, Request, run
 
 if TYPE_CHECKING:
@@ -20,19 +20,10 @@ if TYPE_CHECKING:
     from sssfit.simulate import ProfileSource
 
 
-class Radius(Length):
-    """A length, or the word auto."""
-
-    name = "radius"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Let ``auto`` through."""
-        return value if value == "auto" else super().convert(value, param, ctx)
-
-
 @click.command(epilog="\b\nMethods:\n" + lines_of(SIMULATIONS))
 @click.argument("material", required=False)
 @click.option("--all", "every", is_flag=True, help="All materials that ship with sssfit.")
+@click.option("--paper", is_flag=True, help="The eleven of them that the SSSS paper has.")
 @click.option(
     "--method",
     type=click.Choice(list(SIMULATIONS)),
@@ -51,7 +42,7 @@ class Radius(Length):
 )
 @click.option(
     "--radius",
-    type=Radius(),
+    type=LengthOr("auto"),
     metavar="MM|auto",
     help="Grid radius; auto (montecarlo) grows it until under 0.1 % of any channel lies beyond."
     "  [default: 32 MFP_max; deon-skin: 17.2]",
@@ -71,6 +62,7 @@ def simulate(
     /,
     material: str | None,
     every: bool,
+    paper: bool,
     method: str,
     number: int | None,
     dr: float | None,
@@ -98,8 +90,8 @@ def simulate(
       sssfit simulate tissue.mci --run 2
       sssfit simulate deon-skin
     """
-    if (material is None) != every:
-        raise click.UsageError("name one MATERIAL, or give --all.")
+    if [material is not None, every, paper].count(True) != 1:
+        raise click.UsageError("name one MATERIAL, or give --all or --paper.")
     if number is not None and not is_mci(material):
         raise click.UsageError("--run chooses a run of an MCML input file, .mci.")
     method = method_for(context, method, material)
@@ -108,8 +100,8 @@ def simulate(
         raise click.UsageError("--radius auto is for --method montecarlo; give a length.")
     walk = {key: own.pop(key) for key in ("checkpoint_every", "resume") if key in own}
     settings = {"dr_mm": dr, "radius_mm": radius, **own, **_of_common(method, common)}
-    materials, jobs = _jobs(method, material, number, settings)
-    several = every or len(materials) > 1
+    materials, jobs = _jobs(method, material, number, settings, paper=paper)
+    several = every or paper or len(materials) > 1
     targets = _targets(materials, method, output, several=several)
     if walk.get("resume") and targets == [None]:
         raise click.UsageError("--resume needs a file to go on beside; leave -o - out.")
@@ -125,7 +117,7 @@ def _of_common(method: str, common: Common) -> dict[str, Any]:
 
 
 def _jobs(
-    method: str, material: str | None, number: int | None, settings: dict[str, Any]
+    method: str, material: str | None, number: int | None, settings: dict[str, Any], *, paper: bool
 ) -> tuple[Sequence[Material | ProfileSource], list[Job]]:
     """Load what is asked for; each job has the indices of its materials and its settings."""
     from sssfit.material import load_material, material_names
@@ -136,7 +128,7 @@ def _jobs(
     if material is not None and is_mci(material):
         materials, each = _runs_of(material, number, method, settings)
         return materials, [([k], own) for k, own in enumerate(each)]
-    names = material_names() if material is None else (material,)
+    names = material_names(paper=paper) if material is None else (material,)
     materials = [load_material(name) for name in names]
     shares = SIMULATIONS[method].shares
     groups = shared_walks(materials) if shares else [[k] for k in range(len(materials))]

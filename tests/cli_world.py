@@ -513,7 +513,10 @@ def recording():
             module, function = name.rsplit(".", 1)
             owner = importlib.import_module(module)
             patch.setattr(owner, function, recorded(getattr(owner, function), stand_in))
-        patch.setattr("sssfit.material.material_names", lambda: ("skin1", "marble"))
+        patch.setattr(
+            "sssfit.material.material_names",
+            lambda *, paper=False: ("marble",) if paper else ("skin1", "marble"),
+        )
         yield
 
 

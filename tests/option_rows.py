@@ -24,6 +24,7 @@ from sssfit.formats.csv import csv_text, load_csv
 from sssfit.formats.mci import load_mci
 from sssfit.formats.mco import join_channels, load_mco
 from sssfit.formats.pictures import load_image
+from sssfit.measure.difference import difference_map, magnified_difference
 from sssfit.measure.score import auto_exposure
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
@@ -132,6 +133,12 @@ SIMULATE = {
         f"simulate --all --method burley {GRID}",
         names,
         lambda: ["marble.burley.profile.npz", "skin1.burley.profile.npz"],
+    ),
+    "--paper": Row(
+        _BURLEY,
+        f"simulate --paper --method burley {GRID} -o out",
+        names,
+        lambda: ["out/marble.burley.profile.npz"],
     ),
     "--method": Row(
         f"simulate wax.toml {GRID} -o x.profile.npz",
@@ -347,6 +354,11 @@ def _lit_through() -> Scene:
     return with_transmitted(_scene("head", light_degrees=170.0, transmit=True), world.gaussians())
 
 
+def _pair() -> tuple[Any, Any]:
+    """The disk as the kernel has it, and as the profile has it."""
+    return render_separable(_scene("disk"), kernel()), render_reference(_scene("disk"), profile())
+
+
 RENDER = {
     "--irradiance": Row(
         f"render {_SIZE}",
@@ -464,6 +476,19 @@ RENDER = {
             )
         ),
     ),
+    "--gain": Row(
+        f"{_DISK} -o x.tif --difference lost.exr",
+        "--gain 4",
+        made_picture,
+        lambda: np.float32(magnified_difference(*_pair(), gain=4.0)),
+        default="1.0",
+    ),
+    "--difference-map": Row(
+        f"{_DISK} -o x.tif --difference lost.exr",
+        "--difference-map absolute",
+        made_picture,
+        lambda: np.float32(difference_map(*_pair(), kind="absolute").pixels),
+    ),
     "--force": Row(f"{_DISK} -o foreign.exr", "--force", names, lambda: ["foreign.exr"]),
 }
 
@@ -526,6 +551,12 @@ COMPARE = {
         lambda: [
             f"out/{name}-pareto.{end}" for name in ("marble", "skin1") for end in ("md", "png")
         ],
+    ),
+    "--paper": Row(
+        _KERNELS,
+        "compare --paper --size 24x16 -o out",
+        names,
+        lambda: [f"out/marble-pareto.{end}" for end in ("md", "png")],
     ),
     "--what": Row(
         _BOTH,
@@ -744,6 +775,7 @@ def _inverted(**settings: Any) -> Any:
         "eta": 1.3,
         "name": "from-reflectance",
         "channels": ["R", "G", "B"],
+        "light": "normal",
     } | settings
     return called("sssfit.simulate.inversion.material_from_reflectance", **given)
 
@@ -760,9 +792,26 @@ MATERIALS = {
         _MAKE, "--mean-free-path 2", calls, lambda: _inverted(mean_free_path_mm=[2.0])
     ),
     "--light": Row(
-        _MAKE, "--light diffuse", calls, lambda: _inverted(light="diffuse"), default="normal"
+        _MAKE,
+        "--light diffuse",
+        calls,
+        lambda: _inverted(light="diffuse"),
+        default="normal",
+        words="diffuse for sRGB colours, else normal",
     ),
-    "--eta": Row(_MAKE, "--eta 1.4", calls, lambda: _inverted(eta=1.4)),
+    "--srgb": Row(
+        _MAKE.replace(".4,.2,.1", "1,0,1"),
+        "--srgb",
+        calls,
+        lambda: _inverted(reflectance="#010001", light="diffuse"),
+    ),
+    "--eta": Row(
+        _MAKE.replace(" --eta 1.3", ""),
+        "--eta 1.5",
+        calls,
+        lambda: _inverted(eta=1.5),
+        default="1.4",
+    ),
     "--name": Row(
         f"{_MAKE} -o x.toml",
         "--name lard",

@@ -320,7 +320,20 @@ def rendering(f: Figures) -> list[Any]:
         words = "through the object at most: " + ", ".join("{} {}" for _ in most)
         values = [value for pair in most for value in pair]
         parts.append(Words(words + ", face on the key light is 1", *values))
-    return [*parts, *(_lost(f) if f["rmse"] is not None else []), wrote(f)]
+    lost = _lost(f) if f["rmse"] is not None else []
+    return [*parts, *lost, *_difference(f), wrote(f)]
+
+
+def _difference(f: Figures) -> list[Any]:
+    if f["difference_gain"] is None:
+        return []
+    end, what = f["difference_end"], f["difference_of"]
+    if f["difference_map"] is None:
+        return [Words("difference: absolute, {} times", f["difference_gain"])]
+    if f["difference_map"] == "signed":
+        words = "difference map: {}, blue -{}, white 0, red {}"
+        return [Words(words, what, end, end)]
+    return [Words("difference map: {}, violet 0, green to yellow {}", what, end)]
 
 
 def _lost(f: Figures) -> list[Any]:
@@ -954,6 +967,9 @@ PRINTED: dict[str, Layout] = {
     "render --irradiance disk --size 24x16 --structure": rendering,
     "render --irradiance edge --size 24x16 --border zero": rendering,
     "render --irradiance head --size 24x16 --screen": rendering,
+    "render --irradiance edge --size 24x16 --difference d.exr --gain 4": rendering,
+    "render --irradiance edge --size 24x16 --difference d.png --difference-map signed": rendering,
+    "render --irradiance edge --size 24x16 --difference d.exr --difference-map absolute": rendering,
     "render wax.gaussians2.kernel.json --irradiance head --size 48x48 --transmit": rendering,
     "compare wax.profile.npz --what kernels --size 24x16": comparison,
     "compare wax.profile.npz --what kernels --size 24x16 --error l2 --cost passes": comparison,

@@ -22,7 +22,7 @@ from sssfit.errors import RenderError
 from sssfit.formats.pictures import save_image
 from sssfit.material import load_material
 from sssfit.scene.made import make_scene
-from sssfit.simulate import exact, simulate_exact
+from sssfit.simulate import exact, simulate_dipole, simulate_exact
 
 SMALL = ("--picture", "disk", "--size", "32x32", "--mm-per-pixel", "2.5")
 COMMON = Common(quiet=True, verbose=False, json=False, threads=None, seed=1)
@@ -202,6 +202,7 @@ def test_pictures_that_do_not_agree_are_refused(run, tmp_path):
     [
         ((), "name one MATERIAL"),
         (("skin1", "--all"), "name one MATERIAL"),
+        (("--paper", "--all"), "name one MATERIAL"),
         (("--all", "--chart", "c.png"), "leave --chart and --table out"),
         (("skin1", "-o", "folder"), "-o is the folder of --all"),
         (("--all", "--what", "sheet"), "--all is for --what front"),
@@ -353,7 +354,7 @@ def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch):
     monkeypatch.setattr(
         verb, "profile_of", lambda name, common: real(paths.get(name, name), common)
     )
-    monkeypatch.setattr(material, "material_names", lambda: ("marble", "skin1"))
+    monkeypatch.setattr(material, "material_names", lambda **_: ("marble", "skin1"))
     (tmp_path / "out").mkdir()
     err = run("--all", "-o", "out", *SMALL, status=1)
     assert "1 of 2 materials failed; marble: marble is not one half space" in err
@@ -366,7 +367,7 @@ def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch):
 def test_all_prints_the_fronts(run, tmp_path, monkeypatch):
     from sssfit import material
 
-    monkeypatch.setattr(material, "material_names", lambda: ("skin1", "marble"))
+    monkeypatch.setattr(material, "material_names", lambda **_: ("skin1", "marble"))
     lines = run("--all", *SMALL).splitlines()
     assert [line.split()[0] for line in lines[1:3]] == ["skin1", "marble"]
     names = [f"{name}-pareto.{end}" for name in ("skin1", "marble") for end in ("png", "md")]
@@ -388,3 +389,22 @@ def test_the_front_of_one_material_is_its_line_of_all(run, tmp_path, monkeypatch
     assert one[-1] == "Wrote c.png, t.md"
     assert (tmp_path / "c.png").read_bytes() == (tmp_path / "skin1-pareto.png").read_bytes()
     assert "Wrote" not in run("skin1", "--what", "front", *SMALL)
+
+
+@pytest.mark.parametrize("what", ["kernels", "front"])
+def test_pictures_on_the_pixels_of_the_profile(run, tmp_path, what):
+    coarse = simulate_dipole(load_material("skin1"), dr_mm=2.5, radius_mm=40.0)
+    coarse.save(tmp_path / "p.profile.npz")
+    given = ("--what", what, "--picture", "disk", "--size", "32x32", "--json")
+    own, asked = (
+        json.loads(run("p.profile.npz", *given, "--mm-per-pixel", pitch))
+        for pitch in ("profile", "2.5")
+    )
+    for key in ("rows", "materials") if what == "front" else ("mm_per_pixel", "pixels", "pictures"):
+        if key == "rows":
+            pairs = zip(own[key], asked[key], strict=True)
+            assert all(a["relative_l2"] == b["relative_l2"] for a, b in pairs)
+        else:
+            assert own[key] == asked[key]
+    words = run("--all", *given[2:], "--mm-per-pixel", "profile", status=2)
+    assert "share their pixels" in words

@@ -8,6 +8,7 @@ from click.testing import CliRunner
 from reference_pixels import make_profile
 
 from sssfit.cli import cli, main
+from sssfit.fit import METHODS
 from sssfit.kernel import SeparableKernel
 
 
@@ -76,9 +77,27 @@ def test_normalised_kernels_keep_their_energy_apart(folder):
     np.testing.assert_allclose(kernel.scale, [0.5, 0.25], rtol=2e-3)
 
 
-def test_list_has_a_line_for_each_method(folder):
-    from sssfit.fit import METHODS
+# A single Gaussian leaves nothing to several, and nothing of some shapes; both are warned of.
+@pytest.mark.filterwarnings("ignore::sssfit.errors.SssfitWarning")
+@pytest.mark.parametrize(
+    ("method", "options", "counted"),
+    [
+        *(("svd", given, "rank") for given in ([], ["--rank", "2"])),
+        *(("gaussians", given, "terms") for given in ([], ["--terms", "2"])),
+        *((method, [], None) for method in METHODS if method not in ("svd", "gaussians")),
+    ],
+)
+def test_the_files_name_has_the_method_and_the_count_that_was_fitted(
+    folder, method, options, counted
+):
+    result = ended("fit", "--method", method, *options, "--mm-per-pixel", "0.4", "--json")
+    (name,) = json.loads(result.stdout)["output"]
+    kernel = SeparableKernel.load(name)
+    count = "" if counted is None else kernel.meta["settings"][counted]
+    assert name == f"wax.{kernel.method}{count}.kernel.json"
 
+
+def test_list_has_a_line_for_each_method(folder):
     lines = ended("fit", "--list").stdout.splitlines()
     assert [line.split()[0] for line in lines] == list(METHODS)
     for line, method in zip(lines, METHODS.values(), strict=True):

@@ -15,7 +15,7 @@ from processes import start
 
 from sssfit import simulate
 from sssfit.cli import cli, main
-from sssfit.material import load_material
+from sssfit.material import load_material, material_names
 from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile
 from sssfit.simulate import burley, exact
@@ -135,12 +135,14 @@ def test_profile_to_stdout(tmp_path):
     assert names(tmp_path) == []
 
 
-def test_all_materials_into_a_folder(run, tmp_path):
+@pytest.mark.parametrize("option", ["--all", "--paper"])
+def test_all_materials_into_a_folder(run, tmp_path, option):
     (tmp_path / "out").mkdir()
-    status, out, _ = run("--all", "--method", "burley", *GRID, "-o", "out", "--json")
+    status, out, _ = run(option, "--method", "burley", *GRID, "-o", "out", "--json")
     assert status == 0
     figures = json.loads(out)
-    assert len(figures["rows"]) == 11
+    made = [row["material"] for row in figures["rows"]]
+    assert made == list(material_names(paper=option == "--paper"))
     assert names(tmp_path / "out") == sorted(Path(each).name for each in figures["output"])
     assert "skin1.burley.profile.npz" in names(tmp_path / "out")
 
@@ -154,7 +156,7 @@ def test_exact_solves_materials_of_one_index_together(run, tmp_path, monkeypatch
         return real(materials, **settings)
 
     monkeypatch.setattr(simulate, "simulate_exact_many", counting)
-    assert run("--all", "--method", "exact", "--tolerance", "1%", *GRID)[0] == 0
+    assert run("--paper", "--method", "exact", "--tolerance", "1%", *GRID)[0] == 0
     assert sorted(map(len, calls)) == [1, 10]
     assert ["marble"] in calls
     assert len(names(tmp_path)) == 11
@@ -270,7 +272,7 @@ def test_what_was_done_before_a_signal_stays(run, tmp_path, monkeypatch, number)
     monkeypatch.setattr(simulate, "simulate_dipole", interrupted)
     before = signal.getsignal(signal.SIGTERM)
     try:
-        status, out, err = run("--all", "--method", "dipole", *GRID, "--json")
+        status, out, err = run("--paper", "--method", "dipole", *GRID, "--json")
     finally:
         signal.signal(signal.SIGTERM, before)
     assert status == 130
@@ -284,7 +286,7 @@ def test_what_was_done_before_a_signal_stays(run, tmp_path, monkeypatch, number)
 @posix
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_solver_leaves_nothing_behind(tmp_path, number):
-    process = start([*COMMAND, "--all", "--method", "exact"], cwd=tmp_path)
+    process = start([*COMMAND, "--paper", "--method", "exact"], cwd=tmp_path)
     end = time.monotonic() + 60.0
     while not (tmp_path / ".wholemilk.exact.profile.npz.lock").exists():  # the last of them
         assert process.poll() is None

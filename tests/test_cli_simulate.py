@@ -162,7 +162,7 @@ def test_material_from_stdin_and_from_a_path(run, tmp_path, monkeypatch):
 
 def test_all_materials_into_a_folder(run, tmp_path):
     (tmp_path / "out").mkdir()
-    status, out, _ = run("--all", "--photons", "2000", "-o", "out", "--json")
+    status, out, _ = run("--paper", "--photons", "2000", "-o", "out", "--json")
     assert status == 0
     figures = json.loads(out)
     assert len(figures["rows"]) == len(figures["output"]) == 11
@@ -200,6 +200,7 @@ def test_unfinished_walks_are_pointed_out(run, tmp_path):
     [
         ((), 2, "name one MATERIAL"),
         (("skin1", "--all"), 2, "name one MATERIAL"),
+        (("--paper", "--all"), 2, "name one MATERIAL"),
         (("--all", "-o", "-"), 2, "folder"),
         (("skin1", "--photons", "many"), 2, "'many' is not a whole number"),
         (("skin1", "--photons", "1"), 2, "'1' is not a whole number from 2"),

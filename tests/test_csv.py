@@ -308,6 +308,17 @@ def test_a_table_that_begins_far_out_says_what_the_gap_may_hide():
     parse_csv("r_mm,R\n0.5,0.1\n1.5,0.05\n", "a.csv", quantity="density")
 
 
+@pytest.mark.parametrize(("unit", "mm"), [("um", 1e-3), ("mm", 1.0), ("cm", 10.0), ("m", 1e3)])
+def test_a_gap_is_said_in_the_unit_of_the_table(unit, mm):
+    lines = [f"{r / mm:g},{density * mm**2:g}" for r, density in ((2, 0.01), (2.2, 0.009), (3, 0))]
+    with pytest.warns(SssfitWarning) as caught:
+        profile = parse_csv("\n".join([f"r_{unit},R", *lines]), "a.csv", quantity="density")
+    (line,) = (str(each.message) for each in caught)
+    assert line.startswith(f"a.csv begins at r = {2 / mm:g} {unit}: ")
+    inside, whole = np.pi * 2**2 * 0.01, profile.diffuse_reflectance[0]
+    assert f"has {inside:.3g} of its {whole:.3g} inside" in line
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [

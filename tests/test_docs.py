@@ -2,6 +2,7 @@
 
 import re
 import runpy
+import shlex
 import shutil
 import subprocess
 import sys
@@ -116,9 +117,20 @@ def test_the_overview_of_the_python_pages_runs(capsys):
 
 
 def test_a_material_by_its_colour_is_printed_as_documented(tmp_path):
-    (command,) = commands_of("own-materials.md", "sssfit materials --from")
+    command, *_ = commands_of("own-materials.md", "sssfit materials --from")
     (prints,) = code_blocks("text", "own-materials.md")
     assert figures_of(printed_by(command[1:], tmp_path)) == figures_of(prints)
+
+
+def test_a_colour_in_hex_is_the_same_in_codes(tmp_path):
+    page = code_blocks("", "own-materials.md")
+    (block,) = (each for each in page if "#c58c6b" in each)
+    made = []
+    for line in block.splitlines():
+        printed_by(shlex.split(line)[1:], tmp_path)
+        made.append((tmp_path / "mine.toml").read_text())
+    assert len(made) == 2
+    assert made[0] == made[1]
 
 
 @pytest.fixture(scope="module")

@@ -248,7 +248,7 @@ def test_the_edge_at_45_degrees(skin1):
     cells = {}
     for first, left, second, right in table_with("fits.md", "material", "", "material"):
         cells |= {first: left, second: right}
-    assert set(cells) - {""} == set(material_names())
+    assert set(cells) - {""} == set(material_names(paper=True))
     for name in ("skin1", "marble"):
         profile = exact(name)
         kernel = fit_preintegrated(profile, energy="keep", mm_per_pixel=0.1).kernel
@@ -310,7 +310,7 @@ def test_the_multipole_beside_the_walk():
 
 def test_models_of_the_eleven_materials():
     rows = table_with("theory.md", "channel", "albedo", "exact total")
-    names = [f"{name} {c}" for name in material_names() for c in "RGB"]
+    names = [f"{name} {c}" for name in material_names(paper=True) for c in "RGB"]
     assert [row[0] for row in rows] == names
     for name in ("skin1", "ketchup"):
         material, true = load_material(name), exact(name)
@@ -320,7 +320,7 @@ def test_models_of_the_eleven_materials():
             simulate_burley(material, reflectance=totals, mapping=mapping)
             for mapping in ("perpendicular", "diffuse", "diffuse-mfp")
         ]
-        for c, row in enumerate(rows[3 * material_names().index(name) :][:3]):
+        for c, row in enumerate(rows[3 * material_names(paper=True).index(name) :][:3]):
             assert_cell(row[1], material.layers[0].albedo[c])
             assert_cell(row[2], totals[c])
             for cell, model in zip(row[3:5], dipoles, strict=True):

@@ -735,7 +735,7 @@ def test_killed_a_hundred_times_and_resumed(tmp_path, undisturbed):
 
 @posix
 def test_all_materials_killed_and_resumed(tmp_path):
-    arguments = ("--all", "--photons", "5e4", "--checkpoint-every", "0", "-q")
+    arguments = ("--paper", "--photons", "5e4", "--checkpoint-every", "0", "-q")
     folders = [tmp_path / each for each in ("whole", "killed")]
     for folder in folders:
         folder.mkdir()
@@ -752,11 +752,11 @@ def test_all_materials_killed_and_resumed(tmp_path):
 
 
 def test_a_walk_done_before_is_not_walked_again(run, tmp_path, monkeypatch):
-    # as after a kill between the two walks of --all: marble, of another index, is missing
-    run("--all", "--photons", "2000", "-q")
+    # as after a kill between the two walks of --paper: marble, of another index, is missing
+    run("--paper", "--photons", "2000", "-q")
     whole = (tmp_path / "marble.profile.npz").read_bytes()
     (tmp_path / "marble.profile.npz").unlink()
-    status, out, err = run("--all", "--photons", "2000", "--resume")
+    status, out, err = run("--paper", "--photons", "2000", "--resume")
     assert status == 0
     assert "Wrote marble.profile.npz\nFinished before, nothing to do: apple" in out
     assert "There is no marble.profile.npz.checkpoint to go on from: starting." in err

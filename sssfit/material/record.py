@@ -328,9 +328,21 @@ def load_material(name_or_path: str | Path) -> Material:
     )
 
 
+# Of "Separable Subsurface Scattering", supplementary material G: Jensen et al. 2001.
+_PAPER = (
+    *("apple", "chicken1", "chicken2", "cream", "ketchup", "marble", "potato", "skimmilk"),
+    *("skin1", "skin2", "wholemilk"),
+)
+
+
 @cache
-def material_names() -> tuple[str, ...]:
-    """Return the names of the materials that ship with sssfit, sorted."""
+def material_names(*, paper: bool = False) -> tuple[str, ...]:
+    """Return the names of the materials that ship with sssfit, sorted.
+
+    ``paper`` leaves those that the supplement of "Separable Subsurface Scattering" has.
+    """
+    if paper:
+        return _PAPER
     files = resources.files("sssfit.materials").iterdir()
     return tuple(sorted(f.name[:-5] for f in files if f.name.endswith(".toml")))
 

@@ -89,7 +89,7 @@ def limit_rows(small):
 def method_rows(small):
     """Every method on every material with its own defaults, at 0.1 mm or 513 pixels."""
     rows = []
-    names = material_names()[:1] if small else material_names()
+    names = material_names(paper=True)[:1] if small else material_names(paper=True)
     for name in names:
         profile = simulate_exact(load_material(name))
         # guided takes up to 513 pixels; bright materials reach further than 25 mm.
