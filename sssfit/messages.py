@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from typing import Any
 
+_MOST_NAMED = 4  # channels that a line of a record's repr names
 _MOST_SHOWN = 60  # characters of a value worth repeating to the person who wrote it
 
 
@@ -63,3 +64,32 @@ def number(value: Any, form: str) -> str:
     if not form.endswith("%"):
         return f"{value:{form}}"
     return "0 %" if abs(value) < 1e-9 else f"{100.0 * value:{form[:-1]}} %"
+
+
+def by_channel(channels: Sequence[str], values: Sequence[Any], form: str) -> str:
+    """Give a figure for each channel in a line: "R 0.42, G 0.21", the first four of many."""
+    named = [f"{_short(channels[c])} {number(values[c], form)}" for c in range(len(channels))]
+    named = named[:_MOST_NAMED]
+    more = len(channels) - len(named)
+    return ", ".join(named) + (f" and {more} more" if more else "")
+
+
+def of_material(name: object) -> str:
+    """Give the name of a record's material, where it says one."""
+    return "unknown material" if name is None else _short(printable(str(name)))
+
+
+def _short(name: str) -> str:
+    """Cut a name that would fill the line."""
+    return name if len(name) <= _MOST_SHOWN // 2 else name[: _MOST_SHOWN // 2 - 3] + "..."
+
+
+def html_table(caption: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Return a table for a notebook; all texts are escaped."""
+    from html import escape  # its entities take 3 ms that help need not wait for
+
+    def row(cells: Sequence[str], tag: str) -> str:
+        return "<tr>" + "".join(f"<{tag}>{escape(each)}</{tag}>" for each in cells) + "</tr>"
+
+    lines = [row(heads, "th"), *(row(cells, "td") for cells in rows)]
+    return "\n".join(["<table>", f"<caption>{escape(caption)}</caption>", *lines, "</table>"])

@@ -21,6 +21,16 @@ ROOMS = [
 ]
 # What verbs ask of the chart's room before there is anything to draw; quick to import.
 LIGHT_CHART_FILES = {"data", "files"}
+# A record draws itself for a notebook: its ``plot`` imports a chart when it is called, and nothing
+# else of the record rests on a room above it.
+PLOT_MAY_IMPORT = {
+    "sssfit/profile/record.py": {"sssfit.chart.profile"},
+    "sssfit/kernel/record.py": {"sssfit.chart.kernel", "sssfit.compare.kernel_view"},
+}
+FOR_TYPES = {
+    "sssfit/profile/record.py": {"matplotlib.figure"},
+    "sssfit/kernel/record.py": {"matplotlib.figure"},
+}
 # The compiled layer stands beside the list: these rooms may use it, and it uses none of them.
 ROOMS_ON_JIT = {"profile", "scene", "simulate", "render"}
 # Neighbours that hand records on and know nothing of each other.
@@ -45,9 +55,25 @@ def package_of(path: Path) -> list[str]:
     return list(folder) if folder[0] == "sssfit" else ["sssfit", *folder]
 
 
+def walked(path: Path) -> Iterator[ast.AST]:
+    """Every node of a file but what a record's ``plot`` and its return type may import."""
+    tree, name = ast.parse(path.read_text(encoding="utf-8")), name_of(path)
+    left_out: set[int] = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef) and node.name == "plot" and name in PLOT_MAY_IMPORT:
+            allowed = PLOT_MAY_IMPORT[name]
+        elif isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            allowed = FOR_TYPES.get(name, set())
+        else:
+            continue
+        inside = [each for each in node.body if isinstance(each, ast.ImportFrom)]
+        left_out |= {id(each) for each in inside if each.module in allowed}
+    yield from (node for node in ast.walk(tree) if id(node) not in left_out)
+
+
 def imports(path: Path) -> Iterator[str]:
     """Every module a file imports, inside functions too, with relative names resolved."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in walked(path):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
         elif isinstance(node, ast.ImportFrom):

@@ -4,6 +4,7 @@ What every figure of ``sssfit.chart`` is drawn with; the words are in ``sssfit.c
 """
 
 import contextlib
+import io
 import math
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -68,11 +69,20 @@ NOTE_SIZE, NOTE_COLOUR = 7.5, "#444444"
 
 @contextlib.contextmanager
 def chart_style() -> Iterator[None]:
-    """Matplotlib's defaults and ours on top, whatever the user's matplotlibrc says."""
+    """Matplotlib's defaults and ours on top, independent of the user's matplotlibrc."""
     kept = {"backend", "backend_fallback", "interactive", "toolbar", "timezone"}
     defaults = {key: value for key, value in mpl.rcParamsDefault.items() if key not in kept}
     with mpl.rc_context(cast(Any, defaults | RC)):
         yield
+
+
+class _Page(Figure):
+    """A figure that a notebook shows as it is written, without a backend of matplotlib's."""
+
+    def _repr_png_(self) -> bytes:
+        stream = io.BytesIO()
+        save_figure(self, stream, format="png")
+        return stream.getvalue()
 
 
 @contextlib.contextmanager
@@ -103,7 +113,7 @@ def _empty_page(height_inches: float) -> Figure:
     layout = ConstrainedLayoutEngine(
         rect=(*margins, 1 - 2 * margins[0], 1 - 2 * margins[1]), w_pad=0.05, h_pad=0.06
     )
-    figure = Figure(figsize=(WIDTH_INCHES, height_inches), dpi=DPI, layout=layout)
+    figure = _Page(figsize=(WIDTH_INCHES, height_inches), dpi=DPI, layout=layout)
     FigureCanvasAgg(figure)
     return figure
 

@@ -11,7 +11,7 @@ samples), so sums of them are energies too. A kernel belongs to its pitch in mm 
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, BinaryIO, Self
+from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 import numpy as np
 
@@ -21,6 +21,12 @@ from sssfit.files import write_atomically
 from sssfit.kernel import checks
 from sssfit.kernel import json as kernel_json
 from sssfit.kernel.json import FORMAT, is_kernel_file
+from sssfit.messages import by_channel, html_table, number, of_material
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from sssfit.profile import Profile
 
 __all__ = ["FORMAT", "SeparableKernel", "is_kernel_file"]
 
@@ -82,6 +88,55 @@ class SeparableKernel:
         given = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         for name, value in checks.checked(given).items():
             object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        errors = by_channel(self.channels, self.relative_frobenius_error.tolist(), ".3g%|unknown")
+        return f"<{self._in_words()}: error {errors}>"
+
+    def _repr_html_(self) -> str:
+        columns = (
+            (self.energy, ".6f"),
+            (self.scale, ".6g"),
+            (self.relative_frobenius_error, ".3g%|unknown"),
+            (self.energy_error, "+.2g%|unknown"),
+        )
+        rows = [
+            [name, *(number(values[c], form) for values, form in columns)]
+            for c, name in enumerate(self.channels)
+        ]
+        heads = ["channel", "energy", "scale", "Frobenius error", "energy error"]
+        return html_table(self._in_words(), heads, rows)
+
+    def _in_words(self) -> str:
+        """Say on one line what it is: material, method, terms, pixels."""
+        return (
+            f"SeparableKernel of {of_material(self.meta.get('material'))} by {self.method}, "
+            f"{self.rank} term{'s' if self.rank > 1 else ''}, {self.pixels} "
+            f"pixel{'s' if self.pixels > 1 else ''} of {self.mm_per_pixel:.4g} mm"
+        )
+
+    def plot(self, profile: "Profile | None" = None) -> "Figure":
+        """Draw the kernel, for a notebook; `sssfit.chart.kernel.kernel_figure` says what.
+
+        Parameters
+        ----------
+        profile : Profile, optional
+            What it was fitted to, drawn beside it.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            8 inches wide; `sssfit.chart.page.save_figure` writes it.
+
+        Raises
+        ------
+        KernelError
+            The profile has other channels.
+        """
+        from sssfit.chart.kernel import kernel_figure
+        from sssfit.compare.kernel_view import view_kernel
+
+        return kernel_figure(view_kernel(self, profile))
 
     def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
         # A mapping proxy cannot be pickled; worker processes and deep copies need the record.

@@ -56,7 +56,7 @@ from sssfit.material.toml import (
     read_text,
     write_toml,
 )
-from sssfit.messages import printable, shown
+from sssfit.messages import by_channel, of_material, printable, shown
 from sssfit.optics import normal_reflectance
 
 
@@ -190,6 +190,18 @@ class Material:
         for key in ("eta_above", "eta_below"):
             _store(self, **{key: number(key, getattr(self, key), "eta")})
         check_stack(self.layers, self.channels, self.eta_below)
+
+    def __repr__(self) -> str:
+        if len(self.layers) > 1:
+            thick = ", ".join(f"{each.thickness_mm:.3g}" for each in self.layers[:4])
+            what = f"{len(self.layers)} layers of {thick}{', ...' if len(self.layers) > 4 else ''}"
+        else:
+            paths = by_channel(self.channels, self.layers[0].mean_free_path_mm.tolist(), ".3g")
+            bottom = (
+                "" if self.is_semi_infinite else f" {self.layers[0].thickness_mm:.3g} mm thick,"
+            )
+            what = f"eta {self.layers[0].eta:g},{bottom} mean free path {paths}"
+        return f"<Material {of_material(self.name)}: {what} mm>"
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Material) and self.to_dict() == other.to_dict()

@@ -13,7 +13,7 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, BinaryIO, Self
+from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 import numpy as np
 import numpy.typing as npt
@@ -23,11 +23,14 @@ from sssfit.errors import MaterialError, ProfileError
 from sssfit.files import write_atomically
 from sssfit.material import Material
 from sssfit.material.checks import is_name
-from sssfit.messages import printable
+from sssfit.messages import by_channel, html_table, number, of_material, printable
 from sssfit.profile import checks, npz
 from sssfit.profile import pixels as integrals
 from sssfit.profile.npz import FORMAT, is_profile_file
 from sssfit.profile.pixels import full_kernel
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["FORMAT", "Profile", "full_kernel", "is_profile_file"]
 
@@ -94,6 +97,45 @@ class Profile:
         given = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         for name, value in checks.checked(given).items():
             object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        reflected = by_channel(self.channels, self.diffuse_reflectance.tolist(), ".4f")
+        return f"<{self._in_words()}: R_d {reflected}>"
+
+    def _repr_html_(self) -> str:
+        columns = (
+            (self.diffuse_reflectance, ".6f"),
+            (self.diffuse_reflectance_stderr, ".2g"),
+            (self.beyond_grid, ".6f"),
+            (self.energy_radii_mm([0.5])[0], ".4g"),
+        )
+        rows = [
+            [name, *(number(values[c], form) for values, form in columns)]
+            for c, name in enumerate(self.channels)
+        ]
+        heads = ["channel", "diffuse reflectance", "std. error", "beyond grid", "half within, mm"]
+        return html_table(self._in_words(), heads, rows)
+
+    def _in_words(self) -> str:
+        """Say on one line what it is: material, method, photons, grid."""
+        method = self.meta.get("method") or "unknown method"
+        walked = "" if self.photons is None else f", {self.photons:.3g} photons"
+        return (
+            f"Profile of {of_material(self.material_name)} by {method}{walked}, "
+            f"{self.n_annuli} annuli to {self.r_edges_mm[-1]:.4g} mm"
+        )
+
+    def plot(self) -> "Figure":
+        """Draw the profile, for a notebook; `sssfit.chart.profile.profile_figure` says what.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            8 x 6 inches; `sssfit.chart.page.save_figure` writes it.
+        """
+        from sssfit.chart.profile import profile_figure
+
+        return profile_figure(self)
 
     def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
         # A mapping proxy cannot be pickled; worker processes and deep copies need the record.
