@@ -78,10 +78,10 @@ def materials(
     """List the materials that ship with sssfit, show one in full, or make one.
 
     MATERIAL is one of their names, the path of a TOML file, or - for standard input.
-    --from-reflectance turns the exact solver round: it finds the albedos, for isotropic
-    scattering, whose total diffuse reflectance is what was asked for, and prints what the
-    approximate inversions of renderers would have given. A base colour in sRGB is decoded to linear
-    light, and meant for diffuse light; give --light diffuse with a linear one.
+    --from-reflectance inverts the exact solver: it finds the albedos, for isotropic scattering,
+    that have this total diffuse reflectance, and prints what the approximate inversions of
+    renderers give. A base colour in sRGB is decoded to linear light and inverted for diffuse light;
+    give --light diffuse with a linear base colour.
 
     \b
       sssfit materials skin1                        coefficients, mean free paths, grid
