@@ -5,87 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from ._report import percent
+from sssfit.messages import number
 
 if TYPE_CHECKING:
     from sssfit.choose.choice import Choice, PhotonNeed, Step
 
 _FIGURES = {"p95": "95th percentile", "p99": "99th percentile", "mean": "mean"}
-
-
-def figures_of(choice: Choice) -> dict[str, Any]:
-    """Everything that is printed, as ``--json`` has it; kernel is null where none is needed."""
-    fit = choice.fit
-    return {
-        "material": choice.profile.material_name,
-        "profile_method": choice.profile.meta.get("method"),
-        "mm_per_pixel": choice.mm_per_pixel,
-        "support_mm": choice.support_mm,
-        "tolerance": choice.tolerance,
-        "tolerance_of": choice.tolerance_of,
-        "pictures": [
-            {
-                "irradiance": each.name,
-                "width": each.width,
-                "height": each.height,
-                "mm_per_pixel": each.mm_per_pixel,
-            }
-            for each in choice.scenes
-        ],
-        "kernel": None
-        if fit is None
-        else {
-            "method": fit.kernel.method,
-            "rank": fit.kernel.rank,
-            "pixels": fit.kernel.pixels,
-            "support_mm": fit.kernel.support_mm,
-            "seconds_per_megapixel": choice.seconds_per_megapixel,
-            "relative_frobenius_error": fit.relative_frobenius_error,
-        },
-        "chosen": _row(choice.chosen),
-        "runner_up": _row(choice.runner_up),
-        "cheaper": _row(choice.cheaper),
-        "dearer": [_row(each) for each in choice.dearer],
-        "too_narrow": list(choice.too_narrow),
-        "unfitted": list(choice.unfitted),
-        "photons": _photons(choice.photons),
-        "rows": [_row(each) for each in choice.steps],
-    }
-
-
-def _row(step: Step | None) -> dict[str, Any] | None:
-    """One step; method null is no blur."""
-    from sssfit.measure.score import COLOUR_FIGURES
-
-    if step is None:
-        return None
-    option = step.option
-    return {
-        "label": step.label,
-        "method": option and option.candidate.method,
-        "rank": option.candidate.terms if option else 0,
-        "settings": dict(option.candidate.settings) if option else {},
-        "share": option and option.share,
-        "support_mm": option and option.support_mm,
-        "pixels": option.pixels if option else 1,
-        "taps_per_pixel": step.taps_per_pixel,
-        "error": step.error,
-        **{key: getattr(step, key) for key in COLOUR_FIGURES},
-        "mm_per_pixel": step.mm_per_pixel,
-        "within": step.within,
-    }
-
-
-def _photons(need: PhotonNeed | None) -> dict[str, Any] | None:
-    if need is None:
-        return None
-    return {
-        "photons": need.photons,
-        "tried": list(need.counts),
-        "errors": list(need.errors),
-        "seconds": list(need.seconds),
-        "profile_seconds": need.truth_seconds,
-    }
 
 
 def step_line(step: Step) -> str:
@@ -206,7 +131,7 @@ def _loss(step: Step) -> str:
     """Say how far colours are off: mean and percentiles of Delta E, and how many pixels show."""
     return (
         f"Delta E {step.delta_e_2000_mean:.3g} (95 % of pixels within {step.delta_e_2000_p95:.3g}, "
-        f"99 % within {step.delta_e_2000_p99:.3g}; {percent(step.share_above_1, '.2g')} above 1)"
+        f"99 % within {step.delta_e_2000_p99:.3g}; {number(step.share_above_1, '.2g%')} above 1)"
     )
 
 

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ._compiling import say_if_compiling
 from ._deon_skin import DEON_SKIN
+from ._input import load
 from ._options import Common
-from ._report import binary_stdin
+from ._progress import say_if_compiling
 from ._scene import MADE, Picture, check_file_options, made_options, make_or_read
 
 if TYPE_CHECKING:
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from sssfit.profile import Profile
     from sssfit.scene.record import Scene
 
-MM_PER_PIXEL = 0.3  # of made pictures: skin1's whole kernel is 143 pixels
 _SIZE = (512, 512)
 
 
@@ -27,10 +26,8 @@ def profile_of(name: str, common: Common) -> Profile:
     """Read a profile, ``-`` for stdin, or make the exact one of a material."""
     from sssfit.profile import Profile
 
-    if name == "-":
-        return Profile.read(binary_stdin(), "stdin")
-    if name.endswith(".npz"):
-        return Profile.load(name)
+    if name == "-" or name.endswith(".npz"):
+        return load(Profile, name)
     if name == DEON_SKIN:
         from sssfit.simulate import simulate_deon_skin
 
@@ -38,8 +35,8 @@ def profile_of(name: str, common: Common) -> Profile:
     return _exact(name, common)
 
 
-def material_of(name: str, what: str) -> Material:
-    """Load a material; of a profile, which has no light to trace, say what ``what`` needs."""
+def material_of(name: str) -> Material:
+    """Load the material of a budget; a profile has no light to trace."""
     from sssfit.errors import ProfileError
     from sssfit.material import load_material
 
@@ -47,8 +44,8 @@ def material_of(name: str, what: str) -> Material:
         raise ProfileError(f"{name} has no coefficients to simulate with; name a material.")
     if name.endswith(".npz"):
         raise ProfileError(
-            f"{name} is a profile, and {what} simulates a material: name that, such as skin1 or a "
-            ".toml file of your own."
+            f"{name} is a profile, and a budget simulates a material: name that, such as skin1 or "
+            "a .toml file of your own."
         )
     return load_material(name)
 
@@ -96,6 +93,8 @@ def scenes_of(
         name: make_or_read(Picture(name, None, mm_per_pixel, {}, layer, mask), 0.0, common)
         for name in files
     }
+    from sssfit.fit import MM_PER_PIXEL
+
     pitch = next((each.mm_per_pixel for each in read.values()), mm_per_pixel or MM_PER_PIXEL)
     return [
         read[name]

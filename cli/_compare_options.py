@@ -7,33 +7,36 @@ from typing import Any
 
 import click
 
-from ._compare_input import MM_PER_PIXEL
-from ._fits import FITS
-from ._options import Count, Length, WholeRange
-from ._scene import EDGE_DEGREES, FILE_OPTIONS, MADE, Size
+from sssfit.methods import FITS
 
-PICTURES = "disk,edge,points,head"
+from ._compare_parts import PICTURES
+from ._options import Count, LengthOr, WholeRange
+from ._scene import EDGE_DEGREES, FILE_OPTIONS, MADE, Size
 
 _OPTIONS = (
     click.option("--all", "every", is_flag=True, help="All materials that ship with sssfit."),
+    click.option("--paper", is_flag=True, help="The eleven of them that the SSSS paper has."),
     click.option(
-        "--only",
-        type=click.Choice(["budget", "kernels"]),
-        help="One of the two parts.  [default: both]",
+        "--what",
+        type=click.Choice(["front", "budget", "kernels", "sheet"]),
+        help="budget: why a kernel is off; kernels: every one by error and cost; front: those that "
+        "no other beats, a line a picture; sheet: pictures of all, drawn into --chart."
+        "  [default: budget and kernels]",
     ),
     click.option(
         "--picture",
         "pictures",
         metavar="NAME|FILE,...",
         multiple=True,
-        help=f"What is lit: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG files. The edge "
-        f"is at {EDGE_DEGREES:g} degrees.  [default: {PICTURES}]",
+        help=f"What is lit: {', '.join(MADE)}, or your own EXR, HDR, TIFF, PNG, JPG or TGA "
+        f"files. The edge is at {EDGE_DEGREES:g} degrees.  [default: {PICTURES}]",
     ),
     click.option(
         "--mm-per-pixel",
-        type=Length(),
-        metavar="MM",
-        help=f"Size of all pixels.  [default: what your own file says, else {MM_PER_PIXEL}]",
+        type=LengthOr("profile"),
+        metavar="MM|profile",
+        help="Size of all pixels; profile is the width of the profile's first annulus."
+        "  [default: what your own file says, else 0.3]",
     ),
     click.option(
         "--size",
@@ -45,8 +48,8 @@ _OPTIONS = (
     click.option(
         "--chart",
         metavar="FILE",
-        help="Draw the kernels by error and cost, as PNG, SVG or PDF by the ending; - for PNG on "
-        "stdout.",
+        help="Draw the kernels by error and cost, or the sheet, as PNG, SVG or PDF by the ending; "
+        "- for PNG on stdout.",
     ),
     click.option("--table", metavar="FILE", help="Write the kernels' rows, .md, .csv or .json."),
     click.option(
@@ -68,8 +71,7 @@ _OPTIONS = (
         "--photons",
         type=Count(2, 10**12),
         metavar="N",
-        help="Of the budget's photon walk, or the most of --convergence."
-        "  [default: 1e6; --convergence: 1e7]",
+        help="Of the budget's photon walk.  [default: 1e6]",
     ),
     click.option(
         "--method",
@@ -90,23 +92,10 @@ _OPTIONS = (
         help="The budget of a kernel of this model.  [default: of the photon walk]",
     ),
     click.option(
-        "--sheet", metavar="FILE", help="Instead draw a contact sheet of every kernel's pictures."
-    ),
-    click.option(
-        "--editing",
-        metavar="FILE",
-        help="Instead draw the 2012 model edited by hand; needs no MATERIAL.",
-    ),
-    click.option(
-        "--convergence",
-        metavar="FILE",
-        help="Instead draw the simulation's error over photons and seconds.",
-    ),
-    click.option(
         "-o",
         "--output",
         metavar="FOLDER",
-        help="Where --all puts NAME-pareto.png and NAME-pareto.md.  [default: here]",
+        help="Where --all and --paper put NAME-pareto.png and NAME-pareto.md.  [default: here]",
     ),
     click.option(
         "--force",

@@ -2,11 +2,13 @@
 
 import click
 
-from ._methods import METHODS
-from ._options import Common
-from ._report import finish, table
+from sssfit.messages import table
+from sssfit.methods import SIMULATIONS
 
-DEON_SKIN = METHODS["gaussians"].makes
+from ._options import Common
+from ._output import finish
+
+DEON_SKIN = SIMULATIONS["gaussians"].makes
 
 
 def show_deon_skin(common: Common, *, as_toml: bool) -> None:

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ._compiling import say_if_compiling
+from sssfit.messages import table
+
 from ._memory import check_memory
 from ._options import Common
-from ._outputs import held
-from ._report import binary_stdout, finish, table
+from ._output import binary_stdout, finish, held
+from ._progress import say_if_compiling
 
 if TYPE_CHECKING:
     from sssfit.material import Material
@@ -29,10 +30,11 @@ _PUBLISHED = {"chiang2016": "Chiang et al. 2016", "van_de_hulst": "van de Hulst"
 class Wish:
     """What the options ask for; None where they do not say."""
 
-    from_reflectance: list[float]
+    from_reflectance: list[float] | str
+    srgb: bool
     mean_free_path: list[float] | None
-    eta: float | None
-    light: Light
+    eta: float
+    light: Light | None
     name: str | None
     channels: str | None
     output: str | None
@@ -42,9 +44,12 @@ class Wish:
 def write_material(wish: Wish, common: Common) -> None:
     """Invert, write the TOML, and print what was found beside the published approximations."""
     check_memory("inversion", common.threads)
-    if wish.mean_free_path is None or wish.eta is None:
-        raise click.UsageError("--from-reflectance needs --mean-free-path and --eta.")
-    channels = _channels(wish)
+    if wish.mean_free_path is None:
+        raise click.UsageError("--from-reflectance needs --mean-free-path.")
+    asked_for = _asked(wish)
+    is_srgb = wish.srgb or isinstance(asked_for, str)
+    light = wish.light or ("diffuse" if is_srgb else "normal")
+    channels = _channels(wish, 3 if isinstance(asked_for, str) else len(asked_for))
     name = wish.name or _name_of(wish.output)
     asked = f"{name}.toml" if wish.output is None else wish.output
     path = None if asked == "-" else Path(asked)
@@ -52,7 +57,7 @@ def write_material(wish: Wish, common: Common) -> None:
     with held([path], _is_ours, inputs=[], force=wish.force, named=("a material", ".toml")):
         say_if_compiling(common, solver=True)
         material, figures = _inverted(
-            wish.from_reflectance, wish.mean_free_path, wish.eta, wish.light, name, channels
+            asked_for, wish.mean_free_path, wish.eta, light, name, channels
         )
         _write(material, path)
     figures = {"command": "materials", "output": [str(path or "-")], **figures}
@@ -61,7 +66,7 @@ def write_material(wish: Wish, common: Common) -> None:
 
 
 def _inverted(
-    asked: list[float],
+    asked_for: list[float] | str,
     paths_mm: list[float],
     eta: float,
     light: Light,
@@ -69,6 +74,7 @@ def _inverted(
     channels: list[str],
 ) -> tuple[Material, dict[str, Any]]:
     """Return the material, and its figures beside those of the published approximations."""
+    from sssfit.formats.colours import linear_from_hex
     from sssfit.simulate.inversion import (
         largest_reflectance,
         material_from_reflectance,
@@ -77,9 +83,10 @@ def _inverted(
     )
 
     material = material_from_reflectance(
-        asked, paths_mm, eta, name=name, channels=channels, light=light
+        asked_for, paths_mm, eta, name=name, channels=channels, light=light
     )
     layer = material.layers[0]
+    asked = linear_from_hex(asked_for).tolist() if isinstance(asked_for, str) else asked_for
     published = published_inversions(asked, eta, light=light)
     return material, {
         "name": material.name,
@@ -101,9 +108,25 @@ def _inverted(
     }
 
 
-def _channels(wish: Wish) -> list[str]:
+def _asked(wish: Wish) -> list[float] | str:
+    """Return linear reflectances, or the sRGB colour in hex, which the material's source names."""
+    given = wish.from_reflectance
+    if isinstance(given, str) or not wish.srgb:
+        return given
+    for each in given:
+        if not (each.is_integer() and 0.0 <= each <= 255.0):
+            raise click.UsageError(
+                f"--srgb takes codes of 8 bits, whole numbers from 0 to 255, and not {each:g}."
+            )
+    if len(given) == 3:
+        return "#" + "".join(f"{round(each):02x}" for each in given)
+    from sssfit.formats.colours import srgb_decode
+
+    return [float(srgb_decode(each / 255.0)) for each in given]
+
+
+def _channels(wish: Wish, count: int) -> list[str]:
     """Names of the channels: R, G, B for three."""
-    count = len(wish.from_reflectance)
     if wish.channels is not None:
         names = [each.strip() for each in wish.channels.split(",")]
         if len(names) != count:

@@ -1,82 +1,75 @@
-"""The methods of ``sssfit simulate`` in one table: what each does, and which options are its own.
-
-Nothing of the library is imported here, so the table can make the help; ``function`` is a name in
-``sssfit.simulate``.
-"""
+"""Options of methods, made from their entries in ``sssfit.methods``; which a method takes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import click
 from click.core import ParameterSource
 
+from sssfit.methods import SIMULATIONS, Method, Setting, settings_of
 
-@dataclass(frozen=True, slots=True)
-class Method:
-    """One way from a material to a profile.
+from ._options import Count, ListOf, Number, NumberRange, Share, WholeRange
 
-    ``shares`` says that the function takes a list of materials, works once for what they have in
-    common, and knows ``threads`` and ``stop``; the others take one material. One that ``makes``
-    a profile by name takes none, and that name needs no ``--method``.
-    """
-
-    summary: str
-    function: str
-    options: tuple[str, ...] = ()
-    shares: bool = False
-    makes: str | None = None
-
-
-METHODS = {
-    "montecarlo": Method(
-        "walks photons, through layers and slabs too; with standard errors",
-        "simulate_montecarlo_many",
-        ("photons", "target_error", "checkpoint_every", "resume"),
-        shares=True,
-    ),
-    "exact": Method(
-        "solves the transport equation: no noise; one half space",
-        "simulate_exact_many",
-        ("tolerance",),
-        shares=True,
-    ),
-    "dipole": Method(
-        "diffusion, Jensen et al. 2001; one half space",
-        "simulate_dipole",
-    ),
-    "dipole-grosjean": Method(
-        "the same with Grosjean's diffusion coefficient",
-        "simulate_dipole_grosjean",
-    ),
-    "multipole": Method(
-        "diffusion, Donner and Jensen 2005; slabs and layers too",
-        "simulate_multipole",
-    ),
-    "burley": Method(
-        "normalised diffusion, Christensen and Burley 2015; one half space",
-        "simulate_burley",
-        ("mapping",),
-    ),
-    "gaussians": Method(
-        "skin as the six Gaussians of d'Eon et al. 2007; deon-skin only",
-        "simulate_deon_skin",
-        makes="deon-skin",
-    ),
+_KINDS: dict[str, Callable[[Setting], Any]] = {
+    "number": lambda _: Number(),
+    "numbers": lambda _: ListOf(Number()),
+    "share": lambda _: Share(),
+    "seconds": lambda _: NumberRange(min=0),
+    "count": lambda each: Count(*each.among),
+    "whole": lambda each: WholeRange(*each.among),
+    "choice": lambda each: click.Choice(each.among),
 }
-MAPPINGS = ("perpendicular", "diffuse", "diffuse-mfp")
 
 
-def method_lines() -> str:
-    """Return the methods for the end of the help, a line each; click keeps lines after a backspace.
+def method_options(
+    methods: Mapping[str, Method],
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Return what adds the settings of all methods as options, in the order of the methods."""
 
-    The longest name and two spaces set the column.
-    """
-    width = max(map(len, METHODS)) + 2
-    return "\b\nMethods:\n" + "\n".join(
-        f"  {name.ljust(width)}{method.summary}" for name, method in METHODS.items()
+    def add(command: Callable[..., Any]) -> Callable[..., Any]:
+        for each, owners in reversed(settings_of(methods).values()):
+            command = _option(each, owners)(command)
+        return command
+
+    return add
+
+
+def _option(each: Setting, owners: tuple[str, ...]) -> Callable[..., Any]:
+    """Return the option that asks for a setting; its help begins with the methods that have it."""
+    name, text = f"--{each.name.replace('_', '-')}", f"{', '.join(owners)}: {each.help}"
+    if each.kind == "flag":
+        return click.option(name, is_flag=True, help=text)
+    return click.option(
+        name,
+        type=_KINDS[each.kind](each),
+        metavar=each.metavar or None,
+        default=each.default,
+        show_default=each.default is not None,
+        help=text + (f"  [default: {each.words}]" if each.words else ""),
     )
+
+
+def own_settings(
+    context: click.Context, methods: Mapping[str, Method], method: str, given: dict[str, Any]
+) -> dict[str, Any]:
+    """Keep the method's own settings that were given, by keyword; refuse those of others."""
+    known = settings_of(methods)
+    for option in given:
+        is_given = context.get_parameter_source(option) is ParameterSource.COMMANDLINE
+        owners = known[option][1]
+        if is_given and method not in owners:
+            raise click.UsageError(
+                f"--{option.replace('_', '-')} is for --method {' or '.join(owners)}, and this is "
+                f"{method}; leave it out."
+            )
+    own = {each.name: each.keyword or each.name for each in methods[method].settings}
+    return {
+        own[key]: value
+        for key, value in given.items()
+        if key in own and value is not None and value is not False  # 0 is a value
+    }
 
 
 def method_for(context: click.Context, method: str, material: str | None) -> str:
@@ -84,14 +77,14 @@ def method_for(context: click.Context, method: str, material: str | None) -> str
 
     A name of a profile that a method makes has no coefficients, and no other method can use it.
     """
-    made = METHODS[method].makes
+    made = SIMULATIONS[method].makes
     if made is not None and material != made:
         asked = "--all" if material is None else material
         raise click.UsageError(
             f"--method {method} makes {made} only, and this is {asked}; for sums of Gaussians of a "
             "material's profile use sssfit fit --method gaussians."
         )
-    owners = [name for name, each in METHODS.items() if each.makes == material]
+    owners = [name for name, each in SIMULATIONS.items() if each.makes == material]
     if material is None or not owners or method in owners:
         return method
     if context.get_parameter_source("method") is ParameterSource.COMMANDLINE:
@@ -100,16 +93,3 @@ def method_for(context: click.Context, method: str, material: str | None) -> str
             f"{owners[0]} or leave it out."
         )
     return owners[0]
-
-
-def own_options(context: click.Context, method: str, given: dict[str, Any]) -> dict[str, Any]:
-    """Keep the method's own options of all that methods have; refuse those of others, if given."""
-    for owner, each in METHODS.items():
-        for option in each.options:
-            is_given = context.get_parameter_source(option) is ParameterSource.COMMANDLINE
-            if is_given and option not in METHODS[method].options:
-                raise click.UsageError(
-                    f"--{option.replace('_', '-')} is for --method {owner}, and this is {method}; "
-                    "leave it out."
-                )
-    return {key: given[key] for key in METHODS[method].options}

@@ -114,8 +114,26 @@ class Length(click.ParamType[float]):
         except ValueError:
             number = math.nan
         if not (math.isfinite(number) and number > 0):
-            self.fail(f"{value!r} is not a length above 0, such as 0.05, 3cm or 0.6m.", param, ctx)
+            self.fail(f"{value!r} is not {self.expected()}.", param, ctx)
         return number
+
+    def expected(self) -> str:
+        """Return what a value may be."""
+        return "a length above 0, such as 0.05, 3cm or 0.6m"
+
+
+class LengthOr(Length):
+    """A length, or one word that comes through as it is."""
+
+    def __init__(self, word: str) -> None:
+        self.word = word
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Parse ``value``; a usage error (exit 2) names what was expected."""
+        return value if value == self.word else super().convert(value, param, ctx)
+
+    def expected(self) -> str:
+        return f"{super().expected()}, or {self.word}"
 
 
 class Count(click.ParamType[int]):
@@ -155,6 +173,39 @@ class Reflectance(click.ParamType[float]):
         if number is None:
             self.fail(f"{value!r} is not a reflectance, such as 0.44 or 44%.", param, ctx)
         return number
+
+
+class BaseColour(click.ParamType[Any]):
+    """Reflectances with commas between them, or an sRGB colour in hex, which stays a text."""
+
+    name = "list of reflectances"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Parse ``value``; a usage error (exit 2) names what was expected."""
+        text = str(value).strip()
+        if not text.startswith("#"):
+            return ListOf(Reflectance()).convert(text, param, ctx)
+        if not re.fullmatch("#(?:[0-9a-fA-F]{3}|[0-9a-fA-F]{6})", text):
+            self.fail(f"{text!r} is not an sRGB colour in hex, such as '#c58c6b'.", param, ctx)
+        return text
+
+
+class Lengths(click.ParamType[list[float]]):
+    """Lengths with commas between them; the unit of the last serves those that have none."""
+
+    name = "list of lengths"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> list[float]:
+        """Parse each; a usage error (exit 2) names the one that is wrong."""
+        texts = [each.strip() for each in str(value).split(",")]
+        units = [re.sub(r"[-+.\deE\s]", "", each) for each in texts]
+        if units[-1] and not any(units[:-1]):
+            texts[:-1] = [f"{each}{units[-1]}" for each in texts[:-1]]
+        elif not all(units) and any(units):
+            self.fail(f"{value!r} has a unit for some lengths only; give it to all.", param, ctx)
+        return [Length().convert(each, param, ctx) for each in texts]
 
 
 class ListOf(click.ParamType[list[float]]):

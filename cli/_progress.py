@@ -1,4 +1,6 @@
-"""Progress bars on stderr: of a photon walk with rate and present error, and of counted steps."""
+"""Progress on stderr: bars of a photon walk and of counted steps, a word before compiling."""
+
+from __future__ import annotations
 
 import contextlib
 import math
@@ -7,20 +9,21 @@ from collections.abc import Callable, Iterator
 from datetime import timedelta
 from typing import TYPE_CHECKING
 
-_PIPED_COLUMNS = 80
+from ._options import Common
+from ._output import say
 
 if TYPE_CHECKING:
-    from rich.console import Console
-
+    from sssfit.material import Material
     from sssfit.simulate import Progress as WalkProgress
 
 
 @contextlib.contextmanager
-def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[["WalkProgress"], None] | None]:
-    """Yield a progress callback; None with ``quiet``. Piped, it leaves one line at the end."""
-    if quiet:
+def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[[WalkProgress], None] | None]:
+    """Yield a progress callback; None unless in a terminal, where the bar goes once it is full."""
+    if not _is_shown(quiet):
         yield None
         return
+    from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn
 
     bar = Progress(
@@ -30,12 +33,13 @@ def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[["WalkProgres
         TextColumn("{task.fields[rate]}"),
         TextColumn("error {task.fields[error]}"),
         TextColumn("{task.fields[left]}"),
-        console=_console(),
+        console=Console(stderr=True),
+        transient=True,
     )
     task = bar.add_task(label, total=None, rate="", error="-", left="")
     first: list[WalkProgress] = []
 
-    def report(now: "WalkProgress") -> None:
+    def report(now: WalkProgress) -> None:
         # The bar appears with the first figures: a refused setting should leave one line only.
         bar.start()
         first.append(now)
@@ -57,18 +61,15 @@ def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[["WalkProgres
             bar.stop()
 
 
-def _console() -> "Console":
-    """Return stderr; where it is no terminal, COLUMNS must not cut the one line short."""
-    from rich.console import Console
-
-    is_terminal = sys.stderr is not None and sys.stderr.isatty()
-    return Console(stderr=True, width=None if is_terminal else _PIPED_COLUMNS)
+def _is_shown(quiet: bool) -> bool:
+    """Tell whether somebody looks on: a bar that was redrawn is litter in a log."""
+    return not quiet and sys.stderr is not None and sys.stderr.isatty()
 
 
 @contextlib.contextmanager
 def step_progress(label: str, *, quiet: bool) -> Iterator[Callable[[int, int, str], None] | None]:
     """Yield a callback for (done, of how many, the next one's name); None unless in a terminal."""
-    if quiet or sys.stderr is None or not sys.stderr.isatty():
+    if not _is_shown(quiet):
         yield None
         return
     from rich.console import Console
@@ -89,7 +90,7 @@ def step_progress(label: str, *, quiet: bool) -> Iterator[Callable[[int, int, st
         )
 
 
-def time_left(first: "WalkProgress", now: "WalkProgress") -> str:
+def time_left(first: WalkProgress, now: WalkProgress) -> str:
     """Say how long the rest takes at the rate since the first report, as h:mm:ss.
 
     That rate knows neither compilation nor earlier sittings. rich's own column loses its memory
@@ -102,3 +103,16 @@ def time_left(first: "WalkProgress", now: "WalkProgress") -> str:
         return "-:--:--"
     rest = (now.photons - now.photons_done) / done * (now.seconds - first.seconds)
     return str(timedelta(seconds=round(rest)))
+
+
+def say_if_compiling(common: Common, *, walk: Material | None = None, solver: bool = False) -> None:
+    """Say that the walk of a material, or the exact solver, is about to be compiled."""
+    from sssfit.simulate import is_compiled, is_solver_compiled
+
+    if solver and not is_solver_compiled():
+        say(common, "Compiling the solver, some 3 s; it is kept for later runs where it can be.")
+    if walk is not None and not is_compiled(walk):
+        say(
+            common,
+            "Compiling the photon walk, some 10 s; it is kept for later runs where it can be.",
+        )

@@ -16,7 +16,7 @@ _OPTIONS = (
         default=MADE[0],
         show_default=True,
         metavar="NAME|FILE",
-        help=f"What is lit: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG file.",
+        help=f"What is lit: {', '.join(MADE)}, or your own EXR, HDR, TIFF, PNG, JPG or TGA file.",
     ),
     click.option(
         "--size",
@@ -29,7 +29,8 @@ _OPTIONS = (
         "--mm-per-pixel",
         type=Length(),
         metavar="MM",
-        help="Your own file: size of its pixels, unless its header says.",
+        help="Size of a pixel of your own file, unless its header says, and of the made head with "
+        "--screen.  [default: 0.3 with --screen, else the kernel's]",
     ),
     *FILE_OPTIONS,
     click.option(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ._options import Common
-from ._report import say
+from ._output import say
 
 if TYPE_CHECKING:
     from sssfit.scene.record import Scene
@@ -108,8 +108,8 @@ def made_scene(picture: Picture, mm_per_pixel: float, common: Common) -> Scene:
 
     if picture.mm_per_pixel is not None:
         raise click.UsageError(
-            f"--mm-per-pixel is for pictures from files; {picture.irradiance} is made on the "
-            "kernel's pixels."
+            f"--mm-per-pixel is for pictures from files and for --screen; {picture.irradiance} is "
+            "made on the kernel's pixels."
         )
     check_file_options(picture.layer, picture.mask, has_file=False)
     height, width = picture.size or _default_size(picture, mm_per_pixel, common)
@@ -138,7 +138,7 @@ def _default_size(picture: Picture, mm_per_pixel: float, common: Common) -> tupl
         say(
             common,
             f"The whole face takes {wanted} rows of {mm_per_pixel:.4g} mm; {_MOST_ROWS} show its "
-            "middle (--size for more).",
+            f"middle. Give --size {wanted}x{wanted}, or fit the kernel to larger pixels.",
         )
     rows = min(wanted, _MOST_ROWS)
     return rows, rows

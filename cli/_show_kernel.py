@@ -4,44 +4,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from ._report import percent, plain, table
-
-if TYPE_CHECKING:
-    from sssfit.kernel import SeparableKernel
-
-_PROVENANCE = ("material", "profile_method", "photons", "seed", "version", "profile_sha256")
-
-
-def kernel_figures(kernel: SeparableKernel) -> dict[str, Any]:
-    """Everything that is printed, as ``--json`` has it; null where a kernel does not say.
-
-    Terms have their signs, energies (sign times the squared sum of the pass) and the weights of the
-    middle pixel, (terms, channels).
-    """
-    from sssfit.kernel import FORMAT
-
-    return {
-        "kind": "kernel",
-        "format": FORMAT,
-        **{name: kernel.meta.get(name) for name in _PROVENANCE},
-        "settings": dict(kernel.meta.get("settings") or {}),
-        "method": kernel.method,
-        "rank": kernel.rank,
-        "pixels": kernel.pixels,
-        "mm_per_pixel": kernel.mm_per_pixel,
-        "support_mm": kernel.support_mm,
-        "channels": kernel.channels,
-        "energy": kernel.energy,
-        "scale": kernel.scale,
-        "relative_frobenius_error": kernel.relative_frobenius_error,
-        "energy_error": kernel.energy_error,
-        "sign": kernel.signs,
-        "term_energy": kernel.signs * kernel.weights.sum(axis=1) ** 2,
-        "middle_weight": kernel.weights[:, kernel.half_pixels],
-        "parameters": dict(kernel.parameters),
-    }
+from sssfit.messages import columns, table
 
 
 def kernel_text(figures: Mapping[str, Any]) -> str:
@@ -70,17 +35,14 @@ def _head(figures: Mapping[str, Any]) -> str:
 
 def _channels(figures: Mapping[str, Any]) -> str:
     """One line a channel: energies and errors."""
-    rows = [
-        [
-            name,
-            f"{figures['energy'][c]:.6f}",
-            f"{figures['scale'][c]:.6g}",
-            _share(figures["relative_frobenius_error"][c], ".3g"),
-            _share(figures["energy_error"][c], "+.2g"),
-        ]
-        for c, name in enumerate(figures["channels"])
-    ]
-    return table(["channel", "energy", "scale", "Frobenius error", "energy error"], rows)
+    return columns(
+        "channel",
+        figures["channels"],
+        ("energy", figures["energy"], ".6f"),
+        ("scale", figures["scale"], ".6g"),
+        ("Frobenius error", figures["relative_frobenius_error"], ".3g%|unknown"),
+        ("energy error", figures["energy_error"], "+.2g%|unknown"),
+    )
 
 
 def _terms(figures: Mapping[str, Any]) -> str:
@@ -118,14 +80,10 @@ def _value(value: Any) -> str:
         return f"{value:.6g}"
     if isinstance(value, (list, tuple)):
         return f"[{', '.join(_value(each) for each in value)}]"
-    return _name(value, "") if isinstance(value, str) else json.dumps(plain(value))
+    return _name(value, "") if isinstance(value, str) else json.dumps(value)
 
 
 def _name(value: object, unknown: str) -> str:
     from sssfit.messages import printable
 
     return unknown if value is None else printable(str(value))
-
-
-def _share(value: float, digits: str) -> str:
-    return "unknown" if value != value else percent(value, digits)  # NaN: not recorded

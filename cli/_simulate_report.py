@@ -3,53 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from sssfit.messages import number, table
 
 from ._options import Common
-from ._report import finish, table
-
-if TYPE_CHECKING:
-    from sssfit.profile import Profile
+from ._output import finish
 
 _NOTED_BEYOND = 1e-3  # share of a channel beyond the grid that is worth a remark
 _SIGMAS = 4.5  # a deviation beyond so many standard errors is no accident
 _ROUNDING = 1e-12  # below this an energy balance is rounding, not roulette
-_OWN_SETTINGS = ("tolerance", "similarity", "mapping")  # of the methods that have them
-
-
-def figures_of(profile: Profile, seconds: float | None) -> dict[str, Any]:
-    """Figures of one run, as ``--json`` prints them; no seconds where it was finished before.
-
-    Null stands for what the method does not have: photons where nothing is sampled, say.
-    """
-    meta, settings = profile.meta, profile.meta["settings"]
-    is_known = len(profile.absorbed) > 0
-    return {
-        "material": meta["material"]["name"],
-        "method": meta["method"],
-        "channels": list(profile.channels),
-        "diffuse_reflectance": profile.diffuse_reflectance,
-        "diffuse_reflectance_stderr": profile.diffuse_reflectance_stderr,
-        "specular_reflectance": profile.specular_reflectance,
-        "transmittance": profile.transmittance,
-        "transmittance_stderr": profile.transmittance_stderr,
-        "absorbed": profile.absorbed.sum(axis=0) if is_known else None,
-        "absorbed_by_layer": profile.absorbed if is_known else None,
-        "beyond_grid": profile.beyond_grid,
-        "unfinished": profile.unfinished,
-        "energy_balance": profile.energy_balance,
-        "energy_balance_stderr": meta["energy_balance_stderr"],
-        "dr_mm": float(profile.r_edges_mm[1]),
-        "annuli": profile.n_annuli,
-        "photons": profile.photons,
-        "seed": meta["seed"],
-        "seconds": seconds,
-        "photons_per_second": profile.photons / seconds if profile.photons and seconds else None,
-        "target_error": settings.get("target_error"),
-        "relative_error": meta["relative_error"],
-        "finished_before": seconds is None,
-        **{key: settings[key] for key in _OWN_SETTINGS if key in settings},
-    }
 
 
 def report(rows: list[dict[str, Any]], *, several: bool, common: Common, interrupted: bool) -> None:
@@ -144,9 +107,9 @@ def _transmitted(row: dict[str, Any], channel: int) -> list[str]:
 
 def _error(row: dict[str, Any], key: str, channel: int) -> str:
     """Write a walk's error in its figure's decimals, that of a computation, far smaller, alone."""
-    if row[key] is None or math.isnan(row[key][channel]):
-        return "-"
-    return f"{row[key][channel]:.{'6f' if row['photons'] else '1e'}}"
+    return (
+        "-" if row[key] is None else number(row[key][channel], ".6f" if row["photons"] else ".1e")
+    )
 
 
 def _layers(rows: list[dict[str, Any]]) -> list[str]:

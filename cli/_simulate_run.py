@@ -1,34 +1,37 @@
-"""The walks behind ``sssfit simulate``: outputs checked and locked, walked, saved, resumed."""
+"""The runs behind ``sssfit simulate``: outputs held, profiles computed, saved, resumed, told."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._compiling import say_if_compiling
+from sssfit.methods import SIMULATIONS
+
 from ._options import Common
-from ._outputs import PROFILE, held
-from ._report import say
-from ._simulate_outputs import write_profile
-from ._simulate_report import figures_of, report
+from ._output import PROFILE, held, say, write
+from ._progress import say_if_compiling, walk_progress
+from ._simulate_report import report
 
 if TYPE_CHECKING:
     from sssfit.material import Material
     from sssfit.profile import Profile
-    from sssfit.simulate import Checkpoint, Progress
+    from sssfit.simulate import Checkpoint, ProfileSource, Progress
 
 
-# Indices of the materials that share a walk, and the keywords of simulate_montecarlo_many.
-Walk = tuple[list[int], dict[str, Any]]
+# Indices of the materials that share a run, and the keywords of the method's function.
+Job = tuple[list[int], dict[str, Any]]
+Made = Sequence["Material | ProfileSource"]
 
 
 @dataclass(frozen=True, slots=True)
 class Request:
-    """What was asked for, beside materials and their settings; the last two are the walk's."""
+    """What was asked for, beside materials and their settings; the last two are a walk's."""
 
+    method: str
     force: bool
     several: bool
     common: Common
@@ -36,20 +39,26 @@ class Request:
     checkpoint_every: float = 0.0
     resume: bool = False
 
+    @property
+    def is_walk(self) -> bool:
+        """Whether photons are traced: only a walk is saved half done, and goes on."""
+        return self.method == "montecarlo"
+
 
 @dataclass(frozen=True, slots=True)
 class _Outcome:
-    """Figures of one profile, whether its walk came to its end, whether a checkpoint is kept."""
+    """Figures of one profile, whether its run came to its end, whether a checkpoint is kept."""
 
     figures: dict[str, Any]
     is_complete: bool
     goes_on: bool
 
 
-def run_walks(
-    materials: list[Material], targets: list[Path | None], walks: list[Walk], request: Request
-) -> None:
-    """Walk, write each profile as its walk ends, and report; a target None is stdout."""
+def run(materials: Made, targets: list[Path | None], jobs: list[Job], request: Request) -> None:
+    """Compute, write each profile as its run ends, and report; a target None is stdout.
+
+    After Ctrl-C or SIGTERM what was written by then stays, and a walk is saved as far as it came.
+    """
     from sssfit.errors import StoppedError
     from sssfit.profile import is_profile_file
 
@@ -60,11 +69,15 @@ def run_walks(
         targets, is_profile_file, inputs=request.inputs, force=request.force, named=PROFILE
     )
     with asked_to_stop() as stop, outputs:
-        _check_checkpoints([targets[group[0]] for group, _ in walks], request)
-        for group, settings in walks:
+        if request.is_walk:
+            _check_checkpoints([targets[group[0]] for group, _ in jobs], request)
+        if request.method == "exact":
+            say_if_compiling(request.common, solver=True)
+        one_run: Callable[..., list[_Outcome]] = _walk if request.is_walk else _computed
+        for group, settings in jobs:
             own = [materials[k] for k in group], [targets[k] for k in group], settings
             try:
-                found = _walk_group(*own, request, stop)
+                found = one_run(*own, request, stop)
             except StoppedError:
                 break
             rows |= zip(group, found, strict=True)
@@ -73,18 +86,20 @@ def run_walks(
         _report(rows, materials, request)
 
 
-def _report(rows: dict[int, _Outcome], materials: list[Material], request: Request) -> None:
+def _report(rows: dict[int, _Outcome], materials: Made, request: Request) -> None:
     """Print the figures; say what was interrupted or not begun, and exit 130 in that case."""
     outcomes = [rows[k] for k in sorted(rows)]
-    missing = [each.name for k, each in enumerate(materials) if k not in rows]
+    missing = ", ".join(each.name for k, each in enumerate(materials) if k not in rows)
     interrupted = bool(missing) or not all(each.is_complete for each in outcomes)
-    if interrupted:
+    if interrupted and request.is_walk:
         how = "; --resume goes on from there" if any(each.goes_on for each in outcomes) else ""
-        left = f" Not begun: {', '.join(missing)}." if missing else ""
+        left = f" Not begun: {missing}." if missing else ""
         say(
             request.common,
             f"Interrupted: what was done by then is saved, with its true photon count{how}.{left}",
         )
+    elif interrupted:
+        say(request.common, f"Interrupted. Not done: {missing}.")
     report(
         [each.figures for each in outcomes],
         several=request.several,
@@ -95,7 +110,32 @@ def _report(rows: dict[int, _Outcome], materials: list[Material], request: Reque
         sys.exit(130)
 
 
-def _walk_group(
+def _computed(
+    materials: Made,
+    targets: list[Path | None],
+    settings: dict[str, Any],
+    request: Request,
+    stop: Callable[[], bool],
+) -> list[_Outcome]:
+    """One call of the method's function; those that share work between materials can be stopped."""
+    from sssfit.errors import StoppedError
+
+    method, begun = SIMULATIONS[request.method], time.perf_counter()
+    function = method.load()
+    if method.shares:
+        profiles = list(function(materials, stop=stop, **settings))
+    elif stop():
+        raise StoppedError("stopped between two materials.")
+    else:
+        given = [()] if method.makes is not None else [(each,) for each in materials]
+        profiles = [function(*each, **settings) for each in given]
+    seconds = time.perf_counter() - begun
+    for profile, target in zip(profiles, targets, strict=True):
+        write(profile, target)
+    return [_outcome(*each, seconds) for each in zip(profiles, targets, strict=True)]
+
+
+def _walk(
     materials: list[Material],
     targets: list[Path | None],
     settings: dict[str, Any],
@@ -111,10 +151,10 @@ def _walk_group(
         if profiles := _finished(materials, targets, settings):
             return [_outcome(*each, None) for each in zip(profiles, targets, strict=True)]
         say(request.common, f"There is no {checkpoint.path} to go on from: starting.")
-    profiles, seconds = _walk(materials, settings, request, checkpoint, stop)
+    profiles, seconds = _walked(materials, settings, request, checkpoint, stop)
     for profile, target in zip(profiles, targets, strict=True):
         try:
-            write_profile(profile, target)
+            write(profile, target)
         except FileError as error:
             if checkpoint is None or not checkpoint.is_ours():
                 raise
@@ -167,7 +207,7 @@ def _finished(
     return profiles if len(done) == len(materials) and all(done) else []
 
 
-def _walk(
+def _walked(
     materials: list[Material],
     settings: dict[str, Any],
     request: Request,
@@ -176,8 +216,6 @@ def _walk(
 ) -> tuple[list[Profile], float]:
     """One walk for all ``materials``, with a progress bar; the profiles and seconds of walking."""
     from sssfit.simulate import simulate_montecarlo_many
-
-    from ._progress import walk_progress
 
     common = request.common
     last: list[Progress] = []
@@ -207,7 +245,7 @@ def _walk(
 def _outcome(
     profile: Profile, target: Path | None, seconds: float | None, goes_on: bool = False
 ) -> _Outcome:
-    from sssfit.simulate import is_complete
+    from sssfit.simulate import is_complete, run_figures
 
-    figures = figures_of(profile, seconds) | {"path": str(target or "-")}
-    return _Outcome(figures, is_complete(profile), goes_on)
+    figures = run_figures(profile, seconds) | {"path": str(target or "-")}
+    return _Outcome(figures, profile.photons is None or is_complete(profile), goes_on)

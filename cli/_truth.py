@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ._options import Common
-from ._report import say
+from ._output import say
 
 if TYPE_CHECKING:
     from sssfit.kernel import SeparableKernel

@@ -2,26 +2,32 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from ._figure import chart_output
-from ._guide import chart_guide
-from ._kernel_chart import chart_kernel
-from ._models import chart_models
-from ._options import Common, Count, Length, ListOf, Number, common_options
-from ._report import finish, newest, say
-from ._spectrum import chart_spectrum
+from ._charts import (
+    draw_guide,
+    draw_kernel,
+    draw_models,
+    draw_spectrum,
+    draw_whole,
+    first_of,
+    read_models,
+)
+from ._input import profile_name, read_any
+from ._memory import check_memory
+from ._options import Common, Count, LengthOr, ListOf, Number, common_options
+from ._output import finish_one, held_charts, stem_of, target, write_chart
+from ._truth import true_profile
 
 if TYPE_CHECKING:
     from sssfit.kernel import SeparableKernel
-    from sssfit.material import Material
-    from sssfit.profile import Profile
-    from sssfit.simulate import SoFar
 
-    from ._any_file import Found
+    from ._charts import Drawn
+    from ._input import Found
 
 
 @click.command()
@@ -35,10 +41,10 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--mm-per-pixel",
-    type=Length(),
-    metavar="MM",
-    help="Pixels of the kernel, with --spectrum or --guide."
-    "  [default: the profile's first annulus]",
+    type=LengthOr("profile"),
+    metavar="MM|profile",
+    help="Pixels of the kernel, with --spectrum or --guide; profile is the width of the profile's "
+    "first annulus.  [default: 0.3]",
 )
 @click.option(
     "--k",
@@ -74,20 +80,7 @@ if TYPE_CHECKING:
 )
 @click.option("--force", is_flag=True, help="Replace an input, or a file that is not our chart.")
 @common_options
-def chart(
-    file: str | None,
-    models: bool,
-    spectrum: bool,
-    guide: bool,
-    mm_per_pixel: float | None,
-    ks: list[float] | None,
-    channel: str | None,
-    profile: str | None,
-    photons: int | None,
-    output: str | None,
-    force: bool,
-    common: Common,
-) -> None:
+def chart(file: str | None, output: str | None, force: bool, common: Common, **given: Any) -> None:
     """Draw FILE: a profile, a kernel, a material or the checkpoint of a walk.
 
     FILE is any of these, whatever its name, or - for stdin; by default the newest .profile.npz of
@@ -123,89 +116,62 @@ def chart(
 
     if output not in (None, "-"):
         chart_format(str(output))  # before anything is read or drawn
-    charts = {"--models": models, "--spectrum": spectrum, "--guide": guide}
-    _check_options(
-        [name for name, is_asked in charts.items() if is_asked],
-        {"--photons": photons, "--mm-per-pixel": mm_per_pixel, "--k": ks},
-        {"--channel": channel, "--profile": profile},
-    )
-    if models:
+    asked = [f"--{name}" for name in ("models", "spectrum", "guide") if given[name]]
+    _check_options(asked, given)
+    if given["models"]:
         if file is None:
             raise click.UsageError("--models needs a material, or a profile of a photon walk.")
-        chart_models(file, output, photons, common, force=force)
-        return
-    from ._any_file import read_any
+        check_memory("figures", common.threads)
+        material, walk = read_models(file)
+        if walk is not None and given["photons"] is not None:
+            raise click.UsageError("--photons is for a walk that is yet to be; leave it out.")
+        path = target(output, f"{material.name}.models.png")
+        draw: Callable[[], Drawn] = partial(draw_models, material, walk, given["photons"], common)
+        inputs = [file]
+    else:
+        name = profile_name(file, common)
+        kind, stem, inputs, draw = _of_file(name, read_any(name), asked, given, common)
+        path = target(output, f"{stem_of(name, stem)}.{kind}.png")
+    with held_charts([path], inputs=inputs, force=force):
+        figure, figures, text = draw()
+        write_chart(figure, path)
+    finish_one(common, "chart", path, figures, text, "a PNG")
 
-    name = file or str(newest(common, "*.profile.npz", "sssfit simulate skin1"))
-    found = read_any(name)
-    if spectrum or guide:
-        loaded = _profile(found, name, "--spectrum" if spectrum else "--guide")
-        path = _target(name, loaded.material_name, output, "spectrum" if spectrum else "guide")
-        if spectrum:
-            chart_spectrum(name, loaded, path, mm_per_pixel, common, force=force)
-            return
-        settings = {"mm_per_pixel": mm_per_pixel, "ks": ks, "channel": channel}
-        chart_guide(name, loaded, path, settings, common, force=force)
-        return
+
+def _of_file(
+    name: str, found: Found, asked: list[str], given: dict[str, Any], common: Common
+) -> tuple[str, str | None, list[Any], Callable[[], Drawn]]:
+    """Return the kind of chart of a file, a name for it, what is read, and what draws it."""
+    from sssfit.errors import ProfileError
     from sssfit.kernel import SeparableKernel
-
-    if isinstance(found, SeparableKernel):
-        path = _target(name, _stem(found), output, "kernel")
-        chart_kernel(name, found, path, profile, channel, common, force=force)
-        return
-    _refuse({"--channel": channel, "--profile": profile})
-    _chart_whole(name, found, output, common, force=force)
-
-
-def _chart_whole(
-    name: str, found: Profile | Material | SoFar, output: str | None, common: Common, *, force: bool
-) -> None:
-    """Draw a profile, the first of a checkpoint, or a material."""
     from sssfit.material import Material
     from sssfit.profile import Profile
-    from sssfit.simulate import SoFar
 
-    shown = _first(found, common) if isinstance(found, SoFar) else found
-    kinds = {Profile: "profile", Material: "material", SoFar: "checkpoint"}
-    kind = kinds[type(found)]
-    material = shown.name if isinstance(shown, Material) else shown.material_name
-    path = _target(name, material, output, kind)
-    with chart_output(path, inputs=[name], force=force) as save:
-        from sssfit.chart.material import material_figure
-        from sssfit.chart.profile import profile_figure
-
-        save(material_figure(shown) if isinstance(shown, Material) else profile_figure(shown))
-    figures = {
-        "command": "chart",
-        "output": ["-" if path is None else str(path)],
-        "kind": kind,
-        "file": name,
-        "profile": name if kind == "profile" else None,
-        "material": material,
-        "channels": shown.channels,
-    }
-    finish(common, figures, f"Wrote {path or 'a PNG to stdout'}", to_stderr=path is None)
-
-
-def _first(found: SoFar, common: Common) -> Profile:
-    """Return the profile so far of a walk's first material, saying if there are more."""
-    first, count = found.profiles[0], len(found.profiles)
-    if count > 1:
-        say(common, f"Drawing {first.material_name}, the first of the walk's {count} materials.")
-    return first
+    if asked:
+        if not isinstance(found, Profile):
+            raise ProfileError(
+                f"{name} is not a profile; {asked[0]} draws one, a .profile.npz file."
+            )
+        check_memory("figures", common.threads)
+        if given["spectrum"]:
+            draw = partial(draw_spectrum, name, found, given["mm_per_pixel"])
+            return "spectrum", found.material_name, [name], draw
+        settings = {key: given[key] for key in ("mm_per_pixel", "ks", "channel")}
+        return "guide", found.material_name, [name], partial(draw_guide, name, found, settings)
+    if isinstance(found, SeparableKernel):
+        check_memory("kernel chart", common.threads)
+        profile, source = true_profile(found, name, given["profile"], common)
+        draw = partial(draw_kernel, name, found, profile, source, given["channel"])
+        return "kernel", _name_of(found), [name, source], draw
+    _refuse({"--channel": given["channel"], "--profile": given["profile"]})
+    if isinstance(found, Material):
+        return "material", found.name, [name], partial(draw_whole, name, "material", found)
+    kind = "profile" if isinstance(found, Profile) else "checkpoint"
+    shown = found if isinstance(found, Profile) else first_of(found, common)
+    return kind, shown.material_name, [name], partial(draw_whole, name, kind, shown)
 
 
-def _profile(found: Found, name: str, option: str) -> Profile:
-    """Return what is a profile, or refuse to draw a profile's kernel of anything else."""
-    from sssfit.errors import ProfileError
-    from sssfit.profile import Profile
-
-    if not isinstance(found, Profile):
-        raise ProfileError(f"{name} is not a profile; {option} draws one, a .profile.npz file.")
-    return found
-
-
-def _stem(kernel: SeparableKernel) -> str | None:
+def _name_of(kernel: SeparableKernel) -> str | None:
     """Name a kernel that came without a name; None where its material could not be a file's."""
     from sssfit.material.checks import is_name
 
@@ -214,29 +180,26 @@ def _stem(kernel: SeparableKernel) -> str | None:
 
 
 _WHOSE = {  # options of single charts, and what of it they are for
-    "--photons": ("the walk of", ("--models",)),
-    "--mm-per-pixel": ("the kernel of", ("--spectrum", "--guide")),
-    "--k": ("the fits of", ("--guide",)),
+    "photons": ("the walk of", ("--models",)),
+    "mm_per_pixel": ("the kernel of", ("--spectrum", "--guide")),
+    "ks": ("the fits of", ("--guide",)),
 }
 
 
-def _check_options(
-    charts: list[str], given: dict[str, Any], of_kernels: dict[str, str | None]
-) -> None:
+def _check_options(charts: list[str], given: dict[str, Any]) -> None:
     """Refuse two charts at once, and options of a chart that is not asked for.
 
     Whether a kernel's options have a kernel is known when the file has been read.
     """
     if len(charts) > 1:
         raise click.UsageError(f"{' and '.join(charts[:2])} are two charts; ask for one at a time.")
-    for option, value in given.items():
-        what, owners = _WHOSE[option]
-        if value is not None and not set(owners) & set(charts):
+    for key, (what, owners) in _WHOSE.items():
+        if given[key] is not None and not set(owners) & set(charts):
+            option = "--k" if key == "ks" else f"--{key.replace('_', '-')}"
             raise click.UsageError(f"{option} is for {what} {' or '.join(owners)}; leave it out.")
-    if charts == ["--guide"]:
-        of_kernels = {"--profile": of_kernels["--profile"]}
     if charts:
-        _refuse(of_kernels)
+        of_kernels = ("profile",) if charts == ["--guide"] else ("channel", "profile")
+        _refuse({f"--{key}": given[key] for key in of_kernels})
 
 
 _OF_KERNELS = {"--channel": "the fits of --guide, or for a kernel", "--profile": "a kernel"}
@@ -247,21 +210,3 @@ def _refuse(of_kernels: dict[str, str | None]) -> None:
     for option, value in of_kernels.items():
         if value is not None:
             raise click.UsageError(f"{option} is for {_OF_KERNELS[option]}; leave it out.")
-
-
-_ENDINGS = (".checkpoint", ".npz", ".json", ".toml", ".kernel", ".profile")
-
-
-def _target(name: str, stem: str | None, output: str | None, kind: str) -> Path | None:
-    """Where the chart goes; None is stdout. By default the current folder, under the same name.
-
-    ``stem`` is the name of what came from stdin.
-    """
-    if output is not None:
-        return None if output == "-" else Path(output)
-    own = stem or "stdin"
-    if name != "-":
-        own = Path(name).name
-        for ending in _ENDINGS:
-            own = own.removesuffix(ending)
-    return Path(f"{own}.{kind}.png")

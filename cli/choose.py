@@ -8,12 +8,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ._choose_report import figures_of, step_line, text_of
-from ._compiling import say_if_compiling
+from sssfit.messages import number
+
+from ._choose_report import step_line, text_of
 from ._deon_skin import DEON_SKIN
+from ._input import load
 from ._options import Common, Length, Number, NumberRange, common_options
-from ._outputs import KERNEL, PROFILE, held
-from ._report import binary_stdin, binary_stdout, finish, percent, say
+from ._output import KERNEL, PROFILE, finish, held, say, stem_of, target, write
+from ._progress import say_if_compiling
 from ._scene import (
     EDGE_DEGREES,
     MADE,
@@ -86,8 +88,8 @@ _METRES = (0.1, 9.0)  # plain numbers that may have been meant in metres; 1cm is
     default="head",
     show_default=True,
     metavar="NAME|FILE",
-    help=f"Picture to judge by: {', '.join(MADE)}, or your own EXR, HDR, TIFF or PNG file. The "
-    f"edge is at {EDGE_DEGREES:g} degrees.",
+    help=f"Picture to judge by: {', '.join(MADE)}, or your own EXR, HDR, TIFF, PNG, JPG or TGA "
+    f"file. The edge is at {EDGE_DEGREES:g} degrees.",
 )
 @file_options
 @click.option(
@@ -137,6 +139,7 @@ def choose(
     from sssfit.choose.choice import choose as choose_kernel
     from sssfit.choose.choice import mm_per_pixel_at
     from sssfit.kernel import is_kernel_file
+    from sssfit.material import Material
     from sssfit.profile import is_profile_file
 
     _check_distance(distance_mm)
@@ -144,7 +147,8 @@ def choose(
     check_file_options(layer, mask, has_file=not picture.is_made)
     source = _source(material)
     pitch = mm_per_pixel_at(distance_mm, fov_degrees, resolution[0])
-    path = None if output == "-" else _output_path(output, material, source)
+    name = source.name if isinstance(source, Material) else stem_of(material, source.material_name)
+    path = target(output, f"{name}{_ENDING}")
     profile_path = _beside(path, material)
     read, beside = [material, irradiance], [] if profile_path is None else [profile_path]
     with (
@@ -167,7 +171,7 @@ def choose(
         )
         written = _write(choice, path, profile_path)
     view = {"distance_mm": distance_mm, "fov_degrees": fov_degrees, "resolution": resolution[::-1]}
-    figures = {"command": "choose", "output": written, **view, **figures_of(choice)}
+    figures = {"command": "choose", "output": written, **view, **choice.to_dict()}
     finish(common, figures, text_of(choice, written, figures), to_stderr=written == ["-"])
     if not written and path is not None and path.exists():
         say(common, f"{path} is from an earlier run; this view needs no kernel.")
@@ -185,11 +189,6 @@ def _check_distance(distance_mm: float) -> None:
         )
 
 
-def _output_path(output: str | None, material: str, source: Material | Profile) -> Path:
-    """Return where the kernel goes: where it was asked for, or a name of the material's."""
-    return Path(f"{_stem(material, source)}{_ENDING}" if output is None else output)
-
-
 def _source(name: str) -> Material | Profile:
     """Read a profile, or load a material."""
     from sssfit.material import load_material
@@ -199,20 +198,8 @@ def _source(name: str) -> Material | Profile:
         from sssfit.simulate import simulate_deon_skin
 
         return simulate_deon_skin()
-    if name == "-":
-        return Profile.read(binary_stdin(), "stdin")
-    return Profile.load(name) if name.endswith(_PROFILE_ENDING) else load_material(name)
-
-
-def _stem(name: str, source: Material | Profile) -> str:
-    """Return what the kernel's file is called after."""
-    from sssfit.material import Material
-
-    if isinstance(source, Material):
-        return source.name
-    if name == "-":
-        return source.material_name or "stdin"
-    return Path(name).name.removesuffix(_PROFILE_ENDING).removesuffix(".profile")
+    is_profile = name == "-" or name.endswith(_PROFILE_ENDING)
+    return load(Profile, name) if is_profile else load_material(name)
 
 
 def _beside(path: Path | None, name: str) -> Path | None:
@@ -244,7 +231,7 @@ def _say_first(source: Material | Profile, common: Common) -> None:
         if missing > _WORTH_A_NOTE:
             say(
                 common,
-                f"{percent(missing, '.2g')} of the light lies beyond the profile's grid, where the "
+                f"{number(missing, '.2g%')} of the light lies beyond the profile's grid, where the "
                 "true picture lacks it and a kernel does not: simulate with a larger radius.",
             )
         return
@@ -267,11 +254,7 @@ def _write(choice: Choice, path: Path | None, profile_path: Path | None) -> list
     """Write the kernel, where one is needed, and the profile; return where they went."""
     if choice.fit is None:
         return []
-    if path is None:
-        choice.fit.kernel.write(binary_stdout())
-        binary_stdout().flush()
-        return ["-"]
     if profile_path is not None:
-        choice.profile.save(profile_path)
-    choice.fit.kernel.save(path)
-    return [str(each) for each in (path, profile_path) if each is not None]
+        write(choice.profile, profile_path)
+    write(choice.fit.kernel, path)
+    return [str(path or "-"), *([] if profile_path is None else [str(profile_path)])]

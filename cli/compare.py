@@ -2,25 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import click
 
-from ._compare_budget import BudgetRequest, compare_budget
-from ._compare_options import PICTURES, compare_options
-from ._compare_pareto import Outputs, Wish, compare_all, compare_one, held_outputs
-from ._compare_sheet import chart_convergence, chart_editing, chart_sheet
-from ._deon_skin import DEON_SKIN
-from ._figure import chart_path, held_charts
-from ._fits import own_settings
-from ._options import Common, common_options
-from ._report import finish, say
+from sssfit.methods import FITS
 
-_BUDGET = ("photons", "method", "rank", "terms", "model")
-_SHEETS = ("sheet", "editing", "convergence")
-_PHOTONS = 10**6
+from ._compare_input import profile_of
+from ._compare_options import compare_options
+from ._compare_parts import (
+    budget,
+    compared,
+    first_read,
+    fronts,
+    held_outputs,
+    kernels,
+    scenes_asked,
+    sheet,
+    write_kernels,
+)
+from ._methods import own_settings
+from ._options import Common, common_options
+from ._output import finish
+
+_OF_BUDGETS = ("budget_chart", "photons", "rank", "terms", "model")
 
 
 @click.command()
@@ -42,143 +49,83 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
     \b
       sssfit compare skin1
       sssfit compare skin1 --chart skin1-pareto.png --table skin1.csv
-      sssfit compare skin1 --only budget --method gaussians --budget-chart budget.png
+      sssfit compare skin1 --what budget --method gaussians --budget-chart budget.png
+      sssfit compare skin1 --what front --cost passes
       sssfit compare skin1 --picture head --size 1024x1024 --mm-per-pixel 0.15 --cost seconds
       sssfit compare slab.profile.npz --picture mine.exr --error l2
       sssfit compare --all -o charts
-      sssfit compare skin1 --sheet skin1-sheet.png
+      sssfit compare skin1 --what sheet --chart skin1-sheet.png
     """
-    asked = {key: given[key] for key in _SHEETS if given[key]}
-    if asked:
-        _check_sheets(material, asked, given)
-        _sheets(material, asked, given, common)
-        return
     _check(material, given)
-    names = [name for each in given["pictures"] or (PICTURES,) for name in each.split(",")]
-    wish = Wish(
-        names,
-        given["size"],
-        given["mm_per_pixel"],
-        given["error"],
-        given["cost"],
-        given["force"],
-        common,
-        given["layer"],
-        given["mask"],
-    )
     if material is None:
-        compare_all(Path(given["output"] or "."), wish)
-        return
-    request = _request(context, given)
-    kernels = budget = None
+        from sssfit.material import material_names
+
+        folder = Path(given["output"] or ".")
+        stems = {name: folder / f"{name}-pareto" for name in material_names(paper=given["paper"])}
+        fronts({name: (f"{each}.png", f"{each}.md") for name, each in stems.items()}, given, common)
+    elif given["what"] == "front":
+        fronts({material: (given["chart"], given["table"])}, given, common)
+    elif given["what"] == "sheet":
+        sheet(material, given, common)
+    else:
+        settings = {key: given[key] for key in ("rank", "terms")}
+        own = own_settings(context, FITS, given["method"], settings)
+        _budget_and_kernels(material, given, own, common)
+
+
+def _budget_and_kernels(
+    material: str, given: Mapping[str, Any], settings: Mapping[str, Any], common: Common
+) -> None:
+    """Do both parts, or the one that was asked for, and print them."""
+    figures: dict[str, Any] = {"rows": []}
+    of_budget, texts = None, []
     charts = [given[key] for key in ("chart", "budget_chart") if given[key]]
     tables = [given["table"]] if given["table"] else []
-    with held_outputs(charts, tables, wish, inputs=[material]):
-        if given["only"] != "budget":
-            kernels = compare_one(material, Outputs(given["chart"], given["table"]), wish)
-        if given["only"] != "kernels":
-            budget = _budget(material, request, wish, only=given["only"] == "budget")
-    _report([budget, kernels], given, common)
-
-
-def _request(context: click.Context, given: Mapping[str, Any]) -> BudgetRequest:
-    """Put together what the budget needs."""
-    terms = {key: given[key] for key in ("rank", "terms")}
-    return BudgetRequest(
-        given["photons"] or _PHOTONS,
-        given["method"],
-        own_settings(context, given["method"], terms),
-        given["model"],
-        given["budget_chart"],
-    )
-
-
-def _budget(
-    material: str, request: BudgetRequest, wish: Wish, *, only: bool
-) -> tuple[dict[str, Any], str] | None:
-    """Make the budget; say why there is none, unless it is all that was asked for."""
-    from sssfit.errors import SimulationError
-
-    if not only and (material.endswith(".npz") or material in ("-", DEON_SKIN)):
-        say(wish.common, f"No budget: {material} is a profile, and a budget simulates a material.")
-        return None
-    try:
-        return compare_budget(material, wish.scenes[0], request, wish.common)
-    except SimulationError as error:
-        if only:
-            raise
-        say(wish.common, f"No budget: {error}")
-        return None
-
-
-def _report(
-    parts: Sequence[tuple[dict[str, Any], str] | None], given: Mapping[str, Any], common: Common
-) -> None:
-    """Print both parts and what was written."""
-    budget, kernels = (None if part is None else part[0] for part in parts)
+    with held_outputs(charts, tables, given, inputs=[material]):
+        first = first_read(material, given, common)
+        scenes = scenes_asked(given, common, first)
+        if given["what"] != "budget":
+            profile = first or profile_of(material, common)
+            comparison = compared(profile, scenes, given, common)
+            write_kernels(comparison, given, given["chart"], given["table"])
+            figures, text = kernels(comparison, given)
+            texts.append(text)
+        if given["what"] != "kernels":
+            found = budget(material, scenes[0], given, settings, common)
+            if found is not None:
+                of_budget = found[0]
+                texts.insert(0, found[1])
     output = [given[key] for key in ("budget_chart", "chart", "table") if given[key]]
-    figures = {
-        "command": "compare",
-        "output": output,
-        **(kernels or {"rows": []}),
-        "budget": budget,
-    }
-    texts = [part[1] for part in parts if part is not None]
-    if output:
-        texts.append(f"Wrote {', '.join(output)}")
-    finish(common, figures, "\n\n".join(texts), to_stderr="-" in output)
-
-
-def _sheets(
-    material: str | None, asked: Mapping[str, str], given: Mapping[str, Any], common: Common
-) -> None:
-    """Draw the sheets that were asked for."""
-    paths = [chart_path(each) for each in asked.values()]
-    with held_charts(paths, inputs=[material], force=given["force"]):
-        if "sheet" in asked:
-            from ._compare_input import profile_of
-
-            profile = profile_of(str(material), common)
-            chart_sheet(profile, asked["sheet"], given["mm_per_pixel"], common)
-        if "editing" in asked:
-            chart_editing(asked["editing"], common)
-        if "convergence" in asked:
-            chart_convergence(str(material), asked["convergence"], given["photons"], common)
-
-
-def _check_sheets(material: str | None, asked: Mapping[str, str], given: Mapping[str, Any]) -> None:
-    """Refuse what does not go with a sheet."""
-    if material is None and set(asked) != {"editing"}:
-        raise click.UsageError("name one MATERIAL; only --editing needs none.")
-    pictures = ("pictures", "size", "layer", "mask")
-    for key in ("every", "only", *pictures, "chart", "table", "budget_chart", "output"):
-        if given[key]:
-            raise click.UsageError(
-                f"{_option(key)} does not go with --{next(iter(asked))}; leave it out."
-            )
-    for key, owner in (("mm_per_pixel", "sheet"), ("photons", "convergence")):
-        if given[key] is not None and owner not in asked:
-            raise click.UsageError(f"{_option(key)} is for another chart; leave it out.")
+    texts += [f"Wrote {', '.join(output)}"] if output else []
+    whole = {"command": "compare", "output": output, **figures, "budget": of_budget}
+    finish(common, whole, "\n\n".join(texts), to_stderr="-" in output)
 
 
 def _check(material: str | None, given: Mapping[str, Any]) -> None:
     """Refuse options that do not go together, or that would do nothing."""
-    if (material is None) != given["every"]:
-        raise click.UsageError("name one MATERIAL or profile, or give --all.")
-    if given["every"] and (given["chart"] or given["table"]):
+    what, several = given["what"], material is None
+    if [not several, given["every"], given["paper"]].count(True) != 1:
+        raise click.UsageError("name one MATERIAL or profile, or give --all or --paper.")
+    if several and what not in (None, "front"):
+        raise click.UsageError("--all is for --what front; name one MATERIAL.")
+    if several and (given["chart"] or given["table"]):
         raise click.UsageError("--all names its charts and tables; leave --chart and --table out.")
-    if given["output"] is not None and not given["every"]:
+    if several and given["mm_per_pixel"] == "profile":
+        raise click.UsageError("the pictures of --all share their pixels; give a length in mm.")
+    if given["output"] is not None and not several:
         raise click.UsageError("-o is the folder of --all; name files by --chart and --table.")
-    without_budget = given["every"] or given["only"] == "kernels"
-    idle = ["budget_chart", "photons", "rank", "terms", "model"] if without_budget else []
-    idle += ["chart", "table"] if given["only"] == "budget" else []
+    idle = list(_OF_BUDGETS) if several or what not in (None, "budget") else []
+    idle += ["chart", "table"] if what == "budget" else []
+    idle += ["pictures", "size", "layer", "mask", "table"] if what == "sheet" else []
     for key in idle:
         if given[key]:
-            raise click.UsageError(f"{_option(key)} is for the other part; leave it out.")
+            raise click.UsageError(f"{_option(key)} is for another --what; leave it out.")
+    if what == "sheet" and not given["chart"]:
+        raise click.UsageError("--what sheet is a picture; name its file with --chart.")
     if given["chart"] == given["budget_chart"] == "-":
         raise click.UsageError("only one of --chart and --budget-chart can go to stdout.")
 
 
 def _option(key: str) -> str:
     """Return an option as it is typed."""
-    return "--" + {"every": "all", "pictures": "picture"}.get(key, key).replace("_", "-")
+    return "--" + {"pictures": "picture"}.get(key, key).replace("_", "-")

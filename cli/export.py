@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
+from ._input import kernel_name, load, profile_name
 from ._options import Common, common_options
-from ._outputs import held
-from ._report import binary_stdin, binary_stdout, finish, newest
-
-_ENDINGS = (".npz", ".json", ".profile", ".kernel")
+from ._output import finish_one, held, stem_of, target, write
 
 
 @click.command()
@@ -49,68 +48,31 @@ def export(file: str | None, form: str, output: str | None, force: bool, common:
       sssfit export skin1.svd3.kernel.json --format json -o -
       sssfit export skin1.profile.npz --format csv -o - | head
     """
-    name, text, figures = (_table if form == "csv" else _kernel)(file, form, common)
-    path = _target(name, form, output)
-    _write(text.encode(), path, form, name, force=force)
-    figures = {"command": "export", "output": [str(path or "-")], "format": form, **figures}
-    what = "table" if form == "csv" else "kernel"
-    finish(common, figures, f"Wrote {path or f'the {what} to stdout'}", to_stderr=path is None)
-
-
-def _table(file: str | None, _form: str, common: Common) -> tuple[str, str, dict[str, Any]]:
-    """Return the profile's name, its table and its figures."""
-    from sssfit.formats.csv import csv_text
+    from sssfit.export import hlsl, is_hlsl_file, json_document
+    from sssfit.formats.csv import csv_text, is_profile_csv
+    from sssfit.kernel import SeparableKernel, is_kernel_file
     from sssfit.profile import Profile
 
-    name = file or str(newest(common, "*.profile.npz", "sssfit simulate skin1"))
-    profile = Profile.read(binary_stdin(), "stdin") if name == "-" else Profile.load(name)
-    figures = {"profile": name, "channels": profile.channels, "annuli": profile.n_annuli}
-    return name, csv_text(profile), figures
-
-
-def _kernel(file: str | None, form: str, common: Common) -> tuple[str, str, dict[str, Any]]:
-    """Return the kernel's name, its text in that form and its figures."""
-    from sssfit.export import hlsl, json_document
-    from sssfit.kernel import SeparableKernel
-
-    name = file or str(newest(common, "*.kernel.json", "sssfit fit --method svd --rank 3"))
-    is_stdin = name == "-"
-    kernel = (
-        SeparableKernel.read(binary_stdin(), "stdin") if is_stdin else SeparableKernel.load(name)
-    )
-    figures = {
-        "kernel": name,
-        "channels": kernel.channels,
-        "rank": kernel.rank,
-        "pixels": kernel.pixels,
-        "mm_per_pixel": kernel.mm_per_pixel,
+    figures: dict[str, Any]
+    if form == "csv":
+        name = profile_name(file, common)
+        profile = load(Profile, name)
+        text = csv_text(profile)
+        figures = {"profile": name, "channels": profile.channels, "annuli": profile.n_annuli}
+    else:
+        name = kernel_name(file, common)
+        kernel = load(SeparableKernel, name)
+        text = (hlsl if form == "hlsl" else json_document)(kernel)
+        keys = ("channels", "rank", "pixels", "mm_per_pixel")
+        figures = {"kernel": name, **{key: getattr(kernel, key) for key in keys}}
+    path = target(output, f"{stem_of(name)}.{form}")
+    is_ours: dict[str, Callable[[Path], bool]] = {
+        "hlsl": is_hlsl_file,
+        "json": is_kernel_file,
+        "csv": is_profile_csv,
     }
-    return name, (hlsl if form == "hlsl" else json_document)(kernel), figures
-
-
-def _target(name: str, form: str, output: str | None) -> Path | None:
-    """Where it goes; None is stdout. By default the current folder, under the same name."""
-    if output is not None:
-        return None if output == "-" else Path(output)
-    stem = "stdin" if name == "-" else Path(name).name
-    for ending in _ENDINGS:
-        stem = stem.removesuffix(ending)
-    return Path(f"{stem}.{form}")
-
-
-def _write(content: bytes, path: Path | None, form: str, name: str, *, force: bool) -> None:
-    """To the file, whole or not at all; to stdout where there is none."""
-    from sssfit.export import is_hlsl_file
-    from sssfit.files import write_atomically
-    from sssfit.formats.csv import is_profile_csv
-    from sssfit.kernel import is_kernel_file
-
-    own = {"hlsl": is_hlsl_file, "json": is_kernel_file, "csv": is_profile_csv}
-    with held(
-        [path], own[form], inputs=[name], force=force, named=(f"--format {form}", f".{form}")
-    ):
-        if path is not None:
-            write_atomically(path, lambda stream: stream.write(content))
-            return
-        binary_stdout().write(content)
-        binary_stdout().flush()
+    named = (f"--format {form}", f".{form}")
+    with held([path], is_ours[form], inputs=[name], force=force, named=named):
+        write(text.encode(), path)
+    what = "the table" if form == "csv" else "the kernel"
+    finish_one(common, "export", path, {"format": form, **figures}, "", what)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from ._mci import is_mci
+from sssfit.messages import columns
+
+from ._input import binary_stdin, is_mci
 from ._options import Common, common_options
-from ._outputs import PROFILE, held
-from ._report import binary_stdin, binary_stdout, finish, table
+from ._output import PROFILE, finish_one, held, target, write
 
 if TYPE_CHECKING:
     from sssfit.profile import Profile
@@ -19,6 +19,11 @@ if TYPE_CHECKING:
 
 _DEFAULT_CHANNELS = {1: "mono", 3: "R,G,B"}
 _UNITS = ("um", "mm", "cm", "m")
+_FIGURES = (
+    *("method", "channels", "annuli", "radius_mm", "diffuse_reflectance"),
+    *("diffuse_reflectance_stderr", "specular_reflectance", "beyond_grid", "transmittance"),
+    *("energy_balance", "photons"),
+)
 _OF_TABLES = {"quantity": "--quantity", "unit": "--unit", "density_unit": "--density-unit"}
 
 
@@ -82,14 +87,17 @@ def import_(
       sssfit import skin.mco -o skin.profile.npz
       sssfit import r.mco g.mco b.mco --channels R,G,B -o skin.profile.npz
     """
+    from sssfit.profile import is_profile_file
+
     if len(files) > 1 and output is None:
         raise click.UsageError("name the profile of several files with -o.")
     profile = _read(files, of_table, channels)
-    path = _target(files[0], output)
-    _write(profile, path, files, force=force)
-    figures = {"command": "import", "output": [str(path or "-")], **_figures(profile)}
-    wrote = f"Wrote {path or 'the profile to stdout'}"
-    finish(common, figures, f"{_text(profile)}\n{wrote}", to_stderr=path is None)
+    stem = "stdin" if files[0] == "-" else Path(files[0]).stem
+    path = target(output, f"{stem}.profile.npz")
+    with held([path], is_profile_file, inputs=files, force=force, named=PROFILE):
+        write(profile, path)
+    figures = _figures(profile)
+    finish_one(common, "import", path, figures, _text(figures), "the profile")
 
 
 def _read(files: tuple[str, ...], of_table: dict[str, str | None], channels: str | None) -> Profile:
@@ -139,63 +147,25 @@ def _names(count: int, channels: str | None) -> list[str]:
     return [name.strip() for name in given.split(",")]
 
 
-def _target(name: str, output: str | None) -> Path | None:
-    """Where the profile goes; None is stdout. By default the current folder, the same name."""
-    if output is not None:
-        return None if output == "-" else Path(output)
-    return Path(f"{'stdin' if name == '-' else Path(name).stem}.profile.npz")
-
-
-def _write(profile: Profile, path: Path | None, files: Sequence[str], *, force: bool) -> None:
-    """To the file, whole or not at all; to stdout where there is none."""
-    from sssfit.profile import is_profile_file
-
-    with held([path], is_profile_file, inputs=files, force=force, named=PROFILE):
-        if path is not None:
-            profile.save(path)
-            return
-        profile.write(binary_stdout())
-        binary_stdout().flush()
-
-
 def _figures(profile: Profile) -> dict[str, Any]:
     """Figures of the profile, as ``--json`` prints them; null where the files do not say."""
-    material = profile.meta["material"]
+    figures, material = profile.to_dict(), profile.meta["material"]
     return {
         "source": profile.meta["source"],
         "material": material and material["name"],
-        "method": profile.meta["method"],
-        "channels": list(profile.channels),
-        "annuli": profile.n_annuli,
-        "radius_mm": float(profile.r_edges_mm[-1]),
-        "diffuse_reflectance": profile.diffuse_reflectance,
-        "diffuse_reflectance_stderr": profile.diffuse_reflectance_stderr,
-        "specular_reflectance": profile.specular_reflectance,
-        "beyond_grid": profile.beyond_grid,
-        "transmittance": profile.transmittance,
-        "energy_balance": profile.energy_balance,
-        "photons": profile.photons,
+        **{key: figures[{"transmittance": "transmitted"}.get(key, key)] for key in _FIGURES},
     }
 
 
-def _text(profile: Profile) -> str:
+def _text(figures: dict[str, Any]) -> str:
     """Write the same for people: one line a channel."""
-    import numpy as np
-
-    stderr = profile.diffuse_reflectance_stderr
-    transmitted = profile.transmittance
-    rows = [
-        [
-            name,
-            f"{profile.diffuse_reflectance[c]:.6f}",
-            "-" if np.isnan(stderr[c]) else f"{stderr[c]:.6f}",
-            f"{profile.beyond_grid[c]:.6f}",
-            *([] if transmitted is None else [f"{transmitted[c]:.6f}"]),
-        ]
-        for c, name in enumerate(profile.channels)
-    ]
-    heads = ["channel", "diffuse reflectance", "std. error", "beyond grid"]
-    heads += [] if transmitted is None else ["transmittance"]
-    radius_mm = profile.r_edges_mm[-1]
-    grid = f"{profile.meta['source']}: {profile.n_annuli} annuli, to {radius_mm:.4g} mm"
-    return f"{grid}\n{table(heads, rows)}"
+    return (
+        f"{figures['source']}: {figures['annuli']} annuli, to {figures['radius_mm']:.4g} mm\n"
+    ) + columns(
+        "channel",
+        figures["channels"],
+        ("diffuse reflectance", figures["diffuse_reflectance"], ".6f"),
+        ("std. error", figures["diffuse_reflectance_stderr"], ".6f"),
+        ("beyond grid", figures["beyond_grid"], ".6f"),
+        ("transmittance", figures["transmittance"], ".6f"),
+    )

@@ -5,10 +5,12 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+from sssfit.messages import table
+
 from ._deon_skin import DEON_SKIN, show_deon_skin
 from ._invert import Wish, write_material
-from ._options import Common, Length, ListOf, Number, Reflectance, common_options
-from ._report import finish, table
+from ._options import BaseColour, Common, Lengths, Number, common_options
+from ._output import finish
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -22,26 +24,37 @@ if TYPE_CHECKING:
 @click.option("--toml", "as_toml", is_flag=True, help="Print MATERIAL as TOML, to start your own.")
 @click.option(
     "--from-reflectance",
-    type=ListOf(Reflectance()),
-    metavar="A,B,...",
+    type=BaseColour(),
+    metavar="A,B,...|HEX",
     help="Make a material of this total diffuse reflectance, per channel, such as 0.44,0.23,0.13 "
-    "or 44%.",
+    "or 44%, or of an sRGB base colour, such as '#c58c6b'.",
+)
+@click.option(
+    "--srgb",
+    is_flag=True,
+    help="A,B,... are 8-bit sRGB codes, such as 197,140,107.",
 )
 @click.option(
     "--mean-free-path",
-    type=ListOf(Length()),
+    type=Lengths(),
     metavar="MM,MM,...",
-    help="Its mean free paths, 1 / (sigma_a + sigma_s); one serves all channels.",
+    help="Its mean free paths, 1 / (sigma_a + sigma_s), such as 3.67,1.37,0.68 or 0.4cm; one "
+    "serves all channels.",
 )
-@click.option("--eta", type=Number(), metavar="N", help="Its refractive index.")
+@click.option(
+    "--eta",
+    type=Number(),
+    default=1.4,
+    show_default=True,
+    metavar="N",
+    help="Its refractive index; 1.4 is that of skin.",
+)
 @click.option(
     "--light",
     type=click.Choice(["diffuse", "normal"]),
-    default="normal",
-    show_default=True,
     help="The light that A,B,... are meant for. normal: a beam along the normal, as in profiles; "
     "diffuse: the same radiance from everywhere above, as base colours mean it, and shares of the "
-    "light that enters.",
+    "light that enters.  [default: diffuse for sRGB colours, else normal]",
 )
 @click.option("--name", metavar="NAME", help="Its name.  [default: that of FILE]")
 @click.option(
@@ -58,7 +71,7 @@ def materials(
     /,
     material: str | None,
     as_toml: bool,
-    from_reflectance: list[float] | None,
+    from_reflectance: list[float] | str | None,
     common: Common,
     **wish: Any,
 ) -> None:
@@ -67,7 +80,8 @@ def materials(
     MATERIAL is one of their names, the path of a TOML file, or - for standard input.
     --from-reflectance turns the exact solver round: it finds the albedos, for isotropic
     scattering, whose total diffuse reflectance is what was asked for, and prints what the
-    approximate inversions of renderers would have given. Give --light diffuse with a base colour.
+    approximate inversions of renderers would have given. A base colour in sRGB is decoded to linear
+    light, and meant for diffuse light; give --light diffuse with a linear one.
 
     \b
       sssfit materials skin1                        coefficients, mean free paths, grid
@@ -75,6 +89,7 @@ def materials(
       sssfit materials mine.toml                    check it
       sssfit materials --from-reflectance 0.44,0.23,0.13 --mean-free-path 1.3,0.95,0.67 \\
         --eta 1.3 -o mine.toml                      make one
+      sssfit materials --from-reflectance '#c58c6b' --mean-free-path 0.37,0.14,0.07cm
     """
     if from_reflectance is not None:
         if material is not None or as_toml:

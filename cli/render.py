@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from ._input import kernel_name, load
 from ._options import Common, NumberRange, common_options
-from ._outputs import held
+from ._output import binary_stdout, finish, held, say, stem_of, target
 from ._render_options import picture_options
 from ._render_report import figures_of, text_of
-from ._report import binary_stdin, binary_stdout, finish, newest, say
 from ._scene import Picture, make_or_read
 from ._truth import true_profile
 
@@ -54,6 +55,21 @@ _BEHIND_DEGREES = 170.0
 )
 @click.option("--truth", metavar="FILE", help="Write the true picture as well.")
 @click.option("--difference", metavar="FILE", help="Write the absolute difference as well.")
+@click.option(
+    "--gain",
+    type=NumberRange(min=0.0, min_open=True),
+    default=1.0,
+    show_default=True,
+    metavar="FACTOR",
+    help="--difference: magnify it.",
+)
+@click.option(
+    "--difference-map",
+    type=click.Choice(["signed", "absolute"]),
+    help="--difference: in false colours. signed: luminance, blue where the kernel is darker, red "
+    "where it is brighter; absolute: the largest of the channels, violet to yellow. The scale is "
+    "printed; it ends at the largest difference over --gain.",
+)
 @click.option("--force", is_flag=True, help="Replace an input, or a file that is not our picture.")
 @common_options
 def render(
@@ -73,6 +89,8 @@ def render(
     output: str | None,
     truth: str | None,
     difference: str | None,
+    gain: float,
+    difference_map: str | None,
     force: bool,
     common: Common,
     **own: Any,
@@ -81,32 +99,36 @@ def render(
 
     KERNEL is a .kernel.json file, or - for stdin; by default the newest of this folder. The result
     is radiant exitance in linear light. Made pictures have the kernel's pixels; a file of your own
-    (EXR, HDR, TIFF, PNG) has to have them too. The truth is the same picture convolved with the
-    whole 2D kernel of the profile; Delta E 2000 is of both in sRGB at the exposure. The alpha of
-    your file goes into the result and the truth as it is.
+    (EXR, HDR, TIFF, PNG, JPG, TGA) has to have them too, except with --screen. The truth is the
+    same picture convolved with the whole 2D kernel of the profile; Delta E 2000 is of both in sRGB
+    at the exposure. The alpha of your file goes into the result and the truth as it is.
 
     \b
       sssfit render skin1.svd3.kernel.json --irradiance head -o out.exr
       sssfit render --irradiance edge --angle 45 --size 256x256
-      sssfit render --irradiance mine.png --mm-per-pixel 0.1 -o mine.tif --difference lost.png
+      sssfit render --irradiance mine.png --mm-per-pixel 0.3 -o mine.tif --difference lost.png
       sssfit render --screen --irradiance head
       sssfit render --irradiance head --transmit -o ears.png
     """
     from sssfit.formats.pictures import image_format, is_image_file
+    from sssfit.kernel import SeparableKernel
 
     _check_options(screen, follow, profile or truth or difference or structure)
+    if difference is None and (difference_map or gain != 1.0):
+        raise click.UsageError("--gain and --difference-map are for --difference; name its file.")
     if transmit:
         own = _lit_from_behind(irradiance, own)
     picture = Picture(irradiance, size, mm_per_pixel, own, layer, mask)
-    name, loaded = _kernel(kernel, common)
-    path = _target(name, picture, output)
+    name = kernel_name(kernel, common)
+    loaded = load(SeparableKernel, name)
+    path = target(output, f"{stem_of(name)}.{picture.name}.exr")
     targets = {"picture": path} if path else {}
     targets |= {k: Path(v) for k, v in (("truth", truth), ("difference", difference)) if v}
     for each in targets.values():
         image_format(each)
     outputs = [*targets.values(), *([None] if path is None else [])]
     with held(outputs, is_image_file, inputs=[name, irradiance, profile], force=force):
-        scene = make_or_read(picture, loaded.mm_per_pixel, common)
+        scene = make_or_read(*_on_pixels(picture, loaded, screen=screen), common)
         through = None
         if transmit:
             from sssfit.render.transmittance import transmitted, with_transmitted
@@ -128,7 +150,8 @@ def render(
 
             settings |= {"exposure": exposure, "structure": structure}
             result = judge(scene, loaded, source, **settings)
-        _write(result, scene, loaded, targets, exposure, common)
+        lost = _lost(result, gain, difference_map) if difference else {}
+        _write(result, lost, scene, loaded, targets, exposure, common)
     figures = {
         "command": "render",
         "output": [*(["-"] if path is None else []), *map(str, targets.values())],
@@ -137,8 +160,21 @@ def render(
         "border": border,
         "follow": (follow or "gaussian") if screen else None,
         **figures_of(result, scene, loaded, through),
+        **{f"difference_{key}": lost.get(key) for key in ("gain", "map", "of", "end")},
     }
     finish(common, figures, text_of(figures), to_stderr=path is None)
+
+
+def _on_pixels(picture: Picture, kernel: SeparableKernel, *, screen: bool) -> tuple[Picture, float]:
+    """Return what to make or read, and the size of a made picture's pixels [mm].
+
+    Convolved as it is, a kernel has the picture's pixels; a screen's may have any.
+    """
+    if not (screen and picture.is_made):
+        return picture, kernel.mm_per_pixel
+    from sssfit.fit import MM_PER_PIXEL
+
+    return dataclasses.replace(picture, mm_per_pixel=None), picture.mm_per_pixel or MM_PER_PIXEL
 
 
 def _lit_from_behind(irradiance: str, own: dict[str, Any]) -> dict[str, Any]:
@@ -160,26 +196,21 @@ def _check_options(screen: bool, follow: str | None, compared: object) -> None:
         raise click.UsageError("--follow is for --screen; leave it out.")
 
 
-def _kernel(given: str | None, common: Common) -> tuple[str, SeparableKernel]:
-    """Return the kernel's name and the kernel; by default the newest of this folder."""
-    from sssfit.kernel import SeparableKernel
+def _lost(result: Judgement, gain: float, kind: str | None) -> dict[str, Any]:
+    """Return the difference as it is written, and what the report says of it."""
+    from sssfit.measure.difference import difference_map, magnified_difference
 
-    name = given or str(newest(common, "*.kernel.json", "sssfit fit --method svd --rank 3"))
-    if name == "-":
-        return name, SeparableKernel.read(binary_stdin(), "stdin")
-    return name, SeparableKernel.load(name)
-
-
-def _target(name: str, picture: Picture, output: str | None) -> Path | None:
-    """Where the picture goes; None is stdout. By default the current folder, under both names."""
-    if output is not None:
-        return None if output == "-" else Path(output)
-    stem = "stdin" if name == "-" else Path(name).name.removesuffix(".json").removesuffix(".kernel")
-    return Path(f"{stem}.{picture.name}.exr")
+    assert result.truth is not None  # without a profile the option was refused
+    if kind is None:
+        pixels = magnified_difference(result.picture, result.truth, gain=gain)
+        return {"pixels": pixels, "gain": gain}
+    drawn = difference_map(result.picture, result.truth, kind=kind, gain=gain)
+    return {"pixels": drawn.pixels, "gain": gain, "map": kind, "of": drawn.what, "end": drawn.end}
 
 
 def _write(
     result: Judgement,
+    lost: dict[str, Any],
     scene: Scene,
     kernel: SeparableKernel,
     targets: dict[str, Path],
@@ -190,9 +221,8 @@ def _write(
     from sssfit.formats.pictures import image_format, save_image
     from sssfit.measure.score import auto_exposure
 
-    pictures = {"picture": result.picture}
-    if result.truth is not None:
-        pictures |= {"truth": result.truth, "difference": abs(result.picture - result.truth)}
+    pictures: dict[str, Any] = {"picture": result.picture, "truth": result.truth}
+    pictures["difference"] = lost.get("pixels")
     settings: dict[str, Any] = {
         "channels": kernel.channels,
         "mm_per_pixel": kernel.mm_per_pixel,
@@ -203,9 +233,11 @@ def _write(
         binary_stdout().flush()
     shown = exposure or (result.score.exposure if result.score else auto_exposure(result.picture))
     for what, path in targets.items():
-        factor = shown if image_format(path) == "png" else 1.0
-        own = {} if what == "difference" else alpha
-        for note in save_image(path, pictures[what], exposure=factor, **settings, **own):
+        own = settings | (alpha if what != "difference" else {})
+        own["exposure"] = shown if image_format(path) == "png" else 1.0
+        if what == "difference" and "map" in lost:  # its colours are no light
+            own |= {"exposure": 1.0, "channels": ("R", "G", "B")}
+        for note in save_image(path, pictures[what], **own):
             say(common, f"{path}: {note}")
 
 

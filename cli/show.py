@@ -6,15 +6,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sssfit.messages import columns, table
+
+from ._input import profile_name, read_any
 from ._options import Common, common_options
-from ._report import finish, newest, table
+from ._output import finish
 
 if TYPE_CHECKING:
-    from sssfit.material import Material
-    from sssfit.profile import Profile
-    from sssfit.simulate import SoFar
-
-    from ._any_file import Found
+    from ._input import Found
 
 _SHARES = (0.5, 0.9, 0.99)
 
@@ -35,9 +34,7 @@ def show(file: str | None, common: Common) -> None:
       sssfit show skin1.profile.npz.checkpoint   the profile so far
       sssfit simulate skin1 -o - | sssfit show - --json
     """
-    from ._any_file import read_any
-
-    name = file or str(newest(common, "*.profile.npz", "sssfit simulate skin1"))
+    name = profile_name(file, common)
     figures, text = _shown(read_any(name), name)
     finish(common, {"command": "show", "output": [], "file": name, **figures}, text)
 
@@ -49,34 +46,21 @@ def _shown(found: Found, name: str) -> tuple[dict[str, Any], str]:
     from sssfit.profile import Profile
 
     if isinstance(found, Profile):
-        figures = _figures(found)
+        figures = found.to_dict()
         return figures, f"{name}: diffuse reflectance profile ({figures['format']})\n" + _text(
             figures
         )
     if isinstance(found, SeparableKernel):
-        from ._show_kernel import kernel_figures, kernel_text
+        from ._show_kernel import kernel_text
 
-        figures = kernel_figures(found)
+        figures = found.figures()
         return figures, f"{name}: separable kernel ({figures['format']})\n" + kernel_text(figures)
     if isinstance(found, Material):
         from .materials import material_figures, material_text
 
         return {"kind": "material", **material_figures(found)}, material_text(found)
-    figures = _checkpoint_figures(found)
+    figures = found.to_dict()
     return figures, f"{name}: checkpoint of a photon walk\n" + _checkpoint_text(figures)
-
-
-def _checkpoint_figures(found: SoFar) -> dict[str, Any]:
-    """Where the walk stands, and the figures of its profiles so far."""
-    profiles = [_figures(each) for each in found.profiles]
-    return {
-        "kind": "checkpoint",
-        "photons": found.profiles[0].photons,
-        "flights": found.flights,
-        "seconds": found.seconds,
-        "relative_error": found.relative_error,
-        "profiles": profiles,
-    }
 
 
 def _checkpoint_text(figures: dict[str, Any]) -> str:
@@ -89,80 +73,6 @@ def _checkpoint_text(figures: dict[str, Any]) -> str:
             *(f"\n{_text(each)}" for each in figures["profiles"]),
         ]
     )
-
-
-def _figures(profile: Profile) -> dict[str, Any]:
-    """Everything that is printed, as ``--json`` has it; null where a profile does not say."""
-    from sssfit.profile.bins import energy_radii_mm
-
-    meta = profile.meta
-    radii_mm = energy_radii_mm(profile, _SHARES)
-    return {
-        "kind": "profile",
-        "format": meta["format"],
-        "material": _material_figures(profile),
-        "method": meta.get("method"),
-        "channels": list(profile.channels),
-        "photons": profile.photons,
-        "seed": meta.get("seed"),
-        "version": meta.get("version"),
-        "annuli": profile.n_annuli,
-        "dr_mm": float(profile.r_edges_mm[1]),
-        "uniform": _is_uniform(profile),
-        "radius_mm": float(profile.r_edges_mm[-1]),
-        "diffuse_reflectance": profile.diffuse_reflectance,
-        "diffuse_reflectance_stderr": profile.diffuse_reflectance_stderr,
-        "specular_reflectance": profile.specular_reflectance,
-        "beyond_grid": profile.beyond_grid,
-        "absorbed": profile.absorbed.sum(axis=0) if len(profile.absorbed) else None,
-        "transmitted": profile.transmittance,
-        "unfinished": profile.unfinished,
-        "energy_balance": profile.energy_balance,
-        "energy_balance_stderr": meta.get("energy_balance_stderr"),
-        "radius_of_50_percent_mm": radii_mm[0],
-        "radius_of_90_percent_mm": radii_mm[1],
-        "radius_of_99_percent_mm": radii_mm[2],
-        "empty_annuli": _empty(profile),
-    }
-
-
-def _material_figures(profile: Profile) -> dict[str, Any] | None:
-    """Name and layers, from the top down, of the material the profile was made from.
-
-    No layers where only a name is known; null where there is not even that.
-    """
-    from sssfit.messages import printable
-    from sssfit.profile.bins import material_of
-
-    material = material_of(profile)
-    if material is not None:
-        return {**material.to_dict(), **_scales(material)}
-    if profile.material_name is None:
-        return None
-    source = printable(str(profile.meta["material"].get("source") or ""))
-    return {"name": profile.material_name, "source": source, "layers": []}
-
-
-def _scales(material: Material) -> dict[str, Any]:
-    """Albedo and mean free path per layer and channel."""
-    return {
-        "albedo": [layer.albedo for layer in material.layers],
-        "mean_free_path_mm": [layer.mean_free_path_mm for layer in material.layers],
-    }
-
-
-def _is_uniform(profile: Profile) -> bool:
-    import numpy as np
-
-    width_mm = np.diff(profile.r_edges_mm)
-    return bool(np.allclose(width_mm, width_mm[0]))
-
-
-def _empty(profile: Profile) -> Any:
-    """Annuli per channel in which no photon left any energy; null where none were traced."""
-    if profile.photons is None:
-        return None
-    return ((profile.annulus_energy == 0) & (profile.annulus_energy_stderr == 0)).sum(axis=0)
 
 
 def _text(figures: dict[str, Any]) -> str:
@@ -221,30 +131,21 @@ def _coefficients(figures: dict[str, Any]) -> str:
 
 def _energies(figures: dict[str, Any]) -> str:
     """Where each channel's light went."""
-    head = ["channel", "diffuse R", "+- stderr", "beyond grid", "of diffuse", "absorbed"]
-    columns = ["unfinished", "sum - 1"]
-    transmitted = figures["transmitted"]
-    if transmitted is not None:
-        columns.insert(0, "transmitted")
-    rows = []
-    for c, name in enumerate(figures["channels"]):
-        diffuse, beyond = figures["diffuse_reflectance"][c], figures["beyond_grid"][c]
-        row = [
-            name,
-            f"{diffuse:.6f}",
-            _error(figures["diffuse_reflectance_stderr"][c]),
-            f"{beyond:.2e}",
-            f"{100.0 * beyond / diffuse:.3f} %" if diffuse > 0 else "-",
-            "-" if figures["absorbed"] is None else f"{figures['absorbed'][c]:.6f}",
-        ]
-        row += [] if transmitted is None else [f"{transmitted[c]:.6f}"]
-        row += [f"{figures['unfinished'][c]:.1e}", _balance(figures, c)]
-        rows.append(row)
-    return "\n" + table([*head, *columns], rows)
-
-
-def _error(stderr: float) -> str:
-    return "-" if stderr != stderr else f"{stderr:.1e}"  # NaN: none
+    diffuse, beyond = figures["diffuse_reflectance"], figures["beyond_grid"]
+    shares = [b / d if d > 0 else None for b, d in zip(beyond, diffuse, strict=True)]
+    names = figures["channels"]
+    return "\n" + columns(
+        "channel",
+        names,
+        ("diffuse R", diffuse, ".6f"),
+        ("+- stderr", figures["diffuse_reflectance_stderr"], ".1e"),
+        ("beyond grid", beyond, ".2e"),
+        ("of diffuse", [None if each is None else f"{100.0 * each:.3f} %" for each in shares], ""),
+        ("absorbed", figures["absorbed"] or [None] * len(names), ".6f"),
+        ("transmitted", figures["transmitted"], ".6f"),
+        ("unfinished", figures["unfinished"], ".1e"),
+        ("sum - 1", [_balance(figures, c) for c in range(len(names))], ""),
+    )
 
 
 def _balance(figures: dict[str, Any], channel: int) -> str:
@@ -258,11 +159,7 @@ def _balance(figures: dict[str, Any], channel: int) -> str:
 
 def _radii(figures: dict[str, Any]) -> str:
     """How far the light on the grid spreads."""
-    empty = figures["empty_annuli"]
-    head = ["channel", *(f"{100 * share:g} % within, mm" for share in _SHARES)]
-    rows = [
-        [name, *(f"{figures[f'radius_of_{100 * share:g}_percent_mm'][c]:.4f}" for share in _SHARES)]
-        + ([] if empty is None else [str(empty[c])])
-        for c, name in enumerate(figures["channels"])
-    ]
-    return "\n" + table(head + ([] if empty is None else ["empty"]), rows) + "\n"
+    within = [(100 * share, figures[f"radius_of_{100 * share:g}_percent_mm"]) for share in _SHARES]
+    shown = [(f"{percent:g} % within, mm", radii, ".4f|nan") for percent, radii in within]
+    empty = ("empty", figures["empty_annuli"], "")
+    return f"\n{columns('channel', figures['channels'], *shown, empty)}\n"

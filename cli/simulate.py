@@ -2,74 +2,38 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from ._mci import is_mci, load_runs
-from ._methods import MAPPINGS, METHODS, method_for, method_lines, own_options
-from ._options import Common, Count, Length, NumberRange, Share, WholeRange, common_options
-from ._simulate_computed import run_computed
-from ._simulate_outputs import profile_paths
-from ._simulate_run import Request, Walk, run_walks
+from sssfit.methods import SIMULATIONS, lines_of
+
+from ._input import is_mci
+from ._methods import method_for, method_options, own_settings
+from ._options import Common, Length, LengthOr, WholeRange, common_options
+from ._simulate_run import Job, Request, run
 
 if TYPE_CHECKING:
     from sssfit.material import Material
+    from sssfit.simulate import ProfileSource
 
 
-class Radius(Length):
-    """A length, or the word auto."""
-
-    name = "radius"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Let ``auto`` through."""
-        return value if value == "auto" else super().convert(value, param, ctx)
-
-
-@click.command(epilog=method_lines())
+@click.command(epilog="\b\nMethods:\n" + lines_of(SIMULATIONS))
 @click.argument("material", required=False)
 @click.option("--all", "every", is_flag=True, help="All materials that ship with sssfit.")
+@click.option("--paper", is_flag=True, help="The eleven of them that the SSSS paper has.")
 @click.option(
     "--method",
-    type=click.Choice(list(METHODS)),
+    type=click.Choice(list(SIMULATIONS)),
     default="montecarlo",
     show_default=True,
     metavar="METHOD",
     help="How; the methods are listed below.",
 )
-@click.option("--run", type=WholeRange(1), metavar="N", help="Of an .mci, this run only.")
-@click.option(
-    "--photons",
-    type=Count(2, 10**12),
-    metavar="N",
-    help="montecarlo: photons to trace; every photon serves all channels."
-    "  [default: 1e7; with --target-error no limit]",
-)
-@click.option(
-    "--target-error",
-    type=Share(),
-    metavar="SHARE",
-    help="montecarlo: end when no channel's F(r) has a standard error above this share of F at the "
-    "last edge, such as 0.5%.",
-)
-@click.option(
-    "--tolerance",
-    type=Share(),
-    default="0.01%",
-    show_default=True,
-    metavar="SHARE",
-    help="exact: largest error of F(r), as a share of the total.",
-)
-@click.option(
-    "--mapping",
-    type=click.Choice(MAPPINGS),
-    default=MAPPINGS[0],
-    show_default=True,
-    metavar="FIT",
-    help="burley: which published fit gives s: perpendicular (light from straight above), diffuse "
-    "(from everywhere), or diffuse-mfp (from the diffuse mean free path).",
-)
+@click.option("--run", "number", type=WholeRange(1), metavar="N", help="Of an .mci, this run only.")
+@method_options(SIMULATIONS)
 @click.option(
     "--dr",
     type=Length(),
@@ -78,7 +42,7 @@ class Radius(Length):
 )
 @click.option(
     "--radius",
-    type=Radius(),
+    type=LengthOr("auto"),
     metavar="MM|auto",
     help="Grid radius; auto (montecarlo) grows it until under 0.1 % of any channel lies beyond."
     "  [default: 32 MFP_max; deon-skin: 17.2]",
@@ -90,19 +54,6 @@ class Radius(Length):
     help="Where the profile goes, - for stdout; with --all a folder."
     "  [default: MATERIAL.profile.npz, MATERIAL.METHOD.profile.npz]",
 )
-@click.option(
-    "--checkpoint-every",
-    type=NumberRange(min=0),
-    default=30.0,
-    show_default=True,
-    metavar="SECONDS",
-    help="montecarlo: how often FILE.checkpoint is saved, from which --resume goes on.",
-)
-@click.option(
-    "--resume",
-    is_flag=True,
-    help="montecarlo: go on where a killed or interrupted run was saved.",
-)
 @click.option("--force", is_flag=True, help="Replace an input, or a file that is not our profile.")
 @common_options
 @click.pass_context
@@ -111,8 +62,9 @@ def simulate(
     /,
     material: str | None,
     every: bool,
+    paper: bool,
     method: str,
-    run: int | None,
+    number: int | None,
     dr: float | None,
     radius: float | str | None,
     output: str | None,
@@ -138,57 +90,91 @@ def simulate(
       sssfit simulate tissue.mci --run 2
       sssfit simulate deon-skin
     """
-    if (material is None) != every:
-        raise click.UsageError("name one MATERIAL, or give --all.")
-    if run is not None and not is_mci(material):
+    if [material is not None, every, paper].count(True) != 1:
+        raise click.UsageError("name one MATERIAL, or give --all or --paper.")
+    if number is not None and not is_mci(material):
         raise click.UsageError("--run chooses a run of an MCML input file, .mci.")
     method = method_for(context, method, material)
-    own = own_options(context, method, own)
+    own = own_settings(context, SIMULATIONS, method, own)
     if radius == "auto" and method != "montecarlo":
         raise click.UsageError("--radius auto is for --method montecarlo; give a length.")
     walk = {key: own.pop(key) for key in ("checkpoint_every", "resume") if key in own}
     settings = {"dr_mm": dr, "radius_mm": radius, **own, **_of_common(method, common)}
-    if METHODS[method].makes is not None:
-        _make(method, settings, output, Request(force, several=False, common=common))
-        return
-    materials, jobs = _jobs(material, run, settings, shares=METHODS[method].shares)
-    several = every or len(materials) > 1
-    targets = profile_paths(materials, method, output, several=several)
+    materials, jobs = _jobs(method, material, number, settings, paper=paper)
+    several = every or paper or len(materials) > 1
+    targets = _targets(materials, method, output, several=several)
     if walk.get("resume") and targets == [None]:
         raise click.UsageError("--resume needs a file to go on beside; leave -o - out.")
-    request = Request(force, several, common, inputs=(material,) if material else (), **walk)
-    if method == "montecarlo":
-        run_walks(materials, targets, jobs, request)
-    else:
-        run_computed(method, materials, targets, jobs, request)
-
-
-def _make(method: str, settings: dict[str, Any], output: str | None, request: Request) -> None:
-    """Run a method that takes no material."""
-    from sssfit.simulate import DEON_SKIN
-
-    targets = profile_paths([DEON_SKIN], method, output, several=False)
-    run_computed(method, [DEON_SKIN], targets, [([0], settings)], request)
+    inputs = (material,) if material and SIMULATIONS[method].makes is None else ()
+    run(materials, targets, jobs, Request(method, force, several, common, inputs, **walk))
 
 
 def _of_common(method: str, common: Common) -> dict[str, Any]:
     """Return the common options that the method's function takes; a walk's threads come later."""
     if method == "montecarlo":
         return {"seed": common.seed}
-    return {"threads": common.threads} if METHODS[method].shares else {}
+    return {"threads": common.threads} if SIMULATIONS[method].shares else {}
 
 
 def _jobs(
-    material: str | None, run: int | None, settings: dict[str, Any], *, shares: bool
-) -> tuple[list[Material], list[Walk]]:
+    method: str, material: str | None, number: int | None, settings: dict[str, Any], *, paper: bool
+) -> tuple[Sequence[Material | ProfileSource], list[Job]]:
     """Load what is asked for; each job has the indices of its materials and its settings."""
     from sssfit.material import load_material, material_names
-    from sssfit.simulate import shared_walks
+    from sssfit.simulate import DEON_SKIN, shared_walks
 
+    if SIMULATIONS[method].makes is not None:
+        return [DEON_SKIN], [([0], settings)]
     if material is not None and is_mci(material):
-        materials, each = load_runs(material, run, settings)
+        materials, each = _runs_of(material, number, method, settings)
         return materials, [([k], own) for k, own in enumerate(each)]
-    names = material_names() if material is None else (material,)
+    names = material_names(paper=paper) if material is None else (material,)
     materials = [load_material(name) for name in names]
+    shares = SIMULATIONS[method].shares
     groups = shared_walks(materials) if shares else [[k] for k in range(len(materials))]
     return materials, [(group, settings) for group in groups]
+
+
+def _runs_of(
+    path: str, number: int | None, method: str, given: dict[str, Any]
+) -> tuple[list[Material], list[dict[str, Any]]]:
+    """Return the materials of the runs of a file, or of one, and what to simulate each with.
+
+    ``given`` holds dr_mm and radius_mm, and photons or a target error if these were given; the
+    file's own stand for those that were not.
+    """
+    from sssfit.errors import MaterialError
+    from sssfit.formats.mci import load_mci
+
+    runs = load_mci(path)
+    if number is not None:
+        if number > len(runs):
+            raise MaterialError(f"{path} has no run {number}; give --run 1 to {len(runs)}.")
+        runs = runs[number - 1 : number]
+    settings = [
+        given
+        | {
+            "dr_mm": given["dr_mm"] or run.grid.dr_mm,
+            "radius_mm": given["radius_mm"] or run.grid.radius_mm,
+        }
+        for run in runs
+    ]
+    # A target error alone decides when a walk ends; then the file's photons are no limit either.
+    if method == "montecarlo" and not {"photons", "target_error"} & given.keys():
+        for run, own in zip(runs, settings, strict=True):
+            own["photons"] = run.photons
+    return [run.material for run in runs], settings
+
+
+def _targets(
+    materials: Sequence[Material | ProfileSource], method: str, output: str | None, *, several: bool
+) -> list[Path | None]:
+    """Where each profile goes; None is stdout. Methods but the first put their name into it."""
+    if output == "-":
+        if several:
+            raise click.UsageError("there are several profiles; -o names a folder for them.")
+        return [None]
+    if several or output is None:
+        folder, kind = Path(output or "."), "" if method == "montecarlo" else f".{method}"
+        return [folder / f"{each.name}{kind}.profile.npz" for each in materials]
+    return [Path(output)]

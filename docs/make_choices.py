@@ -30,7 +30,7 @@ dearer step would give, and how few photons would have done.
 
 ## Where the error comes from
 
-`sssfit compare wholemilk --only budget` takes a kernel's error apart (here 1e6 photons, the paper's
+`sssfit compare wholemilk --what budget` takes a kernel's error apart (here 1e6 photons, the paper's
 grid, `svd --rank 3`, half floats; head of 512 x 512 pixels of .3 mm; mean Delta E, relative L2 in
 percent; in brackets what the kernel does not have):
 

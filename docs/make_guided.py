@@ -150,7 +150,7 @@ materials:
 
 def section():
     """Return the section's text."""
-    names = material_names()
+    names = material_names(paper=True)
     with warnings.catch_warnings(), threadpool_limits(1, user_api="blas"):
         warnings.simplefilter("ignore", SssfitWarning)
         found = np.stack([scores(load_material(name)) for name in names])

@@ -60,7 +60,7 @@ def main():
     """Compile first, so that no material's time holds it; then write the page."""
     simulate_montecarlo(load_material("skin1"), photons=1000)
     page = HEAD + f"| {' | '.join(COLUMNS)} |\n|{'---|' * len(COLUMNS)}\n"
-    page += "".join(line for name in material_names() for line in rows(name))
+    page += "".join(line for name in material_names(paper=True) for line in rows(name))
     text = marked_page("docs/make_materials.py", page)
     (DOCS / "materials.md").write_text(text, encoding="utf-8")
 

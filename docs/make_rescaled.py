@@ -7,8 +7,8 @@ from sections import put_section
 
 from sssfit.compare.candidates import Candidate
 from sssfit.compare.judged import border_of, judged_scene
-from sssfit.compare.sheet import MM_PER_PIXEL, PIXELS, SCENES
-from sssfit.fit import support_of
+from sssfit.compare.sheet import PIXELS, SCENES
+from sssfit.fit import MM_PER_PIXEL, support_of
 from sssfit.material import load_material
 from sssfit.measure.score import auto_exposure, measure
 from sssfit.render.reference import render_reference

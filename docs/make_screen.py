@@ -145,7 +145,7 @@ def step_row(kernel, dz_mm, falloff_per_mm):
 def section():
     """Return the section's text."""
     profile = simulate_exact(load_material("skin1"))
-    kernel = fit_artist(profile).kernel
+    kernel = fit_artist(profile, mm_per_pixel="profile").kernel
     near, far, share = figures(kernel)
     names = kernel.channels
     wide_pixels = fit_artist(profile, mm_per_pixel=0.5).kernel

@@ -1,6 +1,6 @@
 """Draw the pictures of docs/how-to-choose.md and write the tables beside them.
 
-python docs/make_sheets.py [sheet] [editing] [convergence] [pareto] [budget]
+python docs/make_sheets.py [sheet] [editing] [pareto] [budget]
 
 A picture and its table come from one computation; `pareto` writes what the page says in short, too.
 """
@@ -11,14 +11,12 @@ from PIL import Image
 from sections import DOCS, put_section
 
 from sssfit.chart.budget import budget_figure
-from sssfit.chart.convergence import convergence_figure
 from sssfit.chart.editing import editing_figure
 from sssfit.chart.page import save_figure
 from sssfit.chart.pareto import pareto_figure
 from sssfit.chart.sheet import sheet_figure
 from sssfit.compare.budget import error_budgets
 from sssfit.compare.comparison import verdicts
-from sssfit.compare.convergence import compute_convergence
 from sssfit.compare.editing import compute_editing
 from sssfit.compare.pareto import compare_kernels
 from sssfit.compare.sheet import compute_sheet
@@ -131,12 +129,6 @@ def two_passes(found):
         yield f"{best.label} on {picture.name} ({best.delta_e_2000_mean:.2f})"
 
 
-def convergence():
-    """Draw skin1's error over photons and seconds."""
-    found = compute_convergence(load_material("skin1"))
-    draw("skin1-convergence.png", convergence_figure(found))
-
-
 def budget():
     """Draw why a kernel of wholemilk is off."""
     draw("wholemilk-budget.png", budget_figure(error_budgets(load_material("wholemilk"), scenes())))
@@ -164,7 +156,6 @@ def write(word, text):
 WORK = {
     "sheet": sheet,
     "editing": editing,
-    "convergence": convergence,
     "pareto": pareto,
     "budget": budget,
 }
@@ -180,14 +171,14 @@ SHORT = """In short, for skin1 on pixels of .3 mm (disk, edge at 30 degrees, poi
 - **Simulate exactly** where that is possible: half spaces with isotropic scattering. Elsewhere
   1e6 photons do."""
 
-SHEET = """`sssfit compare skin1 --sheet skin1-sheet.png` draws the rows of figure S.3 (Jimenez
-et al. 2015, supplement), and first the input times the albedo: what no blur at all would show. The
-edge is upright, as in that figure: a case in which the pre-integrated kernel is exact. skin1,
-{pixels} x {pixels} pixels of {pitch:g} mm, mean and 95th percentile of Delta E:
+SHEET = """`sssfit compare skin1 --what sheet --chart skin1-sheet.png` draws the rows of figure S.3
+(Jimenez et al. 2015, supplement), and first the input times the albedo: what no blur at all would
+show. The edge is upright, as in that figure: a case in which the pre-integrated kernel is exact.
+skin1, {pixels} x {pixels} pixels of {pitch:g} mm, mean and 95th percentile of Delta E:
 
 {rows}"""
 
-EDITING = """`sssfit compare --editing editing.png` draws the edits of figure 6 of RR-02-12 on
+EDITING = """`python docs/make_sheets.py editing` draws the edits of figure 6 of RR-02-12 on
 the six-Gaussian skin, pixels of {pitch:g} mm ([fits.md](fits.md) says why). Delta E to the
 original:
 

@@ -1,4 +1,4 @@
-"""What records hold, whoever made them: arrays of numbers, names of channels, JSON, provenance.
+"""Checks of what records hold: arrays of numbers, names of channels, JSON, provenance.
 
 Files edited by hand and records made in Python pass the same checks; each caller names the error
 to raise.
@@ -7,6 +7,7 @@ to raise.
 import math
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -145,3 +146,23 @@ def _is_finite(value: float) -> bool:
 def _is_label(text: object) -> bool:
     """Whether a text can head a column."""
     return isinstance(text, str) and text.isprintable() and text.strip() == text != ""
+
+
+def plain(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Return figures as JSON holds them: arrays as lists, paths as text, None for NaN and inf."""
+    return {str(key): plain_value(each) for key, each in figures.items()}
+
+
+def plain_value(value: Any) -> Any:
+    """Return one figure as JSON can hold it; see `plain`."""
+    if isinstance(value, Mapping):
+        return plain(value)
+    if hasattr(value, "tolist"):
+        return plain_value(value.tolist())
+    if isinstance(value, (list, tuple)):
+        return [plain_value(each) for each in value]
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

@@ -1,4 +1,4 @@
-"""Errors and warnings: one line each that says what arrived, what was expected, what to do."""
+"""Errors and warnings, one line each: what arrived, what was expected, what to do."""
 
 
 class SssfitError(ValueError):

@@ -1,4 +1,4 @@
-"""Files on disk: nothing half-written, nothing foreign overwritten, no two runs on one output.
+"""Files on disk: atomic writes, no overwriting of foreign files, one run per output.
 
 Writes go to a temporary file beside the target, are flushed to the disk and renamed over it, so a
 reader sees the old file or the new one and never a part of either.
@@ -107,11 +107,11 @@ def check_output(
     path = _followed(path)
     folder = path.parent
     if not folder.is_dir():
-        raise FileError(f"{path}: there is no folder {folder}; make it or choose another with -o.")
+        raise FileError(f"{path}: there is no folder {folder}; make it, or name another.")
     if path.is_dir():
-        raise FileError(f"{path} is a folder; name a file in it with -o.")
+        raise FileError(f"{path} is a folder; name a file in it.")
     if path.exists() and not path.is_file():
-        raise FileError(f"{path} is not an ordinary file; name one with -o, or - for stdout.")
+        raise FileError(f"{path} is not an ordinary file; name another.")
     if path.exists():
         _check_replaceable(path, is_own, force, inputs)
     with _clear_errors(path):
@@ -140,7 +140,7 @@ def _check_replaceable(
     path: Path, is_own: Callable[[Path], bool], force: bool, inputs: Iterable[str | Path]
 ) -> None:
     """Refuse to replace what its owner may want to keep; some things even by force."""
-    remedy = "choose another name with -o, or replace it with --force."
+    remedy = "choose another name, or replace it with `force = True`."
     if not force:
         if _is_among(path, inputs):
             raise FileError(f"{path} is read as an input as well; {remedy}")
@@ -154,12 +154,12 @@ def _check_replaceable(
     if os.geteuid() not in (0, folder.st_uid, path.stat().st_uid):
         raise FileError(
             f"{path} belongs to somebody else, and only the owner may replace a file in "
-            f"{path.parent}; choose another name with -o."
+            f"{path.parent}; choose another name."
         )
 
 
 def _is_among(path: Path, inputs: Iterable[str | Path]) -> bool:
-    """Whether a file is one of these, by whatever name, link or stream they lead to it."""
+    """Whether a file is one of these, by any name, link or stream."""
     here = path.stat()
     for each in inputs:
         with contextlib.suppress(OSError, ValueError):  # the name of a material, a closed stdin
@@ -300,8 +300,7 @@ def _open_locked(lock_path: Path, path: Path) -> int:
         except OSError:
             os.close(handle)
             raise FileError(
-                f"{path} is being written by another run; wait for it or choose another name "
-                "with -o."
+                f"{path} is being written by another run; wait for it, or choose another name."
             ) from None
         with contextlib.suppress(FileNotFoundError):
             if os.path.samestat(lock_path.stat(), os.fstat(handle)):

@@ -121,9 +121,9 @@ def grid_of_lengths(
     if dr > radius * (1.0 + 1e-9):
         raise SimulationError(
             f"{whose}annuli {dr:g} mm wide do not fit into a radius of {radius:g} mm; use a "
-            "smaller --dr or a larger --radius (both in mm)."
+            "smaller `dr_mm` or a larger `radius_mm` (both in mm)."
         )
-    # 1e-9 keeps a ratio that is whole but for its last bits from gaining a ring.
+    # 1e-9: a ratio that is whole except for its last bits must not gain a ring.
     annuli = max(1, math.ceil(radius / dr - 1e-9))
     _check_count(annuli, dr, whose, why)
     return RadialGrid(dr, annuli)
@@ -146,7 +146,8 @@ def _check_count(annuli: int, dr_mm: float, whose: str = "", why: str = "") -> N
         most_radius = _rounded(dr_mm * MOST_ANNULI, math.floor)
         raise SimulationError(
             f"{whose}the grid would have {annuli:.6g} annuli, over the limit of {MOST_ANNULI}{why}"
-            f"; use --dr {least_dr} or more, or --radius {most_radius} or less (both in mm)."
+            f"; use `dr_mm = {least_dr}` or more, or "
+            f"`radius_mm = {most_radius}` or less (both in mm)."
         )
 
 

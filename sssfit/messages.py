@@ -1,4 +1,7 @@
-"""How values and names are worded in messages: on one line, in printable characters."""
+"""How figures, values and names are worded: on one line, in printable characters."""
+
+from collections.abc import Sequence
+from typing import Any
 
 _MOST_SHOWN = 60  # characters of a value worth repeating to the person who wrote it
 
@@ -20,3 +23,43 @@ def shown(value: object) -> str:
         text = "tables nested too deep"
     text = printable(text)  # a repr of an array has newlines
     return text if len(text) <= _MOST_SHOWN else text[: _MOST_SHOWN - 3] + "..."
+
+
+def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """Columns under their heads: the first flush left, the others flush right; no cut, no wrap."""
+    widths = [max(len(row[k]) for row in [header, *rows]) for k in range(len(header))]
+    lines = (
+        "  ".join(
+            cell.ljust(width) if k == 0 else cell.rjust(width)
+            for k, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in [header, *rows]
+    )
+    return "\n".join(lines)
+
+
+def columns(head: str, names: Sequence[str], *each: tuple[str, Sequence[Any] | None, str]) -> str:
+    """Write a table of a row a name: heads with a unit, the values under them and their format.
+
+    A column without values is left out; see `number` for formats.
+    """
+    shown = [(title, values, form) for title, values, form in each if values is not None]
+    rows = [
+        [name, *(number(values[k], form) for _, values, form in shown)]
+        for k, name in enumerate(names)
+    ]
+    return table([head, *(title for title, _, _ in shown)], rows)
+
+
+def number(value: Any, form: str) -> str:
+    """Write a figure by a format; one that ends in % is of a share.
+
+    Shares below 1e-9 are rounding of sums of pixels: 0 %. What is not known is a dash, or what
+    stands behind a bar: ".3g%|unknown".
+    """
+    form, _, unknown = form.partition("|")
+    if value is None or value != value:
+        return unknown or "-"
+    if not form.endswith("%"):
+        return f"{value:{form}}"
+    return "0 %" if abs(value) < 1e-9 else f"{100.0 * value:{form[:-1]}} %"

@@ -1,4 +1,4 @@
-"""Text files of other programs: read whole, known to be text, their numbers taken strictly.
+"""Text files of other programs: decoded, and their numbers parsed strictly.
 
 ``sssfit.formats`` and ``sssfit.material`` read their files by it. UTF-8 is what is meant; UTF-16
 and the Western code page of Windows are what editors there also write, and are read: names and
@@ -83,7 +83,7 @@ def read_text(
 
 
 def decode(content: bytes) -> Text | None:
-    """Decode UTF-8, UTF-16 or the Western code page of Windows; None for what is not text.
+    """Decode UTF-8, UTF-16 or the Western code page of Windows; None if it is not text.
 
     Byte order marks are dropped, line ends become newline characters.
     """
@@ -133,7 +133,7 @@ def finite_number(word: str) -> float | None:
     return value if math.isfinite(value) else None
 
 
-def tenfold_number(word: str, power: int) -> float:
+def decimal_shifted(word: str, power: int) -> float:
     """Return a word that `finite_number` reads, times 10 to a power.
 
     The shift is decimal: 7.4 per cm gives the same bits as 0.74 per mm.

@@ -1,4 +1,4 @@
-"""How many threads there is room for."""
+"""Number of threads, limited by the machine."""
 
 import operator
 import os

@@ -46,7 +46,7 @@ def walk_profiles(names, photons):
 
 def against_walk(photons, tolerance=1e-4, names=None):
     """Chi-square over merged annuli and the largest deviation of F, for every channel."""
-    names = names or material_names()
+    names = names or material_names(paper=True)
     pairs = zip(exact_profiles(names, tolerance), walk_profiles(names, photons), strict=True)
     figures = []
     for name, (exact, walk) in zip(names, pairs, strict=True):
@@ -89,7 +89,7 @@ def shares_apart(names=None, tolerance=1e-4, fine=FINE):
 
     Returns names, that error, and the error the coarser run claims.
     """
-    names = names or material_names()
+    names = names or material_names(paper=True)
     rows = []
     for name, ours, finer in zip(
         names, exact_profiles(names, tolerance), exact_profiles(names, fine), strict=True

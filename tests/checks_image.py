@@ -98,3 +98,33 @@ def load_bytes(tmp_path, data, name="a.png"):
     path = tmp_path / name
     path.write_bytes(data)
     return image.load_image(path)
+
+
+def jpeg(path, codes, *, quality=100, **attributes):
+    """A JPEG of 8-bit codes (H, W, C), each colour of its own (4:4:4)."""
+    import OpenImageIO as oiio  # noqa: N813
+
+    spec = oiio.ImageSpec(codes.shape[1], codes.shape[0], codes.shape[2], "uint8")
+    spec.attribute("Compression", f"jpeg:{quality}")
+    spec.attribute("jpeg:subsampling", "4:4:4")
+    for name, value in attributes.items():
+        spec.attribute(name, value)
+    out = oiio.ImageOutput.create(str(path))
+    assert out.open(str(path), spec), out.geterror()
+    assert out.write_image(np.ascontiguousarray(codes)), out.geterror()
+    out.close()
+
+
+def tga(codes, *, bottom_up=False, packed=False, new=False):
+    """A TGA by hand (Truevision, version 2.0, which ``new`` says): codes (H, W, 1, 3 or 4)."""
+    height, width, count = codes.shape
+    kind = (3 if count == 1 else 2) + (8 if packed else 0)
+    alpha_bits = 8 if count == 4 else 0
+    place = alpha_bits | (0 if bottom_up else 0x20)
+    head = struct.pack("<BBBHHBHHHHBB", 0, 0, kind, 0, 0, 0, 0, 0, width, height, 8 * count, place)
+    order = {1: [0], 3: [2, 1, 0], 4: [2, 1, 0, 3]}[count]
+    rows = codes[::-1] if bottom_up else codes
+    pixels = rows[..., order].astype(np.uint8).reshape(-1, count)
+    each = b"\x80" if packed else b""  # packets of one pixel, repeated once
+    body = b"".join(each + bytes(pixel) for pixel in pixels)
+    return head + body + (bytes(8) + b"TRUEVISION-XFILE.\0" if new else b"")

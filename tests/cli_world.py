@@ -85,13 +85,13 @@ def plate_profile() -> Profile:
 @functools.cache
 def kernel() -> SeparableKernel:
     """Its energy is not the profile's, so that drifts of the channels differ."""
-    return fit_svd(profile(), rank=2, energy="keep").kernel
+    return fit_svd(profile(), rank=2, energy="keep", mm_per_pixel="profile").kernel
 
 
 @functools.cache
 def gaussians() -> SeparableKernel:
     """A kernel that says what goes through a thin body."""
-    return quietly(fit_gaussians, profile(), terms=2).kernel
+    return quietly(fit_gaussians, profile(), terms=2, mm_per_pixel="profile").kernel
 
 
 @functools.cache
@@ -244,9 +244,9 @@ def finishing(both: bool):
     if not both:
         yield
         return
-    from sssfit.cli import _report
+    from sssfit.cli import _output
 
-    real = _report.finish
+    real = _output.finish
 
     def twice(common, figures, text, *, to_stderr=False):
         for as_json in (True, False):
@@ -483,8 +483,7 @@ def blank(*_) -> Figure:
 
 
 _CHARTS = (
-    *("profile", "kernel", "material", "pareto", "budget", "sheet", "editing", "convergence"),
-    *("models", "guide", "spectrum"),
+    *("profile", "kernel", "material", "pareto", "budget", "sheet", "models", "guide", "spectrum"),
 )
 STAND_INS = {
     "sssfit.simulate.simulate_montecarlo_many": few_photons,
@@ -500,8 +499,6 @@ STAND_INS = {
     "sssfit.compare.budget.error_budgets": lambda _, given: budgets(rank_of(given)),
     "sssfit.compare.compare_models": lambda *_: models(),
     "sssfit.compare.sheet.compute_sheet": lambda *_: small_sheet(),
-    "sssfit.compare.editing.compute_editing": lambda *_: small_editing(),
-    "sssfit.compare.convergence.compute_convergence": lambda *_: small_convergence(),
     **{f"sssfit.chart.{kind}.{kind}_figure": blank for kind in _CHARTS},
 }
 
@@ -516,7 +513,10 @@ def recording():
             module, function = name.rsplit(".", 1)
             owner = importlib.import_module(module)
             patch.setattr(owner, function, recorded(getattr(owner, function), stand_in))
-        patch.setattr("sssfit.material.material_names", lambda: ("skin1", "marble"))
+        patch.setattr(
+            "sssfit.material.material_names",
+            lambda *, paper=False: ("marble",) if paper else ("skin1", "marble"),
+        )
         yield
 
 

@@ -24,6 +24,7 @@ from sssfit.formats.csv import csv_text, load_csv
 from sssfit.formats.mci import load_mci
 from sssfit.formats.mco import join_channels, load_mco
 from sssfit.formats.pictures import load_image
+from sssfit.measure.difference import difference_map, magnified_difference
 from sssfit.measure.score import auto_exposure
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
@@ -132,6 +133,12 @@ SIMULATE = {
         f"simulate --all --method burley {GRID}",
         names,
         lambda: ["marble.burley.profile.npz", "skin1.burley.profile.npz"],
+    ),
+    "--paper": Row(
+        _BURLEY,
+        f"simulate --paper --method burley {GRID} -o out",
+        names,
+        lambda: ["out/marble.burley.profile.npz"],
     ),
     "--method": Row(
         f"simulate wax.toml {GRID} -o x.profile.npz",
@@ -256,8 +263,7 @@ FIT = {
         "--mm-per-pixel .5",
         made_kernel,
         _fit("svd", mm_per_pixel=0.5),
-        default=f"{DR_MM}",
-        words="the profile's first annulus",
+        default="0.3",
     ),
     "--support": _fitted("--support", "2.1", "svd", "auto", support_mm=2.1),
     "--normalize": _fitted("--normalize", "", "preintegrated", normalize=True),
@@ -338,9 +344,19 @@ _DISK = f"render --irradiance disk {_SIZE}"
 _LAYERS = f"render --irradiance layers.exr --mm-per-pixel {DR_MM} -o x.exr"
 
 
+def _head_on_screen(height: int, width: int, **own: Any) -> Scene:
+    """The made head, on the default pixels of a screen."""
+    return make_scene("head", height=height, width=width, mm_per_pixel=0.3, **own)
+
+
 def _lit_through() -> Scene:
     """The head lit from 170 degrees off the eye, and what comes through it."""
     return with_transmitted(_scene("head", light_degrees=170.0, transmit=True), world.gaussians())
+
+
+def _pair() -> tuple[Any, Any]:
+    """The disk as the kernel has it, and as the profile has it."""
+    return render_separable(_scene("disk"), kernel()), render_reference(_scene("disk"), profile())
 
 
 RENDER = {
@@ -364,6 +380,7 @@ RENDER = {
         f"--mm-per-pixel {DR_MM}",
         lambda ran: ran.status or ran.picture,
         lambda: _rendered(Scene("bare", picture(), DR_MM)),
+        words="0.3 with --screen, else the kernel's",
     ),
     "--layer": Row(
         f"{_LAYERS} --layer near",
@@ -395,7 +412,7 @@ RENDER = {
         f"render --irradiance head {_SIZE}",
         "--screen",
         made_picture,
-        lambda: np.float32(judge_in_screen_space(_scene("head"), kernel()).picture),
+        lambda: np.float32(judge_in_screen_space(_head_on_screen(16, 24), kernel()).picture),
     ),
     "--light": _lit("head", "--light", "100", "45", light_degrees=100.0),
     "--transmit": Row(
@@ -410,9 +427,7 @@ RENDER = {
         made_picture,
         lambda: np.float32(
             judge_in_screen_space(
-                make_scene("head", height=48, width=48, mm_per_pixel=DR_MM, distance_mm=200.0),
-                kernel(),
-                follow="none",
+                _head_on_screen(48, 48, distance_mm=200.0), kernel(), follow="none"
             ).picture
         ),
         default="gaussian",
@@ -461,13 +476,26 @@ RENDER = {
             )
         ),
     ),
+    "--gain": Row(
+        f"{_DISK} -o x.tif --difference lost.exr",
+        "--gain 4",
+        made_picture,
+        lambda: np.float32(magnified_difference(*_pair(), gain=4.0)),
+        default="1.0",
+    ),
+    "--difference-map": Row(
+        f"{_DISK} -o x.tif --difference lost.exr",
+        "--difference-map absolute",
+        made_picture,
+        lambda: np.float32(difference_map(*_pair(), kind="absolute").pixels),
+    ),
     "--force": Row(f"{_DISK} -o foreign.exr", "--force", names, lambda: ["foreign.exr"]),
 }
 
 # compare
 
-_KERNELS = "compare wax.profile.npz --only kernels --size 24x16"
-_BUDGET = "compare wax.toml --only budget --size 24x16 --picture disk"
+_KERNELS = "compare wax.profile.npz --what kernels --size 24x16"
+_BUDGET = "compare wax.toml --what budget --size 24x16 --picture disk"
 
 
 def _pictures(
@@ -490,13 +518,8 @@ def _budgeted(**settings: Any) -> Any:
     return called("sssfit.compare.budget.error_budgets", wax(), _pictures("disk"), **given)
 
 
-def _converged(**settings: Any) -> Any:
-    return called("sssfit.compare.convergence.compute_convergence", wax(), **settings)
-
-
-_OF_LAYERS = "compare wax.profile.npz --only kernels --picture layers.exr --mm-per-pixel .4"
+_OF_LAYERS = "compare wax.profile.npz --what kernels --picture layers.exr --mm-per-pixel .4"
 _BOTH = "compare wax.toml --size 24x16 --picture disk"
-_CONVERGENCE = "compare wax.toml --convergence c.png"
 
 
 def front(error: str, cost: str) -> Any:
@@ -529,12 +552,18 @@ COMPARE = {
             f"out/{name}-pareto.{end}" for name in ("marble", "skin1") for end in ("md", "png")
         ],
     ),
-    "--only": Row(
+    "--paper": Row(
+        _KERNELS,
+        "compare --paper --size 24x16 -o out",
+        names,
+        lambda: [f"out/marble-pareto.{end}" for end in ("md", "png")],
+    ),
+    "--what": Row(
         _BOTH,
-        "--only kernels",
+        "--what kernels",
         lambda ran: [name for name, _ in calls(ran)],
         lambda: ["simulate_exact", "compare_kernels"],
-        words="both",
+        words="budget and kernels",
     ),
     "--picture": Row(
         _KERNELS,
@@ -552,7 +581,7 @@ COMPARE = {
         words="what your own file says, else 0.3",
     ),
     "--size": Row(
-        "compare wax.profile.npz --only kernels --picture disk,edge",
+        "compare wax.profile.npz --what kernels --picture disk,edge",
         "--size 20x10",
         calls,
         lambda: _compared(_pictures("disk", "edge", size=(10, 20))),
@@ -613,27 +642,6 @@ COMPARE = {
         calls,
         lambda: _budgeted(model="burley"),
         words="of the photon walk",
-    ),
-    "--sheet": Row(
-        "compare wax.profile.npz --sheet s.png",
-        "--sheet t.png --mm-per-pixel .4",
-        lambda ran: (calls(ran), names(ran)),
-        lambda: (
-            called("sssfit.compare.sheet.compute_sheet", profile(), mm_per_pixel=0.4),
-            ["t.png"],
-        ),
-    ),
-    "--editing": Row(
-        _KERNELS,
-        "compare --editing e.png",
-        lambda ran: (calls(ran), names(ran)),
-        lambda: (called("sssfit.compare.editing.compute_editing"), ["e.png"]),
-    ),
-    "--convergence": Row(
-        _CONVERGENCE,
-        "compare wax.toml --convergence d.png --photons 1e5",
-        lambda ran: (calls(ran), names(ran)),
-        lambda: (_converged(photons=[10_000, 31_623, 100_000]), ["d.png"]),
     ),
     "--output": Row(
         "compare --all --size 24x16",
@@ -767,6 +775,7 @@ def _inverted(**settings: Any) -> Any:
         "eta": 1.3,
         "name": "from-reflectance",
         "channels": ["R", "G", "B"],
+        "light": "normal",
     } | settings
     return called("sssfit.simulate.inversion.material_from_reflectance", **given)
 
@@ -783,9 +792,26 @@ MATERIALS = {
         _MAKE, "--mean-free-path 2", calls, lambda: _inverted(mean_free_path_mm=[2.0])
     ),
     "--light": Row(
-        _MAKE, "--light diffuse", calls, lambda: _inverted(light="diffuse"), default="normal"
+        _MAKE,
+        "--light diffuse",
+        calls,
+        lambda: _inverted(light="diffuse"),
+        default="normal",
+        words="diffuse for sRGB colours, else normal",
     ),
-    "--eta": Row(_MAKE, "--eta 1.4", calls, lambda: _inverted(eta=1.4)),
+    "--srgb": Row(
+        _MAKE.replace(".4,.2,.1", "1,0,1"),
+        "--srgb",
+        calls,
+        lambda: _inverted(reflectance="#010001", light="diffuse"),
+    ),
+    "--eta": Row(
+        _MAKE.replace(" --eta 1.3", ""),
+        "--eta 1.5",
+        calls,
+        lambda: _inverted(eta=1.5),
+        default="1.4",
+    ),
     "--name": Row(
         f"{_MAKE} -o x.toml",
         "--name lard",
@@ -944,8 +970,7 @@ CHART = {
         "--mm-per-pixel .5",
         _GUIDES,
         lambda: _guided(mm_per_pixel=0.5),
-        default=f"{DR_MM}",
-        words="the profile's first annulus",
+        default="0.3",
     ),
     "--k": Row(_GUIDE, "--k 1,2", _GUIDES, lambda: _guided(ks=[1.0, 2.0]), default="0,1.55,4"),
     "--channel": Row(
@@ -1023,12 +1048,6 @@ SEEDS = {
         lambda: _rendered(_scene("noise", seed=5)),
     ),
     "compare": Row(_BUDGET, "--seed 5", calls, lambda: _budgeted(seed=5)),
-    "compare --convergence": Row(
-        f"{_CONVERGENCE} --photons 1e5",
-        "--seed 5",
-        calls,
-        lambda: _converged(photons=[10_000, 31_623, 100_000], first_seed=5),
-    ),
     "compare --picture noise": Row(
         f"{_KERNELS} --picture noise",
         "--seed 5",
@@ -1082,7 +1101,6 @@ STREAMS = (
     f"{_MAKE} --name lard -o x.toml",
     f"{_KERNELS} --chart x.png",
     f"{_BUDGET} --budget-chart x.png",
-    "compare wax.profile.npz --sheet x.png",
-    "compare --editing x.png",
-    "compare wax.toml --convergence x.png",
+    "compare wax.profile.npz --what sheet --chart x.png",
+    "compare wax.profile.npz --what front --size 24x16 --chart x.png",
 )

@@ -320,7 +320,20 @@ def rendering(f: Figures) -> list[Any]:
         words = "through the object at most: " + ", ".join("{} {}" for _ in most)
         values = [value for pair in most for value in pair]
         parts.append(Words(words + ", face on the key light is 1", *values))
-    return [*parts, *(_lost(f) if f["rmse"] is not None else []), wrote(f)]
+    lost = _lost(f) if f["rmse"] is not None else []
+    return [*parts, *lost, *_difference(f), wrote(f)]
+
+
+def _difference(f: Figures) -> list[Any]:
+    if f["difference_gain"] is None:
+        return []
+    end, what = f["difference_end"], f["difference_of"]
+    if f["difference_map"] is None:
+        return [Words("difference: absolute, {} times", f["difference_gain"])]
+    if f["difference_map"] == "signed":
+        words = "difference map: {}, blue -{}, white 0, red {}"
+        return [Words(words, what, end, end)]
+    return [Words("difference map: {}, violet 0, green to yellow {}", what, end)]
 
 
 def _lost(f: Figures) -> list[Any]:
@@ -537,7 +550,7 @@ def fronts(f: Figures) -> list[Any]:
             values = [value for row in on for value in (row["label"], row[ERRORS[f["error"]]])]
             rows.append([name, picture, Words(", ".join("{} {}" for _ in on), *values)])
     heads = ["material", "picture", f"front of {f['error']} by {f['cost']}, cheapest first"]
-    return [Table(heads, rows, alike=("material",)), wrote(f)]
+    return [Table(heads, rows, alike=("material",)), *([wrote(f)] if f["output"] else [])]
 
 
 def sheet(f: Figures) -> list[Any]:
@@ -548,18 +561,6 @@ def sheet(f: Figures) -> list[Any]:
             *(f["material"], f["pixels"], f["pixels"], f["mm_per_pixel"]),
         ),
         Table(["kernel", "passes", *f["scenes"]], rows),
-        wrote(f),
-    ]
-
-
-def editing(f: Figures) -> list[Any]:
-    rows = [[row["label"], row["delta_e_2000_mean"], row["delta_e_2000_p99"]] for row in f["rows"]]
-    return [
-        Table(["edit", "mean Delta E to the original", "99th percentile"], rows),
-        Words(
-            "The original against the 2D kernel of the six Gaussians: mean {}, 99th percentile {}",
-            *(f["original_delta_e_2000_mean"], f["original_delta_e_2000_p99"]),
-        ),
         wrote(f),
     ]
 
@@ -582,7 +583,6 @@ def convergence(f: Figures) -> list[Any]:
             *(f["material"], f["slope"], f["slope_stderr"]),
         ),
         Table(["run", "seconds", "error", "own estimate"], rows),
-        wrote(f),
     ]
 
 
@@ -967,16 +967,19 @@ PRINTED: dict[str, Layout] = {
     "render --irradiance disk --size 24x16 --structure": rendering,
     "render --irradiance edge --size 24x16 --border zero": rendering,
     "render --irradiance head --size 24x16 --screen": rendering,
+    "render --irradiance edge --size 24x16 --difference d.exr --gain 4": rendering,
+    "render --irradiance edge --size 24x16 --difference d.png --difference-map signed": rendering,
+    "render --irradiance edge --size 24x16 --difference d.exr --difference-map absolute": rendering,
     "render wax.gaussians2.kernel.json --irradiance head --size 48x48 --transmit": rendering,
-    "compare wax.profile.npz --only kernels --size 24x16": comparison,
-    "compare wax.profile.npz --only kernels --size 24x16 --error l2 --cost passes": comparison,
-    "compare wax.toml --only budget --rank 2 --size 24x16": comparison,
+    "compare wax.profile.npz --what kernels --size 24x16": comparison,
+    "compare wax.profile.npz --what kernels --size 24x16 --error l2 --cost passes": comparison,
+    "compare wax.toml --what budget --rank 2 --size 24x16": comparison,
     "compare wax.toml --size 24x16": comparison,
     "compare --all --size 24x16": fronts,
     "compare --all --size 24x16 --error l2 --cost passes": fronts,
-    "compare wax.profile.npz --sheet s.png": sheet,
-    "compare --editing e.png": editing,
-    "compare wax.toml --convergence c.png": convergence,
+    "compare wax.profile.npz --what sheet --chart s.png": sheet,
+    "compare wax.profile.npz --what front --size 24x16": fronts,
+    "compare wax.profile.npz --what front --size 24x16 --chart f.png --table f.md": fronts,
     "choose wax.toml": choice,
     "choose wax.toml --tolerance 6": choice,
     "choose wax.toml --tolerance 7": choice,

@@ -317,9 +317,9 @@ def test_a_million_photons_unless_told_otherwise(monkeypatch, capsys):
         raise SimulationError("enough")
 
     monkeypatch.setattr("sssfit.compare.budget.error_budgets", error_budgets_of)
-    run(capsys, "skin1", "--only", "budget", *("--picture", "disk", "--size", "8x8"))
+    run(capsys, "skin1", "--what", "budget", *("--picture", "disk", "--size", "8x8"))
     given = ("--photons", "2e4", "--seed", "3", "--picture", "disk", "--size", "8x8")
-    run(capsys, "skin1", "--only", "budget", *given)
+    run(capsys, "skin1", "--what", "budget", *given)
     assert asked == [(1_000_000, 1), (20_000, 3)]
     found = error_budgets(load_material("skin1"), [noise_scene(4)])
     assert found[0].photons == 1_000_000
@@ -335,7 +335,7 @@ def test_the_command_prints_what_the_library_finds(tmp_path, monkeypatch, capsys
     monkeypatch.chdir(tmp_path)
     given = (
         "skin1",
-        "--only",
+        "--what",
         "budget",
         "--picture",
         "edge,disk",
@@ -370,7 +370,7 @@ def test_the_command_prints_what_the_library_finds(tmp_path, monkeypatch, capsys
 
 def test_the_command_writes_a_table_and_what_to_do(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    given = ("skin1", "--only", "budget", "--picture", "head", "--size", "64x64")
+    given = ("skin1", "--what", "budget", "--picture", "head", "--size", "64x64")
     given += ("--mm-per-pixel", "2", "--photons", "1e5")
     code, printed = run(
         capsys, *given, "--method", "gaussians", "--terms", "2", "--model", "burley"
@@ -386,13 +386,12 @@ def test_the_command_writes_a_table_and_what_to_do(tmp_path, monkeypatch, capsys
 @pytest.mark.parametrize(
     ("arguments", "code", "says"),
     [
-        (("skin1", "--only", "kernels", "--model", "dipole"), 2, "--model is for"),
-        (("skin1", "--only", "budget", "--rank", "2", "--method", "burley"), 2, "--rank is for"),
-        (("skin1", "--only", "budget", "--picture", "edge,"), 2, "no picture ''"),
-        (("deon-skin", "--only", "budget"), 1, "deon-skin has no coefficients"),
-        (("a.profile.npz", "--only", "budget"), 1, "is a profile, and a budget simulates"),
-        (("a.profile.npz", "--convergence", "c.png"), 1, "is a profile, and a convergence"),
-        (("skin1", "--only", "budget", "--budget-chart", "b.txt"), 1, "b.txt"),
+        (("skin1", "--what", "kernels", "--model", "dipole"), 2, "--model is for"),
+        (("skin1", "--what", "budget", "--rank", "2", "--method", "burley"), 2, "--rank is for"),
+        (("skin1", "--what", "budget", "--picture", "edge,"), 2, "no picture ''"),
+        (("deon-skin", "--what", "budget"), 1, "deon-skin has no coefficients"),
+        (("a.profile.npz", "--what", "budget"), 1, "is a profile, and a budget simulates"),
+        (("skin1", "--what", "budget", "--budget-chart", "b.txt"), 1, "b.txt"),
     ],
 )
 def test_wrong_usage_is_one_line(capsys, arguments, code, says):

@@ -303,7 +303,7 @@ def test_cost_never_rises_with_distance(name, monkeypatch):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("tolerance", [1.0, 0.3])
-@pytest.mark.parametrize("name", material_names())
+@pytest.mark.parametrize("name", material_names(paper=True))
 def test_cost_never_rises_with_distance_for_any_material(name, tolerance, monkeypatch):
     quick(monkeypatch)
     found = list(costs(name, np.geomspace(100.0, 50_000.0, 16), tolerance, 256))

@@ -185,6 +185,18 @@ def test_no_blur_writes_no_kernel(folder):
     assert not list(folder.iterdir())
 
 
+def test_a_kernel_of_an_earlier_run_is_said_to_be_one():
+    far = ("skin1", "--distance", "60m")
+    assert ended(*far).stderr == ""
+    ended("skin1", *EDGE)
+    found = SeparableKernel.load("skin1.chosen.kernel.json").to_dict()
+    words = "skin1.chosen.kernel.json is from an earlier run; this view needs no kernel."
+    assert ended(*far).stderr.splitlines() == [words]
+    assert ended(*far, "-q").stderr == ""
+    assert SeparableKernel.load("skin1.chosen.kernel.json").to_dict() == found
+    assert words not in ended("skin1", *EDGE).stderr
+
+
 def test_a_picture_of_ones_own_takes_the_pitch():
     pixels = np.zeros((40, 40, 3))
     pixels[:, 20:] = 0.8

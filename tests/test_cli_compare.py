@@ -13,16 +13,16 @@ import pytest
 
 from sssfit.cli import main
 from sssfit.cli._compare_input import scenes_of
-from sssfit.cli._compare_options import PICTURES
-from sssfit.cli._compare_table import is_table_file
+from sssfit.cli._compare_parts import PICTURES
 from sssfit.cli._options import Common
 from sssfit.compare import pareto
 from sssfit.compare.candidates import candidates
+from sssfit.compare.table import is_table_file
 from sssfit.errors import RenderError
 from sssfit.formats.pictures import save_image
 from sssfit.material import load_material
 from sssfit.scene.made import make_scene
-from sssfit.simulate import exact, simulate_exact
+from sssfit.simulate import exact, simulate_dipole, simulate_exact
 
 SMALL = ("--picture", "disk", "--size", "32x32", "--mm-per-pixel", "2.5")
 COMMON = Common(quiet=True, verbose=False, json=False, threads=None, seed=1)
@@ -157,16 +157,16 @@ def test_a_picture_brings_its_pixel_size(run, tmp_path):
 def test_layer_and_mask_of_a_file(run, tmp_path, monkeypatch):
     seen = []
 
-    def stop(profile, scenes, mm_per_pixel, wish):
+    def stop(profile, scenes, **_):
         seen.append(scenes)
         raise RenderError("seen")
 
-    monkeypatch.setattr("sssfit.cli._compare_pareto._compared", stop)
+    monkeypatch.setattr("sssfit.compare.compare_kernels", stop)
     pixels = np.random.default_rng(1).random((16, 16, 7))
     names = ["a.R", "a.G", "a.B", "b.R", "b.G", "b.B", "b.A"]
     pixels[:, :8, 6], pixels[:, 8:, 6] = 0.25, 1.0
     save_image(tmp_path / "mine.exr", pixels, channels=names, mm_per_pixel=2.0)
-    given = ("skin1", "--only", "kernels", "--picture", "mine.exr,disk", "--size", "16x16")
+    given = ("skin1", "--what", "kernels", "--picture", "mine.exr,disk", "--size", "16x16")
     for options in (("--layer", "b"), ("--layer", "b", "--mask", "alpha")):
         run(*given, *options, status=1)
     (plain, disk), (masked, masked_disk) = seen
@@ -202,8 +202,17 @@ def test_pictures_that_do_not_agree_are_refused(run, tmp_path):
     [
         ((), "name one MATERIAL"),
         (("skin1", "--all"), "name one MATERIAL"),
+        (("--paper", "--all"), "name one MATERIAL"),
         (("--all", "--chart", "c.png"), "leave --chart and --table out"),
         (("skin1", "-o", "folder"), "-o is the folder of --all"),
+        (("--all", "--what", "sheet"), "--all is for --what front"),
+        (("skin1", "--what", "sheet"), "name its file with --chart"),
+        (("skin1", "--what", "sheet", "--chart", "c.png", "--picture", "disk"), "--picture is for"),
+        (("skin1", "--what", "sheet", "--chart", "c.png", "--photons", "9"), "--photons is for"),
+        (("skin1", "--what", "front", "--budget-chart", "c.png"), "--budget-chart is for"),
+        (("skin1", "--what", "kernels", "--model", "burley"), "--model is for"),
+        (("skin1", "--what", "budget", "--table", "t.md"), "--table is for"),
+        (("skin1", "--what", "editing"), "'editing' is not one of"),
         (("skin1", "--picture", "dsk"), "there is no picture 'dsk'"),
         (("skin1", "--cost", "money"), "'money' is not one of"),
         (("skin1", "--mm-per-pixel", "0"), "is not a length above 0"),
@@ -230,11 +239,10 @@ def test_a_slab_needs_its_photons_walked(run, tmp_path):
     assert "Take " in run(advised, *SMALL)
 
 
-@pytest.mark.parametrize("option", [("--only", "budget"), ("--convergence", "c.png")])
-def test_a_stack_is_told_what_the_next_command_takes(run, tmp_path, option):
+def test_a_stack_is_told_what_the_next_command_takes(run, tmp_path):
     toml = SLAB.replace("g = 0", "g = 0.8")
     (tmp_path / "forward.toml").write_text(toml)
-    line = one_line(run("forward.toml", "-q", *option, status=1))
+    line = one_line(run("forward.toml", "-q", "--what", "budget", status=1))
     assert "forward is not one half space" in line
     for other in ("leave g out", "multipole"):
         assert other not in line
@@ -271,7 +279,7 @@ def test_it_ends_with_a_verdict_of_two_lines(run, few):
 
 
 def test_the_verdict_says_from_where_on_nothing_shows(run):
-    given = ("--only", "kernels", "--size", "32x32")
+    given = ("--what", "kernels", "--size", "32x32")
     far, near = (
         run("skin1", *given, "--picture", picture, "--mm-per-pixel", pitch).splitlines()[-1]
         for picture, pitch in (("head", "12"), ("points", "1"))
@@ -337,7 +345,7 @@ def test_a_chart_may_go_to_stdout(tmp_path, monkeypatch, capfdbinary):
 
 def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch):
     from sssfit import material
-    from sssfit.cli import _compare_pareto as verb
+    from sssfit.cli import _compare_parts as verb
 
     real = verb.profile_of
     (tmp_path / "marble.toml").write_text(SLAB)
@@ -346,7 +354,7 @@ def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch):
     monkeypatch.setattr(
         verb, "profile_of", lambda name, common: real(paths.get(name, name), common)
     )
-    monkeypatch.setattr(material, "material_names", lambda: ("marble", "skin1"))
+    monkeypatch.setattr(material, "material_names", lambda **_: ("marble", "skin1"))
     (tmp_path / "out").mkdir()
     err = run("--all", "-o", "out", *SMALL, status=1)
     assert "1 of 2 materials failed; marble: marble is not one half space" in err
@@ -359,7 +367,7 @@ def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch):
 def test_all_prints_the_fronts(run, tmp_path, monkeypatch):
     from sssfit import material
 
-    monkeypatch.setattr(material, "material_names", lambda: ("skin1", "marble"))
+    monkeypatch.setattr(material, "material_names", lambda **_: ("skin1", "marble"))
     lines = run("--all", *SMALL).splitlines()
     assert [line.split()[0] for line in lines[1:3]] == ["skin1", "marble"]
     names = [f"{name}-pareto.{end}" for name in ("skin1", "marble") for end in ("png", "md")]
@@ -367,3 +375,36 @@ def test_all_prints_the_fronts(run, tmp_path, monkeypatch):
     found = json.loads(run("--all", *SMALL, "--json"))
     assert {row["material"] for row in found["rows"]} == {"skin1", "marble"}
     assert found["output"] == names
+
+
+def test_the_front_of_one_material_is_its_line_of_all(run, tmp_path, monkeypatch):
+    from sssfit import material
+
+    monkeypatch.setattr(material, "material_names", lambda: ("skin1",))
+    one = run(
+        "skin1", "--what", "front", *SMALL, "--chart", "c.png", "--table", "t.md"
+    ).splitlines()
+    every = run("--all", *SMALL).splitlines()
+    assert one[:-1] == every[:-1]
+    assert one[-1] == "Wrote c.png, t.md"
+    assert (tmp_path / "c.png").read_bytes() == (tmp_path / "skin1-pareto.png").read_bytes()
+    assert "Wrote" not in run("skin1", "--what", "front", *SMALL)
+
+
+@pytest.mark.parametrize("what", ["kernels", "front"])
+def test_pictures_on_the_pixels_of_the_profile(run, tmp_path, what):
+    coarse = simulate_dipole(load_material("skin1"), dr_mm=2.5, radius_mm=40.0)
+    coarse.save(tmp_path / "p.profile.npz")
+    given = ("--what", what, "--picture", "disk", "--size", "32x32", "--json")
+    own, asked = (
+        json.loads(run("p.profile.npz", *given, "--mm-per-pixel", pitch))
+        for pitch in ("profile", "2.5")
+    )
+    for key in ("rows", "materials") if what == "front" else ("mm_per_pixel", "pixels", "pictures"):
+        if key == "rows":
+            pairs = zip(own[key], asked[key], strict=True)
+            assert all(a["relative_l2"] == b["relative_l2"] for a, b in pairs)
+        else:
+            assert own[key] == asked[key]
+    words = run("--all", *given[2:], "--mm-per-pixel", "profile", status=2)
+    assert "share their pixels" in words

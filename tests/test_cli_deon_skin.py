@@ -6,7 +6,7 @@ import json
 import pytest
 
 from sssfit.cli import main
-from sssfit.cli._methods import METHODS
+from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile
 from sssfit.simulate import DEON_SKIN, simulate_deon_skin
 
@@ -28,7 +28,7 @@ def run(tmp_path, monkeypatch, capfd):
 
 
 def test_the_table_of_methods_has_the_name():
-    assert METHODS["gaussians"].makes == DEON_SKIN.name
+    assert SIMULATIONS["gaussians"].makes == DEON_SKIN.name
 
 
 @pytest.mark.parametrize("method", [(), ("--method", "gaussians")])

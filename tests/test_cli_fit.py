@@ -8,6 +8,7 @@ from click.testing import CliRunner
 from reference_pixels import make_profile
 
 from sssfit.cli import cli, main
+from sssfit.fit import METHODS
 from sssfit.kernel import SeparableKernel
 
 
@@ -36,7 +37,7 @@ def failed(capsys, *arguments):
 def test_a_session_from_profile_to_shader(folder):
     assert ended("fit", "--method", "preintegrated").exit_code == 0
     kernel = SeparableKernel.load("wax.preintegrated.kernel.json")
-    assert kernel.mm_per_pixel == pytest.approx(0.1)
+    assert kernel.mm_per_pixel == 0.3
     assert ended("export", "--format", "hlsl").exit_code == 0
     assert (
         (folder / "wax.preintegrated.hlsl")
@@ -45,6 +46,16 @@ def test_a_session_from_profile_to_shader(folder):
     )
     assert ended("export", "--format", "json").exit_code == 0
     assert json.loads((folder / "wax.preintegrated.json").read_text())["pixels"] == kernel.pixels
+
+
+def test_the_pitch_of_the_profile_on_request(folder):
+    own = ended("fit", "--method", "preintegrated", "--mm-per-pixel", "profile", "--json")
+    assert json.loads(own.stdout)["mm_per_pixel"] == pytest.approx(0.1)
+    wrong = ended("fit", "--method", "preintegrated", "--mm-per-pixel", "kernel")
+    assert wrong.exit_code == 2
+    assert "'kernel' is not a length above 0, such as 0.05, 3cm or 0.6m, or profile." in (
+        " ".join(wrong.stderr.split())
+    )
 
 
 def test_json_has_the_figures(folder):
@@ -66,9 +77,27 @@ def test_normalised_kernels_keep_their_energy_apart(folder):
     np.testing.assert_allclose(kernel.scale, [0.5, 0.25], rtol=2e-3)
 
 
-def test_list_has_a_line_for_each_method(folder):
-    from sssfit.fit import METHODS
+# A single Gaussian leaves nothing to several, and nothing of some shapes; both are warned of.
+@pytest.mark.filterwarnings("ignore::sssfit.errors.SssfitWarning")
+@pytest.mark.parametrize(
+    ("method", "options", "counted"),
+    [
+        *(("svd", given, "rank") for given in ([], ["--rank", "2"])),
+        *(("gaussians", given, "terms") for given in ([], ["--terms", "2"])),
+        *((method, [], None) for method in METHODS if method not in ("svd", "gaussians")),
+    ],
+)
+def test_the_files_name_has_the_method_and_the_count_that_was_fitted(
+    folder, method, options, counted
+):
+    result = ended("fit", "--method", method, *options, "--mm-per-pixel", "0.4", "--json")
+    (name,) = json.loads(result.stdout)["output"]
+    kernel = SeparableKernel.load(name)
+    count = "" if counted is None else kernel.meta["settings"][counted]
+    assert name == f"wax.{kernel.method}{count}.kernel.json"
 
+
+def test_list_has_a_line_for_each_method(folder):
     lines = ended("fit", "--list").stdout.splitlines()
     assert [line.split()[0] for line in lines] == list(METHODS)
     for line, method in zip(lines, METHODS.values(), strict=True):

@@ -15,14 +15,15 @@ from processes import start
 
 from sssfit import simulate
 from sssfit.cli import cli, main
-from sssfit.cli._methods import MAPPINGS, METHODS
-from sssfit.material import load_material
+from sssfit.material import load_material, material_names
+from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile
 from sssfit.simulate import burley, exact
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
 COMMAND = [sys.executable, "-m", "sssfit.cli", "simulate"]
-COMPUTED = [name for name, each in METHODS.items() if name != "montecarlo" and not each.makes]
+(MAPPINGS,) = (each.among for each in SIMULATIONS["burley"].settings)
+COMPUTED = [name for name, each in SIMULATIONS.items() if name != "montecarlo" and not each.makes]
 GRID = ("--dr", "0.25", "--radius", "5")
 SLAB = "eta = 1.3\ng = 0\nsigma_a_per_mm = [0.1, 0.1, 0.1]\nsigma_s_per_mm = [9, 9, 9]\n"
 
@@ -54,9 +55,9 @@ def run(tmp_path, monkeypatch, capfd):
 def test_the_table_of_methods_is_true():
     options = {each.name for each in cli.commands["simulate"].params}
     lines = cli.commands["simulate"].epilog.splitlines()
-    for name, method in METHODS.items():
-        assert callable(getattr(simulate, method.function))
-        assert set(method.options) <= options
+    for name, method in SIMULATIONS.items():
+        assert callable(method.load())
+        assert {each.name for each in method.settings} <= options
         assert any(line.split()[0] == name and method.summary in line for line in lines[2:])
     assert tuple(burley.MAPPINGS) == MAPPINGS
 
@@ -134,12 +135,14 @@ def test_profile_to_stdout(tmp_path):
     assert names(tmp_path) == []
 
 
-def test_all_materials_into_a_folder(run, tmp_path):
+@pytest.mark.parametrize("option", ["--all", "--paper"])
+def test_all_materials_into_a_folder(run, tmp_path, option):
     (tmp_path / "out").mkdir()
-    status, out, _ = run("--all", "--method", "burley", *GRID, "-o", "out", "--json")
+    status, out, _ = run(option, "--method", "burley", *GRID, "-o", "out", "--json")
     assert status == 0
     figures = json.loads(out)
-    assert len(figures["rows"]) == 11
+    made = [row["material"] for row in figures["rows"]]
+    assert made == list(material_names(paper=option == "--paper"))
     assert names(tmp_path / "out") == sorted(Path(each).name for each in figures["output"])
     assert "skin1.burley.profile.npz" in names(tmp_path / "out")
 
@@ -153,7 +156,7 @@ def test_exact_solves_materials_of_one_index_together(run, tmp_path, monkeypatch
         return real(materials, **settings)
 
     monkeypatch.setattr(simulate, "simulate_exact_many", counting)
-    assert run("--all", "--method", "exact", "--tolerance", "1%", *GRID)[0] == 0
+    assert run("--paper", "--method", "exact", "--tolerance", "1%", *GRID)[0] == 0
     assert sorted(map(len, calls)) == [1, 10]
     assert ["marble"] in calls
     assert len(names(tmp_path)) == 11
@@ -269,7 +272,7 @@ def test_what_was_done_before_a_signal_stays(run, tmp_path, monkeypatch, number)
     monkeypatch.setattr(simulate, "simulate_dipole", interrupted)
     before = signal.getsignal(signal.SIGTERM)
     try:
-        status, out, err = run("--all", "--method", "dipole", *GRID, "--json")
+        status, out, err = run("--paper", "--method", "dipole", *GRID, "--json")
     finally:
         signal.signal(signal.SIGTERM, before)
     assert status == 130
@@ -283,7 +286,7 @@ def test_what_was_done_before_a_signal_stays(run, tmp_path, monkeypatch, number)
 @posix
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_solver_leaves_nothing_behind(tmp_path, number):
-    process = start([*COMMAND, "--all", "--method", "exact"], cwd=tmp_path)
+    process = start([*COMMAND, "--paper", "--method", "exact"], cwd=tmp_path)
     end = time.monotonic() + 60.0
     while not (tmp_path / ".wholemilk.exact.profile.npz.lock").exists():  # the last of them
         assert process.poll() is None

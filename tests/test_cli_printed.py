@@ -10,11 +10,10 @@ import pytest
 from printed import Exact, Percent, Rough, Table, Words, agrees, check
 from printed_layouts import PRINTED, markdown, simulation
 
+from sssfit.arrays import plain_value
 from sssfit.cli import cli
-from sssfit.cli._report import plain
 from sssfit.kernel import SeparableKernel
 from sssfit.profile import Profile
-from sssfit.profile.bins import energy_radii_mm
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -52,9 +51,9 @@ FIGURES = {
     "energy_balance": lambda made: made.energy_balance,
     "energy_balance_stderr": lambda made: made.meta.get("energy_balance_stderr"),
     "relative_error": lambda made: made.meta["relative_error"],
-    "radius_of_50_percent_mm": lambda made: energy_radii_mm(made, [0.5])[0],
-    "radius_of_90_percent_mm": lambda made: energy_radii_mm(made, [0.9])[0],
-    "radius_of_99_percent_mm": lambda made: energy_radii_mm(made, [0.99])[0],
+    "radius_of_50_percent_mm": lambda made: made.energy_radii_mm([0.5])[0],
+    "radius_of_90_percent_mm": lambda made: made.energy_radii_mm([0.9])[0],
+    "radius_of_99_percent_mm": lambda made: made.energy_radii_mm([0.99])[0],
     "empty_annuli": lambda made: (
         None if made.photons is None else (made.annulus_energy == 0.0).sum(axis=0)
     ),
@@ -134,7 +133,7 @@ def test_the_figures_of_json_are_those_of_the_file(command):
     figures = {key: each for key, each in ran.figures.items() if key in known}
     assert ran.figures.keys() <= {*known, *OTHERS[verb], "command", "output"}
     for key, figure in figures.items():
-        wanted = plain(known[key](made))
+        wanted = plain_value(known[key](made))
         assert same(figure, wanted), f"{key}: {figure} is not {wanted}"
 
 
@@ -150,7 +149,7 @@ def same(found, wanted):
 
 
 def test_tables_in_files_are_those_of_json():
-    command = "compare wax.profile.npz --only kernels --size 24x16 --cost passes --table"
+    command = "compare wax.profile.npz --what kernels --size 24x16 --cost passes --table"
     ran = world.run(f"{command} t.md", both=True)
     text = ran.written["t.md"].decode()
     rows = [line for line in text.splitlines() if not line.startswith(("|---", "<!--"))]
@@ -235,10 +234,10 @@ def test_a_table_has_all_its_rows_and_they_differ():
 
 def test_what_went_wrong_in_a_walk_is_printed(capsys):
     """Energy lost in one channel of one material, walks cut off, a target that was not met."""
-    from sssfit.cli._simulate_report import figures_of
+    from sssfit.simulate import run_figures
 
     rows = [
-        figures_of(each, 0.25) | {"path": f"{each.material_name}.npz", "target_error": 0.2}
+        run_figures(each, 0.25) | {"path": f"{each.material_name}.npz", "target_error": 0.2}
         for each in (world.profile(), world.profile())
     ]
     rows[0]["relative_error"] = 0.125
@@ -260,9 +259,9 @@ def test_what_went_wrong_in_a_walk_is_printed(capsys):
 
 
 def test_of_several_computed_materials_the_worst_error_is_printed(capsys):
-    from sssfit.cli._simulate_report import figures_of
+    from sssfit.simulate import run_figures
 
-    rows = [figures_of(world.exact_profile(), 0.25) | {"path": f"{k}.npz"} for k in range(3)]
+    rows = [run_figures(world.exact_profile(), 0.25) | {"path": f"{k}.npz"} for k in range(3)]
     for row, error in zip(rows, (2e-5, 7e-5, 4e-5), strict=True):
         row |= {"material": f"wax {error}", "relative_error": error}
     figures, text = reported(rows, capsys)

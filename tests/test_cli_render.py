@@ -298,6 +298,9 @@ def test_two_channels_have_no_colour(run, made):
         (("--irradiance", "disk", "-o", "out.jpg"), 1, ".exr"),
         (("--irradiance", "disk", "--truth", "a.exr", "-o", "a.exr"), 2, "same file"),
         (("--irradiance", "disk", "--follow", "lerp"), 2, "--screen"),
+        (("--irradiance", "disk", "--gain", "4"), 2, "are for --difference"),
+        (("--irradiance", "disk", "--difference-map", "signed"), 2, "are for --difference"),
+        (("--irradiance", "disk", "--difference", "a.png", "--gain", "0"), 2, "--gain"),
         (("--irradiance", "disk", "--screen", "--truth", "a.exr"), 2, "--screen"),
         (("--irradiance", "disk", "--exposure", "0"), 2, "--exposure"),
         (("--irradiance", "disk", "--size", "90000x90000"), 1, "GB"),
@@ -492,7 +495,7 @@ def test_ears_glow_red_under_a_light_from_behind(run, coarse):
 
 def test_transmitted_light_in_screen_space(run, coarse):
     kernel = SeparableKernel.load(coarse)
-    options = ("--screen", "--transmit", "-o", "a.exr")
+    options = ("--screen", "--mm-per-pixel", "2", "--transmit", "-o", "a.exr")
     assert run("render", coarse, *HEAD, *options)[0] == 0
     scene = head_scene(height=90, width=90, mm_per_pixel=2.0, light_degrees=170.0, transmit=True)
     np.testing.assert_allclose(

@@ -16,7 +16,6 @@ from sssfit.cli import main
 from sssfit.fit import fit_gaussians, fit_svd
 from sssfit.material import Layer, Material, load_material
 from sssfit.profile import Profile
-from sssfit.profile.bins import energy_radii_mm
 from sssfit.simulate import Checkpoint, simulate_montecarlo, simulate_montecarlo_many
 
 
@@ -222,20 +221,20 @@ def test_chart_refuses_foreign_files_and_endings(folder):
 
 def test_radii_invert_the_cumulative_reflectance(profile):
     shares = np.array([0.1, 0.5, 0.9, 1.0])
-    radii_mm = energy_radii_mm(profile, shares)
+    radii_mm = profile.energy_radii_mm(shares)
     for channel in range(3):
         reached = profile.cumulative_at(radii_mm[:, channel])[:, channel]
         np.testing.assert_allclose(reached, shares * profile.total_on_grid[channel], rtol=1e-5)
 
 
 def test_radii_of_a_channel_without_energy_are_unknown(foreign):
-    radii_mm = energy_radii_mm(foreign, [0.5])
+    radii_mm = foreign.energy_radii_mm([0.5])
     np.testing.assert_allclose(radii_mm, [[1.0]], rtol=1e-6)
     dark = Profile(
         **{name: getattr(foreign, name) for name in foreign.__slots__}
         | {"annulus_energy": [[0.0], [0.0]]}
     )
-    assert np.isnan(energy_radii_mm(dark, [0.5])).all()
+    assert np.isnan(dark.energy_radii_mm([0.5])).all()
 
 
 # Files of every kind

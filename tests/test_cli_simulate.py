@@ -14,10 +14,10 @@ import pytest
 
 from sssfit.cli import main
 from sssfit.cli._interrupt import asked_to_stop
-from sssfit.cli._simulate_report import _energy, figures_of
+from sssfit.cli._simulate_report import _energy
 from sssfit.material import load_material
 from sssfit.profile import Profile
-from sssfit.simulate import simulate_montecarlo
+from sssfit.simulate import run_figures, simulate_montecarlo
 from sssfit.simulate._batches import BATCH_PHOTONS
 from sssfit.simulate._semi_infinite import SemiInfiniteWalk
 
@@ -115,7 +115,7 @@ def test_seconds_are_those_of_the_walk(run, monkeypatch):
 @pytest.mark.parametrize(("sigmas", "said"), [(4.0, "= 1 within"), (10.0, "= 1 NOT WITHIN")])
 def test_an_energy_balance_that_is_off_is_said(sigmas, said, sign):
     row, other = (
-        figures_of(simulate_montecarlo(load_material(name), photons=20_000), 1.0)
+        run_figures(simulate_montecarlo(load_material(name), photons=20_000), 1.0)
         for name in ("skin1", "apple")
     )
     assert "= 1 within the run's own error" in _energy([row])[1]
@@ -162,7 +162,7 @@ def test_material_from_stdin_and_from_a_path(run, tmp_path, monkeypatch):
 
 def test_all_materials_into_a_folder(run, tmp_path):
     (tmp_path / "out").mkdir()
-    status, out, _ = run("--all", "--photons", "2000", "-o", "out", "--json")
+    status, out, _ = run("--paper", "--photons", "2000", "-o", "out", "--json")
     assert status == 0
     figures = json.loads(out)
     assert len(figures["rows"]) == len(figures["output"]) == 11
@@ -200,6 +200,7 @@ def test_unfinished_walks_are_pointed_out(run, tmp_path):
     [
         ((), 2, "name one MATERIAL"),
         (("skin1", "--all"), 2, "name one MATERIAL"),
+        (("--paper", "--all"), 2, "name one MATERIAL"),
         (("--all", "-o", "-"), 2, "folder"),
         (("skin1", "--photons", "many"), 2, "'many' is not a whole number"),
         (("skin1", "--photons", "1"), 2, "'1' is not a whole number from 2"),

@@ -1,19 +1,18 @@
-"""A simulation's error against its price: against direct calls, the slope, the chart, the verb."""
+"""A simulation's error against its price: direct calls, the slope, the chart, the script."""
 
-import functools
 import io
 import itertools
-import json
 import math
 
 import numpy as np
 import pytest
 from figures import assert_legible, words_of
+from printed import check
+from printed_layouts import convergence
 
 from sssfit.chart.convergence import convergence_figure
 from sssfit.chart.page import save_figure
-from sssfit.cli import main
-from sssfit.compare.convergence import compute_convergence, error_of, fit_line
+from sssfit.compare.convergence import compute_convergence, error_of, fit_line, photon_numbers
 from sssfit.errors import SimulationError
 from sssfit.material import load_material
 from sssfit.simulate import simulate_exact, simulate_montecarlo
@@ -137,45 +136,60 @@ def test_the_chart_is_legible_and_gives_the_same_bytes(found):
 
 
 @pytest.fixture
-def run(tmp_path, monkeypatch, capfd):
-    """Run ``sssfit compare``; give exit status, stdout and stderr."""
+def script(tmp_path, monkeypatch, capsys):
+    """Run docs/make_convergence.py in an empty folder; give what it printed, or its last word."""
+    import make_convergence
+
     monkeypatch.chdir(tmp_path)
 
     def call(*arguments):
-        with pytest.raises(SystemExit) as caught:
-            main(["compare", *arguments])
-        out, err = capfd.readouterr()
-        return caught.value.code or 0, out, err
+        monkeypatch.setattr("sys.argv", ["make_convergence.py", *arguments])
+        make_convergence.main()
+        return capsys.readouterr().out
 
     return call
 
 
-def test_the_verb_prints_slope_and_runs(run, tmp_path, monkeypatch, skin1):
-    quick = functools.partial(compute_convergence, tolerances=(1e-4,))
-    monkeypatch.setattr("sssfit.compare.convergence.compute_convergence", quick)
-    status, out, _ = run("skin1", "--convergence", "c.svg", "--photons", "1e5", "--json")
-    assert status == 0
+def test_the_script_prints_slope_and_runs(script, tmp_path, monkeypatch, skin1):
+    made = []
+
+    def quick(*given, **settings):
+        made.append(compute_convergence(*given, tolerances=(1e-4,), **settings))
+        return made[-1]
+
+    monkeypatch.setattr("make_convergence.compute_convergence", quick)
+    out = script("skin1", "1e5", "c.svg")
     assert b"<svg" in (tmp_path / "c.svg").read_bytes()
-    figures = json.loads(out)
+    (found,) = made
+    check(out, convergence(found.to_dict()))
     expected = quick(skin1, photons=(10_000, 31_623, 100_000))
-    assert figures["slope"] == expected.line.slope
-    assert figures["slope_stderr"] == expected.line.slope_stderr
-    assert [row["error"] for row in figures["rows"]] == [each.error for each in expected.walks]
-    assert figures["exact"][-1]["error"] is None
+    assert found.line == expected.line
+    assert [each.error for each in found.walks] == [each.error for each in expected.walks]
+    assert found.to_dict()["exact"][-1]["error"] is None
 
 
 @pytest.mark.parametrize(
-    ("arguments", "status", "fragment"),
+    ("arguments", "fragment"),
     [
-        (("skin1", "--convergence", "c.jpg"), 1, ".png, .svg or .pdf"),
-        (("skin1", "--convergence", "c.png", "--photons", "1000"), 2, "too few for a slope"),
-        (("deon-skin", "--convergence", "c.png"), 1, "name a material"),
-        (("none", "--convergence", "c.png"), 1, "none"),
+        (("skin1", "1e5", "c.jpg"), ".png, .svg or .pdf"),
+        (("skin1", "1000", "c.png"), "too few for a slope"),
+        (("none", "1e5", "c.png"), "none"),
+        (("slab.toml", "1e5", "c.png"), "slab"),
     ],
 )
-def test_bad_input_is_one_clear_line(run, tmp_path, arguments, status, fragment):
-    code, out, err = run(*arguments)
-    assert code == status
-    assert out == ""
-    assert fragment in err.splitlines()[-1]
-    assert not list(tmp_path.iterdir())
+def test_bad_input_is_one_clear_line(script, tmp_path, arguments, fragment):
+    (tmp_path / "slab.toml").write_text(
+        "eta = 1.3\ng = 0\nsigma_a_per_mm = [0.1]\nsigma_s_per_mm = [9]\nthickness_mm = 2\n"
+        'channels = ["a"]\n'
+    )
+    with pytest.raises(SystemExit) as ended:
+        script(*arguments)
+    assert str(ended.value).count("\n") == 0
+    assert fragment in str(ended.value)
+    assert [path.name for path in tmp_path.iterdir()] == ["slab.toml"]
+
+
+def test_two_numbers_of_photons_a_decade():
+    assert photon_numbers(10**6) == (10_000, 31_623, 100_000, 316_228, 1_000_000)
+    with pytest.raises(SimulationError, match="too few for a slope"):
+        photon_numbers(99_999)

@@ -185,7 +185,7 @@ def test_names_that_would_not_come_back_are_not_written(names):
 
 def test_quantity_is_said_by_the_table_or_the_caller():
     table = "r_mm,R\n0.5,0.01\n1.5,0.005\n"
-    with pytest.raises(ProfileError, match="give --quantity density"):
+    with pytest.raises(ProfileError, match='give `quantity = "density"`'):
         parse_csv(table, "a.csv")
     by_comment = parse_csv("# quantity = density\n" + table, "a.csv")
     by_caller = parse_csv(table, "a.csv", quantity="density")
@@ -278,9 +278,9 @@ def test_more_light_than_arrives_names_the_units_that_make_it_right(head, radii_
     radii, densities = CENTRES_MM * radii_mm, DENSITY_PER_MM2 * per_mm2
     with pytest.raises(ProfileError) as error:
         parse_csv(table_of(radii, densities, head), "a.csv", quantity="density")
-    line = str(error.value)
+    line, unit = str(error.value), said["density_unit"]
     assert " of 1 that arrives; it would be 0.3002 with " in line
-    assert f"--density-unit {said['density_unit']}" in line
+    assert f'`density_unit = "{unit}"`' in line
     assert (f"name the column r_{said['unit']}" in line) == (head != f"r_{said['unit']}")
     named = table_of(radii, densities, f"r_{said['unit']}")
     right = parse_csv(named, "a.csv", quantity="density", density_unit=said["density_unit"])
@@ -291,7 +291,7 @@ def test_more_energy_than_arrives_is_no_matter_of_units():
     said = refusal("r_mm,R\n1,1\n2,0.5\n")
     assert "'R' adds up to 1.5 of 1 that arrives" in said
     assert "divide by 100 if they are per cent" in said
-    assert "--quantity density" in said
+    assert '`quantity = "density"`' in said
     assert "per cent" not in refusal("r_mm,R\n1,1000\n2,0.5\n")
 
 
@@ -306,6 +306,17 @@ def test_a_table_that_begins_far_out_says_what_the_gap_may_hide():
     assert f"another {np.pi * 0.1:.3g} is missing" in line
     # Centres of bins begin at half a bin: no gap.
     parse_csv("r_mm,R\n0.5,0.1\n1.5,0.05\n", "a.csv", quantity="density")
+
+
+@pytest.mark.parametrize(("unit", "mm"), [("um", 1e-3), ("mm", 1.0), ("cm", 10.0), ("m", 1e3)])
+def test_a_gap_is_said_in_the_unit_of_the_table(unit, mm):
+    lines = [f"{r / mm:g},{density * mm**2:g}" for r, density in ((2, 0.01), (2.2, 0.009), (3, 0))]
+    with pytest.warns(SssfitWarning) as caught:
+        profile = parse_csv("\n".join([f"r_{unit},R", *lines]), "a.csv", quantity="density")
+    (line,) = (str(each.message) for each in caught)
+    assert line.startswith(f"a.csv begins at r = {2 / mm:g} {unit}: ")
+    inside, whole = np.pi * 2**2 * 0.01, profile.diffuse_reflectance[0]
+    assert f"has {inside:.3g} of its {whole:.3g} inside" in line
 
 
 @pytest.mark.parametrize(

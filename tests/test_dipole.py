@@ -54,7 +54,7 @@ def test_grosjean_annuli_are_the_integral_of_the_density():
         assert profile.cumulative[k, 0] == pytest.approx(entering(eta) * expected, rel=1e-9)
 
 
-@pytest.mark.parametrize("name", material_names())
+@pytest.mark.parametrize("name", material_names(paper=True))
 def test_classical_total_is_its_closed_form(name):
     material = load_material(name)
     coefficients = material.layers[0]

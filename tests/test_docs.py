@@ -2,6 +2,7 @@
 
 import re
 import runpy
+import shlex
 import shutil
 import subprocess
 import sys
@@ -14,13 +15,20 @@ from sssfit.cli import cli
 from sssfit.material import parse_material
 
 ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
 README = (ROOT / "README.md").read_text(encoding="utf-8")
+LINES = 130  # of the README
 
 
-def code_blocks(language: str = "") -> list[str]:
-    """The README's fenced blocks of one language, in order."""
-    fences = re.findall(r"^```(\w*)\n(.*?)^```$", README, re.MULTILINE | re.DOTALL)
+def code_blocks(language: str = "", page: str = "") -> list[str]:
+    """The fenced blocks of one language of a page of docs/, in order; of the README by default."""
+    text = (DOCS / page).read_text(encoding="utf-8") if page else README
+    fences = re.findall(r"^```(\w*)\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
     return [body for found, body in fences if found == language]
+
+
+def test_readme_is_short():
+    assert len(README.splitlines()) <= LINES
 
 
 def test_readme_has_two_commands_of_one_line():
@@ -42,14 +50,15 @@ def test_readme_names_every_verb(verb):
     assert f"sssfit {verb}" in README
 
 
-def test_materials_in_the_readme_load():
-    (example,) = code_blocks("toml")
-    assert len(parse_material(example, "README.md").layers) == 2
+def test_materials_in_the_documents_load():
+    (example,) = code_blocks("toml", "own-materials.md")
+    assert len(parse_material(example, "own-materials.md").layers) == 2
 
 
-def commands_of(start: str) -> list[list[str]]:
-    """The README's commands that begin so, as words."""
-    return [block.split() for block in code_blocks() if block.startswith(start)]
+def commands_of(page: str, start: str = "sssfit ") -> list[list[str]]:
+    """A page's commands that begin so, one a line, as words."""
+    lines = "\n".join(code_blocks(page=page)).splitlines()
+    return [line.split() for line in lines if line.startswith(start)]
 
 
 def printed_by(arguments: list[str], folder: Path) -> str:
@@ -69,16 +78,17 @@ def table_of(text: str) -> list[list[str]]:
     return [line.split()[:3] for line in text.splitlines() if line.startswith(("R ", "G ", "B "))]
 
 
-def test_readme_python_does_what_its_command_line_does(tmp_path, monkeypatch, capsys):
-    (example,) = code_blocks("python")
-    command, _ = commands_of("sssfit simulate")
-    python_prints, command_prints, *_ = code_blocks("text")
+def test_python_example_does_what_its_command_line_does(tmp_path, monkeypatch, capsys):
+    (example,) = code_blocks("python", "simulate.md")
+    command, _ = commands_of("simulate.md", "sssfit simulate")
+    python_prints, command_prints, *_ = code_blocks("text", "simulate.md")
+    arrays = (DOCS / "files.md").read_text(encoding="utf-8")
     from_python, from_command_line = tmp_path / "python", tmp_path / "command-line"
     from_python.mkdir()
     from_command_line.mkdir()
 
     monkeypatch.chdir(from_python)
-    exec(compile(example, "README.md", "exec"), {})
+    exec(compile(example, "simulate.md", "exec"), {})
     assert capsys.readouterr().out == python_prints
     printed = printed_by(command[1:], from_command_line)
     assert table_of(printed) == table_of(command_prints)
@@ -91,26 +101,84 @@ def test_readme_python_does_what_its_command_line_does(tmp_path, monkeypatch, ca
         assert set(ours) == set(theirs)
         for name in ours:
             np.testing.assert_array_equal(ours[name], theirs[name], err_msg=name)
-            assert f"| `{name}` |" in README, f"{name} is not in the README's table"
+            assert f"| `{name}` |" in arrays, f"{name} is not in the table of files.md"
 
 
-@pytest.mark.parametrize(
-    ("verb", "place"), [("sssfit simulate skin1 --method exact", 2), ("sssfit materials --from", 3)]
-)
-def test_readme_commands_print_what_it_says(tmp_path, verb, place):
-    (command,) = commands_of(verb)
-    printed = printed_by(command[1:], tmp_path)
-    assert figures_of(printed) == figures_of(code_blocks("text")[place])
+def test_the_python_of_the_readme_runs(capsys):
+    (example,) = code_blocks("python")
+    exec(compile(example, "README.md", "exec"), {})
+    assert capsys.readouterr().out == "143 (2, 2, 3)\n"
 
 
-def test_readme_session_ends_in_shader_source(tmp_path):
-    (fit,) = commands_of("sssfit fit")
-    commands = (["simulate", "skin1", "--method", "exact"], fit[1:], ["export", "--format", "hlsl"])
-    printed = [printed_by(each, tmp_path) for each in commands]
-    assert figures_of(printed[1]) == figures_of(code_blocks("text")[4])
-    assert "SSS_WEIGHTS[3][427]" in (tmp_path / "skin1.exact.svd3.hlsl").read_text()
-    (render,) = commands_of("sssfit render")
-    assert figures_of(printed_by(render[1:], tmp_path)) == figures_of(code_blocks("text")[5])
+def test_the_overview_of_the_python_pages_runs(capsys):
+    (example,) = code_blocks("python", "api/index.md")
+    exec(compile(example, "api/index.md", "exec"), {})
+    assert [capsys.readouterr().out] == code_blocks("text", "api/index.md")
+
+
+def test_a_material_by_its_colour_is_printed_as_documented(tmp_path):
+    command, *_ = commands_of("own-materials.md", "sssfit materials --from")
+    (prints,) = code_blocks("text", "own-materials.md")
+    assert figures_of(printed_by(command[1:], tmp_path)) == figures_of(prints)
+
+
+def test_a_colour_in_hex_is_the_same_in_codes(tmp_path):
+    page = code_blocks("", "own-materials.md")
+    (block,) = (each for each in page if "#c58c6b" in each)
+    made = []
+    for line in block.splitlines():
+        printed_by(shlex.split(line)[1:], tmp_path)
+        made.append((tmp_path / "mine.toml").read_text())
+    assert len(made) == 2
+    assert made[0] == made[1]
+
+
+@pytest.fixture(scope="module")
+def session(tmp_path_factory) -> tuple[Path, dict[tuple[str, ...], str]]:
+    """The tutorial, done: its folder, and what each of its commands printed."""
+    folder = tmp_path_factory.mktemp("tutorial")
+    commands = commands_of("tutorial.md")
+    return folder, {tuple(each): printed_by(each[1:], folder) for each in commands}
+
+
+def test_the_tutorial_prints_what_it_says(session):
+    _, printed = session
+    assert len(printed) == 5
+    found = [figures_of(each) for each in printed.values()]
+    said = [figures_of(each) for each in code_blocks("text", "tutorial.md")]
+    assert found[: len(said)] == said  # the last command, export, prints the name of its file only
+
+
+@pytest.mark.parametrize("page", ["", "tutorial.md"])
+def test_the_session_ends_in_the_shader_source_that_is_shown(session, page):
+    folder, _ = session
+    (excerpt,) = code_blocks("hlsl", page)
+    written = (folder / "skin1.exact.svd3.hlsl").read_text(encoding="utf-8")
+    assert excerpt in written
+    assert len(excerpt.splitlines()) == 10
+    assert "SSS_WEIGHTS[3][143]" in excerpt
+    assert abs(len(written) - 26_000) < 500, "26 kB, says the README"
+
+
+def test_the_commands_of_the_readme_are_those_of_the_tutorial(session):
+    _, printed = session
+    commands = [tuple(line) for line in (each.split() for each in README.splitlines()) if line]
+    commands = [each for each in commands if each[0] == "sssfit" and each[1] in cli.commands]
+    four = [each for each in commands if each in printed]
+    assert [each[1] for each in four] == ["simulate", "fit", "export", "render"]
+
+
+def test_other_pages_print_what_the_tutorial_does(session):
+    _, printed = session
+    *_, exact = code_blocks("text", "simulate.md")
+    fit, render = code_blocks("text", "kernels.md")
+    for page, verb, said in (
+        ("simulate.md", ["simulate", "skin1", "--method"], exact),
+        ("kernels.md", ["fit"], fit),
+        ("kernels.md", ["render"], render),
+    ):
+        (command,) = commands_of(page, " ".join(["sssfit", *verb]))
+        assert figures_of(printed[tuple(command)]) == figures_of(said)
 
 
 def figures_of(text: str) -> str:
@@ -167,3 +235,29 @@ def test_no_file_names_a_package_host_or_a_path_of_some_machine():
         for pattern in (PACKAGE_HOST, MACHINE_PATH):
             found = pattern.search(text)
             assert found is None, f"{path.relative_to(ROOT)}: {found and found[0]}"
+
+
+DECISION = re.compile(r"^\*\*(\d{4}-\d\d-\d\d)\. (.+?\?)\*\* (.+)$")
+
+
+def decisions() -> list[str]:
+    """The entries of docs/decisions.md, each on one line."""
+    page = (ROOT / "docs" / "decisions.md").read_text(encoding="utf-8")
+    paragraphs = re.split(r"\n\n+", page.strip())
+    return [" ".join(each.split()) for each in paragraphs if not each.startswith("#")][1:]
+
+
+def test_decisions_are_dated_and_take_three_sentences_at_most():
+    for each in decisions():
+        match = DECISION.match(each)
+        assert match, f"expected **DATE. Question?** Answer: {each[:60]}"
+        answer = re.sub(r"\b(et al|eq|vs|e\.g|i\.e)\.", r"\1", match[3])
+        sentences = re.split(r"[.?!](?= [A-Z`\"|\d])", answer)
+        assert len(sentences) <= 3, f"{len(sentences)} sentences: {match[2]}"
+
+
+def test_decisions_name_files_that_are_there():
+    page = (ROOT / "docs" / "decisions.md").read_text(encoding="utf-8")
+    paths = re.findall(r"\b(?:sssfit|cli|docs|tests)/[\w/-]+(?:\.\w+)?", page)
+    assert len(paths) > 5
+    assert [path for path in paths if not (ROOT / path).exists()] == []

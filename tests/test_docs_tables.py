@@ -16,7 +16,6 @@ import pytest
 from checks_models import BEYOND, DIFFUSE, multipole_against_walk
 
 from sssfit.choose.choice import choose, mm_per_pixel_at
-from sssfit.cli._methods import METHODS as SIMULATIONS
 from sssfit.compare.editing import compute_editing
 from sssfit.compare.guide import compute_guide
 from sssfit.compare.sheet import compute_sheet
@@ -24,6 +23,7 @@ from sssfit.compare.spectrum import compute_spectrum
 from sssfit.errors import SssfitWarning
 from sssfit.fit import fit_gaussians, fit_preintegrated, fit_svd
 from sssfit.material import load_material, material_names
+from sssfit.methods import SIMULATIONS
 from sssfit.profile import full_kernel
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS
 from sssfit.simulate import (
@@ -35,7 +35,7 @@ from sssfit.simulate import (
 )
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 MADE = re.compile(r"<!-- made by (\S+)(?: (\w+))?, (\d{4}-\d\d-\d\d): (.+) -->")
 HELD = re.compile(r"<!-- held by (\S+)::(\w+) -->")
 
@@ -151,6 +151,37 @@ def test_a_section_goes_into_its_place(tmp_path, monkeypatch):
     )
 
 
+def rows_named(page, start):
+    """The cells of the rows of a page whose first cell begins so."""
+    return [
+        row
+        for place, _, rows in EVERY
+        if place.startswith(f"{page}:")
+        for row in rows
+        if row[0].startswith(start)
+    ]
+
+
+def test_readme_quotes_its_pages():
+    """The README's table has the figures of the pages it links, cell by cell."""
+    (total,) = rows_named("verification.md", "skin1 R: exact against the walk")
+    apart = [abs(float(row[3])) for row in table_with("verification.md", "comparison", "ours")]
+    (exact,) = rows_named("benchmarks-exact.md", "exact, tolerance 0.0001")
+    walk = table_with("benchmarks.md", "material", "one thread")[0]
+    (rank,) = rows_named("benchmarks-fit.md", "skin1")[:1]
+    passes = rows_named("benchmarks-render.md", "float32, one thread")[0]
+    expected = [
+        [total[1].partition(",")[0], total[2]],
+        [f"{max(apart):.2f}"],
+        [exact[2], exact[1]],
+        [walk[2]],
+        [rank[2]],
+        [passes[1]],
+    ]
+    rows = table_with("README.md", "What", "Figure")
+    assert [row[1].split(", ") for row in rows] == expected
+
+
 def test_names_are_in_the_program():
     code = "\n".join(
         path.read_text(encoding="utf-8")
@@ -217,7 +248,7 @@ def test_the_edge_at_45_degrees(skin1):
     cells = {}
     for first, left, second, right in table_with("fits.md", "material", "", "material"):
         cells |= {first: left, second: right}
-    assert set(cells) - {""} == set(material_names())
+    assert set(cells) - {""} == set(material_names(paper=True))
     for name in ("skin1", "marble"):
         profile = exact(name)
         kernel = fit_preintegrated(profile, energy="keep", mm_per_pixel=0.1).kernel
@@ -279,7 +310,7 @@ def test_the_multipole_beside_the_walk():
 
 def test_models_of_the_eleven_materials():
     rows = table_with("theory.md", "channel", "albedo", "exact total")
-    names = [f"{name} {c}" for name in material_names() for c in "RGB"]
+    names = [f"{name} {c}" for name in material_names(paper=True) for c in "RGB"]
     assert [row[0] for row in rows] == names
     for name in ("skin1", "ketchup"):
         material, true = load_material(name), exact(name)
@@ -289,7 +320,7 @@ def test_models_of_the_eleven_materials():
             simulate_burley(material, reflectance=totals, mapping=mapping)
             for mapping in ("perpendicular", "diffuse", "diffuse-mfp")
         ]
-        for c, row in enumerate(rows[3 * material_names().index(name) :][:3]):
+        for c, row in enumerate(rows[3 * material_names(paper=True).index(name) :][:3]):
             assert_cell(row[1], material.layers[0].albedo[c])
             assert_cell(row[2], totals[c])
             for cell, model in zip(row[3:5], dipoles, strict=True):

@@ -15,6 +15,7 @@ from scipy import special
 from sssfit.errors import SimulationError, SssfitWarning, StoppedError
 from sssfit.grid import make_grid
 from sssfit.material import Layer, Material, load_material
+from sssfit.optics import normal_transmittance
 from sssfit.profile import Profile
 from sssfit.simulate import exact
 from sssfit.simulate._depth import _Equation, decay_rate, respond, respond_to_diffuse_light
@@ -23,11 +24,10 @@ from sssfit.simulate._mixture import (
     single_scattering_beyond,
     single_scattering_of_diffuse_light,
 )
-from sssfit.simulate._surface import entering
 from sssfit.simulate.exact import (
     _LEVELS,
-    _Answer,
     _errors,
+    _Solution,
     _stderr,
     diffuse_reflectance,
     entering_light,
@@ -98,7 +98,7 @@ def test_light_along_the_normal_and_view_along_it_change_places():
     eta, albedo = 1.3, 0.9
     equation = _Equation.of(0.0, eta, _LEVELS[2].depth)
     depths, weights = equation.panels.nodes.ravel(), equation.panels.weights.ravel()
-    seen = replace(equation, escape=entering(eta) * np.exp(-depths) / (4.0 * eta**2))
+    seen = replace(equation, escape=normal_transmittance(eta) * np.exp(-depths) / (4.0 * eta**2))
     first = 4.0 * eta**2 * equation.escape
     multiple = seen.solve(first, np.array([albedo])).multiple[0]
     once = albedo * np.sum(weights * first * seen.escape)
@@ -225,8 +225,8 @@ def test_error_is_kept_as_standard_error():
 
 
 def test_standard_errors_cover_annuli_and_sums():
-    fine = _Answer(np.array([1.0, 0.7, 0.4, 0.1]), 0.0, 0.0)
-    coarse = _Answer(np.array([1.0, 0.6, 0.4, 0.2]), 0.0, 0.0)
+    fine = _Solution(np.array([1.0, 0.7, 0.4, 0.1]), 0.0, 0.0)
+    coarse = _Solution(np.array([1.0, 0.6, 0.4, 0.2]), 0.0, 0.0)
     errors = _errors(fine, coarse)
     np.testing.assert_allclose(errors, [0.1, 0.0, 0.1, 0.0], atol=1e-15)
     stderr = _stderr(fine, coarse, errors)
@@ -236,7 +236,7 @@ def test_standard_errors_cover_annuli_and_sums():
 
 
 def test_the_error_is_never_below_the_energy_that_is_missing():
-    answer = _Answer(np.array([1.0, 0.7, 0.4, 0.1]), 0.0, 0.05)
+    answer = _Solution(np.array([1.0, 0.7, 0.4, 0.1]), 0.0, 0.05)
     np.testing.assert_array_equal(_errors(answer, answer), 0.05)
 
 
@@ -244,7 +244,9 @@ def test_energy_that_is_missing_counts_as_error(monkeypatch):
     material = checks.medium(0.3, 0.7, 1.3)
     total = simulate_exact(material).diffuse_reflectance[0]
     # Three thousandths of the light are said to have come in that neither leave nor are absorbed.
-    monkeypatch.setattr(exact, "entering", lambda eta: entering(eta) + 0.003)
+    monkeypatch.setattr(
+        exact, "normal_transmittance", lambda eta: normal_transmittance(eta) + 0.003
+    )
     profile = simulate_exact(material, tolerance=0.1)
     assert profile.meta["relative_error"] == pytest.approx(0.003 / total, rel=1e-3)
     np.testing.assert_allclose(profile.meta["energy_balance_stderr"], 0.003, rtol=1e-3)

@@ -20,14 +20,17 @@ SCHEMA = json.loads((Path(sssfit.__file__).parent / "kernel.schema.json").read_t
 
 
 def small_kernel(channels=3, terms=2, pixels=5, **changes):
-    """Weights that are no round numbers, signs of both kinds, other figures for every channel."""
+    """Weights that are no round numbers, signs of both kinds, other figures for every channel.
+
+    The channels' names are in no order of letters.
+    """
     rng = np.random.default_rng(5)
     half = rng.random((terms, pixels // 2 + 1, channels)) / 7.0
     each = np.arange(channels)
     fields = {
         "method": "svd",
         "mm_per_pixel": 0.1372549,
-        "channels": tuple(f"c{k}" for k in range(channels)),
+        "channels": tuple(f"c{channels - k}" for k in range(channels)),
         "signs": np.where((np.arange(terms)[:, None] + each) % 2, -1.0, 1.0),
         "weights": np.concatenate((half[:, :0:-1], half), axis=1),
         "relative_frobenius_error": 0.0251 + 0.0113 * each,
@@ -54,6 +57,14 @@ def numbers_of(text, name):
         float(each)
         for each in re.findall(r"-?\d[\d.]*(?:e[+-]?\d+)?", re.sub(r"float\d", "", body))
     ]
+
+
+def is_shortest(literal):
+    """Whether no decimal of fewer digits has the same bits in single precision."""
+    digits = literal.partition("e")[0].strip("-").replace(".", "").strip("0")
+    value = np.float32(literal)
+    shorter = f"{value:.{max(len(digits) - 2, 0)}e}"
+    return len(digits) < 2 or np.float32(shorter) != value
 
 
 def comment_of(text):
@@ -91,6 +102,14 @@ def test_hlsl_holds_every_constant_in_single_precision(channels):
     assert f"static const {kind} SSS_WEIGHTS[2][{shape[1]}]{each} = {{" in text
     assert text.count("{") == text.count("}")
     assert text.count("static const") == 6
+
+
+def test_hlsl_has_the_fewest_digits_that_read_back():
+    text = hlsl(small_kernel(weights=small_kernel().weights * [1e-9, 1.0, 1e6]))
+    literals = re.findall(r"(?<!float)-?\b\d[\d.]*(?:e[+-]?\d+)?", text.split("static const", 1)[1])
+    assert len(literals) > 2 * 5 * 3
+    assert [each for each in literals if not is_shortest(each)] == []
+    assert not is_shortest("0.1372549057")
 
 
 @pytest.mark.parametrize("channels", [1, 3, 5])
@@ -170,6 +189,7 @@ def test_json_document_is_the_kernel_and_a_comment_and_obeys_the_schema():
     jsonschema.validate(whole, SCHEMA)
     again = SeparableKernel.read(io.BytesIO(text.encode()))
     np.testing.assert_array_equal(again.scale, kernel.scale)
+    assert next(iter(whole)) == "comment"
     assert whole.pop("comment")[0].startswith("Subsurface scattering kernel: wax")
     assert whole == kernel.to_dict()
     # By the record's own fields too, so that no name stands for another's numbers.
@@ -203,5 +223,5 @@ def test_the_same_kernel_gives_the_same_text():
 
 def test_a_fitted_kernel_is_exported():
     profile = make_profile(np.linspace(0.0, 2.0, 21), np.full((20, 2), 0.01))
-    text = hlsl(fit_preintegrated(profile).kernel)
+    text = hlsl(fit_preintegrated(profile, mm_per_pixel="profile").kernel)
     assert "float2 SSS_WEIGHTS[1]" in text

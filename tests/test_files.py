@@ -96,7 +96,7 @@ def test_outputs_are_checked_before_the_work(tmp_path, monkeypatch):
     files.check_output(tmp_path / "theirs.npz", own)
     files.check_output(tmp_path / "theirs.npz", foreign, force=True)
     for path, fragment in (
-        (tmp_path / "theirs.npz", "--force"),
+        (tmp_path / "theirs.npz", "`force = True`"),
         (tmp_path / "missing" / "a.npz", "there is no folder"),
         (tmp_path, "is a folder"),
     ):
@@ -142,8 +142,8 @@ ASKED = ("--from-reflectance", ".4,.3,.2", "--mean-free-path", "1", "--eta", "1.
         (("export", "t.kernel.json", "--format", "json", "-o", "x.hlsl"), ".json"),
         (("chart", "t.profile.npz", "-o", "x.json"), ".png"),
         (("render", "t.kernel.json", "-o", "x.json"), ".exr"),
-        (("compare", "skin1", "--only", "kernels", "--table", "x.npz"), ".md"),
-        (("compare", "skin1", "--only", "kernels", "--chart", "x.csv"), ".png"),
+        (("compare", "skin1", "--what", "kernels", "--table", "x.npz"), ".md"),
+        (("compare", "skin1", "--what", "kernels", "--chart", "x.csv"), ".png"),
     ],
 )
 def test_no_verb_writes_a_format_that_the_name_denies(

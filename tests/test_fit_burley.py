@@ -49,7 +49,7 @@ def test_a_known_shape_comes_back(s, total, reach, annuli, power):
 
 def test_a_simulated_model_comes_back_in_every_channel():
     profile = simulate_burley(load_material("skin1"), reflectance=[0.44, 0.22, 0.13])
-    fitted = fit_burley(profile)
+    fitted = fit_burley(profile, mm_per_pixel="profile")
     truth = profile.meta["settings"]["s_per_mm"]
     np.testing.assert_allclose(fitted_shapes(fitted), truth, rtol=1e-8)
     np.testing.assert_allclose(fitted_shapes(fit_burley(profile, mm_per_pixel=0.5)), truth)
@@ -114,7 +114,7 @@ def test_energy_outside_the_support_is_restored():
         assert result.kernel.meta["settings"] == {"energy": "rescale", "normalize": False}
         assert kept.kernel.meta["settings"] == {"energy": "keep", "normalize": False}
     with pytest.raises(FitError, match="energy = 'lose'; expected 'rescale' or 'keep'"):
-        fit_burley(profile, energy="lose")
+        fit_burley(profile, energy="lose", mm_per_pixel="profile")
 
 
 def test_one_pass_has_no_smaller_error_than_the_best_of_rank_one():

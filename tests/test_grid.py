@@ -95,9 +95,8 @@ def test_what_a_refusal_proposes_would_do(dr_mm, radius_mm):
     with pytest.raises(SimulationError) as caught:
         make_grid(SKIN1, dr_mm=dr_mm, radius_mm=radius_mm)
     message = str(caught.value)
-    proposed_dr, proposed_radius = map(
-        float, re.search(r"--dr (\S+) or more, or --radius (\S+) or less", message).groups()
-    )
+    proposed = re.search(r"`dr_mm = (\S+)` or more, or `radius_mm = (\S+)` or less", message)
+    proposed_dr, proposed_radius = map(float, proposed.groups())
     assert make_grid(SKIN1, dr_mm=proposed_dr, radius_mm=radius_mm).annuli > 0.98 * MOST_ANNULI
     assert make_grid(SKIN1, dr_mm=dr_mm, radius_mm=proposed_radius).annuli > 0.98 * MOST_ANNULI
 

@@ -189,13 +189,18 @@ ODD = {
     "noise": lambda: compute_guide(
         make_profile(
             np.arange(41) * 0.1, np.random.default_rng(2).exponential(size=(40, 1)) / 150.0
-        )
+        ),
+        mm_per_pixel="profile",
     ),
-    "one k": lambda: compute_guide(one_over_r_profile(40, 0.1, [0.4]), ks=[2]),
-    "four": lambda: compute_guide(one_over_r_profile(40, 0.1, [0.4]), ks=[0, 1, 2, 4]),
+    "one k": lambda: compute_guide(
+        one_over_r_profile(40, 0.1, [0.4]), ks=[2], mm_per_pixel="profile"
+    ),
+    "four": lambda: compute_guide(
+        one_over_r_profile(40, 0.1, [0.4]), ks=[0, 1, 2, 4], mm_per_pixel="profile"
+    ),
     "one pixel": lambda: compute_guide(one_over_r_profile(10, 0.1, [0.4]), mm_per_pixel=9),
-    "small": lambda: compute_guide(one_over_r_profile(40, 1e-4, [4e-4])),
-    "long names": lambda: compute_guide(long_names()),
+    "small": lambda: compute_guide(one_over_r_profile(40, 1e-4, [4e-4]), mm_per_pixel="profile"),
+    "long names": lambda: compute_guide(long_names(), mm_per_pixel="profile"),
 }
 
 
@@ -239,9 +244,9 @@ def test_bad_settings_are_one_line(settings, words):
     names = {"channels": ["c0", "c1"]}
     meta = dict(one_over_r_profile(10, 0.1, [0.4]).meta) | names
     profile = make_profile(np.arange(11) * 0.1, np.outer(np.full(10, 0.05), [0.0, 1.0]), meta=meta)
-    assert compute_guide(profile).channel == 1
+    assert compute_guide(profile, mm_per_pixel="profile").channel == 1
     with pytest.raises(FitError, match=words):
-        compute_guide(profile, **settings)
+        compute_guide(profile, mm_per_pixel="profile", **settings)
 
 
 @pytest.fixture

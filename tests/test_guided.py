@@ -276,11 +276,14 @@ def test_a_channel_without_light_and_one_in_a_single_annulus():
 def test_too_many_pixels_name_a_pitch_that_would_do(skin1):
     with pytest.raises(FitError, match=r"up to 513 pixels.*1275 pixels") as refusal:
         fit_guided(skin1, mm_per_pixel=float(skin1.r_edges_mm[1]))
-    pitch = float(str(refusal.value).partition("mm_per_pixel = ")[2].split()[0])
+    pitch = float(str(refusal.value).partition("`mm_per_pixel = ")[2].partition("`")[0])
     pixels = 2 * int(support_of(skin1) / pitch) + 1
     assert 500 < pixels <= 513
     with pytest.warns(SssfitWarning, match=rf"pixels of {pitch:.3g} mm are used"):
-        assert guided_target(skin1, None, None).mm_per_pixel == pitch
+        assert guided_target(skin1, "profile", None).mm_per_pixel == pitch
+    with pytest.warns(SssfitWarning, match="and the support is 801 pixels of 0.3 mm"):
+        wide = guided_target(skin1, None, 120.0)
+    assert 500 < 2 * wide.half_pixels + 1 <= 513
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ import pytest
 from reference_head import blocked, first_meeting, height_at
 
 from sssfit.errors import RenderError
-from sssfit.scene._field import HeightField, Lamps, light_field
+from sssfit.scene._field import HeightField, Lighting, light_field
 from sssfit.scene._head_shape import FLOOR_MM
 from sssfit.scene._head_surface import EYE_X, EYE_Y, _roughness, bust, face
 from sssfit.scene.head import FACE_HEIGHT_MM, head_scene, whole_face_mm_per_pixel
@@ -37,7 +37,7 @@ def plane_point(i, j):
 def head():
     """The smooth head on nodes 1 mm apart, lit by the key light alone."""
     field = bust(1.0, 0.0, 2)
-    return field, light_field(field, Lamps(KEY), floor_mm=FLOOR_MM, smooth=False, **SEEN)
+    return field, light_field(field, Lighting(KEY), floor_mm=FLOOR_MM, smooth=False, **SEEN)
 
 
 def test_depth_is_where_a_fine_march_goes_under(head):
@@ -76,7 +76,7 @@ def test_a_point_is_dark_where_a_fine_march_is_blocked(head):
 def test_a_tilted_plane_has_the_cosine_everywhere():
     field = surface(lambda x, y: 0.3 * x - 0.2 * y)
     seen = light_field(
-        field, Lamps(KEY), shape=(40, 40), mm_per_pixel=1.0, distance_mm=DISTANCE, floor_mm=-90.0
+        field, Lighting(KEY), shape=(40, 40), mm_per_pixel=1.0, distance_mm=DISTANCE, floor_mm=-90.0
     )
     normal = np.array((-0.3, 0.2, 1.0)) / np.sqrt(1.13)
     np.testing.assert_allclose(seen.irradiance, normal @ KEY, rtol=1e-10)
@@ -95,7 +95,7 @@ def test_a_sphere_nears_its_cosine_with_the_square_of_the_spacing():
         )
         seen = light_field(
             field,
-            Lamps((0.0, 0.0, 1.0)),
+            Lighting((0.0, 0.0, 1.0)),
             shape=(30, 30),
             mm_per_pixel=1.0,
             distance_mm=DISTANCE,
@@ -115,7 +115,7 @@ def test_the_shadow_of_a_step_has_its_length_to_a_fraction_of_a_pixel():
     field = surface(lambda x, y: np.where(x < -0.01, 10.0, 0.0) + 0.0 * y, 0.05, 20.0)
     light = (-np.sqrt(0.5), 0.0, np.sqrt(0.5))
     seen = light_field(
-        field, Lamps(light), shape=(4, 44), mm_per_pixel=0.7, distance_mm=1e5, floor_mm=-1.0
+        field, Lighting(light), shape=(4, 44), mm_per_pixel=0.7, distance_mm=1e5, floor_mm=-1.0
     )
     ground = seen.irradiance[:, 22:] / np.sqrt(0.5)
     # The wall's face is one cell wide, x = -0.05 to 0; 21 samples a pixel at the edge.
@@ -127,7 +127,7 @@ def test_a_slanted_shadow_has_many_shades_not_steps():
     field = surface(lambda x, y: np.where(x < 0.3 * y, 5.0, 0.0), 0.1, 20.0)
     light = (-np.sqrt(0.5), 0.0, np.sqrt(0.5))
     seen = light_field(
-        field, Lamps(light), shape=(20, 44), mm_per_pixel=0.5, distance_mm=1e5, floor_mm=-1.0
+        field, Lighting(light), shape=(20, 44), mm_per_pixel=0.5, distance_mm=1e5, floor_mm=-1.0
     )
     ground = seen.irradiance[:, 28:] / np.sqrt(0.5)
     # Of 21 samples, five of them on a coarser pattern that alone would make four shades.
@@ -140,8 +140,8 @@ def test_shadows_come_from_outside_the_fine_field_too():
     wall = surface(lambda x, y: np.where(np.abs(x + 40.0) < 5.0, 100.0, 0.0) + 0.0 * y, 1.0)
     light = (-np.sqrt(0.5), 0.0, np.sqrt(0.5))
     view = {"shape": (8, 8), "mm_per_pixel": 1.0, "distance_mm": DISTANCE, "floor_mm": -1.0}
-    assert (light_field(flat, Lamps(light), **view).irradiance > 0.7).all()
-    assert not light_field(flat, Lamps(light), coarse=wall, **view).irradiance.any()
+    assert (light_field(flat, Lighting(light), **view).irradiance > 0.7).all()
+    assert not light_field(flat, Lighting(light), coarse=wall, **view).irradiance.any()
 
 
 def test_buffers_agree_about_the_background():
@@ -160,8 +160,8 @@ def test_a_pixel_has_the_light_of_its_normal(head):
     # the mean of four nodes' central differences is the central difference of bilinear heights.
     field, key_only = head
     fill, strengths, exponent, face_on = (0.6, 0.0, 0.8), (1.0, 0.06, 0.05), 20.0, 0.028
-    lamps = Lamps(KEY, fill, strengths, exponent, face_on)
-    seen = light_field(field, lamps, floor_mm=FLOOR_MM, smooth=False, **SEEN)
+    lighting = Lighting(KEY, fill, strengths, exponent, face_on)
+    seen = light_field(field, lighting, floor_mm=FLOOR_MM, smooth=False, **SEEN)
     chosen = np.random.default_rng(4).choice(np.argwhere(seen.labels > 0), 300, replace=False)
     dark = 0
     for i, j in chosen:
@@ -196,16 +196,16 @@ def test_light_of_planes():
     view = {"shape": (3, 3), "mm_per_pixel": 0.01, "distance_mm": 1e5, "floor_mm": -90.0}
     # Lamp and eye on the axis: .028 (20 + 8) / 8.
     flat = surface(lambda x, y: 0.0 * (x + y))
-    seen = light_field(flat, Lamps((0.0, 0.0, 1.0), exponent=20.0, face_on=0.028), **view)
+    seen = light_field(flat, Lighting((0.0, 0.0, 1.0), exponent=20.0, face_on=0.028), **view)
     np.testing.assert_allclose(seen.specular, 0.0980, rtol=1e-9)
     np.testing.assert_allclose(seen.irradiance, 1.0, rtol=1e-12)
     # Ambient light alone: half of 1 + .2 / sqrt(1.13).
     tilted = surface(lambda x, y: 0.3 * x - 0.2 * y)
-    seen = light_field(tilted, Lamps(KEY, strengths=(0.0, 0.0, 1.0)), **view)
+    seen = light_field(tilted, Lighting(KEY, strengths=(0.0, 0.0, 1.0)), **view)
     np.testing.assert_allclose(seen.irradiance, 0.594072, atol=5e-7)
     # Fill light alone, from below the plane's horizon and from above it.
     for fill, cosine in (((0.6, 0.0, 0.8), 0.62 / np.sqrt(1.13)), ((0.8, -0.6, 0.0), 0.0)):
-        seen = light_field(tilted, Lamps(KEY, fill, (0.0, 1.0, 0.0)), **view)
+        seen = light_field(tilted, Lighting(KEY, fill, (0.0, 1.0, 0.0)), **view)
         np.testing.assert_allclose(seen.irradiance, cosine, rtol=1e-9, atol=1e-15)
 
 

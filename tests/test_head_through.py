@@ -6,10 +6,10 @@ from reference_head import first_run, height_at
 from test_head import SEEN, plane_point
 
 from sssfit.errors import RenderError
-from sssfit.scene._field import HeightField, Lamps, Solid, light_field, light_through
+from sssfit.scene._field import HeightField, Lighting, Solid, light_field, light_through
 from sssfit.scene._head_shape import EAR_MM, FLOOR_MM
 from sssfit.scene._head_surface import SOLID_MM, body
-from sssfit.scene.head import _toward, head_scene
+from sssfit.scene.head import _direction, head_scene
 
 DISTANCE = SEEN["distance_mm"]
 STEP_MM, GAP_MM = 0.02, 0.5
@@ -59,9 +59,11 @@ def raw(solid):
 @pytest.mark.parametrize("light_degrees", [170.0, 110.0, 45.0])
 def test_lengths_are_those_of_a_fine_march(head, light_degrees):
     solid, front = head
-    light = _toward(light_degrees, 20.0)
+    light = _direction(light_degrees, 20.0)
     thickness, cosines = light_through(front, solid, light, floor_mm=FLOOR_MM, **SEEN)
-    seen = light_field(front, Lamps(light), floor_mm=FLOOR_MM, smooth=False, behind=solid, **SEEN)
+    seen = light_field(
+        front, Lighting(light), floor_mm=FLOOR_MM, smooth=False, behind=solid, **SEEN
+    )
     points = points_of(np.where(seen.labels > 0, seen.depth_mm, 0.0))
     thin = (thickness > 0.0) & (thickness < 40.0)
     draws = np.random.default_rng(3)
@@ -91,9 +93,9 @@ def test_a_ball_has_its_chords_and_its_cosines():
     dome = lambda x, y: np.sqrt(np.maximum(radius**2 - x * x - y * y, 0.0))  # noqa: E731
     solid, front = solid_of(dome, lambda x, y: -dome(x, y), spacing=0.25, reach=45.0)
     view = {"shape": (40, 40), "mm_per_pixel": 1.5, "distance_mm": DISTANCE, "floor_mm": 1.0}
-    light = np.array(_toward(115.0, 10.0))
+    light = np.array(_direction(115.0, 10.0))
     thickness, cosines = light_through(front, solid, tuple(light), **view)
-    seen = light_field(front, Lamps((0.0, 0.0, 1.0)), smooth=False, **view)
+    seen = light_field(front, Lighting((0.0, 0.0, 1.0)), smooth=False, **view)
     x = 1.5 * (np.arange(40)[None, :] - 19.5)
     y = 1.5 * (19.5 - np.arange(40)[:, None])
     share = np.where(seen.labels > 0, seen.depth_mm, 0.0) / DISTANCE
@@ -115,7 +117,7 @@ def test_a_ball_has_its_chords_and_its_cosines():
 def test_a_slab_is_its_thickness_over_the_cosine(degrees):
     solid, front = solid_of(lambda x, y: 0.2 * x + 0 * y, lambda x, y: 0.2 * x + 0 * y - 3.0)
     view = {"shape": (8, 8), "mm_per_pixel": 1.0, "distance_mm": DISTANCE, "floor_mm": -50.0}
-    light = np.array(_toward(degrees, 0.0))
+    light = np.array(_direction(degrees, 0.0))
     normal = np.array((-0.2, 0.0, 1.0)) / np.sqrt(1.04)
     thickness, cosines = light_through(front, solid, tuple(light), **view)
     np.testing.assert_allclose(thickness, 3.0 / np.sqrt(1.04) / -(normal @ light), rtol=1e-9)
@@ -192,11 +194,13 @@ def test_a_light_behind_leaves_the_face_to_the_others_and_lights_the_rim():
 
 def test_shadows_of_a_light_behind_are_those_of_a_fine_march(head):
     solid, front = head
-    light = _toward(120.0, 20.0)
-    seen = light_field(front, Lamps(light), floor_mm=FLOOR_MM, smooth=False, behind=solid, **SEEN)
+    light = _direction(120.0, 20.0)
+    seen = light_field(
+        front, Lighting(light), floor_mm=FLOOR_MM, smooth=False, behind=solid, **SEEN
+    )
     facing = light_field(
         front,
-        Lamps(light, light, (0.0, 1.0, 0.0)),
+        Lighting(light, light, (0.0, 1.0, 0.0)),
         floor_mm=FLOOR_MM,
         smooth=False,
         behind=solid,

@@ -9,13 +9,14 @@ import matplotlib.image
 import numpy as np
 import OpenEXR
 import pytest
-from checks_image import chunk, exr, hdr, load_bytes, picture, png, read_png, tiff
+from checks_image import chunk, exr, hdr, jpeg, load_bytes, picture, png, read_png, tga, tiff
 
 from sssfit.errors import FileError, RenderError, SssfitError
 from sssfit.formats import pictures as image
 
 ENDINGS = ("exr", "tif", "png")
 HALF_A_CODE = 0.5 / 65535
+PITCH = 0.2977213249234697  # mm, of 1080 rows 0.6 m away; with every digit, as kernels have it
 
 
 def literal_decode(code):
@@ -69,6 +70,63 @@ def test_8_bit_png_is_decoded_by_the_formula(tmp_path):
     assert found.notes == ("8-bit sRGB decoded to linear",)
 
 
+CODES = np.random.default_rng(5).integers(0, 256, (6, 5, 4)).astype(np.uint8)
+
+
+def decoded(codes):
+    return [literal_decode(code / 255) for code in np.ravel(codes)]
+
+
+@pytest.mark.parametrize("count", [1, 3, 4])
+@pytest.mark.parametrize("layout", [{}, {"bottom_up": True}, {"packed": True}, {"new": True}])
+def test_tga_is_decoded_by_the_formula(tmp_path, count, layout):
+    name = "a.dat" if "new" in layout else "a.TGA"  # the old form is known by its ending only
+    found = load_bytes(tmp_path, tga(CODES[..., :count], **layout), name)
+    np.testing.assert_allclose(
+        found.pixels.ravel(), decoded(CODES[..., : min(count, 3)]), rtol=1e-12
+    )
+    assert found.channels == (("Y",) if count == 1 else ("R", "G", "B"))
+    assert "8-bit sRGB decoded to linear" in found.notes
+    if count == 4:
+        np.testing.assert_array_equal(found.alpha, CODES[..., 3] / 255)
+        assert not found.alpha_is_multiplied
+    else:
+        assert found.alpha is None
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_jpeg_is_decoded_by_the_formula(tmp_path, count):
+    # Blocks of 8 pixels of one colour: what the format loses is the rounding of its own colours.
+    codes = CODES[:2, :3, :count].repeat(8, axis=0).repeat(8, axis=1)
+    jpeg(tmp_path / "a.jpg", codes)
+    found = image.load_image(tmp_path / "a.jpg")
+    assert found.pixels.shape == (16, 24, count)
+    off = 255 * image.srgb_encode(found.pixels) - codes
+    assert np.abs(off).max() <= 2.0
+    assert found.channels == (("Y",) if count == 1 else ("R", "G", "B"))
+    assert found.alpha is None
+    assert found.notes == ("8-bit sRGB decoded to linear",)
+
+
+def test_jpeg_is_turned_upright(tmp_path):
+    codes = CODES[:2, :3, :3].repeat(8, axis=0).repeat(8, axis=1)
+    jpeg(tmp_path / "a.jpeg", codes, Orientation=6)
+    found = image.load_image(tmp_path / "a.jpeg")
+    off = 255 * image.srgb_encode(found.pixels) - np.rot90(codes, -1)
+    assert np.abs(off).max() <= 2.0
+    assert "turned upright from orientation 6" in found.notes
+
+
+def test_a_jpeg_that_is_cut_short_or_damaged_is_not_guessed_at(tmp_path):
+    jpeg(tmp_path / "a.jpg", CODES[..., :3].repeat(8, axis=0).repeat(8, axis=1), quality=90)
+    data = (tmp_path / "a.jpg").read_bytes()
+    for part in (len(data) - 2, len(data) - 60, len(data) // 2):
+        with pytest.raises(FileError, match="damaged or cut short") as caught:
+            load_bytes(tmp_path, data[:part], "b.jpg")
+        assert "\n" not in str(caught.value)
+    assert load_bytes(tmp_path, data + b"more", "c.jpg").pixels.shape == (48, 40, 3)
+
+
 def test_png_by_hand(tmp_path):
     image.save_image(tmp_path / "a.png", picture(), exposure=0.5)
     codes = read_png((tmp_path / "a.png").read_bytes())
@@ -117,9 +175,9 @@ def test_exr_is_read_alike_by_openexr(tmp_path):
 def test_channels_by_other_names_and_the_scale_stay_in_an_exr(tmp_path):
     wanted = picture(channels=4)
     names = ("450nm", "650nm", "550nm", "x")
-    image.save_image(tmp_path / "a.exr", wanted, channels=names, mm_per_pixel=0.1)
+    image.save_image(tmp_path / "a.exr", wanted, channels=names, mm_per_pixel=PITCH)
     found = image.load_image(tmp_path / "a.exr")
-    assert found.mm_per_pixel == 0.1
+    assert found.mm_per_pixel == PITCH
     assert sorted(found.channels) == sorted(names)
     for place, name in enumerate(found.channels):
         assert np.array_equal(found.pixels[..., place], wanted[..., names.index(name)])
@@ -228,7 +286,8 @@ def test_pictures_are_turned_upright(tmp_path, orientation):
     data = tiff(np.array(rows, dtype=np.float32), tags={274: orientation})
     found = load_bytes(tmp_path, data, "a.tif")
     assert found.pixels[..., 0].tolist() == [[1.0, 2.0], [3.0, 4.0]]
-    assert len(found.notes) == (orientation > 1)
+    words = f"turned upright from orientation {orientation}"
+    assert found.notes == ((words,) if orientation > 1 else ())
 
 
 def test_the_first_part_with_colour_is_read(tmp_path):
@@ -247,10 +306,11 @@ def test_the_first_part_with_colour_is_read(tmp_path):
 def test_a_window_of_data_is_put_into_its_picture(tmp_path):
     window = {"x": 2, "y": -1, "full_width": 6, "full_height": 8, "full_x": 0, "full_y": 0}
     exr(tmp_path / "a.exr", picture(), "RGB", **window)
-    found = image.load_image(tmp_path / "a.exr").pixels
+    found = image.load_image(tmp_path / "a.exr")
     wanted = np.zeros((8, 6, 3))
     wanted[:4, 2:] = picture()[1:, :4]
-    assert np.array_equal(found, wanted)
+    assert np.array_equal(found.pixels, wanted)
+    assert found.notes == ("7 x 5 pixels of data put into the 6 x 8 of the picture",)
 
 
 def test_other_channels_are_left_out_or_refused(tmp_path):
@@ -301,10 +361,15 @@ def test_too_large_pictures_are_refused_by_their_header(tmp_path):
         image.load_image(tmp_path / "a.exr", largest_bytes=32 * 105 - 1)
 
 
-@pytest.mark.parametrize("ending", [*ENDINGS, "hdr"])
+@pytest.mark.parametrize("ending", [*ENDINGS, "hdr", "jpg", "tga"])
 def test_damage_is_one_line(tmp_path, ending, capfd):
     if ending == "hdr":
         data = hdr(np.full((5, 7, 4), 130), size=b"-Y 5 +X 7")
+    elif ending == "tga":
+        data = tga(CODES)
+    elif ending == "jpg":
+        jpeg(tmp_path / "a.jpg", CODES[..., :3].repeat(4, axis=0))
+        data = (tmp_path / "a.jpg").read_bytes()
     else:
         image.save_image(tmp_path / f"a.{ending}", picture())
         data = (tmp_path / f"a.{ending}").read_bytes()
@@ -322,7 +387,10 @@ def test_damage_is_one_line(tmp_path, ending, capfd):
 
 
 def test_what_is_no_picture(tmp_path):
-    for data, words in ((b"", "is empty"), (b"GIF89a", "is not an EXR, HDR, TIFF or PNG file")):
+    for data, words in (
+        (b"", "is empty"),
+        (b"GIF89a", "is not an EXR, HDR, TIFF, PNG, JPG or TGA file"),
+    ):
         with pytest.raises(FileError, match=rf"a\.exr {words}; name a picture"):
             load_bytes(tmp_path, data, "a.exr")
     with pytest.raises(FileError, match="is a folder or a device"):

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import OpenEXR
+import OpenImageIO
 import pytest
 from checks_image import chunk, exr, hdr, load_bytes, picture, png, read_png, tiff
 
@@ -273,6 +274,42 @@ def test_other_transfer_curves_are_said(tmp_path):
     assert found.notes[0].endswith("taken for sRGB")
 
 
+def test_a_gamma_that_is_not_heeded_is_said(tmp_path):
+    gamma = struct.pack(">I", round(100_000 / 1.8))
+    found = load_bytes(tmp_path, png([b"abc"], width=1, extra=[(b"gAMA", gamma)]))
+    assert found.notes == ("gamma 1.8 of the file taken for sRGB", "8-bit sRGB decoded to linear")
+
+
+def icc_profile(name):
+    """A colour profile of that name (ICC.1:2001-04) without any curves."""
+    text = name.encode() + b"\0"
+    body = b"desc" + bytes(4) + struct.pack(">I", len(text)) + text + bytes(78)
+    body += bytes(-len(body) % 4)
+    kinds = b"mntr", b"RGB ", b"XYZ "
+    head = struct.pack(">I4sI4s4s4s", 144 + len(body), bytes(4), 0x02400000, *kinds)
+    head += bytes(12) + b"acsp" + bytes(28) + struct.pack(">3i", 63190, 65536, 54061)  # D50
+    return head.ljust(128, b"\0") + struct.pack(">I4sII", 1, b"desc", 144, len(body)) + body
+
+
+@pytest.mark.parametrize(
+    ("name", "notes"),
+    [
+        ("Display P3", ("colour profile Display P3 not applied",)),
+        ("sRGB IEC61966-2.1", ()),  # which is what the numbers are taken for
+    ],
+)
+def test_a_colour_profile_that_is_not_applied_is_said(tmp_path, name, notes):
+    data = np.frombuffer(icc_profile(name), dtype=np.uint8)
+    spec = OpenImageIO.ImageSpec(1, 1, 3, "uint8")
+    spec.attribute("ICCProfile", OpenImageIO.TypeDesc(f"uint8[{len(data)}]"), data)
+    writer = OpenImageIO.ImageOutput.create(str(tmp_path / "a.tif"))
+    assert writer.open(str(tmp_path / "a.tif"), spec)
+    assert writer.write_image(np.zeros((1, 1, 3), dtype=np.uint8))
+    writer.close()
+    found = image.load_image(tmp_path / "a.tif")
+    assert found.notes == (*notes, "8-bit sRGB decoded to linear")
+
+
 COVERAGE = np.array([[0.0, 0.25, 0.5, 1.0]])
 
 
@@ -451,9 +488,9 @@ def test_what_else_cannot_be_written(options, words):
 @pytest.mark.parametrize(
     ("path", "words"),
     [
-        (None, "None is no path"),
-        (5, "5 is no path"),
-        (b"a.png", "is no path"),
+        (None, "None is not a path"),
+        (5, "5 is not a path"),
+        (b"a.png", "is not a path"),
         ("a\0b.png", "holds a null character"),
         (5000 * "x" + ".png", r"^x{200}\.\.\.x{196}\.png cannot be .*name too long"),
         ("a\n\x1b[31mb.png", r"a\\n\\x1b\[31mb\.png cannot be read: no such file"),

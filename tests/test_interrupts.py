@@ -238,7 +238,7 @@ print("imported in threads:", *late)
 )
 def test_nothing_is_imported_after_threads_have_started(tmp_path, arguments):
     profile = make_profile(np.arange(21) * 0.1, np.full((20, 3), 0.01))
-    fit_svd(profile, rank=1).kernel.save(tmp_path / "wax.kernel.json")
+    fit_svd(profile, rank=1, mm_per_pixel="profile").kernel.save(tmp_path / "wax.kernel.json")
     process = start(IMPORTED_IN_THREADS, tmp_path, *arguments, "-q")
     out, err = process.communicate(timeout=300)
     assert (process.returncode, err) == (0, "")

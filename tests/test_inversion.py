@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from sssfit.cli import main
+from sssfit.cli._options import Lengths
 from sssfit.errors import MaterialError
 from sssfit.material import load_material, parse_material
 from sssfit.simulate import simulate_exact
@@ -300,6 +301,65 @@ def test_percents_units_and_one_mean_free_path_for_all(run, tmp_path):
     )
 
 
+def literal_decode(code):
+    """IEC 61966-2-1, one value at a time."""
+    value = code / 255.0
+    return value / 12.92 if value <= 0.04045 else ((value + 0.055) / 1.055) ** 2.4
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [("#c58c6b",), ("#C58C6B", "--light", "diffuse"), ("197,140,107", "--srgb")],
+)
+def test_a_base_colour_in_srgb(run, tmp_path, asked):
+    arguments = ("--from-reflectance", *asked, "--mean-free-path", ".37,.14,.07cm")
+    status, out, _ = run(*arguments, "-o", "mine.toml", "--json")
+    assert status == 0
+    colour = [literal_decode(code) for code in (197, 140, 107)]
+    figures = json.loads(out)
+    np.testing.assert_allclose(figures["reflectance_asked"], colour, rtol=1e-12)
+    assert (figures["light"], figures["eta"]) == ("diffuse", 1.4)
+    material = load_material(tmp_path / "mine.toml")
+    layer = material.layers[0]
+    np.testing.assert_allclose(layer.mean_free_path_mm, [3.7, 1.4, 0.7], rtol=1e-9)
+    assert layer.eta == 1.4
+    # what a renderer shows of it in a white furnace, by the walk's own figure: tested above
+    back = diffuse_reflectance(layer.albedo, 1.4, light="diffuse") / entering_light(1.4, "diffuse")
+    np.testing.assert_allclose(back, colour, atol=2e-6)
+    assert material.source.lower().startswith("srgb #c58c6b, base colour under diffuse light 0.558")
+
+
+def test_a_grey_in_srgb_codes(run, tmp_path):
+    asked = ("--from-reflectance", "128", "--srgb", "--channels", "grey", "--mean-free-path", "1")
+    assert run(*asked, "--light", "normal", "-o", "mine.toml")[0] == 0
+    albedo = load_material(tmp_path / "mine.toml").layers[0].albedo
+    assert diffuse_reflectance(albedo, 1.4)[0] == pytest.approx(literal_decode(128), abs=1e-6)
+
+
+def test_a_base_colour_in_python():
+    material = material_from_reflectance("#fff", 300.0, name="white")
+    assert material.layers[0].albedo.tolist() == [1.0, 1.0, 1.0]
+    assert material.channels == ("R", "G", "B")
+    for wrong in ("c58c6b", "#c58c6bff", "#12", "#ggg", ""):
+        with pytest.raises(MaterialError, match="is not an sRGB colour in hex, such as #c58c6b"):
+            material_from_reflectance(wrong, 1.0, name="wrong")
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("1.3", [1.3]),
+        ("1.3,.95", [1.3, 0.95]),
+        ("130um, 95um", [0.13, 0.095]),
+        ("0.13,0.095,0.067cm", [1.3, 0.95, 0.67]),
+        ("1e3,2e3 um", [1.0, 2.0]),
+        ("1mm,2cm,3m", [1.0, 20.0, 3000.0]),
+    ],
+)
+def test_lengths_share_the_unit_of_the_last(text, expected):
+    np.testing.assert_allclose(Lengths().convert(text, None, None), expected, rtol=1e-12)
+
+
 def test_up_to_64_channels(run, tmp_path):
     shares = ",".join(f"{0.01 * k}" for k in range(64))
     channels = ",".join(f"{400 + 5 * k}nm" for k in range(64))
@@ -343,8 +403,12 @@ def test_only_files_of_its_own_are_replaced(run, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "status", "fragment"),
     [
-        (ASKED, 2, "needs --mean-free-path and --eta"),
-        ((*ASKED[:2], "--eta", "1.3"), 2, "needs --mean-free-path and --eta"),
+        (ASKED[:2], 2, "needs --mean-free-path"),
+        (("--srgb",), 2, "--srgb is for --from-reflectance"),
+        ((*ASKED, "--srgb"), 2, "whole numbers from 0 to 255, and not 0.44"),
+        (("--from-reflectance", "197,140,256", "--srgb", *ASKED[2:]), 2, "and not 256"),
+        (("--from-reflectance", "#c58c6", *ASKED[2:]), 2, "'#c58c6' is not an sRGB colour in hex"),
+        ((*ASKED[:2], "--mean-free-path", "1cm,2,3cm"), 2, "has a unit for some lengths only"),
         (("--eta", "1.3"), 2, "--eta is for --from-reflectance"),
         (("--light", "diffuse"), 2, "--light is for --from-reflectance"),
         ((*ASKED, "--eta", "1.3", "--light", "moon"), 2, "'moon' is not one of"),

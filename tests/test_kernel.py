@@ -279,7 +279,7 @@ def damaged():
         return json.dumps(whole | changes).encode()
 
     term = whole["terms"][0]
-    foreign = ": not a kernel; name a .kernel.json file, as `sssfit fit` writes it."
+    foreign = ": not a kernel; name a .kernel.json file, as sssfit writes it."
     yield "empty", b"", foreign
     yield (
         "cut",

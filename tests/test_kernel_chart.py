@@ -138,7 +138,7 @@ def test_without_a_profile_the_errors_are_the_recorded_ones(kernel):
 
 def test_channels_are_chosen_by_name_or_spread():
     profile = one_over_r_profile(60, 0.1, np.linspace(0.4, 1.0, 9))
-    kernel = fit_svd(profile, rank=1).kernel
+    kernel = fit_svd(profile, rank=1, mm_per_pixel="profile").kernel
     assert view_kernel(kernel, profile).channels == (0, 4, 8)
     assert view_kernel(kernel, profile, channels=["c3"]).channels == (3,)
     with pytest.raises(KernelError, match="there is no channel X; expected one of c0, c1"):
@@ -150,7 +150,7 @@ def test_channels_are_chosen_by_name_or_spread():
 def test_a_channel_without_light_has_no_errors():
     energy = np.outer(np.full(20, 0.02), [1.0, 0.0])
     profile = make_profile(np.arange(21) * 0.1, energy)
-    kernel = fit_svd(profile, rank=1).kernel
+    kernel = fit_svd(profile, rank=1, mm_per_pixel="profile").kernel
     view = view_kernel(kernel, profile)
     assert view.misplaced[1] == view.relative_frobenius_error[1] == view.energy_error[1] == 0.0
     assert_legible(lambda: kernel_figure(view))
@@ -271,10 +271,14 @@ def odd_views():
     )
     return {
         "three": lambda: view_kernel(fit_svd(three, mm_per_pixel=0.2).kernel, three),
-        "grey": lambda: view_kernel(fit_svd(grey, rank=2).kernel, grey),
+        "grey": lambda: view_kernel(fit_svd(grey, rank=2, mm_per_pixel="profile").kernel, grey),
         "no profile": lambda: view_kernel(fit_svd(three, mm_per_pixel=0.2).kernel),
-        "one pass": lambda: view_kernel(fit_preintegrated(three).kernel, three),
-        "ten terms": lambda: view_kernel(fit_svd(three, rank=10).kernel, three),
+        "one pass": lambda: view_kernel(
+            fit_preintegrated(three, mm_per_pixel="profile").kernel, three
+        ),
+        "ten terms": lambda: view_kernel(
+            fit_svd(three, rank=10, mm_per_pixel="profile").kernel, three
+        ),
         "six Gaussians": lambda: view_kernel(
             fit_gaussians(three, terms=6, mm_per_pixel=0.2).kernel, three
         ),
@@ -283,7 +287,7 @@ def odd_views():
             fit_preintegrated(three, mm_per_pixel=40.0, support_mm=9.0).kernel, three
         ),
         "small": lambda: view_kernel(
-            fit_svd(one_over_r_profile(80, 1e-4, [6e-4]), rank=1).kernel,
+            fit_svd(one_over_r_profile(80, 1e-4, [6e-4]), rank=1, mm_per_pixel="profile").kernel,
         ),
     }
 

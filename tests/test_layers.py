@@ -19,7 +19,7 @@ from sssfit.errors import SssfitWarning
 from sssfit.formats.mci import load_mci
 from sssfit.grid import RadialGrid, paper_grid
 from sssfit.simulate import shared_walks, simulate_montecarlo
-from sssfit.simulate._layered import LayeredWalk, alike_channels
+from sssfit.simulate._layered import LayeredWalk, channels_with_equal_scattering
 from sssfit.simulate._run import run
 
 DATA = Path(__file__).parent / "data"
@@ -339,7 +339,7 @@ def test_turned_over_a_stack_transmits_the_same_of_diffuse_light(photons):
 
 def test_channels_that_differ_in_absorption_only_share_a_walk():
     material = stack(layer([0.1, 0.3, 0.2], [2.0, 2.0, 3.0], 0.5, 1.3, 1.0))
-    assert [each.tolist() for each in alike_channels(material)] == [[0, 1], [2]]
+    assert [each.tolist() for each in channels_with_equal_scattering(material)] == [[0, 1], [2]]
 
 
 @sizes

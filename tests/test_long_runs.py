@@ -118,7 +118,7 @@ def test_a_run_may_be_resumed_with_other_ends(tmp_path):
     assert same_bits(skin1(photons=200_000, checkpoint=path), skin1(photons=200_000))
     assert same_bits(skin1(photons=done, checkpoint=path), skin1(photons=done))
     assert same_bits(skin1(target_error=0.004, checkpoint=path), skin1(target_error=0.004))
-    with pytest.raises(SimulationError, match=rf"more than the 20,000 asked .*--photons {done}"):
+    with pytest.raises(SimulationError, match=rf"more than the 20,000 asked .*`photons = {done}`"):
         skin1(photons=20_000, checkpoint=path)
     with pytest.raises(SimulationError, match="more than a target error of 2 % takes"):
         skin1(target_error=0.02, checkpoint=path)
@@ -395,19 +395,21 @@ def test_a_full_disk_costs_the_checkpoint_and_not_the_run(tmp_path, monkeypatch)
     assert names(tmp_path) == ["c"]
 
 
-def test_starting_anew_is_said_and_the_old_work_kept_until_there_is_new(tmp_path):
+def test_a_new_start_is_said_and_the_old_work_kept_until_there_is_new(tmp_path):
     path = tmp_path / "c"
     leave_checkpoint(path, batches=8)
     before = path.read_bytes()
     short, long = Checkpoint(path, resume=False), Checkpoint(path, 0.0, resume=False)
-    with pytest.warns(SssfitWarning, match=r"starting anew beside .*c, which an earlier run left"):
+    with pytest.warns(
+        SssfitWarning, match=r"starting a new run beside .*c, which an earlier run left"
+    ):
         skin1(photons=50_000, checkpoint=short)
     assert not short.is_ours()
     short.remove()
-    with pytest.warns(SssfitWarning, match="starting anew"):
+    with pytest.warns(SssfitWarning, match="starting a new run"):
         skin1(photons=10**6, checkpoint=short, threads=1, stop=stopping_after(2))
     assert path.read_bytes() == before
-    with pytest.warns(SssfitWarning, match="starting anew"):
+    with pytest.warns(SssfitWarning, match="starting a new run"):
         skin1(photons=50_000, checkpoint=long)
     assert path.read_bytes() != before
     long.remove()
@@ -537,7 +539,8 @@ def test_a_checkpoint_cut_in_half_is_one_line(run, tmp_path):
     status, out, err = run("skin1", "--resume")
     assert (status, out) == (1, "")
     assert err == (
-        f"Error: {CHECKPOINT} is a damaged checkpoint; delete it, or start anew without --resume.\n"
+        f"Error: {CHECKPOINT} is a damaged checkpoint; delete it, or start a new run without "
+        "--resume.\n"
     )
 
 
@@ -546,7 +549,7 @@ def test_a_short_run_does_not_touch_the_checkpoint_of_a_long_one(run, tmp_path):
     before = (tmp_path / CHECKPOINT).read_bytes()
     status, _, err = run("skin1", "--photons", "2e4")
     assert status == 0
-    assert err.count(f"Warning: starting anew beside {CHECKPOINT}") == 1
+    assert err.count(f"Warning: starting a new run beside {CHECKPOINT}") == 1
     assert (tmp_path / CHECKPOINT).read_bytes() == before
     assert run("skin1", "--photons", "2e4", "-o", "-")[0] == 0
 
@@ -732,7 +735,7 @@ def test_killed_a_hundred_times_and_resumed(tmp_path, undisturbed):
 
 @posix
 def test_all_materials_killed_and_resumed(tmp_path):
-    arguments = ("--all", "--photons", "5e4", "--checkpoint-every", "0", "-q")
+    arguments = ("--paper", "--photons", "5e4", "--checkpoint-every", "0", "-q")
     folders = [tmp_path / each for each in ("whole", "killed")]
     for folder in folders:
         folder.mkdir()
@@ -749,11 +752,11 @@ def test_all_materials_killed_and_resumed(tmp_path):
 
 
 def test_a_walk_done_before_is_not_walked_again(run, tmp_path, monkeypatch):
-    # as after a kill between the two walks of --all: marble, of another index, is missing
-    run("--all", "--photons", "2000", "-q")
+    # as after a kill between the two walks of --paper: marble, of another index, is missing
+    run("--paper", "--photons", "2000", "-q")
     whole = (tmp_path / "marble.profile.npz").read_bytes()
     (tmp_path / "marble.profile.npz").unlink()
-    status, out, err = run("--all", "--photons", "2000", "--resume")
+    status, out, err = run("--paper", "--photons", "2000", "--resume")
     assert status == 0
     assert "Wrote marble.profile.npz\nFinished before, nothing to do: apple" in out
     assert "There is no marble.profile.npz.checkpoint to go on from: starting." in err

@@ -39,9 +39,8 @@ WRITES = {
         *(f"compare wax.profile.npz --chart {{}}.{each}" for each in ("png", "svg", "pdf")),
         *(f"compare wax.profile.npz --table {{}}.{each}" for each in ("md", "csv", "json")),
         "compare wax.toml --budget-chart {}.png",
-        "compare wax.profile.npz --sheet {}.png",
-        "compare --editing {}.svg",
-        "compare wax.toml --convergence {}.pdf",
+        "compare wax.profile.npz --what sheet --chart {}.png",
+        "compare wax.profile.npz --what front --chart {}.svg",
     ),
     "choose": ("choose wax.toml --irradiance disk -o {}.json",),
     "import": ("import wax.csv -o {}.npz",),
@@ -188,7 +187,7 @@ def test_an_input_is_no_output_by_any_name(run, folder, number):
     before = contents(folder)
     status, _, err = run(f"render wax.kernel.json --irradiance in.exr -o {names[number]}")
     assert status == 1
-    assert "is read as an input as well; choose another name with -o, or replace it with" in err
+    assert "is read as an input as well; choose another name, or replace it with --force" in err
     assert contents(folder) == before
     assert run(f"render wax.kernel.json --irradiance in.exr -o {names[number]}", "--force")[0] == 0
     assert contents(folder)["in.exr" if number != 4 else "hard.exr"] != before["in.exr"]
@@ -234,7 +233,6 @@ def test_two_outputs_into_one_file_are_refused(run, folder):
         "render wax.kernel.json --irradiance disk -o a.exr --truth ./a.exr",
         "render wax.kernel.json --irradiance disk --truth a.png --difference sub/../a.png",
         "compare wax.profile.npz --chart a.png --budget-chart a.png",
-        "compare wax.toml --sheet a.png --convergence a.png",
     ):
         (folder / "sub").mkdir(exist_ok=True)
         before = contents(folder)
@@ -245,7 +243,7 @@ def test_two_outputs_into_one_file_are_refused(run, folder):
 
 
 def test_a_budgets_chart_is_checked_before_the_kernels_are_compared(run, folder, monkeypatch):
-    monkeypatch.setattr("sssfit.cli.compare.compare_one", pytest.fail)
+    monkeypatch.setattr("sssfit.compare.compare_kernels", pytest.fail)
     (folder / "b.png").write_text("mine")
     assert run("compare wax.profile.npz --picture disk --budget-chart b.png")[0] == 1
 
@@ -299,7 +297,7 @@ def test_a_pipe_is_refused(run, folder):
     os.mkfifo("a.npz")
     status, _, err = run("simulate wax.toml --photons 2000 -o a.npz", "--force")
     assert status == 1
-    assert "a.npz is not an ordinary file; name one with -o, or - for stdout." in err
+    assert "a.npz is not an ordinary file; name another." in err
 
 
 @posix
@@ -309,7 +307,7 @@ def test_a_write_protected_file_needs_force(folder, monkeypatch):
     real = os.access  # root may write anywhere
     monkeypatch.setattr(os, "access", lambda of, mode: real(of, mode) and of != path)
     with pytest.raises(
-        FileError, match=r"is write-protected; choose .* or replace it with --force"
+        FileError, match=r"is write-protected; choose .* or replace it with `force = True`"
     ):
         files.check_output(path, is_profile_file)
     files.check_output(path, is_profile_file, force=True)

@@ -107,7 +107,7 @@ def off_at_45_degrees(profile, pitch, channel):
 def test_figures_of_the_45_degree_edge_in_the_docs():
     off = [
         off_at_45_degrees(simulate_exact(load_material(name)), 0.1, c)
-        for name in material_names()
+        for name in material_names(paper=True)
         for c in range(3)
     ]
     assert round(min(off), 3) == 0.051
@@ -153,21 +153,23 @@ def test_energy_beyond_the_grid_is_restored():
 
 def test_another_word_for_the_energy_is_refused():
     with pytest.raises(FitError, match="energy = 'lose'; expected 'rescale' or 'keep'"):
-        fit_preintegrated(one_over_r_profile(40, 0.1, [0.5]), energy="lose")
+        fit_preintegrated(one_over_r_profile(40, 0.1, [0.5]), energy="lose", mm_per_pixel="profile")
 
 
 def test_energy_kept_is_that_of_the_strips_within_the_support():
     profile = one_over_r_profile(40, 0.1, [0.5, 0.9])
     whole, _ = covering(profile, 0.1)
     np.testing.assert_allclose(whole.energy, profile.total_on_grid, rtol=1e-12)
-    part = fit_preintegrated(profile, energy="keep", support_mm=1.0)
+    part = fit_preintegrated(profile, energy="keep", support_mm=1.0, mm_per_pixel="profile")
     line = profile.line_kernel(0.1, 10)
     np.testing.assert_allclose(part.kernel.energy, line.sum(axis=0), rtol=1e-12)
     np.testing.assert_allclose(part.kernel.line, line, rtol=1e-12)
     np.testing.assert_allclose(
         part.energy_error, line.sum(axis=0) / profile.diffuse_reflectance - 1.0, rtol=1e-12
     )
-    normal = fit_preintegrated(profile, energy="keep", support_mm=1.0, normalize=True).kernel
+    normal = fit_preintegrated(
+        profile, energy="keep", support_mm=1.0, normalize=True, mm_per_pixel="profile"
+    ).kernel
     np.testing.assert_allclose(normal.energy, 1.0, rtol=1e-12)
     np.testing.assert_allclose(normal.scale, part.kernel.energy, rtol=1e-12)
 

@@ -201,7 +201,7 @@ def test_the_picture_and_the_kernel_have_to_match():
         return Scene("wall", np.ones((4, 4, channels)), pitch)
 
     render_separable(scene(pitch=0.5 * (1 + 9e-7)), kernel)
-    with pytest.raises(RenderError, match=r"kernel has 0\.5 mm .* wall 0\.25; fit .* 0\.25\."):
+    with pytest.raises(RenderError, match=r"kernel has 0\.5 mm .* wall 0\.25; fit .* 0\.25`\."):
         render_separable(scene(pitch=0.25), kernel)
     with pytest.raises(RenderError, match=r"kernel has 0\.5 mm .* wall 0\.500001;"):
         render_separable(scene(pitch=0.500001), kernel)

@@ -240,6 +240,9 @@ def test_a_channel_without_light_does_not_stop_the_sheet():
     assert np.isfinite(found.rows[3].panels[0].score.delta_e_2000_mean)
 
 
+SHEET = ("skin1", "--what", "sheet", "--chart")
+
+
 @pytest.fixture
 def run(tmp_path, monkeypatch, capfd):
     """Run ``sssfit compare``; give exit status, stdout and stderr."""
@@ -257,7 +260,7 @@ def run(tmp_path, monkeypatch, capfd):
 def test_the_verb_draws_a_sheet_and_tabulates_it(run, tmp_path, monkeypatch, skin1):
     small = functools.partial(compute_sheet, pixels=12, most_terms=1)
     monkeypatch.setattr("sssfit.compare.sheet.compute_sheet", small)
-    status, out, _ = run("skin1", "--sheet", "a.png", "--mm-per-pixel", "3", "--json")
+    status, out, _ = run(*SHEET, "a.png", "--mm-per-pixel", "3", "--json")
     assert status == 0
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")
     figures = json.loads(out)
@@ -268,21 +271,33 @@ def test_the_verb_draws_a_sheet_and_tabulates_it(run, tmp_path, monkeypatch, ski
         assert row["delta_e_2000_mean"] == [x.score.delta_e_2000_mean for x in own.panels]
 
 
-def test_the_verb_draws_edits(run, tmp_path):
-    status, out, _ = run("--editing", "e.pdf")
-    assert status == 0
-    assert (tmp_path / "e.pdf").read_bytes().startswith(b"%PDF")
-    for label in EDITS:
-        assert any(line.startswith(label) for line in out.splitlines())
+def test_the_script_draws_edits_and_tabulates_them(tmp_path, monkeypatch, editing):
+    import make_sheets
+    import sections
+
+    page = tmp_path / "how-to-choose.md"
+    page.write_text("# Page\n")
+    for module in (make_sheets, sections):
+        monkeypatch.setattr(module, "DOCS", tmp_path)
+    monkeypatch.setattr(make_sheets, "compute_editing", lambda: editing)
+    make_sheets.editing()
+    assert (tmp_path / "editing.png").read_bytes().startswith(b"\x89PNG")
+    rows = [line.strip("| ").split(" | ") for line in page.read_text().splitlines() if "|" in line]
+    told = editing.to_dict()
+    keys = ("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99")
+    wanted = [[row["label"], *(f"{row[key]:.2f}" for key in keys)] for row in told["rows"][1:]]
+    assert rows[2:] == wanted
+    assert [row[0] for row in wanted] == [label for label in EDITS if label != "original"]
+    own = ", ".join(f"{told[f'original_{key}']:.2f}" for key in keys[:2])
+    assert f"mean and 95th percentile: {own}." in page.read_text()
 
 
 @pytest.mark.parametrize(
     ("arguments", "status", "fragment"),
     [
-        (("skin1", "--sheet", "a.jpg"), 1, ".png, .svg or .pdf"),
-        (("--editing", "a.jpg"), 1, ".png, .svg or .pdf"),
-        (("skin1", "--sheet", "a.png", "--mm-per-pixel", "0"), 2, "not a length above 0"),
-        (("nothing", "--sheet", "a.png"), 1, "nothing"),
+        ((*SHEET, "a.jpg"), 1, ".png, .svg or .pdf"),
+        ((*SHEET, "a.png", "--mm-per-pixel", "0"), 2, "not a length above 0"),
+        (("nothing", *SHEET[1:], "a.png"), 1, "nothing"),
     ],
 )
 def test_bad_input_is_one_clear_line(run, tmp_path, arguments, status, fragment):

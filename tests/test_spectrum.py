@@ -39,7 +39,7 @@ def noisy_profile(channels):
 
 def test_shares_are_those_of_numpys_singular_values():
     profile = noisy_profile(2)
-    found = compute_spectrum(profile, support_mm=4.0)
+    found = compute_spectrum(profile, support_mm=4.0, mm_per_pixel="profile")
     for c in range(2):
         singular = np.linalg.svd(
             full_kernel(profile.quadrant_kernel(0.1, 40, channel=c)), compute_uv=False
@@ -109,7 +109,7 @@ def test_what_is_drawn_is_what_was_computed(spectrum):
 
 
 def test_negative_eigenvalues_are_hollow():
-    found = compute_spectrum(noisy_profile(1), support_mm=4.0)
+    found = compute_spectrum(noisy_profile(1), support_mm=4.0, mm_per_pixel="profile")
     _, hollow = spectrum_figure(found).axes[1].lines
     drawn = np.isfinite(np.asarray(hollow.get_ydata(), dtype=float))
     np.testing.assert_array_equal(drawn, found.values[:12, 0] < 0.0)
@@ -118,19 +118,23 @@ def test_negative_eigenvalues_are_hollow():
 
 def odd_spectra():
     return {
-        "noise": lambda: compute_spectrum(noisy_profile(3)),
-        "one channel": lambda: compute_spectrum(one_over_r_profile(40, 0.1, [0.4])),
-        "64 channels": lambda: compute_spectrum(noisy_profile(64)),
+        "noise": lambda: compute_spectrum(noisy_profile(3), mm_per_pixel="profile"),
+        "one channel": lambda: compute_spectrum(
+            one_over_r_profile(40, 0.1, [0.4]), mm_per_pixel="profile"
+        ),
+        "64 channels": lambda: compute_spectrum(noisy_profile(64), mm_per_pixel="profile"),
         "one pixel": lambda: compute_spectrum(one_over_r_profile(10, 0.1, [0.4]), mm_per_pixel=9),
         "a dark channel": lambda: compute_spectrum(
-            make_profile(np.arange(11) * 0.1, np.outer(np.full(10, 0.05), [1.0, 0.0]))
+            make_profile(np.arange(11) * 0.1, np.outer(np.full(10, 0.05), [1.0, 0.0])),
+            mm_per_pixel="profile",
         ),
         "long names": lambda: compute_spectrum(
             make_profile(
                 np.arange(11) * 0.1,
                 np.full((10, 3), 0.05),
                 meta=dict(noisy_profile(1).meta) | {"channels": ["W" * 60, "m" * 60, "@" * 60]},
-            )
+            ),
+            mm_per_pixel="profile",
         ),
     }
 
@@ -201,7 +205,7 @@ def test_the_verb_gives_json(run, spectrum):
         (("--spectrum", "--mm-per-pixel", "0"), 2, "not a length above 0"),
         (("--spectrum", "there.profile.npz"), 1, "there.profile.npz"),
         (("--spectrum", "-o", "a.jpg"), 1, ".png, .svg or .pdf"),
-        (("--spectrum", "--mm-per-pixel", "1e-5", "-q"), 1, "use a larger mm_per_pixel"),
+        (("--spectrum", "--mm-per-pixel", "1e-5", "-q"), 1, "use a larger --mm-per-pixel"),
     ],
 )
 def test_bad_input_is_one_clear_line(run, tmp_path, arguments, status, fragment):

@@ -37,7 +37,9 @@ def noisy_profile(n_annuli, seed):
 @pytest.mark.parametrize("rank", [1, 2, 5, 12])
 def test_equals_numpys_svd_of_the_full_kernel(rank):
     for profile in (one_over_r_profile(40, 0.1, [0.3, 1.0]), noisy_profile(40, 3)):
-        fitted = fit_svd(profile, rank=rank, energy="keep", support_mm=4.0).kernel
+        fitted = fit_svd(
+            profile, rank=rank, energy="keep", support_mm=4.0, mm_per_pixel="profile"
+        ).kernel
         for c in range(2):
             whole = full_kernel(profile.quadrant_kernel(0.1, 40, channel=c))
             scale = np.linalg.norm(whole)
@@ -50,7 +52,7 @@ def test_equals_numpys_svd_of_the_full_kernel(rank):
 def test_lanczos_equals_numpys_svd_too():
     # 300 pixels in a half line: beyond the size up to which all eigenvalues are computed
     profile = one_over_r_profile(300, 0.05, [0.9])
-    fitted = fit_svd(profile, rank=6, energy="keep", support_mm=15.0).kernel
+    fitted = fit_svd(profile, rank=6, energy="keep", support_mm=15.0, mm_per_pixel="profile").kernel
     whole = full_kernel(profile.quadrant_kernel(0.05, 300, channel=0))
     assert np.abs(fitted.full(0) - best_of_rank(whole, 6)).max() <= 1e-10 * np.linalg.norm(whole)
 
@@ -70,7 +72,9 @@ def test_eigenpairs_are_those_of_the_whole_kernel():
 
 
 def test_negative_eigenvalues_make_terms_of_sign_minus_one():
-    fitted = fit_svd(noisy_profile(30, 8), rank=20, energy="keep", support_mm=3.0).kernel
+    fitted = fit_svd(
+        noisy_profile(30, 8), rank=20, energy="keep", support_mm=3.0, mm_per_pixel="profile"
+    ).kernel
     values = np.transpose([fitted.parameters[name]["eigenvalues"] for name in ("c0", "c1")])
     assert (values < 0.0).any()
     np.testing.assert_array_equal(fitted.signs, np.where(values < 0.0, -1.0, 1.0))
@@ -210,7 +214,9 @@ def test_the_error_falls_with_the_rank_to_nothing(profile, pitch):
 
 def test_noise_is_fitted_and_repeats_bit_for_bit():
     profile = noisy_profile(400, 5)
-    first, second = (fit_svd(profile, rank=8, support_mm=40.0) for _ in range(2))
+    first, second = (
+        fit_svd(profile, rank=8, support_mm=40.0, mm_per_pixel="profile") for _ in range(2)
+    )
     np.testing.assert_array_equal(first.kernel.weights, second.kernel.weights)
     assert first.stop_reasons[0] == "the largest 8 of 401 eigenvalues"
     quadrant = profile.quadrant_kernel(0.1, 400, channel=0)
@@ -233,10 +239,10 @@ def test_a_single_pixel_is_the_identity():
 
 def test_the_highest_rank_is_the_pixels_of_a_half_line():
     profile = one_over_r_profile(4, 0.5, [0.3])
-    whole = fit_svd(profile, rank=5, energy="keep", support_mm=2.0)
+    whole = fit_svd(profile, rank=5, energy="keep", support_mm=2.0, mm_per_pixel="profile")
     assert whole.relative_frobenius_error[0] < 1e-14
     with pytest.raises(FitError) as caught:
-        fit_svd(profile, rank=6, support_mm=2.0)
+        fit_svd(profile, rank=6, support_mm=2.0, mm_per_pixel="profile")
     assert "rank = 6; expected 1 to 5: the kernel has 9 x 9 pixels" in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -260,14 +266,16 @@ def test_bad_settings_are_one_clear_line(changes, fragment):
 
 def test_a_channel_that_returns_nothing_stays_dark():
     profile = make_profile(np.arange(11) * 0.1, np.outer(np.full(10, 0.05), [1.0, 0.0]))
-    fitted = fit_svd(profile, rank=3)
+    fitted = fit_svd(profile, rank=3, mm_per_pixel="profile")
     np.testing.assert_array_equal(fitted.kernel.weights[:, :, 1], 0.0)
     assert fitted.relative_frobenius_error[1] == 0.0
     assert "returns no light" in fitted.stop_reasons[1]
 
 
 def test_settings_are_in_the_file():
-    kernel = fit_svd(one_over_r_profile(10, 0.1, [0.3]), rank=2, energy="keep").kernel
+    kernel = fit_svd(
+        one_over_r_profile(10, 0.1, [0.3]), rank=2, energy="keep", mm_per_pixel="profile"
+    ).kernel
     assert kernel.method == "svd"
     assert dict(kernel.meta["settings"]) == {"rank": 2, "energy": "keep", "normalize": False}
     json.dumps(kernel.to_dict())
@@ -278,7 +286,13 @@ def test_full_paper_grid_equals_numpys_svd():
     profile = simulate_exact(load_material("skin1"))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        fitted = fit_svd(profile, rank=6, energy="keep", support_mm=float(profile.r_edges_mm[-1]))
+        fitted = fit_svd(
+            profile,
+            rank=6,
+            energy="keep",
+            support_mm=float(profile.r_edges_mm[-1]),
+            mm_per_pixel="profile",
+        )
     assert fitted.kernel.pixels == 2473
     whole = full_kernel(profile.quadrant_kernel(fitted.kernel.mm_per_pixel, 1236, channel=0))
     assert np.abs(fitted.kernel.full(0) - best_of_rank(whole, 6)).max() <= 1e-10 * np.linalg.norm(

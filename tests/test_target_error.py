@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sssfit.cli import main
-from sssfit.cli._progress import time_left
+from sssfit.cli._progress import time_left, walk_progress
 from sssfit.errors import SimulationError, SssfitWarning
 from sssfit.material import load_material
 from sssfit.profile import Profile
@@ -126,6 +126,21 @@ def test_time_left_is_that_of_this_sitting():
     assert time_left(first, first) == "-:--:--"
     assert time_left(first, Progress(2000, 10_000, 110.0, 0.1)) == "0:01:20"
     assert time_left(first, Progress(2000, 2000, 110.0, 0.1)) == "0:00:00"
+
+
+def test_the_bar_says_how_much_is_done_how_fast_and_how_well(capsys):
+    now = Progress(2500, 10_000, 20.0, 0.0123)
+    with walk_progress("wax", quiet=False) as show:
+        show(Progress(1000, 10_000, 5.0, float("inf")))
+        show(now)
+    words = capsys.readouterr().err.split("\n")[-2]
+    assert words.startswith("wax ")
+    share = 100 * now.photons_done / now.photons
+    rate = now.photons_done / now.seconds
+    error = 100 * now.relative_error
+    assert words.split()[-7:] == [
+        *(f"{share:.0f}", "%", f"{rate:,.0f}/s", "error", f"{error:.2g}", "%", "0:01:15")
+    ]
 
 
 def test_target_error_on_the_command_line(tmp_path, monkeypatch, capfd):

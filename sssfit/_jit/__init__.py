@@ -9,7 +9,7 @@ The cache folder is therefore keyed by the version and by a hash of every source
 folder. Where nothing can be written (read-only home, no home at all) functions are compiled in
 each process: slower to start, otherwise the same.
 
-Every file of the cache begins with a checksum of the rest. numba loads whatever bytes it finds: of
+Every file of the cache begins with a checksum of the rest. numba loads any bytes it finds: of
 14 flipped bits in machine code 4 crashed every later run and one gave another profile in silence.
 """
 

@@ -100,8 +100,9 @@ def sample_hg(back: np.float32, u: np.float32) -> np.float32:
 
     ``back`` is 1 - g. The inverse of the cumulative density, (1 + g^2 - ((1 - g^2)/(1 + g v))^2) /
     (2 g) with v = 2u - 1, leaves 1 less than itself as 2 (1 - g)^2 (1 - u) (1 + g u) / (1 - g +
-    2 g u)^2: nothing cancels, and g = 0 is no special case. A cosine, and 1 - g taken from g, would
-    lose the forward peak in single precision: at g = .9999 half of all deflections are below 5e-9.
+    2 g u)^2: nothing cancels, and g = 0 needs no special case. A cosine, and 1 - g taken from g,
+    would lose the forward peak in single precision: at g = .9999 half of all deflections are below
+    5e-9.
     """
     g = _ONE - back
     below = back + _TWO * g * u

@@ -47,7 +47,7 @@ def dot(a: Vector, b: Vector) -> float:
 
 
 @jit_inline
-def meet(field: Field, point: Vector, direction: Vector, near: float, far: float) -> float:
+def intersect(field: Field, point: Vector, direction: Vector, near: float, far: float) -> float:
     """First meeting of a ray, all in mm, with a field; -1 where there is none."""
     heights, _, levels, maxima, x0, y0, spacing = field
     start = ((point[0] - x0) / spacing, (point[1] - y0) / spacing, point[2])
@@ -69,10 +69,10 @@ def leaves(field: Field, point: Vector, direction: Vector, near: float) -> float
 @jit_inline
 def in_shadow(fine: Field, coarse: Field, point: Vector, light: Vector) -> bool:
     """Whether the ray toward the light meets the fine field or, further on, the coarse one."""
-    if meet(fine, point, light, LIFT_MM, 1e9) >= 0.0:
+    if intersect(fine, point, light, LIFT_MM, 1e9) >= 0.0:
         return True
     near = max(leaves(fine, point, light, LIFT_MM), LIFT_MM)
-    return meet(coarse, point, light, near, 1e9) >= 0.0
+    return intersect(coarse, point, light, near, 1e9) >= 0.0
 
 
 @jit_inline
@@ -94,7 +94,9 @@ def surface_normal(fine: Field, point: Vector) -> Vector:
 
 
 @jit_inline
-def shine(normal: Vector, light: Vector, eye: Vector, exponent: float, face_on: float) -> float:
+def specular_highlight(
+    normal: Vector, light: Vector, eye: Vector, exponent: float, face_on: float
+) -> float:
     """Blinn and Phong's highlight, times pi: the exitance of a matt surface as bright.
 
     pi F (n + 8) / (8 pi) (N.H)^n, with Schlick's F = F0 + (1 - F0) (1 - E.H)^5 (Akenine-Moller,
@@ -119,7 +121,7 @@ def light_point(body: Body, point: Vector, eye: Vector, lamp: Lamp) -> tuple[flo
     weak = strengths[1] * max(dot(normal, fill), 0.0)
     # The ambient light is a sky: twice as strong on what looks up as on what looks ahead.
     irradiance = weak + strengths[2] * 0.5 * (1.0 + normal[1])
-    highlight = weak * shine(normal, fill, eye, exponent, face_on)
+    highlight = weak * specular_highlight(normal, fill, eye, exponent, face_on)
     cosine = dot(normal, key)
     if cosine <= 0.0:
         return irradiance, highlight, True
@@ -130,19 +132,19 @@ def light_point(body: Body, point: Vector, eye: Vector, lamp: Lamp) -> tuple[flo
     if blocked:
         return irradiance, highlight, True
     irradiance += strengths[0] * cosine
-    highlight += strengths[0] * cosine * shine(normal, key, eye, exponent, face_on)
+    highlight += strengths[0] * cosine * specular_highlight(normal, key, eye, exponent, face_on)
     return irradiance, highlight, False
 
 
 @jit_inline
-def look(fine: Field, view: View, across: float, up: float) -> tuple[int, Vector, Vector]:
+def visible_point(fine: Field, view: View, across: float, up: float) -> tuple[int, Vector, Vector]:
     """Label, point and direction to the eye; ``across`` and ``up`` in pixels from the middle."""
     pitch, distance, floor = view
     x, y = across * pitch, up * pitch
     length = math.sqrt(x * x + y * y + distance * distance)
     ray = (x / length, y / length, -distance / length)
     back = (-ray[0], -ray[1], -ray[2])
-    t = meet(fine, (0.0, 0.0, distance), ray, 0.0, 1e9)
+    t = intersect(fine, (0.0, 0.0, distance), ray, 0.0, 1e9)
     point = (t * ray[0], t * ray[1], distance + t * ray[2])
     if t < 0.0 or point[2] < floor:
         return 0, point, back
@@ -163,7 +165,7 @@ def gather(
     count, irradiance, highlight, blocked = 0, 0.0, 0.0, 0
     for k in range(samples.shape[0]):
         across, up = corner[0] + samples[k, 0], corner[1] - samples[k, 1]
-        seen, point, eye = look(body[0], view, across, up)
+        seen, point, eye = visible_point(body[0], view, across, up)
         if seen == label:
             e, h, shadow = light_point(body, point, eye, lamp)
             count += 1
@@ -191,7 +193,7 @@ def light_rows(
     for i in range(rows[0], rows[1]):
         for j in range(width):
             corner = (j - 0.5 * width, 0.5 * height - i)
-            label, point, _ = look(body[0], view, corner[0] + 0.5, corner[1] - 0.5)
+            label, point, _ = visible_point(body[0], view, corner[0] + 0.5, corner[1] - 0.5)
             if label == 0:
                 continue
             labels[i, j] = label
@@ -224,7 +226,9 @@ def through_rows(
     cuts = np.empty(6)
     for i in range(rows[0], rows[1]):
         for j in range(width):
-            label, point, _ = look(fine, view, j - 0.5 * width + 0.5, 0.5 * height - i - 0.5)
+            label, point, _ = visible_point(
+                fine, view, j - 0.5 * width + 0.5, 0.5 * height - i - 0.5
+            )
             if label == 0 or dot(surface_normal(fine, point), light) > 0.0:
                 continue
             start, stop, again = first_run(solid, point, light, cuts)

@@ -1,4 +1,4 @@
-"""What every photon walk in lanes draws on: random streams, exponential paths, directions, Fresnel.
+"""Sampling for all photon walks: random streams, exponential paths, directions, Fresnel.
 
 A walk keeps ``LANES`` photons side by side in two flat blocks, one of single-precision numbers and
 one of 32-bit words, a row of ``LANES`` entries for each quantity; flat, so that LLVM sees that rows

@@ -1,4 +1,4 @@
-"""Fine relief of skin: smooth noise and pores, the same at a place whatever grid asks for it."""
+"""Fine relief of skin: smooth noise and pores, the same at a place on every grid."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Light through a body between two height fields: how far a ray runs inside, where it enters.
+"""Light through a body between two height fields: path length inside, and point of entry.
 
 A solid is the tuple (front, back, x0, y0, spacing, low, high): heights [mm] on the same nodes,
 bilinear in between, none of the body below ``low`` or above ``high``. It lies where back <= z <=

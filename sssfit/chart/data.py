@@ -1,4 +1,4 @@
-"""What a chart draws of a profile beside its bins: how far, in which unit, and a 2D image.
+"""What a chart draws of a profile besides its bins: range, unit, and a 2D image.
 
 Nothing here knows matplotlib; ``sssfit.chart`` draws.
 """
@@ -11,7 +11,7 @@ import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.profile import Profile
-from sssfit.profile.bins import Bins, energy_radii_mm
+from sssfit.profile.bins import Bins
 
 _IMAGE_SHARE_COLOUR, _IMAGE_SHARE_GREY = 0.75, 0.95
 _IMAGE_ROWS, _IMAGE_COLUMNS = 201, 501  # wider than any panel, 130 an inch
@@ -56,7 +56,7 @@ def picture(profile: Profile, bins: Sequence[Bins]) -> Picture:
 
 def drawn_radius_mm(profile: Profile, share: float, channels: Sequence[int]) -> float:
     """Radius that holds this share of the energy of every one of the channels that has any [mm]."""
-    radii_mm = energy_radii_mm(profile, [share])[0, list(channels)]
+    radii_mm = profile.energy_radii_mm([share])[0, list(channels)]
     known_mm = radii_mm[np.isfinite(radii_mm)]
     return float(known_mm.max(initial=0.0)) or float(profile.r_edges_mm[-1])
 

@@ -1,4 +1,4 @@
-"""The files charts go to: their formats by ending, and how to know one that is there."""
+"""Chart files: their formats by ending, and whether an existing file is one."""
 
 from pathlib import Path
 from typing import BinaryIO

@@ -27,7 +27,6 @@ from sssfit.chart.page import (
 )
 from sssfit.chart.panels import draw_plane, signed_norm, tick_powers
 from sssfit.chart.text import kernel_subtitle, shortened
-from sssfit.profile.bins import material_of
 
 if TYPE_CHECKING:
     from sssfit.compare.guide import Guide
@@ -189,7 +188,7 @@ def _draw_bars(
 
 def _title(guide: Guide) -> str:
     """Name the material and the channel."""
-    material = material_of(guide.profile)
+    material = guide.profile.material
     channel = shortened(guide.profile.channels[guide.channel])
     what = "guide function and residual of the guided kernel"
     return f"{shortened(material.name, 24) + ', ' if material else ''}{channel}: {what}"

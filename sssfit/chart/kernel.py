@@ -1,4 +1,4 @@
-"""A kernel beside the profile it stands for, as a figure: `kernel_figure`.
+"""A kernel beside the profile it was fitted to, as a figure: `kernel_figure`.
 
 The record comes from ``sssfit.compare.kernel_view``, which has computed everything.
 """
@@ -240,7 +240,7 @@ def _draw_planes(lower: SubFigure, view: KernelView) -> None:
 def _draw_plane(axes: Axes, image: FloatArray, half_mm: float, norm: Normalize) -> None:
     """Draw a quadrant's whole plane, its numbers left to the first column."""
     if isinstance(norm, LogNorm):
-        image = _lifted(image, norm)
+        image = _clamped_to_scale(image, norm)
     axes.set_facecolor("#bbbbbb")  # seen where the logarithm has no value
     draw_plane(axes, image, half_mm, norm, _shades(norm))
     for axis in (axes.xaxis, axes.yaxis):
@@ -253,7 +253,7 @@ def _shades(norm: Normalize) -> str:
     return "RdBu_r" if isinstance(norm, SymLogNorm) else "cividis"
 
 
-def _lifted(image: FloatArray, norm: LogNorm) -> FloatArray:
+def _clamped_to_scale(image: FloatArray, norm: LogNorm) -> FloatArray:
     """Bring what is below a scale, but above 0, to its darkest shade; the rest is grey."""
     return np.where(image > 0.0, np.maximum(image, norm.vmin or 0.0), 0.0)
 

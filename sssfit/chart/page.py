@@ -68,7 +68,7 @@ NOTE_SIZE, NOTE_COLOUR = 7.5, "#444444"
 
 @contextlib.contextmanager
 def chart_style() -> Iterator[None]:
-    """Matplotlib's defaults and ours on top, whatever the user's matplotlibrc says."""
+    """Matplotlib's defaults and ours on top, independent of the user's matplotlibrc."""
     kept = {"backend", "backend_fallback", "interactive", "toolbar", "timezone"}
     defaults = {key: value for key, value in mpl.rcParamsDefault.items() if key not in kept}
     with mpl.rc_context(cast(Any, defaults | RC)):

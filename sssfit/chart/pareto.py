@@ -279,7 +279,7 @@ def _limit(axes: Axes, comparison: Comparison, error: str, cost: str) -> None:
 
 
 def _title(comparison: Comparison, error: str, cost: str) -> str:
-    """Name the material and what is held against what."""
+    """Name the material and the axes."""
     what = f"{_ERRORS[error]} against {'time' if cost == 'seconds' else cost}"
     return titled(comparison.profile, what)
 

@@ -1,4 +1,4 @@
-"""What a chart says about a profile in words and numbers."""
+"""The text of a profile's chart."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""No more than a scene needs: the cheapest kernel whose picture stays within a tolerance.
+"""The cheapest kernel whose picture stays within a tolerance.
 
 What is judged is CIE Delta E 2000 of a picture against the profile's own 2D kernel, its 95th
 percentile unless another figure is asked for (``views``); what counts as cheap is weights
@@ -7,16 +7,17 @@ clock, so the same seed gives the same choice.
 
 No blur at all is tried first, then every option in the order of its cost until one will do. Left
 out are supports too narrow for any kernel: those to which the profile's own kernel cannot be cut
-(its energy kept) without leaving the tolerance, but for the widest of them.
+(its energy kept) without leaving the tolerance, except for the widest of them.
 """
 
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.choose.options import (
     Option,
     by_cost,
@@ -96,6 +97,26 @@ class Step:
         """In words, without the support."""
         return "no blur" if self.option is None else self.option.candidate.label
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return a row of ``sssfit choose --json``; without a method it is no blur."""
+        option = self.option
+        return plain(
+            {
+                "label": self.label,
+                "method": option and option.candidate.method,
+                "rank": option.candidate.terms if option else 0,
+                "settings": option.candidate.settings if option else {},
+                "share": option and option.share,
+                "support_mm": option and option.support_mm,
+                "pixels": option.pixels if option else 1,
+                "taps_per_pixel": self.taps_per_pixel,
+                "error": self.error,
+                **{key: getattr(self, key) for key in COLOUR_FIGURES},
+                "mm_per_pixel": self.mm_per_pixel,
+                "within": self.within,
+            }
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Choice:
@@ -160,6 +181,53 @@ class Choice:
     def support_mm(self) -> float:
         """Radius that keeps 99.9 % of every channel [mm]."""
         return support_of(self.profile)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures that ``sssfit choose --json`` prints; no kernel where none is needed.
+
+        ``rows`` has every step that was tried, in order.
+        """
+        steps = {"chosen": self.chosen, "runner_up": self.runner_up, "cheaper": self.cheaper}
+        return plain(
+            {
+                "material": self.profile.material_name,
+                "profile_method": self.profile.meta.get("method"),
+                "mm_per_pixel": self.mm_per_pixel,
+                "support_mm": self.support_mm,
+                "tolerance": self.tolerance,
+                "tolerance_of": self.tolerance_of,
+                "pictures": [
+                    {
+                        "irradiance": each.name,
+                        "width": each.width,
+                        "height": each.height,
+                        "mm_per_pixel": each.mm_per_pixel,
+                    }
+                    for each in self.scenes
+                ],
+                "kernel": self._kernel_figures(),
+                **{key: each and each.to_dict() for key, each in steps.items()},
+                "dearer": [each.to_dict() for each in self.dearer],
+                "too_narrow": self.too_narrow,
+                "unfitted": self.unfitted,
+                "photons": self.photons and self.photons.to_dict(),
+                "rows": [each.to_dict() for each in self.steps],
+            }
+        )
+
+    def _kernel_figures(self) -> dict[str, Any] | None:
+        """Return what was fitted, and what it takes; None where no blur is needed."""
+        if self.fit is None:
+            return None
+        kernel = self.fit.kernel
+        return {
+            "method": kernel.method,
+            "rank": kernel.rank,
+            "pixels": kernel.pixels,
+            "support_mm": kernel.support_mm,
+            "seconds_per_megapixel": self.seconds_per_megapixel,
+            "relative_frobenius_error": self.fit.relative_frobenius_error,
+        }
 
 
 def choose(
@@ -270,7 +338,7 @@ class _Search:
         if nothing is not None and nothing.within:
             return Choice(*given, steps=tuple(self.steps), chosen=nothing)
         every = supports(views.profile, pitch)
-        kept = self._wide_enough(every)
+        kept = self._useful_supports(every)
         found = options(kept, pitch)
         chosen, runner_up = self._cheapest(found)
         if chosen is None or chosen.option is None:
@@ -322,8 +390,8 @@ class _Search:
             within=found.within,
         )
 
-    def _wide_enough(self, found: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-        """Leave out supports to which even the true kernel cannot be cut, but for the widest.
+    def _useful_supports(self, found: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+        """Leave out supports to which even the true kernel cannot be cut, except for the widest.
 
         That one is kept so that the next cheaper step is one that was tried.
         """

@@ -1,4 +1,4 @@
-"""What may be chosen: every candidate on several supports, with what it costs."""
+"""The options of a choice: every candidate on several supports, with its cost."""
 
 import math
 from collections.abc import Iterator, Sequence

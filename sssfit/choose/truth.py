@@ -1,13 +1,15 @@
-"""How few photons would have done: walks of growing length, fitted as the choice was."""
+"""How many photons are enough: walks of growing length, fitted like the chosen kernel."""
 
 import math
 import time
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
+from sssfit.arrays import plain
 from sssfit.choose.options import Option
 from sssfit.choose.views import Views
 from sssfit.compare._all_light import exact_with_all_light, radius_of
@@ -54,7 +56,7 @@ def is_exact(material: Material) -> bool:
 
 
 def material_of(source: Material | Profile) -> Material | None:
-    """Return the material that walks can be held against the profile of.
+    """Return the material whose walks can be compared with the profile.
 
     None for a profile without coefficients behind it, and for one that is not by transport: a
     model's error would be taken for noise.
@@ -116,6 +118,18 @@ class PhotonNeed:
     seconds: tuple[float, ...]
     truth_method: str
     truth_seconds: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures as ``sssfit choose --json`` has them; None for an error of inf."""
+        return plain(
+            {
+                "photons": self.photons,
+                "tried": self.counts,
+                "errors": self.errors,
+                "seconds": self.seconds,
+                "profile_seconds": self.truth_seconds,
+            }
+        )
 
 
 def photons_needed(

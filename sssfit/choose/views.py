@@ -1,4 +1,4 @@
-"""What a choice is judged on: the head at its distance, and wider views around a close-up."""
+"""The views of a choice: the head at its distance, and wider views around a close-up."""
 
 import math
 from collections.abc import Sequence
@@ -178,7 +178,7 @@ class Views:
         return self.error_of(self._measured(0, picture))
 
     def _measured(self, k: int, picture: FloatArray) -> ImageScore:
-        """Hold a picture of a view against its truth."""
+        """Compare a picture of a view with its truth."""
         scene = self.scenes[k]
         if k not in self._truths:
             self._truths[k] = render_reference(

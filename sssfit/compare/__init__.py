@@ -1,4 +1,4 @@
-"""What is lost: one profile, kernel or picture held against another, in figures."""
+"""What is lost: one profile, kernel or picture compared with another, in figures."""
 
 from sssfit.compare.comparison import Comparison, KernelRow, pareto_front
 from sssfit.compare.guide import Guide, compute_guide

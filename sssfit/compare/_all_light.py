@@ -15,7 +15,7 @@ _FAR_SHARE = 1e-4
 def exact_with_all_light(
     material: Material, grid: RadialGrid, reach_mm: float, *, threads: int | None = None
 ) -> Profile:
-    """Return the exact profile on the grid, doubled until it holds all but .01 % of the light.
+    """Return the exact profile on a grid doubled until at most .01 % of the light lies beyond it.
 
     No further than ``reach_mm``, beyond which a picture ends.
     """

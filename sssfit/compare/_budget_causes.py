@@ -201,9 +201,9 @@ def _of_kernels(
     kernel, kernel_of_cut = rendered(switches.kernel), rendered(switches.kernel_of_cut)
     # Where the fit puts the light beyond the grid: added evenly to its kernel, or nowhere.
     put = kernel - kernel_of_cut
-    hint = "a larger --radius of the simulation"
+    hint = "a larger radius of the simulated grid"
     yield "energy beyond the grid", hint, True, cut + put - truth
-    hint = "a fit that keeps all energy, or a larger --radius"
+    hint = "a fit that keeps all energy, or a larger radius"
     yield "energy beyond the grid, if lost", hint, False, cut - truth
     yield "separability", "a higher rank, or another fit", True, kernel_of_cut - cut
     for storage in dict.fromkeys((switches.storage, "half", "8-bit")):

@@ -75,7 +75,7 @@ def make_sources(
 ) -> Sources:
     """Simulate a half space by the exact solver, the photon walk and the models.
 
-    The truth's grid is doubled until it holds all but 0.01 % of every channel's light, or the
+    The truth's grid is doubled until at most 0.01 % of any channel's light lies beyond it, or the
     picture ends: light beyond the user's grid then falls where it belongs.
 
     Parameters

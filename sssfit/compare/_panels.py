@@ -19,7 +19,7 @@ _JOINT, _SLOPE = (6.0 / 29.0) ** 3, (29.0 / 3.0) ** 3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Panel:
-    """A picture as a display shows it, and how far it is from the one it is held against.
+    """A picture as a display shows it, and its distance from the true one.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def make_panel(
     counts: npt.NDArray[np.int32] | None = None,
     shown_part: tuple[slice, slice] = (slice(None), slice(None)),
 ) -> Panel:
-    """Hold a picture (H, W, C) against a truth; C is 1 (grey) or 3.
+    """Compare a picture (H, W, C) with a truth; C is 1 (grey) or 3.
 
     ``mask`` (H, W) is the outline outside which no difference is drawn, ``counts`` the pixels that
     the score is of, the mask's by default. Only ``shown_part`` of rows and columns is drawn.

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.compare._all_light import radius_of
 from sssfit.compare._budget_causes import STORAGES, Cause, Switches, causes_of, everything
 from sssfit.compare._budget_profiles import MODELS, make_sources, picture_reach_mm
@@ -27,7 +27,7 @@ from sssfit.grid import make_grid
 from sssfit.kernel import SeparableKernel
 from sssfit.material import Material
 from sssfit.measure.delta_e import selected_pixels, selection
-from sssfit.measure.score import ImageScore
+from sssfit.measure.score import COLOUR_FIGURES, ImageScore
 from sssfit.scene.patterns import DISK_RADIUS_MM
 from sssfit.scene.record import Scene
 from sssfit.simulate import Progress
@@ -36,6 +36,7 @@ __all__ = ["MODELS", "STORAGES", "Budget", "Cause", "error_budget", "error_budge
 
 
 PHOTONS = 1_000_000
+_ROW_FIGURES = (*COLOUR_FIGURES, "relative_l2", "energy_drift")
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -103,6 +104,41 @@ class Budget:
         )
         square = float(whole @ whole)
         return float(part @ whole) / square if square > 0.0 else math.nan
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures that ``sssfit compare --json`` prints, a row for each cause.
+
+        Then a row for the interaction and one for the whole; None for what is not made.
+        """
+        return plain(
+            {
+                "material": self.material.name,
+                "channels": self.material.channels,
+                "method": self.kernel.method,
+                "rank": self.kernel.rank,
+                "model": self.model,
+                "storage": self.storage,
+                "photons": self.photons,
+                "seed": self.seed,
+                "mm_per_pixel": self.scene.mm_per_pixel,
+                "radius_mm": self.radius_mm,
+                "beyond_grid": self.beyond_grid,
+                "rows": [self._row(each) for each in (*self.causes, self.interaction, self.whole)],
+            }
+        )
+
+    def _row(self, cause: Cause) -> dict[str, Any]:
+        """Figures of a cause, and of the picture it is on."""
+        return {
+            "picture": self.scene.name,
+            "width": self.scene.width,
+            "height": self.scene.height,
+            "cause": cause.name,
+            "in_whole": cause.is_in_whole,
+            **{key: getattr(cause.score, key, None) for key in _ROW_FIGURES},
+            "share_of_whole": self.share(cause),
+            "hint": cause.hint,
+        }
 
 
 def error_budget(material: Material, scene: Scene, **settings: Any) -> Budget:

@@ -1,4 +1,4 @@
-"""The kernels that are held against one another: every method, rank and number of Gaussians."""
+"""The kernels that are compared: every method, rank and number of Gaussians."""
 
 import warnings
 from collections.abc import Iterator, Mapping
@@ -43,7 +43,7 @@ class Candidate:
 
 
 def candidates(pixels: int, *, most_terms: int = MOST_TERMS) -> tuple[Candidate, ...]:
-    """Return what can be fitted on so many pixels, cheapest first.
+    """Return what can be fitted on a number of pixels, cheapest first.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def candidates(pixels: int, *, most_terms: int = MOST_TERMS) -> tuple[Candidate,
 
 
 def _one_pass(pixels: int) -> Iterator[Candidate]:
-    """Yield the kernels of one term whatever the budget."""
+    """Yield the kernels of one term, which every budget includes."""
     yield Candidate("pre-integrated", "preintegrated", 1)
     yield Candidate("artist", "artist", 1)
     yield Candidate("artist, 2D", "artist", 1, {"target": "kernel"})

@@ -4,15 +4,16 @@
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.errors import RenderError
 from sssfit.fit import support_of
+from sssfit.measure.score import COLOUR_FIGURES
 from sssfit.profile import Profile
 
 
@@ -59,6 +60,12 @@ def pareto_front(cost: npt.ArrayLike, error: npt.ArrayLike) -> npt.NDArray[np.bo
 # What a front can be of: the names of the command line, and the rows' fields.
 ERRORS = {"delta-e": "delta_e_2000_mean", "l2": "relative_l2"}
 COSTS = {"passes": "passes", "weights": "taps_per_pixel", "seconds": "seconds_per_megapixel"}
+_ROW_FIGURES = (
+    *("picture", "label", "method", "rank", "settings", *COLOUR_FIGURES),
+    *("relative_l2", "rmse", "psnr_db", "energy_drift"),
+    *("radial_asymmetry", "passes", "taps_per_pixel", "kernel_bytes", "taps"),
+    *("seconds_per_megapixel", "fit_seconds", "relative_frobenius_error", "stop_reasons"),
+)
 _LEAST_ERROR = 1e-9  # what a geometric mean takes for none
 _COLOURED = (1, 3)  # channels that have a colour, or are grey
 
@@ -147,6 +154,16 @@ class KernelRow:
         cost = self.cost(name)
         return float(f"{cost:.2g}") if name == "seconds" else cost
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return a row of ``sssfit compare --json``: lists and numbers, None: not measured.
+
+        ``on_front`` tells for every error and cost whether no row of the picture beats this one.
+        """
+        on_front = {
+            error: {cost: (error, cost) in self.fronts for cost in COSTS} for error in ERRORS
+        }
+        return plain({**{key: getattr(self, key) for key in _ROW_FIGURES}, "on_front": on_front})
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Comparison:
@@ -199,6 +216,24 @@ class Comparison:
         """Rows of a picture that none of its rows beats, cheapest first."""
         found = [row for row in self.rows_of(picture) if (error, cost) in row.fronts]
         return sorted(found, key=lambda row: row.cost(cost))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures that ``sssfit compare --json`` prints, a row for each kernel."""
+        material = self.profile.material_name
+        return plain(
+            {
+                "material": material,
+                "profile_method": self.profile.meta.get("method"),
+                "channels": self.profile.channels,
+                "mm_per_pixel": self.mm_per_pixel,
+                "pixels": self.pixels,
+                "threads": self.threads,
+                "pictures": [asdict(each) for each in self.pictures],
+                "missing_share": self.missing_share,
+                "left_out": [{"label": label, "reason": why} for label, why in self.left_out],
+                "rows": [{"material": material, **row.to_dict()} for row in self.rows],
+            }
+        )
 
 
 @dataclass(frozen=True, slots=True)

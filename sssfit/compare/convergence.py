@@ -7,12 +7,13 @@ method's is set by its resolution. ``sssfit.chart`` draws the record.
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.errors import SimulationError
 from sssfit.material import Material
 from sssfit.profile import Profile
@@ -21,7 +22,7 @@ from sssfit.simulate import simulate_exact, simulate_montecarlo
 PHOTONS = (10_000, 31_623, 100_000, 316_228, 1_000_000, 3_162_278, 10_000_000)
 SEEDS = 6  # the slope's standard error is then .025
 # One for each of the exact method's resolutions that take seconds; the last is what others are
-# held against. The next one, 3e-7, takes 15 s.
+# compared with. The next one, 3e-7, takes 15 s.
 TOLERANCES = (1e-4, 5e-6, 2e-6)
 
 
@@ -58,7 +59,7 @@ class ExactRun:
     estimate : float [1]
         The method's own: its difference to the next coarser resolution.
     error : float, optional [1]
-        As that of a walk; None for the finest resolution, which the others are held against.
+        As that of a walk; None for the finest resolution, which the others are compared with.
     """
 
     tolerance: float
@@ -94,7 +95,7 @@ class Convergence:
     Parameters
     ----------
     exact : Profile
-        What all are held against.
+        The reference for all.
     walks : tuple of WalkRun
     resolutions : tuple of ExactRun
     line : Line
@@ -105,6 +106,38 @@ class Convergence:
     walks: tuple[WalkRun, ...]
     resolutions: tuple[ExactRun, ...]
     line: Line
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the slope and the figures of every walk and resolution."""
+        return plain(
+            {
+                "material": self.exact.material_name,
+                "slope": self.line.slope,
+                "slope_stderr": self.line.slope_stderr,
+                "rows": [asdict(each) for each in self.walks],
+                "exact": [asdict(each) for each in self.resolutions],
+            }
+        )
+
+
+LEAST_PHOTONS = 10_000
+_PER_DECADE = 2
+
+
+def photon_numbers(most: int) -> tuple[int, ...]:
+    """Return two numbers of photons a decade, from 1e4 up to ``most``.
+
+    Raises
+    ------
+    SimulationError
+        Fewer than 1e5: no slope could be seen.
+    """
+    if most < 10 * LEAST_PHOTONS:
+        raise SimulationError(f"{most:,} photons are too few for a slope; expected 1e5 or more.")
+    numbers: list[int] = []
+    while (number := round(LEAST_PHOTONS * 10 ** (len(numbers) / _PER_DECADE))) <= most:
+        numbers.append(number)
+    return tuple(numbers)
 
 
 def compute_convergence(
@@ -173,7 +206,7 @@ def error_of(profile: Profile, exact: Profile) -> float:
 def fit_line(photons: Sequence[int], errors: Sequence[float]) -> Line:
     """Put a line through logarithms; every point counts alike.
 
-    The largest deviation of F has, over its expectation, the same distribution whatever the number
+    The largest deviation of F has, over its expectation, the same distribution for any number
     of photons: its logarithm scatters alike everywhere, and plain least squares is right.
     """
     x, y = np.log10(np.asarray(photons, dtype=np.float64)), np.log10(errors)

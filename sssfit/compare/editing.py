@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from sssfit.arrays import plain
 from sssfit.compare._panels import Panel, make_panel
 from sssfit.fit import fit_falloff
-from sssfit.measure.score import ImageScore, auto_exposure, measure
+from sssfit.measure.score import COLOUR_FIGURES, ImageScore, auto_exposure, measure
 from sssfit.profile import Profile
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
@@ -47,7 +48,7 @@ class Edit:
     settings : mapping
         width, strength and falloff.
     panel : Panel
-        Held against the original.
+        Compared with the original.
     """
 
     label: str
@@ -73,6 +74,24 @@ class Editing:
     edits: tuple[Edit, ...]
     original_score: ImageScore
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the Delta E of every edit to the original, and the original's own."""
+        original = self.original_score
+        return plain(
+            {
+                "mm_per_pixel": self.mm_per_pixel,
+                **{f"original_{key}": getattr(original, key) for key in COLOUR_FIGURES},
+                "rows": [
+                    {
+                        "label": each.label,
+                        **each.settings,
+                        **{key: getattr(each.panel.score, key) for key in COLOUR_FIGURES},
+                    }
+                    for each in self.edits
+                ],
+            }
+        )
+
 
 def compute_editing(
     *,
@@ -93,7 +112,7 @@ def compute_editing(
     Raises
     ------
     FitError, RenderError
-        Pixels of no use.
+        Invalid pixels.
     """
     profile = simulate_deon_skin()
     scene = make_scene("head", height=height, width=width, mm_per_pixel=mm_per_pixel)

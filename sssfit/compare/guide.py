@@ -1,4 +1,4 @@
-"""What the guided fit looks at and what it leaves: Gamma, residual and pass, for several k.
+"""The guided fit for several k: guide function Gamma, residual and pass.
 
 Supplement figure S.1 (Jimenez et al. 2015, "Separable Subsurface Scattering") draws Gamma_p, under
 which the pre-integrated pass is the optimum, and Gamma for k = 1.55; here each k has its own, with
@@ -13,13 +13,14 @@ only a point where the slope is 0.
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import FitResult, fit_guided
-from sssfit.fit._target import Target
+from sssfit.fit._target import Pitch, Target
 from sssfit.fit.guided import DRAWN_K, extents_of, gamma, guided_target
 from sssfit.profile import Profile
 
@@ -91,13 +92,32 @@ class Guide:
         copies = np.where(np.arange(self.preintegrated.size) == 0, 1.0, 2.0)
         return 0.5 * float(np.abs(self.preintegrated_residual) @ copies @ copies)
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures of ``sssfit chart --guide --json``: a value for each k."""
+        return plain(
+            {
+                "channel": self.profile.channels[self.channel],
+                "mm_per_pixel": self.mm_per_pixel,
+                "pixels": self.pixels,
+                "k": self.ks,
+                "centre_share": self.centre_share,
+                "preintegrated_centre_share": self.preintegrated[0],
+                "misplaced": self.misplaced,
+                "relative_frobenius_error": self.relative_frobenius_error,
+                "weighted_residual": self.weighted_residual,
+                "preintegrated_misplaced": self.preintegrated_misplaced,
+                "preintegrated_frobenius_error": self.preintegrated_errors[0],
+                "preintegrated_weighted_residual": self.preintegrated_errors[1],
+            }
+        )
+
 
 def compute_guide(
     profile: Profile,
     *,
     ks: Sequence[float] = DRAWN,
     channel: str | None = None,
-    mm_per_pixel: float | None = None,
+    mm_per_pixel: Pitch | None = None,
     support_mm: float | None = None,
 ) -> Guide:
     """Fit the guided kernel for each k, and keep what it looked at and what it left.
@@ -117,7 +137,7 @@ def compute_guide(
     Raises
     ------
     FitError, ProfileError
-        The profile, the channel, the pixels or a k is of no use.
+        Invalid profile, channel, pixels or k.
 
     Examples
     --------

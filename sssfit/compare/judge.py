@@ -1,17 +1,18 @@
-"""A kernel on a picture, held against the truth: what it shows, loses and costs."""
+"""A kernel on a picture, compared with the truth: what it shows, loses and costs."""
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
 from sssfit.measure.asymmetry import radial_asymmetry
 from sssfit.measure.cost import Cost, cost_of, seconds_per_megapixel
-from sssfit.measure.score import ImageScore, measure
+from sssfit.measure.score import SCORE_FIGURES, ImageScore, measure
 from sssfit.profile import Profile, full_kernel
 from sssfit.render.reference import render_reference
 from sssfit.render.screen import render_screen
@@ -50,6 +51,18 @@ class Judgement:
     cost: Cost
     asymmetry: FloatArray
     true_asymmetry: FloatArray
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return cost and score as ``sssfit render --json`` prints them; None: not measured."""
+        score = dict.fromkeys(SCORE_FIGURES) if self.score is None else self.score.to_dict()
+        return plain(
+            {
+                **asdict(self.cost),
+                "radial_asymmetry": self.asymmetry,
+                "true_radial_asymmetry": self.true_asymmetry,
+                **score,
+            }
+        )
 
 
 def judge(
@@ -169,7 +182,7 @@ def judge_in_screen_space(
     border: str = "mirror",
     threads: int | None = None,
 ) -> Judgement:
-    """Render a scene as a shader does; there is no truth in perspective to hold it against.
+    """Render a scene as a shader does; in perspective there is no truth to compare it with.
 
     Parameters and errors are those of `render_screen`.
     """

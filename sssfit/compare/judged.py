@@ -1,4 +1,4 @@
-"""Which pixels of a made disk or edge count, so that the picture's size does not change a figure.
+"""Which pixels of a disk or edge count, so that a figure does not depend on the picture's size.
 
 Far from a border every kernel that keeps energy is right: the more of that a picture has, the
 smaller its mean. 512 x 512 pixels of .3 mm gave a fourth of the Delta E of 200 x 200.
@@ -39,7 +39,7 @@ def judged_scene(scene: Scene, profile: Profile) -> Scene:
     light = scene.irradiance[..., 0]
     counts = _within(light > 0.0, reach)
     if scene.name == "edge":
-        counts &= _within(light < light.max(), reach) & _off_ends(light, reach)
+        counts &= _within(light < light.max(), reach) & _away_from_ends(light, reach)
     return dataclasses.replace(scene, mask=counts.astype(np.int32))
 
 
@@ -74,7 +74,7 @@ def _enlarged(scene: Scene, reach: float) -> Scene:
     return dataclasses.replace(scene, irradiance=np.pad(scene.irradiance, (*pads, (0, 0))))
 
 
-def _off_ends(light: npt.NDArray[np.float64], reach: float) -> BoolArray:
+def _away_from_ends(light: npt.NDArray[np.float64], reach: float) -> BoolArray:
     """Tell which pixels are off the two sides of the picture that the edge runs into."""
     across = abs(light[:, -1].mean() - light[:, 0].mean())
     up = abs(light[-1].mean() - light[0].mean())

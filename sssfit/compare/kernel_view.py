@@ -1,4 +1,4 @@
-"""What a kernel looks like beside the profile it stands for: 2D kernels, difference, slices.
+"""A kernel beside the profile it was fitted to: 2D kernels, difference, slices.
 
 ``sssfit.chart`` draws the record.
 """
@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.errors import KernelError
 from sssfit.kernel import SeparableKernel
 from sssfit.profile import Profile
@@ -31,7 +31,7 @@ class KernelView:
     ----------
     kernel : SeparableKernel
     profile : Profile or None
-        What it is held against.
+        What it is compared with.
     channels : tuple of K int
         Which of the kernel's.
     block : int
@@ -68,6 +68,24 @@ class KernelView:
     energy_error: FloatArray
     relative_frobenius_error: FloatArray
     misplaced: FloatArray | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures of ``sssfit chart --json`` of a kernel: a value for each channel."""
+        kernel = self.kernel
+        return plain(
+            {
+                "material": kernel.meta.get("material"),
+                "method": kernel.method,
+                "rank": kernel.rank,
+                "pixels": kernel.pixels,
+                "mm_per_pixel": kernel.mm_per_pixel,
+                "channels": [kernel.channels[c] for c in self.channels],
+                "energy": self.energy,
+                "energy_error": self.energy_error,
+                "relative_frobenius_error": self.relative_frobenius_error,
+                "misplaced": self.misplaced,
+            }
+        )
 
 
 def view_kernel(
@@ -111,15 +129,15 @@ def view_kernel(
         )
     area_mm2 = kernel.mm_per_pixel**2
     ours = [kernel.scale[c] * kernel.quadrant(c) / area_mm2 for c in chosen]
-    image, axis, diagonal = _looks(ours, block := _block(kernel.pixels))
+    image, axis, diagonal = _images_and_slices(ours, block := _block(kernel.pixels))
     energy = (kernel.scale * kernel.energy)[list(chosen)]
     against = _recorded(kernel, chosen) if profile is None else {}
     if profile is not None:
         total = profile.diffuse_reflectance[list(chosen)]
         pixels = kernel.mm_per_pixel, kernel.half_pixels
         true = [profile.quadrant_kernel(*pixels, channel=c) / area_mm2 for c in chosen]
-        against = _held_against(true, ours, total, block, area_mm2)
-        against["energy_error"] = _over(energy - total, total)
+        against = _compare_with_profile(true, ours, total, block, area_mm2)
+        against["energy_error"] = _shares_of(energy - total, total)
     return KernelView(
         kernel=kernel,
         profile=profile,
@@ -133,7 +151,7 @@ def view_kernel(
     )
 
 
-def _looks(quadrants: Sequence[FloatArray], block: int) -> tuple[FloatArray, ...]:
+def _images_and_slices(quadrants: Sequence[FloatArray], block: int) -> tuple[FloatArray, ...]:
     """Return images (K, m+1, m+1), and slices (K, h+1) along the axis and the diagonal."""
     cuts = (lambda each: _blocks(each, block)), (lambda each: each[0]), np.diagonal
     return tuple(np.stack([cut(each) for each in quadrants]) for cut in cuts)
@@ -147,7 +165,7 @@ def _recorded(kernel: SeparableKernel, chosen: Sequence[int]) -> dict[str, Any]:
     return {**dict.fromkeys(names), **recorded}
 
 
-def _held_against(
+def _compare_with_profile(
     true: Sequence[FloatArray],
     ours: Sequence[FloatArray],
     total: FloatArray,
@@ -156,14 +174,14 @@ def _held_against(
 ) -> dict[str, FloatArray]:
     """Return what a view has with a profile; ``total`` (K,) is each channel's energy."""
     apart = [mine - theirs for mine, theirs in zip(ours, true, strict=True)]
-    image, axis, diagonal = _looks(true, block)
+    image, axis, diagonal = _images_and_slices(true, block)
     return {
         "true_image": image,
         "true_axis": axis,
         "true_diagonal": diagonal,
-        "difference": _over(area_mm2 * _looks(apart, block)[0], total),
-        "relative_frobenius_error": _over(_norms(apart), _norms(true)),
-        "misplaced": _over(
+        "difference": _shares_of(area_mm2 * _images_and_slices(apart, block)[0], total),
+        "relative_frobenius_error": _shares_of(_norms(apart), _norms(true)),
+        "misplaced": _shares_of(
             np.array([0.5 * area_mm2 * _sum(np.abs(each)) for each in apart]), total
         ),
     }
@@ -215,7 +233,7 @@ def _norms(quadrants: Sequence[FloatArray]) -> FloatArray:
     return np.sqrt([_sum(each**2) for each in quadrants])
 
 
-def _over(values: FloatArray, totals: FloatArray) -> FloatArray:
+def _shares_of(values: FloatArray, totals: FloatArray) -> FloatArray:
     """Divide each channel's values by its total; 0 for a channel without light."""
     shape = (-1, *(1,) * (values.ndim - 1))
     whole = np.broadcast_to(totals.reshape(shape), values.shape)

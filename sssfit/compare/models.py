@@ -8,11 +8,12 @@ the exact solution there. Totals, F(r) and the L2 error use the annuli as they a
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.errors import SimulationError
 from sssfit.material import Material
 from sssfit.profile import Profile
@@ -63,6 +64,19 @@ class ModelCurve:
         """Name of the method."""
         return str(self.profile.meta["method"])
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the method's figures; errors are shares, against the exact solution."""
+        return plain(
+            {
+                "method": self.method,
+                "diffuse_reflectance": self.profile.diffuse_reflectance,
+                "diffuse_reflectance_stderr": self.profile.diffuse_reflectance_stderr,
+                "total_error": self.total_error,
+                "cumulative_error": self.cumulative_error,
+                "l2_error": self.l2_error,
+            }
+        )
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ModelComparison:
@@ -89,6 +103,22 @@ class ModelComparison:
     def walk(self) -> ModelCurve:
         """The photon walk."""
         return self.curves[1]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures of ``sssfit chart --models --json``, a row for each method."""
+        walk = self.walk.profile
+        return plain(
+            {
+                "material": self.material.name,
+                "channels": self.material.channels,
+                "photons": walk.photons,
+                "seed": walk.meta.get("seed"),
+                "annuli": walk.n_annuli,
+                "dr_mm": float(walk.r_edges_mm[1]),
+                "radius_mm": float(walk.r_edges_mm[-1]),
+                "rows": [each.to_dict() for each in self.curves],
+            }
+        )
 
 
 def compare_models(
@@ -174,7 +204,7 @@ def _grid_of(walk: Profile) -> tuple[float, float]:
     if walk.photons is None or not np.allclose(width_mm, width_mm[0], rtol=1e-6):
         raise SimulationError(
             "models are compared on a photon walk's grid, and this profile has no photons or "
-            "annuli of varying width; walk the material anew."
+            "annuli of varying width; simulate the material again."
         )
     return float(walk.r_edges_mm[1]), float(walk.r_edges_mm[-1])
 
@@ -188,7 +218,7 @@ def _cuts(walk: Profile, channel: int) -> npt.NDArray[np.intp]:
 
 
 def _curve(profile: Profile, exact: Profile, cuts: list[npt.NDArray[np.intp]]) -> ModelCurve:
-    """Hold one profile against the exact one."""
+    """Compare one profile with the exact one."""
     energy = [np.diff(profile.cumulative[cut, c]) for c, cut in enumerate(cuts)]
     truth = [np.diff(exact.cumulative[cut, c]) for c, cut in enumerate(cuts)]
     stderr = [_stderr_of_bins(profile, c, cut) for c, cut in enumerate(cuts)]

@@ -1,4 +1,4 @@
-"""What the artist's kernel may be fitted to: the mean Delta E of three coarse pictures.
+"""The picture error for the artist's fit: the mean Delta E of three coarse pictures.
 
 ``fit_artist(profile, target=picture_error)`` fits three numbers a channel to what is seen of a
 disk, an edge and a lit head. They are coarse, so that a kernel is judged in some milliseconds: for
@@ -50,7 +50,7 @@ def picture_error(pixels: Target) -> Callable[[FloatArray], float]:
     support_mm = pixels.half_pixels * pixels.mm_per_pixel
     coarse_mm = max(pixels.mm_per_pixel, support_mm / _SUPPORT_PIXELS)
     target = Target(pixels.profile, coarse_mm, int(support_mm / coarse_mm + 1e-9))
-    pictures = [_look(pixels.profile, target.half_pixels, *each) for each in _scenes(coarse_mm)]
+    pictures = [_prepare(pixels.profile, target.half_pixels, *each) for each in _scenes(coarse_mm)]
     truth = np.concatenate([each.truth for each in pictures])
     shares = np.concatenate([np.full(len(each.truth), 1.0 / len(each.truth)) for each in pictures])
 
@@ -113,7 +113,7 @@ def _scenes(mm_per_pixel: float) -> Iterator[tuple[Scene, BoolArray]]:
         yield head, head.mask > 0
 
 
-def _look(profile: Profile, half_pixels: int, scene: Scene, counted: BoolArray) -> _Picture:
+def _prepare(profile: Profile, half_pixels: int, scene: Scene, counted: BoolArray) -> _Picture:
     """Render the truth of a picture and prepare its passes."""
     truth = render_reference(scene, profile)
     exposure = auto_exposure(truth, scene.mask)

@@ -10,15 +10,15 @@ from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.compare._panels import Panel, check_colours, make_panel
 from sssfit.compare.candidates import MOST_TERMS, Candidate
 from sssfit.compare.judged import border_of, judged_scene
 from sssfit.compare.pictures import picture_error
-from sssfit.fit import support_of
+from sssfit.fit import Pitch, pitch_of, support_of
 from sssfit.kernel import SeparableKernel
 from sssfit.measure.cost import cost_of
-from sssfit.measure.score import auto_exposure
+from sssfit.measure.score import COLOUR_FIGURES, auto_exposure
 from sssfit.profile import Profile
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
@@ -26,7 +26,6 @@ from sssfit.scene.made import make_scene
 from sssfit.scene.record import Scene
 
 SCENES = ("disk", "edge", "head")
-MM_PER_PIXEL = 0.3  # a head 0.6 m away on 1080 rows
 PIXELS = 200  # 60 mm at that pitch: between the eyes and the mouth
 
 
@@ -46,6 +45,12 @@ class SheetRow:
     label: str
     passes: int | None
     panels: tuple[Panel, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return label, passes and the figures of the score, a value for each scene."""
+        keys = (*COLOUR_FIGURES, "relative_l2")
+        scores = {key: [getattr(each.score, key) for each in self.panels] for key in keys}
+        return plain({"label": self.label, "passes": self.passes, **scores})
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,11 +83,26 @@ class Sheet:
     rows: tuple[SheetRow, ...]
     production: Mapping[str, tuple[float, ...]]
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures of the sheet as JSON has them, a row for each kernel."""
+        return plain(
+            {
+                "material": self.profile.material_name,
+                "mm_per_pixel": self.mm_per_pixel,
+                "pixels": self.pixels,
+                "support_mm": self.support_mm,
+                "scenes": self.scenes,
+                "exposures": self.exposures,
+                "production": self.production,
+                "rows": [each.to_dict() for each in self.rows],
+            }
+        )
+
 
 def compute_sheet(
     profile: Profile,
     *,
-    mm_per_pixel: float = MM_PER_PIXEL,
+    mm_per_pixel: Pitch | None = None,
     pixels: int = PIXELS,
     scenes: Sequence[str] = SCENES,
     most_terms: int = MOST_TERMS,
@@ -94,7 +114,8 @@ def compute_sheet(
     ----------
     profile : Profile
         Of 1 or 3 channels.
-    mm_per_pixel : float [mm]
+    mm_per_pixel : float or "profile", optional [mm]
+        By default 0.3; see ``sssfit.fit.make_target``.
     pixels : int
         Rows and columns.
     scenes : sequence of str
@@ -106,26 +127,27 @@ def compute_sheet(
     Raises
     ------
     FitError, RenderError
-        Pixels, profile or scenes are of no use.
+        Invalid pixels, profile or scenes.
     """
     check_colours("the profile", profile.n_channels)
     support = support_of(profile)
-    easel = _Easel(profile, tuple(scenes), mm_per_pixel, pixels, threads)
+    pitch = pitch_of(profile, mm_per_pixel)
+    panels = _PanelRenderer(profile, tuple(scenes), pitch, pixels, threads)
     line = Candidate("Artist-friendly, line fit", "artist", 1)
-    fitted = line.fit(profile, mm_per_pixel, support).kernel
+    fitted = line.fit(profile, pitch, support).kernel
     production = production_look(fitted)
-    rows = [easel.row("Input, times albedo", easel.inputs())]
+    rows = [panels.row("Input, times albedo", panels.inputs())]
     for candidate in _kernels(min(most_terms, fitted.pixels // 2 + 1), line, production):
-        kernel = candidate.fit(profile, mm_per_pixel, support).kernel
-        rows.append(easel.row(candidate.label, easel.rendered(kernel), cost_of(kernel).passes))
-    rows.append(easel.row("True kernel", easel.truths))
+        kernel = candidate.fit(profile, pitch, support).kernel
+        rows.append(panels.row(candidate.label, panels.rendered(kernel), cost_of(kernel).passes))
+    rows.append(panels.row("True kernel", panels.truths))
     return Sheet(
         profile=profile,
-        mm_per_pixel=mm_per_pixel,
+        mm_per_pixel=pitch,
         pixels=pixels,
         support_mm=support,
         scenes=tuple(scenes),
-        exposures=easel.exposures,
+        exposures=panels.exposures,
         rows=tuple(rows),
         production=production,
     )
@@ -182,7 +204,7 @@ def _typed(value: float) -> float:
     return float(f"{value:.2g}")
 
 
-class _Easel:
+class _PanelRenderer:
     """Scenes with their truths, and the panels of pictures of them."""
 
     def __init__(
@@ -228,7 +250,7 @@ class _Easel:
     def row(
         self, label: str, pictures: Sequence[FloatArray], passes: int | None = None
     ) -> SheetRow:
-        """Hold a picture of each scene against its truth."""
+        """Compare a picture of each scene with its truth."""
         panels = [
             make_panel(
                 picture,

@@ -7,14 +7,17 @@ of the sum of absolute values. ``sssfit.chart`` draws the record.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from sssfit.arrays import FloatArray
-from sssfit.fit import make_target
+from sssfit.arrays import FloatArray, plain
+from sssfit.fit import Pitch, make_target
 from sssfit.fit.svd import all_eigenvalues
 from sssfit.profile import Profile
+
+_MOST = 12  # terms in figures; the chart shows as many
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,9 +57,25 @@ class Spectrum:
         left = 1.0 - np.cumsum(self.squared_share[:, channel])
         return int(np.argmax(left <= error**2)) + 1
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures of ``sssfit chart --spectrum --json``: the first terms by channels."""
+        return plain(
+            {
+                "channels": self.profile.channels,
+                "mm_per_pixel": self.mm_per_pixel,
+                "pixels": self.pixels,
+                "eigenvalues": self.values[:_MOST],
+                "squared_share": self.squared_share[:_MOST],
+                "absolute_share": self.absolute_share[:_MOST],
+                "rank_for_1_percent": [
+                    self.rank_for(0.01, c) for c in range(self.profile.n_channels)
+                ],
+            }
+        )
+
 
 def compute_spectrum(
-    profile: Profile, *, mm_per_pixel: float | None = None, support_mm: float | None = None
+    profile: Profile, *, mm_per_pixel: Pitch | None = None, support_mm: float | None = None
 ) -> Spectrum:
     """Return the singular values of the kernel that fits aim at.
 
@@ -70,7 +89,7 @@ def compute_spectrum(
     Raises
     ------
     FitError, ProfileError
-        The profile, the pitch or the support is of no use.
+        Invalid profile, pitch or support.
 
     Examples
     --------

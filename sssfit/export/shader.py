@@ -17,9 +17,10 @@ _WIDEST_VECTOR = 4  # float4; kernels of more channels become arrays of floats
 
 
 def hlsl(kernel: SeparableKernel) -> str:
-    """Return HLSL: signs and weights of each term, the channel last, the weights by pixel.
+    """Return HLSL: constant arrays of the signs and weights of each term.
 
-    Up to four channels are float to float4; beyond that weights are [term][pixel][channel].
+    Weights are indexed by term and pixel. Up to four channels are one float to float4; more
+    channels take a third index.
     """
     terms, pixels, channels = kernel.weights.shape
     is_vector = channels <= _WIDEST_VECTOR

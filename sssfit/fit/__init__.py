@@ -1,14 +1,22 @@
 """Profile to kernel: one method, one file, one signature ``fit_x(profile, ...) -> FitResult``.
 
-``METHODS`` has them by the names of the command line. Every ``fit_x`` takes a profile and
-``mm_per_pixel``, ``support_mm`` and ``normalize`` by keyword, beside settings of its own.
+``METHODS`` has them by the names of the command line, from the entries in ``sssfit.methods``. Every
+``fit_x`` takes a profile and ``mm_per_pixel`` (0.3 by default), ``support_mm`` and ``normalize`` by
+keyword, beside settings of its own.
+
+The package is the function `fit` as well: ``sssfit.fit(profile, "svd", rank=3)``.
 """
 
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
 
+from sssfit.errors import FitError
 from sssfit.fit._result import FitResult
-from sssfit.fit._target import make_target, support_of
+from sssfit.fit._target import MM_PER_PIXEL, Pitch, make_target, pitch_of, support_of
 from sssfit.fit.artist import fit_artist
 from sssfit.fit.burley import fit_burley
 from sssfit.fit.falloff import fit_falloff
@@ -16,11 +24,18 @@ from sssfit.fit.gaussians import fit_gaussians
 from sssfit.fit.guided import fit_guided
 from sssfit.fit.preintegrated import fit_preintegrated
 from sssfit.fit.svd import fit_svd
+from sssfit.kernel import SeparableKernel
+from sssfit.messages import shown
+from sssfit.methods import FITS
+from sssfit.profile import Profile
 
 __all__ = [
     "METHODS",
+    "MM_PER_PIXEL",
     "FitMethod",
     "FitResult",
+    "Pitch",
+    "fit",
     "fit_artist",
     "fit_burley",
     "fit_falloff",
@@ -29,6 +44,7 @@ __all__ = [
     "fit_preintegrated",
     "fit_svd",
     "make_target",
+    "pitch_of",
     "support_of",
 ]
 
@@ -41,24 +57,51 @@ class FitMethod:
     summary: str
 
 
-METHODS = {
-    "svd": FitMethod(
-        fit_svd, "rank N: the largest terms of the singular value decomposition; the smallest error"
-    ),
-    "gaussians": FitMethod(
-        fit_gaussians, "1 to 10 passes: a sum of Gaussians, best for the profile, r-weighted"
-    ),
-    "preintegrated": FitMethod(
-        fit_preintegrated, "one pass: the profile integrated along lines; exact for axis edges"
-    ),
-    "guided": FitMethod(
-        fit_guided, "one pass fitted under a guide function: near (k = 0) to far (k = 4) scattering"
-    ),
-    "artist": FitMethod(fit_artist, "one pass of two Gaussians per channel, fitted or set by hand"),
-    "falloff": FitMethod(
-        fit_falloff, "one pass, red skin stretched: width, strength and falloff, fitted or by hand"
-    ),
-    "burley": FitMethod(
-        fit_burley, "one pass: normalised diffusion, a shape per channel, as engines take it"
-    ),
-}
+METHODS = {name: FitMethod(each.load(), each.summary) for name, each in FITS.items()}
+
+
+def fit(profile: Profile | str | Path, method: str = "svd", **settings: Any) -> SeparableKernel:
+    """Fit a separable kernel to a profile.
+
+    Parameters
+    ----------
+    profile : Profile, str or Path
+        The record, or the path of a ``.profile.npz`` file.
+    method : str
+        A name of `METHODS`.
+    **settings
+        Keyword arguments of the method's ``fit_x``: ``rank``, ``mm_per_pixel``, ...
+
+    Returns
+    -------
+    SeparableKernel
+        The kernel of the method's `FitResult`, which also has its stop reasons and seconds.
+
+    Raises
+    ------
+    FitError
+        There is no such method, or it cannot fit this profile with these settings.
+    ProfileError
+        The file cannot be read as a profile.
+    """
+    if not isinstance(method, str) or method not in METHODS:
+        raise FitError(f"method = {shown(method)}; expected one of {', '.join(METHODS)}.")
+    if isinstance(profile, str | Path):
+        profile = Profile.load(profile)
+    if not isinstance(profile, Profile):
+        raise FitError(f"profile = {shown(profile)}; expected a Profile, or the path of its file.")
+    return METHODS[method].fit(profile, **settings).kernel
+
+
+class _CallableRoom(ModuleType):
+    """`import sssfit.fit` binds this package to the name, so the package itself is called."""
+
+    def __call__(
+        self, profile: Profile | str | Path, method: str = "svd", **settings: Any
+    ) -> SeparableKernel:
+        return fit(profile, method, **settings)
+
+    __call__.__doc__ = fit.__doc__
+
+
+sys.modules[__name__].__class__ = _CallableRoom

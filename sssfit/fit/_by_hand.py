@@ -1,4 +1,4 @@
-"""Parameters that somebody sets instead of fitting them."""
+"""Parameters set by hand instead of fitted."""
 
 from collections.abc import Mapping, Sequence
 

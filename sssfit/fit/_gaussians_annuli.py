@@ -65,13 +65,13 @@ class Annuli:
     signed: bool
 
     def at(self, log_variances: FloatArray) -> Point:
-        """Find the best weights for given variances; infinitely bad where there is no answer."""
+        """Find the best weights for given variances; infinite error where there is no solution."""
         columns, slopes = self._columns(log_variances)
         weights = np.zeros(len(log_variances))
         try:
             free = self._free(columns)
         except RuntimeError:  # columns alike to rounding can send the solver round in circles
-            return self._nowhere(log_variances)
+            return self._infeasible_point(log_variances)
         basis, wanted = self._unconstrained(columns[:, free])
         norms = np.linalg.norm(basis, axis=0)
         norms[norms == 0.0] = 1.0  # two of one variance, one put in by the total
@@ -80,14 +80,14 @@ class Annuli:
         if self.total is not None:
             found = np.append(found, self.total - found.sum())
         if np.abs(found).sum() > _LARGEST_SUM * max(1.0, self.total or 0.0):
-            return self._nowhere(log_variances)
+            return self._infeasible_point(log_variances)
         weights[free] = found
         jacobian = -slopes * weights
         jacobian -= q @ (q.T @ jacobian)
         return Point(log_variances, weights, self.wanted - columns @ weights, jacobian)
 
-    def _nowhere(self, log_variances: FloatArray) -> Point:
-        """Return a point that is worse than any other."""
+    def _infeasible_point(self, log_variances: FloatArray) -> Point:
+        """Return a point of infinite error."""
         nothing = np.zeros((len(self.wanted), len(log_variances)))
         return Point(log_variances, nothing[0], np.full(self.wanted.shape, np.inf), nothing)
 

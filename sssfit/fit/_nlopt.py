@@ -1,4 +1,4 @@
-"""The one file that knows how optimisers end: nlopt's SLSQP and scipy's, in our words.
+"""The optimisers: nlopt's SLSQP and scipy's simplex, with their stop reasons as text.
 
 SLSQP is sequential quadratic programming (Kraft 1988, "A software package for sequential quadratic
 programming"), as NLopt ships it. What it is handed should be scaled: objectives near 1 at the
@@ -30,7 +30,7 @@ _WORDS = {
     "XTOL_REACHED": "converged: the parameters no longer change",
     "MAXEVAL_REACHED": f"stopped after {_MOST_EVALUATIONS} evaluations, the best of them kept",
     "ROUNDOFF_LIMITED": "converged as far as rounding allows",
-    "FORCED_STOP": "stopped where the objective was no number, the best point before kept",
+    "FORCED_STOP": "stopped where the objective was not a number; the best point before is kept",
     "FAILURE": "stopped without progress, the best point kept",
     "INVALID_ARGS": "the optimiser refused the problem",
     "OUT_OF_MEMORY": "out of memory",
@@ -47,7 +47,7 @@ class Minimum:
     stop_reason: str
 
 
-class _Watch:
+class _TrackedObjective:
     """Call the objective, and keep the best feasible point and the count."""
 
     def __init__(self, objective: Function, equality: Function | None) -> None:
@@ -104,9 +104,9 @@ def minimise(
     """
     import nlopt  # only fits need it
 
-    watch = _Watch(objective, equality)
+    tracked = _TrackedObjective(objective, equality)
     solver = nlopt.opt(nlopt.LD_SLSQP, start.size)
-    solver.set_min_objective(watch)
+    solver.set_min_objective(tracked)
     if equality is not None:
         solver.add_equality_constraint(_filling(equality), FEASIBLE)
     solver.set_lower_bounds(lower)
@@ -115,12 +115,12 @@ def minimise(
     solver.set_ftol_abs(_TO_ZERO)
     solver.set_maxeval(_MOST_EVALUATIONS)
     reason = _run(solver, np.clip(start, lower, upper))
-    if watch.x is None:
+    if tracked.x is None:
         raise FitError(
             f"the optimiser met no usable point ({reason}); expected finite energies and settings: "
-            "try a larger mm_per_pixel or another method."
+            "try a larger `mm_per_pixel` or another method."
         )
-    return Minimum(watch.x, watch.value, watch.evaluations, reason)
+    return Minimum(tracked.x, tracked.value, tracked.evaluations, reason)
 
 
 def minimise_by_simplex(

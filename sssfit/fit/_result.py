@@ -1,4 +1,4 @@
-"""From what a method found for each channel to a kernel with its errors."""
+"""From the fits of the channels to a kernel with its errors."""
 
 import math
 import time
@@ -12,7 +12,7 @@ import numpy.typing as npt
 from threadpoolctl import threadpool_limits
 
 from sssfit import __version__
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._target import Target
 from sssfit.kernel import SeparableKernel
@@ -39,8 +39,8 @@ def factor_to(
     if min(within, wanted) <= 0.0:
         raise FitError(
             f"channel {target.profile.channels[channel]}: the terms have the energy {within:.3g} "
-            f"within the support, which cannot be scaled to {wanted:.3g}; use energy = "
-            '"keep", another number of terms or a larger support.'
+            f"within the support, which cannot be scaled to {wanted:.3g}; use "
+            '`energy = "keep"`, another number of terms or a larger support.'
         )
     return wanted / within
 
@@ -65,16 +65,17 @@ def warn_of_misfit(what: str, kernel: SeparableKernel, *, keeps_energy: bool) ->
     `fit_channels`: the warning points at the caller of the fit.
     """
     errors, energies = kernel.relative_frobenius_error, kernel.energy_error
-    doubts = []
+    problems = []
     if (worse := errors > 1.0).any():
-        doubts.append(
+        problems.append(
             f"is farther from the profile than no kernel at all ({_listed(kernel, errors, worse)})"
         )
     if keeps_energy and (off := np.abs(energies) > _MOST_ENERGY_ERROR).any():
-        doubts.append(f"has not the profile's energy ({_listed(kernel, energies, off, '+')})")
-    if doubts:
+        listed = _listed(kernel, energies, off, "+")
+        problems.append(f"does not preserve the profile's energy ({listed})")
+    if problems:
         warnings.warn(
-            f"{what}: the {kernel.method} kernel {' and '.join(doubts)}: try a larger support, "
+            f"{what}: the {kernel.method} kernel {' and '.join(problems)}: try a larger support, "
             "more terms or another method.",
             SssfitWarning,
             stacklevel=4,
@@ -126,6 +127,30 @@ class FitResult:
         """Kernel's energy against the profile's diffuse reflectance, as a share of it (C,)."""
         return self.kernel.energy_error
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures that ``sssfit fit --json`` prints: lists and numbers."""
+        kernel = self.kernel
+        return plain(
+            {
+                "material": kernel.meta["material"],
+                "channels": kernel.channels,
+                "method": kernel.method,
+                "rank": kernel.rank,
+                "mm_per_pixel": kernel.mm_per_pixel,
+                "support_mm": kernel.support_mm,
+                "pixels": kernel.pixels,
+                "taps": None,
+                "relative_frobenius_error": self.relative_frobenius_error,
+                "energy_error": self.energy_error,
+                "energy": kernel.energy,
+                "scale": kernel.scale,
+                "evaluations": self.evaluations,
+                "stop_reason": self.stop_reasons,
+                "seconds": self.seconds,
+                "parameters": kernel.parameters,
+            }
+        )
+
 
 def fit_channels(
     target: Target,
@@ -171,7 +196,7 @@ def fit_channels(
     channels = range(target.profile.n_channels)
     # One thread: BLAS waits for its threads, up to ten times longer where others hold a core.
     with threadpool_limits(1, user_api="blas"):
-        fits = [_nothing(target) if empty[c] else fit_channel(c) for c in channels]
+        fits = [_zero_fit(target) if empty[c] else fit_channel(c) for c in channels]
         errors = _frobenius_errors(target, fits)
     signs, half = _stacked(fits)
     name = target.name
@@ -207,7 +232,7 @@ def fit_channels(
     )
 
 
-def _nothing(target: Target) -> ChannelFit:
+def _zero_fit(target: Target) -> ChannelFit:
     return ChannelFit(
         np.ones(1), np.zeros((1, target.half_pixels + 1)), "the channel returns no light"
     )

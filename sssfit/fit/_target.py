@@ -1,4 +1,4 @@
-"""What every fit aims at: the pixel-integrated kernel of a profile, on a pitch and a support.
+"""The target of every fit: the pixel-integrated kernel of a profile, on a pitch and a support.
 
 Never point samples: R_d ~ 1/r near the beam, and a sampled kernel's every figure would depend on
 where the samples fall. Quadrants are made a channel at a time: 1237 x 1237 pixels take 12 MB and
@@ -8,15 +8,18 @@ where the samples fall. Quadrants are made a channel at a time: 1237 x 1237 pixe
 import math
 import warnings
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import FitError, SssfitWarning
-from sssfit.messages import printable
+from sssfit.messages import printable, shown
 from sssfit.profile import Profile
 
+MM_PER_PIXEL = 0.3  # a head 0.6 m away on 1080 rows; skin1's whole kernel is 143 pixels
+Pitch: TypeAlias = float | Literal["profile"]
 KEPT = 0.999  # support "auto": share of every channel's on-grid energy within it
 _FAINTEST = 1e-145  # energy: squares of fainter pixels are 0, and errors relative to them nothing
 _MOST_BYTES = 2e9
@@ -67,7 +70,7 @@ class Target:
 
 
 def make_target(
-    profile: Profile, mm_per_pixel: float | None = None, support_mm: float | None = None
+    profile: Profile, mm_per_pixel: Pitch | None = None, support_mm: float | None = None
 ) -> Target:
     """Choose pixels for a profile, and refuse one that no fit can use.
 
@@ -75,8 +78,9 @@ def make_target(
     ----------
     profile : Profile
         From any method.
-    mm_per_pixel : float, optional [mm]
-        Pitch; by default the first annulus's width.
+    mm_per_pixel : float or "profile", optional [mm]
+        Pitch; by default 0.3, as a picture of a head 0.6 m away has it. "profile" is the first
+        annulus's width.
     support_mm : float, optional [mm]
         Half width: 2 floor(support / pitch) + 1 pixels, centres on the axis. By default the
         smallest that keeps 99.9 % of every channel's on-grid energy.
@@ -84,7 +88,7 @@ def make_target(
     Raises
     ------
     FitError
-        Energies that are NaN, negative or all zero; a pitch or support that is no length; a
+        Energies that are NaN, negative or all zero; a pitch or support that is not a length; a
         channel of whose light the support holds nothing; more than 2 GB for a channel.
 
     Warns
@@ -93,7 +97,7 @@ def make_target(
         The kernel is a single pixel (the identity), or more energy comes back than went in.
     """
     _check_profile(profile)
-    pitch = float(profile.r_edges_mm[1] if mm_per_pixel is None else mm_per_pixel)
+    pitch = pitch_of(profile, mm_per_pixel)
     support = support_of(profile) if support_mm is None else float(support_mm)
     for name, value in (("mm_per_pixel", pitch), ("support", support)):
         if not _LEAST_MM <= value <= _MOST_MM:
@@ -101,12 +105,12 @@ def make_target(
                 f"{name} = {value:g}; expected a length in mm above 0, from {_LEAST_MM:g} to "
                 f"{_MOST_MM:g}."
             )
-    # 1e-9 keeps a ratio that is whole but for its last bits from losing a pixel.
+    # 1e-9: a ratio that is whole except for its last bits must not lose a pixel.
     half = math.floor(min(support / pitch, _WIDEST) + 1e-9)
     if half == 0:
         warnings.warn(
             f"a pixel of {pitch:g} mm is wider than the support of {support:.4g} mm: the kernel is "
-            "a single pixel, which blurs nothing; use a smaller mm_per_pixel.",
+            "a single pixel, which blurs nothing; use a smaller `mm_per_pixel`.",
             SssfitWarning,
             stacklevel=3,
         )
@@ -114,6 +118,20 @@ def make_target(
     _check_memory(target)
     _check_light(target)
     return target
+
+
+def pitch_of(profile: Profile, mm_per_pixel: Pitch | None = None) -> float:
+    """Return the pitch [mm]: a given one, `MM_PER_PIXEL`, or the profile's for "profile"."""
+    if mm_per_pixel is None:
+        return MM_PER_PIXEL
+    if isinstance(mm_per_pixel, str):
+        if mm_per_pixel != "profile":
+            raise FitError(
+                f"mm_per_pixel = {shown(mm_per_pixel)}; expected a length in mm, or 'profile' for "
+                "the width of the profile's first annulus."
+            )
+        return float(profile.r_edges_mm[1])
+    return float(mm_per_pixel)
 
 
 def support_of(profile: Profile) -> float:
@@ -134,7 +152,7 @@ def _check_memory(target: Target) -> None:
         raise FitError(
             f"a kernel of {pixels} x {pixels} pixels of {target.mm_per_pixel:.4g} mm would need "
             f"{size / 1e9:.3g} GB of memory a channel, and {_MOST_BYTES / 1e9:.3g} GB is the "
-            "most: use a larger mm_per_pixel or a smaller support."
+            "most: use a larger `mm_per_pixel` or a smaller support."
         )
 
 

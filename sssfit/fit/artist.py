@@ -1,4 +1,4 @@
-"""The artist-friendly kernel: two Gaussians in one pass, to be fitted or set by hand.
+"""The artist-friendly kernel: two Gaussians in one pass, fitted or set by hand.
 
 a_m(x) = w G(x, v_near) + (1 - w) G(x, v_far) per channel (Jimenez et al. 2015, "Separable
 Subsurface Scattering", supplement E). A shader multiplies each sample by
@@ -29,7 +29,7 @@ from sssfit.fit._by_hand import (
 )
 from sssfit.fit._nlopt import Minimum, minimise, minimise_by_simplex
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
-from sssfit.fit._target import Target, make_target
+from sssfit.fit._target import Pitch, Target, make_target
 from sssfit.profile import Profile
 
 _WIDTHS = 10  # tried for each Gaussian, all pairs, before the best are refined
@@ -52,7 +52,7 @@ PictureTarget = Callable[[Target], Callable[[FloatArray], float]]
 def fit_artist(
     profile: Profile,
     *,
-    mm_per_pixel: float | None = None,
+    mm_per_pixel: Pitch | None = None,
     support_mm: float | None = None,
     normalize: bool = False,
     target: Literal["line", "kernel"] | PictureTarget = "line",
@@ -62,7 +62,7 @@ def fit_artist(
 ) -> FitResult:
     """Fit two Gaussians per channel, or take those that are given.
 
-    The pass has the profile's energy, whatever the support cuts off.
+    The pass has the profile's energy, including what the support cuts off.
 
     Parameters
     ----------
@@ -91,7 +91,7 @@ def fit_artist(
     Raises
     ------
     FitError, ProfileError
-        The profile, the pixels or a setting is of no use.
+        Invalid profile, pixels or setting.
     """
     if not callable(target) and target not in ("line", "kernel"):
         raise FitError(

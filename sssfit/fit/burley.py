@@ -21,7 +21,7 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import FitError
 from sssfit.fit._nlopt import root
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels, restores
-from sssfit.fit._target import make_target
+from sssfit.fit._target import Pitch, make_target
 from sssfit.profile import Profile
 from sssfit.shapes import diffusion_cdf, diffusion_line_integral
 
@@ -34,7 +34,7 @@ def fit_burley(
     profile: Profile,
     *,
     energy: str = "rescale",
-    mm_per_pixel: float | None = None,
+    mm_per_pixel: Pitch | None = None,
     support_mm: float | None = None,
     normalize: bool = False,
 ) -> FitResult:

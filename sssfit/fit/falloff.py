@@ -27,7 +27,7 @@ from sssfit.errors import FitError
 from sssfit.fit._by_hand import gaussian_pixels, kernel_misfit, of_unit_sum, per_channel
 from sssfit.fit._nlopt import Minimum, minimise
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
-from sssfit.fit._target import make_target
+from sssfit.fit._target import Pitch, make_target
 from sssfit.profile import Profile
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS
 
@@ -48,7 +48,7 @@ PerChannel = float | Sequence[float]
 def fit_falloff(
     profile: Profile,
     *,
-    mm_per_pixel: float | None = None,
+    mm_per_pixel: Pitch | None = None,
     support_mm: float | None = None,
     normalize: bool = False,
     width: float | None = None,
@@ -57,7 +57,7 @@ def fit_falloff(
 ) -> FitResult:
     """Fit width, strength and falloff to the 2D kernel, or take those that are given.
 
-    The pass has the profile's energy, whatever the support cuts off.
+    The pass has the profile's energy, including what the support cuts off.
 
     Parameters
     ----------
@@ -82,7 +82,7 @@ def fit_falloff(
     Raises
     ------
     FitError, ProfileError
-        The profile, the pixels or a setting is of no use.
+        Invalid profile, pixels or setting.
     """
     target = make_target(profile, mm_per_pixel, support_mm)
     given = _by_hand(width, strength, falloff, profile.channels)

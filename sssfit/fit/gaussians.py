@@ -26,9 +26,9 @@ from threadpoolctl import threadpool_limits
 
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._gaussians_annuli import make_annuli
-from sssfit.fit._gaussians_search import Found, is_steep, rings, search
+from sssfit.fit._gaussians_search import GaussianSum, is_steep, rings, search
 from sssfit.fit._result import ChannelFit, FitResult, factor_to, fit_channels, restores
-from sssfit.fit._target import Target, make_target, name_of
+from sssfit.fit._target import Pitch, Target, make_target, name_of
 from sssfit.profile import Profile
 from sssfit.shapes import gaussian_line_integral
 
@@ -45,7 +45,7 @@ def fit_gaussians(
     signed: bool = False,
     free_energy: bool = False,
     energy: str = "rescale",
-    mm_per_pixel: float | None = None,
+    mm_per_pixel: Pitch | None = None,
     support_mm: float | None = None,
     normalize: bool = False,
 ) -> FitResult:
@@ -120,7 +120,7 @@ def fit_gaussians(
 
 
 def _as_passes(
-    target: Target, channel: int, found: Found, on_grid: float, *, rescale: bool
+    target: Target, channel: int, found: GaussianSum, on_grid: float, *, rescale: bool
 ) -> ChannelFit:
     """Integrate the Gaussians over the pixels; a weight's root goes into each of its two passes."""
     weights, edges_mm = found.weights * on_grid, target.edges_mm()

@@ -1,4 +1,4 @@
-"""The guided kernel: one pass, fitted where a guide function says that it matters.
+"""The guided kernel: one pass, fitted under a guide function that weights the pixels.
 
 Minimise over a the sum of Gamma (R_d - a a^T)^2 subject to (sum a)^2 = ||R_d||_1, with
 Gamma(x, y; k) = (x^2 + y^2)^(k/2) (1 - exp(-b x^2)) (1 - exp(-b y^2)) (Jimenez et al. 2015,
@@ -7,7 +7,7 @@ k = 4 far light. x and y are 1 at the channel's own extent, in proportion to its
 that k and b say the same for a narrow channel as for a wide one; docs/fits.md has what else was
 tried. Sequential quadratic programming, coarse to fine.
 
-Gamma vanishes along the axes, so that the middle pixel a(0) is all but free: it takes up whatever
+Gamma vanishes along the axes, so that the middle pixel a(0) is almost free: it takes up all that
 energy the rest does not want and becomes a spike, which is reported and can be bounded.
 """
 
@@ -21,7 +21,8 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._nlopt import Function, Minimum, minimise
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
-from sssfit.fit._target import Target, make_target
+from sssfit.fit._target import Pitch, Target, make_target
+from sssfit.optics import gauss_legendre
 from sssfit.profile import Profile
 from sssfit.profile.bins import mean_free_paths_mm
 
@@ -41,7 +42,7 @@ _ACROSS = 64  # quadrature nodes of Gamma along a half line, at least: the steps
 def fit_guided(
     profile: Profile,
     *,
-    mm_per_pixel: float | None = None,
+    mm_per_pixel: Pitch | None = None,
     support_mm: float | None = None,
     normalize: bool = False,
     k: float = DRAWN_K,
@@ -54,8 +55,8 @@ def fit_guided(
     ----------
     profile : Profile
     mm_per_pixel, support_mm : float, optional [mm]
-        Pixels, 513 at most; see ``sssfit.fit.make_target``. By default the first annulus's width,
-        or the least with which 513 pixels suffice.
+        Pixels, 513 at most; see ``sssfit.fit.make_target``. By default, and for "profile", the
+        least with which 513 pixels suffice where that is more.
     normalize : bool
         Unit energy for every channel, the energy kept apart.
     k : float
@@ -75,7 +76,7 @@ def fit_guided(
     Raises
     ------
     FitError, ProfileError
-        The profile, the pixels or a setting is of no use.
+        Invalid profile, pixels or setting.
 
     Warns
     -----
@@ -127,13 +128,13 @@ def gamma(half_pixels: int, k: float, b: float = 50.0, extent: float = 1.0) -> F
     """
     unit = (half_pixels + 0.5) * extent  # pixels
     order = max(4, math.ceil(_ACROSS / max(unit, 1.0)))
-    nodes, weights = np.polynomial.legendre.leggauss(order)
+    nodes, weights = gauss_legendre(order, -0.5, 0.5)
     pixels = np.arange(half_pixels + 1)[:, None]
-    square = (((pixels + 0.5 * nodes) / unit) ** 2).ravel()
+    square = (((pixels + nodes) / unit) ** 2).ravel()
     rising = -np.expm1(-b * square)
     values = (square[:, None] + square) ** (0.5 * k) * rising[:, None] * rising
     blocks = values.reshape(half_pixels + 1, order, half_pixels + 1, order)
-    mean: FloatArray = np.einsum("iajb,a,b->ij", blocks, 0.5 * weights, 0.5 * weights)
+    mean: FloatArray = np.einsum("iajb,a,b->ij", blocks, weights, weights)
     return mean
 
 
@@ -180,7 +181,7 @@ def rank_one(
         start / scale,
         lower=np.zeros(start.size),
         upper=upper,
-        equality=None if total is None else _sum_is(math.sqrt(total), copies * scale),
+        equality=None if total is None else _sum_constraint(math.sqrt(total), copies * scale),
     )
     return Minimum(scale * found.x, found.value, found.evaluations, found.stop_reason)
 
@@ -194,7 +195,7 @@ def _misfit(
     return float(np.sum(pull * left)) / norm, -4.0 / norm * scale * (pull @ a)
 
 
-def _sum_is(wanted: float, weights: FloatArray) -> Function:
+def _sum_constraint(wanted: float, weights: FloatArray) -> Function:
     """Return weights x - wanted with its gradient: (sum a)^2 = total has one root with a >= 0."""
 
     def equality(x: FloatArray) -> tuple[float, FloatArray]:
@@ -222,7 +223,7 @@ def fit_one_pass(
         found = rank_one(
             level.quadrant(channel) / total,
             gamma(half, k, b, extent),
-            _on_the_sum(start, most),
+            _normalised_pass(start, most),
             centre_bound=most if half else 1.0,
         )
         levels.append(
@@ -270,7 +271,7 @@ def _refined(half_line: FloatArray, half_pixels: int) -> FloatArray:
     return np.asarray(fine)
 
 
-def _on_the_sum(a: FloatArray, most: float) -> FloatArray:
+def _normalised_pass(a: FloatArray, most: float) -> FloatArray:
     """Scale a half line to a whole pass of sum 1 whose middle holds no more than ``most``."""
     a = a / (2.0 * a.sum() - a[0])
     if a[0] <= most or a.size == 1:
@@ -293,7 +294,7 @@ def _check_settings(k: float, b: float, centre_bound: float | None) -> None:
         )
 
 
-def guided_target(profile: Profile, mm_per_pixel: float | None, support_mm: float | None) -> Target:
+def guided_target(profile: Profile, mm_per_pixel: Pitch | None, support_mm: float | None) -> Target:
     """Choose pixels as `make_target` does, but no more than 513, and name a pitch that will do.
 
     Raises FitError where a pitch was given that takes more; warns where the default was widened.
@@ -308,8 +309,8 @@ def guided_target(profile: Profile, mm_per_pixel: float | None, support_mm: floa
         f"the guided fit takes up to {MOST_PIXELS} pixels, and the support is {pixels} pixels of "
         f"{pitch:.4g} mm"
     )
-    if mm_per_pixel is not None:
-        raise FitError(f"{what}: use mm_per_pixel = {enough:.3g} or more, or a smaller support.")
+    if mm_per_pixel not in (None, "profile"):
+        raise FitError(f"{what}: use `mm_per_pixel = {enough:.3g}` or more, or a smaller support.")
     warnings.warn(f"{what}: pixels of {enough:.3g} mm are used.", SssfitWarning, stacklevel=3)
     return make_target(profile, enough, support_mm)
 

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels, restores
-from sssfit.fit._target import make_target
+from sssfit.fit._target import Pitch, make_target
 from sssfit.profile import Profile
 
 
@@ -22,7 +22,7 @@ def fit_preintegrated(
     profile: Profile,
     *,
     energy: str = "rescale",
-    mm_per_pixel: float | None = None,
+    mm_per_pixel: Pitch | None = None,
     support_mm: float | None = None,
     normalize: bool = False,
 ) -> FitResult:

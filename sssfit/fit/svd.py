@@ -28,7 +28,7 @@ from sssfit.fit._result import (
     frobenius_error,
     restores,
 )
-from sssfit.fit._target import Target, make_target
+from sssfit.fit._target import Pitch, Target, make_target
 from sssfit.profile import Profile
 
 _USUAL_RANK = 3
@@ -42,7 +42,7 @@ def fit_svd(
     *,
     rank: int | None = None,
     energy: str = "rescale",
-    mm_per_pixel: float | None = None,
+    mm_per_pixel: Pitch | None = None,
     support_mm: float | None = None,
     normalize: bool = False,
 ) -> FitResult:
@@ -71,7 +71,7 @@ def fit_svd(
     Raises
     ------
     FitError, ProfileError
-        The rank, the profile, the pitch or the support is of no use.
+        Invalid rank, profile, pitch or support.
     """
     target = make_target(profile, mm_per_pixel, support_mm)
     rank = _checked_rank(rank, target)
@@ -182,6 +182,6 @@ def _checked_rank(rank: int | None, target: Target) -> int:
     if not 1 <= whole <= most:
         raise FitError(
             f"rank = {whole}; expected 1 to {most}: the kernel has {pixels} x {pixels} pixels and, "
-            "being even, no more terms. Use a smaller mm_per_pixel or a larger support."
+            "being even, no more terms. Use a smaller `mm_per_pixel` or a larger support."
         )
     return whole

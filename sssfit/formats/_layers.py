@@ -1,4 +1,4 @@
-"""What of a picture file is read: the part and the channels; and whether it can be."""
+"""Which part and channels of a picture file are read, and whether they can be."""
 
 import dataclasses
 from pathlib import Path
@@ -69,12 +69,12 @@ class _Layer:
 def choose(source: "ImageInput", path: Path, layer: str | None) -> Choice:
     """Take R, G, B of the layer that was asked for; by default those of no layer, else the only.
 
-    Where there is no such layer Y serves, and in the end all that is no alpha.
+    Without such a layer Y is used, and last all channels except alpha.
     """
     specs: list[ImageSpec] = []
     while source.seek_subimage(len(specs), 0):
         specs.append(source.spec())
-    source.geterror()  # that there is no further part is no error; it would hide the next one
+    source.geterror()  # a missing part is not an error; left there it would hide the next one
     coloured = _layers(specs, ("R", "G", "B"))
     grey = _layers(specs, ("Y",))
     if layer is not None:
@@ -90,7 +90,7 @@ def choose(source: "ImageInput", path: Path, layer: str | None) -> Choice:
             )
         if found:
             return _chosen(specs, found[0])
-    return _nameless(specs, path)
+    return _unnamed_channels(specs, path)
 
 
 def _layers(specs: list["ImageSpec"], names: tuple[str, ...]) -> list[_Layer]:
@@ -115,7 +115,7 @@ def _layers(specs: list["ImageSpec"], names: tuple[str, ...]) -> list[_Layer]:
 
 
 def _colours(places: dict[str, int], names: tuple[str, ...]) -> tuple[int, ...] | None:
-    """Return where a group has the channels, None where it has not."""
+    """Return where a group has the channels, or None."""
     if names == ("Y",):
         is_place = all(each in places for each in _PLACE)
         return None if is_place or "y" not in places else (places["y"],)
@@ -142,7 +142,7 @@ def _chosen(specs: list["ImageSpec"], layer: _Layer) -> Choice:
     return Choice(layer.part, specs[layer.part], layer.names, layer.colours, layer.alpha, notes)
 
 
-def _nameless(specs: list["ImageSpec"], path: Path) -> Choice:
+def _unnamed_channels(specs: list["ImageSpec"], path: Path) -> Choice:
     """Take every channel of the first part, where none is called a colour."""
     spec = specs[0]
     # Only beside colours that are known by name is a channel called A alpha; two are grey with it.

@@ -1,4 +1,4 @@
-"""The lines of MCML's files that hold data, taken one after the other and checked.
+"""The data lines of MCML's files, read in order and checked.
 
 Every message names the file, the line, what it holds and what was expected there.
 """
@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from sssfit.errors import SssfitError
 from sssfit.messages import printable, shown
-from sssfit.text import finite_number, tenfold_number
+from sssfit.text import decimal_shifted, finite_number
 
 # What the two formats call a comment. In an input it begins at any #. In an output that would make
 # 1 of the 1.#INF that some C libraries print, and MCML itself puts a space or tab before its own.
@@ -131,4 +131,4 @@ class Lines:
             raise self.failure(
                 line.number, f"{name} = {shown(word)} is out of range; expected {expected}."
             )
-        return tenfold_number(word, tenfold)
+        return decimal_shifted(word, tenfold)

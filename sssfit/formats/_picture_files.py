@@ -1,4 +1,4 @@
-"""The files pictures come from and go to: formats by ending, and by what the file begins with."""
+"""Picture files: their formats, by ending and by their first bytes."""
 
 import contextlib
 import math
@@ -129,7 +129,14 @@ _MAGIC = {
     "hdr": (b"#?RADIANCE", b"#?RGBE"),
     "tiff": (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+"),
     "png": (_PNG,),
+    "jpeg": (b"\xff\xd8\xff",),
 }
+READ = "EXR, HDR, TIFF, PNG, JPG or TGA"
+# A TGA file begins with no mark: the new form ends with one, the old is known by its ending too.
+_TGA_END = b"TRUEVISION-XFILE.\0"
+_TGA_ENDINGS = (".tga", ".targa")
+_TGA_TYPES = (1, 2, 3, 9, 10, 11)  # of palettes, colours and greys, plain and run-length encoded
+_TGA_DEPTHS = (8, 15, 16, 24, 32)  # bits a pixel
 _STDERR = threading.Lock()  # two at once would put the wrong stderr back
 _LONGEST_CALLED = 400  # characters of a path in messages
 # How pictures that we write name their maker; PNG has it in its Exif, which is TIFF's.
@@ -165,7 +172,7 @@ def image_format(target: str | Path | BinaryIO) -> str:
 def as_path(path: object) -> Path:
     """Return the path of a picture; refuse what cannot be one."""
     if not isinstance(path, str | os.PathLike) or isinstance(os.fspath(path), bytes):
-        raise FileError(f"{shown(path)} is no path; name an EXR, HDR, TIFF or PNG file.")
+        raise FileError(f"{shown(path)} is not a path; name an {READ} file.")
     if "\0" in (text := os.fspath(path)):
         raise FileError(f"{shown(text)} holds a null character, which no file's name does.")
     return Path(text)
@@ -180,7 +187,7 @@ def is_image_file(path: str | Path) -> bool:
 
 
 def found_format(path: Path) -> str:
-    """Return the format a file has by its content: "exr", "hdr", "tiff" or "png".
+    """Return the format a file has by its content: a key of ``_MAGIC``, or "tga".
 
     Raises
     ------
@@ -190,13 +197,13 @@ def found_format(path: Path) -> str:
     name = called(path)
     try:
         if path.exists() and not path.is_file():
-            raise FileError(f"{name} is a folder or a device; name an EXR, HDR, TIFF or PNG file.")
+            raise FileError(f"{name} is a folder or a device; name an {READ} file.")
         found = _format_of(path)
         is_empty = path.stat().st_size == 0
     except OSError as error:
         raise FileError(f"{name} cannot be read: {reason(error)}.") from error
     if found is None:
-        what = "is empty" if is_empty else "is not an EXR, HDR, TIFF or PNG file"
+        what = "is empty" if is_empty else f"is not an {READ} file"
         raise FileError(f"{name} {what}; name a picture in one of these formats.")
     return found
 
@@ -265,5 +272,26 @@ def _chunks_are_whole(stream: BinaryIO) -> bool:
 
 def _format_of(path: Path) -> str | None:
     with path.open("rb") as stream:
-        head = stream.read(16)
-    return next((name for name, begins in _MAGIC.items() if head.startswith(begins)), None)
+        head = stream.read(18)
+        if found := next(
+            (name for name, begins in _MAGIC.items() if head.startswith(begins)), None
+        ):
+            return found
+        is_old = path.suffix.lower() in _TGA_ENDINGS
+        return "tga" if _begins_a_tga(head) and (is_old or _ends_a_tga(stream)) else None
+
+
+def _begins_a_tga(head: bytes) -> bool:
+    """Tell whether 18 bytes can be a TGA's header (Truevision, TGA file format, version 2.0)."""
+    if len(head) < 18:
+        return False
+    has_palette, kind = head[1], head[2]
+    width, height = struct.unpack("<HH", head[12:16])
+    is_known = has_palette in (0, 1) and kind in _TGA_TYPES and head[16] in _TGA_DEPTHS
+    return is_known and width > 0 and height > 0
+
+
+def _ends_a_tga(stream: BinaryIO) -> bool:
+    size = stream.seek(0, os.SEEK_END)
+    stream.seek(max(size - len(_TGA_END), 0))
+    return stream.read() == _TGA_END

@@ -42,6 +42,8 @@ _COMPRESSIONS = {
     50002: "JPEG XL",
     52546: "JPEG XL",
 }
+# Of a damaged JPEG the reader makes what it can, and says so; bytes too many cost no pixel.
+_HARMLESS = "extraneous bytes before marker"
 _NOT_BUILT = ("compression support is not configured", "decoding is not implemented")
 
 
@@ -85,8 +87,9 @@ def _stored(path: Path, layer: str | None, largest_bytes: float) -> tuple[Choice
         check_kind(choice, path)
         check_size(choice, path, largest_bytes)
         stored = source.read_image(choice.part, 0, *choice.span, "unknown")
-        if stored is None:
-            raise _unreadable(path, choice.spec, one_line(source.geterror()))
+        words = one_line(source.geterror())
+        if stored is None or (words and _HARMLESS not in words):
+            raise _unreadable(path, choice.spec, words)
         return choice, stored
     finally:
         source.close()

@@ -1,5 +1,6 @@
-"""A picture's values: what may be read, and what each format can hold."""
+"""A picture's colours: sRGB, primaries, and the values each format can hold."""
 
+import re
 from collections.abc import Sequence
 from numbers import Real
 
@@ -14,6 +15,7 @@ from sssfit.messages import printable, shown
 # below the 1.5e-5 of a 16-bit code.
 _JOINT_LINEAR, _JOINT_CODE = 0.0031308, 0.04045
 _SLOPE, _OFFSET, _POWER = 12.92, 0.055, 2.4
+_HEX = re.compile("#(?:[0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
 
 
 def srgb_encode(linear: npt.ArrayLike) -> FloatArray:
@@ -50,6 +52,21 @@ def srgb_decode(code: npt.ArrayLike) -> FloatArray:
     value = np.asarray(code, dtype=np.float64)
     above = ((np.maximum(value, _JOINT_CODE) + _OFFSET) / (1.0 + _OFFSET)) ** _POWER
     return np.where(value <= _JOINT_CODE, value / _SLOPE, above)
+
+
+def linear_from_hex(code: str) -> FloatArray:
+    """Return the linear R, G, B (3,) of an sRGB colour written as a web page does, ``#c58c6b``.
+
+    Raises
+    ------
+    RenderError
+        Not # and three or six digits from 0 to f.
+    """
+    if not isinstance(code, str) or not _HEX.fullmatch(code.strip()):
+        raise RenderError(f"{shown(code)} is not an sRGB colour in hex, such as #c58c6b.")
+    digits = code.strip()[1:]
+    pairs = [each * 2 for each in digits] if len(digits) == 3 else re.findall("..", digits)
+    return srgb_decode([int(each, 16) / 255.0 for each in pairs])
 
 
 # x, y of red, green, blue and white (D65): ITU-R BT.709-6, also the default of OpenEXR.

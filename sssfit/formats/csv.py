@@ -39,7 +39,7 @@ from sssfit.files import has_mark
 from sssfit.messages import printable, shown
 from sssfit.profile import FORMAT, Profile
 from sssfit.profile import pixels as integrals
-from sssfit.text import finite_number, read_text, tenfold_number
+from sssfit.text import decimal_shifted, finite_number, read_text
 
 QUANTITIES = ("density", "energy")
 
@@ -273,7 +273,7 @@ class _Table:
             raise self._failure(
                 self._head,
                 "the column r does not say its unit; name it r_mm, r_um, r_cm or r_m, or give "
-                "--unit. Densities are per square of that unit.",
+                "`unit`. Densities are per square of that unit.",
             )
         return given or named
 
@@ -285,9 +285,9 @@ class _Table:
         quantity, radius = given or self._said, self.radius_name
         if quantity is None:
             raise ProfileError(
-                f"{self.origin} does not say what its numbers are; give --quantity density (R_d "
-                f"in 1/{per_unit}^2 at the radius {radius}) or --quantity energy (of the annulus "
-                f"out to {radius})."
+                f"{self.origin} does not say what its numbers are; give "
+                f'`quantity = "density"` (R_d in 1/{per_unit}^2 at the radius {radius}) or '
+                f'`quantity = "energy"` (of the annulus out to {radius}).'
             )
         if quantity not in QUANTITIES or (self._said or quantity) != quantity:
             other = self._said not in (None, quantity)
@@ -345,7 +345,7 @@ class _Table:
         return np.array(radii_mm), np.array(rows)
 
     def _radius(self, line: _Line, cell: str, before: Sequence[float], quantity: str) -> float:
-        """Read a radius and hold it against those before it."""
+        """Read a radius and compare it with those before it."""
         name = self.radius_name
         if cell.lower() in ("inf", "+inf", "infinity"):
             if quantity == "density":
@@ -362,7 +362,7 @@ class _Table:
                 line, f"{shown(cell)}; expected a radius in {self.unit}, {expected}.", name
             )
         if before and radius_mm <= before[-1]:
-            last = tenfold_number(repr(before[-1]), -_TO_MM[self.unit])
+            last = decimal_shifted(repr(before[-1]), -_TO_MM[self.unit])
             raise self._failure(
                 line, f"{shown(cell)} is not above the {last!r} before it; sort by r.", name
             )
@@ -384,7 +384,7 @@ class _Table:
             raise self._failure(line, "the cell is empty; leave out lines that have gaps.", name)
         if finite_number(cell) is None:
             raise self._failure(line, f"{shown(cell)} is not a finite number such as 1.5e-3.", name)
-        return tenfold_number(cell, power)
+        return decimal_shifted(cell, power)
 
 
 def _density_unit(given: str | None, quantity: str, unit: str) -> str | None:
@@ -422,8 +422,8 @@ def _check_total(profile: Profile, table: _Table, per_unit: str | None) -> None:
     else:
         percent = ", divide by 100 if they are per cent" if total[worst] <= 100.0 else ""
         remedy = (
-            "expected shares of the incident light. Give --quantity density if these are densities"
-            f"{percent}."
+            'expected shares of the incident light. Give `quantity = "density"` if these are '
+            f"densities{percent}."
         )
     raise ProfileError(f"{said}; {remedy}")
 
@@ -436,12 +436,12 @@ def _fitting_units(total: float, table: _Table, per_unit: str) -> str:
     """
     found: list[tuple[float, str]] = []
     for each in UNITS:
-        named = f"--unit {each}" if table.radius_name == "r" else f"name the column r_{each}"
-        how = f"{named}, --density-unit {per_unit}"
+        named = f'`unit = "{each}"`' if table.radius_name == "r" else f"name the column r_{each}"
+        how = f'{named}, `density_unit = "{per_unit}"`'
         radii = total * 100.0 ** (_TO_MM[each] - _TO_MM[table.unit])
         found.append((radii, f"radii in {each} and densities per {per_unit}^2 ({how})"))
         densities = total * 100.0 ** (_TO_MM[per_unit] - _TO_MM[each])
-        found.append((densities, f"densities per {each}^2 (--density-unit {each})"))
+        found.append((densities, f'densities per {each}^2 (`density_unit = "{each}"`)'))
     fitting = [each for each in found if each[0] <= 1.0 + _ABOVE_ONE]
     best = max((value for value, _ in fitting), default=math.nan)
     units = " or ".join(what for value, what in fitting if value > 0.99 * best)
@@ -461,7 +461,7 @@ def _warn_of_gap(profile: Profile, radii_mm: FloatArray, table: _Table) -> None:
     total = profile.diffuse_reflectance
     share = np.divide(inside, total, out=np.zeros_like(total), where=total > 0)
     worst = int(np.argmax(share))
-    first = tenfold_number(repr(first_mm), -_TO_MM[table.unit])
+    first = decimal_shifted(repr(first_mm), -_TO_MM[table.unit])
     warnings.warn(
         f"{table.origin} begins at r = {first:g} {table.unit}: what leaves nearer to the beam is "
         f"not in it. Taken as flat there, {shown(profile.channels[worst])} has {inside[worst]:.3g} "

@@ -206,7 +206,7 @@ def _read_layer(lines: Lines, k: int, count: int) -> Layer:
         for c, (name, allowed, expected, tenfold) in enumerate(_COLUMNS)
     )
     if thickness_mm >= 10.0 * SEMI_INFINITE_CM:
-        _check_ground(lines, line, k, count, is_clear=sigma_a + sigma_s == 0)
+        _check_semi_infinite(lines, line, k, count, is_clear=sigma_a + sigma_s == 0)
         thickness_mm = math.inf
     try:
         coefficients = np.array([sigma_a]), np.array([sigma_s])
@@ -215,7 +215,7 @@ def _read_layer(lines: Lines, k: int, count: int) -> Layer:
         raise lines.failure(line.number, f"layer {k}, in mm: {error}") from None
 
 
-def _check_ground(lines: Lines, line: Line, k: int, count: int, *, is_clear: bool) -> None:
+def _check_semi_infinite(lines: Lines, line: Line, k: int, count: int, *, is_clear: bool) -> None:
     """Refuse a layer without a bottom where there can be none."""
     if k < count:
         raise lines.failure(

@@ -45,7 +45,7 @@ def load_mco(path: str | Path) -> Profile:
 
 
 def is_mco(text: str) -> bool:
-    """Tell whether a text begins as a file of MCML does, of whatever version, after its comments.
+    """Whether a text begins like a file of any version of MCML, after its comments.
 
     Inputs count only where they name MCML: those of version 1 begin with a bare number.
     """
@@ -107,7 +107,7 @@ def join_channels(profiles: Sequence[Profile], channels: Sequence[str]) -> Profi
     Parameters
     ----------
     profiles : sequence of Profile
-        On the same grid, of the same layers but for their coefficients.
+        On the same grid, with the same layers except for their coefficients.
     channels : sequence of str
         A name for each.
 
@@ -153,7 +153,7 @@ def _take_version(lines: Lines) -> None:
         raise lines.failure(
             line.number,
             f"this is a file of MCML {version}; only the output of MCML 1 (version A1) is read. "
-            "Write its layers as an input file of MCML 1, and `sssfit simulate` walks them.",
+            "Write its layers as an input file of MCML 1 (.mci) and simulate that.",
         )
     if line.words != ("A1",):
         raise lines.failure(
@@ -177,7 +177,7 @@ def _sizes(run: MciRun) -> dict[str, int]:
 
 
 def _read_blocks(lines: Lines, run: MciRun) -> dict[str, FloatArray]:
-    """Take all blocks to the end of the file, in whatever order."""
+    """Take all blocks to the end of the file, in any order."""
     sizes = _sizes(run)
     blocks: dict[str, FloatArray] = {}
     while (line := lines.peek()) is not None:

@@ -1,4 +1,4 @@
-"""Pictures of linear light, to and from EXR, TIFF and PNG files; Radiance HDR is read too.
+"""Pictures of linear light, to and from EXR, TIFF and PNG files; HDR, JPG and TGA are read too.
 
 What is read is known by its content. 8- and 16-bit pictures are decoded from sRGB, floating point
 is linear; light comes back in the primaries of sRGB. What was done to a file's numbers stands in
@@ -184,7 +184,8 @@ def load_image(
     Parameters
     ----------
     path : str or Path
-        An EXR, Radiance HDR, TIFF or PNG file, by its content and not by its ending.
+        An EXR, Radiance HDR, TIFF, PNG, JPG or TGA file, by its content and not by its ending, but
+        for TGA files of the first version, which only their ending tells.
     layer : str, optional
         Of an EXR: what stands before the last dot in its channels' names, or the name of a part.
     largest_bytes : float [bytes]

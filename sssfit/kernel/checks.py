@@ -1,4 +1,4 @@
-"""What a kernel's fields must be, whoever made them: shapes, numbers, names, provenance."""
+"""Checks of a kernel's fields: shapes, numbers, names, provenance."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -66,7 +66,7 @@ def _check_shapes(fields: Mapping[str, FloatArray], n_names: int) -> None:
 
 
 def _check_numbers(fields: Mapping[str, FloatArray]) -> None:
-    """Refuse what is not finite in single precision, and what no kernel has."""
+    """Refuse numbers that are not finite in single precision or out of range."""
     weights, signs, scale = fields["weights"], fields["signs"], fields["scale"]
     _check_range("weights", weights, -_MOST)
     _check_range("scale", scale, 0.0)

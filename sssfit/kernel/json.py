@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 FORMAT = "sssfit.kernel/1"
 MARK = b'"sssfit.kernel/'  # by which a file is ours, however damaged
-_REMEDY = "name a .kernel.json file, as `sssfit fit` writes it"
+_REMEDY = "name a .kernel.json file, as sssfit writes it"
 MOST_BYTES = 500_000_000  # 16000 pixels, 10 terms and 64 channels are 200 MB
 _ROUNDING = 1e-9  # relative; sums of pixels may be taken in another order
 
@@ -112,7 +112,7 @@ def _read(source: str | Path | BinaryIO, origin: str) -> bytes:
 def _parsed(text: bytes, origin: str) -> Mapping[str, Any]:
     """Parse JSON and look at its format."""
     try:
-        whole = json.loads(text, object_pairs_hook=_once_each, parse_constant=_no_number)
+        whole = json.loads(text, object_pairs_hook=_unique_keys, parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
         if MARK not in text:
             raise KernelError(f"{origin}: not a kernel; {_REMEDY}.") from None
@@ -131,7 +131,7 @@ def _parsed(text: bytes, origin: str) -> Mapping[str, Any]:
     raise KernelError(f"{origin}: not a kernel{said}; {_REMEDY}.")
 
 
-def _once_each(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     """Make an object, in which JSON itself would allow a key twice."""
     found = dict(pairs)
     if len(found) < len(pairs):
@@ -146,7 +146,7 @@ def _no_number(text: str) -> float:
 
 
 def _check_sizes(whole: Mapping[str, Any]) -> None:
-    """Hold every list against the channels, and the terms against one another."""
+    """Check the length of every list, and that the terms agree."""
     channels, terms = len(whole["channels"]), whole["terms"]
     pixels = len(terms[0]["weights"])
     lists = {"energy": whole["energy"], "scale": whole["scale"]}
@@ -167,7 +167,7 @@ def _check_sizes(whole: Mapping[str, Any]) -> None:
 
 
 def _check_derived(whole: Mapping[str, Any], signs: FloatArray, weights: FloatArray) -> None:
-    """Hold what the file says of its terms against the terms."""
+    """Check what the file says of its terms against the terms."""
     terms, pixels = weights.shape[:2]
     support_mm = (pixels - 1) // 2 * float(whole["mm_per_pixel"])
     counts = {"rank": (whole["rank"], terms), "pixels": (whole["pixels"], pixels)}

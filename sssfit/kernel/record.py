@@ -5,7 +5,7 @@ horizontal pass and the same pass vertically. Weights are energies of pixels (in
 samples), so sums of them are energies too. A kernel belongs to its pitch in mm per pixel.
 
 ``json`` has the file format, ``sssfit/kernel.schema.json`` its JSON Schema;
-``checks`` refuses what is not a kernel.
+``checks`` refuses everything else.
 """
 
 import dataclasses
@@ -15,7 +15,7 @@ from typing import Any, BinaryIO, Self
 
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.errors import KernelError
 from sssfit.files import write_atomically
 from sssfit.kernel import checks
@@ -23,6 +23,8 @@ from sssfit.kernel import json as kernel_json
 from sssfit.kernel.json import FORMAT, is_kernel_file
 
 __all__ = ["FORMAT", "SeparableKernel", "is_kernel_file"]
+
+_PROVENANCE = ("material", "profile_method", "photons", "seed", "version", "profile_sha256")
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -135,6 +137,35 @@ class SeparableKernel:
     def to_dict(self) -> dict[str, Any]:
         """Return the kernel as its file holds it."""
         return kernel_json.content(self)
+
+    def figures(self) -> dict[str, Any]:
+        """Return what ``sssfit show --json`` prints: lists and numbers, None where unknown.
+
+        Terms have their signs, energies (sign times the squared sum of the pass) and the weights of
+        the middle pixel, (terms, channels). `to_dict` is the file, with all weights.
+        """
+        return plain(
+            {
+                "kind": "kernel",
+                "format": FORMAT,
+                **{name: self.meta.get(name) for name in _PROVENANCE},
+                "settings": self.meta.get("settings") or {},
+                "method": self.method,
+                "rank": self.rank,
+                "pixels": self.pixels,
+                "mm_per_pixel": self.mm_per_pixel,
+                "support_mm": self.support_mm,
+                "channels": self.channels,
+                "energy": self.energy,
+                "scale": self.scale,
+                "relative_frobenius_error": self.relative_frobenius_error,
+                "energy_error": self.energy_error,
+                "sign": self.signs,
+                "term_energy": self.signs * self.weights.sum(axis=1) ** 2,
+                "middle_weight": self.weights[:, self.half_pixels],
+                "parameters": self.parameters,
+            }
+        )
 
     def write(self, stream: BinaryIO) -> None:
         """Write JSON to a binary stream; the same kernel gives the same bytes."""

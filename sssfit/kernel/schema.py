@@ -1,4 +1,4 @@
-"""What the file of a kernel must be, by ``kernel.schema.json``: the first fault, with its place.
+"""Checks of a kernel file by ``kernel.schema.json``: the first fault, with its place.
 
 Only the keywords that this schema uses are known; a test holds the two together.
 """

@@ -1,4 +1,4 @@
-"""What the values of a material must satisfy, and the one line said when they do not.
+"""Checks of a material's values, with one line of error for each.
 
 Every message names the key with its index, the value, what was expected and what to do. The records
 of ``sssfit.material`` call these checks when they are made; reading a file puts its name in front.
@@ -95,7 +95,7 @@ def check_lengths(layer: "Layer") -> None:
 
 
 def check_clear_or_not(layer: "Layer") -> None:
-    """Refuse a channel that is all but clear."""
+    """Refuse a channel that is almost clear."""
     sigma_t = layer.sigma_t_per_mm
     for c in np.flatnonzero((sigma_t > 0) & (sigma_t < _LEAST)):
         raise MaterialError(

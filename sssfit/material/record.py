@@ -57,6 +57,7 @@ from sssfit.material.toml import (
     write_toml,
 )
 from sssfit.messages import printable, shown
+from sssfit.optics import normal_reflectance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -222,7 +223,7 @@ class Material:
         total = 0.0
         above = self.eta_above
         for layer in self.layers[: self.first_scattering_layer + 1]:
-            one = ((layer.eta - above) / (layer.eta + above)) ** 2
+            one = normal_reflectance(layer.eta, above)
             total += (1.0 - total) ** 2 * one / (1.0 - total * one)
             above = layer.eta
         return total
@@ -311,13 +312,25 @@ def load_material(name_or_path: str | Path) -> Material:
             return parse_material(content, wanted)
     raise MaterialError(
         f"there is no material {shown(wanted)}; {did_you_mean(wanted, material_names())}"
-        "`sssfit materials` lists those there are, and a file of your own ends in .toml."
+        "`material_names()` lists those there are, and a file of your own ends in .toml."
     )
 
 
+# Of "Separable Subsurface Scattering", supplementary material G: Jensen et al. 2001.
+_PAPER = (
+    *("apple", "chicken1", "chicken2", "cream", "ketchup", "marble", "potato", "skimmilk"),
+    *("skin1", "skin2", "wholemilk"),
+)
+
+
 @cache
-def material_names() -> tuple[str, ...]:
-    """Return the names of the materials that ship with sssfit, sorted."""
+def material_names(*, paper: bool = False) -> tuple[str, ...]:
+    """Return the names of the materials that ship with sssfit, sorted.
+
+    ``paper`` leaves those that the supplement of "Separable Subsurface Scattering" has.
+    """
+    if paper:
+        return _PAPER
     files = resources.files("sssfit.materials").iterdir()
     return tuple(sorted(f.name[:-5] for f in files if f.name.endswith(".toml")))
 

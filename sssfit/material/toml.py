@@ -51,6 +51,7 @@ _ALIASES = {
     "sigma_t": _FROM_ALBEDO,
     "sigma_t_per_mm": _FROM_ALBEDO,
 }
+_EXAMPLE = '`load_material("skin1").to_toml()` gives an example'
 _MISSING = {
     "g": "add g = 0.0 if scattering is isotropic or sigma_s is a reduced one (sigma_s')",
 }
@@ -72,7 +73,7 @@ def is_path(wanted: str) -> bool:
 
 
 def read_text(path: Path) -> Text:
-    """Read a material file, and no more than ``MOST_BYTES`` of whatever it turns out to be."""
+    """Read a material file, at most ``MOST_BYTES`` of it."""
     try:
         is_folder = path.is_dir()
         content = b"" if is_folder else _first_bytes(path)
@@ -162,7 +163,7 @@ def write_toml(head: Mapping[str, Any], layers: Sequence[Mapping[str, Any]]) -> 
 def _read_toml(text: str) -> dict[str, Any]:
     """Parse TOML; every way it can fail becomes one line."""
     if not text.strip():
-        raise MaterialError("the file is empty; `sssfit materials skin1 --toml` prints an example.")
+        raise MaterialError(f"the file is empty; {_EXAMPLE}.")
     try:
         return tomllib.loads(text)
     except RecursionError:
@@ -216,8 +217,7 @@ def _check_complete(layer: Mapping[str, object], where: str) -> None:
     """Refuse a layer that lacks a coefficient."""
     for key in REQUIRED_KEYS:
         if key not in layer:
-            example = "`sssfit materials skin1 --toml` prints an example"
-            raise MaterialError(f"{where}{key} is missing; {_MISSING.get(key, example)}.")
+            raise MaterialError(f"{where}{key} is missing; {_MISSING.get(key, _EXAMPLE)}.")
 
 
 def _assignments(table: Mapping[str, Any]) -> list[str]:

@@ -1,4 +1,4 @@
-"""What every measure asks of two pictures first: checks, the exposure, what a display shows."""
+"""CIE Delta E 2000, and the checks, exposure and displayed colours of every measure."""
 
 from types import ModuleType
 
@@ -77,7 +77,7 @@ def check_pair(image: npt.ArrayLike, truth: npt.ArrayLike) -> tuple[FloatArray, 
 
 
 def check_picture(name: str, picture: FloatArray) -> None:
-    """Refuse what is no picture; negative pixels are allowed, kernels with negative terms ring."""
+    """Refuse what is not a picture; kernels with negative terms may ring below 0."""
     if picture.ndim != 3 or 0 in picture.shape:
         raise RenderError(
             f"{name} has shape {picture.shape}; expected rows, columns and channels, at least one "
@@ -111,7 +111,7 @@ def selected_pixels(picture: FloatArray, selected: BoolArray) -> FloatArray:
 def auto_exposure(truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> float:
     """Return the factor that brings the 99th percentile of the largest channel to 0.8.
 
-    It depends on the truth alone, so that every picture held against it is seen alike. Black
+    It depends on the truth alone: every picture compared with it has the same exposure. Black
     pixels are left out: a small lit object is exposed as if it filled the picture.
 
     Parameters
@@ -124,7 +124,7 @@ def auto_exposure(truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> fl
     Raises
     ------
     RenderError
-        No pixel is lit, or truth or mask is of no use.
+        No pixel is lit, or the truth or the mask is invalid.
     """
     picture = np.asarray(truth, dtype=np.float64)
     check_picture("truth", picture)

@@ -6,11 +6,12 @@ need the extra ``metrics``; `asymmetry` looks at a kernel alone and `cost` at it
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.measure.delta_e import (
     auto_exposure,
     check_exposure,
@@ -27,11 +28,16 @@ __all__ = ["COLOUR_FIGURES", "ImageScore", "auto_exposure", "measure"]
 JUST_NOTICEABLE = 1.0  # Delta E that eyes tell side by side
 # Of an `ImageScore`; the rows of comparisons and choices have the same.
 COLOUR_FIGURES = ("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99", "share_above_1")
+SCORE_FIGURES = (
+    *("rmse", "relative_l2", "maximum", "psnr_db", "energy_drift"),
+    *COLOUR_FIGURES,
+    *("exposure", "ssim", "flip"),
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImageScore:
-    """A picture held against the true one; N pixels that count, C channels.
+    """A picture compared with the true one; N pixels that count, C channels.
 
     Parameters
     ----------
@@ -75,6 +81,10 @@ class ImageScore:
         drift = np.array(self.energy_drift, dtype=np.float64)
         drift.setflags(write=False)
         object.__setattr__(self, "energy_drift", drift)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all figures, in the order and under the names of ``sssfit render --json``."""
+        return plain({key: getattr(self, key) for key in SCORE_FIGURES})
 
 
 def measure(

@@ -1,4 +1,4 @@
-"""What a profile's fields must be, whoever made them: shapes, numbers, provenance."""
+"""Checks of a profile's fields: shapes, numbers, provenance."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -2,7 +2,7 @@
 
 The same content gives the same bytes: members are stored in a fixed order, uncompressed (zlib
 builds differ in their output) and with a fixed date. Reading trusts nothing: sizes are checked
-before anything is allocated, and whatever a damaged file makes the parsers raise leaves here as one
+before anything is allocated, and every exception that a damaged file causes leaves here as one
 line that names the file.
 """
 
@@ -45,8 +45,8 @@ OPTIONAL = (
 # 100 000 annuli, all arrays) 410 MB; more is a zip bomb or somebody else's.
 _LARGEST_FILE_BYTES = 500_000_000
 _LARGEST_META_BYTES = 16_000_000  # numpy's text has 4 bytes a character
-_REMEDY = "write it again with `sssfit simulate`, or name a .profile.npz file"
-_FOREIGN = "name a .profile.npz file, as `sssfit simulate` and `sssfit import` write it"
+_REMEDY = "write it again, or name another .profile.npz file"
+_FOREIGN = "name a .profile.npz file, as sssfit writes it"
 # By either a file is ours, however damaged: the first member's name, or the format in its JSON,
 # four bytes a letter. Both stand uncompressed, one near the beginning and one near the end.
 MARKS = (b"r_edges_mm.npy", "sssfit.profile/".encode("utf-32-le"))
@@ -84,7 +84,7 @@ def unpack(
     """
     try:
         if isinstance(source, str | Path):
-            _check_ordinary(Path(source))
+            _check_regular_file(Path(source))
             with Path(source).open("rb") as stream:
                 return _unpack_known(stream)
         # A pipe cannot seek, an archive's directory is at its end.
@@ -157,7 +157,7 @@ def _unpack_stream(stream: BinaryIO) -> tuple[dict[str, FloatArray], dict[str, A
     return arrays, meta
 
 
-def _check_ordinary(path: Path) -> None:
+def _check_regular_file(path: Path) -> None:
     """Refuse devices, which may never end, and pipes, which have no end to begin a zip from."""
     if path.is_dir():
         raise ProfileError("is a folder")

@@ -7,6 +7,7 @@ flat annuli (``sssfit._jit.pixels``), each cut into parts by the monotone interp
 
 import math
 import operator
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -178,7 +179,7 @@ def checked_support(
     if size > _LARGEST_KERNEL_BYTES:
         raise ProfileError(
             f"a kernel of {across:.6g} pixels each way would take {size:.3g} bytes a "
-            f"channel, more than {_LARGEST_KERNEL_BYTES:.3g}; use a larger mm_per_pixel or a "
+            f"channel, more than {_LARGEST_KERNEL_BYTES:.3g}; use a larger `mm_per_pixel` or a "
             "smaller half_pixels."
         )
     return pitch_mm, _covering_half(r_last_mm, pitch_mm) if half is None else half
@@ -190,3 +191,38 @@ def _covering_half(r_last_mm: float, pitch_mm: float) -> int:
     while (half + 0.5) * pitch_mm < r_last_mm:
         half += 1
     return half
+
+
+# F between 256 points of an annulus is straight to 2e-6 of the annulus' width.
+_PARTS = 256
+
+
+def energy_radii_mm(
+    r_edges_mm: FloatArray, annulus_energy: FloatArray, shares: Sequence[float]
+) -> FloatArray:
+    """Return the radii (k, C) [mm] within which k shares of each channel's energy leave.
+
+    ``r_edges_mm`` (n+1,) and ``annulus_energy`` (n, C) are a profile's.
+    """
+    within = cumulative(annulus_energy)
+    total = within[-1]
+    radii_mm = np.full((len(shares), total.size), np.nan)
+    for channel in np.flatnonzero(total > 0):
+        for k, share in enumerate(shares):
+            wanted = share * total[channel]
+            annulus = int(np.argmax(within[1:, channel] >= wanted))
+            energy = annulus_energy[:, channel]
+            radii_mm[k, channel] = _radius_in(
+                r_edges_mm, energy, annulus, wanted - within[annulus, channel]
+            )
+    return radii_mm
+
+
+def _radius_in(r_edges_mm: FloatArray, energy: FloatArray, annulus: int, wanted: float) -> float:
+    """Radius in an annulus where F has grown by ``wanted`` since its inner edge [mm]."""
+    # The slopes at its edges depend on its neighbours; two on either side make them those of F.
+    first, last = max(annulus - 2, 0), min(annulus + 3, len(energy))
+    near = r_edges_mm[first : last + 1], energy[first:last, None]
+    radii_mm = np.linspace(r_edges_mm[annulus], r_edges_mm[annulus + 1], _PARTS + 1)
+    grown = cumulative_at(*near, radii_mm)[:, 0] - energy[first:annulus].sum()
+    return float(np.interp(wanted, grown, radii_mm))

@@ -1,7 +1,7 @@
 """A diffuse reflectance profile R_d(r), kept as the energy in annuli around a pencil beam.
 
 Energies, not densities: F(r) = int_0^r 2 pi r' R_d(r') dr' is then known exactly at the annulus
-edges, whatever R_d does inside (near the beam it behaves like 1/r), and every kernel made from the
+edges, independent of R_d inside (near the beam it behaves like 1/r), and every kernel made from the
 profile conserves energy by construction. The annulus tallies are those of Wang, Jacques and Zheng,
 "MCML - Monte Carlo modeling of light transport in multi-layered tissues", 1995.
 
@@ -11,23 +11,27 @@ profile conserves energy by construction. The annulus tallies are those of Wang,
 import dataclasses
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, Self
 
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray
-from sssfit.errors import ProfileError
+from sssfit.arrays import FloatArray, plain
+from sssfit.errors import MaterialError, ProfileError
 from sssfit.files import write_atomically
+from sssfit.material import Material
 from sssfit.material.checks import is_name
+from sssfit.messages import printable
 from sssfit.profile import checks, npz
 from sssfit.profile import pixels as integrals
 from sssfit.profile.npz import FORMAT, is_profile_file
 from sssfit.profile.pixels import full_kernel
 
 __all__ = ["FORMAT", "Profile", "full_kernel", "is_profile_file"]
+
+_SHARES = (0.5, 0.9, 0.99)  # of the energy, whose radii `Profile.to_dict` has
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -121,7 +125,7 @@ class Profile:
         """Fingerprint of what fits and true pictures are made from, by which kernels name it.
 
         Radii, energies on the grid and beyond, channels; no provenance, so that the same light is
-        the same profile, by whatever program and version.
+        the same profile, from any program and version.
         """
         digest = hashlib.sha256(json.dumps(self.channels).encode())
         for each in (self.r_edges_mm, self.annulus_energy, self.beyond_grid):
@@ -183,8 +187,19 @@ class Profile:
         return name if is_name(name) else None
 
     @property
+    def material(self) -> Material | None:
+        """The material that the profile says it was made from; None where it holds none."""
+        record = self.meta.get("material")
+        if not isinstance(record, dict):
+            return None
+        try:
+            return Material.from_dict(record)
+        except MaterialError:
+            return None
+
+    @property
     def energy_balance(self) -> FloatArray:
-        """Sum of all energies - 1 (C,): 0 but for roulette's noise and rounding.
+        """Sum of all energies - 1 (C,): 0 except for roulette's noise and rounding.
 
         Specular + diffuse + absorbed + unfinished (+ transmitted) - 1; NaN where it is not known
         what was absorbed.
@@ -313,6 +328,81 @@ class Profile:
             raise ProfileError(f"channel = {channel}; expected 0 to {self.n_channels - 1}.")
         quadrant = integrals.quadrant_kernel(self.r_edges_mm, energy, mm_per_pixel, half_pixels)
         return quadrant if channel is None else quadrant[:, :, 0]
+
+    def energy_radii_mm(self, shares: Sequence[float]) -> FloatArray:
+        """Return the radii within which ``shares`` of each channel's on-grid energy leave.
+
+        F(r) is inverted inside the annulus that holds the share, by its smooth interpolation.
+
+        Parameters
+        ----------
+        shares : sequence of float (k,) [1]
+            Shares of `total_on_grid`, each in (0, 1].
+
+        Returns
+        -------
+        array (k, C) [mm]
+            NaN for a channel without energy on the grid.
+        """
+        return integrals.energy_radii_mm(self.r_edges_mm, self.annulus_energy, shares)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures of ``sssfit show --json``: lists and numbers, None if unknown.
+
+        ``material`` has the coefficients, albedo and mean free path of each layer; no layers where
+        only a name is known.
+        """
+        meta, width_mm = self.meta, np.diff(self.r_edges_mm)
+        radii_mm = self.energy_radii_mm(_SHARES)
+        return plain(
+            {
+                "kind": "profile",
+                "format": meta["format"],
+                "material": self._material_figures(),
+                "method": meta.get("method"),
+                "channels": self.channels,
+                "photons": self.photons,
+                "seed": meta.get("seed"),
+                "version": meta.get("version"),
+                "annuli": self.n_annuli,
+                "dr_mm": float(self.r_edges_mm[1]),
+                "uniform": bool(np.allclose(width_mm, width_mm[0])),
+                "radius_mm": float(self.r_edges_mm[-1]),
+                "diffuse_reflectance": self.diffuse_reflectance,
+                "diffuse_reflectance_stderr": self.diffuse_reflectance_stderr,
+                "specular_reflectance": self.specular_reflectance,
+                "beyond_grid": self.beyond_grid,
+                "absorbed": self.absorbed.sum(axis=0) if len(self.absorbed) else None,
+                "transmitted": self.transmittance,
+                "unfinished": self.unfinished,
+                "energy_balance": self.energy_balance,
+                "energy_balance_stderr": meta.get("energy_balance_stderr"),
+                **{
+                    f"radius_of_{100 * share:g}_percent_mm": each
+                    for share, each in zip(_SHARES, radii_mm, strict=True)
+                },
+                "empty_annuli": self._empty_annuli(),
+            }
+        )
+
+    def _material_figures(self) -> dict[str, Any] | None:
+        """Name and layers, from the top down; None where there is not even a name."""
+        if (material := self.material) is not None:
+            return {
+                **material.to_dict(),
+                "albedo": [layer.albedo for layer in material.layers],
+                "mean_free_path_mm": [layer.mean_free_path_mm for layer in material.layers],
+            }
+        if self.material_name is None:
+            return None
+        source = printable(str(self.meta["material"].get("source") or ""))
+        return {"name": self.material_name, "source": source, "layers": []}
+
+    def _empty_annuli(self) -> Any:
+        """Annuli (C,) in which no photon left any energy; None where none were traced."""
+        if self.photons is None:
+            return None
+        return ((self.annulus_energy == 0) & (self.annulus_energy_stderr == 0)).sum(axis=0)
 
     def write(self, stream: BinaryIO) -> None:
         """Write the profile to a binary stream; the same content gives the same bytes."""

@@ -1,5 +1,92 @@
 """Kernels applied to irradiance: radiant exitance of a lit, translucent surface.
 
-`scene` holds what is lit; `reference` convolves with the true 2D kernel, `separable` with a fitted
-one, `screen` does what a shader does in screen space, with `transmittance` through thin slabs.
+`sssfit.scene` holds what is lit; `reference` convolves with the true 2D kernel, `separable` with a
+fitted one, `screen` does what a shader does in screen space, with `transmittance` through thin
+slabs.
+
+The package is the function `render` as well: ``sssfit.render(image, kernel)``.
 """
+
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.errors import RenderError
+from sssfit.formats.colours import as_light
+from sssfit.formats.pictures import Image, load_image
+from sssfit.kernel import SeparableKernel
+from sssfit.messages import shown
+from sssfit.render.separable import render_separable
+from sssfit.scene.record import Scene
+
+__all__ = ["render"]
+
+FloatArray = npt.NDArray[np.floating[Any]]  # of the precision asked for
+Irradiance = Scene | Image | npt.ArrayLike | str | Path
+
+
+def render(image: Irradiance, kernel: SeparableKernel | str | Path, **settings: Any) -> FloatArray:
+    """Apply a kernel to a flat picture of irradiance.
+
+    Parameters
+    ----------
+    image : array (H, W) or (H, W, C), Scene, Image, str or Path
+        Linear light; a path is that of a picture file. An array or file is taken to have the
+        kernel's pixels, in mm; a scene says its own. Two dimensions are one channel, light without
+        colour, and serve kernels of any number of channels, as C = 1 does.
+    kernel : SeparableKernel, str or Path
+        The record, or the path of a ``.kernel.json`` file.
+    **settings
+        Keyword arguments of `sssfit.render.separable.render_separable`: ``border``, ``threads``,
+        ``dtype``.
+
+    Returns
+    -------
+    array (H, W, C)
+        Radiant exitance in the picture's unit, always with the kernel's C channels: a grey picture
+        comes back in the colours of the material.
+
+    Raises
+    ------
+    RenderError
+        The picture is not one, or does not fit the kernel.
+    KernelError, FileError
+        A file cannot be read.
+    """
+    if isinstance(kernel, str | Path):
+        kernel = SeparableKernel.load(kernel)
+    if not isinstance(kernel, SeparableKernel):
+        raise RenderError(
+            f"kernel = {shown(kernel)}; expected a SeparableKernel, or the path of its file."
+        )
+    return render_separable(_scene(image, kernel.mm_per_pixel), kernel, **settings)
+
+
+def _scene(image: Irradiance, mm_per_pixel: float) -> Scene:
+    """Return what is lit; what has no pitch of its own takes the kernel's."""
+    if isinstance(image, Scene):
+        return image
+    if isinstance(image, str | Path):
+        image = load_image(image)
+    if isinstance(image, Image):
+        return Scene.from_image(image, image.mm_per_pixel or mm_per_pixel)
+    pixels = as_light(image, "the picture")
+    return Scene("the picture", pixels[..., None] if pixels.ndim == 2 else pixels, mm_per_pixel)
+
+
+class _CallableRoom(ModuleType):
+    """`import sssfit.render` binds this package to the name, so the package itself is called."""
+
+    def __call__(
+        self, image: Irradiance, kernel: SeparableKernel | str | Path, **settings: Any
+    ) -> FloatArray:
+        return render(image, kernel, **settings)
+
+    __call__.__doc__ = render.__doc__
+
+
+sys.modules[__name__].__class__ = _CallableRoom

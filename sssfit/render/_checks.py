@@ -1,4 +1,4 @@
-"""What all renderers refuse, and how they say it."""
+"""Checks that all renderers share."""
 
 from sssfit.errors import RenderError
 

@@ -1,4 +1,4 @@
-"""What lies beyond the rim of a picture: one table of sources for all flat renderers."""
+"""What lies beyond the border of a picture: one table of source pixels for all flat renderers."""
 
 import numpy as np
 import numpy.typing as npt

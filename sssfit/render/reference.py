@@ -43,7 +43,7 @@ def render_reference(
     border : str
         One of ``sssfit.render.borders.BORDERS``.
     threads : int, optional
-        By default all cores; the same bits whatever their number.
+        By default all cores; the result does not depend on their number.
 
     Returns
     -------
@@ -61,12 +61,12 @@ def render_reference(
     _plan(scene.height, scene.width, half, profile.n_channels, border)
     quadrant, left_out = reference_quadrant(profile, scene.mm_per_pixel, scene.height, scene.width)
     picture = convolve(scene.irradiance, quadrant, border=border, threads=threads)
-    picture += left_out * _far_away(scene.irradiance, border)
+    picture += left_out * _far_irradiance(scene.irradiance, border)
     # Rounding of the transforms, 1e-16 of the largest pixel, would be negative light.
     return np.maximum(picture, 0.0, out=picture) if quadrant.min() >= 0.0 else picture
 
 
-def _far_away(irradiance: FloatArray, border: str) -> FloatArray:
+def _far_irradiance(irradiance: FloatArray, border: str) -> FloatArray:
     """Mean irradiance (1 or C,) over a picture's continuation, far from it."""
     if border == "zero":
         return np.zeros(1)

@@ -56,7 +56,7 @@ def make_view(
     Raises
     ------
     RenderError
-        The scene has no depth, or a setting is of no use.
+        The scene has no depth, or a setting is invalid.
     """
     for word, name, known in (
         ("follow", follow, FOLLOW),
@@ -221,7 +221,7 @@ def render_screen(
 ) -> FloatArray:
     """Return the radiant exitance of a scene in perspective, specular light included.
 
-    Pixels of mask 0, or of infinite depth, are no translucent object: their irradiance comes back
+    Pixels of mask 0, or of infinite depth, are not translucent: their irradiance is returned
     as it is, as a stencil leaves it. Light of one object never reaches another: for the share of a
     sample that lies on another object's pixel the middle stands in. Light through the object joins
     the irradiance before the blur; specular light is added after it, unblurred.
@@ -261,7 +261,7 @@ def render_screen(
     Raises
     ------
     RenderError
-        No depth, other channels than the kernel's, or a setting of no use.
+        No depth, channels other than the kernel's, or an invalid setting.
     """
     channels = len(kernel.channels)
     for field in ("irradiance", "specular", "back_irradiance"):

@@ -46,7 +46,7 @@ def render_separable(
     border : str
         One of ``sssfit.render.borders.BORDERS``.
     threads : int, optional
-        By default all cores; the same bits whatever their number.
+        By default all cores; the result does not depend on their number.
     dtype : float64 or float32
         Precision of the sums and of the result.
 
@@ -82,7 +82,8 @@ def check_pitch(scene: Scene, kernel: SeparableKernel) -> None:
     if abs(kernel.mm_per_pixel - scene.mm_per_pixel) > 1e-6 * scene.mm_per_pixel:
         raise RenderError(
             f"the kernel has {kernel.mm_per_pixel:.7g} mm per pixel and {scene.name} "
-            f"{scene.mm_per_pixel:.7g}; fit the kernel at --mm-per-pixel {scene.mm_per_pixel:.7g}."
+            f"{scene.mm_per_pixel:.7g}; fit the kernel at "
+            f"`mm_per_pixel = {scene.mm_per_pixel:.7g}`."
         )
 
 

@@ -90,7 +90,7 @@ class Solid:
 
 
 @dataclass(frozen=True, slots=True)
-class Lamps:
+class Lighting:
     """Light on a field: directions point to the light, strengths are irradiance face on."""
 
     key: tuple[float, float, float]
@@ -112,7 +112,7 @@ class Buffers:
 
 def light_field(
     fine: HeightField,
-    lamps: Lamps,
+    lighting: Lighting,
     *,
     shape: tuple[int, int],
     mm_per_pixel: float,
@@ -138,7 +138,7 @@ def light_field(
     body = (behind or Solid(fine.heights, fine.heights, 0.0, 0.0, 1.0)).tables
     tables = (fine.tables, (coarse or fine).tables, body, behind is not None)
     view = (float(mm_per_pixel), float(distance_mm), float(floor_mm))
-    lamp = (lamps.key, lamps.fill, lamps.strengths, lamps.exponent, lamps.face_on)
+    lamp = (lighting.key, lighting.fill, lighting.strengths, lighting.exponent, lighting.face_on)
 
     def band(first: int) -> None:
         rows = (first, min(first + BAND, shape[0]))

@@ -22,7 +22,7 @@ ROUGH = ((7.0, 0.9), (3.1, 0.6), (1.4, 0.5), (0.62, 0.35), (0.27, 0.2))
 PORE_CELL_MM, PORE_SIGMA_MM = 0.9, 0.14
 
 
-def _fade(length_mm: float, spacing_mm: float) -> float:
+def _resolution_weight(length_mm: float, spacing_mm: float) -> float:
     """1 from six nodes a wavelength on, 0 below three."""
     return float(smooth_step(np.asarray((length_mm / spacing_mm - 3.0) / 3.0)))
 
@@ -43,9 +43,9 @@ def _roughness(x: FloatArray, y: FloatArray, spacing_mm: float) -> FloatArray:
 
     total = np.zeros((y.size, x.size))
     for seed, (length, height) in enumerate(ROUGH):
-        if fade := _fade(length, spacing_mm):
+        if fade := _resolution_weight(length, spacing_mm):
             total += fade * height * _noise(x, y, (length, length), 10 + seed)
-    if fade := _fade(4.0 * PORE_SIGMA_MM, spacing_mm):
+    if fade := _resolution_weight(4.0 * PORE_SIGMA_MM, spacing_mm):
         dents = np.empty_like(total)
         fill_pores(x.ravel(), y.ravel(), PORE_CELL_MM, PORE_SIGMA_MM, dents)
         total -= fade * dents
@@ -55,7 +55,7 @@ def _roughness(x: FloatArray, y: FloatArray, spacing_mm: float) -> FloatArray:
 def _lips(x: FloatArray, y: FloatArray, spacing_mm: float) -> FloatArray:
     """Upright creases."""
     where = np.exp(-((x / 21.0) ** 4) - ((y - MOUTH_Y + 0.6) / 6.5) ** 4)
-    fade = _fade(1.2, spacing_mm)
+    fade = _resolution_weight(1.2, spacing_mm)
     return where * fade * 1.6 * _noise(x, y, (1.2, 9.0), 30) if fade else 0.0 * where
 
 
@@ -75,7 +75,7 @@ def _brows(x: FloatArray, y: FloatArray, spacing_mm: float) -> FloatArray:
     thick = 3.6 - 0.055 * np.clip(half - 14.0, 0.0, 50.0)
     ends = smooth_step((half - 11.0) / 6.0) * smooth_step((58.0 - half) / 14.0)
     where = np.exp(-(((y - arc) / thick) ** 4)) * ends
-    hairs = _fade(1.4, spacing_mm) * _noise(half, y, (0.7, 5.0), 40, lean=0.9)
+    hairs = _resolution_weight(1.4, spacing_mm) * _noise(half, y, (0.7, 5.0), 40, lean=0.9)
     return where * (4.0 + 5.0 * hairs)
 
 

@@ -8,7 +8,7 @@ a person.
 import math
 from typing import Any
 
-from sssfit.scene._field import Lamps, light_field, light_through
+from sssfit.scene._field import Lighting, light_field, light_through
 from sssfit.scene._head_shape import FLOOR_MM
 from sssfit.scene._head_surface import COARSE_MM, body, bust, seen_part
 from sssfit.scene.patterns import check_range, check_size
@@ -30,16 +30,16 @@ def whole_face_mm_per_pixel(height: int, width: int) -> float:
     return max(FACE_HEIGHT_MM / height, FACE_WIDTH_MM / width)
 
 
-def _toward(side_degrees: float, up_degrees: float) -> tuple[float, float, float]:
+def _direction(side_degrees: float, up_degrees: float) -> tuple[float, float, float]:
     """Return the unit vector that many degrees to the left of the view axis and above it."""
     side, up = math.radians(side_degrees), math.radians(up_degrees)
     return -math.sin(side) * math.cos(up), math.sin(up), math.cos(side) * math.cos(up)
 
 
-def _opposite(side_degrees: float, up_degrees: float) -> tuple[float, float, float]:
+def _fill_direction(side_degrees: float, up_degrees: float) -> tuple[float, float, float]:
     """Return the direction of the fill light: on the other side of the face, before it."""
     before = math.copysign(min(abs(side_degrees), 180.0 - abs(side_degrees)), side_degrees)
-    return _toward(-0.8 * before, 0.3 * up_degrees)
+    return _direction(-0.8 * before, 0.3 * up_degrees)
 
 
 def head_scene(
@@ -110,7 +110,7 @@ def head_scene(
     cores = thread_count(threads)
     view = (height, width, mm_per_pixel, distance_mm)
     fine, whole = seen_part(*view, detail_mm, cores)
-    key = _toward(light_degrees, light_up_degrees)
+    key = _direction(light_degrees, light_up_degrees)
     is_behind = abs(light_degrees) > FRONT_DEGREES
     solid = body(cores) if transmit or is_behind else None
     seeing: dict[str, Any] = {
@@ -122,7 +122,7 @@ def head_scene(
     }
     seen = light_field(
         fine,
-        Lamps(key, _opposite(light_degrees, light_up_degrees), (1.0, fill, ambient)),
+        Lighting(key, _fill_direction(light_degrees, light_up_degrees), (1.0, fill, ambient)),
         coarse=None if whole else bust(COARSE_MM, 0.0, cores),
         behind=solid if is_behind else None,
         smooth=smooth,

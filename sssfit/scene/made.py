@@ -1,7 +1,8 @@
 """Made pictures that kernels are judged on: known light, so that an error has a cause.
 
-All are grey, linear and, but for the head's silhouette, averaged over each pixel's area by closed
-forms: an edge has no staircase. `head` is lit in perspective and comes with depth and mask.
+All are grey and linear. Except for the head's silhouette they are averaged over each pixel's area
+by closed forms, so an edge has no staircase. `head` is lit in perspective and comes with depth and
+mask.
 """
 
 import inspect

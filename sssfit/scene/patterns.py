@@ -44,7 +44,7 @@ def check_size(name: str, height: int, width: int, mm_per_pixel: float) -> None:
 
 
 def check_above(name: str, option: str, value: float, least: float) -> None:
-    """Refuse all but a number above ``least``, within what pixels can be counted in."""
+    """Refuse anything but a number above ``least``, up to what can be counted in pixels."""
     if not least < value <= _MOST:
         raise RenderError(
             f"{name}: {option} = {value:g}; expected a number above {least:g}, up to {_MOST:g}."
@@ -52,7 +52,7 @@ def check_above(name: str, option: str, value: float, least: float) -> None:
 
 
 def check_range(name: str, option: str, value: float, low: float, high: float) -> None:
-    """Refuse all but a number from ``low`` to ``high``."""
+    """Refuse anything but a number from ``low`` to ``high``."""
     if not low <= value <= high:
         raise RenderError(f"{name}: {option} = {value:g}; expected {low:g} to {high:g}.")
 
@@ -204,7 +204,7 @@ def separable(
     return Scene("separable", 0.5 * (across + down)[..., None], mm_per_pixel)
 
 
-# Whatever the picture, so that a kernel's error does not depend on the picture's size.
+# The same for every picture, so that a kernel's error does not depend on its size.
 DISK_RADIUS_MM = 19.2
 
 

@@ -1,4 +1,4 @@
-"""What a kernel is applied to: an irradiance picture, with its geometry where it has one."""
+"""What a kernel is applied to: a picture of irradiance, with geometry if it has one."""
 
 import dataclasses
 from typing import TYPE_CHECKING, Any

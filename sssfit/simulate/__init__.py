@@ -1,13 +1,26 @@
-"""Material to profile: one method, one file, one signature ``simulate_x(material, ...)``."""
+"""Material to profile: one method, one file, one signature ``simulate_x(material, ...)``.
 
+The package is the function `simulate` as well: ``sssfit.simulate("skin1")``.
+"""
+
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from sssfit.errors import SimulationError
+from sssfit.material import Material, load_material
+from sssfit.messages import shown
+from sssfit.methods import SIMULATIONS
+from sssfit.profile import Profile
 from sssfit.simulate._checkpoint import (
     CHECKPOINT_MARKS,
     EVERY_SECONDS,
     Checkpoint,
     is_checkpoint_file,
 )
-from sssfit.simulate._deterministic import Named
-from sssfit.simulate._finished import is_complete, is_finished
+from sssfit.simulate._deterministic import ProfileSource
+from sssfit.simulate._finished import is_complete, is_finished, run_figures
 from sssfit.simulate._run import Progress
 from sssfit.simulate._so_far import SoFar, read_checkpoint
 from sssfit.simulate.burley import simulate_burley
@@ -27,7 +40,7 @@ __all__ = [
     "DEON_SKIN",
     "EVERY_SECONDS",
     "Checkpoint",
-    "Named",
+    "ProfileSource",
     "Progress",
     "SoFar",
     "is_checkpoint_file",
@@ -36,7 +49,9 @@ __all__ = [
     "is_finished",
     "is_solver_compiled",
     "read_checkpoint",
+    "run_figures",
     "shared_walks",
+    "simulate",
     "simulate_burley",
     "simulate_deon_skin",
     "simulate_dipole",
@@ -48,3 +63,69 @@ __all__ = [
     "simulate_montecarlo_many",
     "simulate_multipole",
 ]
+
+
+def simulate(
+    material: Material | str | Path, method: str | None = None, **settings: Any
+) -> Profile:
+    """Compute the diffuse reflectance profile of a material.
+
+    Parameters
+    ----------
+    material : Material, str or Path
+        The record, a shipped name, or the path of a TOML file, as `sssfit.load_material` takes it;
+        or "deon-skin", the skin of six Gaussians, which has a profile and no coefficients.
+    method : str, optional
+        A name of `sssfit.methods.SIMULATIONS`; by default "montecarlo", the photon walk, and for
+        "deon-skin" its only one, "gaussians".
+    **settings
+        Keyword arguments of the method's ``simulate_x``: ``photons``, ``seed``, ``dr_mm``, ...
+
+    Raises
+    ------
+    SimulationError
+        There is no such method, or it cannot treat this material with these settings.
+    MaterialError
+        There is no such material, or its file cannot be read.
+    """
+    made = {each.makes: name for name, each in SIMULATIONS.items() if each.makes}
+    own = made.get(material) if isinstance(material, str) else None
+    if method is None:
+        method = own or "montecarlo"
+    if not isinstance(method, str) or method not in SIMULATIONS:
+        expected = ", ".join(SIMULATIONS)
+        raise SimulationError(f"method = {shown(method)}; expected one of {expected}.")
+    chosen = SIMULATIONS[method]
+    if own is not None and method != own:
+        raise SimulationError(
+            f"{material} has no coefficients, and the method {method} needs them; leave the method "
+            "out."
+        )
+    if own is None and chosen.makes is not None:
+        raise SimulationError(
+            f"the method {method} makes {chosen.makes} only, and this is {shown(material)}."
+        )
+    profiles = chosen.load()
+    if own is not None:
+        return _one(profiles(**settings))
+    record = load_material(material) if isinstance(material, str | Path) else material
+    return _one(profiles([record] if chosen.shares else record, **settings))
+
+
+def _one(found: Profile | list[Profile]) -> Profile:
+    """Return the profile of a method that takes one material, or several at once."""
+    return found[0] if isinstance(found, list) else found
+
+
+class _CallableRoom(ModuleType):
+    """`import sssfit.simulate` binds this package to the name, so the package itself is called."""
+
+    def __call__(
+        self, material: Material | str | Path, method: str | None = None, **settings: Any
+    ) -> Profile:
+        return simulate(material, method, **settings)
+
+    __call__.__doc__ = simulate.__doc__
+
+
+sys.modules[__name__].__class__ = _CallableRoom

@@ -1,4 +1,4 @@
-"""Walks dealt out in batches, whatever they walk through, and their tallies added in order."""
+"""Photon walks of any kind in batches, and their tallies added in order."""
 
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -19,7 +19,7 @@ MAX_PHOTONS = 10**12
 class Tally:
     """Sums over photons for all channels of a walk (weights begin at 1).
 
-    ``ledger`` is a named tuple of float64 arrays, of whatever kind the walk books into.
+    ``ledger`` is a named tuple of float64 arrays, which the walk adds to.
     """
 
     ledger: Any

@@ -1,4 +1,4 @@
-"""A walk's sums on disk now and then, so that a run killed at any moment can go on.
+"""A walk's sums saved to disk at intervals, so that a killed run can be resumed.
 
 A checkpoint is what a shorter run would have ended with: the ledger summed over whole batches, the
 photons in it, and a fingerprint of what decides the bits of these batches. How many more are to
@@ -67,7 +67,7 @@ class Checkpoint:
     every_seconds : float [s]
         Time between two saves, 0 (after every batch) or more.
     resume : bool
-        Go on from what is there, if anything is; else start anew, and replace it by the first
+        Continue from an existing checkpoint; else start a new run, and replace it by the first
         save.
 
     Raises
@@ -122,8 +122,8 @@ class Checkpoint:
             return _load(self.path, empty, settings)
         if self.path.exists():
             warnings.warn(
-                f"starting anew beside {self.path}, which an earlier run left; it is kept until "
-                "this run's own first checkpoint (--resume would go on from it).",
+                f"starting a new run beside {self.path}, which an earlier run left; it is kept "
+                "until this run's own first checkpoint (`resume = True` would continue from it).",
                 SssfitWarning,
                 stacklevel=6,
             )
@@ -326,7 +326,7 @@ def _check_settings(path: Path, there: Mapping[str, str], here: Mapping[str, str
     if differing:
         raise SimulationError(
             f"{path} was made with other settings: {'; '.join(differing)}. Give the same, or "
-            "start anew without --resume."
+            "start a new run with `resume = False`."
         )
 
 
@@ -335,4 +335,4 @@ def _short(text: str | None) -> str:
     return printable(str(text))[:200]
 
 
-_REMEDY = "delete it, or start anew without --resume"
+_REMEDY = "delete it, or start a new run with `resume = False`"

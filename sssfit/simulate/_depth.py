@@ -33,7 +33,8 @@ import numpy as np
 
 from sssfit._jit.transport import NEGLIGIBLE, Tables, kernel_matrix
 from sssfit.arrays import FloatArray
-from sssfit.simulate._surface import Cone, entering, gauss, is_matched
+from sssfit.optics import gauss_legendre, is_matched, normal_transmittance
+from sssfit.simulate._surface import Cone
 
 _DEPTH = 26.0  # of the last panel: what does not fall like exp(-nu z) is exp(-26) = 5e-12 there
 _WIDEST = 2.5  # panel: C0 = exp(-z) needs it
@@ -120,7 +121,9 @@ def respond(k: float, eta: float, albedos: FloatArray, resolution: Resolution) -
         For a beam of energy 1 that meets the surface along the normal.
     """
     equation = _Equation.of(k, eta, resolution)
-    return equation.solve(entering(eta) * np.exp(-equation.panels.nodes.ravel()), albedos)
+    return equation.solve(
+        normal_transmittance(eta) * np.exp(-equation.panels.nodes.ravel()), albedos
+    )
 
 
 def respond_to_diffuse_light(eta: float, albedos: FloatArray, resolution: Resolution) -> Response:
@@ -136,7 +139,7 @@ def respond_to_diffuse_light(eta: float, albedos: FloatArray, resolution: Resolu
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Equation:
-    """The depth equation of one wavenumber and index on its nodes (N), whatever light comes in.
+    """The depth equation of one wavenumber and index on its nodes (N), for any incident light.
 
     ``escape`` (N,) is E at the nodes, ``matrix`` (N, N) the integral over K_d + K_r on the panels.
     """
@@ -156,7 +159,7 @@ class _Equation:
             panels.nodes,
             panels.weights,
             panels.barycentric,
-            np.stack(gauss(resolution.rule), axis=1),
+            np.stack(gauss_legendre(resolution.rule), axis=1),
             math.sqrt(1.0 + k * k),
             is_matched(eta),
             tables,
@@ -188,7 +191,7 @@ def _panels(kappa: float, resolution: Resolution) -> _Panels:
     edges = [0.0, resolution.first / kappa]
     while edges[-1] < _DEPTH:
         edges.append(edges[-1] + min(_WIDEST, edges[-1] * (resolution.ratio - 1.0)))
-    x, w = np.polynomial.legendre.leggauss(resolution.order)
+    x, w = gauss_legendre(resolution.order, -1.0, 1.0)
     width = np.diff(edges)[:, None]
     # Barycentric weights of Gauss nodes: (-1)^j sqrt((1 - x^2) w) (Berrut and Trefethen 2004).
     signs = np.where(np.arange(x.size) % 2, -1.0, 1.0)
@@ -213,7 +216,7 @@ def _tables(
     per_log = 3.0 / resolution.step
     entries = int(math.log(_BEYOND / kappa / shortest) * per_log) + 4
     distances = shortest * np.exp(np.arange(entries) / per_log)
-    direct = _over_w(distances, k, lambda tau, _: np.ones_like(tau))
+    direct = _integrate_over_w(distances, k, lambda tau, _: np.ones_like(tau))
     z = panels.nodes.ravel()
     if is_matched(eta):
         return _matched_escape(z, k), (direct, math.log(shortest), per_log, np.zeros(4), 1.0)
@@ -243,22 +246,22 @@ def _over_cone(distances: FloatArray, k: float, cone: Cone, weight: FloatArray) 
 
 def _matched_escape(z: FloatArray, k: float) -> FloatArray:
     """Return E without a surface: z/2 int (p - 1) exp(-tau z) dw, p = sqrt(tau^2 - k^2), (n,)."""
-    return z * _over_w(z, k, lambda _, p: p - 1.0)
+    return z * _integrate_over_w(z, k, lambda _, p: p - 1.0)
 
 
 def _tail(below: FloatArray, k: float, nu: float) -> FloatArray:
     """Integrate K_d(d + t) exp(-nu t) over t > 0 for nodes at distance d above the last edge."""
-    return _over_w(below, k, lambda tau, _: 1.0 / (tau + nu))
+    return _integrate_over_w(below, k, lambda tau, _: 1.0 / (tau + nu))
 
 
-def _over_w(distances: FloatArray, k: float, function: _OfTau) -> FloatArray:
+def _integrate_over_w(distances: FloatArray, k: float, function: _OfTau) -> FloatArray:
     """Return 1/2 int_{w0}^inf function(tau, p) exp(-d tau) dw for distances above 0, (n,).
 
     tau = (e^w + k^2 e^-w)/2 and p = (e^w - k^2 e^-w)/2.
     """
     kappa = math.hypot(1.0, k)
     d = np.minimum(distances, 10.0 * NEGLIGIBLE / kappa)  # exp(-360): 0 beyond, and no overflow
-    x, w = gauss(_PER_STRETCH)
+    x, w = gauss_legendre(_PER_STRETCH)
     places = (x + np.arange(_STRETCHES)[:, None]).ravel() / _STRETCHES
     weights = np.tile(w, _STRETCHES) / _STRETCHES
     start = math.log1p(kappa)

@@ -1,8 +1,8 @@
-"""Profiles that are computed and not sampled: from F(r) at the edges to a record.
+"""Profiles that are computed, not sampled: from F(r) at the edges to a record.
 
 Every method without photons ends here, so that its profiles have the same provenance and the same
 guards. Energies stand as the walks' bins do: (n + 1, C), an annulus a row, beyond the grid last.
-Solvers that know F(r) use ``energies_from_cumulative``; closed forms that know what leaves beyond
+Solvers that know F(r) use ``energies_from_cumulative``; closed forms that know the energy beyond
 r use ``energies_from_beyond``, which keeps its digits out to 1e-300 where F(r) is 1 - 1e-16.
 """
 
@@ -24,8 +24,8 @@ ROUNDING = 1e-12  # F may fall by this share of the total: sums of a few thousan
 
 
 @dataclass(frozen=True, slots=True)
-class Named:
-    """What stands for a material where there are no coefficients: a name, and a source."""
+class ProfileSource:
+    """The origin of a profile without coefficients: a name and a source."""
 
     name: str
     source: str
@@ -84,7 +84,7 @@ def energies_from_cumulative(
 
 
 def energies_from_beyond(beyond: FloatArray) -> FloatArray:
-    """Return the energies of `energies_from_cumulative` from what leaves beyond each edge.
+    """Return the energies of `energies_from_cumulative` from the energy beyond each edge.
 
     Takes (n + 1, C), the first row the total, and keeps the last; the differences in between are
     exact to rounding of the energy beyond, however small that is. Raises SimulationError as above.
@@ -99,7 +99,7 @@ def energies_from_beyond(beyond: FloatArray) -> FloatArray:
 
 
 def computed_profile(
-    material: Material | Named,
+    material: Material | ProfileSource,
     method: str,
     grid: RadialGrid,
     reflected: FloatArray,
@@ -115,7 +115,7 @@ def computed_profile(
 
     Parameters
     ----------
-    material : Material or Named
+    material : Material or ProfileSource
     method : str
         As the command line names it; becomes ``meta["method"]``.
     grid : RadialGrid
@@ -125,7 +125,7 @@ def computed_profile(
     stderr : (n + 1, C), optional
         The method's own estimate of their errors; NaN where there is none.
     transmitted : (n + 1, C), optional
-        What leaves through the bottom of a slab.
+        Energy that leaves through the bottom of a slab.
     absorbed : (layers, C), optional
         What stays, by layer; not known by default, and then the energy balance is NaN.
     relative_error : float, optional

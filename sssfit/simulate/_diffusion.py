@@ -1,8 +1,8 @@
-"""What the diffusion models share: coefficients of the diffusion equation and of its boundary.
+"""Coefficients of the diffusion equation and of its boundary, for all diffusion models.
 
 Scattering enters as sigma_s' = (1 - g) sigma_s: diffusion sees directions only by their mean, so
-for these models g other than 0 is no further approximation. The boundary condition is A: flux lost
-through the surface puts the fluence's zero at 2 A D outside it, further for a denser medium.
+for these models g other than 0 needs no further approximation. The boundary condition is A: flux
+lost through the surface puts the fluence's zero at 2 A D outside it, further for a denser medium.
 """
 
 import math
@@ -13,6 +13,7 @@ import numpy as np
 from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError
 from sssfit.material import Layer
+from sssfit.optics import fresnel_reflectance, gauss_legendre
 
 # The polynomials for F_dr are within 0.006 of the integral here, and over 1 from 3.9 on.
 LEAST_ETA, MOST_ETA = 0.5, 2.5
@@ -101,19 +102,10 @@ def fresnel_moments(eta: float) -> tuple[float, float]:
     Up to the critical angle all is reflected; from there mu = mu_c + (1 - mu_c) t^2 takes out the
     square root. eta is the index inside over that outside.
     """
-    x, w = np.polynomial.legendre.leggauss(_NODES)
-    t, w = 0.5 * (x + 1.0), 0.5 * w
+    t, w = gauss_legendre(_NODES)
     critical = math.sqrt(max(0.0, 1.0 - 1.0 / eta**2))
     mu = critical + (1.0 - critical) * t**2
-    weights = w * 2.0 * (1.0 - critical) * t * _fresnel(mu, eta)
+    weights = w * 2.0 * (1.0 - critical) * t * fresnel_reflectance(mu, eta)
     first = 0.5 * critical**2 + float(weights @ mu)
     second = critical**3 / 3.0 + float(weights @ mu**2)
     return first, second
-
-
-def _fresnel(mu: FloatArray, eta: float) -> FloatArray:
-    """Unpolarised reflectance from inside at cosines beyond the critical angle."""
-    out = np.sqrt(np.maximum(0.0, 1.0 - eta**2 * (1.0 - mu**2)))
-    parallel = (mu - eta * out) / (mu + eta * out)
-    perpendicular = (eta * mu - out) / (eta * mu + out)
-    return np.asarray(0.5 * (parallel**2 + perpendicular**2), dtype=np.float64)

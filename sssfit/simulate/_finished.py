@@ -1,4 +1,4 @@
-"""What a profile says of how it was asked for, and whether a run has nothing left to do."""
+"""What a profile records about its run, and whether a run is already finished."""
 
 import math
 import operator
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from sssfit import __version__
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, plain
 from sssfit.errors import SimulationError, SssfitWarning
 from sssfit.grid import make_grid
 from sssfit.material import Material
@@ -202,4 +202,53 @@ def is_finished(
         and (meta.get("seed"), meta.get("version")) == (seed, __version__)
         and (auto or profile.n_annuli == grid.annuli)
         and is_complete(profile)
+    )
+
+
+_OWN_SETTINGS = ("tolerance", "similarity", "mapping")  # of the methods that have them
+
+
+def run_figures(profile: Profile, seconds: float | None) -> dict[str, Any]:
+    """Return the figures that ``sssfit simulate --json`` prints of one run: lists and numbers.
+
+    None stands for what the method does not have: photons where nothing is sampled, say.
+
+    Parameters
+    ----------
+    profile : Profile
+        By a function of this room.
+    seconds : float, optional [s]
+        What the run took; None where it was finished before.
+    """
+    meta, settings = profile.meta, profile.meta["settings"]
+    is_known = len(profile.absorbed) > 0
+    return plain(
+        {
+            "material": meta["material"]["name"],
+            "method": meta["method"],
+            "channels": profile.channels,
+            "diffuse_reflectance": profile.diffuse_reflectance,
+            "diffuse_reflectance_stderr": profile.diffuse_reflectance_stderr,
+            "specular_reflectance": profile.specular_reflectance,
+            "transmittance": profile.transmittance,
+            "transmittance_stderr": profile.transmittance_stderr,
+            "absorbed": profile.absorbed.sum(axis=0) if is_known else None,
+            "absorbed_by_layer": profile.absorbed if is_known else None,
+            "beyond_grid": profile.beyond_grid,
+            "unfinished": profile.unfinished,
+            "energy_balance": profile.energy_balance,
+            "energy_balance_stderr": meta["energy_balance_stderr"],
+            "dr_mm": float(profile.r_edges_mm[1]),
+            "annuli": profile.n_annuli,
+            "photons": profile.photons,
+            "seed": meta["seed"],
+            "seconds": seconds,
+            "photons_per_second": (
+                profile.photons / seconds if profile.photons and seconds else None
+            ),
+            "target_error": settings.get("target_error"),
+            "relative_error": meta["relative_error"],
+            "finished_before": seconds is None,
+            **{key: settings[key] for key in _OWN_SETTINGS if key in settings},
+        }
     )

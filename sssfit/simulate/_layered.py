@@ -35,7 +35,7 @@ class LayeredWalk:
         material, grid = self.materials[0], self.grids[0]
         groups = tuple(
             (_stack(material, members), walk.Bins(1.0 / grid.dr_mm, grid.annuli, members))
-            for members in alike_channels(material)
+            for members in channels_with_equal_scattering(material)
         )
         object.__setattr__(self, "groups", groups)
 
@@ -83,7 +83,7 @@ class LayeredWalk:
         )
 
 
-def alike_channels(material: Material) -> list[npt.NDArray[np.int64]]:
+def channels_with_equal_scattering(material: Material) -> list[npt.NDArray[np.int64]]:
     """Group the channels that differ in absorption only; indices, in their order."""
     groups: dict[bytes, list[int]] = {}
     for c in range(material.n_channels):

@@ -20,7 +20,8 @@ import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError
-from sssfit.simulate._surface import Cone, entering, transmitted
+from sssfit.optics import fresnel_transmittance, normal_transmittance
+from sssfit.simulate._surface import Cone
 
 _REACH = 3.2  # the rule's last nodes lie 1e-16 of the range from its ends
 _DIRECTIONS = 96
@@ -49,8 +50,8 @@ def single_scattering_beyond(radii_mfp: FloatArray, eta: float, step: float) -> 
     cosine = np.cos(angle)
     # (1 + 1/mu) mu / sqrt(1 - mu^2) = (1 + mu) / sin(theta) = 1 / tan(theta/2)
     rate = 1.0 / np.tan(half_angle)
-    share = transmitted(cosine, eta) * np.sin(angle) * cosine / (1.0 + cosine)
-    factor = 0.5 * entering(eta) * weight * share
+    share = fresnel_transmittance(cosine, eta) * np.sin(angle) * cosine / (1.0 + cosine)
+    factor = 0.5 * normal_transmittance(eta) * weight * share
     parts = [
         np.exp(-np.outer(radii_mfp[first : first + _RADII_AT_ONCE], rate)) @ factor
         for first in range(0, len(radii_mfp), _RADII_AT_ONCE)
@@ -114,7 +115,7 @@ def mixture_of(wavenumbers: FloatArray, transform: FloatArray, slowest: float) -
     rates = slowest + np.concatenate(([0.0], np.geomspace(0.01 * slowest, steepest, count)))
     terms = rates**2 / (wavenumbers[:, None] ** 2 + rates**2)
     scale = 1.0 + wavenumbers
-    # Neighbouring rates are all but equal: without the ridge the active set can cycle for ever
+    # Neighbouring rates are almost equal: without the ridge the active set can cycle for ever
     # (seen where the solver's own error is 1e-13). It adds 1e-11 to the misfit.
     ridge = _RIDGE * np.eye(rates.size)
     rows = np.concatenate((terms * scale[:, None], ridge))

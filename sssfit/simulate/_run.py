@@ -42,13 +42,13 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """When a run ends: at so many photons, or at a check that finds the target error met."""
+    """When a run ends: at a number of photons, or at a check that finds the target error met."""
 
     photons: int
     target_error: float | None = None
 
     def is_reached(self, photons_done: int, error: float) -> bool:
-        """Whether a run that has come so far, with this error, is complete."""
+        """Whether a run with these photons and this error is complete."""
         if photons_done >= self.photons:
             return True
         return self.is_met(error) and is_check(photons_done)
@@ -66,7 +66,7 @@ class Ending:
 
 
 def is_check(photons: int) -> bool:
-    """Whether the error is looked at after so many photons: at whole batches, 32 to a doubling.
+    """Whether the error is checked after this number of photons: at whole batches, 32 per doubling.
 
     A run overshoots its target by a 32nd at most; skin1's checks take 0.4 % of a thousand batches.
     """
@@ -75,8 +75,8 @@ def is_check(photons: int) -> bool:
 
 
 @dataclass(slots=True)
-class _Watch:
-    """What is looked at between batches: the error, the end, and who wants to hear of it."""
+class _Monitor:
+    """Checks between batches: the error, the end of the run, and progress reports."""
 
     task: Walk
     ending: Ending
@@ -94,7 +94,7 @@ class _Watch:
         self.error = float(errors.max())
         self.state.least_error = min(self.state.least_error, self.error)
         if self.ending.target_error is not None and photons >= HOPELESS_PHOTONS:
-            _check_hope(self.task, photons, errors)
+            _check_target_is_reachable(self.task, photons, errors)
 
     def is_over(self) -> bool:
         """Whether the run is complete."""
@@ -128,24 +128,24 @@ def run(
     state = State(task.empty_tally())
     if checkpoint:
         state = checkpoint.begin(state.tally, settings or {}, task.materials)
-        _check_still_to_do(checkpoint, state, ending)
-    watch = _Watch(task, ending, state, progress)
+        _check_not_finished(checkpoint, state, ending)
+    monitor = _Monitor(task, ending, state, progress)
     if state.tally.photons:
-        watch.look()
-        watch.report(now=True)
+        monitor.look()
+        monitor.report(now=True)
     begun = perf_counter() - state.seconds
     with closing(_in_order(task, threads, stop, state.tally.photons)) as tallies:
         for tally in tallies:
             state.tally.add(tally)
             state.seconds = perf_counter() - begun
-            watch.look()
-            if watch.is_over():
+            monitor.look()
+            if monitor.is_over():
                 break
-            watch.report()
+            monitor.report()
             if checkpoint:
                 checkpoint.save_if_due(state)
-    watch.report(now=True)
-    if checkpoint and state.tally.photons and not watch.is_over():
+    monitor.report(now=True)
+    if checkpoint and state.tally.photons and not monitor.is_over():
         checkpoint.save_at_stop(state)
     return state.tally
 
@@ -161,7 +161,7 @@ def _in_order(
             stopped = False
             while True:
                 stopped = stopped or (stop is not None and stop())
-                # Two a thread keep every core busy and bound the memory, whatever the photons.
+                # Two a thread keep every core busy and bound the memory for any number of photons.
                 while not stopped and len(pending) < 2 * threads:
                     batch = next(batches, None)
                     if batch is None:
@@ -174,7 +174,7 @@ def _in_order(
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _check_still_to_do(checkpoint: Checkpoint, state: State, ending: Ending) -> None:
+def _check_not_finished(checkpoint: Checkpoint, state: State, ending: Ending) -> None:
     """Refuse to go on where a run asked for this from the start would have ended before."""
     done = state.tally.photons
     if done > ending.photons:
@@ -184,17 +184,18 @@ def _check_still_to_do(checkpoint: Checkpoint, state: State, ending: Ending) -> 
     else:
         return
     raise SimulationError(
-        f"{checkpoint.path} holds {done:,} photons, {why}; take them all with --photons {done} "
-        "alone, or start anew without --resume."
+        f"{checkpoint.path} holds {done:,} photons, {why}; take them all with "
+        f"`photons = {done}` alone, or start a new run with `resume = False`."
     )
 
 
-def _check_hope(task: Walk, photons: int, errors: FloatArray) -> None:
-    """Give up on a target that a channel keeps out of reach, naming the channel."""
+def _check_target_is_reachable(task: Walk, photons: int, errors: FloatArray) -> None:
+    """Refuse a target error that a channel cannot reach, naming the channel."""
     names = [f"{each.name} {name}" for each in task.materials for name in each.channels]
     silent = [name for name, error in zip(names, errors, strict=True) if math.isinf(error)]
     if silent:
         raise SimulationError(
             f"{photons:,} photons returned nothing within the grid in {', '.join(silent)}: no "
-            "target error is in reach; widen the grid with --radius, or leave --target-error out."
+            "target error is in reach; widen the grid with `radius_mm`, or leave "
+            "`target_error` out."
         )

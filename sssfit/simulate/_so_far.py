@@ -1,4 +1,4 @@
-"""What a photon walk has found so far: the profiles that a run would have given that ended there.
+"""The profiles of an unfinished photon walk, as if the run had ended at its checkpoint.
 
 A run saves its sums in a checkpoint (``_checkpoint``); a profile is made of them as it is at the
 end of a run, by ``_assemble``.
@@ -50,6 +50,17 @@ class SoFar:
     flights: int
     seconds: float
     relative_error: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures that ``sssfit show --json`` prints, with those of every profile."""
+        return {
+            "kind": "checkpoint",
+            "photons": self.profiles[0].photons,
+            "flights": self.flights,
+            "seconds": self.seconds,
+            "relative_error": self.relative_error,
+            "profiles": [each.to_dict() for each in self.profiles],
+        }
 
 
 def read_checkpoint(source: str | Path | BinaryIO, origin: str | None = None) -> SoFar:

@@ -1,7 +1,7 @@
 """Normalised diffusion: a profile from reflectance and mean free path, as engines have it.
 
 Christensen and Burley 2015, "Approximate reflectance profiles for efficient subsurface scattering":
-R_d(r) = A s (exp(-s r) + exp(-s r/3)) / (8 pi r), whatever the material, with s from one of three
+R_d(r) = A s (exp(-s r) + exp(-s r/3)) / (8 pi r) for every material, with s from one of three
 fits to photon walks (`sssfit.shapes`). A is the diffuse reflectance, what an artist calls the
 albedo of the surface; it is not the single-scattering albedo. All of A's energy is in the profile.
 """

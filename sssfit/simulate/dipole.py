@@ -70,7 +70,7 @@ def simulate_dipole_grosjean(
 ) -> Profile:
     """Return the profile of the dipole with Grosjean's coefficient and the moments' boundary.
 
-    Parameters, result and errors are those of `simulate_dipole`, but for the index, which may be
+    Parameters, result and errors are those of `simulate_dipole`, except that the index may be
     any. Above an albedo of 0.98 totals are good to 1 %; below 0.95 they are worse than the
     classical ones (23 % high at 0.73), for Grosjean's theory keeps light scattered once apart from
     the diffuse light, which then is alpha' fainter, and the dipole has no such part.

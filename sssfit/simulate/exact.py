@@ -28,6 +28,7 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
+from sssfit.optics import normal_transmittance
 from sssfit.profile import Profile
 from sssfit.simulate._depth import (
     Resolution,
@@ -48,7 +49,7 @@ from sssfit.simulate._mixture import (
     single_scattering_of_diffuse_light,
 )
 from sssfit.simulate._semi_infinite import relative_eta
-from sssfit.simulate._surface import entering, entering_of_diffuse
+from sssfit.simulate._surface import entering_of_diffuse
 from sssfit.threads import available_cores
 
 Light = Literal["normal", "diffuse"]
@@ -226,7 +227,7 @@ def entering_light(eta: float, light: Light = "normal") -> float:
     normal light; for diffuse light 2 int_0^1 R_F(mu) mu dmu seen from outside (Duntley 1942).
     """
     _check_light(eta, light)
-    return entering_of_diffuse(eta) if light == "diffuse" else entering(eta)
+    return entering_of_diffuse(eta) if light == "diffuse" else normal_transmittance(eta)
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,8 +259,8 @@ class _Channel:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Answer:
-    """What leaves beyond each radius (n+1,), what is absorbed, and the known part of the error."""
+class _Solution:
+    """Energy beyond each radius (n+1,), absorbed energy, and the known part of the error."""
 
     beyond: FloatArray
     absorbed: float
@@ -297,7 +298,7 @@ def _solve_group(
 
 def _solve(
     eta: float, channels: Sequence[_Channel], level: _Level, workers: _Workers
-) -> list[_Answer]:
+) -> list[_Solution]:
     """Solve all channels at one resolution."""
     albedos, places = np.unique([each.albedo for each in channels], return_inverse=True)
     rates = [decay_rate(albedo) for albedo in albedos]
@@ -314,8 +315,8 @@ def _solve(
         once = single_scattering_beyond(channel.radii_mfp, eta, level.single_step)
         beyond = channel.albedo * once + mixture.beyond(channel.radii_mfp)
         absorbed = float(responses[0].absorbed[place])
-        balance = abs(float(beyond[0]) + absorbed - entering(eta)) - _ROUNDING
-        answers.append(_Answer(beyond, absorbed, max(balance, mixture.misfit)))
+        balance = abs(float(beyond[0]) + absorbed - normal_transmittance(eta)) - _ROUNDING
+        answers.append(_Solution(beyond, absorbed, max(balance, mixture.misfit)))
     return answers
 
 
@@ -327,7 +328,7 @@ def _wavenumbers(slowest: float, level: _Level) -> FloatArray:
     return wavenumbers
 
 
-def _errors(fine: _Answer, coarse: _Answer) -> FloatArray:
+def _errors(fine: _Solution, coarse: _Solution) -> FloatArray:
     """Error of F at the edges but the first (r = 0), and of the total; (n+1,)."""
     difference = fine.beyond - coarse.beyond
     of_cumulative = np.abs(difference[0] - difference[1:])
@@ -336,13 +337,13 @@ def _errors(fine: _Answer, coarse: _Answer) -> FloatArray:
     return least
 
 
-def _share(errors: FloatArray, answer: _Answer) -> float:
+def _share(errors: FloatArray, answer: _Solution) -> float:
     """Return the largest error as a share of the total; 0 where nothing scatters."""
     total = float(answer.beyond[0])
     return float(np.max(errors)) / total if total > 0.0 else 0.0
 
 
-def _stderr(fine: _Answer, coarse: _Answer, errors: FloatArray) -> FloatArray:
+def _stderr(fine: _Solution, coarse: _Solution, errors: FloatArray) -> FloatArray:
     """Errors of the annuli and beyond the grid, (n+1,), whose squares add up to those of F.
 
     None is under the annulus's own difference, nor the sum up to any edge under F's error there.
@@ -357,8 +358,8 @@ def _stderr(fine: _Answer, coarse: _Answer, errors: FloatArray) -> FloatArray:
 def _profiles(
     materials: Sequence[Material],
     grids: Sequence[RadialGrid],
-    fine: Sequence[_Answer],
-    coarse: Sequence[_Answer],
+    fine: Sequence[_Solution],
+    coarse: Sequence[_Solution],
     errors: Sequence[FloatArray],
     tolerance: float,
 ) -> list[Profile]:

@@ -17,20 +17,20 @@ from sssfit.material.checks import check_texts
 from sssfit.messages import shown
 from sssfit.profile import Profile
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS, gaussian_between, gaussian_beyond
-from sssfit.simulate._deterministic import ROUNDING, Named, computed_profile
+from sssfit.simulate._deterministic import ROUNDING, ProfileSource, computed_profile
 
 _MOST_TOTAL = 1.0 + 1e-6  # published weights are rounded, but not by more
 _LEAST_VARIANCE, _MOST_VARIANCE = 1e-18, 1e18  # mm^2
 
 
-def checked_name(name: str, source: str | None, channels: Sequence[str]) -> Named:
+def checked_name(name: str, source: str | None, channels: Sequence[str]) -> ProfileSource:
     """Return what stands for the material, or refuse names that a material could not have."""
     try:
         check_texts(name, "" if source is None else source)
         check_names(channels)
     except MaterialError as error:
         raise SimulationError(str(error)) from None
-    return Named(name, source or "", tuple(channels))
+    return ProfileSource(name, source or "", tuple(channels))
 
 
 def checked_numbers(
@@ -75,7 +75,7 @@ def _numbers(key: str, values: npt.ArrayLike) -> FloatArray:
         ) from None
 
 
-DEON_SKIN = Named("deon-skin", "d'Eon, Luebke, Enderton 2007", ("R", "G", "B"))
+DEON_SKIN = ProfileSource("deon-skin", "d'Eon, Luebke, Enderton 2007", ("R", "G", "B"))
 
 _RINGS_PER_SIGMA = 10  # of the narrowest: pixels of 2.5 rings then have their energy to 3e-4
 _MOST_BEYOND = 1e-9
@@ -163,7 +163,7 @@ def simulate_gaussians(
     return computed_profile(named, "gaussians", grid, energies, settings=settings)
 
 
-def _not_negative(energies: FloatArray, weights: FloatArray, named: Named) -> FloatArray:
+def _not_negative(energies: FloatArray, weights: FloatArray, named: ProfileSource) -> FloatArray:
     """Refuse R_d below 0 where negative weights outdo the others; rounding becomes 0."""
     is_wrong = energies < -ROUNDING * np.abs(weights).max()
     if is_wrong.any():

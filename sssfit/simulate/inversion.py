@@ -1,4 +1,4 @@
-"""Albedo inversion: from the diffuse reflectance that an artist asks for to a material that has it.
+"""Albedo inversion: from a diffuse reflectance to a material that has it.
 
 The total diffuse reflectance R of a homogeneous half space depends on its albedo a, its refractive
 index and the light that falls on it. What is asked for is R under normally incident light, as the
@@ -21,11 +21,14 @@ from scipy.optimize.elementwise import find_root
 
 from sssfit import __version__
 from sssfit.arrays import FloatArray, check_names
-from sssfit.errors import MaterialError, SimulationError
+from sssfit.errors import MaterialError, RenderError, SimulationError
+from sssfit.formats.colours import linear_from_hex
 from sssfit.material import Layer, Material
 from sssfit.material.checks import check_texts, number
+from sssfit.optics import normal_transmittance
 from sssfit.simulate.exact import LIGHTS, Light, diffuse_reflectance, entering_light
 
+SKIN_ETA = 1.4  # d'Eon and Luebke 2007, GPU Gems 3, chapter 14: .028 at normal incidence
 _CLOSE = 1e-8  # in reflectance; what the exact solver itself is good for
 _ASKED = {"normal": "diffuse reflectance", "diffuse": "base colour under diffuse light"}
 
@@ -72,9 +75,9 @@ def reflectance_of(albedo: npt.ArrayLike, eta: float, light: Light = "normal") -
 def largest_reflectance(eta: float, light: Light = "normal") -> float:
     """Return `reflectance_of` albedo 1, where all light that enters comes back.
 
-    1 - ((eta - 1) / (eta + 1))^2 under normal light, 1 under diffuse light.
+    What of a normal beam is not reflected specularly; 1 under diffuse light.
     """
-    return 1.0 if light == "diffuse" else 1.0 - ((eta - 1.0) / (eta + 1.0)) ** 2
+    return 1.0 if light == "diffuse" else normal_transmittance(eta)
 
 
 def invert_reflectance(
@@ -173,28 +176,29 @@ def van_de_hulst_albedo(colour: FloatArray, g: float = 0.0) -> FloatArray:
 
 
 def material_from_reflectance(
-    reflectance: npt.ArrayLike,
+    reflectance: npt.ArrayLike | str,
     mean_free_path_mm: npt.ArrayLike,
-    eta: float,
+    eta: float = SKIN_ETA,
     *,
     name: str,
-    channels: Sequence[str],
-    light: Light = "normal",
+    channels: Sequence[str] = ("R", "G", "B"),
+    light: Light | None = None,
 ) -> Material:
     """Make the half space, g = 0, whose total diffuse reflectance is what was asked for.
 
     Parameters
     ----------
-    reflectance : (C,) [1]
-        As in `invert_reflectance`.
+    reflectance : (C,) [1] or str
+        As in `invert_reflectance`; or an sRGB colour in hex, "#c58c6b", which is decoded.
     mean_free_path_mm : (C,) or float [mm]
         1 / (sigma_a + sigma_s); one serves all channels.
     eta : float
+        By default that of skin and most that lives, 1.4.
     name : str
     channels : sequence of str
         C names.
-    light : "normal" or "diffuse"
-        As in `invert_reflectance`.
+    light : "normal" or "diffuse", optional
+        As in `invert_reflectance`; by default "diffuse" for a colour in hex, else "normal".
 
     Returns
     -------
@@ -208,6 +212,14 @@ def material_from_reflectance(
     """
     check_texts(name, "")  # all that can be wrong is said before the seconds of work
     check_names(channels)
+    meant = ""
+    if isinstance(reflectance, str):
+        try:
+            meant, reflectance = f"sRGB {reflectance.strip()}, ", linear_from_hex(reflectance)
+        except RenderError as error:
+            raise MaterialError(str(error)) from None
+        light = light or "diffuse"
+    light = light or "normal"
     asked = _reachable(reflectance, eta, light)
     paths_mm = np.atleast_1d(np.asarray(mean_free_path_mm, dtype=np.float64))
     if paths_mm.size not in (1, asked.size) or paths_mm.ndim > 1:
@@ -225,7 +237,7 @@ def material_from_reflectance(
         name,
         tuple(channels),
         (Layer(eta, np.zeros_like(albedo), (1.0 - albedo) / paths_mm, albedo / paths_mm),),
-        source=f"{_ASKED[light]} {words} by exact albedo inversion, sssfit {__version__}",
+        source=f"{meant}{_ASKED[light]} {words} by exact albedo inversion, sssfit {__version__}",
     )
 
 

@@ -60,7 +60,7 @@ def simulate_montecarlo(
     photons : int, optional
         Number of walks, 2 to 1e12; by default the paper's 1e7, with a target error 1e12.
     seed : int
-        Same seed, same bits, whatever the number of threads.
+        The same seed gives the same bits on any number of threads.
     threads : int, optional
         Threads to use; all cores by default.
     dr_mm : float, optional
@@ -294,7 +294,7 @@ def _warn_target(ending: Ending, photons: int, error: float) -> None:
     if target is not None and photons == ending.photons and error >= target:
         warnings.warn(
             f"{photons:,} photons were done before the target error of {100.0 * target:g} % was "
-            f"met; {100.0 * error:.2g} % was reached: give more --photons, or leave them out.",
+            f"met; {100.0 * error:.2g} % was reached: give more `photons`, or leave them out.",
             SssfitWarning,
             stacklevel=4,
         )

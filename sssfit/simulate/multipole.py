@@ -189,7 +189,7 @@ def _layers(material: Material) -> list[_Layer]:
             medium=classical(layer),
             thickness_mm=layer.thickness_mm,
             above=mismatch_by_polynomial(layer.eta / above),
-            # without a bottom there is no interface, whatever eta_below says
+            # without a bottom there is no interface; eta_below has no effect
             below=mismatch_by_polynomial(layer.eta / below)
             if np.isfinite(layer.thickness_mm)
             else 1.0,
@@ -224,21 +224,21 @@ def _both_ways(
     """
     depth, near = medium.depth_mm, 2.0 * entered * medium.coefficient_mm
     far = 2.0 * other * medium.coefficient_mm
-    common = 0.5 * medium.albedo / _lost(2.0 * s * (thickness_mm + near + far))
+    common = 0.5 * medium.albedo / _one_minus_exp(2.0 * s * (thickness_mm + near + far))
     reflected = (
         np.exp(-s * depth)
         * (1.0 + np.exp(-2.0 * s * near))
-        * _lost(2.0 * s * (thickness_mm + far - depth))
+        * _one_minus_exp(2.0 * s * (thickness_mm + far - depth))
     )
     transmitted = (
         np.exp(-s * (thickness_mm - depth))
         * (1.0 + np.exp(-2.0 * s * far))
-        * _lost(2.0 * s * (depth + near))
+        * _one_minus_exp(2.0 * s * (depth + near))
     )
     return common * reflected, common * transmitted
 
 
-def _lost(exponent: FloatArray) -> FloatArray:
+def _one_minus_exp(exponent: FloatArray) -> FloatArray:
     """1 - exp(-exponent)."""
     return np.asarray(-np.expm1(-exponent), dtype=np.float64)
 

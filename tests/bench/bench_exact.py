@@ -66,7 +66,7 @@ def accuracy_rows(small):
 def command_rows(small):
     """Whole processes, start-up included, and the eleven materials in one process."""
     rows = []
-    names = material_names()[:2] if small else material_names()
+    names = material_names(paper=True)[:2] if small else material_names(paper=True)
     with tempfile.TemporaryDirectory() as folder:
         compiling = command("simulate", "skin1", "--method", "exact", cache=folder, folder=folder)
         rows.append(("`sssfit simulate skin1 --method exact`, first use", f"{compiling:.2f}"))

@@ -60,7 +60,7 @@ def whole_fit_rows(small):
     rows = []
     for name in ("skin1", "ketchup"):
         profile = simulate_exact(load_material(name))
-        pitch = 0.5 if small else None
+        pitch = 0.5 if small else "profile"
         reach = float(profile.r_edges_mm[-1])
         pixels_mm = {"mm_per_pixel": pitch, "support_mm": reach}
         took, found = timed(lambda p=profile, m=pixels_mm: fit_svd(p, rank=RANK, **m))
@@ -89,7 +89,7 @@ def limit_rows(small):
 def method_rows(small):
     """Every method on every material with its own defaults, at 0.1 mm or 513 pixels."""
     rows = []
-    names = material_names()[:1] if small else material_names()
+    names = material_names(paper=True)[:1] if small else material_names(paper=True)
     for name in names:
         profile = simulate_exact(load_material(name))
         # guided takes up to 513 pixels; bright materials reach further than 25 mm.

@@ -154,11 +154,11 @@ def command_rows(photons, runs):
         for arguments in (
             ("simulate", "skin1", "--photons", "1000"),
             ("simulate", "skin1", "--photons", str(photons)),
-            ("simulate", "--all", "--photons", str(photons)),
+            ("simulate", "--paper", "--photons", str(photons)),
             ("chart", "skin1.profile.npz"),
             ("materials",),
         ):
-            repeats = 1 if "--all" in arguments else runs
+            repeats = 1 if "--paper" in arguments else runs
             times = [command(*arguments, folder=folder) for _ in range(repeats)]
             rows.append((f"`sssfit {' '.join(arguments)}`", f"{statistics.median(times):.2f}"))
     return rows

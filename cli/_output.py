@@ -1,0 +1,184 @@
+"""What a verb puts out: files held and written, results on stdout, words on stderr."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, BinaryIO, Protocol
+
+import click
+
+from sssfit.messages import printable
+
+from ._options import Common
+
+# What is written, and the ending of its name.
+PROFILE, KERNEL = ("a profile", ".npz"), ("a kernel", ".json")
+_ENDINGS = (".checkpoint", ".npz", ".json", ".toml", ".kernel", ".profile")
+
+
+class _Record(Protocol):
+    """A profile or a kernel."""
+
+    def write(self, stream: BinaryIO) -> None: ...
+    def save(self, path: str | Path) -> None: ...
+
+
+# Words and results
+
+
+def say(common: Common, line: str) -> None:
+    """Put a word on stderr, unless -q."""
+    if not common.quiet:
+        click.echo(printable(line), err=True)
+
+
+def finish(
+    common: Common, figures: Mapping[str, Any], text: str, *, to_stderr: bool = False
+) -> None:
+    """End a verb: its JSON object with ``--json``, else its text unless ``-q``.
+
+    ``to_stderr`` moves the text out of the way of data that went to stdout (``-o -``).
+    """
+    if common.json:
+        from sssfit.arrays import plain
+
+        click.echo(json.dumps(plain(figures), allow_nan=False), err=to_stderr)
+    elif not common.quiet:
+        click.echo(_legible(text, figures), err=to_stderr)
+
+
+def finish_one(
+    common: Common, verb: str, path: Path | None, figures: Mapping[str, Any], text: str, what: str
+) -> None:
+    """End a verb that wrote one file; None is ``what`` on stdout."""
+    whole = {"command": verb, "output": [str(path or "-")], **figures}
+    words = f"{text}\n" * bool(text) + f"Wrote {path or f'{what} to stdout'}"
+    finish(common, whole, words, to_stderr=path is None)
+
+
+def _legible(text: str, figures: Mapping[str, Any]) -> str:
+    """Escape what would move the cursor; a name that holds a newline stays on its line."""
+    for name in (*figures.get("output", ()), *figures.values()):
+        if isinstance(name, str) and "\n" in name:
+            text = text.replace(name, printable(name))
+    return "\n".join(printable(line) for line in text.split("\n"))
+
+
+# Streams
+
+
+def binary_stdout() -> BinaryIO:
+    """Return stdout for bytes, or say in one line that it is closed."""
+    from sssfit.errors import FileError
+
+    if sys.stdout is None:
+        raise FileError("stdout is closed; name a file with -o, or pipe the output somewhere.")
+    return sys.stdout.buffer
+
+
+# Files
+
+
+def target(output: str | None, default: str = "-") -> Path | None:
+    """Return where an output goes: where it was asked for or by default; None is stdout (-)."""
+    name = default if output is None else output
+    return None if name == "-" else Path(name)
+
+
+def stem_of(name: str, of_stdin: str | None = None) -> str:
+    """Name a file without the endings of ours; ``of_stdin`` is the name of what came from there."""
+    if name == "-":
+        return of_stdin or "stdin"
+    stem = Path(name).name
+    for ending in _ENDINGS:
+        stem = stem.removesuffix(ending)
+    return stem
+
+
+@contextlib.contextmanager
+def held(
+    paths: Sequence[Path | None],
+    is_own: Callable[[Path], bool],
+    *,
+    inputs: Iterable[str | Path | None],
+    force: bool,
+    named: tuple[str, str] | None = None,
+) -> Iterator[None]:
+    """Refuse outputs that could not or should not be written, and lock the others; None is stdout.
+
+    ``is_own`` tells an older output of the same kind, ``inputs`` are what the verb reads, ``named``
+    is what is written and how its name ends: ("a profile", ".npz").
+    """
+    from sssfit.files import check_ending, check_output, locked
+
+    if None in paths:
+        binary_stdout()  # closed: said now and not after the work
+    read = [each for each in inputs if each is not None]
+    files = [path for path in paths if path is not None]
+    check_distinct(files)
+    with contextlib.ExitStack() as locks:
+        for path in files:
+            if named is not None:
+                check_ending(path, *named)
+            check_output(path, is_own, force=force, inputs=read)
+            locks.enter_context(locked(path))
+        yield
+
+
+def held_charts(
+    paths: Sequence[Path | None], *, inputs: Iterable[str | Path | None], force: bool
+) -> contextlib.AbstractContextManager[None]:
+    """Hold the outputs of charts; formats are known by their endings."""
+    from sssfit.chart.files import chart_format, is_chart_file
+
+    for path in paths:
+        if path is not None:
+            chart_format(path)
+    return held(paths, is_chart_file, inputs=inputs, force=force)
+
+
+def check_distinct(paths: Iterable[Path]) -> None:
+    """Refuse two outputs into one file."""
+    from sssfit.files import is_same_file
+
+    seen: list[Path] = []
+    for path in paths:
+        for other in seen:
+            if is_same_file(path, other):
+                raise click.UsageError(
+                    f"two outputs name the same file, {path}; give each its own."
+                )
+        seen.append(path)
+
+
+def write(content: bytes | _Record, path: Path | None) -> None:
+    """Write bytes or a record to a file that is held, whole or not at all; None is stdout."""
+    from sssfit.files import write_atomically
+
+    if isinstance(content, bytes):
+        data = content  # bound here: the function below outlives the test above
+        if path is not None:
+            write_atomically(path, lambda stream: stream.write(data))
+            return
+        binary_stdout().write(data)
+    elif path is not None:
+        content.save(path)
+        return
+    else:
+        content.write(binary_stdout())
+    binary_stdout().flush()
+
+
+def write_chart(figure: Any, path: Path | None) -> None:
+    """Write a figure to a file that is held; None is PNG on stdout."""
+    from sssfit.chart.page import save_figure
+
+    if path is not None:
+        save_figure(figure, path)
+        return
+    save_figure(figure, binary_stdout(), format="png")
+    binary_stdout().flush()

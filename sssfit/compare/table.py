@@ -1,0 +1,167 @@
+"""Tables of a comparison of kernels: its rows as Markdown, CSV or JSON files, and in words."""
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from sssfit.compare.comparison import Comparison, KernelRow, Picture, Verdict, verdicts
+from sssfit.files import has_mark
+from sssfit.messages import number
+
+FORMATS = (".md", ".csv", ".json")
+HEADS = (
+    *("kernel", "passes", "weights", "s/Mpixel", "Delta E", "95th", "99th", "above 1"),
+    *("relative L2", "PSNR, dB", "energy drift", "asymmetry"),
+)
+_COST_WORDS = {"weights": "weights a pixel", "passes": "passes", "seconds": "s a megapixel"}
+_ERROR_WORDS = {"delta-e": "Mean Delta E", "l2": "Relative L2"}
+_FORMAT = "sssfit.table/1"
+# What our files begin with, and are known by.
+_MARKS = {
+    ".md": f"<!-- {_FORMAT} -->\n",
+    ".csv": f"# {_FORMAT}\n",
+    ".json": f'{{"format": "{_FORMAT}"',
+}
+
+
+def left_out_lines(comparison: Comparison) -> list[str]:
+    """Say which candidates could not be fitted, and why."""
+    return [f"Left out {label}: {reason}" for label, reason in comparison.left_out]
+
+
+def verdict_lines(comparison: Comparison, error: str, cost: str) -> list[str]:
+    """Say in two lines which kernel to take for which budget, and how near that comes."""
+    found = verdicts(comparison, error, cost)
+    first, *others = found
+    more = "".join(f", {each.label} from {each.cost:g}" for each in others)
+    cheapest, closest = first, found[-1]
+    far = f"{cheapest.label} {_error(cheapest.error, error)} ({cheapest.picture})"
+    near = f"{closest.label} {_error(closest.error, error)} ({closest.picture})"
+    both = f"the cheapest, {far}; the closest, {near}" if others else f"cheapest and closest, {far}"
+    return [
+        f"Take {first.label} for {first.cost:g} {_COST_WORDS[cost]}{more}: over the pictures, no "
+        "other is as near for as little.",
+        f"{_ERROR_WORDS[error]} on the worst picture: {both}; {_unseen(found)}.",
+    ]
+
+
+def _unseen(found: Sequence[Verdict]) -> str:
+    """Name the cheapest whose error 95 % of the pixels of every picture do not show."""
+    for each in found:
+        if each.delta_e_2000_p95 <= 1.0:
+            return f"from {each.label} on, 95 % of every picture are within a Delta E of 1"
+    return "none has 95 % of every picture within a Delta E of 1"
+
+
+def _error(value: float, error: str) -> str:
+    return f"{100.0 * value:.3g} %" if error == "l2" else f"{value:.3g}"
+
+
+def table_text(comparison: Comparison, ending: str, error: str, cost: str) -> str:
+    """Return the content of a table file."""
+    if ending == ".md":
+        return _MARKS[ending] + _markdown(comparison, error, cost)
+    if ending == ".csv":
+        return _MARKS[ending] + _csv(comparison)
+    whole = {"format": _FORMAT, "command": "compare", **comparison.to_dict()}
+    return json.dumps(whole, allow_nan=False)
+
+
+def is_table_file(path: Path) -> bool:
+    """Tell whether a file is a table that we wrote."""
+    return has_mark(path, {mark.encode(): b"" for mark in _MARKS.values()})
+
+
+def _markdown(comparison: Comparison, error: str, cost: str) -> str:
+    """Write a table for each picture; the front in bold."""
+    name = comparison.profile.material_name or "profile"
+    parts = [f"# {name}: kernels by error and cost", setting_of(comparison)]
+    head = f"| {' | '.join(HEADS)} |\n|---|{(len(HEADS) - 1) * '---:|'}"
+    for picture in comparison.pictures:
+        rows = sorted_rows(comparison, picture, error, cost)
+        lines = [_markdown_row(row, (error, cost) in row.fronts) for row in rows]
+        parts.append(f"## {picture_line(picture)}\n\n" + "\n".join([head, *lines]))
+    parts.append(f"Bold: {front_words(error, cost)}.")
+    parts += left_out_lines(comparison)
+    parts.append("\n".join(verdict_lines(comparison, error, cost)))
+    return "\n\n".join(parts) + "\n"
+
+
+def _markdown_row(row: KernelRow, is_on_front: bool) -> str:
+    label, *cells = cells_of(row, "")
+    return f"| {f'**{label}**' if is_on_front else label} | {' | '.join(cells)} |"
+
+
+def _csv(comparison: Comparison) -> str:
+    """All rows, what there is by channel in columns of its own."""
+    lines = [_flat(row, comparison.profile.channels) for row in comparison.to_dict()["rows"]]
+    stream = io.StringIO()
+    writer = csv.DictWriter(stream, list(lines[0]), lineterminator="\n")
+    writer.writeheader()
+    writer.writerows(lines)
+    return stream.getvalue()
+
+
+def _flat(figures: dict[str, Any], channels: Sequence[str]) -> dict[str, Any]:
+    """One value a column: NAME_CHANNEL, on_front_ERROR_COST; settings as JSON."""
+    flat: dict[str, Any] = {}
+    for key, value in figures.items():
+        if isinstance(value, list):
+            flat |= {f"{key}_{name}": each for name, each in zip(channels, value, strict=True)}
+        elif key == "on_front":
+            flat |= {f"{key}_{e}_{c}": int(is_on) for e in value for c, is_on in value[e].items()}
+        else:
+            flat[key] = json.dumps(value) if isinstance(value, dict) else value
+    return flat
+
+
+def sorted_rows(comparison: Comparison, picture: Picture, error: str, cost: str) -> list[KernelRow]:
+    """Rows of a picture by cost, then by error."""
+    rows = comparison.rows_of(picture.name)
+    return sorted(rows, key=lambda row: (row.rounded_cost(cost), row.error(error)))
+
+
+def cells_of(row: KernelRow, mark: str) -> list[str]:
+    """Figures of a row for people; drift and asymmetry of the worst channel."""
+    drift = max(row.energy_drift.tolist(), key=abs)
+    return [
+        f"{mark}{row.label}",
+        f"{row.passes}",
+        f"{row.taps_per_pixel}",
+        f"{row.seconds_per_megapixel:.2g}",
+        number(row.delta_e_2000_mean, ".3f"),
+        number(row.delta_e_2000_p95, ".2f"),
+        number(row.delta_e_2000_p99, ".2f"),
+        number(row.share_above_1, ".3g%"),
+        f"{100.0 * row.relative_l2:.3g} %",
+        f"{row.psnr_db:.1f}",
+        number(drift, "+.2g%"),
+        number(float(row.radial_asymmetry.max()), ".2g"),
+    ]
+
+
+def setting_of(comparison: Comparison) -> str:
+    """Say what was compared, on which pixels."""
+    profile = comparison.profile
+    threads = "1 thread" if comparison.threads == 1 else f"{comparison.threads} threads"
+    missing = comparison.missing_share.max()
+    return (
+        f"{profile.material_name or 'profile'}, {profile.meta.get('method') or 'no method'}: "
+        f"kernels of {comparison.pixels} pixels of {comparison.mm_per_pixel:.4g} mm against the "
+        f"whole 2D kernel, which lacks up to {number(missing, '.2g%')} of a channel's light beyond "
+        f"the grid; seconds on {threads}, float64"
+    )
+
+
+def front_words(error: str, cost: str) -> str:
+    """Say what is special about the rows that are marked."""
+    return f"no other kernel of the picture has as small an error ({error}) at the cost ({cost})"
+
+
+def picture_line(picture: Picture) -> str:
+    """Name a picture with its size and exposure."""
+    size = f"{picture.width} x {picture.height} pixels"
+    return f"{picture.name}, {size}, exposure {picture.exposure:.4g}"

@@ -1,0 +1,61 @@
+"""Light at a smooth surface, and the quadrature for integrals over directions.
+
+The one place of Fresnel's equations outside the compiled walk, which may import numbers only and
+has its own (`sssfit._jit.sampling.fresnel_reflectance`). ``eta`` is the refractive index inside
+over that outside, cosines are those to the normal, inside.
+"""
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.arrays import FloatArray
+
+_LEAST = 1e-150  # denominator: 0 / 0 at a cosine of 0 becomes 0
+MATCHED = 1e-9  # relative indices nearer to 1 reflect less than 1e-18: no surface at all
+
+
+def is_matched(eta: float) -> bool:
+    """Whether a relative index is 1 for all purposes."""
+    return abs(eta - 1.0) < MATCHED
+
+
+def normal_reflectance(eta: float, eta_outside: float = 1.0) -> float:
+    """Specular reflectance R_sp = ((n1 - n0) / (n1 + n0))^2 of a normally incident beam."""
+    return ((eta - eta_outside) / (eta + eta_outside)) ** 2
+
+
+def normal_transmittance(eta: float) -> float:
+    """Share 1 - R_sp of a normally incident beam that gets in."""
+    return 1.0 - normal_reflectance(eta)
+
+
+def fresnel_transmittance(cosine: npt.ArrayLike, eta: float) -> FloatArray:
+    """Share 1 - R_F of unpolarised light from inside that gets out; 0 beyond the critical angle.
+
+    2 eta mu m [1/(eta mu + m)^2 + 1/(mu + eta m)^2] with m the cosine outside, the mean of both
+    polarisations' transmittances (Born and Wolf, "Principles of Optics", section 1.5.3): a
+    difference 1 - R_F would lose grazing angles' digits.
+    """
+    cosine = np.asarray(cosine, dtype=np.float64)
+    outside = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - cosine**2), 0.0))
+    if is_matched(eta):
+        return np.ones_like(cosine)
+    s_polarised = 1.0 / np.maximum(eta * cosine + outside, _LEAST) ** 2
+    p_polarised = 1.0 / np.maximum(cosine + eta * outside, _LEAST) ** 2
+    share: FloatArray = 2.0 * eta * cosine * outside * (s_polarised + p_polarised)
+    return share
+
+
+def fresnel_reflectance(cosine: npt.ArrayLike, eta: float) -> FloatArray:
+    """Reflectance R_F of unpolarised light from inside, to 1e-15; 1 beyond the critical angle."""
+    reflected: FloatArray = 1.0 - fresnel_transmittance(cosine, eta)
+    return reflected
+
+
+def gauss_legendre(
+    count: int, start: float = 0.0, end: float = 1.0
+) -> tuple[FloatArray, FloatArray]:
+    """Return nodes and weights (count,) of Gauss's quadrature over [start, end]."""
+    x, w = np.polynomial.legendre.leggauss(count)
+    middle, half = 0.5 * (start + end), 0.5 * (end - start)
+    return middle + half * x, half * w

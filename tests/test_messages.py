@@ -1,0 +1,88 @@
+"""What the library says names no option of the command line, which writes its own in."""
+
+import ast
+import re
+from pathlib import Path
+
+import pytest
+
+from sssfit.cli._run import in_options
+
+LIBRARY = sorted((Path(__file__).parents[1] / "sssfit").rglob("*.py"))
+# A long option, a short one, or a command: none of these stands in text for Python.
+OPTION = re.compile(r"(?<![\w-])--?[a-zA-Z][\w-]*(?![\w\]])")
+COMMAND = re.compile(r"`sssfit |\bsssfit (simulate|fit|render|chart|show|export|import|compare) ")
+MARKED = re.compile(r"`[^`\n]+`")
+# Of Radiance's own program.
+FOREIGN = "ra_xyze -r"
+# Backquoted in messages without being an argument: a field of the profile.
+FIELDS = {"`unfinished`"}
+
+
+def texts(path: Path) -> list[str]:
+    """Every text of a file that is not a docstring, with the values in f-strings as 0."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    docs = {
+        id(node.body[0].value)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef)
+        and isinstance(node.body[0], ast.Expr)
+    }
+    found, parts = [], set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.JoinedStr):
+            parts |= {id(each) for each in node.values}
+            found.append(
+                "".join(
+                    getattr(each, "value", None) if isinstance(each, ast.Constant) else "0"
+                    for each in node.values
+                )
+            )
+        elif isinstance(node, ast.Constant) and id(node) not in docs | parts:
+            found += [node.value] if isinstance(node.value, str) else []
+    return found
+
+
+# The registry of methods has the help of their options, which is no message.
+@pytest.mark.parametrize(
+    "path", [each for each in LIBRARY if each.name != "methods.py"], ids=lambda path: path.name
+)
+def test_no_text_of_the_library_names_an_option_or_a_command(path):
+    for text in texts(path):
+        assert not OPTION.search(text.replace(FOREIGN, "")), text
+        assert not COMMAND.search(text), text
+
+
+def test_the_scan_finds_options_and_spares_words():
+    for text in ("give --photons 3", "name one with -o.", "use -o FILE", "(--dr 3)"):
+        assert OPTION.search(text), text
+    for text in ("x-axis", "half-width -1 to 1", "-0.5", "pre-integrated", "a - b", "[a-z]"):
+        assert not OPTION.search(text), text
+    assert COMMAND.search("`sssfit fit` writes it")
+
+
+def test_the_command_line_knows_every_argument_that_a_message_marks():
+    marked = {each for path in LIBRARY for text in texts(path) for each in MARKED.findall(text)}
+    assert len(marked) > 10
+    for each in marked - FIELDS:
+        assert "`" not in in_options(each) or "`sssfit materials" in in_options(each), each
+
+
+@pytest.mark.parametrize(
+    ("said", "printed"),
+    [
+        ("use a smaller `dr_mm`.", "use a smaller --dr."),
+        ("use `dr_mm = 0.5` or more", "use --dr 0.5 or more"),
+        ('give `quantity = "density"` (R_d)', "give --quantity density (R_d)"),
+        ("replace it with `force = True`.", "replace it with --force."),
+        ("start a new run with `resume = False`.", "start a new run without --resume."),
+        ("with `photons = 20000` alone", "with --photons 20000 alone"),
+        ("fit it at `mm_per_pixel = 0.3`.", "fit it at --mm-per-pixel 0.3."),
+        ("`material_names()` lists them", "`sssfit materials` lists them"),
+        ("kept apart as `unfinished` and", "kept apart as `unfinished` and"),
+        ("a file named `a b` is none", "a file named `a b` is none"),
+        ("rank = 3; expected 1 to 2", "rank = 3; expected 1 to 2"),
+    ],
+)
+def test_arguments_become_options_where_the_command_line_prints_them(said, printed):
+    assert in_options(said) == printed

@@ -1,0 +1,105 @@
+"""One registry of methods: help, options and functions are made from its entries."""
+
+import inspect
+import subprocess
+import sys
+
+import cli_world as world
+import click
+import pytest
+from option_rows import FITS as SHARED_ROWS
+from option_rows import ROWS
+
+from sssfit import fit
+from sssfit.cli import cli
+from sssfit.cli._methods import method_options
+from sssfit.methods import FITS, SIMULATIONS, Method, Setting, lines_of, settings_of
+
+VERBS = {"simulate": SIMULATIONS, "fit": FITS}
+ENTRIES = [(verb, name) for verb, methods in VERBS.items() for name in methods]
+
+
+def option_of(verb, setting):
+    """click's own object."""
+    (found,) = [each for each in cli.commands[verb].params if each.name == setting.name]
+    return found
+
+
+def test_the_registry_imports_nothing_heavy():
+    program = "import sys, sssfit.methods; assert not {'numpy', 'click'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
+
+
+@pytest.mark.parametrize(("verb", "name"), ENTRIES)
+def test_the_function_takes_every_setting_of_its_entry(verb, name):
+    method = VERBS[verb][name]
+    parameters = inspect.signature(method.load()).parameters
+    for each in method.settings:
+        if each.name in ("checkpoint_every", "resume"):  # of the file beside the walk
+            assert "checkpoint" in parameters
+        else:
+            assert (each.keyword or each.name) in parameters
+    if method.shares:
+        assert {"threads", "stop"} <= parameters.keys()
+
+
+@pytest.mark.parametrize(("verb", "name"), ENTRIES)
+def test_help_lists_the_method_and_its_settings(verb, name):
+    method = VERBS[verb][name]
+    command = cli.commands[verb]
+    assert any(
+        line.split()[:1] == [name] and line.endswith(method.summary)
+        for line in command.epilog.splitlines()
+    )
+    (choices,) = [each.type.choices for each in command.params if each.name == "method"]
+    assert name in choices
+    for each in method.settings:
+        owners, text = option_of(verb, each).help.split(": ", 1)
+        assert name in owners.split(", ")
+        assert text.startswith(each.help)
+
+
+@pytest.mark.parametrize("verb", list(VERBS))
+def test_every_setting_has_a_row_in_the_tests_of_options(verb):
+    settings = settings_of(VERBS[verb])
+    assert {f"--{name.replace('_', '-')}" for name in settings} <= set(ROWS[verb])
+
+
+def test_a_setting_of_several_fits_is_tried_with_each_of_them():
+    shared = {name: owners for name, (_, owners) in settings_of(FITS).items() if len(owners) > 1}
+    tried = " ".join(row.command + row.given for row in SHARED_ROWS.values())
+    tried += ROWS["fit"]["--energy"].command
+    assert list(shared) == ["energy"]
+    assert all(f"--method {owner}" in tried for owner in shared["energy"])
+
+
+def test_the_library_has_the_methods_of_the_registry():
+    assert list(fit.METHODS) == list(FITS)
+    for name, method in FITS.items():
+        assert fit.METHODS[name].fit is method.load()
+        assert fit.METHODS[name].summary == method.summary
+
+
+@pytest.mark.parametrize("name", [name for name, each in FITS.items() if each.counted])
+def test_the_number_in_a_file_name_is_that_of_the_kernel(name):
+    setting, _ = settings_of(FITS)[FITS[name].counted]
+    kernel = world.quietly(FITS[name].load(), world.profile(), mm_per_pixel=0.4).kernel
+    assert kernel.rank == int(setting.words)
+
+
+def test_one_entry_is_a_method_with_help_and_options():
+    new = Setting("sharpness", "whole", "how sharp.", "N", (1, 9), words="3")
+    methods = {**FITS, "new": Method("sssfit.fit.svd:fit_svd", "as the test says", (new,))}
+    assert lines_of(methods).splitlines()[-1] == "  new            as the test says"
+
+    @click.command()
+    @method_options(methods)
+    def command(**_given):
+        """Nothing."""
+
+    (option,) = [each for each in command.params if each.name == "sharpness"]
+    assert option.help == "new: how sharp.  [default: 3]"
+    assert option.type.convert("9", None, None) == 9
+    with pytest.raises(click.BadParameter):
+        option.type.convert("10", None, None)
+    assert len(command.params) == len(settings_of(FITS)) + 1
