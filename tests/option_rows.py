@@ -990,7 +990,7 @@ CHART = {
             view_kernel(kernel(), world.plate_profile()).misplaced.tolist(),
         ],
         default="wax.profile.npz",
-        words="found beside it or here by its fingerprint",
+        words="found beside it or here, by its hash",
     ),
     "--photons": Row(
         "chart wax.toml --models",

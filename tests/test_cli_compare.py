@@ -380,7 +380,7 @@ def test_all_prints_the_fronts(run, tmp_path, monkeypatch):
 def test_the_front_of_one_material_is_its_line_of_all(run, tmp_path, monkeypatch):
     from sssfit import material
 
-    monkeypatch.setattr(material, "material_names", lambda: ("skin1",))
+    monkeypatch.setattr(material, "material_names", lambda **_: ("skin1",))
     one = run(
         "skin1", "--what", "front", *SMALL, "--chart", "c.png", "--table", "t.md"
     ).splitlines()

@@ -107,4 +107,4 @@ def test_there_is_nothing_for_other_methods_to_be_held_against(run, name):
     run("simulate", "deon-skin", "--dr", "0.02")
     status, _, err = run("chart", "--models", name)
     assert (status, err.count("\n")) == (1, 1)
-    assert "no coefficients" in err or "no photon walk of a known material" in err
+    assert "no coefficients" in err or "not a photon walk of a known material" in err

@@ -472,7 +472,7 @@ def test_a_profile_of_other_settings_is_not_finished(run, tmp_path, change):
     run("skin1", "--photons", "2e4")
     status, _, err = run("skin1", *change, "--resume")
     assert status == 0
-    assert "There is no" in err
+    assert "to continue from" in err
     assert run("skin1", *change, "--resume")[2] == ""  # now it is
 
 
@@ -492,7 +492,7 @@ def test_a_profile_without_a_figure_of_its_walk_is_not_finished(run, tmp_path, n
     dataclasses.replace(profile, meta=meta).save(PROFILE)
     status, _, err = run("skin1", "--photons", "2e3", "--resume")
     assert status == 0
-    assert "There is no" in err
+    assert "to continue from" in err
     assert dict(Profile.load(PROFILE).meta) == dict(profile.meta)
 
 

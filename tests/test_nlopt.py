@@ -43,7 +43,7 @@ def test_an_optimum_of_zero_is_no_failure():
 
 
 def test_an_objective_that_is_nan_from_the_start_is_an_error():
-    with pytest.raises(FitError, match=r"no usable point .*no number"):
+    with pytest.raises(FitError, match=r"no usable point .*not a number"):
         minimise(lambda x: (np.nan, x), np.ones(2), **ANYWHERE)
 
 
@@ -52,7 +52,7 @@ def test_where_the_objective_becomes_nan_the_best_point_before_is_kept():
         return bowl(x) if x[1] > -1 else (np.nan, x)
 
     found = minimise(wall, np.array((5.0, 5.0)), **ANYWHERE)
-    assert "no number" in found.stop_reason
+    assert "not a number" in found.stop_reason
     assert found.value == bowl(found.x)[0] <= bowl(np.array((5.0, 5.0)))[0]
     assert found.x[1] > -1
 

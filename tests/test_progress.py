@@ -4,6 +4,7 @@ import os
 import subprocess
 import sys
 
+import processes
 import pytest
 
 posix = pytest.mark.skipif(os.name != "posix", reason="Windows has no pseudo-terminals")
@@ -35,7 +36,7 @@ def test_a_full_bar_is_taken_from_the_terminal(tmp_path, arguments):
 
     ours, theirs = pty.openpty()
     try:
-        ran = subprocess.Popen(
+        ran = processes.start(
             command(arguments),
             cwd=tmp_path,
             stdout=subprocess.DEVNULL,

@@ -82,6 +82,7 @@ RECORDS = {
         {
             *("kernel", "profile", "border", "follow", "material", "method", "rank", "channels"),
             *("irradiance", "width", "height", "mm_per_pixel", "transmitted_maximum"),
+            *("difference_map", "difference_of", "difference_gain", "difference_end"),
         },
     ),
 }

@@ -1,6 +1,7 @@
 """Runs that end at a target error: where they end, what that rests on, what is said of it."""
 
 import json
+import re
 
 import checks
 import numpy as np
@@ -128,12 +129,16 @@ def test_time_left_is_that_of_this_sitting():
     assert time_left(first, Progress(2000, 2000, 110.0, 0.1)) == "0:00:00"
 
 
-def test_the_bar_says_how_much_is_done_how_fast_and_how_well(capsys):
+def test_the_bar_says_how_much_is_done_how_fast_and_how_well(capsys, monkeypatch):
+    monkeypatch.setattr("sssfit.cli._progress._is_shown", lambda quiet: not quiet)
+    monkeypatch.setenv("FORCE_COLOR", "1")  # rich then takes stderr for a terminal
+    monkeypatch.setenv("COLUMNS", "100")
     now = Progress(2500, 10_000, 20.0, 0.0123)
     with walk_progress("wax", quiet=False) as show:
         show(Progress(1000, 10_000, 5.0, float("inf")))
         show(now)
-    words = capsys.readouterr().err.split("\n")[-2]
+    drawn = re.split(r"[\r\n]", re.sub(r"\x1b\[[\d;?]*[A-Za-z]", "", capsys.readouterr().err))
+    words = [line for line in drawn if "/s" in line][-1]
     assert words.startswith("wax ")
     share = 100 * now.photons_done / now.photons
     rate = now.photons_done / now.seconds
