@@ -50,7 +50,7 @@ def rings(target: Target, channel: int) -> tuple[FloatArray, FloatArray]:
 
 
 _ROUGH, _FINE = 1e-3, 1e-8  # relative gain of a step at which a start, or the fit, has converged
-_LONGEST_STEP = 1.5  # of a log variance: a factor of 4.5
+_STEP_SCALE = 1.5  # of a log variance, a factor of 4.5: the unit of the trust region
 _LEAST_STEP = 1e-9  # shorter ones are rounding
 _MOST_EVALUATIONS = 300  # from one start; 5 to 40 are usual
 _MET = 1e-28  # square of a relative error that is rounding
@@ -135,7 +135,7 @@ def _descend(
         point.log_variances,
         seen.jacobian,
         bounds,
-        x_scale=_LONGEST_STEP,
+        x_scale=_STEP_SCALE,
         ftol=tolerance,
         xtol=_LEAST_STEP,
         gtol=None,
