@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sssfit.process import check_memory
+
 from ._charts import (
     draw_guide,
     draw_kernel,
@@ -18,7 +20,6 @@ from ._charts import (
     read_models,
 )
 from ._input import profile_name, read_any
-from ._memory import check_memory
 from ._options import Common, Count, LengthOr, ListOf, Number, common_options
 from ._output import finish_one, held_charts, stem_of, target, write_chart
 from ._truth import true_profile

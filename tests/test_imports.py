@@ -15,7 +15,7 @@ HEAVY = {"numpy", "numba", "scipy", "colour", "matplotlib", "rich", "OpenImageIO
 
 # A room may import from rooms before it in this list, never from one after it.
 ROOMS = [
-    *("errors", "methods", "messages", "files", "text", "threads", "arrays", "optics", "shapes"),
+    *("errors", "methods", "messages", "files", "text", "process", "arrays", "optics", "shapes"),
     *("material", "grid", "profile", "kernel", "formats", "scene"),
     *("simulate", "fit", "render", "measure", "compare", "choose", "export", "chart", "cli"),
 ]
