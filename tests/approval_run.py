@@ -33,7 +33,7 @@ import sssfit
 from sssfit.cli import main
 from sssfit.compare.candidates import Candidate
 from sssfit.compare.candidates import candidates as every_candidate
-from sssfit.threads import available_cores
+from sssfit.process import available_cores
 
 _TRIED = (
     "pre-integrated",
