@@ -63,6 +63,38 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return wrapper
 
 
+def option(names: str, kind: Any, metavar: str | None, text: str, default: Any = None) -> Any:
+    """Return an option, for tables of a row an option.
+
+    ``names`` are "--radius", or "--radius radius_mm" with the name of the parameter; ``kind`` is a
+    click type, a list of choices or None for text. A default is shown.
+    """
+    return click.option(
+        *names.split(),
+        type=click.Choice(kind) if isinstance(kind, list | tuple) else kind,
+        metavar=metavar,
+        default=default,
+        show_default=default is not None,
+        help=text,
+    )
+
+
+def flag(names: str, text: str) -> Any:
+    """Return a switch."""
+    return click.option(*names.split(), is_flag=True, help=text)
+
+
+def options(*rows: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Return what adds options to a command, in their order."""
+
+    def add(command: Callable[..., Any]) -> Callable[..., Any]:
+        for each in reversed(rows):
+            command = each(command)
+        return command
+
+    return add
+
+
 class WholeRange(click.IntRange):
     """A range of whole numbers, named as such in the line said about what is not one."""
 

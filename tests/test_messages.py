@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from sssfit.cli._run import in_options
+from sssfit.messages import Columns, filled, report
 
 LIBRARY = sorted((Path(__file__).parents[1] / "sssfit").rglob("*.py"))
 # A long option, a short one, or a command: none of these stands in text for Python.
@@ -86,3 +87,35 @@ def test_the_command_line_knows_every_argument_that_a_message_marks():
 )
 def test_arguments_become_options_where_the_command_line_prints_them(said, printed):
     assert in_options(said) == printed
+
+
+FIGURES = {
+    "name": "skin1",
+    "width": 1024,
+    "share": 0.1234,
+    "nothing": None,
+    "channels": ["R", "G"],
+    "error": [0.5, float("nan")],
+    "chosen": {"label": "svd 2"},
+}
+
+
+def test_templates_are_filled_by_the_formats_of_figures():
+    text = "{name}: {width:,} wide, {share:.2g%}, {nothing:.3g|unknown}, {nothing:.3g}, {{}}"
+    assert filled(text, FIGURES) == "skin1: 1,024 wide, 12 %, unknown, -, {}"
+    assert filled("{chosen[label]} {error[0]:.2f}", FIGURES) == "svd 2 0.50"
+    with pytest.raises(KeyError):
+        filled("{unknown}", FIGURES)
+
+
+def test_a_report_leaves_out_what_is_not_known():
+    error = Columns("channel", "channels", (("error", "error", ".2g%"), ("no", "nothing", "")))
+    parts = ["{name}", ("nothing", "nothing is {nothing}"), ("width", "{width}"), error]
+    assert report(parts, FIGURES).splitlines() == [
+        "skin1",
+        "1024",
+        "channel  error",
+        "R         50 %",
+        "G            -",
+    ]
+    assert report([("nothing", error)], FIGURES) == ""
