@@ -416,7 +416,7 @@ def _check_light(eta: float, light: str) -> None:
 
 
 def _check_medium(material: Material) -> None:
-    """Refuse what the equation does not cover, naming what would do; warn of similarity."""
+    """Raise an error, with another method, if this one does not apply; warn of similarity."""
     layer = half_space(material, "exact")
     eta = relative_eta(material)
     if not 1.0 <= eta <= _LARGEST_ETA:
