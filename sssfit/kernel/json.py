@@ -14,6 +14,7 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import KernelError
 from sssfit.files import has_mark, read_at_most, reason
 from sssfit.kernel import schema
+from sssfit.kinds import KINDS
 from sssfit.messages import shown
 
 if TYPE_CHECKING:
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
 
 FORMAT = "sssfit.kernel/1"
-MARK = b'"sssfit.kernel/'  # the mark of our files, even damaged ones
 _REMEDY = "name a .kernel.json file, as sssfit writes it"
 MOST_BYTES = 500_000_000  # 16000 pixels, 10 terms and 64 channels are 200 MB
 _ROUNDING = 1e-9  # relative; sums of pixels may be computed in another order
@@ -114,7 +114,7 @@ def _parsed(text: bytes, origin: str) -> Mapping[str, Any]:
     try:
         whole = json.loads(text, object_pairs_hook=_unique_keys, parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
-        if MARK not in text:
+        if not any(mark in text for mark in KINDS["kernel"].marks):
             raise KernelError(f"{origin}: not a kernel; {_REMEDY}.") from None
         if isinstance(error, KernelError):
             raise KernelError(f"{origin}: {error}; fit the kernel again.") from None

@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -47,16 +47,13 @@ from sssfit.material.checks import (
     numbers,
 )
 from sssfit.material.toml import (
-    MOST_BYTES,
-    decode,
     default_channels,
-    did_you_mean,
     is_path,
     read_tables,
     read_text,
     write_toml,
 )
-from sssfit.messages import by_channel, of_material, printable, shown
+from sssfit.messages import by_channel, did_you_mean, of_material, printable, shown
 from sssfit.optics import normal_reflectance
 
 
@@ -311,22 +308,27 @@ def load_material(name_or_path: str | Path) -> Material:
     if wanted == "-":
         if sys.stdin is None:
             raise MaterialError("stdin is closed; name a material or a file instead of -.")
-        with located("stdin: "):
-            text = decode(sys.stdin.buffer.read(MOST_BYTES + 1))
-        with text.hinting(MaterialError) as content:
-            return parse_material(content, "stdin")
+        return read_material(sys.stdin.buffer, "stdin")
     if not isinstance(name_or_path, Path) and wanted in material_names():
         shipped = resources.files("sssfit.materials") / f"{wanted}.toml"
         return parse_material(shipped.read_text("utf-8"), f"{wanted}.toml")
     if isinstance(name_or_path, Path) or is_path(wanted):
-        with located(f"{printable(wanted)}: "):
-            text = read_text(Path(wanted))
-        with text.hinting(MaterialError) as content:
-            return parse_material(content, wanted)
+        return read_material(Path(wanted), wanted)
     raise MaterialError(
         f"there is no material {shown(wanted)}; {did_you_mean(wanted, material_names())}"
         "`material_names()` lists those there are, and a file of your own ends in .toml."
     )
+
+
+def read_material(source: Path | BinaryIO, origin: str) -> Material:
+    """Read a material's TOML from a path or a binary stream; errors are those of `parse_material`.
+
+    Messages call it ``origin``.
+    """
+    with located(f"{printable(origin)}: "):
+        text = read_text(source)
+    with text.hinting(MaterialError) as content:
+        return parse_material(content, origin)
 
 
 # Materials of "Separable Subsurface Scattering", supplementary material G: Jensen et al. 2001.

@@ -6,19 +6,17 @@ name the key; the caller adds the file in front.
 """
 
 import contextlib
-import difflib
 import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from sssfit.errors import MaterialError
 from sssfit.files import reason
-from sssfit.messages import printable, shown
-from sssfit.text import Text
-from sssfit.text import decode as text_of_bytes
+from sssfit.messages import did_you_mean, printable, shown
+from sssfit.text import Text, decode
 
 REQUIRED_KEYS = ("eta", "g", "sigma_a_per_mm", "sigma_s_per_mm")
 LAYER_KEYS = (*REQUIRED_KEYS, "thickness_mm")
@@ -57,12 +55,6 @@ _MISSING = {
 }
 
 
-def did_you_mean(word: str, known: Sequence[str]) -> str:
-    """Return ``did you mean X? `` for the nearest known word, or nothing if none is near."""
-    near = difflib.get_close_matches(word.lower(), known, n=1)
-    return f"did you mean {near[0]}? " if near else ""
-
-
 def is_path(wanted: str) -> bool:
     """Return whether a text is meant as a path rather than a shipped name."""
     if wanted.endswith(".toml") or "/" in wanted or "\\" in wanted:
@@ -72,18 +64,20 @@ def is_path(wanted: str) -> bool:
     return False
 
 
-def read_text(path: Path) -> Text:
+def read_text(source: Path | BinaryIO) -> Text:
     """Read a material file, at most ``MOST_BYTES`` of it."""
+    if not isinstance(source, Path):
+        return _decoded(source.read(MOST_BYTES + 1))
     try:
-        is_folder = path.is_dir()
-        content = b"" if is_folder else _first_bytes(path)
+        is_folder = source.is_dir()
+        content = b"" if is_folder else _first_bytes(source)
     except OSError as error:
         raise MaterialError(f"the file cannot be read: {reason(error)}.") from None
     except ValueError as error:  # a null character in the path
         raise MaterialError(f"the file cannot be read: {error}.") from None
     if is_folder:
         raise MaterialError("this is a folder; name a material file in it.")
-    return decode(content)
+    return _decoded(content)
 
 
 def _first_bytes(path: Path) -> bytes:
@@ -91,11 +85,11 @@ def _first_bytes(path: Path) -> bytes:
         return stream.read(MOST_BYTES + 1)
 
 
-def decode(content: bytes) -> Text:
+def _decoded(content: bytes) -> Text:
     """Return the text of a material file, in UTF-8 or an encoding of Windows."""
     if len(content) > MOST_BYTES:
         raise MaterialError("the file is larger than 1 MB; expected a TOML file of a few lines.")
-    text = text_of_bytes(content)
+    text = decode(content)
     if text is None:
         raise MaterialError("the file is not text; expected a material file in TOML.")
     return text

@@ -20,7 +20,8 @@ import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import ProfileError
-from sssfit.files import read_at_most, reason
+from sssfit.files import is_marked, read_at_most, reason
+from sssfit.kinds import KINDS
 from sssfit.messages import shown
 
 FORMAT = "sssfit.profile/1"
@@ -47,10 +48,6 @@ _LARGEST_FILE_BYTES = 500_000_000
 _LARGEST_META_BYTES = 16_000_000  # numpy's text has 4 bytes a character
 _REMEDY = "write it again, or name another .profile.npz file"
 _FOREIGN = "name a .profile.npz file, as sssfit writes it"
-# Either mark identifies our file, even if damaged: the first member's name, or the format in its
-# JSON, four bytes per letter. Both are stored uncompressed, one near the beginning and one near the
-# end.
-MARKS = (b"r_edges_mm.npy", "sssfit.profile/".encode("utf-32-le"))
 
 
 def pack(arrays: Mapping[str, npt.ArrayLike | None], meta: Mapping[str, Any]) -> bytes:
@@ -118,20 +115,9 @@ def _unpack_known(stream: BinaryIO) -> tuple[dict[str, FloatArray], dict[str, An
             raise
         # zipfile, zlib, struct, numpy's header parser and json raise a dozen unrelated types on
         # damaged bytes (RuntimeError for a flipped encryption bit, MemoryError, RecursionError).
-        if not is_marked(stream, MARKS):
+        if not is_marked(stream, KINDS["profile"].marks):
             raise ProfileError("is not a profile") from None
         raise ProfileError("is damaged") from error
-
-
-def is_marked(stream: BinaryIO, marks: Sequence[bytes]) -> bool:
-    """Return whether a file contains one of some marks, at any position."""
-    stream.seek(0)
-    kept = b""
-    while block := stream.read(1 << 24):
-        if any(mark in kept + block for mark in marks):
-            return True
-        kept = block[-100:]
-    return False
 
 
 def _unpack_stream(stream: BinaryIO) -> tuple[dict[str, FloatArray], dict[str, Any]]:

@@ -13,12 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
+from sssfit.process import thread_count
 from sssfit.profile import Profile
 from sssfit.profile.pixels import checked_support
 from sssfit.render._checks import check_channels, check_memory
 from sssfit.render.borders import source_indices
 from sssfit.scene.record import Scene
-from sssfit.threads import thread_count
 
 ComplexArray = npt.NDArray[np.complex128]
 

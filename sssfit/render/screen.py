@@ -27,9 +27,9 @@ from sssfit._jit import thread_pool
 from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
+from sssfit.process import thread_count
 from sssfit.render.transmittance import transmitted
 from sssfit.scene.record import Scene
-from sssfit.threads import thread_count
 
 FOLLOW = {"none": compiled.FLAT, "lerp": compiled.LERP, "gaussian": compiled.GAUSSIAN}
 LOST = {"none": compiled.NOWHERE, "middle": compiled.MIDDLE, "mean": compiled.MEAN}

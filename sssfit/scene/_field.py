@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
-from sssfit.threads import thread_count
+from sssfit.process import thread_count
 
 # Rows a thread takes at a time; thin bands, since the head is in the middle of the picture.
 BAND = 16

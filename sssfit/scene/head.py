@@ -8,12 +8,12 @@ Nothing is measured from a person.
 import math
 from typing import Any
 
+from sssfit.process import thread_count
 from sssfit.scene._field import Lighting, light_field, light_through
 from sssfit.scene._head_shape import FLOOR_MM
 from sssfit.scene._head_surface import COARSE_MM, body, bust, seen_part
 from sssfit.scene.patterns import check_range, check_size
 from sssfit.scene.record import Scene
-from sssfit.threads import thread_count
 
 # Half size of a picture that shows the face with a margin, around its middle [mm].
 FACE_HEIGHT_MM, FACE_WIDTH_MM = 210.0, 165.0

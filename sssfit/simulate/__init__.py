@@ -14,7 +14,6 @@ from sssfit.messages import shown
 from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile
 from sssfit.simulate._checkpoint import (
-    CHECKPOINT_MARKS,
     EVERY_SECONDS,
     Checkpoint,
     is_checkpoint_file,
@@ -36,7 +35,6 @@ from sssfit.simulate.montecarlo import (
 from sssfit.simulate.multipole import simulate_multipole
 
 __all__ = [
-    "CHECKPOINT_MARKS",
     "DEON_SKIN",
     "EVERY_SECONDS",
     "Checkpoint",

@@ -27,16 +27,16 @@ import numpy.typing as npt
 
 from sssfit._jit import source_key
 from sssfit.errors import FileError, SimulationError, SssfitWarning
-from sssfit.files import has_mark, reason, remove_leftovers, write_atomically
+from sssfit.files import has_mark, is_marked, reason, remove_leftovers, write_atomically
 from sssfit.grid import RadialGrid
+from sssfit.kinds import KINDS
 from sssfit.material import Material
 from sssfit.messages import printable, shown
-from sssfit.profile.npz import is_marked, read_npy
+from sssfit.profile.npz import read_npy
 from sssfit.simulate._batches import BATCH_PHOTONS, MAX_PHOTONS, Tally
 
 FORMAT = "sssfit.checkpoint/1"
-# Either mark identifies our file, even if damaged; both are stored uncompressed.
-CHECKPOINT_MARKS = (b"ledger_absorbed.npy", "sssfit.checkpoint/".encode("utf-32-le"))
+_MARKS = KINDS["checkpoint"].marks
 # At most this much work is lost. skin1's checkpoint takes 1 ms to write, the largest (64 channels
 # of 100 000 annuli, 100 MB) a quarter of a second.
 EVERY_SECONDS = 30.0
@@ -169,8 +169,8 @@ class Checkpoint:
 
 
 def is_checkpoint_file(path: Path) -> bool:
-    """Return whether a file is a checkpoint of any version, even a damaged one."""
-    return has_mark(path, {b"PK": CHECKPOINT_MARKS[1]})
+    """Tell whether a file is a checkpoint of any version, or what damage has left of one."""
+    return has_mark(path, {b"PK": _MARKS[1]})
 
 
 def settings_of(
@@ -232,7 +232,7 @@ def opened(source: Path | BinaryIO, origin: str) -> Iterator[zipfile.ZipFile]:
         # files.
         is_ours = True
         with contextlib.suppress(OSError), _rewound(source) as stream:
-            is_ours = is_marked(stream, CHECKPOINT_MARKS)
+            is_ours = is_marked(stream, _MARKS)
         what = "is a damaged checkpoint" if is_ours else "is not a checkpoint"
         raise FileError(f"{origin} {what}; {_REMEDY}.") from error
 

@@ -30,6 +30,7 @@ from sssfit.errors import SimulationError, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
 from sssfit.optics import normal_transmittance
+from sssfit.process import available_cores
 from sssfit.profile import Profile
 from sssfit.simulate._depth import (
     Resolution,
@@ -51,7 +52,6 @@ from sssfit.simulate._mixture import (
 )
 from sssfit.simulate._semi_infinite import relative_eta
 from sssfit.simulate._surface import entering_of_diffuse
-from sssfit.threads import available_cores
 
 Light = Literal["normal", "diffuse"]
 LIGHTS: tuple[Light, ...] = get_args(Light)

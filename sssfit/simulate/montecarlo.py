@@ -20,6 +20,7 @@ from sssfit._jit import compiled_before
 from sssfit.errors import SimulationError, SssfitWarning, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
+from sssfit.process import available_cores
 from sssfit.profile import Profile
 from sssfit.simulate._batches import Walk, relative_errors
 from sssfit.simulate._checkpoint import Checkpoint, settings_of
@@ -27,7 +28,6 @@ from sssfit.simulate._finished import AUTO_BEYOND, ending_of, profile_of, share_
 from sssfit.simulate._layered import LayeredWalk
 from sssfit.simulate._run import Ending, Progress, run
 from sssfit.simulate._semi_infinite import SemiInfiniteWalk, relative_eta
-from sssfit.threads import available_cores
 
 # With fewer, a channel may have a handful of hits, and its error estimate is unreliable.
 HONEST_PHOTONS = 1000
