@@ -1,9 +1,9 @@
-"""Light through a body between two height fields: path length inside, and point of entry.
+"""Light through a solid between two height fields: path length inside, and point of entry.
 
 A solid is the tuple (front, back, x0, y0, spacing, low, high): heights [mm] on the same nodes,
-bilinear in between, none of the body below ``low`` or above ``high``. It lies where back <= z <=
-front, and is empty where the back is above the front. Over a cell both distances are quadratics of
-the ray's parameter, so that lengths have no steps.
+bilinear in between, with no part below ``low`` or above ``high``. It is the set back <= z <= front,
+and empty where the back is above the front. Over a cell both distances are quadratic in the ray's
+parameter, so lengths have no steps.
 """
 
 import math
@@ -15,7 +15,7 @@ from sssfit._jit import jit, jit_inline
 from sssfit._jit.heightfield import NUDGE_MM, Vector, bilinear, clip_axis, normal_at
 
 FloatArray = npt.NDArray[np.float64]
-# Between what is seen, with its pores, and the smooth solid there may be slivers of air [mm].
+# Largest gap of air between the visible surface, with its pores, and the smooth solid [mm].
 GAP_MM = 0.5
 Solid = tuple[FloatArray, FloatArray, float, float, float, float, float]
 
@@ -24,7 +24,7 @@ Solid = tuple[FloatArray, FloatArray, float, float, float, float, float]
 def over_patch(
     heights: FloatArray, row: int, column: int, at: Vector, step: Vector
 ) -> tuple[float, float, float]:
-    """Coefficients of the ray's height over a patch, C + B t + A t^2."""
+    """Return the coefficients of the ray's height over a patch, C + B t + A t^2."""
     u, v = at[0] - column, at[1] - row
     dx, dy, dz = step
     corner = heights[row, column]
@@ -37,12 +37,12 @@ def over_patch(
 
 @jit_inline
 def add_roots(cuts: FloatArray, count: int, patch: Vector, length: float) -> int:
-    """Sort the roots of C + B t + A t^2 within (0, length) into ``cuts``; return how many."""
+    """Sort the roots of C + B t + A t^2 within (0, length) into ``cuts``; return their number."""
     constant, linear, square = patch
     discriminant = linear * linear - 4.0 * square * constant
     if discriminant < 0.0:
         return count
-    # The stable form: no difference of nearly equal numbers.
+    # The stable form, without differences of nearly equal numbers.
     q = -0.5 * (linear + math.copysign(math.sqrt(discriminant), linear))
     for which in range(2):
         above, below = (q, square) if which == 0 else (constant, q)
@@ -67,9 +67,10 @@ def value(patch: Vector, t: float) -> float:
 def first_run(
     solid: Solid, point: Vector, direction: Vector, cuts: FloatArray
 ) -> tuple[float, float, bool]:
-    """Where a ray, all in mm, is first inside a solid, from and to, and whether it comes in again.
+    """Return start and end of a ray's first run inside a solid, in mm, and if it enters again.
 
-    -1 and -1 where it never is. Gaps under `GAP_MM` belong to the run. ``cuts`` (6,) is work space.
+    Both are -1 if it is never inside. Gaps under `GAP_MM` count as inside. ``cuts`` (6,) is work
+    space.
     """
     front, back, x0, y0, spacing, low, high = solid
     x, y, z = (point[0] - x0) / spacing, (point[1] - y0) / spacing, point[2]
@@ -109,7 +110,7 @@ def first_run(
 
 @jit_inline
 def outward(solid: Solid, point: Vector) -> Vector:
-    """Return the normal of the front or the back, the nearer one, away from the body."""
+    """Return the normal of the front or the back, the nearer one, pointing out of the solid."""
     front, back, x0, y0, spacing = solid[:5]
     x, y = (point[0] - x0) / spacing, (point[1] - y0) / spacing
     over = abs(point[2] - bilinear(front, x, y))

@@ -1,8 +1,8 @@
-"""Search for the variances of a sum of Gaussians: one Gaussian more at a time.
+"""Search for the variances of a sum of Gaussians, adding one Gaussian at a time.
 
 The best sum of N starts from the best of N - 1 with a new Gaussian in each gap between variances,
-below the smallest and above the largest. With weight 0 for the new one each start is as good as
-what it started from, so the error cannot rise with N.
+below the smallest and above the largest. With weight 0 for the new one each start is as good as the
+previous optimum, so the error cannot rise with N.
 """
 
 import math
@@ -21,9 +21,9 @@ _STEEP = 0.05
 
 
 def is_steep(target: Target, channel: int) -> bool:
-    """Whether the objective depends on how finely one looks at the beam; see ``_STEEP``."""
+    """Whether the objective depends on the resolution near the beam; see ``_STEEP``."""
     energy = target.profile.annulus_energy[:, channel]
-    energy = energy / energy.sum()  # else the squares of a faint profile are 0
+    energy = energy / energy.sum()  # otherwise the squares of a faint profile underflow
     areas = annulus_areas(target.profile.r_edges_mm)
     norm = float(np.sum(energy**2 / areas))
     apart = float(np.sum(energy[:2] ** 2 / areas[:2]))
@@ -34,8 +34,8 @@ def is_steep(target: Target, channel: int) -> bool:
 def rings(target: Target, channel: int) -> tuple[FloatArray, FloatArray]:
     """Return the edges (m+1,) [mm] and energies (m,) that a channel is fitted to.
 
-    The profile's own, unless it is steep: then the ten innermost annuli are cut into equal parts no
-    wider than half a pixel, by the profile's monotone interpolation of F.
+    The profile's own, unless the profile is steep; then the ten innermost annuli are cut into equal
+    parts no wider than half a pixel, by the profile's monotone interpolation of F.
     """
     profile = target.profile
     edges_mm, energy = profile.r_edges_mm, profile.annulus_energy[:, channel]
@@ -75,7 +75,7 @@ class GaussianSum:
 def search(annuli: Annuli, terms: int, least_mm2: float, most_mm2: float) -> GaussianSum:
     """Find up to ``terms`` Gaussians with variances between two limits [mm^2].
 
-    Fewer where another one does not lower the error.
+    Fewer if one more does not lower the error.
     """
     bounds = float(np.log(least_mm2)), float(np.log(most_mm2))
     best, evaluations, reason = None, 0, ""
@@ -112,7 +112,7 @@ def _starts(log_variances: FloatArray | None, bounds: tuple[float, float]) -> li
 def _best_of(
     annuli: Annuli, starts: list[FloatArray], bounds: tuple[float, float]
 ) -> tuple[Point, bool, int]:
-    """Try all starts roughly, finish the best; the best point, whether it settled, evaluations."""
+    """Try all starts roughly, finish the best; return that point, if it converged, evaluations."""
     tried = [_descend(annuli, annuli.at(start), bounds, _ROUGH) for start in starts]
     tried.sort(key=lambda each: each[0].cost)
     finished = [_descend(annuli, each[0], bounds, _FINE) for each in tried[:_FINISHED]]
@@ -124,8 +124,8 @@ def _best_of(
 def _descend(
     annuli: Annuli, point: Point, bounds: tuple[float, float], tolerance: float
 ) -> tuple[Point, bool, int]:
-    """Least squares from a point; the last point, whether it converged, evaluations."""
-    from scipy.optimize import least_squares  # 0.8 s that ``fit --list`` need not wait for
+    """Run least squares from a point; return the last point, if it converged, evaluations."""
+    from scipy.optimize import least_squares  # 0.8 s that ``fit --list`` does not need
 
     if not np.isfinite(point.cost):
         return point, True, 0
@@ -145,7 +145,7 @@ def _descend(
 
 
 class _Seen:
-    """The point that was looked at last: its weights serve the residual and the Jacobian."""
+    """Keeps the last point, whose weights serve the residual and the Jacobian."""
 
     def __init__(self, annuli: Annuli, point: Point) -> None:
         self._annuli, self._point = annuli, point
@@ -161,7 +161,7 @@ class _Seen:
 
 
 def _without_zero_weights(point: Point) -> Point:
-    """Leave out Gaussians of weight 0 and put the others in ascending order."""
+    """Drop Gaussians of weight 0 and sort the others by variance."""
     order = np.argsort(point.log_variances)
     kept = order[point.weights[order] != 0.0]
     return Point(

@@ -1,6 +1,6 @@
 """Checks of a kernel file by ``kernel.schema.json``: the first fault, with its place.
 
-Only the keywords that this schema uses are known; a test holds the two together.
+Only the keywords used by this schema are supported; a test compares the two.
 """
 
 import json
@@ -80,7 +80,7 @@ def _check_list(value: list[Any], rules: Schema, path: str) -> None:
 
 
 def _are_numbers(values: list[Any], rules: Schema) -> bool:
-    """Whether all are numbers within the rules, at once: a kernel may have ten million weights."""
+    """Check all numbers at once, because a kernel may have ten million weights."""
     if rules.get("type") != "number" or not set(map(type, values)) <= {int, float}:
         return False
     least, most = rules.get("minimum", -math.inf), rules.get("maximum", math.inf)

@@ -1,8 +1,8 @@
 """The walk of ``sssfit._jit.layered`` in batches: any stack of layers, any g.
 
-Channels that scatter alike (same sigma_s and g in every layer) share a walk; others walk by
-themselves, on the same random streams, which keeps their noise alike. A batch holds them all, so
-that every channel of a profile rests on the same number of photons.
+Channels that scatter alike (same sigma_s and g in every layer) share a walk; others have their own
+walk on the same random streams, so that their noise is similar. A batch includes all of them, so
+that every channel of a profile has the same number of photons.
 """
 
 from dataclasses import dataclass, field
@@ -18,10 +18,10 @@ from sssfit.simulate._batches import BATCH_PHOTONS, Sums, Tally
 
 @dataclass(frozen=True, slots=True)
 class LayeredWalk:
-    """The walks of one layered material, and what the compiled code wants to know of each.
+    """The walks of one layered material, with the inputs of the compiled code.
 
-    ``diffuse`` lights the stack evenly from all sides instead of along the normal; reciprocity
-    (a statement on such light) is tested with it.
+    ``diffuse`` lights the stack evenly from all directions instead of along the normal, for tests
+    of reciprocity.
     """
 
     materials: tuple[Material, ...]
@@ -40,7 +40,7 @@ class LayeredWalk:
         object.__setattr__(self, "groups", groups)
 
     def trace(self, batch: int) -> Tally:
-        """Walk one batch of every group; depends on the seed and the batch's number alone."""
+        """Walk one batch of every group; the result depends only on seed and batch number."""
         tally = self.empty_tally()
         tally.photons = min(BATCH_PHOTONS, self.photons - batch * BATCH_PHOTONS)
         for stack, bins in self.groups:
@@ -57,7 +57,7 @@ class LayeredWalk:
         return tally
 
     def empty_tally(self) -> Tally:
-        """All sums zero."""
+        """Return a tally with all sums zero."""
         material, cells = self.materials[0], self.grids[0].annuli + 1
         n = material.n_channels
         ledger = walk.Ledger(
@@ -70,7 +70,7 @@ class LayeredWalk:
         return Tally(ledger)
 
     def sums(self, tally: Tally, index: int) -> Sums:
-        """Give the sums of the one material there is (``index`` 0)."""
+        """Return the sums of the only material (``index`` 0)."""
         ledger = tally.ledger
         finite = np.isfinite(self.materials[index].layers[-1].thickness_mm)
         return Sums(
@@ -84,7 +84,7 @@ class LayeredWalk:
 
 
 def channels_with_equal_scattering(material: Material) -> list[npt.NDArray[np.int64]]:
-    """Group the channels that differ in absorption only; indices, in their order."""
+    """Group the channels that differ in absorption only; returns indices in their order."""
     groups: dict[bytes, list[int]] = {}
     for c in range(material.n_channels):
         scattering = [(layer.sigma_s_per_mm[c], layer.g[c]) for layer in material.layers]
@@ -93,7 +93,7 @@ def channels_with_equal_scattering(material: Material) -> list[npt.NDArray[np.in
 
 
 def _stack(material: Material, members: npt.NDArray[np.int64]) -> walk.Stack:
-    """Lay out the layers for a group: the least absorbing channel of each layer walks."""
+    """Lay out the layers for a group; its walk follows each layer's least absorbing channel."""
     layers = material.layers
     sigma_a = np.array([layer.sigma_a_per_mm[members] for layer in layers])
     sigma_s = np.array([layer.sigma_s_per_mm[members[0]] for layer in layers])

@@ -12,13 +12,14 @@ from sssfit.grid import RadialGrid
 from sssfit.material import Material
 from sssfit.simulate._batches import BATCH_PHOTONS, Sums, Tally
 
-ROULETTE_THRESHOLD = 1e-4  # MCML's; of the largest channel's weight
-ROULETTE_LEVELS = 30  # one walk in 1e30 survives so many
+# MCML's roulette threshold, applied to the largest weight of all channels.
+ROULETTE_THRESHOLD = 1e-4
+ROULETTE_LEVELS = 30  # one walk in 1e30 survives this many
 
 
 @dataclass(frozen=True, slots=True)
 class SemiInfiniteWalk:
-    """One walk for materials of one refractive index, and what the compiled code wants to know."""
+    """One walk for materials of one refractive index, with the inputs of the compiled code."""
 
     materials: tuple[Material, ...]
     grids: tuple[RadialGrid, ...]
@@ -35,7 +36,7 @@ class SemiInfiniteWalk:
         object.__setattr__(self, "roulette_at", roulette_schedule(largest))
 
     def trace(self, batch: int) -> Tally:
-        """Walk one batch; what comes back depends on the seed and the batch's number alone."""
+        """Walk one batch; the result depends only on the seed and the batch number."""
         tally = self.empty_tally()
         tally.photons = min(BATCH_PHOTONS, self.photons - batch * BATCH_PHOTONS)
         tally.flights = walk.trace_batch(
@@ -50,7 +51,7 @@ class SemiInfiniteWalk:
         return tally
 
     def empty_tally(self) -> Tally:
-        """All sums zero."""
+        """Return a tally with all sums zero."""
         n_channels = self.channels.last_bin.size
         cells = int(np.sum(self.channels.last_bin + 1))
         ledger = walk.Ledger(
@@ -62,7 +63,7 @@ class SemiInfiniteWalk:
         return Tally(ledger)
 
     def sums(self, tally: Tally, index: int) -> Sums:
-        """Give one material's share of a tally."""
+        """Return one material's part of a tally."""
         first = sum(each.n_channels for each in self.materials[:index])
         own = range(first, first + self.materials[index].n_channels)
         ledger = tally.ledger
@@ -76,20 +77,20 @@ class SemiInfiniteWalk:
         )
 
     def _cells(self, channel: int) -> slice:
-        """Where a channel's bins stand in the ledger, the one beyond the grid last."""
+        """Positions of a channel's bins in the ledger, the one beyond the grid last."""
         first = int(self.channels.first_cell[channel])
         return slice(first, first + int(self.channels.last_bin[channel]) + 1)
 
 
 def relative_eta(material: Material) -> float:
-    """Refractive index of the top layer relative to what is above it."""
+    """Refractive index of the top layer relative to the medium above it."""
     return material.layers[0].eta / material.eta_above
 
 
 def roulette_schedule(albedo: float) -> npt.NDArray[np.uint32]:
-    """At how many collisions a walk that survived k = 0, 1, ... roulettes plays the next.
+    """Return the collisions at which a walk that survived k = 0, 1, ... roulettes plays the next.
 
-    The smallest n with albedo^n 10^k under the threshold; the collision cap where that is larger.
+    The smallest n with albedo^n 10^k under the threshold, or the collision cap if that is smaller.
     """
     schedule = np.full(ROULETTE_LEVELS + 1, walk.COLLISION_CAP, np.uint32)
     if albedo == 1.0:
@@ -125,9 +126,9 @@ def _channels(materials: tuple[Material, ...], grids: tuple[RadialGrid, ...]) ->
 
 
 def _powers(base: FloatArray) -> FloatArray:
-    """base^k for k below ``POWER_BLOCK``, (POWER_BLOCK, C).
+    """Return base^k for k below ``POWER_BLOCK``, (POWER_BLOCK, C).
 
-    Python's own power: numpy's differs in the last bit between processors.
+    Uses Python's power, because numpy's differs in the last bit between processors.
     """
     rows = [[float(each) ** k for each in base] for k in range(walk.POWER_BLOCK)]
     return np.array(rows)
