@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from sssfit.fit import _by_hand, artist, burley, falloff, guided
-from sssfit.fit._gaussians_annuli import make_annuli
+from sssfit.fit._gaussians_search import make_annuli
 from sssfit.shapes import diffusion_cdf
 
 SEEDS = range(4)

@@ -25,8 +25,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from sssfit.errors import FitError, SssfitWarning
-from sssfit.fit._gaussians_annuli import make_annuli
-from sssfit.fit._gaussians_search import GaussianSum, is_steep, rings, search
+from sssfit.fit._gaussians_search import GaussianSum, is_steep, make_annuli, rings, search
 from sssfit.fit._result import ChannelFit, FitResult, factor_to, fit_channels, restores
 from sssfit.fit._target import Pitch, Target, make_target, name_of
 from sssfit.profile import Profile

@@ -33,8 +33,7 @@ import numpy as np
 
 from sssfit._jit.transport import NEGLIGIBLE, Tables, kernel_matrix
 from sssfit.arrays import FloatArray
-from sssfit.optics import gauss_legendre, is_matched, normal_transmittance
-from sssfit.simulate._surface import Cone
+from sssfit.optics import Cone, gauss_legendre, is_matched, normal_transmittance
 
 _DEPTH = 26.0  # of the last panel: what does not fall like exp(-nu z) is exp(-26) = 5e-12 there
 _WIDEST = 2.5  # panel: C0 = exp(-z) needs it

@@ -24,9 +24,8 @@ from sssfit.profile import Profile
 from sssfit.simulate._batches import Walk, relative_errors
 from sssfit.simulate._checkpoint import Checkpoint, settings_of
 from sssfit.simulate._finished import AUTO_BEYOND, ending_of, profile_of, share_beyond, whole
-from sssfit.simulate._layered import LayeredWalk
 from sssfit.simulate._run import Ending, Progress, run
-from sssfit.simulate._semi_infinite import SemiInfiniteWalk, relative_eta
+from sssfit.simulate._walks import LayeredWalk, SemiInfiniteWalk, relative_eta
 from sssfit.threads import available_cores
 
 HONEST_PHOTONS = 1000  # below, a channel may rest on a handful of hits and its error on luck
