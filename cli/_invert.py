@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sssfit.messages import table
+from sssfit.process import check_memory
 
-from ._memory import check_memory
 from ._options import Common
 from ._output import binary_stdout, finish, held
 from ._progress import say_if_compiling

@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from ._memory import check_memory, check_threads_of_numba
+from sssfit.process import check_memory, check_threads_of_numba
 
 _MM_PER_UNIT = {"": 1.0, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 
@@ -61,6 +61,38 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
         return command(*args, common=common, **kwargs)
 
     return wrapper
+
+
+def option(names: str, kind: Any, metavar: str | None, text: str, default: Any = None) -> Any:
+    """Return an option, for tables of a row an option.
+
+    ``names`` are "--radius", or "--radius radius_mm" with the name of the parameter; ``kind`` is a
+    click type, a list of choices or None for text. A default is shown.
+    """
+    return click.option(
+        *names.split(),
+        type=click.Choice(kind) if isinstance(kind, list | tuple) else kind,
+        metavar=metavar,
+        default=default,
+        show_default=default is not None,
+        help=text,
+    )
+
+
+def flag(names: str, text: str) -> Any:
+    """Return a switch."""
+    return click.option(*names.split(), is_flag=True, help=text)
+
+
+def options(*rows: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Return what adds options to a command, in their order."""
+
+    def add(command: Callable[..., Any]) -> Callable[..., Any]:
+        for each in reversed(rows):
+            command = each(command)
+        return command
+
+    return add
 
 
 class WholeRange(click.IntRange):

@@ -15,9 +15,9 @@ import click
 
 from sssfit.errors import SssfitError, SssfitWarning
 from sssfit.messages import printable
+from sssfit.process import is_out_of_memory
 
 from ._group import cli
-from ._memory import is_out_of_memory
 
 _LONGEST_LINE = 1000  # a path may be 4096 characters, an option's value anything
 # The library's messages have arguments and calls of Python between backquotes.

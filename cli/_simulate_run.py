@@ -60,9 +60,8 @@ def run(materials: Made, targets: list[Path | None], jobs: list[Job], request: R
     After Ctrl-C or SIGTERM what was written by then stays, and a walk is saved as far as it came.
     """
     from sssfit.errors import StoppedError
+    from sssfit.process import asked_to_stop
     from sssfit.profile import is_profile_file
-
-    from ._interrupt import asked_to_stop
 
     rows: dict[int, _Outcome] = {}
     outputs = held(

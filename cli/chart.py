@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sssfit.process import check_memory
+
 from ._charts import (
     draw_guide,
     draw_kernel,
@@ -17,17 +19,16 @@ from ._charts import (
     first_of,
     read_models,
 )
-from ._input import profile_name, read_any
-from ._memory import check_memory
+from ._input import load_any, profile_name
 from ._options import Common, Count, LengthOr, ListOf, Number, common_options
 from ._output import finish_one, held_charts, stem_of, target, write_chart
 from ._truth import true_profile
 
 if TYPE_CHECKING:
     from sssfit.kernel import SeparableKernel
+    from sssfit.kinds import Loaded
 
     from ._charts import Drawn
-    from ._input import Found
 
 
 @click.command()
@@ -132,7 +133,7 @@ def chart(file: str | None, output: str | None, force: bool, common: Common, **g
         inputs = [file]
     else:
         name = profile_name(file, common)
-        kind, stem, inputs, draw = _of_file(name, read_any(name), asked, given, common)
+        kind, stem, inputs, draw = _of_file(name, load_any(name), asked, given, common)
         path = target(output, f"{stem_of(name, stem)}.{kind}.png")
     with held_charts([path], inputs=inputs, force=force):
         figure, figures, text = draw()
@@ -141,7 +142,7 @@ def chart(file: str | None, output: str | None, force: bool, common: Common, **g
 
 
 def _of_file(
-    name: str, found: Found, asked: list[str], given: dict[str, Any], common: Common
+    name: str, found: Loaded, asked: list[str], given: dict[str, Any], common: Common
 ) -> tuple[str, str | None, list[Any], Callable[[], Drawn]]:
     """Return the kind of chart of a file, a name for it, what is read, and what draws it."""
     from sssfit.errors import ProfileError

@@ -18,31 +18,32 @@ BUDGETS = ("skin1", "wholemilk", "ketchup")
 TEXT = """## No more than the scene needs
 
 `sssfit choose skin1 --distance 0.6m --fov 30 --resolution 1920x1080 --tolerance 1.0` finds the
-kernel with the fewest weights with which 95 % of the head's pixels stay within the tolerance:
-method, rank and support. Its choices at 30 degrees and 1080 rows (weights a pixel, 95th percentile
-of Delta E; last, what `--tolerance-of mean` would take, with the share of pixels above 1):
+kernel (method, rank and support) with the fewest weights for which 95 % of the head's pixels stay
+within the tolerance. Its choices at 30 degrees and 1080 rows, with weights per pixel and the 95th
+percentile of Delta E; the last column is what `--tolerance-of mean` would choose, with the share
+of pixels above 1:
 
 {choices}
 
-A scene pays for what its pixels show. From some metres on a few weights do, or none; close up the
-single scattering has to be paid for by rank. `choose` prints what the next cheaper and the next
-dearer step would give, and how few photons would have done.
+The cost depends on what the pixels show. Beyond a few metres a few weights are enough, or none;
+close up, single scattering needs rank. `choose` also prints what the next cheaper and the next
+more expensive step would give, and how few photons would have been enough.
 
 ## Where the error comes from
 
-`sssfit compare wholemilk --what budget` takes a kernel's error apart (here 1e6 photons, the paper's
-grid, `svd --rank 3`, half floats; head of 512 x 512 pixels of .3 mm; mean Delta E, relative L2 in
-percent; in brackets what the kernel does not have):
+`sssfit compare wholemilk --what budget` splits a kernel's error by cause (here 1e6 photons, the
+paper's grid, `svd --rank 3`, half floats; head of 512 x 512 pixels of .3 mm). Mean Delta E,
+relative L2 in percent; causes in brackets are not part of this kernel:
 
 {budgets}
 
 ![Error budget of wholemilk on disk, edge, points and head](wholemilk-budget.png)
 
-The order is what to act on. For skin1 and ketchup that is rank alone: 1e6 photons and half floats
-do not show. For wholemilk it is the grid, from which 2.7 % of red is missing: give
-`sssfit simulate` a larger `--radius`. For skin1 and ketchup 8-bit weights and every diffusion
-model cost more than stopping at three terms; for wholemilk, which scatters most, Grosjean's dipole
-costs next to nothing.
+Act on the causes in this order. For skin1 and ketchup the only one that matters is rank: 1e6
+photons and half floats do not show. For wholemilk it is the grid, from which 2.7 % of red is
+missing: give `sssfit simulate` a larger `--radius`. For skin1 and ketchup, 8-bit weights or any
+diffusion model cost more than stopping at three terms; for wholemilk, which scatters most,
+Grosjean's dipole costs next to nothing.
 """
 
 

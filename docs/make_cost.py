@@ -18,10 +18,10 @@ REPEATS, ROUNDS = 12, 4  # in turns: what else the machine does then hits all al
 PAPER_PASSES_MS = {"GTX 580": (1.05, 3.07), "GTX 470": (4.6, 10.38), "GT 130M": (13.66, 40.02)}
 PAPER_SAMPLES_MS = (1.02, 1.77, 3.15)
 
-TEXT = """## Cost beside the papers' own ratios
+TEXT = """## Cost compared with the papers
 
-{height} x {width} RGB in float32 on one core, seconds of processor a megapixel, least of
-{repeats}. The report gives milliseconds on graphics cards, so only ratios compare.
+{height} x {width} RGB in float32 on one core, seconds of processor time per megapixel, least of
+{repeats}. The report gives milliseconds on graphics cards, so only ratios can be compared.
 
 | passes of 17 weights | ours | ratio | report's ratio, table 2, close views |
 |---|---|---|---|
@@ -31,11 +31,12 @@ TEXT = """## Cost beside the papers' own ratios
 |---|---|---|---|---|
 {samples}
 
-Six times the passes cost us {pass_ratio:.1f} times the time, and the report 2.3 to 2.9 times. Its
-figures hold a fixed part, which it puts at .1 ms for two passes and .71 ms for six Gaussians where
-nothing scatters, and it does not say how many samples each Gaussian has. From 9 to 33 weights, 3.7
-times as many, we pay {sample_ratio:.1f} times and the report 3.1 times: here a pass costs much
-for any number of weights, so that fewer terms save more than shorter passes do.
+Six times the passes take {pass_ratio:.1f} times as long here, and 2.3 to 2.9 times as long in the
+report. Its figures include a fixed part, given as .1 ms for two passes and .71 ms for six
+Gaussians where nothing scatters, and it does not say how many samples each Gaussian has. From 9
+to 33 weights, 3.7 times as many, the time grows {sample_ratio:.1f} times here and 3.1 times in
+the report. Here a pass has a high cost at any number of weights, so fewer terms save more than
+shorter passes.
 """
 
 

@@ -27,22 +27,24 @@ SUPPORT_MM = 8.0
 TEXT = """## The 2012 model's unit of length
 
 The report gives x no unit. Its width w, strength t and falloff f of table 1 (.014; .78 .70 .75;
-.57 .13 .08) are compared with the six-Gaussian skin by its eq. 3, the sum of squares over sampled
-pixels of the three channels, on a support of {support:g} mm. The one length scale is STRETCH: a
-channel is m = STRETCH w (0.001 + f) times as wide as red skin. What is left of the sum of squares
-of the kernel itself, for the best STRETCH at each pitch, and for the best parameters of all:
+.57 .13 .08) are compared here with the six-Gaussian skin by its eq. 3, the sum of squares over
+sampled pixels of the three channels, on a support of {support:g} mm. The only length scale is
+STRETCH: a channel is m = STRETCH w (0.001 + f) times as wide as red skin. The table gives the
+remaining share of the sum of squares of the kernel, for the best STRETCH at each pixel size and
+for the best of all parameters:
 
-| mm per pixel | best STRETCH | m of R G B | left by table 1 | left by our fit |
+| mm per pixel | best STRETCH | m of R G B | remainder, table 1 | remainder, our fit |
 |---|---|---|---|---|
 {scan}
 
-The delta is one pixel, so the strength belongs to the pitch: in pixels of 0.1 mm the best strength
-is almost 1 and no length suits table 1. From 0.4 mm on the best length hardly depends on the
-pitch, and table 1's red channel is then p itself (m = {red:.2f}), as it should be.
-**STRETCH = {stretch:g}**, the figure at {pitch:g} mm. Widths enter only times 0.001 + f: our fit
-gives the widest channel the falloff 1; one column shows the same kernel at table 1's width.
+The delta peak is one pixel wide, so the strength depends on the pixel size: with pixels of 0.1 mm
+the best strength is almost 1, and no length scale suits table 1. From 0.4 mm on the best length
+scale hardly depends on the pixel size, and table 1's red channel is then p itself (m = {red:.2f}),
+as it should be. **STRETCH = {stretch:g}**, the figure at {pitch:g} mm. Widths enter only as a
+product with 0.001 + f: our fit gives the widest channel the falloff 1, and one column shows the
+same kernel at table 1's width.
 
-| at {pitch:g} mm | width | strength R G B | falloff R G B | falloff at w = .014 | left |
+| at {pitch:g} mm | width | strength R G B | falloff R G B | falloff at w = .014 | remainder |
 |---|---|---|---|---|---|
 {sets}
 """

@@ -125,15 +125,15 @@ def score_table(found):
     words = [
         f"{name} {mean:.3f}, {most:.2f}" for name, (mean, most) in zip(RULES, best, strict=True)
     ]
-    return [*rows, "", f"With each material's best k of these: {'; '.join(words)}."]
+    return [*rows, "", f"With the best k for each material: {'; '.join(words)}."]
 
 
 TEXT = """### What k and b refer to
 
-Made on {date} by `python docs/make_guided.py`. Exact profiles, pixels of .3 mm or, where the
-support asks for it, wider. How far the pass of each k is from the pre-integrated one, half the sum
-of the differences of passes of sum 1, for skin1 on three supports (outer edge, mm); x = 1 in Gamma
-is at the extent after the channel's name (mm):
+Made on {date} by `python docs/make_guided.py`. Exact profiles, pixels of .3 mm, or wider where the
+support requires it. The table shows how far the pass of each k is from the pre-integrated pass
+(half the sum of absolute differences, both passes scaled to sum 1), for skin1 on three supports
+(outer edge, mm). The extent, where x = 1 in Gamma, follows the channel's name (mm):
 
 | support | x = 1 by | channel, extent | {ks} | nearest k |
 |---|---|---|{bars}---|

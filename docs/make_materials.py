@@ -14,14 +14,14 @@ PHOTONS = 10_000_000
 
 HEAD = """# The eleven materials
 
-Made by `python docs/make_materials.py`: 10,000,000 photons each, seed 1, the paper's grid
-(dr = shortest mean free path / 20, radius = 32 longest mean free paths), all cores. Diffuse
-reflectance is the whole of it, with what leaves beyond the grid and without specular reflection,
-for a pencil beam at normal incidence; its standard error is the run's own. Everything but the
-seconds is the same on every machine.
+Made by `python docs/make_materials.py`: 10,000,000 photons each, seed 1, the paper's grid (dr =
+shortest mean free path / 20, radius = 32 longest mean free paths), all cores. The diffuse
+reflectance is for a pencil beam at normal incidence; it includes the light beyond the grid and
+excludes specular reflection. The standard error is the run's own. Everything except the seconds
+is the same on every machine.
 
-For high albedo the paper's grid cuts energy off; `--radius auto` grows it until less than 0.1 %
-of every channel lies beyond.
+For high albedo the paper's grid cuts off energy; `--radius auto` enlarges the grid until less
+than 0.1 % of every channel lies beyond it.
 
 """
 

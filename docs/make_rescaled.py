@@ -19,22 +19,24 @@ from sssfit.simulate import simulate_exact
 MATERIALS = ("skin1", "marble", "ketchup", "wholemilk")
 RANKS = range(1, 7)
 
-TEXT = """## Is SVD rescaled the better one to look at?
+TEXT = """## Does rescaled SVD look better?
 
-The supplement (section B) says that SVD rescaled to the profile's energy, though no longer best in
-the L2 sense, "still provides a perceptionally better match than the Gaussian approximation with
-the same number of terms". It says nothing of rescaled against kept. Mean Delta E 2000 against the
-2D kernel, {pixels} x {pixels} pixels of {pitch:g} mm, N terms: **rescaled / kept / Gaussians**.
+The supplement (section B) says that SVD rescaled to the profile's energy, though no longer the
+best in the L2 sense, "still provides a perceptionally better match than the Gaussian
+approximation with the same number of terms". It does not compare it with SVD that keeps its
+energy. Mean Delta E 2000 against the 2D kernel, {pixels} x {pixels} pixels of {pitch:g} mm, N
+terms: **rescaled / kept / Gaussians**.
 
 {tables}
 
-Rescaled is nearer than the same number of Gaussians in {gaussians} of {count} cases: {exceptions}.
-Rescaled is nearer than kept in {kept} of {count}; N by N, of {each} each: {by_rank}.
-With {most} terms the worst of all cases is {worst_rescaled:.2f} rescaled, {worst_kept:.2f} kept and
-{worst_gaussians:.2f} by Gaussians.
+Rescaled SVD is better than the same number of Gaussians in {gaussians} of {count} cases:
+{exceptions}. Rescaled is better than kept in {kept} of {count}; for each N, of {each}: {by_rank}.
+With {most} terms the worst of all cases is {worst_rescaled:.2f} rescaled, {worst_kept:.2f} kept
+and {worst_gaussians:.2f} with Gaussians.
 
-**Light beyond the grid.** Rescaled kernels put it back, too near; kept ones leave it out; in the
-truth it sees the mean of the picture, and black around the disk. With {most} terms, on the head:
+**Light beyond the grid.** Rescaled kernels return it, too near to the beam; kept kernels lose it.
+In the true picture it sees the mean of the picture, and black around the disk. With {most} terms,
+on the head:
 
 | | energy beyond the grid, R G B | rescaled | kept |
 |---|---|---|---|

@@ -24,29 +24,30 @@ WAYS = (
     ("no following", {"follow": "none"}),
 )
 
-TEXT = """skin1, exact profile, `artist` at {pitch:.3g} mm a pixel: near and far variances R {v[R]},
-G {v[G]}, B {v[B]} mm^2, share of the near one {w[R]:.2f} {w[G]:.2f} {w[B]:.2f}.
+TEXT = """skin1, exact profile, `artist` at {pitch:.3g} mm per pixel: near and far variances R {v[R]},
+G {v[G]}, B {v[B]} mm^2, weight of the near Gaussian {w[R]:.2f} {w[G]:.2f} {w[B]:.2f}.
 
-**Slopes.** What one pass makes of a lit line on a plane tilted by an angle, against the exact form
-per area of surface, sum w G(x, v cos^2): sum of absolute differences over the sum, R G B in
-percent.
+**Slopes.** The response of one pass to a lit line on a plane tilted by an angle, compared with
+the exact form per area of surface, sum w G(x, v cos^2): sum of absolute differences over the sum,
+R G B in percent.
 
 | angle | {heads} |
 |---|{rules}|
 {slopes}
 
-Of even light one pass with "gaussian, none" keeps, R G B in percent (all others keep 100):
+The share of even light that one pass with "gaussian, none" keeps, R G B in percent (all others
+keep 100):
 
 | angle | exact form: the cosine | factor |
 |---|---|---|
 {kept}
 
-The factor is nowhere smaller than the exact form, so the difference of the two columns is also the
-sum of absolute differences between them, as parts of the flat pass.
+The factor is nowhere smaller than the exact form, so the difference between the two columns is
+also the sum of absolute differences, as a share of the flat pass.
 
 **Energy on a slope in perspective.** A lit disk 20 mm wide on the screen, on a plane tilted about
-the vertical through its middle, 300 mm away, 0.5 mm a pixel (both passes; pixels count by the
-surface they show, as d^3). Energy that comes out against energy in times diffuse reflectance,
+the vertical through its middle, 300 mm away, 0.5 mm per pixel (both passes; pixels are weighted
+by the surface they show, d^3). Outgoing energy over incoming energy times diffuse reflectance,
 less 1, R G B in percent:
 
 | angle | {heads} |
@@ -54,8 +55,8 @@ less 1, R G B in percent:
 {drift}
 
 **Steps.** Of the light beyond a step of height dz the exact form keeps w exp(-dz^2 / 2 v_near) +
-(1 - w) exp(-dz^2 / 2 v_far), the factor exp(-dz^2 / 2 v_far); R G B in percent. The difference is
-the error:
+(1 - w) exp(-dz^2 / 2 v_far), and the factor keeps exp(-dz^2 / 2 v_far); R G B in percent. The
+difference between them is the error:
 
 | step mm | exact form | factor | lerp |
 |---|---|---|---|

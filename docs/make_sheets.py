@@ -162,33 +162,32 @@ WORK = {
 SHORT = """In short, for skin1 on pixels of .3 mm (disk, edge at 30 degrees, points, head):
 
 - **Two passes, {first_weights} weights: {first}**, whose worst picture is {first_picture}: mean
-  Delta E {first_error}. Which is nearest depends on the picture:
-  {two}.
-- **More: SVD, energy rescaled.** 95 % of the pixels of every picture are within a Delta E of 1
-  from {unseen}.
-- **Ask `sssfit choose`** before either: a scene pays for what its pixels show.
-- **Simulate exactly** where that is possible: half spaces with isotropic scattering. Elsewhere
-  1e6 photons do."""
+  Delta E {first_error}. The best kernel depends on the picture: {two}.
+- **More passes: SVD, energy rescaled.** 95 % of the pixels of every picture are within a Delta E
+  of 1 from {unseen}.
+- **Run `sssfit choose`** before either: the cost depends on what the pixels of your scene show.
+- **Simulate exactly** where possible: half spaces with isotropic scattering. Elsewhere 1e6
+  photons are enough."""
 
 SHEET = """`sssfit compare skin1 --what sheet --chart skin1-sheet.png` draws the rows of figure S.3
-(Jimenez et al. 2015, supplement), and first the input times the albedo: what no blur at all would
-show. The edge is upright, as in that figure: a case in which the pre-integrated kernel is exact.
-skin1, {pixels} x {pixels} pixels of {pitch:g} mm, mean and 95th percentile of Delta E:
+(Jimenez et al. 2015, supplement), preceded by the input times the albedo, which is the picture
+without blur. The edge is upright, as in that figure, a case in which the pre-integrated kernel is
+exact. skin1, {pixels} x {pixels} pixels of {pitch:g} mm, mean and 95th percentile of Delta E:
 
 {rows}"""
 
 EDITING = """`python docs/make_sheets.py editing` draws the edits of figure 6 of RR-02-12 on
-the six-Gaussian skin, pixels of {pitch:g} mm ([fits.md](fits.md) says why). Delta E to the
+the six-Gaussian skin, with pixels of {pitch:g} mm ([fits.md](fits.md) says why). Delta E to the
 original:
 
 {rows}
 
-The original against the 2D kernel of the six Gaussians, mean and 95th percentile: {own}."""
+The original compared with the 2D kernel of the six Gaussians, mean and 95th percentile: {own}."""
 
 PARETO = """`sssfit compare skin1 --chart skin1-pareto.png` fits every method, rank and number of
-Gaussians and draws them by error and cost; the line is the Pareto front, faint is what another
-kernel beats. By weights, skin1 at {pitch:g} mm ({pixels} pixels a pass, 512 x 512 pixels of
-picture):
+Gaussians and plots their error against their cost. The line is the Pareto front; kernels that
+another one beats are faint. By weights, skin1 at {pitch:g} mm ({pixels} pixels a pass, pictures of
+512 x 512 pixels):
 
 {rows}"""
 

@@ -21,21 +21,23 @@ FULL = 100_000_000
 
 HEAD = """# Verification
 
-Made by `python docs/make_verification.py`: {photons:,} photons a walk ({loop:,} where the scalar
-loop is compared), seed 1. The last column is how far the two are apart in standard errors; a test
-fails beyond {limit}. Profiles are compared by chi-square over annuli merged until each holds
-{hits} hits, and the p value is given as the standard errors of equal two-sided probability.
+Made by `python docs/make_verification.py`: {photons:,} photons per walk ({loop:,} for comparisons
+with the scalar loop), seed 1. The last column is the difference in standard errors; a test fails
+beyond {limit}. Profiles are compared by chi-square over annuli that are merged until each holds
+{hits} hits, and the p value is converted to standard errors with the same two-sided probability.
 
-- Chandrasekhar's H function is solved in tests/reference.py from its integral equation.
-- Giovanelli's figure has four published digits; half a unit of the last counts as its error.
-- The single-scattering profile F1(r) has a closed form (tests/reference.py); the walk is at albedo
-  1e-6, where all but a millionth of what returns has collided once.
+- Chandrasekhar's H function is computed in tests/reference.py from its integral equation.
+- Giovanelli's figure has four published digits; half a unit of the last digit counts as its
+  error.
+- The single-scattering profile F1(r) has a closed form (tests/reference.py); the walk uses an
+  albedo of 1e-6, where all but a millionth of the returning light has collided once.
 - The scalar loop (tests/reference.py) follows one photon at a time in double precision.
-- The layered walk is compared at a quarter of the photons: with the semi-infinite walk, and with a
-  scalar MCML (tests/reference.py) on a fifth of these; there energies are shares of what enters.
-- The exact solver is at a tolerance of {fine:g} against the walk; F is compared at every edge of
-  the merged annuli from the third on, and the worst is listed.
-- MCML 1.2.2 is the original C program; origin of its profiles: tests/data/README.md.
+- The layered walk is compared with the semi-infinite walk at a quarter of the photons, and with a
+  scalar MCML (tests/reference.py) at a fifth of these; in the latter, energies are shares of the
+  light that enters.
+- The exact solver runs at a tolerance of {fine:g} against the walk; F is compared at every edge
+  of the merged annuli from the third on, and the table lists the worst edge.
+- MCML 1.2.2 is the original C program; tests/data/README.md gives the origin of its profiles.
 
 | comparison | ours | theirs | standard errors apart |
 |---|---|---|---|
@@ -45,7 +47,7 @@ FINER = """
 ## The exact solver against itself
 
 Largest |F - F_fine| / total over channels and annulus edges from the third on, at the default
-tolerance of 1e-4 and against a run at {fine:g}; and the error that the run itself claims.
+tolerance of 1e-4, compared with a run at {fine:g}; and the error that the run itself claims.
 
 | material | error | claimed |
 |---|---|---|
@@ -54,10 +56,10 @@ tolerance of 1e-4 and against a run at {fine:g}; and the error that the run itse
 SIMILARITY = """
 ## What the similarity relation costs
 
-The exact solver with sigma_s' = (1 - g) sigma_s against the layered walk with g, eta 1.3,
-{photons:,} photons; albedo is the reduced one. Misplaced: half the sum over annuli of the
-differences of their shares of the total. F within one reduced mean free path of the beam is in the
-last column.
+The exact solver with sigma_s' = (1 - g) sigma_s compared with the layered walk with g, at eta
+1.3, {photons:,} photons; the albedo is the reduced one. Misplaced is half the sum over annuli of
+the absolute differences of their shares of the total. The last column is the error of F within
+one reduced mean free path of the beam.
 
 | g | albedo | walk | total | misplaced | F at 1 MFP |
 |---|---|---|---|---|---|

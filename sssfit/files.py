@@ -13,7 +13,7 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -64,6 +64,17 @@ def has_mark(path: Path, marks: Mapping[bytes, bytes]) -> bool:
         return False
     found = (mark for begin, mark in marks.items() if head.startswith(begin))
     return any(mark in head or mark in tail for mark in found)
+
+
+def is_marked(stream: BinaryIO, marks: Sequence[bytes]) -> bool:
+    """Whether a file that can seek holds one of some marks, anywhere in it."""
+    stream.seek(0)
+    kept = b""
+    while block := stream.read(1 << 24):
+        if any(mark in kept + block for mark in marks):
+            return True
+        kept = block[-100:]
+    return False
 
 
 def read_at_most(stream: BinaryIO, most: int) -> bytes:

@@ -1,7 +1,9 @@
 """How figures, values and names are worded: on one line, in printable characters."""
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from string import Formatter
+from typing import Any, TypeAlias
 
 _MOST_NAMED = 4  # channels that a line of a record's repr names
 _MOST_SHOWN = 60  # characters of a value worth repeating to the person who wrote it
@@ -24,6 +26,14 @@ def shown(value: object) -> str:
         text = "tables nested too deep"
     text = printable(text)  # a repr of an array has newlines
     return text if len(text) <= _MOST_SHOWN else text[: _MOST_SHOWN - 3] + "..."
+
+
+def did_you_mean(word: str, known: Sequence[str]) -> str:
+    """Return ``did you mean X? `` for the nearest known word, or nothing if none is near."""
+    import difflib  # 5 ms that help need not wait for
+
+    near = difflib.get_close_matches(word.lower(), known, n=1)
+    return f"did you mean {near[0]}? " if near else ""
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
@@ -64,6 +74,56 @@ def number(value: Any, form: str) -> str:
     if not form.endswith("%"):
         return f"{value:{form}}"
     return "0 %" if abs(value) < 1e-9 else f"{100.0 * value:{form[:-1]}} %"
+
+
+class _Template(Formatter):
+    """A template whose fields are written by `number`."""
+
+    def format_field(self, value: Any, form: str) -> str:
+        """Write a figure by its format, and anything without a format as it is."""
+        return number(value, form) if form else str(value)
+
+
+def filled(template: str, figures: Mapping[str, Any]) -> str:
+    """Fill a template from a record's figures: "{width} pixels, off by {relative_l2:.3g%|inf %}".
+
+    See `number` for formats; "{chosen[label]}" is a figure of a part.
+    """
+    return _Template().vformat(template, (), figures)
+
+
+@dataclass(frozen=True, slots=True)
+class Columns:
+    """A table of a report, of a row a name: see `columns`.
+
+    ``names`` is the key of the names; ``each`` has title, key and format of each column.
+    """
+
+    head: str
+    names: str
+    each: tuple[tuple[str, str, str], ...]
+
+
+Part: TypeAlias = str | Columns | tuple[str, str | Columns]
+
+
+def report(parts: Iterable[Part], figures: Mapping[str, Any]) -> str:
+    """Write a record's figures for people, a part a line or a table.
+
+    A part is a template of `filled` or `Columns`; with a key before it, it is left out where the
+    figure of that key is None.
+    """
+    lines = []
+    for part in parts:
+        key, shown = part if isinstance(part, tuple) else ("", part)
+        if key and figures[key] is None:
+            continue
+        if isinstance(shown, Columns):
+            each = [(title, figures[own], form) for title, own, form in shown.each]
+            lines.append(columns(shown.head, figures[shown.names], *each))
+        else:
+            lines.append(filled(shown, figures))
+    return "\n".join(lines)
 
 
 def by_channel(channels: Sequence[str], values: Sequence[Any], form: str) -> str:

@@ -5,7 +5,7 @@ has its own (`sssfit._jit.sampling.fresnel_reflectance`). ``eta`` is the refract
 over that outside, cosines are those to the normal, inside.
 
 Light at cosine mu to the normal leaves a medium if mu > mu_c = sqrt(1 - 1/eta^2). Integrals over
-this cone take mu = mu_c + (1 - mu_c) t^2, which tames the square root at the critical angle.
+this cone take mu = mu_c + (1 - mu_c) t^2, which removes the square root at the critical angle.
 """
 
 import math
@@ -71,7 +71,7 @@ _DIRECTIONS = 96  # 1e-13 of Duntley's closed form for indices from 1.0001 to 4
 
 
 def entering_of_diffuse(eta: float) -> float:
-    """Share 1 - R_sp that gets in of light of the same radiance from everywhere above.
+    """Return the share 1 - R_sp that enters, of light of equal radiance from all directions above.
 
     R_sp = 2 int_0^1 R_F(mu) mu dmu outside; by Snell's law mu dmu is eta^2 times that inside.
     """
@@ -81,7 +81,7 @@ def entering_of_diffuse(eta: float) -> float:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Cone:
-    """Quadrature over the cone of light that gets out, for a relative index above 1.
+    """Quadrature over the escape cone, for a relative index above 1.
 
     ``cosine`` (M,), ``tangent`` (M,) of the directions; ``weight`` (M,) holds (1 - R_F) dmu.
     """
@@ -92,7 +92,7 @@ class Cone:
 
     @classmethod
     def of(cls, eta: float, count: int) -> "Cone":
-        """Build the cone of a relative index with that many directions."""
+        """Build the cone for a relative index with this many directions."""
         t, w = gauss_legendre(count)
         critical = math.sqrt(1.0 - 1.0 / eta**2)
         cosine = critical + (1.0 - critical) * t**2

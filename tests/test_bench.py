@@ -19,7 +19,7 @@ EXACT = [
             "`sssfit simulate skin1 --method exact`, first use",
             "`sssfit simulate skin1 --method exact`",
             "2 materials, as many commands",
-            "2 materials, one process, start-up apart",
+            "2 materials, one process, without start-up",
         ],
     ),
 ]

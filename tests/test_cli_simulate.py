@@ -13,9 +13,9 @@ import processes
 import pytest
 
 from sssfit.cli import main
-from sssfit.cli._interrupt import asked_to_stop
 from sssfit.cli._simulate_report import _energy
 from sssfit.material import load_material
+from sssfit.process import asked_to_stop
 from sssfit.profile import Profile
 from sssfit.simulate import run_figures, simulate_montecarlo
 from sssfit.simulate._batches import BATCH_PHOTONS

@@ -1,20 +1,22 @@
 """What the library says names no option of the command line, which writes its own in."""
 
 import ast
+import functools
 import re
 from pathlib import Path
 
 import pytest
 
 from sssfit.cli._run import in_options
+from sssfit.messages import Columns, filled, report
 
 LIBRARY = sorted((Path(__file__).parents[1] / "sssfit").rglob("*.py"))
 # A long option, a short one, or a command: none of these stands in text for Python.
 OPTION = re.compile(r"(?<![\w-])--?[a-zA-Z][\w-]*(?![\w\]])")
 COMMAND = re.compile(r"`sssfit |\bsssfit (simulate|fit|render|chart|show|export|import|compare) ")
 MARKED = re.compile(r"`[^`\n]+`")
-# Of Radiance's own program.
-FOREIGN = "ra_xyze -r"
+# Commands of others: Radiance's own program, the shell's limit.
+FOREIGN = ("ra_xyze -r", "ulimit -v")
 # Backquoted in messages without being an argument: a field of the profile.
 FIELDS = {"`unfinished`"}
 
@@ -49,7 +51,8 @@ def texts(path: Path) -> list[str]:
 )
 def test_no_text_of_the_library_names_an_option_or_a_command(path):
     for text in texts(path):
-        assert not OPTION.search(text.replace(FOREIGN, "")), text
+        ours = functools.reduce(lambda rest, each: rest.replace(each, ""), FOREIGN, text)
+        assert not OPTION.search(ours), text
         assert not COMMAND.search(text), text
 
 
@@ -86,3 +89,35 @@ def test_the_command_line_knows_every_argument_that_a_message_marks():
 )
 def test_arguments_become_options_where_the_command_line_prints_them(said, printed):
     assert in_options(said) == printed
+
+
+FIGURES = {
+    "name": "skin1",
+    "width": 1024,
+    "share": 0.1234,
+    "nothing": None,
+    "channels": ["R", "G"],
+    "error": [0.5, float("nan")],
+    "chosen": {"label": "svd 2"},
+}
+
+
+def test_templates_are_filled_by_the_formats_of_figures():
+    text = "{name}: {width:,} wide, {share:.2g%}, {nothing:.3g|unknown}, {nothing:.3g}, {{}}"
+    assert filled(text, FIGURES) == "skin1: 1,024 wide, 12 %, unknown, -, {}"
+    assert filled("{chosen[label]} {error[0]:.2f}", FIGURES) == "svd 2 0.50"
+    with pytest.raises(KeyError):
+        filled("{unknown}", FIGURES)
+
+
+def test_a_report_leaves_out_what_is_not_known():
+    error = Columns("channel", "channels", (("error", "error", ".2g%"), ("no", "nothing", "")))
+    parts = ["{name}", ("nothing", "nothing is {nothing}"), ("width", "{width}"), error]
+    assert report(parts, FIGURES).splitlines() == [
+        "skin1",
+        "1024",
+        "channel  error",
+        "R         50 %",
+        "G            -",
+    ]
+    assert report([("nothing", error)], FIGURES) == ""

@@ -1,24 +1,24 @@
 """A height field seen in perspective under a sharp key light: the buffers of a range of rows.
 
-The eye is at (0, 0, distance) over the field's origin and looks down; a pixel is ``mm_per_pixel``
-wide on the plane z = 0. The key light is directional: a point is lit if the ray toward it meets
-nothing. Five samples a pixel (its centre and four rooks), and sixteen more where they disagree
-about what is seen or lit, so that the edges of shadows have no steps.
+The camera is at (0, 0, distance) above the field's origin and looks down; a pixel is
+``mm_per_pixel`` wide on the plane z = 0. The key light is directional: a point is lit if the ray
+toward it meets nothing. There are five samples per pixel (its centre and four rooks), and sixteen
+more where they disagree about visibility or light, so that the edges of shadows have no steps.
 
-A light that stands behind the field is blocked by the body between its front and its back; for
-other lights the field is a front alone, and nothing passes behind it.
+A light behind the field is blocked by the solid between its front and its back. For other lights
+the field is a front only, and nothing passes behind it.
 
 A solid is the tuple (front, back, x0, y0, spacing, low, high): heights [mm] on the same nodes,
-bilinear in between, none of the body below ``low`` or above ``high``. It lies where back <= z <=
-front, and is empty where the back is above the front. Over a cell both distances are quadratics of
-the ray's parameter, so that lengths have no steps.
+bilinear in between, with no part below ``low`` or above ``high``. It is the set back <= z <= front,
+and empty where the back is above the front. Over a cell both distances are quadratic in the ray's
+parameter, so lengths have no steps.
 
-A field is the tuple (heights, inner, levels, maxima, x0, y0, spacing): ``inner`` is above 0 where
-an object of its own, label 2, lies in the surface of label 1. A body is (the field seen, the
-one that casts shadows from outside it, the solid, whether the key light stands behind). A view is
-(mm_per_pixel, distance, floor): what lies below the floor is background. A lamp is (direction to
-the key light, to the fill light, their strengths and the ambient light's, exponent, reflectance at
-normal incidence).
+A field is the tuple (heights, inner, levels, maxima, x0, y0, spacing): ``inner`` is above 0 where a
+separate object, label 2, lies in the surface of label 1. A body is (the visible field, the one that
+casts shadows from outside it, the solid, whether the key light is behind). A view is (mm_per_pixel,
+distance, floor): everything below the floor is background. A lamp is (direction to the key light,
+to the fill light, their strengths and the ambient light's, exponent, reflectance at normal
+incidence).
 """
 
 import math
@@ -30,7 +30,7 @@ from sssfit._jit import jit, jit_inline
 from sssfit._jit.heightfield import NUDGE_MM, Vector, bilinear, clip_axis, first_hit, normal_at
 
 FloatArray = npt.NDArray[np.float64]
-# Between what is seen, with its pores, and the smooth solid there may be slivers of air [mm].
+# Largest gap of air between the visible surface, with its pores, and the smooth solid [mm].
 GAP_MM = 0.5
 Solid = tuple[FloatArray, FloatArray, float, float, float, float, float]
 
@@ -39,7 +39,7 @@ Solid = tuple[FloatArray, FloatArray, float, float, float, float, float]
 def over_patch(
     heights: FloatArray, row: int, column: int, at: Vector, step: Vector
 ) -> tuple[float, float, float]:
-    """Coefficients of the ray's height over a patch, C + B t + A t^2."""
+    """Return the coefficients of the ray's height over a patch, C + B t + A t^2."""
     u, v = at[0] - column, at[1] - row
     dx, dy, dz = step
     corner = heights[row, column]
@@ -52,12 +52,12 @@ def over_patch(
 
 @jit_inline
 def add_roots(cuts: FloatArray, count: int, patch: Vector, length: float) -> int:
-    """Sort the roots of C + B t + A t^2 within (0, length) into ``cuts``; return how many."""
+    """Sort the roots of C + B t + A t^2 within (0, length) into ``cuts``; return their number."""
     constant, linear, square = patch
     discriminant = linear * linear - 4.0 * square * constant
     if discriminant < 0.0:
         return count
-    # The stable form: no difference of nearly equal numbers.
+    # The stable form, without differences of nearly equal numbers.
     q = -0.5 * (linear + math.copysign(math.sqrt(discriminant), linear))
     for which in range(2):
         above, below = (q, square) if which == 0 else (constant, q)
@@ -82,9 +82,10 @@ def value(patch: Vector, t: float) -> float:
 def first_run(
     solid: Solid, point: Vector, direction: Vector, cuts: FloatArray
 ) -> tuple[float, float, bool]:
-    """Where a ray, all in mm, is first inside a solid, from and to, and whether it comes in again.
+    """Return start and end of a ray's first run inside a solid, in mm, and if it enters again.
 
-    -1 and -1 where it never is. Gaps under `GAP_MM` belong to the run. ``cuts`` (6,) is work space.
+    Both are -1 if it is never inside. Gaps under `GAP_MM` count as inside. ``cuts`` (6,) is work
+    space.
     """
     front, back, x0, y0, spacing, low, high = solid
     x, y, z = (point[0] - x0) / spacing, (point[1] - y0) / spacing, point[2]
@@ -124,7 +125,7 @@ def first_run(
 
 @jit_inline
 def outward(solid: Solid, point: Vector) -> Vector:
-    """Return the normal of the front or the back, the nearer one, away from the body."""
+    """Return the normal of the front or the back, the nearer one, pointing out of the solid."""
     front, back, x0, y0, spacing = solid[:5]
     x, y = (point[0] - x0) / spacing, (point[1] - y0) / spacing
     over = abs(point[2] - bilinear(front, x, y))
@@ -140,9 +141,9 @@ Body = tuple[Field, Field, Solid, bool]
 View = tuple[float, float, float]
 Lamp = tuple[Vector, Vector, Vector, float, float]
 
-# Clear of the patch that the light's ray starts on [mm]; the finest cells are 0.02 mm and more.
+# Offset from the patch where the light's ray starts [mm]; the finest cells are 0.02 mm and more.
 LIFT_MM = 1e-3
-# The same off the body's own, coarser front, along the normal: pores are 0.1 mm deep.
+# The same from the solid's coarser front, along the normal: pores are 0.1 mm deep.
 OFF_BODY_MM = 0.3
 # Rooks: no two in a row or a column, so edges along either axis have five steps, not three.
 FIRST = np.array([(0.5, 0.5), (0.1, 0.3), (0.7, 0.1), (0.9, 0.7), (0.3, 0.9)])
@@ -151,13 +152,13 @@ MORE = np.array([((i % 4 + 0.5) / 4.0, (i // 4 + 0.5) / 4.0) for i in range(16)]
 
 @jit_inline
 def dot(a: Vector, b: Vector) -> float:
-    """Scalar product."""
+    """Return the scalar product."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @jit_inline
 def intersect(field: Field, point: Vector, direction: Vector, near: float, far: float) -> float:
-    """First meeting of a ray, all in mm, with a field; -1 where there is none."""
+    """Return the first intersection of a ray, all in mm, with a field; -1 if there is none."""
     heights, _, levels, maxima, x0, y0, spacing = field
     start = ((point[0] - x0) / spacing, (point[1] - y0) / spacing, point[2])
     step = (direction[0] / spacing, direction[1] / spacing, direction[2])
@@ -166,7 +167,7 @@ def intersect(field: Field, point: Vector, direction: Vector, near: float, far: 
 
 @jit_inline
 def leaves(field: Field, point: Vector, direction: Vector, near: float) -> float:
-    """Where a ray from inside leaves the field's rectangle."""
+    """Return where a ray from inside leaves the field's rectangle."""
     heights, _, _, _, x0, y0, spacing = field
     start, slope = (point[0] - x0) / spacing, direction[0] / spacing
     near, far = clip_axis(start, slope, heights.shape[1] - 1.0, near, 1e9)
@@ -177,7 +178,7 @@ def leaves(field: Field, point: Vector, direction: Vector, near: float) -> float
 
 @jit_inline
 def in_shadow(fine: Field, coarse: Field, point: Vector, light: Vector) -> bool:
-    """Whether the ray toward the light meets the fine field or, further on, the coarse one."""
+    """Return whether the ray toward the light meets the fine field or then the coarse one."""
     if intersect(fine, point, light, LIFT_MM, 1e9) >= 0.0:
         return True
     near = max(leaves(fine, point, light, LIFT_MM), LIFT_MM)
@@ -186,7 +187,7 @@ def in_shadow(fine: Field, coarse: Field, point: Vector, light: Vector) -> bool:
 
 @jit_inline
 def behind_body(solid: Solid, point: Vector, normal: Vector, light: Vector) -> bool:
-    """Whether the ray toward the light runs through the body."""
+    """Return whether the ray toward the light runs through the solid."""
     off = (
         point[0] + OFF_BODY_MM * normal[0],
         point[1] + OFF_BODY_MM * normal[1],
@@ -197,7 +198,7 @@ def behind_body(solid: Solid, point: Vector, normal: Vector, light: Vector) -> b
 
 @jit_inline
 def surface_normal(fine: Field, point: Vector) -> Vector:
-    """Return the unit normal of the surface at a point, toward the eye's side."""
+    """Return the unit normal of the surface at a point, on the camera's side."""
     x, y = (point[0] - fine[4]) / fine[6], (point[1] - fine[5]) / fine[6]
     return normal_at(fine[0], fine[6], x, y)
 
@@ -206,7 +207,7 @@ def surface_normal(fine: Field, point: Vector) -> Vector:
 def specular_highlight(
     normal: Vector, light: Vector, eye: Vector, exponent: float, face_on: float
 ) -> float:
-    """Blinn and Phong's highlight, times pi: the exitance of a matt surface as bright.
+    """Return the Blinn-Phong highlight, times pi: the exitance of an equally bright matt surface.
 
     pi F (n + 8) / (8 pi) (N.H)^n, with Schlick's F = F0 + (1 - F0) (1 - E.H)^5 (Akenine-Moller,
     Haines, Hoffman 2008, "Real-Time Rendering", chapter 7).
@@ -223,12 +224,12 @@ def specular_highlight(
 
 @jit_inline
 def light_point(body: Body, point: Vector, eye: Vector, lamp: Lamp) -> tuple[float, float, bool]:
-    """Irradiance and highlight of a point, and whether the key light is blocked."""
+    """Return irradiance and highlight of a point, and whether the key light is blocked."""
     fine, coarse, solid, is_behind = body
     key, fill, strengths, exponent, face_on = lamp
     normal = surface_normal(fine, point)
     weak = strengths[1] * max(dot(normal, fill), 0.0)
-    # The ambient light is a sky: twice as strong on what looks up as on what looks ahead.
+    # The ambient light is a sky, twice as strong on surfaces that face up as on those facing ahead.
     irradiance = weak + strengths[2] * 0.5 * (1.0 + normal[1])
     highlight = weak * specular_highlight(normal, fill, eye, exponent, face_on)
     cosine = dot(normal, key)
@@ -297,7 +298,7 @@ def light_rows(
     irradiance: FloatArray,
     specular: FloatArray,
 ) -> None:
-    """Fill a range of rows of the buffers; one sample a pixel, its centre, if not ``smooth``."""
+    """Fill a range of rows of the buffers; one sample per pixel, its centre, if not ``smooth``."""
     height, width = depth.shape
     for i in range(rows[0], rows[1]):
         for j in range(width):
@@ -326,10 +327,10 @@ def through_rows(
     thickness: FloatArray,
     behind: FloatArray,
 ) -> None:
-    """Fill a range of rows: mm that light runs inside to a pixel's centre, cosine where it enters.
+    """Fill a range of rows: path of light inside to a pixel's centre [mm], cosine at entry.
 
-    Only to points that face away from the light: others it reaches through air, if at all. The
-    cosine is 0 where another part of the body shadows the place.
+    Only for points that face away from the light; it reaches others through air. The cosine is 0
+    where another part of the solid casts a shadow.
     """
     height, width = thickness.shape
     cuts = np.empty(6)
@@ -341,7 +342,7 @@ def through_rows(
             if label == 0 or dot(surface_normal(fine, point), light) > 0.0:
                 continue
             start, stop, again = first_run(solid, point, light, cuts)
-            if stop < 0.0 or start > GAP_MM:  # the smooth solid is not at this place
+            if stop < 0.0 or start > GAP_MM:  # the smooth solid is missing here
                 continue
             thickness[i, j] = stop - start
             if not again:

@@ -18,6 +18,7 @@ import numpy as np
 from sssfit.arrays import FloatArray
 from sssfit.errors import KernelError
 from sssfit.files import has_mark, read_at_most, reason
+from sssfit.kinds import KINDS
 from sssfit.messages import shown
 
 if TYPE_CHECKING:
@@ -90,7 +91,7 @@ def _check_list(value: list[Any], rules: Schema, path: str) -> None:
 
 
 def _are_numbers(values: list[Any], rules: Schema) -> bool:
-    """Whether all are numbers within the rules, at once: a kernel may have ten million weights."""
+    """Check all numbers at once, because a kernel may have ten million weights."""
     if rules.get("type") != "number" or not set(map(type, values)) <= {int, float}:
         return False
     least, most = rules.get("minimum", -math.inf), rules.get("maximum", math.inf)
@@ -123,14 +124,13 @@ def _is_finite(value: float) -> bool:
 
 
 FORMAT = "sssfit.kernel/1"
-MARK = b'"sssfit.kernel/'  # by which a file is ours, however damaged
 _REMEDY = "name a .kernel.json file, as sssfit writes it"
 MOST_BYTES = 500_000_000  # 16000 pixels, 10 terms and 64 channels are 200 MB
-_ROUNDING = 1e-9  # relative; sums of pixels may be taken in another order
+_ROUNDING = 1e-9  # relative; sums of pixels may be computed in another order
 
 
 def content(kernel: "SeparableKernel") -> dict[str, Any]:
-    """Return what the file holds; NaN becomes None."""
+    """Return the contents of the file; NaN becomes None."""
     return {
         "format": FORMAT,
         "method": kernel.method,
@@ -168,7 +168,7 @@ def unpack(source: str | Path | BinaryIO, origin: str) -> dict[str, Any]:
     Raises
     ------
     KernelError
-        One line that names the origin and the place in the file.
+        The file is invalid; the one-line message names the origin and the place in the file.
     """
     whole = _parsed(_read(source, origin), origin)
     try:
@@ -192,12 +192,12 @@ def unpack(source: str | Path | BinaryIO, origin: str) -> dict[str, Any]:
 
 
 def is_kernel_file(path: Path) -> bool:
-    """Whether a file is a kernel of any version, by the format it names."""
+    """Return whether a file is a kernel of any version, by the format it names."""
     return has_mark(path, {b"{": b'"format": "sssfit.kernel/'})
 
 
 def _read(source: str | Path | BinaryIO, origin: str) -> bytes:
-    """Read it all, up to a limit."""
+    """Read the whole file, up to a limit."""
     try:
         if isinstance(source, str | Path):
             with Path(source).open("rb") as file:
@@ -212,11 +212,11 @@ def _read(source: str | Path | BinaryIO, origin: str) -> bytes:
 
 
 def _parsed(text: bytes, origin: str) -> Mapping[str, Any]:
-    """Parse JSON and look at its format."""
+    """Parse JSON and check its format."""
     try:
         whole = json.loads(text, object_pairs_hook=_unique_keys, parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
-        if MARK not in text:
+        if not any(mark in text for mark in KINDS["kernel"].marks):
             raise KernelError(f"{origin}: not a kernel; {_REMEDY}.") from None
         if isinstance(error, KernelError):
             raise KernelError(f"{origin}: {error}; fit the kernel again.") from None
@@ -234,7 +234,7 @@ def _parsed(text: bytes, origin: str) -> Mapping[str, Any]:
 
 
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Make an object, in which JSON itself would allow a key twice."""
+    """Make an object, and raise an error for repeated keys, which JSON would allow."""
     found = dict(pairs)
     if len(found) < len(pairs):
         names = [name for name, _ in pairs]
@@ -269,7 +269,7 @@ def _check_sizes(whole: Mapping[str, Any]) -> None:
 
 
 def _check_derived(whole: Mapping[str, Any], signs: FloatArray, weights: FloatArray) -> None:
-    """Check what the file says of its terms against the terms."""
+    """Check the file's figures of the terms against the terms."""
     terms, pixels = weights.shape[:2]
     support_mm = (pixels - 1) // 2 * float(whole["mm_per_pixel"])
     counts = {"rank": (whole["rank"], terms), "pixels": (whole["pixels"], pixels)}

@@ -3,8 +3,8 @@
 `SemiInfiniteWalk` is for half spaces with g = 0: every channel rides on the same paths.
 
 `LayeredWalk` is for any stack of layers and any g. Channels that scatter alike (same sigma_s and g
-in every layer) share a walk; others walk by themselves, on the same random streams, which keeps
-their noise alike. A batch holds them all, so that every channel of a profile rests on the same
+in every layer) share a walk; others have their own walk on the same random streams, so that their
+noise is similar. A batch includes all of them, so that every channel of a profile has the same
 number of photons.
 """
 
@@ -23,10 +23,10 @@ from sssfit.simulate._batches import BATCH_PHOTONS, Sums, Tally
 
 @dataclass(frozen=True, slots=True)
 class LayeredWalk:
-    """The walks of one layered material, and what the compiled code wants to know of each.
+    """The walks of one layered material, with the inputs of the compiled code.
 
-    ``diffuse`` lights the stack evenly from all sides instead of along the normal; reciprocity
-    (a statement on such light) is tested with it.
+    ``diffuse`` lights the stack evenly from all directions instead of along the normal, for tests
+    of reciprocity.
     """
 
     materials: tuple[Material, ...]
@@ -45,7 +45,7 @@ class LayeredWalk:
         object.__setattr__(self, "groups", groups)
 
     def trace(self, batch: int) -> Tally:
-        """Walk one batch of every group; depends on the seed and the batch's number alone."""
+        """Walk one batch of every group; the result depends only on seed and batch number."""
         tally = self.empty_tally()
         tally.photons = min(BATCH_PHOTONS, self.photons - batch * BATCH_PHOTONS)
         for stack, bins in self.groups:
@@ -62,7 +62,7 @@ class LayeredWalk:
         return tally
 
     def empty_tally(self) -> Tally:
-        """All sums zero."""
+        """Return a tally with all sums zero."""
         material, cells = self.materials[0], self.grids[0].annuli + 1
         n = material.n_channels
         ledger = layered.Ledger(
@@ -75,7 +75,7 @@ class LayeredWalk:
         return Tally(ledger)
 
     def sums(self, tally: Tally, index: int) -> Sums:
-        """Give the sums of the one material there is (``index`` 0)."""
+        """Return the sums of the only material (``index`` 0)."""
         ledger = tally.ledger
         finite = np.isfinite(self.materials[index].layers[-1].thickness_mm)
         return Sums(
@@ -89,7 +89,7 @@ class LayeredWalk:
 
 
 def channels_with_equal_scattering(material: Material) -> list[npt.NDArray[np.int64]]:
-    """Group the channels that differ in absorption only; indices, in their order."""
+    """Group the channels that differ in absorption only; returns indices in their order."""
     groups: dict[bytes, list[int]] = {}
     for c in range(material.n_channels):
         scattering = [(layer.sigma_s_per_mm[c], layer.g[c]) for layer in material.layers]
@@ -98,7 +98,7 @@ def channels_with_equal_scattering(material: Material) -> list[npt.NDArray[np.in
 
 
 def _stack(material: Material, members: npt.NDArray[np.int64]) -> layered.Stack:
-    """Lay out the layers for a group: the least absorbing channel of each layer walks."""
+    """Lay out the layers for a group; its walk follows each layer's least absorbing channel."""
     layers = material.layers
     sigma_a = np.array([layer.sigma_a_per_mm[members] for layer in layers])
     sigma_s = np.array([layer.sigma_s_per_mm[members[0]] for layer in layers])
@@ -117,13 +117,14 @@ def _stack(material: Material, members: npt.NDArray[np.int64]) -> layered.Stack:
     )
 
 
-ROULETTE_THRESHOLD = 1e-4  # MCML's; of the largest channel's weight
-ROULETTE_LEVELS = 30  # one walk in 1e30 survives so many
+# MCML's roulette threshold, applied to the largest weight of all channels.
+ROULETTE_THRESHOLD = 1e-4
+ROULETTE_LEVELS = 30  # one walk in 1e30 survives this many
 
 
 @dataclass(frozen=True, slots=True)
 class SemiInfiniteWalk:
-    """One walk for materials of one refractive index, and what the compiled code wants to know."""
+    """One walk for materials of one refractive index, with the inputs of the compiled code."""
 
     materials: tuple[Material, ...]
     grids: tuple[RadialGrid, ...]
@@ -140,7 +141,7 @@ class SemiInfiniteWalk:
         object.__setattr__(self, "roulette_at", roulette_schedule(largest))
 
     def trace(self, batch: int) -> Tally:
-        """Walk one batch; what comes back depends on the seed and the batch's number alone."""
+        """Walk one batch; the result depends only on the seed and the batch number."""
         tally = self.empty_tally()
         tally.photons = min(BATCH_PHOTONS, self.photons - batch * BATCH_PHOTONS)
         tally.flights = semi_infinite.trace_batch(
@@ -155,7 +156,7 @@ class SemiInfiniteWalk:
         return tally
 
     def empty_tally(self) -> Tally:
-        """All sums zero."""
+        """Return a tally with all sums zero."""
         n_channels = self.channels.last_bin.size
         cells = int(np.sum(self.channels.last_bin + 1))
         ledger = semi_infinite.Ledger(
@@ -167,7 +168,7 @@ class SemiInfiniteWalk:
         return Tally(ledger)
 
     def sums(self, tally: Tally, index: int) -> Sums:
-        """Give one material's share of a tally."""
+        """Return one material's part of a tally."""
         first = sum(each.n_channels for each in self.materials[:index])
         own = range(first, first + self.materials[index].n_channels)
         ledger = tally.ledger
@@ -181,20 +182,20 @@ class SemiInfiniteWalk:
         )
 
     def _cells(self, channel: int) -> slice:
-        """Where a channel's bins stand in the ledger, the one beyond the grid last."""
+        """Positions of a channel's bins in the ledger, the one beyond the grid last."""
         first = int(self.channels.first_cell[channel])
         return slice(first, first + int(self.channels.last_bin[channel]) + 1)
 
 
 def relative_eta(material: Material) -> float:
-    """Refractive index of the top layer relative to what is above it."""
+    """Refractive index of the top layer relative to the medium above it."""
     return material.layers[0].eta / material.eta_above
 
 
 def roulette_schedule(albedo: float) -> npt.NDArray[np.uint32]:
-    """At how many collisions a walk that survived k = 0, 1, ... roulettes plays the next.
+    """Return the collisions at which a walk that survived k = 0, 1, ... roulettes plays the next.
 
-    The smallest n with albedo^n 10^k under the threshold; the collision cap where that is larger.
+    The smallest n with albedo^n 10^k under the threshold, or the collision cap if that is smaller.
     """
     schedule = np.full(ROULETTE_LEVELS + 1, semi_infinite.COLLISION_CAP, np.uint32)
     if albedo == 1.0:
@@ -232,9 +233,9 @@ def _channels(
 
 
 def _powers(base: FloatArray) -> FloatArray:
-    """base^k for k below ``POWER_BLOCK``, (POWER_BLOCK, C).
+    """Return base^k for k below ``POWER_BLOCK``, (POWER_BLOCK, C).
 
-    Python's own power: numpy's differs in the last bit between processors.
+    Uses Python's power, because numpy's differs in the last bit between processors.
     """
     rows = [[float(each) ** k for each in base] for k in range(semi_infinite.POWER_BLOCK)]
     return np.array(rows)

@@ -78,7 +78,7 @@ def command_rows(small):
         each = [command("simulate", name, "--method", "exact", folder=folder) for name in names]
         rows.append((f"{len(names)} materials, as many commands", f"{sum(each):.2f}"))
     took = seconds(lambda: simulate_exact_many([load_material(name) for name in names]))
-    rows.append((f"{len(names)} materials, one process, start-up apart", f"{took:.2f}"))
+    rows.append((f"{len(names)} materials, one process, without start-up", f"{took:.2f}"))
     return rows
 
 
@@ -88,11 +88,11 @@ def page(small):
     simulate_montecarlo(load_material("skin1"), photons=2000)
     sections = [
         "# Benchmarks of the exact solver",
-        "Made by `python tests/bench/bench_exact.py --write`; times move with the machine. This "
+        "Made by `python tests/bench/bench_exact.py --write`; times depend on the machine. This "
         f"run: sssfit {sssfit.__version__}, {processor()}, Python {platform.python_version()}, "
         f"numpy {np.__version__}.",
         "## Speed against accuracy",
-        "skin1, three channels, the paper's grid, all cores, start-up apart. The error is the "
+        "skin1, three channels, the paper's grid, all cores, without start-up. The error is the "
         "largest difference of F(r) from the solver's finest run, over all edges and channels, as "
         "a share of the total; the claim is the solver's error estimate, and the walk's largest "
         "standard error.",

@@ -108,22 +108,22 @@ def page(small):
     """All tables."""
     sections = [
         "# Benchmarks of fits",
-        "Made by `python tests/bench/bench_fit.py --write`; times move with the machine. This run: "
+        "Made by `python tests/bench/bench_fit.py --write`; times depend on the machine. This run: "
         f"sssfit {sssfit.__version__}, {processor()}, Python {platform.python_version()}, numpy "
         f"{np.__version__}.",
         "## Singular values of skin1's red kernel",
         "One thread; the last column is the largest difference of the six singular values, as a "
         "share of the first.",
-        markdown(("work", "pixels", "seconds", "apart"), solver_rows(small)),
+        markdown(("work", "pixels", "seconds", "difference"), solver_rows(small)),
         "## Rank 6 of three channels on the paper's grid",
-        "Seconds for pixels, terms and errors together, and the most memory the process has held.",
+        "Seconds for pixels, terms and errors together, and the peak memory of the process.",
         markdown(("material", "pixels", "seconds", "MB"), whole_fit_rows(small)),
         "## Gaussians and the guided fit",
-        "Three channels of skin1, exact profile; seconds, and the seconds that were allowed.",
+        "Three channels of skin1, exact profile; seconds, and the limit in seconds.",
         markdown(("fit", "pixels", "seconds", "allowed"), limit_rows(small)),
         "## All methods, all materials",
-        "Exact profiles, pixels of 0.1 mm (wider where 513 would not hold 99.9 % of the energy), "
-        "each method's defaults: relative Frobenius error of each channel and the largest energy "
+        "Exact profiles, pixels of 0.1 mm (wider where 513 pixels do not hold 99.9 % of the energy), "
+        "each method with its defaults: relative Frobenius error of each channel and the largest energy "
         "error in percent.",
         markdown(
             ("material, method", "mm", "terms", "R", "G", "B", "energy", "seconds"),

@@ -33,7 +33,7 @@ import sssfit  # noqa: E402
 from sssfit.render.reference import convolve, padded_shape  # noqa: E402
 from sssfit.render.separable import apply_passes  # noqa: E402
 
-# Prints what the first use of the passes takes, imports apart, in one precision and in both.
+# Prints what the first use of the passes takes, without imports, in one precision and in both.
 FIRST_USE = """
 import sys, time
 import numpy as np
@@ -148,27 +148,26 @@ def reference_rows(small, runs):
 def page(small):
     """All tables."""
     side, runs = (64, 1) if small else (2048, 7)
-    heads = ("work", "seconds", "scipy's time over it", "largest difference")
+    heads = ("work", "seconds", "speed-up over scipy", "largest difference")
     sections = [
         "# Benchmarks of renderers",
-        "Made by `python tests/bench/bench_render.py --write`; times move with the machine. This "
+        "Made by `python tests/bench/bench_render.py --write`; times depend on the machine. This "
         f"run: sssfit {sssfit.__version__}, {processor()}, Python {platform.python_version()}, "
-        f"numpy {np.__version__}, scipy {scipy.__version__}. Best of {runs + 1}, in turn.",
+        f"numpy {np.__version__}, scipy {scipy.__version__}. Best of {runs + 1}, run in turn.",
         "## Separable passes",
         f"One term on {side} x {side} RGB, mirrored borders. The ratio is to scipy's float32, the "
-        "difference to ours in float64. OpenCV (`pip install opencv-python-headless`) with one "
-        "thread.",
+        "difference to our float64. OpenCV (`pip install opencv-python-headless`) uses one thread.",
         "### 25 weights",
         markdown(heads, pass_rows(25, side, runs)),
         "### 427 weights",
         "As many as skin1 has on pixels of 0.1 mm.",
         markdown(heads, pass_rows(427, side, 1 if small else 3)),
         "### Compiling",
-        "Seconds until the first picture is blurred, imports apart.",
+        "Seconds until the first picture is blurred, without imports.",
         markdown(("process", "float32", "float64 after it"), compile_rows()),
         "## The true kernel by FFT",
-        "RGB in float64, two threads. Beside it scipy.fft's rfft2 and irfft2, three times, of the "
-        "padded size; last, one channel of irradiance that serves three of the kernel.",
+        "RGB in float64, two threads. For comparison (bare), three pairs of scipy.fft's rfft2 and "
+        "irfft2 at the padded size; last, one channel of irradiance with three of the kernel.",
         markdown(
             ("picture", "kernel", "padded", "bare, s", "ours, s", "ratio", "one for three, s"),
             reference_rows(small, runs),

@@ -196,13 +196,13 @@ def page(small):
     photons, whole = (20_000, 20_000) if small else (2_000_000, 10_000_000)
     sections = [
         "# Benchmarks",
-        "Made by `python tests/bench/bench_walk.py --write`; times are medians and move with the "
-        f"machine, ratios were taken in turn. This run: sssfit {sssfit.__version__}, "
+        "Made by `python tests/bench/bench_walk.py --write`; times are medians and depend on the "
+        f"machine; the two sides of a ratio ran in turn. This run: sssfit {sssfit.__version__}, "
         f"{processor()}, Python {platform.python_version()}, numpy {np.__version__}.",
         "## The walk in lanes against a literal scalar loop",
         "Photons a second on one core, all three channels, the paper's grid. The loop is "
-        "`scalar_walk` of tests/reference.py: one photon at a time, double precision, compiled by "
-        "numba too.",
+        "`scalar_walk` of tests/reference.py: one photon at a time, double precision, also "
+        "compiled by numba.",
         markdown(("material", "scalar loop", "lanes", "ratio"), walk_rows(photons)),
         "The layered walk against `scalar_layered_walk`, one channel:",
         markdown(("material", "scalar loop", "lanes", "ratio"), layered_rows(photons // 4)),
