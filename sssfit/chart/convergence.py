@@ -1,6 +1,6 @@
-"""Error of a simulation against photons and seconds, as a figure: `convergence_figure`.
+"""Error of a simulation over photons and seconds, as a figure: `convergence_figure`.
 
-The record comes from ``sssfit.compare.convergence``, which has computed everything.
+``sssfit.compare.convergence`` computes the record.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ _NOTE = (
 
 
 def _subtitle(found: Convergence) -> str:
-    """Say what the truth is, and the slope."""
+    """Return text about the truth and the slope."""
     line, estimate = found.line, found.resolutions[-1].estimate
     return (
         f"against the exact solution, itself good to {estimate:.1g} of the total · fitted slope "
@@ -70,7 +70,7 @@ def _subtitle(found: Convergence) -> str:
 
 
 def _draw_photons(axes: Axes, found: Convergence) -> None:
-    """Draw walks, the line through them, and one of slope -1/2 through their middle."""
+    """Draw the walks, the line through them, and one of slope -1/2 through their middle."""
     photons = np.array([each.photons for each in found.walks], dtype=np.float64)
     errors = np.array([each.error for each in found.walks])
     ends = np.array([photons.min(), photons.max()])
@@ -83,7 +83,7 @@ def _draw_photons(axes: Axes, found: Convergence) -> None:
 
 
 def _draw_seconds(axes: Axes, found: Convergence) -> None:
-    """Draw both methods by what they took; hollow: the exact method's own estimate."""
+    """Draw both methods over their seconds; hollow markers are the exact method's own estimate."""
     seconds = [each.seconds for each in found.walks]
     axes.plot(seconds, [each.error for each in found.walks], label="photon walks", **_WALK)
     known = [(each.seconds, each.error) for each in found.resolutions if each.error is not None]

@@ -1,6 +1,6 @@
 """Edits of the 2012 model in a row, as a figure: `editing_figure`.
 
-The record comes from ``sssfit.compare.editing``, which has computed everything.
+``sssfit.compare.editing`` computes the record.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 AMPLIFIED = 10.0
 _TITLE = "Six-Gaussian skin: the 2012 model edited by hand"
-_MOST_INCHES, _ROOM_INCHES = 1.8, 7.6  # of a picture, of a row of them
-_APART, _ROWS_APART = 0.05, 0.15  # of a picture; rows have figures between
+_MOST_INCHES, _ROOM_INCHES = 1.8, 7.6  # size of a picture, of a row of them
+_APART, _ROWS_APART = 0.05, 0.15  # gap, in pictures; rows have figures between them
 
 
 def editing_figure(editing: Editing) -> Figure:
-    """Draw the original and its edits, and under each edit what it changed.
+    """Draw the original and its edits, with the changes under each edit.
 
     Parameters
     ----------
@@ -54,7 +54,7 @@ def editing_figure(editing: Editing) -> Figure:
 
 
 def _subtitle(editing: Editing) -> str:
-    """Say what is shown."""
+    """Return the title."""
     rows, columns = editing.edits[0].panel.difference.shape
     return (
         f"head, no texture · {columns} x {rows} pixels of {editing.mm_per_pixel:g} mm · sssfit "
@@ -64,7 +64,7 @@ def _subtitle(editing: Editing) -> str:
 
 
 def _notes(editing: Editing) -> list[str]:
-    """Say where the figures come from."""
+    """Return the notes on the figures."""
     first, score = editing.edits[0].settings, editing.original_score
     strength, falloff = (
         " ".join(f"{value:g}" for value in first[key]) for key in ("strength", "falloff")

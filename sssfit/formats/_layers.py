@@ -1,4 +1,4 @@
-"""Which part and channels of a picture file are read, and whether they can be."""
+"""Selects the part and channels of a picture file, and checks that they can be read."""
 
 import dataclasses
 from pathlib import Path
@@ -11,7 +11,7 @@ from sssfit.messages import printable
 if TYPE_CHECKING:
     from OpenImageIO import ImageInput, ImageSpec
 
-# What a render holds for each value of the picture, all float64: the irradiance, its padded copy,
+# Memory of a render for each value of the picture, all float64: the irradiance, its padded copy,
 # the transform of that, and the result.
 BYTES_PER_VALUE = 4 * 8
 LARGEST_BYTES = 4_000_000_000
@@ -20,7 +20,7 @@ FULL_SCALE = {"uint8": 255, "uint16": 65535}
 _FLOATS = ("half", "float", "double")
 
 
-# Channels of a layer, in small letters; a layer of X, Y and Z is a place or a direction.
+# Channels of a layer, in lower case; a layer of X, Y and Z is a position or a direction.
 _RGB = (("r", "g", "b"), ("red", "green", "blue"))
 _ALPHA = ("a", "alpha")
 _PLACE = ("x", "y", "z")
@@ -28,7 +28,7 @@ _PLACE = ("x", "y", "z")
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Choice:
-    """The part of a file that is read, its channels and alpha by their places in it."""
+    """The part of a file that is read, with the indices of its channels and alpha."""
 
     part: int
     spec: "ImageSpec"
@@ -39,7 +39,7 @@ class Choice:
 
     @property
     def span(self) -> tuple[int, int]:
-        """First place and one past the last of what has to be read."""
+        """First index and one past the last index to read."""
         places = [*self.colours, *([] if self.alpha is None else [self.alpha])]
         return min(places), max(places) + 1
 
@@ -62,19 +62,19 @@ class _Layer:
 
     @property
     def label(self) -> str:
-        """What it is called."""
+        """Name of the layer."""
         return self.prefix or self.part_name
 
 
 def choose(source: "ImageInput", path: Path, layer: str | None) -> Choice:
-    """Take R, G, B of the layer that was asked for; by default those of no layer, else the only.
+    """Select R, G, B of the requested layer; by default those without a layer, else the only ones.
 
     Without such a layer Y is used, and last all channels except alpha.
     """
     specs: list[ImageSpec] = []
     while source.seek_subimage(len(specs), 0):
         specs.append(source.spec())
-    source.geterror()  # a missing part is not an error; left there it would hide the next one
+    source.geterror()  # a missing part is not an error; without this it would hide the next error
     coloured = _layers(specs, ("R", "G", "B"))
     grey = _layers(specs, ("Y",))
     if layer is not None:
@@ -105,7 +105,7 @@ def _layers(specs: list["ImageSpec"], names: tuple[str, ...]) -> list[_Layer]:
             if (colours := _colours(places, names)) is None:
                 continue
             alpha = next((places[each] for each in _ALPHA if each in places), None)
-            # TIFF and PNG say which channel is alpha, however it is called.
+            # TIFF and PNG say which channel is alpha, under any name.
             if not prefix and alpha is None and spec.alpha_channel not in (-1, *colours):
                 name = str(spec.channelnames[spec.alpha_channel])
                 alpha = None if "." in name else int(spec.alpha_channel)
@@ -115,7 +115,7 @@ def _layers(specs: list["ImageSpec"], names: tuple[str, ...]) -> list[_Layer]:
 
 
 def _colours(places: dict[str, int], names: tuple[str, ...]) -> tuple[int, ...] | None:
-    """Return where a group has the channels, or None."""
+    """Return the indices of the channels in a group, or None."""
     if names == ("Y",):
         is_place = all(each in places for each in _PLACE)
         return None if is_place or "y" not in places else (places["y"],)
@@ -126,7 +126,7 @@ def _colours(places: dict[str, int], names: tuple[str, ...]) -> tuple[int, ...] 
 
 
 def _named(specs: list["ImageSpec"], layers: list[_Layer], name: str, path: Path) -> Choice:
-    """Return the layer of that name, or list those that there are."""
+    """Return the layer of that name, or raise an error that lists the layers."""
     for each in layers:
         if name in (each.prefix, each.part_name) and name:
             return _chosen(specs, each)
@@ -136,20 +136,20 @@ def _named(specs: list["ImageSpec"], layers: list[_Layer], name: str, path: Path
 
 
 def _chosen(specs: list["ImageSpec"], layer: _Layer) -> Choice:
-    """Say which layer it is where it has a name, and what is not used."""
+    """Return notes on the name of the layer and on unused layers."""
     used = [f"layer {printable(layer.prefix)} used"] if layer.prefix else []
     notes = (*used, *_left_out(specs, layer.part, layer.colours, layer.alpha))
     return Choice(layer.part, specs[layer.part], layer.names, layer.colours, layer.alpha, notes)
 
 
 def _unnamed_channels(specs: list["ImageSpec"], path: Path) -> Choice:
-    """Take every channel of the first part, where none is called a colour."""
+    """Select every channel of the first part, if none has the name of a colour."""
     spec = specs[0]
-    # Only beside colours that are known by name is a channel called A alpha; two are grey with it.
+    # A channel named A is alpha only with colours known by name; two channels are grey with alpha.
     alpha = int(spec.alpha_channel) if spec.nchannels in (2, 4) else -1
     colours = tuple(i for i in range(spec.nchannels) if i != alpha)
     names = [str(each) for each in spec.channelnames]
-    # A dot parts a layer from its channel: depth and normals may be among them.
+    # A dot separates layer and channel; depth and normals may be among them.
     if not colours or any("." in name for name in names):
         raise RenderError(
             f"{called(path)} has the channels {_listed(names)}; expected R, G, B or Y: write the "
@@ -163,7 +163,7 @@ def _unnamed_channels(specs: list["ImageSpec"], path: Path) -> Choice:
 def _left_out(
     specs: list["ImageSpec"], part: int, colours: tuple[int, ...], alpha: int | None
 ) -> tuple[str, ...]:
-    """Say which parts and channels of the file are not used."""
+    """Return notes on parts and channels of the file that are not used."""
     spec, notes = specs[part], []
     if len(specs) > 1:
         notes.append(f"part {part + 1} of {len(specs)} used")
@@ -178,13 +178,13 @@ def _left_out(
 
 
 def _listed(names: list[str]) -> str:
-    """List names, the first eight of many."""
+    """Return a list of names as text, the first eight of many."""
     shown = ", ".join(printable(name) for name in names[:8])
     return shown if len(names) <= 8 else f"{shown} and {len(names) - 8} more"
 
 
 def check_kind(choice: Choice, path: Path) -> None:
-    """Refuse numbers that say nothing of light, and pixels that lie in depth."""
+    """Raise an error for values that are not light, and for deep pixels."""
     spec = choice.spec
     if spec.deep or spec.depth > 1:
         raise RenderError(
@@ -200,9 +200,9 @@ def check_kind(choice: Choice, path: Path) -> None:
 
 
 def check_size(choice: Choice, path: Path, largest_bytes: float) -> None:
-    """Refuse by the header what would not fit the memory."""
+    """Raise an error, from the header alone, for a picture that would not fit in memory."""
     spec, count = choice.spec, len(choice.colours)
-    # A window of data may be larger than the picture it belongs to.
+    # A data window may be larger than its picture.
     width, height = max(spec.width, spec.full_width), max(spec.height, spec.full_height)
     if width < 1 or height < 1:
         raise RenderError(

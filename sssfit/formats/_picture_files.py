@@ -1,4 +1,4 @@
-"""Picture files: their formats, by ending and by their first bytes."""
+"""Picture files and their formats, by ending and by first bytes."""
 
 import contextlib
 import math
@@ -23,9 +23,9 @@ _PNG_SIGNATURE = 8  # bytes
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """What was done to a file's light: the factors in it (3,), and the primaries of R, G, B.
+    """Encoding of a file's light: factors (3,), and the primaries of R, G, B.
 
-    ``exposure`` and ``correction`` are 1 where the header does not say, ``primaries`` None.
+    ``exposure`` and ``correction`` are 1 and ``primaries`` is None if the header has no entry.
     """
 
     exposure: float = 1.0
@@ -34,14 +34,14 @@ class Header:
 
 
 def read_header(path: Path, format: str) -> Header:
-    """Return what the header of a Radiance or PNG file says; nothing for other formats.
+    """Return the encoding from the header of a Radiance or PNG file; the default for others.
 
     Raises
     ------
     FileError
-        Unreadable, or a line of a Radiance header is not what it should be.
+        The file is unreadable, or a line of its Radiance header is invalid.
     RenderError
-        A Radiance file of CIE XYZ.
+        The file is a Radiance file of CIE XYZ.
     """
     try:
         if format == "hdr":
@@ -54,9 +54,9 @@ def read_header(path: Path, format: str) -> Header:
 
 
 def _radiance(path: Path) -> Header:
-    """Multiply up the EXPOSURE and COLORCORR lines (Ward, Radiance file formats); the last rules.
+    """Read a Radiance header (Ward, Radiance file formats): all factors, the last primaries.
 
-    A picture holds the light times all of them.
+    A picture holds the light times all of these factors.
     """
     with path.open("rb") as stream:
         text = stream.read(_LONGEST_HEADER).replace(b"\r", b"").partition(b"\n\n")[0]
@@ -100,7 +100,7 @@ def _numbers(path: Path, key: str, value: str, count: int) -> tuple[float, ...]:
 
 
 def _png_primaries(path: Path) -> tuple[float, ...] | None:
-    """Return the cHRM chunk's numbers, unless another chunk overrules it (PNG 3, 11.3.2.1)."""
+    """Return the numbers of the cHRM chunk, unless another chunk overrides it (PNG 3, 11.3.2.1)."""
     found = None
     with path.open("rb") as stream:
         stream.seek(_PNG_SIGNATURE)
@@ -118,12 +118,12 @@ def _png_primaries(path: Path) -> tuple[float, ...] | None:
     return found
 
 
-# What is written, by ending.
+# Formats that are written, by ending.
 _ENDINGS = {".exr": "exr", ".tif": "tiff", ".tiff": "tiff", ".png": "png"}
 FORMATS = ("exr", "tiff", "png")
 _PNG = b"\x89PNG\r\n\x1a\n"
-# What is read, by its first bytes: a wrong ending does no harm. Both byte orders of TIFF, and its
-# variant for more than 4 GB.
+# Formats that are read, by first bytes, so a wrong ending does no harm. TIFF has two byte orders,
+# and a variant for more than 4 GB.
 _MAGIC = {
     "exr": (b"\x76\x2f\x31\x01",),
     "hdr": (b"#?RADIANCE", b"#?RGBE"),
@@ -132,14 +132,15 @@ _MAGIC = {
     "jpeg": (b"\xff\xd8\xff",),
 }
 READ = "EXR, HDR, TIFF, PNG, JPG or TGA"
-# A TGA file begins with no mark: the new form ends with one, the old is known by its ending too.
+# A TGA file begins with no mark: the new form ends with one, the old needs its file ending.
 _TGA_END = b"TRUEVISION-XFILE.\0"
 _TGA_ENDINGS = (".tga", ".targa")
-_TGA_TYPES = (1, 2, 3, 9, 10, 11)  # of palettes, colours and greys, plain and run-length encoded
+# Types with palettes, colours and greys, plain and run-length encoded.
+_TGA_TYPES = (1, 2, 3, 9, 10, 11)
 _TGA_DEPTHS = (8, 15, 16, 24, 32)  # bits a pixel
-_STDERR = threading.Lock()  # two at once would put the wrong stderr back
+_STDERR = threading.Lock()  # two at once would restore the wrong stderr
 _LONGEST_CALLED = 400  # characters of a path in messages
-# How pictures that we write name their maker; PNG has it in its Exif, which is TIFF's.
+# How pictures that we write name their maker; PNG has it in its Exif, which uses TIFF's tags.
 MAKER = "sssfit picture"
 _MARKS = {
     begin: b"Software\0string\0\x0e\0\0\0" + MAKER.encode()
@@ -148,16 +149,16 @@ _MARKS = {
     for name, begins in _MAGIC.items()
     for begin in begins
 }
-_CRC_BLOCK = 1 << 20  # bytes held at a time while a chunk is summed
+_CRC_BLOCK = 1 << 20  # bytes in memory while the checksum of a chunk is computed
 
 
 def image_format(target: str | Path | BinaryIO) -> str:
-    """Return the format that the ending of a path asks for: "exr", "tiff" or "png".
+    """Return the format of a path by its ending: "exr", "tiff" or "png".
 
     Raises
     ------
     FileError
-        The ending is another, or a stream has none.
+        The path has another ending, or a stream has none.
     """
     if not isinstance(target, str | Path):
         raise FileError(f"a stream has no ending; name a format: {', '.join(FORMATS)}.")
@@ -170,7 +171,7 @@ def image_format(target: str | Path | BinaryIO) -> str:
 
 
 def as_path(path: object) -> Path:
-    """Return the path of a picture; refuse what cannot be one."""
+    """Return the path of a picture; raises an error if it cannot be one."""
     if not isinstance(path, str | os.PathLike) or isinstance(os.fspath(path), bytes):
         raise FileError(f"{shown(path)} is not a path; name an {READ} file.")
     if "\0" in (text := os.fspath(path)):
@@ -179,7 +180,7 @@ def as_path(path: object) -> Path:
 
 
 def is_image_file(path: str | Path) -> bool:
-    """Tell whether a file is a picture that we wrote, by what it says of its maker."""
+    """Return whether a file is a picture that we wrote, by the maker it names."""
     try:
         return has_mark(as_path(path), _MARKS)
     except FileError:
@@ -187,12 +188,12 @@ def is_image_file(path: str | Path) -> bool:
 
 
 def found_format(path: Path) -> str:
-    """Return the format a file has by its content: a key of ``_MAGIC``, or "tga".
+    """Return the format of a file by its content: a key of ``_MAGIC``, or "tga".
 
     Raises
     ------
     FileError
-        Missing, unreadable, a folder or device, empty, or of another format.
+        The file is missing, unreadable, a folder or device, empty, or of another format.
     """
     name = called(path)
     try:
@@ -209,7 +210,7 @@ def found_format(path: Path) -> str:
 
 
 def called(path: Path) -> str:
-    """Return a path as it stands in messages: on one line, its middle left out where it is long."""
+    """Return a path for messages: on one line, and shortened in the middle if it is long."""
     text = printable(str(path))
     half = _LONGEST_CALLED // 2
     return text if len(text) <= _LONGEST_CALLED else f"{text[:half]}...{text[-half:]}"
@@ -217,13 +218,13 @@ def called(path: Path) -> str:
 
 @contextlib.contextmanager
 def without_lines_of_libpng() -> Iterator[None]:
-    """Keep stderr to ourselves: libpng writes its errors there, and then hands them on as well."""
+    """Capture stderr, because libpng writes its errors there and also returns them."""
     with _STDERR:
         with contextlib.suppress(OSError, ValueError, AttributeError):
             sys.stderr.flush()
         try:
             kept = os.dup(2)
-        except OSError:  # closed: there is nothing to keep clean
+        except OSError:  # closed: no need to capture it
             yield
             return
         try:
@@ -236,12 +237,12 @@ def without_lines_of_libpng() -> Iterator[None]:
 
 
 def check_png(path: Path) -> None:
-    """Check a PNG's chunks against their own sums, which libpng does for some of them only.
+    """Check the checksums of a PNG's chunks, which libpng does for some of them only.
 
     Raises
     ------
     FileError
-        Cut short or damaged.
+        The file is truncated or damaged.
     """
     try:
         with path.open("rb") as stream:
@@ -254,7 +255,7 @@ def check_png(path: Path) -> None:
 
 
 def _chunks_are_whole(stream: BinaryIO) -> bool:
-    """Tell whether every chunk up to IEND is there and has the sum it says."""
+    """Return whether every chunk up to IEND is present with the right checksum."""
     while len(head := stream.read(8)) == 8:
         length, name = struct.unpack(">I4s", head)
         total = zlib.crc32(name)
@@ -282,7 +283,7 @@ def _format_of(path: Path) -> str | None:
 
 
 def _begins_a_tga(head: bytes) -> bool:
-    """Tell whether 18 bytes can be a TGA's header (Truevision, TGA file format, version 2.0)."""
+    """Return whether 18 bytes can be a TGA header (Truevision, TGA file format, version 2.0)."""
     if len(head) < 18:
         return False
     has_palette, kind = head[1], head[2]

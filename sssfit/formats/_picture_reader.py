@@ -1,4 +1,4 @@
-"""Pictures from files, through OpenImageIO: whole, turned upright, linear."""
+"""Reads pictures through OpenImageIO: complete, upright and linear."""
 
 import contextlib
 from collections.abc import Sequence
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
     from OpenImageIO import ImageInput, ImageSpec
 
 
-# In EXR headers, as text: so that a written picture can be read again without naming its scale.
+# In EXR headers, as text, so that a written picture keeps its pixel size.
 SCALE_KEY = "sssfit:mm_per_pixel"
 _LONGEST_REASON = 120
-# TIFF's numbers; how libtiff ends its word on one that it lacks.
+# TIFF's numbers, and the end of libtiff's message on a missing one.
 _COMPRESSIONS = {
     32946: "deflate",
     34661: "JBIG",
@@ -42,7 +42,7 @@ _COMPRESSIONS = {
     50002: "JPEG XL",
     52546: "JPEG XL",
 }
-# Of a damaged JPEG the reader makes what it can, and says so; bytes too many cost no pixel.
+# The reader decodes what it can of a damaged JPEG, and says so; surplus bytes cost no pixel.
 _HARMLESS = "extraneous bytes before marker"
 _NOT_BUILT = ("compression support is not configured", "decoding is not implemented")
 
@@ -75,12 +75,12 @@ def read_image(path: Path, layer: str | None, largest_bytes: float) -> dict[str,
                 *(*divided, *converted),
             ),
         }
-    except UnicodeDecodeError:  # bytes of a damaged header, in what the library hands on or says
+    except UnicodeDecodeError:  # bytes of a damaged header, in the library's results or messages
         raise FileError(f"{called(path)} is damaged (a word in its header is not text).") from None
 
 
 def _stored(path: Path, layer: str | None, largest_bytes: float) -> tuple[Choice, npt.NDArray[Any]]:
-    """Return what is read of a file, and its numbers as they lie there."""
+    """Return the selected layer of a file, and its values as stored."""
     source = _open(path)
     try:
         choice = choose(source, path, layer)
@@ -96,7 +96,7 @@ def _stored(path: Path, layer: str | None, largest_bytes: float) -> tuple[Choice
 
 
 def _unreadable(path: Path, spec: "ImageSpec", words: str) -> FileError:
-    """Tell a compression that the library was built without from a damaged file."""
+    """Distinguish a compression that the library lacks from a damaged file."""
     if not words.endswith(_NOT_BUILT):
         return FileError(f"{called(path)} is damaged or cut short ({words}).")
     code = spec.get_int_attribute("tiff:Compression")
@@ -108,14 +108,14 @@ def _unreadable(path: Path, spec: "ImageSpec", words: str) -> FileError:
 
 
 def _open(path: Path) -> "ImageInput":
-    """Open by content; alpha stays unmultiplied where a file has it so."""
+    """Open a file by its content; unmultiplied alpha stays unmultiplied."""
     import OpenImageIO  # 0.2 s
 
     config = OpenImageIO.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)
     try:
         source = OpenImageIO.ImageInput.open(str(path), config)
-    except TypeError:  # what a name that is not UTF-8 becomes
+    except TypeError:  # raised for a name that is not UTF-8
         raise FileError(f"{called(path)} has a name that is not UTF-8; rename it.") from None
     if source is None:
         raise FileError(
@@ -125,13 +125,13 @@ def _open(path: Path) -> "ImageInput":
 
 
 def one_line(text: str) -> str:
-    """Shorten what the library says to one line."""
+    """Shorten a message of the library to one line."""
     line = printable(text.strip().partition("\n")[0]).rstrip(".")
     return line if len(line) <= _LONGEST_REASON else f"{line[:_LONGEST_REASON]}..."
 
 
 def _in_window(raw: npt.NDArray[Any], spec: "ImageSpec") -> npt.NDArray[Any]:
-    """Put an EXR's window of data into the picture it belongs to: black around, cut outside."""
+    """Put an EXR's data window into its picture: black around it, cropped outside."""
     if (spec.x, spec.y, spec.width, spec.height) == (
         *(spec.full_x, spec.full_y),
         *(spec.full_width, spec.full_height),
@@ -148,7 +148,7 @@ def _in_window(raw: npt.NDArray[Any], spec: "ImageSpec") -> npt.NDArray[Any]:
 
 
 def _upright(stored: npt.NDArray[Any], spec: "ImageSpec") -> npt.NDArray[Any]:
-    """Turn rows and columns as the orientation, 1 to 8 as in TIFF and Exif, says."""
+    """Turn rows and columns by the orientation, 1 to 8 as in TIFF and Exif."""
     turned = {
         2: stored[:, ::-1],
         3: stored[::-1, ::-1],
@@ -162,7 +162,7 @@ def _upright(stored: npt.NDArray[Any], spec: "ImageSpec") -> npt.NDArray[Any]:
 
 
 def _about_file(spec: "ImageSpec") -> list[str]:
-    """Say what of the header changed the picture, and what was not heeded."""
+    """Return notes on header entries that changed the picture, and on ignored ones."""
     notes = []
     if (orientation := spec.get_int_attribute("Orientation", 1)) in range(2, 9):
         notes.append(f"turned upright from orientation {orientation}")
@@ -178,7 +178,7 @@ def _about_file(spec: "ImageSpec") -> list[str]:
 
 
 def _without_factors(colour: FloatArray, header: Header) -> tuple[FloatArray, list[str]]:
-    """Take the factors of a Radiance header out of the light, and say which."""
+    """Divide the light by the factors of a Radiance header, and return notes."""
     notes = []
     if header.exposure != 1.0:
         notes.append(f"divided by the exposure of {header.exposure:.4g} in its header")
@@ -187,12 +187,12 @@ def _without_factors(colour: FloatArray, header: Header) -> tuple[FloatArray, li
         notes.append(f"divided by the colour correction of {words} in its header")
     if not notes:
         return colour, []
-    with np.errstate(over="ignore"):  # what becomes infinite is refused later
+    with np.errstate(over="ignore"):  # infinite values raise an error later
         return colour / (header.exposure * np.array(header.correction)), notes
 
 
 def _chromaticities(spec: "ImageSpec") -> tuple[float, ...] | None:
-    """Return those of an EXR's header; None where there are none, or they are something else."""
+    """Return the primaries of an EXR header; None if they are missing or invalid."""
     found = spec.getattribute("chromaticities")
     is_usual = isinstance(found, tuple) and len(found) == 8
     return tuple(float(each) for each in found) if is_usual else None
@@ -201,7 +201,7 @@ def _chromaticities(spec: "ImageSpec") -> tuple[float, ...] | None:
 def _linear(
     whole: npt.NDArray[Any], choice: Choice
 ) -> tuple[FloatArray, FloatArray | None, bool, list[str]]:
-    """Return linear colour, alpha, whether it is in the colour, and what was done, in words."""
+    """Return linear colour, alpha, whether alpha is in the colour, and notes."""
     spec, first = choice.spec, choice.span[0]
     colour = _as_float64(whole[..., [place - first for place in choice.colours]])
     alpha, is_multiplied, notes = None, False, []
@@ -209,7 +209,7 @@ def _linear(
         alpha = _as_float64(whole[..., choice.alpha - first])
         is_multiplied = not spec.get_int_attribute("oiio:UnassociatedAlpha")
         notes.append(_about_alpha(is_multiplied, choice.bits))
-        if is_multiplied and choice.bits:  # the curve of sRGB belongs to the colour without alpha
+        if is_multiplied and choice.bits:  # the sRGB curve applies to the colour without alpha
             safe = np.where(alpha > 0.0, alpha, 1.0)[..., None]
             colour, is_multiplied = np.minimum(colour / safe, 1.0), False
     space = spec.get_string_attribute("oiio:ColorSpace")
@@ -230,9 +230,9 @@ def _linear(
 def _in_our_primaries(
     colour: FloatArray, choice: Choice, primaries: Sequence[float] | None, path: Path
 ) -> tuple[FloatArray, list[str]]:
-    """Return R, G, B in the primaries of sRGB, and what was done, in words.
+    """Return R, G, B in the primaries of sRGB, and notes.
 
-    A colour outside the triangle of ours would have negative light, which no surface receives.
+    A colour outside the sRGB triangle would have negative light, which no surface receives.
     """
     if primaries is None or choice.names != ("R", "G", "B"):
         return colour, []
@@ -250,8 +250,8 @@ def _in_our_primaries(
 
 
 def _as_float64(stored: npt.NDArray[Any]) -> FloatArray:
-    """Return floats as they are, whole numbers as shares of their largest code."""
-    with np.errstate(invalid="ignore"):  # some NaN warn when widened; they are refused later
+    """Return floats unchanged, and integers as shares of their largest code."""
+    with np.errstate(invalid="ignore"):  # some NaN warn when widened; they raise an error later
         return stored.astype(np.float64) / FULL_SCALE.get(stored.dtype.name, 1)
 
 

@@ -1,8 +1,7 @@
 """Pictures of linear light, to and from EXR, TIFF and PNG files; HDR, JPG and TGA are read too.
 
-What is read is known by its content. 8- and 16-bit pictures are decoded from sRGB, floating point
-is linear; light comes back in the primaries of sRGB. What was done to a file's numbers stands in
-`Image.notes`.
+Files are recognised by content. 8- and 16-bit pictures are decoded from sRGB, floating point is
+linear; the result has the primaries of sRGB. `Image.notes` lists the conversions.
 """
 
 import contextlib
@@ -42,7 +41,7 @@ from sssfit.formats.colours import (
 )
 from sssfit.messages import shown
 
-# The library would put in the time of writing, and a picture made twice would differ.
+# The library would write the current time, so a picture written twice would differ.
 _DATE = "1980:01:01 00:00:00"
 
 
@@ -57,12 +56,12 @@ def image_bytes(
 ) -> bytes:
     """Return the whole file of (H, W, C) float32, or uint16 for PNG; alpha is the last channel.
 
-    The library writes to names only, so a folder of our own takes the file first.
+    The library writes to named files only, so the file first goes to a temporary folder.
 
     Raises
     ------
     FileError
-        That folder cannot be written to.
+        The temporary folder cannot be written.
     """
     import OpenImageIO  # 0.2 s
 
@@ -74,12 +73,13 @@ def image_bytes(
     spec.attribute("Software", MAKER)
     spec.alpha_channel = count - 1 if has_alpha else -1
     if has_alpha and not is_multiplied:
-        spec.attribute("oiio:UnassociatedAlpha", 1)  # what it gets is what it writes
+        spec.attribute("oiio:UnassociatedAlpha", 1)  # the library writes the values unchanged
     if format == "png":
         spec.attribute("oiio:ColorSpace", "srgb_rec709_scene")
     else:
         spec.attribute("DateTime", _DATE)
-        # TIFF is left plain: not every reader knows the predictor that compressed floats have.
+        # TIFF is not compressed, because not every reader supports the predictor of compressed
+        # floats.
         spec.attribute("compression", "zip" if format == "exr" else "none")
     if format == "exr" and mm_per_pixel is not None:
         spec.attribute(SCALE_KEY, repr(float(mm_per_pixel)))
@@ -87,7 +87,7 @@ def image_bytes(
         with temporary_folder() as folder:
             path = folder / f"picture.{format}"
             target = OpenImageIO.ImageOutput.create(str(path))
-            # Other layouts in memory are refused.
+            # The library does not accept other layouts in memory.
             packed = np.ascontiguousarray(pixels)
             assert target is not None  # these formats are part of the library
             with without_lines_of_libpng() if format == "png" else contextlib.nullcontext():
@@ -122,22 +122,22 @@ class Image:
     pixels : array (H, W, C)
         Linear light; row 0 is the top.
     channels : tuple of str
-        Names of the channels: ("R", "G", "B"), ("Y",) for grey, others as an EXR has them.
+        Names of the channels: ("R", "G", "B"), ("Y",) for grey, or others from an EXR.
     mm_per_pixel : float, optional [mm]
-        Size of a pixel; None where the file does not say.
+        Size of a pixel; None if the file does not say.
     alpha : array (H, W), optional
-        Coverage, kept apart from the colour.
+        Coverage, stored separately from the colour.
     alpha_is_multiplied : bool
-        Whether ``pixels`` hold the light times the coverage, as in an EXR.
+        Whether ``pixels`` are multiplied by the coverage, as in an EXR.
     name : str
         The file's name without its folder.
     notes : tuple of str
-        What was done to the file's numbers, in words for stderr.
+        Conversions of the file's values, as text for stderr.
 
     Raises
     ------
     RenderError
-        An array does not hold real numbers, or has another shape.
+        An array does not hold real numbers, or has the wrong shape.
     """
 
     pixels: FloatArray
@@ -159,7 +159,7 @@ class Image:
                 )
 
     def _store(self, field: str, dimensions: int) -> None:
-        """Keep an array read-only, in the order of C."""
+        """Store an array read-only, in C order."""
         kept = np.array(as_light(getattr(self, field), field), order="C")
         if kept.ndim != dimensions:
             raise RenderError(
@@ -175,36 +175,36 @@ def load_image(
 ) -> Image:
     """Read a picture as linear light.
 
-    EXR: R, G, B of the first part that has them, or of the only layer that has, else Y, else all
-    channels; its window of data is put into the picture's, black around. Palettes become RGB, grey
-    stays one channel. Primaries other than those of sRGB are converted, white staying white: the
-    chromaticities of an EXR, PRIMARIES of a Radiance file, cHRM of a PNG. Values that would fall
-    below 0 then are set to 0. Radiance's EXPOSURE and COLORCORR are taken out of the light.
+    From an EXR it takes R, G, B of the first part that has them, or of the only layer that has
+    them, else Y, else all channels; its data window is placed in the picture, with black around.
+    Palettes become RGB, grey stays one channel. Primaries other than those of sRGB are converted
+    with white kept: the chromaticities of an EXR, PRIMARIES of a Radiance file, cHRM of a PNG.
+    Negative values that result are set to 0. Radiance's EXPOSURE and COLORCORR are divided out.
 
     Parameters
     ----------
     path : str or Path
-        An EXR, Radiance HDR, TIFF, PNG, JPG or TGA file, by its content and not by its ending, but
-        for TGA files of the first version, which only their ending tells.
+        An EXR, Radiance HDR, TIFF, PNG, JPG or TGA file, recognised by its content; only TGA files
+        of the first version also need their ending.
     layer : str, optional
-        Of an EXR: what stands before the last dot in its channels' names, or the name of a part.
+        Layer of an EXR: the part of its channels' names before the last dot, or the name of a part.
     largest_bytes : float [bytes]
-        Refuse pictures that would need more to be rendered, 32 bytes for each of their values.
+        Limit of the memory for rendering the picture, 32 bytes for each of its values.
 
     Returns
     -------
     Image
-        8- and 16-bit numbers sRGB-decoded (IEC 61966-2-1) unless the file says that they are
-        linear; turned upright.
+        The upright picture; 8- and 16-bit values are sRGB-decoded (IEC 61966-2-1) unless the file
+        says that they are linear.
 
     Raises
     ------
     FileError
-        Missing, unreadable, damaged, cut short, of another format, or compressed in a way that
-        the library was built without.
+        The file is missing, unreadable, damaged, truncated, of another format, or uses a
+        compression that the library lacks.
     RenderError
-        Too large, without channels that can be used, with several layers and none of them named,
-        or with NaN, infinite or negative values.
+        The picture is too large, has no usable channels, has several layers and none is selected,
+        or has NaN, infinite or negative values.
     """
     source = as_path(path)
     largest = positive(largest_bytes, "largest_bytes")
@@ -229,40 +229,40 @@ def save_image(
     alpha: npt.ArrayLike | None = None,
     alpha_is_multiplied: bool = False,
 ) -> tuple[str, ...]:
-    """Write linear light: float32 to EXR or TIFF as it is, 16-bit sRGB to PNG.
+    """Write linear light: unchanged float32 to EXR or TIFF, 16-bit sRGB to PNG.
 
-    A PNG holds ``exposure`` times the light, clipped to 0 to 1 and sRGB-encoded. With alpha, an EXR
-    holds the light times it and a PNG the light without it, as these formats have it; a TIFF says
-    which. Files are written whole or not at all, and the same picture gives the same bytes.
+    A PNG holds ``exposure`` times the light, clipped to 0 to 1 and sRGB-encoded. By the conventions
+    of the formats, an EXR holds the light times alpha and a PNG the light without it; a TIFF says
+    which. Files are written completely or not at all, and the same picture gives the same bytes.
 
     Parameters
     ----------
     target : path or binary stream
-        Where to.
+        Where to write.
     pixels : array (H, W, C)
         Linear light; row 0 is the top.
     channels : sequence of str, optional
         Names for EXR; needed for other counts than 1 (Y) and 3 (R, G, B), which only EXR can hold.
     format : str, optional
-        "exr", "tiff" or "png"; by default what the ending says.
+        "exr", "tiff" or "png"; by default from the ending.
     exposure : float
-        Factor for PNG; the other formats keep the light as it is.
+        Factor for PNG; the other formats keep the light unchanged.
     mm_per_pixel : float, optional [mm]
-        Kept in the header of an EXR, from where `load_image` takes it.
+        Stored in the header of an EXR, from which `load_image` reads it.
     alpha : array (H, W), optional
         Coverage, for pictures of 1 or 3 channels.
     alpha_is_multiplied : bool
-        Whether ``pixels`` hold the light times the coverage.
+        Whether ``pixels`` are multiplied by the coverage.
 
     Returns
     -------
     tuple of str
-        What was done to the numbers, in words for stderr.
+        Conversions of the values, as text for stderr.
 
     Raises
     ------
     FileError
-        The file cannot be written; an older one is untouched.
+        The file cannot be written; an older one stays unchanged.
     RenderError
         The values are not finite, or do not fit the format.
     """
@@ -301,5 +301,5 @@ def _write(path: Path, data: bytes) -> None:
     """Write the whole file or nothing."""
     try:
         write_atomically(path, lambda stream: stream.write(data))
-    except OSError as error:  # a name that no file system takes
+    except OSError as error:  # a name that is invalid in every file system
         raise FileError(f"{called(path)} cannot be written: {reason(error)}.") from None
