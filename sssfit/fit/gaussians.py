@@ -13,8 +13,7 @@ The fit uses the profile's annuli and not the pixels, so variances and weights d
 pixel size. The exception are profiles with R_d ~ 1/r near the beam, where the integral of r R^2
 diverges as annuli narrow; these are evaluated at the resolution of the pixels, with a warning.
 
-Next: ``_gaussians_annuli.py`` has the objective, ``_gaussians_search.py`` the search and the
-resolution.
+Next: ``_gaussians_search.py`` has the objective, the search and the resolution.
 """
 
 import math
@@ -25,8 +24,7 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from sssfit.errors import FitError, SssfitWarning
-from sssfit.fit._gaussians_annuli import make_annuli
-from sssfit.fit._gaussians_search import GaussianSum, is_steep, rings, search
+from sssfit.fit._gaussians_search import GaussianSum, is_steep, make_annuli, rings, search
 from sssfit.fit._result import ChannelFit, FitResult, factor_to, fit_channels, restores
 from sssfit.fit._target import Pitch, Target, make_target, name_of
 from sssfit.profile import Profile

@@ -33,8 +33,7 @@ import numpy as np
 
 from sssfit._jit.transport import NEGLIGIBLE, Tables, kernel_matrix
 from sssfit.arrays import FloatArray
-from sssfit.optics import gauss_legendre, is_matched, normal_transmittance
-from sssfit.simulate._surface import Cone
+from sssfit.optics import Cone, gauss_legendre, is_matched, normal_transmittance
 
 # Depth of the last panel: components that do not fall like exp(-nu z) are exp(-26) = 5e-12 there.
 _DEPTH = 26.0

@@ -20,8 +20,7 @@ import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError
-from sssfit.optics import fresnel_transmittance, normal_transmittance
-from sssfit.simulate._surface import Cone
+from sssfit.optics import Cone, fresnel_transmittance, normal_transmittance
 
 _REACH = 3.2  # the last nodes of the rule lie 1e-16 of the range from its ends
 _DIRECTIONS = 96

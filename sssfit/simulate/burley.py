@@ -29,7 +29,7 @@ from sssfit.simulate._deterministic import (
     half_space,
     warn_of_similarity,
 )
-from sssfit.simulate._semi_infinite import relative_eta
+from sssfit.simulate._walks import relative_eta
 from sssfit.simulate.exact import diffuse_reflectance
 
 MAPPINGS: Mapping[str, Callable[[npt.ArrayLike], FloatArray]] = MappingProxyType(

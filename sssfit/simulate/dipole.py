@@ -29,7 +29,7 @@ from sssfit.simulate._diffusion import (
     mismatch_by_moments,
     mismatch_by_polynomial,
 )
-from sssfit.simulate._semi_infinite import relative_eta
+from sssfit.simulate._walks import relative_eta
 
 
 def simulate_dipole(

@@ -29,7 +29,7 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
-from sssfit.optics import normal_transmittance
+from sssfit.optics import entering_of_diffuse, normal_transmittance
 from sssfit.process import available_cores
 from sssfit.profile import Profile
 from sssfit.simulate._depth import (
@@ -50,8 +50,7 @@ from sssfit.simulate._mixture import (
     single_scattering_beyond,
     single_scattering_of_diffuse_light,
 )
-from sssfit.simulate._semi_infinite import relative_eta
-from sssfit.simulate._surface import entering_of_diffuse
+from sssfit.simulate._walks import relative_eta
 
 Light = Literal["normal", "diffuse"]
 LIGHTS: tuple[Light, ...] = get_args(Light)

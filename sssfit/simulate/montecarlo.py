@@ -25,9 +25,8 @@ from sssfit.profile import Profile
 from sssfit.simulate._batches import Walk, relative_errors
 from sssfit.simulate._checkpoint import Checkpoint, settings_of
 from sssfit.simulate._finished import AUTO_BEYOND, ending_of, profile_of, share_beyond, whole
-from sssfit.simulate._layered import LayeredWalk
 from sssfit.simulate._run import Ending, Progress, run
-from sssfit.simulate._semi_infinite import SemiInfiniteWalk, relative_eta
+from sssfit.simulate._walks import LayeredWalk, SemiInfiniteWalk, relative_eta
 
 # With fewer, a channel may have a handful of hits, and its error estimate is unreliable.
 HONEST_PHOTONS = 1000
