@@ -167,7 +167,7 @@ def draw_models(
 
 def _percent(share: float | None) -> str:
     """Write a share in percent, with its zeros; a dash where there is none."""
-    return "-" if share is None else f"{100.0 * share:.3f} %"
+    return "-" if share is None else f"{100.0 * share:z.3f} %"
 
 
 def read_models(name: str) -> tuple[Material, Profile | None]:

@@ -99,11 +99,11 @@ def _photon_lines(need: PhotonNeed | None) -> list[str]:
     if need is None:
         return []
     if need.photons is None:
-        enough = f"{need.counts[-1]:.0e} photons are not enough for a walk"
+        enough = f"{need.counts[-1]:.2g} photons are not enough for a walk"
     else:
-        enough = f"a walk of {need.photons:.0e} photons would do"
+        enough = f"a walk of {need.photons:.2g} photons would do"
     tried = ", ".join(
-        f"{count:.0e} Delta E {error:.3g} in {seconds:.1f} s"
+        f"{count:.2g} Delta E {error:.3g} in {seconds:.1f} s"
         for count, error, seconds in zip(need.counts, need.errors, need.seconds, strict=True)
     )
     by = "needs none" if need.truth_method == "exact" else "is the truth here"

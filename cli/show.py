@@ -160,6 +160,6 @@ def _balance(figures: dict[str, Any], channel: int) -> str:
 def _radii(figures: dict[str, Any]) -> str:
     """How far the light on the grid spreads."""
     within = [(100 * share, figures[f"radius_of_{100 * share:g}_percent_mm"]) for share in _SHARES]
-    shown = [(f"{percent:g} % within, mm", radii, ".4f|nan") for percent, radii in within]
+    shown = [(f"{percent:g} % within, mm", radii, ".4f") for percent, radii in within]
     empty = ("empty", figures["empty_annuli"], "")
     return f"\n{columns('channel', figures['channels'], *shown, empty)}\n"

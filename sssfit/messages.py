@@ -73,7 +73,14 @@ def number(value: Any, form: str) -> str:
         return unknown or "-"
     if not form.endswith("%"):
         return f"{value:{form}}"
-    return "0 %" if abs(value) < 1e-9 else f"{100.0 * value:{form[:-1]}} %"
+    return "0 %" if abs(value) < 1e-9 else f"{_per_cent(100.0 * value, form[:-1])} %"
+
+
+def _per_cent(value: float, form: str) -> str:
+    """Write per cents without an exponent where they are large: 100, and not 1e+02."""
+    text = f"{value:{form}}"
+    sign = "+" if form.startswith("+") else ""
+    return f"{float(text):{sign}.0f}" if "e+" in text else text
 
 
 class _Template(Formatter):

@@ -16,9 +16,8 @@ from checks import (
 from sssfit.grid import RadialGrid, paper_grid
 from sssfit.material import Layer, Material, load_material
 from sssfit.simulate import simulate_montecarlo
-from sssfit.simulate._layered import LayeredWalk
 from sssfit.simulate._run import run
-from sssfit.simulate._semi_infinite import SemiInfiniteWalk
+from sssfit.simulate._walks import LayeredWalk, SemiInfiniteWalk
 
 
 def layer(sigma_a, sigma_s, g=0.0, eta=1.0, thickness=math.inf):

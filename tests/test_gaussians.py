@@ -19,7 +19,7 @@ from reference_gaussians import (
 from reference_pixels import make_profile, one_over_r_profile
 from scipy.integrate import quad
 
-import sssfit.fit._gaussians_annuli as annuli_module
+import sssfit.fit._gaussians_search as annuli_module
 from sssfit import shapes
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import METHODS, fit_gaussians, make_target

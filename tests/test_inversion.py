@@ -370,7 +370,7 @@ def test_up_to_64_channels(run, tmp_path):
     assert status == 2
     assert "64 values; name their channels with --channels" in err
     _, _, err = run("--from-reflectance", ".4", *ASKED[2:], "--eta", "1.3")
-    assert "--from-reflectance has 1 value; name" in err
+    assert "--from-reflectance has 1 value; name its channel with --channels" in err
     more = (*asked[:1], shares + ",0.1", *asked[2:], "--channels", channels + ",x", "-o", "t.toml")
     status, _, err = run(*more)
     assert status == 1

@@ -19,8 +19,8 @@ from sssfit.errors import SssfitWarning
 from sssfit.formats.mci import load_mci
 from sssfit.grid import RadialGrid, paper_grid
 from sssfit.simulate import shared_walks, simulate_montecarlo
-from sssfit.simulate._layered import LayeredWalk, channels_with_equal_scattering
 from sssfit.simulate._run import run
+from sssfit.simulate._walks import LayeredWalk, channels_with_equal_scattering
 
 DATA = Path(__file__).parent / "data"
 LIMIT = checks.LIMIT

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from sssfit.cli._output import in_options
-from sssfit.messages import Columns, filled, report
+from sssfit.messages import Columns, filled, number, report
 
 LIBRARY = sorted((Path(__file__).parents[1] / "sssfit").rglob("*.py"))
 # A long option, a short one, or a command: none of these stands in text for Python.
@@ -89,6 +89,24 @@ def test_the_command_line_knows_every_argument_that_a_message_marks():
 )
 def test_arguments_become_options_where_the_command_line_prints_them(said, printed):
     assert in_options(said) == printed
+
+
+@pytest.mark.parametrize(
+    ("share", "form", "written"),
+    [
+        (0.99375, ".2g%", "99 %"),
+        (0.9975, ".2g%", "100 %"),  # and not 1e+02 %
+        (2.7, "+.2g%", "+270 %"),
+        (-11.14, "+.2g%", "-1100 %"),
+        (0.000123, ".2g%", "0.012 %"),
+        (1e-10, "+.2g%", "0 %"),
+        (None, ".2g%|unknown", "unknown"),
+        (float("nan"), ".4f", "-"),
+        (float("inf"), ".3g%", "inf %"),
+    ],
+)
+def test_shares_are_written_in_per_cent(share, form, written):
+    assert number(share, form) == written
 
 
 FIGURES = {

@@ -21,7 +21,7 @@ from sssfit.simulate import simulate_montecarlo, simulate_montecarlo_many
 from sssfit.simulate._batches import BATCH_PHOTONS
 from sssfit.simulate._finished import AUTO_BEYOND
 from sssfit.simulate._run import run
-from sssfit.simulate._semi_infinite import SemiInfiniteWalk, roulette_schedule
+from sssfit.simulate._walks import SemiInfiniteWalk, roulette_schedule
 
 LIMIT = checks.LIMIT
 # What double precision leaves of sums over a few thousand bins and a million collisions.

@@ -86,7 +86,7 @@ def choose(source: "ImageInput", path: Path, layer: str | None) -> Choice:
         if len(found) > 1:
             raise RenderError(
                 f"{called(path)} has the layers {_listed([each.label for each in found])}; name "
-                "the one that is meant."
+                "the one that is meant with `layer`."
             )
         if found:
             return _chosen(specs, found[0])

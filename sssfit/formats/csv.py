@@ -391,7 +391,9 @@ def _density_unit(given: str | None, quantity: str, unit: str) -> str | None:
     """Return the unit whose square densities are per; None for energies."""
     if quantity == "energy":
         if given is not None:
-            raise ProfileError("density_unit is for densities; energies have no unit.")
+            raise ProfileError(
+                "`density_unit` is for densities; energies have no unit: leave it out."
+            )
         return None
     if given is not None and given not in _TO_MM:
         raise ProfileError(f"density_unit = {shown(given)}; expected {', '.join(UNITS[:-1])} or m.")
