@@ -24,9 +24,10 @@ from sssfit.simulate._run import Progress
 from sssfit.simulate._so_far import SoFar, read_checkpoint
 from sssfit.simulate.burley import simulate_burley
 from sssfit.simulate.dipole import simulate_dipole, simulate_dipole_grosjean
-from sssfit.simulate.exact import simulate_exact, simulate_exact_many
+from sssfit.simulate.exact import is_solver_compiled, simulate_exact, simulate_exact_many
 from sssfit.simulate.gaussians import DEON_SKIN, simulate_deon_skin, simulate_gaussians
 from sssfit.simulate.montecarlo import (
+    is_compiled,
     shared_walks,
     simulate_montecarlo,
     simulate_montecarlo_many,
@@ -45,8 +46,10 @@ __all__ = [
     "SoFar",
     "compiling_note",
     "is_checkpoint_file",
+    "is_compiled",
     "is_complete",
     "is_finished",
+    "is_solver_compiled",
     "read_checkpoint",
     "run_figures",
     "shared_walks",
