@@ -1,9 +1,9 @@
 """A diffuse reflectance profile R_d(r), stored as the energy in annuli around a pencil beam.
 
 It stores energies, not densities, so F(r) = int_0^r 2 pi r' R_d(r') dr' is known exactly at the
-annulus edges, independent of R_d inside (near the beam it behaves like 1/r), and every kernel made
-from the profile conserves energy by construction. The annulus tallies are those of Wang, Jacques
-and Zheng, "MCML - Monte Carlo modeling of light transport in multi-layered tissues", 1995.
+annulus edges, independent of R_d inside (near the beam it behaves like 1/r), and kernels made from
+it conserve energy by construction. The annulus tallies are those of Wang, Jacques and Zheng,
+"MCML - Monte Carlo modeling of light transport in multi-layered tissues", 1995.
 
 ``pixels`` has its integrals, ``npz`` its file format, ``checks`` the conditions on its fields.
 """
