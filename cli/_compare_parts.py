@@ -13,7 +13,7 @@ from ._compare_report import budget_text, fronts_text, kernels_text, sheet_text
 from ._deon_skin import DEON_SKIN
 from ._options import Common
 from ._output import (
-    check_distinct,
+    check_outputs,
     finish,
     finish_one,
     held,
@@ -78,7 +78,7 @@ def held_outputs(
                 f"{name}: tables are Markdown, CSV or JSON; end it in .md, .csv or .json."
             )
     drawn, written = [target(each) for each in charts], [Path(each) for each in tables]
-    check_distinct([each for each in (*drawn, *written) if each is not None])
+    check_outputs([*drawn, *written])
     read = [*inputs, *names_of(given)]
     with (
         held_charts(drawn, inputs=read, force=given["force"]),

@@ -302,6 +302,52 @@ def locked(path: Path) -> Iterator[None]:
         os.close(handle)
 
 
+def check_distinct(paths: Iterable[Path]) -> None:
+    """Refuse two outputs into one file."""
+    seen: list[Path] = []
+    for path in paths:
+        if any(is_same_file(path, other) for other in seen):
+            raise FileError(f"two outputs name the same file, {path}; give each its own.")
+        seen.append(path)
+
+
+@contextlib.contextmanager
+def held(
+    paths: Iterable[Path | None],
+    is_own: Callable[[Path], bool],
+    *,
+    inputs: Iterable[str | Path | None] = (),
+    force: bool = False,
+    named: tuple[str, str] | None = None,
+) -> Iterator[None]:
+    """Refuse outputs that could not or should not be written, and lock the others.
+
+    Parameters
+    ----------
+    paths : iterable of Path or None
+        Where outputs are to go; None is passed over.
+    is_own, inputs, force
+        As in `check_output`; None among the inputs is passed over.
+    named : (str, str), optional
+        What is written and how its name ends: ("a profile", ".npz").
+
+    Raises
+    ------
+    FileError
+        As `check_distinct`, `check_ending`, `check_output` and `locked`.
+    """
+    files = [path for path in paths if path is not None]
+    read = [each for each in inputs if each is not None]
+    check_distinct(files)
+    with contextlib.ExitStack() as locks:
+        for path in files:
+            if named is not None:
+                check_ending(path, *named)
+            check_output(path, is_own, force=force, inputs=read)
+            locks.enter_context(locked(path))
+        yield
+
+
 def _open_locked(lock_path: Path, path: Path) -> int:
     """Open and lock; again if the file was unlinked between the two by the run that ended."""
     while True:

@@ -77,8 +77,8 @@ def number(value: Any, form: str) -> str:
 
 
 def _per_cent(value: float, form: str) -> str:
-    """Write per cents without an exponent where they are large: 100, and not 1e+02."""
-    text = f"{value:{form}}"
+    """Write per cents without an exponent where they are large, and 0 without a minus."""
+    text = f"{value:{form.replace('.', 'z.')}}"
     sign = "+" if form.startswith("+") else ""
     return f"{float(text):{sign}.0f}" if "e+" in text else text
 

@@ -1,5 +1,6 @@
 """What an invocation left behind, as lines that a person can read and compare."""
 
+import contextlib
 import io
 import json
 import re
@@ -75,13 +76,11 @@ def _text(text: str) -> list[str]:
 
 
 def _line(line: str) -> Iterator[str]:
+    whole = None
     if line.startswith("{") and line.endswith("}"):
-        try:
+        with contextlib.suppress(ValueError):
             whole = json.loads(line)
-        except ValueError:
-            pass
-        else:
-            assert json.dumps(whole) == line, "JSON on stdout as Python writes it"
+        if whole is not None and json.dumps(whole) == line:
             yield "{"
             yield from _json(whole)
             yield "}"
@@ -133,12 +132,7 @@ def _file(name: str, data: bytes, ran: Ran) -> list[str]:
         text = data.decode("utf-8")
     except UnicodeDecodeError:
         return [f"{len(data)} bytes"]
-    return [_short(line) for line in _verbatim(text)]
-
-
-def _verbatim(text: str) -> list[str]:
-    lines = text.split("\n")
-    return lines[:-1] if lines[-1] == "" else [*lines, "(no newline at the end)"]
+    return [_short(line) for line in _text(text)]
 
 
 def _short(line: str) -> str:

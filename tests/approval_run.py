@@ -2,7 +2,8 @@
 
 What depends on the machine is stood in for: the clock goes on by fractions of a second each time it
 is asked, there are two cores, everything counts as compiled, bars are drawn at every report, a
-chart is described in place of being drawn, and a comparison tries one kernel of every kind.
+chart is described in place of being laid out and drawn, and a comparison tries one kernel of every
+kind.
 """
 
 import contextlib
@@ -28,6 +29,7 @@ import approval_world as world
 import matplotlib.figure
 import rich.progress
 from approval_figures import figure_lines
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 import sssfit
 from sssfit.cli import main
@@ -190,6 +192,7 @@ def stand_ins(command: Command, charts: dict[bytes, list[str]]) -> Iterator[None
             mock.patch.object(cost.seconds_per_megapixel, "__defaults__", (5, clock)),
             mock.patch.object(rich.progress, "Progress", Bar),
             mock.patch.object(matplotlib.figure.Figure, "savefig", describe),
+            mock.patch.object(ConstrainedLayoutEngine, "execute", return_value=None),
         ]
         for each in patches:
             stack.enter_context(each)

@@ -21,9 +21,10 @@ Only ratios of refractive indices count, so n may be below 1; g = 1 means no sca
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 import numpy as np
 
@@ -80,12 +81,26 @@ class MciRun:
     depth_bins: int
     angle_bins: int
 
+    def settings(self, given: Mapping[str, Any], *, photons: bool) -> dict[str, Any]:
+        """Return settings of a simulation, with this run's grid where none is given.
 
-def load_mci(path: str | Path) -> tuple[MciRun, ...]:
-    """Read the runs of an MCML input file; see `parse_mci`."""
+        ``photons`` adds its number of photons as well.
+        """
+        own = {"dr_mm": self.grid.dr_mm, "radius_mm": self.grid.radius_mm}
+        own |= {key: each for key, each in given.items() if each is not None}
+        return own | ({"photons": self.photons} if photons else {})
+
+
+def load_mci(path: str | Path, number: int | None = None) -> tuple[MciRun, ...]:
+    """Read the runs of an MCML input file, or one of them, from 1 up; see `parse_mci`."""
     text = read_text(path, str(path), expected="an MCML input file", error=MaterialError)
     with text.hinting(MaterialError) as content:
-        return parse_mci(content, str(path))
+        runs = parse_mci(content, str(path))
+    if number is None:
+        return runs
+    if not 1 <= number <= len(runs):
+        raise MaterialError(f"{path} has no run {number}; give `number = 1` to {len(runs)}.")
+    return (runs[number - 1],)
 
 
 def parse_mci(text: str, origin: str) -> tuple[MciRun, ...]:

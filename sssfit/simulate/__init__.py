@@ -33,14 +33,18 @@ from sssfit.simulate.montecarlo import (
     simulate_montecarlo_many,
 )
 from sssfit.simulate.multipole import simulate_multipole
+from sssfit.simulate.runner import Outcome, Results, compiling_note, simulate_to_files
 
 __all__ = [
     "DEON_SKIN",
     "EVERY_SECONDS",
     "Checkpoint",
+    "Outcome",
     "ProfileSource",
     "Progress",
+    "Results",
     "SoFar",
+    "compiling_note",
     "is_checkpoint_file",
     "is_compiled",
     "is_complete",
@@ -60,6 +64,7 @@ __all__ = [
     "simulate_montecarlo",
     "simulate_montecarlo_many",
     "simulate_multipole",
+    "simulate_to_files",
 ]
 
 
