@@ -147,14 +147,15 @@ def fronts(
     """
     from sssfit.errors import FitError, SssfitError
 
+    several = given["every"] or given["paper"]
     done: list[Comparison] = []
     wrote: list[str] = []
     failed: list[str] = []
     charts, tables = (
         [each for each in column if each] for column in zip(*outputs.values(), strict=True)
     )
-    with held_outputs(charts, tables, given, inputs=() if given["every"] else list(outputs)):
-        first = None if given["every"] else first_read(next(iter(outputs)), given, common)
+    with held_outputs(charts, tables, given, inputs=() if several else list(outputs)):
+        first = None if several else first_read(next(iter(outputs)), given, common)
         scenes = scenes_asked(given, common, first)
         for name, (chart, table) in outputs.items():
             try:
@@ -162,7 +163,7 @@ def fronts(
                 done.append(compared(profile, scenes, given, common))
                 write_kernels(done[-1], given, chart, table)
             except SssfitError as error:
-                if not given["every"]:
+                if not several:
                     raise
                 failed.append(f"{name}: {error}")
             else:

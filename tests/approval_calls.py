@@ -189,6 +189,11 @@ FORMATS = [
     "csv.parse_csv('r_mm,a\\n1e13,.1\\n2,1\\n', 'a.csv', quantity='energy')",
     "csv.csv_text(csv.load_csv('energy.csv'))",
     "csv.csv_text(world.plate())",
+    *(
+        f"csv.parse_csv('r_mm,a\\n1,.1\\n2,.01\\n{word},.5\\n', 'a.csv', quantity='energy').beyond_grid"
+        for word in ("inf", "+INF", "Infinity", "-inf", "nan")
+    ),
+    "csv.parse_csv('r_mm,a,a_stderr\\n1,.1,NaN\\n2,.01,.001\\n', 'a.csv', quantity='energy').annulus_energy_stderr",
     "csv.UNITS, csv.QUANTITIES",
     "mci.load_mci('two.mci')",
     "mci.load_mci('sample.mci')",
@@ -232,6 +237,10 @@ FORMATS = [
             *("rgba16.png", "grey.png", "turned.tif", "rgba8.tif", "photo.tga", "photo.jpg"),
             *("old.hdr", "xyz.hdr", "negative.exr", "foreign.png", "out", "missing.png"),
         )
+    ),
+    *(
+        f"pictures.load_image('packed{code}.tif')"
+        for code in (34661, 34712, 34887, 34925, 50000, 50002, 52546, 40000)
     ),
     "pictures.load_image('layers.exr', layer='near')",
     "pictures.load_image('layers.exr', layer=3)",
@@ -288,6 +297,8 @@ COMPARE = [
     "judge.judge(scene('edge', pitch=0.2125), kernel('plate.artist'), world.plate(), border='zero')",
     "judge.judge(scene('disk'), kernel('wax.svd2'))",
     "judge.judge_in_screen_space(scene('head', pitch=3.0), kernel('wax.svd2'), follow='lerp', border='clamp')",
+    "judge.judge_in_screen_space(scene('head', pitch=3.0), kernel('wax.svd2'))",
+    "judge.judge_in_screen_space(scene('disk'), kernel('wax.svd2'))",
     "budget.error_budget(world.parse_material(world.WAX, 'w'), scene('edge', pitch=0.5, angle_degrees=20.0),"
     " photons=2000, method='burley', storage='8-bit', radius_mm=9.0, seed=3)",
     "budget.error_budget(world.parse_material(world.WAX, 'w'), scene('disk', pitch=0.5),"

@@ -365,6 +365,11 @@ COMPARE = [
     C(f"compare wax.profile.npz --what budget --picture disk {TINY}"),
     C("compare plate.toml --what budget --picture disk --size 20x20"),
     C("compare"),
+    C("compare --all --picture disk --size 16x12 --mm-per-pixel .4 -o out", few=True),
+    C("compare --paper --picture edge --size 16x12 --mm-per-pixel .9 --error l2 --json", few=True),
+    C("simulate --paper --method burley --dr 2 --radius 20 -o out", few=True),
+    C("compare wax.profile.npz --picture disk --size 16x12 --mm-per-pixel 20 --what kernels"),
+    C("simulate --all --method burley --dr 2 --radius 20 -o out", few=True),
     C("compare wax.toml --all"),
     C("compare --all --what budget"),
     C("compare --all --chart x.png"),
@@ -512,6 +517,28 @@ IMPORT = [
     C("import density.csv -o foreign.npz --force"),
     C("import density.csv -o x.csv"),
     C("import"),
+]
+
+OWN = [
+    *(
+        C(f"render wax.svd2.kernel.json --irradiance disk {SMALL} -o own.{ending}")
+        for ending in ("exr", "tif", "png")
+    ),
+    C(f"render wax.svd2.kernel.json --irradiance disk {SMALL} -o own_chart.png"),
+    *(C(f"chart plate.toml -o own_chart.{ending}") for ending in ("png", "svg", "pdf")),
+    C("chart plate.toml -o own.png"),
+    *(
+        C(f"compare mono.profile.npz --what front --picture disk {TINY} --table {name}")
+        for name in ("own.md", "own_table.csv", "own_table.json", "own.csv")
+    ),
+    C("export wax.svd2.kernel.json --format hlsl -o own.hlsl"),
+    C("export wax.profile.npz --format csv -o own.csv"),
+    C("export wax.profile.npz --format csv -o own_table.csv"),
+    C("import density.csv -o mono.profile.npz"),
+    C("fit wax.profile.npz --method svd --mm-per-pixel 1 -o grau.kernel.json"),
+    C("materials --from-reflectance .3 --channels Y --mean-free-path 1 -o own.toml"),
+    C("materials --from-reflectance .3 --channels Y --mean-free-path 1 -o wax.toml"),
+    C("simulate wax.toml --method dipole --dr 1 --radius 5 -o mono.profile.npz"),
 ]
 
 EXPORT = [
@@ -671,4 +698,5 @@ COMMANDS = {
     "export": EXPORT,
     "chart": CHART,
     "show": SHOW,
+    "own": OWN,
 }

@@ -410,6 +410,7 @@ def _pictures(folder: Path) -> None:
     _write(folder / "turned.tif", light(8, 13, 3), Orientation=3)
     _write(folder / "rgba8.tif", _codes(np.uint8, 8, 13, 4), oiio__UnassociatedAlpha=1)
     _write(folder / "photo.tga", _codes(np.uint8, 8, 13, 3))
+    _compressed(folder)
     smooth = np.broadcast_to(np.linspace(40, 200, 16)[:, None, None], (16, 24, 3))
     _write(folder / "photo.jpg", smooth.astype(np.uint8), Compression="jpeg:95")
     (folder / "old.hdr").write_bytes(
@@ -421,6 +422,17 @@ def _pictures(folder: Path) -> None:
     )
     (folder / "cut.exr").write_bytes((folder / "mine.exr").read_bytes()[:400])
     (folder / "cut.png").write_bytes((folder / "rgb8.png").read_bytes()[:-30])
+
+
+def _compressed(folder: Path) -> None:
+    """TIFF files that say they are compressed in ways that readers may lack; they are not."""
+    plain = (folder / "turned.tif").read_bytes()
+    tag = struct.pack("<HHI", 259, 3, 1)  # compression, a short, one of them
+    assert plain.count(tag) == 1
+    for code in (34661, 34712, 34887, 34925, 50000, 50002, 52546, 40000):
+        at = plain.index(tag) + len(tag)
+        packed = plain[:at] + struct.pack("<H", code) + plain[at + 2 :]
+        (folder / f"packed{code}.tif").write_bytes(packed)
 
 
 # Tables and MCML's files
@@ -554,6 +566,25 @@ def _mcml(folder: Path) -> None:
 # All
 
 
+def _own(folder: Path) -> None:
+    """Files of ours from earlier runs, which may be replaced."""
+    for ending in ("exr", "tif", "png"):
+        save_image(folder / f"own.{ending}", light(4, 5, 3))
+    (folder / "own_chart.png").write_bytes(b"\x89PNG\r\n\x1a\n....tEXtSoftware\0sssfit chart")
+    texts = {
+        "own_chart.svg": "<?xml version='1.0'?>\n<dc:title>sssfit chart</dc:title>\n",
+        "own_chart.pdf": "%PDF-1.4\n/Creator (sssfit chart)\n",
+        "own.md": "<!-- sssfit.table/1 -->\n",
+        "own_table.csv": "# sssfit.table/1\n",
+        "own_table.json": '{"format": "sssfit.table/1"}\n',
+        "own.hlsl": "// sssfit.hlsl/1\n",
+        "own.csv": "# sssfit.profile.csv/1\n",
+        "own.toml": "# Made by `sssfit materials --from-reflectance`, which may replace this file;",
+    }
+    for name, text in texts.items():
+        (folder / name).write_text(text)
+
+
 def _records(folder: Path) -> None:
     for name, text in (("wax", WAX), ("plate", PLATE), ("leaf", LEAF), ("varnish", CLEAR)):
         (folder / f"{name}.toml").write_text(text, encoding="utf-8")
@@ -581,6 +612,7 @@ def files() -> Path:
     _pictures(folder)
     _tables(folder)
     _mcml(folder)
+    _own(folder)
     (folder / "out").mkdir()
     (folder / "empty").mkdir()
     newest = ("damaged.kernel.json", "wax.svd2.kernel.json", "wax.profile.npz")
