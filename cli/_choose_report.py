@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from sssfit.messages import number
+from sssfit.messages import number, of_material
 
 if TYPE_CHECKING:
     from sssfit.choose.choice import Choice, PhotonNeed, Step
@@ -24,7 +24,8 @@ def step_line(step: Step) -> str:
 def text_of(choice: Choice, written: Sequence[str], figures: Mapping[str, Any]) -> str:
     """Write the choice first, then why neither less nor more."""
     where = (
-        f"{figures['material']} at {figures['distance_mm'] / 1000.0:g} m, {choice.mm_per_pixel:.4g}"
+        f"{of_material(figures['material'])} at {figures['distance_mm'] / 1000.0:g} m, "
+        f"{choice.mm_per_pixel:.4g}"
         f" mm per pixel, {_FIGURES[choice.tolerance_of]} of Delta E within {choice.tolerance:g}:"
     )
     lines = [where, *(_no_blur(choice) if choice.fit is None else _kernel(choice)), *_seen(choice)]

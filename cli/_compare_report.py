@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from sssfit.messages import number, table
+from sssfit.messages import number, of_material, table
 
 if TYPE_CHECKING:
     from sssfit.compare.budget import Budget, Cause
@@ -61,8 +61,8 @@ def sheet_text(figures: dict[str, Any]) -> str:
         for row in figures["rows"]
     ]
     return (
-        f"{figures['material']}: mean Delta E 2000 on {figures['pixels']} x {figures['pixels']} "
-        f"pixels of {figures['mm_per_pixel']:.4g} mm\n"
+        f"{of_material(figures['material'])}: mean Delta E 2000 on {figures['pixels']} x "
+        f"{figures['pixels']} pixels of {figures['mm_per_pixel']:.4g} mm\n"
         f"{table(['kernel', 'passes', *figures['scenes']], rows)}"
     )
 

@@ -216,6 +216,8 @@ FORMATS = [
     "mco.parse_mco(world.mco_text().replace('InParm #', 'Input #'), 'a.mco')",
     "mco.parse_mco(world.mco_text().replace('2 4 1', '2 1 1'), 'a.mco')",
     "mco.parse_mco(world.mco_text(rat='.9\\n.3\\n0\\n0'), 'a.mco')",
+    "mco.parse_mco(world.mco_text(rat='.9\\n.3\\n0\\n0', absorbed='0\\n0', through='0\\n0\\n0\\n0'), 'a.mco')",
+    "mco.parse_mco(world.mco_text(name='x' * 120 + '.mco'), 'a.mco').material_name",
     "mco.parse_mco(world.mco_text(absorbed='0.4\\n0.16'), 'a.mco')",
     "mco.parse_mco(world.mco_text(through='1\\n1\\n1\\n1'), 'a.mco')",
     "mco.parse_mco(world.mco_text(reflected='1 2\\n3 4 5'), 'a.mco')",
@@ -230,11 +232,16 @@ FORMATS = [
     "matrix_to_bt709([.64, .33, .3, .6, .15, .06, .3457, .3585], 'a.exr')",
     "matrix_to_bt709([.64, .33, .3, .6, .15, .06, .3127, .329], 'a.exr')",
     "matrix_to_bt709([.64, .33, .3, .6, .15, .06, .3127, 0], 'a.exr')",
+    "matrix_to_bt709([.3, .6, .64, .33, .15, .06, .3127, .329], 'a.exr')",
+    "matrix_to_bt709([.3, .6, .3, .6, .15, .06, .3127, .329], 'a.exr')",
     *(
         f"pictures.load_image('{name}')"
         for name in (
             *("mine.exr", "depth.exr", "vier.exr", "two.exr", "wide.exr", "ebu.exr", "rgb8.png"),
             *("rgba16.png", "grey.png", "turned.tif", "rgba8.tif", "photo.tga", "photo.jpg"),
+            *(f"o{k}.tif" for k in range(1, 9)),
+            *("inside.exr", "across.exr", "half.exr", "y.exr", "place.exr", "wide.tif"),
+            *("associated.tif", "palette.png", "p3.png", "srgb_and_p3.png"),
             *("old.hdr", "xyz.hdr", "negative.exr", "foreign.png", "out", "missing.png"),
         )
     ),

@@ -170,6 +170,7 @@ def stand_ins(
 ) -> Iterator[None]:
     """All that stands in for what depends on the machine; ``charts`` receives descriptions."""
     from sssfit import material, simulate
+    from sssfit.choose import truth
     from sssfit.compare import pictures, sheet
     from sssfit.measure import cost
 
@@ -195,6 +196,8 @@ def stand_ins(
                 sheet.compute_sheet, functools.partial(sheet.compute_sheet, pixels=24, most_terms=2)
             ),
             mock.patch.object(pictures, "PIXELS", 13),
+            mock.patch.object(truth, "WALK_PHOTONS", 3000),
+            mock.patch.object(truth, "COUNTS", (1000, 2000, 4000)),
             mock.patch.object(cost.seconds_per_megapixel, "__defaults__", (5, clock)),
             mock.patch.object(rich.progress, "Progress", Bar),
             mock.patch.object(matplotlib.figure.Figure, "savefig", describe),
