@@ -23,15 +23,15 @@ if TYPE_CHECKING:
 
 DENSE_PER_MM = 10.0  # cream, the densest of Jensen et al. 2001, has 7.38; skin1 in 1/cm has 7.7
 # Only ratios of indices count: relative to air or water as 1, a vacuum is below 1.
-LEAST_ETA, MOST_ETA = 0.5, 4
+MIN_ETA, MAX_ETA = 0.5, 4
 _LEAST, _MOST = 1e-9, 1e9  # 1/mm and mm: 1000 km and an atom's width are beyond any material
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._+-]{0,99}"
 
 # For each number of a material: whether it is valid, and the expectation for messages.
 _RULES: dict[str, tuple[Callable[[float], bool], str]] = {
     "eta": (
-        lambda v: LEAST_ETA <= v <= MOST_ETA,
-        f"one refractive index from {LEAST_ETA} to {MOST_ETA}, such as 1.4",
+        lambda v: MIN_ETA <= v <= MAX_ETA,
+        f"one refractive index from {MIN_ETA} to {MAX_ETA}, such as 1.4",
     ),
     "g": (
         lambda v: -1 < v <= 1,
