@@ -5,6 +5,10 @@ class SssfitError(ValueError):
     """Base of every error the toolkit raises on purpose; its text is one line for the user."""
 
 
+class ArgumentError(SssfitError):
+    """Arguments that do not go together, or one that is missing."""
+
+
 class MaterialError(SssfitError):
     """A material file or its values cannot be used."""
 
