@@ -153,7 +153,7 @@ def draw_models(
         [
             f"{row['method']} {name}",
             number(row["diffuse_reflectance"][c], ".6f"),
-            *("-" if row["method"] == "exact" else _percent(row[key][c]) for key in _ERRORS),
+            *("-" if row["method"] == "exact" else number(row[key][c], ".3f%") for key in _ERRORS),
         ]
         for row in figures["rows"]
         for c, name in enumerate(figures["channels"])
@@ -163,11 +163,6 @@ def draw_models(
         f"on {figures['annuli']} annuli of {figures['dr_mm']:.4g} mm\n{table(heads, rows)}"
     )
     return models_figure(comparison), figures, text
-
-
-def _percent(share: float | None) -> str:
-    """Write a share in percent, with its zeros; a dash where there is none."""
-    return "-" if share is None else f"{100.0 * share:z.3f} %"
 
 
 def read_models(name: str) -> tuple[Material, Profile | None]:

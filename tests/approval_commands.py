@@ -66,18 +66,21 @@ MATERIALS = [
     C("materials nottoml.toml"),
     C("materials foreign.toml"),
     C(
-        "materials --from-reflectance .44,.23,.13 --mean-free-path 1.3,.95,.67 --eta 1.3 -o lard.toml"
+        "materials --from-reflectance .44,.23 --mean-free-path 1.3,.95 --eta 1.3 -o lard.toml"
+        " --channels R,G"
     ),
     C("materials --from-reflectance '#C58c6b' --mean-free-path 0.037,0.014,0.007cm --name skin"),
     C("materials --from-reflectance '#fa6' --mean-free-path 400um --light normal -o - "),
-    C("materials --from-reflectance 197,140,107 --srgb --mean-free-path .4 --name Haut --json"),
+    C("materials --from-reflectance 107,140,197 --srgb --mean-free-path .4 --name Haut --json"),
     C("materials --from-reflectance 40 --srgb --mean-free-path .4 --channels λ -o out/g.toml"),
     C(
         "materials --from-reflectance 44%,.2 --mean-free-path 1,2 --channels B,A --light diffuse"
         " --eta 1.5 -o out/pair.toml -q"
     ),
-    C("materials --from-reflectance .44,0,.13 --mean-free-path 1 -o foreign.toml"),
-    C("materials --from-reflectance .44,0,.13 --mean-free-path 1 -o foreign.toml --force"),
+    C("materials --from-reflectance .44,0 --channels a,b --mean-free-path 1 -o foreign.toml"),
+    C(
+        "materials --from-reflectance .44,0 --channels a,b --mean-free-path 1 -o foreign.toml --force"
+    ),
     C("materials --from-reflectance .44 --mean-free-path 1"),
     C("materials --from-reflectance .44,.2 --mean-free-path 1 --channels a,b,c"),
     C("materials --from-reflectance .4,.3,.2"),
@@ -90,7 +93,6 @@ MATERIALS = [
     C("materials --from-reflectance .4,.3,.2 --mean-free-path 1,2"),
     C("materials --from-reflectance .4,.3,.2 --mean-free-path 1mm,2,3"),
     C("materials --from-reflectance .4,.3,.2 --mean-free-path 1 --eta nan"),
-    C("materials --from-reflectance .4,.3,.2 --mean-free-path 1 -o lard.txt"),
 ]
 
 SIMULATE = [
@@ -125,7 +127,6 @@ SIMULATE = [
     C("simulate deon-skin --dr .5 --radius 10"),
     C("simulate deon-skin --dr .5 --radius 10 -o out/skin.npz --json"),
     C("simulate --paper --method burley --dr .5 --radius 5 -o out"),
-    C("simulate --all --method burley --dr .5 --radius 5 -o empty -q", brief=True),
     C("simulate - --method burley --dr .5 --radius 5", stdin="leaf.toml"),
     C("simulate"),
     C("simulate wax.toml --all"),
@@ -337,7 +338,7 @@ COMPARE = [
     C("compare wax.profile.npz --size 24x16 --mm-per-pixel .1cm --what front -q"),
     C(f"compare - --picture disk {TINY} --what front", stdin="leaf.profile.npz"),
     C(f"compare wax.profile.npz --picture disk {TINY} --what kernels", terminal=True),
-    C("compare wax.profile.npz --what sheet --chart s.png --mm-per-pixel .5"),
+    C("compare mono.profile.npz --what sheet --chart s.png --mm-per-pixel .5"),
     C("compare 'Größe λ.profile.npz' --what sheet --chart s.svg --mm-per-pixel profile --json"),
     C(f"compare wax.toml --what budget --picture disk,edge {TINY} --photons 2000 --seed 5"),
     C(f"compare wax.toml --what budget --picture disk {TINY} --photons 2e3 --rank 1 --json"),
@@ -353,9 +354,9 @@ COMPARE = [
     C(
         f"compare wax.toml --what budget --picture disk {TINY} --photons 2000",
         compiled=False,
+        terminal=True,
         note="not compiled",
     ),
-    C(f"compare wax.toml --what budget --picture disk {TINY} --photons 2000", terminal=True),
     C(f"compare wax.toml --picture disk {TINY} --photons 2000 --chart - --table t.md"),
     C(f"compare leaf.toml --picture disk {TINY} --error l2"),
     C(f"compare plate.toml --picture disk {TINY}"),
@@ -419,11 +420,7 @@ CHOOSE = [
         stdin="wax.profile.npz",
     ),
     C("choose wax.toml --distance 40cm --fov 3 --resolution 40x48 --irradiance disk --tolerance 5"),
-    C(
-        "choose wax.toml --distance 40cm --fov 3 --resolution 40x48 --irradiance disk --tolerance 5",
-        compiled=False,
-        note="not compiled",
-    ),
+    C("choose wax.toml --distance 70m --resolution 40x24", compiled=False, note="not compiled"),
     C("choose wax.profile.npz --irradiance mine.exr --tolerance 2"),
     C(
         "choose wax.profile.npz --irradiance layers.exr --layer far --mask alpha --fov 40 --tolerance 9"
@@ -572,9 +569,8 @@ CHART = [
     C(
         "chart --guide 'Größe λ.profile.npz' --k 0,2 --channel R --mm-per-pixel .04cm --json -o g.svg"
     ),
-    C("chart --models wax.toml --photons 1e3 --seed 3"),
+    C("chart --models wax.toml --photons 1e3 --seed 3", terminal=True),
     C("chart --models wax.profile.npz -o m.pdf --json"),
-    C("chart --models wax.toml --photons 1000", terminal=True),
     C("chart --models wax.toml --spectrum"),
     C("chart --models"),
     C("chart --models deon-skin"),

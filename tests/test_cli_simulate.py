@@ -18,12 +18,8 @@ from sssfit.process import asked_to_stop
 from sssfit.profile import Profile
 from sssfit.simulate import run_figures, simulate_montecarlo
 from sssfit.simulate._batches import BATCH_PHOTONS
-<<<<<<< HEAD
-from sssfit.simulate._semi_infinite import SemiInfiniteWalk
-from sssfit.simulate.summary import energy_lines
-=======
 from sssfit.simulate._walks import SemiInfiniteWalk
->>>>>>> h-int
+from sssfit.simulate.summary import energy_lines
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
 COMMAND = [sys.executable, "-m", "sssfit.cli", "simulate"]

@@ -100,6 +100,7 @@ def test_arguments_become_options_where_the_command_line_prints_them(said, print
         (-11.14, "+.2g%", "-1100 %"),
         (0.000123, ".2g%", "0.012 %"),
         (1e-10, "+.2g%", "0 %"),
+        (-2.7e-6, "+.3f%", "+0.000 %"),
         (None, ".2g%|unknown", "unknown"),
         (float("nan"), ".4f", "-"),
         (float("inf"), ".3g%", "inf %"),
