@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 from sssfit.messages import columns, number, table
+from sssfit.methods import DEON_SKIN
 
-from ._deon_skin import DEON_SKIN
 from ._options import Common
 from ._output import say
 from ._progress import say_if_compiling, walk_progress

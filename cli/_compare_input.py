@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ._deon_skin import DEON_SKIN
+from sssfit.methods import DEON_SKIN
+
 from ._input import load
 from ._options import Common
 from ._progress import say_if_compiling

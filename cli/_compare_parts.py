@@ -8,9 +8,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sssfit.methods import DEON_SKIN
+
 from ._compare_input import material_of, profile_of, scenes_of
 from ._compare_report import budget_text, fronts_text, kernels_text, sheet_text
-from ._deon_skin import DEON_SKIN
 from ._options import Common
 from ._output import (
     check_outputs,

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import click
 
 from sssfit.messages import number
+from sssfit.methods import DEON_SKIN
 
 from ._choose_report import step_line, text_of
-from ._deon_skin import DEON_SKIN
 from ._input import load
 from ._options import Common, Length, Number, NumberRange, common_options
 from ._output import KERNEL, PROFILE, finish, held, say, stem_of, target, write

@@ -5,6 +5,10 @@ class SssfitError(ValueError):
     """Base class of all deliberate errors of the toolkit; its text is one line for the user."""
 
 
+class ArgumentError(SssfitError):
+    """Arguments that do not go together, or one that is missing."""
+
+
 class MaterialError(SssfitError):
     """A material file or its values are invalid."""
 

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
-from sssfit.errors import FileError
+from sssfit.errors import ArgumentError, FileError
 
 if sys.platform == "win32":
     import msvcrt
@@ -309,7 +309,7 @@ def check_distinct(paths: Iterable[Path]) -> None:
     seen: list[Path] = []
     for path in paths:
         if any(is_same_file(path, other) for other in seen):
-            raise FileError(f"two outputs name the same file, {path}; give each its own.")
+            raise ArgumentError(f"two outputs name the same file, {path}; give each its own.")
         seen.append(path)
 
 
@@ -335,8 +335,10 @@ def held(
 
     Raises
     ------
+    ArgumentError
+        Two outputs into one file.
     FileError
-        As `check_distinct`, `check_ending`, `check_output` and `locked`.
+        As `check_ending`, `check_output` and `locked`.
     """
     files = [path for path in paths if path is not None]
     read = [each for each in inputs if each is not None]

@@ -89,6 +89,8 @@ class Method:
         return imported(self.function)
 
 
+DEON_SKIN = "deon-skin"  # a profile that is made without a material
+
 SIMULATIONS: Mapping[str, Method] = {
     "montecarlo": Method(
         "sssfit.simulate:simulate_montecarlo_many",
@@ -163,7 +165,7 @@ SIMULATIONS: Mapping[str, Method] = {
     "gaussians": Method(
         "sssfit.simulate:simulate_deon_skin",
         "skin as the six Gaussians of d'Eon et al. 2007; deon-skin only",
-        makes="deon-skin",
+        makes=DEON_SKIN,
     ),
 }
 
