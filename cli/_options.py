@@ -3,7 +3,7 @@
 import functools
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,7 +63,9 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
     return wrapper
 
 
-def option(names: str, kind: Any, metavar: str | None, text: str, default: Any = None) -> Any:
+def option(
+    names: str, kind: Any, metavar: str | None, text: str, default: Any = None, **more: Any
+) -> Any:
     """Return an option, for tables of a row an option.
 
     ``names`` are "--radius", or "--radius radius_mm" with the name of the parameter; ``kind`` is a
@@ -76,6 +78,7 @@ def option(names: str, kind: Any, metavar: str | None, text: str, default: Any =
         default=default,
         show_default=default is not None,
         help=text,
+        **more,
     )
 
 
@@ -93,6 +96,14 @@ def options(*rows: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
         return command
 
     return add
+
+
+def refuse(given: Mapping[str, Any], whose: Mapping[str, str]) -> None:
+    """Refuse options that would do nothing; ``whose`` says of each parameter what it is for."""
+    named = {each.name: each.opts[-1] for each in click.get_current_context().command.params}
+    for key, owner in whose.items():
+        if given[key] not in (None, False, ()):
+            raise click.UsageError(f"{named[key]} is for {owner}; leave it out.")
 
 
 class WholeRange(click.IntRange):

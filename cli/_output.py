@@ -36,6 +36,14 @@ def say(common: Common, line: str) -> None:
         click.echo(printable(line), err=True)
 
 
+def say_notes(common: Common, notes: Iterable[str]) -> None:
+    """Put the library's notes on stderr, with options in place of its arguments, unless -q."""
+    from ._run import in_options  # which imports the verbs
+
+    for note in notes:
+        say(common, in_options(note))
+
+
 def finish(
     common: Common, figures: Mapping[str, Any], text: str, *, to_stderr: bool = False
 ) -> None:

@@ -24,6 +24,7 @@ _LONGEST_LINE = 1000  # a path may be 4096 characters, an option's value anythin
 _ARGUMENT = re.compile(r"(with )?`(\w+)(?: = ([^`]+))?`")
 _COMMANDS = {
     "`material_names()`": "`sssfit materials`",
+    "`simulate_montecarlo(material)`": "`sssfit simulate`",
     '`load_material("skin1").to_toml()`': "`sssfit materials skin1 --toml`",
 }
 _OUT_OF_MEMORY = "out of memory: use a smaller grid or picture, fewer channels or --threads."

@@ -22,8 +22,8 @@ class Setting:
     name : str
         Of the option, with underscores.
     kind : str
-        "number", "numbers" (one, or one a channel), "share", "seconds", "whole", "count" (a whole
-        number, 1e7 is understood), "choice" or "flag".
+        "number", "numbers" (one, or one a channel), "length", "share", "seconds", "whole", "count"
+        (a whole number, 1e7 is understood), "choice" or "flag".
     help : str
         What it does; the names of the methods that have it are put before.
     metavar : str
@@ -50,7 +50,7 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """One way from a material to a profile, or from a profile to a kernel.
+    """One way from a material to a profile, from a profile to a kernel, or to a made picture.
 
     Parameters
     ----------

@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from sssfit.compare.comparison import Comparison, KernelRow, Picture, Verdict, verdicts
+from sssfit.errors import FileError
 from sssfit.files import has_mark
-from sssfit.messages import number
+from sssfit.messages import number, table
 
 FORMATS = (".md", ".csv", ".json")
 HEADS = (
@@ -25,6 +26,42 @@ _MARKS = {
     ".csv": f"# {_FORMAT}\n",
     ".json": f'{{"format": "{_FORMAT}"',
 }
+
+
+def check_table_name(path: Path) -> None:
+    """Refuse a name whose ending is of no table.
+
+    Raises
+    ------
+    FileError
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise FileError(f"{path}: tables are Markdown, CSV or JSON; end it in .md, .csv or .json.")
+
+
+def kernels_text(comparison: Comparison, error: str, cost: str) -> str:
+    """Write a table for each picture, sorted by cost and error, the front marked with a star."""
+    parts = [setting_of(comparison)]
+    for picture in comparison.pictures:
+        rows = sorted_rows(comparison, picture, error, cost)
+        cells = [cells_of(row, "* " if (error, cost) in row.fronts else "  ") for row in rows]
+        parts.append(f"{picture_line(picture)}\n{table(['  kernel', *HEADS[1:]], cells)}")
+    parts.append(f"* {front_words(error, cost)}")
+    parts += left_out_lines(comparison)
+    parts.append("\n".join(verdict_lines(comparison, error, cost)))
+    return "\n\n".join(parts)
+
+
+def fronts_text(done: Sequence[Comparison], error: str, cost: str) -> str:
+    """Write the kernels that no other beats, a line a material and picture."""
+    cells = []
+    for comparison in done:
+        name = comparison.profile.material_name or "profile"
+        for picture in comparison.pictures:
+            front = comparison.front(picture.name, error, cost)
+            kernels = ", ".join(f"{row.label} {row.error(error):.2g}" for row in front)
+            cells.append([name, picture.name, kernels])
+    return table(["material", "picture", f"front of {error} by {cost}, cheapest first"], cells)
 
 
 def left_out_lines(comparison: Comparison) -> list[str]:

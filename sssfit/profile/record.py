@@ -229,6 +229,11 @@ class Profile:
         return name if is_name(name) else None
 
     @property
+    def label(self) -> str:
+        """What messages and kernels call it: its material, or the file that it came from."""
+        return self.material_name or printable(str(self.meta.get("source") or "unknown material"))
+
+    @property
     def material(self) -> Material | None:
         """The material that the profile says it was made from; None where it holds none."""
         record = self.meta.get("material")
