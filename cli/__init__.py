@@ -9,7 +9,7 @@ from __future__ import annotations
 try:
     from typing import TYPE_CHECKING, Any
 
-    from ._interrupt import Interrupts
+    from sssfit.process import Interrupts
 except KeyboardInterrupt:  # in the few milliseconds before the signals are ours
     raise SystemExit(130) from None
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from ._input import DEON_SKIN
 from ._options import Common
-from ._output import check_distinct, held, held_charts, say, say_notes, target, write, write_chart
+from ._output import check_outputs, held, held_charts, say, say_notes, target, write, write_chart
 from ._progress import say_if_compiling, step_progress, walk_progress
 
 if TYPE_CHECKING:
@@ -36,7 +36,7 @@ def held_outputs(
     for path in written:
         check_table_name(path)
     drawn = [target(each) for each in charts if each]
-    check_distinct([each for each in (*drawn, *written) if each is not None])
+    check_outputs([*drawn, *written])
     with (
         held_charts(drawn, inputs=inputs, force=given["force"]),
         held(written, is_table_file, inputs=inputs, force=given["force"]),

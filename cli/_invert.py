@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sssfit.messages import table
+from sssfit.process import check_memory
 
-from ._memory import check_memory
 from ._options import Common
 from ._output import binary_stdout, finish, held
 from ._progress import say_if_compiling
@@ -134,8 +134,8 @@ def _channels(request: InversionRequest, count: int) -> list[str]:
         return names
     if count != 3:
         raise click.UsageError(
-            f"--from-reflectance has {count} value{'s' * (count != 1)}; name their channels with "
-            "--channels."
+            f"--from-reflectance has {count} value{'s' * (count != 1)}; name "
+            f"{'its channel' if count == 1 else 'their channels'} with --channels."
         )
     return ["R", "G", "B"]
 

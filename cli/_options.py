@@ -9,7 +9,7 @@ from typing import Any
 
 import click
 
-from ._memory import check_memory, check_threads_of_numba
+from sssfit.process import check_memory, check_threads_of_numba
 
 _MM_PER_UNIT = {"": 1.0, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 
@@ -75,9 +75,8 @@ def option(
         *names.split(),
         type=click.Choice(kind) if isinstance(kind, list | tuple) else kind,
         metavar=metavar,
-        default=default,
-        show_default=default is not None,
         help=text,
+        **({} if default is None else {"default": default, "show_default": True}),
         **more,
     )
 

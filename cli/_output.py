@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import json
+import re
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol
 
@@ -17,6 +18,13 @@ from ._options import Common
 
 # What is written, and the ending of its name.
 PROFILE, KERNEL = ("a profile", ".npz"), ("a kernel", ".json")
+# The library's messages have arguments and calls of Python between backquotes.
+_ARGUMENT = re.compile(r"(with )?`(\w+)(?: = ([^`]+))?`")
+_COMMANDS = {
+    "`material_names()`": "`sssfit materials`",
+    "`simulate_montecarlo(material)`": "`sssfit simulate`",
+    '`load_material("skin1").to_toml()`': "`sssfit materials skin1 --toml`",
+}
 _ENDINGS = (".checkpoint", ".npz", ".json", ".toml", ".kernel", ".profile")
 
 
@@ -30,18 +38,47 @@ class _Record(Protocol):
 # Words and results
 
 
+def in_options(message: str) -> str:
+    """Put options in place of the arguments that a message of the library names.
+
+    ``rank = 3`` between backquotes becomes ``--rank 3``; an argument that is True becomes the
+    option alone, and "with" one that is False becomes "without" it. Units at the end of an
+    argument's name are not part of the option's.
+    """
+    from ._group import cli
+
+    options = {
+        parameter.name: parameter.opts[-1]
+        for verb in cli.commands.values()
+        for parameter in verb.params
+        if isinstance(parameter, click.Option)
+    }
+
+    def option(found: re.Match[str]) -> str:
+        before, name, value = found[1] or "", found[2], found[3]
+        named = options.get(name) or options.get(re.sub(r"_mm2?$", "", name))
+        if named is None:
+            return found[0]
+        if value in (None, "True"):
+            return before + named
+        plain = value.strip('"')
+        return f"without {named}" if plain == "False" else f"{before}{named} {plain}"
+
+    for call, command in _COMMANDS.items():
+        message = message.replace(call, command)
+    return _ARGUMENT.sub(option, message)
+
+
 def say(common: Common, line: str) -> None:
     """Put a word on stderr, unless -q."""
     if not common.quiet:
-        click.echo(printable(line), err=True)
+        click.echo(printable(in_options(line)), err=True)
 
 
 def say_notes(common: Common, notes: Iterable[str]) -> None:
-    """Put the library's notes on stderr, with options in place of its arguments, unless -q."""
-    from ._run import in_options  # which imports the verbs
-
+    """Put the library's notes on stderr, unless -q."""
     for note in notes:
-        say(common, in_options(note))
+        say(common, note)
 
 
 def finish(
@@ -56,7 +93,7 @@ def finish(
 
         click.echo(json.dumps(plain(figures), allow_nan=False), err=to_stderr)
     elif not common.quiet:
-        click.echo(_legible(text, figures), err=to_stderr)
+        click.echo(_legible(in_options(text), figures), err=to_stderr)
 
 
 def finish_one(
@@ -107,7 +144,6 @@ def stem_of(name: str, of_stdin: str | None = None) -> str:
     return stem
 
 
-@contextlib.contextmanager
 def held(
     paths: Sequence[Path | None],
     is_own: Callable[[Path], bool],
@@ -115,26 +151,15 @@ def held(
     inputs: Iterable[str | Path | None],
     force: bool,
     named: tuple[str, str] | None = None,
-) -> Iterator[None]:
+) -> contextlib.AbstractContextManager[None]:
     """Refuse outputs that could not or should not be written, and lock the others; None is stdout.
 
-    ``is_own`` tells an older output of the same kind, ``inputs`` are what the verb reads, ``named``
-    is what is written and how its name ends: ("a profile", ".npz").
+    See `sssfit.files.held`.
     """
-    from sssfit.files import check_ending, check_output, locked
+    from sssfit.files import held as files_held
 
-    if None in paths:
-        binary_stdout()  # closed: said now and not after the work
-    read = [each for each in inputs if each is not None]
-    files = [path for path in paths if path is not None]
-    check_distinct(files)
-    with contextlib.ExitStack() as locks:
-        for path in files:
-            if named is not None:
-                check_ending(path, *named)
-            check_output(path, is_own, force=force, inputs=read)
-            locks.enter_context(locked(path))
-        yield
+    check_outputs(paths)
+    return files_held(paths, is_own, inputs=inputs, force=force, named=named)
 
 
 def held_charts(
@@ -149,18 +174,17 @@ def held_charts(
     return held(paths, is_chart_file, inputs=inputs, force=force)
 
 
-def check_distinct(paths: Iterable[Path]) -> None:
-    """Refuse two outputs into one file."""
-    from sssfit.files import is_same_file
+def check_outputs(paths: Sequence[Path | None]) -> None:
+    """Refuse a closed stdout, which is None, and two outputs into one file, before the work."""
+    from sssfit.errors import FileError
+    from sssfit.files import check_distinct
 
-    seen: list[Path] = []
-    for path in paths:
-        for other in seen:
-            if is_same_file(path, other):
-                raise click.UsageError(
-                    f"two outputs name the same file, {path}; give each its own."
-                )
-        seen.append(path)
+    if None in paths:
+        binary_stdout()
+    try:
+        check_distinct(path for path in paths if path is not None)
+    except FileError as error:
+        raise click.UsageError(str(error)) from None
 
 
 def write(content: bytes | _Record, path: Path | None) -> None:

@@ -107,12 +107,8 @@ def time_left(first: WalkProgress, now: WalkProgress) -> str:
 
 def say_if_compiling(common: Common, *, walk: Material | None = None, solver: bool = False) -> None:
     """Say that the walk of a material, or the exact solver, is about to be compiled."""
-    from sssfit.simulate import is_compiled, is_solver_compiled
+    from sssfit.simulate import compiling_note
 
-    if solver and not is_solver_compiled():
-        say(common, "Compiling the solver, some 3 s; it is kept for later runs where it can be.")
-    if walk is not None and not is_compiled(walk):
-        say(
-            common,
-            "Compiling the photon walk, some 10 s; it is kept for later runs where it can be.",
-        )
+    wanted = [None] * solver + [walk] * (walk is not None)
+    for note in filter(None, map(compiling_note, wanted)):
+        say(common, note)

@@ -5,7 +5,6 @@ Exit status: 0 done, 1 a clear error, 2 wrong usage, 130 interrupted with what w
 
 import logging
 import os
-import re
 import sys
 import warnings
 from collections.abc import Sequence
@@ -15,18 +14,12 @@ import click
 
 from sssfit.errors import SssfitError, SssfitWarning
 from sssfit.messages import printable
+from sssfit.process import is_out_of_memory
 
 from ._group import cli
-from ._memory import is_out_of_memory
+from ._output import in_options
 
 _LONGEST_LINE = 1000  # a path may be 4096 characters, an option's value anything
-# The library's messages have arguments and calls of Python between backquotes.
-_ARGUMENT = re.compile(r"(with )?`(\w+)(?: = ([^`]+))?`")
-_COMMANDS = {
-    "`material_names()`": "`sssfit materials`",
-    "`simulate_montecarlo(material)`": "`sssfit simulate`",
-    '`load_material("skin1").to_toml()`': "`sssfit materials skin1 --toml`",
-}
 _OUT_OF_MEMORY = "out of memory: use a smaller grid or picture, fewer channels or --threads."
 
 
@@ -81,35 +74,6 @@ def _refuse(error: click.ClickException) -> NoReturn:
     # click lists the choices of an option on lines of their own.
     click.echo(f"Error: {_one_line(' '.join(error.format_message().split()))}", err=True)
     sys.exit(error.exit_code)
-
-
-def in_options(message: str) -> str:
-    """Put options in place of the arguments that a message of the library names.
-
-    ``rank = 3`` between backquotes becomes ``--rank 3``; an argument that is True becomes the
-    option alone, and "with" one that is False becomes "without" it. Units at the end of an
-    argument's name are not part of the option's.
-    """
-    options = {
-        parameter.name: parameter.opts[-1]
-        for verb in cli.commands.values()
-        for parameter in verb.params
-        if isinstance(parameter, click.Option)
-    }
-
-    def option(found: re.Match[str]) -> str:
-        before, name, value = found[1] or "", found[2], found[3]
-        named = options.get(name) or options.get(re.sub(r"_mm2?$", "", name))
-        if named is None:
-            return found[0]
-        if value in (None, "True"):
-            return before + named
-        plain = value.strip('"')
-        return f"without {named}" if plain == "False" else f"{before}{named} {plain}"
-
-    for call, command in _COMMANDS.items():
-        message = message.replace(call, command)
-    return _ARGUMENT.sub(option, message)
 
 
 def _one_line(text: str) -> str:

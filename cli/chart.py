@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sssfit.messages import report
+from sssfit.process import check_memory
 
-from ._input import load_source, profile_name, profile_of_kernel, read_any
-from ._memory import check_memory
+from ._input import load_any, load_source, profile_name, profile_of_kernel
 from ._options import Common, common_options, options, refuse
 from ._output import finish_one, held_charts, say, stem_of, target, write_chart
 from ._progress import say_if_compiling, walk_progress
@@ -127,7 +127,7 @@ def _found(name: str, view: str, common: Common) -> tuple[Any, str, str | None]:
     from sssfit.material.checks import is_name
     from sssfit.profile import Profile
 
-    found = load_source(name) if view == "models" else read_any(name)
+    found = load_source(name) if view == "models" else load_any(name)
     if view in ("spectrum", "guide") and not isinstance(found, Profile):
         raise ProfileError(f"{name} is not a profile; --{view} draws one, a .profile.npz file.")
     if isinstance(found, Material):

@@ -8,9 +8,9 @@ import click
 
 from sssfit.messages import report
 from sssfit.methods import FITS, lines_of, settings_of
+from sssfit.process import check_memory
 
 from ._input import load, profile_name
-from ._memory import check_memory
 from ._methods import method_options, own_settings
 from ._options import Common, common_options, options
 from ._output import KERNEL, finish_one, held, stem_of, target, write

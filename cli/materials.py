@@ -143,7 +143,8 @@ def _list(common: Common) -> None:
         for row in rows
     ]
     figures = {"command": "materials", "output": [], "rows": rows, "profiles": [DEON_SKIN]}
-    text = f"{table(head, cells)}\n\n{DEON_SKIN}: a profile without coefficients, for simulate only"
+    uses = "a profile without coefficients, for simulate, compare and choose"
+    text = f"{table(head, cells)}\n\n{DEON_SKIN}: {uses}"
     finish(common, figures, text)
 
 

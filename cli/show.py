@@ -8,12 +8,12 @@ import click
 
 from sssfit.messages import columns, table
 
-from ._input import profile_name, read_any
+from ._input import load_any, profile_name
 from ._options import Common, common_options
 from ._output import finish
 
 if TYPE_CHECKING:
-    from ._input import Found
+    from sssfit.kinds import Loaded
 
 _SHARES = (0.5, 0.9, 0.99)
 
@@ -35,11 +35,11 @@ def show(file: str | None, common: Common) -> None:
       sssfit simulate skin1 -o - | sssfit show - --json
     """
     name = profile_name(file, common)
-    figures, text = _shown(read_any(name), name)
+    figures, text = _shown(load_any(name), name)
     finish(common, {"command": "show", "output": [], "file": name, **figures}, text)
 
 
-def _shown(found: Found, name: str) -> tuple[dict[str, Any], str]:
+def _shown(found: Loaded, name: str) -> tuple[dict[str, Any], str]:
     """Return the figures of what was found, and the page for people."""
     from sssfit.kernel import SeparableKernel
     from sssfit.material import Material
@@ -160,6 +160,6 @@ def _balance(figures: dict[str, Any], channel: int) -> str:
 def _radii(figures: dict[str, Any]) -> str:
     """How far the light on the grid spreads."""
     within = [(100 * share, figures[f"radius_of_{100 * share:g}_percent_mm"]) for share in _SHARES]
-    shown = [(f"{percent:g} % within, mm", radii, ".4f|nan") for percent, radii in within]
+    shown = [(f"{percent:g} % within, mm", radii, ".4f") for percent, radii in within]
     empty = ("empty", figures["empty_annuli"], "")
     return f"\n{columns('channel', figures['channels'], *shown, empty)}\n"

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -12,71 +12,42 @@ from sssfit.methods import SIMULATIONS, lines_of
 
 from ._input import is_mci
 from ._methods import method_for, method_options, own_settings
-from ._options import Common, Length, LengthOr, WholeRange, common_options
-from ._simulate_run import Job, Request, run
-
-if TYPE_CHECKING:
-    from sssfit.material import Material
-    from sssfit.simulate import ProfileSource
+from ._options import Common, Length, LengthOr, WholeRange, common_options, flag, option, options
+from ._output import check_outputs, finish, say, write
+from ._progress import walk_progress
 
 
 @click.command(epilog="\b\nMethods:\n" + lines_of(SIMULATIONS))
 @click.argument("material", required=False)
-@click.option("--all", "every", is_flag=True, help="All materials that ship with sssfit.")
-@click.option("--paper", is_flag=True, help="The eleven of them that the SSSS paper has.")
-@click.option(
-    "--method",
-    type=click.Choice(list(SIMULATIONS)),
-    default="montecarlo",
-    show_default=True,
-    metavar="METHOD",
-    help="Simulation method, as listed below.",
+@options(
+    flag("--all every", "All materials that ship with sssfit."),
+    flag("--paper", "The eleven of them that the SSSS paper has."),
+    option(
+        "--method", [*SIMULATIONS], "METHOD", "Simulation method, as listed below.", "montecarlo"
+    ),
+    option("--run number", WholeRange(1), "N", "Simulate only this run of an .mci file."),
+    method_options(SIMULATIONS),
+    option("--dr", Length(), "MM", "Annulus width.  [default: MFP_min / 20; deon-skin: 0.008]"),
+    option(
+        "--radius",
+        LengthOr("auto"),
+        "MM|auto",
+        "Grid radius; auto (montecarlo) grows it until under 0.1 % of any channel lies beyond."
+        "  [default: 32 MFP_max; deon-skin: 17.2]",
+    ),
+    option(
+        "-o --output",
+        None,
+        "FILE",
+        "Where the profile goes, - for stdout; with --all a folder."
+        "  [default: MATERIAL.profile.npz, MATERIAL.METHOD.profile.npz]",
+    ),
+    flag("--force", "Replace an input, or a file that is not our profile."),
 )
-@click.option(
-    "--run",
-    "number",
-    type=WholeRange(1),
-    metavar="N",
-    help="Simulate only this run of an .mci file.",
-)
-@method_options(SIMULATIONS)
-@click.option(
-    "--dr",
-    type=Length(),
-    metavar="MM",
-    help="Annulus width.  [default: MFP_min / 20; deon-skin: 0.008]",
-)
-@click.option(
-    "--radius",
-    type=LengthOr("auto"),
-    metavar="MM|auto",
-    help="Grid radius; auto (montecarlo) grows it until under 0.1 % of any channel lies beyond."
-    "  [default: 32 MFP_max; deon-skin: 17.2]",
-)
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE",
-    help="Where the profile goes, - for stdout; with --all a folder."
-    "  [default: MATERIAL.profile.npz, MATERIAL.METHOD.profile.npz]",
-)
-@click.option("--force", is_flag=True, help="Replace an input, or a file that is not our profile.")
 @common_options
 @click.pass_context
 def simulate(
-    context: click.Context,
-    /,
-    material: str | None,
-    every: bool,
-    paper: bool,
-    method: str,
-    number: int | None,
-    dr: float | None,
-    radius: float | str | None,
-    output: str | None,
-    force: bool,
-    common: Common,
-    **own: Any,
+    context: click.Context, /, material: str | None, method: str, common: Common, **given: Any
 ) -> None:
     """Compute the diffuse reflectance profile of MATERIAL and write it.
 
@@ -96,84 +67,53 @@ def simulate(
       sssfit simulate tissue.mci --run 2
       sssfit simulate deon-skin
     """
+    every, paper, number, dr, radius, output, force = (
+        given.pop(key) for key in ("every", "paper", "number", "dr", "radius", "output", "force")
+    )
     if [material is not None, every, paper].count(True) != 1:
         raise click.UsageError("name one MATERIAL, or give --all or --paper.")
     if number is not None and not is_mci(material):
         raise click.UsageError("--run chooses a run of an MCML input file, .mci.")
     method = method_for(context, method, material)
-    own = own_settings(context, SIMULATIONS, method, own)
+    own = own_settings(context, SIMULATIONS, method, given) | {"dr_mm": dr, "radius_mm": radius}
     if radius == "auto" and method != "montecarlo":
         raise click.UsageError("--radius auto is for --method montecarlo; give a length.")
-    walk = {key: own.pop(key) for key in ("checkpoint_every", "resume") if key in own}
-    settings = {"dr_mm": dr, "radius_mm": radius, **own, **_of_common(method, common)}
-    materials, jobs = _jobs(method, material, number, settings, paper=paper)
+    how: dict[str, Any] = {
+        key: own.pop(key) for key in ("checkpoint_every", "resume") if key in own
+    }
+    own |= {"threads": common.threads} if SIMULATIONS[method].shares else {}
+    own |= {"seed": common.seed} if method == "montecarlo" else {}
+    materials, settings = _asked(method, material, number, own, paper=paper)
     several = every or paper or len(materials) > 1
-    targets = _targets(materials, method, output, several=several)
-    if walk.get("resume") and targets == [None]:
+    paths = _paths(materials, method, output, several=several)
+    if how.get("resume") and paths == [None]:
         raise click.UsageError("--resume needs a file to go on beside; leave -o - out.")
-    inputs = (material,) if material and SIMULATIONS[method].makes is None else ()
-    run(materials, targets, jobs, Request(method, force, several, common, inputs, **walk))
+    how["inputs"] = [material] if material and SIMULATIONS[method].makes is None else []
+    _run((materials, paths, method, settings), common, several=several, force=force, **how)
 
 
-def _of_common(method: str, common: Common) -> dict[str, Any]:
-    """Return the common options that the method's function takes; a walk's threads come later."""
-    if method == "montecarlo":
-        return {"seed": common.seed}
-    return {"threads": common.threads} if SIMULATIONS[method].shares else {}
-
-
-def _jobs(
-    method: str, material: str | None, number: int | None, settings: dict[str, Any], *, paper: bool
-) -> tuple[Sequence[Material | ProfileSource], list[Job]]:
-    """Load what is asked for; each job has the indices of its materials and its settings."""
+def _asked(
+    method: str, material: str | None, number: int | None, given: dict[str, Any], *, paper: bool
+) -> tuple[list[Any], Any]:
+    """Load what is asked for, with the settings for all, or for each run of an .mci file."""
+    from sssfit.formats.mci import load_mci
     from sssfit.material import load_material, material_names
-    from sssfit.simulate import DEON_SKIN, shared_walks
+    from sssfit.simulate import DEON_SKIN
 
     if SIMULATIONS[method].makes is not None:
-        return [DEON_SKIN], [([0], settings)]
+        return [DEON_SKIN], given
     if material is not None and is_mci(material):
-        materials, each = _runs_of(material, number, method, settings)
-        return materials, [([k], own) for k, own in enumerate(each)]
+        runs = load_mci(material, number)
+        # A target error alone decides when a walk ends; then the file's photons are no limit.
+        photons = method == "montecarlo" and not {"photons", "target_error"} & given.keys()
+        each = [run.settings(given, photons=photons) for run in runs]
+        return [run.material for run in runs], each
     names = material_names(paper=paper) if material is None else (material,)
-    materials = [load_material(name) for name in names]
-    shares = SIMULATIONS[method].shares
-    groups = shared_walks(materials) if shares else [[k] for k in range(len(materials))]
-    return materials, [(group, settings) for group in groups]
+    return [load_material(name) for name in names], given
 
 
-def _runs_of(
-    path: str, number: int | None, method: str, given: dict[str, Any]
-) -> tuple[list[Material], list[dict[str, Any]]]:
-    """Return the materials of the runs of a file, or of one, and what to simulate each with.
-
-    ``given`` holds dr_mm and radius_mm, and photons or a target error if these were given; the
-    file's own stand for those that were not.
-    """
-    from sssfit.errors import MaterialError
-    from sssfit.formats.mci import load_mci
-
-    runs = load_mci(path)
-    if number is not None:
-        if number > len(runs):
-            raise MaterialError(f"{path} has no run {number}; give --run 1 to {len(runs)}.")
-        runs = runs[number - 1 : number]
-    settings = [
-        given
-        | {
-            "dr_mm": given["dr_mm"] or run.grid.dr_mm,
-            "radius_mm": given["radius_mm"] or run.grid.radius_mm,
-        }
-        for run in runs
-    ]
-    # A target error alone decides when a walk ends; then the file's photons are no limit either.
-    if method == "montecarlo" and not {"photons", "target_error"} & given.keys():
-        for run, own in zip(runs, settings, strict=True):
-            own["photons"] = run.photons
-    return [run.material for run in runs], settings
-
-
-def _targets(
-    materials: Sequence[Material | ProfileSource], method: str, output: str | None, *, several: bool
+def _paths(
+    materials: list[Any], method: str, output: str | None, *, several: bool
 ) -> list[Path | None]:
     """Where each profile goes; None is stdout. Methods but the first put their name into it."""
     if output == "-":
@@ -184,3 +124,26 @@ def _targets(
         folder, kind = Path(output or "."), "" if method == "montecarlo" else f".{method}"
         return [folder / f"{each.name}{kind}.profile.npz" for each in materials]
     return [Path(output)]
+
+
+def _run(asked: Any, common: Common, *, several: bool, **how: Any) -> None:
+    """Compute and write each profile, and report; what was done by Ctrl-C or SIGTERM stays."""
+    from sssfit.process import asked_to_stop
+    from sssfit.simulate import simulate_to_files
+
+    how["tell"] = lambda line: say(common, line)
+    how["watch"] = lambda label: walk_progress(label, quiet=common.quiet)
+    check_outputs(asked[1])
+    with asked_to_stop() as stop:
+        found = simulate_to_files(*asked, stop=stop, **how)
+        if not found.outcomes:
+            raise KeyboardInterrupt
+        if to_stdout := asked[1] == [None]:
+            write(found.outcomes[0].profile, None)
+    if found.note:
+        say(common, found.note)
+    figures = {"command": "simulate", **found.to_dict(several=several)}
+    text = found.summary(several=several) + "\nWrote the profile to stdout" * to_stdout
+    finish(common, figures, text, to_stderr=to_stdout)
+    if found.is_interrupted:
+        sys.exit(130)

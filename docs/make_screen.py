@@ -24,8 +24,8 @@ WAYS = (
     ("no following", {"follow": "none"}),
 )
 
-TEXT = """skin1, exact profile, `artist` at {pitch:.3g} mm per pixel: near and far variances R {v[R]},
-G {v[G]}, B {v[B]} mm^2, weight of the near Gaussian {w[R]:.2f} {w[G]:.2f} {w[B]:.2f}.
+TEXT = """skin1, exact profile, `artist` at {pitch:.3g} mm per pixel: near and far variances
+R {v[R]}, G {v[G]}, B {v[B]} mm^2, weight of the near Gaussian {w[R]:.2f} {w[G]:.2f} {w[B]:.2f}.
 
 **Slopes.** The response of one pass to a lit line on a plane tilted by an angle, compared with
 the exact form per area of surface, sum w G(x, v cos^2): sum of absolute differences over the sum,

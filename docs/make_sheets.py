@@ -7,17 +7,16 @@ A picture and its table come from one computation; `pareto` writes what the page
 
 import sys
 
+from edited_skin import compute_editing, editing_figure
 from PIL import Image
 from sections import DOCS, put_section
 
 from sssfit.chart.budget import budget_figure
-from sssfit.chart.editing import editing_figure
 from sssfit.chart.page import save_figure
 from sssfit.chart.pareto import pareto_figure
 from sssfit.chart.sheet import sheet_figure
 from sssfit.compare.budget import error_budgets
 from sssfit.compare.comparison import verdicts
-from sssfit.compare.editing import compute_editing
 from sssfit.compare.pareto import compare_kernels
 from sssfit.compare.sheet import compute_sheet
 from sssfit.material import load_material

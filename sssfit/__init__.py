@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from sssfit.fit import fit
     from sssfit.formats.pictures import load_image, save_image
     from sssfit.kernel import SeparableKernel
+    from sssfit.kinds import load
     from sssfit.material import Layer, Material, load_material, material_names
     from sssfit.profile import Profile
     from sssfit.render import render
@@ -46,6 +47,7 @@ __all__ = [
     "SssfitError",
     "SssfitWarning",
     "fit",
+    "load",
     "load_image",
     "load_material",
     "material_names",
@@ -63,6 +65,7 @@ _HOMES = {
     "SeparableKernel": "kernel",
     "SssfitError": "errors",
     "SssfitWarning": "errors",
+    "load": "kinds",
     "load_image": "formats.pictures",
     "load_material": "material",
     "material_names": "material",

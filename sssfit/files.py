@@ -13,7 +13,7 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
@@ -64,6 +64,17 @@ def has_mark(path: Path, marks: Mapping[bytes, bytes]) -> bool:
         return False
     found = (mark for begin, mark in marks.items() if head.startswith(begin))
     return any(mark in head or mark in tail for mark in found)
+
+
+def is_marked(stream: BinaryIO, marks: Sequence[bytes]) -> bool:
+    """Whether a file that can seek holds one of some marks, anywhere in it."""
+    stream.seek(0)
+    kept = b""
+    while block := stream.read(1 << 24):
+        if any(mark in kept + block for mark in marks):
+            return True
+        kept = block[-100:]
+    return False
 
 
 def read_at_most(stream: BinaryIO, most: int) -> bytes:
@@ -289,6 +300,52 @@ def locked(path: Path) -> Iterator[None]:
             lock_path.unlink()
         _unfinished.discard(lock_path)
         os.close(handle)
+
+
+def check_distinct(paths: Iterable[Path]) -> None:
+    """Refuse two outputs into one file."""
+    seen: list[Path] = []
+    for path in paths:
+        if any(is_same_file(path, other) for other in seen):
+            raise FileError(f"two outputs name the same file, {path}; give each its own.")
+        seen.append(path)
+
+
+@contextlib.contextmanager
+def held(
+    paths: Iterable[Path | None],
+    is_own: Callable[[Path], bool],
+    *,
+    inputs: Iterable[str | Path | None] = (),
+    force: bool = False,
+    named: tuple[str, str] | None = None,
+) -> Iterator[None]:
+    """Refuse outputs that could not or should not be written, and lock the others.
+
+    Parameters
+    ----------
+    paths : iterable of Path or None
+        Where outputs are to go; None is passed over.
+    is_own, inputs, force
+        As in `check_output`; None among the inputs is passed over.
+    named : (str, str), optional
+        What is written and how its name ends: ("a profile", ".npz").
+
+    Raises
+    ------
+    FileError
+        As `check_distinct`, `check_ending`, `check_output` and `locked`.
+    """
+    files = [path for path in paths if path is not None]
+    read = [each for each in inputs if each is not None]
+    check_distinct(files)
+    with contextlib.ExitStack() as locks:
+        for path in files:
+            if named is not None:
+                check_ending(path, *named)
+            check_output(path, is_own, force=force, inputs=read)
+            locks.enter_context(locked(path))
+        yield
 
 
 def _open_locked(lock_path: Path, path: Path) -> int:

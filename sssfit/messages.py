@@ -28,6 +28,14 @@ def shown(value: object) -> str:
     return text if len(text) <= _MOST_SHOWN else text[: _MOST_SHOWN - 3] + "..."
 
 
+def did_you_mean(word: str, known: Sequence[str]) -> str:
+    """Return ``did you mean X? `` for the nearest known word, or nothing if none is near."""
+    import difflib  # 5 ms that help need not wait for
+
+    near = difflib.get_close_matches(word.lower(), known, n=1)
+    return f"did you mean {near[0]}? " if near else ""
+
+
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Columns under their heads: the first flush left, the others flush right; no cut, no wrap."""
     widths = [max(len(row[k]) for row in [header, *rows]) for k in range(len(header))]
@@ -65,7 +73,14 @@ def number(value: Any, form: str) -> str:
         return unknown or "-"
     if not form.endswith("%"):
         return f"{value:{form}}"
-    return "0 %" if abs(value) < 1e-9 else f"{100.0 * value:{form[:-1]}} %"
+    return "0 %" if abs(value) < 1e-9 else f"{_per_cent(100.0 * value, form[:-1])} %"
+
+
+def _per_cent(value: float, form: str) -> str:
+    """Write per cents without an exponent where they are large, and 0 without a minus."""
+    text = f"{value:{form.replace('.', 'z.')}}"
+    sign = "+" if form.startswith("+") else ""
+    return f"{float(text):{sign}.0f}" if "e+" in text else text
 
 
 class _Template(Formatter):

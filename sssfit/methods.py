@@ -10,7 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
+from operator import attrgetter
 from typing import Any
+
+
+def imported(where: str) -> Callable[..., Any]:
+    """Import a function or a method of a class: "module:name" or "module:class.name"."""
+    module, names = where.split(":")
+    found: Callable[..., Any] = attrgetter(names)(import_module(module))
+    return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,9 +86,7 @@ class Method:
 
     def load(self) -> Callable[..., Any]:
         """Import the method's function."""
-        module, name = self.function.split(":")
-        function: Callable[..., Any] = getattr(import_module(module), name)
-        return function
+        return imported(self.function)
 
 
 SIMULATIONS: Mapping[str, Method] = {

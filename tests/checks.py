@@ -87,32 +87,34 @@ def standard_error(sums, squares, photons):
 
 def totals(photons):
     """Index-matched totals against Chandrasekhar, index 1.5 against Giovanelli."""
-    figures = []
-    for albedo in (0.5, 0.9, 0.99):
-        profile = simulate_montecarlo(medium(1.0 - albedo, albedo, 1.0), photons=photons)
-        total, stderr = profile.diffuse_reflectance[0], profile.diffuse_reflectance_stderr[0]
-        theory = reference.chandrasekhar_total(albedo)
-        figures.append(
-            Figure(
-                f"index-matched total, albedo {albedo}, against Chandrasekhar's H",
-                f"{total:.6f} ± {stderr:.6f}",
-                f"{theory:.6f}",
-                (total - theory) / stderr,
-            )
-        )
+    return [*(chandrasekhar(each, photons) for each in (0.5, 0.9, 0.99)), giovanelli(photons)]
+
+
+def chandrasekhar(albedo, photons):
+    """The total of an index-matched half space against Chandrasekhar's H function."""
+    profile = simulate_montecarlo(medium(1.0 - albedo, albedo, 1.0), photons=photons)
+    total, stderr = profile.diffuse_reflectance[0], profile.diffuse_reflectance_stderr[0]
+    theory = reference.chandrasekhar_total(albedo)
+    return Figure(
+        f"index-matched total, albedo {albedo}, against Chandrasekhar's H",
+        f"{total:.6f} ± {stderr:.6f}",
+        f"{theory:.6f}",
+        (total - theory) / stderr,
+    )
+
+
+def giovanelli(photons):
+    """Specular and diffuse reflectance at index 1.5, albedo 0.9."""
     profile = simulate_montecarlo(medium(1.0, 9.0, 1.5), photons=photons)
     total = profile.specular_reflectance + profile.diffuse_reflectance[0]
     # Published to four digits: half a unit of the last belongs to the reference.
     stderr = np.hypot(profile.diffuse_reflectance_stderr[0], 0.00005 / np.sqrt(3.0))
-    figures.append(
-        Figure(
-            "specular + diffuse, eta 1.5, albedo 0.9, against Giovanelli 1955",
-            f"{total:.6f} ± {profile.diffuse_reflectance_stderr[0]:.6f}",
-            "0.2600",
-            (total - 0.26) / stderr,
-        )
+    return Figure(
+        "specular + diffuse, eta 1.5, albedo 0.9, against Giovanelli 1955",
+        f"{total:.6f} ± {profile.diffuse_reflectance_stderr[0]:.6f}",
+        "0.2600",
+        (total - 0.26) / stderr,
     )
-    return figures
 
 
 def single_scattering(photons, eta):

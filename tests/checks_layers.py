@@ -16,9 +16,8 @@ from checks import (
 from sssfit.grid import RadialGrid, paper_grid
 from sssfit.material import Layer, Material, load_material
 from sssfit.simulate import simulate_montecarlo
-from sssfit.simulate._layered import LayeredWalk
 from sssfit.simulate._run import run
-from sssfit.simulate._semi_infinite import SemiInfiniteWalk
+from sssfit.simulate._walks import LayeredWalk, SemiInfiniteWalk
 
 
 def layer(sigma_a, sigma_s, g=0.0, eta=1.0, thickness=math.inf):
@@ -104,6 +103,22 @@ def van_de_hulst(photons):
             )
         )
     return figures
+
+
+def giovanelli(photons):
+    """Specular and diffuse reflectance at index 1.5, albedo 0.9, by the layered walk."""
+    material = stack(layer(1.0, 9.0, 0.0, 1.5))
+    sums = sums_of(LayeredWalk((material,), (paper_grid(material),), 1, photons))
+    total, squares = sums.reflected[:, 0].sum(axis=0)
+    r, error = total / photons, float(standard_error(total, squares, photons))
+    specular = material.specular_reflectance
+    found = specular + (1.0 - specular) * r
+    return Figure(
+        "specular + diffuse by the layered walk, eta 1.5, albedo 0.9, against Giovanelli 1955",
+        f"{found:.6f} ± {error:.6f}",
+        "0.2600",
+        (found - 0.26) / math.hypot(error, 5e-5),
+    )
 
 
 def one_layer(name, photons):

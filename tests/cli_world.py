@@ -20,8 +20,10 @@ from pathlib import Path
 from types import NoneType
 from typing import Any
 
+import edited_skin
 import numpy as np
 import OpenImageIO
+import walk_convergence
 from click.testing import CliRunner
 from matplotlib.figure import Figure
 from test_mci import file_text, run_text
@@ -30,7 +32,7 @@ from test_mco import BELOW, DR_CM, IN_LAYERS, N_R, REFLECTED, SPECULAR, block, m
 from sssfit import compare, simulate
 from sssfit.choose import choice as choose
 from sssfit.cli import cli
-from sssfit.compare import budget, convergence, editing, pareto, sheet
+from sssfit.compare import budget, pareto, sheet
 from sssfit.compare.candidates import Candidate, candidates
 from sssfit.errors import SssfitWarning
 from sssfit.fit import fit_gaussians, fit_svd
@@ -459,22 +461,24 @@ def small_sheet() -> Any:
 
 @functools.cache
 def small_editing() -> Any:
-    return _unrecorded(editing.compute_editing)(height=24, width=24, mm_per_pixel=5.0)
+    return _unrecorded(edited_skin.compute_editing)(height=24, width=24, mm_per_pixel=5.0)
 
 
 @functools.cache
 def small_convergence() -> Any:
     """Made up: resolutions of the exact solver take seconds."""
     walks = tuple(
-        convergence.WalkRun(photons, 1 + k, 0.125 * (k + 1), error)
+        walk_convergence.WalkRun(photons, 1 + k, 0.125 * (k + 1), error)
         for k, (photons, error) in enumerate(((1000, 0.031), (2000, 0.027), (4000, 0.0142)))
     )
-    line = convergence.fit_line([each.photons for each in walks], [each.error for each in walks])
-    exact = (
-        convergence.ExactRun(1e-2, 0.51, 3.1e-3, 2.2e-3),
-        convergence.ExactRun(1e-4, 1.73, 4.3e-5, None),
+    line = walk_convergence.fit_line(
+        [each.photons for each in walks], [each.error for each in walks]
     )
-    return convergence.Convergence(exact_profile(), walks, exact, line)
+    exact = (
+        walk_convergence.ExactRun(1e-2, 0.51, 3.1e-3, 2.2e-3),
+        walk_convergence.ExactRun(1e-4, 1.73, 4.3e-5, None),
+    )
+    return walk_convergence.Convergence(exact_profile(), walks, exact, line)
 
 
 def blank(*_) -> Figure:

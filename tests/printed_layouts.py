@@ -50,7 +50,9 @@ def materials_list(f: Figures) -> list[Any]:
     ]
     return [
         Table([*heads, "radius, mm"], rows),
-        Words("{}: a profile without coefficients, for simulate only", *f["profiles"]),
+        Words(
+            "{}: a profile without coefficients, for simulate, compare and choose", *f["profiles"]
+        ),
     ]
 
 

@@ -1,5 +1,6 @@
 """Slow, literal oracles for sums of Gaussians, and profiles made of known ones."""
 
+import functools
 from itertools import pairwise
 
 import numpy as np
@@ -8,6 +9,9 @@ from scipy.integrate import quad
 from scipy.optimize import minimize
 
 from sssfit import shapes
+from sssfit.grid import make_grid
+from sssfit.material import load_material
+from sssfit.simulate import simulate_dipole
 
 
 def gaussian_energy(variances, edges):
@@ -84,3 +88,17 @@ def best_found_anywhere(profile, channel, terms, rng, tries):
         start = np.append(widths, rng.uniform(0.1, 1.0, terms))
         best = min(best, minimize(misfit, start, method="BFGS").fun)
     return np.sqrt(best)
+
+
+@functools.cache
+def fine_dipole(name):
+    """A dipole as the published figures have it, on a grid that is as good as none.
+
+    The error of two Gaussians of marble's green is 9.552, 9.5546, 9.5556 % at 0.04, 0.01, 0.005 mm.
+    """
+    material = load_material(name)
+    grid = make_grid(material)
+    dr_mm = grid.dr_mm / 8
+    # what lies beyond matters for the albedos next to 1, whose grids have the fewest annuli
+    radius_mm = min(8 * grid.r_edges_mm[-1], 90_000 * dr_mm)
+    return with_merged_annuli(simulate_dipole(material, dr_mm=dr_mm, radius_mm=radius_mm))

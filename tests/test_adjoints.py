@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from sssfit.fit import _by_hand, artist, burley, falloff, guided
-from sssfit.fit._gaussians_annuli import make_annuli
+from sssfit.fit._gaussians_search import make_annuli
 from sssfit.shapes import diffusion_cdf
 
 SEEDS = range(4)
@@ -188,7 +188,7 @@ def sum_of_gaussians(total: float | None, *, signed: bool) -> Callable:
             return 2.0 * y * (point.jacobian.T @ point.residual)
 
         return Pair(
-            "_gaussians_annuli.py", lambda x: annuli.at(x).cost, adjoint, np.log([0.05, 0.6, 4.0])
+            "_gaussians_search.py", lambda x: annuli.at(x).cost, adjoint, np.log([0.05, 0.6, 4.0])
         )
 
     return made
@@ -203,7 +203,7 @@ def columns_of_gaussians(_) -> Pair:
         return np.sum(slopes * y.reshape(slopes.shape), axis=0)
 
     return Pair(
-        "_gaussians_annuli.py",
+        "_gaussians_search.py",
         lambda x: annuli._columns(x)[0].ravel(),
         adjoint,
         np.log([0.05, 0.6, 4.0]),
@@ -283,7 +283,7 @@ def test_a_wrong_adjoint_is_seen(monkeypatch):
 
 
 def test_every_file_that_writes_derivatives_has_a_pair(monkeypatch):
-    """``_nlopt`` hands on what it is given, and ``_gaussians_search`` steps along ``at``'s."""
+    """``_nlopt`` hands on what it is given."""
     folder = Path(artist.__file__).parent
     words = ("gradient", "derivative", "jacobian", "slope")
     written = {
@@ -292,4 +292,4 @@ def test_every_file_that_writes_derivatives_has_a_pair(monkeypatch):
         if any(word in path.read_text(encoding="utf-8") for word in words)
     }
     tested = {make(monkeypatch).file for make in PAIRS.values()}
-    assert written - {"_nlopt.py", "_gaussians_search.py"} == tested
+    assert written - {"_nlopt.py"} == tested

@@ -12,9 +12,9 @@ from reference_pixels import make_profile
 
 from sssfit import files
 from sssfit.cli import main
-from sssfit.cli._memory import is_out_of_memory
 from sssfit.errors import FitError, SimulationError
 from sssfit.fit import fit_svd
+from sssfit.process import is_out_of_memory
 from sssfit.simulate._run import Ending
 
 posix = pytest.mark.skipif(os.name != "posix", reason="limits are POSIX")

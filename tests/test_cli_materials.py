@@ -41,7 +41,8 @@ def test_list_names_every_material_within_100_columns(run):
     assert lines[0].split()[:2] == ["name", "eta"]
     assert lines[0].count("mm") == 3
     assert [line.split()[0] for line in lines[1:-2]] == list(material_names())
-    assert lines[-2:] == ["", "deon-skin: a profile without coefficients, for simulate only"]
+    uses = "a profile without coefficients, for simulate, compare and choose"
+    assert lines[-2:] == ["", f"deon-skin: {uses}"]
     assert max(map(len, lines)) <= 100
     skin1 = next(line for line in lines if line.startswith("skin1"))
     expected = "skin1 1.3 0.95855 0.83810 0.67785 1.2953 0.9524 0.6711 0.03356 1236 41.48"

@@ -232,7 +232,7 @@ def test_a_table_has_all_its_rows_and_they_differ():
         )
 
 
-def test_what_went_wrong_in_a_walk_is_printed(capsys):
+def test_what_went_wrong_in_a_walk_is_printed():
     """Energy lost in one channel of one material, walks cut off, a target that was not met."""
     from sssfit.simulate import run_figures
 
@@ -248,7 +248,7 @@ def test_what_went_wrong_in_a_walk_is_printed(capsys):
         "unfinished": [1.25e-4, 2.5e-4, 3.75e-4],
         "relative_error": 0.375,
     }
-    figures, text = reported(rows, capsys)
+    figures, text = reported(rows)
     assert (
         "NOT WITHIN the run's own error: -3.0e-03, standard error 4e-04 (worst channel, lard G)"
         in text
@@ -258,24 +258,23 @@ def test_what_went_wrong_in_a_walk_is_printed(capsys):
     check(text, simulation(figures))
 
 
-def test_of_several_computed_materials_the_worst_error_is_printed(capsys):
+def test_of_several_computed_materials_the_worst_error_is_printed():
     from sssfit.simulate import run_figures
 
     rows = [run_figures(world.exact_profile(), 0.25) | {"path": f"{k}.npz"} for k in range(3)]
     for row, error in zip(rows, (2e-5, 7e-5, 4e-5), strict=True):
         row |= {"material": f"wax {error}", "relative_error": error}
-    figures, text = reported(rows, capsys)
+    figures, text = reported(rows)
     assert text.startswith("3 materials: exact to 0.007 % of the total")
     check(text, simulation(figures))
 
 
-def reported(rows, capsys):
+def reported(rows):
     """The JSON object and the text of a run of several materials."""
-    from sssfit.cli._options import Common
-    from sssfit.cli._simulate_report import report
+    from sssfit.cli._output import in_options
+    from sssfit.simulate.summary import summary
 
-    for as_json in (True, False):
-        common = Common(quiet=False, verbose=False, json=as_json, threads=None, seed=1)
-        report([dict(row) for row in rows], several=True, common=common, interrupted=False)
-    first, _, text = capsys.readouterr().out.partition("\n")
-    return json.loads(first), text
+    rows = [dict(row) for row in rows]
+    paths = [row.pop("path") for row in rows]
+    text = f"{in_options(summary(rows, several=True))}\nWrote {', '.join(paths)}"
+    return json.loads(json.dumps({"output": paths, "rows": plain_value(rows)})), text

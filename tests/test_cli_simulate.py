@@ -13,13 +13,13 @@ import processes
 import pytest
 
 from sssfit.cli import main
-from sssfit.cli._interrupt import asked_to_stop
-from sssfit.cli._simulate_report import _energy
 from sssfit.material import load_material
+from sssfit.process import asked_to_stop
 from sssfit.profile import Profile
 from sssfit.simulate import run_figures, simulate_montecarlo
 from sssfit.simulate._batches import BATCH_PHOTONS
-from sssfit.simulate._semi_infinite import SemiInfiniteWalk
+from sssfit.simulate._walks import SemiInfiniteWalk
+from sssfit.simulate.summary import energy_lines
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
 COMMAND = [sys.executable, "-m", "sssfit.cli", "simulate"]
@@ -118,12 +118,12 @@ def test_an_energy_balance_that_is_off_is_said(sigmas, said, sign):
         run_figures(simulate_montecarlo(load_material(name), photons=20_000), 1.0)
         for name in ("skin1", "apple")
     )
-    assert "= 1 within the run's own error" in _energy([row])[1]
+    assert "= 1 within the run's own error" in energy_lines([row])[1]
     error = row["energy_balance_stderr"][0]
     assert error > 1e-9  # more than rounding
     row["energy_balance"] = np.array([sign * sigmas * error, 0.0, 0.0])
     other["energy_balance"] = np.zeros(3)
-    alone, together = _energy([row])[1], _energy([other, row])[0]
+    alone, together = energy_lines([row])[1], energy_lines([other, row])[0]
     for line in (alone, together):
         assert f"{said} the run's own error: {sign * sigmas * error:+.1e}" in line
         assert "(worst channel, skin1 R)" in line

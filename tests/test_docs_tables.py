@@ -14,9 +14,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from checks_models import BEYOND, DIFFUSE, multipole_against_walk
+from edited_skin import compute_editing
 
 from sssfit.choose.choice import choose, mm_per_pixel_at
-from sssfit.compare.editing import compute_editing
 from sssfit.compare.guide import compute_guide
 from sssfit.compare.sheet import compute_sheet
 from sssfit.compare.spectrum import compute_spectrum

@@ -66,10 +66,7 @@ def test_totals_under_diffuse_light_are_a_literal_walks(eta, albedo, seed):
 
 
 @pytest.mark.parametrize("eta", [1.001, 1.1, 1.3, 1.5, 2.0, 4.0])
-def test_the_surface_reflects_of_diffuse_light_what_duntley_says(eta):
-    assert 1.0 - entering_light(eta, "diffuse") == pytest.approx(
-        reference.duntley_specular(eta), abs=1e-10
-    )
+def test_a_beam_along_the_normal_enters_by_fresnel(eta):
     assert entering_light(eta) == pytest.approx(1.0 - ((eta - 1.0) / (eta + 1.0)) ** 2, abs=1e-15)
 
 
@@ -103,12 +100,6 @@ def test_light_along_the_normal_and_view_along_it_change_places():
     multiple = seen.solve(first, np.array([albedo])).multiple[0]
     once = albedo * np.sum(weights * first * seen.escape)
     assert multiple + once == pytest.approx(diffuse_reflectance([albedo], eta)[0], abs=1e-7)
-
-
-def test_total_is_giovanellis():
-    profile = simulate_exact(checks.medium(1.0, 9.0, 1.5))
-    total = profile.specular_reflectance + profile.diffuse_reflectance[0]
-    assert total == pytest.approx(0.2600, abs=1e-4)  # published to four digits
 
 
 @pytest.mark.parametrize("eta", [1.0, 1.0001, 1.3, 2.0])
@@ -148,14 +139,6 @@ def test_energy_is_conserved_at_every_albedo(eta):
     once = albedos * single_scattering_beyond(np.zeros(1), eta, 0.05)
     enters = 1.0 - ((eta - 1.0) / (eta + 1.0)) ** 2
     np.testing.assert_allclose(response.multiple + once + response.absorbed, enters, atol=1e-7)
-
-
-@pytest.mark.parametrize(
-    ("albedo", "rate"), [(0.5, 0.957504), (0.9, 0.525430), (0.99, 0.172511), (1.0, 0.0)]
-)
-def test_decay_rates_are_the_published_ones(albedo, rate):
-    # Case, de Hoffmann and Placzek 1953, table 2
-    assert decay_rate(albedo) == pytest.approx(rate, abs=1e-6)
 
 
 @pytest.mark.parametrize("albedo", [0.0, 0.01, 0.05, 0.0501, 0.3, 1 - 1e-5, 1 - 2e-6, 1 - 1e-9])

@@ -10,58 +10,29 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from reference_gaussians import (
     best_found_anywhere,
+    fine_dipole,
     gaussian_energy,
     profile_of_gaussians,
     relative_error,
     relative_error_of_density,
-    with_merged_annuli,
 )
 from reference_pixels import make_profile, one_over_r_profile
 from scipy.integrate import quad
 
-import sssfit.fit._gaussians_annuli as annuli_module
+import sssfit.fit._gaussians_search as annuli_module
 from sssfit import shapes
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import METHODS, fit_gaussians, make_target
 from sssfit.fit._gaussians_search import rings
-from sssfit.grid import make_grid
 from sssfit.material import load_material, material_names
 from sssfit.simulate.dipole import simulate_dipole
 from sssfit.simulate.exact import simulate_exact
 
 SKIN_EDGES = np.linspace(0.0, 20.0, 1001)
 
-# Published for the classical dipole of marble's green channel: the errors of 2, 4 and 6 Gaussians,
-# and variances [mm^2] and weights of four.
-PUBLISHED = {
-    True: (
-        {2: 0.0956, 4: 0.0125, 6: 0.00197},
-        (0.036, 0.146, 0.911, 7.009),
-        (0.070, 0.184, 0.206, 0.288),
-    ),
-    False: (
-        {2: 0.1297, 4: 0.0150, 6: 0.00221},
-        (0.0382, 0.163, 1.166, 10.13),
-        (0.0783, 0.193, 0.229, 0.291),
-    ),
-}
 
 # Some random profiles are ones that a kernel of few terms does not suit, and it says so.
 random_profiles = pytest.mark.filterwarnings("ignore:.* kernel (is farther|has not)")
-
-
-def fine_dipole(name):
-    """A dipole as the published figures have it, on a grid that is as good as none.
-
-    The error of two Gaussians of marble's green is 9.552, 9.5546, 9.5556 % at 0.04, 0.01, 0.005 mm.
-    """
-    material = load_material(name)
-    grid = make_grid(material)
-    dr_mm = grid.dr_mm / 8
-    # what lies beyond matters for the albedos next to 1, whose grids have the fewest annuli
-    radius_mm = min(8 * grid.r_edges_mm[-1], 90_000 * dr_mm)
-    fine = simulate_dipole(material, dr_mm=dr_mm, radius_mm=radius_mm)
-    return with_merged_annuli(fine)
 
 
 @pytest.fixture(scope="module")
@@ -145,25 +116,6 @@ def test_variances_may_be_as_wide_as_the_grid():
     profile = profile_of_gaussians([1.0, 20.0], [[0.4], [0.5]], edges)  # 25 is the limit
     found = parameters(fit(profile, 2), "c0")
     np.testing.assert_allclose(found["variances_mm2"], [1.0, 20.0], rtol=1e-6)
-
-
-@pytest.mark.parametrize("free_energy", [True, False])
-def test_published_optima_of_the_dipole_of_marble(marble, free_energy):
-    published, variances, weights = PUBLISHED[free_energy]
-    entering = 1.0 - marble.specular_reflectance  # the published weights leave this factor out
-    for terms, expected in published.items():
-        found = parameters(fit(marble, terms, free_energy=free_energy), "c1")
-        half_a_digit = 0.5 * 10.0 ** (math.floor(math.log10(expected)) - 2)
-        assert found["relative_error"] == pytest.approx(expected, abs=half_a_digit)
-        if terms == 4:
-            np.testing.assert_allclose(found["variances_mm2"], variances, rtol=0.01)
-            np.testing.assert_allclose(np.divide(found["weights"], entering), weights, rtol=0.01)
-            if free_energy:
-                assert sum(found["weights"]) / entering == pytest.approx(0.748, abs=5e-4)
-            else:
-                total = marble.diffuse_reflectance[1]
-                assert sum(found["weights"]) == pytest.approx(total, rel=1e-12)
-                assert total / entering == pytest.approx(0.791, abs=5e-4)
 
 
 def test_worst_dipoles_are_those_of_the_docs():

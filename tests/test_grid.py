@@ -20,21 +20,6 @@ def test_edges_are_multiples_of_the_ring_width():
     assert grid.radius_mm == 1.0
 
 
-@pytest.mark.parametrize(
-    ("name", "dr_mm", "annuli"),
-    [
-        ("skin1", 1 / 1.49 / 20, 1236),  # 640 * 1.49 / 0.772 = 1235.2
-        ("chicken1", 1 / 0.57 / 20, 2211),
-        ("ketchup", 1 / 1.48 / 20, 3931),  # 640 * 1.48 / 0.241 = 3930.3
-        ("marble", 1 / 3.0071 / 20, 878),
-    ],
-)
-def test_paper_grid_of_measured_materials(name, dr_mm, annuli):
-    grid = paper_grid(load_material(name))
-    assert grid.dr_mm == pytest.approx(dr_mm, rel=1e-12)
-    assert grid.annuli == annuli
-
-
 def test_equal_mean_free_paths_give_no_ring_for_rounding():
     material = Material("m", ("R",), (Layer(1.3, 0.0, [0.1], [0.6]),))
     assert paper_grid(material).annuli == 640

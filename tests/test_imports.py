@@ -15,7 +15,18 @@ HEAVY = {"numpy", "numba", "scipy", "colour", "matplotlib", "rich", "OpenImageIO
 
 # A room may import from rooms before it in this list, never from one after it.
 ROOMS = [
-    *("errors", "methods", "messages", "files", "text", "threads", "arrays", "optics", "shapes"),
+    *(
+        "errors",
+        "methods",
+        "messages",
+        "files",
+        "text",
+        "kinds",
+        "process",
+        "arrays",
+        "optics",
+        "shapes",
+    ),
     *("material", "grid", "profile", "kernel", "formats", "scene"),
     *("simulate", "fit", "render", "measure", "compare", "choose", "export", "chart", "cli"),
 ]
@@ -30,6 +41,8 @@ PLOT_MAY_IMPORT = {
 FOR_TYPES = {
     "sssfit/profile/record.py": {"matplotlib.figure"},
     "sssfit/kernel/record.py": {"matplotlib.figure"},
+    # What `load` returns; a reader is imported by its name once a file of its kind is read.
+    "sssfit/kinds.py": {f"sssfit.{room}" for room in ("kernel", "material", "profile", "simulate")},
 }
 # The compiled layer stands beside the list: these rooms may use it, and it uses none of them.
 ROOMS_ON_JIT = {"profile", "scene", "simulate", "render"}

@@ -58,7 +58,7 @@ finally:
     time.sleep(60)
 """,
     "stopped in order": """
-from sssfit.cli._interrupt import asked_to_stop
+from sssfit.process import asked_to_stop
 import time
 with asked_to_stop() as stop:
     click.echo("ready")

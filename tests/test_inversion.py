@@ -18,7 +18,6 @@ from sssfit.material import load_material, parse_material
 from sssfit.simulate import simulate_exact
 from sssfit.simulate.exact import LIGHTS, diffuse_reflectance, entering_light
 from sssfit.simulate.inversion import (
-    chiang_albedo,
     invert_reflectance,
     largest_reflectance,
     material_from_reflectance,
@@ -103,38 +102,6 @@ def test_a_material_has_one_reflectance_a_channel(shape):
         return
     with pytest.raises(MaterialError, match="shape"):
         invert_reflectance(np.full(shape, 0.3), 1.3)
-
-
-def test_chiang_is_the_published_polynomial():
-    a = np.array([0.0, 0.13, 0.5, 1.0])
-    expected = 1 - np.exp(-5.09406 * a + 2.61188 * a**2 - 4.31805 * a**3)
-    np.testing.assert_allclose(chiang_albedo(a), expected, atol=1e-15)
-
-
-@pytest.mark.parametrize("g", [0.0, 0.8])
-def test_van_de_hulsts_inverse_undoes_his_formula(g):
-    albedo = np.array([0.0, 0.1, 0.5, 0.9, 0.99, 0.9999, 1.0])
-    s = np.sqrt((1 - albedo) / (1 - albedo * g))
-    colour = (1 - s) * (1 - 0.139 * s) / (1 + 1.17 * s)
-    # The published coefficients have six digits.
-    np.testing.assert_allclose(van_de_hulst_albedo(colour, g), albedo, atol=5e-5)
-
-
-@pytest.mark.parametrize(
-    ("light", "published"),
-    # R / (1 - R_sp) and the two published formulas, by hand; under diffuse light R is that share.
-    [
-        ("normal", {"van_de_hulst": [0.883040, 0.669708, 0.470580]}),
-        ("diffuse", {"van_de_hulst": [0.878312, 0.663546, 0.464995]}),
-    ],
-)
-def test_the_published_albedos_of_skin(light, published):
-    asked = [0.44, 0.23, 0.13]
-    found = published_inversions(asked, 1.3, light=light)
-    np.testing.assert_allclose(found["van_de_hulst"].albedo, published["van_de_hulst"], atol=5e-7)
-    a = np.array(asked)
-    chiang = 1 - np.exp(-5.09406 * a + 2.61188 * a**2 - 4.31805 * a**3)
-    np.testing.assert_allclose(found["chiang2016"].albedo, chiang, atol=1e-15)
 
 
 def test_what_the_published_ones_really_reflect_is_a_literal_walks():
@@ -370,7 +337,7 @@ def test_up_to_64_channels(run, tmp_path):
     assert status == 2
     assert "64 values; name their channels with --channels" in err
     _, _, err = run("--from-reflectance", ".4", *ASKED[2:], "--eta", "1.3")
-    assert "--from-reflectance has 1 value; name" in err
+    assert "--from-reflectance has 1 value; name its channel with --channels" in err
     more = (*asked[:1], shares + ",0.1", *asked[2:], "--channels", channels + ",x", "-o", "t.toml")
     status, _, err = run(*more)
     assert status == 1

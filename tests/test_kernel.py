@@ -100,7 +100,7 @@ def test_a_file_gives_the_same_bits_back_and_obeys_the_schema(kernel):
     jsonschema.validate(json.loads(written), SCHEMA)
 
 
-# What sssfit.kernel.schema looks at; the rest are words for people.
+# What sssfit.kernel.json looks at; the rest are words for people.
 KNOWN_KEYWORDS = {
     *("$schema", "title", "description", "const", "enum", "type", "pattern", "minimum", "maximum"),
     *("minItems", "maxItems", "uniqueItems", "items", "required", "properties"),

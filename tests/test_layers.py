@@ -8,7 +8,7 @@ import checks_layers
 import numpy as np
 import pytest
 import reference
-from checks_layers import STACKS, layer, scalar_sums, stack
+from checks_layers import STACKS, layer, stack
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import stats
@@ -17,10 +17,10 @@ from scipy.integrate import quad
 from sssfit._jit import layered, sampling
 from sssfit.errors import SssfitWarning
 from sssfit.formats.mci import load_mci
-from sssfit.grid import RadialGrid, paper_grid
+from sssfit.grid import RadialGrid
 from sssfit.simulate import shared_walks, simulate_montecarlo
-from sssfit.simulate._layered import LayeredWalk, channels_with_equal_scattering
 from sssfit.simulate._run import run
+from sssfit.simulate._walks import LayeredWalk, channels_with_equal_scattering
 
 DATA = Path(__file__).parent / "data"
 LIMIT = checks.LIMIT
@@ -152,20 +152,6 @@ def test_directions_are_forgotten_as_g_to_the_number_of_collisions(g):
 # Published and closed forms
 
 
-@sizes
-def test_van_de_hulst_slab(photons):
-    assert_within(checks_layers.van_de_hulst(photons))
-
-
-@sizes
-def test_giovanelli_by_the_layered_walk(photons):
-    material = stack(layer(1.0, 9.0, 0.0, 1.5), above=1.0)
-    task = LayeredWalk((material,), (paper_grid(material),), 1, photons)
-    (r, error), _ = walk_totals(task)
-    specular = material.specular_reflectance
-    assert_agree(specular + (1.0 - specular) * r, 0.2600, error, 5e-5)
-
-
 def test_without_scattering_beer_and_lambert():
     slab = stack(layer(2.0, 0.0, 0.0, 1.0, 0.4))
     r, _, t, error = totals(simulate_montecarlo(slab, photons=200_000))
@@ -259,50 +245,6 @@ def test_one_layer_equals_the_semi_infinite_walk(name, photons):
 @pytest.mark.parametrize("name", list(STACKS))
 def test_lanes_equal_the_scalar_mcml(name, photons):
     assert_within(checks_layers.against_scalar_mcml(name, photons))
-
-
-def absorbed_error(absorbed, photons):
-    """At least its standard error: a photon loses at most all it has in a layer."""
-    return np.sqrt(absorbed * (1.0 - absorbed) / photons)
-
-
-@sizes
-def test_sample_mci_gives_what_mcml_gives(photons):
-    (asked,) = load_mci(Path(__file__).parent / "data" / "sample.mci")
-    material, grid = asked.material, asked.grid
-    profile = simulate_montecarlo(
-        material, photons=photons, dr_mm=grid.dr_mm, radius_mm=grid.radius_mm
-    )
-    r, r_error, t, t_error = totals(profile)
-    absorbed = profile.absorbed[:, 0]
-    absorbed_here = absorbed_error(absorbed, photons)
-    assert_energy_conserved(profile)
-
-    # MCML's own 1e6 photons (tests/data/README.md), as exact as ours per photon; six printed
-    # digits, of the layers four
-    assert profile.specular_reflectance == pytest.approx(0.0243729, abs=5e-8)
-    per_photon = math.sqrt(photons / 1e6)
-    assert_agree(r, 0.237544, r_error, r_error * per_photon)
-    assert_agree(t, 0.0964896, t_error, t_error * per_photon)
-    # it counts what leaves beyond its last annulus but one into the last, from 4.9 mm on
-    rim = profile.annulus_energy[-1, 0] + profile.beyond_grid[0]
-    rim_error = math.hypot(profile.annulus_energy_stderr[-1, 0], profile.beyond_grid_stderr[0])
-    assert_agree(rim, 0.009773, rim_error, rim_error * per_photon)
-    for ours, theirs, error in zip(absorbed, (0.2612, 0.1488, 0.2316), absorbed_here, strict=True):
-        assert_agree(ours, theirs, error, math.hypot(error * per_photon, 5e-5))
-    whole_error = math.hypot(r_error, t_error)  # what is absorbed does not leave
-    assert_agree(absorbed.sum(), 0.641594, whole_error, whole_error * per_photon)
-
-    # the literal loop, for which 1 enters
-    loop_photons, entering = photons // 5, 1.0 - material.specular_reflectance
-    reflected, transmitted, lost = scalar_sums(material, loop_photons, grid)
-    for ours, error, theirs in ((r, r_error, reflected), (t, t_error, transmitted)):
-        total, squares = theirs.sum(axis=0)
-        their_error = checks.standard_error(total, squares, loop_photons)
-        assert_agree(ours, entering * total / loop_photons, error, entering * their_error)
-    lost = entering * lost / loop_photons
-    for each in zip(absorbed, lost, absorbed_here, absorbed_error(lost, loop_photons), strict=True):
-        assert_agree(*each)
 
 
 @sizes

@@ -1,21 +1,22 @@
 """What the library says names no option of the command line, which writes its own in."""
 
 import ast
+import functools
 import re
 from pathlib import Path
 
 import pytest
 
-from sssfit.cli._run import in_options
-from sssfit.messages import Columns, filled, report
+from sssfit.cli._output import in_options
+from sssfit.messages import Columns, filled, number, report
 
 LIBRARY = sorted((Path(__file__).parents[1] / "sssfit").rglob("*.py"))
 # A long option, a short one, or a command: none of these stands in text for Python.
 OPTION = re.compile(r"(?<![\w-])--?[a-zA-Z][\w-]*(?![\w\]])")
 COMMAND = re.compile(r"`sssfit |\bsssfit (simulate|fit|render|chart|show|export|import|compare) ")
 MARKED = re.compile(r"`[^`\n]+`")
-# Of Radiance's own program.
-FOREIGN = "ra_xyze -r"
+# Commands of others: Radiance's own program, the shell's limit.
+FOREIGN = ("ra_xyze -r", "ulimit -v")
 # Backquoted in messages without being an argument: a field of the profile.
 FIELDS = {"`unfinished`"}
 
@@ -50,7 +51,8 @@ def texts(path: Path) -> list[str]:
 )
 def test_no_text_of_the_library_names_an_option_or_a_command(path):
     for text in texts(path):
-        assert not OPTION.search(text.replace(FOREIGN, "")), text
+        ours = functools.reduce(lambda rest, each: rest.replace(each, ""), FOREIGN, text)
+        assert not OPTION.search(ours), text
         assert not COMMAND.search(text), text
 
 
@@ -87,6 +89,25 @@ def test_the_command_line_knows_every_argument_that_a_message_marks():
 )
 def test_arguments_become_options_where_the_command_line_prints_them(said, printed):
     assert in_options(said) == printed
+
+
+@pytest.mark.parametrize(
+    ("share", "form", "written"),
+    [
+        (0.99375, ".2g%", "99 %"),
+        (0.9975, ".2g%", "100 %"),  # and not 1e+02 %
+        (2.7, "+.2g%", "+270 %"),
+        (-11.14, "+.2g%", "-1100 %"),
+        (0.000123, ".2g%", "0.012 %"),
+        (1e-10, "+.2g%", "0 %"),
+        (-2.7e-6, "+.3f%", "+0.000 %"),
+        (None, ".2g%|unknown", "unknown"),
+        (float("nan"), ".4f", "-"),
+        (float("inf"), ".3g%", "inf %"),
+    ],
+)
+def test_shares_are_written_in_per_cent(share, form, written):
+    assert number(share, form) == written
 
 
 FIGURES = {

@@ -21,7 +21,7 @@ from sssfit.simulate import simulate_montecarlo, simulate_montecarlo_many
 from sssfit.simulate._batches import BATCH_PHOTONS
 from sssfit.simulate._finished import AUTO_BEYOND
 from sssfit.simulate._run import run
-from sssfit.simulate._semi_infinite import SemiInfiniteWalk, roulette_schedule
+from sssfit.simulate._walks import SemiInfiniteWalk, roulette_schedule
 
 LIMIT = checks.LIMIT
 # What double precision leaves of sums over a few thousand bins and a million collisions.
@@ -52,16 +52,6 @@ def same_bits(a, b):
 
 
 # Truth
-
-
-@sizes
-def test_totals_against_chandrasekhar_and_giovanelli(photons):
-    assert_within(checks.totals(photons))
-
-
-def test_chandrasekhar_oracle_gives_the_published_digits():
-    for albedo, published in ((0.5, 0.11523), (0.9, 0.41495), (0.99, 0.75272)):
-        assert reference.chandrasekhar_total(albedo) == pytest.approx(published, abs=5e-6)
 
 
 @sizes

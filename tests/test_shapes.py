@@ -129,19 +129,3 @@ def test_diffusion_line_integral_keeps_digits_in_the_tail_and_adds_up():
     np.testing.assert_array_equal(pixels, pixels[::-1])
     whole = shapes.diffusion_line_integral(-40.5, 40.5, 0.7)
     assert pixels.sum() == pytest.approx(float(whole), rel=1e-14)
-
-
-def test_three_mappings_of_the_shape():
-    # by hand from Christensen and Burley 2015
-    assert shapes.s_perpendicular(0.3) == pytest.approx(1.85 - 0.3 + 7.0 * 0.125)
-    assert shapes.s_perpendicular(1.0) == pytest.approx(0.85 + 7.0 * 0.008)
-    assert shapes.s_diffuse(0.3) == pytest.approx(1.6 + 3.5 * 0.25)
-    assert shapes.s_diffuse_mean_free_path(0.83) == pytest.approx(3.5 + 6.25)
-    assert shapes.s_diffuse_mean_free_path([0.33, 1.33]).tolist() == [3.5, 103.5]
-
-
-def test_six_gaussian_skin_is_whole():
-    weights = np.array(shapes.SKIN_WEIGHTS)
-    assert weights.shape == (len(shapes.SKIN_VARIANCES_MM2), 3)
-    np.testing.assert_allclose(weights.sum(axis=0), 1.0, atol=1e-12)
-    assert sorted(shapes.SKIN_VARIANCES_MM2) == list(shapes.SKIN_VARIANCES_MM2)

@@ -7,15 +7,14 @@ import warnings
 
 import numpy as np
 import pytest
+from edited_skin import EDITS, TABLE_1, compute_editing, editing_figure
 from figures import assert_legible, drawn_texts
 from reference_pixels import make_profile, one_over_r_profile
 
-from sssfit.chart.editing import editing_figure
 from sssfit.chart.page import save_figure
 from sssfit.chart.sheet import sheet_figure
 from sssfit.cli import main
 from sssfit.compare._panels import lightness, make_panel
-from sssfit.compare.editing import EDITS, TABLE_1, compute_editing
 from sssfit.compare.judge import judge
 from sssfit.compare.judged import border_of, judged_scene
 from sssfit.compare.pictures import picture_error

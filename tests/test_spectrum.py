@@ -10,7 +10,6 @@ from figures import assert_legible, words_of
 from matplotlib.colors import to_hex
 from reference_pixels import make_profile, one_over_r_profile
 
-from sssfit import shapes
 from sssfit.chart.page import save_figure
 from sssfit.chart.spectrum import spectrum_figure
 from sssfit.cli import main
@@ -58,25 +57,6 @@ def test_the_rank_for_an_error_is_the_least_that_reaches_it(skin1, spectrum):
             fit_svd(skin1, rank=each, energy="keep", mm_per_pixel=0.1) for each in (rank, rank - 1)
         )
         assert enough.relative_frobenius_error[c] <= 0.01 < less.relative_frobenius_error[c]
-
-
-def six_gaussian_skin():
-    """The skin that TR12 uses, as a profile (d'Eon, Luebke and Enderton 2007)."""
-    edges = np.arange(3001) * 0.01
-    shares = [shapes.gaussian_cdf(edges, each) for each in shapes.SKIN_VARIANCES_MM2]
-    grown = np.transpose(shares) @ np.array(shapes.SKIN_WEIGHTS)
-    return make_profile(edges, np.diff(grown, axis=0), beyond_grid=1.0 - grown[-1])
-
-
-def test_about_80_percent_holds_for_red_skin_in_absolute_values_only(skin1):
-    # docs/fits.md: the six-Gaussian skin, then skin1, at 0.1 mm
-    for profile, squared, absolute in (
-        (six_gaussian_skin(), (97.8, 99.2, 99.7), (84.3, 91.1, 95.0)),
-        (skin1, (89.6, 93.3, 96.0), (67.3, 73.6, 79.4)),
-    ):
-        found = compute_spectrum(profile, mm_per_pixel=0.1)
-        np.testing.assert_allclose(100 * found.squared_share[0], squared, atol=0.051)
-        np.testing.assert_allclose(100 * found.absolute_share[0], absolute, atol=0.051)
 
 
 def test_energy_concentrates_as_pixels_grow(skin1):

@@ -1,16 +1,16 @@
-"""The compiled layer: one jit policy for every function below, and where its machine code is kept.
+"""The compiled layer: one jit policy for every function, and the cache of its machine code.
 
-Flags are chosen here once. ``nogil`` lets plain Python threads run batches side by side;
-``error_model="numpy"`` drops the zero-division branch that keeps LLVM from vectorising;
+This module sets the flags once. ``nogil`` lets Python threads run batches in parallel;
+``error_model="numpy"`` removes the zero-division branch that prevents LLVM from vectorising;
 ``fastmath`` stays off, so that the same seed gives the same bits on every machine.
 
 numba's own cache does not notice an edit to a helper in *another* file and would run stale code.
 The cache folder is therefore keyed by the version and by a hash of every source file of this
-folder. Where nothing can be written (read-only home, no home at all) functions are compiled in
-each process: slower to start, otherwise the same.
+folder. Without a writable folder (read-only home, or none) functions are compiled in each process:
+slower to start, otherwise the same.
 
-Every file of the cache begins with a checksum of the rest. numba loads any bytes it finds: of
-14 flipped bits in machine code 4 crashed every later run and one gave another profile in silence.
+Every file of the cache begins with a checksum of the rest. numba loads any bytes it finds: of 14
+flipped bits in machine code 4 crashed every later run and one silently gave a different profile.
 """
 
 import contextlib
@@ -35,7 +35,7 @@ _SUM_BYTES = 32  # of SHA-256
 
 
 def source_key() -> str:
-    """Version and a hash of the compiled layer's sources: what a cached binary depends on."""
+    """Return version and a hash of the compiled layer's sources, which key the cache."""
     digest = hashlib.sha256()
     for path in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(path.name.encode())
@@ -44,7 +44,7 @@ def source_key() -> str:
 
 
 def user_cache_folder() -> Path:
-    """Folder for machine code: NUMBA_CACHE_DIR if set, else the platform's user cache folder."""
+    """Return the cache folder: NUMBA_CACHE_DIR if set, else the platform's user cache folder."""
     if chosen := os.environ.get("NUMBA_CACHE_DIR"):
         return Path(chosen)
     if sys.platform == "win32":
@@ -57,7 +57,7 @@ def user_cache_folder() -> Path:
 
 
 def _writable_cache_folder() -> str:
-    """Return the keyed cache folder, or an empty string where it cannot be made and written to."""
+    """Return the keyed cache folder, or an empty string if it cannot be created and written."""
     try:
         folder = user_cache_folder() / source_key()
         folder.mkdir(parents=True, exist_ok=True)
@@ -73,16 +73,16 @@ _CACHE_FOLDER = _writable_cache_folder()
 
 
 def compiled_before(file: str, function: str = "trace_batch") -> bool:
-    """Whether machine code of that file's function lies in the cache, made from these sources."""
+    """Return whether the cache has machine code for that file's function from these sources."""
     pattern = f"{file}.{function}-*.nbc"
     return bool(_CACHE_FOLDER) and any(Path(_CACHE_FOLDER).rglob(pattern))
 
 
 def thread_pool(threads: int, name: str = "sssfit") -> ThreadPoolExecutor:
-    """Make threads for compiled functions, numba having imported what it needs to load them.
+    """Return threads for compiled functions, after numba's lazy imports.
 
-    Left to the first call that is 0.3 s of imports on several threads at once, where an interrupt
-    or the end of memory in one of them can leave the others waiting for its locks for ever.
+    Otherwise the first call would do 0.3 s of imports on several threads at once, where an
+    interrupt or a MemoryError in one of them can leave the others waiting for its locks forever.
     """
     from numba.core import boxing  # noqa: F401
     from numba.core.runtime import context as runtime  # noqa: F401
@@ -93,27 +93,27 @@ def thread_pool(threads: int, name: str = "sssfit") -> ThreadPoolExecutor:
 
 
 def jit(function: Function) -> Function:
-    """Compile ``function`` on first call under the house policy; ``.py_func`` is its slow twin."""
+    """Compile ``function`` on first call with the common policy; ``.py_func`` is its slow twin."""
     return _compile(function, inline="never")
 
 
 def jit_inline(function: Function) -> Function:
-    """As ``jit``, but merged into its compiled callers before their arrays are counted.
+    """Like ``jit``, but inlined into compiled callers before array references are counted.
 
-    A plain call counts references on every array it passes; for the handling of single photons
-    that doubled the time of a walk (skin1: 527 ns a photon by calls, 264 ns merged).
+    A plain call counts references on every array it passes; for the handling of single photons this
+    doubled the time of a walk (skin1: 527 ns per photon with calls, 264 ns inlined).
     """
     return _compile(function, inline="always")
 
 
 class _DamagedError(Exception):
-    """A file of the cache is not what was written."""
+    """A file of the cache has changed since it was written."""
 
 
 class _CheckedFiles(IndexDataCacheFile):
-    """numba's index and data files, each behind the SHA-256 of what follows it.
+    """numba's index and data files, each preceded by the SHA-256 of its content.
 
-    The sum is looked at before anything is unpickled; the 290 kB of a walk take 0.2 ms.
+    The checksum is verified before anything is unpickled; the 290 kB of a walk take 0.2 ms.
     """
 
     def _load_index(self) -> dict[object, str]:
@@ -143,7 +143,7 @@ class _CheckedFiles(IndexDataCacheFile):
 
 
 def _checked(content: bytes) -> bytes:
-    """Return what follows the checksum, or raise where it has changed since it was written."""
+    """Return the content after the checksum, or raise if it has changed since it was written."""
     said, data = content[:_SUM_BYTES], content[_SUM_BYTES:]
     if hashlib.sha256(data).digest() != said:
         raise _DamagedError
@@ -151,10 +151,9 @@ def _checked(content: bytes) -> bytes:
 
 
 class _ForgivingCache(FunctionCache):
-    """numba's cache on disk, for which nothing that goes wrong there is more than a miss.
+    """numba's cache on disk, in which every error counts as a miss.
 
-    A full disk or quota, or a file that a crash cut short or the disk damaged, would otherwise stop
-    every later run.
+    Otherwise a full disk or quota, or a truncated or damaged file, would stop every later run.
     """
 
     def __init__(self, function: object) -> None:
@@ -168,7 +167,7 @@ class _ForgivingCache(FunctionCache):
     def load_overload(self, sig: object, target_context: object) -> object:
         try:
             return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
-        except Exception:  # _DamagedError, OSError, or what other versions of numba make of it
+        except Exception:  # _DamagedError, OSError, or the errors of other versions of numba
             self._forget()
             return None
 
@@ -186,8 +185,8 @@ class _ForgivingCache(FunctionCache):
 def _compile(function: Function, *, inline: Literal["never", "always"]) -> Function:
     """Decorate with a cache in our keyed folder.
 
-    numba reads the folder from a global setting when a cache is made; it is set for the length of
-    the call and put back, so that a host program's own choice stands.
+    numba reads the folder from a global setting when a cache is created; it is set during the call
+    and restored, so that the setting of a host program stays.
     """
     compiled: Function = numba.njit(function, nogil=True, error_model="numpy", inline=inline)
     if _CACHE_FOLDER:

@@ -1,10 +1,10 @@
-"""Rays against a height field: the first point where a ray meets bilinear patches, and its light.
+"""Rays and height fields: the first intersection of a ray with bilinear patches, and its normal.
 
 A field is heights z [mm] on nodes (row, column) ``spacing`` mm apart, bilinear in between. Rays are
-given in cells across (x along columns, y along rows) and mm up (z), their parameter t in mm. A
-pyramid of maxima lets a ray pass over what it cannot touch (Tevs, Ihrke, Seidel 2008, "Maximum
-mipmaps for fast, accurate, and scalable dynamic height field rendering"); within a cell the meeting
-point is the root of a quadratic, so there are no steps to be too long and no terraces.
+given in cells across (x along columns, y along rows) and mm up (z), with parameter t in mm. A
+pyramid of maxima lets a ray skip blocks that it cannot touch (Tevs, Ihrke, Seidel 2008, "Maximum
+mipmaps for fast, accurate, and scalable dynamic height field rendering"); within a cell the
+intersection is the root of a quadratic, so there are no step-size errors.
 """
 
 import math
@@ -18,7 +18,7 @@ FloatArray = npt.NDArray[np.float64]
 Levels = npt.NDArray[np.int64]
 Vector = tuple[float, float, float]
 
-# Past the border of a cell, so that the next cell is the one that the ray has entered [mm].
+# Step past the border of a cell, so that the ray is inside the next cell [mm].
 NUDGE_MM = 1e-7
 START_LEVEL = 4
 
@@ -47,7 +47,7 @@ def fill_maxima(heights: FloatArray, levels: Levels, maxima: FloatArray) -> None
 def clip_axis(
     start: float, slope: float, end: float, near: float, far: float
 ) -> tuple[float, float]:
-    """Shorten [near, far] to where 0 <= start + t slope <= end."""
+    """Clip [near, far] to 0 <= start + t slope <= end."""
     if slope == 0.0:
         return (near, far) if 0.0 <= start <= end else (1.0, 0.0)
     first, second = -start / slope, (end - start) / slope
@@ -58,7 +58,7 @@ def clip_axis(
 def patch_root(
     heights: FloatArray, row: int, column: int, at: Vector, step: Vector, length: float
 ) -> float:
-    """First t in [0, length] where the ray is on or under the patch; -1 where it stays above.
+    """Return the first t in [0, length] where the ray is on or under the patch; -1 if above.
 
     Height over the patch is f(t) = C + B t + A t^2, because the patch is a + b u + c v + e u v.
     """
@@ -76,7 +76,7 @@ def patch_root(
     root = math.inf
     discriminant = linear * linear - 4.0 * square * constant
     if discriminant >= 0.0:
-        # The stable form: no difference of nearly equal numbers.
+        # The stable form, without differences of nearly equal numbers.
         q = -0.5 * (linear + math.copysign(math.sqrt(discriminant), linear))
         if square != 0.0 and q / square >= 0.0:
             root = q / square
@@ -95,7 +95,7 @@ def first_hit(
     near: float,
     far: float,
 ) -> float:
-    """Parameter t [mm] in [near, far] of the first meeting; -1 where there is none."""
+    """Return parameter t [mm] in [near, far] of the first intersection; -1 if there is none."""
     x, y, z = start
     dx, dy, dz = step
     near, far = clip_axis(x, dx, heights.shape[1] - 1.0, near, far)
@@ -106,7 +106,7 @@ def first_hit(
         near = max(near, (highest - z) / dz)
     elif dz > 0.0:
         far = min(far, (highest - z) / dz)
-    # Rays start or end near the surface, where large blocks are seldom passed over: 16 cells.
+    # Rays start or end near the surface, where large blocks are rarely skipped: 16 cells.
     level, t = min(top, START_LEVEL), near
     while t < far:
         size = 1 << level
@@ -136,7 +136,7 @@ def first_hit(
 
 @jit_inline
 def bilinear(values: FloatArray, x: float, y: float) -> float:
-    """Value between nodes; x and y in cells."""
+    """Return the value between nodes; x and y in cells."""
     column = min(max(int(x), 0), values.shape[1] - 2)
     row = min(max(int(y), 0), values.shape[0] - 2)
     u, v = x - column, y - row
@@ -148,7 +148,7 @@ def bilinear(values: FloatArray, x: float, y: float) -> float:
 
 @jit_inline
 def slope_at(heights: FloatArray, row: int, column: int) -> tuple[float, float]:
-    """Central differences at a node [mm per cell]; one-sided at the border."""
+    """Return central differences at a node [mm per cell]; one-sided at the border."""
     rows, columns = heights.shape
     left, right = max(column - 1, 0), min(column + 1, columns - 1)
     before, after = max(row - 1, 0), min(row + 1, rows - 1)
@@ -159,7 +159,7 @@ def slope_at(heights: FloatArray, row: int, column: int) -> tuple[float, float]:
 
 @jit_inline
 def normal_at(heights: FloatArray, spacing: float, x: float, y: float) -> Vector:
-    """Mix the unit normal from four nodes' slopes, so that no cell shows as a facet."""
+    """Interpolate the unit normal from four nodes' slopes, so that no cell shows as a facet."""
     column = min(max(int(x), 0), heights.shape[1] - 2)
     row = min(max(int(y), 0), heights.shape[0] - 2)
     u, v = x - column, y - row

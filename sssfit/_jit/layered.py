@@ -1,19 +1,19 @@
-"""The photon walk through layers in lanes: MCML (Wang, Jacques, Zheng 1995) in full.
+"""The photon walk through layers, in lanes: all of MCML (Wang, Jacques, Zheng 1995).
 
 Any number of layers, Henyey-Greenstein scattering, Fresnel and total internal reflection at every
 interface, clear layers, finite stacks or a semi-infinite last layer. As in
 ``sssfit._jit.semi_infinite``, ``LANES`` photons advance side by side without a branch: each flies
-to its next collision or to the interface before it, whichever comes first, and scatters in the one
-case and waits for its Fresnel event in the other. The events (interfaces, roulette, the collision
-cap) are then handled lane by lane.
+to its next collision or to the interface before it, whichever comes first, and then scatters or
+waits for its Fresnel event. The events (interfaces, roulette, the collision cap) are then handled
+lane by lane.
 
-Channels may share a walk where only absorption differs between them. It is walked for the least
-absorbing one (weight times albedo at a collision, implicit capture as published); the others lose
-exp(-delta L) more, delta their excess absorption and L the path, which is the same estimate of the
-same energy with weights that never exceed the walk's own.
+Channels may share a walk if they differ in absorption only. The walk follows the least absorbing
+one (weight times albedo at a collision, implicit capture as published); the weights of the others
+are reduced by exp(-delta L), with delta their excess absorption and L the path. This estimates the
+same energy, with weights that never exceed the walk's own.
 
-Lengths are in mm. Weights are booked whenever a photon leaves a layer: what it lost since it
-entered is what the layer absorbed.
+Lengths are in mm. Weights are tallied whenever a photon leaves a layer: the weight lost since it
+entered is absorbed in the layer.
 """
 
 import math
@@ -43,9 +43,9 @@ _X, _Y, _Z = 0, LANES, 2 * LANES
 _UX, _UY, _UZ = 3 * LANES, 4 * LANES, 5 * LANES
 _DEPTH = 6 * LANES  # optical depth left to the next collision
 _WEIGHT = 7 * LANES  # of the least absorbing channel; 1 at entry
-_PATH = 8 * LANES  # flown since the last booking, in one layer
-# What the lane's layer is like, copied: looked up in the stack's arrays, which for all LLVM knows
-# might be changed by the stores to this one, it would keep ``advance`` from being vectorised.
+_PATH = 8 * LANES  # path since the last tally, in one layer
+# Copies of the coefficients of the lane's layer. Looking them up in the stack's arrays, which might
+# alias this one for LLVM, would prevent ``advance`` from being vectorised.
 _TOP, _BOTTOM = 9 * LANES, 10 * LANES
 _SIGMA_T, _CAPTURE, _BACK = 11 * LANES, 12 * LANES, 13 * LANES
 _FLOAT_ROWS = 14
@@ -56,7 +56,8 @@ _WORD_ROWS = GENERATOR_ROWS + 3
 
 _ZERO, _HALF, _ONE, _TWO, _THREE = _F32(0.0), _F32(0.5), _F32(1.0), _F32(2.0), _F32(3.0)
 _ZERO_WORD, _ONE_WORD = _U32(0), _U32(1)
-_THRESHOLD = _F32(1e-4)  # MCML's roulette: under it, one in ten goes on with ten times the weight
+# MCML's roulette threshold: below it, one in ten survives with ten times the weight.
+_THRESHOLD = _F32(1e-4)
 _SURVIVAL = _F32(0.1)
 _GAIN = _F32(10.0)
 _GRAZING = 1e-6  # least cosine after refraction: a photon along a clear layer would never end
@@ -77,7 +78,7 @@ class Stack(NamedTuple):
 
 
 class Bins(NamedTuple):
-    """Where the walk's K channels stand among all channels of the ledger."""
+    """Positions of the walk's K channels among all channels of the ledger."""
 
     per_mm: float  # bins of the radial grid per mm
     last: int  # the bin that stands for "beyond the grid"
@@ -96,11 +97,11 @@ class Ledger(NamedTuple):
 
 @jit
 def sample_hg(back: np.float32, u: np.float32) -> np.float32:
-    """1 - cosine of a Henyey-Greenstein deflection, g > 0 forward, from a uniform u.
+    """Return 1 - cosine of a Henyey-Greenstein deflection, g > 0 forward, from a uniform u.
 
     ``back`` is 1 - g. The inverse of the cumulative density, (1 + g^2 - ((1 - g^2)/(1 + g v))^2) /
-    (2 g) with v = 2u - 1, leaves 1 less than itself as 2 (1 - g)^2 (1 - u) (1 + g u) / (1 - g +
-    2 g u)^2: nothing cancels, and g = 0 needs no special case. A cosine, and 1 - g taken from g,
+    (2 g) with v = 2u - 1, gives 1 minus the cosine as 2 (1 - g)^2 (1 - u) (1 + g u) / (1 - g + 2 g
+    u)^2: nothing cancels, and g = 0 needs no special case. A cosine, and 1 - g computed from g,
     would lose the forward peak in single precision: at g = .9999 half of all deflections are below
     5e-9.
     """
@@ -117,20 +118,20 @@ def hg_pdf(cos_theta: float, g: float) -> float:
 
 @jit
 def advance(floats: LaneFloats, words: LaneWords, live: int) -> None:
-    """Fly every live lane to its next collision or interface; scatter those that collide.
+    """Move every live lane to its next collision or interface; scatter those that collide.
 
     The frame around the old direction is the branch-free one of Duff et al. 2017, "Building an
-    Orthonormal Basis, Revisited". One Newton step keeps directions at unit length over thousands
-    of collisions.
+    Orthonormal Basis, Revisited". One Newton step keeps directions at unit length over thousands of
+    collisions.
     """
     for lane in range(live):
         sigma_t = floats[_SIGMA_T + lane]
         z, depth, weight = floats[_Z + lane], floats[_DEPTH + lane], floats[_WEIGHT + lane]
         ux, uy, uz = floats[_UX + lane], floats[_UY + lane], floats[_UZ + lane]
-        # Both are loaded before the choice: a load inside a branch is not vectorised.
+        # Load both before the choice, because a load inside a branch is not vectorised.
         top, bottom = floats[_TOP + lane], floats[_BOTTOM + lane]
         interface = bottom if uz > _ZERO else top
-        # abs: 0/-0 must not make a flight along the layer (uz = 0) look like one of length -inf
+        # abs: for a flight along the layer (uz = 0), 0/-0 must not give a length of -inf
         to_interface = abs((interface - z) / uz)
         to_collision = depth / sigma_t
         meets = to_interface < to_collision
@@ -166,7 +167,7 @@ def advance(floats: LaneFloats, words: LaneWords, live: int) -> None:
 def find_events(
     floats: LaneFloats, words: LaneWords, live: int, events: npt.NDArray[np.int64]
 ) -> int:
-    """List the lanes at an interface, under the roulette's threshold or at the collision cap."""
+    """List the lanes at an interface, below the roulette threshold or at the collision cap."""
     count = 0
     for lane in range(live):
         events[count] = lane
@@ -180,7 +181,7 @@ def find_events(
 
 @jit_inline
 def enter_layer(floats: LaneFloats, words: LaneWords, lane: int, layer: int, stack: Stack) -> None:
-    """Put a lane into a layer: its number, and copies of what the flight needs."""
+    """Put a lane into a layer: set its number and copy the coefficients of the flight."""
     words[_LAYER + lane] = _U32(layer)
     floats[_TOP + lane] = stack.top_mm[layer]
     floats[_BOTTOM + lane] = stack.bottom_mm[layer]
@@ -219,8 +220,8 @@ def launch(
     words[_COLLISIONS + lane] = _ZERO_WORD
     words[_AT_INTERFACE + lane] = _ZERO_WORD
     for k in range(booked.shape[1]):
-        booked[lane, k, 0] = 1.0  # share of the walk's weight this channel still has
-        booked[lane, k, 1] = 1.0  # its weight at the last booking
+        booked[lane, k, 0] = 1.0  # share of the walk's weight that this channel still has
+        booked[lane, k, 1] = 1.0  # its weight at the last tally
 
 
 @jit_inline
@@ -233,7 +234,7 @@ def book_layer(
     bins: Bins,
     absorbed: FloatArray,
 ) -> None:
-    """Book what every channel lost in the present layer since the last booking."""
+    """Tally the weight that every channel lost in this layer since the last tally."""
     layer = int(words[_LAYER + lane])
     path = float(floats[_PATH + lane])
     weight = float(floats[_WEIGHT + lane])
@@ -275,7 +276,7 @@ def score_weight(
 def survives_roulette(
     floats: LaneFloats, words: LaneWords, booked: FloatArray, lane: int, bins: Bins, ledger: Ledger
 ) -> bool:
-    """Play roulette for a booked lane; what it adds or takes has mean zero."""
+    """Play roulette for a tallied lane; the weight it adds or takes has mean zero."""
     if next_unit(words, lane) >= _SURVIVAL:
         score_weight(booked, lane, bins, -1.0, ROULETTE_SPREAD, ledger.roulette)
         return False
@@ -306,7 +307,7 @@ def cross_interface(
     bins: Bins,
     ledger: Ledger,
 ) -> bool:
-    """Reflect at the interface ahead, or go through; say whether the photon is still inside."""
+    """Reflect at or pass the interface ahead; return whether the photon is still inside."""
     layer = int(words[_LAYER + lane])
     down = floats[_UZ + lane] > _ZERO
     ratio = stack.eta[layer + 1] / (stack.eta[layer + 2] if down else stack.eta[layer])
@@ -338,7 +339,7 @@ def handle_event(
     bins: Bins,
     ledger: Ledger,
 ) -> bool:
-    """Let a photon pass an interface, play roulette or stop; say whether its walk goes on."""
+    """Let a photon pass an interface, play roulette or stop; return whether its walk goes on."""
     if words[_AT_INTERFACE + lane] != _ZERO_WORD:
         return cross_interface(floats, words, booked, lane, stack, bins, ledger)
     book_layer(floats, words, booked, lane, stack, bins, ledger.absorbed)
@@ -373,8 +374,8 @@ def trace_batch(
 ) -> int:
     """Walk ``photons`` photons of one batch into ``ledger``; return the number of flights.
 
-    ``first_layer`` is the first that is not clear; what the clear ones above it reflect of the
-    beam counts as specular.
+    ``first_layer`` is the first that is not clear; the reflection of the beam by the clear ones
+    above it counts as specular.
     """
     floats = np.zeros(_FLOAT_ROWS * LANES, np.float32)
     words = np.zeros(_WORD_ROWS * LANES, np.uint32)
@@ -389,7 +390,8 @@ def trace_batch(
     while live > 0:
         advance(floats, words, live)
         flights += live
-        # From the last lane down, so that the lane moved into a gap has had its event handled.
+        # From the last lane down, so that a lane moved into a gap has already had its event
+        # handled.
         for k in range(find_events(floats, words, live, events) - 1, -1, -1):
             lane = events[k]
             if handle_event(floats, words, booked, lane, stack, bins, ledger):

@@ -1,12 +1,13 @@
 """Separable passes over pictures, four pairs of weights at a time.
 
-A row is laid out per channel in a line buffer with its borders filled in, so that the sum over the
-weights runs over neighbouring x and becomes vector code; an even pass needs one multiplication for
-two pixels. The pass down sums whole rows of planes (C, H + 1, W), the last one black. Weights come
-as halves from the middle out, filled up with zeros to 1 + 4 n. 2048 x 2048 RGB in float32 with 25
-weights: 0.05 s on one core, of which reading and writing the pixels is more than half.
+A row is copied per channel into a line buffer with its borders filled in, so that the sum over the
+weights runs over neighbouring x and is vectorised; an even pass needs one multiplication for two
+pixels. The vertical pass sums whole rows of planes (C, H + 1, W), the last one black. Weights are
+half lines from the middle outwards, padded with zeros to 1 + 4 n. 2048 x 2048 RGB in float32 with
+25 weights: 0.05 s on one core, of which reading and writing the pixels is more than half.
 
-Sums do not depend on how rows are shared out. Everything is done in the pixels' own precision.
+Sums do not depend on the distribution of rows over threads. All sums are in the pixels' own
+precision.
 """
 
 from typing import Any
@@ -41,7 +42,7 @@ def sum_line(total: FloatArray, line: FloatArray, weights: FloatArray, half: int
         total[x] = weights[0] * middle[x]
     for k in range(1, weights.size, 4):
         w0, w1, w2, w3 = weights[k], weights[k + 1], weights[k + 2], weights[k + 3]
-        # Both start where the four reach furthest left: constant offsets need one overlap check.
+        # Both start at the leftmost of the four: constant offsets need a single overlap check.
         a, b = line[half - k - 3 :], line[half + k :]
         for x in range(width):
             total[x] += (w0 * (a[x + 3] + b[x]) + w1 * (a[x + 2] + b[x + 1])) + (
@@ -82,15 +83,15 @@ def pass_across(
 ) -> None:
     """Rows first to last - 1 of pixels (H, W, 1 or C), blurred along x, into planes (C, H+1, W).
 
-    ``columns`` (half + W + half) says what stands where, ``weights`` (C, 1 + half), of which each
-    channel uses 1 + ``reach`` (C).
+    ``columns`` (half + W + half) holds the source columns; ``weights`` are (C, 1 + half), of which
+    each channel uses 1 + ``reach`` (C).
     """
     width, source_channels = pixels.shape[1:]
     half = weights.shape[1] - 1
     line = np.zeros(width + 2 * half, pixels.dtype)
     for y in range(first, last):
         for c in range(planes.shape[0]):
-            if c < source_channels:  # one channel serves all
+            if c < source_channels:  # one channel is used for all
                 fill_line(line, pixels[y], columns, half, c)
             sum_line(planes[c, y], line, weights[c, : 1 + reach[c]], half)
 
@@ -107,7 +108,7 @@ def pass_down(
 ) -> None:
     """Blur planes (C, H+1, W) along y and add rows first to last - 1 to out (H, W, C).
 
-    ``rows`` (half + H + half) says which plane row stands where; the rest as `pass_across`.
+    ``rows`` (half + H + half) holds the source rows of the planes; the rest as in `pass_across`.
     """
     width, channels = out.shape[1:]
     half = weights.shape[1] - 1

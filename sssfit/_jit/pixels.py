@@ -2,9 +2,9 @@
 
 A pixel's energy is sum_j d_j (A_j - A_j-1): d_j the density between the radii R_j-1 and R_j, A_j
 the area that the disk of radius R_j shares with the pixel. Disks that cover the pixel share all of
-it and smaller ones nothing, so only the edges that cut it (one to three at p = dr) need the closed
-form. Differences of areas are kept from falling below zero by rounding, so that a profile without
-negative energies has a kernel without negative weights.
+it and smaller ones none, so only the edges that cut it (one to three at p = dr) need the closed
+form. Differences of areas that rounding makes negative become zero, so that a profile without
+negative energies gives a kernel without negative weights.
 
 Every pixel here lies in the first quadrant. A pixel on an axis is cut in half there and doubled,
 the centre pixel quartered and taken four times.
@@ -27,9 +27,9 @@ def circular_segment(radius: float, share: float) -> float:
     if s2 > 0.0025:
         s = min(share, 1.0)
         return radius * radius * (math.asin(s) - s * math.sqrt(1.0 - s * s))
-    # Both cancel: at s = 1.25e-4 (a pixel 4000 pixels out) they keep 7 digits, at s = 0.05 they
-    # lose 3. The series keeps all of them up to there (next term: 1e-16 of the sum), and takes a
-    # tenth of the time.
+    # Both terms cancel: at s = 1.25e-4 (a pixel 4000 pixels out) they keep 7 digits, at s = 0.05
+    # they lose 3. The series keeps all of them up to there (next term: 1e-16 of the sum), and takes
+    # a tenth of the time.
     series = 3.0 / 28.0 + s2 * (5.0 / 72.0 + s2 * (35.0 / 704.0 + s2 * (63.0 / 1664.0)))
     return radius * radius * share * s2 * (2.0 / 3.0 + s2 * (0.2 + s2 * series))
 
@@ -50,7 +50,7 @@ def half_chord(radius: float, x: float) -> float:
 
 @jit
 def disk_pixel_area(radius: float, x0: float, x1: float, y0: float, y1: float) -> float:
-    """Area of the disk's share of [x0, x1] x [y0, y1], 0 <= x0, 0 <= y0, if its edge cuts it."""
+    """Return the disk's area inside [x0, x1] x [y0, y1], 0 <= x0, 0 <= y0, if its edge cuts it."""
     if half_chord(radius, y0) <= x0 or radius <= y0:
         return 0.0
     if half_chord(radius, x0) > y1 and radius > y1:
@@ -72,14 +72,14 @@ def disk_pixel_area(radius: float, x0: float, x1: float, y0: float, y1: float) -
 
 @jit
 def disk_strip_area(radius: float, x0: float, x1: float) -> float:
-    """Area of the disk's share of [x0, x1] x (-inf, inf), 0 <= x0 < R."""
+    """Return the disk's area inside [x0, x1] x (-inf, inf), 0 <= x0 < R."""
     xb = min(x1, radius)
     return 2.0 * area_under_arc(radius, x0, half_chord(radius, x0), xb, half_chord(radius, xb), 0.0)
 
 
 @jit
 def span(k: int, pitch: float) -> tuple[float, float, float]:
-    """Return the part of pixel k at x >= 0, [(k-1/2)p, (k+1/2)p], and how many such there are."""
+    """Return the part of pixel k at x >= 0, [(k-1/2)p, (k+1/2)p], and the number of such parts."""
     if k == 0:
         return 0.0, 0.5 * pitch, 2.0
     return (k - 0.5) * pitch, (k + 0.5) * pitch, 1.0
@@ -91,7 +91,8 @@ def line_energy(
 ) -> FloatArray:
     """Energy in strips of one pixel's width at x >= 0: (half_pixels+1, C).
 
-    ``radii`` (m) are the outer edges and rise, ``densities`` (m, C) lie inside them.
+    ``radii`` (m) are the outer edges, increasing; ``densities`` (m, C) belong to the annuli inside
+    them.
     """
     line = np.zeros((half_pixels + 1, densities.shape[1]))
     first = 0
@@ -132,7 +133,7 @@ def quadrant_energy(
 
 @jit
 def first_beyond(radii: FloatArray, start: int, i: int, k: int, pitch: float) -> int:
-    """First edge from ``start`` on that reaches into pixel (i, k)."""
+    """Return the first edge from ``start`` on that reaches into pixel (i, k)."""
     nearest = math.hypot(span(i, pitch)[0], span(k, pitch)[0])
     while start < radii.size and radii[start] <= nearest:
         start += 1
@@ -149,7 +150,7 @@ def add_pixel(
     k: int,
     pitch: float,
 ) -> None:
-    """Add to ``pixel`` (C) what the annuli from ``first`` on have in pixel (i, k)."""
+    """Add to ``pixel`` (C) the energy of the annuli from ``first`` on in pixel (i, k)."""
     x0, x1, x_copies = span(k, pitch)
     y0, y1, y_copies = span(i, pitch)
     copies = x_copies * y_copies

@@ -1,11 +1,11 @@
 """Sampling for all photon walks: random streams, exponential paths, directions, Fresnel.
 
-A walk keeps ``LANES`` photons side by side in two flat blocks, one of single-precision numbers and
-one of 32-bit words, a row of ``LANES`` entries for each quantity; flat, so that LLVM sees that rows
+A walk keeps ``LANES`` photons in two flat blocks, one of single-precision numbers and one of 32-bit
+words, with a row of ``LANES`` entries for each quantity. They are flat so that LLVM sees that rows
 do not overlap. The first four rows of words hold the lanes' generators.
 
-Random numbers belong to the lanes of a batch (xoshiro128++, Blackman and Vigna 2021, seeded by
-splitmix64 from seed, batch and lane): the same batch gives the same bits on any thread, in any
+Every lane of a batch has its own random numbers (xoshiro128++, Blackman and Vigna 2021, seeded by
+splitmix64 from seed, batch and lane): so a batch gives the same bits on any thread and in any
 order. numba promotes uint32 + uint32 to uint64, hence the cast around every intermediate.
 """
 
@@ -89,7 +89,7 @@ def next_unit(words: LaneWords, lane: int) -> np.float32:
 def negative_log(x: np.float32) -> np.float32:
     """-ln x for x in (0, 1): x = 2^e m, sqrt(1/2) <= m < sqrt(2), Cephes' polynomial for ln m.
 
-    A libm call would keep the flight loop from being vectorised. Absolute error under 1e-7.
+    A libm call would prevent the flight loop from being vectorised. Absolute error under 1e-7.
     """
     bits = _U32(_F32(x).view(np.uint32) + _U32(_ONE_BITS - _SQRT_HALF_BITS))
     exponent = _F32(np.int32(bits >> _U32(23))) - _F32(127.0)
@@ -132,7 +132,7 @@ def cos_sin_turn(u: np.float32) -> tuple[np.float32, np.float32]:
 
 @jit
 def fresnel_reflectance(cos_inside: float, eta: float) -> float:
-    """Unpolarised Fresnel reflectance from inside a medium of relative index ``eta``."""
+    """Return the unpolarised Fresnel reflectance from inside a medium of relative index ``eta``."""
     sin_outside = eta * math.sqrt(max(0.0, 1.0 - cos_inside * cos_inside))
     if sin_outside >= 1.0:
         return 1.0

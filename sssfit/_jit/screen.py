@@ -1,11 +1,11 @@
 """One pass of a screen-space blur: samples along a row or a column, as a shader takes them.
 
-Pictures are (N, C), N = H W pixels row after row. A sample lies between two pixels and is read
-linearly. What a sample brings is split in three: light that is seen; light lost by depth, made up
-for as `View.lost` says; and the share of pixels of other objects, for which the middle stands in.
+Pictures are (N, C), N = H W pixels row after row. A sample lies between two pixels and is
+interpolated linearly. Its weight is split into three parts: light that counts; light lost by depth,
+replaced as `View.lost` says; and the share of other objects, which the middle pixel replaces.
 
-Helpers are called and not merged (``jit_inline``): that takes 25 ns a sample of three channels, and
-60 merged.
+Helpers are called and not inlined (``jit_inline``): this takes 25 ns per sample of three channels,
+against 60 inlined.
 """
 
 import math
@@ -27,10 +27,10 @@ SEEN, LOST, FOREIGN, NEAR, MASS = 0, 1, 2, 3, 4
 
 
 class View(NamedTuple):
-    """What a pass reads beside the picture, and how."""
+    """The other inputs of a pass, and its settings."""
 
     depth_mm: FloatArray  # (N,)
-    mask: npt.NDArray[np.int32]  # (N,) which object; 0 is not blurred
+    mask: npt.NDArray[np.int32]  # (N,) number of the object; 0 is not blurred
     step: FloatArray  # (N,) pixels from one sample to the next
     stretch: FloatArray  # (N,) factor on differences of depth
     rate: FloatArray  # (C,) 1/mm of the lerp, 1/mm^2 of the Gaussian factor
@@ -53,9 +53,9 @@ def blur(
 ) -> None:
     """Write pixels ``first`` to ``last`` of the pass with ``weights`` (P, C) into ``out`` (N, C).
 
-    Pixels of no object are left as they are in ``out``.
+    Pixels of no object are left unchanged in ``out``.
     """
-    # Each read of an array from the tuple counts its references: taken out of the loop once.
+    # Each read of an array from the tuple counts its references, so read them once.
     depth_mm, mask, step, stretch, rate = (
         view.depth_mm,
         view.mask,
@@ -87,7 +87,7 @@ def blur(
 
 @jit
 def clear(sums: FloatArray) -> None:
-    """Set to 0 by hand: a slice costs 20 ns a call, as much as a sample."""
+    """Set to 0 in a loop: a slice costs 20 ns per call, as much as a sample."""
     for row in range(sums.shape[0]):
         for c in range(sums.shape[1]):
             sums[row, c] = 0.0
@@ -106,9 +106,9 @@ def sample(
     border: int,
     x: float,
 ) -> tuple[float, float]:
-    """Read the picture at ``x`` on the line of pixel p into ``light`` (C,), its own object only.
+    """Read the picture at ``x`` on the line of pixel p into ``light`` (C,), only from its object.
 
-    Returns the share of the two pixels that is of p's object, and their depth less that of p.
+    Returns the share of the two pixels that belongs to p's object, and their depth minus that of p.
     ``light`` is already multiplied by the share.
     """
     left = math.floor(x)
@@ -121,7 +121,7 @@ def sample(
         if weight == 0.0:
             continue
         j = inside(left + end, length, border)
-        if j < 0:  # beyond a border without light: dark, and as far away as the middle
+        if j < 0:  # beyond a dark border: black, at the depth of the middle
             share += weight
             continue
         q = base + j * stride
@@ -137,7 +137,7 @@ def sample(
 
 @jit
 def inside(j: int, length: int, border: int) -> int:
-    """Pixel of the picture that stands for pixel j of the endless line; -1 for none."""
+    """Return the source pixel for pixel j of the continued line; -1 for none."""
     index = j
     if j < 0 or j >= length:
         if border == ZERO:
@@ -153,7 +153,7 @@ def inside(j: int, length: int, border: int) -> int:
 
 @jit
 def kept(dz: float, rate: float, follow: int) -> float:
-    """Share of a sample's light that stays, ``dz`` deeper than the middle."""
+    """Return the share of a sample's light that remains, ``dz`` deeper than the middle."""
     share = 1.0
     if dz != 0.0:
         if follow == LERP:
@@ -175,7 +175,7 @@ def add(sums: FloatArray, c: int, weight: float, keep: float, share: float, ligh
 
 @jit
 def total(sums: FloatArray, c: int, middle: float, lost: int) -> float:
-    """Return what the pass leaves in a pixel: seen, foreign from the middle, lost as chosen."""
+    """Return a pixel of the pass: seen light, foreign from the middle, lost as chosen."""
     instead = 0.0
     if lost == MIDDLE or (lost == MEAN and sums[MASS, c] == 0.0):
         instead = middle

@@ -1,17 +1,17 @@
 """The photon walk in a homogeneous, semi-infinite, isotropically scattering medium, in lanes.
 
-Lengths are in mean free paths, so the walk knows neither absorption nor channel: a photon that
+Lengths are in mean free paths, so the walk depends on neither absorption nor channel: a photon that
 leaves after n collisions at radius rho adds albedo^n at r = rho * mean_free_path to each channel
-(implicit capture; Wang, Jacques, Zheng 1995, "MCML"). One walk therefore serves every channel, and
+(implicit capture; Wang, Jacques, Zheng 1995, "MCML"). One walk therefore gives every channel, and
 every material of the same refractive index.
 
-``LANES`` photons walk side by side as a structure of arrays in single precision. ``advance`` moves
+``LANES`` photons walk in parallel as a structure of arrays in single precision. ``advance`` moves
 all of them by one flight without a branch, which LLVM vectorises; ``find_events`` then lists the
 few lanes that leave or reach their roulette, and only those are handled one by one. A photon that
-ends makes room for the next; when no more are to be launched the last live lane moves into the
-gap, so that a few long walks at the end of a batch do not drag empty lanes along.
+ends is replaced by the next; after the last launch the last live lane moves into the gap, so that a
+few long walks at the end of a batch do not process empty lanes.
 
-``sampling`` holds the random streams and what is drawn from them.
+``sampling`` has the random streams and the samplers.
 """
 
 import math
@@ -33,7 +33,7 @@ from sssfit._jit.sampling import (
     seed_lanes,
 )
 
-COLLISION_CAP = 1_000_000  # walks end here unfinished; albedo 1 would otherwise walk for ever
+COLLISION_CAP = 1_000_000  # walks end here unfinished; with albedo 1 they might never end
 POWER_BLOCK = 1024  # albedo^n = low[n % 1024] * high[n // 1024] reaches past the collision cap
 _BLOCK_BITS, _BLOCK_MASK = 10, POWER_BLOCK - 1
 
@@ -46,30 +46,30 @@ _DX, _DY, _DZ = 3 * LANES, 4 * LANES, 5 * LANES  # the last flight, in mean free
 _COS = 6 * LANES  # its direction cosine against the inward normal
 _BOOST = 7 * LANES  # weight factor gained by surviving roulette
 _FLOAT_ROWS = 8
-_COLLISIONS = GENERATOR_ROWS * LANES  # so far
+_COLLISIONS = GENERATOR_ROWS * LANES  # path so far
 _EVENT = (GENERATOR_ROWS + 1) * LANES  # number of collisions that triggers roulette
 _LEVEL = (GENERATOR_ROWS + 2) * LANES  # roulettes survived
-_SETTLED = (GENERATOR_ROWS + 3) * LANES  # collisions already in the ledger
+_SETTLED = (GENERATOR_ROWS + 3) * LANES  # collisions already tallied
 _WORD_ROWS = GENERATOR_ROWS + 4
 
 _ONE, _TWO = _F32(1.0), _F32(2.0)
 _SURVIVAL = _F32(0.1)  # MCML's roulette: one in ten survives with ten times the weight
 _GAIN = _F32(10.0)
-# Variance of what it adds, in squared weights: .9 * 1^2 + .1 * 9^2. The expected one, since gains
-# are rare: a short run without any would see a small spread about a mean that is off.
+# Variance of the weight it adds, in squared weights: .9 * 1^2 + .1 * 9^2. It is the expected one
+# because gains are rare: a short run without any would estimate a small spread around a wrong mean.
 ROULETTE_SPREAD = 9.0
 
 FloatArray = npt.NDArray[np.float64]
 
 
 class Channels(NamedTuple):
-    """What turns a walk into energy per channel; C channels, all materials of one walk together."""
+    """Tables that turn a walk into energy per channel, for all materials of a walk together."""
 
     power_low: FloatArray  # (POWER_BLOCK, C): albedo^k
     power_high: FloatArray  # (POWER_BLOCK, C): albedo^(POWER_BLOCK k)
     bins_per_mean_free_path: FloatArray  # (C,)
     last_bin: npt.NDArray[np.int64]  # (C,): the bin that stands for "beyond the grid"
-    first_cell: npt.NDArray[np.int64]  # (C,): where the channel's bins begin in the tally
+    first_cell: npt.NDArray[np.int64]  # (C,): start of the channel's bins in the tally
 
 
 class Ledger(NamedTuple):
@@ -78,7 +78,7 @@ class Ledger(NamedTuple):
     bins: FloatArray  # (cells, 2): energy leaving, per bin
     absorbed: FloatArray  # (C,)
     unfinished: FloatArray  # (C, 2): energy of walks stopped at the collision cap
-    roulette: FloatArray  # (C, 2): what roulette added, zero on average, and its variance
+    roulette: FloatArray  # (C, 2): energy added by roulette, zero on average, and its variance
 
 
 @jit
@@ -123,7 +123,7 @@ def advance(floats: LaneFloats, words: LaneWords, live: int, critical_cos: np.fl
 def find_events(
     floats: LaneFloats, words: LaneWords, live: int, events: npt.NDArray[np.int64]
 ) -> int:
-    """List the lanes above the surface or due for roulette; return how many there are."""
+    """List the lanes above the surface or due for roulette; return their number."""
     count = 0
     for lane in range(live):
         events[count] = lane
@@ -146,10 +146,10 @@ def score_exit(
 ) -> None:
     """Add a photon that leaves: boost albedo^n in the bin of its radius at the surface.
 
-    What it left inside since the last booking is boost (albedo^settled - albedo^n).
+    The weight absorbed since the last tally is boost (albedo^settled - albedo^n).
     """
     settled = int(words[_SETTLED + lane])
-    collisions = int(words[_COLLISIONS + lane]) - 1  # ``advance`` counted one it did not reach
+    collisions = int(words[_COLLISIONS + lane]) - 1  # ``advance`` counted one that it did not reach
     boost = float(floats[_BOOST + lane])
     overshoot = floats[_Z + lane] / floats[_DZ + lane]  # share of the flight above the surface
     x = floats[_X + lane] - overshoot * floats[_DX + lane]
@@ -175,9 +175,9 @@ def score_event(
     channels: Channels,
     absorbed: FloatArray,
 ) -> None:
-    """Book absorption up to the lane's present collision n, and w = boost albedo^n in ``sums``.
+    """Tally absorption up to the lane's collision n, and w = boost albedo^n in ``sums``.
 
-    As gain w and, for the variance, spread w^2.
+    Added as gain w and, for the variance, spread w^2.
     """
     settled = int(words[_SETTLED + lane])
     collisions = int(words[_COLLISIONS + lane])
@@ -198,10 +198,10 @@ def survives_event(
     channels: Channels,
     ledger: Ledger,
 ) -> bool:
-    """Play roulette, or stop at the collision cap; book either and say whether the walk goes on.
+    """Play roulette, or stop at the collision cap; return whether the walk goes on.
 
-    The weights roulette takes and gives are uncorrelated with mean zero (a martingale), so their
-    variances add to that of the run's energy balance.
+    The weights that roulette takes and gives are uncorrelated with mean zero (a martingale), so
+    their variances add up in the run's energy balance.
     """
     boost = float(floats[_BOOST + lane])
     absorbed = ledger.absorbed
@@ -239,7 +239,7 @@ def handle_event(
     channels: Channels,
     ledger: Ledger,
 ) -> bool:
-    """Let a photon leave, reflect or play roulette; say whether its walk goes on."""
+    """Let a photon leave, reflect or play roulette; return whether its walk goes on."""
     if floats[_Z + lane] < _F32(0.0):
         reflectance = fresnel_reflectance(-float(floats[_COS + lane]), eta)
         if next_unit(words, lane) >= reflectance:
@@ -279,7 +279,8 @@ def trace_batch(
     while live > 0:
         advance(floats, words, live, critical_cos)
         flights += live
-        # From the last lane down, so that the lane moved into a gap has had its event handled.
+        # From the last lane down, so that a lane moved into a gap has already had its event
+        # handled.
         for k in range(find_events(floats, words, live, events) - 1, -1, -1):
             lane = events[k]
             if handle_event(floats, words, lane, eta, roulette_at, channels, ledger):

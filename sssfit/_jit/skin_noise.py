@@ -1,4 +1,4 @@
-"""Fine relief of skin: smooth noise and pores, the same at a place on every grid."""
+"""Fine relief of skin: smooth noise and pores, the same at each position on every grid."""
 
 import math
 
@@ -12,7 +12,7 @@ FloatArray = npt.NDArray[np.float64]
 
 @jit_inline
 def hashed(column: int, row: int, seed: int) -> float:
-    """Evenly spread number in [0, 1) of a lattice point: multiply and shift, 32 bits."""
+    """Return a uniform number in [0, 1) for a lattice point, by a 32-bit hash."""
     h = (column * 374761393 + row * 668265263 + seed * 974711) & 0xFFFFFFFF
     h = ((h ^ (h >> 13)) * 1274126177) & 0xFFFFFFFF
     return (h ^ (h >> 16)) / 4294967296.0
@@ -20,7 +20,7 @@ def hashed(column: int, row: int, seed: int) -> float:
 
 @jit
 def smooth_noise(x: float, y: float, seed: int) -> float:
-    """Between -1 and 1: lattice values with weights 6 t^5 - 15 t^4 + 10 t^3 (Perlin 2002)."""
+    """Return noise between -1 and 1, with weights 6 t^5 - 15 t^4 + 10 t^3 (Perlin 2002)."""
     column, row = math.floor(x), math.floor(y)
     u, v = x - column, y - row
     u = u * u * u * (u * (6.0 * u - 15.0) + 10.0)
@@ -32,7 +32,7 @@ def smooth_noise(x: float, y: float, seed: int) -> float:
 
 @jit
 def pores(x: float, y: float, sigma: float) -> float:
-    """Sum of round dents, one at a random place of each unit cell, each of its own depth."""
+    """Return a sum of round dents, one at a random position in each unit cell, of random depth."""
     column, row = math.floor(x), math.floor(y)
     total = 0.0
     for j in range(row - 1, row + 2):
@@ -61,7 +61,7 @@ def fill_noise(
 
 @jit
 def fill_pores(x: FloatArray, y: FloatArray, cell: float, sigma: float, out: FloatArray) -> None:
-    """Pores on the grid, in cells of ``cell`` mm."""
+    """Return pores on the grid, in cells of ``cell`` mm."""
     for i in range(y.size):
         for j in range(x.size):
             out[i, j] = pores(x[j] / cell, y[i] / cell, sigma / cell)

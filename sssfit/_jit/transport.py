@@ -15,16 +15,16 @@ from sssfit._jit import jit, jit_inline
 
 FloatArray = npt.NDArray[np.float64]
 
-# A table of K_d and the logarithm of its first distance, entries per unit of logarithm; a table of
-# X from distance 0, entries per mean free path.
+# A table of K_d, the logarithm of its first distance and entries per unit of logarithm; a table of
+# X from distance 0 and entries per mean free path.
 Tables = tuple[FloatArray, float, float, FloatArray, float]
 # Nodes, weights and barycentric weights of one panel; nodes and weights of a rule on [0, 1].
 Panel = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
 
-FALL = 3.0  # K_d falls like exp(-kappa d): no stretch of the quadrature spans more than exp(-3)
+FALL = 3.0  # K_d falls like exp(-kappa d): no interval of the quadrature spans more than exp(-3)
 NEGLIGIBLE = 36.0  # exp(-36) = 2e-16
-# Next to the target distances are x^6: d log d of K_d becomes smooth enough for 12 Gauss nodes to
-# reach 1e-9 of a row's sum (x^4: 1e-7).
+# Next to the target, distances are x^6, so that d log d of K_d becomes smooth enough for 12 Gauss
+# nodes to reach 1e-9 of a row's sum (x^4: 1e-7).
 POWER = 6
 
 
@@ -41,12 +41,12 @@ def interpolated(table: FloatArray, position: float) -> float:
 
 @jit_inline
 def kernel(distance: float, is_mirrored: bool, tables: Tables) -> float:
-    """K_d, or K_r = K_d - X for a mirrored target: 0 beyond the table of X, where they agree."""
+    """Return K_d, or K_r = K_d - X for a mirrored target: 0 beyond the table of X."""
     direct, log_first, per_log, escape, per_mfp = tables
     position = distance * per_mfp
     if is_mirrored and position > escape.size - 2:
         return 0.0
-    # Nearer than the table's first distance K_d is held: x^6 leaves such sources no weight.
+    # Nearer than the table's first distance K_d is constant: x^6 gives such sources no weight.
     value = interpolated(direct, max((math.log(distance) - log_first) * per_log, 1.0))
     if is_mirrored:
         value -= interpolated(escape, position)
@@ -63,9 +63,9 @@ def add_stretch(
     panel: Panel,
     tables: Tables,
 ) -> None:
-    """Add the part of a panel at distances ``inner`` to ``outer`` from the target.
+    """Add the integral over a panel at distances ``inner`` to ``outer`` from the target.
 
-    ``side`` is the target's depth and the direction (-1 or 1) in which the stretch lies.
+    ``side`` is the target's depth and the direction (-1 or 1) of the interval.
     """
     target, sign = side
     nodes, _, barycentric, rule = panel
@@ -77,7 +77,7 @@ def add_stretch(
         source = target + sign * distance
         total = 0.0
         for j in range(nodes.size):
-            # 1e-300 for a source on a node: its share is then 1 and all others' 0
+            # 1e-300 for a source on a node: its share is then 1 and those of the others 0
             shares[j] = barycentric[j] / (source - nodes[j] + 1e-300)
             total += shares[j]
         scale = weight * kernel(distance, target < 0.0, tables) / total
@@ -95,7 +95,7 @@ def add_side(
     panel: Panel,
     tables: Tables,
 ) -> None:
-    """Add a panel's part on one side of the target, in stretches that double with distance."""
+    """Add the integral on one side of the target, in intervals that double with distance."""
     outer = min(outer, NEGLIGIBLE / kappa)
     start = inner
     while start < outer:
@@ -116,7 +116,7 @@ def add_panel(
     panel: Panel,
     tables: Tables,
 ) -> None:
-    """Add one panel's integrals for one target, which lies inside, beside or mirrored above it."""
+    """Add one panel's integrals for one target inside, beside or mirrored above it."""
     if lower < target < upper:
         add_side(row, 0.0, target - lower, kappa, (target, -1.0), panel, tables)
         add_side(row, 0.0, upper - target, kappa, (target, 1.0), panel, tables)
@@ -159,11 +159,11 @@ def kernel_matrix(
     rule : (q, 2)
         Nodes and weights of a Gauss rule on [0, 1].
     kappa : float
-        sqrt(1 + k^2): K_d falls off like exp(-kappa d).
+        sqrt(1 + k^2): K_d falls like exp(-kappa d).
     is_matched : bool
-        Equal refractive indices: no mirror path.
+        Whether the refractive indices are equal, without a mirror path.
     tables : Tables
-        Of K_d and X.
+        Tables of K_d and X.
     """
     panels, order = nodes.shape
     matrix = np.zeros((panels * order, panels * order))

@@ -1,8 +1,8 @@
-"""Records to figures, one file a figure; nothing is computed here beyond what drawing takes.
+"""Draws records as figures, one file per figure; results are computed elsewhere.
 
-`page` has what they share and writes them: the same figure gives the same bytes. Matplotlib is
-imported in this room only, and never its pyplot, which takes 0.8 s to import and keeps global
-state; `files` and `data` do without it, for what is asked before there is anything to draw.
+`page` has their common parts and writes them: the same figure gives the same bytes. Only this room
+imports matplotlib, and never its pyplot, which takes 0.8 s to import and keeps global state.
+`files` and `data` do not import it, because they are needed before a figure is drawn.
 `figure_of` draws any record that has a chart.
 """
 

@@ -1,7 +1,7 @@
 """An error budget as a figure: `budget_figure`.
 
-The records come from ``sssfit.compare.budget``, which has computed everything. Delta E of causes do
-not add up, so they stand side by side; shares of the squared error do, so these are stacked.
+``sssfit.compare.budget`` computes the records. Delta E of causes do not add up, so they are drawn
+side by side; shares of the squared error do, so these are stacked.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from sssfit.chart.text import count, shortened
 if TYPE_CHECKING:
     from sssfit.compare.budget import Budget, Cause
 
-_BAR_INCHES = 0.3  # a picture's stacked bar
-_ROW_INCHES = 0.23  # a cause's line of markers
+_BAR_INCHES = 0.3  # height of a picture's stacked bar
+_ROW_INCHES = 0.23  # height of a cause's line of markers
 _LEAST = 1e-4  # Delta E, or relative L2 in percent: smaller ones are drawn at the edge
-_WRITTEN_PERCENT = 6.0  # a share that has room for its figure in the bar
-# Okabe and Ito 2008, "Color Universal Design", with hatches that tell them apart in grey.
+_WRITTEN_PERCENT = 6.0  # smallest share with room for its figure in the bar
+# Okabe and Ito 2008, "Color Universal Design", with hatches that distinguish them in grey.
 _FILLS = (
     ("#0072b2", ""),
     ("#e69f00", "////"),
@@ -45,18 +45,18 @@ _NOTES = (
 
 
 def budget_figure(budgets: Budget | Sequence[Budget]) -> Figure:
-    """Draw which cause makes how much of a kernel's error, on one picture or several.
+    """Draw the contribution of each cause to a kernel's error, on one picture or several.
 
     Parameters
     ----------
     budgets : Budget or sequence of Budget
-        Of one material and kernel; the first five are drawn.
+        Budgets of one material and kernel; the first five are drawn.
 
     Returns
     -------
     matplotlib.figure.Figure
         8 inches wide: a stacked bar for each picture, shares [%] of the squared error; under it,
-        for each cause alone, Delta E 2000 on a logarithmic axis, or relative L2 [%] where channels
+        for each cause alone, Delta E 2000 on a logarithmic axis, or relative L2 [%] if the channels
         have no colour.
     """
     given = list(budgets) if isinstance(budgets, Sequence) else [budgets]
@@ -72,12 +72,12 @@ def budget_figure(budgets: Budget | Sequence[Budget]) -> Figure:
 
 
 def _title(budget: Budget) -> str:
-    """Name the material."""
+    """Return the title with the material."""
     return f"{shortened(budget.material.name, 24)}: why the kernel's picture is not the true one"
 
 
 def _subtitle(budget: Budget) -> str:
-    """Say what the kernel was made from, and what it is tried on."""
+    """Return text about the kernel's profile and the pictures."""
     source = budget.model or f"{count(budget.photons)} photons, seed {budget.seed}"
     kernel, scene = budget.kernel, budget.scene
     words = [
@@ -90,7 +90,7 @@ def _subtitle(budget: Budget) -> str:
 
 
 def _names(budget: Budget) -> list[tuple[str, str]]:
-    """Causes from the top down with the text beside them, then what they make together."""
+    """Return the causes from the top down with their labels, then the whole."""
     measured = [each for each in budget.causes if each.score is not None]
     inside = [(each.name, each.name) for each in measured if each.is_in_whole]
     others = [(each.name, f"({each.name})") for each in measured if not each.is_in_whole]
@@ -104,7 +104,7 @@ def _draw_shares(axes: Axes, budgets: Sequence[Budget]) -> None:
     fills = dict(zip(parts, _FILLS, strict=False))
     fills[budgets[0].interaction.name] = _FILLS[-1]
     for row, budget in enumerate(budgets):
-        ends = {1.0: 0.0, -1.0: 0.0}  # what is stacked so far on either side of 0
+        ends = {1.0: 0.0, -1.0: 0.0}  # the stacked sums on either side of 0
         for name in parts:
             percent = 100.0 * budget.share(_cause(budget, name))
             if math.isnan(percent) or percent == 0.0:
@@ -130,14 +130,14 @@ def _draw_shares(axes: Axes, budgets: Sequence[Budget]) -> None:
 
 
 def _write_share(axes: Axes, row: int, middle: float, percent: float) -> None:
-    """Put a share's figure into its part of the bar, on white: hatches are under it."""
+    """Write a share's figure into its part of the bar, on white because of the hatches."""
     box: Style = {"facecolor": "white", "edgecolor": "none", "pad": 1.2, "alpha": 0.9}
     words = f"{percent:.0f} %"
     axes.text(middle, row, words, ha="center", va="center", fontsize=7.5, bbox=box)
 
 
 def _draw_alone(axes: Axes, budgets: Sequence[Budget], names: Sequence[tuple[str, str]]) -> None:
-    """Draw a line a cause, a marker for each picture; hollow is the 99th percentile."""
+    """Draw a line per cause with a marker for each picture; hollow is the 99th percentile."""
     is_seen = all(not math.isnan(b.whole.score.delta_e_2000_mean) for b in budgets if b.whole.score)
     for k, budget in enumerate(budgets):
         for row, (name, _) in enumerate(names):
@@ -179,7 +179,7 @@ def _legend(axes: Axes, title: str, handles: Sequence[Patch | Line2D], columns: 
 
 
 def _figures(cause: Cause, *, is_seen: bool) -> list[float]:
-    """Mean and 99th percentile of Delta E, or relative L2 in percent."""
+    """Return mean and 99th percentile of Delta E, or relative L2 in percent."""
     if cause.score is None:
         return [math.nan]
     if not is_seen:
@@ -188,17 +188,17 @@ def _figures(cause: Cause, *, is_seen: bool) -> list[float]:
 
 
 def _cause(budget: Budget, name: str) -> Cause:
-    """Find a cause, the interaction or the whole."""
+    """Return a cause, the interaction or the whole by its name."""
     every = (*budget.causes, budget.interaction, budget.whole)
     return next(each for each in every if each.name == name)
 
 
 def _is_part(budget: Budget, name: str) -> bool:
-    """Whether it is stacked: in the whole, and not the whole itself."""
+    """Return whether a cause is stacked: part of the whole, and not the whole itself."""
     return name != budget.whole.name and _cause(budget, name).is_in_whole
 
 
 def _left_out(budgets: Sequence[Budget]) -> list[str]:
-    """Say how many pictures are not drawn."""
+    """Return a note on the number of pictures that are not drawn."""
     more = len(budgets) - len(_MARKERS)
     return [f"{more} more pictures are not drawn."] if more > 0 else []

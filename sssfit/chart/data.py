@@ -1,6 +1,6 @@
-"""What a chart draws of a profile besides its bins: range, unit, and a 2D image.
+"""Data of a profile's chart besides its bins: range, unit, and a 2D image.
 
-Nothing here knows matplotlib; ``sssfit.chart`` draws.
+Without matplotlib; the other files of ``sssfit.chart`` draw.
 """
 
 import math
@@ -14,14 +14,14 @@ from sssfit.profile import Profile
 from sssfit.profile.bins import Bins
 
 _IMAGE_SHARE_COLOUR, _IMAGE_SHARE_GREY = 0.75, 0.95
-_IMAGE_ROWS, _IMAGE_COLUMNS = 201, 501  # wider than any panel, 130 an inch
+_IMAGE_ROWS, _IMAGE_COLUMNS = 201, 501  # wider than any panel, 130 per inch
 _EXPOSED_AT = 0.35  # of the half height
 _NOTHING = 1e-200  # 1/mm: stands for 0 under a logarithm
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Picture:
-    """R_d(x, y) around the beam: (rows, columns, C) [1/mm^2], and how far it reaches [mm]."""
+    """Return R_d(x, y) around the beam (rows, columns, C) [1/mm^2], and its half width [mm]."""
 
     per_mm2: FloatArray
     half_width_mm: float
@@ -29,7 +29,7 @@ class Picture:
 
     @property
     def exposure_per_mm2(self) -> float:
-        """R_d that is shown half bright: the brightest channel's, a third of the way up."""
+        """Return the R_d that is shown at half brightness, from the brightest channel."""
         along = self.per_mm2[_IMAGE_ROWS // 2 + round(_EXPOSED_AT * _IMAGE_ROWS / 2)]
         return float(along[_IMAGE_COLUMNS // 2].max()) or 1.0
 
@@ -43,7 +43,7 @@ class Picture:
 
 
 def picture(profile: Profile, bins: Sequence[Bins]) -> Picture:
-    """Return the centre of the 2D profile: of three channels, else of the first alone."""
+    """Return the centre of the 2D profile: of three channels, else of the first only."""
     is_colour = len(bins) == 3
     shown = range(3) if is_colour else range(1)
     half_mm = drawn_radius_mm(
@@ -55,17 +55,17 @@ def picture(profile: Profile, bins: Sequence[Bins]) -> Picture:
 
 
 def drawn_radius_mm(profile: Profile, share: float, channels: Sequence[int]) -> float:
-    """Radius that holds this share of the energy of every one of the channels that has any [mm]."""
+    """Return the radius that contains this share of the energy of every lit channel [mm]."""
     radii_mm = profile.energy_radii_mm([share])[0, list(channels)]
     known_mm = radii_mm[np.isfinite(radii_mm)]
     return float(known_mm.max(initial=0.0)) or float(profile.r_edges_mm[-1])
 
 
 def _image_per_mm2(bins: Bins, pitch_mm: float) -> FloatArray:
-    """R_d at the centres of pixels around the beam (rows, columns) [1/mm^2].
+    """Return R_d at the centres of pixels around the beam (rows, columns) [1/mm^2].
 
-    log(2 pi r R_d) is interpolated between the middles of the bins: steps, or the kinks of an
-    interpolated F, would draw rings. The centre pixel takes the mean over a disk of its area.
+    log(2 pi r R_d) is interpolated between the middles of the bins, because steps, or the kinks of
+    an interpolated F, would show as rings. The centre pixel is the mean over a disk of its area.
     """
     y = pitch_mm * (np.arange(_IMAGE_ROWS) - _IMAGE_ROWS // 2)
     x = pitch_mm * (np.arange(_IMAGE_COLUMNS) - _IMAGE_COLUMNS // 2)
@@ -77,10 +77,10 @@ def _image_per_mm2(bins: Bins, pitch_mm: float) -> FloatArray:
 
 
 def _nodes(bins: Bins) -> tuple[FloatArray, FloatArray]:
-    """Radii (k,) [mm] and log(2 pi r R_d) (k,) there: the middles of the bins.
+    """Return the middles of the bins (k,) [mm], and log(2 pi r R_d) (k,) there.
 
-    Past the last bin that is drawn, an exponential takes over that holds what energy is left: a
-    mean over the empty rest of the grid would put a glow far from the beam.
+    Beyond the last drawn bin, an exponential with the remaining energy continues it: a mean over
+    the empty rest of the grid would draw a glow far from the beam.
     """
     middles_mm = 0.5 * (bins.edges_mm[1:] + bins.edges_mm[:-1])
     logarithms = np.log(np.maximum(bins.energy / np.diff(bins.edges_mm), 0.5 * _NOTHING))

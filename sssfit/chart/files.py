@@ -16,12 +16,12 @@ _MARKS = {
 
 
 def chart_format(target: str | Path | BinaryIO) -> str:
-    """Return the format that the ending of a path asks for: "png", "svg" or "pdf".
+    """Return the format of a path by its ending: "png", "svg" or "pdf".
 
     Raises
     ------
     FileError
-        The ending is another, or a stream has none.
+        The path has another ending, or a stream has none.
     """
     if not isinstance(target, str | Path):
         raise FileError(f"a stream has no ending; name one of {', '.join(FORMATS)}.")
@@ -29,12 +29,12 @@ def chart_format(target: str | Path | BinaryIO) -> str:
 
 
 def known_format(name: str, origin: str) -> str:
-    """Return the format in lower case, or refuse it with a line that begins with ``origin``."""
+    """Return the format in lower case, or raise an error that begins with ``origin``."""
     if (chosen := name.lower()) not in FORMATS:
         raise FileError(f"{origin}: charts are PNG, SVG or PDF; end it in .png, .svg or .pdf.")
     return chosen
 
 
 def is_chart_file(path: Path) -> bool:
-    """Tell whether a file is a chart that we wrote, by what PNG, SVG and PDF say of their maker."""
+    """Return whether a file is a chart that we wrote, by the maker that it names."""
     return has_mark(path, _MARKS)

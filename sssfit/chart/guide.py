@@ -1,6 +1,6 @@
-"""The guide function beside what the guided fit leaves, as a figure: `guide_figure`.
+"""The guide function beside the residual of the guided fit, as a figure: `guide_figure`.
 
-The record comes from ``sssfit.compare.guide``, which has computed everything.
+``sssfit.compare.guide`` computes the record.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ from sssfit.chart.text import kernel_subtitle, shortened
 if TYPE_CHECKING:
     from sssfit.compare.guide import Guide
 
-_ROW_INCHES, _LINE_INCHES = 2.05, 0.165  # of panels, of the table
-_WIDTHS = (1.0, 1.0, 1.75)  # of the columns, so that images fill theirs
+_ROW_INCHES, _LINE_INCHES = 2.05, 0.165  # heights of panels, of the table
+_WIDTHS = (1.0, 1.0, 1.75)  # widths of the columns, so that images fill theirs
 _HEADS = (
     "",
     "middle pixel of the pass",
@@ -40,7 +40,7 @@ _HEADS = (
     "Frobenius error",
     "misfit weighted by Γ",
 )
-_GUIDE_DECADES = 3  # of the guide functions, below and above their value halfway out
+_GUIDE_DECADES = 3  # decades of the guide functions, below and above their value halfway out
 _PASS_DECADES = 6
 _GREY = "#666666"
 _DISTANCE = "distance from the middle (mm)"
@@ -54,7 +54,7 @@ _NOTE = (
 
 
 class _Row(NamedTuple):
-    """One line of panels; no guided pass beside the pre-integrated one in its own."""
+    """One row of panels; the pre-integrated row has no guided pass."""
 
     guide: str
     name: str
@@ -64,7 +64,7 @@ class _Row(NamedTuple):
 
 
 def guide_figure(guide: Guide) -> Figure:
-    """Draw guide function, what is left, and the pass: pre-integrated first, then a row for each k.
+    """Draw guide function, residual and pass: pre-integrated first, then a row for each k.
 
     Parameters
     ----------
@@ -101,7 +101,7 @@ def guide_figure(guide: Guide) -> Figure:
 
 
 def _rows(guide: Guide) -> list[_Row]:
-    """Return what is drawn: the pre-integrated pass with its Gamma_p, then the fits."""
+    """Return the rows: the pre-integrated pass with its Gamma_p, then the fits."""
     line = _Row("Γₚ", "pre-integrated", guide.preintegrated_gamma, guide.preintegrated_residual)
     fits = [
         _Row(f"Γ, k = {k:g}", f"k = {k:g}", guide.gamma[i], guide.residual[i], guide.passes[i])
@@ -111,7 +111,7 @@ def _rows(guide: Guide) -> list[_Row]:
 
 
 def _table(guide: Guide) -> list[tuple[str, list[str]]]:
-    """Name and figures of each line."""
+    """Return name and figures of each row."""
     line = guide.preintegrated[0], guide.preintegrated_misplaced, *guide.preintegrated_errors
     columns = (
         guide.centre_share,
@@ -140,7 +140,7 @@ def _draw_row(
 
 
 def _over_halfway(gamma: FloatArray) -> FloatArray:
-    """Return a guide function over its value on the diagonal halfway out, where it has one."""
+    """Return a guide function relative to its value on the diagonal halfway out."""
     diagonal = np.diagonal(gamma)[: gamma.shape[0] // 2 + 1]
     known = diagonal[np.isfinite(diagonal) & (diagonal > 0.0)]
     return gamma / known[-1] if known.size else gamma
@@ -176,7 +176,7 @@ def _draw_pass(axes: Axes, guide: Guide, guided: FloatArray | None) -> None:
 def _draw_bars(
     below: SubFigure, panels: npt.NDArray[Any], shades: tuple[LogNorm, SymLogNorm]
 ) -> None:
-    """Explain the colours of both columns of images, under them."""
+    """Draw the colour bars of both columns of images, under them."""
     place: Style = {"location": "bottom", "pad": 0.02, "aspect": 20}
     first = below.colorbar(ScalarMappable(shades[0], "cividis"), ax=panels[:, 0], **place)
     first.set_label("Γ over Γ halfway out")
@@ -187,7 +187,7 @@ def _draw_bars(
 
 
 def _title(guide: Guide) -> str:
-    """Name the material and the channel."""
+    """Return the title with material and channel."""
     material = guide.profile.material
     channel = shortened(guide.profile.channels[guide.channel])
     what = "guide function and residual of the guided kernel"

@@ -1,6 +1,6 @@
-"""A kernel beside the profile it stands for, as a figure: `kernel_figure`.
+"""A kernel beside the profile that it approximates, as a figure: `kernel_figure`.
 
-The record comes from ``sssfit.compare.kernel_view``, which has computed everything.
+``sssfit.compare.kernel_view`` computes the record.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ if TYPE_CHECKING:
     from sssfit.compare.kernel_view import KernelView
     from sssfit.kernel import SeparableKernel
 
-_PASS_INCHES, _ROW_INCHES, _LINE_INCHES = 2.1, 1.76, 0.165  # of panels, of the table
-_WIDTHS = 4.4  # of planes and slices together, in images
-_MIDDLE = 0.2  # of a pixel: where the step of the middle one begins on a logarithmic axis
+_PASS_INCHES, _ROW_INCHES, _LINE_INCHES = 2.1, 1.76, 0.165  # heights of panels, of the table
+_WIDTHS = 4.4  # width of planes and slices together, in images
+_MIDDLE = 0.2  # share of a pixel where the step of the middle one begins on a logarithmic axis
 _PASS_DECADES, _SLICE_DECADES, _IMAGE_DECADES, _DIFFERENCE_DECADES = 4, 7, 5, 3
 _AXIS: Style = {"color": COLOURS[2], "linestyle": "-"}
 _DIAGONAL: Style = {"color": COLOURS[0], "linestyle": LINE_STYLES[1]}
@@ -54,7 +54,7 @@ _PALE: Style = {"linestyle": "-", "lw": 3.2, "alpha": 0.3}
 
 
 def kernel_figure(view: KernelView) -> Figure:
-    """Draw a kernel's passes, its plane beside the true one, their difference and slices.
+    """Draw a kernel's passes, its 2D kernel beside the true one, their difference and slices.
 
     Parameters
     ----------
@@ -65,12 +65,12 @@ def kernel_figure(view: KernelView) -> Figure:
     matplotlib.figure.Figure
         8 inches wide. For each channel a panel of the passes [1/mm] over the distance from the
         middle [mm], and a row: the profile's energy per area [1/mm^2] and the kernel's, their
-        difference in each pixel as a share of the channel's energy, and both along the axis and
-        the diagonal. Without a profile only what is the kernel's.
+        difference in each pixel as a share of the channel's energy, and both along the axis and the
+        diagonal. Without a profile only the kernel is drawn.
     """
     heads, rows = _table(view)
     labels = _term_labels(view)
-    planes = _ROW_INCHES * len(rows) + 0.9  # with their bars
+    planes = _ROW_INCHES * len(rows) + 0.9  # with their colour bars
     height = 1.4 + _LINE_INCHES * (len(rows) + len(labels) / 2) + _PASS_INCHES + planes
     title, subtitle = _title(view.kernel), _subtitle(view.kernel)
     with new_page(height, title, subtitle, _notes(view)) as (figure, below):
@@ -90,7 +90,7 @@ def _title(kernel: SeparableKernel) -> str:
 
 
 def _subtitle(kernel: SeparableKernel) -> str:
-    """Say which pixels it is on, and what it was made from."""
+    """Return text about the pixels and the origin of the kernel."""
     meta = kernel.meta
     parts = [f"{kernel.pixels} x {kernel.pixels} pixels of {kernel.mm_per_pixel:.4g} mm"]
     if method := meta.get("profile_method"):
@@ -120,7 +120,7 @@ def _percent(share: float) -> str:
 
 
 def _term_labels(view: KernelView) -> list[str]:
-    """Name each term with its sign, or the signs of the channels where they differ."""
+    """Name each term with its sign, or with the signs of the channels if they differ."""
     kernel = view.kernel
     labels = []
     for t in range(kernel.rank):
@@ -134,7 +134,7 @@ def _term_labels(view: KernelView) -> list[str]:
 
 
 def _term_style(term: int, terms: int) -> Style:
-    """Colour and dashes of a term: told apart without colour as well."""
+    """Return colour and dashes of a term, distinguishable without colour too."""
     # The last tenth of viridis is too light on white.
     colour = mpl.colormaps["viridis"](0.9 * term / (terms - 1)) if terms > 1 else COLOURS[2]
     width = LINE_WIDTH if terms <= len(LINE_STYLES) else 0.8
@@ -142,14 +142,14 @@ def _term_style(term: int, terms: int) -> Style:
 
 
 def _draw_passes(upper: SubFigure, view: KernelView) -> None:
-    """Draw each channel's passes in a panel of its own, on scales that all share."""
+    """Draw each channel's passes in its own panel, on shared scales."""
     kernel = view.kernel
     half = kernel.weights[:, kernel.half_pixels :][:, :, view.channels] / kernel.mm_per_pixel
     edges = _edges(kernel.half_pixels, kernel.mm_per_pixel)
     panels = upper.subplots(1, len(view.channels), sharex=True, sharey=True, squeeze=False)[0]
     for k, c in enumerate(view.channels):
         axes = panels[k]
-        # Scales first: a channel without light has nothing that a logarithmic one could fit.
+        # Set the scales first, because a channel without light has no value for a logarithmic one.
         _scale_distance(axes, edges)
         _scale_passes(axes, half)
         for t in range(kernel.rank):
@@ -161,7 +161,7 @@ def _draw_passes(upper: SubFigure, view: KernelView) -> None:
 
 
 def _scale_passes(axes: Axes, values: FloatArray) -> None:
-    """Scale weights logarithmically, on either side of 0 where there are some on either side."""
+    """Scale weights logarithmically, on both sides of 0 if there are negative ones."""
     most = float(np.abs(values).max()) or 1.0
     least = most * 10.0**-_PASS_DECADES
     if values.min() >= 0.0:
@@ -205,7 +205,7 @@ def _scale_distance(axes: Axes, edges: FloatArray) -> None:
 
 
 def _image_norm(view: KernelView) -> LogNorm:
-    """One scale for all planes: five decades down from the largest."""
+    """Return one scale for all planes: five decades down from the largest value."""
     most = max(float(each.max()) for each in (view.image, _or_zero(view.true_image))) or 1.0
     return LogNorm(most * 10.0**-_IMAGE_DECADES, most)
 
@@ -215,7 +215,7 @@ def _or_zero(values: FloatArray | None) -> FloatArray:
 
 
 def _draw_planes(lower: SubFigure, view: KernelView) -> None:
-    """Draw a row for each channel: its planes and slices; and the bars of colour under them."""
+    """Draw a row for each channel, with its planes and slices, and the colour bars under them."""
     planes = list(_planes(view))
     norms = _image_norm(view), signed_norm(_or_zero(view.difference), _DIFFERENCE_DECADES)
     rows, widths = len(view.channels), [*[1.0] * len(planes), _WIDTHS - len(planes)]
@@ -238,10 +238,10 @@ def _draw_planes(lower: SubFigure, view: KernelView) -> None:
 
 
 def _draw_plane(axes: Axes, image: FloatArray, half_mm: float, norm: Normalize) -> None:
-    """Draw a quadrant's whole plane, its numbers left to the first column."""
+    """Draw the whole plane of a quadrant, with tick labels in the first column only."""
     if isinstance(norm, LogNorm):
         image = _clamped_to_scale(image, norm)
-    axes.set_facecolor("#bbbbbb")  # seen where the logarithm has no value
+    axes.set_facecolor("#bbbbbb")  # shown where the logarithm has no value
     draw_plane(axes, image, half_mm, norm, _shades(norm))
     for axis in (axes.xaxis, axes.yaxis):
         axis.set_major_locator(FixedLocator([-_round(half_mm), 0.0, _round(half_mm)]))
@@ -254,12 +254,12 @@ def _shades(norm: Normalize) -> str:
 
 
 def _clamped_to_scale(image: FloatArray, norm: LogNorm) -> FloatArray:
-    """Bring what is below a scale, but above 0, to its darkest shade; the rest is grey."""
+    """Clip values above 0 to the darkest shade of a scale; the rest is grey."""
     return np.where(image > 0.0, np.maximum(image, norm.vmin or 0.0), 0.0)
 
 
 def _planes(view: KernelView) -> Iterator[tuple[str, FloatArray, bool]]:
-    """Yield title, images (K, m+1, m+1), and whether they have a sign."""
+    """Yield title, images (K, m+1, m+1), and whether they are signed."""
     if view.true_image is not None:
         yield "profile", view.true_image, False
     yield "kernel", view.image, False
@@ -268,12 +268,12 @@ def _planes(view: KernelView) -> Iterator[tuple[str, FloatArray, bool]]:
 
 
 def _half_mm(view: KernelView) -> float:
-    """Distance from the middle to the rim of the images [mm]."""
+    """Return the distance from the middle to the rim of the images [mm]."""
     return (len(view.image[0]) - 0.5) * view.block * view.kernel.mm_per_pixel
 
 
 def _round(half_mm: float) -> float:
-    """Return the largest 1, 2 or 5 times a power of ten whose number stays clear of the rim."""
+    """Return the largest 1, 2 or 5 times a power of ten whose label fits inside the rim."""
     most = 0.75 * half_mm
     power = 10.0 ** math.floor(math.log10(most))
     return max(each * power for each in (1.0, 2.0, 5.0) if each * power <= most)
@@ -302,7 +302,7 @@ def _draw_slices(axes: Axes, view: KernelView, row: int) -> None:
 
 
 def _scale_slices(axes: Axes, view: KernelView) -> None:
-    """Scale both axes logarithmically, alike for all channels."""
+    """Scale both axes logarithmically, equally for all channels."""
     kernel = view.kernel
     _scale_distance(axes, _edges(kernel.half_pixels, math.sqrt(2.0) * kernel.mm_per_pixel))
     axes.set_xlim(left=_MIDDLE * kernel.mm_per_pixel)
@@ -314,7 +314,7 @@ def _scale_slices(axes: Axes, view: KernelView) -> None:
 
 
 def _draw_steps(axes: Axes, values: FloatArray, edges: FloatArray, style: Style) -> None:
-    """Draw what is above 0 as steps from pixel to pixel."""
+    """Draw values above 0 as steps from pixel to pixel."""
     positive = np.where(values > 0.0, values, np.nan)
     axes.stairs(positive, edges, baseline=None, snap=False, **style)
 
@@ -325,7 +325,7 @@ def _draw_bars(
     is_signed: list[bool],
     norms: tuple[LogNorm, SymLogNorm],
 ) -> None:
-    """Explain the colours of the images, under them."""
+    """Draw the colour bars of the images, under them."""
     plain = is_signed.count(False)
     bar = _bar(lower, panels[:, :plain], norms[0], "energy per mm²", extend="min")
     bar.ax.xaxis.set_major_locator(LogLocator(numticks=4))
@@ -340,12 +340,13 @@ def _bar(
 ) -> Colorbar:
     shades = ScalarMappable(norm, _shades(norm))
     bar = lower.colorbar(shades, ax=beside, location="bottom", pad=0.03, aspect=20, **style)
-    bar.set_label(label, loc="left")  # a narrow one's runs on to the right, where nothing is
+    # That of a narrow bar extends to the right, where there is room.
+    bar.set_label(label, loc="left")
     return bar
 
 
 def _notes(view: KernelView) -> list[str]:
-    """Say what is drawn, and how to read it."""
+    """Return the notes on the panels."""
     kernel = view.kernel
     scaled = "" if np.all(kernel.scale == 1.0) else "scale times the "
     notes = [

@@ -22,10 +22,10 @@ from sssfit.chart.text import shortened, spread
 from sssfit.material import Layer, Material
 
 HEIGHT_INCHES = 3.9
-_LETTERS = 20  # of channels' names that stand beside each other under a panel
-_MOST_NAMES = 12  # that stand upright there
+_LETTERS = 20  # letters of channel names that fit side by side under a panel
+_MOST_NAMES = 12  # number of names that fit there upright
 _MOST_LAYERS = 6
-_FEW_CHANNELS = 4  # that many are points, more are lines through them
+_FEW_CHANNELS = 4  # up to this many channels are points, more are lines
 _MARKERS = "os^Dv<"
 _SHADES = (*COLOURS, "#cc79a7", "#444444", "#e69f00")
 
@@ -36,15 +36,15 @@ def material_figure(material: Material) -> Figure:
     Parameters
     ----------
     material : Material
-        Of more than six layers the first, the last and some between are drawn; clear ones, which
-        have nothing to draw, are left out.
+        Of more than six layers the first, the last and some between are drawn; clear ones are
+        omitted.
 
     Returns
     -------
     matplotlib.figure.Figure
-        8 inches wide, a point a channel and layer, on logarithmic scales: sigma_a and the reduced
-        sigma_s [1/mm], the reduced mean free path [mm], and 1 - albedo, the share that a collision
-        absorbs: albedos near 1 differ much in what they do, and little in themselves.
+        8 inches wide, with a point per channel and layer, on logarithmic scales: sigma_a and the
+        reduced sigma_s [1/mm], the reduced mean free path [mm], and 1 - albedo, the share that a
+        collision absorbs, because albedos near 1 look alike and differ much in effect.
     """
     matter = [k for k, layer in enumerate(material.layers) if not layer.is_clear]
     shown = [matter[k] for k in spread(len(matter), _MOST_LAYERS)]
@@ -70,7 +70,7 @@ def material_figure(material: Material) -> Figure:
 
 
 def _subtitle(material: Material) -> str:
-    """Say what the material is."""
+    """Return text about the material."""
     count = len(material.layers)
     is_deep = math.isinf(material.layers[-1].thickness_mm)
     end = "half space" if is_deep and count == 1 else "half space below" if is_deep else "slab"
@@ -81,14 +81,14 @@ def _subtitle(material: Material) -> str:
 
 
 def _label(material: Material, index: int) -> str:
-    """Name a layer by its place, thickness and refractive index."""
+    """Name a layer by its index, thickness and refractive index."""
     layer = material.layers[index]
     thickness = "semi-infinite" if math.isinf(layer.thickness_mm) else f"{layer.thickness_mm:g} mm"
     return f"layer {index + 1}: {thickness}, eta {layer.eta:g}"
 
 
 def _style(place: int) -> Style:
-    """Colour, marker and dashes of a layer: told apart without colour as well."""
+    """Return colour, marker and dashes of a layer, distinguishable without colour too."""
     return {
         "color": _SHADES[place],
         "marker": _MARKERS[place],
@@ -119,12 +119,12 @@ def _draw_layer(panels: Sequence[Axes], layer: Layer, place: int) -> None:
 
 
 def _are_upright(names: Sequence[str]) -> bool:
-    """Whether names have no room beside each other under a panel."""
+    """Return whether names do not fit side by side under a panel."""
     return sum(map(len, names)) > _LETTERS
 
 
 def _name_channels(axes: Axes, names: Sequence[str]) -> None:
-    """Name the channels beside each other, or up to twelve of them upright."""
+    """Label the channels side by side, or up to twelve of them upright."""
     is_upright = _are_upright(names)
     shown = spread(len(names), _MOST_NAMES) if is_upright else range(len(names))
     rotation = 90 if is_upright else 0
@@ -133,7 +133,7 @@ def _name_channels(axes: Axes, names: Sequence[str]) -> None:
 
 
 def _limit(axes: Axes) -> None:
-    """Set the limits of a logarithmic axis, a decade apart at least."""
+    """Set the limits of a logarithmic axis, at least a decade apart."""
     values = np.concatenate([np.asarray(line.get_ydata()) for line in axes.lines])
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if values.size else (0.1, 1.0)
@@ -144,7 +144,7 @@ def _limit(axes: Axes) -> None:
 
 
 def _notes(material: Material, shown: Sequence[int]) -> list[str]:
-    """Say what the panels mean and what is not in them."""
+    """Return the notes on the panels and on omitted layers."""
     notes = [
         "sigma_s' = (1 - g) sigma_s. Mean free path: 1 / (sigma_a + sigma_s'). Albedo: sigma_s / "
         "(sigma_a + sigma_s). What is 0 has no point."

@@ -1,7 +1,7 @@
 """Profile models against the exact solution, as a figure: `models_figure`.
 
-Above, what each method says of 2 pi r R_d; below, its error; a column a channel. The record comes
-from ``sssfit.compare.models``, which has computed everything.
+The upper panels show 2 pi r R_d by each method, the lower ones its error, with one column per
+channel. ``sssfit.compare.models`` computes the record.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ if TYPE_CHECKING:
 
 HEIGHT_INCHES = 6.6
 _MOST_COLUMNS = 3
-_DECADES = 5  # of 2 pi r R_d that are drawn at most
+_DECADES = 5  # most decades of 2 pi r R_d that are drawn
 _LINEAR_PERCENT, _LEAST_PERCENT, _MOST_PERCENT = 10.0, -100.0, 1000.0
 _TICKS_PERCENT = (-100, -10, 0, 10, 100, 1000)
 _MINUS = "\N{MINUS SIGN}"
 
-# Black, and of Okabe and Ito 2008: sky blue, vermillion, blue, bluish green; dashes tell them apart
-# without colour.
+# Black, and of Okabe and Ito 2008: sky blue, vermillion, blue, bluish green; dashes distinguish
+# them without colour.
 _STYLES: dict[str, Style] = {
     "exact": {"color": "#000000", "linestyle": "-", "lw": 1.3},
     "montecarlo": {"color": "#56b4e9", "linestyle": "-", "lw": 0.8},
@@ -45,7 +45,7 @@ _BAND_ALPHA = 0.45
 
 
 def models_figure(comparison: ModelComparison) -> Figure:
-    """Draw what every method says of one material, and how far that is from the exact solution.
+    """Draw a material by every method, and the error of each compared with the exact solution.
 
     Parameters
     ----------
@@ -55,8 +55,9 @@ def models_figure(comparison: ModelComparison) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        8 x 6.6 inches, a column a channel: 2 pi r R_d [1/mm] over r [mm], and the relative error
-        [%] below, linear to 10 % and logarithmic beyond; totals and their errors in the legend.
+        8 x 6.6 inches, one column per channel: 2 pi r R_d [1/mm] over r [mm], and the relative
+        error [%] below, linear to 10 % and logarithmic beyond; totals and their errors in the
+        legend.
     """
     shown = spread(comparison.material.n_channels, _MOST_COLUMNS)
     title, subtitle = _title(comparison), _subtitle(comparison)
@@ -79,7 +80,7 @@ def models_figure(comparison: ModelComparison) -> Figure:
 def _table(
     comparison: ModelComparison, shown: Sequence[int]
 ) -> tuple[list[str], list[tuple[str, list[str]]], list[Handle]]:
-    """Heads, a row for each method with its totals, and its line or, of the walk, its band."""
+    """Return heads, a row for each method with its totals, and its line or the walk's band."""
     channels = [_channel_name(comparison, each) for each in shown]
     rows = [
         (method_name(curve.method), [_total_with_error(curve, each) for each in shown])
@@ -90,7 +91,7 @@ def _table(
 
 
 def _handle(method: str) -> Handle:
-    """Return a method's line, of the walk with its band."""
+    """Return the line of a method, for the walk with its band."""
     line = Line2D([], [], **_STYLES[method])
     if method != "montecarlo":
         return line
@@ -98,7 +99,7 @@ def _handle(method: str) -> Handle:
 
 
 def _draw_densities(axes: Axes, comparison: ModelComparison, channel: int) -> None:
-    """2 pi r R_d of every method, the exact one on top of the walk's band."""
+    """Draw 2 pi r R_d of every method, the exact one on top of the walk's band."""
     edges_mm = comparison.edges_mm[channel]
     widths_mm = np.diff(edges_mm)
     for curve in _back_to_front(comparison):
@@ -109,7 +110,7 @@ def _draw_densities(axes: Axes, comparison: ModelComparison, channel: int) -> No
 
 
 def _draw_errors(axes: Axes, comparison: ModelComparison, channel: int) -> None:
-    """Error of every method against the exact one, in percent."""
+    """Draw the error of every method compared with the exact one, in percent."""
     edges_mm = comparison.edges_mm[channel]
     for curve in _back_to_front(comparison):
         error = 100 * curve.relative_error[channel]
@@ -121,7 +122,7 @@ def _draw_errors(axes: Axes, comparison: ModelComparison, channel: int) -> None:
 
 
 def _back_to_front(comparison: ModelComparison) -> list[ModelCurve]:
-    """Put the walk first, with its wide band, and the exact solution on top of all."""
+    """Return the drawing order: the walk with its band first, the exact solution last."""
     return [comparison.walk, *comparison.curves[2:], comparison.exact]
 
 
@@ -131,7 +132,7 @@ def _draw_curve(
     """Draw a line through the middles of the bins; the walk as steps with a band."""
     style = _STYLES[curve.method]
     if edges_mm.size < 2:
-        return  # the walk has too few photons, as the title says
+        return  # the walk has too few photons; the title says so
     if curve.method != "montecarlo":
         axes.plot(0.5 * (edges_mm[1:] + edges_mm[:-1]), mean, **style)
         return
@@ -174,23 +175,23 @@ def _limit(panels: npt.NDArray[Any], comparison: ModelComparison, shown: Sequenc
 
 
 def _signed(value: float, _: int) -> str:
-    """Write a tick with its sign, 0 without."""
+    """Return the label of a tick with its sign; 0 has none."""
     return f"{value:+g}".replace("-", _MINUS) if value else "0"
 
 
 def _title(comparison: ModelComparison) -> str:
-    """Name the material and the reference of the models."""
+    """Return the title with the material and the reference of the models."""
     truth = "isotropic scattering" if _is_similar(comparison) else "the exact solution"
     return f"{shortened(comparison.material.name, 20)}: models against {truth}"
 
 
 def _is_similar(comparison: ModelComparison) -> bool:
-    """Whether the exact solution is that of the similar isotropic medium: g is not 0."""
+    """Return whether the exact solution is for the similar isotropic medium (g is not 0)."""
     return bool(comparison.exact.profile.meta["settings"].get("similarity"))
 
 
 def _subtitle(comparison: ModelComparison) -> str:
-    """Say how the two profiles that need it were made, and on what grid."""
+    """Return text about the walk, the exact solution and their grid."""
     exact, walk = comparison.exact.profile, comparison.walk.profile
     reached = 100.0 * float(exact.meta["relative_error"] or 0.0)
     what = "Isotropic" if _is_similar(comparison) else "Exact"
@@ -201,14 +202,14 @@ def _subtitle(comparison: ModelComparison) -> str:
 
 
 def _channel_name(comparison: ModelComparison, channel: int) -> str:
-    """Name a channel."""
+    """Return the name of a channel."""
     return shortened(comparison.material.channels[channel])
 
 
 def _panel_title(comparison: ModelComparison, channel: int) -> str:
-    """Name a channel, with albedo and mean free path, or why nothing is drawn."""
+    """Return a channel's name with albedo and mean free path, or why it is empty."""
     name, layer = _channel_name(comparison, channel), comparison.material.layers[0]
-    apart = " · " if len(name) <= 4 else "\n"  # a longer one leaves too little room beside it
+    apart = " · " if len(name) <= 4 else "\n"  # a longer one leaves too little room for the rest
     if comparison.edges_mm[channel].size < 2:
         return f"{name}{apart}too few photons to draw"
     albedo, path_mm = layer.albedo[channel], layer.mean_free_path_mm[channel]
@@ -216,7 +217,7 @@ def _panel_title(comparison: ModelComparison, channel: int) -> str:
 
 
 def _total_with_error(curve: ModelCurve, channel: int) -> str:
-    """Total diffuse reflectance, and how far it is from the exact one."""
+    """Return the total diffuse reflectance and its error compared with the exact one."""
     total = float(curve.profile.diffuse_reflectance[channel])
     error = 100.0 * float(curve.total_error[channel])
     if curve.method == "exact" or math.isnan(error):
@@ -231,7 +232,7 @@ def _total_with_error(curve: ModelCurve, channel: int) -> str:
 
 
 def _notes(comparison: ModelComparison, shown: Sequence[int]) -> list[str]:
-    """Say what the curves are means over, what the band is, and what is left out."""
+    """Return the notes on the bins, the band and omitted parts."""
     notes = [
         "Means over annuli merged until the walk has 100 effective photons in each; curves end "
         "where it has too few. Band: ±1 standard error of the walk. Errors: linear within ±10 % "

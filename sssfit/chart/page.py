@@ -1,6 +1,6 @@
-"""The page a chart stands on: style, title, legend or table, notes, axes with their names.
+"""The page of a chart: style, title, legend or table, notes, axes with their labels.
 
-What every figure of ``sssfit.chart`` is drawn with; the words are in ``sssfit.chart.text``.
+All figures of ``sssfit.chart`` use this module; ``sssfit.chart.text`` has the words.
 """
 
 import contextlib
@@ -30,10 +30,10 @@ from sssfit.chart.files import MAKER, chart_format, known_format
 from sssfit.files import write_atomically
 
 Style = dict[str, Any]
-Handle = Artist | tuple[Artist, ...]  # what stands in a legend: drawn over each other, if several
+Handle = Artist | tuple[Artist, ...]  # a legend's handle; several are drawn over each other
 
 WIDTH_INCHES, MARGIN_INCHES, DPI = 8.0, 0.1, 200  # 1600 pixels wide
-FONT = "DejaVu Sans"  # comes with matplotlib: the same glyphs on every machine
+FONT = "DejaVu Sans"  # ships with matplotlib, so the glyphs are the same on every machine
 LINE_WIDTH = 1.1  # points
 RC: Style = {
     "font.family": [FONT],
@@ -69,7 +69,7 @@ NOTE_SIZE, NOTE_COLOUR = 7.5, "#444444"
 
 @contextlib.contextmanager
 def chart_style() -> Iterator[None]:
-    """Matplotlib's defaults and ours on top, independent of the user's matplotlibrc."""
+    """Use matplotlib's defaults with ours on top, independent of the user's matplotlibrc."""
     kept = {"backend", "backend_fallback", "interactive", "toolbar", "timezone"}
     defaults = {key: value for key, value in mpl.rcParamsDefault.items() if key not in kept}
     with mpl.rc_context(cast(Any, defaults | RC)):
@@ -77,7 +77,7 @@ def chart_style() -> Iterator[None]:
 
 
 class _Page(Figure):
-    """A figure that a notebook shows as it is written, without a backend of matplotlib's."""
+    """A figure that a notebook shows as it is written, without a backend of matplotlib."""
 
     def _repr_png_(self) -> bytes:
         stream = io.BytesIO()
@@ -89,11 +89,11 @@ class _Page(Figure):
 def new_page(
     height_inches: float, title: str, subtitle: str, notes: Sequence[str] = ()
 ) -> Iterator[tuple[Figure, SubFigure]]:
-    """Make a page, 8 inches wide, with its title and provenance at the head and notes at the foot.
+    """Make a page, 8 inches wide, with title and provenance at the top and notes at the bottom.
 
-    Yields the figure, and what is left of it for `add_legend`, `add_table` and panels. Each takes
-    the head of a subfigure and leaves the rest: matplotlib lets nothing else share that place. When
-    all is drawn, `lay_out` gives everything its place.
+    Yields the figure, and the remaining subfigure for `add_legend`, `add_table` and panels. Each
+    takes the top of a subfigure and returns the rest, because matplotlib lets nothing else share
+    that area. After drawing, `lay_out` computes the layout.
     """
     with chart_style():
         figure = _empty_page(height_inches)
@@ -119,14 +119,14 @@ def _empty_page(height_inches: float) -> Figure:
 
 
 def _rest(figure: Figure | SubFigure) -> SubFigure:
-    """Return what the title, notes and legends of a figure leave of it."""
+    """Return the part of a figure without title, notes and legends."""
     return cast(SubFigure, figure.subfigures())
 
 
 def add_legend(
     below: SubFigure, handles: Sequence[Handle], labels: Sequence[str], *, title: str = ""
 ) -> SubFigure:
-    """Explain handles at the head of a subfigure, in as many columns as fit; return the rest."""
+    """Draw a legend at the top of a subfigure, in as many columns as fit; return the rest."""
     room = (WIDTH_INCHES - 2 * MARGIN_INCHES) * DPI
     for columns in range(min(5, len(handles)), 0, -1):
         legend = _draw_legend(below, handles, labels, columns, title=title or None)
@@ -142,9 +142,9 @@ def add_table(
     rows: Sequence[tuple[str, Sequence[str]]],
     handles: Sequence[Handle] = (),
 ) -> SubFigure:
-    """Tabulate rows of a name and figures at the head of a subfigure; return the rest.
+    """Draw a table of names and figures at the top of a subfigure; return the rest.
 
-    A row's handle stands before its name; ``heads`` begin with that of the names.
+    A row's handle precedes its name; ``heads`` begin with that of the names.
     """
     blank = _Blank()
     cells = list(zip(heads, *([name, *figures] for name, figures in rows), strict=True))
@@ -159,17 +159,17 @@ def add_table(
 
 
 class _Blank(Line2D):
-    """The handle of a cell that has none."""
+    """The handle of a cell without one."""
 
     def __init__(self) -> None:
         super().__init__([], [])
 
 
 class _NoRoom(HandlerBase):
-    """Gives a blank handle no room."""
+    """Gives a blank handle no width."""
 
     def legend_artist(self, *given: Any) -> Artist:
-        """Set the width of the handle's box, which comes last, to 0."""
+        """Set the width of the handle's box, the last one, to 0."""
         _, orig_handle, _, handlebox = given
         handlebox.width = 0.0
         return cast(Artist, orig_handle)
@@ -183,7 +183,7 @@ def _draw_legend(
     **style: Any,
 ) -> Legend:
     legend = below.legend(
-        cast(Sequence[Artist], handles),  # matplotlib's stubs know of no tuples
+        cast(Sequence[Artist], handles),  # matplotlib's stubs do not know tuples
         [drawable(each) for each in labels],
         ncols=columns,
         loc="outside upper left",
@@ -205,20 +205,20 @@ def _font() -> FT2Font:
 
 
 def drawable(text: str) -> str:
-    """Replace what the font has no glyph for, and keep dollars from opening a formula."""
+    """Replace characters that the font lacks, and escape dollars, which would start a formula."""
     font = _font()
     known = "".join(c if c == "\n" or font.get_char_index(ord(c)) else "?" for c in text)
     return known.replace("$", r"\$")
 
 
 def tick(axis: Axis) -> None:
-    """Tick a linear axis at round numbers, written plainly."""
+    """Tick a linear axis at round numbers, in plain notation."""
     axis.set_major_locator(MaxNLocator(7, steps=[1, 2, 2.5, 5, 10]))
     axis.set_major_formatter(StrMethodFormatter("{x:g}"))
 
 
 def tick_decades(axis: Axis, most: int) -> None:
-    """Tick powers of ten; 2 and 5 have numbers too where an axis with limits is short."""
+    """Tick powers of ten, and label 2 and 5 too if an axis with limits is short."""
     axis.set_major_locator(LogLocator(numticks=most))
     axis.set_minor_locator(LogLocator(subs=(2, 5)))
     low, high = axis.get_view_interval()
@@ -233,9 +233,9 @@ def name_axes(axes: Axes, title: str, x_label: str, y_label: str) -> None:
 
 
 def lay_out(figure: Figure) -> None:
-    """Give everything its place, once, so that the same figure has the same bytes.
+    """Compute the layout once, so that the same figure has the same bytes.
 
-    Places differ by a rounding (2e-16) from run to run, and SVG names clips by a hash of them.
+    Positions differ by rounding (2e-16) from run to run, and SVG names clips by a hash of them.
     """
     engine = figure.get_layout_engine()
     if not isinstance(engine, ConstrainedLayoutEngine):
@@ -252,19 +252,19 @@ def lay_out(figure: Figure) -> None:
 def save_figure(
     figure: Figure, target: str | Path | BinaryIO, *, format: str | None = None
 ) -> None:
-    """Write a figure as PNG, SVG or PDF, whole or not at all; same figure, same bytes.
+    """Write a figure as PNG, SVG or PDF, completely or not at all; same figure, same bytes.
 
     Parameters
     ----------
     figure : Figure
     target : path or binary stream
     format : str, optional
-        "png", "svg" or "pdf"; by default what the path's ending says.
+        "png", "svg" or "pdf"; by default from the path's ending.
 
     Raises
     ------
     FileError
-        Another format, or the file cannot be written.
+        The format is unknown, or the file cannot be written.
     """
     chosen = chart_format(target) if format is None else known_format(format, f"format {format!r}")
     if isinstance(target, str | Path):
@@ -274,7 +274,7 @@ def save_figure(
 
 
 def _print(figure: Figure, stream: BinaryIO, chosen: str) -> None:
-    # Level 8 takes 0.2 s more than the default and 5 % off a PNG's 310 kB.
+    # Level 8 takes 0.2 s more than the default and saves 5 % of a PNG's 310 kB.
     settings: dict[str, Style] = {
         "png": {"pil_kwargs": {"compress_level": 8}, "metadata": {"Software": MAKER}},
         "svg": {"metadata": {"Creator": MAKER, "Date": None}},

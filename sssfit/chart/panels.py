@@ -1,4 +1,4 @@
-"""Pictures in a mosaic, planes of kernels and differences, with their scales of colour."""
+"""Pictures in a mosaic, planes of kernels and differences, with their colour scales."""
 
 import math
 from typing import Any
@@ -14,10 +14,10 @@ from matplotlib.ticker import MaxNLocator
 from sssfit.arrays import FloatArray
 from sssfit.profile import full_kernel
 
-# Red where there is too much light, blue where too little: told apart by the colour blind too.
+# Red where there is too much light, blue where too little, safe for colour blindness.
 _SHADES = "RdBu_r"
-_LIGHTEST = 100.0  # of CIE L*: a difference amplified once goes from black to white
-_DECADES = 5  # of energies per pixel, on either side of what is drawn linearly
+_LIGHTEST = 100.0  # range of CIE L*: an amplified difference of this size goes from black to white
+_DECADES = 5  # decades of energies per pixel, on either side of the linear part
 
 
 def new_mosaic(below: SubFigure, width: float, height: float) -> Axes:
@@ -32,19 +32,19 @@ def new_mosaic(below: SubFigure, width: float, height: float) -> Axes:
 
 
 def put_picture(axes: Axes, x: float, y: float, picture: FloatArray) -> None:
-    """Put sRGB codes (H, W, 3) there, their upper left corner at (x, y)."""
+    """Draw sRGB codes (H, W, 3) with the upper left corner at (x, y)."""
     _put(axes, x, y, np.clip(picture, 0.0, 1.0))
 
 
 def put_difference(
     axes: Axes, x: float, y: float, difference: FloatArray, amplified: float
 ) -> None:
-    """Put a difference (H, W) of lightness there, white where it is 0."""
+    """Draw a difference (H, W) of lightness, white where it is 0."""
     _put(axes, x, y, difference, norm=_norm(amplified), cmap=_SHADES)
 
 
 def draw_bar(below: SubFigure, axes: Axes, amplified: float, label: str) -> None:
-    """Explain the colours of differences, under a mosaic."""
+    """Draw the colour bar of differences, under a mosaic."""
     most = _LIGHTEST / amplified
     below.colorbar(
         ScalarMappable(_norm(amplified), _SHADES),
@@ -55,7 +55,7 @@ def draw_bar(below: SubFigure, axes: Axes, amplified: float, label: str) -> None
         format="{x:g}",
         shrink=0.4,
         aspect=35,
-        pad=0.1 / axes.get_ylim()[0],  # of the mosaic's height: a tenth of a picture
+        pad=0.1 / axes.get_ylim()[0],  # share of the mosaic's height: a tenth of a picture
     )
 
 
@@ -71,7 +71,7 @@ def _norm(amplified: float) -> Normalize:
 def draw_plane(
     axes: Axes, quadrant: FloatArray, half_mm: float, norm: Normalize, shades: str
 ) -> None:
-    """Show the whole plane of a quadrant, which reaches so far from the middle to its rim."""
+    """Draw the whole plane of a quadrant with this half width."""
     extent = (-half_mm, half_mm, -half_mm, half_mm)
     axes.imshow(
         full_kernel(quadrant), norm=norm, cmap=shades, extent=extent, interpolation="nearest"
@@ -82,14 +82,14 @@ def draw_plane(
 
 
 def signed_norm(values: FloatArray, decades: int = _DECADES) -> SymLogNorm:
-    """Scale values of either sign: linear about 0, then the decades up to the largest."""
+    """Return a scale for signed values: linear around 0, then decades up to the largest."""
     most = float(np.abs(values).max()) or 1.0
     linear = 10.0 ** (math.floor(math.log10(most)) - decades)
     return SymLogNorm(linear, vmin=-most, vmax=most, base=10)
 
 
 def tick_powers(bar: Colorbar, norm: SymLogNorm) -> None:
-    """Write 0 and powers of ten: the largest on either side, one more above 0."""
+    """Label 0 and powers of ten: the largest on either side, one more above 0."""
     linear, most = round(math.log10(norm.linthresh)), math.floor(math.log10(norm.vmax or 1.0))
     middle = linear + (most - linear) // 2
     bar.set_ticks([-(10.0**most), 0.0, 10.0**middle, 10.0**most])

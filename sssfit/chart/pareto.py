@@ -1,6 +1,6 @@
 """Speed against accuracy of kernels, as a figure: `pareto_figure`.
 
-The record comes from ``sssfit.compare.pareto``, which has computed everything.
+``sssfit.compare.pareto`` computes the record.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from sssfit.compare.comparison import Comparison, KernelRow, Picture
 
 
-_HEAD_INCHES, _PANEL_INCHES = 1.9, 2.3  # of title, legend and notes; of a panel
-# Those of `COLOURS` and four more of Okabe and Ito, which the colour-blind tell apart too.
+_HEAD_INCHES, _PANEL_INCHES = 1.9, 2.3  # heights of title, legend and notes; of a panel
+# Those of `COLOURS` and four more of Okabe and Ito, safe for colour blindness.
 _METHODS: dict[str, tuple[str, str, str]] = {
     "svd": ("SVD", COLOURS[2], "o"),
     "gaussians": ("sum of Gaussians", COLOURS[0], "s"),
@@ -45,12 +45,12 @@ _METHODS: dict[str, tuple[str, str, str]] = {
 _GREY = "#666666"
 _FAINT = 0.35
 _MOST_TICKS = 8
-_LANE = 0.014  # of the panel's width, between points of the same cost
-_FARTHEST = 8  # lines down that a label is moved at most
+_LANE = 0.014  # share of the panel's width between points of equal cost
+_FARTHEST = 8  # most lines by which a label is moved down
 _JUST_NOTICEABLE = 1.0  # Delta E
 _NOTICED: Style = {"color": _GREY, "lw": 0.8, "ls": (0, (4, 2))}
-_WORTH_A_NOTE = 1e-3  # of the light
-_LEAST = {"delta-e": 1e-3, "l2": 1e-5}  # smaller errors are drawn there
+_WORTH_A_NOTE = 1e-3  # share of the light
+_LEAST = {"delta-e": 1e-3, "l2": 1e-5}  # smaller errors are drawn at this value
 _ERRORS = {"delta-e": "mean ΔE 2000", "l2": "relative L2 error"}
 _COSTS = {
     "passes": "one-dimensional passes over the picture",
@@ -75,12 +75,12 @@ def pareto_figure(
     Returns
     -------
     matplotlib.figure.Figure
-        8 inches wide, 2.3 inches a picture; both axes logarithmic, of all panels the same.
+        8 inches wide, 2.3 inches per picture; both axes logarithmic, the same in all panels.
 
     Raises
     ------
     RenderError
-        Delta E of other than 1 or 3 channels.
+        Delta E is requested for other than 1 or 3 channels.
     """
     from sssfit.compare.comparison import check_error
 
@@ -107,7 +107,7 @@ def pareto_figure(
 
 
 def _handles(comparison: Comparison, error: str) -> list[Line2D]:
-    """Explain the methods that are drawn, and the lines."""
+    """Draw the legend of the methods and lines."""
     handles = [
         *_method_handles(comparison),
         Line2D([], [], color=_GREY, lw=1.0, label="Pareto front"),
@@ -118,7 +118,7 @@ def _handles(comparison: Comparison, error: str) -> list[Line2D]:
 
 
 def _method_handles(comparison: Comparison) -> list[Line2D]:
-    """Return a marker for each method there is, and for kernels that keep the fit's energy."""
+    """Return a marker for each method, and for kernels that keep the fit's energy."""
     drawn = {row.method: row for row in comparison.rows}
     kept = next((row for row in comparison.rows if _is_kept(row)), None)
     handles = [
@@ -135,7 +135,7 @@ def _method_handles(comparison: Comparison) -> list[Line2D]:
 def _draw_panel(
     axes: Axes, comparison: Comparison, picture: Picture, error: str, cost: str
 ) -> None:
-    """Draw one picture's points: the front in full, the others faint."""
+    """Draw one picture's points: the front in full colour, the others faint."""
     rows, front = comparison.rows_of(picture.name), comparison.front(picture.name, error, cost)
     lanes = [0] * len(rows) if cost == "seconds" else _lanes(rows, front, cost)
     low, high = axes.get_xlim()
@@ -161,19 +161,19 @@ def place_labels(
     *,
     level: float | None = None,
 ) -> None:
-    """Write a label below and left of each point of a falling front, where nothing else can be.
+    """Write a label below and left of each point of a falling front, where no other point can be.
 
-    A label that would meet another goes further down, with a line to its point; one that finds no
-    room is left out. Limits and place of the axes have to be final.
+    A label that would overlap another is moved down, with a line to its point; one without room is
+    omitted. Limits and position of the axes must be final.
 
     Parameters
     ----------
     axes : Axes
     points : sequence of (x, y)
-        In data, x rising and y falling.
+        Points in data coordinates, x rising and y falling.
     labels : sequence of str
     level : float, optional
-        A horizontal line in data that labels stay off.
+        A horizontal line in data coordinates that labels avoid.
     """
     panel, pixels = axes.get_window_extent(), axes.transData.transform
     taken = [Bbox([pixel, pixel]).padded(0.045 * axes.figure.dpi) for pixel in map(pixels, points)]
@@ -200,22 +200,22 @@ def place_labels(
 
 
 def _places() -> Iterator[tuple[int, float, str]]:
-    """Yield places by preference: lines down, points to the right, and where the label ends."""
+    """Yield positions by preference: lines down, points to the right, and the label's end."""
     for line in range(_FARTHEST):
         yield from ((line, -2.0, "right"), (line, 0.0, "center"), (line, 2.0, "left"))
 
 
 def _tie(axes: Axes, point: tuple[float, float], box: Bbox) -> None:
-    """Join a point with its label, which is not next to it."""
+    """Connect a point with a distant label."""
     x = min(max(axes.transData.transform(point)[0], box.x0), box.x1)
     end = axes.transData.inverted().transform((x, box.y1))
     axes.plot(*zip(point, end, strict=True), color="#999999", lw=0.5, zorder=2)
 
 
 def _lanes(rows: Sequence[KernelRow], front: Sequence[KernelRow], cost: str) -> list[int]:
-    """Return how far to the right each row stands of its cost, so that equal costs are apart.
+    """Return how far each row is drawn to the right of its cost, to separate equal costs.
 
-    The front stands where its cost is; of the others each method has a lane of its own.
+    The front is drawn at its cost; of the others, each method has its own offset.
     """
     lanes = []
     for row in rows:
@@ -226,18 +226,18 @@ def _lanes(rows: Sequence[KernelRow], front: Sequence[KernelRow], cost: str) -> 
 
 
 def _kind(row: KernelRow) -> tuple[int, bool]:
-    """Order of a row's method in the legend."""
+    """Return the position of a row's method in the legend."""
     known = list(_METHODS)
     return known.index(row.method) if row.method in known else len(known), _is_kept(row)
 
 
 def _is_kept(row: KernelRow) -> bool:
-    """Whether the energy is as the fit left it, and not the profile's."""
+    """Return whether the energy is the fit's and not the profile's."""
     return row.settings.get("energy") == "keep"
 
 
 def _style(row: KernelRow, *, is_kept: bool) -> Style:
-    """Colour and marker of a row's method; hollow where the energy is as the fit left it."""
+    """Return colour and marker of a row's method, hollow if the energy is the fit's."""
     _, colour, marker = _METHODS.get(row.method, (row.method, _GREY, "*"))
     return {
         "color": colour,
@@ -251,12 +251,12 @@ def _style(row: KernelRow, *, is_kept: bool) -> Style:
 
 
 def _point(row: KernelRow, error: str, cost: str) -> tuple[float, float]:
-    """Where a row is drawn; an error too small for the axis at its foot."""
+    """Return the position of a row; errors too small for the axis are at its bottom."""
     return row.cost(cost), max(row.error(error), _LEAST[error])
 
 
 def _limit(axes: Axes, comparison: Comparison, error: str, cost: str) -> None:
-    """Set the axes that all panels share, with room for labels at the left and below."""
+    """Set the shared axes of all panels, with room for labels at the left and below."""
     points = [_point(row, error, cost) for row in comparison.rows]
     costs = [x for x, _ in points]
     errors = [y for _, y in points if math.isfinite(y)] or [1.0]
@@ -279,19 +279,19 @@ def _limit(axes: Axes, comparison: Comparison, error: str, cost: str) -> None:
 
 
 def _title(comparison: Comparison, error: str, cost: str) -> str:
-    """Name the material and the axes."""
+    """Return the title with material and axes."""
     what = f"{_ERRORS[error]} against {'time' if cost == 'seconds' else cost}"
     return titled(comparison.profile, what)
 
 
 def _panel_title(picture: Picture) -> str:
-    """Name the picture, its size and how bright it is looked at."""
+    """Return the picture's name, size and exposure."""
     size = f"{picture.width} × {picture.height} pixels"  # noqa: RUF001 (a product)
     return f"{shortened(picture.name, 24)}, {size}, exposure {picture.exposure:.3g}"
 
 
 def _notes(comparison: Comparison, error: str, cost: str) -> list[str]:
-    """Say what errors and costs are, and who is not drawn."""
+    """Return the notes on errors, costs and omitted kernels."""
     first = {
         "delta-e": "ΔE 2000 of the picture by the kernel against that by the profile's whole 2D "
         "kernel, in sRGB at the exposure.",

@@ -1,4 +1,4 @@
-"""A profile drawn as the plots of "Separable Subsurface Scattering", Jimenez et al. 2015.
+"""A profile drawn like the plots of "Separable Subsurface Scattering", Jimenez et al. 2015.
 
 Supplement G: 2 pi r R_d linear and logarithmic, R_d against mean free paths, and the 2D profile.
 """
@@ -30,7 +30,7 @@ from sssfit.profile.bins import Bins, mean_free_paths_mm, merged
 
 HEIGHT_INCHES = 6.0
 _UNWEIGHTED = r"$R_d$ (1/mm²)"
-_DECADES = 10  # most of a log axis: a profile without noise would go on to underflow
+_DECADES = 10  # most decades of a log axis: a profile without noise would continue to underflow
 _GREY_DECADES = 6
 _LINEAR_SHARE = 0.995
 
@@ -41,14 +41,14 @@ def profile_figure(profile: Profile) -> Figure:
     Parameters
     ----------
     profile : Profile
-        Of any method; error bands and merged annuli only where it has photons.
+        A profile of any method; error bands and merged annuli only if it has photons.
 
     Returns
     -------
     matplotlib.figure.Figure
         8 x 6 inches; 2 pi r R_d [1/mm] over r [mm], linear and logarithmic; R_d [1/mm^2] over r in
-        mean free paths (in mm where the material is unknown); R_d(x, y) over mm, in colour for
-        three channels, else the first channel in shades of grey.
+        mean free paths (in mm if the material is unknown); R_d(x, y) over mm, in colour for three
+        channels, else the first channel in shades of grey.
     """
     bins = [merged(profile, channel) for channel in range(profile.n_channels)]
     shown = picture(profile, bins)
@@ -68,7 +68,7 @@ def profile_figure(profile: Profile) -> Figure:
 
 
 def _draw_legend(below: SubFigure, profile: Profile, bins: list[Bins]) -> SubFigure:
-    """Name channels and their totals; return what is left for panels."""
+    """Draw the legend with channels and totals; return the rest for panels."""
     shown = words.in_legend(profile.n_channels)
     handles = [Line2D([], [], **_line_style(k, profile.n_channels)) for k in shown]
     labels = [words.channel_label(profile, k, is_drawn=bool(bins[k].is_drawn.any())) for k in shown]
@@ -76,7 +76,7 @@ def _draw_legend(below: SubFigure, profile: Profile, bins: list[Bins]) -> SubFig
 
 
 def _line_style(channel: int, n_channels: int) -> Style:
-    """Colour and dashes of a channel: told apart without colour as well."""
+    """Return colour and dashes of a channel, distinguishable without colour too."""
     dashes = LINE_STYLES[channel % (3 if n_channels <= 3 else len(LINE_STYLES))]
     if n_channels <= len(COLOURS):
         return {"color": COLOURS[channel], "linestyle": dashes}
@@ -131,7 +131,7 @@ def _draw_unweighted(axes: Axes, profile: Profile, bins: list[Bins]) -> None:
 def _draw_curves(
     axes: Axes, edges: list[FloatArray], values: list[tuple[FloatArray, FloatArray]]
 ) -> None:
-    """Draw a step a bin, and a band of one standard error for the channels in the legend."""
+    """Draw a step per bin, and a band of one standard error for the channels in the legend."""
     named = words.in_legend(len(edges))
     for channel, (mean, error) in enumerate(values):
         style = _line_style(channel, len(edges))
@@ -162,7 +162,7 @@ def _limit_decades(axes: Axes, values: list[FloatArray]) -> float:
     bottom = max(positive.min(initial=peak), peak * 10.0**-_DECADES) / 2
     axes.set_ylim(bottom, peak * 2)
     axes.yaxis.set_major_locator(LogLocator(numticks=7))
-    # Within 1.3 decades 2 and 5 are named as well: there may be one power of ten, or none.
+    # Within 1.3 decades 2 and 5 are labelled as well: there may be one power of ten, or none.
     axes.yaxis.set_minor_locator(LogLocator(subs=(2, 5)))
     axes.yaxis.set_minor_formatter(LogFormatterSciNotation(minor_thresholds=(1.3, 1.3)))
     tick(axes.xaxis)
@@ -187,7 +187,7 @@ def _draw_image(below: SubFigure, axes: Axes, profile: Profile, shown: Picture) 
 
 
 def _cut_to_squares(axes: Axes, shown: Picture) -> None:
-    """Cut the picture, which is wider than its panel, until its pixels are square."""
+    """Crop the picture, which is wider than its panel, so that its pixels are square."""
     box = axes.get_window_extent()
     half_width_mm = shown.half_height_mm * box.width / box.height
     axes.set_xlim(-half_width_mm, half_width_mm)

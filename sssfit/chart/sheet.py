@@ -1,6 +1,6 @@
 """Every kernel's pictures beside their differences, as a figure: `sheet_figure`.
 
-The record comes from ``sssfit.compare.sheet``, which has computed everything.
+``sssfit.compare.sheet`` computes the record.
 """
 
 from __future__ import annotations
@@ -18,8 +18,10 @@ if TYPE_CHECKING:
     from sssfit.compare.sheet import Sheet, SheetRow
 
 AMPLIFIED = 10.0
-_MOST_INCHES, _ROOM_INCHES = 1.0, 6.5  # of a picture, 200 of the page's pixels; of a row of them
-_APART, _PAIRS_APART, _ROWS_APART = 0.03, 0.1, 0.22  # of a picture; rows have figures between
+# Size of a picture, 200 of the page's pixels; of a row of them.
+_MOST_INCHES, _ROOM_INCHES = 1.0, 6.5
+# Gap, in pictures; rows have figures between them.
+_APART, _PAIRS_APART, _ROWS_APART = 0.03, 0.1, 0.22
 
 
 def sheet_figure(sheet: Sheet) -> Figure:
@@ -32,8 +34,8 @@ def sheet_figure(sheet: Sheet) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        8 inches wide; pictures in sRGB at the truth's exposure. Differences are of lightness
-        (CIE L*), ten times amplified: red is too bright, blue too dark.
+        8 inches wide; pictures in sRGB at the truth's exposure. Differences are in lightness (CIE
+        L*), amplified ten times: red is too bright, blue too dark.
     """
     wide, tall = 2.0 + _APART + _PAIRS_APART, 1.0 + _ROWS_APART
     width, height = wide * len(sheet.scenes) - _PAIRS_APART, tall * len(sheet.rows)
@@ -52,7 +54,7 @@ def sheet_figure(sheet: Sheet) -> Figure:
 
 
 def _subtitle(sheet: Sheet) -> str:
-    """Say what the pictures are, and what stands beside them."""
+    """Return text about the pictures and their differences."""
     meta = sheet.profile.meta
     side = sheet.pixels * sheet.mm_per_pixel
     parts = [
@@ -80,13 +82,13 @@ def _draw_row(axes: Axes, row: SheetRow, down: float, wide: float) -> None:
 
 
 def _label(row: SheetRow) -> str:
-    """Split a label at its comma, and say how many passes there are."""
+    """Split a label at its comma, and add the number of passes."""
     name = row.label.replace(", ", "\n")
     return name if row.passes is None else f"{name}\n{row.passes} passes"
 
 
 def _notes(sheet: Sheet) -> list[str]:
-    """Say what is drawn."""
+    """Return the notes on the rows."""
     values = [
         f"{name} {' '.join(f'{each:g}' for each in sheet.production[key])}"
         for name, key in (("near", "near_mm2"), ("far", "far_mm2"))

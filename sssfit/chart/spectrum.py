@@ -1,6 +1,6 @@
 """The singular values of a profile's kernel, as a figure: `spectrum_figure`.
 
-The record comes from ``sssfit.compare.spectrum``, which has computed everything.
+``sssfit.compare.spectrum`` computes the record.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ if TYPE_CHECKING:
 HEIGHT_INCHES = 4.4
 _MOST_CHANNELS = 3
 _MOST_TERMS = 12
-_DECADES = 6  # of a share that are drawn at most
+_DECADES = 6  # most decades of a share that are drawn
 _MARKERS = "os^"
 _HEADS = ("", "first value, squared", "first value, absolute", "terms for an error of 1 %")
 
 
 def spectrum_figure(spectrum: Spectrum) -> Figure:
-    """Draw what share of the kernel each singular value has, in both readings of "energy".
+    """Draw the share of each singular value in the kernel, in both readings of "energy".
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def spectrum_figure(spectrum: Spectrum) -> Figure:
     -------
     matplotlib.figure.Figure
         8 x 4.4 inches: shares [%] of the sum of squares and of the sum of absolute values over the
-        number of the term, logarithmic; hollow where the eigenvalue is negative.
+        number of the term, logarithmic; hollow if the eigenvalue is negative.
     """
     shown = spread(spectrum.profile.n_channels, _MOST_CHANNELS)
     where = kernel_subtitle(spectrum.profile, spectrum.pixels, spectrum.mm_per_pixel)
@@ -68,7 +68,7 @@ def spectrum_figure(spectrum: Spectrum) -> Figure:
 
 
 def _style(k: int) -> Style:
-    """Colour, dashes and marker of the k-th channel drawn: told apart without colour as well."""
+    """Return colour, dashes and marker of the k-th channel, distinguishable without colour too."""
     return {
         "color": COLOURS[k],
         "linestyle": LINE_STYLES[k],
@@ -79,7 +79,7 @@ def _style(k: int) -> Style:
 
 
 def _draw_shares(axes: Axes, spectrum: Spectrum, shares: FloatArray, shown: Sequence[int]) -> None:
-    """One line a channel; hollow markers for negative eigenvalues."""
+    """Draw a line per channel, with hollow markers for negative eigenvalues."""
     terms = np.arange(1, min(_MOST_TERMS, len(shares)) + 1)
     for k, channel in enumerate(shown):
         percent = 100.0 * shares[: terms.size, channel]
@@ -94,7 +94,7 @@ def _draw_shares(axes: Axes, spectrum: Spectrum, shares: FloatArray, shown: Sequ
 
 
 def _limit(axes: Axes, spectrum: Spectrum, shown: Sequence[int]) -> None:
-    """Set the axis that both panels share: percent, six decades at most."""
+    """Set the shared axis of both panels: percent, at most six decades."""
     squared = 100.0 * spectrum.squared_share[:_MOST_TERMS, shown]
     least = float(squared[squared > 0.0].min(initial=100.0))
     axes.set_ylim(max(least / 2.0, 10.0 ** (2 - _DECADES)), 160.0)
@@ -104,7 +104,7 @@ def _limit(axes: Axes, spectrum: Spectrum, shown: Sequence[int]) -> None:
 
 
 def _row(spectrum: Spectrum, channel: int) -> tuple[str, list[str]]:
-    """Name and figures of one channel in the table."""
+    """Return name and figures of one channel in the table."""
     name = shortened(spectrum.profile.channels[channel])
     first = (spectrum.squared_share[0, channel], spectrum.absolute_share[0, channel])
     if not first[0] > 0.0:
@@ -114,7 +114,7 @@ def _row(spectrum: Spectrum, channel: int) -> tuple[str, list[str]]:
 
 
 def _notes(spectrum: Spectrum, shown: Sequence[int]) -> list[str]:
-    """Say what is drawn, and what is left out."""
+    """Return the notes on drawn and omitted parts."""
     notes = [
         "Term: a horizontal and a vertical pass. The squares that N terms leave are the square of "
         "the relative Frobenius error of the best N-term kernel. Hollow: negative eigenvalue."

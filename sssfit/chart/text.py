@@ -24,19 +24,19 @@ _SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def title(profile: Profile) -> str:
-    """Name the material."""
+    """Return the title with the material."""
     so_far = " so far" if profile.meta.get("checkpoint") else ""
     return titled(profile, f"diffuse reflectance profile{so_far}")
 
 
 def titled(profile: Profile, what: str) -> str:
-    """Say what is drawn of a profile, after its material's name where it has one."""
+    """Return a title for a profile, after its material's name if it has one."""
     name = profile.material_name
     return f"{shortened(name, 24)}: {what}" if name else what.capitalize()
 
 
 def legend_title(profile: Profile) -> str:
-    """Say what stands beside the channels."""
+    """Return the head of the channels' legend."""
     if not (profile.diffuse_reflectance_stderr > 0).any():
         return "Total diffuse reflectance"
     kind = "estimated" if profile.photons is None else "standard"
@@ -44,7 +44,7 @@ def legend_title(profile: Profile) -> str:
 
 
 def subtitle(profile: Profile) -> str:
-    """Say how the profile was made, and on what grid."""
+    """Return text about the method and the grid of a profile."""
     meta = profile.meta
     parts = [method_name(meta.get("method"))] if meta.get("method") else []
     if profile.photons is not None:
@@ -56,7 +56,7 @@ def subtitle(profile: Profile) -> str:
 
 
 def kernel_subtitle(profile: Profile, pixels: int, mm_per_pixel: float) -> str:
-    """Say which pixels a profile's kernel is on, and how the profile was made."""
+    """Return text about the pixels of a kernel and the method of its profile."""
     meta = profile.meta
     parts = [method_name(meta["method"])] if meta.get("method") else []
     parts.append(f"{pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm")
@@ -66,19 +66,19 @@ def kernel_subtitle(profile: Profile, pixels: int, mm_per_pixel: float) -> str:
 
 
 def method_name(method: object) -> str:
-    """Name a method for people."""
+    """Return the displayed name of a method."""
     return _METHODS.get(str(method), shortened(str(method)))
 
 
 def grid(profile: Profile) -> str:
-    """Say how many annuli there are, how wide if all are, and how far they reach."""
+    """Return text about the annuli: number, width if equal, and outer radius."""
     width_mm = np.diff(profile.r_edges_mm)
     spacing = f" of {width_mm[0]:.4g} mm" if np.allclose(width_mm, width_mm[0]) else ""
     return f"{profile.n_annuli} annuli{spacing} to r = {profile.r_edges_mm[-1]:.4g} mm"
 
 
 def count(number: int) -> str:
-    """Write a count: 10⁷, 2.5×10⁶, or in full where three digits are not enough."""
+    """Return a count as text: 10⁷, 2.5×10⁶, or in full if three digits are not enough."""
     exponent = len(str(number)) - 1
     mantissa = number / 10**exponent
     if exponent < 4 or round(mantissa, 2) * 10**exponent != number:
@@ -88,7 +88,7 @@ def count(number: int) -> str:
 
 
 def channel_label(profile: Profile, channel: int, *, is_drawn: bool) -> str:
-    """Name a channel with its total diffuse reflectance and standard error."""
+    """Return a channel's name with its total diffuse reflectance and standard error."""
     total = with_error(
         float(profile.diffuse_reflectance[channel]),
         float(profile.diffuse_reflectance_stderr[channel]),
@@ -98,19 +98,19 @@ def channel_label(profile: Profile, channel: int, *, is_drawn: bool) -> str:
 
 
 def in_legend(n_channels: int) -> list[int]:
-    """Channels that the legend names: all, or eight spread from the first to the last."""
+    """Return the channels that the legend names: all, or eight spread from first to last."""
     return spread(n_channels, _MOST_IN_LEGEND)
 
 
 def spread(n_channels: int, most: int) -> list[int]:
-    """All channels, or so many of them spread from the first to the last."""
+    """Return all channels, or this many of them spread from the first to the last."""
     if n_channels <= most:
         return list(range(n_channels))
     return [int(each) for each in np.linspace(0, n_channels - 1, most).round()]
 
 
 def with_error(value: float, stderr: float) -> str:
-    """Write a value and its standard error, two digits of which set the decimals."""
+    """Return a value and its standard error as text; two digits of the error set the decimals."""
     if not stderr > 0:
         return f"{value:.4g}"
     decimals = min(max(1 - math.floor(math.log10(stderr)), 0), 12)
@@ -118,9 +118,9 @@ def with_error(value: float, stderr: float) -> str:
 
 
 def shortened(name: str, longest: int = 12) -> str:
-    """Keep a name from running out of its place: its beginning and its end stay.
+    """Shorten a name in the middle to fit its space.
 
-    Names that have to be told apart differ at the end more often than not: infrared-850nm.
+    The end is kept because names often differ there: infrared-850nm.
     """
     if len(name) <= longest:
         return name
@@ -129,7 +129,7 @@ def shortened(name: str, longest: int = 12) -> str:
 
 
 def footnotes(profile: Profile, image: str) -> list[str]:
-    """Say what the curves leave out and what they and the ``image`` mean."""
+    """Return the notes on the curves and the ``image``."""
     notes = [
         f"Beyond the grid (r > {profile.r_edges_mm[-1]:.4g} mm): {_beyond(profile)} of diffuse. "
         f"Specular reflectance ({profile.specular_reflectance:.4g}) is not included.",
@@ -146,7 +146,7 @@ def footnotes(profile: Profile, image: str) -> list[str]:
 
 
 def image_note(profile: Profile, image: Picture) -> str:
-    """Say how the 2D profile became colours or shades."""
+    """Return a note on the colours or shades of the 2D profile."""
     if profile.n_channels != 3:
         return ""
     named = "" if profile.channels == ("R", "G", "B") else " of the channels as R, G, B"
@@ -157,7 +157,7 @@ def image_note(profile: Profile, image: Picture) -> str:
 
 
 def path_label(profile: Profile, paths_mm: FloatArray) -> str:
-    """Name the axis in mean free paths, with the lengths where they fit."""
+    """Return the label of the axis in mean free paths, with the lengths if they fit."""
     if profile.n_channels > 4:
         return "r (mean free paths)"
     lengths = ", ".join(
@@ -169,7 +169,7 @@ def path_label(profile: Profile, paths_mm: FloatArray) -> str:
 
 
 def _beyond(profile: Profile) -> str:
-    """Each channel's share beyond the grid; of many, the largest."""
+    """Return each channel's share beyond the grid; of many channels, the largest."""
     diffuse = profile.diffuse_reflectance
     shares = np.divide(profile.beyond_grid, diffuse, out=np.zeros_like(diffuse), where=diffuse > 0)
     if profile.n_channels <= 4:
@@ -180,7 +180,7 @@ def _beyond(profile: Profile) -> str:
 
 
 def _digits(value: float) -> str:
-    """Three significant digits, trailing zeros too."""
+    """Return three significant digits, with trailing zeros."""
     return f"{value:#.3g}".rstrip(".")
 
 

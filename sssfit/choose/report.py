@@ -86,12 +86,12 @@ def _untried(choice: Choice) -> Iterator[str]:
 def _photons(need: PhotonNeed) -> str:
     """Say how many photons a walk would need, and what the truth took."""
     tried = ", ".join(
-        f"{count:.0e} Delta E {error:.3g} in {seconds:.1f} s"
+        f"{count:.2g} Delta E {error:.3g} in {seconds:.1f} s"
         for count, error, seconds in zip(need.counts, need.errors, need.seconds, strict=True)
     )
-    enough = f"a walk of {need.photons or 0:.0e} photons would do"
+    enough = f"a walk of {need.photons or 0:.2g} photons would do"
     if need.photons is None:
-        enough = f"{need.counts[-1]:.0e} photons are not enough for a walk"
+        enough = f"{need.counts[-1]:.2g} photons are not enough for a walk"
     by = "needs none" if need.truth_method == "exact" else "is the truth here"
     text = f"photons: {enough} ({tried}); {need.truth_method} {by}, {need.truth_seconds:.1f} s"
     return text.replace("e+0", "e")

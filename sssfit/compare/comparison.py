@@ -224,9 +224,11 @@ class Comparison:
         """
         material = self.profile.material_name
         asked: dict[str, Any] = {}
+        last: dict[str, Any] = {}
         if error is not None and cost is not None:
             found = [asdict(each) for each in verdicts(self, error, cost)]
-            asked = {"error": error, "cost": cost, "verdict": found}
+            asked = {"error": error, "cost": cost}
+            last = {"verdict": found}
         return plain(
             {
                 **asked,
@@ -240,6 +242,7 @@ class Comparison:
                 "missing_share": self.missing_share,
                 "left_out": [{"label": label, "reason": why} for label, why in self.left_out],
                 "rows": [{"material": material, **row.to_dict()} for row in self.rows],
+                **last,
             }
         )
 

@@ -20,11 +20,11 @@ from sssfit.errors import FitError, RenderError
 from sssfit.fit import FitResult, make_target
 from sssfit.measure.delta_e import selected_pixels, selection
 from sssfit.measure.score import COLOUR_FIGURES
+from sssfit.process import thread_count
 from sssfit.profile import Profile
 from sssfit.render._checks import check_channels
 from sssfit.render.separable import render_separable
 from sssfit.scene.record import Scene
-from sssfit.threads import thread_count
 
 Report = Callable[[int, int, str], None]
 _Judged = tuple[Candidate, FitResult, Sequence[Judgement]]

@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -81,16 +82,21 @@ def verdict_lines(comparison: Comparison, error: str, cost: str) -> list[str]:
     return [
         f"Take {first.label} for {first.cost:g} {_COST_WORDS[cost]}{more}: over the pictures, no "
         "other is as near for as little.",
-        f"{_ERROR_WORDS[error]} on the worst picture: {both}; {_unseen(found)}.",
+        f"{_ERROR_WORDS[error]} on the worst picture: {both}{_unseen(found)}.",
     ]
 
 
 def _unseen(found: Sequence[Verdict]) -> str:
-    """Name the cheapest whose error 95 % of the pixels of every picture do not show."""
+    """Name the cheapest whose error 95 % of the pixels of every picture do not show.
+
+    Nothing where the channels are no colour.
+    """
     for each in found:
         if each.delta_e_2000_p95 <= 1.0:
-            return f"from {each.label} on, 95 % of every picture are within a Delta E of 1"
-    return "none has 95 % of every picture within a Delta E of 1"
+            return f"; from {each.label} on, 95 % of every picture are within a Delta E of 1"
+    if math.isnan(found[0].delta_e_2000_p95):
+        return ""
+    return "; none has 95 % of every picture within a Delta E of 1"
 
 
 def _error(value: float, error: str) -> str:
@@ -104,7 +110,7 @@ def table_text(comparison: Comparison, ending: str, error: str, cost: str) -> st
     if ending == ".csv":
         return _MARKS[ending] + _csv(comparison)
     whole = {"format": _FORMAT, "command": "compare", **comparison.to_dict()}
-    return json.dumps(whole, allow_nan=False)
+    return json.dumps(whole, allow_nan=False) + "\n"
 
 
 def is_table_file(path: Path) -> bool:

@@ -1,4 +1,4 @@
-"""A kernel as a JSON document: the kernel file itself, with what it is in words."""
+"""A kernel as a JSON document: the kernel file with a comment in words."""
 
 import json
 import math
@@ -11,9 +11,9 @@ _ROUNDING = 1e-12
 
 
 def description(kernel: SeparableKernel) -> list[str]:
-    """Return the lines of the comment; nothing in them depends on the clock or the machine.
+    """Return the lines of the comment, which do not depend on the clock or the machine.
 
-    What is text comes out on one line: a newline would end a shader's comment.
+    Text is kept on one line, because a newline would end a shader's comment.
     """
     meta = kernel.meta
     photons = f", {meta['photons']:,} photons" if meta.get("photons") is not None else ""
@@ -44,7 +44,7 @@ def _values(values: Sequence[float]) -> str:
 
 
 def _errors(values: Sequence[float]) -> str:
-    """Write an error for each channel; rounding of sums of pixels is 0."""
+    """Return an error for each channel as text; rounding of sums of pixels counts as 0."""
     return ", ".join(
         "unknown" if math.isnan(each) else f"{0.0 if abs(each) < _ROUNDING else each:.6g}"
         for each in values
@@ -52,7 +52,7 @@ def _errors(values: Sequence[float]) -> str:
 
 
 def json_document(kernel: SeparableKernel) -> str:
-    """Return the kernel as indented JSON, a ``comment`` (list of lines) first; always the same."""
+    """Return the kernel as indented JSON, with a ``comment`` (list of lines) first."""
     whole = {"comment": description(kernel), **kernel.to_dict()}
     terms = whole.pop("terms")
     head = json.dumps(whole, indent=1, allow_nan=False, ensure_ascii=False)

@@ -1,6 +1,6 @@
-"""A kernel as shader source: constant arrays with a comment that says what they are.
+"""A kernel as shader source: constant arrays with a comment that explains them.
 
-Numbers are single precision, written with the fewest digits that read back to the same bits.
+Numbers are in single precision, with the fewest digits that are read back to the same bits.
 """
 
 from pathlib import Path
@@ -12,15 +12,15 @@ from sssfit.export.document import description
 from sssfit.files import has_mark
 from sssfit.kernel import SeparableKernel
 
-MARK = "// sssfit.hlsl/1"  # by which a file is known to be ours, and may be replaced
-_WIDEST_VECTOR = 4  # float4; kernels of more channels become arrays of floats
+MARK = "// sssfit.hlsl/1"  # the mark of our files, which may be replaced
+_WIDEST_VECTOR = 4  # float4; kernels with more channels become arrays of floats
 
 
 def hlsl(kernel: SeparableKernel) -> str:
     """Return HLSL: constant arrays of the signs and weights of each term.
 
-    Weights are indexed by term and pixel. Up to four channels are one float to float4; more
-    channels take a third index.
+    Weights are indexed by term and pixel. One to four channels are float to float4; more channels
+    take a third index.
     """
     terms, pixels, channels = kernel.weights.shape
     is_vector = channels <= _WIDEST_VECTOR
@@ -43,12 +43,12 @@ def hlsl(kernel: SeparableKernel) -> str:
 
 
 def is_hlsl_file(path: Path) -> bool:
-    """Whether a file is shader source that `hlsl` wrote."""
+    """Return whether a file is shader source that `hlsl` wrote."""
     return has_mark(path, {MARK.encode(): b""})
 
 
 def _value(values: npt.NDArray[np.float64], kind: str) -> str:
-    """Write one value a channel: a vector, a single number, or a list."""
+    """Return one value per channel as text: a vector, a single number, or a list."""
     numbers = ", ".join(_number(each) for each in values)
     if kind != "float":
         return f"{kind}({numbers})"
@@ -56,7 +56,7 @@ def _value(values: npt.NDArray[np.float64], kind: str) -> str:
 
 
 def _number(value: float) -> str:
-    """Write a single-precision literal; what is under the least normal one is 0, as on GPUs."""
+    """Return a single-precision literal; subnormal numbers become 0, as on GPUs."""
     single = np.float32(value)
     if abs(single) < np.finfo(np.float32).tiny:
         return "0.0"

@@ -1,10 +1,10 @@
-"""Profile to kernel: one method, one file, one signature ``fit_x(profile, ...) -> FitResult``.
+"""Profile to kernel: one method per file, with one signature ``fit_x(profile, ...) -> FitResult``.
 
-``METHODS`` has them by the names of the command line, from the entries in ``sssfit.methods``. Every
-``fit_x`` takes a profile and ``mm_per_pixel`` (0.3 by default), ``support_mm`` and ``normalize`` by
-keyword, beside settings of its own.
+``METHODS`` maps the names of the command line to the methods; its entries come from
+``sssfit.methods``. Every ``fit_x`` takes a profile and ``mm_per_pixel`` (0.3 by default),
+``support_mm`` and ``normalize`` by keyword, and its own settings.
 
-The package is the function `fit` as well: ``sssfit.fit(profile, "svd", rank=3)``.
+The package can also be called like the function `fit`: ``sssfit.fit(profile, "svd", rank=3)``.
 """
 
 import sys
@@ -52,7 +52,7 @@ __all__ = [
 
 @dataclass(frozen=True, slots=True)
 class FitMethod:
-    """One way from a profile to a kernel."""
+    """A method of fitting a kernel to a profile."""
 
     fit: Callable[..., FitResult]
     summary: str
@@ -80,7 +80,7 @@ def fit_result(profile: Profile | str | Path, method: str = "svd", **settings: A
     Raises
     ------
     FitError
-        Unknown method, or it cannot fit this profile with these settings.
+        The method is unknown, or cannot fit this profile with these settings.
     ProfileError
         The file cannot be read as a profile.
     """
@@ -106,7 +106,7 @@ def fit(profile: Profile | str | Path, method: str = "svd", **settings: Any) -> 
 
 
 class _CallableRoom(ModuleType):
-    """`import sssfit.fit` binds this package to the name, so the package itself is called."""
+    """Makes the package callable, because `import sssfit.fit` binds it to the function's name."""
 
     def __call__(
         self, profile: Profile | str | Path, method: str = "svd", **settings: Any

@@ -1,4 +1,4 @@
-"""Parameters set by hand instead of fitted."""
+"""Helpers of the fits whose parameters may also be set by hand."""
 
 from collections.abc import Mapping, Sequence
 
@@ -17,7 +17,7 @@ def gaussian_pixels(edges_mm: FloatArray, sigmas_mm: FloatArray) -> tuple[FloatA
     edges_mm : array (h+2,) [mm]
         `Target.edges_mm`.
     sigmas_mm : array (g,) [mm]
-        Standard deviations: roots of variances per axis.
+        Standard deviations per axis.
 
     Returns
     -------
@@ -36,7 +36,7 @@ def of_unit_sum(half: FloatArray, slopes: FloatArray) -> tuple[FloatArray, Float
     Raises
     ------
     FitError
-        A line so wide beside its pixels that nothing of it lies in them.
+        The line is so wide that its pixels hold no energy.
     """
     copies = np.where(np.arange(half.size) == 0, 1.0, 2.0)
     total = copies @ half
@@ -49,7 +49,7 @@ def of_unit_sum(half: FloatArray, slopes: FloatArray) -> tuple[FloatArray, Float
 def line_misfit(
     half: FloatArray, wanted: FloatArray, weights: FloatArray
 ) -> tuple[float, FloatArray]:
-    """Return sum weights (half - wanted)^2 over that at half = 0, and the gradient in half."""
+    """Return sum weights (half - wanted)^2 relative to half = 0, and its gradient."""
     norm = float(weights @ wanted**2) or 1.0
     left = half - wanted
     return float(weights @ left**2) / norm, 2.0 / norm * weights * left
@@ -58,9 +58,10 @@ def line_misfit(
 def kernel_misfit(
     half: FloatArray, wanted: FloatArray, weights: FloatArray
 ) -> tuple[float, FloatArray]:
-    """Return sum_ij w_i w_j (half_i half_j - wanted_ij)^2 over that at half = 0, and its gradient.
+    """Return sum_ij w_i w_j (half_i half_j - wanted_ij)^2 relative to half = 0, and its gradient.
 
-    ``wanted`` (n, n) are pixels of a quadrant, ``weights`` (n,) how often each row is there.
+    ``wanted`` (n, n) are the pixels of a quadrant, ``weights`` (n,) the number of copies of each
+    row.
     """
     norm = float(weights @ (wanted**2 @ weights)) or 1.0
     left = half[:, None] * half - wanted
@@ -71,12 +72,12 @@ def kernel_misfit(
 def per_channel(
     given: Mapping[str, float | Sequence[float] | None], channels: tuple[str, ...]
 ) -> FloatArray | None:
-    """Return parameters by channel (parameters, C), or None where none is given.
+    """Return parameters by channel (parameters, C), or None if none is given.
 
     Raises
     ------
     FitError
-        Some are missing, some are not finite, or there are neither one nor C of them.
+        Some are missing or not finite, or their number is neither one nor C.
     """
     missing = [name for name, value in given.items() if value is None]
     if len(missing) == len(given):

@@ -1,19 +1,167 @@
-"""Search for the variances of a sum of Gaussians: one Gaussian more at a time.
+"""Objective of the Gaussian fit of one channel, and the search for the variances.
 
-The best sum of N starts from the best of N - 1 with a new Gaussian in each gap between variances,
-below the smallest and above the largest. With weight 0 for the new one each start is as good as
-what it started from, so the error cannot rise with N.
+The objective int r (R - sum_i w_i G(v_i, r))^2 dr is evaluated from the energies of the annuli.
+With e the energy of an annulus, A its area and E_i the energy of a unit Gaussian in it, it is
+
+    sum over annuli of (e - sum_i w_i E_i)^2 / (2 pi A).
+
+This is the same integral for the means over the annuli; point samples would be wrong where R_d is
+curved within an annulus. For given variances the weights are a linear least squares problem; the
+remaining function depends on the variances alone and is minimised over their logarithms (variable
+projection: Golub and Pereyra 1973; the Jacobian is Kaufman's of 1975, which leaves out a term that
+vanishes with the residual).
+
+The search adds one Gaussian at a time. The best sum of N starts from the best of N - 1 with a new
+Gaussian in each gap between variances, below the smallest and above the largest. With weight 0 for
+the new one each start is as good as the previous optimum, so the error cannot rise with N.
 """
 
 import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
-from sssfit.fit._gaussians_annuli import Annuli, Point
 from sssfit.fit._target import Target
 from sssfit.profile.pixels import PARTS_PER_ANNULUS, SUBDIVIDED_ANNULI, annulus_areas
+
+# Signed weights may cancel: two of +-1e8 with nearly equal variances were seen to fit photon noise.
+# Their absolute sum may be at most this many times the energy.
+_LARGEST_SUM = 10.0
+_RANK = 1e-12  # columns closer than this, such as Gaussians of equal variance, count as one
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Point:
+    """Log variances (N,), the best weights for them (N,), and their error.
+
+    ``residual`` (n,) is relative: its norm is the relative error of the literature. ``jacobian``
+    (n, N).
+    """
+
+    log_variances: FloatArray
+    weights: FloatArray
+    residual: FloatArray
+    jacobian: FloatArray
+
+    @property
+    def cost(self) -> float:
+        """Square of the relative error."""
+        return float(self.residual @ self.residual)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Annuli:
+    """The objective for one channel, as a function of the variances' logarithms.
+
+    Energies are shares of the energy on the grid, so that faint profiles do not underflow.
+
+    ``inner``, ``width`` (n, 1) [mm^2] are r0^2 / 2 and (r1^2 - r0^2) / 2 of each annulus; ``scale``
+    (n, 1) is sqrt(area) times the target's norm, ``wanted`` (n,) the target, of norm 1; ``total``
+    the required sum of the weights, or None if it is free.
+    """
+
+    inner: FloatArray
+    width: FloatArray
+    scale: FloatArray
+    wanted: FloatArray
+    total: float | None
+    signed: bool
+
+    def at(self, log_variances: FloatArray) -> Point:
+        """Return the best weights for given variances; infinite error if there is no solution."""
+        columns, slopes = self._columns(log_variances)
+        weights = np.zeros(len(log_variances))
+        try:
+            free = self._free(columns)
+        except RuntimeError:  # columns equal to rounding can make the solver cycle
+            return self._infeasible_point(log_variances)
+        basis, wanted = self._unconstrained(columns[:, free])
+        norms = np.linalg.norm(basis, axis=0)
+        norms[norms == 0.0] = 1.0  # two of equal variance, one eliminated by the total
+        q, r = np.linalg.qr(basis / norms)
+        found = np.linalg.lstsq(r, q.T @ wanted, rcond=_RANK)[0] / norms
+        if self.total is not None:
+            found = np.append(found, self.total - found.sum())
+        if np.abs(found).sum() > _LARGEST_SUM * max(1.0, self.total or 0.0):
+            return self._infeasible_point(log_variances)
+        weights[free] = found
+        jacobian = -slopes * weights
+        jacobian -= q @ (q.T @ jacobian)
+        return Point(log_variances, weights, self.wanted - columns @ weights, jacobian)
+
+    def _infeasible_point(self, log_variances: FloatArray) -> Point:
+        """Return a point of infinite error."""
+        nothing = np.zeros((len(self.wanted), len(log_variances)))
+        return Point(log_variances, nothing[0], np.full(self.wanted.shape, np.inf), nothing)
+
+    def _columns(self, log_variances: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return scaled energies of unit Gaussians in the annuli (n, N), and their log derivatives.
+
+        exp(-a) - exp(-b) is computed as exp(-a) (1 - exp(a - b)), which keeps its digits in thin
+        annuli.
+        """
+        inverse = np.exp(-log_variances)
+        a, step = self.inner * inverse, self.width * inverse
+        at_inner = np.exp(-a)
+        energy = -at_inner * np.expm1(-step)
+        slope = a * energy - step * (at_inner - energy)
+        return energy / self.scale, slope / self.scale
+
+    def _free(self, columns: FloatArray) -> npt.NDArray[np.intp]:
+        """Return the indices of the weights that are not 0 at the optimum."""
+        from scipy.optimize import nnls  # 0.8 s that ``fit --list`` need not wait for
+
+        terms = columns.shape[1]
+        if self.signed:
+            return np.arange(terms)
+        if self.total is None:
+            r = _triangle(np.column_stack((columns, self.wanted)))
+            return np.flatnonzero(nnls(r[:, :terms], r[:, terms])[0] > 0.0)
+        # Weights on a simplex: with sum w = T, columns w - wanted = sum_i w_i/T (T column_i -
+        # wanted). The non-negative u that minimises |sum_i u_i (...)|^2 + (1 - sum u)^2 is a
+        # multiple of the best w, because for a fixed direction of u the minimum grows with the
+        # first term.
+        r = _triangle(self.total * columns - self.wanted[:, None])
+        rows = np.vstack((r, np.ones(terms)))
+        aim = np.append(np.zeros(len(r)), 1.0)
+        return np.flatnonzero(nnls(rows, aim)[0] > 0.0)
+
+    def _unconstrained(self, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return columns and target of the problem with the last weight eliminated by the total."""
+        if self.total is None:
+            return columns, self.wanted
+        last = columns[:, -1]
+        return columns[:, :-1] - last[:, None], self.wanted - self.total * last
+
+
+def _triangle(matrix: FloatArray) -> FloatArray:
+    """Return R of the QR decomposition: a small matrix with the same inner products."""
+    return np.asarray(np.linalg.qr(matrix, mode="r"), dtype=np.float64)
+
+
+def make_annuli(
+    r_edges_mm: FloatArray, energy: FloatArray, total: float | None, *, signed: bool
+) -> Annuli:
+    """Set up the objective for the energies (n,) of a channel, at least one of them above 0.
+
+    ``total`` is the required sum of the weights as a share of the energy on the grid, or None.
+    """
+    inner, outer = r_edges_mm[:-1], r_edges_mm[1:]
+    width = 0.5 * (outer - inner) * (outer + inner)
+    root = np.sqrt(2.0 * math.pi * width)
+    wanted = energy / energy.sum() / root
+    norm = float(np.linalg.norm(wanted))
+    return Annuli(
+        inner=0.5 * inner[:, None] ** 2,
+        width=width[:, None],
+        scale=root[:, None] * norm,
+        wanted=wanted / norm,
+        total=total,
+        signed=signed,
+    )
+
 
 # Merging the first two annuli lowers int r R^2 dr by this share or more: 16 to 33 % where R_d ~ 1/r
 # (the exact profiles of four materials), under 0.6 % for dipoles on grids five times too coarse.
@@ -21,9 +169,9 @@ _STEEP = 0.05
 
 
 def is_steep(target: Target, channel: int) -> bool:
-    """Whether the objective depends on how finely one looks at the beam; see ``_STEEP``."""
+    """Whether the objective depends on the resolution near the beam; see ``_STEEP``."""
     energy = target.profile.annulus_energy[:, channel]
-    energy = energy / energy.sum()  # else the squares of a faint profile are 0
+    energy = energy / energy.sum()  # otherwise the squares of a faint profile underflow
     areas = annulus_areas(target.profile.r_edges_mm)
     norm = float(np.sum(energy**2 / areas))
     apart = float(np.sum(energy[:2] ** 2 / areas[:2]))
@@ -34,8 +182,8 @@ def is_steep(target: Target, channel: int) -> bool:
 def rings(target: Target, channel: int) -> tuple[FloatArray, FloatArray]:
     """Return the edges (m+1,) [mm] and energies (m,) that a channel is fitted to.
 
-    The profile's own, unless it is steep: then the ten innermost annuli are cut into equal parts no
-    wider than half a pixel, by the profile's monotone interpolation of F.
+    The profile's own, unless the profile is steep; then the ten innermost annuli are cut into equal
+    parts no wider than half a pixel, by the profile's monotone interpolation of F.
     """
     profile = target.profile
     edges_mm, energy = profile.r_edges_mm, profile.annulus_energy[:, channel]
@@ -75,7 +223,7 @@ class GaussianSum:
 def search(annuli: Annuli, terms: int, least_mm2: float, most_mm2: float) -> GaussianSum:
     """Find up to ``terms`` Gaussians with variances between two limits [mm^2].
 
-    Fewer where another one does not lower the error.
+    Fewer if one more does not lower the error.
     """
     bounds = float(np.log(least_mm2)), float(np.log(most_mm2))
     best, evaluations, reason = None, 0, ""
@@ -112,7 +260,7 @@ def _starts(log_variances: FloatArray | None, bounds: tuple[float, float]) -> li
 def _best_of(
     annuli: Annuli, starts: list[FloatArray], bounds: tuple[float, float]
 ) -> tuple[Point, bool, int]:
-    """Try all starts roughly, finish the best; the best point, whether it settled, evaluations."""
+    """Try all starts roughly, finish the best; return that point, if it converged, evaluations."""
     tried = [_descend(annuli, annuli.at(start), bounds, _ROUGH) for start in starts]
     tried.sort(key=lambda each: each[0].cost)
     finished = [_descend(annuli, each[0], bounds, _FINE) for each in tried[:_FINISHED]]
@@ -124,8 +272,8 @@ def _best_of(
 def _descend(
     annuli: Annuli, point: Point, bounds: tuple[float, float], tolerance: float
 ) -> tuple[Point, bool, int]:
-    """Least squares from a point; the last point, whether it converged, evaluations."""
-    from scipy.optimize import least_squares  # 0.8 s that ``fit --list`` need not wait for
+    """Run least squares from a point; return the last point, if it converged, evaluations."""
+    from scipy.optimize import least_squares  # 0.8 s that ``fit --list`` does not need
 
     if not np.isfinite(point.cost):
         return point, True, 0
@@ -145,7 +293,7 @@ def _descend(
 
 
 class _Seen:
-    """The point that was looked at last: its weights serve the residual and the Jacobian."""
+    """Keeps the last point, whose weights serve the residual and the Jacobian."""
 
     def __init__(self, annuli: Annuli, point: Point) -> None:
         self._annuli, self._point = annuli, point
@@ -161,7 +309,7 @@ class _Seen:
 
 
 def _without_zero_weights(point: Point) -> Point:
-    """Leave out Gaussians of weight 0 and put the others in ascending order."""
+    """Drop Gaussians of weight 0 and sort the others by variance."""
     order = np.argsort(point.log_variances)
     kept = order[point.weights[order] != 0.0]
     return Point(

@@ -1,11 +1,11 @@
 """The optimisers: nlopt's SLSQP and scipy's simplex, with their stop reasons as text.
 
 SLSQP is sequential quadratic programming (Kraft 1988, "A software package for sequential quadratic
-programming"), as NLopt ships it. What it is handed should be scaled: objectives near 1 at the
-start, second derivatives near 1 in every parameter; its first step takes the Hessian for the
-identity. Four habits of nlopt are met here: an objective that is NaN comes back as success;
-rounding near an optimum of 0 raises; a start outside the bounds is refused; an exception loses the
-result.
+programming"), as NLopt ships it. Objectives should be scaled to values near 1 at the start and
+second derivatives near 1 in every parameter, because its first step assumes the identity as
+Hessian. This module handles four properties of nlopt: an objective that is NaN is reported as
+success; rounding near an optimum of 0 raises; a start outside the bounds is refused; an exception
+loses the result.
 """
 
 from collections.abc import Callable
@@ -19,11 +19,11 @@ from sssfit.errors import FitError
 
 Function = Callable[[FloatArray], tuple[float, FloatArray]]
 
-FEASIBLE = 1e-9  # a point counts where the equality holds to this
-_TO_ZERO = 1e-26  # absolute change that is none, for objectives whose optimum is 0
+FEASIBLE = 1e-9  # a point is feasible if the equality holds to this
+_TO_ZERO = 1e-26  # absolute change that counts as none, for objectives whose optimum is 0
 _MOST_EVALUATIONS = 2000
 
-# By nlopt's name: numbers differ between releases.
+# By nlopt's names, because the numbers differ between releases.
 _WORDS = {
     "SUCCESS": "converged",
     "FTOL_REACHED": "converged: the objective no longer changes",
@@ -39,7 +39,7 @@ _WORDS = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Minimum:
-    """Where an objective is lowest: ``x`` (n,), its ``value``, and how it was found."""
+    """The minimum of an objective: ``x`` (n,), its ``value``, and how it was found."""
 
     x: FloatArray
     value: float
@@ -48,7 +48,7 @@ class Minimum:
 
 
 class _TrackedObjective:
-    """Call the objective, and keep the best feasible point and the count."""
+    """Calls the objective, and keeps the best feasible point and the count."""
 
     def __init__(self, objective: Function, equality: Function | None) -> None:
         self.objective, self.equality = objective, equality
@@ -79,7 +79,7 @@ def minimise(
     equality: Function | None = None,
     relative_change: float = 1e-12,
 ) -> Minimum:
-    """Minimise a smooth function within bounds and, if given, on equality(x) = 0.
+    """Minimise a smooth function within bounds and, if given, subject to equality(x) = 0.
 
     Parameters
     ----------
@@ -90,17 +90,17 @@ def minimise(
     lower, upper : array (n,)
         May be infinite.
     relative_change : float
-        Of the objective, from one step to the next, below which it ends.
+        Change of the objective from one step to the next below which the search ends.
 
     Returns
     -------
     Minimum
-        The best feasible point met, also where nlopt gave up; the stop reason says so.
+        The best feasible point found, even if nlopt gave up; the stop reason says so.
 
     Raises
     ------
     FitError
-        No point met was both feasible and finite.
+        No point found was both feasible and finite.
     """
     import nlopt  # only fits need it
 
@@ -144,10 +144,11 @@ def minimise_by_simplex(
         Moved into the bounds; the other corners of the first simplex are ``step`` away, inwards.
     lower, upper : array (n,)
     change, value_change : float
-        Of the parameters and of the objective across the simplex, below which both it ends.
+        Ranges of the parameters and of the objective across the simplex; the search ends below
+        both.
     most_evaluations : int
     """
-    from scipy.optimize import Bounds, minimize  # 0.8 s that other methods need not wait for
+    from scipy.optimize import Bounds, minimize  # 0.8 s that other methods do not need
 
     start = np.clip(start, lower, upper)
     inwards = np.where(start + step <= upper, step, -step)
@@ -173,14 +174,14 @@ def minimise_by_simplex(
 
 
 def root(function: Callable[[float], float], low: float, high: float) -> tuple[float, int, str]:
-    """Find where a function of one number is 0, between two places where its signs differ.
+    """Find a zero of a function between two points where its signs differ (Brent's method).
 
     Returns
     -------
     float, int, str
-        The place, evaluations, and in words why it ended (Brent's method).
+        The zero, the evaluations, and the stop reason in words.
     """
-    from scipy.optimize import brentq  # 0.2 s that other methods need not wait for
+    from scipy.optimize import brentq  # 0.2 s that other methods do not need
 
     x, found = brentq(function, low, high, xtol=1e-14, full_output=True, disp=False)
     if found.converged:
@@ -189,7 +190,7 @@ def root(function: Callable[[float], float], low: float, high: float) -> tuple[f
 
 
 def _filling(function: Function) -> Callable[[FloatArray, FloatArray], float]:
-    """Return a function as nlopt calls it, that writes its gradient where asked to."""
+    """Return a function with nlopt's interface, which writes the gradient if requested."""
 
     def call(x: FloatArray, gradient: FloatArray) -> float:
         value, slope = function(x)
@@ -201,7 +202,7 @@ def _filling(function: Function) -> Callable[[FloatArray, FloatArray], float]:
 
 
 def _run(solver: Any, start: FloatArray) -> str:
-    """Run to the end, however it ends, and say in words how."""
+    """Run the optimiser and return the stop reason in words."""
     import nlopt
 
     try:

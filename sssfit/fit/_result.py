@@ -1,4 +1,4 @@
-"""From the fits of the channels to a kernel with its errors."""
+"""Builds a kernel with its errors from the fits of the channels."""
 
 import math
 import time
@@ -21,7 +21,7 @@ ENERGIES = ("rescale", "keep")
 
 
 def restores(energy: str) -> bool:
-    """Whether "rescale" was asked for and not "keep"; any other word raises FitError."""
+    """Return True for "rescale" and False for "keep"; any other word raises FitError."""
     if energy not in ENERGIES:
         raise FitError(f"energy = {energy!r}; expected {' or '.join(map(repr, ENERGIES))}.")
     return energy == "rescale"
@@ -30,10 +30,10 @@ def restores(energy: str) -> bool:
 def factor_to(
     wanted: float, target: Target, channel: int, signs: FloatArray, half: FloatArray
 ) -> float:
-    """Return what the energy of a channel's terms has to be multiplied with to be ``wanted``.
+    """Return the factor that brings the energy of a channel's terms to ``wanted``.
 
-    ``signs`` (T,) and ``half`` (T, h+1) are the terms within the support. Raises FitError where
-    these, or what is wanted, add up to no energy: terms of both signs may.
+    ``signs`` (T,) and ``half`` (T, h+1) are the terms within the support. Raises FitError if these,
+    or the wanted energy, add up to nothing, as terms of both signs may.
     """
     within = float(signs @ (half @ target.copies) ** 2)
     if min(within, wanted) <= 0.0:
@@ -50,7 +50,7 @@ _MOST_ENERGY_ERROR = 0.1
 
 
 def check_finite(what: str, method: str, *errors: FloatArray) -> None:
-    """Refuse a fit whose errors (C,) are not numbers."""
+    """Raise FitError for a fit whose errors (C,) are not finite."""
     if not np.isfinite(errors).all():
         raise FitError(
             f"{what}: the errors of the {method} kernel are not finite; try a larger support or "
@@ -59,10 +59,10 @@ def check_finite(what: str, method: str, *errors: FloatArray) -> None:
 
 
 def warn_of_misfit(what: str, kernel: SeparableKernel, *, keeps_energy: bool) -> None:
-    """Warn of channels that no kernel at all would be nearer to, or that lost their energy.
+    """Warn of channels with a relative error above 1 or with lost energy.
 
-    ``keeps_energy`` is False where another energy than the profile's was asked for. To be called by
-    `fit_channels`: the warning points at the caller of the fit.
+    ``keeps_energy`` is False if the settings ask for another energy than the profile's. Only
+    `fit_channels` may call this: the warning points at the caller of the fit.
     """
     errors, energies = kernel.relative_frobenius_error, kernel.energy_error
     problems = []
@@ -85,7 +85,7 @@ def warn_of_misfit(what: str, kernel: SeparableKernel, *, keeps_energy: bool) ->
 def _listed(
     kernel: SeparableKernel, values: FloatArray, which: npt.NDArray[np.bool_], sign: str = ""
 ) -> str:
-    """Return up to four channels with their values in percent."""
+    """Return text with up to four channels and their values in percent."""
     found = np.flatnonzero(which)
     texts = [f"{kernel.channels[c]} {100.0 * values[c]:{sign}.3g} %" for c in found[:4]]
     return ", ".join(texts) + (f" and {len(found) - 4} more" if len(found) > 4 else "")
@@ -93,11 +93,11 @@ def _listed(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChannelFit:
-    """One channel's terms: ``signs`` (T,), ``half`` (T, h+1) passes from the middle outwards.
+    """The terms of one channel: ``signs`` (T,) and ``half`` (T, h+1), passes from the middle on.
 
-    ``parameters`` is what the method found, for JSON; ``stop_reason`` says in words why it ended.
-    A method that has the target's quadrant at hand gives `frobenius_error` as
-    ``relative_frobenius_error``; otherwise the quadrant is made once more for it.
+    ``parameters`` holds what the method found, for JSON; ``stop_reason`` says in words why it
+    ended. A method that has the target's quadrant at hand gives `frobenius_error` as
+    ``relative_frobenius_error``; otherwise the quadrant is computed again for it.
     """
 
     signs: FloatArray
@@ -110,7 +110,7 @@ class ChannelFit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FitResult:
-    """A kernel and how it came about; a value per channel where it is a tuple or array (C,)."""
+    """A kernel and how it was found; tuples and arrays (C,) have one value per channel."""
 
     kernel: SeparableKernel
     evaluations: tuple[int, ...]
@@ -124,11 +124,11 @@ class FitResult:
 
     @property
     def energy_error(self) -> FloatArray:
-        """Kernel's energy against the profile's diffuse reflectance, as a share of it (C,)."""
+        """Relative difference of the kernel's energy from the diffuse reflectance (C,)."""
         return self.kernel.energy_error
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the figures that ``sssfit fit --json`` prints: lists and numbers."""
+        """Return the figures that ``sssfit fit --json`` prints, as lists and numbers."""
         kernel = self.kernel
         return plain(
             {
@@ -162,39 +162,40 @@ def fit_channels(
     is_fitted: bool = True,
     keeps_energy: bool = True,
 ) -> FitResult:
-    """Fit channel by channel and put the terms into one kernel.
+    """Fit channel by channel and collect the terms in one kernel.
 
     Parameters
     ----------
     target : Target
     method : str
-        As the command line names it.
+        Its name on the command line.
     fit_channel : callable
-        From a channel's index to its terms; not called for channels that return nothing, whose
-        weights are 0. Channels may have fewer terms than others: the rest are 0.
+        Takes a channel's index and returns its terms. It is not called for channels that return no
+        light, whose weights are 0. Channels may have fewer terms than others: the rest are 0.
     settings : mapping
         The method's own settings, for provenance.
     normalize : bool
-        Give every channel unit energy and keep the energy apart in ``scale``.
+        Scale every channel to unit energy, and keep its energy in ``kernel.scale``.
     is_fitted : bool
-        False for kernels set by hand, which need not be near the profile.
+        False for kernels set by hand, which may differ from the profile.
     keeps_energy : bool
-        False where another energy than the profile's was asked for.
+        False if the settings ask for another energy than the profile's.
 
     Raises
     ------
     FitError
-        A fit that is not finite, or one without energy that is to be normalised.
+        The fit is not finite, or has no energy that could be normalised.
 
     Warns
     -----
     SssfitWarning
-        A fit that is farther from the profile than no kernel at all, or that lost its energy.
+        The relative error of the fit is above 1, or it lost energy.
     """
     begun = time.perf_counter()
     empty = target.is_empty
     channels = range(target.profile.n_channels)
-    # One thread: BLAS waits for its threads, up to ten times longer where others hold a core.
+    # One thread: BLAS waits for its threads, up to ten times longer if another process holds a
+    # core.
     with threadpool_limits(1, user_api="blas"):
         fits = [_zero_fit(target) if empty[c] else fit_channel(c) for c in channels]
         errors = _frobenius_errors(target, fits)
@@ -239,7 +240,7 @@ def _zero_fit(target: Target) -> ChannelFit:
 
 
 def _stacked(fits: list[ChannelFit]) -> tuple[FloatArray, FloatArray]:
-    """Return signs (T, C) and half passes (T, h+1, C); terms a channel lacks are 0."""
+    """Return signs (T, C) and half passes (T, h+1, C); missing terms of a channel are 0."""
     terms, channels = max(len(each.signs) for each in fits), len(fits)
     signs = np.ones((terms, channels))
     half = np.zeros((terms, fits[0].half.shape[1], channels))
@@ -269,7 +270,7 @@ def frobenius_error(
 
 
 def _frobenius_errors(target: Target, fits: list[ChannelFit]) -> FloatArray:
-    """Return `frobenius_error` of each channel (C,); 0 for a channel that returns nothing."""
+    """Return `frobenius_error` of each channel (C,); 0 for a channel that returns no light."""
     errors = np.zeros(len(fits))
     for c in np.flatnonzero(~target.is_empty):
         given, channel = fits[c].relative_frobenius_error, int(c)
@@ -288,7 +289,7 @@ def _square(quadrant: FloatArray, target: Target) -> float:
 
 
 def _parameters(fits: list[ChannelFit], channels: tuple[str, ...]) -> dict[str, Any]:
-    """Return what each channel's fit found, by channel."""
+    """Return the parameters that each channel's fit found."""
     return {
         name: dict(each.parameters)
         for name, each in zip(channels, fits, strict=True)
@@ -297,7 +298,7 @@ def _parameters(fits: list[ChannelFit], channels: tuple[str, ...]) -> dict[str, 
 
 
 def _provenance(target: Target, settings: Mapping[str, Any], *, normalize: bool) -> dict[str, Any]:
-    """Return where the kernel comes from."""
+    """Return the provenance of the kernel."""
     meta = target.profile.meta
     return {
         "material": target.name,

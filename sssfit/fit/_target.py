@@ -1,8 +1,8 @@
 """The target of every fit: the pixel-integrated kernel of a profile, on a pitch and a support.
 
-Never point samples: R_d ~ 1/r near the beam, and a sampled kernel's every figure would depend on
-where the samples fall. Quadrants are made a channel at a time: 1237 x 1237 pixels take 12 MB and
-0.07 s, 3932 x 3932 take 124 MB and 0.7 s.
+Pixels are never point samples: R_d ~ 1/r near the beam, so every figure of a sampled kernel would
+depend on the positions of the samples. Quadrants are computed one channel at a time: 1237 x 1237
+pixels take 12 MB and 0.07 s, 3932 x 3932 take 124 MB and 0.7 s.
 """
 
 import math
@@ -21,15 +21,15 @@ from sssfit.profile import Profile
 MM_PER_PIXEL = 0.3  # a head 0.6 m away on 1080 rows; skin1's whole kernel is 143 pixels
 Pitch: TypeAlias = float | Literal["profile"]
 KEPT = 0.999  # support "auto": share of every channel's on-grid energy within it
-_FAINTEST = 1e-145  # energy: squares of fainter pixels are 0, and errors relative to them nothing
+_FAINTEST = 1e-145  # energy: squares of fainter pixels underflow, and with them relative errors
 _MOST_BYTES = 2e9
-_LEAST_MM, _MOST_MM = 1e-12, 1e12  # of a kernel's pixels
-_WIDEST = 1e15  # pixels: beyond it the fit is refused for memory anyway; keeps floor() finite
+_LEAST_MM, _MOST_MM = 1e-12, 1e12  # sizes of a kernel's pixels
+_WIDEST = 1e15  # pixels: more would exceed the memory limit anyway; keeps floor() finite
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Target:
-    """A profile with the pixels it is to be fitted on: pitch p, pixels -h to h."""
+    """A profile and the pixels of its fit: pitch p, pixels -h to h."""
 
     profile: Profile
     mm_per_pixel: float
@@ -37,23 +37,23 @@ class Target:
 
     @property
     def name(self) -> str:
-        """What messages and kernels call the profile."""
+        """The name of the profile in messages and kernels."""
         return self.profile.label
 
     @property
     def total(self) -> FloatArray:
-        """Energy that the kernel stands for (C,): the diffuse reflectance, beyond the grid too."""
+        """Energy of the kernel (C,): the diffuse reflectance, including light beyond the grid."""
         return self.profile.diffuse_reflectance
 
     @property
     def is_empty(self) -> npt.NDArray[np.bool_]:
-        """Channels that return nothing at all (C,)."""
+        """Channels that return no light (C,)."""
         empty: npt.NDArray[np.bool_] = self.profile.total_on_grid <= 0.0
         return empty
 
     @property
     def copies(self) -> FloatArray:
-        """How often each pixel of a half line is there (h+1,): once in the middle, else twice."""
+        """Copies of each pixel of a half line (h+1,): one of the middle pixel, else two."""
         return np.where(np.arange(self.half_pixels + 1) == 0, 1.0, 2.0)
 
     def quadrant(self, channel: int) -> FloatArray:
@@ -72,15 +72,15 @@ class Target:
 def make_target(
     profile: Profile, mm_per_pixel: Pitch | None = None, support_mm: float | None = None
 ) -> Target:
-    """Choose pixels for a profile, and refuse one that no fit can use.
+    """Choose the pixels for a profile, and check that it can be fitted.
 
     Parameters
     ----------
     profile : Profile
-        From any method.
+        A profile of any method.
     mm_per_pixel : float or "profile", optional [mm]
-        Pitch; by default 0.3, as a picture of a head 0.6 m away has it. "profile" is the first
-        annulus's width.
+        Pixel size, by default 0.3, for a picture of a head 0.6 m away. "profile" is the width of
+        the first annulus.
     support_mm : float, optional [mm]
         Half width: 2 floor(support / pitch) + 1 pixels, centres on the axis. By default the
         smallest that keeps 99.9 % of every channel's on-grid energy.
@@ -88,13 +88,14 @@ def make_target(
     Raises
     ------
     FitError
-        Energies that are NaN, negative or all zero; a pitch or support that is not a length; a
-        channel of whose light the support holds nothing; more than 2 GB for a channel.
+        Energies are NaN, negative or all zero; the pixel size or support is not a length; the
+        support holds no light of a channel; a channel would need more than 2 GB.
 
     Warns
     -----
     SssfitWarning
-        The kernel is a single pixel (the identity), or more energy comes back than went in.
+        The kernel is a single pixel (the identity), or the profile returns more energy than went
+        in.
     """
     _check_profile(profile)
     pitch = pitch_of(profile, mm_per_pixel)
@@ -105,7 +106,7 @@ def make_target(
                 f"{name} = {value:g}; expected a length in mm above 0, from {_LEAST_MM:g} to "
                 f"{_MOST_MM:g}."
             )
-    # 1e-9: a ratio that is whole except for its last bits must not lose a pixel.
+    # 1e-9: a ratio that is an integer up to rounding must not lose a pixel.
     half = math.floor(min(support / pitch, _WIDEST) + 1e-9)
     if half == 0:
         warnings.warn(
@@ -121,7 +122,7 @@ def make_target(
 
 
 def pitch_of(profile: Profile, mm_per_pixel: Pitch | None = None) -> float:
-    """Return the pitch [mm]: a given one, `MM_PER_PIXEL`, or the profile's for "profile"."""
+    """Return the pixel size [mm]: the given one, `MM_PER_PIXEL`, or the profile's for "profile"."""
     if mm_per_pixel is None:
         return MM_PER_PIXEL
     if isinstance(mm_per_pixel, str):
@@ -142,9 +143,9 @@ def support_of(profile: Profile) -> float:
 
 
 def _check_memory(target: Target) -> None:
-    """Refuse pixels that would not fit in memory, before anything is done.
+    """Raise FitError for pixels that would not fit in memory, before anything is computed.
 
-    Every fit holds two quadrants at once, the target's and its own, if only for the error.
+    Every fit holds two quadrants at once, the target's and its own, at least for the error.
     """
     size = 2.0 * 8.0 * (target.half_pixels + 1.0) ** 2
     if size > _MOST_BYTES:
@@ -157,7 +158,7 @@ def _check_memory(target: Target) -> None:
 
 
 def _check_light(target: Target) -> None:
-    """Refuse channels that return light, but none that the pixels could show."""
+    """Raise FitError for channels that return light, but none within the support."""
     corner_mm = math.sqrt(2.0) * target.mm_per_pixel * (target.half_pixels + 0.5)
     within = target.profile.cumulative_at(np.array([corner_mm]))[0]
     for c in np.flatnonzero(~target.is_empty & (within < _FAINTEST)):
@@ -169,7 +170,7 @@ def _check_light(target: Target) -> None:
 
 
 def _check_profile(profile: Profile) -> None:
-    """One clear line for data that no fit can use."""
+    """Raise FitError for data that no fit can use."""
     energy, name = profile.annulus_energy, profile.label
     if not np.isfinite(energy).all():
         raise FitError(f"{name}: the profile holds NaN or infinite energies; make it again.")

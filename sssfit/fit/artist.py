@@ -5,9 +5,9 @@ Subsurface Scattering", supplement E). A shader multiplies each sample by
 exp(-d_z^2 / (2 max(v_near, v_far))) for the depth between it and the middle; that variance goes
 into the kernel's parameters.
 
-Least squares fit one channel at a time to its line integral or to its 2D kernel. What a picture
-shows depends on all channels at once, and this room renders none: a caller hands in what judges
-their numbers (`sssfit.compare.pictures`).
+Least squares fits one channel at a time to its line integral or to its 2D kernel. The visible error
+of a picture depends on all channels together, and this room renders no pictures, so the caller
+passes the function that judges the parameters (`sssfit.compare.pictures`).
 """
 
 import functools
@@ -32,20 +32,22 @@ from sssfit.fit._result import ChannelFit, FitResult, fit_channels
 from sssfit.fit._target import Pitch, Target, make_target
 from sssfit.profile import Profile
 
-_WIDTHS = 10  # tried for each Gaussian, all pairs, before the best are refined
+_WIDTHS = 10  # widths tried for each Gaussian, in all pairs, before the best are refined
 _REFINED = 3
-# Starts of the search by pictures, for all channels alike: log(w / (1 - w)), and the logs of v_near
-# and v_far over the square of the radius within which half of the channel's energy lies.
+# Starts of the search by pictures, the same for all channels: log(w / (1 - w)), and the logs of
+# v_near and v_far relative to the square of the radius that holds half of the channel's energy.
 _SHARES = (-1.0, 0.0, 1.0)
 _NEAR = (-3.0, -1.5, 0.0)
 _FAR = (1.0, 2.0, 3.0)
-_STEP, _CHANGE, _VALUE_CHANGE = 0.5, 0.02, 1e-3  # of the same; and of a Delta E
+# Step and tolerance of these parameters; tolerance of a Delta E.
+_STEP, _CHANGE, _VALUE_CHANGE = 0.5, 0.02, 1e-3
 _MOST_EVALUATIONS = 1000
-_LEAST_MM2, _MOST_MM2 = 1e-18, 1e18  # by hand; files hold no more, and squares of less overflow
+# By hand; the limits of kernel files, and squares of less underflow.
+_LEAST_MM2, _MOST_MM2 = 1e-18, 1e18
 
 PerChannel = float | Sequence[float]
 Misfit = Callable[[FloatArray], tuple[float, FloatArray]]
-# From the kernel's pixels to a function of (w, log v_near, log v_far) by channel (3, C).
+# Takes the kernel's pixels; returns a function of (w, log v_near, log v_far) by channel (3, C).
 PictureTarget = Callable[[Target], Callable[[FloatArray], float]]
 
 
@@ -60,33 +62,33 @@ def fit_artist(
     far_mm2: PerChannel | None = None,
     weight: PerChannel | None = None,
 ) -> FitResult:
-    """Fit two Gaussians per channel, or take those that are given.
+    """Fit two Gaussians per channel, or use given ones.
 
-    The pass has the profile's energy, including what the support cuts off.
+    The pass preserves the profile's energy, including the part that the support cuts off.
 
     Parameters
     ----------
     profile : Profile
     mm_per_pixel, support_mm : float, optional [mm]
-        Pixels; see ``sssfit.fit.make_target``.
+        Pixel size and half width of the support; see ``sssfit.fit.make_target``.
     normalize : bool
-        Unit energy for every channel, the energy kept apart.
+        Scale every channel to unit energy, and keep its energy in ``kernel.scale``.
     target : str or callable
-        What to be near to: "line", the profile integrated along lines, which is what a long
-        straight edge sees; "kernel", all pixels of the 2D kernel; both by least squares. Or
-        pictures: a function such as ``sssfit.compare.pictures.picture_error`` that takes the
-        `Target` and returns one from (w, log v_near, log v_far) by channel (3, C) to a Delta E,
-        which Nelder and Mead's simplex minimises over the numbers of all channels at once.
+        What to fit by least squares: "line", the profile integrated along lines, which decides how
+        a long straight edge looks, or "kernel", all pixels of the 2D kernel. Or a function such as
+        ``sssfit.compare.pictures.picture_error`` that takes the `Target` and returns one from (w,
+        log v_near, log v_far) by channel (3, C) to a Delta E of pictures, which Nelder and Mead's
+        simplex minimises over the parameters of all channels together.
     near_mm2, far_mm2 : float or one per channel, optional [mm^2]
-        Variances per axis, set by hand; with ``weight`` or not at all.
+        Variances per axis, set by hand together with ``weight``.
     weight : float or one per channel, optional
         Share of the near Gaussian, 0 to 1.
 
     Returns
     -------
     FitResult
-        One term. By channel the parameters hold ``near_mm2``, ``far_mm2``, ``weight`` and
-        ``depth_variance_mm2``.
+        One term. For each channel
+        ``kernel.parameters`` has ``near_mm2``, ``far_mm2``, ``weight`` and ``depth_variance_mm2``.
 
     Raises
     ------
@@ -100,7 +102,7 @@ def fit_artist(
     pixels = make_target(profile, mm_per_pixel, support_mm)
     by_hand = _by_hand(near_mm2, far_mm2, weight, profile.channels)
 
-    @functools.cache  # with the first channel, so that the seconds are those of the fit
+    @functools.cache  # called with the first channel, so that the time counts as the fit's
     def by_pictures() -> list[Minimum]:
         assert callable(target)
         return fit_to_pictures(pixels, target(pixels))
@@ -128,7 +130,7 @@ def fit_artist(
 
 
 def two_gaussians(edges_mm: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return a_m over pixels (h+1,) and its derivatives (3, h+1) in w, log v_near, log v_far.
+    """Return a_m over pixels (h+1,) and its derivatives (3, h+1) by w, log v_near, log v_far.
 
     ``x`` is (w, log v_near, log v_far).
     """
@@ -139,18 +141,19 @@ def two_gaussians(edges_mm: FloatArray, x: FloatArray) -> tuple[FloatArray, Floa
 
 
 def fit_two_gaussians(edges_mm: FloatArray, misfit: Misfit) -> Minimum:
-    """Minimise over (w, log v_near, log v_far), from the best of a grid of variances.
+    """Minimise over (w, log v_near, log v_far), starting at the best of a grid of variances.
 
     Parameters
     ----------
     edges_mm : array (h+2,) [mm]
         `Target.edges_mm`.
     misfit : callable
-        From a pass of sum 1 (h+1,) to how far off it is, and the gradient.
+        Takes a pass of sum 1 (h+1,); returns its error and the gradient.
     """
 
     def objective(x: FloatArray) -> tuple[float, FloatArray]:
-        # With the energy it will have: a pass that spills over the support would else look good.
+        # With the energy of the final pass; otherwise a pass wider than the support would look
+        # good.
         half, slopes = of_unit_sum(*two_gaussians(edges_mm, x))
         value, gradient = misfit(half)
         return value, slopes @ gradient
@@ -168,14 +171,14 @@ def fit_two_gaussians(edges_mm: FloatArray, misfit: Misfit) -> Minimum:
 
 
 def fit_to_pictures(pixels: Target, objective: Callable[[FloatArray], float]) -> list[Minimum]:
-    """Minimise over (w, log v_near, log v_far) of all channels at once; one `Minimum` a channel.
+    """Minimise over (w, log v_near, log v_far) of all channels; return a `Minimum` per channel.
 
     Parameters
     ----------
     pixels : Target
     objective : callable
-        From these numbers by channel (3, C) to how far off pictures are. Channels without light are
-        handed in as 1, 0, 0 and not fitted.
+        Takes these parameters by channel (3, C); returns the error of the pictures. Channels
+        without light get 1, 0, 0 and are not fitted.
     """
     lit = np.flatnonzero(~pixels.is_empty)
     log_v = _log_variances(pixels.edges_mm())
@@ -210,22 +213,22 @@ def fit_to_pictures(pixels: Target, objective: Callable[[FloatArray], float]) ->
 
 
 def artist_pass(pixels: Target, channel: int, x: FloatArray) -> FloatArray:
-    """Return the half line (h+1,) of (w, log v_near, log v_far), of the channel's energy."""
+    """Return the half line (h+1,) for (w, log v_near, log v_far), with the channel's energy."""
     half, _ = of_unit_sum(*two_gaussians(pixels.edges_mm(), x))
     return math.sqrt(float(pixels.total[channel])) * half
 
 
 def _log_variances(edges_mm: FloatArray) -> FloatArray:
-    """Return the least and the largest log of a variance: a tenth of a pixel, twice the support.
+    """Return the bounds of the log variances, from a tenth of a pixel and twice the support.
 
-    The one is a point in its pixel, the other flat over all of them.
+    The first Gaussian is a point in its pixel, the second is flat over the support.
     """
     limits: FloatArray = 2.0 * np.log(np.array((0.2 * edges_mm[1], 2.0 * edges_mm[-1])))
     return limits
 
 
 def _half_energy_radii(pixels: Target) -> FloatArray:
-    """Return the radius within which half of the energy on the grid lies (C,) [mm]."""
+    """Return the radius that holds half of the energy on the grid (C,) [mm]."""
     profile = pixels.profile
     within = profile.cumulative
     return np.array(
@@ -237,7 +240,7 @@ def _half_energy_radii(pixels: Target) -> FloatArray:
 
 
 def _misfit_of(pixels: Target, channel: int, target: str) -> Misfit:
-    """Return what measures a pass of sum 1 against the channel's line or its 2D kernel."""
+    """Return the misfit of a pass of sum 1 to the channel's line integral or 2D kernel."""
     copies = pixels.copies
     if target == "line":
         line = pixels.half_line()[:, channel]
@@ -247,7 +250,7 @@ def _misfit_of(pixels: Target, channel: int, target: str) -> Misfit:
 
 
 def _near_first(x: FloatArray) -> FloatArray:
-    """Name the narrower Gaussian the near one."""
+    """Return the parameters with the narrower Gaussian as the near one."""
     return x if x[1] <= x[2] else np.array((1.0 - x[0], x[2], x[1]))
 
 
@@ -268,7 +271,7 @@ def _by_hand(
     weight: PerChannel | None,
     channels: tuple[str, ...],
 ) -> FloatArray | None:
-    """Return (w, log v_near, log v_far) by channel (3, C), or None where nothing is given."""
+    """Return (w, log v_near, log v_far) by channel (3, C), or None if nothing is given."""
     values = per_channel({"weight": weight, "near_mm2": near_mm2, "far_mm2": far_mm2}, channels)
     if values is None:
         return None

@@ -2,15 +2,15 @@
 
 Christensen and Burley 2015, "Approximate reflectance profiles for efficient subsurface scattering":
 R_d(r) = A s (exp(-s r) + exp(-s r / 3)) / (8 pi r), with A the diffuse reflectance. A is the
-profile's own. s is the one that minimises
+profile's own; s minimises
 
     int_0^R (F(r) - A (1 - exp(-s r) / 4 - 3 exp(-s r / 3) / 4))^2 dr
 
-over the grid, F(r) being the energy within r. Energies and not densities: R_d ~ 1/r would make the
-objective depend on the pixels or on the width of the first annulus, and F is known exactly at the
-edges. The kernel is the model's line integral, in closed form: s/(4 pi) (K0(s x) + K0(s x / 3))
-integrated over each pixel, as `sssfit.fit.preintegrated` does with the profile itself; what the
-model has outside the support is restored as there.
+over the grid, where F(r) is the energy within r. The fit uses energies and not densities, because
+R_d ~ 1/r would make the objective depend on the pixels or on the width of the first annulus, and F
+is known exactly at the edges. The kernel is the model's line integral, in closed form: s/(4 pi)
+(K0(s x) + K0(s x / 3)) integrated over each pixel, as `sssfit.fit.preintegrated` does with the
+profile itself. The model's energy outside the support is restored in the same way.
 """
 
 import math
@@ -44,12 +44,12 @@ def fit_burley(
     ----------
     profile : Profile
     energy : str
-        "rescale" (default): every channel scaled to its diffuse reflectance A. "keep": what the
-        model's strips within the support hold.
+        "rescale" (default) scales every channel to its diffuse reflectance A; "keep" keeps the
+        energy of the model's strips within the support.
     mm_per_pixel, support_mm : float, optional [mm]
         Pixels; see ``sssfit.fit.make_target``. The shape does not depend on them.
     normalize : bool
-        Unit energy for every channel, the energy kept apart.
+        Scale every channel to unit energy, and keep its energy in ``kernel.scale``.
 
     Returns
     -------
@@ -62,7 +62,7 @@ def fit_burley(
     ------
     FitError, ProfileError
         The profile, the pitch, the support or the energy is invalid, or a channel's grid does not
-        tell its shape.
+        determine its shape.
     """
     rescale = restores(energy)
     target = make_target(profile, mm_per_pixel, support_mm)
@@ -94,10 +94,10 @@ def fit_burley(
 
 
 def _fit_shape(r_mm: FloatArray, shares: FloatArray, channel: str) -> tuple[float, int, str]:
-    """Return the s [1/mm] of least squares to F / A at the edges (n+1,), evaluations, why it ended.
+    """Return the least-squares s [1/mm] for F / A at the edges (n+1,), evaluations, stop reason.
 
-    A scan of log s finds the best stretch, so that no start has to be guessed; in it the objective
-    has a slope of 0, which gives s to rounding, as its smallest value would not.
+    A scan of log s finds the best interval, so that no start has to be guessed. There the zero of
+    the objective's slope gives s to rounding, which its smallest value would not.
     """
     weights = 0.5 * (np.diff(r_mm, append=r_mm[-1]) + np.diff(r_mm, prepend=r_mm[0]))
 

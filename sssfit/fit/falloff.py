@@ -2,16 +2,16 @@
 
 s(w, t, f)[x] = p(x / m) t / m + delta(x) (1 - t) with m = STRETCH w (0.001 + f), width w, strength
 t and falloff f, and p the red channel of d'Eon's six-Gaussian skin (Jimenez, Jarabo, Gutierrez
-2012, "Separable Subsurface Scattering", RR-02-12, eqs. 1 to 3). Where the report leaves a choice:
+2012, "Separable Subsurface Scattering", RR-02-12, eqs. 1 to 3). Where the report is ambiguous:
 
-- Eq. 1 prints p[x w / (0.001 + f)], by which a larger width narrows; its figure 6 and the released
-  shader widen. The figure is followed.
+- Eq. 1 prints p[x w / (0.001 + f)], in which a larger width narrows the kernel, but in figure 6 and
+  the released shader it widens. This fit follows the figure.
 - x has no unit. ``STRETCH`` makes the parameters of table 1 fit the six-Gaussian skin best, and the
   red channel is then 1.02 times as wide as p: docs/make_falloff.py finds it.
-- w and 0.001 + f matter through their product only: four numbers for the scales of three channels.
-  A fit gives the widest channel the falloff 1.
+- Only the product of w and 0.001 + f matters: four numbers for the scales of three channels. A fit
+  gives the widest channel the falloff 1.
 - p is the skin integrated along lines, of unit integral. Read as R_d along a radius it fits worse.
-- delta is the middle pixel: the strength belongs to the pitch. In small pixels it is 1.
+- delta is the middle pixel, so the strength depends on the pixel size. For small pixels it is 1.
 """
 
 import functools
@@ -36,9 +36,10 @@ STRETCH = 127.7
 _SIGMAS_MM = np.sqrt(SKIN_VARIANCES_MM2)
 _RED = np.array([row[0] for row in SKIN_WEIGHTS])
 _LEAST_FALLOFF = 0.001
-_WIDTHS, _MOST_FALLOFF = (1e-9, 1e9), 1e6  # by hand; beyond them squares leave double precision
-_DENSE = 8  # pixels that are all samples; farther out they lie an eighth of their distance apart
-_SCALES = 24  # tried with each of some strengths, before the best are refined
+_WIDTHS, _MOST_FALLOFF = (1e-9, 1e9), 1e6  # by hand; beyond them squares overflow double precision
+# Every pixel is a sample up to here; farther out samples are an eighth of their distance apart.
+_DENSE = 8
+_SCALES = 24  # scales tried with each strength, before the best are refined
 _STRENGTHS = (0.25, 0.5, 0.75, 1.0)
 _REFINED = 3
 
@@ -55,19 +56,19 @@ def fit_falloff(
     strength: PerChannel | None = None,
     falloff: PerChannel | None = None,
 ) -> FitResult:
-    """Fit width, strength and falloff to the 2D kernel, or take those that are given.
+    """Fit width, strength and falloff to the 2D kernel, or use given ones.
 
-    The pass has the profile's energy, including what the support cuts off.
+    The pass preserves the profile's energy, including the part that the support cuts off.
 
     Parameters
     ----------
     profile : Profile
     mm_per_pixel, support_mm : float, optional [mm]
-        Pixels; see ``sssfit.fit.make_target``.
+        Pixel size and half width of the support; see ``sssfit.fit.make_target``.
     normalize : bool
-        Unit energy for every channel, the energy kept apart.
+        Scale every channel to unit energy, and keep its energy in ``kernel.scale``.
     width : float, optional
-        Of all channels, above 0, set by hand; with ``strength`` and ``falloff`` or not at all.
+        Width of all channels, above 0, set by hand together with ``strength`` and ``falloff``.
     strength : float or one per channel, optional
         Share of the light that scatters, 0 to 1.
     falloff : float or one per channel, optional
@@ -76,8 +77,8 @@ def fit_falloff(
     Returns
     -------
     FitResult
-        One term. By channel the parameters hold ``width`` (the same for all), ``strength``,
-        ``falloff`` and ``misfit``, which is `sampled_misfit`.
+        One term. For each channel ``kernel.parameters`` has ``width`` (the same for all),
+        ``strength``, ``falloff`` and ``misfit``, which is `sampled_misfit`.
 
     Raises
     ------
@@ -92,7 +93,7 @@ def fit_falloff(
     def quadrant_of(channel: int) -> FloatArray:
         return target.quadrant(channel) / float(total[channel])
 
-    @functools.cache  # with the first channel, so that the seconds are those of the fit
+    @functools.cache  # called with the first channel, so that the time counts as the fit's
     def all_channels() -> tuple[dict[int, Minimum], FloatArray]:
         if given is not None:
             return {}, given
@@ -129,14 +130,14 @@ def fit_falloff(
 
 
 def scale_of(width: float, falloff: float) -> float:
-    """How many times as wide as red skin a channel is: m = STRETCH w (0.001 + f)."""
+    """Return the width of a channel relative to red skin: m = STRETCH w (0.001 + f)."""
     return STRETCH * width * (_LEAST_FALLOFF + falloff)
 
 
 def stretched_skin(x: FloatArray, edges_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return s over pixels, scaled to sum 1 (h+1,), and its derivatives (2, h+1).
 
-    ``x`` is (t, log m), ``edges_mm`` (h+2,) those of `Target.edges_mm`.
+    ``x`` is (t, log m), ``edges_mm`` (h+2,) are those of `Target.edges_mm`.
     """
     energy, slope = gaussian_pixels(edges_mm, _SIGMAS_MM * math.exp(x[1]))
     delta = np.zeros(edges_mm.size - 1)
@@ -147,7 +148,7 @@ def stretched_skin(x: FloatArray, edges_mm: FloatArray) -> tuple[FloatArray, Flo
 
 
 def sampled_misfit(half: FloatArray, quadrant: FloatArray) -> tuple[float, FloatArray]:
-    """Return eq. 3's sum for a pass (h+1,), over that of no kernel at all, and its gradient.
+    """Return eq. 3's sum for a pass (h+1,), relative to an empty pass, and its gradient.
 
     Summed over pairs of sampled pixels of a quadrant (h+1, h+1) and their copies in the plane.
     """
@@ -159,7 +160,7 @@ def sampled_misfit(half: FloatArray, quadrant: FloatArray) -> tuple[float, Float
 
 
 def samples(pixels: int) -> npt.NDArray[np.int64]:
-    """Return the pixels that eq. 3 looks at, of so many on a half line: dense near the middle."""
+    """Return the pixels of a half line that eq. 3 samples, dense near the middle."""
     at = [0]
     while (farther := at[-1] + max(1, at[-1] // _DENSE)) < pixels:
         at.append(farther)
@@ -202,7 +203,7 @@ def _by_hand(
     falloff: PerChannel | None,
     channels: tuple[str, ...],
 ) -> FloatArray | None:
-    """Return width, strength and falloff (3, C), or None where nothing is given."""
+    """Return width, strength and falloff (3, C), or None if nothing is given."""
     given = {"width": width, "strength": strength, "falloff": falloff}
     values = per_channel(given, channels)
     if values is None:

@@ -5,16 +5,15 @@ minimise  int r (R_d(r) - sum_i w_i G(v_i, r))^2 dr,   G(v, r) = exp(-r^2 / 2v) 
 with the sum of the weights held at the diffuse reflectance (Jimenez et al. 2015, "Separable
 Subsurface Scattering", supplement eq. S.1; without that constraint d'Eon and Luebke 2007, "Advanced
 techniques for realistic real-time skin rendering", GPU Gems 3, chapter 14). A Gaussian in the plane
-is a product of two along the axes, so each term is one pass, integrated over the pixels. What the
-Gaussians have outside the support is restored by one factor, unless ``energy="keep"``: of six for
-skin1's red that is 45 % on 13 pixels of .3 mm.
+is a product of two along the axes, so each term is one pass, integrated over the pixels. One factor
+restores the energy of the Gaussians outside the support, unless ``energy="keep"``: 45 % for six
+Gaussians of skin1's red on 13 pixels of .3 mm.
 
-The fit sees the profile's annuli and not the pixels: variances and weights do not depend on the
-pitch. The exception are profiles with R_d ~ 1/r near the beam, where the integral of r R^2 has no
-limit as annuli narrow; these are looked at as finely as the pixels are, and a warning says so.
+The fit uses the profile's annuli and not the pixels, so variances and weights do not depend on the
+pixel size. The exception are profiles with R_d ~ 1/r near the beam, where the integral of r R^2
+diverges as annuli narrow; these are evaluated at the resolution of the pixels, with a warning.
 
-Next: ``_gaussians_annuli.py`` has the objective, ``_gaussians_search.py`` the search,
-``_gaussians_search.py`` what is looked at how finely.
+Next: ``_gaussians_search.py`` has the objective, the search and the resolution.
 """
 
 import math
@@ -25,16 +24,15 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from sssfit.errors import FitError, SssfitWarning
-from sssfit.fit._gaussians_annuli import make_annuli
-from sssfit.fit._gaussians_search import GaussianSum, is_steep, rings, search
+from sssfit.fit._gaussians_search import GaussianSum, is_steep, make_annuli, rings, search
 from sssfit.fit._result import ChannelFit, FitResult, factor_to, fit_channels, restores
 from sssfit.fit._target import Pitch, Target, make_target
 from sssfit.profile import Profile
 from sssfit.shapes import gaussian_line_integral
 
 MOST_TERMS = 10
-# Of the first annulus's width: a Gaussian this narrow has 0.9997 of its energy there, and a
-# narrower one cannot be told from it.
+# Of the first annulus's width: a Gaussian this narrow has 0.9997 of its energy there, and narrower
+# ones cannot be distinguished from it.
 _NARROWEST = 0.25
 
 
@@ -49,44 +47,43 @@ def fit_gaussians(
     support_mm: float | None = None,
     normalize: bool = False,
 ) -> FitResult:
-    """Fit a sum of Gaussians to the profile, r-weighted least squares.
+    """Fit a sum of Gaussians to the profile by r-weighted least squares.
 
     Parameters
     ----------
     profile : Profile
     terms : int
-        Number N of Gaussians, 1 to 10; fewer come out where one more does not lower the error.
+        Number N of Gaussians, 1 to 10; the result has fewer if one more does not lower the error.
     signed : bool
         Allow negative weights.
     free_energy : bool
-        Do not hold the sum of the weights at the diffuse reflectance: a smaller error near the
-        beam for an energy that is off.
+        Do not constrain the sum of the weights to the diffuse reflectance: a smaller error near the
+        beam, but a wrong energy.
     energy : str
-        "rescale" (default): every channel's terms scaled to the sum of its weights, as they would
-        add up without a support. "keep": what lies within the support.
+        "rescale" (default) scales the terms of every channel to the sum of its weights, the energy
+        without a support; "keep" keeps the energy within the support.
     mm_per_pixel, support_mm : float, optional [mm]
-        Pixels; see ``sssfit.fit.make_target``.
+        Pixel size and half width of the support; see ``sssfit.fit.make_target``.
     normalize : bool
-        Unit energy for every channel, the energy kept apart.
+        Scale every channel to unit energy, and keep its energy in ``kernel.scale``.
 
     Returns
     -------
     FitResult
         The kernel's ``parameters`` have for each channel ``variances_mm2`` (ascending), ``weights``
-        (energies without a support and before ``normalize``) and ``relative_error``, that of the
-        literature:
-        sqrt(int r (R - fit)^2 dr / int r R^2 dr) over the profile's grid.
+        (energies without a support and before ``normalize``) and ``relative_error``, as in the
+        literature, sqrt(int r (R - fit)^2 dr / int r R^2 dr) over the profile's grid.
 
     Raises
     ------
     FitError, ProfileError
-        Terms out of range or too many for the annuli; the profile, the pitch or the support is of
-        no use.
+        The number of terms is out of range or too large for the annuli; the profile, the pixel size
+        or the support is invalid.
 
     Warns
     -----
     SssfitWarning
-        R_d rises towards the beam as 1/r, so that Gaussians and errors depend on the pitch.
+        R_d rises towards the beam like 1/r, so Gaussians and errors depend on the pixel size.
     """
     number, rescale = _checked_terms(terms), restores(energy)
     target = make_target(profile, mm_per_pixel, support_mm)
@@ -102,7 +99,7 @@ def fit_gaussians(
         found = search(annuli, number, narrowest_mm**2, float(edges_mm[-1]) ** 2)
         return _as_passes(target, channel, found, on_grid, rescale=rescale)
 
-    # One BLAS thread: matrices of a few thousand rows and 10 columns gain nothing from more.
+    # One BLAS thread: matrices of a few thousand rows and 10 columns do not profit from more.
     with threadpool_limits(1, user_api="blas"):
         return fit_channels(
             target,
@@ -122,7 +119,7 @@ def fit_gaussians(
 def _as_passes(
     target: Target, channel: int, found: GaussianSum, on_grid: float, *, rescale: bool
 ) -> ChannelFit:
-    """Integrate the Gaussians over the pixels; a weight's root goes into each of its two passes."""
+    """Integrate the Gaussians over the pixels; each pass takes the square root of the weight."""
     weights, edges_mm = found.weights * on_grid, target.edges_mm()
     columns = gaussian_line_integral(edges_mm[:-1], edges_mm[1:], found.variances_mm2[:, None])
     signs, half = np.sign(weights), np.sqrt(np.abs(weights))[:, None] * columns
@@ -142,7 +139,7 @@ def _as_passes(
 
 
 def _checked_terms(terms: int) -> int:
-    """Refuse a number of Gaussians that is none."""
+    """Check the number of Gaussians."""
     try:
         number = operator.index(terms)
     except TypeError:
@@ -153,7 +150,7 @@ def _checked_terms(terms: int) -> int:
 
 
 def _check_annuli(profile: Profile, terms: int) -> None:
-    """Refuse more unknowns than data."""
+    """Raise FitError if there are more unknowns than data."""
     if profile.n_annuli < 2 * terms:
         raise FitError(
             f"{profile.label}: a profile of {profile.n_annuli} annuli cannot fix the width and "
@@ -162,7 +159,7 @@ def _check_annuli(profile: Profile, terms: int) -> None:
 
 
 def _warn_of_pitch(target: Target) -> None:
-    """Say once where the objective has no limit of its own."""
+    """Warn if the objective depends on the resolution."""
     if any(is_steep(target, int(c)) for c in np.flatnonzero(~target.is_empty)):
         warnings.warn(
             f"{target.name}: R_d is steep near the beam (single "

@@ -1,14 +1,14 @@
 """The guided kernel: one pass, fitted under a guide function that weights the pixels.
 
-Minimise over a the sum of Gamma (R_d - a a^T)^2 subject to (sum a)^2 = ||R_d||_1, with
-Gamma(x, y; k) = (x^2 + y^2)^(k/2) (1 - exp(-b x^2)) (1 - exp(-b y^2)) (Jimenez et al. 2015,
-"Separable Subsurface Scattering", supplement eqs. S.7 to S.9): k = 0 favours light near the beam,
-k = 4 far light. x and y are 1 at the channel's own extent, in proportion to its mean free path, so
-that k and b say the same for a narrow channel as for a wide one; docs/fits.md has what else was
-tried. Sequential quadratic programming, coarse to fine.
+Minimise over a the sum of Gamma (R_d - a a^T)^2 subject to (sum a)^2 = ||R_d||_1, with Gamma(x, y;
+k) = (x^2 + y^2)^(k/2) (1 - exp(-b x^2)) (1 - exp(-b y^2)) (Jimenez et al. 2015, "Separable
+Subsurface Scattering", supplement eqs. S.7 to S.9): k = 0 favours light near the beam, k = 4 light
+far from it. x and y are 1 at the channel's own extent, in proportion to its mean free path, so k
+and b have the same meaning for narrow and wide channels; docs/fits.md compares other rules. The
+search is sequential quadratic programming, from coarse to fine grids.
 
-Gamma vanishes along the axes, so that the middle pixel a(0) is almost free: it takes up all that
-energy the rest does not want and becomes a spike, which is reported and can be bounded.
+Gamma vanishes along the axes, so the middle pixel a(0) is almost unconstrained: it takes the energy
+that the other pixels leave over and becomes a spike, which is reported and can be bounded.
 """
 
 import math
@@ -26,17 +26,17 @@ from sssfit.optics import gauss_legendre
 from sssfit.profile import Profile
 from sssfit.profile.bins import mean_free_paths_mm
 
-# The k that the paper draws Gamma for (figure S.1b). The pass nearest to the pre-integrated one is
-# not this one for every channel: k = 0 for skin1's red, see docs/fits.md.
+# The k for which the paper draws Gamma (figure S.1b). It does not give the pass nearest to the
+# pre-integrated one for every channel: that is k = 0 for skin1's red, see docs/fits.md.
 DRAWN_K = 1.55
 MOST_PIXELS = 513
-_COARSEST = 8  # pixels on either side at the first level: each level has twice those of the last
+_COARSEST = 8  # half pixels of the first level; each level has twice as many as the last
 _SPIKE = (
-    0.25  # of sum(a): a middle pixel above it, and twice the pre-integrated one's, is warned of
+    0.25  # share of sum(a): warn of a middle pixel above it and above twice the pre-integrated one
 )
-_LEAST_B, _MOST_B = 1e-3, 1e9  # beyond, Gamma is 0 or 1 to rounding
+_LEAST_B, _MOST_B = 1e-3, 1e9  # beyond these, Gamma is 0 or 1 to rounding
 _LEAST_BOUND = 1e-9
-_ACROSS = 64  # quadrature nodes of Gamma along a half line, at least: the steps are 1/7 wide
+_ACROSS = 64  # least number of quadrature nodes of Gamma along a half line; its steps are 1/7 wide
 
 
 def fit_guided(
@@ -49,29 +49,31 @@ def fit_guided(
     b: float = 50.0,
     centre_bound: float | None = None,
 ) -> FitResult:
-    """Fit one pass under the guide function Gamma.
+    """Fit one pass with the guide function Gamma as weights.
 
     Parameters
     ----------
     profile : Profile
     mm_per_pixel, support_mm : float, optional [mm]
-        Pixels, 513 at most; see ``sssfit.fit.make_target``. By default, and for "profile", the
-        least with which 513 pixels suffice where that is more.
+        Pixel size and half width of the support, 513 pixels at most; see
+        ``sssfit.fit.make_target``. The default and "profile" are widened if they would take more
+        pixels.
     normalize : bool
-        Unit energy for every channel, the energy kept apart.
+        Scale every channel to unit energy, and keep its energy in ``kernel.scale``.
     k : float
         0 (near scattering) to 4 (far scattering).
     b : float
-        How close to the axes Gamma vanishes: within some 1/sqrt(b) of the channel's extent.
+        How close to the axes Gamma vanishes: within about 1/sqrt(b) of the channel's extent.
     centre_bound : float, optional
         Largest share of sum(a) that the middle pixel may hold, above 0 and up to 1.
 
     Returns
     -------
     FitResult
-        One term. By channel the parameters hold ``extent_mm``, where x = 1 in Gamma,
-        ``centre_share`` = a(0) / sum(a), that of the pre-integrated pass, the share of
-        sum Gamma R_d^2 that is left, and how each level ended.
+        One term. For each channel
+        ``kernel.parameters`` has ``extent_mm``, where x = 1 in Gamma, ``centre_share`` = a(0) /
+        sum(a), the same for the pre-integrated pass, the remaining share of sum Gamma R_d^2, and
+        how each level ended.
 
     Raises
     ------
@@ -81,7 +83,7 @@ def fit_guided(
     Warns
     -----
     SssfitWarning
-        The middle pixel holds over a quarter of sum(a) and over twice the pre-integrated pass's.
+        The middle pixel holds over a quarter of sum(a) and over twice its pre-integrated share.
     """
     from threadpoolctl import threadpool_limits
 
@@ -109,9 +111,9 @@ def fit_guided(
 def extents_of(target: Target) -> FloatArray:
     """Return where x = 1 in each channel's Gamma (C,) [mm]: the support, by mean free path.
 
-    The support reaches to the outer edges of its pixels, and belongs to the lit channel of the
-    longest mean free path. Of a profile that names no mean free paths (a table, a stack of layers)
-    all channels have the support, as in the supplement.
+    The support reaches to the outer edges of its pixels, and is the extent of the lit channel with
+    the longest mean free path. For a profile without mean free paths (a table, a stack of layers)
+    it is the extent of all channels, as in the supplement.
     """
     support_mm = target.mm_per_pixel * (target.half_pixels + 0.5)
     paths_mm = mean_free_paths_mm(target.profile)
@@ -121,7 +123,7 @@ def extents_of(target: Target) -> FloatArray:
 
 
 def gamma(half_pixels: int, k: float, b: float = 50.0, extent: float = 1.0) -> FloatArray:
-    """Mean of Gamma over every pixel of a quadrant (h+1, h+1), both axes included: eq. S.9.
+    """Return the mean of Gamma over every pixel of a quadrant (h+1, h+1) with its axes: eq. S.9.
 
     ``extent`` is where x = 1, as a share of the support's h + 1/2 pixels: pixel i covers
     (i - 1/2, i + 1/2) / ((h + 1/2) extent).
@@ -153,22 +155,22 @@ def rank_one(
     wanted, weights : array (h+1, h+1)
         A quadrant; c counts each pixel's copies in the plane.
     start : array (h+1,)
-        Where to begin, and what the scale of each a_i is judged from.
+        Starting point, from which the scale of each a_i is estimated.
     total : float or None
-        What (sum of the whole pass)^2 has to be; None leaves it free.
+        Required (sum of the whole pass)^2; None leaves it free.
     centre_bound : float
         Largest a_0.
 
     Returns
     -------
     Minimum
-        ``x`` is a; ``value`` the minimum as a share of that at a = 0.
+        ``x`` is a; ``value`` is the minimum relative to the value at a = 0.
     """
     copies = np.where(np.arange(start.size) == 0, 1.0, 2.0)
     weights = copies[:, None] * copies * weights
     norm = float(np.sum(weights * wanted**2)) or 1.0
-    # In units of 1 / sqrt(second derivative) of each a_i SLSQP, which begins with the identity for
-    # a Hessian, needs 11 evaluations at 65 pixels and at 513; in units of a_i itself 227 at 65.
+    # In units of 1 / sqrt(second derivative) of each a_i, SLSQP, which starts from the identity as
+    # Hessian, needs 11 evaluations at 65 pixels and at 513; in units of a_i itself 227 at 65.
     scale = np.sqrt(norm / (8.0 * weights @ start**2))
 
     def objective(x: FloatArray) -> tuple[float, FloatArray]:
@@ -207,7 +209,7 @@ def _sum_constraint(wanted: float, weights: FloatArray) -> Function:
 def fit_one_pass(
     target: Target, channel: int, extent_mm: float, k: float, b: float, most: float
 ) -> ChannelFit:
-    """Fit a channel level by level; energies as shares of its own, so that sum(a) = 1.
+    """Fit a channel level by level, with energies as shares of its total, so that sum(a) = 1.
 
     ``extent_mm`` is where x = 1 in Gamma, ``most`` the largest share of the middle pixel.
     """
@@ -250,7 +252,7 @@ def fit_one_pass(
 
 
 def _levels(half_pixels: int) -> list[int]:
-    """Return the half pixels of each level, coarse to fine: 8, 16, ..., up to those asked for."""
+    """Return the half pixels of each level, coarse to fine: 8, 16, ..., up to the full number."""
     halves = [half_pixels]
     while halves[0] >= 2 * _COARSEST:
         halves.insert(0, halves[0] // 2)
@@ -258,13 +260,13 @@ def _levels(half_pixels: int) -> list[int]:
 
 
 def _refined(half_line: FloatArray, half_pixels: int) -> FloatArray:
-    """Spread a pass (h'+1,) over more pixels of the same support, keeping its sum and sign."""
+    """Resample a pass (h'+1,) to more pixels on the same support, keeping its sum and sign."""
     from scipy.interpolate import PchipInterpolator
 
     def edges(half: int) -> FloatArray:
         return np.concatenate(([0.0], (np.arange(half + 1) + 0.5) / (half + 0.5)))
 
-    # The sum from the axis outwards, monotone between the edges where it is known.
+    # Interpolate the cumulative sum from the axis outwards, monotone between the known edges.
     within = np.cumsum(np.concatenate(([0.0, 0.5 * half_line[0]], half_line[1:])))
     fine = np.diff(PchipInterpolator(edges(half_line.size - 1), within)(edges(half_pixels)))
     fine[0] *= 2.0
@@ -272,7 +274,7 @@ def _refined(half_line: FloatArray, half_pixels: int) -> FloatArray:
 
 
 def _normalised_pass(a: FloatArray, most: float) -> FloatArray:
-    """Scale a half line to a whole pass of sum 1 whose middle holds no more than ``most``."""
+    """Scale a half line to a whole pass of sum 1 whose middle pixel holds at most ``most``."""
     a = a / (2.0 * a.sum() - a[0])
     if a[0] <= most or a.size == 1:
         return a
@@ -295,9 +297,10 @@ def _check_settings(k: float, b: float, centre_bound: float | None) -> None:
 
 
 def guided_target(profile: Profile, mm_per_pixel: Pitch | None, support_mm: float | None) -> Target:
-    """Choose pixels as `make_target` does, but no more than 513, and name a pitch that will do.
+    """Choose pixels as `make_target` does, but at most 513.
 
-    Raises FitError where a pitch was given that takes more; warns where the default was widened.
+    Raises FitError, which names a sufficient pixel size, if a given one takes more; warns if the
+    default is widened.
     """
     target = make_target(profile, mm_per_pixel, support_mm)
     pixels, pitch = 2 * target.half_pixels + 1, target.mm_per_pixel
@@ -322,7 +325,7 @@ def _rounded_up(value: float) -> float:
 
 
 def _warn_of_spikes(result: FitResult) -> None:
-    """Warn of channels whose middle pixel took up what the guide function left over."""
+    """Warn of channels with a spike in the middle pixel."""
     spikes = []
     for channel, found in result.kernel.parameters.items():
         share, line = found["centre_share"], found["preintegrated_centre_share"]

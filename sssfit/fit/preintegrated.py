@@ -1,12 +1,12 @@
 """The pre-integrated kernel: one pass, exact for edges along the axes.
 
 a_p(x) = int R_d(x, y) dy and A_p = a_p a_p / ||R_d||_1 (Jimenez et al. 2015, "Separable Subsurface
-Scattering", supplement eqs. S.5 and S.6). Convolving E(x, y) = E1(x) + E2(y) with A_p gives what
-the 2D kernel gives, if the support holds all of the energy; the supplement's claim for an edge of
-any orientation does not hold: at 45 degrees it is off by some 6 % of the step.
+Scattering", supplement eqs. S.5 and S.6). Convolving E(x, y) = E1(x) + E2(y) with A_p equals
+convolving with the 2D kernel, if the support holds all of the energy. The supplement's claim for an
+edge of any orientation does not hold: at 45 degrees it is off by about 6 % of the step.
 
-||a_p||_1 = ||R_d||_1, so by default the energy of the strips outside the support is restored: of
-skin1's red they hold 31.5 % on 13 pixels of .3 mm. ``energy="keep"`` leaves it out.
+||a_p||_1 = ||R_d||_1, so by default the energy of the strips outside the support is restored:
+31.5 % of skin1's red on 13 pixels of .3 mm. ``energy="keep"`` turns this off.
 """
 
 import math
@@ -32,12 +32,12 @@ def fit_preintegrated(
     ----------
     profile : Profile
     energy : str
-        "rescale" (default): every channel scaled to its diffuse reflectance. "keep": what its
-        strips within the support hold.
+        "rescale" (default) scales every channel to its diffuse reflectance; "keep" keeps the energy
+        of its strips within the support.
     mm_per_pixel, support_mm : float, optional [mm]
-        Pixels; see ``sssfit.fit.make_target``.
+        Pixel size and half width of the support; see ``sssfit.fit.make_target``.
     normalize : bool
-        Unit energy for every channel, the energy kept apart.
+        Scale every channel to unit energy, and keep its energy in ``kernel.scale``.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def fit_preintegrated(
         line = lines[:, channel]
         within = float(target.copies @ line)
         wanted = float(target.total[channel]) if rescale else within
-        # A pass of the sum sqrt(energy) makes a kernel of that energy.
+        # A pass with the sum sqrt(energy) makes a kernel with that energy.
         half = math.sqrt(wanted) / within * line
         return ChannelFit(np.ones(1), half[None], "closed form")
 

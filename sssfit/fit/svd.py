@@ -3,14 +3,15 @@
 Truncating the singular value decomposition of the 2D kernel is optimal in the Frobenius norm
 (Eckart and Young 1936; Jimenez et al. 2015, "Separable Subsurface Scattering", supplement eqs. S.2
 to S.4). The kernel K is symmetric and even in x and in y, so its decomposition is that of one
-quadrant Q: with c_i copies of pixel i in a line (1 in the middle, else 2) the matrix
-sqrt(c_i) Q_ik sqrt(c_k) has K's eigenvalues, and V_i / sqrt(c_i) are the eigenvectors' halves.
-Singular values are absolute eigenvalues. A negative one, from noise or from the steps between
-annuli, makes a term of sign -1.
+quadrant Q: with c_i copies of pixel i in a line (1 in the middle, else 2) the matrix sqrt(c_i) Q_ik
+sqrt(c_k) has K's eigenvalues, and V_i / sqrt(c_i) are the eigenvectors' halves. Singular values are
+absolute eigenvalues. A negative one, from noise or from the steps between annuli, gives a term of
+sign -1.
 
-Optimal terms do not have the profile's energy. By default they are scaled to it (supplement B):
-to all of ||R_d||_1, beyond the support and the grid too, so that a wall in even light keeps its
-colour. ``energy="keep"`` leaves them optimal; no kernel of the same rank has a smaller error.
+Optimal terms do not have the profile's energy. By default they are scaled to it (supplement B): to
+all of ||R_d||_1, including the light beyond the support and the grid, so that a wall in even light
+keeps its colour. ``energy="keep"`` keeps them optimal; no kernel of the same rank has a smaller
+error.
 """
 
 import math
@@ -32,8 +33,8 @@ from sssfit.fit._target import Pitch, Target, make_target
 from sssfit.profile import Profile
 
 _USUAL_RANK = 3
-# Up to here all eigenvalues take 4 ms, no more than a few by Lanczos; at 1237 pixels it is 90 ms
-# against 6 ms, at 3932 seconds against 0.1 s.
+# Up to here all eigenvalues take 4 ms, no more than a few by Lanczos. At 1237 pixels it is 90 ms
+# against 6 ms, at 3932 it is seconds against 0.1 s.
 _SMALL = 200
 
 
@@ -52,21 +53,21 @@ def fit_svd(
     ----------
     profile : Profile
     rank : int, optional
-        Number of terms, from 1 to the pixels of a half line: more the kernel does not have. By
-        default 3, or all of a smaller kernel.
+        Number of terms, from 1 to the pixels of a half line, which is the full rank of the kernel.
+        By default 3, or all of a smaller kernel.
     energy : str
-        "rescale" (default): every channel's terms scaled to its diffuse reflectance. "keep": as
-        they are, optimal in the Frobenius norm.
+        "rescale" (default) scales the terms of every channel to its diffuse reflectance; "keep"
+        keeps them as they are, optimal in the Frobenius norm.
     mm_per_pixel, support_mm : float, optional [mm]
-        Pixels; see ``sssfit.fit.make_target``.
+        Pixel size and half width of the support; see ``sssfit.fit.make_target``.
     normalize : bool
-        Unit energy for every channel, the energy kept apart.
+        Scale every channel to unit energy, and keep its energy in ``kernel.scale``.
 
     Returns
     -------
     FitResult
-        Terms in falling order; ``kernel.parameters`` has each channel's ``eigenvalues`` (of the
-        profile's kernel) and ``scaled_by``, what they were multiplied with.
+        Terms in descending order; ``kernel.parameters`` has each channel's ``eigenvalues`` (of the
+        profile's kernel) and ``scaled_by``, their common factor.
 
     Raises
     ------
@@ -92,14 +93,14 @@ def fit_svd(
 
 
 def eigenpairs(quadrant: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
-    """Return a kernel's eigenvalues of largest magnitude, falling, and their eigenvectors.
+    """Return a kernel's eigenvalues of largest magnitude, descending, and their eigenvectors.
 
     Parameters
     ----------
     quadrant : array (n, n)
-        A quadrant with both its axes, symmetric.
+        A quadrant including both axes, symmetric.
     count : int
-        At most n; the kernel of 2 n - 1 pixels has no other eigenvalues than 0.
+        At most n; all other eigenvalues of the kernel of 2 n - 1 pixels are 0.
 
     Returns
     -------
@@ -114,7 +115,7 @@ def eigenpairs(quadrant: FloatArray, count: int) -> tuple[FloatArray, FloatArray
 
 
 def all_eigenvalues(quadrant: FloatArray) -> FloatArray:
-    """Return a kernel's eigenvalues (n,), falling in magnitude; n, n as in `eigenpairs`.
+    """Return all eigenvalues (n,) of a quadrant (n, n), descending in magnitude.
 
     0.1 s for 1237 pixels, 3 s for 3932.
     """
@@ -126,26 +127,26 @@ def all_eigenvalues(quadrant: FloatArray) -> FloatArray:
 
 
 def _root_copies(n: int) -> FloatArray:
-    """Return the square root of how often each pixel of a half line is there (n,)."""
+    """Return the square root of the copies of each pixel of a half line (n,)."""
     return np.sqrt(np.where(np.arange(n) == 0, 1.0, 2.0))
 
 
 def _largest(quadrant: FloatArray, root: FloatArray, count: int) -> tuple[FloatArray, FloatArray]:
-    """Eigenvalues of root_i Q_ik root_k: all where they are few, else the largest by Lanczos."""
-    # 0.1 s that other methods need not wait for
+    """Return eigenvalues of root_i Q_ik root_k: all if n is small, else the largest."""
+    # 0.1 s that other methods do not need
     from scipy.linalg import eigh
     from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
     n = len(quadrant)
     if n > _SMALL and 4 * count < n:
-        # As a product, so that 124 MB for 3932 pixels are not held twice.
+        # As a product, so that 124 MB for 3932 pixels are not stored twice.
         weighted = LinearOperator(
             (n, n), matvec=lambda x: root * (quadrant @ (root * x.ravel())), dtype=np.float64
         )
         try:
             values, vectors = eigsh(weighted, count, which="LM", v0=root, rng=0)
         except ArpackNoConvergence:
-            pass  # eigenvalues that noise has made nearly equal: take the slow road
+            pass  # noise can make eigenvalues nearly equal: take the slow path
         else:
             return values, vectors
     found: tuple[FloatArray, FloatArray] = eigh(root[:, None] * quadrant * root)
@@ -153,7 +154,7 @@ def _largest(quadrant: FloatArray, root: FloatArray, count: int) -> tuple[FloatA
 
 
 def _fit_channel(target: Target, channel: int, rank: int, *, rescale: bool) -> ChannelFit:
-    """One channel's terms, and its error while its pixels are at hand."""
+    """Return one channel's terms, and its error while its pixels are in memory."""
     quadrant = target.quadrant(channel)
     values, vectors = eigenpairs(quadrant, rank)
     signs = np.where(values < 0.0, -1.0, 1.0)
@@ -171,7 +172,7 @@ def _fit_channel(target: Target, channel: int, rank: int, *, rescale: bool) -> C
 
 
 def _checked_rank(rank: int | None, target: Target) -> int:
-    """Refuse a rank that the kernel does not have."""
+    """Check that the kernel has this rank."""
     pixels, most = 2 * target.half_pixels + 1, target.half_pixels + 1
     if rank is None:
         return min(_USUAL_RANK, most)

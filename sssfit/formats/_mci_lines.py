@@ -1,6 +1,6 @@
 """The data lines of MCML's files, read in order and checked.
 
-Every message names the file, the line, what it holds and what was expected there.
+Every message names the file, the line, its content and what was expected there.
 """
 
 import re
@@ -11,13 +11,14 @@ from sssfit.errors import SssfitError
 from sssfit.messages import printable, shown
 from sssfit.text import decimal_shifted, finite_number
 
-# What the two formats call a comment. In an input it begins at any #. In an output that would make
-# 1 of the 1.#INF that some C libraries print, and MCML itself puts a space or tab before its own.
+# Comments of the two formats. In an input a comment begins at any #. In an output that would turn
+# the 1.#INF of some C libraries into 1, so a space or tab must precede it, as in MCML's own
+# comments.
 INPUT_COMMENT = re.compile(r"#")
 OUTPUT_COMMENT = re.compile(r"(?:^|\s)#")
 
 
-# What files of MCML 2 and 3 begin with: mcmli2.0 and mcmli_3.0 (inputs), mcmloA2.0 and mcmlo_3.0
+# First words of files of MCML 2 and 3: mcmli2.0 and mcmli_3.0 (inputs), mcmloA2.0 and mcmlo_3.0
 # (outputs in ASCII).
 _OTHER_VERSION = re.compile(r"mcml[io][ab]?_?(\d+(?:\.\d+)*)", re.IGNORECASE | re.ASCII)
 
@@ -29,25 +30,25 @@ def other_version(word: str) -> str | None:
 
 
 class Line(NamedTuple):
-    """A line's number in the file, from 1, and its words without the comment; at least one."""
+    """A line's number in the file, from 1, and its words without the comment, at least one."""
 
     number: int
     words: tuple[str, ...]
 
 
 class Lines:
-    """The lines of a text that hold data; blank ones and comments are passed over.
+    """The data lines of a text, without blank lines and comments.
 
     Parameters
     ----------
     text : str
         The whole file.
     origin : str
-        What messages call it.
+        Its name in messages.
     comment : re.Pattern
-        What begins a comment.
+        Pattern of the start of a comment.
     error : type
-        What to raise.
+        Class of the errors to raise.
     """
 
     def __init__(
@@ -59,11 +60,11 @@ class Lines:
         self.comment = comment
 
     def failure(self, number: int, said: str) -> SssfitError:
-        """Return the error to raise about a line."""
+        """Return the error to raise for a line."""
         return self._error(f"{self._origin}: line {number}: {said}")
 
     def peek(self) -> Line | None:
-        """Return the next line that holds data, and leave it there; None at the end."""
+        """Return the next data line without consuming it; None at the end."""
         while self._taken < len(self._raw):
             words = self.comment.split(self._raw[self._taken], maxsplit=1)[0].split()
             if words:
@@ -72,7 +73,7 @@ class Lines:
         return None
 
     def take(self, expected: str) -> Line:
-        """Take the next line that holds data, in which ``expected`` should be."""
+        """Consume the next data line, which should hold ``expected``."""
         line = self.peek()
         if line is None:
             end = len(self._raw) - (self._raw[-1] == "")
@@ -84,7 +85,7 @@ class Lines:
         return line
 
     def take_words(self, *names: str) -> Line:
-        """Take a line of as many words as there are names."""
+        """Consume a line with as many words as there are names."""
         wanted = ", ".join(names)
         line = self.take(wanted)
         if len(line.words) != len(names):
@@ -117,7 +118,7 @@ class Lines:
         *,
         tenfold: int = 0,
     ) -> float:
-        """Return word k, checked as it stands, times 10 to the power ``tenfold``.
+        """Return word k, checked as written, times 10 to the power ``tenfold``.
 
         The shift is decimal: 7.4 per cm gives the same bits as 0.74 per mm.
         """

@@ -1,6 +1,10 @@
-"""Picture files: their formats, by ending and by their first bytes."""
+"""Picture files before a pixel is read: format, header, layers, and whether they can be read.
+
+A format is known by its first bytes, and for writing by its ending.
+"""
 
 import contextlib
+import dataclasses
 import math
 import os
 import struct
@@ -10,11 +14,15 @@ import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import TYPE_CHECKING, BinaryIO
 
 from sssfit.errors import FileError, RenderError
 from sssfit.files import has_mark, reason
 from sssfit.messages import printable, shown
+
+if TYPE_CHECKING:
+    from OpenImageIO import ImageInput, ImageSpec
+
 
 _LONGEST_HEADER = 1 << 20
 _LARGEST = 1e30  # product of exposures; Radiance's own numbers span 1e-38 to 1e38
@@ -23,9 +31,9 @@ _PNG_SIGNATURE = 8  # bytes
 
 @dataclass(frozen=True, slots=True)
 class Header:
-    """What was done to a file's light: the factors in it (3,), and the primaries of R, G, B.
+    """Encoding of a file's light: factors (3,), and the primaries of R, G, B.
 
-    ``exposure`` and ``correction`` are 1 where the header does not say, ``primaries`` None.
+    ``exposure`` and ``correction`` are 1 and ``primaries`` is None if the header has no entry.
     """
 
     exposure: float = 1.0
@@ -34,14 +42,14 @@ class Header:
 
 
 def read_header(path: Path, format: str) -> Header:
-    """Return what the header of a Radiance or PNG file says; nothing for other formats.
+    """Return the encoding from the header of a Radiance or PNG file; the default for others.
 
     Raises
     ------
     FileError
-        Unreadable, or a line of a Radiance header is not what it should be.
+        The file is unreadable, or a line of its Radiance header is invalid.
     RenderError
-        A Radiance file of CIE XYZ.
+        The file is a Radiance file of CIE XYZ.
     """
     try:
         if format == "hdr":
@@ -54,9 +62,9 @@ def read_header(path: Path, format: str) -> Header:
 
 
 def _radiance(path: Path) -> Header:
-    """Multiply up the EXPOSURE and COLORCORR lines (Ward, Radiance file formats); the last rules.
+    """Read a Radiance header (Ward, Radiance file formats): all factors, the last primaries.
 
-    A picture holds the light times all of them.
+    A picture holds the light times all of these factors.
     """
     with path.open("rb") as stream:
         text = stream.read(_LONGEST_HEADER).replace(b"\r", b"").partition(b"\n\n")[0]
@@ -100,7 +108,7 @@ def _numbers(path: Path, key: str, value: str, count: int) -> tuple[float, ...]:
 
 
 def _png_primaries(path: Path) -> tuple[float, ...] | None:
-    """Return the cHRM chunk's numbers, unless another chunk overrules it (PNG 3, 11.3.2.1)."""
+    """Return the numbers of the cHRM chunk, unless another chunk overrides it (PNG 3, 11.3.2.1)."""
     found = None
     with path.open("rb") as stream:
         stream.seek(_PNG_SIGNATURE)
@@ -118,12 +126,12 @@ def _png_primaries(path: Path) -> tuple[float, ...] | None:
     return found
 
 
-# What is written, by ending.
+# Formats that are written, by ending.
 _ENDINGS = {".exr": "exr", ".tif": "tiff", ".tiff": "tiff", ".png": "png"}
 FORMATS = ("exr", "tiff", "png")
 _PNG = b"\x89PNG\r\n\x1a\n"
-# What is read, by its first bytes: a wrong ending does no harm. Both byte orders of TIFF, and its
-# variant for more than 4 GB.
+# Formats that are read, by first bytes, so a wrong ending does no harm. TIFF has two byte orders,
+# and a variant for more than 4 GB.
 _MAGIC = {
     "exr": (b"\x76\x2f\x31\x01",),
     "hdr": (b"#?RADIANCE", b"#?RGBE"),
@@ -132,14 +140,15 @@ _MAGIC = {
     "jpeg": (b"\xff\xd8\xff",),
 }
 READ = "EXR, HDR, TIFF, PNG, JPG or TGA"
-# A TGA file begins with no mark: the new form ends with one, the old is known by its ending too.
+# A TGA file begins with no mark: the new form ends with one, the old needs its file ending.
 _TGA_END = b"TRUEVISION-XFILE.\0"
 _TGA_ENDINGS = (".tga", ".targa")
-_TGA_TYPES = (1, 2, 3, 9, 10, 11)  # of palettes, colours and greys, plain and run-length encoded
+# Types with palettes, colours and greys, plain and run-length encoded.
+_TGA_TYPES = (1, 2, 3, 9, 10, 11)
 _TGA_DEPTHS = (8, 15, 16, 24, 32)  # bits a pixel
-_STDERR = threading.Lock()  # two at once would put the wrong stderr back
+_STDERR = threading.Lock()  # two at once would restore the wrong stderr
 _LONGEST_CALLED = 400  # characters of a path in messages
-# How pictures that we write name their maker; PNG has it in its Exif, which is TIFF's.
+# How pictures that we write name their maker; PNG has it in its Exif, which uses TIFF's tags.
 MAKER = "sssfit picture"
 _MARKS = {
     begin: b"Software\0string\0\x0e\0\0\0" + MAKER.encode()
@@ -148,16 +157,16 @@ _MARKS = {
     for name, begins in _MAGIC.items()
     for begin in begins
 }
-_CRC_BLOCK = 1 << 20  # bytes held at a time while a chunk is summed
+_CRC_BLOCK = 1 << 20  # bytes in memory while the checksum of a chunk is computed
 
 
 def image_format(target: str | Path | BinaryIO) -> str:
-    """Return the format that the ending of a path asks for: "exr", "tiff" or "png".
+    """Return the format of a path by its ending: "exr", "tiff" or "png".
 
     Raises
     ------
     FileError
-        The ending is another, or a stream has none.
+        The path has another ending, or a stream has none.
     """
     if not isinstance(target, str | Path):
         raise FileError(f"a stream has no ending; name a format: {', '.join(FORMATS)}.")
@@ -170,7 +179,7 @@ def image_format(target: str | Path | BinaryIO) -> str:
 
 
 def as_path(path: object) -> Path:
-    """Return the path of a picture; refuse what cannot be one."""
+    """Return the path of a picture; raises an error if it cannot be one."""
     if not isinstance(path, str | os.PathLike) or isinstance(os.fspath(path), bytes):
         raise FileError(f"{shown(path)} is not a path; name an {READ} file.")
     if "\0" in (text := os.fspath(path)):
@@ -179,7 +188,7 @@ def as_path(path: object) -> Path:
 
 
 def is_image_file(path: str | Path) -> bool:
-    """Tell whether a file is a picture that we wrote, by what it says of its maker."""
+    """Return whether a file is a picture that we wrote, by the maker it names."""
     try:
         return has_mark(as_path(path), _MARKS)
     except FileError:
@@ -187,12 +196,12 @@ def is_image_file(path: str | Path) -> bool:
 
 
 def found_format(path: Path) -> str:
-    """Return the format a file has by its content: a key of ``_MAGIC``, or "tga".
+    """Return the format of a file by its content: a key of ``_MAGIC``, or "tga".
 
     Raises
     ------
     FileError
-        Missing, unreadable, a folder or device, empty, or of another format.
+        The file is missing, unreadable, a folder or device, empty, or of another format.
     """
     name = called(path)
     try:
@@ -209,7 +218,7 @@ def found_format(path: Path) -> str:
 
 
 def called(path: Path) -> str:
-    """Return a path as it stands in messages: on one line, its middle left out where it is long."""
+    """Return a path for messages: on one line, and shortened in the middle if it is long."""
     text = printable(str(path))
     half = _LONGEST_CALLED // 2
     return text if len(text) <= _LONGEST_CALLED else f"{text[:half]}...{text[-half:]}"
@@ -217,13 +226,13 @@ def called(path: Path) -> str:
 
 @contextlib.contextmanager
 def without_lines_of_libpng() -> Iterator[None]:
-    """Keep stderr to ourselves: libpng writes its errors there, and then hands them on as well."""
+    """Capture stderr, because libpng writes its errors there and also returns them."""
     with _STDERR:
         with contextlib.suppress(OSError, ValueError, AttributeError):
             sys.stderr.flush()
         try:
             kept = os.dup(2)
-        except OSError:  # closed: there is nothing to keep clean
+        except OSError:  # closed: no need to capture it
             yield
             return
         try:
@@ -236,12 +245,12 @@ def without_lines_of_libpng() -> Iterator[None]:
 
 
 def check_png(path: Path) -> None:
-    """Check a PNG's chunks against their own sums, which libpng does for some of them only.
+    """Check the checksums of a PNG's chunks, which libpng does for some of them only.
 
     Raises
     ------
     FileError
-        Cut short or damaged.
+        The file is truncated or damaged.
     """
     try:
         with path.open("rb") as stream:
@@ -254,7 +263,7 @@ def check_png(path: Path) -> None:
 
 
 def _chunks_are_whole(stream: BinaryIO) -> bool:
-    """Tell whether every chunk up to IEND is there and has the sum it says."""
+    """Return whether every chunk up to IEND is present with the right checksum."""
     while len(head := stream.read(8)) == 8:
         length, name = struct.unpack(">I4s", head)
         total = zlib.crc32(name)
@@ -282,7 +291,7 @@ def _format_of(path: Path) -> str | None:
 
 
 def _begins_a_tga(head: bytes) -> bool:
-    """Tell whether 18 bytes can be a TGA's header (Truevision, TGA file format, version 2.0)."""
+    """Return whether 18 bytes can be a TGA header (Truevision, TGA file format, version 2.0)."""
     if len(head) < 18:
         return False
     has_palette, kind = head[1], head[2]
@@ -295,3 +304,208 @@ def _ends_a_tga(stream: BinaryIO) -> bool:
     size = stream.seek(0, os.SEEK_END)
     stream.seek(max(size - len(_TGA_END), 0))
     return stream.read() == _TGA_END
+
+
+# Memory of a render for each value of the picture, all float64: the irradiance, its padded copy,
+# the transform of that, and the result.
+BYTES_PER_VALUE = 4 * 8
+LARGEST_BYTES = 4_000_000_000
+# The largest code of whole numbers, by the library's names.
+FULL_SCALE = {"uint8": 255, "uint16": 65535}
+_FLOATS = ("half", "float", "double")
+
+
+# Channels of a layer, in lower case; a layer of X, Y and Z is a position or a direction.
+_RGB = (("r", "g", "b"), ("red", "green", "blue"))
+_ALPHA = ("a", "alpha")
+_PLACE = ("x", "y", "z")
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class Choice:
+    """The part of a file that is read, with the indices of its channels and alpha."""
+
+    part: int
+    spec: "ImageSpec"
+    names: tuple[str, ...]
+    colours: tuple[int, ...]
+    alpha: int | None
+    notes: tuple[str, ...]
+
+    @property
+    def span(self) -> tuple[int, int]:
+        """First index and one past the last index to read."""
+        places = [*self.colours, *([] if self.alpha is None else [self.alpha])]
+        return min(places), max(places) + 1
+
+    @property
+    def bits(self) -> int | None:
+        """8 or 16 for whole numbers, None for floating point."""
+        return {"uint8": 8, "uint16": 16}.get(str(self.spec.format))
+
+
+@dataclasses.dataclass(frozen=True, slots=True)
+class _Layer:
+    """Channels of a part that belong together: "name.R" belongs to name, "R" to its part."""
+
+    part: int
+    prefix: str
+    part_name: str
+    names: tuple[str, ...]
+    colours: tuple[int, ...]
+    alpha: int | None
+
+    @property
+    def label(self) -> str:
+        """Name of the layer."""
+        return self.prefix or self.part_name
+
+
+def choose(source: "ImageInput", path: Path, layer: str | None) -> Choice:
+    """Select R, G, B of the requested layer; by default those without a layer, else the only ones.
+
+    Without such a layer Y is used, and last all channels except alpha.
+    """
+    specs: list[ImageSpec] = []
+    while source.seek_subimage(len(specs), 0):
+        specs.append(source.spec())
+    source.geterror()  # a missing part is not an error; without this it would hide the next error
+    coloured = _layers(specs, ("R", "G", "B"))
+    grey = _layers(specs, ("Y",))
+    if layer is not None:
+        return _named(specs, [*coloured, *grey], layer, path)
+    for found in (coloured, grey):
+        plain = [each for each in found if not each.prefix]
+        if plain:
+            return _chosen(specs, plain[0])
+        if len(found) > 1:
+            raise RenderError(
+                f"{called(path)} has the layers {_listed([each.label for each in found])}; name "
+                "the one that is meant with `layer`."
+            )
+        if found:
+            return _chosen(specs, found[0])
+    return _unnamed_channels(specs, path)
+
+
+def _layers(specs: list["ImageSpec"], names: tuple[str, ...]) -> list[_Layer]:
+    """Return the layers of all parts that have R, G, B, or Y, in the order of the file."""
+    layers = []
+    for part, spec in enumerate(specs):
+        groups: dict[str, dict[str, int]] = {}
+        for place, name in enumerate(spec.channelnames):
+            prefix, _, channel = str(name).rpartition(".")
+            groups.setdefault(prefix, {}).setdefault(channel.lower(), place)
+        for prefix, places in groups.items():
+            if (colours := _colours(places, names)) is None:
+                continue
+            alpha = next((places[each] for each in _ALPHA if each in places), None)
+            # TIFF and PNG say which channel is alpha, under any name.
+            if not prefix and alpha is None and spec.alpha_channel not in (-1, *colours):
+                name = str(spec.channelnames[spec.alpha_channel])
+                alpha = None if "." in name else int(spec.alpha_channel)
+            part_name = spec.get_string_attribute("oiio:subimagename")
+            layers.append(_Layer(part, prefix, part_name, names, colours, alpha))
+    return layers
+
+
+def _colours(places: dict[str, int], names: tuple[str, ...]) -> tuple[int, ...] | None:
+    """Return the indices of the channels in a group, or None."""
+    if names == ("Y",):
+        is_place = all(each in places for each in _PLACE)
+        return None if is_place or "y" not in places else (places["y"],)
+    for spelling in _RGB:
+        if all(each in places for each in spelling):
+            return tuple(places[each] for each in spelling)
+    return None
+
+
+def _named(specs: list["ImageSpec"], layers: list[_Layer], name: str, path: Path) -> Choice:
+    """Return the layer of that name, or raise an error that lists the layers."""
+    for each in layers:
+        if name in (each.prefix, each.part_name) and name:
+            return _chosen(specs, each)
+    labels = [each.label for each in layers if each.label]
+    what = f"it has {_listed(labels)}" if labels else "it has none of R, G, B or Y with a name"
+    raise RenderError(f"{called(path)} has no layer {printable(name)!r}; {what}.")
+
+
+def _chosen(specs: list["ImageSpec"], layer: _Layer) -> Choice:
+    """Return notes on the name of the layer and on unused layers."""
+    used = [f"layer {printable(layer.prefix)} used"] if layer.prefix else []
+    notes = (*used, *_left_out(specs, layer.part, layer.colours, layer.alpha))
+    return Choice(layer.part, specs[layer.part], layer.names, layer.colours, layer.alpha, notes)
+
+
+def _unnamed_channels(specs: list["ImageSpec"], path: Path) -> Choice:
+    """Select every channel of the first part, if none has the name of a colour."""
+    spec = specs[0]
+    # A channel named A is alpha only with colours known by name; two channels are grey with alpha.
+    alpha = int(spec.alpha_channel) if spec.nchannels in (2, 4) else -1
+    colours = tuple(i for i in range(spec.nchannels) if i != alpha)
+    names = [str(each) for each in spec.channelnames]
+    # A dot separates layer and channel; depth and normals may be among them.
+    if not colours or any("." in name for name in names):
+        raise RenderError(
+            f"{called(path)} has the channels {_listed(names)}; expected R, G, B or Y: write the "
+            "layer that is meant into a picture of its own."
+        )
+    kept = None if alpha < 0 else alpha
+    notes = _left_out(specs, 0, colours, kept)
+    return Choice(0, spec, tuple(names[place] for place in colours), colours, kept, notes)
+
+
+def _left_out(
+    specs: list["ImageSpec"], part: int, colours: tuple[int, ...], alpha: int | None
+) -> tuple[str, ...]:
+    """Return notes on parts and channels of the file that are not used."""
+    spec, notes = specs[part], []
+    if len(specs) > 1:
+        notes.append(f"part {part + 1} of {len(specs)} used")
+    others = [
+        name
+        for place, name in enumerate(spec.channelnames)
+        if place not in colours and place != alpha
+    ]
+    if others:
+        notes.append(f"channels {_listed(others)} left out")
+    return tuple(notes)
+
+
+def _listed(names: list[str]) -> str:
+    """Return a list of names as text, the first eight of many."""
+    shown = ", ".join(printable(name) for name in names[:8])
+    return shown if len(names) <= 8 else f"{shown} and {len(names) - 8} more"
+
+
+def check_kind(choice: Choice, path: Path) -> None:
+    """Raise an error for values that are not light, and for deep pixels."""
+    spec = choice.spec
+    if spec.deep or spec.depth > 1:
+        raise RenderError(
+            f"{called(path)} has several samples in a pixel's depth; flatten it first."
+        )
+    kinds = {str(spec.channelformats[place]) for place in choice.colours if spec.channelformats}
+    kinds = kinds or {str(spec.format)}
+    if not kinds <= {*_FLOATS, *FULL_SCALE}:
+        raise RenderError(
+            f"{called(path)} has pixels of {' and '.join(sorted(kinds))}; expected 8 or 16 bits, "
+            "half, float or double: write it as one of these."
+        )
+
+
+def check_size(choice: Choice, path: Path, largest_bytes: float) -> None:
+    """Raise an error, from the header alone, for a picture that would not fit in memory."""
+    spec, count = choice.spec, len(choice.colours)
+    # A data window may be larger than its picture.
+    width, height = max(spec.width, spec.full_width), max(spec.height, spec.full_height)
+    if width < 1 or height < 1:
+        raise RenderError(
+            f"{called(path)} has {height} rows of {width} pixels; expected at least one."
+        )
+    needed = BYTES_PER_VALUE * width * height * count
+    if needed > largest_bytes:
+        raise RenderError(
+            f"{called(path)} is {width} x {height} with {count} channels: rendering needs "
+            f"{needed / 1e9:.3g} GB, the limit is {largest_bytes / 1e9:.3g} GB; crop or scale it."
+        )

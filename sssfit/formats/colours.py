@@ -1,4 +1,4 @@
-"""A picture's colours: sRGB, primaries, and the values each format can hold."""
+"""Colours of pictures: sRGB, primaries, and the values that each format can hold."""
 
 import re
 from collections.abc import Sequence
@@ -11,8 +11,8 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
 from sssfit.messages import printable, shown
 
-# The standard's own rounded numbers. Its two pieces miss one another by 2e-8 at the joint, far
-# below the 1.5e-5 of a 16-bit code.
+# The rounded numbers of the standard. Its two pieces differ by 2e-8 where they meet, far below the
+# 1.5e-5 of a 16-bit code.
 _JOINT_LINEAR, _JOINT_CODE = 0.0031308, 0.04045
 _SLOPE, _OFFSET, _POWER = 12.92, 0.055, 2.4
 _HEX = re.compile("#(?:[0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
@@ -24,7 +24,7 @@ def srgb_encode(linear: npt.ArrayLike) -> FloatArray:
     Parameters
     ----------
     linear : array
-        Linear light; below 0 and above 1 the two pieces of the curve go on.
+        Linear light; below 0 and above 1 the two pieces of the curve continue.
 
     Returns
     -------
@@ -42,7 +42,7 @@ def srgb_decode(code: npt.ArrayLike) -> FloatArray:
     Parameters
     ----------
     code : array
-        V, the integer of a file over its largest (255 or 65535).
+        V, the integer of a file divided by the largest one (255 or 65535).
 
     Returns
     -------
@@ -55,12 +55,12 @@ def srgb_decode(code: npt.ArrayLike) -> FloatArray:
 
 
 def linear_from_hex(code: str) -> FloatArray:
-    """Return the linear R, G, B (3,) of an sRGB colour written as a web page does, ``#c58c6b``.
+    """Return the linear R, G, B (3,) of an sRGB colour in hex, ``#c58c6b``.
 
     Raises
     ------
     RenderError
-        Not # and three or six digits from 0 to f.
+        The text is not # and three or six digits from 0 to f.
     """
     if not isinstance(code, str) or not _HEX.fullmatch(code.strip()):
         raise RenderError(f"{shown(code)} is not an sRGB colour in hex, such as #c58c6b.")
@@ -71,7 +71,7 @@ def linear_from_hex(code: str) -> FloatArray:
 
 # x, y of red, green, blue and white (D65): ITU-R BT.709-6, also the default of OpenEXR.
 BT709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
-_ALIKE = 5e-4  # files round to three digits or four; no colour moves by over .2 % of white
+_ALIKE = 5e-4  # files round to three or four digits; no colour changes by over .2 % of white
 # Cone responses of K. M. Lam's thesis (Bradford, 1985), as in CIE 15 and the ICC's profiles.
 _BRADFORD = np.array(
     [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
@@ -81,14 +81,14 @@ _BRADFORD = np.array(
 def matrix_to_bt709(primaries: Sequence[float], origin: str) -> FloatArray | None:
     """Return the matrix (3, 3) from linear R, G, B of these primaries to those of BT.709.
 
-    White stays white: it is adapted by Bradford's cone responses. None where nothing changes.
+    White stays white: it is adapted with Bradford's cone responses. None if nothing changes.
 
     Parameters
     ----------
     primaries : eight numbers
         CIE 1931 x and y of red, green, blue and white.
     origin : str
-        The file, for messages.
+        Name of the file, for messages.
 
     Raises
     ------
@@ -126,17 +126,17 @@ def _to_xyz(primaries: FloatArray) -> FloatArray:
 
 
 _LONGEST_PNG = 1_000_000  # pixels a side: libpng's own limit
-_LONGEST_NAME = 255  # bytes of a channel's name: the most that an EXR keeps
+_LONGEST_NAME = 255  # bytes of a channel's name: the most that an EXR stores
 _CODES = 65535  # the largest of 16 bits
-_ROUNDING = 1e-6  # of white: what no code shows is not said to be clipped
+_ROUNDING = 1e-6  # share of white: clipping that changes no code is not reported
 
 
 def as_light(values: npt.ArrayLike, what: str) -> FloatArray:
-    """Return numbers as float64; refuse words, objects, complex numbers and ragged rows."""
+    """Return numbers as float64; raises for words, objects, complex numbers and ragged rows."""
     try:
         array = np.asarray(values)
         found = f"of type {array.dtype}"
-    except (TypeError, ValueError) as error:  # rows of unlike lengths
+    except (TypeError, ValueError) as error:  # rows of different lengths
         array = np.array(None)
         found = str(error).partition(".")[0]
     if array.dtype.kind not in "biuf":
@@ -195,7 +195,7 @@ def channel_names(light: FloatArray, given: Sequence[str] | None, format: str) -
 def check_values(
     pixels: FloatArray, channels: Sequence[str], origin: str, *, negative: bool
 ) -> None:
-    """Refuse NaN and infinite values, and negative ones unless allowed: how many, where first."""
+    """Raise an error for NaN, infinite and, unless allowed, negative values, with their count."""
     for what, bad in (
         ("NaN or infinite", ~np.isfinite(pixels)),
         ("negative", np.zeros(0, dtype=bool) if negative else pixels < 0.0),
@@ -209,7 +209,7 @@ def check_values(
 
 
 def check_alpha(alpha: npt.ArrayLike, light: FloatArray, names: Sequence[str]) -> FloatArray:
-    """Return coverage (H, W); refuse what does not fit the picture, or would not be found again."""
+    """Return coverage (H, W); raises an error if it does not fit the picture or the format."""
     coverage = as_light(alpha, "alpha")
     if coverage.shape != light.shape[:2]:
         raise RenderError(
@@ -227,7 +227,7 @@ def check_alpha(alpha: npt.ArrayLike, light: FloatArray, names: Sequence[str]) -
 def as_format_has_it(
     light: FloatArray, alpha: FloatArray | None, is_multiplied: bool, format: str
 ) -> tuple[FloatArray, bool, tuple[str, ...]]:
-    """Return the light with alpha in it or not, whether it is, and what was done, in words."""
+    """Return the light with or without alpha, whether it is included, and notes."""
     if alpha is None or format == "tiff" or is_multiplied == (format == "exr"):
         return light, is_multiplied, ()
     coverage = alpha[..., None]
@@ -240,7 +240,7 @@ def as_format_has_it(
 def png_codes(
     light: FloatArray, exposure: float, alpha: FloatArray | None = None
 ) -> tuple[npt.NDArray[np.uint16], tuple[str, ...]]:
-    """Return 16-bit sRGB codes, those of alpha as shares behind them; how many were clipped."""
+    """Return 16-bit sRGB codes, followed by those of alpha, and the number of clipped values."""
     with np.errstate(over="ignore"):  # infinite light is clipped as well
         exposed = exposure * light
     clipped = int(((exposed < -_ROUNDING) | (exposed > 1.0 + _ROUNDING)).sum())
@@ -255,7 +255,7 @@ def png_codes(
 def as_float32(
     light: FloatArray, exposure: float, alpha: FloatArray | None = None
 ) -> npt.NDArray[np.float32]:
-    """Return float32, alpha behind the colours, or refuse what it cannot hold."""
+    """Return float32, with alpha after the colours; raises for values beyond float32."""
     if exposure != 1.0:
         raise RenderError(
             f"exposure = {exposure:g} is for PNG; EXR and TIFF keep the light as it is: leave it "

@@ -1,24 +1,24 @@
-"""Profiles as tables (CSV): those of other programs and of measurements in, ours out.
+"""Profiles as tables (CSV): reads those of other programs and measurements, writes ours.
 
-A table has comment lines that begin with #, a header line and a line for each radius; commas
-separate its columns. ``r_mm`` is the radius in mm (``r_um``, ``r_cm``, ``r_m`` in those units, and
+A table has comment lines that begin with #, a header line and a line for each radius, with columns
+separated by commas. ``r_mm`` is the radius in mm (``r_um``, ``r_cm``, ``r_m`` in those units, and
 ``r`` in a unit that the caller gives), a column named ``X_stderr`` holds the standard errors of the
-column ``X`` (nan: none), and every other column is a channel. What the numbers mean is the table's
-quantity, which is either given or said in a comment, ``# quantity = energy``:
+column ``X`` (nan: none), and every other column is a channel. The quantity of the table is the
+meaning of its numbers. It is either given or named in a comment, ``# quantity = energy``:
 
 density
     R_d at the radius, per square of the radius' unit unless the caller gives another: in 1/cm^2
-    beside ``r_cm``. It is taken to be that of the annulus around the radius. Annuli meet half-way
-    between the radii; the first begins at 0, the last reaches as far beyond its radius as it begins
-    before it. The energy of an annulus is R_d times its area.
+    with ``r_cm``. It is assumed for the whole annulus around the radius. Annuli meet half-way
+    between the radii; the first begins at 0, and the last extends equally to both sides of its
+    radius. The energy of an annulus is R_d times its area.
 energy
     The share of the incident light that leaves in an annulus, whose outer edge is the radius and
     whose inner edge is that of the line before (0 for the first). A last line whose radius is inf
     holds the energy beyond.
 
-Radii may be unequally spaced. What we write is energy, with every digit: reading it gives the same
-bits of radii, energies and standard errors. Specular reflectance, absorption and transmittance have
-no place in a table.
+Radii may be unequally spaced. We write energies with every digit, so radii, energies and standard
+errors are read back to the same bits. A table cannot hold specular reflectance, absorption and
+transmittance.
 """
 
 import csv
@@ -46,8 +46,8 @@ QUANTITIES = ("density", "energy")
 _MARK = "# sssfit.profile.csv/1"
 _STDERR = "_stderr"
 _SAID = re.compile(r"#\s*quantity\s*=\s*(\w+)")
-_MOST = 1e12  # mm, as far as a grid may reach; and any number, so that nothing overflows
-_ABOVE_ONE = 1e-6  # of rounding in sums that are 1
+_MOST = 1e12  # mm, the limit of a grid; and the limit of any number, so that nothing overflows
+_ABOVE_ONE = 1e-6  # tolerance for rounding in sums that are 1
 # Powers of ten from a unit to mm.
 _TO_MM = {"um": -3, "mm": 0, "cm": 1, "m": 3}
 UNITS = tuple(_TO_MM)
@@ -77,37 +77,38 @@ def parse_csv(
     unit: str | None = None,
     density_unit: str | None = None,
 ) -> Profile:
-    r"""Read a profile from the text of a table, as this file's head describes it.
+    r"""Read a profile from the text of a table; the module docstring describes the format.
 
     Parameters
     ----------
     text : str
         The whole file, lines ending in newline characters.
     origin : str
-        The file it came from: stands first in every message, its last part is ``meta["source"]``.
+        Path of its file, which begins every message; its last part becomes ``meta["source"]``.
     quantity : "density" or "energy", optional
-        What the numbers are; by default what the table says.
+        Meaning of the numbers; by default the one that the table names.
     unit : "um", "mm", "cm" or "m", optional
-        Unit of a column of radii that is named ``r`` alone; other names say it themselves.
+        Unit of a column of radii named ``r``; other names include the unit.
     density_unit : the same, optional
-        Densities are per square of this unit; by default per square of the radii's.
+        Unit of densities, per square; by default the unit of the radii.
 
     Returns
     -------
     Profile
-        Of unknown material; nothing is known about absorption (``absorbed`` has no layers, the
-        energy balance is NaN), and the specular reflectance is given as 0.
+        A profile of unknown material. Absorption is unknown (``absorbed`` has no layers, the energy
+        balance is NaN), and the specular reflectance is 0.
 
     Raises
     ------
     ProfileError
-        One line with the origin, the line's number, the column, what it holds and the remedy. A
-        channel that adds up to more than all light is one; the units that would do are named.
+        The table is invalid; the one-line message has the origin, the line's number, the column,
+        its value and the remedy. A channel that adds up to more than all light is an error that
+        names the right units.
 
     Warns
     -----
     SssfitWarning
-        Densities begin so far out that what lies inside is a guess.
+        Densities begin so far out that the energy inside is a guess.
 
     Examples
     --------
@@ -161,15 +162,15 @@ def parse_csv(
 
 
 def csv_text(profile: Profile) -> str:
-    """Write a profile as a table of energies; `parse_csv` gives the same bits back.
+    """Write a profile as a table of energies, which `parse_csv` reads back to the same bits.
 
-    A channel without a single standard error has no column of them.
+    A channel without any standard error has no column of them.
 
     Raises
     ------
     ProfileError
-        A channel's name cannot head a column, or its energies could not be read back: one is below
-        0, or they add up to more than 1.
+        A channel's name cannot be the head of a column, or its energies could not be read back: one
+        is below 0, or they add up to more than 1.
     """
     _check_names(profile.channels)
     _check_energies(profile)
@@ -193,7 +194,7 @@ def csv_text(profile: Profile) -> str:
 
 
 def is_profile_csv(path: Path) -> bool:
-    """Tell whether a file is a table that `csv_text` wrote."""
+    """Return whether a file is a table that `csv_text` wrote."""
     return has_mark(path, {_MARK.encode(): b""})
 
 
@@ -206,7 +207,7 @@ class _Line:
 
 
 class _Table:
-    """A table's header and lines of cells, and the one line said about what is wrong in them."""
+    """A table's header and lines of cells, and its one-line errors."""
 
     def __init__(self, text: str, origin: str, unit: str | None) -> None:
         self.origin = origin
@@ -257,7 +258,7 @@ class _Table:
         return radii[0]
 
     def _checked_unit(self, given: str | None) -> str:
-        """Return the unit of the radii, by their column's name or by the caller."""
+        """Return the unit of the radii, from their column's name or from the caller."""
         named = self.radius_name.partition("_")[2]
         if given is not None and given not in _TO_MM:
             raise ProfileError(
@@ -278,9 +279,9 @@ class _Table:
         return given or named
 
     def checked_quantity(self, given: str | None, per_unit: str) -> str:
-        """Return what the numbers are, by the caller or by the table's own comment.
+        """Return the quantity of the numbers, from the caller or the table's own comment.
 
-        ``per_unit`` is the unit that densities would be per square of.
+        ``per_unit`` is the unit of densities, per square.
         """
         quantity, radius = given or self._said, self.radius_name
         if quantity is None:
@@ -299,7 +300,7 @@ class _Table:
         return quantity
 
     def channels(self) -> list[str]:
-        """Names of the columns that are channels."""
+        """Return the names of the columns that are channels."""
         channels = [name for name in self.value_names if not name.endswith(_STDERR)]
         try:
             check_names(channels)
@@ -314,9 +315,9 @@ class _Table:
         return channels
 
     def numbers(self, quantity: str, power: int) -> tuple[FloatArray, FloatArray]:
-        """Return all radii (m,) [mm], the last may be inf, and the other columns (m, k).
+        """Return all radii (m,) [mm], of which the last may be inf, and the other columns (m, k).
 
-        The others times ten to a power.
+        The other columns are multiplied by a power of ten.
         """
         at = self._head.cells.index(self.radius_name)
         radii_mm: list[float] = []
@@ -388,10 +389,12 @@ class _Table:
 
 
 def _density_unit(given: str | None, quantity: str, unit: str) -> str | None:
-    """Return the unit whose square densities are per; None for energies."""
+    """Return the unit of densities, per square; None for energies."""
     if quantity == "energy":
         if given is not None:
-            raise ProfileError("density_unit is for densities; energies have no unit.")
+            raise ProfileError(
+                "`density_unit` is for densities; energies have no unit: leave it out."
+            )
         return None
     if given is not None and given not in _TO_MM:
         raise ProfileError(f"density_unit = {shown(given)}; expected {', '.join(UNITS[:-1])} or m.")
@@ -399,7 +402,7 @@ def _density_unit(given: str | None, quantity: str, unit: str) -> str | None:
 
 
 def _edges_mm(radii_mm: FloatArray, quantity: str) -> FloatArray:
-    """Edges of the annuli (n+1,) [mm] from finite radii (n,)."""
+    """Return the edges of the annuli (n+1,) [mm] for finite radii (n,)."""
     if quantity == "energy":
         return np.append(0.0, radii_mm)
     between_mm = radii_mm[:-1] + 0.5 * np.diff(radii_mm)
@@ -408,7 +411,7 @@ def _edges_mm(radii_mm: FloatArray, quantity: str) -> FloatArray:
 
 
 def _check_total(profile: Profile, table: _Table, per_unit: str | None) -> None:
-    """Refuse a channel that reflects more than arrives; say in which units it would not."""
+    """Raise an error for a channel that reflects more than arrives, and name the right units."""
     total = profile.diffuse_reflectance
     worst = int(np.argmax(total))
     if total[worst] <= 1.0 + _ABOVE_ONE:
@@ -429,10 +432,9 @@ def _check_total(profile: Profile, table: _Table, per_unit: str | None) -> None:
 
 
 def _fitting_units(total: float, table: _Table, per_unit: str) -> str:
-    """Name the units that make a total of densities the largest that is no more than 1.
+    """Return the units that give the largest total of densities up to 1, as text.
 
-    Radii in another unit alone, or densities per square of another alone: both together change
-    nothing.
+    Either the radii or the densities are in another unit; changing both changes nothing.
     """
     found: list[tuple[float, str]] = []
     for each in UNITS:
@@ -449,10 +451,10 @@ def _fitting_units(total: float, table: _Table, per_unit: str) -> str:
 
 
 def _warn_of_gap(profile: Profile, radii_mm: FloatArray, table: _Table) -> None:
-    """Say what may hide before the first radius, where that is no bin's centre.
+    """Warn of light before the first radius, if that is not the centre of a bin.
 
-    R_d is taken as flat from the axis to the first radius. Near a beam it rises like 1/r; from the
-    same value at the first radius that is twice the energy.
+    R_d is assumed constant from the axis to the first radius. Near a beam it rises like 1/r, which
+    gives twice the energy for the same value at the first radius.
     """
     first_mm, second_mm = radii_mm[:2].tolist()
     if first_mm <= 0.5 * (second_mm - first_mm) * (1.0 + 1e-6):
@@ -473,7 +475,7 @@ def _warn_of_gap(profile: Profile, radii_mm: FloatArray, table: _Table) -> None:
 
 
 def _check_names(channels: Sequence[str]) -> None:
-    """Refuse names that would not come back as the same columns."""
+    """Check for names that would not be read back as the same columns."""
     try:
         check_names(list(channels))
     except MaterialError as error:
@@ -486,7 +488,7 @@ def _check_names(channels: Sequence[str]) -> None:
 
 
 def _check_energies(profile: Profile) -> None:
-    """Refuse energies that reading the table would refuse."""
+    """Check for energies that could not be read back."""
     energy = np.vstack((profile.annulus_energy, profile.beyond_grid))
     if (energy < 0.0).any():
         k, c = (int(each[0]) for each in np.nonzero(energy < 0.0))
@@ -505,7 +507,7 @@ def _check_energies(profile: Profile) -> None:
 
 
 def _provenance(profile: Profile) -> str:
-    """Say where a profile comes from, for people."""
+    """Return the origin of a profile as text."""
     meta = profile.meta
     parts = [
         str(profile.material_name or meta.get("source") or "unknown material"),

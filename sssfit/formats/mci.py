@@ -15,15 +15,16 @@ runs, and for each run from the top down::
     1.37  1  10   0    1E8
     1.0                          # n below
 
-Only ratios of refractive indices count, so n may be below 1; g = 1 is no scattering at all. What
-MCML writes in turn is read by ``sssfit.formats.mco``.
+Only ratios of refractive indices count, so n may be below 1; g = 1 means no scattering.
+``sssfit.formats.mco`` reads MCML's output.
 """
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
+from typing import Any
 
 import numpy as np
 
@@ -43,7 +44,7 @@ _LENGTH = "a length above 0, in cm"
 _COEFFICIENT = "a number of 0 or more, in 1/cm"
 _INDEX = f"a refractive index from {LEAST_ETA} to {MOST_ETA}"
 
-# The columns of a layer's line: name, what will do, what to say was expected, power of ten to mm.
+# The columns of a layer's line: name, valid values, expectation in messages, power of ten to mm.
 _COLUMNS: tuple[tuple[str, Callable[[float], bool], str, int], ...] = (
     ("n", lambda v: LEAST_ETA <= v <= MOST_ETA, _INDEX, 0),
     ("mua", lambda v: 0 <= v <= 1e9, _COEFFICIENT, -1),
@@ -60,17 +61,17 @@ class MciRun:
     Parameters
     ----------
     material : Material
-        Of one channel, "mono", named after the output file. A last layer of 1e6 cm or more is
-        semi-infinite, and the index given for what lies below it is ignored.
+        Material of one channel, "mono", named after the output file. A last layer of 1e6 cm or more
+        is semi-infinite, and the index below it is ignored.
     grid : RadialGrid
-        As many annuli as the file has dr. MCML counts what leaves further out into the last one; a
-        profile keeps it apart.
+        Grid with as many annuli as the file has dr. MCML adds the light beyond to the last one; a
+        profile keeps it separate.
     photons : int
-        Photons to trace.
+        Number of photons to trace.
     output : str
-        The output file as MCML would name it.
+        Name of MCML's output file.
     depth_bins, angle_bins : int
-        MCML's numbers of dz and da, by which its output is laid out; nothing here depends on them.
+        MCML's numbers of dz and da, which only affect its output.
     """
 
     material: Material
@@ -80,12 +81,26 @@ class MciRun:
     depth_bins: int
     angle_bins: int
 
+    def settings(self, given: Mapping[str, Any], *, photons: bool) -> dict[str, Any]:
+        """Return settings of a simulation, with this run's grid where none is given.
 
-def load_mci(path: str | Path) -> tuple[MciRun, ...]:
-    """Read the runs of an MCML input file; see `parse_mci`."""
+        ``photons`` adds its number of photons as well.
+        """
+        own = {"dr_mm": self.grid.dr_mm, "radius_mm": self.grid.radius_mm}
+        own |= {key: each for key, each in given.items() if each is not None}
+        return own | ({"photons": self.photons} if photons else {})
+
+
+def load_mci(path: str | Path, number: int | None = None) -> tuple[MciRun, ...]:
+    """Read the runs of an MCML input file, or one of them, from 1 up; see `parse_mci`."""
     text = read_text(path, str(path), expected="an MCML input file", error=MaterialError)
     with text.hinting(MaterialError) as content:
-        return parse_mci(content, str(path))
+        runs = parse_mci(content, str(path))
+    if number is None:
+        return runs
+    if not 1 <= number <= len(runs):
+        raise MaterialError(f"{path} has no run {number}; give `number = 1` to {len(runs)}.")
+    return (runs[number - 1],)
 
 
 def parse_mci(text: str, origin: str) -> tuple[MciRun, ...]:
@@ -96,17 +111,18 @@ def parse_mci(text: str, origin: str) -> tuple[MciRun, ...]:
     text : str
         The whole file, lines ending in newline characters.
     origin : str
-        The file it came from: stands first in every message.
+        Path of its file, which begins every message.
 
     Returns
     -------
     tuple of MciRun
-        In the order of the file; at least one.
+        The runs in the order of the file, at least one.
 
     Raises
     ------
     MaterialError
-        One line with the origin, the line's number, what it holds and what was expected.
+        The text is invalid; the one-line message has the origin, the line's number, its content and
+        what was expected.
 
     Examples
     --------
@@ -124,7 +140,7 @@ def parse_mci(text: str, origin: str) -> tuple[MciRun, ...]:
         at = lines.peek()
         which = f"run {k} of {count}"
         run = read_run(lines, which, f"{Path(origin).name}, {which} (MCML)")
-        if run.material.name.lower() in runs:  # and some file systems know no capitals
+        if run.material.name.lower() in runs:  # and some file systems ignore case
             raise lines.failure(
                 at.number if at else 0,
                 f"run {k} writes {shown(run.output)}, and an earlier run has the same name; give "
@@ -141,7 +157,7 @@ def parse_mci(text: str, origin: str) -> tuple[MciRun, ...]:
 
 
 def _take_version(lines: Lines) -> None:
-    """Take the first line; one without a version is a foreign file's."""
+    """Consume the first line; a file without a version is foreign."""
     line = lines.take("the file version, 1.0")
     if (version := other_version(line.words[0])) is not None:
         raise lines.failure(
@@ -158,7 +174,7 @@ def _take_version(lines: Lines) -> None:
 
 
 def read_run(lines: Lines, which: str, source: str) -> MciRun:
-    """Take the lines of one run, which MCML's output repeats; ``which`` names it in messages."""
+    """Consume the lines of one run, which MCML's output repeats; ``which`` names it in messages."""
     head = lines.take_words(f"the output file of {which}", "its format A")
     output, form = head.words
     if form.upper() not in ("A", "B"):
@@ -187,7 +203,7 @@ def read_run(lines: Lines, which: str, source: str) -> MciRun:
 
 
 def _read_stack(lines: Lines) -> tuple[tuple[Layer, ...], float, float]:
-    """Take the number of layers, n above, the layers and n below."""
+    """Consume the number of layers, n above, the layers and n below."""
     at = lines.take_words("the number of layers")
     count = lines.whole(at, 0, "the number of layers", MOST_ANNULI)
     at = lines.take_words("n above the layers")
@@ -199,7 +215,7 @@ def _read_stack(lines: Lines) -> tuple[tuple[Layer, ...], float, float]:
 
 
 def _read_layer(lines: Lines, k: int, count: int) -> Layer:
-    """Take the line of layer k of ``count``, from 1."""
+    """Consume the line of layer k of ``count``, from 1."""
     line = lines.take_words(*(f"{column[0]} of layer {k} of {count}" for column in _COLUMNS))
     eta, sigma_a, sigma_s, g, thickness_mm = (
         lines.real(line, c, name, allowed, expected, tenfold=tenfold)
@@ -216,7 +232,7 @@ def _read_layer(lines: Lines, k: int, count: int) -> Layer:
 
 
 def _check_semi_infinite(lines: Lines, line: Line, k: int, count: int, *, is_clear: bool) -> None:
-    """Refuse a layer without a bottom where there can be none."""
+    """Raise an error for a layer without a bottom that is not the last."""
     if k < count:
         raise lines.failure(
             line.number,
@@ -236,6 +252,6 @@ def _is_spacing(value: float) -> bool:
 
 
 def _name_of(output: str) -> str:
-    """Name a material after the output file, with what file names here may hold."""
+    """Name a material after the output file, with the characters that our names allow."""
     stem = PurePosixPath(output.replace("\\", "/")).stem
     return re.sub(r"[^A-Za-z0-9._+-]", "_", stem).lstrip("._+-")[:100] or "mcml"

@@ -1,14 +1,14 @@
-"""MCML output files (``.mco``, ASCII): what the original program found, as a profile in mm.
+"""MCML output files (``.mco``, ASCII): the result of the original program, as a profile in mm.
 
 The format is that of MCML 1.2.2 (Wang, Jacques, Zheng, Computer Methods and Programs in Biomedicine
 47, 1995; its manual, appendix E): the version A1, then named blocks. ``InParm`` repeats the input
 (``InParam`` in the ports to GPUs after Alerstam et al. 2008, which copy the lines of the input);
 ``RAT`` has the specular and diffuse reflectance, the absorbed fraction and the transmittance;
-``A_l``, ``Rd_r`` and ``Tt_r`` have what a profile needs, in cm. The other blocks are checked for
-their length and left alone.
+``A_l``, ``Rd_r`` and ``Tt_r`` have the data of a profile, in cm. The other blocks are checked for
+their length only.
 
-Rd_r[i] is energy over area, and the area is 2 pi (i + 1/2) dr^2; the last bin also counts all that
-leaves beyond it, so it says nothing about a radius and goes to ``beyond_grid``. Tt_r likewise.
+Rd_r[i] is energy over area, and the area is 2 pi (i + 1/2) dr^2. The last bin also includes all
+light beyond it, so it goes to ``beyond_grid``. The same holds for Tt_r.
 """
 
 import warnings
@@ -28,10 +28,10 @@ from sssfit.messages import printable, shown
 from sssfit.profile import FORMAT, Profile
 from sssfit.text import finite_number, read_text
 
-# MCML prints five digits of Rd_r and Tt_r, four of A_l: half a unit of the last is 5e-5 or 5e-4 of
-# the number at most, and that of a sum too.
+# MCML prints five digits of Rd_r and Tt_r, four of A_l: half a unit of the last digit is at most
+# 5e-5 or 5e-4 of a number, and also of a sum.
 _RADIAL_DIGITS, _LAYER_DIGITS = 1e-4, 1e-3
-# Roulette adds 3e-4 a photon at random, under 1e-5 in a thousand; RAT has six digits.
+# Roulette adds 3e-4 per photon at random, under 1e-5 for a thousand photons; RAT has six digits.
 _LOST = 1e-3
 _HEADS = ("InParm", "InParam")
 _NEEDED = ("RAT", "A_l", "Rd_r", "Tt_r")
@@ -45,9 +45,9 @@ def load_mco(path: str | Path) -> Profile:
 
 
 def is_mco(text: str) -> bool:
-    """Whether a text begins like a file of any version of MCML, after its comments.
+    """Return whether a text begins like a file of any version of MCML, after its comments.
 
-    Inputs count only where they name MCML: those of version 1 begin with a bare number.
+    Inputs count only if they name MCML; those of version 1 begin with a bare number.
     """
     line = Lines(text, "", comment=OUTPUT_COMMENT, error=ProfileError).peek()
     word = line.words[0] if line else ""
@@ -62,20 +62,21 @@ def parse_mco(text: str, origin: str) -> Profile:
     text : str
         The whole file, lines ending in newline characters.
     origin : str
-        The file it came from: stands first in every message, its last part is ``meta["source"]``.
+        Path of its file, which begins every message; its last part becomes ``meta["source"]``.
 
     Returns
     -------
     Profile
-        One channel, "mono"; an annulus fewer than MCML had dr. ``absorbed`` is A_l, scaled by the
-        last digit to add up to the six digits of RAT. Standard errors are NaN and ``photons`` is
-        None, because MCML keeps no squared weights; their number is in ``meta["settings"]``.
+        One channel, "mono", with one annulus fewer than MCML's dr. ``absorbed`` is A_l, scaled in
+        the last digit to add up to the six digits of RAT. Standard errors are NaN and ``photons``
+        is None, because MCML keeps no squared weights; the number of photons is in
+        ``meta["settings"]``.
 
     Raises
     ------
     ProfileError
-        One line with the origin and the line's number: cut short, not of this format, of another
-        version of MCML, in binary, or the blocks contradict one another.
+        The text is truncated, of another format, of another version of MCML, or binary, or its
+        blocks contradict one another; the one-line message has the origin and the line's number.
 
     Warns
     -----
@@ -107,14 +108,14 @@ def join_channels(profiles: Sequence[Profile], channels: Sequence[str]) -> Profi
     Parameters
     ----------
     profiles : sequence of Profile
-        On the same grid, with the same layers except for their coefficients.
+        Profiles on the same grid, with the same layers except for their coefficients.
     channels : sequence of str
-        A name for each.
+        A name for each profile.
 
     Raises
     ------
     ProfileError
-        Names that cannot be used, or profiles that do not belong together; one line says which.
+        A name is invalid, or the profiles do not belong together; the one-line message says which.
     """
     if len(channels) != len(profiles):
         raise ProfileError(
@@ -163,7 +164,7 @@ def _take_version(lines: Lines) -> None:
 
 
 def _sizes(run: MciRun) -> dict[str, int]:
-    """How many numbers each block has."""
+    """Return the number of values of each block."""
     n_z, n_r, n_a = run.depth_bins, run.grid.annuli, run.angle_bins
     one_dimensional = {"RAT": 4, "A_l": len(run.material.layers), "A_z": n_z, "Rd_r": n_r}
     return one_dimensional | {
@@ -177,7 +178,7 @@ def _sizes(run: MciRun) -> dict[str, int]:
 
 
 def _read_blocks(lines: Lines, run: MciRun) -> dict[str, FloatArray]:
-    """Take all blocks to the end of the file, in any order."""
+    """Consume all blocks to the end of the file, in any order."""
     sizes = _sizes(run)
     blocks: dict[str, FloatArray] = {}
     while (line := lines.peek()) is not None:
@@ -199,7 +200,7 @@ def _read_blocks(lines: Lines, run: MciRun) -> dict[str, FloatArray]:
 
 
 def _read_numbers(lines: Lines, name: str, size: int) -> FloatArray:
-    """Take the numbers of a block, which end with a line."""
+    """Consume the numbers of a block, which end with a line."""
     values: list[float] = []
     while len(values) < size:
         line = lines.take(f"number {len(values) + 1} of {size} of the block {name}")
@@ -223,7 +224,7 @@ def _energy(lines: Lines, line: Line, name: str, word: str) -> float:
 def _check_energies(
     origin: str, specular: float, diffuse: float, absorbed: float, transmitted: float
 ) -> None:
-    """Refuse more light than arrives, and say where some of it went missing."""
+    """Raise an error for more light than arrives, and warn if some is missing."""
     reflected = specular + diffuse
     if reflected > 1.0 + _LOST:
         raise ProfileError(
@@ -242,7 +243,7 @@ def _check_energies(
 
 
 def _profile(run: MciRun, blocks: dict[str, FloatArray], origin: str) -> Profile:
-    """From densities in 1/cm^2 to energies; see the head of this file."""
+    """Convert densities in 1/cm^2 to energies; see the module docstring."""
     specular, diffuse, absorbed, transmitted = blocks["RAT"].tolist()
     dr_cm = run.grid.dr_mm / 10.0
     areas_cm2 = 2.0 * np.pi * (np.arange(run.grid.annuli) + 0.5) * dr_cm**2
@@ -269,7 +270,7 @@ def _profile(run: MciRun, blocks: dict[str, FloatArray], origin: str) -> Profile
 
 
 def _check_sum(origin: str, name: str, found: float, said: float, tolerance: float) -> None:
-    """Refuse a block whose energies are not those of RAT: edited, or not of this dr."""
+    """Raise an error for a block whose energies differ from RAT: edited, or of another dr."""
     if abs(found - said) > tolerance * max(found, said):
         raise ProfileError(
             f"{printable(origin)}: the block {name} adds up to {found:.6g} and RAT says "
@@ -305,13 +306,13 @@ _PER_CHANNEL = (
 
 
 def _joined(profiles: Sequence[Profile], name: str) -> FloatArray | None:
-    """One field of several profiles along the channel axis; None where it is."""
+    """Return one field of several profiles along the channel axis; None if it is None."""
     values = [getattr(each, name) for each in profiles]
     return None if values[0] is None else np.concatenate(values, axis=-1)
 
 
 def _check_fit(first: Profile, other: Profile, top: Material, material: Material) -> None:
-    """Refuse to join what differs in more than its coefficients."""
+    """Raise an error for profiles that differ in more than coefficients."""
     ours, theirs = first.r_edges_mm, other.r_edges_mm
     if not np.array_equal(ours, theirs):
         said = (
@@ -333,13 +334,13 @@ def _check_fit(first: Profile, other: Profile, top: Material, material: Material
 
 
 def _shape(material: Material) -> tuple[object, ...]:
-    """All of a material but its name and coefficients."""
+    """Return everything of a material except its name and coefficients."""
     layers = tuple((layer.eta, layer.thickness_mm) for layer in material.layers)
     return (material.eta_above, layers, material.eta_below)
 
 
 def _joined_material(materials: Sequence[Material], channels: Sequence[str]) -> Material:
-    """Side by side, the coefficients of materials of one channel each."""
+    """Join materials of one channel each into one with all coefficients."""
     first = materials[0]
     layers = tuple(
         Layer(

@@ -1,15 +1,14 @@
 """Pictures of linear light, to and from EXR, TIFF and PNG files; HDR, JPG and TGA are read too.
 
-What is read is known by its content. 8- and 16-bit pictures are decoded from sRGB, floating point
-is linear; light comes back in the primaries of sRGB. What was done to a file's numbers stands in
-`Image.notes`.
+Files are recognised by content. 8- and 16-bit pictures are decoded from sRGB, floating point is
+linear; the result has the primaries of sRGB. `Image.notes` lists the conversions.
 """
 
 import contextlib
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
@@ -17,17 +16,25 @@ import numpy.typing as npt
 from sssfit.arrays import FloatArray
 from sssfit.errors import FileError, RenderError
 from sssfit.files import reason, temporary_folder, write_atomically
-from sssfit.formats._layers import LARGEST_BYTES
 from sssfit.formats._picture_files import (
     FORMATS,
+    FULL_SCALE,
+    LARGEST_BYTES,
     MAKER,
+    Choice,
+    Header,
     as_path,
     called,
+    check_kind,
+    check_png,
+    check_size,
+    choose,
+    found_format,
     image_format,
     is_image_file,
+    read_header,
     without_lines_of_libpng,
 )
-from sssfit.formats._picture_reader import SCALE_KEY, one_line, read_image
 from sssfit.formats.colours import (
     as_float32,
     as_format_has_it,
@@ -35,14 +42,255 @@ from sssfit.formats.colours import (
     channel_names,
     check_alpha,
     check_values,
+    matrix_to_bt709,
     png_codes,
     positive,
     srgb_decode,
     srgb_encode,
 )
-from sssfit.messages import shown
+from sssfit.messages import printable, shown
+from sssfit.text import finite_number
 
-# The library would put in the time of writing, and a picture made twice would differ.
+if TYPE_CHECKING:
+    from OpenImageIO import ImageInput, ImageSpec
+
+
+# In EXR headers, as text, so that a written picture keeps its pixel size.
+SCALE_KEY = "sssfit:mm_per_pixel"
+_LONGEST_REASON = 120
+# TIFF's numbers, and the end of libtiff's message on a missing one.
+_COMPRESSIONS = {
+    32946: "deflate",
+    34661: "JBIG",
+    34712: "JPEG 2000",
+    34887: "LERC",
+    34925: "LZMA",
+    50000: "Zstandard (zstd)",
+    50001: "WebP",
+    50002: "JPEG XL",
+    52546: "JPEG XL",
+}
+# The reader decodes what it can of a damaged JPEG, and says so; surplus bytes cost no pixel.
+_HARMLESS = "extraneous bytes before marker"
+_NOT_BUILT = ("compression support is not configured", "decoding is not implemented")
+
+
+def read_image(path: Path, layer: str | None, largest_bytes: float) -> dict[str, Any]:
+    """Return the fields of an `Image`; see `sssfit.formats.pictures.load_image`."""
+    format = found_format(path)
+    if format == "png":
+        check_png(path)
+    header = read_header(path, format)
+    try:
+        with without_lines_of_libpng() if format == "png" else contextlib.nullcontext():
+            choice, stored = _stored(path, layer, largest_bytes)
+        spec = choice.spec
+        whole = _upright(_in_window(stored, spec), spec)
+        colour, alpha, is_multiplied, done = _linear(whole, choice)
+        light, divided = _without_factors(colour, header)
+        primaries = header.primaries or _chromaticities(spec)
+        pixels, converted = _in_our_primaries(light, choice, primaries, path)
+        scale = finite_number(spec.get_string_attribute(SCALE_KEY)) or 0.0
+        return {
+            "pixels": pixels,
+            "channels": choice.names,
+            "mm_per_pixel": scale if scale > 0.0 else None,
+            "alpha": alpha,
+            "alpha_is_multiplied": is_multiplied,
+            "name": path.name,
+            "notes": (
+                *(*choice.notes, *_about_file(spec), *done),
+                *(*divided, *converted),
+            ),
+        }
+    except UnicodeDecodeError:  # bytes of a damaged header, in the library's results or messages
+        raise FileError(f"{called(path)} is damaged (a word in its header is not text).") from None
+
+
+def _stored(path: Path, layer: str | None, largest_bytes: float) -> tuple[Choice, npt.NDArray[Any]]:
+    """Return the selected layer of a file, and its values as stored."""
+    source = _open(path)
+    try:
+        choice = choose(source, path, layer)
+        check_kind(choice, path)
+        check_size(choice, path, largest_bytes)
+        stored = source.read_image(choice.part, 0, *choice.span, "unknown")
+        words = one_line(source.geterror())
+        if stored is None or (words and _HARMLESS not in words):
+            raise _unreadable(path, choice.spec, words)
+        return choice, stored
+    finally:
+        source.close()
+
+
+def _unreadable(path: Path, spec: "ImageSpec", words: str) -> FileError:
+    """Distinguish a compression that the library lacks from a damaged file."""
+    if not words.endswith(_NOT_BUILT):
+        return FileError(f"{called(path)} is damaged or cut short ({words}).")
+    code = spec.get_int_attribute("tiff:Compression")
+    name = _COMPRESSIONS.get(code, f"scheme {code}")
+    return FileError(
+        f"{called(path)} is compressed by {name}, which the reader of pictures was built without; "
+        "save it with LZW, ZIP or no compression."
+    )
+
+
+def _open(path: Path) -> "ImageInput":
+    """Open a file by its content; unmultiplied alpha stays unmultiplied."""
+    import OpenImageIO  # 0.2 s
+
+    config = OpenImageIO.ImageSpec()
+    config.attribute("oiio:UnassociatedAlpha", 1)
+    try:
+        source = OpenImageIO.ImageInput.open(str(path), config)
+    except TypeError:  # raised for a name that is not UTF-8
+        raise FileError(f"{called(path)} has a name that is not UTF-8; rename it.") from None
+    if source is None:
+        raise FileError(
+            f"{called(path)} is damaged or cut short ({one_line(OpenImageIO.geterror())})."
+        )
+    return source
+
+
+def one_line(text: str) -> str:
+    """Shorten a message of the library to one line."""
+    line = printable(text.strip().partition("\n")[0]).rstrip(".")
+    return line if len(line) <= _LONGEST_REASON else f"{line[:_LONGEST_REASON]}..."
+
+
+def _in_window(raw: npt.NDArray[Any], spec: "ImageSpec") -> npt.NDArray[Any]:
+    """Put an EXR's data window into its picture: black around it, cropped outside."""
+    if (spec.x, spec.y, spec.width, spec.height) == (
+        *(spec.full_x, spec.full_y),
+        *(spec.full_width, spec.full_height),
+    ):
+        return raw
+    whole = np.zeros((spec.full_height, spec.full_width, raw.shape[2]), dtype=raw.dtype)
+    top, left = spec.y - spec.full_y, spec.x - spec.full_x
+    rows = slice(max(top, 0), max(top + spec.height, 0))
+    columns = slice(max(left, 0), max(left + spec.width, 0))
+    target = whole[rows, columns]
+    first_row, first_column = max(-top, 0), max(-left, 0)
+    target[:] = raw[first_row:, first_column:][: target.shape[0], : target.shape[1]]
+    return whole
+
+
+def _upright(stored: npt.NDArray[Any], spec: "ImageSpec") -> npt.NDArray[Any]:
+    """Turn rows and columns by the orientation, 1 to 8 as in TIFF and Exif."""
+    turned = {
+        2: stored[:, ::-1],
+        3: stored[::-1, ::-1],
+        4: stored[::-1],
+        5: stored.transpose(1, 0, 2),
+        6: np.rot90(stored, -1),
+        7: stored[::-1, ::-1].transpose(1, 0, 2),
+        8: np.rot90(stored),
+    }
+    return turned.get(spec.get_int_attribute("Orientation", 1), stored)
+
+
+def _about_file(spec: "ImageSpec") -> list[str]:
+    """Return notes on header entries that changed the picture, and on ignored ones."""
+    notes = []
+    if (orientation := spec.get_int_attribute("Orientation", 1)) in range(2, 9):
+        notes.append(f"turned upright from orientation {orientation}")
+    if (spec.width, spec.height) != (spec.full_width, spec.full_height):
+        notes.append(
+            f"{spec.width} x {spec.height} pixels of data put into the {spec.full_width} x "
+            f"{spec.full_height} of the picture"
+        )
+    profile = spec.get_string_attribute("ICCProfile:profile_description")
+    if profile and "sRGB" not in profile:
+        notes.append(f"colour profile {printable(profile)} not applied")
+    return notes
+
+
+def _without_factors(colour: FloatArray, header: Header) -> tuple[FloatArray, list[str]]:
+    """Divide the light by the factors of a Radiance header, and return notes."""
+    notes = []
+    if header.exposure != 1.0:
+        notes.append(f"divided by the exposure of {header.exposure:.4g} in its header")
+    if set(header.correction) != {1.0}:
+        words = " ".join(f"{each:.4g}" for each in header.correction)
+        notes.append(f"divided by the colour correction of {words} in its header")
+    if not notes:
+        return colour, []
+    with np.errstate(over="ignore"):  # infinite values raise an error later
+        return colour / (header.exposure * np.array(header.correction)), notes
+
+
+def _chromaticities(spec: "ImageSpec") -> tuple[float, ...] | None:
+    """Return the primaries of an EXR header; None if they are missing or invalid."""
+    found = spec.getattribute("chromaticities")
+    is_usual = isinstance(found, tuple) and len(found) == 8
+    return tuple(float(each) for each in found) if is_usual else None
+
+
+def _linear(
+    whole: npt.NDArray[Any], choice: Choice
+) -> tuple[FloatArray, FloatArray | None, bool, list[str]]:
+    """Return linear colour, alpha, whether alpha is in the colour, and notes."""
+    spec, first = choice.spec, choice.span[0]
+    colour = _as_float64(whole[..., [place - first for place in choice.colours]])
+    alpha, is_multiplied, notes = None, False, []
+    if choice.alpha is not None:
+        alpha = _as_float64(whole[..., choice.alpha - first])
+        is_multiplied = not spec.get_int_attribute("oiio:UnassociatedAlpha")
+        notes.append(_about_alpha(is_multiplied, choice.bits))
+        if is_multiplied and choice.bits:  # the sRGB curve applies to the colour without alpha
+            safe = np.where(alpha > 0.0, alpha, 1.0)[..., None]
+            colour, is_multiplied = np.minimum(colour / safe, 1.0), False
+    space = spec.get_string_attribute("oiio:ColorSpace")
+    if choice.bits is None:
+        if space and not space.startswith("lin"):
+            notes.append(f"colour space {printable(space)} of the file taken for linear")
+        return colour, alpha, is_multiplied, notes
+    if space.startswith("lin"):
+        return colour, alpha, is_multiplied, [*notes, f"{choice.bits}-bit, linear as the file says"]
+    if gamma := spec.get_float_attribute("oiio:Gamma"):
+        notes.append(f"gamma {gamma:.3g} of the file taken for sRGB")
+    elif space and not space.startswith("srgb"):
+        notes.append(f"colour space {printable(space)} of the file taken for sRGB")
+    notes.append(f"{choice.bits}-bit sRGB decoded to linear")
+    return srgb_decode(colour), alpha, is_multiplied, notes
+
+
+def _in_our_primaries(
+    colour: FloatArray, choice: Choice, primaries: Sequence[float] | None, path: Path
+) -> tuple[FloatArray, list[str]]:
+    """Return R, G, B in the primaries of sRGB, and notes.
+
+    A colour outside the sRGB triangle would have negative light, which no surface receives.
+    """
+    if primaries is None or choice.names != ("R", "G", "B"):
+        return colour, []
+    if (matrix := matrix_to_bt709(primaries, called(path))) is None:
+        return colour, []
+    words = " ".join(f"{each:.4g}" for each in primaries)
+    notes = [f"converted from the chromaticities {words} to those of sRGB"]
+    converted = colour @ matrix.T
+    is_outside = (converted < 0.0) & (colour >= 0.0).all(axis=-1, keepdims=True)
+    if is_outside.any():
+        notes.append(
+            f"{int(is_outside.sum())} of {colour.size} values outside sRGB's triangle set to 0"
+        )
+    return np.where(is_outside, 0.0, converted), notes
+
+
+def _as_float64(stored: npt.NDArray[Any]) -> FloatArray:
+    """Return floats unchanged, and integers as shares of their largest code."""
+    with np.errstate(invalid="ignore"):  # some NaN warn when widened; they raise an error later
+        return stored.astype(np.float64) / FULL_SCALE.get(stored.dtype.name, 1)
+
+
+def _about_alpha(is_multiplied: bool, bits: int | None) -> str:
+    if is_multiplied and bits:
+        return "alpha kept apart, colour divided by it"
+    state = "multiplied by it" if is_multiplied else "without it"
+    return f"alpha kept apart, colour used as stored, {state}"
+
+
+# The library would write the current time, so a picture written twice would differ.
 _DATE = "1980:01:01 00:00:00"
 
 
@@ -57,12 +305,12 @@ def image_bytes(
 ) -> bytes:
     """Return the whole file of (H, W, C) float32, or uint16 for PNG; alpha is the last channel.
 
-    The library writes to names only, so a folder of our own takes the file first.
+    The library writes to named files only, so the file first goes to a temporary folder.
 
     Raises
     ------
     FileError
-        That folder cannot be written to.
+        The temporary folder cannot be written.
     """
     import OpenImageIO  # 0.2 s
 
@@ -74,12 +322,13 @@ def image_bytes(
     spec.attribute("Software", MAKER)
     spec.alpha_channel = count - 1 if has_alpha else -1
     if has_alpha and not is_multiplied:
-        spec.attribute("oiio:UnassociatedAlpha", 1)  # what it gets is what it writes
+        spec.attribute("oiio:UnassociatedAlpha", 1)  # the library writes the values unchanged
     if format == "png":
         spec.attribute("oiio:ColorSpace", "srgb_rec709_scene")
     else:
         spec.attribute("DateTime", _DATE)
-        # TIFF is left plain: not every reader knows the predictor that compressed floats have.
+        # TIFF is not compressed, because not every reader supports the predictor of compressed
+        # floats.
         spec.attribute("compression", "zip" if format == "exr" else "none")
     if format == "exr" and mm_per_pixel is not None:
         spec.attribute(SCALE_KEY, repr(float(mm_per_pixel)))
@@ -87,7 +336,7 @@ def image_bytes(
         with temporary_folder() as folder:
             path = folder / f"picture.{format}"
             target = OpenImageIO.ImageOutput.create(str(path))
-            # Other layouts in memory are refused.
+            # The library does not accept other layouts in memory.
             packed = np.ascontiguousarray(pixels)
             assert target is not None  # these formats are part of the library
             with without_lines_of_libpng() if format == "png" else contextlib.nullcontext():
@@ -122,22 +371,22 @@ class Image:
     pixels : array (H, W, C)
         Linear light; row 0 is the top.
     channels : tuple of str
-        Names of the channels: ("R", "G", "B"), ("Y",) for grey, others as an EXR has them.
+        Names of the channels: ("R", "G", "B"), ("Y",) for grey, or others from an EXR.
     mm_per_pixel : float, optional [mm]
-        Size of a pixel; None where the file does not say.
+        Size of a pixel; None if the file does not say.
     alpha : array (H, W), optional
-        Coverage, kept apart from the colour.
+        Coverage, stored separately from the colour.
     alpha_is_multiplied : bool
-        Whether ``pixels`` hold the light times the coverage, as in an EXR.
+        Whether ``pixels`` are multiplied by the coverage, as in an EXR.
     name : str
         The file's name without its folder.
     notes : tuple of str
-        What was done to the file's numbers, in words for stderr.
+        Conversions of the file's values, as text for stderr.
 
     Raises
     ------
     RenderError
-        An array does not hold real numbers, or has another shape.
+        An array does not hold real numbers, or has the wrong shape.
     """
 
     pixels: FloatArray
@@ -159,7 +408,7 @@ class Image:
                 )
 
     def _store(self, field: str, dimensions: int) -> None:
-        """Keep an array read-only, in the order of C."""
+        """Store an array read-only, in C order."""
         kept = np.array(as_light(getattr(self, field), field), order="C")
         if kept.ndim != dimensions:
             raise RenderError(
@@ -175,36 +424,36 @@ def load_image(
 ) -> Image:
     """Read a picture as linear light.
 
-    EXR: R, G, B of the first part that has them, or of the only layer that has, else Y, else all
-    channels; its window of data is put into the picture's, black around. Palettes become RGB, grey
-    stays one channel. Primaries other than those of sRGB are converted, white staying white: the
-    chromaticities of an EXR, PRIMARIES of a Radiance file, cHRM of a PNG. Values that would fall
-    below 0 then are set to 0. Radiance's EXPOSURE and COLORCORR are taken out of the light.
+    From an EXR it takes R, G, B of the first part that has them, or of the only layer that has
+    them, else Y, else all channels; its data window is placed in the picture, with black around.
+    Palettes become RGB, grey stays one channel. Primaries other than those of sRGB are converted
+    with white kept: the chromaticities of an EXR, PRIMARIES of a Radiance file, cHRM of a PNG.
+    Negative values that result are set to 0. Radiance's EXPOSURE and COLORCORR are divided out.
 
     Parameters
     ----------
     path : str or Path
-        An EXR, Radiance HDR, TIFF, PNG, JPG or TGA file, by its content and not by its ending, but
-        for TGA files of the first version, which only their ending tells.
+        An EXR, Radiance HDR, TIFF, PNG, JPG or TGA file, recognised by its content; only TGA files
+        of the first version also need their ending.
     layer : str, optional
-        Of an EXR: what stands before the last dot in its channels' names, or the name of a part.
+        Layer of an EXR: the part of its channels' names before the last dot, or the name of a part.
     largest_bytes : float [bytes]
-        Refuse pictures that would need more to be rendered, 32 bytes for each of their values.
+        Limit of the memory for rendering the picture, 32 bytes for each of its values.
 
     Returns
     -------
     Image
-        8- and 16-bit numbers sRGB-decoded (IEC 61966-2-1) unless the file says that they are
-        linear; turned upright.
+        The upright picture; 8- and 16-bit values are sRGB-decoded (IEC 61966-2-1) unless the file
+        says that they are linear.
 
     Raises
     ------
     FileError
-        Missing, unreadable, damaged, cut short, of another format, or compressed in a way that
-        the library was built without.
+        The file is missing, unreadable, damaged, truncated, of another format, or uses a
+        compression that the library lacks.
     RenderError
-        Too large, without channels that can be used, with several layers and none of them named,
-        or with NaN, infinite or negative values.
+        The picture is too large, has no usable channels, has several layers and none is selected,
+        or has NaN, infinite or negative values.
     """
     source = as_path(path)
     largest = positive(largest_bytes, "largest_bytes")
@@ -229,40 +478,40 @@ def save_image(
     alpha: npt.ArrayLike | None = None,
     alpha_is_multiplied: bool = False,
 ) -> tuple[str, ...]:
-    """Write linear light: float32 to EXR or TIFF as it is, 16-bit sRGB to PNG.
+    """Write linear light: unchanged float32 to EXR or TIFF, 16-bit sRGB to PNG.
 
-    A PNG holds ``exposure`` times the light, clipped to 0 to 1 and sRGB-encoded. With alpha, an EXR
-    holds the light times it and a PNG the light without it, as these formats have it; a TIFF says
-    which. Files are written whole or not at all, and the same picture gives the same bytes.
+    A PNG holds ``exposure`` times the light, clipped to 0 to 1 and sRGB-encoded. By the conventions
+    of the formats, an EXR holds the light times alpha and a PNG the light without it; a TIFF says
+    which. Files are written completely or not at all, and the same picture gives the same bytes.
 
     Parameters
     ----------
     target : path or binary stream
-        Where to.
+        Where to write.
     pixels : array (H, W, C)
         Linear light; row 0 is the top.
     channels : sequence of str, optional
         Names for EXR; needed for other counts than 1 (Y) and 3 (R, G, B), which only EXR can hold.
     format : str, optional
-        "exr", "tiff" or "png"; by default what the ending says.
+        "exr", "tiff" or "png"; by default from the ending.
     exposure : float
-        Factor for PNG; the other formats keep the light as it is.
+        Factor for PNG; the other formats keep the light unchanged.
     mm_per_pixel : float, optional [mm]
-        Kept in the header of an EXR, from where `load_image` takes it.
+        Stored in the header of an EXR, from which `load_image` reads it.
     alpha : array (H, W), optional
         Coverage, for pictures of 1 or 3 channels.
     alpha_is_multiplied : bool
-        Whether ``pixels`` hold the light times the coverage.
+        Whether ``pixels`` are multiplied by the coverage.
 
     Returns
     -------
     tuple of str
-        What was done to the numbers, in words for stderr.
+        Conversions of the values, as text for stderr.
 
     Raises
     ------
     FileError
-        The file cannot be written; an older one is untouched.
+        The file cannot be written; an older one stays unchanged.
     RenderError
         The values are not finite, or do not fit the format.
     """
@@ -301,5 +550,5 @@ def _write(path: Path, data: bytes) -> None:
     """Write the whole file or nothing."""
     try:
         write_atomically(path, lambda stream: stream.write(data))
-    except OSError as error:  # a name that no file system takes
+    except OSError as error:  # a name that is invalid in every file system
         raise FileError(f"{called(path)} cannot be written: {reason(error)}.") from None

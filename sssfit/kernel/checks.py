@@ -16,14 +16,14 @@ from sssfit.arrays import (
 from sssfit.errors import KernelError
 from sssfit.messages import shown
 
-# Of weights and scales: their squares are finite in single precision, which shaders compute in.
+# Limit of weights and scales: their squares are finite in single precision, as in shaders.
 _MOST = 1e18
 _LEAST_MM, _MOST_MM = 1e-12, 1e12
 _ARRAYS = ("signs", "weights", "relative_frobenius_error", "energy_error", "scale")
 
 
 def checked(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a `sssfit.kernel.SeparableKernel` as it keeps them, or KernelError."""
+    """Return the fields of a `sssfit.kernel.SeparableKernel` as stored, or raise KernelError."""
     fields: dict[str, Any] = {
         name: number_array(name, given[name], KernelError) for name in _ARRAYS
     }
@@ -66,7 +66,7 @@ def _check_shapes(fields: Mapping[str, FloatArray], n_names: int) -> None:
 
 
 def _check_numbers(fields: Mapping[str, FloatArray]) -> None:
-    """Refuse numbers that are not finite in single precision or out of range."""
+    """Check that numbers are finite in single precision and in range."""
     weights, signs, scale = fields["weights"], fields["signs"], fields["scale"]
     _check_range("weights", weights, -_MOST)
     _check_range("scale", scale, 0.0)
@@ -87,7 +87,7 @@ def _check_numbers(fields: Mapping[str, FloatArray]) -> None:
 
 
 def _check_range(name: str, values: FloatArray, least: float, *, or_unknown: bool = False) -> None:
-    """Refuse values that are not numbers from ``least`` to as much upwards; NaN if unknown."""
+    """Check for numbers of at least ``least``, and below the limit; NaN if unknown."""
     most = max(_MOST, -least)
     bad = ~((values >= least) & (values <= most)) & ~(or_unknown & np.isnan(values))
     if bad.any():
@@ -103,13 +103,13 @@ def _check_meta(meta: Mapping[str, Any]) -> None:
         check_label("meta.material", meta["material"], KernelError)
 
 
-# What rendering reads of a method's parameters: lists of numbers and single ones.
+# The parameters of methods that rendering reads: lists of numbers and single numbers.
 _LISTS = ("variances_mm2", "weights")
 _NUMBERS = ("near_mm2", "far_mm2", "weight", "depth_variance_mm2")
 
 
 def _check_parameters(path: str, found: object) -> None:
-    """Check what a method found for a channel, as far as others read it."""
+    """Check the parameters that a method found for a channel, as far as other rooms read them."""
     if not isinstance(found, Mapping):
         raise KernelError(f"{path} = {shown(found)}; expected a mapping.")
     for name in {*_LISTS, *_NUMBERS} & found.keys():

@@ -1,10 +1,15 @@
 """The file of a separable kernel: JSON that a person can read and a shader author can parse.
 
-Numbers are written as the shortest decimals that read back to the same bits.
+Numbers are written as the shortest decimals that read back to the same bits. A file is checked
+against ``kernel.schema.json`` by the keywords that this schema uses; a test holds the two together.
 """
 
 import json
-from collections.abc import Mapping
+import math
+import re
+from collections.abc import Callable, Mapping
+from functools import cache
+from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, BinaryIO
 
@@ -13,22 +18,119 @@ import numpy as np
 from sssfit.arrays import FloatArray
 from sssfit.errors import KernelError
 from sssfit.files import has_mark, read_at_most, reason
-from sssfit.kernel import schema
+from sssfit.kinds import KINDS
 from sssfit.messages import shown
 
 if TYPE_CHECKING:
     from sssfit.kernel import SeparableKernel
 
 
+Schema = Mapping[str, Any]
+
+_TYPES: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "object": (lambda v: isinstance(v, dict), "an object"),
+    "array": (lambda v: isinstance(v, list), "a list"),
+    "string": (lambda v: isinstance(v, str), "a text"),
+    "number": (lambda v: type(v) in (int, float) and _is_finite(v), "a finite number"),
+    "integer": (lambda v: type(v) is int, "a whole number"),
+    "null": (lambda v: v is None, "null"),
+}
+
+
+@cache
+def schema() -> Schema:
+    """Return the schema that is installed with the library."""
+    text = (resources.files("sssfit") / "kernel.schema.json").read_text("utf-8")
+    found: Schema = json.loads(text)
+    return found
+
+
+def check(value: object, rules: Schema, path: str = "") -> None:
+    """Raise KernelError with the place of the first value that breaks the rules."""
+    if "const" in rules and value != rules["const"]:
+        raise _fault(path, value, repr(rules["const"]))
+    if "enum" in rules and (value not in rules["enum"] or isinstance(value, bool)):
+        raise _fault(path, value, " or ".join(map(str, rules["enum"])))
+    if "type" in rules:
+        _check_type(value, rules["type"], path)
+    if isinstance(value, str) and not re.search(rules.get("pattern", ""), value):
+        raise _fault(path, value, "a text that prints on one line")
+    if isinstance(value, (int, float)):
+        _check_range(value, rules, path)
+    elif isinstance(value, list):
+        _check_list(value, rules, path)
+    elif isinstance(value, dict):
+        _check_object(value, rules, path)
+
+
+def _check_type(value: object, wanted: str | list[str], path: str) -> None:
+    names = [wanted] if isinstance(wanted, str) else wanted
+    if not any(_TYPES[name][0](value) for name in names):
+        raise _fault(path, value, " or ".join(_TYPES[name][1] for name in names))
+
+
+def _check_range(value: float, rules: Schema, path: str) -> None:
+    least, most = rules.get("minimum", -math.inf), rules.get("maximum", math.inf)
+    if not least <= value <= most:
+        limits = f"{least:.6g} to {most:.6g}" if math.isfinite(most) else f"{least:g} or more"
+        raise _fault(path, value, limits)
+
+
+def _check_list(value: list[Any], rules: Schema, path: str) -> None:
+    least, most = rules.get("minItems", 0), rules.get("maxItems", math.inf)
+    if not least <= len(value) <= most:
+        limits = f"{least}" if math.isinf(most) else f"{least} to {most}"
+        many = "" if math.isfinite(most) else " or more"
+        raise KernelError(f"{path} has {len(value)} entries; expected {limits}{many}.")
+    if rules.get("uniqueItems") and len(set(map(repr, value))) < len(value):
+        raise KernelError(f"{path} = {shown(value)} has an entry twice; expected each once.")
+    items = rules.get("items", {})
+    if not _are_numbers(value, items):
+        for k, each in enumerate(value):
+            check(each, items, f"{path}[{k}]")
+
+
+def _are_numbers(values: list[Any], rules: Schema) -> bool:
+    """Check all numbers at once, because a kernel may have ten million weights."""
+    if rules.get("type") != "number" or not set(map(type, values)) <= {int, float}:
+        return False
+    least, most = rules.get("minimum", -math.inf), rules.get("maximum", math.inf)
+    return all(_is_finite(each) and least <= each <= most for each in values)
+
+
+def _check_object(value: dict[str, Any], rules: Schema, path: str) -> None:
+    for name in rules.get("required", ()):
+        if name not in value:
+            raise KernelError(f"{path or 'the kernel'} has no {name}.")
+    named = rules.get("properties", {})
+    for name, each in value.items():
+        check(each, named.get(name, rules.get("additionalProperties", {})), _joined(path, name))
+
+
+def _joined(path: str, name: str) -> str:
+    return f"{path}.{name}" if path else name
+
+
+def _fault(path: str, value: object, expected: str) -> KernelError:
+    said = json.dumps(value) if value is None or isinstance(value, bool) else shown(value)
+    return KernelError(f"{path or 'the kernel'} = {said}; expected {expected}.")
+
+
+def _is_finite(value: float) -> bool:
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # an integer of 400 digits
+        return False
+
+
 FORMAT = "sssfit.kernel/1"
-MARK = b'"sssfit.kernel/'  # by which a file is ours, however damaged
 _REMEDY = "name a .kernel.json file, as sssfit writes it"
 MOST_BYTES = 500_000_000  # 16000 pixels, 10 terms and 64 channels are 200 MB
-_ROUNDING = 1e-9  # relative; sums of pixels may be taken in another order
+_ROUNDING = 1e-9  # relative; sums of pixels may be computed in another order
 
 
 def content(kernel: "SeparableKernel") -> dict[str, Any]:
-    """Return what the file holds; NaN becomes None."""
+    """Return the contents of the file; NaN becomes None."""
     return {
         "format": FORMAT,
         "method": kernel.method,
@@ -66,11 +168,11 @@ def unpack(source: str | Path | BinaryIO, origin: str) -> dict[str, Any]:
     Raises
     ------
     KernelError
-        One line that names the origin and the place in the file.
+        The file is invalid; the one-line message names the origin and the place in the file.
     """
     whole = _parsed(_read(source, origin), origin)
     try:
-        schema.check(whole, schema.schema())
+        check(whole, schema())
         _check_sizes(whole)
         signs = np.array([term["sign"] for term in whole["terms"]], dtype=np.float64)
         weights = np.array([term["weights"] for term in whole["terms"]], dtype=np.float64)
@@ -90,12 +192,12 @@ def unpack(source: str | Path | BinaryIO, origin: str) -> dict[str, Any]:
 
 
 def is_kernel_file(path: Path) -> bool:
-    """Whether a file is a kernel of any version, by the format it names."""
+    """Return whether a file is a kernel of any version, by the format it names."""
     return has_mark(path, {b"{": b'"format": "sssfit.kernel/'})
 
 
 def _read(source: str | Path | BinaryIO, origin: str) -> bytes:
-    """Read it all, up to a limit."""
+    """Read the whole file, up to a limit."""
     try:
         if isinstance(source, str | Path):
             with Path(source).open("rb") as file:
@@ -110,11 +212,11 @@ def _read(source: str | Path | BinaryIO, origin: str) -> bytes:
 
 
 def _parsed(text: bytes, origin: str) -> Mapping[str, Any]:
-    """Parse JSON and look at its format."""
+    """Parse JSON and check its format."""
     try:
         whole = json.loads(text, object_pairs_hook=_unique_keys, parse_constant=_no_number)
     except (ValueError, RecursionError) as error:
-        if MARK not in text:
+        if not any(mark in text for mark in KINDS["kernel"].marks):
             raise KernelError(f"{origin}: not a kernel; {_REMEDY}.") from None
         if isinstance(error, KernelError):
             raise KernelError(f"{origin}: {error}; fit the kernel again.") from None
@@ -132,7 +234,7 @@ def _parsed(text: bytes, origin: str) -> Mapping[str, Any]:
 
 
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """Make an object, in which JSON itself would allow a key twice."""
+    """Make an object, and raise an error for repeated keys, which JSON would allow."""
     found = dict(pairs)
     if len(found) < len(pairs):
         names = [name for name, _ in pairs]
@@ -167,7 +269,7 @@ def _check_sizes(whole: Mapping[str, Any]) -> None:
 
 
 def _check_derived(whole: Mapping[str, Any], signs: FloatArray, weights: FloatArray) -> None:
-    """Check what the file says of its terms against the terms."""
+    """Check the file's figures of the terms against the terms."""
     terms, pixels = weights.shape[:2]
     support_mm = (pixels - 1) // 2 * float(whole["mm_per_pixel"])
     counts = {"rank": (whole["rank"], terms), "pixels": (whole["pixels"], pixels)}

@@ -1,11 +1,11 @@
-"""Separable kernels: what a shader convolves with, as signed pairs of one-dimensional passes.
+"""Separable kernels: the filter of a shader, as signed pairs of one-dimensional passes.
 
 The 2D kernel of channel c is K[i, j] = sum_t s_tc w_tc[i] w_tc[j], s = +1 or -1: every term is a
 horizontal pass and the same pass vertically. Weights are energies of pixels (integrals, not
-samples), so sums of them are energies too. A kernel belongs to its pitch in mm per pixel.
+samples), so their sums are energies too. A kernel is made for one pixel size, in mm per pixel.
 
-``json`` has the file format, ``sssfit/kernel.schema.json`` its JSON Schema;
-``checks`` refuses everything else.
+``json`` has the file format, ``sssfit/kernel.schema.json`` its JSON Schema; ``checks`` validates
+its fields.
 """
 
 import dataclasses
@@ -43,34 +43,34 @@ class SeparableKernel:
     Parameters
     ----------
     method : str
-        The fit that made it, as the command line names it.
+        The fit that made it, by its name on the command line.
     mm_per_pixel : float [mm]
-        Pitch; pixel h is centred on the axis.
+        Pixel size; pixel h is centred on the axis.
     channels : tuple of str
-        C names.
+        Names of the C channels.
     signs : array (T, C)
         +1 or -1.
     weights : array (T, P, C)
         The passes; symmetric about the middle pixel.
     relative_frobenius_error : array (C,)
-        ||K - target|| / ||target|| over the support; NaN where it was not fitted to a profile.
+        ||K - target|| / ||target|| over the support; NaN if it was not fitted to a profile.
     energy_error : array (C,)
-        Energy of the kernel against the profile's diffuse reflectance, as a share of the latter:
-        what lies beyond the grid and beyond the support counts. NaN as above.
+        Relative difference of the kernel's energy from the profile's diffuse reflectance, which
+        includes the light beyond the grid and the support. NaN as above.
     scale : array (C,)
-        What to multiply the 2D kernel with to have the profile's energy back: 1 unless the fit was
-        normalised; then the kernel's energy is 1 and this is the albedo an engine multiplies in.
+        Factor that restores the profile's energy: 1, unless the fit was normalised. Then the
+        kernel's energy is 1, and this is the albedo by which an engine multiplies.
     parameters : mapping
-        What the method found by channel, for JSON: variances, weights, widths.
+        Results of the method by channel, for JSON: variances, weights, widths.
     meta : mapping
-        Provenance, for JSON; all of it may be missing: material (a name), material_sha256,
+        Provenance, for JSON; any of it may be missing: material (a name), material_sha256,
         profile_sha256 (`Profile.sha256`), profile_method, photons, seed, version, settings.
 
     Raises
     ------
     KernelError
         A field has the wrong shape, is not a number, is beyond single precision, or cannot be
-        kept as JSON.
+        stored as JSON.
     """
 
     method: str
@@ -108,7 +108,7 @@ class SeparableKernel:
         return html_table(self._in_words(), heads, rows)
 
     def _in_words(self) -> str:
-        """Say on one line what it is: material, method, terms, pixels."""
+        """Return one line with material, method, terms and pixels."""
         return (
             f"SeparableKernel of {of_material(self.meta.get('material'))} by {self.method}, "
             f"{self.rank} term{'s' if self.rank > 1 else ''}, {self.pixels} "
@@ -116,12 +116,12 @@ class SeparableKernel:
         )
 
     def plot(self, profile: "Profile | None" = None) -> "Figure":
-        """Draw the kernel, for a notebook; `sssfit.chart.kernel.kernel_figure` says what.
+        """Draw the kernel, for a notebook; see `sssfit.chart.kernel.kernel_figure`.
 
         Parameters
         ----------
         profile : Profile, optional
-            What it was fitted to, drawn beside it.
+            The profile that it was fitted to, drawn beside it.
 
         Returns
         -------
@@ -166,13 +166,13 @@ class SeparableKernel:
 
     @property
     def energy(self) -> FloatArray:
-        """Sum of the 2D kernel over all pixels (C,); ``scale`` times this is in the profile's."""
+        """Sum of the 2D kernel over all pixels (C,), without ``scale``."""
         total: FloatArray = np.sum(self.signs * np.sum(self.weights, axis=1) ** 2, axis=0)
         return total
 
     @property
     def line(self) -> FloatArray:
-        """Sum of the 2D kernel along one axis (P, C): what a long straight edge sees."""
+        """Sum of the 2D kernel along one axis (P, C), its response to a line."""
         sums = self.signs * np.sum(self.weights, axis=1)
         along: FloatArray = np.einsum("tc,tpc->pc", sums, self.weights)
         return along
@@ -190,11 +190,11 @@ class SeparableKernel:
         return kernel
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the kernel as its file holds it."""
+        """Return the contents of the kernel's file."""
         return kernel_json.content(self)
 
     def figures(self) -> dict[str, Any]:
-        """Return what ``sssfit show --json`` prints: lists and numbers, None where unknown.
+        """Return the figures of ``sssfit show --json``, as lists and numbers, None if unknown.
 
         Terms have their signs, energies (sign times the squared sum of the pass) and the weights of
         the middle pixel, (terms, channels). `to_dict` is the file, with all weights.
@@ -227,23 +227,24 @@ class SeparableKernel:
         stream.write(kernel_json.pack(self))
 
     def save(self, path: str | Path) -> None:
-        """Write the kernel to ``path`` (by custom ``NAME.kernel.json``), whole or not at all.
+        """Write the kernel to ``path`` (by convention ``NAME.kernel.json``), whole or not at all.
 
         Raises
         ------
         FileError
-            The file cannot be written; an older one at ``path`` is untouched.
+            The file cannot be written; an older file at ``path`` stays unchanged.
         """
         write_atomically(Path(path), self.write)
 
     @classmethod
     def read(cls, source: str | Path | BinaryIO, origin: str | None = None) -> Self:
-        """Read a kernel from a path or a binary stream; numbers come back bit for bit.
+        """Read a kernel from a path or a binary stream; numbers are read back bit for bit.
 
         Raises
         ------
         KernelError
-            One line that names the origin: missing, damaged, foreign, or of another version.
+            The file is missing, damaged, foreign, or of another version; the one-line message names
+            the origin.
         """
         if origin is None:
             origin = str(source) if isinstance(source, str | Path) else "the kernel"

@@ -1,5 +1,19 @@
 """Materials: absorption and scattering per channel and layer, from TOML or made in Python."""
 
-from sssfit.material.record import Layer, Material, load_material, material_names, parse_material
+from sssfit.material.record import (
+    Layer,
+    Material,
+    load_material,
+    material_names,
+    parse_material,
+    read_material,
+)
 
-__all__ = ["Layer", "Material", "load_material", "material_names", "parse_material"]
+__all__ = [
+    "Layer",
+    "Material",
+    "load_material",
+    "material_names",
+    "parse_material",
+    "read_material",
+]

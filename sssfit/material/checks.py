@@ -22,12 +22,12 @@ if TYPE_CHECKING:
 
 
 DENSE_PER_MM = 10.0  # cream, the densest of Jensen et al. 2001, has 7.38; skin1 in 1/cm has 7.7
-# Only ratios of indices count: a vacuum beside air or water taken as 1 lies below 1.
+# Only ratios of indices count: relative to air or water as 1, a vacuum is below 1.
 LEAST_ETA, MOST_ETA = 0.5, 4
 _LEAST, _MOST = 1e-9, 1e9  # 1/mm and mm: 1000 km and an atom's width are beyond any material
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._+-]{0,99}"
 
-# For each number of a material: whether it will do, and what to say was expected.
+# For each number of a material: whether it is valid, and the expectation for messages.
 _RULES: dict[str, tuple[Callable[[float], bool], str]] = {
     "eta": (
         lambda v: LEAST_ETA <= v <= MOST_ETA,
@@ -95,7 +95,7 @@ def check_lengths(layer: "Layer") -> None:
 
 
 def check_clear_or_not(layer: "Layer") -> None:
-    """Refuse a channel that is almost clear."""
+    """Raise an error for a channel that is almost clear."""
     sigma_t = layer.sigma_t_per_mm
     for c in np.flatnonzero((sigma_t > 0) & (sigma_t < _LEAST)):
         raise MaterialError(
@@ -105,7 +105,7 @@ def check_clear_or_not(layer: "Layer") -> None:
 
 
 def check_not_per_cm(layer: "Layer") -> None:
-    """Refuse a reduced extinction beyond that of known materials: it is likely in 1/cm."""
+    """Raise an error for a reduced extinction above known materials, which is likely in 1/cm."""
     sigma_t = layer.reduced_sigma_t_per_mm
     for c in np.flatnonzero(sigma_t > DENSE_PER_MM):
         raise MaterialError(
@@ -116,12 +116,12 @@ def check_not_per_cm(layer: "Layer") -> None:
 
 
 def is_name(name: object) -> TypeGuard[str]:
-    """Tell whether something is a text that can be part of a file name."""
+    """Return whether a value is a text that can be part of a file name."""
     return isinstance(name, str) and re.fullmatch(_NAME, name) is not None
 
 
 def check_texts(name: object, source: object) -> None:
-    """Check that the name can be part of a file name and the source be written to a file."""
+    """Check that the name is valid in a file name and the source can be written to a file."""
     if not is_name(name):
         raise MaterialError(
             f"name = {shown(name)} cannot be part of a file name; use at most 100 letters, digits "
@@ -171,7 +171,7 @@ def check_stack(layers: Sequence["Layer"], channels: Sequence[str], eta_below: f
 
 
 def _check_extinction(layers: Sequence["Layer"], channels: Sequence[str]) -> None:
-    """Refuse channels that nothing absorbs or scatters, and clear ground without a bottom."""
+    """Check for channels that are clear in all layers, and for a clear layer without a bottom."""
     sigma_t = np.array([layer.sigma_t_per_mm for layer in layers])
     everywhere = " in every layer" if len(layers) > 1 else ""
     if not sigma_t.any(axis=0).all():

@@ -1,8 +1,8 @@
-"""Materials: how much a medium absorbs and scatters, loaded from TOML and checked.
+"""Materials: absorption and scattering of a medium, loaded from TOML and checked.
 
 A ``Material`` is one or more ``Layer`` records from the top down, each with coefficients per colour
-channel in 1/mm. Eleven measured ones ship with sssfit (Jensen et al. 2001); a file of your own has
-the same form::
+channel in 1/mm. 22 measured ones ship with sssfit (Jensen et al. 2001, Narasimhan et al. 2006);
+your own file has the same form::
 
     name = "skin1"
     source = "Jensen et al. 2001"
@@ -16,7 +16,7 @@ A stack has ``[[layers]]`` tables in place of the coefficients, from the top dow
 ``thickness_mm``, and ``eta_above`` and ``eta_below`` above them.
 
 Similarity theory reduces anisotropic scattering to sigma_s' = (1 - g) sigma_s; the mean free paths
-here, which lay out grids, are the reduced ones. Next: ``sssfit.grid``, ``sssfit.simulate``.
+here, which determine grids, are the reduced ones. Next: ``sssfit.grid``, ``sssfit.simulate``.
 """
 
 import hashlib
@@ -28,7 +28,7 @@ from dataclasses import dataclass
 from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -47,16 +47,13 @@ from sssfit.material.checks import (
     numbers,
 )
 from sssfit.material.toml import (
-    MOST_BYTES,
-    decode,
     default_channels,
-    did_you_mean,
     is_path,
     read_tables,
     read_text,
     write_toml,
 )
-from sssfit.messages import by_channel, of_material, printable, shown
+from sssfit.messages import by_channel, did_you_mean, of_material, printable, shown
 from sssfit.optics import normal_reflectance
 
 
@@ -69,17 +66,18 @@ class Layer:
     eta : float
         Refractive index, 0.5 to 4, the same for all channels; only ratios of indices count.
     g : (C,) or float
-        Mean cosine of scattering, above -1 to 1; above 0 is forward. One number serves all. 1 is
-        no scattering at all, and becomes sigma_s = 0 and g = 0 in that channel.
+        Mean cosine of scattering, above -1 to 1; above 0 is forward. One number applies to all
+        channels. 1 means no scattering, and becomes sigma_s = 0 and g = 0 in that channel.
     sigma_a_per_mm, sigma_s_per_mm : (C,)
-        Absorption and scattering coefficients [1/mm]. Both 0: the layer is clear in that channel.
+        Absorption and scattering coefficients [1/mm]. If both are 0, the layer is clear in that
+        channel.
     thickness_mm : float
-        Thickness [mm]; infinite (the default) for the ground below everything.
+        Thickness [mm]; infinite (the default) for a last layer without a bottom.
 
     Raises
     ------
     MaterialError
-        A value is not a number, is out of range, or the lists differ in length.
+        A value is not a number or out of range, or the lists differ in length.
     """
 
     eta: float
@@ -114,7 +112,7 @@ class Layer:
 
     @property
     def albedo(self) -> FloatArray:
-        """Single-scattering albedo sigma_s / sigma_t, (C,); 0 where the layer is clear."""
+        """Single-scattering albedo sigma_s / sigma_t, (C,); 0 if the layer is clear."""
         sigma_t = self.sigma_t_per_mm
         return np.divide(
             self.sigma_s_per_mm, sigma_t, out=np.zeros_like(sigma_t), where=sigma_t > 0
@@ -122,7 +120,7 @@ class Layer:
 
     @property
     def is_clear(self) -> bool:
-        """Whether no channel is absorbed or scattered (glass, say)."""
+        """Whether no channel is absorbed or scattered, as in glass."""
         return not self.sigma_t_per_mm.any()
 
     @property
@@ -137,12 +135,12 @@ class Layer:
 
     @property
     def mean_free_path_mm(self) -> FloatArray:
-        """Reduced mean free path 1 / (sigma_a + (1 - g) sigma_s) [mm], (C,); inf where clear."""
+        """Reduced mean free path 1 / (sigma_a + (1 - g) sigma_s) [mm], (C,); inf if clear."""
         sigma_t = self.reduced_sigma_t_per_mm
         return np.divide(1.0, sigma_t, out=np.full_like(sigma_t, math.inf), where=sigma_t > 0)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the layer as JSON can hold it; an infinite thickness is None."""
+        """Return the layer as JSON values; an infinite thickness is None."""
         return {
             "eta": self.eta,
             "g": self.g.tolist(),
@@ -165,14 +163,14 @@ class Material:
     layers : tuple of Layer
         From the top down; only the last may be semi-infinite, and it must not be clear then.
     source : str
-        Where the coefficients come from; for people, not part of ``sha256``.
+        Origin of the coefficients, for people; not part of ``sha256``.
     eta_above, eta_below : float
-        Refractive indices of what lies above the first and below the last layer.
+        Refractive indices of the media above the first and below the last layer.
 
     Raises
     ------
     MaterialError
-        The layers do not fit the channels or one another, or a name cannot be used.
+        The layers do not fit the channels or one another, or a name is invalid.
     """
 
     name: str
@@ -221,16 +219,16 @@ class Material:
 
     @property
     def first_scattering_layer(self) -> int:
-        """Number of clear layers on top: the walk begins below them."""
+        """Number of clear layers on top; the walk starts below them."""
         return next(k for k, layer in enumerate(self.layers) if not layer.is_clear)
 
     @property
     def specular_reflectance(self) -> float:
-        """Fresnel reflectance at normal incidence of all interfaces above the first matter.
+        """Fresnel reflectance at normal incidence of all interfaces above the first turbid layer.
 
-        ((n1 - n0) / (n1 + n0))^2 for one; clear layers on top add theirs, multiple reflections
-        between them included: R = R1 + (1 - R1)^2 R2 / (1 - R1 R2) (Wang, Jacques, Zheng 1995,
-        eq. 3.4 for one such layer).
+        ((n1 - n0) / (n1 + n0))^2 for one; clear layers on top add theirs, including multiple
+        reflections: R = R1 + (1 - R1)^2 R2 / (1 - R1 R2) (Wang, Jacques, Zheng 1995, eq. 3.4 for
+        one such layer).
         """
         total = 0.0
         above = self.eta_above
@@ -242,13 +240,13 @@ class Material:
 
     @property
     def sha256(self) -> str:
-        """Fingerprint of name, channels, indices and coefficients, however they were written."""
+        """Fingerprint of name, channels, indices and coefficients, in any notation."""
         content = self.to_dict()
         del content["source"]
         return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the material as JSON can hold it, for ``from_dict``."""
+        """Return the material as JSON values, for ``from_dict``."""
         return {
             "name": self.name,
             "source": self.source,
@@ -260,7 +258,7 @@ class Material:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> "Material":
-        """Rebuild what ``to_dict`` gave.
+        """Rebuild a material from the result of ``to_dict``.
 
         Raises
         ------
@@ -293,13 +291,13 @@ def load_material(name_or_path: str | Path) -> Material:
     Parameters
     ----------
     name_or_path : str or Path
-        A shipped name (see ``material_names``); a path, recognised by its ``.toml``, a separator,
-        or being there; ``-`` for standard input.
+        A shipped name (see ``material_names``); a path, recognised by ``.toml``, a separator, or an
+        existing file; or ``-`` for standard input.
 
     Raises
     ------
     MaterialError
-        Unknown material, or its file cannot be read or is invalid.
+        The material is unknown, or its file cannot be read or is invalid.
 
     Examples
     --------
@@ -310,25 +308,30 @@ def load_material(name_or_path: str | Path) -> Material:
     if wanted == "-":
         if sys.stdin is None:
             raise MaterialError("stdin is closed; name a material or a file instead of -.")
-        with located("stdin: "):
-            text = decode(sys.stdin.buffer.read(MOST_BYTES + 1))
-        with text.hinting(MaterialError) as content:
-            return parse_material(content, "stdin")
+        return read_material(sys.stdin.buffer, "stdin")
     if not isinstance(name_or_path, Path) and wanted in material_names():
         shipped = resources.files("sssfit.materials") / f"{wanted}.toml"
         return parse_material(shipped.read_text("utf-8"), f"{wanted}.toml")
     if isinstance(name_or_path, Path) or is_path(wanted):
-        with located(f"{printable(wanted)}: "):
-            text = read_text(Path(wanted))
-        with text.hinting(MaterialError) as content:
-            return parse_material(content, wanted)
+        return read_material(Path(wanted), wanted)
     raise MaterialError(
         f"there is no material {shown(wanted)}; {did_you_mean(wanted, material_names())}"
         "`material_names()` lists those there are, and a file of your own ends in .toml."
     )
 
 
-# Of "Separable Subsurface Scattering", supplementary material G: Jensen et al. 2001.
+def read_material(source: Path | BinaryIO, origin: str) -> Material:
+    """Read a material's TOML from a path or a binary stream; errors are those of `parse_material`.
+
+    Messages call it ``origin``.
+    """
+    with located(f"{printable(origin)}: "):
+        text = read_text(source)
+    with text.hinting(MaterialError) as content:
+        return parse_material(content, origin)
+
+
+# Materials of "Separable Subsurface Scattering", supplementary material G: Jensen et al. 2001.
 _PAPER = (
     *("apple", "chicken1", "chicken2", "cream", "ketchup", "marble", "potato", "skimmilk"),
     *("skin1", "skin2", "wholemilk"),
@@ -339,7 +342,7 @@ _PAPER = (
 def material_names(*, paper: bool = False) -> tuple[str, ...]:
     """Return the names of the materials that ship with sssfit, sorted.
 
-    ``paper`` leaves those that the supplement of "Separable Subsurface Scattering" has.
+    ``paper`` selects those in the supplement of "Separable Subsurface Scattering".
     """
     if paper:
         return _PAPER
@@ -348,19 +351,20 @@ def material_names(*, paper: bool = False) -> tuple[str, ...]:
 
 
 def parse_material(text: str, origin: str) -> Material:
-    """Read a material from the text of its TOML.
+    """Read a material from TOML text.
 
     Parameters
     ----------
     text : str
         The TOML.
     origin : str
-        The file it came from: stands first in every message, and its stem is the default name.
+        Its file, which begins every message; the stem of the file is the default name.
 
     Raises
     ------
     MaterialError
-        One line with the origin, the key, what it holds, what was expected and what to do.
+        The TOML is invalid; the one-line message has the origin, the key, its value, what was
+        expected and what to do.
     """
     with located(f"{printable(origin)}: "):
         if not isinstance(text, str):
@@ -389,7 +393,7 @@ def _layer_from_dict(content: Mapping[str, Any]) -> Layer:
 
 
 def _layer_table(layer: Layer) -> dict[str, Any]:
-    """Return a layer as a file holds it: no infinite thickness, one g where all are equal."""
+    """Return a layer as written to a file: no infinite thickness, one g if all are equal."""
     table = {key: value for key, value in layer.to_dict().items() if value is not None}
     if len(set(table["g"])) == 1:
         table["g"] = table["g"][0]
@@ -402,6 +406,6 @@ def _read_only(array: FloatArray) -> FloatArray:
 
 
 def _store(record: object, **values: Any) -> None:
-    """Set fields of a frozen record while it is being made."""
+    """Set fields of a frozen record during its construction."""
     for key, value in values.items():
         object.__setattr__(record, key, value)

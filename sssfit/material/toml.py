@@ -1,24 +1,22 @@
 """The text form of a material: TOML to tables of known keys, and back to TOML.
 
-Only the structure is judged here: which tables, which keys, what a wrong key was meant to be. The
-values are judged by the records in ``sssfit.material``, so a material made in Python meets the same
-rules. Messages name the key; the caller puts the file in front.
+Only the structure is checked here: tables, keys, and the likely meaning of a wrong key. The records
+in ``sssfit.material`` check the values, so a material made in Python meets the same rules. Messages
+name the key; the caller adds the file in front.
 """
 
 import contextlib
-import difflib
 import json
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from sssfit.errors import MaterialError
 from sssfit.files import reason
-from sssfit.messages import printable, shown
-from sssfit.text import Text
-from sssfit.text import decode as text_of_bytes
+from sssfit.messages import did_you_mean, printable, shown
+from sssfit.text import Text, decode
 
 REQUIRED_KEYS = ("eta", "g", "sigma_a_per_mm", "sigma_s_per_mm")
 LAYER_KEYS = (*REQUIRED_KEYS, "thickness_mm")
@@ -57,14 +55,8 @@ _MISSING = {
 }
 
 
-def did_you_mean(word: str, known: Sequence[str]) -> str:
-    """Return ``did you mean X? `` for the nearest known word, or nothing if none is near."""
-    near = difflib.get_close_matches(word.lower(), known, n=1)
-    return f"did you mean {near[0]}? " if near else ""
-
-
 def is_path(wanted: str) -> bool:
-    """Whether a text is meant as a path rather than a shipped name."""
+    """Return whether a text is meant as a path rather than a shipped name."""
     if wanted.endswith(".toml") or "/" in wanted or "\\" in wanted:
         return True
     with contextlib.suppress(OSError, ValueError):  # a name too long, or with a null character
@@ -72,18 +64,20 @@ def is_path(wanted: str) -> bool:
     return False
 
 
-def read_text(path: Path) -> Text:
+def read_text(source: Path | BinaryIO) -> Text:
     """Read a material file, at most ``MOST_BYTES`` of it."""
+    if not isinstance(source, Path):
+        return _decoded(source.read(MOST_BYTES + 1))
     try:
-        is_folder = path.is_dir()
-        content = b"" if is_folder else _first_bytes(path)
+        is_folder = source.is_dir()
+        content = b"" if is_folder else _first_bytes(source)
     except OSError as error:
         raise MaterialError(f"the file cannot be read: {reason(error)}.") from None
     except ValueError as error:  # a null character in the path
         raise MaterialError(f"the file cannot be read: {error}.") from None
     if is_folder:
         raise MaterialError("this is a folder; name a material file in it.")
-    return decode(content)
+    return _decoded(content)
 
 
 def _first_bytes(path: Path) -> bytes:
@@ -91,18 +85,18 @@ def _first_bytes(path: Path) -> bytes:
         return stream.read(MOST_BYTES + 1)
 
 
-def decode(content: bytes) -> Text:
-    """Return the text of a material file, in UTF-8 or as Windows writes it."""
+def _decoded(content: bytes) -> Text:
+    """Return the text of a material file, in UTF-8 or an encoding of Windows."""
     if len(content) > MOST_BYTES:
         raise MaterialError("the file is larger than 1 MB; expected a TOML file of a few lines.")
-    text = text_of_bytes(content)
+    text = decode(content)
     if text is None:
         raise MaterialError("the file is not text; expected a material file in TOML.")
     return text
 
 
 def default_channels(n_values: int) -> tuple[str, str, str]:
-    """Return R, G, B for three values; any other number needs names."""
+    """Return R, G, B for three values; other numbers of values need names."""
     if n_values != 3:
         raise MaterialError(
             f"channels is missing; it may be left out for three values (R, G, B), and there are "
@@ -112,20 +106,20 @@ def default_channels(n_values: int) -> tuple[str, str, str]:
 
 
 def read_tables(text: str) -> tuple[dict[str, Any], list[tuple[str, dict[str, Any]]]]:
-    """Read a material's TOML into its head and its layers, keys checked and values not.
+    """Read a material's TOML into its head and its layers; checks keys but not values.
 
     Returns
     -------
     head : dict
-        Those of ``HEAD_KEYS`` that were given.
+        Values of the ``HEAD_KEYS`` that are present.
     layers : list of (str, dict)
-        From the top down, each with what to put before its keys in a message: ``layers[0].``, or
-        nothing where the coefficients stand at the top level.
+        From the top down, each with the prefix of its keys in messages: ``layers[0].``, or an empty
+        text if the coefficients are at the top level.
 
     Raises
     ------
     MaterialError
-        Not TOML, or a key is unknown, missing or in the wrong table.
+        The text is not TOML, or a key is unknown, missing or in the wrong table.
     """
     document = _read_toml(text)
     _check_keys(document, (*HEAD_KEYS, *LAYER_KEYS, "layers"), "")
@@ -161,7 +155,7 @@ def write_toml(head: Mapping[str, Any], layers: Sequence[Mapping[str, Any]]) -> 
 
 
 def _read_toml(text: str) -> dict[str, Any]:
-    """Parse TOML; every way it can fail becomes one line."""
+    """Parse TOML; every error becomes one line."""
     if not text.strip():
         raise MaterialError(f"the file is empty; {_EXAMPLE}.")
     try:
@@ -189,7 +183,7 @@ def _layer_tables(layers: object) -> list[tuple[str, dict[str, Any]]]:
 
 
 def _check_keys(table: Mapping[str, object], known: Sequence[str], where: str) -> None:
-    """Refuse an unknown key with the likeliest remedy."""
+    """Raise an error for an unknown key, with the likeliest remedy."""
     for key in table:
         if key not in known:
             name = key if re.fullmatch(r"[\w'-]{1,60}", key, re.ASCII) else shown(key)
@@ -200,7 +194,7 @@ def _check_keys(table: Mapping[str, object], known: Sequence[str], where: str) -
 
 
 def _remedy(key: str, known: Sequence[str]) -> str:
-    """Say what to write in place of an unknown key."""
+    """Return what to write in place of an unknown key."""
     if key in HEAD_KEYS:
         return "it belongs at the top level, above the first [[layers]]"
     if match := re.fullmatch(_COEFFICIENT, key, re.IGNORECASE):
@@ -214,7 +208,7 @@ def _remedy(key: str, known: Sequence[str]) -> str:
 
 
 def _check_complete(layer: Mapping[str, object], where: str) -> None:
-    """Refuse a layer that lacks a coefficient."""
+    """Raise an error for a layer that lacks a coefficient."""
     for key in REQUIRED_KEYS:
         if key not in layer:
             raise MaterialError(f"{where}{key} is missing; {_MISSING.get(key, _EXAMPLE)}.")
@@ -231,6 +225,6 @@ def _literal(value: Any) -> str:
     if isinstance(value, float):
         return repr(value)
     if isinstance(value, str):
-        # JSON's escapes are TOML's too, but JSON lets DEL stand as it is and TOML does not.
+        # JSON's escapes are valid in TOML, but JSON leaves DEL unescaped and TOML does not.
         return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
     return "[" + ", ".join(_literal(each) for each in value) + "]"

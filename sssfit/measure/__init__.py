@@ -1,1 +1,1 @@
-"""How far a picture is from the true one, and what a kernel costs."""
+"""Measures: the error of a picture compared with the true one, and the cost of a kernel."""

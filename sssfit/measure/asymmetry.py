@@ -1,7 +1,7 @@
-"""How far a point response is from round: its spread over angles on circles about the middle.
+"""Radial asymmetry of a point response: its variation over angles on circles around the middle.
 
-The true kernel is round; a separable one need not be, and its low ranks show as crosses and squares
-about small highlights.
+The true kernel is round, a separable one need not be: low ranks show as crosses and squares around
+small highlights.
 """
 
 import numpy as np
@@ -10,35 +10,37 @@ import numpy.typing as npt
 from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
 
-# A multiple of 8, so that axes and diagonals are among them; 8192 change skin1's rank 1 by 2e-5.
+# A multiple of 8, so that axes and diagonals are included; 8192 angles change skin1's rank 1 by
+# 2e-5.
 ANGLES = 512
 
 
 def radial_asymmetry(response: npt.ArrayLike, *, from_pixels: int = 1) -> float:
-    """Return the share of a point response that depends on the angle; 0 if it is round.
+    """Return the part of a point response that depends on the angle; 0 if it is round.
 
-    sqrt(sum_r r var(K) / sum_r r mean(K^2)): var and mean over angles on circles of radius r =
-    ``from_pixels`` to h, r for their lengths. It is the relative L2 distance to the same response
-    averaged over angles, without what lies further in.
+    sqrt(sum_r r var(K) / sum_r r mean(K^2)): with var and mean over angles on circles of radius r =
+    ``from_pixels`` to h, weighted by r for their lengths. This is the relative L2 distance from the
+    response averaged over angles, without the pixels inside the first circle.
 
     Parameters
     ----------
     response : array (2h+1, 2h+1)
-        What one lit pixel in the middle becomes: a 2D kernel, or a picture of one point.
+        The response to one lit pixel in the middle: a 2D kernel, or a picture of one point.
     from_pixels : int
-        Radius of the first circle. Beside a sharp peak the squareness of pixels shows: skin1's
+        Radius of the first circle. Near a sharp peak the squareness of pixels dominates: skin1's
         round kernel at 0.1 mm a pixel has 0.055 to 0.083 from 1 on and 0.002 to 0.006 from 4 on.
 
     Returns
     -------
     float [1]
-        0 to 1. Values between pixels come from a cubic spline, which leaves a floor: a Gaussian of
-        sigma 3 px integrated over pixels has 5.6e-5, one of 1 px 8e-3.
+        From 0 to 1. Values between pixels come from a cubic spline, which sets a floor: a Gaussian
+        of sigma 3 px integrated over pixels has 5.6e-5, one of 1 px 8e-3.
 
     Raises
     ------
     RenderError
-        No square of an odd number of pixels, at least 3, NaN in it, or no such circle.
+        The response is not a square of an odd number of pixels (at least 3), holds NaN, or has no
+        such circle.
     """
     mean, mean_square = _moments(response)
     if not 1 <= from_pixels <= len(mean):
@@ -81,7 +83,7 @@ def _moments(response: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
 
 
 def _checked(response: npt.ArrayLike) -> FloatArray:
-    """Return the response as float64 with its largest value 1, or refuse it."""
+    """Return the response as float64 with its largest value 1, or raise an error."""
     picture = np.asarray(response, dtype=np.float64)
     if picture.ndim != 2 or len(set(picture.shape)) != 1 or len(picture) % 2 == 0:
         raise RenderError(

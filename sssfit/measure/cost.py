@@ -1,4 +1,4 @@
-"""What a kernel costs: passes and taps, which carry over to any processor, and measured seconds."""
+"""Cost of a kernel: passes and taps, which hold for any processor, and measured seconds."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -9,24 +9,25 @@ import numpy as np
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
 
-# What shaders hold weights in.
+# Bytes of a weight in a shader, a float32.
 FLOAT_BYTES = 4
 
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """The price of a kernel by pixel.
+    """The cost of a kernel per pixel.
 
     Parameters
     ----------
     passes : int
-        One-dimensional passes over the picture: two a term.
+        One-dimensional passes over the picture, two per term.
     taps_per_pixel : int
-        Weights applied to a pixel in all passes; one weight serves all channels at once.
+        Weights applied to a pixel in all passes; one weight counts for all channels together.
     kernel_bytes : int
-        A float32 table of all terms, pixels and channels: T P C 4. Both halves of a pass are in it.
+        Size of a float32 table of all terms, pixels and channels: T P C 4, with both halves of a
+        pass.
     seconds_per_megapixel : float, optional [s]
-        Measured, of 1e6 pixels with all their channels; None where nothing was timed.
+        Measured time of 1e6 pixels with all their channels; None if nothing was timed.
     """
 
     passes: int
@@ -36,13 +37,13 @@ class Cost:
 
 
 def cost_of(kernel: SeparableKernel, seconds_per_megapixel: float | None = None) -> Cost:
-    """Return what a kernel costs; terms that are 0 in every channel cost nothing.
+    """Return the cost of a kernel; terms that are 0 in every channel cost nothing.
 
     Parameters
     ----------
     kernel : SeparableKernel
     seconds_per_megapixel : float, optional [s]
-        As the function of that name measured it.
+        Measured by the function of that name.
 
     Examples
     --------
@@ -68,26 +69,26 @@ def seconds_per_megapixel(
     repeats: int = 5,
     clock: Callable[[], float] = perf_counter,
 ) -> float:
-    """Return the least wall time of a call, by 1e6 pixels [s].
+    """Return the least wall time of a call per 1e6 pixels [s].
 
-    One call before them is not counted: it compiles, plans and warms caches. The least of several
-    is the one that other programs disturbed least.
+    A first call is not counted: it compiles, plans and warms caches. The shortest of several is the
+    one least disturbed by other programs.
 
     Parameters
     ----------
     render : callable
-        Renders ``pixels`` pixels; what it returns is dropped.
+        Renders ``pixels`` pixels; its result is discarded.
     pixels : int
-        H W of its picture.
+        Number of pixels H W of its picture.
     repeats : int
-        Calls that are timed.
+        Number of timed calls.
     clock : callable
-        Seconds now.
+        Returns the time in seconds.
 
     Raises
     ------
     RenderError
-        Pixels or repeats below 1.
+        Pixels or repeats are below 1.
     """
     if pixels < 1 or repeats < 1:
         raise RenderError(f"{pixels} pixels, {repeats} repeats; expected at least 1 of each.")

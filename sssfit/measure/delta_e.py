@@ -1,4 +1,4 @@
-"""CIE Delta E 2000, and the checks, exposure and displayed colours of every measure."""
+"""CIE Delta E 2000, and the checks, exposure and displayed colours of all measures."""
 
 from types import ModuleType
 
@@ -8,7 +8,7 @@ import numpy.typing as npt
 from sssfit.arrays import BoolArray, FloatArray
 from sssfit.errors import RenderError
 
-# Blocks that stay in the cache: 1080p takes 0.7 s so, 2 s in blocks of 65536 and 4 s whole.
+# Blocks that fit in the cache: 1080p takes 0.7 s, but 2 s in blocks of 65536 and 4 s whole.
 BLOCK_PIXELS = 16384
 
 
@@ -20,7 +20,7 @@ def delta_e_2000(image: FloatArray, truth: FloatArray, exposure: float = 1.0) ->
     image, truth : array (N, 3) or (N, 1)
         Linear sRGB or grey.
     exposure : float
-        Factor before pixels are cut to [0, 1].
+        Factor applied before pixels are clipped to [0, 1].
 
     Returns
     -------
@@ -45,7 +45,7 @@ def lab(pixels: FloatArray) -> FloatArray:
     """Return CIE L, a, b of linear sRGB pixels (N, 3)."""
     colour = _load_colour()
     srgb = colour.RGB_COLOURSPACES["sRGB"]
-    # From the primaries, not the standard's table: its four digits give white b = 0.01.
+    # From the primaries, not the standard's table, whose four digits give white b = 0.01.
     to_xyz = colour.normalised_primary_matrix(srgb.primaries, srgb.whitepoint)
     colours: FloatArray = np.asarray(colour.XYZ_to_Lab(pixels @ to_xyz.T, srgb.whitepoint))
     return colours
@@ -53,18 +53,18 @@ def lab(pixels: FloatArray) -> FloatArray:
 
 def _load_colour() -> ModuleType:
     """Import colour-science: 0.8 s for any of its parts, so only when colours are compared."""
-    with np.printoptions():  # at its import it sets how all of numpy prints, to the way of 1.13
+    with np.printoptions():  # on import it sets numpy's print options to those of 1.13
         import colour
     return colour
 
 
-# The largest channel and not the luminance: red is 1.7 times the luminance of skin1, and with that
-# at 0.8 all of the red that light has left would have been cut off.
+# The largest channel and not the luminance: red is 1.7 times the luminance of skin1, so with the
+# luminance at 0.8 lit red would be clipped.
 AUTO_VALUE, AUTO_PERCENTILE = 0.8, 99.0
 
 
 def check_pair(image: npt.ArrayLike, truth: npt.ArrayLike) -> tuple[FloatArray, FloatArray]:
-    """Return both pictures as float64 (H, W, C) or refuse them."""
+    """Return both pictures as float64 (H, W, C), or raise an error."""
     pictures = np.asarray(image, dtype=np.float64), np.asarray(truth, dtype=np.float64)
     if pictures[0].shape != pictures[1].shape:
         raise RenderError(
@@ -77,7 +77,7 @@ def check_pair(image: npt.ArrayLike, truth: npt.ArrayLike) -> tuple[FloatArray, 
 
 
 def check_picture(name: str, picture: FloatArray) -> None:
-    """Refuse what is not a picture; kernels with negative terms may ring below 0."""
+    """Check that an array is a picture; kernels with negative terms may ring below 0."""
     if picture.ndim != 3 or 0 in picture.shape:
         raise RenderError(
             f"{name} has shape {picture.shape}; expected rows, columns and channels, at least one "
@@ -89,7 +89,7 @@ def check_picture(name: str, picture: FloatArray) -> None:
 
 
 def selection(mask: npt.ArrayLike | None, picture: FloatArray) -> BoolArray:
-    """Return which pixels (H, W) count: those of a mask above 0, all without one."""
+    """Return which pixels (H, W) count: those where the mask is above 0, or all without a mask."""
     if mask is None:
         return np.ones(picture.shape[:2], dtype=np.bool_)
     selected = np.asarray(mask) > 0
@@ -111,15 +111,15 @@ def selected_pixels(picture: FloatArray, selected: BoolArray) -> FloatArray:
 def auto_exposure(truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> float:
     """Return the factor that brings the 99th percentile of the largest channel to 0.8.
 
-    It depends on the truth alone: every picture compared with it has the same exposure. Black
-    pixels are left out: a small lit object is exposed as if it filled the picture.
+    It depends on the truth alone, so every picture compared with it has the same exposure. Black
+    pixels are ignored, so a small lit object is exposed as if it filled the picture.
 
     Parameters
     ----------
     truth : array (H, W, C)
         Linear light.
     mask : array (H, W), optional
-        Only pixels above 0 count.
+        Only pixels where it is above 0 count.
 
     Raises
     ------
@@ -134,21 +134,21 @@ def auto_exposure(truth: npt.ArrayLike, mask: npt.ArrayLike | None = None) -> fl
 def exposure_of(pixels: FloatArray) -> float:
     """Return `auto_exposure` of pixels (N, C)."""
     largest = pixels.max(axis=-1)
-    lit = largest[largest > np.finfo(np.float64).tiny]  # of less, the inverse overflows
+    lit = largest[largest > np.finfo(np.float64).tiny]  # below this, the inverse overflows
     if lit.size == 0:
         raise RenderError("truth is black: no exposure can be found; give one.")
     return float(AUTO_VALUE / np.percentile(lit, AUTO_PERCENTILE))
 
 
 def check_exposure(exposure: float) -> float:
-    """Return an exposure that was given, or refuse it."""
+    """Return a given exposure, or raise an error."""
     if not (np.isfinite(exposure) and exposure > 0.0):
         raise RenderError(f"exposure = {exposure:g}; expected a factor above 0.")
     return float(exposure)
 
 
 def shown(pixels: FloatArray, exposure: float) -> FloatArray:
-    """Return what a display has to show: exposed, cut to [0, 1], grey as three channels."""
-    with np.errstate(over="ignore"):  # infinite light is cut to 1 as well
+    """Return the displayed picture: exposed, clipped to [0, 1], grey as three channels."""
+    with np.errstate(over="ignore"):  # infinite light is clipped to 1 as well
         cut: FloatArray = np.clip(pixels * exposure, 0.0, 1.0)
     return np.repeat(cut, 3, axis=-1) if cut.shape[-1] == 1 else cut

@@ -1,8 +1,8 @@
-"""What a picture lost, in false colours that colour-blind eyes can tell.
+"""Difference of a picture from the true one, in false colours safe for colour blindness.
 
-False colours run from blue by white to red for signed differences (ColorBrewer's RdBu, Harrower and
-Brewer 2003) and from dark violet by green to yellow for absolute ones (viridis, Smith and van der
-Walt 2015). Both can be told apart with the common kinds of colour blindness.
+The colours run from blue through white to red for signed differences (ColorBrewer's RdBu, Harrower
+and Brewer 2003) and from dark violet through green to yellow for absolute ones (viridis, Smith and
+van der Walt 2015). Both maps are readable with the common kinds of colour blindness.
 """
 
 import math
@@ -17,7 +17,7 @@ from sssfit.errors import RenderError
 from sssfit.formats.colours import linear_from_hex, srgb_decode, srgb_encode
 
 MAPS = ("signed", "absolute")
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear R, G, B: ITU-R BT.709-6
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # luminance of linear R, G, B: ITU-R BT.709-6
 # Anchors at even steps; between them sRGB codes are linear, as in the maps' own definition.
 _RED_BLUE = (
     *("#053061", "#2166ac", "#4393c3", "#92c5de", "#d1e5f0", "#f7f7f7"),
@@ -41,10 +41,10 @@ class DifferenceMap:
     kind : str, optional
         "signed" or "absolute" false colours; None: magnified.
     what : str, optional
-        The number behind each colour, in words.
+        Description of the number that a colour shows.
     end : float, optional
-        The difference at the ends of the scale, in the pictures' unit: blue is -end or less in a
-        signed map, red and yellow are end or more.
+        The difference at the ends of the scale, in the pictures' unit: blue means -end or less in a
+        signed map, red and yellow mean end or more.
     gain : float
         What the difference is multiplied with; of a map the scale is divided by it.
     """
@@ -78,15 +78,15 @@ def difference_map(
     picture, truth : array (H, W, C)
         Linear light.
     kind : str, optional
-        "signed": of the luminance for three channels, else of the channels' mean; "absolute": the
-        largest of the channels. None: `magnified_difference`.
+        "signed" shows the luminance for three channels, else the mean of the channels; "absolute"
+        shows the largest of the channels. None: `magnified_difference`.
     gain : float
-        The scale ends at the largest difference over this: at 1 nothing is beyond it.
+        The scale ends at the largest difference over the gain, so at 1 no pixel is beyond it.
 
     Raises
     ------
     RenderError
-        Pictures of different shapes, another kind, or a gain that is not above 0.
+        The pictures differ in shape, the kind is unknown, or the gain is not above 0.
     """
     if kind is None:
         magnified = magnified_difference(picture, truth, gain=gain)
@@ -95,7 +95,7 @@ def difference_map(
         raise RenderError(f"kind = {kind!r}; expected {' or '.join(MAPS)}.")
     values, what = _values(_difference(picture, truth), kind)
     end = float(np.abs(values).max(initial=0.0)) / _gain(gain)
-    at = values / end if end > 0.0 else values  # nothing differs: the colour of 0
+    at = values / end if end > 0.0 else values  # no difference: the colour of 0
     colours = _coloured(0.5 + 0.5 * at, _RED_BLUE) if kind == "signed" else _coloured(at, _VIRIDIS)
     return DifferenceMap(colours, kind, what, end, gain)
 
@@ -118,7 +118,7 @@ def _gain(gain: float) -> float:
 
 
 def _values(difference: FloatArray, kind: str) -> tuple[FloatArray, str]:
-    """Return one number a pixel (H, W), and what it is."""
+    """Return one number per pixel (H, W), and its description."""
     channels = difference.shape[2]
     if kind == "absolute":
         largest: FloatArray = np.abs(difference).max(axis=2)
@@ -130,7 +130,7 @@ def _values(difference: FloatArray, kind: str) -> tuple[FloatArray, str]:
 
 
 def _coloured(at: FloatArray, anchors: tuple[str, ...]) -> FloatArray:
-    """Return linear colours (H, W, 3) of places on a scale, 0 to 1; beyond is as at the ends."""
+    """Return linear colours (H, W, 3) for positions on the scale, clipped to 0 to 1."""
     codes = np.stack([srgb_encode(linear_from_hex(each)) for each in anchors])
     places = np.linspace(0.0, 1.0, len(anchors))
     return srgb_decode(np.stack([np.interp(at, places, code) for code in codes.T], axis=-1))

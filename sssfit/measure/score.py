@@ -1,8 +1,8 @@
-"""How far a rendered picture is from the true one: in energy, in colour as seen, in structure.
+"""Errors of a rendered picture compared with the true one: energy, visible colour, structure.
 
-RMSE, relative L2, maximum, PSNR and energy drift are of linear light as it is. CIE Delta E 2000,
-SSIM and FLIP are of what a display shows, at a stated exposure. `structure` has the last two, which
-need the extra ``metrics``; `asymmetry` looks at a kernel alone and `cost` at its price.
+RMSE, relative L2, maximum, PSNR and energy drift are computed from linear light. CIE Delta E 2000,
+SSIM and FLIP are computed from the displayed picture, at a stated exposure. `structure` has the
+last two, which need the extra ``metrics``; `asymmetry` and `cost` are measures of a kernel alone.
 """
 
 from dataclasses import dataclass
@@ -25,8 +25,8 @@ from sssfit.measure.delta_e import (
 __all__ = ["COLOUR_FIGURES", "ImageScore", "auto_exposure", "measure"]
 
 
-JUST_NOTICEABLE = 1.0  # Delta E that eyes tell side by side
-# Of an `ImageScore`; the rows of comparisons and choices have the same.
+JUST_NOTICEABLE = 1.0  # Delta E that an eye can see side by side
+# Fields of an `ImageScore` that the rows of comparisons and choices also have.
 COLOUR_FIGURES = ("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99", "share_above_1")
 SCORE_FIGURES = (
     *("rmse", "relative_l2", "maximum", "psnr_db", "energy_drift"),
@@ -37,14 +37,14 @@ SCORE_FIGURES = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ImageScore:
-    """A picture compared with the true one; N pixels that count, C channels.
+    """A picture compared with the true one, with C channels.
 
     Parameters
     ----------
     rmse : float [as the pictures]
         sqrt(mean((image - truth)^2)) over pixels and channels.
     relative_l2 : float [1]
-        ||image - truth|| / ||truth||; 0 where both are black, inf where only the truth is.
+        ||image - truth|| / ||truth||; 0 if both are black, inf if only the truth is black.
     maximum : float [as the pictures]
         The largest |image - truth|.
     psnr_db : float [dB]
@@ -52,14 +52,13 @@ class ImageScore:
     energy_drift : array (C,) [1]
         sum(image) / sum(truth) - 1; black channels as in ``relative_l2``.
     delta_e_2000_mean, delta_e_2000_p95, delta_e_2000_p99 : float [1]
-        CIE Delta E 2000 at the exposure, linear sRGB under D65: its mean, its 95th and its 99th
-        percentile. One channel is taken for grey; NaN for 2 channels and for more than 3, which
-        have no colour.
+        CIE Delta E 2000 at the exposure, for linear sRGB under D65: mean, 95th and 99th percentile.
+        One channel counts as grey; NaN for 2 channels and for more than 3, which have no colour.
     share_above_1 : float [1]
-        Share of the pixels whose Delta E is above 1, about what an eye can tell side by side; NaN
-        where there is no colour.
+        Share of the pixels with a Delta E above 1, about the smallest difference seen side by side;
+        NaN without colour.
     exposure : float [1 / as the pictures]
-        What both were multiplied with before they were cut to [0, 1] and looked at.
+        Factor applied to both pictures before they were clipped to [0, 1].
     ssim, flip : float, optional [1]
         See ``sssfit.measure.structure``; None unless asked for.
     """
@@ -83,7 +82,7 @@ class ImageScore:
         object.__setattr__(self, "energy_drift", drift)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return all figures, in the order and under the names of ``sssfit render --json``."""
+        """Return all figures in the order and with the names of ``sssfit render --json``."""
         return plain({key: getattr(self, key) for key in SCORE_FIGURES})
 
 
@@ -95,24 +94,24 @@ def measure(
     mask: npt.ArrayLike | None = None,
     structure: bool = False,
 ) -> ImageScore:
-    """Return how far ``image`` is from ``truth``.
+    """Return the errors of ``image`` compared with ``truth``.
 
     Parameters
     ----------
     image, truth : array (H, W, C)
-        Linear light. Negative pixels count as they are, and as black where they are looked at.
+        Linear light. Negative pixels count unchanged in linear light, and as black when displayed.
     exposure : float, optional
         Factor before display; `auto_exposure` of the truth unless given.
     mask : array (H, W), optional
         Restricts every figure to pixels above 0.
     structure : bool
-        SSIM and FLIP too; they need the extra ``metrics``. FLIP is NaN where Delta E is.
+        Also compute SSIM and FLIP, which need the extra ``metrics``. FLIP is NaN where Delta E is.
 
     Raises
     ------
     RenderError
-        The pictures differ in shape or hold NaN, the mask fits neither or is empty, the exposure is
-        not above 0, or the truth is black and none was given.
+        The pictures differ in shape or hold NaN, the mask does not fit or is empty, the exposure is
+        not above 0, or the truth is black and no exposure is given.
 
     Examples
     --------
@@ -155,14 +154,14 @@ def _root_mean_square(values: FloatArray) -> float:
 
 
 def _ratio(part: npt.ArrayLike, whole: npt.ArrayLike) -> FloatArray:
-    """Divide; 0 / 0 is 0 (nothing was lost), x / 0 is inf with the sign of x."""
+    """Divide; 0 / 0 is 0 (no error), x / 0 is inf with the sign of x."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.divide(part, whole)
     return np.where(np.equal(part, 0.0), 0.0, ratio)
 
 
 def _colour_differences(pixels: FloatArray, true: FloatArray, exposure: float) -> dict[str, float]:
-    """Return the figures of Delta E 2000 of pixels (N, C)."""
+    """Return the figures of Delta E 2000 for pixels (N, C)."""
     if pixels.shape[1] not in (1, 3):
         return dict.fromkeys(COLOUR_FIGURES, np.nan)
     differences = delta_e_2000(pixels, true, exposure)

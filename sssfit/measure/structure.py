@@ -1,4 +1,4 @@
-"""Structure as seen: SSIM and FLIP of what a display shows; both need the extra ``metrics``."""
+"""Visible structure: SSIM and FLIP of the displayed picture; both need the extra ``metrics``."""
 
 import numpy as np
 import numpy.typing as npt
@@ -28,8 +28,8 @@ def ssim(
 ) -> float:
     """Return the mean structural similarity; 1 for identical pictures.
 
-    Of sRGB code values in [0, 1], by channel, with a Gaussian window of sigma 1.5 on 11 x 11 pixels
-    and K = (0.01, 0.03); the mean is over windows that lie within the picture.
+    Computed from sRGB code values in [0, 1], by channel, with a Gaussian window of sigma 1.5 on 11
+    x 11 pixels and K = (0.01, 0.03); the mean is over windows inside the picture.
 
     Parameters
     ----------
@@ -38,12 +38,12 @@ def ssim(
     exposure : float, optional
         Factor before display; `auto_exposure` of the truth unless given.
     mask : array (H, W), optional
-        Only windows whose middle pixel is above 0; they look at what is around it, too.
+        Only windows whose middle pixel is above 0 count; they include the pixels around it.
 
     Raises
     ------
     RenderError
-        As ``measure``; too few pixels; the extra ``metrics`` is missing.
+        As ``measure``; also too few pixels, or the extra ``metrics`` is missing.
 
     References
     ----------
@@ -83,7 +83,7 @@ def flip(
     pixels_per_degree: float = PIXELS_PER_DEGREE,
     mask: npt.ArrayLike | None = None,
 ) -> float:
-    """Return the mean LDR-FLIP, the difference seen when one flips between pictures: 0 to 1.
+    """Return the mean LDR-FLIP, the visible difference when flipping between pictures, 0 to 1.
 
     Parameters
     ----------
@@ -92,14 +92,14 @@ def flip(
     exposure : float, optional
         Factor before display; `auto_exposure` of the truth unless given.
     pixels_per_degree : float [1/degree]
-        Of the eye's visual angle.
+        Pixels per degree of visual angle.
     mask : array (H, W), optional
-        The mean is over pixels above 0; what is beside them is seen, too.
+        The mean is over pixels above 0; the pixels around them are seen too.
 
     Raises
     ------
     RenderError
-        As ``measure``; other channel counts; the extra ``metrics`` is missing.
+        As ``measure``; also other channel counts, or the extra ``metrics`` is missing.
 
     References
     ----------
@@ -147,5 +147,5 @@ def _srgb_code(linear: FloatArray) -> FloatArray:
 
 
 def _missing(measure: str, library: str) -> RenderError:
-    """Return the error for a library that the extra would have brought."""
+    """Return the error for a missing library of the extra ``metrics``."""
     return RenderError(f'{measure} needs {library}, which is not here: install "sssfit[metrics]".')

@@ -1,7 +1,7 @@
-"""Annuli of a profile, merged until each holds enough photons for a useful error.
+"""Annuli of a profile, merged until each bin has enough photons for a useful error.
 
-A simulated profile has noise that grows outwards; charts and comparisons look at means over bins
-with a known error. Without photons the annuli stay as they are.
+The noise of a simulated profile grows outwards, so charts and comparisons use means over bins with
+a known error. Without photons the annuli are not merged.
 """
 
 import math
@@ -16,34 +16,35 @@ from sssfit.profile import pixels as integrals
 
 
 def mean_free_paths_mm(profile: Profile) -> FloatArray | None:
-    """Mean free path of each channel (C,) [mm] in the material's top layer; None if unknown."""
+    """Return the mean free path of each channel (C,) [mm] in the top layer, or None if unknown."""
     material = profile.material
     if material is None or material.n_channels != profile.n_channels:
         return None
     if len(material.layers) > 1:
-        return None  # there is no one mean free path
+        return None  # there is no single mean free path
     paths_mm = material.layers[0].mean_free_path_mm
     return paths_mm if np.isfinite(paths_mm).all() else None
 
 
 # 100 hits of equal weight have a standard error of 10 %: a tenth of the 2.3 that make a decade.
 LEAST_HITS = 100
-# No bin is narrower than 1/40 of its radius: over that R_d falls by under 10 % out to 4 decay
+# No bin is narrower than 1/40 of its radius. Over that width R_d falls by under 10 % out to 4 decay
 # lengths, and 1236 annuli become 163 steps without a visible change of the curve.
 _RADII_PER_WIDTH = 40
 _WIDENING = 1.25
-# An exponential tail of equally full bins widens by under 1.7 a bin until it runs out of photons;
-# what then reaches 100 hits spans decades. Up to 8 annuli the widths are luck, near the beam.
+# In an exponential tail of equally full bins, widths grow by under 1.7 per bin until the photons
+# run out; later bins with 100 hits span decades. Near the beam, up to 8 annuli, the widths are
+# random.
 _MOST_WIDENING = 2
 _WIDTH_OF_LUCK = 8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bins:
-    """One channel's annuli, neighbours merged: edges (m+1,) [mm], energies and errors (m,) [1].
+    """One channel's merged annuli: edges (m+1,) [mm], energies and errors (m,) [1].
 
-    ``is_drawn`` (m,) is False for the last bins where they hold fewer than 100 effective hits, or
-    are so much wider than the one before that a mean over them says little.
+    ``is_drawn`` (m,) is False for the last bins if they hold fewer than 100 effective hits, or are
+    too wide, compared with the bin before, for a meaningful mean.
     """
 
     edges_mm: FloatArray
@@ -56,7 +57,7 @@ class Bins:
         return self._over(np.diff(self.edges_mm))
 
     def per_mm2(self) -> tuple[FloatArray, FloatArray]:
-        """Mean of R_d over each bin and its standard error (m,) [1/mm^2]; NaN: not drawn."""
+        """Return the mean of R_d over each bin and its standard error (m,) [1/mm^2], or NaN."""
         return self._over(integrals.annulus_areas(self.edges_mm))
 
     def _over(self, measure: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -65,12 +66,12 @@ class Bins:
 
 
 def merged(profile: Profile, channel: int) -> Bins:
-    """Merge neighbouring annuli, ever more of them outwards, until each bin holds 100 hits.
+    """Merge neighbouring annuli, more of them outwards, until each bin holds 100 hits.
 
     With N photons, e and s an annulus' energy and standard error, S2 = N ((N-1) s^2 + e^2) is its
     sum of squared weights, and (N e)^2 / S2 hits of equal weight would have the same relative
-    error. S2 adds up where annuli merge, see `Profile.cumulative_stderr`. Without photons or
-    errors the annuli stay as they are.
+    error. S2 of merged annuli is a sum, see `Profile.cumulative_stderr`. Without photons or errors
+    the annuli are not merged.
     """
     energy = profile.annulus_energy[:, channel]
     stderr = profile.annulus_energy_stderr[:, channel]
@@ -89,16 +90,16 @@ def merged(profile: Profile, channel: int) -> Bins:
 
 
 def effective_hits(energy: FloatArray, mean_square: FloatArray, photons: int) -> FloatArray:
-    """Hits of equal weight with the same relative error, from e and S2 / N."""
+    """Return the hits of equal weight with the same relative error, from e and S2 / N."""
     out = np.zeros_like(energy)
     return np.divide(photons * energy**2, mean_square, out=out, where=mean_square > 0)
 
 
 def _cuts(energy: FloatArray, mean_square: FloatArray, photons: int) -> list[int]:
-    """Choose the edges that stay; bins never get narrower outwards."""
+    """Choose the remaining edges; bins never get narrower outwards."""
 
     def is_full(first: int, last: int) -> bool:
-        # Slices: differences of running sums lose the tails, S2 spans 20 decades in a profile.
+        # Sums of slices, because differences of running sums lose the tails: S2 spans 20 decades.
         annuli = slice(first, last)
         total = energy[annuli].sum(keepdims=True), mean_square[annuli].sum(keepdims=True)
         return bool(effective_hits(*total, photons)[0] >= LEAST_HITS)
@@ -109,14 +110,14 @@ def _cuts(energy: FloatArray, mean_square: FloatArray, photons: int) -> list[int
         while first + width < end and not is_full(first, first + width):
             width = math.ceil(_WIDENING * width)
         cuts.append(min(first + width, end))
-    # What the end of the grid cut short joins its neighbour; a long empty tail must not.
+    # A bin cut short by the end of the grid joins its neighbour; a long empty tail must not.
     if len(cuts) > 2 and not is_full(cuts[-2], end) and end - cuts[-2] <= cuts[-2] - cuts[-3]:
         del cuts[-2]
     return cuts
 
 
 def _is_in_step(cuts: list[int]) -> npt.NDArray[np.bool_]:
-    """Whether each bin is not too wide after the one before it."""
+    """Return whether each bin is not too wide after the one before it."""
     widths = np.diff(cuts)
     widest = np.maximum(_MOST_WIDENING * widths[:-1], _WIDTH_OF_LUCK)
     return np.concatenate(([True], widths[1:] <= widest))

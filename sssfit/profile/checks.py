@@ -11,16 +11,16 @@ from sssfit.material import Material
 from sssfit.messages import shown
 from sssfit.profile.npz import FORMAT, OPTIONAL
 
-# Shares of light and mm: as far as a grid or a table may reach, and squares stay far from overflow.
+# Limits of shares of light and of mm, beyond any grid or table; squares stay far from overflow.
 _MOST = 1e12
 _LEAST_MM = 1e-12
-# Width of an annulus as a share of its radius: the 64 parts that pixels are integrated from stay
-# apart in double precision. 100 000 annuli, the most there may be, have 1e-5 at the rim.
+# Least width of an annulus as a share of its radius, so that the 64 parts used for pixels stay
+# distinct in double precision. 100 000 annuli, the maximum, have 1e-5 at the rim.
 _NARROWEST = 1e-9
 
 
 def checked(given: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a `sssfit.profile.Profile` as it keeps them, or raise ProfileError."""
+    """Return the fields of a `sssfit.profile.Profile` as stored, or raise ProfileError."""
     fields: dict[str, Any] = {
         name: None
         if value is None and name in OPTIONAL
@@ -133,7 +133,7 @@ def _is_error(value: object) -> bool:
 
 
 def _check_material(meta: Mapping[str, Any]) -> None:
-    """Refuse coefficients that are not those of the fingerprint beside them: one was edited."""
+    """Raise an error if coefficients and fingerprint disagree, because one was edited."""
     record, fingerprint = meta.get("material"), meta.get("material_sha256")
     if record is not None and not isinstance(record, Mapping):
         raise ProfileError(f"meta.material = {shown(record)}; expected a mapping or null.")

@@ -1,9 +1,9 @@
 """The ``.profile.npz`` container: named arrays and a JSON text in an archive without pickle.
 
 The same content gives the same bytes: members are stored in a fixed order, uncompressed (zlib
-builds differ in their output) and with a fixed date. Reading trusts nothing: sizes are checked
-before anything is allocated, and every exception that a damaged file causes leaves here as one
-line that names the file.
+builds differ in their output) and with a fixed date. Reading does not trust the file: sizes are
+checked before anything is allocated, and every exception caused by a damaged file becomes one line
+that names the file.
 """
 
 import errno
@@ -20,7 +20,8 @@ import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import ProfileError
-from sssfit.files import read_at_most, reason
+from sssfit.files import is_marked, read_at_most, reason
+from sssfit.kinds import KINDS
 from sssfit.messages import shown
 
 FORMAT = "sssfit.profile/1"
@@ -41,15 +42,12 @@ OPTIONAL = (
     "beyond_grid_transmittance_stderr",
 )
 
-# The largest profile of the paper's materials is 0.3 MB, the largest there may be (64 channels of
-# 100 000 annuli, all arrays) 410 MB; more is a zip bomb or somebody else's.
+# The largest profile of the paper's materials is 0.3 MB, the largest possible one (64 channels of
+# 100 000 annuli, all arrays) 410 MB; a larger file is a zip bomb or not ours.
 _LARGEST_FILE_BYTES = 500_000_000
 _LARGEST_META_BYTES = 16_000_000  # numpy's text has 4 bytes a character
 _REMEDY = "write it again, or name another .profile.npz file"
 _FOREIGN = "name a .profile.npz file, as sssfit writes it"
-# By either a file is ours, however damaged: the first member's name, or the format in its JSON,
-# four bytes a letter. Both stand uncompressed, one near the beginning and one near the end.
-MARKS = (b"r_edges_mm.npy", "sssfit.profile/".encode("utf-32-le"))
 
 
 def pack(arrays: Mapping[str, npt.ArrayLike | None], meta: Mapping[str, Any]) -> bytes:
@@ -59,14 +57,14 @@ def pack(arrays: Mapping[str, npt.ArrayLike | None], meta: Mapping[str, Any]) ->
         for name, value in arrays.items()
         if value is not None
     }
-    # ascontiguousarray lifts a scalar to one dimension.
+    # ascontiguousarray turns a scalar into one dimension.
     members["specular_reflectance"] = members["specular_reflectance"].reshape(())
     members["meta"] = np.array(json.dumps(dict(meta), sort_keys=True))
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_STORED) as archive:
         for name, array in members.items():
             member = zipfile.ZipInfo(f"{name}.npy", date_time=(1980, 1, 1, 0, 0, 0))
-            member.create_system = 3  # else Windows writes another byte
+            member.create_system = 3  # otherwise Windows writes another byte
             member.external_attr = 0o644 << 16
             archive.writestr(member, _npy_bytes(array))
     return buffer.getvalue()
@@ -80,14 +78,14 @@ def unpack(
     Raises
     ------
     ProfileError
-        Missing, unreadable, damaged, foreign, of another version of the format, or too large.
+        The file is missing, unreadable, damaged, foreign, too large, or of another format version.
     """
     try:
         if isinstance(source, str | Path):
             _check_regular_file(Path(source))
             with Path(source).open("rb") as stream:
                 return _unpack_known(stream)
-        # A pipe cannot seek, an archive's directory is at its end.
+        # A pipe cannot seek, but an archive's directory is at its end.
         return _unpack_known(io.BytesIO(read_at_most(source, _LARGEST_FILE_BYTES)))
     except ProfileError as error:
         remedy = _FOREIGN if str(error).startswith("is not ") else _REMEDY
@@ -97,40 +95,29 @@ def unpack(
 
 
 def is_profile_file(path: Path) -> bool:
-    """Tell whether ``path`` is a profile of any version of the format; reads its meta only."""
+    """Return whether ``path`` is a profile of any format version; reads its meta only."""
     try:
         with zipfile.ZipFile(path) as archive:
             return _file_format(_read_meta(archive)).startswith("sssfit.profile/")
-    except Exception:  # see unpack: damaged bytes raise nearly anything, and are not a profile
+    except Exception:  # see unpack: damaged bytes raise almost any error, and are not a profile
         return False
 
 
 def _unpack_known(stream: BinaryIO) -> tuple[dict[str, FloatArray], dict[str, Any]]:
-    """Read every member; a file that does not name itself ours is called foreign, not damaged."""
+    """Read every member; a file without our mark is called foreign, not damaged."""
     try:
         return _unpack_stream(stream)
     except ProfileError:
         raise
     except Exception as error:
-        # A damaged directory may send zipfile to before the beginning of the file.
+        # A damaged directory may make zipfile seek to before the beginning of the file.
         if isinstance(error, OSError) and error.errno != errno.EINVAL:
             raise
         # zipfile, zlib, struct, numpy's header parser and json raise a dozen unrelated types on
         # damaged bytes (RuntimeError for a flipped encryption bit, MemoryError, RecursionError).
-        if not is_marked(stream, MARKS):
+        if not is_marked(stream, KINDS["profile"].marks):
             raise ProfileError("is not a profile") from None
         raise ProfileError("is damaged") from error
-
-
-def is_marked(stream: BinaryIO, marks: Sequence[bytes]) -> bool:
-    """Whether a file holds one of some marks, anywhere in it."""
-    stream.seek(0)
-    kept = b""
-    while block := stream.read(1 << 24):
-        if any(mark in kept + block for mark in marks):
-            return True
-        kept = block[-100:]
-    return False
 
 
 def _unpack_stream(stream: BinaryIO) -> tuple[dict[str, FloatArray], dict[str, Any]]:
@@ -158,7 +145,7 @@ def _unpack_stream(stream: BinaryIO) -> tuple[dict[str, FloatArray], dict[str, A
 
 
 def _check_regular_file(path: Path) -> None:
-    """Refuse devices, which may never end, and pipes, which have no end to begin a zip from."""
+    """Raise an error for devices and pipes: reading a zip starts at its end, which they lack."""
     if path.is_dir():
         raise ProfileError("is a folder")
     if path.exists() and not path.is_file():
@@ -166,7 +153,7 @@ def _check_regular_file(path: Path) -> None:
 
 
 def _listed(names: Sequence[str]) -> str:
-    """Name a few members of an archive."""
+    """Return text with the names of a few members of an archive."""
     return shown(", ".join(names)) if names else "nothing"
 
 
@@ -186,7 +173,7 @@ def _read_float(archive: zipfile.ZipFile, name: str) -> FloatArray:
 
 
 def read_npy(archive: zipfile.ZipFile, name: str, kind: str, most_bytes: int) -> npt.NDArray[Any]:
-    """Read one .npy member whose header must agree with its length, before it is believed.
+    """Read one .npy member after checking that its header agrees with its length.
 
     ``kind`` is "f" for float64 or "U" for text. A ProfileError continues a sentence that names the
     file; other damage raises anything that zipfile, zlib and numpy's header parser raise.

@@ -1,11 +1,11 @@
-"""A diffuse reflectance profile R_d(r), kept as the energy in annuli around a pencil beam.
+"""A diffuse reflectance profile R_d(r), stored as the energy in annuli around a pencil beam.
 
-Energies, not densities: F(r) = int_0^r 2 pi r' R_d(r') dr' is then known exactly at the annulus
-edges, independent of R_d inside (near the beam it behaves like 1/r), and every kernel made from the
-profile conserves energy by construction. The annulus tallies are those of Wang, Jacques and Zheng,
+It stores energies, not densities, so F(r) = int_0^r 2 pi r' R_d(r') dr' is known exactly at the
+annulus edges, independent of R_d inside (near the beam it behaves like 1/r), and kernels made from
+it conserve energy by construction. The annulus tallies are those of Wang, Jacques and Zheng,
 "MCML - Monte Carlo modeling of light transport in multi-layered tissues", 1995.
 
-``pixels`` has its integrals, ``npz`` its file, ``checks`` what it must satisfy.
+``pixels`` has its integrals, ``npz`` its file format, ``checks`` the conditions on its fields.
 """
 
 import dataclasses
@@ -34,12 +34,12 @@ if TYPE_CHECKING:
 
 __all__ = ["FORMAT", "Profile", "full_kernel", "is_profile_file"]
 
-_SHARES = (0.5, 0.9, 0.99)  # of the energy, whose radii `Profile.to_dict` has
+_SHARES = (0.5, 0.9, 0.99)  # shares of the energy whose radii `Profile.to_dict` reports
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
 class Profile:
-    """Energy that leaves a material in annuli around the point where a pencil beam enters it.
+    """Energy that leaves a material in annuli around the point where a pencil beam enters.
 
     A beam of weight 1 enters at normal incidence; all energies are fractions of it. n annuli, C
     channels, the channel axis last. Arrays are stored as read-only float64.
@@ -51,32 +51,32 @@ class Profile:
     annulus_energy : array (n, C) [1]
         Diffusely reflected energy in each annulus.
     annulus_energy_stderr : array (n, C) [1]
-        Standard error of each; NaN where there is none.
+        Standard error of each; NaN if there is none.
     beyond_grid, beyond_grid_stderr : array (C,) [1]
-        Energy reflected beyond the last edge, and its standard error (NaN where there is none).
+        Energy reflected beyond the last edge, and its standard error (NaN if there is none).
     specular_reflectance : float [1]
         Mirror reflection at entry, not part of the diffuse energies.
     absorbed : array (layers, C) [1]
-        Energy absorbed in each layer, from the top down; no layers where it is not known.
+        Energy absorbed in each layer, from the top down; no layers if it is unknown.
     unfinished : array (C,) [1]
         Energy of walks stopped at the collision cap.
     annulus_transmittance : array (n, C) [1] or None
         Energy that leaves through the bottom, by annulus; None for a semi-infinite material.
     meta : mapping
-        Provenance that JSON can hold: ``format`` ("sssfit.profile/1"), ``channels`` (C names),
-        ``material``, ``method``, ``photons`` (number of walks, None where nothing is sampled),
+        Provenance as JSON values: ``format`` ("sssfit.profile/1"), ``channels`` (C names),
+        ``material``, ``method``, ``photons`` (number of walks, None if nothing is sampled),
         ``seed``, ``version``, settings.
     beyond_grid_transmittance : array (C,) [1] or None
-        Energy that leaves through the bottom beyond the last edge; None where
-        ``annulus_transmittance`` is, or where it is not known.
+        Energy that leaves through the bottom beyond the last edge; None if
+        ``annulus_transmittance`` is None, or if it is unknown.
     annulus_transmittance_stderr : array (n, C) [1] or None
     beyond_grid_transmittance_stderr : array (C,) [1] or None
-        Standard errors of the two.
+        Their standard errors.
 
     Raises
     ------
     ProfileError
-        A field has the wrong shape, is not a number, or meta does not describe it.
+        A field has the wrong shape or is not a number, or ``meta`` does not match the fields.
     """
 
     r_edges_mm: FloatArray
@@ -117,7 +117,7 @@ class Profile:
         return html_table(self._in_words(), heads, rows)
 
     def _in_words(self) -> str:
-        """Say on one line what it is: material, method, photons, grid."""
+        """Return one line with material, method, photons and grid."""
         method = self.meta.get("method") or "unknown method"
         walked = "" if self.photons is None else f", {self.photons:.3g} photons"
         return (
@@ -126,7 +126,7 @@ class Profile:
         )
 
     def plot(self) -> "Figure":
-        """Draw the profile, for a notebook; `sssfit.chart.profile.profile_figure` says what.
+        """Draw the profile, for a notebook; see `sssfit.chart.profile.profile_figure`.
 
         Returns
         -------
@@ -159,15 +159,15 @@ class Profile:
 
     @property
     def photons(self) -> int | None:
-        """Number of photon walks behind the energies; None where nothing was sampled."""
+        """Number of photon walks behind the energies; None if nothing was sampled."""
         return self.meta.get("photons")
 
     @property
     def sha256(self) -> str:
-        """Fingerprint of what fits and true pictures are made from, by which kernels name it.
+        """Fingerprint of the data used by fits and true pictures; kernels record it.
 
-        Radii, energies on the grid and beyond, channels; no provenance, so that the same light is
-        the same profile, from any program and version.
+        It covers radii, energies on the grid and beyond, and channels, but not the provenance, so
+        equal light gives equal fingerprints from any program and version.
         """
         digest = hashlib.sha256(json.dumps(self.channels).encode())
         for each in (self.r_edges_mm, self.annulus_energy, self.beyond_grid):
@@ -182,7 +182,7 @@ class Profile:
 
     @property
     def diffuse_reflectance(self) -> FloatArray:
-        """Energy reflected diffusely, on the grid and beyond (C,); specular is not part of it."""
+        """Energy reflected diffusely, on the grid and beyond (C,), without specular reflection."""
         return self.total_on_grid + self.beyond_grid
 
     @property
@@ -197,7 +197,7 @@ class Profile:
     def transmittance(self) -> FloatArray | None:
         """Energy that leaves through the bottom, on the grid and beyond (C,), or None.
 
-        Light that crosses a slab without a collision is part of it.
+        It includes light that crosses a slab without a collision.
         """
         if self.annulus_transmittance is None:
             return None
@@ -220,9 +220,10 @@ class Profile:
 
     @property
     def material_name(self) -> str | None:
-        """Name of the material, or of what else the profile was made from; None if unknown.
+        """Name of the material, or of another source of the profile; None if unknown.
 
-        A profile may have a name and no coefficients. Names that no file could have count as none.
+        A profile may have a name and no coefficients. Names that are invalid in files count as
+        none.
         """
         record = self.meta.get("material")
         name = record.get("name") if isinstance(record, Mapping) else None
@@ -235,7 +236,7 @@ class Profile:
 
     @property
     def material(self) -> Material | None:
-        """The material that the profile says it was made from; None where it holds none."""
+        """The material that the profile records as its source; None if there is none."""
         record = self.meta.get("material")
         if not isinstance(record, dict):
             return None
@@ -248,8 +249,8 @@ class Profile:
     def energy_balance(self) -> FloatArray:
         """Sum of all energies - 1 (C,): 0 except for roulette's noise and rounding.
 
-        Specular + diffuse + absorbed + unfinished (+ transmitted) - 1; NaN where it is not known
-        what was absorbed.
+        Specular + diffuse + absorbed + unfinished (+ transmitted) - 1; NaN if the absorbed energy
+        is unknown.
         """
         if len(self.absorbed) == 0:
             return np.full(self.n_channels, np.nan)
@@ -267,10 +268,10 @@ class Profile:
     def cumulative_stderr(self) -> FloatArray:
         """Standard error of `cumulative` (n+1, C).
 
-        A photon of N lands in at most one annulus, so annuli are anticorrelated and their
-        variances do not add. The walk's s_i^2 = (S2_i/N - e_i^2)/(N-1) gives back the sum of
-        squared weights S2_i = N ((N-1) s_i^2 + e_i^2), and these do add:
-        Var F_k = (sum_{i<k} S2_i/N - F_k^2)/(N-1). Without photons they add.
+        A photon of N lands in at most one annulus, so annuli are anticorrelated and their variances
+        do not add. The walk's s_i^2 = (S2_i/N - e_i^2)/(N-1) gives the sum of squared weights
+        S2_i = N ((N-1) s_i^2 + e_i^2), which do add: Var F_k = (sum_{i<k} S2_i/N - F_k^2)/(N-1).
+        Without photons the variances are added.
         """
         stderr = _stderr_of_sums(self.annulus_energy, self.annulus_energy_stderr, self.photons)
         return np.concatenate((np.zeros((1, self.n_channels)), stderr))
@@ -288,8 +289,8 @@ class Profile:
     def cumulative_at(self, r_mm: npt.ArrayLike) -> FloatArray:
         """Return F at any radius: exact at the edges, smooth and monotone between them.
 
-        Takes radii (...) [mm] from 0 up, beyond the last edge F stays at its last value; returns
-        (..., C). Raises ProfileError for a radius that is negative or NaN.
+        Takes radii (...) [mm] from 0 up and returns (..., C); beyond the last edge F keeps its last
+        value. Raises ProfileError for a radius that is negative or NaN.
         """
         radii_mm = np.minimum(np.asarray(r_mm, dtype=np.float64), self.r_edges_mm[-1])
         if not (radii_mm >= 0).all():
@@ -297,26 +298,26 @@ class Profile:
         return integrals.cumulative_at(self.r_edges_mm, self.annulus_energy, radii_mm)
 
     def flat_annuli(self) -> tuple[FloatArray, FloatArray]:
-        """Return the flat annuli that lines and pixels are integrated from.
+        """Return the flat annuli from which lines and pixels are integrated.
 
-        The profile's own, cut into equal parts by the monotone interpolation of F: the innermost
-        ten into 64 each, where R_d ~ 1/r is steep, those further out into fewer, and all of them
-        into two at least. Energies between the original edges are unchanged. Returns the edges
-        (m+1,) [mm] and the densities between them (m, C) [1/mm^2].
+        The profile's annuli, cut into equal parts by the monotone interpolation of F: the innermost
+        ten into 64 each, where R_d ~ 1/r is steep, those farther out into fewer, but at least two.
+        Energies between the original edges are unchanged. Returns the edges (m+1,) [mm] and the
+        densities between them (m, C) [1/mm^2].
         """
         return integrals.flat_annuli(self.r_edges_mm, self.annulus_energy)
 
     def line_kernel(self, mm_per_pixel: float, half_pixels: int | None = None) -> FloatArray:
         """Pre-integrated kernel: R_d integrated over y, and over each pixel in x.
 
-        a_k = int_{(k-1/2)p}^{(k+1/2)p} int R_d(x, y) dy dx: eq. S.5 of the supplement of Jimenez
-        et al., "Separable Subsurface Scattering", 2015, in closed form from the areas that disks
-        share with a strip. What lies beyond the grid is not part of it.
+        a_k = int_{(k-1/2)p}^{(k+1/2)p} int R_d(x, y) dy dx: eq. S.5 of the supplement of Jimenez et
+        al., "Separable Subsurface Scattering", 2015, in closed form from the areas that disks share
+        with a strip. Energy beyond the grid is not included.
 
         Parameters
         ----------
         mm_per_pixel : float [mm]
-            Pitch p; the middle pixel is centred on the beam.
+            Pixel size p; the middle pixel is centred on the beam.
         half_pixels : int, optional
             Pixels h on either side; by default the fewest that cover the grid.
 
@@ -328,7 +329,8 @@ class Profile:
         Raises
         ------
         ProfileError
-            A pitch or size that is not one, or a kernel of more than 2 GB a channel.
+            The pixel size or half width is invalid, or the kernel would take more than 2 GB per
+            channel.
         """
         return integrals.line_kernel(
             self.r_edges_mm, self.annulus_energy, mm_per_pixel, half_pixels
@@ -345,8 +347,9 @@ class Profile:
 
         Pixel (i, k) covers [(i-1/2)p, (i+1/2)p] x [(k-1/2)p, (k+1/2)p]; [0, 0] is the centre pixel
         and holds all of its energy. Symmetric; `full_kernel` unfolds it. The row sums of a kernel
-        that covers the grid are those of `line_kernel`. A pitch below a third of the first annulus
-        asks for more than the profile holds: the centre pixel of R_d ~ 1/r then lacks over 0.1 %.
+        that covers the grid are those of `line_kernel`. A pixel size below a third of the first
+        annulus exceeds the resolution of the profile: the centre pixel of R_d ~ 1/r then lacks over
+        0.1 %.
 
         Parameters
         ----------
@@ -355,7 +358,7 @@ class Profile:
         half_pixels : int, optional
             Pixels h beyond the centre; by default the fewest that cover the grid.
         channel : int, optional
-            Only this channel, without a channel axis: a third of the memory for RGB.
+            Return only this channel, without a channel axis; a third of the memory for RGB.
 
         Returns
         -------
@@ -365,7 +368,8 @@ class Profile:
         Raises
         ------
         ProfileError
-            A pitch, size or channel that is not one, or a kernel of more than 2 GB a channel.
+            The pixel size, half width or channel is invalid, or the kernel would take more than
+            2 GB per channel.
         """
         if channel is None:
             energy = self.annulus_energy
@@ -377,9 +381,9 @@ class Profile:
         return quadrant if channel is None else quadrant[:, :, 0]
 
     def energy_radii_mm(self, shares: Sequence[float]) -> FloatArray:
-        """Return the radii within which ``shares`` of each channel's on-grid energy leave.
+        """Return the radii that contain ``shares`` of each channel's on-grid energy.
 
-        F(r) is inverted inside the annulus that holds the share, by its smooth interpolation.
+        The smooth interpolation of F(r) is inverted inside the annulus that holds the share.
 
         Parameters
         ----------
@@ -394,9 +398,9 @@ class Profile:
         return integrals.energy_radii_mm(self.r_edges_mm, self.annulus_energy, shares)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the figures of ``sssfit show --json``: lists and numbers, None if unknown.
+        """Return the figures of ``sssfit show --json``, as lists and numbers, None if unknown.
 
-        ``material`` has the coefficients, albedo and mean free path of each layer; no layers where
+        ``material`` has the coefficients, albedo and mean free path of each layer; no layers if
         only a name is known.
         """
         meta, width_mm = self.meta, np.diff(self.r_edges_mm)
@@ -433,7 +437,7 @@ class Profile:
         )
 
     def _material_figures(self) -> dict[str, Any] | None:
-        """Name and layers, from the top down; None where there is not even a name."""
+        """Return name and layers, from the top down; None without a name."""
         if (material := self.material) is not None:
             return {
                 **material.to_dict(),
@@ -446,7 +450,7 @@ class Profile:
         return {"name": self.material_name, "source": source, "layers": []}
 
     def _empty_annuli(self) -> Any:
-        """Annuli (C,) in which no photon left any energy; None where none were traced."""
+        """Return the number of annuli (C,) without energy from any photon; None without photons."""
         if self.photons is None:
             return None
         return ((self.annulus_energy == 0) & (self.annulus_energy_stderr == 0)).sum(axis=0)
@@ -457,12 +461,12 @@ class Profile:
         stream.write(npz.pack(arrays, arrays.pop("meta")))
 
     def save(self, path: str | Path) -> None:
-        """Write the profile to ``path`` (by custom ``NAME.profile.npz``), whole or not at all.
+        """Write the profile to ``path`` (by convention ``NAME.profile.npz``), whole or not at all.
 
         Raises
         ------
         FileError
-            The file cannot be written; an older one at ``path`` is untouched.
+            The file cannot be written; an older file at ``path`` stays unchanged.
         """
         write_atomically(Path(path), self.write)
 
@@ -470,12 +474,13 @@ class Profile:
     def read(cls, source: str | Path | BinaryIO, origin: str | None = None) -> Self:
         """Read a profile from a path or a binary stream (which need not be able to seek).
 
-        Error messages call it ``origin``: if not given the path, or "the profile" for a stream.
+        Error messages call it ``origin``, by default the path, or "the profile" for a stream.
 
         Raises
         ------
         ProfileError
-            One line that names the origin: missing, damaged, foreign, or of another version.
+            The file is missing, damaged, foreign, or of another version; the one-line message names
+            the origin.
         """
         if origin is None:
             origin = str(source) if isinstance(source, str | Path) else "the profile"
@@ -500,4 +505,4 @@ def _stderr_of_sums(energy: FloatArray, stderr: FloatArray, photons: int | None)
         return np.full(energy.shape, np.nan)
     mean_square = np.cumsum((photons - 1) * stderr**2 + energy**2, axis=0)
     variance = (mean_square - np.cumsum(energy, axis=0) ** 2) / (photons - 1)
-    return np.sqrt(np.maximum(variance, 0.0))  # rounding may leave -1e-17 where all weights agree
+    return np.sqrt(np.maximum(variance, 0.0))  # rounding may leave -1e-17 if all weights are equal

@@ -1,10 +1,10 @@
 """Kernels applied to irradiance: radiant exitance of a lit, translucent surface.
 
-`sssfit.scene` holds what is lit; `reference` convolves with the true 2D kernel, `separable` with a
-fitted one, `screen` does what a shader does in screen space, with `transmittance` through thin
-slabs.
+`sssfit.scene` has the lit scenes. `reference` convolves with the true 2D kernel, `separable` with a
+fitted one, `screen` works like a shader in screen space, and `transmittance` adds light through
+thin slabs.
 
-The package is the function `render` as well: ``sssfit.render(image, kernel)``.
+The package can also be called like the function `render`: ``sssfit.render(image, kernel)``.
 """
 
 import sys
@@ -25,7 +25,7 @@ from sssfit.scene.record import Scene
 
 __all__ = ["render"]
 
-FloatArray = npt.NDArray[np.floating[Any]]  # of the precision asked for
+FloatArray = npt.NDArray[np.floating[Any]]  # in the requested precision
 Irradiance = Scene | Image | npt.ArrayLike | str | Path
 
 
@@ -35,9 +35,9 @@ def render(image: Irradiance, kernel: SeparableKernel | str | Path, **settings: 
     Parameters
     ----------
     image : array (H, W) or (H, W, C), Scene, Image, str or Path
-        Linear light; a path is that of a picture file. An array or file is taken to have the
-        kernel's pixels, in mm; a scene says its own. Two dimensions are one channel, light without
-        colour, and serve kernels of any number of channels, as C = 1 does.
+        Linear light, or the path of a picture file. An array or file takes the kernel's pixel size;
+        a scene has its own. Two dimensions are one channel, light without colour; like C = 1 they
+        fit kernels with any number of channels.
     kernel : SeparableKernel, str or Path
         The record, or the path of a ``.kernel.json`` file.
     **settings
@@ -47,13 +47,13 @@ def render(image: Irradiance, kernel: SeparableKernel | str | Path, **settings: 
     Returns
     -------
     array (H, W, C)
-        Radiant exitance in the picture's unit, always with the kernel's C channels: a grey picture
-        comes back in the colours of the material.
+        Radiant exitance in the picture's unit, with the C channels of the kernel: a grey picture is
+        returned in the colours of the material.
 
     Raises
     ------
     RenderError
-        The picture is not one, or does not fit the kernel.
+        The picture is invalid, or does not fit the kernel.
     KernelError, FileError
         A file cannot be read.
     """
@@ -67,7 +67,7 @@ def render(image: Irradiance, kernel: SeparableKernel | str | Path, **settings: 
 
 
 def _scene(image: Irradiance, mm_per_pixel: float) -> Scene:
-    """Return what is lit; what has no pitch of its own takes the kernel's."""
+    """Return the picture as a scene, which takes the kernel's pixel size if it has none."""
     if isinstance(image, Scene):
         return image
     if isinstance(image, str | Path):
@@ -79,7 +79,7 @@ def _scene(image: Irradiance, mm_per_pixel: float) -> Scene:
 
 
 class _CallableRoom(ModuleType):
-    """`import sssfit.render` binds this package to the name, so the package itself is called."""
+    """Makes the package callable, as `import sssfit.render` binds it to the function's name."""
 
     def __call__(
         self, image: Irradiance, kernel: SeparableKernel | str | Path, **settings: Any

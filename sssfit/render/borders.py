@@ -1,24 +1,24 @@
-"""What lies beyond the border of a picture: one table of source pixels for all flat renderers."""
+"""Borders of a picture: one table of source pixels for all flat renderers."""
 
 import numpy as np
 import numpy.typing as npt
 
 from sssfit.errors import RenderError
 
-# mirror: the pixel at the rim is repeated and then its neighbours, numpy.pad's "symmetric", so
-# that no light is lost; clamp: only the pixel at the rim is, "edge"; zero: black.
+# mirror repeats the pixel at the rim and then its neighbours (numpy.pad's "symmetric"), so that no
+# light is lost; clamp repeats only the pixel at the rim ("edge"); zero is black.
 BORDERS = ("mirror", "clamp", "zero")
 
 
 def source_indices(size: int, beyond: int, border: str) -> npt.NDArray[np.intp]:
-    """Return which pixel stands at each place of a line that goes on past both its ends.
+    """Return the source pixel at each place of a line that continues past both its ends.
 
     Parameters
     ----------
     size : int
-        Pixels of the line, n.
+        Number of pixels of the line, n.
     beyond : int
-        Places wanted on either side; more than n mirror again and again.
+        Places needed on either side; more than n are mirrored repeatedly.
     border : str
         One of `BORDERS`.
 
@@ -30,7 +30,7 @@ def source_indices(size: int, beyond: int, border: str) -> npt.NDArray[np.intp]:
     Raises
     ------
     RenderError
-        No such border.
+        The border is unknown.
     """
     place = np.arange(-beyond, size + beyond)
     if border == "mirror":  # with the period 2 n

@@ -1,10 +1,10 @@
-"""The truth: irradiance convolved in two dimensions with the pixels of a profile, by FFT.
+"""The true picture: irradiance convolved with the pixels of a profile in two dimensions, by FFT.
 
-The picture is continued past its rim as the border says, so far that the circular convolution
-never sees its own other side. An even kernel's spectrum is real and even: the cosine transform
-(DCT-I) of one quadrant has all of it, a quarter of a full transform's size. Rows that the border
-repeats are transformed along x once, and rows that are not wanted are not transformed back, so that
-the whole stays near the cost of a bare transform there and back of the continued picture.
+The picture is continued past its rim as the border says, far enough that the circular convolution
+never wraps around. The spectrum of an even kernel is real and even, so the cosine transform (DCT-I)
+of one quadrant, a quarter of the size of a full transform, holds all of it. Rows that the border
+repeats are transformed along x only once, and unneeded rows are not transformed back, so the cost
+stays near that of one forward and one inverse transform of the continued picture.
 """
 
 import dataclasses
@@ -13,12 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
+from sssfit.process import thread_count
 from sssfit.profile import Profile
 from sssfit.profile.pixels import checked_support
 from sssfit.render._checks import check_channels, check_memory
 from sssfit.render.borders import source_indices
 from sssfit.scene.record import Scene
-from sssfit.threads import thread_count
 
 ComplexArray = npt.NDArray[np.complex128]
 
@@ -30,20 +30,20 @@ def render_reference(
 ) -> FloatArray:
     """Convolve irradiance with a profile's own 2D kernel on the scene's pixels.
 
-    Light that leaves beyond the profile's grid, or beyond the kernel's pixels, sees what lies far
-    away, on average: with mirrors the picture's mean, with clamped borders that of its corners. It
-    is added, so that a constant picture comes back with all of the diffuse reflectance.
+    Light that leaves beyond the profile's grid, or beyond the kernel's pixels, is replaced by an
+    average of the distance: the picture's mean with mirrored borders, the mean of its corners with
+    clamped ones. A constant picture therefore returns all of the diffuse reflectance.
 
     Parameters
     ----------
     scene : Scene
-        Flat: only its irradiance and pitch are looked at.
+        A flat picture: only its irradiance and pixel size are used.
     profile : Profile
-        From any method; the kernel and what it leaves out: `reference_quadrant`.
+        A profile of any method; `reference_quadrant` has the kernel and the remaining energy.
     border : str
         One of ``sssfit.render.borders.BORDERS``.
     threads : int, optional
-        By default all cores; the result does not depend on their number.
+        Threads to use, by default all cores; the result does not depend on them.
 
     Returns
     -------
@@ -53,21 +53,21 @@ def render_reference(
     Raises
     ------
     RenderError
-        Channels that do not match, no such border, or more memory than there is to be used.
+        The channels do not match, the border is unknown, or the memory limit is exceeded.
     """
     check_channels(scene.channels, profile.n_channels)
-    thread_count(threads)  # refused before the kernel's pixels are made
+    thread_count(threads)  # raises before the kernel's pixels are computed
     half = reference_half_pixels(profile, scene.mm_per_pixel, scene.height, scene.width)
     _plan(scene.height, scene.width, half, profile.n_channels, border)
     quadrant, left_out = reference_quadrant(profile, scene.mm_per_pixel, scene.height, scene.width)
     picture = convolve(scene.irradiance, quadrant, border=border, threads=threads)
     picture += left_out * _far_irradiance(scene.irradiance, border)
-    # Rounding of the transforms, 1e-16 of the largest pixel, would be negative light.
+    # Rounding of the transforms, 1e-16 of the largest pixel, would give negative light.
     return np.maximum(picture, 0.0, out=picture) if quadrant.min() >= 0.0 else picture
 
 
 def _far_irradiance(irradiance: FloatArray, border: str) -> FloatArray:
-    """Mean irradiance (1 or C,) over a picture's continuation, far from it."""
+    """Return the mean irradiance (1 or C,) of a picture's continuation, far from the picture."""
     if border == "zero":
         return np.zeros(1)
     seen = irradiance[:: max(len(irradiance) - 1, 1), :: max(irradiance.shape[1] - 1, 1)]
@@ -76,10 +76,10 @@ def _far_irradiance(irradiance: FloatArray, border: str) -> FloatArray:
 
 
 def reference_half_pixels(profile: Profile, mm_per_pixel: float, height: int, width: int) -> int:
-    """Half width h of the true kernel: its whole grid, or what a picture of 256 can see of it.
+    """Return the half width h of the true kernel: its whole grid, or what 256 pixels need.
 
-    Larger pictures see more. Without the least, small ones had kernels cut to their own size, and
-    with mirrors 20 x 20 pixels of 0.4 mm were .6 % off for skin1.
+    Larger pictures use more. Without the minimum, small pictures had kernels cut to their own size,
+    and with mirrored borders 20 x 20 pixels of 0.4 mm were .6 % off for skin1.
     """
     covering = checked_support(profile.r_edges_mm[-1], mm_per_pixel, None, dimensions=1)[1]
     return min(covering, max(height, width, _LEAST_REACH) - 1)
@@ -88,16 +88,16 @@ def reference_half_pixels(profile: Profile, mm_per_pixel: float, height: int, wi
 def reference_quadrant(
     profile: Profile, mm_per_pixel: float, height: int, width: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the true kernel for a picture of that size, and the energy that is not in it.
+    """Return the true kernel for a picture of that size, and the energy outside it.
 
-    Two pixels of a picture are at most max(H, W) - 1 apart along either axis: what the profile
-    sends further than that (or 255, in small pictures), or beyond its own grid, is left out. Zero
-    borders lose nothing; mirror and clamp lack light from reflections further out.
+    Two pixels of a picture are at most max(H, W) - 1 apart along either axis, so light that travels
+    farther than that (or 255, in small pictures), or beyond the profile's grid, is left out. Zero
+    borders lose nothing; mirror and clamp lack the light of reflections farther out.
 
     Returns
     -------
     array (h+1, h+1, C), array (C,)
-        Energies of pixels, one quadrant with both axes; diffuse reflectance less their sum.
+        Energies of the pixels of one quadrant with both axes; diffuse reflectance minus their sum.
     """
     half = reference_half_pixels(profile, mm_per_pixel, height, width)
     quadrant = profile.quadrant_kernel(mm_per_pixel, half)
@@ -118,9 +118,9 @@ def convolve(
     Parameters
     ----------
     irradiance : array (H, W, 1) or (H, W, C)
-        One channel is transformed once and serves all.
+        A single channel is transformed once for all channels of the kernel.
     quadrant : array (h+1, h+1, C)
-        A quadrant of the kernel with both its axes, as ``Profile.quadrant_kernel`` makes it.
+        A quadrant of the kernel with both its axes, as from ``Profile.quadrant_kernel``.
     border, threads
         As `render_reference`.
 
@@ -147,18 +147,18 @@ def convolve(
         product = np.empty_like(spectrum) if given == 1 else spectrum
         _multiply(spectrum, even, product)
         out[:, :, c] = _backward(product, y, x, workers)
-        del spectrum, product, even  # else the next channel's are made beside them
+        del spectrum, product, even  # otherwise they coexist with the next channel's
     return out
 
 
 def padded_shape(height: int, width: int, half: int, border: str) -> tuple[int, int]:
-    """Rows and columns that `convolve` transforms for a kernel of half width h."""
+    """Return the rows and columns that `convolve` transforms for a kernel of half width h."""
     return _axis(height, half, border).length, _axis(width, half, border).length
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
 class _Axis:
-    """One axis of the continued picture: ``size`` pixels from place ``start`` on, of ``length``."""
+    """One axis of the continued picture: ``size`` pixels from ``start`` on, out of ``length``."""
 
     size: int
     half: int
@@ -168,12 +168,12 @@ class _Axis:
 
     @property
     def bins(self) -> int:
-        """Frequencies from 0 to Nyquist's."""
+        """Number of frequencies from 0 to Nyquist's."""
         return self.length // 2 + 1
 
     @property
     def inside(self) -> slice:
-        """Where the picture itself stands."""
+        """Slice of the picture itself."""
         return slice(self.start, self.start + self.size)
 
 
@@ -182,7 +182,7 @@ def _axis(size: int, half: int, border: str) -> _Axis:
     from scipy.fft import next_fast_len
 
     if border == "zero":
-        # Beyond size - 1 the kernel meets black only, and one black margin serves both ends.
+        # Beyond size - 1 the kernel meets black only, and both ends share one black margin.
         half = min(half, size - 1)
         start, least = 0, size + half
     else:
@@ -212,14 +212,14 @@ def _forward(plane: FloatArray, y: _Axis, x: _Axis, workers: int) -> ComplexArra
 
     wide = np.zeros((y.size, x.length))
     wide[:, x.inside] = plane
-    # The margins only, from what lies dense: taken from all of RGB, all columns, it took 60 ms of
-    # 2048 x 2048 pixels, as long as the transforms.
+    # Copy the margins only, from contiguous memory: taking all columns from RGB took 60 ms for 2048
+    # x 2048 pixels, as long as the transforms.
     for margin in (slice(0, x.start), slice(x.start + x.size, x.sources.size)):
         wide[:, margin] = np.take(wide, x.start + x.sources[margin], axis=1)
     rows = rfft(wide, axis=1, workers=workers, overwrite_x=True)
     spectrum = np.empty((y.length, x.bins), dtype=np.complex128)
     spectrum[y.sources.size :] = 0.0
-    # "clip": with the default, numpy makes the rows elsewhere first and copies them.
+    # "clip": with the default, numpy builds the rows in a temporary array and copies them.
     np.take(rows, y.sources, axis=0, out=spectrum[: y.sources.size], mode="clip")
     transformed: ComplexArray = fft(spectrum, axis=0, workers=workers, overwrite_x=True)
     return transformed
@@ -236,14 +236,14 @@ def _even_spectrum(quadrant: FloatArray, y: _Axis, x: _Axis, workers: int) -> Fl
 
 
 def _multiply(spectrum: ComplexArray, even: FloatArray, product: ComplexArray) -> None:
-    """Multiply into ``product``; rows past Nyquist's are those before it, backwards."""
+    """Multiply into ``product``; rows past Nyquist's are those before it in reverse order."""
     n = len(even)
     np.multiply(spectrum[:n], even, out=product[:n])
     np.multiply(spectrum[n:], even[-2:0:-1], out=product[n:])
 
 
 def _backward(spectrum: ComplexArray, y: _Axis, x: _Axis, workers: int) -> FloatArray:
-    """Transform back what is inside the picture, (H, W); ``spectrum`` is overwritten."""
+    """Transform back the part inside the picture, (H, W); ``spectrum`` is overwritten."""
     from scipy.fft import ifft, irfft
 
     rows = ifft(spectrum, axis=0, workers=workers, overwrite_x=True)[y.inside]

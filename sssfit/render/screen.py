@@ -1,16 +1,16 @@
-"""What a shader does in screen space: two passes a term, a kernel in mm seen in perspective.
+"""Screen space as in a shader: two passes per term, with a kernel in mm seen in perspective.
 
-Seen at depth d with a vertical field of view fov, a plane shows
+At depth d, with a vertical field of view fov, a plane has
 
     pixels per mm = (H / 2) / (d tan(fov / 2)) = distance_mm / (d mm_per_pixel)
 
 so that sample i of the kernel lies i kernel.mm_per_pixel pixels_per_mm(d) scale pixels from the
-middle, d and scale those of the middle pixel. Two factors hide in it. The half: normalised device
-coordinates run over 2, from -1 to 1, and texture coordinates over 1, so an offset in the latter
-is dv = X / (2 d tan(fov / 2)). The aspect ratio: along a row du = dv H / W; in square pixels it
-cancels, du W = dv H. The listing of Jimenez, Jarabo, Gutierrez 2012, "Separable subsurface
-scattering" (appendix A), which this follows otherwise, has neither: its kernels are twice as high
-in world units as they say, and 2 W / H times as wide.
+middle, d and scale those of the middle pixel. Two factors are easily missed. The half: normalised
+device coordinates run over 2, from -1 to 1, and texture coordinates over 1, so an offset in the
+latter is dv = X / (2 d tan(fov / 2)). The aspect ratio: along a row du = dv H / W; in square pixels
+it cancels, du W = dv H. The listing of Jimenez, Jarabo, Gutierrez 2012, "Separable subsurface
+scattering" (appendix A), which this module follows otherwise, has neither: its kernels are twice as
+high in world units as specified, and 2 W / H times as wide.
 
 `sssfit._jit.screen` has the pass, ``_view`` the step and the buffers; docs/screen-space.md
 compares the ways to follow a surface.
@@ -27,17 +27,17 @@ from sssfit._jit import thread_pool
 from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
+from sssfit.process import thread_count
 from sssfit.render.transmittance import transmitted
 from sssfit.scene.record import Scene
-from sssfit.threads import thread_count
 
 FOLLOW = {"none": compiled.FLAT, "lerp": compiled.LERP, "gaussian": compiled.GAUSSIAN}
 LOST = {"none": compiled.NOWHERE, "middle": compiled.MIDDLE, "mean": compiled.MEAN}
 BORDER = {"mirror": compiled.MIRROR, "clamp": compiled.CLAMP, "zero": compiled.ZERO}
 
-# The lerp's end in standard deviations of the kernel; docs/screen-space.md derives it.
+# End of the lerp in standard deviations of the kernel; docs/screen-space.md derives it.
 LERP_SIGMAS = 3.8
-_FARTHEST = 1e9  # pixels from the middle to a sample; far below where indices overflow
+_FARTHEST = 1e9  # largest distance of a sample in pixels; far below the overflow of indices
 
 
 def make_view(
@@ -51,7 +51,7 @@ def make_view(
     scale: npt.ArrayLike | None,
     border: str,
 ) -> compiled.View:
-    """Return the buffers of a pass; arguments as `render_screen` has them.
+    """Return the buffers of a pass; arguments are those of `render_screen`.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def _factor(
     falloff_per_mm: float | None,
     sizes: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return the rates (C,) at which light is lost with depth, and the stretch of depth (H, W)."""
+    """Return the rates (C,) at which light is lost with depth, and the depth scale (H, W)."""
     rate, stretch = np.zeros(len(kernel.channels)), np.ones(sizes.shape)
     if follow == "gaussian":
         rate = 0.5 / depth_variances(kernel, depth_variance_mm2)
@@ -105,14 +105,14 @@ def _factor(
 
 
 def objects(scene: Scene) -> npt.NDArray[np.int32]:
-    """Return the mask (H, W): 1 everywhere without one, and 0 where the eye meets nothing."""
+    """Return the mask (H, W): 1 everywhere if there is none, and 0 on the background."""
     mask = np.ones((scene.height, scene.width), np.int32) if scene.mask is None else scene.mask
     there = True if scene.depth_mm is None else np.isfinite(scene.depth_mm)
     return np.where(there, mask, 0).astype(np.int32)
 
 
 def depths(scene: Scene, mask: npt.NDArray[np.int32]) -> FloatArray:
-    """Return the depth (H, W) [mm] of all objects; 1 where there is none and it is not read."""
+    """Return the depth (H, W) [mm] of all objects; 1 on the background, where it is not read."""
     if scene.depth_mm is None or scene.distance_mm is None:
         missing = "depth_mm" if scene.depth_mm is None else "distance_mm"
         raise RenderError(
@@ -137,8 +137,8 @@ def depth_variances(
 ) -> FloatArray:
     """Return the variances (C,) [mm^2] of the depth factor.
 
-    What is given, or the kernel's ``depth_variance_mm2`` (the artist's larger Gaussian), or the
-    kernel's own second moment per axis, which for a single Gaussian is the same.
+    The given ones, or the kernel's ``depth_variance_mm2`` (the artist's larger Gaussian), or the
+    kernel's second moment per axis, which is the same for a single Gaussian.
     """
     if given_mm2 is not None:
         values = np.asarray(given_mm2, dtype=np.float64)
@@ -155,9 +155,9 @@ def depth_variances(
 
 
 def second_moments(kernel: SeparableKernel) -> FloatArray:
-    """Return the 2D kernel's variance along an axis (C,) [mm^2], of absolute weights.
+    """Return the 2D kernel's variance along an axis (C,) [mm^2], with absolute weights.
 
-    Terms of minus sign would let it fall below 0. At least that of a pixel, p^2 / 12.
+    Terms of negative sign could make it negative. It is at least that of a pixel, p^2 / 12.
     """
     x = kernel.mm_per_pixel * np.arange(-kernel.half_pixels, kernel.half_pixels + 1)
     line = np.abs(kernel.line)
@@ -168,7 +168,7 @@ def second_moments(kernel: SeparableKernel) -> FloatArray:
 
 
 def lerp_falloff(kernel: SeparableKernel) -> float:
-    """Return the lerp's falloff [1/mm]: complete at `LERP_SIGMAS` of the widest channel."""
+    """Return the lerp's falloff [1/mm], which ends at `LERP_SIGMAS` of the widest channel."""
     return float(1.0 / (LERP_SIGMAS * np.sqrt(second_moments(kernel).max())))
 
 
@@ -188,9 +188,9 @@ def _steps(
     scene: Scene, kernel: SeparableKernel, depth_mm: FloatArray, sizes: FloatArray
 ) -> FloatArray:
     """Return the pixels from one sample to the next (H, W)."""
-    assert scene.distance_mm is not None  # `depths` has looked
-    # Multiplied out first, so that a plane at distance_mm has steps of exactly 1.
-    with np.errstate(over="ignore"):  # refused below
+    assert scene.distance_mm is not None  # checked by `depths`
+    # Multiply first, so that a plane at distance_mm has steps of exactly 1.
+    with np.errstate(over="ignore"):  # checked below
         nearer = kernel.mm_per_pixel * scene.distance_mm / (depth_mm * scene.mm_per_pixel)
         steps: FloatArray = nearer * sizes
     if not (steps.max() * kernel.half_pixels < _FARTHEST):
@@ -204,7 +204,7 @@ def _steps(
 __all__ = ["render_screen"]
 
 
-_BLOCK = 16_384  # pixels a thread takes at a time: some 10 ms, and no wait at the end
+_BLOCK = 16_384  # pixels a thread takes at a time: about 10 ms, so no thread waits long at the end
 
 
 def render_screen(
@@ -222,46 +222,46 @@ def render_screen(
     """Return the radiant exitance of a scene in perspective, specular light included.
 
     Pixels of mask 0, or of infinite depth, are not translucent: their irradiance is returned
-    as it is, as a stencil leaves it. Light of one object never reaches another: for the share of a
-    sample that lies on another object's pixel the middle stands in. Light through the object joins
+    unchanged, as with a stencil. Light of one object never reaches another: the middle pixel
+    replaces the share of a sample that lies on another object. Light through the object is added to
     the irradiance before the blur; specular light is added after it, unblurred.
 
     Parameters
     ----------
     scene : Scene
-        With ``depth_mm`` and ``distance_mm``.
+        A scene with ``depth_mm`` and ``distance_mm``.
     kernel : SeparableKernel
-        Of any pitch: its samples are ``kernel.mm_per_pixel`` apart on the surface. Where that is
-        many pixels of the screen, samples lie as sparse as a shader's.
+        A kernel of any pixel size: its samples are ``kernel.mm_per_pixel`` apart on the surface.
+        Where that is many pixels of the screen, the samples are as sparse as a shader's.
     follow : str
-        What a difference of depth dz to the middle leaves of a sample. "gaussian":
+        How a depth difference dz from the middle pixel reduces the weight of a sample. "gaussian":
         exp(-dz^2 / (2 v)) (Jimenez et al. 2015, "Separable Subsurface Scattering", supplement E).
-        "lerp": 1 - saturate(falloff |dz|) (2012, appendix A). "none": all of it.
+        "lerp": 1 - saturate(falloff |dz|) (2012, appendix A). "none": not at all.
     lost : str, optional
-        What replaces the rest: "mean", the weighted mean of what the pass did see; "middle", the
-        middle pixel; "none", nothing, as the supplement's equation stands. The default is "mean"
-        for "gaussian" and, as in the listing, "middle" for "lerp".
+        What replaces the lost weight: "mean", the weighted mean of the samples that the pass uses;
+        "middle", the middle pixel; "none", nothing, as in the supplement's equation. The default is
+        "mean" for "gaussian" and, as in the listing, "middle" for "lerp".
     depth_variance_mm2 : float or one per channel, optional [mm^2]
-        v of "gaussian". By default the larger variance of the artist's kernel; for other kernels
-        their second moment. Where ``scale`` is s, v s^2 is used.
+        v of "gaussian". By default the larger variance of the artist's kernel, and the second
+        moment of other kernels. With ``scale`` s it is v s^2.
     falloff_per_mm : float, optional [1/mm]
-        Of "lerp". By default complete at 3.8 standard deviations of the widest channel.
+        Falloff of "lerp". By default it ends at 3.8 standard deviations of the widest channel.
     scale : float or array (H, W), optional
         Size of the kernel: 0 leaves a pixel unblurred.
     border : str
         Beyond the picture: "mirror", "clamp", or "zero" (dark, at the middle's depth).
     threads : int, optional
-        By default one for each core. The result does not depend on them.
+        Threads to use, by default one per core. The result does not depend on them.
 
     Returns
     -------
     array (H, W, C)
-        Irradiance blurred, times the kernel's energy and its ``scale``, plus specular light.
+        Blurred irradiance, times the kernel's energy and its ``scale``, plus specular light.
 
     Raises
     ------
     RenderError
-        No depth, channels other than the kernel's, or an invalid setting.
+        The scene has no depth or other channels than the kernel, or a setting is invalid.
     """
     channels = len(kernel.channels)
     for field in ("irradiance", "specular", "back_irradiance"):
@@ -287,7 +287,7 @@ def render_screen(
 
 
 def _check_channels(scene: Scene, field: str, channels: int) -> None:
-    """Refuse a buffer that does not have the kernel's channels."""
+    """Raise an error for a buffer that does not have the kernel's channels."""
     buffer = getattr(scene, field)
     if buffer is not None and (buffer.ndim != 3 or buffer.shape[2] not in (1, channels)):
         raise RenderError(

@@ -1,8 +1,8 @@
 """A fitted kernel on a flat picture: two one-dimensional passes for every term.
 
 The sum over terms t of s_t w_t[i] w_t[j] is applied as a pass along x and the same pass along y;
-``sssfit._jit.passes`` does the work, rows shared out to plain threads. Signs and the kernel's
-scale ride on the second pass.
+``sssfit._jit.passes`` does the work, with rows distributed over threads. The second pass applies
+signs and the kernel's scale.
 """
 
 import itertools
@@ -15,14 +15,14 @@ import numpy.typing as npt
 
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
+from sssfit.process import thread_count
 from sssfit.render._checks import check_channels, check_memory
 from sssfit.render.borders import source_indices
 from sssfit.scene.record import Scene
-from sssfit.threads import thread_count
 
 FloatArray = npt.NDArray[np.floating[Any]]
 
-# Rows of a thread's share: 64 rows of 2048 RGB pixels take 2 ms, a thousand times its start.
+# Rows per block of a thread: 64 rows of 2048 RGB pixels take 2 ms, a thousand times a start.
 _ROWS = 64
 _PAIRS = 4  # weights that the compiled passes take at a time
 
@@ -40,13 +40,13 @@ def render_separable(
     Parameters
     ----------
     scene : Scene
-        Flat: only its irradiance and pitch are looked at.
+        A flat picture: only its irradiance and pixel size are used.
     kernel : SeparableKernel
-        On the scene's pixels; its ``scale`` is multiplied in.
+        A kernel for the scene's pixel size; its ``scale`` is applied.
     border : str
         One of ``sssfit.render.borders.BORDERS``.
     threads : int, optional
-        By default all cores; the result does not depend on their number.
+        Threads to use, by default all cores; the result does not depend on them.
     dtype : float64 or float32
         Precision of the sums and of the result.
 
@@ -58,14 +58,14 @@ def render_separable(
     Raises
     ------
     RenderError
-        Kernel and scene differ in pitch or channels; no such border, precision or thread count.
+        Kernel and scene differ in pixel size or channels, or a setting is invalid.
     """
     check_pitch(scene, kernel)
     check_channels(scene.channels, len(kernel.channels))
     precision = np.dtype(dtype)
     if precision not in (np.float32, np.float64):
         raise RenderError(f"dtype = {precision}; expected float32 or float64.")
-    # Two passes, the result and, in float32, the picture once more.
+    # Two passes, the result and, in float32, a copy of the picture.
     samples = scene.height * scene.width * len(kernel.channels)
     check_memory(
         3.0 * samples * precision.itemsize,
@@ -78,7 +78,7 @@ def render_separable(
 
 
 def check_pitch(scene: Scene, kernel: SeparableKernel) -> None:
-    """Refuse a kernel that was made for pixels of another size."""
+    """Raise an error for a kernel that was made for another pixel size."""
     if abs(kernel.mm_per_pixel - scene.mm_per_pixel) > 1e-6 * scene.mm_per_pixel:
         raise RenderError(
             f"the kernel has {kernel.mm_per_pixel:.7g} mm per pixel and {scene.name} "
@@ -95,12 +95,12 @@ def apply_passes(
     border: str = "mirror",
     threads: int | None = None,
 ) -> FloatArray:
-    """Sum over terms t of signs_t times the passes weights_t along x and along y.
+    """Return the sum over terms t of signs_t times the passes weights_t along x and y.
 
     Parameters
     ----------
     pixels : array (H, W, 1) or (H, W, C)
-        float32 or float64, which everything is done in.
+        float32 or float64, the precision of all sums.
     weights : array (T, P, C)
         Symmetric about the middle; zeros at the ends cost nothing.
     signs : array (T, C)
@@ -111,7 +111,7 @@ def apply_passes(
     Returns
     -------
     array (H, W, C)
-        In the pixels' precision.
+        The blurred picture, in the pixels' precision.
     """
     from sssfit._jit import thread_pool
     from sssfit._jit.passes import pass_across, pass_down  # numba: 0.4 s
@@ -125,7 +125,7 @@ def apply_passes(
     rows = source_indices(height, beyond, border)
     channels = weights.shape[2]
     planes = np.empty((channels, height + 1, width), pixels.dtype)
-    planes[:, height] = 0.0  # what lies outside a black border
+    planes[:, height] = 0.0  # pixels outside a black border
     out = np.zeros((height, width, channels), pixels.dtype)
     with thread_pool(thread_count(threads), "sssfit-passes") as pool:
         for t in range(len(weights)):
@@ -135,16 +135,16 @@ def apply_passes(
 
 
 def _share(pool: ThreadPoolExecutor, rows: int, work: Callable[..., None], *given: object) -> None:
-    """Do ``work(*given, first, last)`` on blocks of rows and wait for all of them."""
+    """Run ``work(*given, first, last)`` on blocks of rows and wait for all of them."""
     edges = [*range(0, rows, _ROWS), rows]
     for done in [pool.submit(work, *given, *block) for block in itertools.pairwise(edges)]:
         done.result()
 
 
 def _halves(weights: FloatArray) -> tuple[FloatArray, npt.NDArray[np.intp]]:
-    """Return passes from the middle out (T, C, 1 + 4 n), and how far each reaches (T, C).
+    """Return passes from the middle outwards (T, C, 1 + 4 n), and their reaches (T, C).
 
-    Zeros at the ends are left off, and others put there to make up whole groups of pairs.
+    Zeros at the ends are removed, and others added to fill whole groups of pairs.
     """
     middle = weights.shape[1] // 2
     half = weights[:, middle:].transpose(0, 2, 1)

@@ -1,22 +1,22 @@
 """Light through thin slabs (ears, nostrils), from the kernel that blurs it.
 
-T(s) is the share that arrives of what enters on the far side, s the distance it travels inside. For
+T(s) is the share of the light entering on the far side that arrives after a distance s inside. For
 a sum of Gaussians
 
     T(s) = sum_i w_i exp(-s^2 / (2 v_i)),
 
-each Gaussian as it is over the plane, v_i its variance per axis, with the part of its exponent
-that belongs to the depth (Jimenez, Jarabo, Gutierrez 2012, "Separable subsurface scattering",
-section 4). That exponent is ours: the listing of Jimenez, Whelan, Sundstedt, Gutierrez 2010,
-"Real-time realistic skin translucency", has exp(-s^2 / v_i) over the same variances, and its light
-reaches 1 / sqrt 2 as far (``PUBLISHED``).
+where each Gaussian is the one of the plane, with variance v_i per axis, and the exponent is its
+part for the depth (Jimenez, Jarabo, Gutierrez 2012, "Separable subsurface scattering", section 4).
+That exponent is ours: the listing of Jimenez, Whelan, Sundstedt, Gutierrez 2010, "Real-time
+realistic skin translucency", has exp(-s^2 / v_i) over the same variances, and its light reaches 1 /
+sqrt 2 as far (``PUBLISHED``).
 
-The sum is also the share of the reflected light that leaves more than s from where it enters:
-exp(-s^2 / (2 v)) is what one Gaussian has beyond the radius s. So every kernel has a T, made of
-Gaussians or not: `beyond`.
+The sum is also the share of the reflected light that leaves farther than s from where it enters:
+exp(-s^2 / (2 v)) is the energy of one Gaussian beyond the radius s. So every kernel has a T, even
+if it is not made of Gaussians: `beyond`.
 
 The weights are shares: they add up to 1 and T(0) = 1. The blur that follows has the energy of the
-diffuse reflectance; with energies as weights that would be counted twice.
+diffuse reflectance; energies as weights would count it twice.
 """
 
 import dataclasses
@@ -31,7 +31,7 @@ from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
 from sssfit.scene.record import Scene
 
-# c of exp(-s^2 / (c v)): what a Gaussian of variance v has beyond s, and the 2010 listing's.
+# c of exp(-s^2 / (c v)): for the energy of a Gaussian beyond s, and for the 2010 listing.
 OURS, PUBLISHED = 2.0, 1.0
 
 
@@ -47,11 +47,11 @@ def transmittance(
     Parameters
     ----------
     thickness_mm : array (...) [mm]
-        Distance s inside; from 0 up, infinite where nothing comes through.
+        Distance s inside, at least 0; infinite where no light comes through.
     variances_mm2 : array (G, C) [mm^2]
-        Of G Gaussians, per axis, above 0.
+        Variances of G Gaussians per axis, above 0.
     weights : array (G, C)
-        Shares of the light; `gaussians_of` has them with sum 1.
+        Shares of the light; those of `gaussians_of` have the sum 1.
     widths : float
         c of exp(-s^2 / (c v_i)), above 0: ``OURS``, 2, or for comparison ``PUBLISHED``, 1.
 
@@ -62,7 +62,7 @@ def transmittance(
     Raises
     ------
     RenderError
-        Shapes that do not fit, a variance that is not above 0, a thickness below 0 or NaN.
+        Shapes do not fit, a variance is not above 0, or a thickness is below 0 or NaN.
     """
     s = _thickness(thickness_mm)
     variances = np.asarray(variances_mm2, dtype=np.float64)
@@ -83,7 +83,7 @@ def transmittance(
 
 
 def _thickness(thickness_mm: npt.ArrayLike) -> FloatArray:
-    """Return thicknesses as float64, or refuse them."""
+    """Return thicknesses as float64, or raise an error."""
     s = np.asarray(thickness_mm, dtype=np.float64)
     if not (s >= 0.0).all():
         raise RenderError("thickness_mm has values that are negative or NaN; expected 0 and up.")
@@ -93,19 +93,19 @@ def _thickness(thickness_mm: npt.ArrayLike) -> FloatArray:
 def beyond(kernel: SeparableKernel, thickness_mm: npt.ArrayLike) -> FloatArray:
     """Return the share of a round kernel's light beyond the radius s, from its line integral.
 
-    With a(x) the integral of R_d over y, Abel's integral of it over the plane outside s is
+    With a(x) the integral of R_d over y, Abel's transform gives for the plane outside s
 
         T(s) = 2 int_s^inf a(x) x / sqrt(x^2 - s^2) dx / int a dx,
 
-    in closed form for a line of pixels, a(x) constant in each. Exact for a pre-integrated pass; a
-    kernel that is not round has the T of the round one with its line. 0 where negative terms would
-    make it less.
+    in closed form for a line of pixels, with a(x) constant in each. This is exact for a
+    pre-integrated pass; a kernel that is not round has the T of the round one with the same line
+    integral. Negative values become 0.
 
     Parameters
     ----------
     kernel : SeparableKernel
     thickness_mm : array (...) [mm]
-        From 0 up, infinite where nothing comes through.
+        Distances, at least 0; infinite where no light comes through.
 
     Returns
     -------
@@ -115,12 +115,12 @@ def beyond(kernel: SeparableKernel, thickness_mm: npt.ArrayLike) -> FloatArray:
     Raises
     ------
     RenderError
-        A thickness below 0 or NaN.
+        A thickness is below 0 or NaN.
     """
     s = _thickness(thickness_mm)[..., None]
     line = kernel.line[kernel.half_pixels :]
     edges_mm = kernel.mm_per_pixel * (np.arange(len(line)) + 0.5)
-    # By parts: a falls by a step at each outer edge of a pixel, and sqrt(x^2 - s^2) is the rest.
+    # Integrated by parts: a falls by a step at each outer edge of a pixel, times sqrt(x^2 - s^2).
     steps = line - np.concatenate((line[1:], np.zeros((1, line.shape[1]))))
     total = np.zeros((*s.shape[:-1], line.shape[1]))
     for edge_mm, step in zip(edges_mm, steps, strict=True):
@@ -133,16 +133,16 @@ def beyond(kernel: SeparableKernel, thickness_mm: npt.ArrayLike) -> FloatArray:
 
 
 def through(kernel: SeparableKernel, thickness_mm: npt.ArrayLike) -> FloatArray:
-    """Return T(s) of a kernel (..., C): by its Gaussians where it has them, else by `beyond`."""
+    """Return T(s) of a kernel (..., C): from its Gaussians if it has any, else from `beyond`."""
     if any(_gaussians(kernel.parameters.get(name))[0] for name in kernel.channels):
         return transmittance(thickness_mm, *gaussians_of(kernel))
     return beyond(kernel, thickness_mm)
 
 
 def gaussians_of(kernel: SeparableKernel) -> tuple[FloatArray, FloatArray]:
-    """Return the kernel's Gaussians: variances (G, C) [mm^2] and shares (G, C), of sum 1.
+    """Return the kernel's Gaussians: variances (G, C) [mm^2] and shares (G, C) of sum 1.
 
-    A sum of Gaussians has its own; the artist's kernel the near and the far one of its pass. A
+    A sum of Gaussians has its own; the artist's kernel has the near and far one of its pass. A
     channel that returns no light has shares of 0.
 
     Raises
@@ -172,7 +172,7 @@ def gaussians_of(kernel: SeparableKernel) -> tuple[FloatArray, FloatArray]:
 
 
 def _gaussians(parameters: Mapping[str, Any] | None) -> tuple[list[float], list[float]]:
-    """Return a channel's variances and weights; none where it has no Gaussians."""
+    """Return a channel's variances and weights; empty if it has no Gaussians."""
     parameters = parameters or {}
     if {"variances_mm2", "weights"} <= parameters.keys():
         return list(parameters["variances_mm2"]), list(parameters["weights"])
@@ -183,9 +183,9 @@ def _gaussians(parameters: Mapping[str, Any] | None) -> tuple[list[float], list[
 
 
 def transmitted(scene: Scene, kernel: SeparableKernel) -> FloatArray | None:
-    """Return what arrives through the object, back_irradiance T(thickness) (H, W, C).
+    """Return the light through the object, back_irradiance T(thickness) (H, W, C).
 
-    It is added to the irradiance before the blur. None for a scene without these buffers.
+    To be added to the irradiance before the blur. None for a scene without these buffers.
 
     Raises
     ------
@@ -201,20 +201,20 @@ def transmitted(scene: Scene, kernel: SeparableKernel) -> FloatArray | None:
             f"{missing} is missing; give both or neither."
         )
     arrives = np.zeros((scene.height, scene.width, len(kernel.channels)))
-    lit = (scene.back_irradiance > 0.0).any(axis=2)  # of most pixels nothing is lit behind
+    lit = (scene.back_irradiance > 0.0).any(axis=2)  # most pixels have no light behind them
     arrives[lit] = scene.back_irradiance[lit] * through(kernel, scene.thickness_mm[lit])
     return arrives
 
 
 def with_transmitted(scene: Scene, kernel: SeparableKernel) -> Scene:
-    """Return the scene with what arrives through the object in its irradiance, (H, W, C).
+    """Return the scene with the light through the object added to its irradiance, (H, W, C).
 
-    For renderers that look at the irradiance alone; thickness and back irradiance are used up.
+    For renderers that use the irradiance alone; thickness and back irradiance are removed.
 
     Raises
     ------
     RenderError
-        The scene has neither of the two buffers, or as `transmitted`.
+        The scene has neither buffer, or as `transmitted`.
     """
     arrives = transmitted(scene, kernel)
     if arrives is None:

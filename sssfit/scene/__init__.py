@@ -1,1 +1,1 @@
-"""What kernels are applied to: pictures of irradiance and what lies under each pixel."""
+"""What kernels are applied to: pictures of irradiance, with depth and mask where they have them."""

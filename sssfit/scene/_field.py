@@ -1,4 +1,4 @@
-"""A height field with what rays need to meet it quickly; lit by threads, a band of rows each."""
+"""Height fields with tables for fast ray intersection; threads light them in bands of rows."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -7,9 +7,9 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
-from sssfit.threads import thread_count
+from sssfit.process import thread_count
 
-# Rows that a thread takes at a time: the head is in the middle of the picture, so bands are thin.
+# Rows a thread takes at a time; thin bands, since the head is in the middle of the picture.
 BAND = 16
 
 
@@ -20,13 +20,13 @@ class HeightField:
     Parameters
     ----------
     heights : array (rows, columns) [mm]
-        Of the nodes, toward the eye; rows go up, columns to the right.
+        Heights of the nodes, toward the camera; rows go up, columns to the right.
     x0_mm, y0_mm : float [mm]
-        Where the first node is.
+        Position of the first node.
     spacing_mm : float [mm]
-        Between nodes, the same along rows and columns.
+        Spacing of the nodes, the same along rows and columns.
     inner : array (rows, columns), optional
-        Above 0 where an object of its own (label 2) lies in the surface; without it all is label 1.
+        Above 0 where a separate object (label 2) lies in the surface; the rest is label 1.
     """
 
     heights: FloatArray
@@ -46,7 +46,7 @@ class HeightField:
 
 
 def _pyramid(heights: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
-    """Offset, rows and columns of each level, and the maxima of them all in one array."""
+    """Offset, rows and columns of each level, and the maxima of all levels in one array."""
     from sssfit._jit.heightfield import fill_maxima
 
     rows, columns = heights.shape[0] - 1, heights.shape[1] - 1
@@ -64,13 +64,13 @@ def _pyramid(heights: FloatArray) -> tuple[npt.NDArray[np.int64], FloatArray]:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solid:
-    """A body between two height fields on the same nodes, as `HeightField` has them.
+    """A solid between two height fields on the same nodes, as in `HeightField`.
 
     Parameters
     ----------
     front, back : array (rows, columns) [mm]
-        Heights of its surface toward the eye and away from it; where the back is above the front
-        there is nothing.
+        Heights of its surface toward the camera and away from it; where the back is above the front
+        there is no solid.
     x0_mm, y0_mm, spacing_mm : float [mm]
     """
 
@@ -91,7 +91,7 @@ class Solid:
 
 @dataclass(frozen=True, slots=True)
 class Lighting:
-    """Light on a field: directions point to the light, strengths are irradiance face on."""
+    """Lights on a field: directions to the light, and irradiance at normal incidence."""
 
     key: tuple[float, float, float]
     fill: tuple[float, float, float] = (0.0, 0.0, 1.0)
@@ -102,7 +102,7 @@ class Lighting:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Buffers:
-    """What the eye sees: (H, W) each; depth inf, label 0 and no light on the background."""
+    """What the camera sees, (H, W) each; the background has depth inf, label 0 and no light."""
 
     depth_mm: FloatArray
     labels: npt.NDArray[np.int32]
@@ -123,11 +123,11 @@ def light_field(
     smooth: bool = True,
     threads: int | None = None,
 ) -> Buffers:
-    """Light a field under a perspective view from ``distance_mm`` above its origin.
+    """Light a field and view it in perspective from ``distance_mm`` above its origin.
 
-    ``coarse`` casts shadows from outside the fine field. ``behind`` is for a key light that stands
-    behind the field: the body that then casts the shadows. ``smooth`` averages several samples a
-    pixel; without it a pixel is what its centre sees.
+    ``coarse`` casts shadows from outside the fine field. ``behind`` is the solid that casts the
+    shadows of a key light behind the field. ``smooth`` averages several samples per pixel; without
+    it a pixel shows its centre.
     """
     from sssfit._jit import thread_pool
     from sssfit._jit.lit_field import light_rows
@@ -170,10 +170,10 @@ def light_through(
     floor_mm: float,
     threads: int | None = None,
 ) -> tuple[FloatArray, FloatArray]:
-    """Return how far light runs inside to each pixel's centre [mm], and its cosine where it enters.
+    """Return the path of light inside to each pixel's centre [mm], and its cosine at entry.
 
-    Both (H, W), and 0 where the surface faces the light or nothing is; the cosine is 0 in the
-    shadow of another part, too. View as `light_field`.
+    Both are (H, W), and 0 where the surface faces the light and on the background; the cosine is
+    also 0 in the shadow of another part. The view is that of `light_field`.
     """
     from sssfit._jit import thread_pool
     from sssfit._jit.lit_field import through_rows

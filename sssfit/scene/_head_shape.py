@@ -1,7 +1,8 @@
 """The head's large forms: skull, jaw, neck and ears, front and back, lofted from outlines [mm].
 
-x to the right, y up, z toward the eye; the origin lies between nose and eyes on the plane through
-the face's front. Sizes are those of an adult: crown to chin 232 mm, cheekbone to cheekbone 143 mm.
+x points right, y up, z toward the camera; the origin lies between nose and eyes on the plane
+through the front of the face. Sizes are those of an adult: crown to chin 232 mm, cheekbone to
+cheekbone 143 mm.
 """
 
 import functools
@@ -16,10 +17,10 @@ if TYPE_CHECKING:
 
 Outline = tuple[tuple[float, float, float, float], ...]
 
-# Behind this there is nothing to see.
+# Nothing behind this is visible.
 FLOOR_MM = -150.0
 
-# Height y, half width, front z, z at the sides. The ends are round: squares are interpolated.
+# Height y, half width, front z, z at the sides. Squares are interpolated, so the ends are round.
 HEAD = (
     (132.0, 0.0, -100.0, -100.0),
     (126.0, 31.0, -74.0, -98.0),
@@ -52,7 +53,7 @@ NECK = (
     (-240.0, 225.0, -40.0, -118.0),
     (-400.0, 230.0, -40.0, -118.0),
 )
-# The same from behind: height y, half width, back z, z at the sides. The jaw ends in the neck.
+# The same for the back: height y, half width, back z, z at the sides. The jaw ends in the neck.
 HEAD_BACK = (
     (132.0, 0.0, -100.0, -100.0),
     (126.0, 31.0, -123.0, -98.0),
@@ -85,25 +86,25 @@ NECK_BACK = (
     (-240.0, 225.0, -190.0, -118.0),
     (-400.0, 230.0, -190.0, -118.0),
 )
-# Skin, cartilage, skin: from the front of an ear to its back, and how much thicker its lobe is.
+# Thickness of an ear (skin, cartilage, skin), and how much thicker its lobe is.
 EAR_MM, LOBE_MM = 3.0, 1.5
 
 
 def smooth_max(a: FloatArray, b: FloatArray, blend_mm: float) -> FloatArray:
-    """Larger of two heights, rounded where they are within ``blend_mm`` of each other."""
+    """Return the larger of two heights, rounded where they differ by less than ``blend_mm``."""
     near = np.maximum(blend_mm - np.abs(a - b), 0.0)
     return np.maximum(a, b) + near * near / (4.0 * blend_mm)
 
 
 def smooth_step(t: FloatArray) -> FloatArray:
-    """0 below 0, 1 above 1, 3 t^2 - 2 t^3 in between."""
+    """Smooth step: 0 below 0, 1 above 1, 3 t^2 - 2 t^3 in between."""
     t = np.clip(t, 0.0, 1.0)
     return t * t * (3.0 - 2.0 * t)
 
 
 @functools.cache
 def _curves(outline: Outline, smooth_mm: float) -> "list[CubicSpline[np.float64]]":
-    """Squared half width, squared depth and z of the sides as smooth functions of y."""
+    """Return squared half width, squared depth and z of the sides as smooth functions of y."""
     from scipy.interpolate import CubicSpline, PchipInterpolator
     from scipy.ndimage import gaussian_filter1d
 
@@ -123,10 +124,10 @@ def _curves(outline: Outline, smooth_mm: float) -> "list[CubicSpline[np.float64]
 def loft(
     outline: Outline, x: FloatArray, y: FloatArray, power: float, smooth_mm: float
 ) -> FloatArray:
-    """Heights of slices |x / w|^p + |(z - side) / depth|^p = 1; a cliff outside them."""
+    """Return heights of slices |x / w|^p + |(z - side) / depth|^p = 1; a cliff outside them."""
     known = np.clip(y, min(knot[0] for knot in outline) - 15.0, outline[0][0] + 15.0)
     squares, depths, sides = (curve(known) for curve in _curves(outline, smooth_mm))
-    # Past the round ends the squares are negative: the cliff goes on from there.
+    # Past the round ends the squares are negative, and the cliff continues from there.
     width = np.sign(squares) * np.sqrt(np.abs(squares))
     depth = np.sqrt(np.maximum(depths, 0.0))
     across = np.abs(x) / np.maximum(width, 1e-3)
@@ -137,7 +138,7 @@ def loft(
 
 
 def gaussian(d: FloatArray, sigma: float) -> FloatArray:
-    """exp(-d^2 / 2 sigma^2)."""
+    """Return exp(-d^2 / 2 sigma^2)."""
     return np.exp(-0.5 * (d / sigma) ** 2)
 
 
@@ -151,8 +152,8 @@ def ellipsoid(
 
 
 def ear(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Front and back of a slab with a rim, a bowl and a lobe, standing off the head's side."""
-    # Tilted back at the top, as ears are.
+    """Return front and back of a slab with a rim, a bowl and a lobe, apart from the head's side."""
+    # Tilted back at the top, like ears.
     v = y - 3.0
     u = x - 75.5 - 0.16 * v
     r = np.hypot(u / 12.0, v / 31.0)
@@ -163,13 +164,13 @@ def ear(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     lobe = 2.0 * np.exp(-(((u + 3.0) / 6.0) ** 2) - ((v + 24.0) / 7.0) ** 2)
     edge = 9.0 * np.maximum(r - 0.93, 0.0) * 12.0
     middle = body + rim + bowl + fold * (r < 1.2) + lobe
-    # Both sides fall off to the edge, where they meet.
+    # Both sides fall to the edge, where they meet.
     back = middle - EAR_MM - 0.5 * LOBE_MM * lobe + edge * edge * 0.02 + edge
     return middle - edge * edge * 0.02 - edge, back
 
 
 def shape(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Head, neck and ears without a face."""
+    """Return head, neck and ears without a face."""
     z = loft(HEAD, x, y, 2.25, 3.0)
     z = smooth_max(z, ear(np.abs(x), y)[0], 3.0)
     neck = loft(NECK, x, y, 2.0, 4.0)
@@ -182,7 +183,7 @@ def shape(x: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def back(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Where head, neck and ears end behind; above the front where there is nothing of them."""
+    """Return the back of head, neck and ears; above the front outside them."""
     z = loft(_turned(HEAD_BACK), x, y, 2.25, 3.0)
     z = smooth_max(z, -ear(np.abs(x), y)[1], 3.0)
     neck = loft(_turned(NECK_BACK), x, y, 2.0, 4.0)
@@ -190,5 +191,5 @@ def back(x: FloatArray, y: FloatArray) -> FloatArray:
 
 
 def _turned(outline: Outline) -> Outline:
-    """Look at an outline from behind."""
+    """Return an outline seen from behind."""
     return tuple((y, width, -end, -side) for y, width, end, side in outline)

@@ -17,13 +17,13 @@ from sssfit.scene._head_shape import (
     smooth_step,
 )
 
-# Wavelength and height of the roughness, in mm and in pores' depths.
+# Wavelength [mm] and height of the roughness, in depths of a pore.
 ROUGH = ((7.0, 0.9), (3.1, 0.6), (1.4, 0.5), (0.62, 0.35), (0.27, 0.2))
 PORE_CELL_MM, PORE_SIGMA_MM = 0.9, 0.14
 
 
 def _resolution_weight(length_mm: float, spacing_mm: float) -> float:
-    """1 from six nodes a wavelength on, 0 below three."""
+    """Return 1 from six nodes per wavelength on, 0 below three."""
     return float(smooth_step(np.asarray((length_mm / spacing_mm - 3.0) / 3.0)))
 
 
@@ -86,7 +86,7 @@ def _within(
     box: tuple[float, float, float, float],
     *more: float,
 ) -> FloatArray:
-    """Lay a form on the columns and rows of its box only; what lies outside is 0 to 1e-6."""
+    """Evaluate a form on the columns and rows of its box only; outside it is 0 to 1e-6."""
     left, right, low, high = box
     columns = np.flatnonzero((x[0] >= left) & (x[0] <= right))
     rows = np.flatnonzero((y[:, 0] >= low) & (y[:, 0] <= high))
@@ -98,7 +98,7 @@ def _within(
 
 
 def detail(x: FloatArray, y: FloatArray, inside: FloatArray, spacing_mm: float) -> FloatArray:
-    """Relief in depths of a pore; none on the eyes, which are smooth and wet."""
+    """Return the relief in depths of a pore; none on the eyes, which are smooth and wet."""
     skin = _roughness(x, y, spacing_mm)
     skin += _within(_lips, x, y, (-42.0, 42.0, -68.0, -42.0), spacing_mm)
     skin += _within(_brows, x, y, (-58.0, 58.0, 26.0, 49.0), spacing_mm)
@@ -109,7 +109,7 @@ def detail(x: FloatArray, y: FloatArray, inside: FloatArray, spacing_mm: float) 
 EYE_X, EYE_Y, EYE_Z = 32.0, 20.0, -23.0
 MOUTH_Y = -54.0
 
-# The nose along its ridge: y, how far it stands out, half width.
+# The nose along its ridge: y, height above the face, half width.
 NOSE = np.array(
     [
         (-42.0, 0.0, 12.0),
@@ -133,12 +133,12 @@ NOSE = np.array(
 
 
 def pair(x: FloatArray, at: float, sigma: float) -> FloatArray:
-    """Add a Gaussian on either side: no crease where the halves meet."""
+    """Add a Gaussian on either side, without a crease where the halves meet."""
     return gaussian(x - at, sigma) + gaussian(x + at, sigma)
 
 
 def planes(x: FloatArray, y: FloatArray) -> FloatArray:
-    """Broad forms: what is added to the head before nose, eyes and mouth."""
+    """Return the broad forms, added to the head before nose, eyes and mouth."""
     add = (
         5.0 * pair(x, 27.0, 15.0) * gaussian(y - 37.0 + 0.006 * (np.hypot(x, 8.0) - 25.0) ** 2, 6.0)
     )
@@ -199,7 +199,7 @@ def fold(x: FloatArray, y: FloatArray, z: FloatArray) -> FloatArray:
 
 
 def eye(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Socket, lids and the ball between them; also how far inside the lids' opening a point is."""
+    """Return socket, lids and ball, and how far inside the opening of the lids a point is."""
     u, v = x - EYE_X, y - EYE_Y
     z = z - 10.0 * pair(x, EYE_X, 12.7) * gaussian(v - 1.0, 8.5)
     z = z - 3.5 * gaussian(x - 17.0, 4.5) * gaussian(v - 3.0, 6.0)
@@ -217,7 +217,7 @@ def eye(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatA
     inside = np.minimum(top - tilt, tilt - bottom)
     inside = np.minimum(inside, 14.8 - np.abs(u))
     ball = ellipsoid(x, y, (EYE_X, EYE_Y, EYE_Z), (15.6, 12.2, 12.2))
-    # The cornea stands out of the ball.
+    # The cornea rises above the ball.
     ball = smooth_max(
         ball, ellipsoid(x, y, (EYE_X, EYE_Y + 0.3, EYE_Z + 5.6), (7.4, 7.4, 7.6)), 0.6
     )
@@ -226,7 +226,7 @@ def eye(x: FloatArray, y: FloatArray, z: FloatArray) -> tuple[FloatArray, FloatA
 
 
 def face(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Heights [mm] of the smooth head, and where the eyes are (above 0)."""
+    """Return the heights [mm] of the smooth head, and the eyes (above 0)."""
     half = np.abs(x)
     z = shape(x, y)
     z = z + planes(half, y)
@@ -236,19 +236,19 @@ def face(x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     return eye(half, y, z)
 
 
-# Half width of the bust, its lower end and the crown: nothing outside is modelled [mm].
+# Half width of the bust, its lower end and the crown [mm]; the model ends there.
 BUST_WIDTH_MM, BUST_LOW_MM, BUST_HIGH_MM = 230.0, -260.0, 136.0
-# Of the grid that casts shadows from outside the picture.
+# Spacing of the grid that casts shadows from outside the picture.
 COARSE_MM = 0.8
-# Of the body that light runs through: an ear is 3 mm thick and its rim 3 mm wide.
+# Spacing of the solid that light crosses: an ear is 3 mm thick and its rim 3 mm wide.
 SOLID_MM = 0.5
-# Nodes of the picture's own grid at most: 8e6 take about 0.3 GB with their tables.
+# Most nodes of the picture's own grid: 8e6 take about 0.3 GB with their tables.
 MAX_NODES = 8e6
 STRIP = 32
 
 
 def nodes(low: float, high: float, spacing: float) -> FloatArray:
-    """Whole multiples of the spacing that hold [low, high]; symmetric if that is."""
+    """Return multiples of the spacing that contain [low, high]; symmetric if the interval is."""
     values: FloatArray = spacing * np.arange(
         math.floor(low / spacing), math.ceil(high / spacing) + 1, dtype=np.float64
     )
@@ -258,7 +258,7 @@ def nodes(low: float, high: float, spacing: float) -> FloatArray:
 def head_field(
     x: FloatArray, y: FloatArray, spacing_mm: float, detail_mm: float, threads: int
 ) -> HeightField:
-    """Heights at nodes x (columns,), y (rows,); the eyes' openings as the inner object."""
+    """Return the heights at nodes x (columns,), y (rows,), with the eyes as the inner object."""
     heights, eyes = np.empty((y.size, x.size)), np.empty((y.size, x.size))
 
     def strip(first: int) -> None:
@@ -266,10 +266,10 @@ def head_field(
         z, inside = face(x[None, :], y[part, None])
         if detail_mm > 0.0:
             z = z + detail_mm * detail(x[None, :], y[part, None], inside, spacing_mm)
-        # A little below the floor, so that no ray comes to rest on it.
+        # A little below the floor, so that no ray ends on it.
         heights[part], eyes[part] = np.maximum(z, FLOOR_MM - 10.0), inside
 
-    # Before the threads, which need them all.
+    # Import before the threads, which need them all.
     import scipy.interpolate
     import scipy.ndimage  # noqa: F401
 
@@ -281,14 +281,14 @@ def head_field(
 
 
 def bust(spacing_mm: float, detail_mm: float, threads: int) -> HeightField:
-    """All that is modelled."""
+    """Return the whole model."""
     x = nodes(-BUST_WIDTH_MM, BUST_WIDTH_MM, spacing_mm)
     y = nodes(BUST_LOW_MM, BUST_HIGH_MM, spacing_mm)
     return head_field(x, y, spacing_mm, detail_mm, threads)
 
 
 def body(threads: int) -> Solid:
-    """Return all that is modelled with its back, smooth: what light runs through."""
+    """Return the smooth model with its back, the solid that light crosses."""
     front = bust(SOLID_MM, 0.0, threads)
     rows, columns = front.heights.shape
     x = front.x0_mm + SOLID_MM * np.arange(columns, dtype=np.float64)
@@ -314,8 +314,8 @@ def seen_part(
     detail_mm: float,
     threads: int,
 ) -> tuple[HeightField, bool]:
-    """Sample what the rays can meet, three quarters of a pixel a cell; say whether that is all."""
-    # Rays spread on from the plane z = 0 to the floor.
+    """Sample the part that rays can meet, 3/4 pixel per cell; also return whether that is all."""
+    # Rays continue to spread from the plane z = 0 to the floor.
     spread = 0.5 * mm_per_pixel * (distance_mm - FLOOR_MM) / distance_mm
     across = min(spread * width, BUST_WIDTH_MM)
     low, high = max(-spread * height, BUST_LOW_MM), min(spread * height, BUST_HIGH_MM)

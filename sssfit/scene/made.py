@@ -1,8 +1,8 @@
-"""Made pictures that kernels are judged on: known light, so that an error has a cause.
+"""Made pictures for judging kernels, with light given by formulas.
 
 All are grey and linear. Except for the head's silhouette they are averaged over each pixel's area
-by closed forms, so an edge has no staircase. The head is lit in perspective and comes with depth
-and mask. A picture is imported when it is made, so that help answers at once.
+in closed form, so edges have no staircase. The head is lit in perspective and comes with depth and
+mask. A picture's function is imported when it is made, so that help answers at once.
 """
 
 from __future__ import annotations
@@ -72,13 +72,13 @@ _COMMON = {"height", "width", "mm_per_pixel"}
 
 
 def options_of(name: str) -> tuple[str, ...]:
-    """Own options of a made picture, beside its size."""
+    """Return the options of a made picture, apart from its size."""
     parameters = inspect.signature(MADE[name].load()).parameters
     return tuple(key for key in parameters if key not in _COMMON)
 
 
 def make_scene(name: str, *, height: int, width: int, mm_per_pixel: float, **options: Any) -> Scene:
-    """Make a picture by name.
+    """Make a picture by its name.
 
     Parameters
     ----------
@@ -89,17 +89,17 @@ def make_scene(name: str, *, height: int, width: int, mm_per_pixel: float, **opt
     mm_per_pixel : float [mm]
         Size of a pixel on the surface.
     **options
-        The picture's own, as its function has them; a value of None stands for its default.
+        Options of the picture's function; a value of None means its default.
 
     Returns
     -------
     Scene
-        One channel, for kernels of any number of channels.
+        A scene of one channel, for kernels with any number of channels.
 
     Raises
     ------
     RenderError
-        No such picture or option, or a value that it cannot have.
+        The picture or option is unknown, or a value is invalid.
     """
     from sssfit.errors import RenderError
 

@@ -1,6 +1,6 @@
 """Pictures made by a formula: edges and shapes, stripes, noise, points and small highlights.
 
-Border pixels of a white shape on black hold the share of them that is covered, exactly.
+Border pixels of a white shape on black hold exactly the covered share of their area.
 """
 
 import math
@@ -11,26 +11,26 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
 from sssfit.scene.record import Scene
 
-# A render holds some 120 bytes a pixel of RGB, and 8 GB is its limit: said before a head is made,
-# which takes half a minute for 11000 x 11000.
+# A render needs about 120 bytes per RGB pixel, and 8 GB is its limit. Checked before a head is
+# made, which takes half a minute for 11000 x 11000.
 _MOST = 1e12  # mm, degrees or pieces
-_LEAST_MM = 1e-12  # of a pixel, as in the fits: a made head of 1e-320 mm a pixel took minutes
+_LEAST_MM = 1e-12  # of a pixel, as in the fits: a made head of 1e-320 mm per pixel took minutes
 MAX_PIXELS = 60_000_000
 
 
 def is_whole(value: float) -> bool:
-    """Whether a number is finite and has no fraction."""
+    """Return whether a number is finite and an integer."""
     return math.isfinite(value) and value == int(value)
 
 
 def check_seed(name: str, seed: float) -> None:
-    """Refuse what the random numbers cannot start from."""
+    """Check the seed of the random numbers."""
     if not is_whole(seed) or seed < 0:
         raise RenderError(f"{name}: seed = {seed}; expected a whole number from 0.")
 
 
 def check_size(name: str, height: int, width: int, mm_per_pixel: float) -> None:
-    """Refuse pictures without pixels, pixels without size and what no memory holds."""
+    """Check the number and the size of the pixels, and the memory they need."""
     for word, value in (("height", height), ("width", width)):
         if not is_whole(value) or value < 1:
             raise RenderError(f"{name}: {word} = {value}; expected a whole number, 1 or more.")
@@ -44,7 +44,7 @@ def check_size(name: str, height: int, width: int, mm_per_pixel: float) -> None:
 
 
 def check_above(name: str, option: str, value: float, least: float) -> None:
-    """Refuse anything but a number above ``least``, up to what can be counted in pixels."""
+    """Check for a number above ``least`` that can be counted in pixels."""
     if not least < value <= _MOST:
         raise RenderError(
             f"{name}: {option} = {value:g}; expected a number above {least:g}, up to {_MOST:g}."
@@ -52,13 +52,13 @@ def check_above(name: str, option: str, value: float, least: float) -> None:
 
 
 def check_range(name: str, option: str, value: float, low: float, high: float) -> None:
-    """Refuse anything but a number from ``low`` to ``high``."""
+    """Check for a number from ``low`` to ``high``."""
     if not low <= value <= high:
         raise RenderError(f"{name}: {option} = {value:g}; expected {low:g} to {high:g}.")
 
 
 def check_finite(name: str, option: str, value: float) -> None:
-    """Refuse NaN, infinity, and what no pixels can be counted in."""
+    """Check for a finite number that can be counted in pixels."""
     if not abs(value) <= _MOST:
         raise RenderError(
             f"{name}: {option} = {value:g}; expected a finite number, up to {_MOST:g}."
@@ -66,7 +66,7 @@ def check_finite(name: str, option: str, value: float) -> None:
 
 
 def check_period(name: str, period_mm: float, mm_per_pixel: float) -> None:
-    """No pixels can show a period of less than two of them (Nyquist)."""
+    """Check the period: pixels cannot show less than two of them (Nyquist)."""
     check_above(name, "period_mm", period_mm, 0.0)
     if period_mm < 2.0 * mm_per_pixel:
         raise RenderError(
@@ -75,16 +75,16 @@ def check_period(name: str, period_mm: float, mm_per_pixel: float) -> None:
         )
 
 
-# A highlight and what is around it: 1000 to 1.
+# A highlight and its surroundings: 1000 to 1.
 BASE, HIGHLIGHT = 0.5, 500.0
 
 
 def points(
     *, height: int, width: int, mm_per_pixel: float, spacing_mm: float | None = None
 ) -> Scene:
-    """Pixels of 1 on black, one in the middle and others ``spacing_mm`` apart to all sides.
+    """Pixels of 1 on black, one in the middle and others ``spacing_mm`` apart in all directions.
 
-    The spacing is 32 pixels by default and is rounded to whole pixels, so that no point is spread.
+    The spacing is 32 pixels by default and is rounded to whole pixels, so no point is spread.
     """
     check_size("points", height, width, mm_per_pixel)
     if spacing_mm is None:
@@ -112,7 +112,7 @@ def highlights(
 ) -> Scene:
     """Disks of 500 on 0.5, each around the centre of a pixel drawn by ``seed``.
 
-    The radius is 1.5 pixels by default; disks that overlap are no brighter for it.
+    The radius is 1.5 pixels by default; overlapping disks are not brighter.
     """
     check_size("highlights", height, width, mm_per_pixel)
     if radius_mm is None:
@@ -137,11 +137,11 @@ def highlights(
 
 
 def noise(*, height: int, width: int, mm_per_pixel: float, seed: int = 1) -> Scene:
-    """Random light from 0 to 1 whose amplitudes fall as 1/f; its mean is 1/2.
+    """Random light from 0 to 1 with amplitudes that fall as 1/f; its mean is 1/2.
 
     White noise is filtered in the Fourier domain (Field 1987, "Relations between the statistics of
     natural images and the response properties of cortical cells": 1/f in amplitude), so it is
-    periodic across the borders; then scaled so that its farthest value from 1/2 is 0 or 1.
+    periodic across the borders. Then it is scaled so that its farthest value from 1/2 is 0 or 1.
     """
     from scipy.fft import irfft2, rfft2
 
@@ -158,9 +158,9 @@ def noise(*, height: int, width: int, mm_per_pixel: float, seed: int = 1) -> Sce
 
 
 def wave(phase: FloatArray, across: float, along: float) -> FloatArray:
-    """(1 + cos(2 pi phase)) / 2, averaged over pixels ``across`` and ``along`` periods wide.
+    """Return (1 + cos(2 pi phase)) / 2, averaged over pixels ``across`` and ``along`` periods wide.
 
-    Averaged over a box, a cosine is multiplied by the sinc of the box in periods, once an axis.
+    The average over a box multiplies a cosine by the sinc of the box in periods, for each axis.
     """
     contrast = float(np.sinc(across) * np.sinc(along))
     return 0.5 + 0.5 * contrast * np.cos(2.0 * np.pi * phase)
@@ -190,7 +190,7 @@ def stripes(
 def separable(
     *, height: int, width: int, mm_per_pixel: float, period_mm: float | None = None
 ) -> Scene:
-    """E1(x) + E2(y): half the light by an upright edge in the middle, half by level stripes.
+    """E1(x) + E2(y): half the light from a vertical edge in the middle, half from stripes.
 
     The stripes' period is half the height by default, at least two pixels.
     """
@@ -209,14 +209,14 @@ DISK_RADIUS_MM = 19.2
 
 
 def middle_out(pixels: int) -> FloatArray:
-    """Coordinates of pixel centres from the middle of the picture, in pixels."""
+    """Return coordinates of pixel centres from the middle of the picture, in pixels."""
     return np.arange(pixels, dtype=np.float64) - 0.5 * (pixels - 1)
 
 
 def _quarter(x: FloatArray, y: FloatArray, radius: float) -> FloatArray:
-    """Area that a disk around 0 shares with [0, x] x [0, y]; odd in x and in y.
+    """Return the area that a disk around 0 shares with [0, x] x [0, y]; odd in x and in y.
 
-    x y where the corner is inside; beyond, y xa + int_xa^x sqrt(R^2 - t^2) dt, R^2 = xa^2 + y^2.
+    x y if the corner is inside; otherwise y xa + int_xa^x sqrt(R^2 - t^2) dt, R^2 = xa^2 + y^2.
     """
     sign = np.sign(x) * np.sign(y)
     x, y = np.minimum(np.abs(x), radius), np.minimum(np.abs(y), radius)
@@ -231,10 +231,10 @@ def _quarter(x: FloatArray, y: FloatArray, radius: float) -> FloatArray:
 
 
 def disk_coverage(x: FloatArray, y: FloatArray, radius: float) -> FloatArray:
-    """Share of unit pixels, centred at x (W,) and y (H,), that a disk around 0 covers: (H, W).
+    """Return the share of unit pixels centred at x (W,), y (H,) covered by a disk around 0.
 
-    Pixels that its edge does not cut are 0 or 1 exactly; of the others, differences of areas as
-    large as the disk leave an error of about 1e-16 R^2.
+    Pixels not cut by its edge are exactly 0 or 1; the others are differences of areas as large as
+    the disk, with an error of about 1e-16 R^2.
     """
     x, y = x[None, :], y[:, None]
     farthest = np.hypot(np.abs(x) + 0.5, np.abs(y) + 0.5)
@@ -250,15 +250,15 @@ def disk_coverage(x: FloatArray, y: FloatArray, radius: float) -> FloatArray:
 
 
 def half_plane_coverage(distance: FloatArray, angle_degrees: float) -> FloatArray:
-    """Share of unit pixels on the lit side of a line; ``distance`` of their centres inside it.
+    """Return the share of unit pixels on the lit side of a line, at ``distance`` d inside it.
 
-    With c >= s the larger and smaller of |cos|, |sin|: 1/2 + d/c while the line cuts two opposite
-    sides, (h^2/2) / (c s) where it cuts a corner off, h = (c + s)/2 - |d| deep.
+    With c >= s, the larger and smaller of |cos| and |sin|, it is 1/2 + d/c if the line cuts two
+    opposite sides, and (h^2/2) / (c s) if it cuts off a corner of depth h = (c + s)/2 - |d|.
     """
     turn = np.radians(angle_degrees)
     s, c = sorted((abs(np.cos(turn)), abs(np.sin(turn))))
     depth = np.maximum(0.5 * (c + s) - np.abs(distance), 0.0)
-    # Where s = 0 there are no corners: depth / s is not used, so 1 will do.
+    # For s = 0 there are no corners and depth / s is not used, so any s works.
     corner = depth * (depth / (s or 1.0)) / (2.0 * c)
     corner = np.where(distance > 0.0, 1.0 - corner, corner)
     area: FloatArray = np.where(np.abs(distance) < 0.5 * (c - s), 0.5 + distance / c, corner)
@@ -268,7 +268,7 @@ def half_plane_coverage(distance: FloatArray, angle_degrees: float) -> FloatArra
 def disk(*, height: int, width: int, mm_per_pixel: float, radius_mm: float | None = None) -> Scene:
     """White disk in the middle of black.
 
-    Its radius is 19.2 mm by default, and a quarter of the smaller side where that does not fit.
+    Its radius is 19.2 mm by default, or a quarter of the smaller side if that does not fit.
     """
     check_size("disk", height, width, mm_per_pixel)
     if radius_mm is None:
@@ -289,7 +289,7 @@ def edge(
 ) -> Scene:
     """White half plane x cos(angle) + y sin(angle) > offset, from the middle, y up.
 
-    So 0 lights the right half, 90 the upper one.
+    So 0 lights the right half, 90 the upper half.
     """
     check_size("edge", height, width, mm_per_pixel)
     check_finite("edge", "angle_degrees", angle_degrees)

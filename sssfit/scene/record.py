@@ -1,4 +1,4 @@
-"""What a kernel is applied to: a picture of irradiance, with geometry if it has one."""
+"""What a kernel is applied to: a picture of irradiance, optionally with geometry."""
 
 import dataclasses
 from typing import TYPE_CHECKING, Any
@@ -14,40 +14,41 @@ if TYPE_CHECKING:
     from sssfit.formats.pictures import Image
 
 
-_MOST_OBJECTS = 2**31 - 1  # numbers of 32 bits
-_HALF = 0.5  # of coverage: a pixel of an outline belongs to what covers more of it
+_MOST_OBJECTS = 2**31 - 1  # largest number of 32 bits
+_HALF = 0.5  # of coverage: a pixel on an outline belongs to the object that covers more of it
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
 class Scene:
-    """Irradiance on pixels, linear light, with the buffers a renderer would have beside it.
+    """Irradiance on pixels, as linear light, with the other buffers of a renderer.
 
     Arrays are stored as read-only float64, channel axis last. H rows from the top, W columns.
 
     Parameters
     ----------
     name : str
-        What it is, for reports: a made picture's name or a file's.
+        Name for reports: that of a made picture or of a file.
     irradiance : array (H, W, C)
-        What arrives at the surface, at least 0. C = 1 serves kernels of any number of channels.
+        Light that arrives at the surface, at least 0. C = 1 fits kernels with any number of
+        channels.
     mm_per_pixel : float [mm]
         Size of a pixel on the surface; for a perspective view that of the plane at ``distance_mm``.
     distance_mm : float, optional [mm]
-        From the eye to that plane; None for a flat picture, seen from straight above.
+        Distance of the camera from that plane; None for a flat picture seen from above.
     depth_mm : array (H, W), optional [mm]
-        Distance along the view axis from the eye; inf where nothing is.
+        Distance from the camera along the view axis; inf on the background.
     mask : array (H, W) of int, optional
-        Which translucent object a pixel belongs to, 1 and up; 0 for everything else.
+        Number of the translucent object of a pixel, from 1; 0 for everything else.
     specular : array (H, W, C) or (H, W, 1), optional
         Light reflected at the surface: never blurred, added afterwards.
     thickness_mm : array (H, W), optional [mm]
-        How far light travels inside the object to this point from the light's side.
+        Path of the light inside the object to this point.
     back_irradiance : array (H, W, C) or (H, W, 1), optional
         Irradiance where that light enters.
     alpha : array (H, W), optional
-        Coverage of a picture from a file: carried along for what is written, never blurred.
+        Coverage of a picture from a file, kept for the output and never blurred.
     alpha_is_multiplied : bool
-        Whether the irradiance holds the light times the coverage.
+        Whether the irradiance is multiplied by the coverage.
 
     Raises
     ------
@@ -76,18 +77,18 @@ class Scene:
         Parameters
         ----------
         image : Image
-            Of ``sssfit.formats.pictures.load_image``.
+            A picture from ``sssfit.formats.pictures.load_image``.
         mm_per_pixel : float [mm]
         alpha_is_mask : bool
-            The object is what alpha covers by half or more: there the light is taken without
-            alpha; all else is dark and of mask 0.
+            The object is the part that alpha covers by half or more. There the light is divided by
+            alpha; the rest is dark and has mask 0.
 
         Raises
         ------
         RenderError
-            Alpha is to be the mask, and there is none, or it covers nothing.
+            The alpha channel should be the mask, but it is missing or covers nothing.
         """
-        # Renderers' filters leave some alpha a little below 0.
+        # The filters of renderers leave alpha slightly below 0 in places.
         alpha = None if image.alpha is None else np.maximum(image.alpha, 0.0)
         if not alpha_is_mask:
             return cls(
@@ -122,7 +123,7 @@ class Scene:
         self._store("mask", np.int32)
 
     def _store(self, field: str, dtype: npt.DTypeLike) -> None:
-        """Check a buffer against the irradiance and keep it read-only."""
+        """Check the shape and values of a buffer and store it read-only."""
         given = getattr(self, field)
         if given is None:
             return
@@ -132,7 +133,7 @@ class Scene:
                 f"{self.name}: {field} is {values.shape[:2]} and irradiance "
                 f"{np.shape(self.irradiance)[:2]}; expected the same rows and columns."
             )
-        # Only depth may be infinite: where the eye sees past the object.
+        # Only depth may be infinite, on the background.
         bad = np.isnan(values) if field == "depth_mm" else ~np.isfinite(values)
         if bad.any() or (values < 0).any():
             what = "NaN or infinite" if bad.any() else "negative"
@@ -144,13 +145,13 @@ class Scene:
             raise RenderError(
                 f"{self.name}: mask holds other values than whole numbers up to {_MOST_OBJECTS}."
             )
-        # Row after row, in any case: sums over pixels in another order round otherwise.
+        # Always row-major: sums over pixels in another order round differently.
         kept = values.astype(dtype, order="C")
         kept.setflags(write=False)
         object.__setattr__(self, field, kept)
 
     def corner(self, pixels: int) -> "Scene":
-        """Return the scene's upper left corner, so many pixels wide and high."""
+        """Return the upper left corner of the scene with this height and width."""
         buffers: dict[str, Any] = {
             field.name: value[:pixels, :pixels]
             for field in dataclasses.fields(self)
@@ -170,7 +171,7 @@ class Scene:
 
     @property
     def channels(self) -> int:
-        """Channels of the irradiance; 1 serves kernels of any number."""
+        """Channels of the irradiance; 1 fits kernels with any number."""
         return int(self.irradiance.shape[2])
 
     @property

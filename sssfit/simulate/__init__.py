@@ -1,6 +1,6 @@
-"""Material to profile: one method, one file, one signature ``simulate_x(material, ...)``.
+"""Material to profile: one method per file, with one signature ``simulate_x(material, ...)``.
 
-The package is the function `simulate` as well: ``sssfit.simulate("skin1")``.
+The package can also be called like the function `simulate`: ``sssfit.simulate("skin1")``.
 """
 
 import sys
@@ -14,7 +14,6 @@ from sssfit.messages import shown
 from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile
 from sssfit.simulate._checkpoint import (
-    CHECKPOINT_MARKS,
     EVERY_SECONDS,
     Checkpoint,
     is_checkpoint_file,
@@ -34,15 +33,18 @@ from sssfit.simulate.montecarlo import (
     simulate_montecarlo_many,
 )
 from sssfit.simulate.multipole import simulate_multipole
+from sssfit.simulate.runner import Outcome, Results, compiling_note, simulate_to_files
 
 __all__ = [
-    "CHECKPOINT_MARKS",
     "DEON_SKIN",
     "EVERY_SECONDS",
     "Checkpoint",
+    "Outcome",
     "ProfileSource",
     "Progress",
+    "Results",
     "SoFar",
+    "compiling_note",
     "is_checkpoint_file",
     "is_compiled",
     "is_complete",
@@ -62,6 +64,7 @@ __all__ = [
     "simulate_montecarlo",
     "simulate_montecarlo_many",
     "simulate_multipole",
+    "simulate_to_files",
 ]
 
 
@@ -73,20 +76,20 @@ def simulate(
     Parameters
     ----------
     material : Material, str or Path
-        The record, a shipped name, or the path of a TOML file, as `sssfit.load_material` takes it;
-        or "deon-skin", the skin of six Gaussians, which has a profile and no coefficients.
+        The record, a shipped name, or the path of a TOML file, as in `sssfit.load_material`; or
+        "deon-skin", the skin of six Gaussians, a profile without coefficients.
     method : str, optional
-        A name of `sssfit.methods.SIMULATIONS`; by default "montecarlo", the photon walk, and for
-        "deon-skin" its only one, "gaussians".
+        A name of `sssfit.methods.SIMULATIONS`; by default "montecarlo", the photon walk, and
+        "gaussians" for "deon-skin".
     **settings
         Keyword arguments of the method's ``simulate_x``: ``photons``, ``seed``, ``dr_mm``, ...
 
     Raises
     ------
     SimulationError
-        Unknown method, or it cannot simulate this material with these settings.
+        The method is unknown, or cannot simulate this material with these settings.
     MaterialError
-        Unknown material, or its file cannot be read.
+        The material is unknown, or its file cannot be read.
     """
     made = {each.makes: name for name, each in SIMULATIONS.items() if each.makes}
     own = made.get(material) if isinstance(material, str) else None
@@ -113,12 +116,12 @@ def simulate(
 
 
 def _one(found: Profile | list[Profile]) -> Profile:
-    """Return the profile of a method that takes one material, or several at once."""
+    """Return the profile of a method that takes one material or several."""
     return found[0] if isinstance(found, list) else found
 
 
 class _CallableRoom(ModuleType):
-    """`import sssfit.simulate` binds this package to the name, so the package itself is called."""
+    """Makes the package callable, as `import sssfit.simulate` binds it to the function's name."""
 
     def __call__(
         self, material: Material | str | Path, method: str | None = None, **settings: Any

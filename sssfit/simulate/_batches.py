@@ -1,4 +1,4 @@
-"""Photon walks of any kind in batches, and their tallies added in order."""
+"""Photon walks of any kind in batches, with tallies that are added in order."""
 
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -9,8 +9,8 @@ from sssfit.arrays import FloatArray
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
 
-# 16384 photons of skin1 take 4 ms, of an absorption-free medium of eta 1.3 half a second: short
-# enough for Ctrl-C, long enough that dealing out a batch (some 0.1 ms) does not show.
+# 16384 photons of skin1 take 4 ms, those of a medium of eta 1.3 without absorption half a second:
+# short enough for Ctrl-C, long enough to hide the cost of starting a batch (about 0.1 ms).
 BATCH_PHOTONS = 16_384
 MAX_PHOTONS = 10**12
 
@@ -19,7 +19,7 @@ MAX_PHOTONS = 10**12
 class Tally:
     """Sums over photons for all channels of a walk (weights begin at 1).
 
-    ``ledger`` is a named tuple of float64 arrays, which the walk adds to.
+    ``ledger`` is a named tuple of float64 arrays to which the walk adds.
     """
 
     ledger: Any
@@ -27,7 +27,7 @@ class Tally:
     flights: int = 0
 
     def add(self, other: "Tally") -> None:
-        """Add a batch; called in the order of the batches, since float sums depend on order."""
+        """Add a batch; called in the order of the batches, since float sums depend on it."""
         for mine, theirs in zip(self.ledger, other.ledger, strict=True):
             mine += theirs
         self.photons += other.photons
@@ -47,7 +47,7 @@ class Sums:
 
 
 class Walk(Protocol):
-    """What can be walked in batches."""
+    """Interface of a walk in batches."""
 
     @property
     def materials(self) -> tuple[Material, ...]: ...
@@ -63,9 +63,9 @@ class Walk(Protocol):
 
 
 def relative_errors(task: Walk, tally: Tally) -> FloatArray:
-    """Largest standard error of F over the annulus edges / F at the last, per channel (C,).
+    """Return the largest standard error of F over the edges / F at the last edge, (C,).
 
-    Infinite where nothing has come back within the grid; 0 where sigma_s = 0 and nothing can.
+    Infinite if no light has returned within the grid; 0 if sigma_s = 0, where none can return.
     """
     each = [_errors(task.sums(tally, k), one) for k, one in enumerate(task.materials)]
     return np.concatenate(each)
@@ -78,7 +78,7 @@ def _errors(sums: Sums, material: Material) -> FloatArray:
     if sums.photons < 2:
         return np.where(dark, 0.0, infinite)
     energy, squares = np.moveaxis(np.cumsum(sums.reflected[:-1], axis=0) / sums.photons, -1, 0)
-    # Rounding may leave -1e-17 where all photons carry the same weight.
+    # Rounding may leave -1e-17 if all photons have the same weight.
     variance = np.maximum(np.max(squares - energy**2, axis=0), 0.0) / (sums.photons - 1)
     relative = np.divide(np.sqrt(variance), energy[-1], out=infinite, where=energy[-1] > 0.0)
     return np.where(dark, 0.0, relative)

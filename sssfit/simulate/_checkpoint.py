@@ -1,13 +1,13 @@
-"""A walk's sums saved to disk at intervals, so that a killed run can be resumed.
+"""Saves the sums of a walk at intervals, so that a killed run can be resumed.
 
-A checkpoint is what a shorter run would have ended with: the ledger summed over whole batches, the
-photons in it, and a fingerprint of what decides the bits of these batches. How many more are to
-follow is not part of that: a run may be resumed with more photons or a smaller target error, and
-ends in the same bits as one that was asked for that from the start. The materials are kept in full,
-so that ``_so_far`` can make profiles of the sums without them.
+A checkpoint is the result of a shorter run: the ledger summed over whole batches, its photons, and
+a fingerprint of everything that determines the bits of these batches. The number of remaining
+photons is not part of it, so a run may be resumed with more photons or a smaller target error, and
+ends in the same bits as a run with those settings from the start. The materials are stored in full,
+so that ``_so_far`` can make profiles from the file alone.
 
-Which run may write a checkpoint is settled by the lock on the output it belongs to (see
-``sssfit.files.locked``); nothing here locks.
+The lock on its output decides which run may write a checkpoint (see ``sssfit.files.locked``); this
+module does not lock.
 """
 
 import contextlib
@@ -27,18 +27,18 @@ import numpy.typing as npt
 
 from sssfit._jit import source_key
 from sssfit.errors import FileError, SimulationError, SssfitWarning
-from sssfit.files import has_mark, reason, remove_leftovers, write_atomically
+from sssfit.files import has_mark, is_marked, reason, remove_leftovers, write_atomically
 from sssfit.grid import RadialGrid
+from sssfit.kinds import KINDS
 from sssfit.material import Material
 from sssfit.messages import printable, shown
-from sssfit.profile.npz import is_marked, read_npy
+from sssfit.profile.npz import read_npy
 from sssfit.simulate._batches import BATCH_PHOTONS, MAX_PHOTONS, Tally
 
 FORMAT = "sssfit.checkpoint/1"
-# By either a file is ours, however damaged; both stand uncompressed.
-CHECKPOINT_MARKS = (b"ledger_absorbed.npy", "sssfit.checkpoint/".encode("utf-32-le"))
-# At most so much is lost; skin1's takes 1 ms to write, the largest (64 channels of 100 000
-# annuli, 100 MB) a quarter of a second.
+_MARKS = KINDS["checkpoint"].marks
+# At most this much work is lost. skin1's checkpoint takes 1 ms to write, the largest (64 channels
+# of 100 000 annuli, 100 MB) a quarter of a second.
 EVERY_SECONDS = 30.0
 _MOST_META_BYTES = 16_000_000  # numpy's text has 4 bytes a character
 _HEADER_BYTES = 10_000  # numpy's own limit
@@ -46,9 +46,9 @@ _HEADER_BYTES = 10_000  # numpy's own limit
 
 @dataclass(slots=True)
 class State:
-    """Where a walk stands: its sums, the least error of any check so far, seconds of all sittings.
+    """State of a walk: its sums, the least error of any check so far, seconds of all runs together.
 
-    The least error tells whether a run with some target would have ended before.
+    The least error shows whether a run with a given target would have ended earlier.
     """
 
     tally: Tally
@@ -58,22 +58,22 @@ class State:
 
 @dataclass(slots=True)
 class Checkpoint:
-    """Where a walk saves its sums, how often, and whether it continues from saved ones.
+    """Where and how often a walk saves its sums, and whether it continues from saved ones.
 
     Parameters
     ----------
     path : Path
-        By custom the output's name and ``.checkpoint``.
+        By convention the output's name followed by ``.checkpoint``.
     every_seconds : float [s]
         Time between two saves, 0 (after every batch) or more.
     resume : bool
-        Continue from an existing checkpoint; else start a new run, and replace it by the first
-        save.
+        Continue from an existing checkpoint; otherwise start a new run, whose first save replaces
+        it.
 
     Raises
     ------
     SimulationError
-        A time that is negative or not finite.
+        The time is negative or not finite.
 
     Examples
     --------
@@ -105,14 +105,14 @@ class Checkpoint:
     def begin(
         self, empty: Tally, settings: Mapping[str, str], materials: Sequence[Material]
     ) -> State:
-        """Return where to begin: at what was saved with the same ``settings``, or at ``empty``.
+        """Return the state to start from: the one saved with the same ``settings``, or ``empty``.
 
         Raises
         ------
         FileError
-            What is there cannot be read, or is damaged or foreign.
+            The file cannot be read, is damaged, or is not a checkpoint.
         SimulationError
-            It was made with other settings; the message names them.
+            It was made with other settings, which the message names.
         """
         remove_leftovers(self.path)
         self._settings, self._materials = settings, materials
@@ -130,23 +130,24 @@ class Checkpoint:
         return State(empty)
 
     def save_if_due(self, state: State) -> None:
-        """Save every so often. A failure is said once and costs nothing but the checkpoint."""
+        """Save at intervals. A failure causes one warning, and only the checkpoint is lost."""
         if perf_counter() - self._saved_at >= self.every_seconds:
             self._save(state)
 
     def save_at_stop(self, state: State) -> None:
-        """Save what a stopped run has done, but not over the work of another, longer one."""
+        """Save the work of a stopped run, but not over that of another, longer one."""
         if self._is_ours or not self.path.exists():
             self._save(state)
 
     def is_ours(self) -> bool:
-        """Whether what lies there is this run's, saved by it or gone on from."""
+        """Whether the file is this run's: saved or resumed by it."""
         return self._is_ours
 
     def remove(self) -> None:
-        """Delete what this run saved or went on from, its result being safe; nobody else's."""
+        """Delete the checkpoint that this run saved or resumed, once its result is safe."""
         if self._is_ours:
-            with contextlib.suppress(OSError):  # a folder turned read-only: it does no harm there
+            # The folder has become read-only; the file does no harm there.
+            with contextlib.suppress(OSError):
                 self.path.unlink()
             self._is_ours = False
 
@@ -169,13 +170,13 @@ class Checkpoint:
 
 def is_checkpoint_file(path: Path) -> bool:
     """Tell whether a file is a checkpoint of any version, or what damage has left of one."""
-    return has_mark(path, {b"PK": CHECKPOINT_MARKS[1]})
+    return has_mark(path, {b"PK": _MARKS[1]})
 
 
 def settings_of(
     materials: Sequence[Material], grids: Sequence[RadialGrid], seed: int
 ) -> dict[str, str]:
-    """Everything that decides the bits of a walk's batches, in words that can be shown."""
+    """Return everything that determines the bits of a walk's batches, as printable text."""
     return {
         "seed": str(seed),
         "material": ", ".join(f"{each.name} (sha256 {each.sha256[:16]})" for each in materials),
@@ -200,14 +201,14 @@ def _write(
         "seconds": state.seconds,
     }
     arrays = {f"ledger_{name}": each for name, each in state.tally.ledger._asdict().items()}
-    # In memory first: on a full disk zipfile's own clean-up would fail a second time.
+    # In memory first, because zipfile's own clean-up would fail again on a full disk.
     buffer = io.BytesIO()
     np.savez(buffer, meta=np.array(json.dumps(meta)), **arrays)
     write_atomically(path, lambda stream: stream.write(buffer.getbuffer()))
 
 
 def _load(path: Path, empty: Tally, settings: Mapping[str, str]) -> State:
-    """Fill ``empty`` with what the file holds, if it was made with the same settings."""
+    """Fill ``empty`` with the contents of a file that was made with the same settings."""
     with opened(path, str(path)) as archive:
         meta = read_meta(archive)
         _check_settings(path, meta["settings"], settings)
@@ -216,7 +217,7 @@ def _load(path: Path, empty: Tally, settings: Mapping[str, str]) -> State:
 
 @contextlib.contextmanager
 def opened(source: Path | BinaryIO, origin: str) -> Iterator[zipfile.ZipFile]:
-    """Open a checkpoint, and say in one line that begins with ``origin`` what is wrong with it."""
+    """Open a checkpoint; errors are one line that begins with ``origin``."""
     try:
         with zipfile.ZipFile(source) as archive:
             yield archive
@@ -227,16 +228,17 @@ def opened(source: Path | BinaryIO, origin: str) -> Iterator[zipfile.ZipFile]:
     except SimulationError:
         raise
     except Exception as error:
-        # zipfile, zlib, numpy's header parser and json raise a dozen unrelated types on damage.
+        # zipfile, zlib, numpy's header parser and json raise a dozen unrelated types for damaged
+        # files.
         is_ours = True
         with contextlib.suppress(OSError), _rewound(source) as stream:
-            is_ours = is_marked(stream, CHECKPOINT_MARKS)
+            is_ours = is_marked(stream, _MARKS)
         what = "is a damaged checkpoint" if is_ours else "is not a checkpoint"
         raise FileError(f"{origin} {what}; {_REMEDY}.") from error
 
 
 def read_meta(archive: zipfile.ZipFile) -> dict[str, Any]:
-    """Read what a checkpoint says of itself; raise a CheckpointError or what damage does."""
+    """Read the metadata of a checkpoint; raises CheckpointError, or other errors if damaged."""
     meta = dict(json.loads(str(read_npy(archive, "meta", "U", _MOST_META_BYTES))))
     if meta.get("format") != FORMAT:
         raise CheckpointError(f"has format {shown(meta.get('format'))}, not {FORMAT!r}")
@@ -247,7 +249,7 @@ def read_meta(archive: zipfile.ZipFile) -> dict[str, Any]:
 
 
 def read_state(archive: zipfile.ZipFile, meta: Mapping[str, Any], empty: Tally) -> State:
-    """Fill ``empty`` with the sums in a checkpoint; raise a CheckpointError or what damage does."""
+    """Fill ``empty`` with the sums of a checkpoint; raises CheckpointError, or others."""
     mine = {f"ledger_{name}": each for name, each in empty.ledger._asdict().items()}
     if {*archive.namelist()} != {f"{name}.npy" for name in [*mine, "meta"]}:
         raise CheckpointError("is a damaged checkpoint")
@@ -263,17 +265,17 @@ def read_state(archive: zipfile.ZipFile, meta: Mapping[str, Any], empty: Tally) 
 
 
 class CheckpointError(Exception):
-    """What is wrong with a checkpoint, to stand after its name in a message."""
+    """A fault of a checkpoint, as text that follows its name in a message."""
 
     @classmethod
     def of(cls, detail: str) -> "CheckpointError":
-        """Make the fault of a value that no run writes."""
+        """Return the error for a value that no run writes."""
         return cls(f"is damaged or was edited: {detail}")
 
 
 @contextlib.contextmanager
 def _rewound(source: Path | BinaryIO) -> Iterator[BinaryIO]:
-    """Lend a file's or stream's bytes from their beginning."""
+    """Yield a file or stream at its beginning."""
     if isinstance(source, Path):
         with source.open("rb") as stream:
             yield stream
@@ -283,7 +285,7 @@ def _rewound(source: Path | BinaryIO) -> Iterator[BinaryIO]:
 
 
 def _checked_state(empty: Tally, meta: Mapping[str, Any]) -> State:
-    """Put the counts and figures of a checkpoint into a state; raise what is wrong as an error."""
+    """Copy the counts and figures of a checkpoint into a state; raises an error if invalid."""
     photons, flights = meta.get("photons"), meta.get("flights")
     if type(photons) is not int or photons % BATCH_PHOTONS or not 0 < photons <= MAX_PHOTONS:
         raise CheckpointError.of(
@@ -301,9 +303,9 @@ def _checked_state(empty: Tally, meta: Mapping[str, Any]) -> State:
 
 
 def _check_sums(name: str, sums: npt.NDArray[Any], mine: npt.NDArray[Any], photons: int) -> None:
-    """Refuse sums that no walk can have: a photon weighs 1, and roulette adds 1e-3 of it at most.
+    """Check for sums that no walk can have: a photon weighs 1, and roulette adds at most 1e-3.
 
-    Only what roulette added may be below 0.
+    Only the weight added by roulette may be below 0.
     """
     if sums.shape != mine.shape:
         raise CheckpointError.of(f"{name} has shape {sums.shape}, expected {mine.shape}")
@@ -317,7 +319,7 @@ def _check_sums(name: str, sums: npt.NDArray[Any], mine: npt.NDArray[Any], photo
 
 
 def _check_settings(path: Path, there: Mapping[str, str], here: Mapping[str, str]) -> None:
-    """Name every setting in which a checkpoint differs from the run that is to continue from it."""
+    """Raise an error that names every setting in which a checkpoint differs from the run."""
     differing = [
         f"{_short(name)} = {_short(there.get(name))} (now {_short(here.get(name))})"
         for name in {**here, **there}
@@ -331,7 +333,7 @@ def _check_settings(path: Path, there: Mapping[str, str], here: Mapping[str, str
 
 
 def _short(text: str | None) -> str:
-    """Give what a file says on one line: many materials in a walk would fill a page."""
+    """Shorten a value to one line: many materials in a walk would fill a page."""
     return printable(str(text))[:200]
 
 

@@ -1,8 +1,8 @@
 """The depth integral equation of a half space, for one wavenumber along the surface.
 
-Lengths in mean free paths, isotropic scattering, a the albedo. A pencil beam's first collisions
-have the density C0(z) = (1 - R_sp) exp(-z) on the axis. Fourier transformed along the surface, with
-wavenumber k, all collisions obey
+Lengths are in mean free paths, scattering is isotropic, and a is the albedo. The first collisions
+of a pencil beam have the density C0(z) = (1 - R_sp) exp(-z) on the axis. After a Fourier transform
+along the surface, with wavenumber k, all collisions obey
 
     C(z) = C0(z) + a int_0^inf [K_d(|z - z'|) + K_r(z + z')] C(z') dz'
 
@@ -11,18 +11,18 @@ wavenumber k, all collisions obey
     X(s)   = 1/2 int_{mu_c}^1 (1 - R_F) exp(-s/mu) J0(k s tan(theta)) dmu/mu
     E(z)   = 1/2 int_{mu_c}^1 (1 - R_F) exp(-z/mu) J0(k z tan(theta)) dmu
 
-with kappa = sqrt(1 + k^2), and a int C(z) E(z) dz gets out. Four things make that a small matrix:
+with kappa = sqrt(1 + k^2), and a int C(z) E(z) dz escapes. Four methods keep the matrix small:
 
 - panels graded towards the surface, polynomials on them, and product quadrature for the logarithm
   of K_d at 0 (``sssfit._jit.transport``);
-- K_d and X depend on one distance, so they are tabulated;
-- below some 25 mean free paths C falls like exp(-nu z), nu^2 = k^2 + lambda^2 with Case's
-  a artanh(lambda) = lambda: the integral over that tail is 1/2 int exp(-d tau) / (tau + nu) dw, so
-  that no albedo, 1 included, needs deeper panels;
+- K_d and X depend on one distance only, so they are tabulated;
+- deeper than about 25 mean free paths C falls like exp(-nu z), nu^2 = k^2 + lambda^2 with Case's a
+  artanh(lambda) = lambda: the integral over that tail is 1/2 int exp(-d tau) / (tau + nu) dw, so
+  that no albedo, not even 1, needs deeper panels;
 - the matrix does not depend on the albedo: all channels of one refractive index share it.
 
-K_r and the part of E that the critical angle adds fall like (k s tan(theta_c))^-2 and are left out
-beyond ``Resolution.phase`` radians.
+K_r and the contribution of the critical angle to E fall like (k s tan(theta_c))^-2 and are
+neglected beyond ``Resolution.phase`` radians.
 """
 
 import math
@@ -33,25 +33,26 @@ import numpy as np
 
 from sssfit._jit.transport import NEGLIGIBLE, Tables, kernel_matrix
 from sssfit.arrays import FloatArray
-from sssfit.optics import gauss_legendre, is_matched, normal_transmittance
-from sssfit.simulate._surface import Cone
+from sssfit.optics import Cone, gauss_legendre, is_matched, normal_transmittance
 
-_DEPTH = 26.0  # of the last panel: what does not fall like exp(-nu z) is exp(-26) = 5e-12 there
+# Depth of the last panel: components that do not fall like exp(-nu z) are exp(-26) = 5e-12 there.
+_DEPTH = 26.0
 _WIDEST = 2.5  # panel: C0 = exp(-z) needs it
 _BEYOND = 40.0  # exp(-40) = 4e-18: tables end here
-_MOST_ENTRIES = 8000  # of the table of X; only indices under 1.005 ask for more
+_MOST_ENTRIES = 8000  # largest size of the table of X; only indices under 1.005 need more
 _OfTau = Callable[[FloatArray, FloatArray], FloatArray]
 _STRETCHES, _PER_STRETCH = 14, 8  # Gauss nodes over w; 14 times 8 give K_d to 1e-12
 
 
 @dataclass(frozen=True, slots=True)
 class Resolution:
-    """How finely the equation is solved.
+    """Resolution of the solution of the depth equation.
 
-    ``order`` polynomial nodes a panel; ``first`` the first panel's width [1/kappa]; ``ratio`` by
-    which the next grow; ``rule`` Gauss nodes of the product quadrature; ``step`` of the table of X,
-    in radians and mean free paths; ``directions`` in the cone that gets out; ``phase`` [rad] of J0
-    up to which they are followed.
+    ``order`` is the number of polynomial nodes per panel; ``first`` the width of the first panel
+    [1/kappa]; ``ratio`` the growth of the next ones; ``rule`` the number of Gauss nodes of the
+    product quadrature; ``step`` that of the table of X, in radians and mean free paths;
+    ``directions`` the number of directions in the escape cone; ``phase`` [rad] the largest argument
+    of J0 that is resolved.
     """
 
     order: int
@@ -65,7 +66,7 @@ class Resolution:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Response:
-    """Energy for one wavenumber, by albedo (A,): scattered more than once and out; absorbed."""
+    """Energies for one wavenumber, by albedo (A,): multiply scattered and escaped; absorbed."""
 
     multiple: FloatArray
     absorbed: FloatArray
@@ -79,13 +80,13 @@ class _Panels:
     nodes: FloatArray
     weights: FloatArray
     barycentric: FloatArray
-    last_value: FloatArray  # (p,): a panel's polynomial at its lower end from its node values
+    last_value: FloatArray  # (p,): gives a panel's polynomial at its lower end from its node values
 
 
 def decay_rate(albedo: float) -> float:
     """Return lambda of a artanh(lambda) = lambda, in [0, 1] (Case and Zweifel 1967, eq. 4.2.10).
 
-    Deep inside a medium of that albedo, light falls like exp(-lambda z), z in mean free paths.
+    Deep inside a medium with that albedo, light falls like exp(-lambda z), z in mean free paths.
     """
     if albedo <= 0.05:
         return 1.0  # 1 - lambda = 2 exp(-2/a) < 1e-17
@@ -94,7 +95,7 @@ def decay_rate(albedo: float) -> float:
     if albedo > 1.0 - 1e-6:
         return math.sqrt(3.0 * (1.0 - albedo))  # the next term is 1 - albedo smaller
 
-    from scipy import optimize  # 0.2 s that the photon walk need not wait for
+    from scipy import optimize  # 0.2 s that the photon walk does not need
 
     def excess(t: float) -> float:  # lambda = 1 - exp(t): artanh is (log(2 - exp(t)) - t) / 2
         return 0.5 * albedo * (math.log(2.0 - math.exp(t)) - t) + math.expm1(t)
@@ -108,9 +109,9 @@ def respond(k: float, eta: float, albedos: FloatArray, resolution: Resolution) -
     Parameters
     ----------
     k : float [1/MFP]
-        Wavenumber, 0 or above.
+        Wavenumber, at least 0.
     eta : float
-        Relative refractive index, 1 or above.
+        Relative refractive index, at least 1.
     albedos : (A,)
         0 to 1.
     resolution : Resolution
@@ -118,7 +119,7 @@ def respond(k: float, eta: float, albedos: FloatArray, resolution: Resolution) -
     Returns
     -------
     Response
-        For a beam of energy 1 that meets the surface along the normal.
+        For a beam of energy 1 along the normal.
     """
     equation = _Equation.of(k, eta, resolution)
     return equation.solve(
@@ -127,11 +128,11 @@ def respond(k: float, eta: float, albedos: FloatArray, resolution: Resolution) -
 
 
 def respond_to_diffuse_light(eta: float, albedos: FloatArray, resolution: Resolution) -> Response:
-    """Solve the depth equation for light of the same radiance from everywhere above.
+    """Solve the depth equation for light of equal radiance from all directions above.
 
-    Parameters are those of `respond`. Light of radiance 1/pi brings energy 1 to a unit of area; in
-    the cone below it is eta^2 (1 - R_F)/pi, so that its first collisions have the density
-    4 eta^2 E(z) (docs/theory.md).
+    Parameters are those of `respond`. Light of radiance 1/pi brings energy 1 to a unit of area.
+    Inside, within the cone, it is eta^2 (1 - R_F)/pi, so its first collisions have the density 4
+    eta^2 E(z) (docs/theory.md).
     """
     equation = _Equation.of(0.0, eta, resolution)
     return equation.solve(4.0 * eta**2 * equation.escape, albedos)
@@ -139,7 +140,7 @@ def respond_to_diffuse_light(eta: float, albedos: FloatArray, resolution: Resolu
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Equation:
-    """The depth equation of one wavenumber and index on its nodes (N), for any incident light.
+    """The depth equation for one wavenumber and index on its nodes (N), for any incident light.
 
     ``escape`` (N,) is E at the nodes, ``matrix`` (N, N) the integral over K_d + K_r on the panels.
     """
@@ -151,7 +152,7 @@ class _Equation:
 
     @classmethod
     def of(cls, k: float, eta: float, resolution: Resolution) -> "_Equation":
-        """Set it up."""
+        """Set up the equation."""
         panels = _panels(math.sqrt(1.0 + k * k), resolution)
         escape, tables = _tables(k, eta, panels, resolution)
         matrix = kernel_matrix(
@@ -212,7 +213,7 @@ def _tables(
 ) -> tuple[FloatArray, Tables]:
     """Return E at the nodes and the tables of K_d and X."""
     kappa = math.hypot(1.0, k)
-    shortest = 1e-9 * panels.nodes[0, 0]  # nearer sources weigh 1e-9 log(1e-9) of a panel
+    shortest = 1e-9 * panels.nodes[0, 0]  # nearer sources contribute 1e-9 log(1e-9) of a panel
     per_log = 3.0 / resolution.step
     entries = int(math.log(_BEYOND / kappa / shortest) * per_log) + 4
     distances = shortest * np.exp(np.arange(entries) / per_log)

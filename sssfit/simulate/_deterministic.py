@@ -1,9 +1,9 @@
-"""Profiles that are computed, not sampled: from F(r) at the edges to a record.
+"""Profiles that are computed instead of sampled: from F(r) at the edges to a record.
 
-Every method without photons ends here, so that its profiles have the same provenance and the same
-guards. Energies stand as the walks' bins do: (n + 1, C), an annulus a row, beyond the grid last.
-Solvers that know F(r) use ``energies_from_cumulative``; closed forms that know the energy beyond
-r use ``energies_from_beyond``, which keeps its digits out to 1e-300 where F(r) is 1 - 1e-16.
+Every method without photons ends here, so that its profiles have the same provenance and checks.
+Energies are arranged like the walks' bins: (n + 1, C), one annulus per row, beyond the grid last.
+Solvers that give F(r) use ``energies_from_cumulative``; closed forms for the energy beyond r use
+``energies_from_beyond``, which keeps its digits down to 1e-300 where F(r) is 1 - 1e-16.
 """
 
 import warnings
@@ -20,7 +20,7 @@ from sssfit.grid import RadialGrid
 from sssfit.material import Layer, Material
 from sssfit.profile import FORMAT, Profile
 
-ROUNDING = 1e-12  # F may fall by this share of the total: sums of a few thousand terms, rounded
+ROUNDING = 1e-12  # F may fall by this share of the total: rounding of sums of a few thousand terms
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class ProfileSource:
         return len(self.channels)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return what JSON holds of it."""
+        """Return the source as JSON values."""
         return {"name": self.name, "source": self.source}
 
 
@@ -48,8 +48,8 @@ def energies_from_cumulative(
 ) -> FloatArray:
     """Return the energy of each annulus and beyond the grid, all at least 0, (n + 1, C).
 
-    F cannot fall. Where it does, by no more than the method's own error, it is replaced by its
-    running maximum, held under the total: where |F - truth| <= e before, it is so afterwards.
+    F cannot fall. If it does, by no more than the method's own error, it is replaced by its running
+    maximum, limited by the total: if |F - truth| <= e before, this still holds afterwards.
 
     Parameters
     ----------
@@ -58,12 +58,12 @@ def energies_from_cumulative(
     total : (C,)
         F at infinity.
     tolerance : float
-        How far F may fall, or exceed the total, as a share of the largest total.
+        The amount by which F may fall or exceed the total, as a share of the largest total.
 
     Raises
     ------
     SimulationError
-        A value that is not finite, F that does not begin at 0, or falls by more.
+        A value is not finite, or F does not start at 0 or falls by more.
     """
     total = np.asarray(total, dtype=np.float64)
     everywhere = np.vstack((cumulative, total))
@@ -86,8 +86,9 @@ def energies_from_cumulative(
 def energies_from_beyond(beyond: FloatArray) -> FloatArray:
     """Return the energies of `energies_from_cumulative` from the energy beyond each edge.
 
-    Takes (n + 1, C), the first row the total, and keeps the last; the differences in between are
-    exact to rounding of the energy beyond, however small that is. Raises SimulationError as above.
+    Takes (n + 1, C), whose first row is the total, and keeps the last row; the differences between
+    rows are exact to rounding of the energy beyond, no matter how small. Raises SimulationError as
+    above.
     """
     if not np.isfinite(beyond).all():
         raise SimulationError("energies are not finite everywhere; a defect of the method.")
@@ -111,29 +112,29 @@ def computed_profile(
     settings: Mapping[str, Any] | None = None,
     energy_balance_stderr: list[float] | None = None,
 ) -> Profile:
-    """Put energies that were computed into a profile: no photons, no seed.
+    """Make a profile from computed energies, without photons and seed.
 
     Parameters
     ----------
     material : Material or ProfileSource
     method : str
-        As the command line names it; becomes ``meta["method"]``.
+        Its name on the command line; becomes ``meta["method"]``.
     grid : RadialGrid
         n annuli.
     reflected : (n + 1, C)
         Energies of the annuli and beyond the grid, shares of the incident light.
     stderr : (n + 1, C), optional
-        The method's own estimate of their errors; NaN where there is none.
+        The method's own estimate of their errors; NaN if there is none.
     transmitted : (n + 1, C), optional
         Energy that leaves through the bottom of a slab.
     absorbed : (layers, C), optional
-        What stays, by layer; not known by default, and then the energy balance is NaN.
+        Absorbed energy by layer; unknown by default, and then the energy balance is NaN.
     relative_error : float, optional
-        The error reached, in the terms of the method's tolerance.
+        The error that was reached, in the terms of the method's tolerance.
     settings : mapping, optional
-        The method's own, for provenance; the grid's come with them.
+        The method's own settings, for provenance; those of the grid are added.
     energy_balance_stderr : list of float, optional
-        By how much the energies of each channel may miss 1.
+        Error of the sum of the energies of each channel, which should be 1.
 
     Returns
     -------
@@ -170,12 +171,12 @@ def computed_profile(
 
 
 def half_space(material: Material, method: str) -> Layer:
-    """Return the one layer of a homogeneous half space, or name the methods for anything else.
+    """Return the layer of a homogeneous half space; the error names methods for other materials.
 
     Raises
     ------
     SimulationError
-        Not a material, a stack, or a slab.
+        The argument is not a material, or it is a stack or a slab.
     """
     check_is_material(material)
     if not material.is_semi_infinite:
@@ -188,7 +189,7 @@ def half_space(material: Material, method: str) -> Layer:
 
 
 def warn_of_similarity(material: Material, method: str) -> None:
-    """Say that scattering with g other than 0 is taken as isotropic, where it is."""
+    """Warn if scattering with g other than 0 is treated as isotropic."""
     steepest = float(np.max(np.abs(material.layers[0].g)))
     if steepest > 0.0:
         warnings.warn(
@@ -201,7 +202,7 @@ def warn_of_similarity(material: Material, method: str) -> None:
 
 
 def check_is_material(material: object) -> None:
-    """Refuse a name or a path, which has to be loaded first, in one line."""
+    """Raise an error for a name or a path, which must be loaded first."""
     if not isinstance(material, Material):
         raise SimulationError(
             f"{material!r} is not a Material; load one with sssfit.material.load_material."

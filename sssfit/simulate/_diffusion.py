@@ -1,8 +1,8 @@
 """Coefficients of the diffusion equation and of its boundary, for all diffusion models.
 
-Scattering enters as sigma_s' = (1 - g) sigma_s: diffusion sees directions only by their mean, so
-for these models g other than 0 needs no further approximation. The boundary condition is A: flux
-lost through the surface puts the fluence's zero at 2 A D outside it, further for a denser medium.
+Scattering enters as sigma_s' = (1 - g) sigma_s: diffusion depends on directions only through their
+mean, so g other than 0 needs no further approximation. A is the boundary condition: flux lost
+through the surface puts the zero of the fluence 2 A D outside it, farther for a denser medium.
 """
 
 import math
@@ -15,18 +15,18 @@ from sssfit.errors import SimulationError
 from sssfit.material import Layer
 from sssfit.optics import fresnel_reflectance, gauss_legendre
 
-# The polynomials for F_dr are within 0.006 of the integral here, and over 1 from 3.9 on.
+# The polynomials for F_dr are within 0.006 of the integral in this range, and above 1 from 3.9 on.
 LEAST_ETA, MOST_ETA = 0.5, 2.5
 _NODES = 200
 
 
 @dataclass(frozen=True, slots=True)
 class Diffusion:
-    """A layer as the diffusion equation knows it, by channel.
+    """Coefficients of a layer for the diffusion equation, by channel.
 
     ``albedo`` alpha' = sigma_s' / sigma_t' (C,); ``depth_mm`` z_r = 1 / sigma_t' (C,) where the
-    beam is taken to become diffuse; ``coefficient_mm`` D (C,); ``sigma_tr_per_mm``
-    sqrt(sigma_a / D) (C,), the decay of fluence with distance.
+    beam is assumed to become diffuse; ``coefficient_mm`` D (C,); ``sigma_tr_per_mm`` sqrt(sigma_a /
+    D) (C,), the decay of fluence with distance.
     """
 
     albedo: FloatArray
@@ -44,7 +44,7 @@ def classical(layer: Layer) -> Diffusion:
 
 
 def grosjean(layer: Layer) -> Diffusion:
-    """D = (2 sigma_a + sigma_s') / (3 sigma_t'^2): Grosjean 1956, right where much is absorbed.
+    """D = (2 sigma_a + sigma_s') / (3 sigma_t'^2): Grosjean 1956, right for strong absorption.
 
     Used for a dipole by d'Eon and Irving 2011, "A quantized-diffusion model".
     """
@@ -71,7 +71,7 @@ def mismatch_by_polynomial(eta: float) -> float:
     Raises
     ------
     SimulationError
-        eta outside 0.5 to 2.5, where the polynomials no longer describe Fresnel's formulas.
+        eta is outside 0.5 to 2.5, where the polynomials do not approximate Fresnel's formulas.
     """
     if not LEAST_ETA <= eta <= MOST_ETA:
         raise SimulationError(
@@ -88,7 +88,7 @@ def mismatch_by_polynomial(eta: float) -> float:
 
 
 def mismatch_by_moments(eta: float) -> float:
-    """Return A = (1 + 3 C_2) / (1 - 2 C_1) with the moments of Fresnel's reflectance from inside.
+    """Return A = (1 + 3 C_2) / (1 - 2 C_1) with the moments of the internal Fresnel reflectance.
 
     The boundary condition with the full first moment; see d'Eon and Irving 2011.
     """
@@ -99,8 +99,8 @@ def mismatch_by_moments(eta: float) -> float:
 def fresnel_moments(eta: float) -> tuple[float, float]:
     """Return C_i = int_0^1 R_F(mu) mu^i dmu for i = 1, 2, mu the cosine inside; to 1e-10.
 
-    Up to the critical angle all is reflected; from there mu = mu_c + (1 - mu_c) t^2 takes out the
-    square root. eta is the index inside over that outside.
+    Below mu_c all light is reflected; above it, mu = mu_c + (1 - mu_c) t^2 removes the square root.
+    eta is the index inside over that outside.
     """
     t, w = gauss_legendre(_NODES)
     critical = math.sqrt(max(0.0, 1.0 - 1.0 / eta**2))

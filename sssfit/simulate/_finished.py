@@ -22,7 +22,7 @@ AUTO_BEYOND = 1e-3  # radius "auto": less than this share of any channel lies be
 
 
 def share_beyond(sums: Sums) -> FloatArray:
-    """Share of each channel's energy, reflected and transmitted, beyond every annulus, (n, C)."""
+    """Return the share of each channel's energy beyond every annulus, both sides, (n, C)."""
     energy = sums.reflected[..., 0]
     if sums.transmitted is not None:
         energy = energy + sums.transmitted[..., 0]
@@ -33,7 +33,7 @@ def share_beyond(sums: Sums) -> FloatArray:
 
 
 def _trimmed(sums: Sums) -> Sums:
-    """Move the outermost annuli beyond the grid for as long as less than the share lies there."""
+    """Move the outermost annuli beyond the grid while less than the share lies there."""
     outside = np.max(share_beyond(sums), axis=1)
     if outside[-1] >= AUTO_BEYOND:
         return sums
@@ -47,16 +47,16 @@ def _trimmed(sums: Sums) -> Sums:
 
 
 def _mean_and_error(sums: FloatArray, photons: int) -> tuple[FloatArray, FloatArray]:
-    """Mean over photons and its standard error from sums of w and w^2, (..., 2)."""
+    """Return the mean over photons and its standard error from sums of w and w^2, (..., 2)."""
     mean, mean_square = sums[..., 0] / photons, sums[..., 1] / photons
-    # Rounding may leave a variance of -1e-17 where all photons carry the same weight.
+    # Rounding may leave a variance of -1e-17 if all photons have the same weight.
     return mean, np.sqrt(np.maximum(mean_square - mean**2, 0.0) / (photons - 1))
 
 
 def profile_of(
     task: Walk, tally: Tally, index: int, ending: Ending, error: float, *, trim: bool
 ) -> Profile:
-    """Turn one material's share of the tally into a profile; weights begin at 1 - specular."""
+    """Turn one material's part of the tally into a profile; weights start at 1 - specular."""
     material, grid = task.materials[index], task.grids[index]
     entering = 1.0 - material.specular_reflectance
     sums = task.sums(tally, index)
@@ -102,7 +102,7 @@ def profile_of(
 
 
 def _warn_unfinished(material: Material, profile: Profile) -> None:
-    """Say so when walks stopped at the collision cap carry more than the run's own error."""
+    """Warn if walks stopped at the collision cap hold more energy than the run's own error."""
     if np.any(profile.unfinished > profile.diffuse_reflectance_stderr):
         warnings.warn(
             f"{material.name}: {100.0 * float(np.max(profile.unfinished)):.2g} % of the light was "
@@ -114,18 +114,19 @@ def _warn_unfinished(material: Material, profile: Profile) -> None:
         )
 
 
-# A total of R is left with sqrt((1/R - 1) / N) by N photons: 1e-7 for .99 and the most photons.
+# N photons give a total R a relative error of sqrt((1/R - 1) / N): 1e-7 for .99 and the most
+# photons.
 LEAST_TARGET = 1e-7
 DEFAULT_PHOTONS = 10_000_000
 
 
 def ending_of(photons: int | None, target_error: float | None) -> Ending:
-    """When to end; without a number of photons a target alone decides.
+    """Return the end condition of a run; without a number of photons, the target alone decides.
 
     Raises
     ------
     SimulationError
-        A number or a target out of range.
+        The number or the target is out of range.
     """
     if photons is None:
         photons = DEFAULT_PHOTONS if target_error is None else MAX_PHOTONS
@@ -141,7 +142,7 @@ def ending_of(photons: int | None, target_error: float | None) -> Ending:
 
 
 def whole(name: str, value: int) -> int:
-    """Take any kind of whole number (numpy's too) for a plain int, or refuse it in one line."""
+    """Convert any whole number (numpy's too) to int, or raise an error."""
     try:
         return operator.index(value)
     except TypeError:
@@ -151,10 +152,10 @@ def whole(name: str, value: int) -> int:
 def provenance(
     materials: Sequence[Material], dr_mm: float, ending: Ending, *, auto: bool
 ) -> dict[str, Any]:
-    """Return the settings of a run as a profile's meta keeps them.
+    """Return the settings of a run as stored in a profile's meta.
 
-    All materials of the walk are named: roulette follows the largest albedo, so a profile's last
-    bits depend on its company.
+    All materials of the walk are named: roulette follows the largest albedo, so the last bits of a
+    profile depend on the others.
     """
     return {
         "dr_mm": dr_mm,
@@ -166,7 +167,7 @@ def provenance(
 
 
 def is_complete(profile: Profile) -> bool:
-    """Whether the run behind a profile of this method came to its end, and was not stopped."""
+    """Whether the run of a profile of this method reached its end and was not stopped."""
     settings, error = profile.meta["settings"], profile.meta["relative_error"]
     ending = Ending(settings["photons"], settings["target_error"])
     return ending.is_reached(profile.photons or 0, math.inf if error is None else error)
@@ -183,9 +184,9 @@ def is_finished(
     radius_mm: float | str | None = None,
     target_error: float | None = None,
 ) -> bool:
-    """Whether ``simulate_montecarlo_many`` with these arguments would give this profile again.
+    """Whether ``simulate_montecarlo_many`` with these arguments would return this profile.
 
-    ``index`` is the place of the profile's material among ``materials``.
+    ``index`` is the index of the profile's material in ``materials``.
     """
     meta, material = profile.meta, materials[index]
     auto = radius_mm == "auto"
@@ -205,20 +206,20 @@ def is_finished(
     )
 
 
-_OWN_SETTINGS = ("tolerance", "similarity", "mapping")  # of the methods that have them
+_OWN_SETTINGS = ("tolerance", "similarity", "mapping")  # for methods that have them
 
 
 def run_figures(profile: Profile, seconds: float | None) -> dict[str, Any]:
-    """Return the figures that ``sssfit simulate --json`` prints of one run: lists and numbers.
+    """Return the figures of one run that ``sssfit simulate --json`` prints, as lists and numbers.
 
-    None stands for what the method does not have: photons where nothing is sampled, say.
+    Figures that a method does not have are None, such as photons if nothing is sampled.
 
     Parameters
     ----------
     profile : Profile
-        By a function of this room.
+        From any method of this room.
     seconds : float, optional [s]
-        What the run took; None where it was finished before.
+        Duration of the run; None if it was already finished.
     """
     meta, settings = profile.meta, profile.meta["settings"]
     is_known = len(profile.absorbed) > 0

@@ -1,16 +1,16 @@
 """From wavenumbers back to radii: the profile as a mixture of Bessel functions K0.
 
-Multiple scattering's transform Rhat(k) is, to the solver's own precision, a Stieltjes function of
-k^2: a sum of w q^2 / (k^2 + q^2), w >= 0, q >= lambda. Each term is the transform of
-w q^2 K0(q r) / (2 pi), of which w q r K1(q r) leaves beyond r. So the inversion
+The transform Rhat(k) of multiple scattering is, to the solver's precision, a Stieltjes function of
+k^2: a sum of w q^2 / (k^2 + q^2), w >= 0, q >= lambda. Each term is the transform of w q^2 K0(q
+r) / (2 pi), of which w q r K1(q r) leaves beyond r. So the inversion
 
     F(r) = r int_0^inf Rhat(k) J1(k r) dk
 
-becomes a non-negative least squares problem of some 40 wavenumbers and 200 rates q (Lawson and
-Hanson 1974) with a closed form behind it. F rises everywhere and R_d falls everywhere by
-construction, however far out, and the tail beyond the last wavenumber is carried on; interpolating
-Rhat and integrating against J1 left a noise of 1e-6 of the total. What the mixture misses at the
-wavenumbers is returned, and is part of the solver's error.
+becomes a non-negative least squares problem of about 40 wavenumbers and 200 rates q (Lawson and
+Hanson 1974), followed by a closed form. By construction F rises and R_d falls everywhere, at any
+distance, and the tail beyond the last wavenumber is extrapolated. Interpolating Rhat and
+integrating against J1 left a noise of 1e-6 of the total. The misfit of the mixture at the
+wavenumbers is returned as part of the solver's error.
 """
 
 import math
@@ -20,30 +20,29 @@ import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError
-from sssfit.optics import fresnel_transmittance, normal_transmittance
-from sssfit.simulate._surface import Cone
+from sssfit.optics import Cone, fresnel_transmittance, normal_transmittance
 
-_REACH = 3.2  # the rule's last nodes lie 1e-16 of the range from its ends
+_REACH = 3.2  # the last nodes of the rule lie 1e-16 of the range from its ends
 _DIRECTIONS = 96
 _RADII_AT_ONCE = 8192  # 8 MB of exponents at a time for 128 directions
 
 
 def single_scattering_beyond(radii_mfp: FloatArray, eta: float, step: float) -> FloatArray:
-    """Return the energy once scattered, for albedo 1, that leaves beyond each radius.
+    """Return the singly scattered energy, for albedo 1, that leaves beyond each radius.
 
     Parameters
     ----------
     radii_mfp : (n,) [MFP]
-        From 0 up.
+        Radii, at least 0.
     eta : float
-        Relative refractive index, 1 or above.
+        Relative refractive index, at least 1.
     step : float
-        Of the double-exponential rule; 0.1 gives 1e-7, 0.05 gives 1e-12.
+        Step of the double-exponential rule; 0.1 gives 1e-7, 0.05 gives 1e-12.
 
     Returns
     -------
     (n,) array
-        Multiply by the albedo. The first value for radius 0 is the total.
+        To be multiplied by the albedo. The value at radius 0 is the total.
     """
     half_angle, weight = _angles(eta, step)
     angle = 2.0 * half_angle
@@ -60,7 +59,7 @@ def single_scattering_beyond(radii_mfp: FloatArray, eta: float, step: float) -> 
 
 
 def single_scattering_of_diffuse_light(eta: float) -> float:
-    """Return the share that leaves, scattered once, of the same radiance from everywhere above.
+    """Return the singly scattered share under light of equal radiance from all directions.
 
     eta^2 int int (1 - R_F(mu)) (1 - R_F(mu')) mu mu' / (mu + mu') dmu dmu' over the cone, for
     albedo 1 and incident light of 1. Without a surface that is 2/3 (1 - ln 2).
@@ -80,8 +79,8 @@ def _angles(eta: float, step: float) -> tuple[FloatArray, FloatArray]:
     return 0.5 * largest * place, largest * weight
 
 
-_PER_E_FOLD = 13  # rates; 9 leave 1e-5, 13 1e-7
-_STEEPER = 30.0  # the largest rate against the largest wavenumber
+_PER_E_FOLD = 13  # rates per decade; 9 leave 1e-5, 13 leave 1e-7
+_STEEPER = 30.0  # the largest rate relative to the largest wavenumber
 _RIDGE = 1e-8
 
 
@@ -94,7 +93,7 @@ class Mixture:
     misfit: float
 
     def beyond(self, radii_mfp: FloatArray) -> FloatArray:
-        """Energy that leaves beyond each radius: sum of w q r K1(q r), (n,)."""
+        """Return the energy that leaves beyond each radius: sum of w q r K1(q r), (n,)."""
         parts = [
             _q_r_k1(np.outer(radii_mfp[first : first + _RADII_AT_ONCE], self.rates)) @ self.weights
             for first in range(0, len(radii_mfp), _RADII_AT_ONCE)
@@ -103,20 +102,20 @@ class Mixture:
 
 
 def mixture_of(wavenumbers: FloatArray, transform: FloatArray, slowest: float) -> Mixture:
-    """Fit Rhat at the wavenumbers (m,) [1/MFP] by rates from ``slowest`` up.
+    """Fit Rhat at the wavenumbers (m,) [1/MFP] with rates from ``slowest`` up.
 
-    Residuals are weighted by 1 + k: Rhat falls like 1/k^2, and the first annuli rest on large k.
+    Residuals are weighted by 1 + k: Rhat falls like 1/k^2, and the first annuli depend on large k.
     """
     steepest = _STEEPER * float(wavenumbers[-1])
-    from scipy import optimize  # 0.2 s that the photon walk need not wait for
+    from scipy import optimize  # 0.2 s that the photon walk does not need
 
-    # One rate at the very end of the spectrum, the others from 1 % beyond it.
+    # One rate at the end of the spectrum, the others from 1 % beyond it.
     count = math.ceil(_PER_E_FOLD * math.log(100.0 * steepest / slowest))
     rates = slowest + np.concatenate(([0.0], np.geomspace(0.01 * slowest, steepest, count)))
     terms = rates**2 / (wavenumbers[:, None] ** 2 + rates**2)
     scale = 1.0 + wavenumbers
-    # Neighbouring rates are almost equal: without the ridge the active set can cycle for ever
-    # (seen where the solver's own error is 1e-13). It adds 1e-11 to the misfit.
+    # Neighbouring rates are almost equal: without the ridge the active set can cycle forever (seen
+    # where the solver's own error is 1e-13). It adds 1e-11 to the misfit.
     ridge = _RIDGE * np.eye(rates.size)
     rows = np.concatenate((terms * scale[:, None], ridge))
     wanted = np.append(transform * scale, np.zeros(rates.size))

@@ -1,7 +1,7 @@
-"""A run: batches dealt out to threads, summed in order, saved now and then, ended in time.
+"""A run: batches on threads, summed in order, saved at intervals, and ended at the target.
 
-Where a run ends depends on its seed and never on threads or the clock: a target error is compared
-after whole batches, at numbers of batches fixed beforehand.
+The end of a run depends on its seed and never on threads or the clock: the target error is checked
+after whole batches, at fixed numbers of batches.
 """
 
 import math
@@ -19,17 +19,17 @@ from sssfit.simulate._batches import BATCH_PHOTONS, Tally, Walk, relative_errors
 from sssfit.simulate._checkpoint import Checkpoint, State
 
 REPORT_SECONDS = 0.1
-# A channel that has returned nothing in as many photons as a whole default run has would need
-# 10 000 times more for an error of 1 %.
+# A channel that returned no light in as many photons as a default run has would need 10 000 times
+# more for an error of 1 %.
 HOPELESS_PHOTONS = 10_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """How far a walk has come: photons done of all, seconds, and the relative error so far.
+    """Progress of a walk: photons done and in total, seconds, and the relative error so far.
 
-    With a target error ``photons`` is an estimate, from an error that falls as 1/sqrt(N), and at
-    most the limit. ``relative_error`` is that of the last check: the largest standard error of F
+    With a target error ``photons`` is an estimate, assuming that the error falls as 1/sqrt(N), and
+    at most the limit. ``relative_error`` is that of the last check: the largest standard error of F
     over all annulus edges, as a share of F at the last edge, of the worst channel; infinite until
     every channel has energy on its grid. A resumed walk counts its earlier photons and seconds.
     """
@@ -42,23 +42,23 @@ class Progress:
 
 @dataclass(frozen=True, slots=True)
 class Ending:
-    """When a run ends: at a number of photons, or at a check that finds the target error met."""
+    """The end of a run: a number of photons, or a check that finds the target error met."""
 
     photons: int
     target_error: float | None = None
 
     def is_reached(self, photons_done: int, error: float) -> bool:
-        """Whether a run with these photons and this error is complete."""
+        """Return whether a run with these photons and this error is complete."""
         if photons_done >= self.photons:
             return True
         return self.is_met(error) and is_check(photons_done)
 
     def is_met(self, error: float) -> bool:
-        """Whether an error is under the target; never without one."""
+        """Return whether an error is under the target; False without a target."""
         return self.target_error is not None and error < self.target_error
 
     def expected_photons(self, photons_done: int, error: float) -> int:
-        """Estimate of all photons: N (error / target)^2, at most the limit."""
+        """Estimate the total number of photons: N (error / target)^2, at most the limit."""
         if self.target_error is None or math.isinf(error):
             return self.photons
         ratio = max(1.0, error / self.target_error)
@@ -66,9 +66,9 @@ class Ending:
 
 
 def is_check(photons: int) -> bool:
-    """Whether the error is checked after this number of photons: at whole batches, 32 per doubling.
+    """Whether the error is checked after this many photons: whole batches, 32 times per doubling.
 
-    A run overshoots its target by a 32nd at most; skin1's checks take 0.4 % of a thousand batches.
+    A run overshoots its target by at most 1 in 32; skin1's checks take 0.4 % of a thousand batches.
     """
     batches, rest = divmod(photons, BATCH_PHOTONS)
     return rest == 0 and batches % (1 << max(0, batches.bit_length() - 6)) == 0
@@ -86,7 +86,7 @@ class _Monitor:
     reported: float = -math.inf
 
     def look(self) -> None:
-        """Bring the error up to date where a check is due, or at the end."""
+        """Update the error if a check is due, or at the end."""
         photons = self.state.tally.photons
         if not is_check(photons) and photons < self.ending.photons:
             return
@@ -101,7 +101,7 @@ class _Monitor:
         return self.ending.is_reached(self.state.tally.photons, self.error)
 
     def report(self, *, now: bool = False) -> None:
-        """Tell of the progress: ``now``, or if the last time is long enough ago."""
+        """Report the progress: ``now``, or if the last report is long enough ago."""
         photons = self.state.tally.photons
         is_due = now or self.state.seconds - self.reported > REPORT_SECONDS
         if self.progress and photons and is_due:
@@ -122,7 +122,8 @@ def run(
 ) -> Tally:
     """Walk batches on ``threads`` threads until the photons are done or the target is met.
 
-    Ends early, in order, once ``stop`` says so. ``settings`` are what a checkpoint must agree with.
+    Ends early, after a whole batch, when ``stop`` returns true. ``settings`` must agree with those
+    of a checkpoint.
     """
     ending = Ending(task.photons, target_error)
     state = State(task.empty_tally())
@@ -153,7 +154,7 @@ def run(
 def _in_order(
     task: Walk, threads: int, stop: Callable[[], bool] | None, photons_done: int
 ) -> Generator[Tally]:
-    """Tallies of the batches yet to do in their order, while a few more are on their way."""
+    """Yield the tallies of the remaining batches in order, while a few more are computed."""
     batches = iter(range(photons_done // BATCH_PHOTONS, -(-task.photons // BATCH_PHOTONS)))
     pending: deque[Future[Tally]] = deque()
     with thread_pool(threads, "sssfit-walk") as pool:
@@ -161,7 +162,8 @@ def _in_order(
             stopped = False
             while True:
                 stopped = stopped or (stop is not None and stop())
-                # Two a thread keep every core busy and bound the memory for any number of photons.
+                # Two per thread keep every core busy and limit the memory for any number of
+                # photons.
                 while not stopped and len(pending) < 2 * threads:
                     batch = next(batches, None)
                     if batch is None:
@@ -175,7 +177,7 @@ def _in_order(
 
 
 def _check_not_finished(checkpoint: Checkpoint, state: State, ending: Ending) -> None:
-    """Refuse to go on where a run asked for this from the start would have ended before."""
+    """Raise an error if a run with these settings from the start would have ended earlier."""
     done = state.tally.photons
     if done > ending.photons:
         why = f"more than the {ending.photons:,} asked for"
@@ -190,7 +192,7 @@ def _check_not_finished(checkpoint: Checkpoint, state: State, ending: Ending) ->
 
 
 def _check_target_is_reachable(task: Walk, photons: int, errors: FloatArray) -> None:
-    """Refuse a target error that a channel cannot reach, naming the channel."""
+    """Raise an error that names the channel if it cannot reach the target error."""
     names = [f"{each.name} {name}" for each in task.materials for name in each.channels]
     silent = [name for name, error in zip(names, errors, strict=True) if math.isinf(error)]
     if silent:

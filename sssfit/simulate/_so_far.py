@@ -1,7 +1,7 @@
 """The profiles of an unfinished photon walk, as if the run had ended at its checkpoint.
 
-A run saves its sums in a checkpoint (``_checkpoint``); a profile is made of them as it is at the
-end of a run, by ``_assemble``.
+A run saves its sums in a checkpoint (``_checkpoint``); ``_assemble`` makes a profile from them as
+at the end of a run.
 """
 
 from collections.abc import Mapping, Sequence
@@ -31,17 +31,17 @@ from sssfit.simulate.montecarlo import check_media, make_walk
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SoFar:
-    """Where a walk stood when its checkpoint was saved.
+    """State of a walk when its checkpoint was saved.
 
     Parameters
     ----------
     profiles : tuple of Profile
-        One for each material of the walk; ``meta["checkpoint"]`` has the format they came from,
-        and ``meta["version"]`` is None where another version of the walk made the sums.
+        One for each material of the walk; ``meta["checkpoint"]`` is the format of the checkpoint,
+        and ``meta["version"]`` is None if another version of the walk made the sums.
     flights : int
         Free paths walked.
     seconds : float [s]
-        Time of all sittings.
+        Time of all runs together.
     relative_error : float
         Largest standard error of F(r), as a share of F at the last edge, of the worst channel.
     """
@@ -66,14 +66,14 @@ class SoFar:
 def read_checkpoint(source: str | Path | BinaryIO, origin: str | None = None) -> SoFar:
     """Read a checkpoint from a path or a binary stream that can seek, and make its profiles.
 
-    Error messages call it ``origin``: if not given the path, or "the checkpoint" for a stream. A
-    grid whose radius was to be found ("auto") is not trimmed yet.
+    Error messages call it ``origin``, by default the path, or "the checkpoint" for a stream. A grid
+    with an automatic radius ("auto") is not trimmed yet.
 
     Raises
     ------
     FileError
-        One line that names the origin: missing, damaged, edited, foreign, of another format, or
-        saved before checkpoints kept their materials.
+        The file is missing, damaged, edited, foreign, of another format, or was saved before
+        checkpoints stored their materials; the one-line message names the origin.
     """
     if isinstance(source, str | Path):
         source, origin = Path(source), origin or str(source)
@@ -96,7 +96,7 @@ def read_checkpoint(source: str | Path | BinaryIO, origin: str | None = None) ->
 
 
 def _walk_of(meta: Mapping[str, Any]) -> Walk:
-    """Return the walk that a checkpoint is of; its materials must be those it was begun with."""
+    """Return the walk of a checkpoint, whose materials must be those it was started with."""
     settings, records = meta["settings"], meta.get("materials")
     if records is None:
         raise CheckpointError("was saved by a version that did not keep the materials in it")
@@ -126,6 +126,6 @@ def _grids(settings: Mapping[str, str]) -> Sequence[RadialGrid]:
 
 
 def _marked(profile: Profile, *, is_current: bool) -> Profile:
-    """Note where a profile comes from, and not our version where the sums are another's."""
+    """Record the provenance, and no version if another version made the sums."""
     meta = {**profile.meta, "checkpoint": FORMAT}
     return replace(profile, meta=meta if is_current else {**meta, "version": None})

@@ -1,9 +1,9 @@
-"""Normalised diffusion: a profile from reflectance and mean free path, as engines have it.
+"""Normalised diffusion: a profile from reflectance and mean free path, as engines use it.
 
 Christensen and Burley 2015, "Approximate reflectance profiles for efficient subsurface scattering":
-R_d(r) = A s (exp(-s r) + exp(-s r/3)) / (8 pi r) for every material, with s from one of three
-fits to photon walks (`sssfit.shapes`). A is the diffuse reflectance, what an artist calls the
-albedo of the surface; it is not the single-scattering albedo. All of A's energy is in the profile.
+R_d(r) = A s (exp(-s r) + exp(-s r/3)) / (8 pi r) for every material, with s from one of three fits
+to photon walks (`sssfit.shapes`). A is the diffuse reflectance, which artists call the albedo of
+the surface; it is not the single-scattering albedo. The profile holds all of A's energy.
 """
 
 from collections.abc import Callable, Mapping
@@ -29,7 +29,7 @@ from sssfit.simulate._deterministic import (
     half_space,
     warn_of_similarity,
 )
-from sssfit.simulate._semi_infinite import relative_eta
+from sssfit.simulate._walks import relative_eta
 from sssfit.simulate.exact import diffuse_reflectance
 
 MAPPINGS: Mapping[str, Callable[[npt.ArrayLike], FloatArray]] = MappingProxyType(
@@ -54,28 +54,28 @@ def simulate_burley(
     Parameters
     ----------
     material : Material
-        A homogeneous half space; any g (by sigma_s').
+        A homogeneous half space; any g (through sigma_s').
     mapping : str
-        Which fit gives s: "perpendicular" (light along the normal, as the other methods have it) or
-        "diffuse" (light from all sides), both over the mean free path 1 / sigma_t'; "diffuse-mfp",
-        over the diffuse mean free path 1 / sqrt(3 sigma_a sigma_t').
+        The fit that gives s: "perpendicular" (light along the normal, as in the other methods) or
+        "diffuse" (light from all directions), both relative to the mean free path 1 / sigma_t'; or
+        "diffuse-mfp", relative to the diffuse mean free path 1 / sqrt(3 sigma_a sigma_t').
     reflectance : (C,) or float, optional
-        A, the diffuse reflectance, 0 to 1; by default the exact one
-        of the material (a half second), which must then be as dense as what is above it.
+        A, the diffuse reflectance, 0 to 1; by default the exact one of the material (half a
+        second), whose index must then not be below that of the medium above.
     dr_mm, radius_mm : float, optional
-        Grid, as `sssfit.grid.make_grid` takes it [mm].
+        Grid, as in `sssfit.grid.make_grid` [mm].
 
     Returns
     -------
     Profile
-        Exact to rounding, for the model; standard errors are NaN. ``meta["settings"]`` holds
-        ``mapping``, ``reflectance`` and ``s_per_mm``.
+        The model to rounding; standard errors are NaN. ``meta["settings"]`` holds ``mapping``,
+        ``reflectance`` and ``s_per_mm``.
 
     Raises
     ------
     SimulationError
-        A slab or a stack, an unknown mapping, a reflectance out of range, "diffuse-mfp" where
-        nothing absorbs, or a grid that cannot be.
+        The material is a slab or a stack, the mapping is unknown, the reflectance is out of range,
+        "diffuse-mfp" is used without absorption, or the grid is invalid.
 
     Examples
     --------
@@ -118,7 +118,7 @@ def _reflectance(material: Material, layer: Layer, given: npt.ArrayLike | None) 
 
 
 def _own_reflectance(material: Material, layer: Layer) -> FloatArray:
-    """Diffuse reflectance by the exact solver (C,); g other than 0 by the similarity relation."""
+    """Return the exact diffuse reflectance (C,), for g other than 0 by the similarity relation."""
     eta = relative_eta(material)
     if eta < 1.0:
         raise SimulationError(
@@ -130,7 +130,7 @@ def _own_reflectance(material: Material, layer: Layer) -> FloatArray:
 
 
 def _scale_per_mm(material: Material, layer: Layer, mapping: str) -> FloatArray:
-    """Return what s is relative to (C,) [1/mm]: 1 over the mean free path that a mapping means."""
+    """Return the unit of s (C,) [1/mm]: the inverse of the mean free path that a mapping uses."""
     sigma_t = layer.reduced_sigma_t_per_mm
     if mapping != "diffuse-mfp":
         return sigma_t

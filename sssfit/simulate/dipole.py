@@ -1,17 +1,18 @@
 """The dipole: a half space as a point source below its surface and a negative one above.
 
 ``simulate_dipole`` is the classical one (Jensen, Marschner, Levoy, Hanrahan 2001, "A practical
-model for subsurface light transport"); ``simulate_dipole_grosjean`` takes Grosjean's diffusion
+model for subsurface light transport"); ``simulate_dipole_grosjean`` uses Grosjean's diffusion
 coefficient and the boundary condition of d'Eon and Irving 2011, "A quantized-diffusion model for
 rendering translucent materials". With z_v = z_r + 4 A D and d = sqrt(r^2 + z^2)
 
     R_d(r) = (1 - R_sp) alpha'/(4 pi) sum over z_r, z_v of z (1 + sigma_tr d) exp(-sigma_tr d) / d^3
 
-and the energy beyond r is (1 - R_sp) alpha'/2 times the sum of z exp(-sigma_tr d) / d: no profile
-is quadrature. The factor 1 - R_sp, which the paper keeps apart, makes it a share of the incident
-light. The dipole knows no single scattering: near the beam, where R_d ~ 1/r, it is finite.
+and the energy beyond r is (1 - R_sp) alpha'/2 times the sum of z exp(-sigma_tr d) / d, so no
+quadrature is needed. The factor 1 - R_sp, which the paper applies separately, makes it a share of
+the incident light. The dipole has no single scattering, so it is finite near the beam, where R_d ~
+1/r.
 
-Next: ``multipole.py`` for slabs and stacks, ``docs/theory.md`` for where it fails.
+Next: ``multipole.py`` for slabs and stacks, ``docs/theory.md`` for its errors.
 """
 
 import numpy as np
@@ -28,7 +29,7 @@ from sssfit.simulate._diffusion import (
     mismatch_by_moments,
     mismatch_by_polynomial,
 )
-from sssfit.simulate._semi_infinite import relative_eta
+from sssfit.simulate._walks import relative_eta
 
 
 def simulate_dipole(
@@ -39,20 +40,20 @@ def simulate_dipole(
     Parameters
     ----------
     material : Material
-        A homogeneous half space; any g (by sigma_s'), relative index 0.5 to 2.5.
+        A homogeneous half space; any g (through sigma_s'), relative index 0.5 to 2.5.
     dr_mm, radius_mm : float, optional
-        Grid, as `sssfit.grid.make_grid` takes it [mm].
+        Grid, as in `sssfit.grid.make_grid` [mm].
 
     Returns
     -------
     Profile
-        Exact to rounding, for the model. Standard errors are NaN: what the model lacks it does not
-        know (2 % of the total at albedo 0.99, 11 % at 0.75). Nor is it known what is absorbed.
+        The model to rounding. Standard errors are NaN, because the error of the model itself is
+        unknown (2 % of the total at albedo 0.99, 11 % at 0.75). The absorbed energy is unknown too.
 
     Raises
     ------
     SimulationError
-        A slab or a stack, an index out of range, or a grid that cannot be.
+        The material is a slab or a stack, its index is out of range, or the grid is invalid.
 
     Examples
     --------
@@ -70,10 +71,10 @@ def simulate_dipole_grosjean(
 ) -> Profile:
     """Return the profile of the dipole with Grosjean's coefficient and the moments' boundary.
 
-    Parameters, result and errors are those of `simulate_dipole`, except that the index may be
-    any. Above an albedo of 0.98 totals are good to 1 %; below 0.95 they are worse than the
-    classical ones (23 % high at 0.73), for Grosjean's theory keeps light scattered once apart from
-    the diffuse light, which then is alpha' fainter, and the dipole has no such part.
+    Parameters, result and errors are those of `simulate_dipole`, except that the index may be any.
+    Above an albedo of 0.98 totals are good to 1 %; below 0.95 they are worse than the classical
+    ones (23 % too high at 0.73), because Grosjean's theory separates single scattering from the
+    diffuse light, which is then fainter by a factor alpha', and the dipole has no such part.
 
     Examples
     --------
@@ -87,7 +88,7 @@ def simulate_dipole_grosjean(
 
 
 def dipole_beyond(r_mm: FloatArray, medium: Diffusion, boundary: float) -> FloatArray:
-    """Energy that a dipole sends out beyond each radius (k, C), of 1 that entered."""
+    """Return the share of the entering light that leaves beyond each radius (k, C)."""
     r_mm = r_mm[:, None]
     beyond = np.zeros((len(r_mm), medium.albedo.size))
     for depth_mm in (

@@ -1,13 +1,14 @@
-"""The exact profile of a half space: the transport equation solved, not sampled.
+"""The exact profile of a half space: solves the transport equation instead of sampling it.
 
-Isotropic scattering in a homogeneous medium without a bottom, lit by a pencil beam along the
-normal. Light scattered once has a closed form (``_single``); the rest is solved wavenumber by
-wavenumber along the surface (``_depth``) and brought back to radii as a mixture of Bessel functions
-(``_mixture``), which gives F(r) at the edges of any grid. Channels and materials of one refractive
-index share wavenumbers and kernel matrices: in mean free paths only the albedo tells them apart.
+The model is isotropic scattering in a homogeneous medium without a bottom, lit by a pencil beam
+along the normal. Single scattering has a closed form; the rest is solved for each wavenumber along
+the surface (``_depth``) and transformed back to radii as a mixture of Bessel functions
+(``_mixture``, which also has single scattering). This gives F(r) at the edges of any grid. Channels
+and materials of one refractive index share wavenumbers and kernel matrices: in mean free paths only
+the albedo tells them apart.
 
-The error estimate is the largest difference between two resolutions, each some ten times finer
-than the one before; it belongs to the coarser of the two, and the finer one is what is returned.
+The error estimate is the largest difference between two resolutions, each about ten times finer
+than the one before. It belongs to the coarser of the two, and the finer one is returned.
 
 Scattering with g other than 0 is replaced by isotropic scattering of the reduced coefficient
 sigma_s' = (1 - g) sigma_s (similarity relation; van de Hulst 1980, chapter 14): an approximation.
@@ -28,7 +29,8 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
-from sssfit.optics import normal_transmittance
+from sssfit.optics import entering_of_diffuse, normal_transmittance
+from sssfit.process import available_cores
 from sssfit.profile import Profile
 from sssfit.simulate._depth import (
     Resolution,
@@ -48,27 +50,25 @@ from sssfit.simulate._mixture import (
     single_scattering_beyond,
     single_scattering_of_diffuse_light,
 )
-from sssfit.simulate._semi_infinite import relative_eta
-from sssfit.simulate._surface import entering_of_diffuse
-from sssfit.threads import available_cores
+from sssfit.simulate._walks import relative_eta
 
 Light = Literal["normal", "diffuse"]
 LIGHTS: tuple[Light, ...] = get_args(Light)
 
 DEFAULT_TOLERANCE = 1e-4
 _LARGEST_ETA = 4.0
-_BEST_GAIN = 100.0  # a level's error against the one before; 2 to 50 were seen
-_ROUNDING = 1e-14  # of the energy balance, whose terms are near 1 however small the albedo
+_BEST_GAIN = 100.0  # a level's error relative to the one before; 2 to 50 were seen
+_ROUNDING = 1e-14  # error of the energy balance, whose terms are near 1 for any albedo
 _LARGEST_FLOOR = 1e-2  # of the rates, for grids within one mean free path
 
 
 @dataclass(frozen=True, slots=True)
 class _Level:
-    """One resolution: of the depth equation, of wavenumbers and of single scattering."""
+    """One resolution of the depth equation, of the wavenumbers and of single scattering."""
 
     depth: Resolution
     largest: float  # wavenumber [1/MFP]
-    density: float  # wavenumbers in a unit of asinh(k / k0)
+    density: float  # wavenumbers per unit of asinh(k / k0)
     single_step: float
 
 
@@ -95,17 +95,17 @@ def simulate_exact(
     Parameters
     ----------
     material : Material
-        One layer without a bottom, at least as dense optically as what is above it; for g other
+        One layer without a bottom, whose index is not below that of the medium above; for g other
         than 0 the similarity relation is used.
     dr_mm, radius_mm : float, optional
-        Grid, as ``sssfit.grid.make_grid`` has it.
+        Grid, as in ``sssfit.grid.make_grid``.
     tolerance : float
         Largest error of F(r) at an annulus edge, and of the total, as a share of the total; above
         0 and below 1.
     threads : int, optional
         Threads to use; all cores by default. The result does not depend on them.
     stop : callable, optional
-        Asked now and then; once true, StoppedError is raised.
+        Called at intervals; StoppedError is raised when it returns true.
 
     Returns
     -------
@@ -115,15 +115,15 @@ def simulate_exact(
     Raises
     ------
     SimulationError
-        A layered or finite medium, one thinner optically than what is above it, settings out of
-        range, or a tolerance that the finest resolution does not meet.
+        The medium is layered or finite, or its index is below that of the medium above; settings
+        are out of range; or the finest resolution does not meet the tolerance.
     StoppedError
-        ``stop`` said so.
+        ``stop`` returned true.
 
     Warns
     -----
     SssfitWarning
-        g is not 0: the result is an approximation.
+        g is not 0, so the result is an approximation.
 
     References
     ----------
@@ -148,7 +148,7 @@ def simulate_exact_many(
     threads: int | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> list[Profile]:
-    """Solve for several materials; those of one relative refractive index share the work.
+    """Solve for several materials; those with the same relative refractive index share the work.
 
     Parameters and errors are those of ``simulate_exact``. Returns the profiles in the order of
     ``materials``; they differ from those of single runs by less than their error estimates.
@@ -162,8 +162,8 @@ def simulate_exact_many(
     for k, material in enumerate(materials):
         groups.setdefault(relative_eta(material), []).append(k)
     profiles: dict[int, Profile] = {}
-    # One BLAS thread for each of ours: matrices of 100 to 400 rows gain nothing from more, and
-    # where another process keeps a core busy its waiting threads made skin1 take 14 s, not 1.8.
+    # One BLAS thread for each of ours: matrices of 100 to 400 rows do not profit from more, and
+    # with another process on one core BLAS's waiting threads made skin1 take 14 s instead of 1.8.
     from scipy import optimize, special  # noqa: F401 (before the threads, which need them)
 
     with thread_pool(threads) as pool, threadpool_limits(1, user_api="blas"):
@@ -175,7 +175,7 @@ def simulate_exact_many(
 
 
 def is_solver_compiled() -> bool:
-    """Whether the solver can start at once; else its first use compiles, some 3 s."""
+    """Return whether the solver can start at once; otherwise it first compiles, about 3 s."""
     return compiled_before("transport", "kernel_matrix")
 
 
@@ -187,22 +187,22 @@ def diffuse_reflectance(
     Parameters
     ----------
     albedo : array (N,)
-        0 to 1.
+        Albedos, 0 to 1.
     eta : float
         Relative refractive index, 1 to 4.
     light : "normal" or "diffuse"
-        What it is lit by: a beam along the normal, or the same radiance from everywhere above.
+        The incident light: a beam along the normal, or equal radiance from all directions above.
 
     Returns
     -------
     (N,) array
-        A share of the incident light, good to 1e-8 (5e-8 for indices from 1 to 1.001); specular
-        reflection is not part of it: albedo 1 gives `entering_light`.
+        Share of the incident light, good to 1e-8 (5e-8 for indices from 1 to 1.001), without
+        specular reflection: albedo 1 gives `entering_light`.
 
     Raises
     ------
     SimulationError
-        An albedo or index out of range, or a light of another name.
+        An albedo or index is out of range, or the light is unknown.
     """
     albedos = np.atleast_1d(np.asarray(albedo, dtype=np.float64))
     if not ((albedos >= 0.0) & (albedos <= 1.0)).all():
@@ -221,7 +221,7 @@ def diffuse_reflectance(
 
 
 def entering_light(eta: float, light: Light = "normal") -> float:
-    """Return 1 - R_sp, the share of the incident light that the surface lets in.
+    """Return 1 - R_sp, the share of the incident light that enters.
 
     Parameters and errors are those of `diffuse_reflectance`. R_sp is ((eta - 1)/(eta + 1))^2 for
     normal light; for diffuse light 2 int_0^1 R_F(mu) mu dmu seen from outside (Duntley 1942).
@@ -232,7 +232,7 @@ def entering_light(eta: float, light: Light = "normal") -> float:
 
 @dataclass(frozen=True, slots=True)
 class _Workers:
-    """Threads, and when to stop them."""
+    """Threads, and the condition that stops them."""
 
     pool: ThreadPoolExecutor
     stop: Callable[[], bool] | None
@@ -240,7 +240,7 @@ class _Workers:
     def respond(
         self, wavenumbers: FloatArray, eta: float, albedos: FloatArray, resolution: Resolution
     ) -> list[Response]:
-        """Solve the depth equation for each wavenumber; StoppedError once ``stop`` says so."""
+        """Solve the depth equation for each wavenumber; StoppedError when ``stop`` returns true."""
 
         def one(k: float) -> Response:
             if self.stop is not None and self.stop():
@@ -252,7 +252,7 @@ class _Workers:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Channel:
-    """One colour of one material in mean free paths: what is asked for."""
+    """The problem for one channel of one material, in mean free paths."""
 
     albedo: float
     radii_mfp: FloatArray
@@ -274,7 +274,7 @@ def _solve_group(
     tolerance: float,
     workers: _Workers,
 ) -> list[Profile]:
-    """Refine until two resolutions agree for every channel; profiles of the finer."""
+    """Refine until two resolutions agree for every channel; return the finer profiles."""
     channels = [
         _Channel(albedo, grid.r_edges_mm * sigma_t)
         for material, grid in zip(materials, grids, strict=True)
@@ -302,8 +302,8 @@ def _solve(
     """Solve all channels at one resolution."""
     albedos, places = np.unique([each.albedo for each in channels], return_inverse=True)
     rates = [decay_rate(albedo) for albedo in albedos]
-    # A hundred times the grid's radius is as good as infinity: wavenumbers need not resolve it,
-    # and rates under a thousandth of theirs differ in what leaves there alone.
+    # A hundred times the grid's radius counts as infinity: wavenumbers need not resolve it, and
+    # rates under a thousandth of theirs differ only in the light that leaves there.
     floor = min(0.01 / max(float(each.radii_mfp[-1]) for each in channels), _LARGEST_FLOOR)
     slowest = np.maximum(rates, 1e-3 * floor)
     wavenumbers = _wavenumbers(max(float(slowest.min()), floor), level)
@@ -329,7 +329,7 @@ def _wavenumbers(slowest: float, level: _Level) -> FloatArray:
 
 
 def _errors(fine: _Solution, coarse: _Solution) -> FloatArray:
-    """Error of F at the edges but the first (r = 0), and of the total; (n+1,)."""
+    """Return the error of F at all edges except the first (r = 0), and of the total; (n+1,)."""
     difference = fine.beyond - coarse.beyond
     of_cumulative = np.abs(difference[0] - difference[1:])
     errors = np.append(of_cumulative, abs(float(difference[0])))
@@ -338,15 +338,16 @@ def _errors(fine: _Solution, coarse: _Solution) -> FloatArray:
 
 
 def _share(errors: FloatArray, answer: _Solution) -> float:
-    """Return the largest error as a share of the total; 0 where nothing scatters."""
+    """Return the largest error as a share of the total; 0 without scattering."""
     total = float(answer.beyond[0])
     return float(np.max(errors)) / total if total > 0.0 else 0.0
 
 
 def _stderr(fine: _Solution, coarse: _Solution, errors: FloatArray) -> FloatArray:
-    """Errors of the annuli and beyond the grid, (n+1,), whose squares add up to those of F.
+    """Return errors of the annuli and beyond the grid, (n+1,), whose squares add up to those of F.
 
-    None is under the annulus's own difference, nor the sum up to any edge under F's error there.
+    Each is at least the annulus's own difference, and the sum up to any edge at least F's error
+    there.
     """
     largest = np.maximum.accumulate(errors)
     steps = np.diff(np.concatenate(([0.0], largest**2)))
@@ -363,7 +364,7 @@ def _profiles(
     errors: Sequence[FloatArray],
     tolerance: float,
 ) -> list[Profile]:
-    """Put the channels' answers together again."""
+    """Assemble the solutions of the channels into profiles."""
     profiles, first = [], 0
     for material, grid in zip(materials, grids, strict=True):
         own = slice(first, first + material.n_channels)
@@ -398,7 +399,7 @@ def _reduced(material: Material) -> tuple[list[float], list[float]]:
 
 
 def _check_settings(tolerance: float, threads: int) -> None:
-    """Refuse settings out of range, one line each."""
+    """Check the settings; each error is one line."""
     if not 0.0 < tolerance < 1.0:
         raise SimulationError(f"tolerance = {tolerance}; give a share of the total, 0 to 1.")
     if threads < 1:
@@ -406,7 +407,7 @@ def _check_settings(tolerance: float, threads: int) -> None:
 
 
 def _check_light(eta: float, light: str) -> None:
-    """Refuse an index out of range and a light that is not known."""
+    """Check the index and the light."""
     if not 1.0 <= eta <= _LARGEST_ETA:
         raise SimulationError(f"eta = {eta:g}; expected a relative refractive index from 1 to 4.")
     if light not in LIGHTS:
@@ -414,7 +415,7 @@ def _check_light(eta: float, light: str) -> None:
 
 
 def _check_medium(material: Material) -> None:
-    """Refuse what the equation does not cover, naming what would do; warn of similarity."""
+    """Raise an error, with another method, if this one does not apply; warn of similarity."""
     layer = half_space(material, "exact")
     eta = relative_eta(material)
     if not 1.0 <= eta <= _LARGEST_ETA:

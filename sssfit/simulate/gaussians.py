@@ -1,8 +1,8 @@
-"""Sums of Gaussians as profiles: what skin was published as, and anything of that form.
+"""Sums of Gaussians as profiles: the published skin, and any other sum.
 
-d'Eon, Luebke and Enderton 2007, "Efficient rendering of human skin", gave the skin of a face as six
-Gaussians, and shaders have used them since. R_d(r) = sum_i w_i exp(-r^2 / 2 v_i) / (2 pi v_i) has
-no coefficients behind it: the profile holds a name and a source in place of a material.
+d'Eon, Luebke and Enderton 2007, "Efficient rendering of human skin", described the skin of a face
+by six Gaussians, which shaders have used since. R_d(r) = sum_i w_i exp(-r^2 / 2 v_i) / (2 pi v_i)
+has no coefficients; the profile holds a name and a source in place of a material.
 """
 
 from collections.abc import Sequence
@@ -19,12 +19,12 @@ from sssfit.profile import Profile
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS, gaussian_between, gaussian_beyond
 from sssfit.simulate._deterministic import ROUNDING, ProfileSource, computed_profile
 
-_MOST_TOTAL = 1.0 + 1e-6  # published weights are rounded, but not by more
+_MOST_TOTAL = 1.0 + 1e-6  # published weights are rounded, but by no more than this
 _LEAST_VARIANCE, _MOST_VARIANCE = 1e-18, 1e18  # mm^2
 
 
 def checked_name(name: str, source: str | None, channels: Sequence[str]) -> ProfileSource:
-    """Return what stands for the material, or refuse names that a material could not have."""
+    """Return the record that replaces the material; raises an error for invalid names."""
     try:
         check_texts(name, "" if source is None else source)
         check_names(channels)
@@ -36,7 +36,7 @@ def checked_name(name: str, source: str | None, channels: Sequence[str]) -> Prof
 def checked_numbers(
     variances_mm2: npt.ArrayLike, weights: npt.ArrayLike, n_channels: int
 ) -> tuple[FloatArray, FloatArray]:
-    """Return variances (N,) and weights (N, C), or say in one line what is wrong with them."""
+    """Return variances (N,) and weights (N, C) as arrays, or raise a one-line error."""
     variances, shares = _numbers("variances_mm2", variances_mm2), _numbers("weights", weights)
     if variances.ndim != 1 or variances.size == 0:
         raise SimulationError(
@@ -77,16 +77,16 @@ def _numbers(key: str, values: npt.ArrayLike) -> FloatArray:
 
 DEON_SKIN = ProfileSource("deon-skin", "d'Eon, Luebke, Enderton 2007", ("R", "G", "B"))
 
-_RINGS_PER_SIGMA = 10  # of the narrowest: pixels of 2.5 rings then have their energy to 3e-4
+_RINGS_PER_SIGMA = 10  # of the narrowest: the energy of pixels of 2.5 annuli is then right to 3e-4
 _MOST_BEYOND = 1e-9
 
 
 def simulate_deon_skin(*, dr_mm: float | None = None, radius_mm: float | None = None) -> Profile:
     """Return the skin of a face, the six Gaussians of d'Eon, Luebke and Enderton 2007.
 
-    Every channel returns all of the light: the model leaves the colour of skin to a texture. By
-    default 2151 annuli of 0.008 mm, to 17.208 mm, beyond which lies 1.6e-10 of R. Takes the grid,
-    and raises, as `simulate_gaussians`.
+    Every channel returns all of the light: the model takes the colour of skin from a texture. By
+    default 2151 annuli of 0.008 mm, to 17.208 mm, beyond which lies 1.6e-10 of R. Grid and errors
+    are those of `simulate_gaussians`.
 
     Examples
     --------
@@ -114,37 +114,36 @@ def simulate_gaussians(
     radius_mm: float | None = None,
     source: str | None = None,
 ) -> Profile:
-    """Return the profile that is a sum of Gaussians in the plane.
+    """Return the profile of a sum of Gaussians in the plane.
 
     Parameters
     ----------
     variances_mm2 : (N,) [mm^2]
-        Per axis, above 0; the same for all channels.
+        Variances per axis, above 0; the same for all channels.
     weights : (N, C)
-        Energy of each Gaussian; negative ones may cancel others, but R_d may not go below 0.
+        Energy of each Gaussian. Negative ones may cancel others, but R_d must not be negative.
     name : str
-        What the profile is called, fit for a file name.
+        Name of the profile, suitable as a file name.
     channels : sequence of str
-        Their C names.
+        Names of the C channels.
     dr_mm : float, optional
         Width of an annulus [mm]; by default a tenth of the narrowest standard deviation.
     radius_mm : float, optional
-        Radius to be covered [mm]; by default such that under 1e-9 of any channel lies beyond.
+        Outer radius of the grid [mm]; by default under 1e-9 of any channel lies beyond it.
     source : str, optional
-        Where the numbers come from.
+        Source of the numbers.
 
     Returns
     -------
     Profile
-        Exact to rounding of every annulus, however faint; standard errors are NaN, specular
+        Exact to rounding in every annulus, even in faint ones; standard errors are NaN, specular
         reflectance 0 and absorption unknown. ``meta["material"]`` has ``name`` and ``source``, and
         ``meta["settings"]`` the ``variances_mm2`` and ``weights``.
 
     Raises
     ------
     SimulationError
-        Numbers that cannot be, light below 0 or of more than 1, names that cannot be used, a grid
-        that cannot be.
+        Numbers, names or the grid are invalid, or the light is below 0 or above 1.
 
     Examples
     --------
@@ -164,7 +163,7 @@ def simulate_gaussians(
 
 
 def _not_negative(energies: FloatArray, weights: FloatArray, named: ProfileSource) -> FloatArray:
-    """Refuse R_d below 0 where negative weights outdo the others; rounding becomes 0."""
+    """Raise an error if R_d is negative; rounding errors become 0."""
     is_wrong = energies < -ROUNDING * np.abs(weights).max()
     if is_wrong.any():
         k, c = (int(each[0]) for each in np.nonzero(is_wrong))
@@ -178,7 +177,7 @@ def _not_negative(energies: FloatArray, weights: FloatArray, named: ProfileSourc
 def _grid(
     variances: FloatArray, weights: FloatArray, dr_mm: float | None, radius_mm: float | None
 ) -> RadialGrid:
-    """Return the grid; by default each of N Gaussians leaves under 1e-9 / N beyond it."""
+    """Return the grid; by default each of N Gaussians has under 1e-9 / N beyond it."""
     sigmas_mm = np.sqrt(variances)
     if dr_mm is None:
         dr_mm = float(sigmas_mm.min()) / _RINGS_PER_SIGMA

@@ -1,12 +1,12 @@
 """Albedo inversion: from a diffuse reflectance to a material that has it.
 
 The total diffuse reflectance R of a homogeneous half space depends on its albedo a, its refractive
-index and the light that falls on it. What is asked for is R under normally incident light, as the
-profile of a pencil beam has it, or a base colour: the share that comes back of diffuse light that
-entered, R_d / (1 - R_sp), as a renderer shows it in a white furnace. The exact solver gives R(a) to
-1e-8, and a root finder turns it round. In s = sqrt(1 - a), R is smooth and nearly straight all the
-way to s = 0, where in a its slope is infinite. The formulas that renderers use stand beside it:
-they are right for diffuse light and no surface. Next: ``sssfit.simulate.exact``.
+index and the incident light. The input is R under normally incident light, as in the profile of a
+pencil beam, or a base colour: the share of the entering diffuse light that comes back, R_d / (1 -
+R_sp), as a renderer shows it in a white furnace. The exact solver gives R(a) to 1e-8, and a root
+finder inverts it. As a function of s = sqrt(1 - a), R is smooth and nearly linear down to s = 0,
+where its slope by a is infinite. For comparison, the module has the formulas that renderers use,
+which are right for diffuse light without a surface. Next: ``sssfit.simulate.exact``.
 
 Not imported with the other methods: scipy.optimize takes 0.2 s to load.
 """
@@ -29,16 +29,16 @@ from sssfit.optics import normal_transmittance
 from sssfit.simulate.exact import LIGHTS, Light, diffuse_reflectance, entering_light
 
 SKIN_ETA = 1.4  # d'Eon and Luebke 2007, GPU Gems 3, chapter 14: .028 at normal incidence
-_CLOSE = 1e-8  # in reflectance; what the exact solver itself is good for
+_CLOSE = 1e-8  # in reflectance; the precision of the exact solver
 _ASKED = {"normal": "diffuse reflectance", "diffuse": "base colour under diffuse light"}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Inversion:
-    """Albedos (C,) that a method finds for diffuse reflectances, and what these really reflect.
+    """Albedos (C,) found for diffuse reflectances, and the reflectances that they really have.
 
     ``reflectance`` (C,) is that of the exact solver, under the same light; for the exact inversion
-    it is what was asked.
+    it equals the input.
     """
 
     albedo: FloatArray
@@ -46,18 +46,18 @@ class Inversion:
 
 
 def reflectance_of(albedo: npt.ArrayLike, eta: float, light: Light = "normal") -> FloatArray:
-    """Return what is asked for in an inversion, by the exact solver.
+    """Return the reflectance that an inversion takes, by the exact solver.
 
     Parameters
     ----------
     albedo : (C,)
-        0 to 1; g = 0.
+        Albedos, 0 to 1, with g = 0.
     eta : float
         Refractive index relative to what is above.
     light : "normal" or "diffuse"
         "normal": the total diffuse reflectance R_d under light along the normal, a share of the
-        incident light. "diffuse": the base colour R_d / (1 - R_sp), R_d and R_sp under the same
-        radiance from everywhere above; a share of the light that enters.
+        incident light. "diffuse": the base colour R_d / (1 - R_sp), R_d and R_sp under equal
+        radiance from all directions above; a share of the light that enters.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def reflectance_of(albedo: npt.ArrayLike, eta: float, light: Light = "normal") -
     Raises
     ------
     SimulationError
-        An argument out of range.
+        An argument is out of range.
     """
     total = diffuse_reflectance(albedo, eta, light=light)
     return total / entering_light(eta, light) if light == "diffuse" else total
@@ -75,7 +75,7 @@ def reflectance_of(albedo: npt.ArrayLike, eta: float, light: Light = "normal") -
 def largest_reflectance(eta: float, light: Light = "normal") -> float:
     """Return `reflectance_of` albedo 1, where all light that enters comes back.
 
-    What of a normal beam is not reflected specularly; 1 under diffuse light.
+    Under normal light this is 1 less the specular reflectance; under diffuse light it is 1.
     """
     return 1.0 if light == "diffuse" else normal_transmittance(eta)
 
@@ -83,18 +83,18 @@ def largest_reflectance(eta: float, light: Light = "normal") -> float:
 def invert_reflectance(
     reflectance: npt.ArrayLike, eta: float, *, light: Light = "normal"
 ) -> Inversion:
-    """Find the albedos of total diffuse reflectances, g = 0, by the exact solver.
+    """Find the albedos for total diffuse reflectances, g = 0, with the exact solver.
 
     Solves R(1 - s^2) = reflectance for s in [0, 1], all channels at once, to 1e-8 in R.
 
     Parameters
     ----------
     reflectance : (C,) [1]
-        As in `reflectance_of`: from 0 to `largest_reflectance`.
+        Reflectances as in `reflectance_of`, from 0 to `largest_reflectance`.
     eta : float
         Refractive index relative to what is above.
     light : "normal" or "diffuse"
-        Which light the reflectance is meant for; base colours mean diffuse light.
+        The incident light of the reflectance; base colours are defined for diffuse light.
 
     Returns
     -------
@@ -103,8 +103,8 @@ def invert_reflectance(
     Raises
     ------
     MaterialError
-        A reflectance that no albedo gives; the message names the largest that one does. A light
-        of another name.
+        No albedo gives the reflectance; the message names the largest possible one. Or the light is
+        unknown.
 
     Examples
     --------
@@ -115,7 +115,7 @@ def invert_reflectance(
     """
     asked = _reachable(reflectance, eta, light)
     darkest, brightest = reflectance_of(np.array([0.0, 1.0]), eta, light)
-    # The solver's last digits may put its own ends a hair inside; the root is then that end.
+    # Rounding may place the solver's end values slightly inside; the root is then that end.
     aim = np.clip(asked, darkest, brightest)
 
     def excess(s: FloatArray, /, wanted: FloatArray) -> FloatArray:
@@ -131,7 +131,7 @@ def invert_reflectance(
 def published_inversions(
     reflectance: npt.ArrayLike, eta: float, *, light: Light = "normal"
 ) -> dict[str, Inversion]:
-    """Return what the approximate inversions of renderers give, and what that really reflects.
+    """Return the albedos of the approximate inversions of renderers, and their true reflectances.
 
     Parameters and errors are those of `invert_reflectance`; keys are "chiang2016" and
     "van_de_hulst". The latter takes the share of the light that enters.
@@ -151,7 +151,7 @@ def published_inversions(
 
 
 def chiang_albedo(reflectance: FloatArray) -> FloatArray:
-    """Albedo for a surface reflectance A (C,), a fit to simulations that knows no index.
+    """Return the albedo for a surface reflectance A (C,), a fit to simulations without an index.
 
     a = 1 - exp(-5.09406 A + 2.61188 A^2 - 4.31805 A^3): Chiang, Kutz and Burley 2016, "Practical
     and controllable subsurface scattering for production path tracing", SIGGRAPH talks.
@@ -162,11 +162,11 @@ def chiang_albedo(reflectance: FloatArray) -> FloatArray:
 
 
 def van_de_hulst_albedo(colour: FloatArray, g: float = 0.0) -> FloatArray:
-    """Albedo for a multiple-scattering albedo C (C,), index-matched.
+    """Return the albedo for a multiple-scattering albedo C (C,), index-matched.
 
     s = 4.09712 + 4.20863 C - sqrt(9.59217 + 41.6808 C + 17.7126 C^2), a = (1 - s^2) / (1 - g s^2):
-    van de Hulst's C = (1 - s)(1 - 0.139 s) / (1 + 1.17 s) turned round by Kulla and Conty 2017, as
-    in the OpenPBR specification 1.1, where C is the share of the light that *enters*.
+    van de Hulst's C = (1 - s)(1 - 0.139 s) / (1 + 1.17 s) inverted by Kulla and Conty 2017, as in
+    the OpenPBR specification 1.1, where C is the share of the light that *enters*.
     """
     root = np.sqrt(9.59217 + colour * (41.6808 + colour * 17.7126))
     # Rounded coefficients: s is 0.999997 at C = 0 and -5e-6 at C = 1.
@@ -184,33 +184,34 @@ def material_from_reflectance(
     channels: Sequence[str] = ("R", "G", "B"),
     light: Light | None = None,
 ) -> Material:
-    """Make the half space, g = 0, whose total diffuse reflectance is what was asked for.
+    """Make the half space, g = 0, that has a given total diffuse reflectance.
 
     Parameters
     ----------
     reflectance : (C,) [1] or str
-        As in `invert_reflectance`; or an sRGB colour in hex, "#c58c6b", which is decoded.
+        Reflectances as in `invert_reflectance`, or an sRGB colour in hex, "#c58c6b", which is
+        decoded.
     mean_free_path_mm : (C,) or float [mm]
-        1 / (sigma_a + sigma_s); one serves all channels.
+        1 / (sigma_a + sigma_s), by channel or one for all.
     eta : float
-        By default that of skin and most that lives, 1.4.
+        By default 1.4, that of skin and most living tissue.
     name : str
     channels : sequence of str
-        C names.
+        Names of the C channels.
     light : "normal" or "diffuse", optional
         As in `invert_reflectance`; by default "diffuse" for a colour in hex, else "normal".
 
     Returns
     -------
     Material
-        Its ``source`` says which reflectance was asked for, and under which light.
+        Its ``source`` names the given reflectance and its light.
 
     Raises
     ------
     MaterialError
-        As `invert_reflectance`, or lists that differ in length, or a value that no material has.
+        As `invert_reflectance`; or lists differ in length, or a value is invalid for a material.
     """
-    check_texts(name, "")  # all that can be wrong is said before the seconds of work
+    check_texts(name, "")  # raises all errors before seconds of work
     check_names(channels)
     meant = ""
     if isinstance(reflectance, str):
@@ -227,7 +228,7 @@ def material_from_reflectance(
             f"{paths_mm.size} mean free paths for {asked.size} reflectances; give as many, or one "
             "for all."
         )
-    if not ((paths_mm >= 1e-9) & (paths_mm <= 1e9)).all():  # of coefficients of a material
+    if not ((paths_mm >= 1e-9) & (paths_mm <= 1e9)).all():  # limit of coefficients of a material
         raise MaterialError(
             f"mean free paths {paths_mm.tolist()}; expected lengths from 1e-9 to 1e9 mm."
         )
@@ -242,13 +243,14 @@ def material_from_reflectance(
 
 
 def _reachable(reflectance: npt.ArrayLike, eta: float, light: str) -> FloatArray:
-    """Return the reflectances as an array (C,); refuse those that no albedo gives."""
+    """Return the reflectances as an array (C,); raises for those that no albedo gives."""
     asked = np.atleast_1d(np.asarray(reflectance, dtype=np.float64))
     if asked.ndim > 1 or asked.size == 0:
         raise MaterialError(f"reflectance has shape {asked.shape}; expected one number a channel.")
     if light not in LIGHTS:
         raise MaterialError(f"light = {light!r}; expected {' or '.join(LIGHTS)}.")
-    if number("eta", eta) < 1.0:  # a material may have less; the exact solver takes no less
+    # A material may have less, but the exact solver does not accept less.
+    if number("eta", eta) < 1.0:
         raise MaterialError(f"eta = {eta:g}; expected a relative refractive index from 1 to 4.")
     most = largest_reflectance(eta, light)
     where = "under diffuse light" if light == "diffuse" else f"at eta = {eta:g}"

@@ -1,10 +1,10 @@
 """Photon walks: the diffuse reflectance profile by Monte Carlo, with standard errors.
 
 The walks are compiled (``sssfit._jit.semi_infinite`` and ``layered``, after Wang, Jacques and Zheng
-1995, "MCML"); this file picks one and turns what comes back into profiles. Photons are
-split into batches of ``BATCH_PHOTONS``; every batch has its own random streams and its own tallies,
-and the tallies are added in the order of the batches. So the same seed gives the same bits on any
-number of threads, and a run stopped after k batches equals one of k ``BATCH_PHOTONS`` photons.
+1995, "MCML"); this file picks one and turns its sums into profiles. Photons are split into batches
+of ``BATCH_PHOTONS``; every batch has its own random streams and its own tallies, and the tallies
+are added in the order of the batches. The same seed therefore gives the same bits on any number of
+threads, and a run stopped after k batches equals one of k ``BATCH_PHOTONS`` photons.
 
 Standard errors come from squared weights: a photon leaves through one annulus at most, so with
 weights w the energy of an annulus is sum(w)/N and its variance (sum(w^2)/N - energy^2)/(N - 1).
@@ -20,18 +20,19 @@ from sssfit._jit import compiled_before
 from sssfit.errors import SimulationError, SssfitWarning, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
+from sssfit.process import available_cores
 from sssfit.profile import Profile
 from sssfit.simulate._batches import Walk, relative_errors
 from sssfit.simulate._checkpoint import Checkpoint, settings_of
 from sssfit.simulate._finished import AUTO_BEYOND, ending_of, profile_of, share_beyond, whole
-from sssfit.simulate._layered import LayeredWalk
 from sssfit.simulate._run import Ending, Progress, run
-from sssfit.simulate._semi_infinite import SemiInfiniteWalk, relative_eta
-from sssfit.threads import available_cores
+from sssfit.simulate._walks import LayeredWalk, SemiInfiniteWalk, relative_eta
 
-HONEST_PHOTONS = 1000  # below, a channel may rest on a handful of hits and its error on luck
+# With fewer, a channel may have a handful of hits, and its error estimate is unreliable.
+HONEST_PHOTONS = 1000
 PILOT_PHOTONS = 200_000
-# Beyond, single precision no longer resolves the peak (see ``sample_hg``, made for a forward one).
+# Beyond these, single precision does not resolve the peak (see ``sample_hg``, which is made for a
+# forward one).
 LEAST_G, MOST_G = -0.99, 0.9999
 
 
@@ -50,15 +51,16 @@ def simulate_montecarlo(
 ) -> Profile:
     """Trace photons through a material: a half space, a slab or a stack of layers.
 
-    A homogeneous half space with g = 0 takes the fast walk, which serves all channels at once;
-    anything else takes the layered one, where channels share a walk if only absorption differs.
+    A homogeneous half space with g = 0 uses the fast walk, which gives all channels at once;
+    everything else uses the layered walk, where channels share a walk if they differ in absorption
+    only.
 
     Parameters
     ----------
     material : Material
         Any stack of layers that ``Material`` accepts, g from -0.99 to 0.99.
     photons : int, optional
-        Number of walks, 2 to 1e12; by default the paper's 1e7, with a target error 1e12.
+        Number of walks, 2 to 1e12; by default the paper's 1e7, or 1e12 with a target error.
     seed : int
         The same seed gives the same bits on any number of threads.
     threads : int, optional
@@ -67,40 +69,40 @@ def simulate_montecarlo(
         Width of an annulus [mm]; by default the shortest mean free path / 20.
     radius_mm : float or "auto", optional
         Outer radius of the grid [mm]; by default 32 times the longest mean free path. "auto"
-        grows it until less than 0.1 % of any channel's diffuse reflectance lies beyond.
+        enlarges it until less than 0.1 % of any channel's diffuse reflectance lies beyond.
     target_error : float, optional
         End when, for every channel, the largest standard error of F(r) over the annulus edges is
-        under this share (0 to 1) of F at the last edge. Looked at after numbers of batches fixed
-        beforehand, 1/64 to 1/32 apart: the end depends on the seed alone. Channels that do not
-        scatter are left out.
+        under this share (0 to 1) of F at the last edge. Checked after fixed numbers of batches,
+        1/64 to 1/32 apart, so the end depends only on the seed. Channels that do not scatter are
+        ignored.
     checkpoint : Checkpoint or Path, optional
-        Where to save the sums now and then, so that a run killed at any moment can go on and end
-        in the same bits; a path stands for ``Checkpoint(path)``, which continues an existing one.
-        The file stays until the caller has saved the profile and calls ``Checkpoint.remove``.
+        Where to save the sums at intervals, so that a killed run can continue and end in the same
+        bits. A path means ``Checkpoint(path)``, which continues an existing checkpoint. The file
+        stays until the caller has saved the profile and calls ``Checkpoint.remove``.
     progress : callable, optional
-        Called with a ``Progress`` some ten times a second.
+        Called with a ``Progress`` about ten times a second.
     stop : callable, optional
-        Asked after every batch; once true the run ends with the photons done so far.
+        Called after every batch; when it returns true, the run ends with the photons so far.
 
     Returns
     -------
     Profile
-        With energies relative to the incident light and ``meta["photons"]`` the walks in it.
+        Energies are relative to the incident light; ``meta["photons"]`` is the number of walks.
 
     Raises
     ------
     SimulationError
-        g beyond what the walk samples well, settings out of range or other than those of the
-        checkpoint, or a target error with a channel that returns nothing within the grid.
+        g is outside the range of the walk; settings are out of range or differ from those of the
+        checkpoint; or there is a target error and a channel returns no light within the grid.
     FileError
-        The checkpoint to continue from cannot be read, or is damaged or foreign.
+        The checkpoint to continue from cannot be read, is damaged, or is not a checkpoint.
     StoppedError
-        ``stop`` said so before a batch was done.
+        ``stop`` returned true before the first batch was done.
 
     Warns
     -----
     SssfitWarning
-        The photons were done before the target error was met, or a checkpoint cannot be written
+        The run reached its last photon before the target error, or a checkpoint cannot be written
         (the run goes on).
 
     References
@@ -142,7 +144,7 @@ def simulate_montecarlo_many(
     progress: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> list[Profile]:
-    """Trace several materials of one relative refractive index with one and the same walk.
+    """Trace several materials of one relative refractive index with a single walk.
 
     Parameters and errors are those of ``simulate_montecarlo``; a profile may differ from that of
     a single run in its last bits, since roulette follows the largest albedo of all channels.
@@ -184,7 +186,7 @@ def simulate_montecarlo_many(
 
 
 def check_media(materials: Sequence[Material]) -> None:
-    """Refuse what this walk does not model, naming what would do."""
+    """Raise an error that names another method if no walk models the material."""
     if not materials:
         raise SimulationError("no material given; name at least one.")
     for material in materials:
@@ -211,16 +213,16 @@ def check_media(materials: Sequence[Material]) -> None:
 
 
 def is_plain(material: Material) -> bool:
-    """Whether the fast walk serves: a half space, g = 0, at least as dense as what is above."""
+    """Whether the fast walk applies: a half space, g = 0, index at least that of the top medium."""
     layer = material.layers[0]
     plain = material.is_semi_infinite and not np.any(layer.g)
     return plain and relative_eta(material) >= 1.0
 
 
 def shared_walks(materials: Sequence[Material]) -> list[list[int]]:
-    """Group the materials that one walk can serve; indices, the first of each group in order.
+    """Group the materials that can share a walk; returns indices in order of first members.
 
-    Plain half spaces (g = 0) of one relative refractive index share one; others walk alone.
+    Half spaces with g = 0 and equal relative refractive index share one; the others do not.
     """
     groups: dict[object, list[int]] = {}
     for k, material in enumerate(materials):
@@ -231,20 +233,20 @@ def shared_walks(materials: Sequence[Material]) -> list[list[int]]:
 
 
 def is_compiled(material: Material) -> bool:
-    """Whether the walk of a material can start at once; else its first use compiles, some 10 s."""
+    """Whether the walk of a material can start at once; otherwise it compiles first, about 10 s."""
     return compiled_before("semi_infinite" if is_plain(material) else "layered")
 
 
 def make_walk(
     materials: Sequence[Material], grids: Sequence[RadialGrid], seed: int, photons: int
 ) -> Walk:
-    """Choose the walk that models no more than the material needs."""
+    """Choose the simplest walk for the material."""
     kind = SemiInfiniteWalk if is_plain(materials[0]) else LayeredWalk
     return kind(tuple(materials), tuple(grids), seed, photons)
 
 
 def _check_settings(photons: int, seed: int, threads: int) -> None:
-    """Refuse settings out of range, one line each."""
+    """Check the settings; each error is one line."""
     if not 0 <= seed < 2**64:
         raise SimulationError(f"seed = {seed}; give a whole number from 0 to 2^64 - 1.")
     if threads < 1:
@@ -267,8 +269,8 @@ def _auto_grids(
 ) -> list[RadialGrid]:
     """Double each material's radius until a pilot walk loses half the allowed share or less.
 
-    Half, so that the run itself, whose first photons are the pilot's, stays under the share; what
-    the doubling gave too much is trimmed off its result.
+    Half, so that the run itself, whose first photons are those of the pilot, stays under the share.
+    The excess of the doubling is trimmed off the result.
     """
     grids = [make_grid(each, dr_mm=dr_mm) for each in materials]
     while True:
@@ -289,7 +291,7 @@ def _auto_grids(
 
 
 def _warn_target(ending: Ending, photons: int, error: float) -> None:
-    """Say so when a run came to its last photon before its target error."""
+    """Warn if a run reached its last photon before its target error."""
     target = ending.target_error
     if target is not None and photons == ending.photons and error >= target:
         warnings.warn(

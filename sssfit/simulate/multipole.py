@@ -1,21 +1,21 @@
 """The multipole: slabs and stacks of layers by diffusion (Donner and Jensen 2005).
 
-"Light diffusion in multi-layered translucent materials". Between two surfaces the dipole's sources
-are mirrored over and over, at 2 i H + z_r and 2 i H - z_r - 2 z_0 for every whole i, with
-H = d + z_0 + z_d, z_0 = 2 A_0 D and z_d = 2 A_d D beyond the upper and the lower surface. In the
+"Light diffusion in multi-layered translucent materials". Between two surfaces the sources of the
+dipole are mirrored repeatedly, at 2 i H + z_r and 2 i H - z_r - 2 z_0 for every integer i, with H =
+d + z_0 + z_d, z_0 = 2 A_0 D and z_d = 2 A_d D beyond the upper and the lower surface. In the
 plane's frequencies an image at depth z is +-exp(-s |z|) / 2, s = sqrt(sigma_tr^2 + k^2), and the
-sum over all i is geometric, so no number of images has to be chosen:
+sum over all i is a geometric series, so no number of images has to be chosen:
 
     Rhat(k) = alpha' sinh(s (d + z_d - l)) cosh(s z_0) / sinh(s H)
     That(k) = alpha' sinh(s (l + z_0)) cosh(s z_d) / sinh(s H)          l = 1/sigma_t'
 
-Convolutions are products there, and layers add as in Kubelka and Munk's theory, with light that
-goes back and forth between them as 1 / (1 - R1' R2); R1' and T1' are for light from below:
+Convolutions are products there, and layers are added as in the theory of Kubelka and Munk, with
+repeated reflections between them as 1 / (1 - R1' R2); R1' and T1' are for light from below:
 
     R = R1 + T1 R2 T1' / (1 - R1' R2),      T = T1 T2 / (1 - R1' R2)
 
-Light that enters a layer from another one is treated as the beam is, as if it came along the
-normal; and all light is taken to scatter, also what crosses a thin slab without a collision, which
+Light that enters a layer from another one is treated like the beam, as if it came along the normal.
+All light is assumed to scatter, even the light that crosses a thin slab without a collision, which
 the photon walk counts at r = 0. Next: ``docs/theory.md`` for the errors of both.
 """
 
@@ -41,10 +41,10 @@ from sssfit.simulate._diffusion import Diffusion, classical, mismatch_by_polynom
 from sssfit.simulate.dipole import dipole_beyond
 
 # Step of ln k; 0.02 would do. The bias, a factor k^0.5, makes both ends of the range fade: without
-# it the periodic transform wraps Rhat(0) around, an error of 1e-7 where there is 1e-14.
+# it the periodic transform wraps Rhat(0) around, with an error of 1e-7 instead of 1e-14.
 _STEP = 0.01
 _BIAS = -0.5
-# How far the range goes beyond the scales that matter, where 1e-3 and 1e3 leave 1e-10.
+# Extension of the range beyond the relevant scales; 1e-3 and 1e3 leave 1e-10.
 _BEYOND_LOW, _BEYOND_HIGH = 1e-13, 1e6
 
 _POINTS = range(-3, 5)  # eight nodes around a point: their error is step^8
@@ -58,7 +58,7 @@ def cumulative_from_transform(
     Parameters
     ----------
     transform : callable
-        Takes wavenumbers (n, 1) [1/mm], gives Rhat (n, C): the integral of 2 pi r R_d(r) J0(k r).
+        Takes wavenumbers (n, 1) [1/mm], returns Rhat (n, C): the integral of 2 pi r R_d(r) J0(k r).
     r_mm : (m,) [mm]
         Radii; the first is 0.
     shortest_mm : float [mm]
@@ -68,7 +68,7 @@ def cumulative_from_transform(
     -------
     (m, C)
     """
-    from scipy.fft import fht, fhtoffset  # 0.2 s that the photon walk need not wait for
+    from scipy.fft import fht, fhtoffset  # 0.2 s that the photon walk does not need
 
     low = _BEYOND_LOW / r_mm[-1]
     high = _BEYOND_HIGH / min(shortest_mm, float(r_mm[1]))
@@ -84,7 +84,7 @@ def cumulative_from_transform(
 
 
 def _interpolated(values: FloatArray, at: FloatArray) -> FloatArray:
-    """Lagrange's interpolation (C, m) between values (C, n) that stand at 0, 1, 2, ..."""
+    """Return Lagrange interpolation (C, m) between values (C, n) at 0, 1, 2, ..."""
     first = np.floor(at).astype(np.intp)
     fraction = at - first
     out = np.zeros((len(values), at.size))
@@ -108,27 +108,28 @@ def simulate_multipole(
     Parameters
     ----------
     material : Material
-        Layers thicker than one reduced mean free path in every channel, any g (by sigma_s'); the
-        last may be without a bottom. One layer without a bottom gives the classical dipole.
+        Layers thicker than one reduced mean free path in every channel, any g (through sigma_s');
+        the last may have no bottom. One layer without a bottom gives the classical dipole.
     dr_mm, radius_mm : float, optional
-        Grid, as `sssfit.grid.make_grid` takes it [mm].
+        Grid, as in `sssfit.grid.make_grid` [mm].
 
     Returns
     -------
     Profile
-        F is good to 1e-13 of what enters, for the model; the model's own error is not known to it
-        (standard errors are NaN), nor what is absorbed. Transmittance where the stack has an end.
+        The model's F, to 1e-13 of the light that enters. The error of the model itself is unknown
+        (standard errors are NaN), and so is the absorbed energy. Has a transmittance if the stack
+        has a bottom.
 
     Raises
     ------
     SimulationError
-        A layer that is clear or too thin in a channel, a relative index out of 0.5 to 2.5, or a
-        grid that cannot be.
+        A layer is clear or too thin in a channel, a relative index is outside 0.5 to 2.5, or the
+        grid is invalid.
 
     Warns
     -----
     SssfitWarning
-        A layer thinner than two reduced mean free paths, or over 1 % of the light crosses the
+        A layer is thinner than two reduced mean free paths, or over 1 % of the light crosses the
         stack without a collision.
     """
     check_is_material(material)
@@ -144,7 +145,7 @@ def simulate_multipole(
     total = _stack(layers, np.zeros((1, 1)))
 
     def energies(name: str, shortest_mm: float) -> FloatArray:
-        """Reflected or transmitted light of 1 that enters, by annulus."""
+        """Return reflected or transmitted light by annulus, as shares of the light that enters."""
         cumulative = cumulative_from_transform(
             lambda k: getattr(_stack(layers, k), name), grid.r_edges_mm, shortest_mm
         )
@@ -170,9 +171,9 @@ class _Layer:
 
 @dataclass(frozen=True, slots=True)
 class _Response:
-    """What comes back and what goes through, at each wavenumber and channel (n, C).
+    """Reflected and transmitted light at each wavenumber and channel (n, C).
 
-    Of light from above, and (``_up``) of light from below.
+    For light from above, and (``_up``) for light from below.
     """
 
     reflected: FloatArray
@@ -182,14 +183,14 @@ class _Response:
 
 
 def _layers(material: Material) -> list[_Layer]:
-    """Each layer with the mismatch at its interfaces; at none it is 1."""
+    """Return each layer with the A of its interfaces; it is 1 without an interface."""
     etas = [material.eta_above, *(each.eta for each in material.layers), material.eta_below]
     return [
         _Layer(
             medium=classical(layer),
             thickness_mm=layer.thickness_mm,
             above=mismatch_by_polynomial(layer.eta / above),
-            # without a bottom there is no interface; eta_below has no effect
+            # without a bottom there is no interface, and eta_below has no effect
             below=mismatch_by_polynomial(layer.eta / below)
             if np.isfinite(layer.thickness_mm)
             else 1.0,
@@ -199,7 +200,7 @@ def _layers(material: Material) -> list[_Layer]:
 
 
 def _stack(layers: list[_Layer], k_per_mm: FloatArray) -> _Response:
-    """Respond as a stack, from the top down, at wavenumbers (n, 1) [1/mm]."""
+    """Return the response of a stack, from the top down, at wavenumbers (n, 1) [1/mm]."""
     whole = _one(layers[0], k_per_mm)
     for layer in layers[1:]:
         whole = _added(whole, _one(layer, k_per_mm))
@@ -207,8 +208,8 @@ def _stack(layers: list[_Layer], k_per_mm: FloatArray) -> _Response:
 
 
 def _one(layer: _Layer, k_per_mm: FloatArray) -> _Response:
-    """Respond as one layer."""
-    # sinh(s d) / sinh(s H) has a limit at s = 0, which a length of 1e100 mm comes to the bit
+    """Return the response of one layer."""
+    # sinh(s d) / sinh(s H) has a limit at s = 0, which a length of 1e100 mm reaches to the bit
     s = np.maximum(np.hypot(layer.medium.sigma_tr_per_mm, k_per_mm), 1e-100)
     down = _both_ways(layer.medium, layer.thickness_mm, layer.above, layer.below, s)
     up = _both_ways(layer.medium, layer.thickness_mm, layer.below, layer.above, s)
@@ -218,9 +219,9 @@ def _one(layer: _Layer, k_per_mm: FloatArray) -> _Response:
 def _both_ways(
     medium: Diffusion, thickness_mm: float, entered: float, other: float, s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Rhat and That (n, C) of the module's head for light from the side ``entered``.
+    """Return Rhat and That (n, C) of the module docstring, for light from the side ``entered``.
 
-    The hyperbolic functions are written as falling exponentials, so an infinite thickness needs no
+    The hyperbolic functions are written as decaying exponentials, so an infinite thickness needs no
     special case.
     """
     depth, near = medium.depth_mm, 2.0 * entered * medium.coefficient_mm
@@ -240,12 +241,12 @@ def _both_ways(
 
 
 def _one_minus_exp(exponent: FloatArray) -> FloatArray:
-    """1 - exp(-exponent)."""
+    """Return 1 - exp(-exponent)."""
     return np.asarray(-np.expm1(-exponent), dtype=np.float64)
 
 
 def _added(top: _Response, bottom: _Response) -> _Response:
-    """Respond as one layer on another."""
+    """Return the response of one layer on another."""
     between = 1.0 / (1.0 - top.reflected_up * bottom.reflected)
     back = top.transmitted * bottom.reflected * top.transmitted_up * between
     forth = bottom.transmitted_up * top.reflected_up * bottom.transmitted * between
@@ -258,7 +259,7 @@ def _added(top: _Response, bottom: _Response) -> _Response:
 
 
 def _check_layers(material: Material) -> None:
-    """Refuse layers that diffusion cannot describe."""
+    """Raise an error for layers that diffusion cannot describe."""
     for k, layer in enumerate(material.layers):
         for channel, path_mm in zip(material.channels, layer.mean_free_path_mm, strict=True):
             where = f"{material.name}: layer {k + 1}, channel {channel}"
@@ -274,7 +275,7 @@ def _check_layers(material: Material) -> None:
 
 
 def _warn_of_thin(material: Material) -> None:
-    """Say where the model is out by more than some per cent."""
+    """Warn if the model is off by more than a few percent."""
     thinnest = min(
         float(np.min(each.thickness_mm / each.mean_free_path_mm)) for each in material.layers
     )

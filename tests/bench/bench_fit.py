@@ -122,9 +122,9 @@ def page(small):
         "Three channels of skin1, exact profile; seconds, and the limit in seconds.",
         markdown(("fit", "pixels", "seconds", "allowed"), limit_rows(small)),
         "## All methods, all materials",
-        "Exact profiles, pixels of 0.1 mm (wider where 513 pixels do not hold 99.9 % of the energy), "
-        "each method with its defaults: relative Frobenius error of each channel and the largest energy "
-        "error in percent.",
+        "Exact profiles, pixels of 0.1 mm (wider where 513 pixels do not hold 99.9 % of the "
+        "energy), each method with its defaults: relative Frobenius error of each channel and the "
+        "largest energy error in percent.",
         markdown(
             ("material, method", "mm", "terms", "R", "G", "B", "energy", "seconds"),
             method_rows(small),

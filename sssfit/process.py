@@ -1,18 +1,25 @@
-"""Ctrl-C and SIGTERM: the first asks for an orderly end, the second ends the program at once.
+"""The process: its cores and threads, the memory it may use, Ctrl-C and SIGTERM.
 
-The first raises KeyboardInterrupt in the main thread, or is noted where a verb saves what it has
-done (`asked_to_stop`). Python code hears a signal only between two of its own instructions, and the
-main thread may be inside compiled code for minutes. So the second signal is heard by a thread that
-waits at the pipe into which Python's C handler writes; it removes temporary files and locks and
-ends the process with 130. Where even that thread cannot run, because compiled code keeps Python's
-global lock, the kernel ends the process: with glibc a signal's handler is good for one signal until
-the thread renews it (System V semantics).
+Memory: under a limit (``ulimit -v``, a batch system's) compiled libraries do not raise MemoryError.
+At 400 MB scipy's BLAS tried for ever to get its buffers, at 520 MB the process ended in a
+segmentation fault. So the limit is compared with what libraries and threads take, as measured.
 
-Nothing heavy is imported here: the handlers stand before the command line itself is imported.
+Signals: the first asks for an orderly end, the second ends the program at once. The first raises
+KeyboardInterrupt in the main thread, or is noted where what is done can be saved
+(`asked_to_stop`). Python code hears a signal only between two of its own instructions, and the main
+thread may be inside compiled code for minutes. So the second signal is heard by a thread that waits
+at the pipe into which Python's C handler writes; it removes temporary files and locks and ends the
+process with 130. Where even that thread cannot run, because compiled code keeps Python's global
+lock, the kernel ends the process: with glibc a signal's handler is good for one signal until the
+thread renews it (System V semantics).
+
+Nothing heavy is imported here: a program takes the signals in hand before anything else.
 """
 
 import contextlib
+import errno
 import functools
+import operator
 import os
 import select
 import signal
@@ -21,6 +28,114 @@ import threading
 from collections.abc import Callable, Iterator
 from types import FrameType, TracebackType
 from typing import Any, NoReturn
+
+from sssfit.errors import RenderError, SssfitError
+
+if sys.platform != "win32":
+    import resource
+
+
+# Threads
+
+
+def available_cores() -> int:
+    """Cores this process may use (containers and ``taskset`` grant fewer than there are)."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def thread_count(threads: int | None) -> int:
+    """Return the number of threads to use: all cores there are where none is named."""
+    if threads is None:
+        return available_cores()
+    try:
+        count = operator.index(threads)
+    except TypeError:
+        count = 0
+    if count < 1:
+        raise RenderError(f"threads = {threads!r}; expected a whole number from 1 up.")
+    return count
+
+
+# Memory
+
+# Address space [MB] of a small run with one thread, some 10 % more than was seen.
+_NEEDED_MB = {
+    "simulate": 620,
+    "fit": 650,
+    "picture fit": 980,
+    "render": 800,
+    "compare": 1080,
+    "choose": 880,
+    "chart": 570,
+    "kernel chart": 710,
+    "show": 460,
+    "figures": 680,  # of models, spectra and guide functions
+    "inversion": 700,
+}
+_OTHER_MB = 280
+# Of a thread: its stack, and what the C library sets aside for it. Without threads of our own a
+# core has BLAS's buffers.
+_THREAD_MB, _CORE_MB = 75, 6
+_THREADED = {"simulate", "picture fit", "render", "compare", "choose", "figures"}
+
+_NO_MORE = ("allocate memory", "can't start new thread", "failed to map segment")
+
+
+def check_memory(what: str, threads: int | None) -> None:
+    """Refuse work that needs more memory than the process may use; ``what`` is a key of the table.
+
+    Raises
+    ------
+    SssfitError
+        The limit is too low.
+    """
+    if sys.platform == "win32":
+        return
+    limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+    if limit == resource.RLIM_INFINITY:
+        return
+    cores = available_cores()
+    needed = _NEEDED_MB.get(what, _OTHER_MB) + _CORE_MB * cores
+    hint = ""
+    if what in _THREADED:
+        needed += _THREAD_MB * (threads or cores)
+        hint = ", or give fewer `threads`" if (threads or cores) > 1 else ""
+    if limit < needed * 10**6:
+        raise SssfitError(
+            f"this process may use {limit / 1e6:.0f} MB of memory (ulimit -v), and this takes "
+            f"about {needed} MB; raise the limit{hint}."
+        )
+
+
+def check_threads_of_numba() -> None:
+    """Refuse a number of threads that numba cannot be imported with.
+
+    Raises
+    ------
+    SssfitError
+        NUMBA_NUM_THREADS is no whole number above 0.
+    """
+    given = os.environ.get("NUMBA_NUM_THREADS")
+    if given is not None and not (given.strip().isdecimal() and int(given)):
+        raise SssfitError(
+            f"NUMBA_NUM_THREADS = {given!r}; set it to a whole number from 1 up, or unset it."
+        )
+
+
+def is_out_of_memory(error: BaseException | None) -> bool:
+    """Tell whether an error comes from a lack of memory, under any library's name for it."""
+    while error is not None:
+        if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
+            return True
+        if any(words in str(error).lower() for words in _NO_MORE):
+            return True
+        error = error.__cause__ or error.__context__
+    return False
+
+
+# Signals
 
 _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 _STATUS = 130

@@ -1,0 +1,156 @@
+"""The kinds of file that sssfit writes, told apart by what they hold; `load` reads any of them.
+
+A new kind is one entry here. Nothing of a room is imported before one of its files is read.
+"""
+
+import io
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
+
+from sssfit.errors import FileError
+from sssfit.files import is_marked, read_at_most, reason
+from sssfit.messages import did_you_mean
+from sssfit.methods import imported
+from sssfit.text import decode
+
+if TYPE_CHECKING:
+    from sssfit.kernel import SeparableKernel
+    from sssfit.material import Material
+    from sssfit.profile import Profile
+    from sssfit.simulate import SoFar
+
+    Loaded: TypeAlias = Profile | SeparableKernel | Material | SoFar
+
+MOST_BYTES = 500_000_000  # the most that a file of ours may have
+_MOST_TOML_BYTES = 1_000_001
+# What every material has: a table of layers or a coefficient, if by a name that has to be mended.
+_MATERIAL = re.compile(r"^\s*(\[\[layers\]\]|[\"']?(sigma|mu)_?[as])", re.MULTILINE | re.IGNORECASE)
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """One kind of file.
+
+    Parameters
+    ----------
+    words : str
+        What messages call it.
+    reader : str
+        "module:function" of a path or a binary stream and of the name that messages call it.
+    marks : tuple of bytes
+        By any of them a file is of this kind, however damaged. A material, a text, has none.
+    """
+
+    words: str
+    reader: str
+    marks: tuple[bytes, ...] = ()
+
+
+# The marks of archives are their first member's name, or the format in their JSON, which numpy
+# writes with four bytes a letter. Both stand uncompressed.
+KINDS: Mapping[str, Kind] = {
+    "profile": Kind(
+        "a profile (.profile.npz)",
+        "sssfit.profile:Profile.read",
+        (b"r_edges_mm.npy", "sssfit.profile/".encode("utf-32-le")),
+    ),
+    "kernel": Kind(
+        "a kernel (.kernel.json)", "sssfit.kernel:SeparableKernel.read", (b'"sssfit.kernel/',)
+    ),
+    "material": Kind("a material (.toml)", "sssfit.material:read_material"),
+    "checkpoint": Kind(
+        "a walk's checkpoint (.checkpoint)",
+        "sssfit.simulate:read_checkpoint",
+        (b"ledger_absorbed.npy", "sssfit.checkpoint/".encode("utf-32-le")),
+    ),
+}
+
+
+def load(source: "str | Path | BinaryIO", origin: str | None = None) -> "Loaded":
+    """Read a profile, a kernel, a material or a walk's checkpoint, told by what the file holds.
+
+    Parameters
+    ----------
+    source : str, Path or binary stream
+        A file, the name of a material that ships with sssfit, or a stream (which need not seek).
+    origin : str, optional
+        What messages call it; by default the path, or "the stream".
+
+    Returns
+    -------
+    Profile, SeparableKernel, Material or SoFar
+
+    Raises
+    ------
+    SssfitError
+        One line: not a file of ours, or one of ours that is damaged.
+
+    Examples
+    --------
+    >>> load("skin1").name
+    'skin1'
+    """
+    if not isinstance(source, str | Path):
+        origin = origin or "the stream"
+        source = _whole(source, origin)
+        kind = _kind(source)
+        source.seek(0)
+    else:
+        origin = origin or str(source)
+        names = imported("sssfit.material:material_names")()
+        path = Path(source)
+        if source in names and not path.exists():
+            return imported("sssfit.material:load_material")(source)  # type: ignore[no-any-return]
+        _check_regular_file(path, origin, names)
+        source = path
+        try:
+            with path.open("rb") as stream:
+                kind = _kind(stream)
+        except OSError as error:
+            raise FileError(f"{origin} cannot be read: {reason(error)}.") from error
+    if kind is None:
+        raise FileError(f"{origin} is not a sssfit file; expected {_expected()}.")
+    found: Loaded = imported(kind.reader)(source, origin)
+    return found
+
+
+def _whole(stream: BinaryIO, origin: str) -> io.BytesIO:
+    """Take all of a stream that may not seek, up to the most that a file of ours may have."""
+    content = read_at_most(stream, MOST_BYTES + 1)
+    if len(content) > MOST_BYTES:
+        raise FileError(f"{origin} has over {MOST_BYTES:,} bytes; expected {_expected()}.")
+    return io.BytesIO(content)
+
+
+def _check_regular_file(path: Path, origin: str, names: Any) -> None:
+    """Refuse what is not there, folders, devices and pipes."""
+    try:
+        path.stat()
+    except (OSError, ValueError) as error:  # ValueError: a null character
+        why = reason(error) if isinstance(error, OSError) else str(error)
+        near = did_you_mean(origin, names).strip()
+        raise FileError(f"{origin} cannot be read: {why}.{f' {near}' if near else ''}") from None
+    if path.is_dir():
+        raise FileError(f"{origin} is a folder; name a file in it.")
+    if not path.is_file():
+        raise FileError(f"{origin} is not an ordinary file; use - to read a pipe.")
+
+
+def _kind(stream: BinaryIO) -> Kind | None:
+    """Tell a kind by the marks in a file; None for what is foreign."""
+    for kind in KINDS.values():
+        if is_marked(stream, kind.marks):
+            return kind
+    stream.seek(0)
+    text = decode(stream.read(_MOST_TOML_BYTES))
+    is_material = text is not None and _MATERIAL.search(text.content)
+    return KINDS["material"] if is_material else None
+
+
+def _expected() -> str:
+    """List the kinds."""
+    *others, last = (kind.words for kind in KINDS.values())
+    return f"{', '.join(others)} or {last}"

@@ -1,0 +1,241 @@
+"""The walks of ``sssfit._jit`` in batches: ``semi_infinite`` and ``layered``.
+
+`SemiInfiniteWalk` is for half spaces with g = 0: every channel rides on the same paths.
+
+`LayeredWalk` is for any stack of layers and any g. Channels that scatter alike (same sigma_s and g
+in every layer) share a walk; others have their own walk on the same random streams, so that their
+noise is similar. A batch includes all of them, so that every channel of a profile has the same
+number of photons.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit._jit import layered, semi_infinite
+from sssfit.arrays import FloatArray
+from sssfit.grid import RadialGrid
+from sssfit.material import Material
+from sssfit.simulate._batches import BATCH_PHOTONS, Sums, Tally
+
+
+@dataclass(frozen=True, slots=True)
+class LayeredWalk:
+    """The walks of one layered material, with the inputs of the compiled code.
+
+    ``diffuse`` lights the stack evenly from all directions instead of along the normal, for tests
+    of reciprocity.
+    """
+
+    materials: tuple[Material, ...]
+    grids: tuple[RadialGrid, ...]
+    seed: int
+    photons: int
+    diffuse: bool = False
+    groups: tuple[tuple[layered.Stack, layered.Bins], ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        material, grid = self.materials[0], self.grids[0]
+        groups = tuple(
+            (_stack(material, members), layered.Bins(1.0 / grid.dr_mm, grid.annuli, members))
+            for members in channels_with_equal_scattering(material)
+        )
+        object.__setattr__(self, "groups", groups)
+
+    def trace(self, batch: int) -> Tally:
+        """Walk one batch of every group; the result depends only on seed and batch number."""
+        tally = self.empty_tally()
+        tally.photons = min(BATCH_PHOTONS, self.photons - batch * BATCH_PHOTONS)
+        for stack, bins in self.groups:
+            tally.flights += layered.trace_batch(
+                np.uint64(self.seed),
+                np.int64(batch),
+                tally.photons,
+                self.materials[0].first_scattering_layer,
+                self.diffuse,
+                stack,
+                bins,
+                tally.ledger,
+            )
+        return tally
+
+    def empty_tally(self) -> Tally:
+        """Return a tally with all sums zero."""
+        material, cells = self.materials[0], self.grids[0].annuli + 1
+        n = material.n_channels
+        ledger = layered.Ledger(
+            reflected=np.zeros((cells, n, 2)),
+            transmitted=np.zeros((cells, n, 2)),
+            absorbed=np.zeros((len(material.layers), n)),
+            unfinished=np.zeros((n, 2)),
+            roulette=np.zeros((n, 2)),
+        )
+        return Tally(ledger)
+
+    def sums(self, tally: Tally, index: int) -> Sums:
+        """Return the sums of the only material (``index`` 0)."""
+        ledger = tally.ledger
+        finite = np.isfinite(self.materials[index].layers[-1].thickness_mm)
+        return Sums(
+            photons=tally.photons,
+            reflected=ledger.reflected,
+            transmitted=ledger.transmitted if finite else None,
+            absorbed=ledger.absorbed,
+            unfinished=ledger.unfinished,
+            roulette=ledger.roulette,
+        )
+
+
+def channels_with_equal_scattering(material: Material) -> list[npt.NDArray[np.int64]]:
+    """Group the channels that differ in absorption only; returns indices in their order."""
+    groups: dict[bytes, list[int]] = {}
+    for c in range(material.n_channels):
+        scattering = [(layer.sigma_s_per_mm[c], layer.g[c]) for layer in material.layers]
+        groups.setdefault(np.array(scattering).tobytes(), []).append(c)
+    return [np.array(members, np.int64) for members in groups.values()]
+
+
+def _stack(material: Material, members: npt.NDArray[np.int64]) -> layered.Stack:
+    """Lay out the layers for a group; its walk follows each layer's least absorbing channel."""
+    layers = material.layers
+    sigma_a = np.array([layer.sigma_a_per_mm[members] for layer in layers])
+    sigma_s = np.array([layer.sigma_s_per_mm[members[0]] for layer in layers])
+    least = sigma_a.min(axis=1)
+    sigma_t = least + sigma_s
+    edges_mm = np.concatenate([[0.0], np.cumsum([layer.thickness_mm for layer in layers])])
+    capture = np.divide(least, sigma_t, out=np.zeros_like(least), where=sigma_t > 0.0)
+    return layered.Stack(
+        top_mm=edges_mm[:-1].astype(np.float32),
+        bottom_mm=edges_mm[1:].astype(np.float32),
+        sigma_t_per_mm=sigma_t.astype(np.float32),
+        capture=capture.astype(np.float32),
+        back=np.array([1.0 - layer.g[members[0]] for layer in layers], np.float32),
+        eta=np.array([material.eta_above, *(each.eta for each in layers), material.eta_below]),
+        excess_per_mm=sigma_a - least[:, None],
+    )
+
+
+# MCML's roulette threshold, applied to the largest weight of all channels.
+ROULETTE_THRESHOLD = 1e-4
+ROULETTE_LEVELS = 30  # one walk in 1e30 survives this many
+
+
+@dataclass(frozen=True, slots=True)
+class SemiInfiniteWalk:
+    """One walk for materials of one refractive index, with the inputs of the compiled code."""
+
+    materials: tuple[Material, ...]
+    grids: tuple[RadialGrid, ...]
+    seed: int
+    photons: int
+    eta: float = field(init=False)
+    channels: semi_infinite.Channels = field(init=False)
+    roulette_at: npt.NDArray[np.uint32] = field(init=False)
+
+    def __post_init__(self) -> None:
+        largest = max(float(each.layers[0].albedo.max()) for each in self.materials)
+        object.__setattr__(self, "eta", relative_eta(self.materials[0]))
+        object.__setattr__(self, "channels", _channels(self.materials, self.grids))
+        object.__setattr__(self, "roulette_at", roulette_schedule(largest))
+
+    def trace(self, batch: int) -> Tally:
+        """Walk one batch; the result depends only on the seed and the batch number."""
+        tally = self.empty_tally()
+        tally.photons = min(BATCH_PHOTONS, self.photons - batch * BATCH_PHOTONS)
+        tally.flights = semi_infinite.trace_batch(
+            np.uint64(self.seed),
+            np.int64(batch),
+            tally.photons,
+            self.eta,
+            self.roulette_at,
+            self.channels,
+            tally.ledger,
+        )
+        return tally
+
+    def empty_tally(self) -> Tally:
+        """Return a tally with all sums zero."""
+        n_channels = self.channels.last_bin.size
+        cells = int(np.sum(self.channels.last_bin + 1))
+        ledger = semi_infinite.Ledger(
+            bins=np.zeros((cells, 2)),
+            absorbed=np.zeros(n_channels),
+            unfinished=np.zeros((n_channels, 2)),
+            roulette=np.zeros((n_channels, 2)),
+        )
+        return Tally(ledger)
+
+    def sums(self, tally: Tally, index: int) -> Sums:
+        """Return one material's part of a tally."""
+        first = sum(each.n_channels for each in self.materials[:index])
+        own = range(first, first + self.materials[index].n_channels)
+        ledger = tally.ledger
+        return Sums(
+            photons=tally.photons,
+            reflected=np.stack([ledger.bins[self._cells(c)] for c in own], axis=1),
+            transmitted=None,
+            absorbed=ledger.absorbed[None, own],
+            unfinished=ledger.unfinished[own],
+            roulette=ledger.roulette[own],
+        )
+
+    def _cells(self, channel: int) -> slice:
+        """Positions of a channel's bins in the ledger, the one beyond the grid last."""
+        first = int(self.channels.first_cell[channel])
+        return slice(first, first + int(self.channels.last_bin[channel]) + 1)
+
+
+def relative_eta(material: Material) -> float:
+    """Refractive index of the top layer relative to the medium above it."""
+    return material.layers[0].eta / material.eta_above
+
+
+def roulette_schedule(albedo: float) -> npt.NDArray[np.uint32]:
+    """Return the collisions at which a walk that survived k = 0, 1, ... roulettes plays the next.
+
+    The smallest n with albedo^n 10^k under the threshold, or the collision cap if that is smaller.
+    """
+    schedule = np.full(ROULETTE_LEVELS + 1, semi_infinite.COLLISION_CAP, np.uint32)
+    if albedo == 1.0:
+        return schedule
+    decay = -math.log(albedo) if albedo > 0.0 else math.inf
+    previous = 1
+    for level in range(ROULETTE_LEVELS):
+        under = (level * math.log(10.0) - math.log(ROULETTE_THRESHOLD)) / decay
+        previous = max(previous + 1, math.floor(under) + 1)
+        schedule[level] = min(previous, semi_infinite.COLLISION_CAP)
+    return schedule
+
+
+def _channels(
+    materials: tuple[Material, ...], grids: tuple[RadialGrid, ...]
+) -> semi_infinite.Channels:
+    """Lay the channels of all materials side by side."""
+    albedo = np.concatenate([each.layers[0].albedo for each in materials])
+    bins_per_mfp = np.concatenate(
+        [
+            each.layers[0].mean_free_path_mm / grid.dr_mm
+            for each, grid in zip(materials, grids, strict=True)
+        ]
+    )
+    counts = [each.n_channels for each in materials]
+    last_bin = np.repeat([grid.annuli for grid in grids], counts).astype(np.int64)
+    first_cell = np.concatenate([[0], np.cumsum(last_bin[:-1] + 1)]).astype(np.int64)
+    return semi_infinite.Channels(
+        power_low=_powers(albedo),
+        power_high=_powers(_powers(albedo)[-1] * albedo),
+        bins_per_mean_free_path=bins_per_mfp,
+        last_bin=last_bin,
+        first_cell=first_cell,
+    )
+
+
+def _powers(base: FloatArray) -> FloatArray:
+    """Return base^k for k below ``POWER_BLOCK``, (POWER_BLOCK, C).
+
+    Uses Python's power, because numpy's differs in the last bit between processors.
+    """
+    rows = [[float(each) ** k for each in base] for k in range(semi_infinite.POWER_BLOCK)]
+    return np.array(rows)

@@ -1,0 +1,297 @@
+"""Profiles computed and written to files: each output held, walks saved half done and resumed.
+
+What ``sssfit simulate`` does, for a script that runs for hours: `simulate_to_files` refuses outputs
+that cannot be written before it begins, writes each profile as its run ends, and leaves a
+checkpoint from which a killed run goes on to the same bits. Next: ``sssfit.simulate.summary``.
+"""
+
+import time
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from sssfit.errors import FileError, ProfileError, StoppedError
+from sssfit.files import check_output, held
+from sssfit.material import Material
+from sssfit.methods import SIMULATIONS
+from sssfit.profile import Profile, is_profile_file
+from sssfit.simulate._checkpoint import EVERY_SECONDS, Checkpoint, is_checkpoint_file
+from sssfit.simulate._finished import is_complete, is_finished, run_figures
+from sssfit.simulate._run import Progress
+from sssfit.simulate.exact import is_solver_compiled
+from sssfit.simulate.montecarlo import is_compiled, shared_walks, simulate_montecarlo_many
+from sssfit.simulate.summary import summary
+
+Stop = Callable[[], bool]
+Watch = Callable[[str], AbstractContextManager[Callable[[Progress], None] | None]]
+_COMPILING = "Compiling the {}, some {} s; it is kept for later runs where it can be."
+
+
+def compiling_note(walk: Material | None = None) -> str:
+    """Say that the walk of a material, or the exact solver, is about to be compiled, if it is."""
+    if walk is None:
+        return "" if is_solver_compiled() else _COMPILING.format("solver", 3)
+    return "" if is_compiled(walk) else _COMPILING.format("photon walk", 10)
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """One profile of a run.
+
+    Parameters
+    ----------
+    profile : Profile
+    path : Path or None
+        Where it was written; None where no file was asked for.
+    seconds : float, optional [s]
+        What its run took; None where it was finished before.
+    is_complete : bool
+        Whether the run came to its end, and was not stopped.
+    is_resumable : bool
+        Whether a checkpoint is kept.
+    """
+
+    profile: Profile
+    path: Path | None
+    seconds: float | None
+    is_complete: bool = True
+    is_resumable: bool = False
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures of ``sssfit simulate --json``; see `run_figures`."""
+        return run_figures(self.profile, self.seconds)
+
+
+@dataclass(frozen=True, slots=True)
+class Results:
+    """The profiles of `simulate_to_files`, in the order of the materials.
+
+    Parameters
+    ----------
+    outcomes : tuple of Outcome
+        Of the materials that were done, or saved as far as they came.
+    not_begun : tuple of str
+        Names of those that were not when ``stop`` said so.
+    """
+
+    outcomes: tuple[Outcome, ...]
+    not_begun: tuple[str, ...] = ()
+
+    @property
+    def is_interrupted(self) -> bool:
+        """Whether anything that was asked for is missing."""
+        return bool(self.not_begun) or not all(each.is_complete for each in self.outcomes)
+
+    @property
+    def note(self) -> str:
+        """What an interruption left, in a sentence or two; empty without one."""
+        left = ", ".join(self.not_begun)
+        if not self.is_interrupted:
+            return ""
+        if self.outcomes[0].profile.photons is None:
+            return f"Interrupted. Not done: {left}."
+        resumable = any(each.is_resumable for each in self.outcomes)
+        how = "; `resume = True` continues from there" if resumable else ""
+        return f"Interrupted: the photons traced so far are saved, with their true count{how}." + (
+            f" Not begun: {left}." if left else ""
+        )
+
+    def to_dict(self, *, several: bool) -> dict[str, Any]:
+        """Return what ``sssfit simulate --json`` prints; ``several`` asks for rows."""
+        rows = [each.to_dict() for each in self.outcomes]
+        return {
+            "output": [str(each.path or "-") for each in self.outcomes],
+            **({"rows": rows} if several else rows[0]),
+            **({"interrupted": True} if self.is_interrupted else {}),
+        }
+
+    def summary(self, *, several: bool) -> str:
+        """Return the page for people; see `sssfit.simulate.summary.summary`."""
+        lines = [summary([each.to_dict() for each in self.outcomes], several=several)]
+        for start, is_old in (("Wrote", False), ("Finished before, nothing to do:", True)):
+            paths = [
+                str(each.path)
+                for each in self.outcomes
+                if (each.seconds is None) is is_old and each.path
+            ]
+            lines += [f"{start} {', '.join(paths)}"] if paths else []
+        return "\n".join(lines)
+
+
+def simulate_to_files(
+    materials: Sequence[Any],
+    paths: Sequence[Path | None],
+    method: str = "montecarlo",
+    settings: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
+    *,
+    resume: bool = False,
+    checkpoint_every: float = EVERY_SECONDS,
+    force: bool = False,
+    inputs: Iterable[str | Path] = (),
+    stop: Stop = lambda: False,
+    tell: Callable[[str], object] = lambda line: None,  # noqa: ARG005
+    watch: Watch = lambda label: nullcontext(),  # noqa: ARG005
+) -> Results:
+    """Compute the profile of each material and write it as soon as it is done.
+
+    Parameters
+    ----------
+    materials : sequence of Material or ProfileSource
+        Those that one run can serve share it. For a method that makes one profile without a
+        material, the source of that profile.
+    paths : sequence of Path or None
+        Where each profile goes; None leaves it to the caller.
+    method : str
+        A name of `sssfit.methods.SIMULATIONS`.
+    settings : mapping or sequence of mappings, optional
+        Keyword arguments of the method's function: for all, or for each material, which then has
+        its own run.
+    resume : bool
+        Continue a walk from its checkpoint; what is finished is not computed again.
+    checkpoint_every : float [s]
+        Time between two saves of a walk, beside its first path.
+    force : bool
+        Replace files that are not ours, and inputs.
+    inputs : iterable of str or Path
+        Files that are read, and not to be written.
+    stop : callable
+        Once it returns true, a walk ends with the photons done so far, and nothing else begins.
+    tell : callable
+        Given sentences for people while it runs.
+    watch : callable
+        Given a label for each walk, returns a context whose value is told of the progress.
+
+    Returns
+    -------
+    Results
+
+    Raises
+    ------
+    SimulationError, FileError
+        Settings, outputs or checkpoints that cannot be used.
+    """
+    if settings is None or isinstance(settings, Mapping):
+        every, shares = [settings or {}] * len(paths), SIMULATIONS[method].shares
+    else:
+        every, shares = list(settings), False
+    groups = shared_walks(materials) if shares else [[k] for k in range(len(paths))]
+    is_walk = method == "montecarlo"
+    inputs = tuple(inputs)
+    found: dict[int, Outcome] = {}
+    with held(paths, is_profile_file, inputs=inputs, force=force, named=("a profile", ".npz")):
+        saves = [
+            Checkpoint(_beside(path), checkpoint_every, resume=resume) if is_walk and path else None
+            for path in (paths[group[0]] for group in groups)
+        ]
+        for save in saves:
+            if save and not resume:
+                check_output(save.path, is_checkpoint_file, force=force, inputs=inputs)
+        if method == "exact" and (note := compiling_note()):
+            tell(note)
+        for group, save in zip(groups, saves, strict=True):
+            own = [materials[k] for k in group], [paths[k] for k in group]
+            given = every[group[0]]
+            try:
+                if is_walk:
+                    made = _walk(*own, given, save, stop, tell, watch)
+                else:
+                    made = _computed(*own, given, method, stop)
+            except StoppedError:
+                break
+            found |= zip(group, made, strict=True)
+    missing = [each.name for k, each in enumerate(materials) if k not in found]
+    return Results(tuple(found[k] for k in sorted(found)), tuple(missing))
+
+
+def _beside(path: Path) -> Path:
+    """Where a walk is saved: beside its first output, and so under its lock."""
+    return path.with_name(f"{path.name}.checkpoint")
+
+
+def _computed(
+    materials: Sequence[Any],
+    paths: Sequence[Path | None],
+    settings: Mapping[str, Any],
+    method: str,
+    stop: Stop,
+) -> list[Outcome]:
+    """One call of the method's function; those that share work between materials can be stopped."""
+    chosen, begun = SIMULATIONS[method], time.perf_counter()
+    function = chosen.load()
+    if chosen.shares:
+        profiles = function(materials, stop=stop, **settings)
+    elif stop():
+        raise StoppedError("stopped between two materials.")
+    else:
+        profiles = [function(*([] if chosen.makes else [each]), **settings) for each in materials]
+    seconds = time.perf_counter() - begun
+    _write(profiles, paths)
+    return [Outcome(*each, seconds) for each in zip(profiles, paths, strict=True)]
+
+
+def _walk(
+    materials: Sequence[Any],
+    paths: Sequence[Path | None],
+    settings: Mapping[str, Any],
+    save: Checkpoint | None,
+    stop: Stop,
+    tell: Callable[[str], object],
+    watch: Watch,
+) -> list[Outcome]:
+    """One walk for all ``materials``, from its checkpoint if there is one to go on from."""
+    resumes = save is not None and save.resume and save.path.exists()
+    if save and save.resume and not resumes:
+        if before := _finished(materials, paths, settings):
+            return [Outcome(*each, None) for each in zip(before, paths, strict=True)]
+        tell(f"No {save.path} to continue from: starting a new run.")
+    if compiling := compiling_note(materials[0]):
+        tell(compiling)
+    last: list[Progress] = []
+    label = materials[0].name if len(materials) == 1 else f"{len(materials)} materials"
+    with watch(label) as show:
+
+        def note(now: Progress) -> None:
+            if save and resumes and not last:
+                tell(f"Continuing from {save.path}: {now.photons_done:,} photons done.")
+            last[:] = [now]
+            if show:
+                show(now)
+
+        profiles = simulate_montecarlo_many(
+            materials, checkpoint=save, progress=note, stop=stop, **settings
+        )
+    try:
+        _write(profiles, paths)
+    except FileError as error:
+        if save is None or not save.is_ours():
+            raise
+        raise FileError(
+            f"{str(error).rstrip('.')}; {save.path} is kept: `resume = True` continues from it."
+        ) from None
+    complete = is_complete(profiles[0])
+    if save and complete:
+        save.remove()
+    kept = save is not None and save.is_ours()
+    seconds = last[-1].seconds
+    return [Outcome(*each, seconds, complete, kept) for each in zip(profiles, paths, strict=True)]
+
+
+def _finished(
+    materials: Sequence[Material], paths: Sequence[Path | None], settings: Mapping[str, Any]
+) -> list[Profile]:
+    """Return the profiles of this very walk if all are there, complete; else none."""
+    asked = {key: each for key, each in settings.items() if key != "threads"}
+    try:
+        profiles = [Profile.load(path) for path in paths if path and path.exists()]
+    except ProfileError:
+        return []
+    done = [is_finished(each, k, materials, **asked) for k, each in enumerate(profiles)]
+    return profiles if len(done) == len(materials) and all(done) else []
+
+
+def _write(profiles: Sequence[Profile], paths: Sequence[Path | None]) -> None:
+    for profile, path in zip(profiles, paths, strict=True):
+        if path is not None:
+            profile.save(path)

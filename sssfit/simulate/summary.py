@@ -1,0 +1,156 @@
+"""What runs found, in words: the page that ``sssfit simulate`` prints of its figures."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from sssfit.messages import columns
+
+_NOTED_BEYOND = 1e-3  # share of a channel beyond the grid that is worth a remark
+_SIGMAS = 4.5  # a deviation beyond so many standard errors is no accident
+_ROUNDING = 1e-12  # below this an energy balance is rounding, not roulette
+
+Rows = Sequence[dict[str, Any]]
+
+
+def summary(rows: Rows, *, several: bool) -> str:
+    """Return a page on runs of one method.
+
+    Parameters
+    ----------
+    rows : sequence of dict
+        By `sssfit.simulate.run_figures`.
+    several : bool
+        Whether more than one material was asked for; then the page begins with their number.
+    """
+    lines = [
+        _heading(rows, several=several),
+        _table(rows),
+        *(
+            f"absorbed by layer, {name}: {', '.join(f'{each[c]:.6f}' for each in layers)}"
+            for name, row, c in _channels(rows)
+            if (layers := row["absorbed_by_layer"]) is not None and len(layers) > 1
+        ),
+        *energy_lines(rows),
+        *_beyond(rows),
+        *_target(rows),
+    ]
+    return "\n".join(lines)
+
+
+def _channels(rows: Rows) -> list[tuple[str, dict[str, Any], int]]:
+    """Each channel of each row: its name with that of the material, the row, its index."""
+    return [
+        (f"{row['material']} {name}", row, c)
+        for row in rows
+        for c, name in enumerate(row["channels"])
+    ]
+
+
+def _heading(rows: Rows, *, several: bool) -> str:
+    """Say who, by what method, how fast, on which grid."""
+    row = rows[0]
+    if several:
+        return f"{len(rows)} materials: {_how(rows)}"
+    seconds, rate, annuli = row["seconds"], row["photons_per_second"], row["annuli"]
+    speed = "" if seconds is None else f", {seconds:.1f} s"
+    speed += f" ({rate:,.0f} a second)" if rate else ""
+    return (
+        f"{row['material']}: {_how(rows)}{speed}; {annuli} annuli of {row['dr_mm']:.4g} mm, "
+        f"to {annuli * row['dr_mm']:.4g} mm"
+    )
+
+
+def _how(rows: Rows) -> str:
+    """Say how many photons were traced, or what was computed."""
+    row = rows[0]
+    if row["photons"] is not None:
+        counts = sorted({each["photons"] for each in rows})
+        photons = " to ".join(f"{n:,}" for n in counts[:: len(counts) - 1 or 1])
+        return f"{photons} photons, seed {row['seed']}"
+    words = str(row["method"])
+    if row.get("tolerance") is not None:
+        reached = max(each["relative_error"] or 0.0 for each in rows)
+        words += f" to {100.0 * reached:.1g} % of the total"
+    words += ", for isotropic scattering of (1 - g) sigma_s" if row.get("similarity") else ""
+    return words + (f" ({row['mapping']})" if row.get("mapping") else "")
+
+
+def _table(rows: Rows) -> str:
+    """One line a channel; the material's name where there are several."""
+    walked = rows[0]["photons"]
+    # The error of a walk has its figure's decimals; that of a computation is far smaller.
+    error, form = ("std. error", ".6f") if walked else ("est. error", ".1e")
+    channels = _channels(rows)
+    names = [name for name, _, _ in channels] if len(rows) > 1 else rows[0]["channels"]
+    is_slab = any(row["transmittance"] is not None for row in rows)
+
+    def values(key: str, *, shown: bool = True) -> list[Any] | None:
+        each = [None if row[key] is None else row[key][c] for _, row, c in channels]
+        return each if shown else None
+
+    return columns(
+        "channel",
+        names,
+        ("diffuse reflectance", values("diffuse_reflectance"), ".6f"),
+        (error, values("diffuse_reflectance_stderr"), form),
+        ("transmittance", values("transmittance", shown=is_slab), ".6f"),
+        (error, values("transmittance_stderr", shown=is_slab), form),
+        ("absorbed", values("absorbed"), ".6f"),
+        ("beyond grid", values("beyond_grid"), ".6f"),
+    )
+
+
+def energy_lines(rows: Rows) -> list[str]:
+    """Say whether specular + diffuse + absorbed = 1 within the runs' own error, where known."""
+    lines = [] if len(rows) > 1 else [f"specular reflectance {rows[0]['specular_reflectance']:.6f}"]
+    if any(row["energy_balance_stderr"] is None for row in rows):
+        return lines
+    balance, stderr, name = max(
+        (
+            (float(row["energy_balance"][c]), float(row["energy_balance_stderr"][c]), name)
+            for name, row, c in _channels(rows)
+        ),
+        key=lambda each: abs(each[0]) / (_SIGMAS * each[1] + _ROUNDING),
+    )
+    unfinished = max(float(each) for row in rows for each in row["unfinished"])
+    parts = "specular + diffuse + absorbed"
+    parts += " + transmitted" if any(row["transmittance"] is not None for row in rows) else ""
+    parts += " + unfinished" if unfinished > 0.0 else ""
+    if not rows[0]["photons"]:
+        return [*lines, f"energy: {parts} = 1 to {abs(balance):.0e} (worst channel, {name})"]
+    within = abs(balance) <= _SIGMAS * stderr + _ROUNDING
+    lines.append(
+        f"energy: {parts} = 1 {'within' if within else 'NOT WITHIN'} the run's own error: "
+        f"{balance:+.1e}, standard error {max(stderr, _ROUNDING):.0e} (worst channel, {name})"
+    )
+    return [*lines, *([f"unfinished, at most: {unfinished:.6f}"] if unfinished > 0.0 else [])]
+
+
+def _beyond(rows: Rows) -> list[str]:
+    """Remark on channels that lose a noticeable share beyond the grid."""
+    lost = [
+        f"{name} {100.0 * share:.1f} %"
+        for name, row, c in _channels(rows)
+        if (total := row["diffuse_reflectance"][c]) > 0.0
+        and (share := row["beyond_grid"][c] / total) > _NOTED_BEYOND
+    ]
+    remedy = '`radius_mm = "auto"`' if rows[0]["photons"] else "`radius_mm`"
+    shares = ", ".join(lost)
+    return [f"beyond the grid, as a share of diffuse: {shares} ({remedy})"] if lost else []
+
+
+def _target(rows: Rows) -> list[str]:
+    """Say whether the target error was met, and how many photons that took."""
+    target = rows[0]["target_error"]
+    if target is None:
+        return []
+    error = max(
+        math.inf if row["relative_error"] is None else row["relative_error"] for row in rows
+    )
+    photons = " and ".join(dict.fromkeys(f"{row['photons']:,}" for row in rows))
+    return [
+        f"target error {100.0 * target:g} % of F at the last edge: "
+        f"{'met' if error < target else 'NOT MET'} with {photons} photons, "
+        f"{100.0 * error:.3g} % reached"
+    ]

@@ -1,0 +1,674 @@
+"""The invocations whose output is approved: every option of every verb off its default.
+
+A new option or message takes a line here; ``python tests/approve.py`` then records what it does.
+"""
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+from approval_run import Command
+
+C = Command
+GRID = "--dr .2 --radius 6"
+SMALL = "--size 40x24"
+
+
+def _write(name: str, text: str) -> Callable[[], object]:
+    return lambda: Path(name).write_text(text, encoding="utf-8")
+
+
+def _into(folder: str) -> Callable[[], object]:
+    return lambda: os.chdir(folder)
+
+
+def _gone(*names: str) -> Callable[[], object]:
+    return lambda: [Path(name).unlink() for name in names]
+
+
+HELP = [
+    C("", note="no verb"),
+    *(C(f"{verb} -h".strip()) for verb in ("", "materials", "simulate", "fit", "render")),
+    *(C(f"{verb} --help") for verb in ("compare", "choose", "import", "export", "chart", "show")),
+    C("--version"),
+    C("--version -v", hidden=(r" \d[\w.]*$",)),
+    C("simulat wax.toml"),
+    C("fit --rang 3"),
+    C("show wax.toml --threads 0"),
+    C("show wax.toml --seed -1"),
+    C("show wax.toml --threads two"),
+    C("show wax.toml wax.toml"),
+    C("show wax.toml", environment=(("NUMBA_NUM_THREADS", "0"),), note="NUMBA_NUM_THREADS=0"),
+]
+
+MATERIALS = [
+    C("materials"),
+    C("materials --json"),
+    C("materials -q"),
+    C("materials wax.toml --threads 1 --seed 2"),
+    C("materials plate.toml -v"),
+    C("materials leaf.toml --json"),
+    C("materials plate.toml --json"),
+    C("materials varnish.toml"),
+    C("materials skin1 --toml"),
+    C("materials plate.toml --toml"),
+    C("materials leaf.toml --toml"),
+    C("materials -", stdin="leaf.toml"),
+    C("materials deon-skin"),
+    C("materials deon-skin --json"),
+    C("materials deon-skin --toml"),
+    C("materials wax.toml --toml --json"),
+    C("materials --toml"),
+    C("materials wax.toml --eta 1.2"),
+    C("materials skn1"),
+    C("materials missing.toml"),
+    C("materials broken.toml"),
+    C("materials nottoml.toml"),
+    C("materials foreign.toml"),
+    C(
+        "materials --from-reflectance .44,.23 --mean-free-path 1.3,.95 --eta 1.3 -o lard.toml"
+        " --channels R,G"
+    ),
+    C("materials --from-reflectance '#C58c6b' --mean-free-path 0.037,0.014,0.007cm --name skin"),
+    C("materials --from-reflectance '#fa6' --mean-free-path 400um --light normal -o - "),
+    C("materials --from-reflectance 107,140,197 --srgb --mean-free-path .4 --name Haut --json"),
+    C("materials --from-reflectance 40 --srgb --mean-free-path .4 --channels λ -o out/g.toml"),
+    C(
+        "materials --from-reflectance 44%,.2 --mean-free-path 1,2 --channels B,A --light diffuse"
+        " --eta 1.5 -o out/pair.toml -q"
+    ),
+    C("materials --from-reflectance .44,0 --channels a,b --mean-free-path 1 -o foreign.toml"),
+    C(
+        "materials --from-reflectance .44,0 --channels a,b --mean-free-path 1 -o foreign.toml --force"
+    ),
+    C("materials --from-reflectance .44 --mean-free-path 1"),
+    C("materials --from-reflectance .44,.2 --mean-free-path 1 --channels a,b,c"),
+    C("materials --from-reflectance .4,.3,.2"),
+    C("materials wax.toml --from-reflectance .4,.3,.2 --mean-free-path 1"),
+    C("materials --from-reflectance .4,.3,2 --mean-free-path 1"),
+    C("materials --from-reflectance .99,.3,.2 --mean-free-path 1 --eta 1.4"),
+    C("materials --from-reflectance '#12345' --mean-free-path 1"),
+    C("materials --from-reflectance .4,x,.2 --mean-free-path 1"),
+    C("materials --from-reflectance 1.5,2,3 --srgb --mean-free-path 1"),
+    C("materials --from-reflectance .4,.3,.2 --mean-free-path 1,2"),
+    C("materials --from-reflectance .4,.3,.2 --mean-free-path 1mm,2,3"),
+    C("materials --from-reflectance .4,.3,.2 --mean-free-path 1 --eta nan"),
+]
+
+SIMULATE = [
+    C(f"simulate wax.toml {GRID} --photons 3000"),
+    C(f"simulate wax.toml {GRID} --photons 3000 --seed 5 --threads 1 --json"),
+    C(f"simulate plate.toml {GRID} --photons 2e3 -o 'out/Platte λ.npz' -v"),
+    C("simulate leaf.toml --dr 200um --radius .5cm --photons 2000 -o - ", note="to stdout"),
+    C(f"simulate wax.toml {GRID} --photons 2000 -q"),
+    C(f"simulate wax.toml {GRID} --photons 1.5e5", terminal=True),
+    C(f"simulate wax.toml {GRID} --photons 1000", compiled=False, note="not compiled"),
+    C("simulate wax.toml --dr .2 --radius auto --photons 2000 -o auto.profile.npz"),
+    C(f"simulate wax.toml {GRID} --target-error 30% --photons 40000 -o aim.npz"),
+    C(f"simulate wax.toml {GRID} --target-error .1 --photons 1000 -o aim.npz --json"),
+    C(f"simulate wax.toml {GRID} --photons 2000 --checkpoint-every 0 -o often.npz"),
+    C(f"simulate wax.toml {GRID} --photons 2000 --resume -o new.npz"),
+    C("simulate two.mci -o out --photons 1000"),
+    C("simulate two.mci -o out --json"),
+    C("simulate two.mci --run 2"),
+    C("simulate two.mci --run 2 --dr .5 --radius 3 --photons 500 -v"),
+    C("simulate sample.mci --run 1 --photons 300"),
+    C("simulate two.mci --run 3"),
+    C("simulate two.mci --run 1 --method multipole"),
+    C(f"simulate wax.toml {GRID} --method exact"),
+    C(f"simulate wax.toml {GRID} --method exact --tolerance 2% --json"),
+    C(f"simulate wax.toml {GRID} --method exact", compiled=False, note="not compiled"),
+    C("simulate leaf.toml --dr .3 --radius 4 --method exact"),
+    C(f"simulate wax.toml {GRID} --method dipole -o d.npz --json"),
+    C(f"simulate leaf.toml {GRID} --method dipole-grosjean"),
+    C(f"simulate plate.toml {GRID} --method multipole"),
+    C(f"simulate wax.toml {GRID} --method burley --mapping diffuse-mfp"),
+    C(f"simulate leaf.toml {GRID} --method burley --mapping diffuse --json"),
+    C("simulate deon-skin --dr .5 --radius 10"),
+    C("simulate deon-skin --dr .5 --radius 10 -o out/skin.npz --json"),
+    C("simulate --paper --method burley --dr .5 --radius 5 -o out"),
+    C("simulate - --method burley --dr .5 --radius 5", stdin="leaf.toml"),
+    C("simulate"),
+    C("simulate wax.toml --all"),
+    C("simulate --all -o -"),
+    C("simulate wax.toml --run 1"),
+    C("simulate wax.toml --method burley --photons 20"),
+    C("simulate wax.toml --tolerance 1%"),
+    C("simulate wax.toml --method dipole --radius auto"),
+    C("simulate wax.toml --method dipole --dr 1 --radius .5"),
+    C("simulate wax.toml --photons 1"),
+    C("simulate wax.toml --photons 1.5e1x"),
+    C("simulate wax.toml --target-error 150%"),
+    C("simulate wax.toml --dr 0"),
+    C("simulate wax.toml --dr 1inch"),
+    C("simulate wax.toml --radius far"),
+    C("simulate wax.toml --checkpoint-every -1"),
+    C("simulate wax.toml --resume -o -"),
+    C("simulate plate.toml --method exact"),
+    C("simulate varnish.toml --method dipole"),
+    C("simulate plate.toml --method gaussians"),
+    C("simulate --all --method gaussians"),
+    C("simulate deon-skin --method exact"),
+    C("simulate wax.toml --method dipole -o foreign.npz"),
+    C("simulate wax.toml --method dipole --dr .5 --radius 5 -o foreign.npz --force"),
+    C("simulate wax.toml --photons 10 -o foreign.npz.txt"),
+    C("simulate wax.toml --method dipole -o missing/x.npz"),
+    C(
+        "simulate wax.toml --photons 2000 -o x.npz --resume",
+        set_up=_write("x.npz.checkpoint", "mine"),
+    ),
+    C("simulate wax.toml --photons 2000 -o x.npz", set_up=_write("x.npz.checkpoint", "mine")),
+    C("simulate missing.toml"),
+    *(C(f"simulate {name}.mci") for name in ("short", "twice", "extra", "bad_g", "bad_photons")),
+    *(C(f"simulate {name}.mci") for name in ("words", "thick", "missing")),
+]
+
+FIT = [
+    C("fit --list"),
+    C("fit --method svd"),
+    C("fit wax.profile.npz --method svd --rank 2 --mm-per-pixel .5 --support 2.1 --energy keep"),
+    C("fit 'Größe λ.profile.npz' --method svd --rank 1 --mm-per-pixel profile --normalize --json"),
+    C("fit wax.profile.npz --method gaussians --mm-per-pixel .4 --support 1.5mm"),
+    C("fit wax.profile.npz --method gaussians --terms 2 --mm-per-pixel .5 --energy keep"),
+    C("fit four.profile.npz --method gaussians --terms 3 --signed --mm-per-pixel 500um"),
+    C("fit leaf.profile.npz --method gaussians --terms 2 --free-energy --mm-per-pixel .25 --json"),
+    C("fit leaf.profile.npz --method preintegrated --energy keep --mm-per-pixel .25 -o vor.json"),
+    C("fit mono.profile.npz --method preintegrated --mm-per-pixel .05cm"),
+    C("fit wax.profile.npz --method guided --k 3 --b 5 --mm-per-pixel .5"),
+    C("fit wax.profile.npz --method guided --k 0 --mm-per-pixel .5 --normalize"),
+    C("fit wax.profile.npz --method guided --centre-bound .2 --mm-per-pixel .5 --json"),
+    C("fit wax.profile.npz --method artist --mm-per-pixel .5"),
+    C("fit wax.profile.npz --method artist --target kernel --mm-per-pixel .5 -v"),
+    C("fit wax.profile.npz --method artist --near .2,.1,.05 --far 2 --weight .4,.5,.6"),
+    C("fit wax.profile.npz --method artist --target picture --mm-per-pixel .5"),
+    C("fit wax.profile.npz --method falloff --mm-per-pixel .5"),
+    C("fit wax.profile.npz --method falloff --width .3 --strength .8,.7,.75 --falloff .6,.2,.1"),
+    C("fit four.profile.npz --method burley --mm-per-pixel .4 --energy keep"),
+    C("fit wax.profile.npz --method burley --mm-per-pixel .4 --seed 3 --threads 1"),
+    C("fit - --method svd --mm-per-pixel 1 -o -", stdin="leaf.profile.npz"),
+    C("fit - --method svd --mm-per-pixel 1 --rank 1", stdin="Größe λ.profile.npz"),
+    C("fit wax.profile.npz --method svd --mm-per-pixel .5 -q"),
+    C("fit wax.profile.npz --method svd --mm-per-pixel .5 -o foreign.json"),
+    C("fit wax.profile.npz --method svd --mm-per-pixel .5 -o foreign.json --force"),
+    C("fit wax.profile.npz --method svd --mm-per-pixel .5 -o five.kernel.json"),
+    C("fit wax.profile.npz"),
+    C("fit wax.profile.npz --method svd --terms 2"),
+    C("fit wax.profile.npz --method gaussians --rank 2"),
+    C("fit wax.profile.npz --method svd --rank 0"),
+    C("fit wax.profile.npz --method svd --rank 200 --mm-per-pixel .5"),
+    C("fit wax.profile.npz --method guided --k 5"),
+    C("fit wax.profile.npz --method guided --b nan"),
+    C("fit wax.profile.npz --method guided --centre-bound 2"),
+    C("fit wax.profile.npz --method artist --near .2"),
+    C("fit wax.profile.npz --method artist --near .2,.3 --far 2 --weight .5"),
+    C("fit wax.profile.npz --method artist --target kernel --near .2 --far 2 --weight .5"),
+    C("fit wax.profile.npz --method falloff --width .3"),
+    C("fit wax.profile.npz --method svd --mm-per-pixel wide"),
+    C("fit wax.profile.npz --method svd --support 1e5m"),
+    C("fit four.profile.npz --method svd --mm-per-pixel profile"),
+    C("fit wax.profile.npz --method svd --mm-per-pixel 30"),
+    C("fit missing.profile.npz --method svd"),
+    C("fit damaged.profile.npz --method svd"),
+    C("fit foreign.npz --method svd"),
+    C("fit wax.svd2.kernel.json --method svd"),
+    C("fit wax.profile.npz --method svd -o x.txt"),
+    C("fit --method svd", set_up=_into("empty"), note="in an empty folder"),
+]
+
+RENDER = [
+    C(f"render --irradiance disk {SMALL}"),
+    C(f"render wax.svd2.kernel.json --irradiance edge --angle 30 {SMALL} --border zero --json"),
+    C(f"render wax.svd2.kernel.json --irradiance disk --radius 1.1mm {SMALL} -o 'Scheibe ß.exr'"),
+    C(f"render wax.svd2.kernel.json --irradiance stripes --period .3cm --angle 20 {SMALL}"),
+    C(f"render wax.svd2.kernel.json --irradiance separable --period 2 {SMALL} --border clamp"),
+    C(f"render wax.svd2.kernel.json --irradiance points --spacing 1.5 {SMALL}"),
+    C(f"render wax.svd2.kernel.json --irradiance noise --seed 9 {SMALL} --threads 1"),
+    C(f"render wax.svd2.kernel.json --irradiance highlights --radius .6 {SMALL} --exposure 2.5"),
+    C(f"render wax.svd2.kernel.json {SMALL} --distance .9m --light 20 -o kopf.png --truth w.tif"),
+    C(f"render wax.gaussians3.kernel.json --transmit {SMALL} -v"),
+    C(f"render wax.gaussians3.kernel.json --transmit --light 150 {SMALL} --json"),
+    C(f"render wax.svd2.kernel.json --screen {SMALL} --mm-per-pixel 1.5"),
+    C(f"render wax.svd2.kernel.json --screen --follow lerp {SMALL} --mm-per-pixel 1.5 --json"),
+    C(
+        f"render wax.gaussians3.kernel.json --screen --follow none --transmit {SMALL} --mm-per-pixel 1.5"
+    ),
+    C(f"render plate.artist.kernel.json --irradiance disk {SMALL} --difference d.exr --gain 3"),
+    C(
+        f"render plate.artist.kernel.json --irradiance disk {SMALL} --difference d.png --difference-map signed"
+    ),
+    C(
+        f"render plate.artist.kernel.json --irradiance disk {SMALL} --difference d.png"
+        " --difference-map absolute --gain 2 --json"
+    ),
+    C(
+        f"render plate.artist.kernel.json --irradiance edge {SMALL} -o a.png --truth t.exr --structure"
+    ),
+    C(
+        f"render plate.artist.kernel.json --irradiance edge {SMALL} -o a.exr --profile wax.profile.npz"
+    ),
+    C(f"render vier.gaussians4.kernel.json --irradiance disk {SMALL} --json"),
+    C(f"render vier.gaussians4.kernel.json --irradiance disk {SMALL}"),
+    C(f"render leaf.burley.kernel.json --irradiance disk {SMALL}"),
+    C(f"render grau.kernel.json --irradiance disk {SMALL} -o g.tif"),
+    C(f"render grau.kernel.json --irradiance disk {SMALL} --profile mono.profile.npz"),
+    C(f"render five.kernel.json --irradiance disk {SMALL} -q"),
+    C(f"render - --irradiance disk {SMALL} -o -", stdin="wax.svd2.kernel.json"),
+    C(f"render - --irradiance disk {SMALL}", stdin="wax.svd2.kernel.json"),
+    C("render wax.svd2.kernel.json --irradiance points -q"),
+    C("render wax.svd2.kernel.json --irradiance mine.exr"),
+    C("render wax.svd2.kernel.json --irradiance mine.exr --mm-per-pixel 250um -o x.tiff --json"),
+    C("render wax.svd2.kernel.json --irradiance bare.exr --mm-per-pixel .25"),
+    C("render wax.svd2.kernel.json --irradiance bare.exr"),
+    C("render wax.svd2.kernel.json --irradiance bare.exr --mm-per-pixel .5"),
+    C(
+        "render wax.svd2.kernel.json --irradiance layers.exr --layer far --mm-per-pixel .25 -o x.png"
+    ),
+    C(
+        "render wax.svd2.kernel.json --irradiance layers.exr --layer far --mask alpha --mm-per-pixel .25"
+    ),
+    C("render wax.svd2.kernel.json --irradiance layers.exr --mm-per-pixel .25"),
+    C("render wax.svd2.kernel.json --irradiance layers.exr --layer Near --mm-per-pixel .25"),
+    *(
+        C(f"render wax.svd2.kernel.json --irradiance {name} --mm-per-pixel .25 -o x.exr")
+        for name in (
+            *("depth.exr", "wide.exr", "ebu.exr", "rgb8.png", "rgba16.png", "turned.tif"),
+            *("rgba8.tif", "photo.tga", "photo.jpg", "old.hdr", "grey.png"),
+            *("negative.exr", "xyz.hdr", "cut.exr", "cut.png", "foreign.exr", "vier.exr"),
+        )
+    ),
+    C("render vier.gaussians4.kernel.json --irradiance vier.exr --mm-per-pixel .3"),
+    C("render leaf.burley.kernel.json --irradiance two.exr --mm-per-pixel .15 --border clamp"),
+    C("render grau.kernel.json --irradiance rgba16.png --mm-per-pixel .3333333333333333 -o x.exr"),
+    C("render grau.kernel.json --irradiance grey.png --mm-per-pixel .3333333333333333 -o x.png"),
+    C(f"render wax.svd2.kernel.json --irradiance disk {SMALL} -o foreign.exr"),
+    C(f"render wax.svd2.kernel.json --irradiance disk {SMALL} -o foreign.exr --force"),
+    C("render wax.svd2.kernel.json --irradiance mine.exr -o mine.exr"),
+    C(f"render wax.svd2.kernel.json --irradiance disk {SMALL} -o x.gif"),
+    C(f"render wax.svd2.kernel.json --irradiance disk {SMALL} -o x.exr --truth x.exr"),
+    C("render wax.svd2.kernel.json --irradiance missing.exr"),
+    C("render wax.svd2.kernel.json --irradiance disk --size 40"),
+    C("render wax.svd2.kernel.json --irradiance disk --angle 3"),
+    C("render wax.svd2.kernel.json --irradiance disk --mm-per-pixel 3"),
+    C("render wax.svd2.kernel.json --irradiance disk --layer near"),
+    C("render wax.svd2.kernel.json --irradiance mine.exr --size 3x3"),
+    C("render wax.svd2.kernel.json --irradiance mine.exr --mask alpha"),
+    C("render wax.svd2.kernel.json --irradiance disk --transmit"),
+    C("render wax.svd2.kernel.json --transmit --size 20x20"),
+    C("render wax.svd2.kernel.json --screen --irradiance disk"),
+    C("render wax.svd2.kernel.json --screen --truth x.exr"),
+    C("render wax.svd2.kernel.json --follow lerp"),
+    C("render wax.svd2.kernel.json --gain 3"),
+    C("render wax.svd2.kernel.json --exposure 0"),
+    C("render wax.svd2.kernel.json --distance 1mm --size 20x20"),
+    C("render grau.kernel.json --irradiance disk --truth t.exr"),
+    C("render damaged.kernel.json"),
+    C("render foreign.json"),
+    C("render wax.profile.npz"),
+    C("render missing.kernel.json"),
+    C("render", set_up=_into("empty"), note="in an empty folder"),
+    C(
+        f"render wax.svd2.kernel.json --irradiance disk {SMALL}",
+        set_up=_gone("wax.profile.npz"),
+        note="the profile gone",
+    ),
+]
+
+TINY = "--size 32x20 --mm-per-pixel .5"
+COMPARE = [
+    C(f"compare wax.profile.npz --picture disk,edge {TINY}"),
+    C(f"compare wax.profile.npz --picture disk --picture points {TINY} --what kernels --json"),
+    C(
+        f"compare wax.profile.npz --picture disk {TINY} --error l2 --cost passes --table t.md --chart c.svg"
+    ),
+    C(
+        f"compare wax.profile.npz --picture disk {TINY} --cost seconds --table t.csv --chart 'Größe.pdf' -v"
+    ),
+    C(
+        f"compare 'Größe λ.profile.npz' --picture edge,disk {TINY} --error l2 --table t.json --threads 1"
+    ),
+    C(f"compare four.profile.npz --picture edge {TINY} --error l2 --table t.csv"),
+    C(f"compare four.profile.npz --picture edge {TINY}"),
+    C(f"compare mono.profile.npz --picture disk,noise --seed 4 {TINY} --what front"),
+    C(f"compare wax.profile.npz --picture disk,edge {TINY} --what front --cost seconds --json"),
+    C(f"compare wax.profile.npz --picture disk {TINY} --what front --chart f.png --table f.md"),
+    C("compare wax.profile.npz --picture mine.exr --what front"),
+    C(
+        "compare wax.profile.npz --picture layers.exr --layer far --mask alpha --mm-per-pixel profile"
+    ),
+    C("compare wax.profile.npz --size 24x16 --mm-per-pixel .1cm --what front -q"),
+    C(f"compare - --picture disk {TINY} --what front", stdin="leaf.profile.npz"),
+    C(f"compare wax.profile.npz --picture disk {TINY} --what kernels", terminal=True),
+    C("compare mono.profile.npz --what sheet --chart s.png --mm-per-pixel .5"),
+    C("compare 'Größe λ.profile.npz' --what sheet --chart s.svg --mm-per-pixel profile --json"),
+    C(f"compare wax.toml --what budget --picture disk,edge {TINY} --photons 2000 --seed 5"),
+    C(f"compare wax.toml --what budget --picture disk {TINY} --photons 2e3 --rank 1 --json"),
+    C(
+        f"compare wax.toml --what budget --picture disk {TINY} --photons 2000 --method gaussians"
+        " --terms 2 --budget-chart b.png"
+    ),
+    C(f"compare wax.toml --what budget --picture disk {TINY} --photons 2000 --model dipole"),
+    C(
+        f"compare wax.toml --what budget --picture disk {TINY} --photons 2000 --method burley"
+        " --model burley --json"
+    ),
+    C(
+        f"compare wax.toml --what budget --picture disk {TINY} --photons 2000",
+        compiled=False,
+        terminal=True,
+        note="not compiled",
+    ),
+    C(f"compare wax.toml --picture disk {TINY} --photons 2000 --chart - --table t.md"),
+    C(f"compare leaf.toml --picture disk {TINY} --error l2"),
+    C(f"compare plate.toml --picture disk {TINY}"),
+    C(f"compare deon-skin --picture disk {TINY} --what front"),
+    C(f"compare deon-skin --what budget --picture disk {TINY}"),
+    C(f"compare wax.profile.npz --what budget --picture disk {TINY}"),
+    C("compare plate.toml --what budget --picture disk --size 20x20"),
+    C("compare"),
+    C("compare wax.toml --all"),
+    C("compare --all --what budget"),
+    C("compare --all --chart x.png"),
+    C("compare --paper --mm-per-pixel profile"),
+    C("compare wax.toml -o out"),
+    C("compare wax.toml --what front --photons 20"),
+    C("compare wax.toml --what budget --chart x.png"),
+    C("compare wax.toml --what sheet --picture disk --chart x.png"),
+    C("compare wax.toml --what sheet"),
+    C("compare wax.toml --chart - --budget-chart -"),
+    C("compare wax.toml --method gaussians --rank 2"),
+    C("compare wax.toml --picture disc"),
+    C("compare wax.toml --picture mine.exr --size 3x3"),
+    C("compare wax.toml --picture disk --layer far"),
+    C("compare wax.toml --table x.txt"),
+    C("compare wax.toml --chart x.gif"),
+    C("compare wax.toml --chart foreign.png"),
+    C("compare wax.toml --table foreign.md"),
+    C(f"compare mono.profile.npz --picture disk {TINY} --what kernels --table foreign.md --force"),
+    C("compare wax.toml --chart x.png --budget-chart x.png"),
+    C("compare wax.toml --photons 1"),
+    C(f"compare missing.toml --picture disk {TINY}"),
+]
+
+VIEW = "--distance .6m --fov 20 --resolution 64x48"
+CHOOSE = [
+    C("choose wax.toml --distance 3m --resolution 40x24 --irradiance edge"),
+    C("choose wax.toml --distance 60m --resolution 40x24"),
+    C(
+        "choose wax.profile.npz --distance 40cm --fov 3 --resolution 40x48 --irradiance disk --tolerance 2"
+    ),
+    C(
+        "choose wax.profile.npz --distance 40cm --fov 3 --resolution 40x48 --irradiance disk --tolerance 5"
+    ),
+    C(
+        "choose wax.profile.npz --distance 40cm --fov 3 --resolution 40x48 --irradiance disk --tolerance 2"
+        " --tolerance-of mean --json"
+    ),
+    C(
+        "choose wax.profile.npz --distance 40cm --fov 3 --resolution 40x48 --irradiance edge"
+        " --tolerance 6 --tolerance-of p99 -v -o 'out/Wahl λ.json'"
+    ),
+    C(
+        "choose 'Größe λ.profile.npz' --distance .3m --fov 2 --resolution 30x40 --irradiance points"
+        " --tolerance 12 --threads 1"
+    ),
+    C(
+        "choose mono.profile.npz --distance .3m --fov 2 --resolution 30x40 --irradiance noise --seed 4"
+        " --tolerance 2 -q"
+    ),
+    C(
+        "choose - --distance 40cm --fov 3 --resolution 40x48 --irradiance disk --tolerance 6 -o -",
+        stdin="wax.profile.npz",
+    ),
+    C("choose wax.toml --distance 40cm --fov 3 --resolution 40x48 --irradiance disk --tolerance 5"),
+    C("choose wax.toml --distance 70m --resolution 40x24", compiled=False, note="not compiled"),
+    C("choose wax.profile.npz --irradiance mine.exr --tolerance 2"),
+    C(
+        "choose wax.profile.npz --irradiance layers.exr --layer far --mask alpha --fov 40 --tolerance 9"
+    ),
+    C("choose wax.profile.npz --distance 900 --resolution 64x48 --tolerance 20"),
+    C(
+        "choose wax.profile.npz --distance 3m --resolution 40x24 --irradiance edge",
+        set_up=_write("wax.chosen.kernel.json", '{"format": "sssfit.kernel/1"}'),
+        note="an earlier one",
+    ),
+    C("choose deon-skin --distance 60m --resolution 40x24"),
+    C("choose"),
+    C("choose wax.toml --distance 1"),
+    C("choose wax.toml --distance 1cm"),
+    C("choose wax.toml --fov 180"),
+    C("choose wax.toml --resolution 40by30"),
+    C("choose wax.toml --tolerance 0"),
+    C("choose wax.toml --tolerance-of p90"),
+    C("choose wax.toml --irradiance disk --layer far"),
+    C("choose wax.profile.npz --irradiance missing.png"),
+    C("choose four.profile.npz --irradiance disk --resolution 40x24"),
+    C("choose wax.toml -o foreign.json"),
+    C(
+        "choose mono.profile.npz --distance .3m --fov 2 --resolution 30x40 --irradiance disk --tolerance 8"
+        " -o foreign.json --force"
+    ),
+    C("choose missing.toml"),
+]
+
+IMPORT = [
+    C("import density.csv"),
+    C("import cm.csv --quantity density --json"),
+    C("import cm.csv --quantity density --density-unit mm"),
+    C("import plain.csv --quantity density --unit mm --density-unit cm -o 'Größe.npz'"),
+    C("import plain.csv --quantity density --unit cm"),
+    C("import energy.csv -v"),
+    C("import energy.csv --json -o e.npz"),
+    C("import gap.csv --quantity density"),
+    C("import - --quantity density", stdin="cm.csv"),
+    C("import density.csv -o -"),
+    C("import density.csv -q --threads 1 --seed 2"),
+    C("import latin1.csv --quantity density"),
+    C("import latin1-comment.csv --quantity density"),
+    C("import utf16.csv --quantity density"),
+    C("import bom.csv --quantity density"),
+    C("import r.mco"),
+    C("import r.mco g.mco -o rg.npz --channels G,R --json"),
+    C("import r.mco g.mco r.mco -o rgb.npz"),
+    C("import g.mco --channels grün"),
+    C("import - --channels ' λ '", stdin="g.mco"),
+    C("import lossy.mco"),
+    C("import cudamcml-inparam.mco"),
+    C("import mcml2.mco"),
+    C("import toomuch.csv --quantity density"),
+    C("import toomuch_plain.csv --quantity density --unit um"),
+    C("import energies_over.csv --quantity energy"),
+    C("import density.csv --quantity energy"),
+    C("import energy.csv --density-unit cm"),
+    C("import cm.csv"),
+    C("import plain.csv --quantity density"),
+    C("import cm.csv --quantity density --unit mm"),
+    C("import afterinf.csv --quantity density"),
+    C("import zero.csv --quantity energy"),
+    C("import zero.csv --quantity density"),
+    *(
+        C(f"import {name}.csv --quantity energy")
+        for name in (
+            *("empty", "numbers", "onecolumn", "noname", "twice", "noradius", "tworadii"),
+            *("stray_stderr", "gaps", "afterinf", "oneline", "head", "unsorted", "negative"),
+            *("word", "emptycell", "quoted", "said", "missing"),
+        )
+    ),
+    *(
+        C(f"import {name}.mco")
+        for name in ("wrong_sum", "short", "negative", "extra", "binary", "missing")
+    ),
+    C("import r.mco other_n.mco -o x.npz --channels a,b"),
+    C("import r.mco other_grid.mco -o x.npz --channels a,b"),
+    C("import r.mco g.mco"),
+    C("import r.mco g.mco -o x.npz"),
+    C("import r.mco g.mco -o x.npz --channels a,b,c"),
+    C("import r.mco g.mco -o x.npz --channels a,a"),
+    C("import r.mco density.csv -o x.npz"),
+    C("import r.mco --unit cm"),
+    C("import density.csv --channels a,b"),
+    C("import two.mci"),
+    C("import wax.profile.npz"),
+    C("import density.csv -o foreign.npz"),
+    C("import density.csv -o foreign.npz --force"),
+    C("import density.csv -o x.csv"),
+    C("import"),
+]
+
+EXPORT = [
+    C("export --format hlsl"),
+    C("export wax.svd2.kernel.json --format json"),
+    C("export plate.artist.kernel.json --format hlsl -o 'Platte λ.hlsl' --json"),
+    C("export plate.artist.kernel.json --format json -o out/p.json -v"),
+    C("export grau.kernel.json --format hlsl -o -"),
+    C("export grau.kernel.json --format json -o - -q"),
+    C("export leaf.burley.kernel.json --format hlsl"),
+    C("export leaf.burley.kernel.json --format json"),
+    C("export vier.gaussians4.kernel.json --format hlsl"),
+    C("export five.kernel.json --format hlsl"),
+    C("export five.kernel.json --format json --json"),
+    C("export - --format hlsl", stdin="five.kernel.json"),
+    C("export --format csv"),
+    C("export 'Größe λ.profile.npz' --format csv -o p.csv --json"),
+    C("export leaf.profile.npz --format csv -o -"),
+    C("export four.profile.npz --format csv -q"),
+    C("export - --format csv -o out/x.csv", stdin="mono.profile.npz"),
+    C("export --format csv --threads 2 --seed 3"),
+    C("export wax.svd2.kernel.json"),
+    C("export wax.svd2.kernel.json --format csv"),
+    C("export wax.profile.npz --format hlsl"),
+    C("export wax.svd2.kernel.json --format glsl"),
+    C("export wax.svd2.kernel.json --format hlsl -o foreign.hlsl"),
+    C("export wax.svd2.kernel.json --format hlsl -o foreign.hlsl --force"),
+    C("export wax.svd2.kernel.json --format json -o wax.svd2.kernel.json"),
+    C("export wax.svd2.kernel.json --format json -o wax.svd2.kernel.json --force"),
+    C("export wax.profile.npz --format csv -o foreign.csv"),
+    C("export wax.svd2.kernel.json --format hlsl -o x.txt"),
+    C("export wax.profile.npz --format csv -o out"),
+    C("export damaged.kernel.json --format json"),
+    C("export --format hlsl", set_up=_into("empty"), note="in an empty folder"),
+    C("export --format csv", set_up=_into("empty"), note="in an empty folder"),
+]
+
+CHART = [
+    C("chart"),
+    C("chart 'Größe λ.profile.npz' -o 'Bild λ.svg' --json"),
+    C("chart four.profile.npz -q --threads 1"),
+    C("chart leaf.profile.npz -o -"),
+    C("chart wax.svd2.kernel.json"),
+    C("chart plate.artist.kernel.json --channel G -o p.pdf --json"),
+    C("chart wax.svd2.kernel.json --profile wax.profile.npz --channel B"),
+    C("chart vier.gaussians4.kernel.json --profile four.profile.npz"),
+    C("chart grau.kernel.json"),
+    C("chart -", stdin="grau.kernel.json"),
+    C("chart plate.toml"),
+    C("chart leaf.toml --json"),
+    C("chart skin1 -v -o skin.png"),
+    C("chart --spectrum"),
+    C("chart --spectrum 'Größe λ.profile.npz' --mm-per-pixel .4 --json"),
+    C("chart --guide wax.profile.npz --mm-per-pixel profile"),
+    C(
+        "chart --guide 'Größe λ.profile.npz' --k 0,2 --channel R --mm-per-pixel .04cm --json -o g.svg"
+    ),
+    C("chart --models wax.toml --photons 1e3 --seed 3", terminal=True),
+    C("chart --models wax.profile.npz -o m.pdf --json"),
+    C("chart --models wax.toml --spectrum"),
+    C("chart --models"),
+    C("chart --models deon-skin"),
+    C("chart --models leaf.profile.npz"),
+    C("chart --models wax.profile.npz --photons 100"),
+    C("chart --models plate.toml"),
+    C("chart wax.profile.npz --photons 100"),
+    C("chart wax.profile.npz --k 1"),
+    C("chart wax.profile.npz --spectrum --channel R"),
+    C("chart wax.profile.npz --channel R"),
+    C("chart wax.profile.npz --guide --profile wax.profile.npz"),
+    C("chart wax.profile.npz --guide --channel N"),
+    C("chart four.profile.npz --guide --channel E"),
+    C("chart wax.profile.npz --guide --k 1,2,3,4,0"),
+    C("chart wax.svd2.kernel.json --guide"),
+    C("chart wax.svd2.kernel.json --channel X"),
+    C("chart wax.profile.npz -o x.gif"),
+    C("chart wax.profile.npz -o foreign.png"),
+    C("chart wax.profile.npz -o foreign.png --force"),
+    C("chart foreign.csv"),
+]
+
+
+def _checkpoint() -> None:
+    """A walk of two materials, saved and not finished."""
+    from sssfit.material import load_material
+    from sssfit.simulate import Checkpoint, simulate_montecarlo_many
+
+    asked: list[int] = []
+
+    def stop() -> bool:
+        asked.append(1)
+        return len(asked) > 2
+
+    simulate_montecarlo_many(
+        [load_material("wax.toml")],
+        photons=200_000,
+        dr_mm=0.5,
+        radius_mm=4.0,
+        checkpoint=Checkpoint(Path("w.npz.checkpoint"), 0.0),
+        stop=stop,
+    )
+
+
+SHOW = [
+    C("show"),
+    C("show wax.profile.npz --json"),
+    C("show 'Größe λ.profile.npz'"),
+    C("show 'Größe λ.profile.npz' --json"),
+    C("show leaf.profile.npz -v"),
+    C("show four.profile.npz"),
+    C("show four.profile.npz --json"),
+    C("show mono.profile.npz"),
+    C("show wax.svd2.kernel.json"),
+    C("show plate.artist.kernel.json"),
+    C("show plate.artist.kernel.json --json"),
+    C("show grau.kernel.json"),
+    C("show leaf.burley.kernel.json"),
+    C("show vier.gaussians4.kernel.json"),
+    C("show wax.gaussians3.kernel.json"),
+    C("show five.kernel.json --json"),
+    C("show five.kernel.json -q"),
+    C("show plate.toml"),
+    C("show leaf.toml --json"),
+    C("show skin1"),
+    C("show -", stdin="leaf.toml"),
+    C("show - --json", stdin="grau.kernel.json"),
+    C("show -", stdin="mono.profile.npz"),
+    C("show -", stdin="foreign.csv"),
+    C("show w.npz.checkpoint", set_up=_checkpoint),
+    C("show w.npz.checkpoint --json", set_up=_checkpoint),
+    C("chart w.npz.checkpoint", set_up=_checkpoint),
+    C(
+        "simulate wax.toml --photons 2e5 --dr .5 --radius 4 -o w.npz --resume -v",
+        set_up=_checkpoint,
+    ),
+    C("simulate wax.toml --photons 2e5 --dr .5 --radius 3 -o w.npz --resume", set_up=_checkpoint),
+    C("show skin2"),
+    C("show missing.npz"),
+    C("show out"),
+    C("show foreign.npz"),
+    C("show density.csv"),
+    C("show broken.toml"),
+    C("show damaged.profile.npz"),
+    C("show damaged.kernel.json"),
+    C("show", set_up=_into("empty"), note="in an empty folder"),
+]
+
+COMMANDS = {
+    "help": HELP,
+    "materials": MATERIALS,
+    "simulate": SIMULATE,
+    "fit": FIT,
+    "render": RENDER,
+    "compare": COMPARE,
+    "choose": CHOOSE,
+    "import": IMPORT,
+    "export": EXPORT,
+    "chart": CHART,
+    "show": SHOW,
+}
