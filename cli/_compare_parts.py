@@ -7,9 +7,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._input import DEON_SKIN
+from ._input import DEON_SKIN, load_source
 from ._options import Common
-from ._output import check_outputs, held, held_charts, say, say_notes, target, write, write_chart
+from ._output import (
+    check_outputs,
+    finish,
+    held,
+    held_charts,
+    say,
+    say_notes,
+    target,
+    write,
+    write_chart,
+)
 from ._progress import say_if_compiling, step_progress, walk_progress
 
 if TYPE_CHECKING:
@@ -144,3 +154,51 @@ def budgets_of(
     if given["budget_chart"] is not None:
         write_chart(figure_of(budgets), target(given["budget_chart"]))
     return budgets
+
+
+def fronts(
+    outputs: Mapping[str, tuple[str | None, str | None]],
+    pictures: Sequence[str],
+    given: Mapping[str, Any],
+    common: Common,
+) -> None:
+    """Compare the kernels of materials, print their fronts, and write a chart and a table of each.
+
+    ``outputs`` has chart and table by the name of the material. Of --all, one that fails is named
+    at the end, and the others are done.
+    """
+    from sssfit.compare.table import fronts_text, left_out_lines
+    from sssfit.errors import FitError, SssfitError
+
+    done, wrote, failed = [], [], []
+    charts, tables = zip(*outputs.values(), strict=True)
+    inputs = [*([] if given["every"] else outputs), *pictures]
+    with held_outputs(charts, tables, inputs, given):
+        first = None
+        if given["mm_per_pixel"] == "profile":  # of one material, as was checked
+            first = profile_of(load_source(next(iter(outputs))), common)
+        scenes = scenes_of(pictures, first, given, common)
+        for name, files in outputs.items():
+            try:
+                profile = first or profile_of(load_source(name), common)
+                done.append(compared(profile, scenes, *files, given, common))
+                wrote += [each for each in files if each]
+            except SssfitError as error:
+                if not given["every"]:
+                    raise
+                failed.append(f"{name}: {error}")
+    if done:
+        say_notes(common, [line for each in done for line in left_out_lines(each)])
+        figures = {
+            "command": "compare",
+            "output": wrote,
+            "error": given["error"],
+            "cost": given["cost"],
+            "materials": [each.profile.material_name for each in done],
+            "rows": [row for each in done for row in each.to_dict()["rows"]],
+        }
+        text = fronts_text(done, given["error"], given["cost"])
+        text += f"\nWrote {', '.join(wrote)}" if wrote else ""
+        finish(common, figures, text, to_stderr="-" in wrote)
+    if failed:
+        raise FitError(f"{len(failed)} of {len(outputs)} materials failed; {' '.join(failed)}")

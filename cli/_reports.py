@@ -6,7 +6,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from sssfit.messages import Columns, Part, filled, number, table
+from sssfit.messages import Columns, Part
 
 # fmt: off
 KERNEL_DRAWN: tuple[Part, ...] = (
@@ -122,61 +122,6 @@ def models_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     }
     found["diffuse_reflectance"] = [row["diffuse_reflectance"][c] for row, c in rows]
     return {"curves": [f"{row['method']} {figures['channels'][c]}" for row, c in rows], **found}
-
-
-_CAUSES = ("", "Delta E mean", "p95", "p99", "relative L2", "largest drift", "of the whole")
-
-
-def budget_text(figures: Mapping[str, Any]) -> str:
-    """Write the budget of a picture, and what to do about its two largest causes.
-
-    What is not in the whole comes last, in brackets: it has no share in it.
-    """
-    *causes, interaction, whole = figures["rows"]
-    inside = [each for each in causes if each["in_whole"]]
-    others = [each for each in causes if not each["in_whole"]]
-    simulated = figures["model"] or f"{figures['photons']:,} photons"
-    head = filled(
-        "{material} on {picture}, {width} x {height} pixels of {mm_per_pixel:.4g} mm: {simulated} "
-        "to {radius_mm:.4g} mm, {method}, {rank} terms",
-        {**figures, **whole, "simulated": simulated},
-    )
-    rows = [_cause(each) for each in (*inside, interaction, whole, *others)]
-    first, second = inside[:2]
-    advice = (
-        f"First: {first['cause']} ({first['hint']}). Then: {second['cause']} ({second['hint']})."
-    )
-    return "\n".join([head, table(_CAUSES, rows), advice])
-
-
-def _cause(row: Mapping[str, Any]) -> list[str]:
-    """Write the figures of one cause."""
-    name = row["cause"] if row["in_whole"] else f"({row['cause']})"
-    if row["relative_l2"] is None:
-        return [name, row["hint"], "", "", "", "", ""]
-    return [
-        name,
-        number(row["delta_e_2000_mean"], ".4f"),
-        number(row["delta_e_2000_p95"], ".3f"),
-        number(row["delta_e_2000_p99"], ".3f"),
-        f"{100.0 * row['relative_l2']:.4f} %",
-        number(max(row["energy_drift"], key=abs), "+.3f%"),
-        number(row["share_of_whole"], "+.1f%|nan %") if row["in_whole"] else "",
-    ]
-
-
-def sheet_text(figures: Mapping[str, Any]) -> str:
-    """Write mean Delta E of every kernel on every picture."""
-    head = "{material}: mean Delta E 2000 on {pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm"
-    rows = [
-        [
-            each["label"],
-            str(each["passes"] or "-"),
-            *(f"{value:.3g}" for value in each["delta_e_2000_mean"]),
-        ]
-        for each in figures["rows"]
-    ]
-    return f"{filled(head, figures)}\n{table(['kernel', 'passes', *figures['scenes']], rows)}"
 
 
 # Report of a chart by what is drawn, and what its words add to the figures.

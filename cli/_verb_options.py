@@ -157,3 +157,16 @@ EXPORT = (
     flag("--force", "Replace an input, or a file that sssfit did not write."),
 )
 # fmt: on
+
+_OF_CHARTS = {  # options of single charts: what of it they are for, and the charts
+    "photons": ("the walk of --models", {"models"}),
+    "mm_per_pixel": ("the kernel of --spectrum or --guide", {"spectrum", "guide"}),
+    "ks": ("the fits of --guide", {"guide"}),
+    "channel": ("the fits of --guide, or for a kernel", {"guide", "kernel"}),
+    "profile": ("a kernel", {"kernel"}),
+}
+
+
+def of_other_charts(charts: set[str]) -> dict[str, str]:
+    """Return the options that are for other charts than these, with what they are for."""
+    return {key: what for key, (what, owners) in _OF_CHARTS.items() if not owners & charts}

@@ -15,7 +15,7 @@ from ._options import Common, common_options, options, refuse
 from ._output import finish_one, held_charts, say, stem_of, target, write_chart
 from ._progress import say_if_compiling, walk_progress
 from ._reports import CHARTS
-from ._verb_options import CHART
+from ._verb_options import CHART, of_other_charts
 
 if TYPE_CHECKING:
     from sssfit.profile import Profile
@@ -23,13 +23,6 @@ if TYPE_CHECKING:
 _VIEWS = ("models", "spectrum", "guide")
 _FILES = ("profile", "kernel", "material", "checkpoint")
 _MEMORY = {"kernel": "kernel chart", **dict.fromkeys(_VIEWS, "figures")}
-_WHOSE = {  # options of single charts: what of it they are for, and the charts
-    "photons": ("the walk of --models", {"models"}),
-    "mm_per_pixel": ("the kernel of --spectrum or --guide", {"spectrum", "guide"}),
-    "ks": ("the fits of --guide", {"guide"}),
-    "channel": ("the fits of --guide, or for a kernel", {"guide", "kernel"}),
-    "profile": ("a kernel", {"kernel"}),
-}
 
 
 @click.command()
@@ -78,11 +71,9 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
     view = _view(file, given)
     name = file if view == "models" and file else profile_name(file, common)
     found, kind, made_of = _found(name, view, common)
-    _refuse(given, {kind})
-    if view == "models" and isinstance(found, Profile) and given["photons"] is not None:
-        raise click.UsageError(
-            "--photons is for a new walk, and FILE is already one; leave it out."
-        )
+    refuse(given, of_other_charts({kind}))
+    if kind == "models" and isinstance(found, Profile):
+        refuse(given, {"photons": "a new walk, and FILE is already one"})
     check_memory(_MEMORY.get(kind, "chart"), common.threads)
     profile, source = None, name if kind in ("profile", "spectrum", "guide") else None
     if isinstance(found, SeparableKernel):
@@ -90,14 +81,12 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
     stem = made_of if kind == "models" else stem_of(name, made_of)
     path = target(given["output"], f"{stem}.{kind}.png")
     with held_charts([path], inputs=[name, source], force=given["force"]):
-        record = found
-        if kind in CHARTS:
-            record = _computed(found, kind, profile, given, common)
+        record = _computed(found, kind, profile, given, common) if kind in CHARTS else found
         write_chart(figure_of(record), path)
     figures: dict[str, Any] = {} if view else {"kind": kind, "file": name}
     figures |= {"profile": source} if kind != "models" else {}
-    own = {"material": made_of, "channels": getattr(found, "channels", None)}
-    figures |= record.to_dict() if kind in CHARTS else own
+    own = {"material": made_of, "channels": found.channels} if kind not in CHARTS else {}
+    figures |= own or record.to_dict()
     parts, words = CHARTS.get(kind, ((), dict))
     finish_one(common, "chart", path, figures, report(parts, figures | words(figures)), "a PNG")
 
@@ -108,15 +97,10 @@ def _view(file: str | None, given: Mapping[str, Any]) -> str:
     if len(views) > 1:
         raise click.UsageError(f"{' and '.join(views[:2])} are two charts; ask for one at a time.")
     view = views[0].removeprefix("--") if views else ""
-    _refuse(given, {view} if view else set(_FILES))
+    refuse(given, of_other_charts({view} if view else set(_FILES)))
     if view == "models" and file is None:
         raise click.UsageError("--models needs a material, or a profile of a photon walk.")
     return view
-
-
-def _refuse(given: Mapping[str, Any], kinds: set[str]) -> None:
-    """Refuse the options of other charts than these."""
-    refuse(given, {key: what for key, (what, owners) in _WHOSE.items() if not owners & kinds})
 
 
 def _found(name: str, view: str, common: Common) -> tuple[Any, str, str | None]:
@@ -154,19 +138,12 @@ def _computed(
     if kind == "kernel":
         channels = [given["channel"]] if asked else None
         return compare.view_kernel(found, profile, channels=channels)
-    if kind == "spectrum":
-        return compare.compute_spectrum(found, mm_per_pixel=given["mm_per_pixel"])
-    if kind == "guide":
-        return compare.compute_guide(found, mm_per_pixel=given["mm_per_pixel"], **asked)
+    if kind != "models":
+        compute = compare.compute_guide if kind == "guide" else compare.compute_spectrum
+        return compute(found, mm_per_pixel=given["mm_per_pixel"], **asked)
     walk = found if isinstance(found, Profile) else None
     material = compare.material_of_walk(walk) if walk else found
+    settings = {"walk": walk, "photons": given["photons"], "seed": common.seed}
     say_if_compiling(common, walk=None if walk else material, solver=True)
     with walk_progress(material.name, quiet=common.quiet or walk is not None) as show:
-        return compare.compare_models(
-            material,
-            walk=walk,
-            photons=given["photons"],
-            seed=common.seed,
-            threads=common.threads,
-            progress=show,
-        )
+        return compare.compare_models(material, **settings, threads=common.threads, progress=show)

@@ -64,10 +64,14 @@ def choose(material: str, common: Common, **given: Any) -> None:
     source = load_source(material)
     view = {key: given[key] for key in ("distance_mm", "fov_degrees")}
     pitch = library.mm_per_pixel_at(**view, rows=given["resolution"][0])
+    asked = {key: given[key] for key in ("distance_mm", "tolerance", "tolerance_of")}
     is_file = material == "-" or material.endswith(".npz")
     name = source.name if isinstance(source, Material) else stem_of(material, source.material_name)
     path = target(given["output"], f"{name}.chosen.kernel.json")
-    profile_path = None if path is None or is_file else _beside(path)
+    profile_path = None
+    if path is not None and not is_file:  # not simulate's name: a longer walk may lie there
+        stem = path.name.removesuffix(".json").removesuffix(".kernel")
+        profile_path = path.with_name(f"{stem}.profile.npz")
     hold = {"inputs": [material, given["irradiance"]], "force": given["force"]}
     with (
         held([path], is_kernel_file, named=KERNEL, **hold),
@@ -79,10 +83,8 @@ def choose(material: str, common: Common, **given: Any) -> None:
             source,
             mm_per_pixel=pitch,
             scene=scene,
-            distance_mm=given["distance_mm"],
             frame=given["resolution"],
-            tolerance=given["tolerance"],
-            tolerance_of=given["tolerance_of"],
+            **asked,
             seed=common.seed,
             threads=common.threads,
             progress=(lambda step: say(common, step_line(step))) if common.verbose else None,
@@ -111,12 +113,6 @@ def _check_distance(distance_mm: float) -> None:
             f"--distance: {distance_mm:g} mm is nearer than {MIN_DISTANCE_MM:g} mm; "
             f"{metres if _METRES[0] <= distance_mm <= _METRES[1] else 'move away.'}"
         )
-
-
-def _beside(path: Path) -> Path:
-    """Where the profile goes; not under the name of simulate's: a longer walk may lie there."""
-    stem = path.name.removesuffix(".json").removesuffix(".kernel")
-    return path.with_name(f"{stem}.profile.npz")
 
 
 def _scene(pitch: float, given: dict[str, Any], common: Common) -> Scene:

@@ -11,13 +11,12 @@ import click
 from sssfit.methods import FITS
 from sssfit.scene.made import COMPARED
 
-from ._compare_parts import budgets_of, compared, held_outputs, profile_of, scenes_of
+from ._compare_parts import budgets_of, compared, fronts, held_outputs, profile_of, scenes_of
 from ._input import load_source
 from ._methods import own_settings
 from ._options import Common, common_options, options, refuse
-from ._output import finish, finish_one, held_charts, say_notes, target, write_chart
+from ._output import finish, finish_one, held_charts, target, write_chart
 from ._picture import check_pictures
-from ._reports import budget_text, sheet_text
 from ._verb_options import COMPARE
 
 _OF_BUDGETS = ("budget_chart", "photons", "rank", "terms", "model")
@@ -57,9 +56,9 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
         folder = Path(given["output"] or ".")
         stems = {name: folder / f"{name}-pareto" for name in material_names(paper=given["paper"])}
         files = {each: (f"{stem}.png", f"{stem}.md") for each, stem in stems.items()}
-        _fronts(files, names, given, common)
+        fronts(files, names, given, common)
     elif given["what"] == "front":
-        _fronts({material: (given["chart"], given["table"])}, names, given, common)
+        fronts({material: (given["chart"], given["table"])}, names, given, common)
     elif given["what"] == "sheet":
         _sheet(material, given, common)
     else:
@@ -100,7 +99,7 @@ def _budget_and_kernels(
     common: Common,
 ) -> None:
     """Do both parts, or the one that was asked for, and print them; ``settings`` are of the fit."""
-    from sssfit.compare.table import kernels_text
+    from sssfit.compare.table import budget_text, kernels_text
 
     figures: dict[str, Any] = {"rows": []}
     front, what, texts = (given["error"], given["cost"]), given["what"], []
@@ -125,58 +124,11 @@ def _budget_and_kernels(
     finish(common, whole, "\n\n".join(texts), to_stderr="-" in output)
 
 
-def _fronts(
-    outputs: Mapping[str, tuple[str | None, str | None]],
-    pictures: Sequence[str],
-    given: Mapping[str, Any],
-    common: Common,
-) -> None:
-    """Compare the kernels of materials, print their fronts, and write a chart and a table of each.
-
-    ``outputs`` has chart and table by the name of the material. Of --all, one that fails is named
-    at the end, and the others are done.
-    """
-    from sssfit.compare.table import fronts_text, left_out_lines
-    from sssfit.errors import FitError, SssfitError
-
-    done, wrote, failed = [], [], []
-    charts, tables = zip(*outputs.values(), strict=True)
-    inputs = [*([] if given["every"] else outputs), *pictures]
-    with held_outputs(charts, tables, inputs, given):
-        first = None
-        if given["mm_per_pixel"] == "profile":  # of one material, as was checked
-            first = profile_of(load_source(next(iter(outputs))), common)
-        scenes = scenes_of(pictures, first, given, common)
-        for name, files in outputs.items():
-            try:
-                profile = first or profile_of(load_source(name), common)
-                done.append(compared(profile, scenes, *files, given, common))
-                wrote += [each for each in files if each]
-            except SssfitError as error:
-                if not given["every"]:
-                    raise
-                failed.append(f"{name}: {error}")
-    if done:
-        say_notes(common, [line for each in done for line in left_out_lines(each)])
-        figures = {
-            "command": "compare",
-            "output": wrote,
-            "error": given["error"],
-            "cost": given["cost"],
-            "materials": [each.profile.material_name for each in done],
-            "rows": [row for each in done for row in each.to_dict()["rows"]],
-        }
-        text = fronts_text(done, given["error"], given["cost"])
-        text += f"\nWrote {', '.join(wrote)}" if wrote else ""
-        finish(common, figures, text, to_stderr="-" in wrote)
-    if failed:
-        raise FitError(f"{len(failed)} of {len(outputs)} materials failed; {' '.join(failed)}")
-
-
 def _sheet(name: str, given: Mapping[str, Any], common: Common) -> None:
     """Draw a contact sheet of a profile's kernels, and print its figures."""
     from sssfit.chart import figure_of
     from sssfit.compare.sheet import compute_sheet
+    from sssfit.compare.table import sheet_text
 
     path = target(given["chart"])
     with held_charts([path], inputs=[name], force=given["force"]):

@@ -55,13 +55,12 @@ def render(context: click.Context, /, kernel: str | None, common: Common, **give
     own = _check(context, given)
     name, irradiance = kernel_name(kernel, common), given["irradiance"]
     loaded = load(SeparableKernel, name)
-    picture = irradiance if irradiance in MADE else Path(irradiance).stem
-    path = target(given["output"], f"{stem_of(name)}.{picture}.exr")
+    path = target(given["output"], f"{stem_of(name)}.{Path(irradiance).stem}.exr")
     asked = {"picture": path, "truth": given["truth"], "difference": given["difference"]}
     files = {key: Path(each) for key, each in asked.items() if each}
     for each in files.values():
         image_format(each)
-    outputs = [*files.values(), *([None] if path is None else [])]
+    outputs = [*files.values(), *[None] * (path is None)]
     inputs = [name, irradiance, given["profile"]]
     with held(outputs, is_image_file, inputs=inputs, force=given["force"]):
         source, made = _rendered(loaded, name, given, own, common)
@@ -136,13 +135,11 @@ def _rendered(
 
 def _text(figures: Mapping[str, Any]) -> str:
     """Write the figures for people."""
-    how, most = f"{figures['border']} borders", figures["transmitted_maximum"]
-    if figures["follow"]:
-        how = f"screen space, follow {figures['follow']}, {how}"
-    kind = figures["difference_map"]
+    kind, most = figures["difference_map"], figures["transmitted_maximum"]
+    screen = f"screen space, follow {figures['follow']}, " if figures["follow"] else ""
     is_grey = figures["rmse"] is not None and figures["delta_e_2000_mean"] is None
     words = {
-        "how": how,
+        "how": f"{screen}{figures['border']} borders",
         "most": by_channel(figures["channels"], most, ".3g") if most is not None else None,
         "no_colour": len(figures["channels"]) if is_grey else None,
         "magnified": figures["difference_gain"] if kind is None else None,

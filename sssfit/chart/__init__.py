@@ -9,25 +9,24 @@ imports matplotlib, and never its pyplot, which takes 0.8 s to import and keeps 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from sssfit.methods import imported
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Where the chart of a record is drawn, by the record's class; a new chart is one file and one line.
+# Where a record is drawn, by the record's class; a new chart is one file and one line.
 FIGURES: Mapping[str, str] = {
-    "Budget": "budget:budget_figure",
-    "Comparison": "pareto:pareto_figure",
-    "Convergence": "convergence:convergence_figure",
-    "Editing": "editing:editing_figure",
-    "Guide": "guide:guide_figure",
-    "KernelView": "kernel:kernel_figure",
-    "Material": "material:material_figure",
-    "ModelComparison": "models:models_figure",
-    "Profile": "profile:profile_figure",
-    "Sheet": "sheet:sheet_figure",
-    "Spectrum": "spectrum:spectrum_figure",
+    "Budget": "sssfit.chart.budget:budget_figure",
+    "Comparison": "sssfit.chart.pareto:pareto_figure",
+    "Guide": "sssfit.chart.guide:guide_figure",
+    "KernelView": "sssfit.chart.kernel:kernel_figure",
+    "Material": "sssfit.chart.material:material_figure",
+    "ModelComparison": "sssfit.chart.models:models_figure",
+    "Profile": "sssfit.chart.profile:profile_figure",
+    "Sheet": "sssfit.chart.sheet:sheet_figure",
+    "Spectrum": "sssfit.chart.spectrum:spectrum_figure",
 }
 
 
@@ -54,6 +53,5 @@ def figure_of(record: Any, **options: Any) -> Figure:
     kind = type(record[0] if isinstance(record, list) else record).__name__
     if kind not in FIGURES:
         raise TypeError(f"no chart of {kind}; expected one of {', '.join(FIGURES)}.")
-    module, name = FIGURES[kind].split(":")
-    figure: Figure = getattr(import_module(f"sssfit.chart.{module}"), name)(record, **options)
+    figure: Figure = imported(FIGURES[kind])(record, **options)
     return figure
