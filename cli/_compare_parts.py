@@ -7,7 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ._input import DEON_SKIN, load_source
+from sssfit.methods import DEON_SKIN
+
+from ._input import load_source
 from ._options import Common
 from ._output import (
     check_outputs,

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, TypeVar
 
-from sssfit.methods import SIMULATIONS
+from sssfit.methods import DEON_SKIN
 
 from ._options import Common
 from ._output import say, say_notes
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from sssfit.material import Material
     from sssfit.profile import Profile
 
-DEON_SKIN = SIMULATIONS["gaussians"].makes
 
 _Record = TypeVar("_Record", "Profile", "SeparableKernel")
 

@@ -6,8 +6,9 @@ import json
 import re
 import tempfile
 import zipfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -27,22 +28,23 @@ def lines_of(command: Command, ran: Ran) -> list[str]:
     lines += _section("stdout", _stdout(ran))
     lines += _section("stderr", _stderr(command, ran))
     for name, data in ran.written.items():
-        content = [] if command.brief else _file(name, data, ran)
+        content = [] if command.brief else file_lines(name, data, ran.charts)
         lines += _section(f"wrote {name}", content) or [f"wrote {name}"]
     lines += [f"removed {name}" for name in ran.gone]
-    return [_masked(line, command, ran) for line in lines]
+    return [masked(line, ran.folder, command.hidden) for line in lines]
 
 
 def _section(head: str, content: list[str]) -> list[str]:
     return [head, *(f"| {line}".rstrip() if line else "|" for line in content)] if content else []
 
 
-def _masked(line: str, command: Command, ran: Ran) -> str:
-    line = line.replace(ran.folder, "FOLDER")
+def masked(line: str, folder: str, hidden: Sequence[str] = ()) -> str:
+    """Hide what no two machines or versions have alike."""
+    line = line.replace(folder, "FOLDER")
     line = re.sub(rf"(?<![\w.]){re.escape(__version__)}(?![\w.])", "VERSION", line)
     # How often a search asks depends on the last bits of sums.
     line = re.sub(r'("evaluations": )(\d+|\[[\d, ]*\])', r"\1HIDDEN", line)
-    for pattern in command.hidden:
+    for pattern in hidden:
         line = re.sub(pattern, "HIDDEN", line)
     return line
 
@@ -57,17 +59,17 @@ def _stdout(ran: Ran) -> list[str]:
         return list(_npz(ran.stdout))
     if ran.stdout.startswith(b"\x76\x2f\x31\x01"):
         return list(_picture("stdout.exr", ran.stdout))
-    return _text(ran.stdout.decode("utf-8"))
+    return text_lines(ran.stdout.decode("utf-8"))
 
 
 def _stderr(command: Command, ran: Ran) -> list[str]:
     if not command.terminal:
-        return _text(ran.stderr)
+        return text_lines(ran.stderr)
     shown = [line.rstrip() for line in re.split(r"[\r\n]", _ANSI.sub("", ran.stderr))]
     return [line for line in shown if line]
 
 
-def _text(text: str) -> list[str]:
+def text_lines(text: str) -> list[str]:
     """Lines as they are, spaces at their ends made visible; JSON a key a line."""
     lines = text.split("\n")
     ending = [] if lines[-1] == "" else ["(no newline at the end)"]
@@ -121,9 +123,12 @@ def _rows(rows: list[dict[str, Any]], depth: int) -> Iterator[str]:
 # Files
 
 
-def _file(name: str, data: bytes, ran: Ran) -> list[str]:
-    if data in ran.charts:
-        return ran.charts[data]
+def file_lines(
+    name: str, data: bytes, charts: Mapping[bytes, list[str]] = MappingProxyType({})
+) -> list[str]:
+    """A file by its content; ``charts`` are descriptions of charts."""
+    if data in charts:
+        return charts[data]
     if data.startswith(b"PK"):
         return list(_npz(data))
     if name.endswith(_PICTURES):
@@ -132,7 +137,7 @@ def _file(name: str, data: bytes, ran: Ran) -> list[str]:
         text = data.decode("utf-8")
     except UnicodeDecodeError:
         return [f"{len(data)} bytes"]
-    return [_short(line) for line in _text(text)]
+    return [_short(line) for line in text_lines(text)]
 
 
 def _short(line: str) -> str:
@@ -142,7 +147,7 @@ def _short(line: str) -> str:
         end = _closing(line, begin)
         inside = line[begin:end]
         if len(inside) > 200 and re.fullmatch(r"[-+\d.eE\[\],\s]*", inside):
-            parts += [line[at:begin], _summary(json.loads(inside))]
+            parts += [line[at:begin], summary(json.loads(inside))]
             at = end
         else:
             parts.append(line[at : begin + 1])
@@ -159,12 +164,12 @@ def _closing(line: str, begin: int) -> int:
     return len(line)
 
 
-def _summary(values: Any) -> str:
+def summary(values: Any) -> str:
     """Shape, first and last, and two sums, of which one tells the order."""
     try:
         array = np.asarray(values, dtype=np.float64)
     except ValueError:  # rows of unlike lengths
-        return f"[{', '.join(_summary(each) for each in values)}]"
+        return f"[{', '.join(summary(each) for each in values)}]"
     shape = " x ".join(map(str, array.shape))
     flat = array.ravel()
     places = np.cos(1.0 + np.arange(flat.size))
@@ -187,10 +192,15 @@ def _npz(data: bytes) -> Iterator[str]:
             if array.dtype.kind == "U":
                 yield f"{name}:"
                 yield from _json(json.loads(str(array)))
-            elif array.size <= _FEW:
-                yield f"{name}: {array.dtype} {array.shape} {[_number(x) for x in array.ravel()]}"
             else:
-                yield f"{name}: {array.dtype} {_summary(array)}"
+                yield f"{name}: {array_text(array)}"
+
+
+def array_text(array: np.ndarray) -> str:
+    """Type, shape and all of a few numbers, of many a summary."""
+    if array.size > _FEW:
+        return f"{array.dtype} {summary(array)}"
+    return f"{array.dtype} {array.shape} {[_number(float(x)) for x in array.ravel()]}"
 
 
 def _picture(name: str, data: bytes) -> Iterator[str]:

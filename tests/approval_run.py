@@ -163,8 +163,8 @@ class _Time(types.ModuleType):
 
 
 @contextlib.contextmanager
-def stand_ins(command: Command, charts: dict[bytes, list[str]]) -> Iterator[None]:
-    """All that stands in for what depends on the machine."""
+def stand_ins(charts: dict[bytes, list[str]], *, compiled: bool = True) -> Iterator[None]:
+    """All that stands in for what depends on the machine; ``charts`` receives descriptions."""
     from sssfit import simulate
     from sssfit.compare import pictures, sheet
     from sssfit.measure import cost
@@ -177,12 +177,13 @@ def stand_ins(command: Command, charts: dict[bytes, list[str]]) -> Iterator[None
         charts[name] = figure_lines(figure, settings)
         stream.write(name)
 
+    modules()
     with contextlib.ExitStack() as stack:
         patches = [
             *_in_place_of(time.perf_counter, clock),
             *_in_place_of(time, _Time(clock)),
-            *_in_place_of(simulate.is_compiled, lambda *_: command.compiled),
-            *_in_place_of(simulate.is_solver_compiled, lambda: command.compiled),
+            *_in_place_of(simulate.is_compiled, lambda *_: compiled),
+            *_in_place_of(simulate.is_solver_compiled, lambda: compiled),
             *_in_place_of(available_cores, lambda: 2),
             *_in_place_of(every_candidate, _some_candidates),
             *_in_place_of(
@@ -204,21 +205,27 @@ def _some_candidates(pixels: int, **settings: int) -> tuple[Candidate, ...]:
     return tuple(each for each in every_candidate(pixels, **settings) if each.label in _TRIED)
 
 
-def run(command: Command) -> Ran:
-    """Run in a fresh copy of the folder of files."""
-    modules()
-    charts: dict[bytes, list[str]] = {}
+@contextlib.contextmanager
+def copied_files() -> Iterator[Path]:
+    """Be in a fresh copy of the folder of files."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name).resolve()
         shutil.copytree(world.files(), folder, dirs_exist_ok=True)
         with contextlib.chdir(folder):
-            with stand_ins(command, charts):
-                if command.set_up is not None:
-                    command.set_up()
-                before = contents(folder)
-                with _environment(command), warnings.catch_warnings():
-                    status, stdout, stderr = _captured(command)
-            after = contents(folder)
+            yield folder
+
+
+def run(command: Command) -> Ran:
+    """Run in a fresh copy of the folder of files."""
+    charts: dict[bytes, list[str]] = {}
+    with copied_files() as folder:
+        with stand_ins(charts, compiled=command.compiled):
+            if command.set_up is not None:
+                command.set_up()
+            before = contents(folder)
+            with _environment(command), warnings.catch_warnings():
+                status, stdout, stderr = _captured(command)
+        after = contents(folder)
         written = {path: data for path, data in after.items() if before.get(path) != data}
         gone = tuple(sorted(before.keys() - after.keys()))
     return Ran(status, stdout, stderr, written, gone, charts, str(folder))

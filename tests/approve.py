@@ -1,4 +1,6 @@
-"""Record what the invocations of ``approval_commands`` do now: ``python tests/approve.py [VERB]``.
+"""Record what the lines of ``approval_commands`` and ``approval_calls`` do now.
+
+``python tests/approve.py`` records all, ``python tests/approve.py fit python-compare`` two groups.
 
 Read the difference (``git diff tests/approved``) before you commit it: a fault that is approved is
 worse than no test.
@@ -9,6 +11,8 @@ import time
 import warnings
 from pathlib import Path
 
+import approval_calls as calls
+from approval_calls import CALLS, Call
 from approval_commands import COMMANDS
 from approval_files import lines_of
 from approval_run import Command, run
@@ -17,13 +21,16 @@ FOLDER = Path(__file__).parent / "approved"
 _MARK = "$ "  # no line of an output begins with it: those have a bar before them
 
 
-def recorded(command: Command) -> list[str]:
-    """What an invocation does now."""
-    return lines_of(command, run(command))
+EVERY: dict[str, list[Command] | list[Call]] = COMMANDS | CALLS
+
+
+def recorded(each: Command | Call) -> list[str]:
+    """What an invocation or a call does now."""
+    return calls.lines_of(each) if isinstance(each, Call) else lines_of(each, run(each))
 
 
 def approved(group: str) -> dict[str, list[str]]:
-    """What the invocations of a group are to do, by their titles."""
+    """What the invocations or calls of a group are to do, by their titles."""
     path = FOLDER / f"{group}.txt"
     found: dict[str, list[str]] = {}
     for line in path.read_text(encoding="utf-8").splitlines() if path.exists() else []:
@@ -36,7 +43,7 @@ def approved(group: str) -> dict[str, list[str]]:
 
 def approve(group: str) -> None:
     parts = []
-    for command in COMMANDS[group]:
+    for command in EVERY[group]:
         begun = time.process_time()
         parts.append("\n".join([f"{_MARK}{command.title}", *recorded(command)]))
         if (seconds := time.process_time() - begun) > 0.5:
@@ -48,7 +55,7 @@ def approve(group: str) -> None:
 
 if __name__ == "__main__":
     warnings.simplefilter("error")
-    for name in sys.argv[1:] or COMMANDS:
+    for name in sys.argv[1:] or EVERY:
         begun = time.process_time()
         approve(name)
         print(f"{name}: {time.process_time() - begun:.1f} s of processor time")

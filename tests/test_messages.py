@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from sssfit.cli._output import in_options
+from sssfit.cli._options import in_options
 from sssfit.messages import Columns, filled, number, report
 
 LIBRARY = sorted((Path(__file__).parents[1] / "sssfit").rglob("*.py"))

@@ -119,8 +119,9 @@ def join_channels(profiles: Sequence[Profile], channels: Sequence[str]) -> Profi
     """
     if len(channels) != len(profiles):
         raise ProfileError(
-            f"{len(channels)} channel names ({shown(', '.join(channels))}) for {len(profiles)} "
-            "files; give one per file, such as R,G,B."
+            f"{len(channels)} channel name{'s' * (len(channels) != 1)} "
+            f"({shown(', '.join(channels))}) for {len(profiles)} files; give one per file, such as "
+            "R,G,B."
         )
     try:
         check_names(list(channels))
