@@ -144,7 +144,7 @@ def told(value: Any) -> Iterator[str]:
     elif isinstance(value, Material):
         yield from text_lines(value.to_toml())
     elif hasattr(value, "to_dict"):
-        yield f"{value!r:.120}"
+        yield type(value).__name__
         yield from text_lines(json.dumps(value.to_dict()) + "\n")
     elif isinstance(value, np.ndarray):
         yield array_text(value)

@@ -227,7 +227,7 @@ def test_channels_are_joined():
 @pytest.mark.parametrize(
     ("other", "channels", "said"),
     [
-        (mco_text(), ["R"], "1 channel names ('R') for 2 files"),
+        (mco_text(), ["R"], "1 channel name ('R') for 2 files"),
         (mco_text(), ["R", "R"], "channels[1] = 'R' is there twice"),
         (mco_text(), ["R", ""], "channels[1] = ''; expected a name"),
         (mco_text(layers=("1.5 1 100 0.9 0.1", LAYERS[1])), ["R", "G"], "b.mco has other layers"),
