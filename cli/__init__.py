@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
     from typing import NoReturn
 
-    from ._group import cli
+    from ._main import cli
 
 __all__ = ["cli", "main"]
 
@@ -30,7 +30,7 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
     interrupts = Interrupts()
     interrupts.take()
     try:
-        from ._run import run
+        from ._main import run
 
         run(args)
     finally:
@@ -41,7 +41,7 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
 def __getattr__(name: str) -> Any:
     """Import the group of verbs when somebody asks for it."""
     if name == "cli":
-        from ._group import cli
+        from ._main import cli
 
         return cli
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

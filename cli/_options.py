@@ -3,13 +3,24 @@
 import functools
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import click
 
+from sssfit.errors import ArgumentError
 from sssfit.process import check_memory, check_threads_of_numba
+
+# The library's messages have arguments and calls of Python between backquotes.
+_ARGUMENT = re.compile(r"(with )?`(\w+)(?: = ([^`]+))?`")
+_COMMANDS = {
+    "`simulate`": "`sssfit simulate`",
+    '`simulate("deon-skin")`': "sssfit simulate deon-skin",
+    "`material_names()`": "`sssfit materials`",
+    "`simulate_montecarlo(material)`": "`sssfit simulate`",
+    '`load_material("skin1").to_toml()`': "`sssfit materials skin1 --toml`",
+}
 
 _MM_PER_UNIT = {"": 1.0, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 
@@ -58,12 +69,48 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
         check_threads_of_numba()
         check_memory(command.__name__.rstrip("_"), threads)
         common = Common(quiet, verbose, as_json, threads, seed)
-        return command(*args, common=common, **kwargs)
+        try:
+            return command(*args, common=common, **kwargs)
+        except ArgumentError as error:
+            raise click.UsageError(in_options(str(error))) from None
 
     return wrapper
 
 
-def option(names: str, kind: Any, metavar: str | None, text: str, default: Any = None) -> Any:
+def in_options(message: str) -> str:
+    """Put options in place of the arguments that a message of the library names.
+
+    ``rank = 3`` between backquotes becomes ``--rank 3``; an argument that is True becomes the
+    option alone, and "with" one that is False becomes "without" it. Units at the end of an
+    argument's name are not part of the option's.
+    """
+    from ._main import cli
+
+    options = {
+        parameter.name: parameter.opts[-1]
+        for verb in cli.commands.values()
+        for parameter in verb.params
+        if isinstance(parameter, click.Option)
+    }
+
+    def option(found: re.Match[str]) -> str:
+        before, name, value = found[1] or "", found[2], found[3]
+        named = options.get(name) or options.get(re.sub(r"_mm2?$", "", name))
+        if named is None:
+            return found[0]
+        if value in (None, "True"):
+            return before + named
+        plain = value.strip('"')
+        return f"without {named}" if plain == "False" else f"{before}{named} {plain}"
+
+    for call, command in _COMMANDS.items():
+        message = message.replace(call, command)
+    return _ARGUMENT.sub(option, message)
+
+
+def option(
+    names: str, kind: Any, metavar: str | None, text: str, default: Any = None, **more: Any
+) -> Any:
     """Return an option, for tables of a row an option.
 
     ``names`` are "--radius", or "--radius radius_mm" with the name of the parameter; ``kind`` is a
@@ -73,9 +120,9 @@ def option(names: str, kind: Any, metavar: str | None, text: str, default: Any =
         *names.split(),
         type=click.Choice(kind) if isinstance(kind, list | tuple) else kind,
         metavar=metavar,
-        default=default,
-        show_default=default is not None,
         help=text,
+        **({} if default is None else {"default": default, "show_default": True}),
+        **more,
     )
 
 
@@ -93,6 +140,14 @@ def options(*rows: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
         return command
 
     return add
+
+
+def refuse(given: Mapping[str, Any], whose: Mapping[str, str]) -> None:
+    """Refuse options that would do nothing; ``whose`` says of each parameter what it is for."""
+    named = {each.name: each.opts[-1] for each in click.get_current_context().command.params}
+    for key, owner in whose.items():
+        if given[key] not in (None, False, ()):
+            raise click.UsageError(f"{named[key]} is for {owner}; leave it out.")
 
 
 class WholeRange(click.IntRange):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import json
-import re
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
@@ -14,16 +13,10 @@ import click
 
 from sssfit.messages import printable
 
-from ._options import Common
+from ._options import Common, in_options
 
 # What is written, and the ending of its name.
 PROFILE, KERNEL = ("a profile", ".npz"), ("a kernel", ".json")
-# The library's messages have arguments and calls of Python between backquotes.
-_ARGUMENT = re.compile(r"(with )?`(\w+)(?: = ([^`]+))?`")
-_COMMANDS = {
-    "`material_names()`": "`sssfit materials`",
-    '`load_material("skin1").to_toml()`': "`sssfit materials skin1 --toml`",
-}
 _ENDINGS = (".checkpoint", ".npz", ".json", ".toml", ".kernel", ".profile")
 
 
@@ -37,41 +30,16 @@ class _Record(Protocol):
 # Words and results
 
 
-def in_options(message: str) -> str:
-    """Put options in place of the arguments that a message of the library names.
-
-    ``rank = 3`` between backquotes becomes ``--rank 3``; an argument that is True becomes the
-    option alone, and "with" one that is False becomes "without" it. Units at the end of an
-    argument's name are not part of the option's.
-    """
-    from ._group import cli
-
-    options = {
-        parameter.name: parameter.opts[-1]
-        for verb in cli.commands.values()
-        for parameter in verb.params
-        if isinstance(parameter, click.Option)
-    }
-
-    def option(found: re.Match[str]) -> str:
-        before, name, value = found[1] or "", found[2], found[3]
-        named = options.get(name) or options.get(re.sub(r"_mm2?$", "", name))
-        if named is None:
-            return found[0]
-        if value in (None, "True"):
-            return before + named
-        plain = value.strip('"')
-        return f"without {named}" if plain == "False" else f"{before}{named} {plain}"
-
-    for call, command in _COMMANDS.items():
-        message = message.replace(call, command)
-    return _ARGUMENT.sub(option, message)
-
-
 def say(common: Common, line: str) -> None:
     """Put a word on stderr, unless -q."""
     if not common.quiet:
         click.echo(printable(in_options(line)), err=True)
+
+
+def say_notes(common: Common, notes: Iterable[str]) -> None:
+    """Put the library's notes on stderr, unless -q."""
+    for note in notes:
+        say(common, note)
 
 
 def finish(
@@ -169,15 +137,11 @@ def held_charts(
 
 def check_outputs(paths: Sequence[Path | None]) -> None:
     """Refuse a closed stdout, which is None, and two outputs into one file, before the work."""
-    from sssfit.errors import FileError
     from sssfit.files import check_distinct
 
     if None in paths:
         binary_stdout()
-    try:
-        check_distinct(path for path in paths if path is not None)
-    except FileError as error:
-        raise click.UsageError(str(error)) from None
+    check_distinct(path for path in paths if path is not None)
 
 
 def write(content: bytes | _Record, path: Path | None) -> None:

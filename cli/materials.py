@@ -1,79 +1,61 @@
 """``sssfit materials``: those that ship with sssfit, one in full, or a new one by reflectance."""
 
-from typing import TYPE_CHECKING, Any
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+from typing import Any
 
 import click
 from click.core import ParameterSource
 
-from sssfit.messages import table
+from sssfit.methods import DEON_SKIN
 
-from ._deon_skin import DEON_SKIN, show_deon_skin
-from ._invert import InversionRequest, write_material
-from ._options import BaseColour, Common, Lengths, Number, common_options
-from ._output import finish
+from ._options import BaseColour, Common, Lengths, Number, common_options, flag, option, options
+from ._output import finish, finish_one, held, target, write
+from ._progress import say_if_compiling
 
-if TYPE_CHECKING:
-    from collections.abc import Iterable
-
-    from sssfit.grid import RadialGrid
-    from sssfit.material import Layer, Material
+# Heads the files we make: only a file that begins with it is replaced without --force.
+_OURS = "# Made by `sssfit materials --from-reflectance`, which may replace this file;"
 
 
 @click.command()
 @click.argument("material", required=False)
-@click.option("--toml", "as_toml", is_flag=True, help="Print MATERIAL as TOML, to start your own.")
-@click.option(
-    "--from-reflectance",
-    type=BaseColour(),
-    metavar="A,B,...|HEX",
-    help="Make a material of this total diffuse reflectance, per channel, such as 0.44,0.23,0.13 "
-    "or 44%, or of an sRGB base colour, such as '#c58c6b'.",
+@options(
+    flag("--toml as_toml", "Print MATERIAL as TOML, to start your own."),
+    option(
+        "--from-reflectance",
+        BaseColour(),
+        "A,B,...|HEX",
+        "Make a material of this total diffuse reflectance, per channel, such as 0.44,0.23,0.13 "
+        "or 44%, or of an sRGB base colour, such as '#c58c6b'.",
+    ),
+    flag("--srgb", "A,B,... are 8-bit sRGB codes, such as 197,140,107."),
+    option(
+        "--mean-free-path",
+        Lengths(),
+        "MM,MM,...",
+        "Its mean free paths, 1 / (sigma_a + sigma_s), such as 3.67,1.37,0.68 or 0.4cm; one "
+        "serves all channels.",
+    ),
+    option("--eta", Number(), "N", "Its refractive index; 1.4 is that of skin.", 1.4),
+    option(
+        "--light",
+        ["diffuse", "normal"],
+        None,
+        "The light that A,B,... are meant for. normal: a beam along the normal, as in profiles; "
+        "diffuse: the same radiance from everywhere above, as base colours mean it, and shares of "
+        "the light that enters.  [default: diffuse for sRGB colours, else normal]",
+    ),
+    option("--name", None, "NAME", "Its name.  [default: that of FILE]"),
+    option("--channels", None, "A,B,...", "Names of its channels.  [default: R,G,B for three]"),
+    option("-o --output", None, "FILE", "Where it goes, - for stdout.  [default: NAME.toml]"),
+    flag("--force", "Replace a file that --from-reflectance did not make."),
 )
-@click.option(
-    "--srgb",
-    is_flag=True,
-    help="A,B,... are 8-bit sRGB codes, such as 197,140,107.",
-)
-@click.option(
-    "--mean-free-path",
-    type=Lengths(),
-    metavar="MM,MM,...",
-    help="Its mean free paths, 1 / (sigma_a + sigma_s), such as 3.67,1.37,0.68 or 0.4cm; one "
-    "serves all channels.",
-)
-@click.option(
-    "--eta",
-    type=Number(),
-    default=1.4,
-    show_default=True,
-    metavar="N",
-    help="Its refractive index; 1.4 is that of skin.",
-)
-@click.option(
-    "--light",
-    type=click.Choice(["diffuse", "normal"]),
-    help="The light that A,B,... are meant for. normal: a beam along the normal, as in profiles; "
-    "diffuse: the same radiance from everywhere above, as base colours mean it, and shares of the "
-    "light that enters.  [default: diffuse for sRGB colours, else normal]",
-)
-@click.option("--name", metavar="NAME", help="Its name.  [default: that of FILE]")
-@click.option(
-    "--channels", metavar="A,B,...", help="Names of its channels.  [default: R,G,B for three]"
-)
-@click.option(
-    "-o", "--output", metavar="FILE", help="Where it goes, - for stdout.  [default: NAME.toml]"
-)
-@click.option("--force", is_flag=True, help="Replace a file that --from-reflectance did not make.")
 @common_options
 @click.pass_context
 def materials(
-    context: click.Context,
-    /,
-    material: str | None,
-    as_toml: bool,
-    from_reflectance: list[float] | str | None,
-    common: Common,
-    **request: Any,
+    context: click.Context, /, material: str | None, as_toml: bool, common: Common, **given: Any
 ) -> None:
     """List the materials that ship with sssfit, show one in full, or make one.
 
@@ -91,174 +73,78 @@ def materials(
         --eta 1.3 -o mine.toml                      make one
       sssfit materials --from-reflectance '#c58c6b' --mean-free-path 0.37,0.14,0.07cm
     """
+    from_reflectance = given.pop("from_reflectance")
     if from_reflectance is not None:
         if material is not None or as_toml:
             raise click.UsageError("--from-reflectance makes a material; name none with it.")
-        write_material(InversionRequest(from_reflectance, **request), common)
+        _make(from_reflectance, common, given)
         return
-    for key in request:
+    for key in given:
         if context.get_parameter_source(key) is ParameterSource.COMMANDLINE:
             raise click.UsageError(
                 f"--{key.replace('_', '-')} is for --from-reflectance; leave it out."
             )
     if as_toml and (common.json or material is None):
         raise click.UsageError("--toml needs a MATERIAL and does not go with --json.")
-    if material is None:
-        _list(common)
-    elif material == DEON_SKIN:
-        show_deon_skin(common, as_toml=as_toml)
-    elif as_toml:
-        from sssfit.material import load_material
-
-        # TOML is UTF-8 on every terminal: bytes.
-        click.echo(load_material(material).to_toml().encode(), nl=False)
-    else:
-        _show(common, material)
-
-
-def _list(common: Common) -> None:
-    """Print one row per shipped material."""
-    from sssfit.material import load_material, material_names
-
-    rows = [_figures(load_material(name)) for name in material_names()]
-    head = (
-        "name",
-        "eta",
-        "albedo R G B",
-        "mean free path R G B, mm",
-        "dr, mm",
-        "annuli",
-        "radius, mm",
-    )
-    cells = [
-        (
-            row["name"],
-            f"{row['eta']:g}",
-            " ".join(f"{each:.5f}" for each in row["albedo"]),
-            " ".join(f"{each:.4f}" for each in row["mean_free_path_mm"]),
-            f"{row['dr_mm']:.5f}",
-            f"{row['annuli']}",
-            f"{row['radius_mm']:.2f}",
+    if as_toml and material == DEON_SKIN:
+        raise click.UsageError(
+            f"{material} has no coefficients to write as TOML; begin with another, such as skin1."
         )
-        for row in rows
-    ]
-    figures = {"command": "materials", "output": [], "rows": rows, "profiles": [DEON_SKIN]}
-    uses = "a profile without coefficients, for simulate, compare and choose"
-    text = f"{table(head, cells)}\n\n{DEON_SKIN}: {uses}"
-    finish(common, figures, text)
-
-
-def _show(common: Common, name_or_path: str) -> None:
-    """Print one material in full."""
+    from sssfit.export import summary
     from sssfit.material import load_material
 
-    material = load_material(name_or_path)
-    figures = {"command": "materials", "output": [], **material_figures(material)}
-    finish(common, figures, material_text(material))
+    if as_toml:
+        # TOML is UTF-8 on every terminal: bytes.
+        click.echo(load_material(str(material)).to_toml().encode(), nl=False)
+        return
+    if material is None:
+        figures, page = summary.shipped_figures(), summary.shipped_page
+    elif material == DEON_SKIN:
+        figures, page = summary.deon_skin_figures(), summary.deon_skin_page
+    else:
+        figures = summary.material_figures(load_material(material))
+        page = summary.material_page
+    finish(common, {"command": "materials", "output": [], **figures}, page(figures))
 
 
-def material_figures(material: "Material") -> dict[str, Any]:
-    """Everything that is printed of one material, as ``--json`` has it."""
-    return {**_figures(material), **_content(material)}
+def _make(asked: list[float] | str, common: Common, given: dict[str, Any]) -> None:
+    """Invert, write the TOML, and print what was found beside the published approximations."""
+    from sssfit.files import has_mark
+    from sssfit.formats.colours import reflectance_of_codes
+    from sssfit.process import check_memory
 
-
-def _figures(material: "Material") -> dict[str, Any]:
-    """Return the figures of a row; those of one layer are null for a stack."""
-    one = material.layers[0] if len(material.layers) == 1 else None
-    grid = _grid(material)
-    return {
-        "name": material.name,
-        "source": material.source,
-        "channels": material.channels,
-        "eta": one and one.eta,
-        "albedo": one and one.albedo,
-        "mean_free_path_mm": one and one.mean_free_path_mm,
-        "dr_mm": grid and grid.dr_mm,
-        "annuli": grid and grid.annuli,
-        "radius_mm": grid and grid.radius_mm,
-    }
-
-
-def _content(material: "Material") -> dict[str, Any]:
-    """Return what a row leaves out: coefficients, per layer and, for one layer, on their own."""
-    layers = [
-        layer.to_dict() | {"albedo": layer.albedo, "mean_free_path_mm": layer.mean_free_path_mm}
-        for layer in material.layers
-    ]
-    keys = ("g", "sigma_a_per_mm", "sigma_s_per_mm", "thickness_mm")
-    return {
-        **{key: layers[0][key] if len(layers) == 1 else None for key in keys},
-        "eta_above": material.eta_above,
-        "eta_below": material.eta_below,
-        "specular_reflectance": material.specular_reflectance,
-        "layers": layers,
-        "sha256": material.sha256,
-    }
-
-
-def _grid(material: "Material") -> "RadialGrid | None":
-    """Return the paper's grid, or None where that would have too many annuli."""
-    from sssfit.errors import SimulationError
-    from sssfit.grid import paper_grid
-
-    try:
-        return paper_grid(material)
-    except SimulationError:
-        return None
-
-
-def material_text(material: "Material") -> str:
-    """Return the page a person reads."""
-    from sssfit.messages import printable
-
-    grid = _grid(material)
-    lines = [
-        f"name                  {material.name}",
-        f"source                {printable(material.source) or 'not given'}",
-        f"specular reflectance  {material.specular_reflectance:.5f}",
-        "paper's grid          "
-        + (
-            f"dr {grid.dr_mm:.6g} mm, {grid.annuli} annuli, radius {grid.radius_mm:.6g} mm"
-            if grid
-            else "none: too many annuli, give simulate a --dr or --radius"
-        ),
-        f"sha256                {material.sha256}",
-    ]
-    several = len(material.layers) > 1
-    if material.eta_above != 1:
-        lines += ["", f"above: eta {material.eta_above:g}"]
-    for number, layer in enumerate(material.layers, 1):
-        lines += ["", _layer_heading(layer, number if several else None)]
-        lines.append(_layer_table(layer, material.channels))
-    if any(layer.g.any() for layer in material.layers):
-        lines.append("mean free path: the reduced one, 1 / (sigma_a + (1 - g) sigma_s)")
-    if material.eta_below != 1:
-        lines += ["", f"below: eta {material.eta_below:g}"]
-    return "\n".join(lines)
-
-
-def _layer_heading(layer: "Layer", number: int | None) -> str:
-    thickness = layer.to_dict()["thickness_mm"]
-    return (
-        (f"layer {number}: " if number else "")
-        + ("semi-infinite" if thickness is None else f"{thickness:g} mm thick")
-        + f", eta {layer.eta:g}"
-        + (", clear" if layer.is_clear else "")
+    check_memory("inversion", common.threads)
+    if given["mean_free_path"] is None:
+        raise click.UsageError("--from-reflectance needs --mean-free-path.")
+    light: Any = given["light"] or (
+        "diffuse" if given["srgb"] or isinstance(asked, str) else "normal"
     )
+    asked = reflectance_of_codes(asked) if given["srgb"] else asked
+    names = _channels(given["channels"], 3 if isinstance(asked, str) else len(asked))
+    output = given["output"]
+    name = given["name"] or ("from-reflectance" if output in (None, "", "-") else Path(output).stem)
+    path = target(output, f"{name}.toml")
+    is_ours = functools.partial(has_mark, marks={_OURS.encode(): b""})
+    with held([path], is_ours, inputs=[], force=given["force"], named=("a material", ".toml")):
+        say_if_compiling(common, solver=True)
+        from sssfit.simulate import inversion
+
+        material = inversion.material_from_reflectance(
+            asked, given["mean_free_path"], given["eta"], name=name, channels=names, light=light
+        )
+        figures = inversion.inversion_figures(material, asked, light)
+        write(f"{_OURS} delete this line to keep it.\n{material.to_toml()}".encode(), path)
+    finish_one(common, "materials", path, figures, inversion.summary(figures), "the material")
 
 
-def _layer_table(layer: "Layer", channels: "Iterable[str]") -> str:
-    """Return the coefficients of a layer, a row a channel."""
-    head = ("channel", "sigma_a, 1/mm", "sigma_s, 1/mm", "g", "albedo", "mean free path, mm")
-    columns = (
-        layer.sigma_a_per_mm,
-        layer.sigma_s_per_mm,
-        layer.g,
-        layer.albedo,
-        layer.mean_free_path_mm,
-    )
-    rows = [
-        (channel, *(f"{value:.6g}" for value in values))
-        for channel, *values in zip(channels, *columns, strict=True)
-    ]
-    return table(head, rows)
+def _channels(given: str | None, count: int) -> list[str]:
+    """Names of the channels: R, G, B for three."""
+    if given is None and count != 3:
+        raise click.UsageError(
+            f"--from-reflectance has {count} value{'s' * (count != 1)}; name "
+            f"{'its channel' if count == 1 else 'their channels'} with --channels."
+        )
+    names = [each.strip() for each in (given or "R,G,B").split(",")]
+    if len(names) != count:
+        raise click.UsageError(f"--channels has {len(names)} names for {count} reflectances.")
+    return names

@@ -1,4 +1,4 @@
-"""sssfit: from a translucent material to the table a real-time shader can afford.
+"""sssfit: from a translucent material to the kernel of a real-time shader.
 
 Three calls take a material to a picture::
 
@@ -7,18 +7,18 @@ Three calls take a material to a picture::
     kernel = sssfit.fit(profile, "svd", rank=3)
     picture = sssfit.render(image, kernel)
 
-Each is also the package of its room (``from sssfit.fit import fit_svd``). The rooms, in the order a
-material walks through them:
+Each is also the package of its room (``from sssfit.fit import fit_svd``). The rooms, in the order
+of the work:
 
 - ``sssfit.material``: absorption and scattering coefficients, loaded and checked.
 - ``sssfit.simulate``: material to diffuse reflectance profile R_d(r).
-- ``sssfit.profile``: the profile itself, kept as energy in annuli.
+- ``sssfit.profile``: the profile itself, stored as energy in annuli.
 - ``sssfit.fit``: profile to separable kernel, ``sssfit.kernel``.
 - ``sssfit.render``: kernels applied to pictures.
 - ``sssfit.chart``: records to figures.
 
-The names of ``__all__`` are loaded when they are first asked for (PEP 562), because the command
-line imports this module before anything else, and ``--help`` must not wait for numpy or numba.
+The names of ``__all__`` are loaded at their first use (PEP 562), because the command line imports
+this module first, and ``--help`` must not wait for numpy or numba.
 """
 
 from importlib import import_module

@@ -1,7 +1,7 @@
-"""Checks of what records hold: arrays of numbers, names of channels, JSON, provenance.
+"""Checks of the fields of records: arrays of numbers, names of channels, JSON, provenance.
 
-Files edited by hand and records made in Python pass the same checks; each caller names the error
-to raise.
+Files edited by hand and records made in Python get the same checks; each caller passes the error to
+raise.
 """
 
 import math
@@ -21,12 +21,12 @@ FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
 
 MOST_CHANNELS = 64
-_MOST_PHOTONS = 10**18  # a million times what one run may have
+_MOST_PHOTONS = 10**18  # a million times the photons of a run
 _SHA256 = re.compile(r"[0-9a-f]{1,64}")
 
 
 def number_array(name: str, value: object, error: type[SssfitError]) -> FloatArray:
-    """Return a read-only float64 copy: a frozen record alone does not guard its arrays' contents.
+    """Return a read-only float64 copy, because a frozen record does not protect array contents.
 
     Texts and booleans are not numbers, although numpy would convert them.
     """
@@ -41,7 +41,7 @@ def number_array(name: str, value: object, error: type[SssfitError]) -> FloatArr
 
 
 def json_object(name: str, value: object, error: type[SssfitError]) -> Mapping[str, Any]:
-    """Return a read-only copy, as a file will hold it: a tuple becomes a list."""
+    """Return a read-only copy as stored in a file: a tuple becomes a list."""
     if not isinstance(value, Mapping):
         raise error(f"{name} = {shown(value)}; expected a mapping.")
     try:
@@ -96,7 +96,7 @@ def check_provenance(meta: Mapping[str, Any], error: type[SssfitError]) -> None:
 
 
 def _is_numeric(value: object) -> bool:
-    """Whether every element is a number; looks at each one unless numpy's type says so."""
+    """Return whether every element is a number; checks each one unless numpy's type says so."""
     if isinstance(value, np.ndarray) and value.dtype.kind in "iuf":
         return True
     kinds = set(map(type, np.array(value, dtype=object).ravel()))
@@ -105,7 +105,7 @@ def _is_numeric(value: object) -> bool:
 
 
 def _json_value(path: str, value: object) -> Any:
-    """Copy what JSON can hold; a ValueError names the place of what it cannot."""
+    """Copy JSON values; a ValueError names the position of an invalid one."""
     if isinstance(value, Mapping):
         return {_json_key(path, key): _json_value(f"{path}.{key}", value[key]) for key in value}
     if isinstance(value, (list, tuple)):
@@ -136,7 +136,7 @@ def _json_text(path: str, text: str) -> str:
 
 
 def _is_finite(value: float) -> bool:
-    """Whether a number is finite as a float64; an integer of 400 digits is not."""
+    """Return whether a number is finite as a float64; an integer of 400 digits is not."""
     try:
         return math.isfinite(value)
     except OverflowError:
@@ -144,17 +144,17 @@ def _is_finite(value: float) -> bool:
 
 
 def _is_label(text: object) -> bool:
-    """Whether a text can head a column."""
+    """Return whether a text can be the head of a column."""
     return isinstance(text, str) and text.isprintable() and text.strip() == text != ""
 
 
 def plain(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Return figures as JSON holds them: arrays as lists, paths as text, None for NaN and inf."""
+    """Return figures as JSON values: arrays as lists, paths as text, None for NaN and inf."""
     return {str(key): plain_value(each) for key, each in figures.items()}
 
 
 def plain_value(value: Any) -> Any:
-    """Return one figure as JSON can hold it; see `plain`."""
+    """Return one figure as a JSON value; see `plain`."""
     if isinstance(value, Mapping):
         return plain(value)
     if hasattr(value, "tolist"):

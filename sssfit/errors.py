@@ -2,35 +2,39 @@
 
 
 class SssfitError(ValueError):
-    """Base of every error the toolkit raises on purpose; its text is one line for the user."""
+    """Base class of all deliberate errors of the toolkit; its text is one line for the user."""
+
+
+class ArgumentError(SssfitError):
+    """Arguments that do not go together, or one that is missing."""
 
 
 class MaterialError(SssfitError):
-    """A material file or its values cannot be used."""
+    """A material file or its values are invalid."""
 
 
 class ProfileError(SssfitError):
-    """A profile file or its values cannot be used."""
+    """A profile file or its values are invalid."""
 
 
 class SimulationError(SssfitError):
-    """A simulation cannot be run as asked."""
+    """A simulation cannot run with these inputs."""
 
 
 class StoppedError(SimulationError):
-    """A simulation was stopped before anything was done that could be kept."""
+    """A simulation was stopped before it had any result to keep."""
 
 
 class KernelError(SssfitError):
-    """A kernel file or its values cannot be used."""
+    """A kernel file or its values are invalid."""
 
 
 class FitError(SssfitError):
-    """A profile cannot be fitted as asked."""
+    """A profile cannot be fitted with these settings."""
 
 
 class RenderError(SssfitError):
-    """A picture cannot be rendered or compared as asked."""
+    """A picture cannot be rendered or compared with these settings."""
 
 
 class FileError(SssfitError):
@@ -38,4 +42,4 @@ class FileError(SssfitError):
 
 
 class SssfitWarning(UserWarning):
-    """The result stands, but something about it should be known before it is used."""
+    """The result is valid, but the user should know something about it before using it."""

@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import BinaryIO
 
-from sssfit.errors import FileError
+from sssfit.errors import ArgumentError, FileError
 
 if sys.platform == "win32":
     import msvcrt
@@ -45,14 +45,14 @@ def reason(error: OSError) -> str:
 
 
 def has_mark(path: Path, marks: Mapping[bytes, bytes]) -> bool:
-    """Tell whether a file says of itself that we wrote it.
+    """Return whether a file carries our mark.
 
     Parameters
     ----------
     path : Path
-        A file of any kind, or none.
+        A file of any kind; it need not exist.
     marks : mapping
-        From what a format's files begin with, to what ours have near their beginning or end.
+        Maps the first bytes of a format's files to our mark near their beginning or end.
     """
     try:
         with path.open("rb") as stream:
@@ -78,9 +78,9 @@ def is_marked(stream: BinaryIO, marks: Sequence[bytes]) -> bool:
 
 
 def read_at_most(stream: BinaryIO, most: int) -> bytes:
-    """Read a stream to its end, but no more than so many bytes.
+    """Read a stream to its end, but at most this many bytes.
 
-    ``stream.read(most)`` would first make room for all of them: 2 GB for a profile of 0.3 MB.
+    ``stream.read(most)`` would first allocate all of them: 2 GB for a profile of 0.3 MB.
     """
     parts: list[bytes] = []
     while most > 0 and (part := stream.read(min(most, _READ_BYTES))):
@@ -96,23 +96,23 @@ def check_output(
     force: bool = False,
     inputs: Iterable[str | Path] = (),
 ) -> None:
-    """Refuse an output that could not be written, before hours are spent on its content.
+    """Raise an error for an output that could not be written, before hours of work.
 
     Parameters
     ----------
     path : Path
         Where the output is to go.
     is_own : callable
-        Whether an existing file is one of ours, of the kind about to replace it.
+        Returns whether an existing file is one of ours, of the same kind as the output.
     force : bool
         Replace a foreign or write-protected file, or an input, as well.
     inputs : iterable of str or Path
-        What is read, ``-`` for stdin; names of what is not a file are passed over.
+        The inputs, ``-`` for stdin; names that are not files are ignored.
 
     Raises
     ------
     FileError
-        The folder is missing or not writable, or the file is an input, or somebody else's.
+        The folder is missing or not writable, or the file is an input or not ours.
     """
     _check_target(path)
     path = _followed(path)
@@ -132,14 +132,14 @@ def check_output(
 
 
 def is_same_file(one: Path, other: Path) -> bool:
-    """Tell whether two names lead to one file, which need not be there yet."""
+    """Return whether two names lead to the same file, which need not exist yet."""
     with contextlib.suppress(OSError):
         return one.samefile(other)
     return os.path.normcase(os.path.realpath(one)) == os.path.normcase(os.path.realpath(other))
 
 
 def _check_target(path: Path) -> None:
-    """Refuse a symbolic link that leads round in a circle."""
+    """Raise an error for a circular symbolic link."""
     try:
         path.stat()
     except OSError as error:
@@ -150,7 +150,7 @@ def _check_target(path: Path) -> None:
 def _check_replaceable(
     path: Path, is_own: Callable[[Path], bool], force: bool, inputs: Iterable[str | Path]
 ) -> None:
-    """Refuse to replace what its owner may want to keep; some things even by force."""
+    """Raise an error instead of replacing files that the user may want to keep."""
     remedy = "choose another name, or replace it with `force = True`."
     if not force:
         if _is_among(path, inputs):
@@ -170,7 +170,7 @@ def _check_replaceable(
 
 
 def _is_among(path: Path, inputs: Iterable[str | Path]) -> bool:
-    """Whether a file is one of these, by any name, link or stream."""
+    """Return whether a file is one of these, by any name, link or stream."""
     here = path.stat()
     for each in inputs:
         with contextlib.suppress(OSError, ValueError):  # the name of a material, a closed stdin
@@ -187,21 +187,21 @@ _SHADERS = (".glsl", ".hlsl", ".wgsl")
 
 
 def check_ending(path: Path, what: str, own: str) -> None:
-    """Refuse an output whose name promises another format than it will have.
+    """Raise an error for an output whose name promises another format.
 
     Parameters
     ----------
     path : Path
         Where the output is to go.
     what : str
-        What it is, with its article: "a profile".
+        Its kind, with the article: "a profile".
     own : str
         The ending of its format: ".npz".
 
     Raises
     ------
     FileError
-        The name ends as files of another format do.
+        The name has the ending of another format.
     """
     ending = path.suffix.lower()
     if ending != own and ending in (*_DATA, *_PICTURES, *_SHADERS):
@@ -209,12 +209,13 @@ def check_ending(path: Path, what: str, own: str) -> None:
 
 
 def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
-    """Write a whole file or nothing: temporary file in the same folder, fsync, rename.
+    """Write a complete file or nothing: temporary file in the same folder, fsync, rename.
 
     Raises
     ------
     FileError
-        Disk full, folder read-only, or any other failure; an older file at ``path`` is untouched.
+        The disk is full, the folder read-only, or another failure; an older file at ``path`` stays
+        unchanged.
     """
     path = _followed(path)
     with _clear_errors(path):
@@ -247,9 +248,9 @@ def temporary_folder() -> Iterator[Path]:
 
 
 def remove_unfinished() -> None:
-    """Delete temporary files and locks of this process, which is about to end at once.
+    """Delete temporary files and locks of this process, which is about to end.
 
-    Other threads may still be writing: what is not yet renamed into place goes, what is stays.
+    Other threads may still be writing: files not yet renamed are deleted, the others stay.
     """
     for path in tuple(_unfinished):
         with contextlib.suppress(OSError):
@@ -264,9 +265,9 @@ atexit.register(remove_unfinished)
 
 
 def remove_leftovers(path: Path) -> None:
-    """Delete what writes of ``path`` left behind when they were killed half-way.
+    """Delete the temporary files of killed writes of ``path``.
 
-    To be called by who holds the output's lock: nobody else is writing it then.
+    Call it while holding the output's lock, so that no other process is writing.
     """
     pattern = f".{glob.escape(path.name)}.{8 * '?'}.tmp"  # mkstemp puts eight letters in
     with contextlib.suppress(OSError):
@@ -278,8 +279,8 @@ def remove_leftovers(path: Path) -> None:
 def locked(path: Path) -> Iterator[None]:
     """Hold the output ``path`` for this process by an operating-system lock.
 
-    The lock lives on ``.NAME.lock`` beside the output and goes with the process, kill -9 included;
-    a lock file left behind by a killed run holds nothing.
+    The lock is on ``.NAME.lock`` beside the output and ends with the process, even by kill -9; the
+    lock file of a killed run locks nothing.
 
     Raises
     ------
@@ -295,7 +296,8 @@ def locked(path: Path) -> Iterator[None]:
         remove_leftovers(path)
         yield
     finally:
-        # Unlink before the lock is let go: a waiting process then notices that its file is gone.
+        # Unlink before the lock is released, so that a waiting process notices that its file is
+        # gone.
         with contextlib.suppress(OSError):
             lock_path.unlink()
         _unfinished.discard(lock_path)
@@ -307,7 +309,7 @@ def check_distinct(paths: Iterable[Path]) -> None:
     seen: list[Path] = []
     for path in paths:
         if any(is_same_file(path, other) for other in seen):
-            raise FileError(f"two outputs name the same file, {path}; give each its own.")
+            raise ArgumentError(f"two outputs name the same file, {path}; give each its own.")
         seen.append(path)
 
 
@@ -333,8 +335,10 @@ def held(
 
     Raises
     ------
+    ArgumentError
+        Two outputs into one file.
     FileError
-        As `check_distinct`, `check_ending`, `check_output` and `locked`.
+        As `check_ending`, `check_output` and `locked`.
     """
     files = [path for path in paths if path is not None]
     read = [each for each in inputs if each is not None]
@@ -349,7 +353,7 @@ def held(
 
 
 def _open_locked(lock_path: Path, path: Path) -> int:
-    """Open and lock; again if the file was unlinked between the two by the run that ended."""
+    """Open and lock; repeat if the run that ended unlinked the file in between."""
     while True:
         handle = os.open(lock_path, os.O_RDWR | os.O_CREAT, 0o644)
         try:
@@ -366,10 +370,11 @@ def _open_locked(lock_path: Path, path: Path) -> int:
 
 
 def _flush_folder(folder: Path) -> None:
-    """Put a rename on the disk as well, so that what is deleted after it is not gone before it."""
+    """Flush a rename to the disk, so that later deletions do not become durable before it."""
     if sys.platform == "win32":
         return  # a folder cannot be opened there
-    with contextlib.suppress(OSError):  # not every file system can; the file itself is safe
+    # Not supported by every file system; the file itself is safe.
+    with contextlib.suppress(OSError):
         handle = os.open(folder, os.O_RDONLY)
         try:
             os.fsync(handle)
@@ -386,13 +391,13 @@ def _lock(handle: int) -> None:
 
 
 def _temporary(path: Path) -> tuple[int, Path]:
-    """Make the file that is to be renamed to ``path``; `remove_leftovers` knows it by its name."""
+    """Make the file that will be renamed to ``path``; `remove_leftovers` recognises its name."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
     return handle, Path(name)
 
 
 def _followed(path: Path) -> Path:
-    """Where a symbolic link leads, so that a rename replaces the file and not the link."""
+    """Return the target of a symbolic link, so that a rename replaces the file and not the link."""
     return path.resolve() if path.is_symlink() else path
 
 

@@ -1,8 +1,8 @@
 """Radial grids: the rings in which a simulation counts the light that comes back.
 
-A grid is uniform: ``annuli`` rings, each ``dr_mm`` wide, from the axis outwards. Light that leaves
-beyond the last ring is kept apart by whoever simulates. The default spacing and radius are those of
-"Separable Subsurface Scattering", supplementary material F.
+A grid is uniform: ``annuli`` rings, each ``dr_mm`` wide, from the axis outwards. The simulation
+counts light beyond the last ring separately. The default spacing and radius are those of "Separable
+Subsurface Scattering", supplementary material F.
 """
 
 import math
@@ -37,7 +37,7 @@ class RadialGrid:
     Raises
     ------
     SimulationError
-        A width that is not a finite length above 0, or a number of rings out of range.
+        The width is not a finite length above 0, or the number of rings is out of range.
     """
 
     dr_mm: float
@@ -67,12 +67,12 @@ def paper_grid(material: Material) -> RadialGrid:
 
     ``dr = min(MFP) / 20`` and ``annuli = ceil(32 max(MFP) / dr)`` over the channels of all layers
     that are not clear, with reduced mean free paths ("Separable Subsurface Scattering",
-    supplementary material F). For high albedo the radius cuts energy off: 2.7 % of wholemilk's red.
+    supplementary material F). For high albedo the radius cuts off energy: 2.7 % of wholemilk's red.
 
     Raises
     ------
     SimulationError
-        The mean free paths differ so much that it takes over 100 000 rings.
+        The mean free paths differ so much that the grid would need over 100 000 rings.
     """
     return make_grid(material)
 
@@ -80,23 +80,22 @@ def paper_grid(material: Material) -> RadialGrid:
 def make_grid(
     material: Material, *, dr_mm: float | None = None, radius_mm: float | None = None
 ) -> RadialGrid:
-    """Return the grid of the paper, or one of another ring width or radius.
+    """Return the grid of the paper, or one with another ring width or radius.
 
     Parameters
     ----------
     material : Material
-        Its reduced mean free paths give what is left open.
+        Its reduced mean free paths give the defaults.
     dr_mm : float, optional
         Width of a ring [mm]; by default a 20th of the shortest mean free path.
     radius_mm : float, optional
-        Radius to be covered [mm], rounded up to whole rings; by default 32 of the longest mean
-        free paths.
+        Outer radius [mm], rounded up to whole rings; by default 32 of the longest mean free paths.
 
     Raises
     ------
     SimulationError
-        A length that is not finite and above 0, rings wider than the radius, or over 100 000 of
-        them; the message names widths and radii that would do.
+        A length is not finite and above 0, the rings are wider than the radius, or there are over
+        100 000 of them; the message names valid widths and radii.
     """
     paths_mm = np.concatenate([layer.mean_free_path_mm for layer in material.layers])
     paths_mm = paths_mm[np.isfinite(paths_mm)]
@@ -115,7 +114,7 @@ def grid_of_lengths(
 ) -> RadialGrid:
     """Return the grid of rings ``dr_mm`` wide that covers ``radius_mm``, rounded up to whole rings.
 
-    Raises SimulationError as `make_grid`; ``whose`` stands before its message, ``why`` within.
+    Raises SimulationError as `make_grid`; its message begins with ``whose`` and includes ``why``.
     """
     dr, radius = _length("dr_mm", dr_mm), _length("radius_mm", radius_mm)
     if dr > radius * (1.0 + 1e-9):
@@ -123,7 +122,7 @@ def grid_of_lengths(
             f"{whose}annuli {dr:g} mm wide do not fit into a radius of {radius:g} mm; use a "
             "smaller `dr_mm` or a larger `radius_mm` (both in mm)."
         )
-    # 1e-9: a ratio that is whole except for its last bits must not gain a ring.
+    # 1e-9: a ratio that is an integer up to rounding must not gain a ring.
     annuli = max(1, math.ceil(radius / dr - 1e-9))
     _check_count(annuli, dr, whose, why)
     return RadialGrid(dr, annuli)
@@ -140,7 +139,7 @@ def _length(key: str, value: Any) -> float:
 
 
 def _check_count(annuli: int, dr_mm: float, whose: str = "", why: str = "") -> None:
-    """Refuse too many rings, and say which width or radius would do."""
+    """Raise an error for too many rings, with a sufficient width or radius."""
     if annuli > MOST_ANNULI:
         least_dr = _rounded(dr_mm * (annuli / MOST_ANNULI), math.ceil)
         most_radius = _rounded(dr_mm * MOST_ANNULI, math.floor)
@@ -152,6 +151,6 @@ def _check_count(annuli: int, dr_mm: float, whose: str = "", why: str = "") -> N
 
 
 def _rounded(value: float, rounding: Callable[[float], int]) -> str:
-    """Write a number with three digits, rounded to the safe side."""
+    """Return a number with three digits as text, rounded to the safe side."""
     scale = 10.0 ** (math.floor(math.log10(value)) - 2)
     return f"{rounding(value / scale) * scale:.3g}"

@@ -1,4 +1,4 @@
-"""The kinds of file that sssfit writes, told apart by what they hold; `load` reads any of them.
+"""The kinds of file that sssfit writes, recognised by content; `load` reads any of them.
 
 A new kind is one entry here. Nothing of a room is imported before one of its files is read.
 """
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 MOST_BYTES = 500_000_000  # the most that a file of ours may have
 _MOST_TOML_BYTES = 1_000_001
-# What every material has: a table of layers or a coefficient, if by a name that has to be mended.
+# What every material has: a table of layers or a coefficient, even with a misspelt name.
 _MATERIAL = re.compile(r"^\s*(\[\[layers\]\]|[\"']?(sigma|mu)_?[as])", re.MULTILINE | re.IGNORECASE)
 
 
@@ -37,11 +37,12 @@ class Kind:
     Parameters
     ----------
     words : str
-        What messages call it.
+        Its name in messages.
     reader : str
-        "module:function" of a path or a binary stream and of the name that messages call it.
+        "module:function", which takes a path or binary stream and its name in messages.
     marks : tuple of bytes
-        By any of them a file is of this kind, however damaged. A material, a text, has none.
+        Any of them identifies a file of this kind, even a damaged one. A material, which is text,
+        has none.
     """
 
     words: str
@@ -70,14 +71,14 @@ KINDS: Mapping[str, Kind] = {
 
 
 def load(source: "str | Path | BinaryIO", origin: str | None = None) -> "Loaded":
-    """Read a profile, a kernel, a material or a walk's checkpoint, told by what the file holds.
+    """Read a profile, a kernel, a material or a walk's checkpoint, recognised by content.
 
     Parameters
     ----------
     source : str, Path or binary stream
         A file, the name of a material that ships with sssfit, or a stream (which need not seek).
     origin : str, optional
-        What messages call it; by default the path, or "the stream".
+        Its name in messages, by default the path, or "the stream".
 
     Returns
     -------
@@ -86,7 +87,7 @@ def load(source: "str | Path | BinaryIO", origin: str | None = None) -> "Loaded"
     Raises
     ------
     SssfitError
-        One line: not a file of ours, or one of ours that is damaged.
+        The file is not one of ours, or it is damaged; the message is one line.
 
     Examples
     --------
@@ -118,7 +119,7 @@ def load(source: "str | Path | BinaryIO", origin: str | None = None) -> "Loaded"
 
 
 def _whole(stream: BinaryIO, origin: str) -> io.BytesIO:
-    """Take all of a stream that may not seek, up to the most that a file of ours may have."""
+    """Read a stream that may not seek, up to the largest size of our files."""
     content = read_at_most(stream, MOST_BYTES + 1)
     if len(content) > MOST_BYTES:
         raise FileError(f"{origin} has over {MOST_BYTES:,} bytes; expected {_expected()}.")
@@ -126,7 +127,7 @@ def _whole(stream: BinaryIO, origin: str) -> io.BytesIO:
 
 
 def _check_regular_file(path: Path, origin: str, names: Any) -> None:
-    """Refuse what is not there, folders, devices and pipes."""
+    """Raise an error for missing files, folders, devices and pipes."""
     try:
         path.stat()
     except (OSError, ValueError) as error:  # ValueError: a null character
@@ -140,7 +141,7 @@ def _check_regular_file(path: Path, origin: str, names: Any) -> None:
 
 
 def _kind(stream: BinaryIO) -> Kind | None:
-    """Tell a kind by the marks in a file; None for what is foreign."""
+    """Return the kind by the marks in a file; None for foreign files."""
     for kind in KINDS.values():
         if is_marked(stream, kind.marks):
             return kind
@@ -151,6 +152,6 @@ def _kind(stream: BinaryIO) -> Kind | None:
 
 
 def _expected() -> str:
-    """List the kinds."""
+    """Return the names of the kinds as text."""
     *others, last = (kind.words for kind in KINDS.values())
     return f"{', '.join(others)} or {last}"

@@ -1,21 +1,21 @@
-"""How figures, values and names are worded: on one line, in printable characters."""
+"""Wording of figures, values and names: on one line, in printable characters."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from string import Formatter
 from typing import Any, TypeAlias
 
-_MOST_NAMED = 4  # channels that a line of a record's repr names
-_MOST_SHOWN = 60  # characters of a value worth repeating to the person who wrote it
+_MOST_NAMED = 4  # channels named in a record's repr
+_MOST_SHOWN = 60  # characters of a value that a message repeats
 
 
 def printable(text: str) -> str:
-    """Escape what does not print (newlines too), so that ``text`` can stand inside a message."""
+    """Escape unprintable characters, also newlines, so that ``text`` can be part of a message."""
     return "".join(c if c.isprintable() else repr(c)[1:-1] for c in text)
 
 
 def shown(value: object) -> str:
-    """Give a value as one short printable line: escapes for control characters, cut at 60."""
+    """Return a value as one short printable line: control characters escaped, cut at 60."""
     import numpy as np  # the command line asks for `printable` before it loads anything heavy
 
     try:
@@ -30,14 +30,14 @@ def shown(value: object) -> str:
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:
     """Return ``did you mean X? `` for the nearest known word, or nothing if none is near."""
-    import difflib  # 5 ms that help need not wait for
+    import difflib  # 5 ms that help does not need
 
     near = difflib.get_close_matches(word.lower(), known, n=1)
     return f"did you mean {near[0]}? " if near else ""
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Columns under their heads: the first flush left, the others flush right; no cut, no wrap."""
+    """Return columns under their heads: the first flush left, the others flush right; never cut."""
     widths = [max(len(row[k]) for row in [header, *rows]) for k in range(len(header))]
     lines = (
         "  ".join(
@@ -50,9 +50,9 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def columns(head: str, names: Sequence[str], *each: tuple[str, Sequence[Any] | None, str]) -> str:
-    """Write a table of a row a name: heads with a unit, the values under them and their format.
+    """Return a table with one row per name: heads with units, and values with their formats.
 
-    A column without values is left out; see `number` for formats.
+    A column without values is omitted; see `number` for formats.
     """
     shown = [(title, values, form) for title, values, form in each if values is not None]
     rows = [
@@ -63,10 +63,10 @@ def columns(head: str, names: Sequence[str], *each: tuple[str, Sequence[Any] | N
 
 
 def number(value: Any, form: str) -> str:
-    """Write a figure by a format; one that ends in % is of a share.
+    """Return a figure as text by a format; a format that ends in % is for shares.
 
-    Shares below 1e-9 are rounding of sums of pixels: 0 %. What is not known is a dash, or what
-    stands behind a bar: ".3g%|unknown".
+    Shares below 1e-9 are rounding of sums of pixels: 0 %. Unknown figures are a dash, or the text
+    after a bar: ".3g%|unknown".
     """
     form, _, unknown = form.partition("|")
     if value is None or value != value:
@@ -84,10 +84,10 @@ def _per_cent(value: float, form: str) -> str:
 
 
 class _Template(Formatter):
-    """A template whose fields are written by `number`."""
+    """A template whose fields are formatted by `number`."""
 
     def format_field(self, value: Any, form: str) -> str:
-        """Write a figure by its format, and anything without a format as it is."""
+        """Format a figure; anything without a format stays as it is."""
         return number(value, form) if form else str(value)
 
 
@@ -101,7 +101,7 @@ def filled(template: str, figures: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Columns:
-    """A table of a report, of a row a name: see `columns`.
+    """A table of a report with one row per name; see `columns`.
 
     ``names`` is the key of the names; ``each`` has title, key and format of each column.
     """
@@ -115,9 +115,9 @@ Part: TypeAlias = str | Columns | tuple[str, str | Columns]
 
 
 def report(parts: Iterable[Part], figures: Mapping[str, Any]) -> str:
-    """Write a record's figures for people, a part a line or a table.
+    """Return a record's figures as a report; each part is a line or a table.
 
-    A part is a template of `filled` or `Columns`; with a key before it, it is left out where the
+    A part is a template of `filled` or `Columns`; with a key before it, the part is omitted if the
     figure of that key is None.
     """
     lines = []
@@ -134,7 +134,7 @@ def report(parts: Iterable[Part], figures: Mapping[str, Any]) -> str:
 
 
 def by_channel(channels: Sequence[str], values: Sequence[Any], form: str) -> str:
-    """Give a figure for each channel in a line: "R 0.42, G 0.21", the first four of many."""
+    """Return a figure for each channel in one line: "R 0.42, G 0.21", the first four of many."""
     named = [f"{_short(channels[c])} {number(values[c], form)}" for c in range(len(channels))]
     named = named[:_MOST_NAMED]
     more = len(channels) - len(named)
@@ -142,18 +142,18 @@ def by_channel(channels: Sequence[str], values: Sequence[Any], form: str) -> str
 
 
 def of_material(name: object) -> str:
-    """Give the name of a record's material, where it says one."""
+    """Return the name of a record's material, if it has one."""
     return "unknown material" if name is None else _short(printable(str(name)))
 
 
 def _short(name: str) -> str:
-    """Cut a name that would fill the line."""
+    """Shorten a name that would fill the line."""
     return name if len(name) <= _MOST_SHOWN // 2 else name[: _MOST_SHOWN // 2 - 3] + "..."
 
 
 def html_table(caption: str, heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """Return a table for a notebook; all texts are escaped."""
-    from html import escape  # its entities take 3 ms that help need not wait for
+    from html import escape  # its entities take 3 ms that help does not need
 
     def row(cells: Sequence[str], tag: str) -> str:
         return "<tr>" + "".join(f"<{tag}>{escape(each)}</{tag}>" for each in cells) + "</tr>"

@@ -1,4 +1,4 @@
-"""Every method of ``sssfit simulate`` and ``sssfit fit``: what it does, its function, its settings.
+"""The methods of ``sssfit simulate`` and ``sssfit fit``, with summary, function and settings.
 
 A new method is one file with its function and one entry here: help, ``--method``, the documentation
 and the tests of options are made from the entries. Nothing of the library is imported before a
@@ -23,27 +23,27 @@ def imported(where: str) -> Callable[..., Any]:
 
 @dataclass(frozen=True, slots=True)
 class Setting:
-    """A keyword of a method's function, and the option that asks for it.
+    """A keyword of a method's function, and its option.
 
     Parameters
     ----------
     name : str
-        Of the option, with underscores.
+        Name of the option, with underscores.
     kind : str
-        "number", "numbers" (one, or one a channel), "share", "seconds", "whole", "count" (a whole
-        number, 1e7 is understood), "choice" or "flag".
+        "number", "numbers" (one, or one per channel), "length", "share", "seconds", "whole",
+        "count" (a whole number, 1e7 is understood), "choice" or "flag".
     help : str
-        What it does; the names of the methods that have it are put before.
+        Help text; the names of its methods are put before it.
     metavar : str
-        What stands for the value in the help.
+        Placeholder of the value in the help.
     among : tuple
         The choices, or the smallest and the largest whole number.
     default : str or float, optional
-        What the function is given where nothing is asked for; shown in the help.
+        Value if the option is not given; shown in the help.
     words : str
-        How the help describes a default that the function has itself.
+        Description of a default that the function has itself.
     keyword : str
-        Of the function, where it is not the option's name: with a unit.
+        Keyword of the function if it differs from the option's name, as with a unit.
     """
 
     name: str
@@ -58,23 +58,23 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """One way from a material to a profile, or from a profile to a kernel.
+    """A method from a material to a profile, from a profile to a kernel, or to a made picture.
 
     Parameters
     ----------
     function : str
         "module:name"; `load` imports it.
     summary : str
-        On one line.
+        Help text on one line.
     settings : tuple of Setting
     counted : str
-        The setting whose value becomes part of the kernel's file name (svd3), by ``words`` where it
-        is not given.
+        The setting whose value becomes part of the kernel's file name (svd3), by ``words`` if it is
+        not given.
     shares : bool
-        The function takes a list of materials, works once for what they have in common, and knows
+        Whether the function takes a list of materials, shares their common work, and takes
         ``threads`` and ``stop``; the others take one material.
     makes : str, optional
-        The name of the one profile it makes, without a material; that name needs no ``--method``.
+        Name of the only profile it makes, without a material; that name needs no ``--method``.
     """
 
     function: str
@@ -89,15 +89,17 @@ class Method:
         return imported(self.function)
 
 
+DEON_SKIN = "deon-skin"  # a profile that is made without a material
+
 SIMULATIONS: Mapping[str, Method] = {
     "montecarlo": Method(
         "sssfit.simulate:simulate_montecarlo_many",
-        "walks photons, through layers and slabs too; with standard errors",
+        "photon walk, also through layers and slabs; with standard errors",
         (
             Setting(
                 "photons",
                 "count",
-                "photons to trace; every photon serves all channels.",
+                "photons to trace; each photon counts for all channels.",
                 "N",
                 (2, 10**12),
                 words="1e7; with --target-error no limit",
@@ -122,7 +124,7 @@ SIMULATIONS: Mapping[str, Method] = {
     ),
     "exact": Method(
         "sssfit.simulate:simulate_exact_many",
-        "solves the transport equation: no noise; one half space",
+        "solution of the transport equation, without noise; half spaces only",
         (
             Setting(
                 "tolerance",
@@ -135,7 +137,7 @@ SIMULATIONS: Mapping[str, Method] = {
         shares=True,
     ),
     "dipole": Method(
-        "sssfit.simulate:simulate_dipole", "diffusion, Jensen et al. 2001; one half space"
+        "sssfit.simulate:simulate_dipole", "diffusion, Jensen et al. 2001; half spaces only"
     ),
     "dipole-grosjean": Method(
         "sssfit.simulate:simulate_dipole_grosjean",
@@ -143,17 +145,17 @@ SIMULATIONS: Mapping[str, Method] = {
     ),
     "multipole": Method(
         "sssfit.simulate:simulate_multipole",
-        "diffusion, Donner and Jensen 2005; slabs and layers too",
+        "diffusion, Donner and Jensen 2005; also for slabs and layers",
     ),
     "burley": Method(
         "sssfit.simulate:simulate_burley",
-        "normalised diffusion, Christensen and Burley 2015; one half space",
+        "normalised diffusion, Christensen and Burley 2015; half spaces only",
         (
             Setting(
                 "mapping",
                 "choice",
-                "which published fit gives s: perpendicular (light from straight above), diffuse "
-                "(from everywhere), or diffuse-mfp (from the diffuse mean free path).",
+                "published fit of s: perpendicular (beam along the normal), diffuse (light from "
+                "all directions), or diffuse-mfp (scaled by the diffuse mean free path).",
                 "FIT",
                 ("perpendicular", "diffuse", "diffuse-mfp"),
                 default="perpendicular",
@@ -163,7 +165,7 @@ SIMULATIONS: Mapping[str, Method] = {
     "gaussians": Method(
         "sssfit.simulate:simulate_deon_skin",
         "skin as the six Gaussians of d'Eon et al. 2007; deon-skin only",
-        makes="deon-skin",
+        makes=DEON_SKIN,
     ),
 }
 
@@ -185,29 +187,30 @@ FITS: Mapping[str, Method] = {
     ),
     "gaussians": Method(
         "sssfit.fit.gaussians:fit_gaussians",
-        "1 to 10 passes: a sum of Gaussians, best for the profile, r-weighted",
+        "1 to 10 terms: a sum of Gaussians, r-weighted least squares of the profile",
         (
             Setting("terms", "whole", "number of Gaussians.", "N", (1, 10), words="4"),
             Setting("signed", "flag", "allow negative weights."),
-            Setting("free_energy", "flag", "leave the sum of the weights free."),
+            Setting("free_energy", "flag", "do not constrain the sum of the weights."),
             _ENERGY,
         ),
         counted="terms",
     ),
     "preintegrated": Method(
         "sssfit.fit.preintegrated:fit_preintegrated",
-        "one pass: the profile integrated along lines; exact for axis edges",
+        "one term: the profile integrated along lines; exact for edges along the axes",
         (_ENERGY,),
     ),
     "guided": Method(
         "sssfit.fit.guided:fit_guided",
-        "one pass fitted under a guide function: near (k = 0) to far (k = 4) scattering",
+        "one term, weighted by a guide function: near (k = 0) to far (k = 4) scattering",
         (
             Setting("k", "number", "0 for near, 4 for far scattering.", "0..4", words="1.55"),
             Setting(
                 "b",
                 "number",
-                "narrowness of the axes that the guide function leaves out.",
+                "how close to the axes the guide function vanishes: within about 1/sqrt(b) of the "
+                "extent.",
                 "NUMBER",
                 words="50",
             ),
@@ -222,7 +225,7 @@ FITS: Mapping[str, Method] = {
     ),
     "artist": Method(
         "sssfit.fit.artist:fit_artist",
-        "one pass of two Gaussians per channel, fitted or set by hand",
+        "one term of two Gaussians per channel, fitted or set by hand",
         (
             Setting(
                 "target",
@@ -256,13 +259,13 @@ FITS: Mapping[str, Method] = {
     ),
     "falloff": Method(
         "sssfit.fit.falloff:fit_falloff",
-        "one pass, red skin stretched: width, strength and falloff, fitted or by hand",
+        "one term, the 2012 model: stretched red skin with width, strength and falloff",
         (
             Setting("width", "number", "width, the same for all channels.", "W"),
             Setting(
                 "strength",
                 "numbers",
-                "share that is blurred, one or one per channel.",
+                "share of the light that scatters, one or one per channel.",
                 "T,...",
             ),
             Setting(
@@ -275,14 +278,14 @@ FITS: Mapping[str, Method] = {
     ),
     "burley": Method(
         "sssfit.fit.burley:fit_burley",
-        "one pass: normalised diffusion, a shape per channel, as engines use it",
+        "one term: normalised diffusion with one shape per channel, as engines use it",
         (_ENERGY,),
     ),
 }
 
 
 def settings_of(methods: Mapping[str, Method]) -> dict[str, tuple[Setting, tuple[str, ...]]]:
-    """Return every setting by its name, each once, with the names of the methods that have it."""
+    """Return every setting once by its name, with the names of the methods that have it."""
     found: dict[str, tuple[Setting, tuple[str, ...]]] = {}
     for name, method in methods.items():
         for each in method.settings:
@@ -292,6 +295,6 @@ def settings_of(methods: Mapping[str, Method]) -> dict[str, tuple[Setting, tuple
 
 
 def lines_of(methods: Mapping[str, Method]) -> str:
-    """Return name and summary, a line each; the longest name and two spaces set the column."""
+    """Return a line of name and summary for each; the longest name sets the column."""
     width = max(map(len, methods)) + 2
     return "\n".join(f"  {name.ljust(width)}{each.summary}" for name, each in methods.items())

@@ -1,8 +1,8 @@
 """Light at a smooth surface, and the quadrature for integrals over directions.
 
-The one place of Fresnel's equations outside the compiled walk, which may import numbers only and
-has its own (`sssfit._jit.sampling.fresnel_reflectance`). ``eta`` is the refractive index inside
-over that outside, cosines are those to the normal, inside.
+This is the only place of Fresnel's equations outside the compiled layer, which may not import this
+module and has its own (`sssfit._jit.sampling.fresnel_reflectance`). ``eta`` is the refractive index
+inside divided by that outside; cosines are those to the normal, inside.
 
 Light at cosine mu to the normal leaves a medium if mu > mu_c = sqrt(1 - 1/eta^2). Integrals over
 this cone take mu = mu_c + (1 - mu_c) t^2, which removes the square root at the critical angle.
@@ -17,30 +17,30 @@ import numpy.typing as npt
 from sssfit.arrays import FloatArray
 
 _LEAST = 1e-150  # denominator: 0 / 0 at a cosine of 0 becomes 0
-MATCHED = 1e-9  # relative indices nearer to 1 reflect less than 1e-18: no surface at all
+MATCHED = 1e-9  # relative indices nearer to 1 reflect less than 1e-18, like no surface
 
 
 def is_matched(eta: float) -> bool:
-    """Whether a relative index is 1 for all purposes."""
+    """Return whether a relative index counts as 1."""
     return abs(eta - 1.0) < MATCHED
 
 
 def normal_reflectance(eta: float, eta_outside: float = 1.0) -> float:
-    """Specular reflectance R_sp = ((n1 - n0) / (n1 + n0))^2 of a normally incident beam."""
+    """Return the specular reflectance R_sp = ((n1 - n0) / (n1 + n0))^2 at normal incidence."""
     return ((eta - eta_outside) / (eta + eta_outside)) ** 2
 
 
 def normal_transmittance(eta: float) -> float:
-    """Share 1 - R_sp of a normally incident beam that gets in."""
+    """Return the share 1 - R_sp of a normally incident beam that enters."""
     return 1.0 - normal_reflectance(eta)
 
 
 def fresnel_transmittance(cosine: npt.ArrayLike, eta: float) -> FloatArray:
-    """Share 1 - R_F of unpolarised light from inside that gets out; 0 beyond the critical angle.
+    """Return the share 1 - R_F of unpolarised light that escapes; 0 beyond the critical angle.
 
     2 eta mu m [1/(eta mu + m)^2 + 1/(mu + eta m)^2] with m the cosine outside, the mean of both
     polarisations' transmittances (Born and Wolf, "Principles of Optics", section 1.5.3): a
-    difference 1 - R_F would lose grazing angles' digits.
+    difference 1 - R_F would lose digits at grazing angles.
     """
     cosine = np.asarray(cosine, dtype=np.float64)
     outside = np.sqrt(np.maximum(1.0 - eta**2 * (1.0 - cosine**2), 0.0))
@@ -53,7 +53,7 @@ def fresnel_transmittance(cosine: npt.ArrayLike, eta: float) -> FloatArray:
 
 
 def fresnel_reflectance(cosine: npt.ArrayLike, eta: float) -> FloatArray:
-    """Reflectance R_F of unpolarised light from inside, to 1e-15; 1 beyond the critical angle."""
+    """Return R_F of unpolarised light from inside, to 1e-15; 1 beyond the critical angle."""
     reflected: FloatArray = 1.0 - fresnel_transmittance(cosine, eta)
     return reflected
 
@@ -61,7 +61,7 @@ def fresnel_reflectance(cosine: npt.ArrayLike, eta: float) -> FloatArray:
 def gauss_legendre(
     count: int, start: float = 0.0, end: float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
-    """Return nodes and weights (count,) of Gauss's quadrature over [start, end]."""
+    """Return nodes and weights (count,) of Gaussian quadrature over [start, end]."""
     x, w = np.polynomial.legendre.leggauss(count)
     middle, half = 0.5 * (start + end), 0.5 * (end - start)
     return middle + half * x, half * w

@@ -1,19 +1,19 @@
 """The process: its cores and threads, the memory it may use, Ctrl-C and SIGTERM.
 
 Memory: under a limit (``ulimit -v``, a batch system's) compiled libraries do not raise MemoryError.
-At 400 MB scipy's BLAS tried for ever to get its buffers, at 520 MB the process ended in a
-segmentation fault. So the limit is compared with what libraries and threads take, as measured.
+At 400 MB scipy's BLAS tried forever to get its buffers, at 520 MB the process ended in a
+segmentation fault. So the limit is compared with the measured needs of libraries and threads.
 
-Signals: the first asks for an orderly end, the second ends the program at once. The first raises
-KeyboardInterrupt in the main thread, or is noted where what is done can be saved
-(`asked_to_stop`). Python code hears a signal only between two of its own instructions, and the main
-thread may be inside compiled code for minutes. So the second signal is heard by a thread that waits
-at the pipe into which Python's C handler writes; it removes temporary files and locks and ends the
-process with 130. Where even that thread cannot run, because compiled code keeps Python's global
-lock, the kernel ends the process: with glibc a signal's handler is good for one signal until the
-thread renews it (System V semantics).
+Signals: the first requests an orderly end, the second ends the program at once. The first raises
+KeyboardInterrupt in the main thread, or is recorded if the work so far can be saved
+(`asked_to_stop`). Python code receives a signal only between two of its instructions, and the main
+thread may be inside compiled code for minutes. So a thread that waits at the pipe of Python's C
+handler handles the second signal; it removes temporary files and locks and ends the process with
+130. If even that thread cannot run, because compiled code holds Python's global lock, the kernel
+ends the process: with glibc a signal's handler works for one signal until the thread renews it
+(System V semantics).
 
-Nothing heavy is imported here: a program takes the signals in hand before anything else.
+Nothing heavy is imported here, because a program installs its signal handlers first.
 """
 
 import contextlib
@@ -39,14 +39,14 @@ if sys.platform != "win32":
 
 
 def available_cores() -> int:
-    """Cores this process may use (containers and ``taskset`` grant fewer than there are)."""
+    """Return the cores this process may use, which containers and ``taskset`` may limit."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def thread_count(threads: int | None) -> int:
-    """Return the number of threads to use: all cores there are where none is named."""
+    """Return the number of threads to use: by default all cores."""
     if threads is None:
         return available_cores()
     try:
@@ -84,7 +84,7 @@ _NO_MORE = ("allocate memory", "can't start new thread", "failed to map segment"
 
 
 def check_memory(what: str, threads: int | None) -> None:
-    """Refuse work that needs more memory than the process may use; ``what`` is a key of the table.
+    """Raise an error for work that needs more memory than allowed; ``what`` is a key of the table.
 
     Raises
     ------
@@ -110,12 +110,12 @@ def check_memory(what: str, threads: int | None) -> None:
 
 
 def check_threads_of_numba() -> None:
-    """Refuse a number of threads that numba cannot be imported with.
+    """Raise an error for a number of threads with which numba cannot be imported.
 
     Raises
     ------
     SssfitError
-        NUMBA_NUM_THREADS is no whole number above 0.
+        NUMBA_NUM_THREADS is not a whole number above 0.
     """
     given = os.environ.get("NUMBA_NUM_THREADS")
     if given is not None and not (given.strip().isdecimal() and int(given)):
@@ -125,7 +125,7 @@ def check_threads_of_numba() -> None:
 
 
 def is_out_of_memory(error: BaseException | None) -> bool:
-    """Tell whether an error comes from a lack of memory, under any library's name for it."""
+    """Return whether an error means a lack of memory, under any library's name for it."""
     while error is not None:
         if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
             return True
@@ -181,13 +181,13 @@ class Interrupts:
     def _uncaught(
         self, kind: type[BaseException], error: BaseException, traceback: TracebackType | None
     ) -> None:
-        """End without a traceback where nothing was left to catch an interruption."""
+        """End without a traceback if nothing catches an interruption."""
         if issubclass(kind, KeyboardInterrupt):
             _end(b"\nInterrupted.\n")
         self._hooks[0](kind, error, traceback)
 
     def _unraisable(self, ignored: "sys.UnraisableHookArgs") -> None:
-        """End where Python would print an interruption and forget it: in a clean-up of its own."""
+        """End where Python would print an interruption and ignore it, in its own clean-up."""
         if issubclass(ignored.exc_type, KeyboardInterrupt):
             _end(b"\nInterrupted.\n")
         self._hooks[1](ignored)
@@ -224,7 +224,7 @@ def asked_to_stop() -> Iterator[Callable[[], bool]]:
 
 
 def _raise(_signal: int, frame: FrameType | None) -> None:
-    """Interrupt the main thread; the second time the listening thread is about to end us."""
+    """Interrupt the main thread; at the second signal the listening thread ends the process."""
     if _heard.is_set():
         return
     _heard.set()
@@ -234,7 +234,7 @@ def _raise(_signal: int, frame: FrameType | None) -> None:
 
 
 def _is_importing(frame: FrameType | None) -> bool:
-    """Whether a module is being imported: compiled ones print or swallow what is raised in them."""
+    """Return whether a module is being imported: compiled ones print or swallow exceptions."""
     while frame is not None:
         if frame.f_code.co_filename.startswith("<frozen importlib"):
             return True
@@ -254,7 +254,7 @@ def _listen(reader: int) -> None:
 
 
 def _end(line: bytes) -> NoReturn:
-    """End this process here and now, without temporary files, locks or a hidden cursor."""
+    """End this process at once, without temporary files, locks or a hidden cursor."""
     files = sys.modules.get("sssfit.files")
     if remove := getattr(files, "remove_unfinished", None):
         remove()

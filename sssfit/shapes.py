@@ -1,4 +1,4 @@
-"""Shapes that profiles are modelled by: Gaussians, normalised diffusion, the six-Gaussian skin.
+"""Model shapes of profiles: Gaussians, normalised diffusion, the six-Gaussian skin.
 
 Pure formulas of unit energy: no materials, no profiles, no units beyond "the same length
 everywhere". A density in the plane is ``*_density``, its energy within a disk ``*_cdf``, its
@@ -45,7 +45,7 @@ def gaussian_cdf(r: npt.ArrayLike, variance: npt.ArrayLike) -> FloatArray:
 def gaussian_between(
     inner: npt.ArrayLike, outer: npt.ArrayLike, variance: npt.ArrayLike
 ) -> FloatArray:
-    """Energy of `gaussian_density` between two radii, every digit of it, however small.
+    """Energy of `gaussian_density` between two radii, with all digits even if it is small.
 
     exp(-a^2 / 2v) (1 - exp(-(b^2 - a^2) / 2v)); a difference of two CDFs has no more digits than 1.
     """
@@ -72,7 +72,7 @@ def gaussian_line_integral(
 
     A difference of two tails, on the side of 0 where these are small and keep their digits.
     """
-    from scipy.special import ndtr  # 0.2 s that the photon walk need not wait for
+    from scipy.special import ndtr  # 0.2 s that the photon walk does not need
 
     sigma = np.sqrt(np.asarray(variance, dtype=np.float64))
     a, b = np.asarray(left) / sigma, np.asarray(right) / sigma
@@ -105,11 +105,11 @@ def diffusion_cdf(r: npt.ArrayLike, s: npt.ArrayLike) -> FloatArray:
 
 
 def diffusion_radius(share: npt.ArrayLike, s: npt.ArrayLike) -> FloatArray:
-    """Radius within which a share (0 to 1) of the energy lies: the inverse of `diffusion_cdf`.
+    """Radius that contains a share (0 to 1) of the energy: the inverse of `diffusion_cdf`.
 
     With y = exp(-s r / 3) the CDF reads y^3 + 3 y = 4 (1 - share), and y = 2 sinh t makes the left
-    side 2 sinh 3t. Small shares, which 1 - share would round, start from the series
-    s r = 2 u + 4 u^2 / 3 and take two steps of Newton. NaN for a share outside 0 to 1.
+    side 2 sinh 3t. Small shares, which 1 - share would round, start from the series s r = 2 u + 4
+    u^2 / 3 and take two Newton steps. NaN for a share outside 0 to 1.
     """
     u = np.asarray(share, dtype=np.float64)
     u = np.where((u >= 0.0) & (u <= 1.0), u, np.nan)
@@ -127,7 +127,7 @@ def diffusion_marginal(x: npt.ArrayLike, s: npt.ArrayLike) -> FloatArray:
 
     Infinite at x = 0: pixels take `diffusion_line_integral`. Its second moment is 7 / s^2.
     """
-    from scipy.special import k0  # 0.2 s that the photon walk need not wait for
+    from scipy.special import k0  # 0.2 s that the photon walk does not need
 
     s = np.asarray(s, dtype=np.float64)
     t = s * np.abs(x)

@@ -67,7 +67,7 @@ def saved(pixels: Any, **own: Any) -> tuple[Any, bytes]:
 @functools.cache
 def comparison() -> Any:
     scenes = [scene("disk", pitch=0.5), scene("edge", pitch=0.5, angle_degrees=30.0)]
-    return compare.compare_kernels(world.wax(), scenes, mm_per_pixel=0.5, support_mm=3.0)
+    return compare.compare_kernels(world.wax(), scenes, support_mm=3.0)
 
 
 def fields(record: Any) -> dict[str, Any]:
@@ -241,6 +241,10 @@ FORMATS = [
             *("rgba16.png", "grey.png", "turned.tif", "rgba8.tif", "photo.tga", "photo.jpg"),
             *(f"o{k}.tif" for k in range(1, 9)),
             *("inside.exr", "across.exr", "half.exr", "y.exr", "place.exr", "wide.tif"),
+            *(
+                f"t{name}.tga"
+                for name in ("1_8", "2_15", "2_16", "2_24", "2_32", "2_48", "3_8", "4_8")
+            ),
             *("associated.tif", "palette.png", "p3.png", "srgb_and_p3.png"),
             *("old.hdr", "xyz.hdr", "negative.exr", "foreign.png", "out", "missing.png"),
         )
@@ -287,10 +291,10 @@ COMPARE = [
     "table.table_text(comparison(), '.csv', 'l2', 'passes')",
     "[table.verdict_lines(comparison(), e, c) for e in ('l2', 'delta-e') for c in ('passes', 'seconds')]",
     "compare.pareto_front([1, 2, 2, 3, 4], [5, 4, 4, 4, 1])",
-    "compare.compare_kernels(world.leaf(), [scene('edge')], mm_per_pixel=0.25, support_mm=1.0).to_dict()['rows'][:2]",
-    "compare.compare_kernels(world.wax(), [], mm_per_pixel=0.5)",
-    "compare.compare_kernels(world.wax(), [scene('edge'), scene('edge')], mm_per_pixel=0.25)",
-    "compare.compare_kernels(world.wax(), [scene('edge')], mm_per_pixel=0.5)",
+    "compare.compare_kernels(world.leaf(), [scene('edge')], support_mm=1.0).to_dict()['rows'][:2]",
+    "compare.compare_kernels(world.wax(), [])",
+    "compare.compare_kernels(world.wax(), [scene('edge'), scene('edge')])",
+    "compare.compare_kernels(world.wax(), [scene('edge'), scene('disk', pitch=0.5)])",
     "compare.compute_guide(world.plate(), ks=[0.5], channel='G', mm_per_pixel=0.4, support_mm=2.0)",
     "fields(compare.compute_guide(world.plate(), ks=[0.5, 3.0], mm_per_pixel=0.4, support_mm=2.0))",
     "compare.compute_guide(world.plate(), ks=[])",
@@ -312,6 +316,12 @@ COMPARE = [
     " photons=2000, settings={'rank': 2}, model='dipole', storage='float32')",
     "budget.error_budget(world.parse_material(world.WAX, 'w'), scene('disk'), storage='16-bit')",
     "budget.error_budget(world.parse_material(world.LEAF, 'w'), scene('disk'))",
+    "budget.error_budgets(world.parse_material(world.WAX, 'w'), [])",
+    "budget.error_budgets(world.parse_material(world.WAX, 'w'), [scene('disk'), scene('edge', pitch=0.5)])",
+    "budget.error_budget(world.parse_material(world.WAX, 'w'), scene('disk'), model='multipole')",
+    "budget.error_budget(world.parse_material(world.WAX, 'w'), Scene('flat', np.ones((4, 5, 1)), 0.5))",
+    "compare.compare_kernels(world.wax(), [scene('disk')], candidates=[])",
+    "compare.compare_kernels(world.wax(), [scene('disk', pitch=2.5), scene('edge', pitch=2.5)]).to_dict()['rows'][:2]",
     "sheet.compute_sheet(world.mono(), mm_per_pixel=0.8, pixels=12, scenes=('edge',), most_terms=1)",
     "sheet.production_look(fit_artist(world.plate(), mm_per_pixel=0.4).kernel)",
 ]
@@ -351,13 +361,13 @@ MEASURE = [
     "[structure.flip(near(TRUTH), TRUTH, 0.7), structure.flip(near(TRUTH), TRUTH, mask=MASK, pixels_per_degree=20.0)]",
     "structure.flip(near(TRUTH), TRUTH, pixels_per_degree=0.0)",
     "structure.ssim(TRUTH[:4], TRUTH[:4])",
-    "difference.difference_map(near(TRUTH), TRUTH, kind='signed', gain=3.0)",
-    "difference.difference_map(near(TRUTH), TRUTH, kind='absolute')",
-    "difference.difference_map(near(TRUTH)[..., :2], TRUTH[..., :2])",
-    "difference.difference_map(near(TRUTH)[..., :1], TRUTH[..., :1], kind='absolute', gain=2.0)",
-    "difference.difference_map(TRUTH, TRUTH)",
-    "difference.difference_map(TRUTH, TRUTH, kind='relative')",
-    "difference.difference_map(TRUTH, TRUTH[1:])",
+    "fields(difference.difference_map(near(TRUTH), TRUTH, kind='signed', gain=3.0))",
+    "fields(difference.difference_map(near(TRUTH), TRUTH, kind='absolute'))",
+    "fields(difference.difference_map(near(TRUTH)[..., :2], TRUTH[..., :2]))",
+    "fields(difference.difference_map(near(TRUTH)[..., :1], TRUTH[..., :1], kind='absolute', gain=2.0))",
+    "fields(difference.difference_map(TRUTH, TRUTH))",
+    "fields(difference.difference_map(TRUTH, TRUTH, kind='relative'))",
+    "fields(difference.difference_map(TRUTH, TRUTH[1:]))",
     "difference.magnified_difference(near(TRUTH), TRUTH, gain=2.5)",
     "difference.magnified_difference(near(TRUTH), TRUTH, gain=-1.0)",
     "[asymmetry.radial_asymmetry(kernel('wax.svd2').full(1), from_pixels=k) for k in (1, 2, 4)]",

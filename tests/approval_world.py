@@ -445,6 +445,9 @@ def _unusual(folder: Path) -> None:
     _write(folder / "place.exr", light(3, 4, 3), ["X", "Y", "Z"])
     _write(folder / "wide.tif", (1e6 * light(3, 4, 3)).astype(np.uint32))
     _write(folder / "associated.tif", _codes(np.uint16, 3, 4, 4))
+    for kind, depth in ((1, 8), (2, 15), (2, 16), (2, 24), (2, 32), (2, 48), (3, 8), (4, 8)):
+        head = struct.pack("<3B2HB4H2B", 0, 0, kind, 0, 0, 0, 0, 0, 2, 1, depth, 0x20)
+        (folder / f"t{kind}_{depth}.tga").write_bytes(head + bytes(range(10, 10 + depth // 4)))
     palette = Image.fromarray(_codes(np.uint8, 3, 4, 1)[..., 0] % 4, "P")
     palette.putpalette([200, 30, 40, 50, 160, 70, 80, 90, 250, 110, 120, 130])
     palette.save(folder / "palette.png")

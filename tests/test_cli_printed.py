@@ -271,7 +271,7 @@ def test_of_several_computed_materials_the_worst_error_is_printed():
 
 def reported(rows):
     """The JSON object and the text of a run of several materials."""
-    from sssfit.cli._output import in_options
+    from sssfit.cli._options import in_options
     from sssfit.simulate.summary import summary
 
     rows = [dict(row) for row in rows]

@@ -177,7 +177,7 @@ import sys
 
 class Go:
     def find_spec(self, name, *_):
-        if name == "sssfit.cli._run":
+        if name == "sssfit.cli._main":
             print("go", flush=True)
 
 sys.meta_path.insert(0, Go())

@@ -3,7 +3,7 @@
 import cli_world as world
 import pytest
 
-from sssfit.errors import FileError
+from sssfit.errors import SssfitError
 from sssfit.profile import Profile
 from sssfit.simulate import run_figures, simulate_montecarlo_many, simulate_to_files
 from sssfit.simulate._batches import BATCH_PHOTONS
@@ -58,7 +58,7 @@ def test_a_stopped_walk_goes_on_to_the_same_bits(tmp_path):
 def test_outputs_are_refused_before_the_work(tmp_path):
     (tmp_path / "mine").write_text("mine\n")
     for paths in ([tmp_path / "mine"], [tmp_path / "a.npz", tmp_path / "a.npz"]):
-        with pytest.raises(FileError):
+        with pytest.raises(SssfitError):
             simulate_to_files([world.wax()] * len(paths), paths, settings={"photons": 10**12})
     assert [each.name for each in tmp_path.iterdir()] == ["mine"]
 

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from sssfit.fit._result import ChannelFit, FitResult, fit_channels, restores
+from sssfit.fit._result import ChannelFit, FitResult, fit_channels, rescales_energy
 from sssfit.fit._target import Pitch, make_target
 from sssfit.profile import Profile
 
@@ -31,6 +31,7 @@ def fit_preintegrated(
     Parameters
     ----------
     profile : Profile
+        The profile to fit.
     energy : str
         "rescale" (default) scales every channel to its diffuse reflectance; "keep" keeps the energy
         of its strips within the support.
@@ -49,7 +50,7 @@ def fit_preintegrated(
     FitError, ProfileError
         The profile, the pitch, the support or the energy is invalid.
     """
-    rescale = restores(energy)
+    rescale = rescales_energy(energy)
     target = make_target(profile, mm_per_pixel, support_mm)
     lines = target.half_line()
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
-from sssfit.errors import RenderError
+from sssfit.errors import ArgumentError, RenderError
 from sssfit.messages import printable, shown
 
 # The rounded numbers of the standard. Its two pieces differ by 2e-8 where they meet, far below the
@@ -52,6 +52,23 @@ def srgb_decode(code: npt.ArrayLike) -> FloatArray:
     value = np.asarray(code, dtype=np.float64)
     above = ((np.maximum(value, _JOINT_CODE) + _OFFSET) / (1.0 + _OFFSET)) ** _POWER
     return np.where(value <= _JOINT_CODE, value / _SLOPE, above)
+
+
+def reflectance_of_codes(codes: str | Sequence[float]) -> str | list[float]:
+    """Return the linear reflectances (C,) of 8-bit sRGB codes; of three the colour in hex.
+
+    A text is taken for hex, and returned. Raises ArgumentError for what is no code of 8 bits.
+    """
+    if isinstance(codes, str):
+        return codes
+    for each in codes:
+        if not (float(each).is_integer() and 0.0 <= each <= 255.0):
+            raise ArgumentError(
+                f"`srgb` takes codes of 8 bits, whole numbers from 0 to 255, and not {each:g}."
+            )
+    if len(codes) == 3:
+        return "#" + "".join(f"{round(each):02x}" for each in codes)
+    return [float(srgb_decode(each / 255.0)) for each in codes]
 
 
 def linear_from_hex(code: str) -> FloatArray:

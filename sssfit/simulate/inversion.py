@@ -12,24 +12,28 @@ Not imported with the other methods: scipy.optimize takes 0.2 s to load.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize.elementwise import find_root
 
 from sssfit import __version__
-from sssfit.arrays import FloatArray, check_names
+from sssfit.arrays import FloatArray, check_names, plain
 from sssfit.errors import MaterialError, RenderError, SimulationError
 from sssfit.formats.colours import linear_from_hex
 from sssfit.material import Layer, Material
 from sssfit.material.checks import check_texts, number
+from sssfit.messages import Columns, report
 from sssfit.optics import normal_transmittance
 from sssfit.simulate.exact import LIGHTS, Light, diffuse_reflectance, entering_light
 
 SKIN_ETA = 1.4  # d'Eon and Luebke 2007, GPU Gems 3, chapter 14: .028 at normal incidence
 _CLOSE = 1e-8  # in reflectance; the precision of the exact solver
+_DARK = 1e-9  # a reflectance that no relative error is given for: the fits were not made for it
+_PUBLISHED = {"chiang2016": "Chiang et al. 2016", "van_de_hulst": "van de Hulst"}
 _ASKED = {"normal": "diffuse reflectance", "diffuse": "base colour under diffuse light"}
 
 
@@ -213,15 +217,9 @@ def material_from_reflectance(
     """
     check_texts(name, "")  # raises all errors before seconds of work
     check_names(channels)
-    meant = ""
-    if isinstance(reflectance, str):
-        try:
-            meant, reflectance = f"sRGB {reflectance.strip()}, ", linear_from_hex(reflectance)
-        except RenderError as error:
-            raise MaterialError(str(error)) from None
-        light = light or "diffuse"
-    light = light or "normal"
-    asked = _reachable(reflectance, eta, light)
+    meant = f"sRGB {reflectance.strip()}, " if isinstance(reflectance, str) else ""
+    light = light or ("diffuse" if meant else "normal")
+    asked = _reachable(_linear(reflectance), eta, light)
     paths_mm = np.atleast_1d(np.asarray(mean_free_path_mm, dtype=np.float64))
     if paths_mm.size not in (1, asked.size) or paths_mm.ndim > 1:
         raise MaterialError(
@@ -240,6 +238,83 @@ def material_from_reflectance(
         (Layer(eta, np.zeros_like(albedo), (1.0 - albedo) / paths_mm, albedo / paths_mm),),
         source=f"{meant}{_ASKED[light]} {words} by exact albedo inversion, sssfit {__version__}",
     )
+
+
+def inversion_figures(
+    material: Material, reflectance: npt.ArrayLike | str, light: Light
+) -> dict[str, Any]:
+    """Return the figures of a material by `material_from_reflectance`, made with these arguments.
+
+    Those of the published approximations stand beside it; lists and numbers, as JSON holds them.
+    """
+    layer, asked = material.layers[0], np.atleast_1d(_linear(reflectance))
+    published = published_inversions(asked, layer.eta, light=light)
+    return plain(
+        {
+            "name": material.name,
+            "channels": material.channels,
+            "light": light,
+            "eta": layer.eta,
+            "mean_free_path_mm": layer.mean_free_path_mm,
+            "reflectance_asked": asked,
+            "reflectance": reflectance_of(layer.albedo, layer.eta, light),
+            "reflectance_normal": reflectance_of(layer.albedo, layer.eta, "normal"),
+            "largest_reflectance": largest_reflectance(layer.eta, light),
+            "albedo": layer.albedo,
+            "sigma_a_per_mm": layer.sigma_a_per_mm,
+            "sigma_s_per_mm": layer.sigma_s_per_mm,
+            "approximations": {
+                key: {"albedo": each.albedo, "reflectance": each.reflectance}
+                for key, each in published.items()
+            },
+        }
+    )
+
+
+def summary(figures: Mapping[str, Any]) -> str:
+    """Write `inversion_figures` for people."""
+    is_diffuse = figures["light"] == "diffuse"
+    what = "base colour" if is_diffuse else "diffuse reflectance"
+    found = (
+        (what, "reflectance", ".6f"),
+        *((("normal reflectance", "reflectance_normal", ".6f"),) if is_diffuse else ()),
+        ("albedo", "albedo", ".6f"),
+        ("sigma_a, 1/mm", "sigma_a_per_mm", ".6g"),
+        ("sigma_s, 1/mm", "sigma_s_per_mm", ".6g"),
+    )
+    published = tuple((f"{title}, gives", key, "") for key, title in _PUBLISHED.items())
+    asked = figures["reflectance_asked"]
+    told = {
+        **figures,
+        "most": math.floor(1e6 * figures["largest_reflectance"]) / 1e6,
+        **{
+            key: list(map(_given, made["albedo"], made["reflectance"], asked))
+            for key, made in figures["approximations"].items()
+        },
+    }
+    parts = (
+        "{name}: eta {eta:g}, could reflect up to {most:g} under {light} light",
+        Columns("channel", "channels", found),
+        f"approximate albedos, the {what} they really have, and its error:",
+        Columns("channel", "channels", published),
+    )
+    return report(parts, told)
+
+
+def _given(albedo: float, gives: float, asked: float) -> str:
+    """Albedo, reflectance and its relative error."""
+    error = "" if asked < _DARK else f" ({100.0 * (gives / asked - 1.0):+#.3g} %)"
+    return f"{albedo:.6f}, {gives:.6f}{error}"
+
+
+def _linear(reflectance: npt.ArrayLike | str) -> npt.ArrayLike:
+    """Decode a colour in hex; anything else is linear."""
+    if not isinstance(reflectance, str):
+        return reflectance
+    try:
+        return linear_from_hex(reflectance)
+    except RenderError as error:
+        raise MaterialError(str(error)) from None
 
 
 def _reachable(reflectance: npt.ArrayLike, eta: float, light: str) -> FloatArray:
