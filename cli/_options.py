@@ -9,6 +9,7 @@ from typing import Any
 
 import click
 
+from sssfit import text
 from sssfit.errors import ArgumentError
 from sssfit.process import check_memory, check_threads_of_numba
 
@@ -20,8 +21,6 @@ _COMMANDS = {
     "`material_names()`": "`sssfit materials`",
     '`load_material("skin1").to_toml()`': "`sssfit materials skin1 --toml`",
 }
-
-_MM_PER_UNIT = {"": 1.0, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 
 
 @dataclass(frozen=True)
@@ -173,115 +172,20 @@ class NumberRange(click.FloatRange):
         return number
 
 
-class Length(click.ParamType[float]):
-    """A length: a plain number is mm; 250um, 3cm and 0.6m are understood. Gives mm."""
+class Value(click.ParamType[Any]):
+    """What a function of the library reads from a text; its ArgumentError is a usage error."""
 
-    name = "length"
+    def __init__(self, name: str, read: Callable[..., Any], *how: Any) -> None:
+        self.name, self.read, self.how = name, read, how
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """Parse ``value``; a usage error (exit 2) names what was expected."""
-        if isinstance(value, float):
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Read ``value``; a default that is no text stays as it is."""
+        if not isinstance(value, str):
             return value
-        match = re.fullmatch(r"\s*([-+.\deE]+?)\s*(um|mm|cm|m|)\s*", str(value))
         try:
-            number = float(match[1]) * _MM_PER_UNIT[match[2]] if match else math.nan
-        except ValueError:
-            number = math.nan
-        if not (math.isfinite(number) and number > 0):
-            self.fail(f"{value!r} is not {self.expected()}.", param, ctx)
-        return number
-
-    def expected(self) -> str:
-        """Return what a value may be."""
-        return "a length above 0, such as 0.05, 3cm or 0.6m"
-
-
-class LengthOr(Length):
-    """A length, or one word that comes through as it is."""
-
-    def __init__(self, word: str) -> None:
-        self.word = word
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Parse ``value``; a usage error (exit 2) names what was expected."""
-        return value if value == self.word else super().convert(value, param, ctx)
-
-    def expected(self) -> str:
-        return f"{super().expected()}, or {self.word}"
-
-
-class Count(click.ParamType[int]):
-    """A whole number that may be written 1e7."""
-
-    name = "count"
-
-    def __init__(self, least: int, most: int) -> None:
-        self.least, self.most = least, most
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """Parse ``value``; a usage error (exit 2) names what was expected."""
-        try:
-            number = float(str(value).replace("_", ""))
-        except ValueError:
-            number = math.nan
-        if not (number.is_integer() and self.least <= number <= self.most):
-            self.fail(
-                f"{value!r} is not a whole number from {self.least} to {self.most:.0e} "
-                "(10000000 and 1e7 are both understood).",
-                param,
-                ctx,
-            )
-        return int(number)
-
-
-class Reflectance(click.ParamType[float]):
-    """A number that may be written in percent; which can be reached the library knows."""
-
-    name = "reflectance"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """Parse ``value``; a usage error (exit 2) names what was expected."""
-        number = _number_or_percent(str(value))
-        if number is None:
-            self.fail(f"{value!r} is not a reflectance, such as 0.44 or 44%.", param, ctx)
-        return number
-
-
-class BaseColour(click.ParamType[Any]):
-    """Reflectances with commas between them, or an sRGB colour in hex, which stays a text."""
-
-    name = "list of reflectances"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Parse ``value``; a usage error (exit 2) names what was expected."""
-        text = str(value).strip()
-        if not text.startswith("#"):
-            return ListOf(Reflectance()).convert(text, param, ctx)
-        if not re.fullmatch("#(?:[0-9a-fA-F]{3}|[0-9a-fA-F]{6})", text):
-            self.fail(f"{text!r} is not an sRGB colour in hex, such as '#c58c6b'.", param, ctx)
-        return text
-
-
-class Lengths(click.ParamType[list[float]]):
-    """Lengths with commas between them; the unit of the last serves those that have none."""
-
-    name = "list of lengths"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> list[float]:
-        """Parse each; a usage error (exit 2) names the one that is wrong."""
-        texts = [each.strip() for each in str(value).split(",")]
-        units = [re.sub(r"[-+.\deE\s]", "", each) for each in texts]
-        if units[-1] and not any(units[:-1]):
-            texts[:-1] = [f"{each}{units[-1]}" for each in texts[:-1]]
-        elif not all(units) and any(units):
-            self.fail(f"{value!r} has a unit for some lengths only; give it to all.", param, ctx)
-        return [Length().convert(each, param, ctx) for each in texts]
+            return self.read(value, *self.how)
+        except ArgumentError as error:
+            self.fail(str(error), param, ctx)
 
 
 class ListOf(click.ParamType[list[float]]):
@@ -297,27 +201,9 @@ class ListOf(click.ParamType[list[float]]):
         return [self.item.convert(each, param, ctx) for each in str(value).split(",")]
 
 
-class Share(click.ParamType[float]):
-    """A share between 0 and 1, which may be written in percent: 0.5% or 0.005."""
-
-    name = "share"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """Parse ``value``; a usage error (exit 2) names what was expected."""
-        number = _number_or_percent(str(value))
-        if number is None or not 0.0 < number < 1.0:
-            self.fail(
-                f"{value!r} is not a share between 0 and 100 %, such as 0.5% or 0.005.", param, ctx
-            )
-        return number
-
-
-def _number_or_percent(text: str) -> float | None:
-    """Read 0.44 or 44%; None for what is no number."""
-    text = text.strip()
-    try:
-        return float(text[:-1]) / 100.0 if text.endswith("%") else float(text)
-    except ValueError:
-        return None
+Length = functools.partial(Value, "length", text.length_mm)
+LengthOr = Length  # and one word, which comes through as it is
+Lengths = functools.partial(Value, "list of lengths", text.lengths_mm)
+Count = functools.partial(Value, "count", text.whole_number)
+Share = functools.partial(Value, "share", text.share)
+BaseColour = functools.partial(Value, "list of reflectances", text.base_colour)
