@@ -6,13 +6,17 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, TypeVar
 
+from sssfit.methods import DEON_SKIN
+
 from ._options import Common
-from ._output import say
+from ._output import say, say_notes
 
 if TYPE_CHECKING:
     from sssfit.kernel import SeparableKernel
     from sssfit.kinds import Loaded
+    from sssfit.material import Material
     from sssfit.profile import Profile
+
 
 _Record = TypeVar("_Record", "Profile", "SeparableKernel")
 
@@ -41,6 +45,27 @@ def kernel_name(given: str | None, common: Common) -> str:
     return given or newest(common, "*.kernel.json", "sssfit fit --method svd --rank 3")
 
 
+def profile_of_kernel(
+    kernel: SeparableKernel, name: str, given: str | None, common: Common
+) -> tuple[Profile | None, str | None]:
+    """Return a kernel's profile and its file: the one given, else the one it was fitted to.
+
+    It is looked for beside the kernel and in the current folder.
+    """
+    from sssfit.kernel.origin import find_profile
+    from sssfit.profile import Profile
+
+    if given is None:
+        folders = {Path(), Path() if name == "-" else Path(name).parent}
+        profile, file, note = find_profile(kernel, name, folders)
+        say_notes(common, [] if note is None else [note])
+        return profile, file
+    asked = Profile.load(given)
+    if kernel.meta.get("profile_sha256") not in (None, asked.sha256):
+        say(common, f"{given} is not the profile that {name} was fitted to.")
+    return asked, given
+
+
 def is_mci(name: str | None) -> bool:
     """Whether a name given for a material means an MCML input file."""
     return name is not None and name.lower().endswith(".mci")
@@ -49,6 +74,18 @@ def is_mci(name: str | None) -> bool:
 def load(kind: type[_Record], name: str) -> _Record:
     """Read a profile or a kernel; ``-`` is stdin."""
     return kind.read(binary_stdin(), "stdin") if name == "-" else kind.load(name)
+
+
+def load_source(name: str) -> Material | Profile:
+    """Read a profile, ``-`` for stdin, or load a material."""
+    from sssfit.material import load_material
+    from sssfit.profile import Profile
+
+    if name == DEON_SKIN:
+        from sssfit.simulate import simulate_deon_skin
+
+        return simulate_deon_skin()
+    return load(Profile, name) if name == "-" or name.endswith(".npz") else load_material(name)
 
 
 def load_any(name: str) -> Loaded:

@@ -10,11 +10,12 @@ from click.core import ParameterSource
 
 from sssfit.methods import SIMULATIONS, Method, Setting, settings_of
 
-from ._options import Count, ListOf, Number, NumberRange, Share, WholeRange
+from ._options import Count, Length, ListOf, Number, NumberRange, Share, WholeRange
 
 _KINDS: dict[str, Callable[[Setting], Any]] = {
     "number": lambda _: Number(),
     "numbers": lambda _: ListOf(Number()),
+    "length": lambda _: Length(),
     "share": lambda _: Share(),
     "seconds": lambda _: NumberRange(min=0),
     "count": lambda each: Count(*each.among),
@@ -52,19 +53,27 @@ def _option(each: Setting, owners: tuple[str, ...]) -> Callable[..., Any]:
 
 
 def own_settings(
-    context: click.Context, methods: Mapping[str, Method], method: str, given: dict[str, Any]
+    context: click.Context,
+    methods: Mapping[str, Method],
+    method: str,
+    given: Mapping[str, Any],
+    by: str = "--method",
 ) -> dict[str, Any]:
-    """Keep the method's own settings that were given, by keyword; refuse those of others."""
+    """Keep the method's own settings that were given, by keyword; refuse those of others.
+
+    ``by`` is the option that names the method.
+    """
     known = settings_of(methods)
     for option in given:
         is_given = context.get_parameter_source(option) is ParameterSource.COMMANDLINE
         owners = known[option][1]
         if is_given and method not in owners:
             raise click.UsageError(
-                f"--{option.replace('_', '-')} is for --method {' or '.join(owners)}, and this is "
+                f"--{option.replace('_', '-')} is for {by} {' or '.join(owners)}, and this is "
                 f"{method}; leave it out."
             )
-    own = {each.name: each.keyword or each.name for each in methods[method].settings}
+    settings = methods[method].settings if method in methods else ()
+    own = {each.name: each.keyword or each.name for each in settings}
     return {
         own[key]: value
         for key, value in given.items()

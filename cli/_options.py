@@ -3,7 +3,7 @@
 import functools
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ _COMMANDS = {
     "`simulate`": "`sssfit simulate`",
     '`simulate("deon-skin")`': "sssfit simulate deon-skin",
     "`material_names()`": "`sssfit materials`",
+    "`simulate_montecarlo(material)`": "`sssfit simulate`",
     '`load_material("skin1").to_toml()`': "`sssfit materials skin1 --toml`",
 }
 
@@ -106,7 +107,9 @@ def in_options(message: str) -> str:
     return _ARGUMENT.sub(option, message)
 
 
-def option(names: str, kind: Any, metavar: str | None, text: str, default: Any = None) -> Any:
+def option(
+    names: str, kind: Any, metavar: str | None, text: str, default: Any = None, **more: Any
+) -> Any:
     """Return an option, for tables of a row an option.
 
     ``names`` are "--radius", or "--radius radius_mm" with the name of the parameter; ``kind`` is a
@@ -116,9 +119,9 @@ def option(names: str, kind: Any, metavar: str | None, text: str, default: Any =
         *names.split(),
         type=click.Choice(kind) if isinstance(kind, list | tuple) else kind,
         metavar=metavar,
-        default=default,
-        show_default=default is not None,
         help=text,
+        **({} if default is None else {"default": default, "show_default": True}),
+        **more,
     )
 
 
@@ -136,6 +139,14 @@ def options(*rows: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
         return command
 
     return add
+
+
+def refuse(given: Mapping[str, Any], whose: Mapping[str, str]) -> None:
+    """Refuse options that would do nothing; ``whose`` says of each parameter what it is for."""
+    named = {each.name: each.opts[-1] for each in click.get_current_context().command.params}
+    for key, owner in whose.items():
+        if given[key] not in (None, False, ()):
+            raise click.UsageError(f"{named[key]} is for {owner}; leave it out.")
 
 
 class WholeRange(click.IntRange):

@@ -36,6 +36,12 @@ def say(common: Common, line: str) -> None:
         click.echo(printable(in_options(line)), err=True)
 
 
+def say_notes(common: Common, notes: Iterable[str]) -> None:
+    """Put the library's notes on stderr, unless -q."""
+    for note in notes:
+        say(common, note)
+
+
 def finish(
     common: Common, figures: Mapping[str, Any], text: str, *, to_stderr: bool = False
 ) -> None:

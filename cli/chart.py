@@ -2,86 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import partial
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from sssfit.messages import report
 from sssfit.process import check_memory
 
-from ._charts import (
-    draw_guide,
-    draw_kernel,
-    draw_models,
-    draw_spectrum,
-    draw_whole,
-    first_of,
-    read_models,
-)
-from ._input import load_any, profile_name
-from ._options import Common, Count, LengthOr, ListOf, Number, common_options
-from ._output import finish_one, held_charts, stem_of, target, write_chart
-from ._truth import true_profile
+from ._input import load_any, load_source, profile_name, profile_of_kernel
+from ._options import Common, common_options, options, refuse
+from ._output import finish_one, held_charts, say, stem_of, target, write_chart
+from ._progress import say_if_compiling, walk_progress
+from ._reports import CHARTS
+from ._verb_options import CHART, of_other_charts
 
 if TYPE_CHECKING:
-    from sssfit.kernel import SeparableKernel
-    from sssfit.kinds import Loaded
+    from sssfit.profile import Profile
 
-    from ._charts import Drawn
+_VIEWS = ("models", "spectrum", "guide")
+_FILES = ("profile", "kernel", "material", "checkpoint")
+_MEMORY = {"kernel": "kernel chart", **dict.fromkeys(_VIEWS, "figures")}
 
 
 @click.command()
 @click.argument("file", required=False)
-@click.option(
-    "--models", is_flag=True, help="Draw a material by every method, and the methods' errors."
-)
-@click.option("--spectrum", is_flag=True, help="Draw the energy of the kernel's singular values.")
-@click.option(
-    "--guide", is_flag=True, help="Draw the guide function beside the residual of the guided fit."
-)
-@click.option(
-    "--mm-per-pixel",
-    type=LengthOr("profile"),
-    metavar="MM|profile",
-    help="Pixels of the kernel, with --spectrum or --guide; profile is the width of the profile's "
-    "first annulus.  [default: 0.3]",
-)
-@click.option(
-    "--k",
-    "ks",
-    type=ListOf(Number()),
-    metavar="0..4,...",
-    help="One to four values, with --guide.  [default: 0,1.55,4]",
-)
-@click.option(
-    "--channel",
-    metavar="NAME",
-    help="Channel to draw, with --guide or of a kernel."
-    "  [default: the first that returns light; of a kernel up to three]",
-)
-@click.option(
-    "--profile",
-    metavar="FILE",
-    help="Profile that a kernel was fitted to.  [default: found beside it or here, by its hash]",
-)
-@click.option(
-    "--photons",
-    type=Count(2, 10**12),
-    metavar="N",
-    help="Photons of the walk, with --models.  [default: 1e7]",
-)
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE",
-    help="Where the chart goes, as PNG, SVG or PDF by its ending; - for PNG on stdout."
-    "  [default: NAME.profile.png, NAME.kernel.png, NAME.material.png, NAME.checkpoint.png,"
-    " NAME.spectrum.png, NAME.guide.png, MATERIAL.models.png]",
-)
-@click.option("--force", is_flag=True, help="Replace an input, or a file that is not our chart.")
+@options(*CHART)
 @common_options
-def chart(file: str | None, output: str | None, force: bool, common: Common, **given: Any) -> None:
+def chart(file: str | None, common: Common, **given: Any) -> None:
     """Draw FILE: a profile, a kernel, a material or the checkpoint of a walk.
 
     FILE is any of these, under any name, or - for stdin; by default the newest .profile.npz of
@@ -113,103 +61,89 @@ def chart(file: str | None, output: str | None, force: bool, common: Common, **g
       sssfit chart --guide skin1.profile.npz --mm-per-pixel 0.1
       sssfit chart --models skin1
     """
+    from sssfit.chart import figure_of
     from sssfit.chart.files import chart_format
+    from sssfit.kernel import SeparableKernel
+    from sssfit.profile import Profile
 
-    if output not in (None, "-"):
-        chart_format(str(output))  # before anything is read or drawn
-    asked = [f"--{name}" for name in ("models", "spectrum", "guide") if given[name]]
-    _check_options(asked, given)
-    if given["models"]:
-        if file is None:
-            raise click.UsageError("--models needs a material, or a profile of a photon walk.")
-        check_memory("figures", common.threads)
-        material, walk = read_models(file)
-        if walk is not None and given["photons"] is not None:
-            raise click.UsageError(
-                "--photons is for a new walk, and FILE is already one; leave it out."
-            )
-        path = target(output, f"{material.name}.models.png")
-        draw: Callable[[], Drawn] = partial(draw_models, material, walk, given["photons"], common)
-        inputs = [file]
-    else:
-        name = profile_name(file, common)
-        kind, stem, inputs, draw = _of_file(name, load_any(name), asked, given, common)
-        path = target(output, f"{stem_of(name, stem)}.{kind}.png")
-    with held_charts([path], inputs=inputs, force=force):
-        figure, figures, text = draw()
-        write_chart(figure, path)
-    finish_one(common, "chart", path, figures, text, "a PNG")
+    if given["output"] not in (None, "-"):
+        chart_format(given["output"])  # before anything is read or drawn
+    view = _view(file, given)
+    name = file if view == "models" and file else profile_name(file, common)
+    found, kind, made_of = _found(name, view, common)
+    refuse(given, of_other_charts({kind}))
+    if kind == "models" and isinstance(found, Profile):
+        refuse(given, {"photons": "a new walk, and FILE is already one"})
+    check_memory(_MEMORY.get(kind, "chart"), common.threads)
+    profile, source = None, name if kind in ("profile", "spectrum", "guide") else None
+    if isinstance(found, SeparableKernel):
+        profile, source = profile_of_kernel(found, name, given["profile"], common)
+    stem = made_of if kind == "models" else stem_of(name, made_of)
+    path = target(given["output"], f"{stem}.{kind}.png")
+    with held_charts([path], inputs=[name, source], force=given["force"]):
+        record = _computed(found, kind, profile, given, common) if kind in CHARTS else found
+        write_chart(figure_of(record), path)
+    figures: dict[str, Any] = {} if view else {"kind": kind, "file": name}
+    figures |= {"profile": source} if kind != "models" else {}
+    own = {"material": made_of, "channels": found.channels} if kind not in CHARTS else {}
+    figures |= own or record.to_dict()
+    parts, words = CHARTS.get(kind, ((), dict))
+    finish_one(common, "chart", path, figures, report(parts, figures | words(figures)), "a PNG")
 
 
-def _of_file(
-    name: str, found: Loaded, asked: list[str], given: dict[str, Any], common: Common
-) -> tuple[str, str | None, list[Any], Callable[[], Drawn]]:
-    """Return the kind of chart of a file, a name for it, what is read, and what draws it."""
+def _view(file: str | None, given: Mapping[str, Any]) -> str:
+    """Return the chart that was asked for by its name; by default it is that of the file."""
+    views = [f"--{name}" for name in _VIEWS if given[name]]
+    if len(views) > 1:
+        raise click.UsageError(f"{' and '.join(views[:2])} are two charts; ask for one at a time.")
+    view = views[0].removeprefix("--") if views else ""
+    refuse(given, of_other_charts({view} if view else set(_FILES)))
+    if view == "models" and file is None:
+        raise click.UsageError("--models needs a material, or a profile of a photon walk.")
+    return view
+
+
+def _found(name: str, view: str, common: Common) -> tuple[Any, str, str | None]:
+    """Read the file; return what is drawn of it, and the name of what it was made from."""
     from sssfit.errors import ProfileError
     from sssfit.kernel import SeparableKernel
     from sssfit.material import Material
+    from sssfit.material.checks import is_name
     from sssfit.profile import Profile
 
-    if asked:
-        if not isinstance(found, Profile):
-            raise ProfileError(
-                f"{name} is not a profile; {asked[0]} draws one, a .profile.npz file."
-            )
-        check_memory("figures", common.threads)
-        if given["spectrum"]:
-            draw = partial(draw_spectrum, name, found, given["mm_per_pixel"])
-            return "spectrum", found.material_name, [name], draw
-        settings = {key: given[key] for key in ("mm_per_pixel", "ks", "channel")}
-        return "guide", found.material_name, [name], partial(draw_guide, name, found, settings)
-    if isinstance(found, SeparableKernel):
-        check_memory("kernel chart", common.threads)
-        profile, source = true_profile(found, name, given["profile"], common)
-        draw = partial(draw_kernel, name, found, profile, source, given["channel"])
-        return "kernel", _name_of(found), [name, source], draw
-    _refuse({"--channel": given["channel"], "--profile": given["profile"]})
+    found = load_source(name) if view == "models" else load_any(name)
+    if view in ("spectrum", "guide") and not isinstance(found, Profile):
+        raise ProfileError(f"{name} is not a profile; --{view} draws one, a .profile.npz file.")
     if isinstance(found, Material):
-        return "material", found.name, [name], partial(draw_whole, name, "material", found)
-    kind = "profile" if isinstance(found, Profile) else "checkpoint"
-    shown = found if isinstance(found, Profile) else first_of(found, common)
-    return kind, shown.material_name, [name], partial(draw_whole, name, kind, shown)
+        return found, view or "material", found.name
+    if isinstance(found, Profile):
+        return found, view or "profile", found.material_name
+    if isinstance(found, SeparableKernel):
+        made_of = found.meta.get("material")
+        return found, "kernel", f"{made_of}.{found.method}" if is_name(made_of) else None
+    first, count = found.profiles[0], len(found.profiles)
+    if count > 1:
+        say(common, f"Drawing {first.label}, the first of the walk's {count} materials.")
+    return first, "checkpoint", first.material_name
 
 
-def _name_of(kernel: SeparableKernel) -> str | None:
-    """Name a kernel that came without a name; None where its material could not be a file's."""
-    from sssfit.material.checks import is_name
+def _computed(
+    found: Any, kind: str, profile: Profile | None, given: Mapping[str, Any], common: Common
+) -> Any:
+    """Compute the record that is drawn from that of the file."""
+    from sssfit import compare
+    from sssfit.profile import Profile
 
-    material = kernel.meta.get("material")
-    return f"{material}.{kernel.method}" if is_name(material) else None
-
-
-_WHOSE = {  # options of single charts, and what of it they are for
-    "photons": ("the walk of", ("--models",)),
-    "mm_per_pixel": ("the kernel of", ("--spectrum", "--guide")),
-    "ks": ("the fits of", ("--guide",)),
-}
-
-
-def _check_options(charts: list[str], given: dict[str, Any]) -> None:
-    """Refuse two charts at once, and options of a chart that is not asked for.
-
-    Whether a kernel's options have a kernel is known when the file has been read.
-    """
-    if len(charts) > 1:
-        raise click.UsageError(f"{' and '.join(charts[:2])} are two charts; ask for one at a time.")
-    for key, (what, owners) in _WHOSE.items():
-        if given[key] is not None and not set(owners) & set(charts):
-            option = "--k" if key == "ks" else f"--{key.replace('_', '-')}"
-            raise click.UsageError(f"{option} is for {what} {' or '.join(owners)}; leave it out.")
-    if charts:
-        of_kernels = ("profile",) if charts == ["--guide"] else ("channel", "profile")
-        _refuse({f"--{key}": given[key] for key in of_kernels})
-
-
-_OF_KERNELS = {"--channel": "the fits of --guide, or for a kernel", "--profile": "a kernel"}
-
-
-def _refuse(of_kernels: dict[str, str | None]) -> None:
-    """Refuse the options of a kernel where there is none."""
-    for option, value in of_kernels.items():
-        if value is not None:
-            raise click.UsageError(f"{option} is for {_OF_KERNELS[option]}; leave it out.")
+    asked = {key: given[key] for key in ("ks", "channel") if given[key] is not None}
+    if kind == "kernel":
+        channels = [given["channel"]] if asked else None
+        return compare.view_kernel(found, profile, channels=channels)
+    if kind != "models":
+        compute = compare.compute_guide if kind == "guide" else compare.compute_spectrum
+        return compute(found, mm_per_pixel=given["mm_per_pixel"], **asked)
+    walk = found if isinstance(found, Profile) else None
+    material = compare.material_of_walk(walk) if walk else found
+    settings = {"walk": walk, "photons": given["photons"], "seed": common.seed}
+    say_if_compiling(common, walk=None if walk else material, solver=True)
+    with walk_progress(material.name, quiet=common.quiet or walk is not None) as show:
+        return compare.compare_models(material, **settings, threads=common.threads, progress=show)

@@ -2,121 +2,38 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from sssfit.messages import number
-from sssfit.methods import DEON_SKIN
+from sssfit.messages import report
+from sssfit.scene.made import EDGE_DEGREES
 
-from ._choose_report import step_line, text_of
-from ._input import load
-from ._options import Common, Length, Number, NumberRange, common_options
-from ._output import KERNEL, PROFILE, finish, held, say, stem_of, target, write
+from ._input import load_source
+from ._options import Common, common_options, options
+from ._output import KERNEL, PROFILE, finish, held, say, say_notes, stem_of, target, write
+from ._picture import check_pictures
 from ._progress import say_if_compiling
-from ._scene import (
-    EDGE_DEGREES,
-    MADE,
-    Picture,
-    Size,
-    check_file_options,
-    file_options,
-    made_options,
-    made_scene,
-    read_scene,
-)
+from ._reports import CHOSEN
+from ._verb_options import CHOOSE
 
 if TYPE_CHECKING:
-    from sssfit.choose.choice import Choice, Step
+    from sssfit.choose.choice import Choice
     from sssfit.material import Material
     from sssfit.profile import Profile
     from sssfit.scene.record import Scene
 
-_PROFILE_ENDING, _ENDING = ".npz", ".chosen.kernel.json"
-_WORTH_A_NOTE = 1e-3  # of the light
 _METRES = (0.1, 9.0)  # plain numbers that may have been meant in metres; 1cm is 10 mm and was not
+_MOST_PIXELS = 512  # of a made picture, along an edge
+_FIGURES = {"p95": "95th percentile", "p99": "99th percentile", "mean": "mean"}
 
 
 @click.command()
 @click.argument("material")
-@click.option(
-    "--distance",
-    "distance_mm",
-    type=Length(),
-    default="0.6m",
-    show_default=True,
-    metavar="LENGTH",
-    help="Camera distance.",
-)
-@click.option(
-    "--fov",
-    "fov_degrees",
-    type=NumberRange(0.0, 180.0, min_open=True, max_open=True),
-    default=30.0,
-    show_default=True,
-    metavar="DEGREES",
-    help="Vertical field of view.",
-)
-@click.option(
-    "--resolution",
-    type=Size(),
-    default="1920x1080",
-    show_default=True,
-    metavar="WxH",
-    help="Columns and rows of the frame.",
-)
-@click.option(
-    "--tolerance",
-    type=Number(),
-    default=1.0,
-    show_default=True,
-    metavar="DELTA-E",
-    help="Largest CIE Delta E 2000 against the true 2D kernel.",
-)
-@click.option(
-    "--tolerance-of",
-    type=click.Choice(["p95", "p99", "mean"]),
-    default="p95",
-    show_default=True,
-    help="The figure to compare with it: a percentile over the picture, or the mean, which hides "
-    "the pixels that are far off.",
-)
-@click.option(
-    "--irradiance",
-    default="head",
-    show_default=True,
-    metavar="NAME|FILE",
-    help=f"Picture to judge by: {', '.join(MADE)}, or your own EXR, HDR, TIFF, PNG, JPG or TGA "
-    f"file. The edge is at {EDGE_DEGREES:g} degrees.",
-)
-@file_options
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE",
-    help="Kernel file, - for stdout; the profile goes beside it.  "
-    "[default: MATERIAL.chosen.kernel.json]",
-)
-@click.option(
-    "--force", is_flag=True, help="Replace an input, or files that are not our kernel or profile."
-)
+@options(*CHOOSE)
 @common_options
-def choose(
-    material: str,
-    distance_mm: float,
-    fov_degrees: float,
-    resolution: tuple[int, int],
-    tolerance: float,
-    tolerance_of: str,
-    irradiance: str,
-    layer: str | None,
-    mask: str | None,
-    output: str | None,
-    force: bool,
-    common: Common,
-) -> None:
+def choose(material: str, common: Common, **given: Any) -> None:
     """Choose the cheapest kernel whose error the scene does not show, and save it.
 
     Tries every method and rank at seven supports, cheapest first, and stops at the first whose
@@ -136,43 +53,52 @@ def choose(
       sssfit choose slab.profile.npz --tolerance-of mean --tolerance 0.3
       sssfit choose mine.toml --irradiance mine.exr -v
     """
-    from sssfit.choose.choice import choose as choose_kernel
-    from sssfit.choose.choice import mm_per_pixel_at
+    from sssfit.choose import choice as library
+    from sssfit.choose.report import sentences, step_line
     from sssfit.kernel import is_kernel_file
     from sssfit.material import Material
     from sssfit.profile import is_profile_file
 
-    _check_distance(distance_mm)
-    picture = Picture(irradiance, None, None, made_options(irradiance), layer, mask)
-    check_file_options(layer, mask, has_file=not picture.is_made)
-    source = _source(material)
-    pitch = mm_per_pixel_at(distance_mm, fov_degrees, resolution[0])
+    _check_distance(given["distance_mm"])
+    check_pictures([given["irradiance"]], given["layer"], given["mask"])
+    source = load_source(material)
+    view = {key: given[key] for key in ("distance_mm", "fov_degrees")}
+    pitch = library.mm_per_pixel_at(**view, rows=given["resolution"][0])
+    asked = {key: given[key] for key in ("distance_mm", "tolerance", "tolerance_of")}
+    is_file = material == "-" or material.endswith(".npz")
     name = source.name if isinstance(source, Material) else stem_of(material, source.material_name)
-    path = target(output, f"{name}{_ENDING}")
-    profile_path = _beside(path, material)
-    read, beside = [material, irradiance], [] if profile_path is None else [profile_path]
+    path = target(given["output"], f"{name}.chosen.kernel.json")
+    profile_path = None
+    if path is not None and not is_file:  # not simulate's name: a longer walk may lie there
+        stem = path.name.removesuffix(".json").removesuffix(".kernel")
+        profile_path = path.with_name(f"{stem}.profile.npz")
+    hold = {"inputs": [material, given["irradiance"]], "force": given["force"]}
     with (
-        held([path], is_kernel_file, inputs=read, force=force, named=KERNEL),
-        held(beside, is_profile_file, inputs=read, force=force, named=PROFILE),
+        held([path], is_kernel_file, named=KERNEL, **hold),
+        held([profile_path] if profile_path else [], is_profile_file, named=PROFILE, **hold),
     ):
-        scene = None if irradiance == "head" else _scene(picture, pitch, resolution, common)
+        scene = None if given["irradiance"] == "head" else _scene(pitch, given, common)
         _say_first(source, common)
-        choice = choose_kernel(
+        choice = library.choose(
             source,
             mm_per_pixel=pitch,
             scene=scene,
-            distance_mm=distance_mm,
-            frame=resolution,
-            tolerance=tolerance,
-            tolerance_of=tolerance_of,
+            frame=given["resolution"],
+            **asked,
             seed=common.seed,
             threads=common.threads,
-            progress=lambda step: _say_step(step, common),
+            progress=(lambda step: say(common, step_line(step))) if common.verbose else None,
         )
         written = _write(choice, path, profile_path)
-    view = {"distance_mm": distance_mm, "fov_degrees": fov_degrees, "resolution": resolution[::-1]}
+    view["resolution"] = given["resolution"][::-1]
     figures = {"command": "choose", "output": written, **view, **choice.to_dict()}
-    finish(common, figures, text_of(choice, written, figures), to_stderr=written == ["-"])
+    words = {
+        "metres": given["distance_mm"] / 1000.0,
+        "figure": _FIGURES[choice.tolerance_of],
+        "sentences": "\n".join(sentences(choice)),
+        "wrote": f"Wrote {', '.join(written)}" if written else "No kernel is written.",
+    }
+    finish(common, figures, report(CHOSEN, {**figures, **words}), to_stderr=written == ["-"])
     if not written and path is not None and path.exists():
         say(common, f"{path} is from an earlier run; this view needs no kernel.")
 
@@ -189,65 +115,29 @@ def _check_distance(distance_mm: float) -> None:
         )
 
 
-def _source(name: str) -> Material | Profile:
-    """Read a profile, or load a material."""
-    from sssfit.material import load_material
-    from sssfit.profile import Profile
-
-    if name == DEON_SKIN:
-        from sssfit.simulate import simulate_deon_skin
-
-        return simulate_deon_skin()
-    is_profile = name == "-" or name.endswith(_PROFILE_ENDING)
-    return load(Profile, name) if is_profile else load_material(name)
-
-
-def _beside(path: Path | None, name: str) -> Path | None:
-    """Where the profile goes; None for stdout, and where it was read from a file.
-
-    Not under the name that `sssfit simulate` gives: a longer walk may lie there.
-    """
-    if path is None or name == "-" or name.endswith(_PROFILE_ENDING):
-        return None
-    stem = path.name.removesuffix(".json").removesuffix(".kernel")
-    return path.with_name(f"{stem}.profile.npz")
-
-
-def _scene(picture: Picture, pitch: float, resolution: tuple[int, int], common: Common) -> Scene:
+def _scene(pitch: float, given: dict[str, Any], common: Common) -> Scene:
     """Make or read what the choice is judged on; a file that does not say has the pitch."""
-    if not picture.is_made:
-        return read_scene(picture, pitch, common)
-    size = min(resolution[0], 512), min(resolution[1], 512)
-    return made_scene(replace(picture, size=size), pitch, common)
+    from sssfit.scene.load import load_scene
+
+    name, asked = given["irradiance"], {key: given[key] for key in ("layer", "mask")}
+    asked |= {"angle_degrees": EDGE_DEGREES} if name == "edge" else {}
+    rows, columns = (min(each, _MOST_PIXELS) for each in given["resolution"])
+    scene, notes = load_scene(
+        name, otherwise=pitch, size=(rows, columns), seed=common.seed, **asked
+    )
+    say_notes(common, notes)
+    return scene
 
 
 def _say_first(source: Material | Profile, common: Common) -> None:
     """Say what takes longest, and what a profile cannot tell."""
-    from sssfit.choose.choice import is_exact
-    from sssfit.profile import Profile
+    from sssfit.choose.truth import is_exact, notes_on
+    from sssfit.material import Material
 
-    if isinstance(source, Profile):
-        missing = source.beyond_grid.sum() / max(source.diffuse_reflectance.sum(), 1e-300)
-        if missing > _WORTH_A_NOTE:
-            say(
-                common,
-                f"{number(missing, '.2g%')} of the light lies beyond the profile's grid, where the "
-                "true picture lacks it and a kernel does not: simulate with a larger radius.",
-            )
-        return
-    if is_exact(source):
-        say_if_compiling(common, solver=True)
-        return
-    say_if_compiling(common, walk=source)
-    say(
-        common,
-        f"{source.name} has no exact solution: tracing 1e7 photons for its true profile.",
-    )
-
-
-def _say_step(step: Step, common: Common) -> None:
-    if common.verbose:
-        say(common, step_line(step))
+    if isinstance(source, Material):
+        exact = is_exact(source)
+        say_if_compiling(common, solver=exact, walk=None if exact else source)
+    say_notes(common, notes_on(source))
 
 
 def _write(choice: Choice, path: Path | None, profile_path: Path | None) -> list[str]:

@@ -2,37 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
 from sssfit.methods import FITS
+from sssfit.scene.made import COMPARED
 
-from ._compare_input import profile_of
-from ._compare_options import compare_options
-from ._compare_parts import (
-    budget,
-    compared,
-    first_read,
-    fronts,
-    held_outputs,
-    kernels,
-    scenes_asked,
-    sheet,
-    write_kernels,
-)
+from ._compare_parts import budgets_of, compared, fronts, held_outputs, profile_of, scenes_of
+from ._input import load_source
 from ._methods import own_settings
-from ._options import Common, common_options
-from ._output import finish
+from ._options import Common, common_options, options, refuse
+from ._output import finish, finish_one, held_charts, target, write_chart
+from ._picture import check_pictures
+from ._verb_options import COMPARE
 
 _OF_BUDGETS = ("budget_chart", "photons", "rank", "terms", "model")
 
 
 @click.command()
 @click.argument("material", required=False)
-@compare_options
+@options(*COMPARE)
 @common_options
 @click.pass_context
 def compare(context: click.Context, /, material: str | None, common: Common, **given: Any) -> None:
@@ -56,52 +48,26 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
       sssfit compare --all -o charts
       sssfit compare skin1 --what sheet --chart skin1-sheet.png
     """
-    _check(material, given)
+    names = [name for each in given["pictures"] or COMPARED for name in each.split(",")]
+    _check(material, given, names)
     if material is None:
         from sssfit.material import material_names
 
         folder = Path(given["output"] or ".")
         stems = {name: folder / f"{name}-pareto" for name in material_names(paper=given["paper"])}
-        fronts({name: (f"{each}.png", f"{each}.md") for name, each in stems.items()}, given, common)
+        files = {each: (f"{stem}.png", f"{stem}.md") for each, stem in stems.items()}
+        fronts(files, names, given, common)
     elif given["what"] == "front":
-        fronts({material: (given["chart"], given["table"])}, given, common)
+        fronts({material: (given["chart"], given["table"])}, names, given, common)
     elif given["what"] == "sheet":
-        sheet(material, given, common)
+        _sheet(material, given, common)
     else:
         settings = {key: given[key] for key in ("rank", "terms")}
         own = own_settings(context, FITS, given["method"], settings)
-        _budget_and_kernels(material, given, own, common)
+        _budget_and_kernels(material, names, own, given, common)
 
 
-def _budget_and_kernels(
-    material: str, given: Mapping[str, Any], settings: Mapping[str, Any], common: Common
-) -> None:
-    """Do both parts, or the one that was asked for, and print them."""
-    figures: dict[str, Any] = {"rows": []}
-    of_budget, texts = None, []
-    charts = [given[key] for key in ("chart", "budget_chart") if given[key]]
-    tables = [given["table"]] if given["table"] else []
-    with held_outputs(charts, tables, given, inputs=[material]):
-        first = first_read(material, given, common)
-        scenes = scenes_asked(given, common, first)
-        if given["what"] != "budget":
-            profile = first or profile_of(material, common)
-            comparison = compared(profile, scenes, given, common)
-            write_kernels(comparison, given, given["chart"], given["table"])
-            figures, text = kernels(comparison, given)
-            texts.append(text)
-        if given["what"] != "kernels":
-            found = budget(material, scenes[0], given, settings, common)
-            if found is not None:
-                of_budget = found[0]
-                texts.insert(0, found[1])
-    output = [given[key] for key in ("budget_chart", "chart", "table") if given[key]]
-    texts += [f"Wrote {', '.join(output)}"] if output else []
-    whole = {"command": "compare", "output": output, **figures, "budget": of_budget}
-    finish(common, whole, "\n\n".join(texts), to_stderr="-" in output)
-
-
-def _check(material: str | None, given: Mapping[str, Any]) -> None:
+def _check(material: str | None, given: Mapping[str, Any], names: Sequence[str]) -> None:
     """Refuse options that do not go together, or that would do nothing."""
     what, several = given["what"], material is None
     if [not several, given["every"], given["paper"]].count(True) != 1:
@@ -117,15 +83,58 @@ def _check(material: str | None, given: Mapping[str, Any]) -> None:
     idle = list(_OF_BUDGETS) if several or what not in (None, "budget") else []
     idle += ["chart", "table"] if what == "budget" else []
     idle += ["pictures", "size", "layer", "mask", "table"] if what == "sheet" else []
-    for key in idle:
-        if given[key]:
-            raise click.UsageError(f"{_option(key)} is for another --what; leave it out.")
+    refuse(given, dict.fromkeys(idle, "another --what"))
     if what == "sheet" and not given["chart"]:
         raise click.UsageError("--what sheet is a picture; name its file with --chart.")
     if given["chart"] == given["budget_chart"] == "-":
         raise click.UsageError("only one of --chart and --budget-chart can go to stdout.")
+    check_pictures(names, given["layer"], given["mask"], given["size"])
 
 
-def _option(key: str) -> str:
-    """Return an option as it is typed."""
-    return "--" + {"pictures": "picture"}.get(key, key).replace("_", "-")
+def _budget_and_kernels(
+    name: str,
+    pictures: Sequence[str],
+    settings: Mapping[str, Any],
+    given: Mapping[str, Any],
+    common: Common,
+) -> None:
+    """Do both parts, or the one that was asked for, and print them; ``settings`` are of the fit."""
+    from sssfit.compare.table import budget_text, kernels_text
+
+    figures: dict[str, Any] = {"rows": []}
+    front, what, texts = (given["error"], given["cost"]), given["what"], []
+    charts = [given["chart"], given["budget_chart"]]
+    with held_outputs(charts, [given["table"]], [name, *pictures], given):
+        source = load_source(name)
+        first = profile_of(source, common) if given["mm_per_pixel"] == "profile" else None
+        scenes = scenes_of(pictures, first, given, common)
+        if what != "budget":
+            profile = first or profile_of(source, common)
+            found = compared(profile, scenes, given["chart"], given["table"], given, common)
+            figures = found.to_dict(*front)
+            texts.append(kernels_text(found, *front))
+        budgets = []
+        if what != "kernels":
+            budgets = budgets_of(name, source, scenes, settings, given, common)
+    each = [one.to_dict() for one in budgets]
+    budget = {**each[0], "rows": [row for one in each for row in one["rows"]]} if each else None
+    output = [given[key] for key in ("budget_chart", "chart", "table") if given[key]]
+    texts = [*map(budget_text, each), *texts, *([f"Wrote {', '.join(output)}"] if output else [])]
+    whole = {"command": "compare", "output": output, **figures, "budget": budget}
+    finish(common, whole, "\n\n".join(texts), to_stderr="-" in output)
+
+
+def _sheet(name: str, given: Mapping[str, Any], common: Common) -> None:
+    """Draw a contact sheet of a profile's kernels, and print its figures."""
+    from sssfit.chart import figure_of
+    from sssfit.compare.sheet import compute_sheet
+    from sssfit.compare.table import sheet_text
+
+    path = target(given["chart"])
+    with held_charts([path], inputs=[name], force=given["force"]):
+        profile = profile_of(load_source(name), common)
+        pitch = given["mm_per_pixel"]
+        found = compute_sheet(profile, mm_per_pixel=pitch, threads=common.threads)
+        write_chart(figure_of(found), path)
+    told = found.to_dict()
+    finish_one(common, "compare", path, told, sheet_text(told), "a PNG")

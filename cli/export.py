@@ -9,29 +9,14 @@ from typing import Any
 import click
 
 from ._input import kernel_name, load, profile_name
-from ._options import Common, common_options
+from ._options import Common, common_options, options
 from ._output import finish_one, held, stem_of, target, write
+from ._verb_options import EXPORT
 
 
 @click.command()
 @click.argument("file", required=False)
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["hlsl", "json", "csv"]),
-    required=True,
-    help="Output format. hlsl: a kernel as shader source; json: a kernel as a document; csv: a "
-    "profile as a table.",
-)
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE",
-    help="Output file, - for stdout.  [default: NAME.FORMAT]",
-)
-@click.option(
-    "--force", is_flag=True, help="Replace an input, or a file that sssfit did not write."
-)
+@options(*EXPORT)
 @common_options
 def export(file: str | None, form: str, output: str | None, force: bool, common: Common) -> None:
     """Export FILE for other programs.

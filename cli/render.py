@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-import dataclasses
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from ._input import kernel_name, load
-from ._options import Common, NumberRange, common_options
-from ._output import binary_stdout, finish, held, say, stem_of, target
-from ._render_options import picture_options
-from ._render_report import figures_of, text_of
-from ._scene import Picture, make_or_read
-from ._truth import true_profile
+from sssfit.messages import by_channel, report
+from sssfit.methods import settings_of
+from sssfit.scene.made import MADE
+
+from ._input import kernel_name, load, profile_of_kernel
+from ._methods import method_options, own_settings
+from ._options import Common, common_options, options
+from ._output import binary_stdout, finish, held, say_notes, stem_of, target
+from ._picture import check_pictures
+from ._reports import RENDERED
+from ._verb_options import MAPS, RENDER, RENDER_PICTURE
 
 if TYPE_CHECKING:
-    import numpy as np
-    import numpy.typing as npt
-
     from sssfit.compare.judge import Judgement
     from sssfit.kernel import SeparableKernel
-    from sssfit.scene.record import Scene
-
-    FloatArray = npt.NDArray[np.float64]
-
 
 # Of the head's key light: behind both ears.
 _BEHIND_DEGREES = 170.0
@@ -33,68 +30,10 @@ _BEHIND_DEGREES = 170.0
 
 @click.command()
 @click.argument("kernel", required=False)
-@picture_options
-@click.option(
-    "--profile",
-    metavar="FILE",
-    help="Reference profile.  [default: the profile here that the kernel was fitted to]",
-)
-@click.option(
-    "--exposure",
-    type=NumberRange(min=0.0, min_open=True),
-    metavar="FACTOR",
-    help="Exposure for Delta E and PNG files.  [default: from the true picture]",
-)
-@click.option("--structure", is_flag=True, help='Also SSIM and FLIP (needs "sssfit[metrics]").')
-@click.option(
-    "-o",
-    "--output",
-    metavar="FILE",
-    help="Where the picture goes, .exr, .tif or .png (16 bits, sRGB); - for EXR on stdout."
-    "  [default: KERNEL.PICTURE.exr]",
-)
-@click.option("--truth", metavar="FILE", help="Write the true picture as well.")
-@click.option("--difference", metavar="FILE", help="Write the absolute difference as well.")
-@click.option(
-    "--gain",
-    type=NumberRange(min=0.0, min_open=True),
-    default=1.0,
-    show_default=True,
-    metavar="FACTOR",
-    help="--difference: magnify it.",
-)
-@click.option(
-    "--difference-map",
-    type=click.Choice(["signed", "absolute"]),
-    help="--difference: in false colours. signed: luminance, blue where the kernel is darker, red "
-    "where it is brighter; absolute: the largest of the channels, violet to yellow. The scale is "
-    "printed; it ends at the largest difference over --gain.",
-)
-@click.option("--force", is_flag=True, help="Replace an input, or a file that is not our picture.")
+@options(*RENDER_PICTURE, method_options(MADE), *RENDER)
 @common_options
-def render(
-    kernel: str | None,
-    irradiance: str,
-    size: tuple[int, int] | None,
-    mm_per_pixel: float | None,
-    layer: str | None,
-    mask: str | None,
-    border: str,
-    transmit: bool,
-    screen: bool,
-    follow: str | None,
-    profile: str | None,
-    exposure: float | None,
-    structure: bool,
-    output: str | None,
-    truth: str | None,
-    difference: str | None,
-    gain: float,
-    difference_map: str | None,
-    force: bool,
-    common: Common,
-    **own: Any,
-) -> None:
+@click.pass_context
+def render(context: click.Context, /, kernel: str | None, common: Common, **given: Any) -> None:
     """Apply KERNEL to a picture of irradiance, and measure its error.
 
     KERNEL is a .kernel.json file, or - for stdin; by default the newest of this folder. The result
@@ -113,139 +52,98 @@ def render(
     from sssfit.formats.pictures import image_format, is_image_file
     from sssfit.kernel import SeparableKernel
 
-    _check_options(screen, follow, profile or truth or difference or structure)
-    if difference is None and (difference_map or gain != 1.0):
-        raise click.UsageError("--gain and --difference-map are for --difference; name its file.")
-    if transmit:
-        own = _lit_from_behind(irradiance, own)
-    picture = Picture(irradiance, size, mm_per_pixel, own, layer, mask)
-    name = kernel_name(kernel, common)
+    own = _check(context, given)
+    name, irradiance = kernel_name(kernel, common), given["irradiance"]
     loaded = load(SeparableKernel, name)
-    path = target(output, f"{stem_of(name)}.{picture.name}.exr")
-    targets = {"picture": path} if path else {}
-    targets |= {k: Path(v) for k, v in (("truth", truth), ("difference", difference)) if v}
-    for each in targets.values():
+    path = target(given["output"], f"{stem_of(name)}.{Path(irradiance).stem}.exr")
+    asked = {"picture": path, "truth": given["truth"], "difference": given["difference"]}
+    files = {key: Path(each) for key, each in asked.items() if each}
+    for each in files.values():
         image_format(each)
-    outputs = [*targets.values(), *([None] if path is None else [])]
-    with held(outputs, is_image_file, inputs=[name, irradiance, profile], force=force):
-        scene = make_or_read(*_on_pixels(picture, loaded, screen=screen), common)
-        through = None
-        if transmit:
-            from sssfit.render.transmittance import transmitted, with_transmitted
-
-            through = transmitted(scene, loaded)
-            scene = scene if screen else with_transmitted(scene, loaded)
-        source, source_name = (
-            (None, None) if screen else true_profile(loaded, name, profile, common)
-        )
-        if source is None and (truth or difference):
-            raise click.UsageError("--truth and --difference need the profile; name it.")
-        settings: dict[str, Any] = {"border": border, "threads": common.threads}
-        if screen:
-            from sssfit.compare.judge import judge_in_screen_space
-
-            result = judge_in_screen_space(scene, loaded, follow=follow or "gaussian", **settings)
-        else:
-            from sssfit.compare.judge import judge
-
-            settings |= {"exposure": exposure, "structure": structure}
-            result = judge(scene, loaded, source, **settings)
-        lost = _lost(result, gain, difference_map) if difference else {}
-        _write(result, lost, scene, loaded, targets, exposure, common)
+    outputs = [*files.values(), *[None] * (path is None)]
+    inputs = [name, irradiance, given["profile"]]
+    with held(outputs, is_image_file, inputs=inputs, force=given["force"]):
+        source, made = _rendered(loaded, name, given, own, common)
+        targets: dict[str, Any] = files if path else {"picture": binary_stdout(), **files}
+        say_notes(common, made.save(targets, exposure=given["exposure"]))
     figures = {
         "command": "render",
-        "output": [*(["-"] if path is None else []), *map(str, targets.values())],
+        "output": [*(["-"] if path is None else []), *map(str, files.values())],
         "kernel": name,
-        "profile": source_name,
-        "border": border,
-        "follow": (follow or "gaussian") if screen else None,
-        **figures_of(result, scene, loaded, through),
-        **{f"difference_{key}": lost.get(key) for key in ("gain", "map", "of", "end")},
+        "profile": source,
+        "border": given["border"],
+        "follow": (given["follow"] or "gaussian") if given["screen"] else None,
+        **made.to_dict(),
     }
-    finish(common, figures, text_of(figures), to_stderr=path is None)
+    finish(common, figures, _text(figures), to_stderr=path is None)
 
 
-def _on_pixels(picture: Picture, kernel: SeparableKernel, *, screen: bool) -> tuple[Picture, float]:
-    """Return what to make or read, and the size of a made picture's pixels [mm].
-
-    Convolved as it is, a kernel has the picture's pixels; a screen's may have any.
-    """
-    if not (screen and picture.is_made):
-        return picture, kernel.mm_per_pixel
-    from sssfit.fit import MM_PER_PIXEL
-
-    return dataclasses.replace(picture, mm_per_pixel=None), picture.mm_per_pixel or MM_PER_PIXEL
-
-
-def _lit_from_behind(irradiance: str, own: dict[str, Any]) -> dict[str, Any]:
-    """Return the head's options with light through it, its key light behind unless it is given."""
-    if irradiance != "head":
-        raise click.UsageError("--transmit is for the head; leave it out.")
-    light = own["light_degrees"]
-    return {**own, "transmit": True, "light_degrees": _BEHIND_DEGREES if light is None else light}
-
-
-def _check_options(screen: bool, follow: str | None, compared: object) -> None:
-    """Refuse options that would do nothing."""
-    if screen and compared:
+def _check(context: click.Context, given: dict[str, Any]) -> dict[str, Any]:
+    """Refuse options that do not go together; return the made picture's own."""
+    name, is_made, screen = given["irradiance"], given["irradiance"] in MADE, given["screen"]
+    if screen and any(given[key] for key in ("profile", "truth", "difference", "structure")):
         raise click.UsageError(
             "--screen has no true picture to measure against: leave out --profile, --truth, "
             "--difference and --structure."
         )
-    if follow and not screen:
+    if given["follow"] and not screen:
         raise click.UsageError("--follow is for --screen; leave it out.")
+    if given["difference"] is None and (given["difference_map"] or given["gain"] != 1.0):
+        raise click.UsageError("--gain and --difference-map are for --difference; name its file.")
+    check_pictures([name], given["layer"], given["mask"], given["size"])
+    if is_made and not screen and given["mm_per_pixel"] is not None:
+        raise click.UsageError(
+            f"--mm-per-pixel is for pictures from files and for --screen; {name} is made on the "
+            "kernel's pixels."
+        )
+    settings = {key: given[key] for key in settings_of(MADE)}
+    own = own_settings(context, MADE, name, settings, "--irradiance")
+    return ({"light_degrees": _BEHIND_DEGREES} | own) if given["transmit"] else own
 
 
-def _lost(result: Judgement, gain: float, kind: str | None) -> dict[str, Any]:
-    """Return the difference as it is written, and what the report says of it."""
-    from sssfit.measure.difference import difference_map, magnified_difference
-
-    assert result.truth is not None  # without a profile the option was refused
-    if kind is None:
-        pixels = magnified_difference(result.picture, result.truth, gain=gain)
-        return {"pixels": pixels, "gain": gain}
-    drawn = difference_map(result.picture, result.truth, kind=kind, gain=gain)
-    return {"pixels": drawn.pixels, "gain": gain, "map": kind, "of": drawn.what, "end": drawn.end}
-
-
-def _write(
-    result: Judgement,
-    lost: dict[str, Any],
-    scene: Scene,
+def _rendered(
     kernel: SeparableKernel,
-    targets: dict[str, Path],
-    exposure: float | None,
+    name: str,
+    given: Mapping[str, Any],
+    own: dict[str, Any],
     common: Common,
-) -> None:
-    """Write the picture, and the truth and the difference where they are wanted."""
-    from sssfit.formats.pictures import image_format, save_image
-    from sssfit.measure.score import auto_exposure
+) -> tuple[str | None, Judgement]:
+    """Light the picture and render it; return the file of its profile, too."""
+    from sssfit.compare.judge import judge, judge_in_screen_space
+    from sssfit.fit import MM_PER_PIXEL
+    from sssfit.scene.load import load_scene
 
-    pictures: dict[str, Any] = {"picture": result.picture, "truth": result.truth}
-    pictures["difference"] = lost.get("pixels")
-    settings: dict[str, Any] = {
-        "channels": kernel.channels,
-        "mm_per_pixel": kernel.mm_per_pixel,
+    screen, picture = given["screen"], given["irradiance"]
+    made_mm = (given["mm_per_pixel"] or MM_PER_PIXEL) if screen else kernel.mm_per_pixel
+    asked = {key: given[key] for key in ("size", "layer", "mask")} | own
+    pitch = made_mm if picture in MADE else given["mm_per_pixel"]
+    scene, notes = load_scene(picture, pitch, seed=common.seed, **asked)
+    say_notes(common, notes)
+    how = {key: given[key] for key in ("transmit", "border")} | {"threads": common.threads}
+    if screen:
+        follow = given["follow"] or "gaussian"
+        return None, judge_in_screen_space(scene, kernel, follow=follow, **how)
+    profile, source = profile_of_kernel(kernel, name, given["profile"], common)
+    if profile is None and (given["truth"] or given["difference"]):
+        raise click.UsageError("--truth and --difference need the profile; name it.")
+    how |= {key: given[key] for key in ("exposure", "structure")}
+    made = judge(scene, kernel, profile, **how)
+    if given["difference"]:
+        made = made.with_difference(given["difference_map"], given["gain"])
+    return source, made
+
+
+def _text(figures: Mapping[str, Any]) -> str:
+    """Write the figures for people."""
+    kind, most = figures["difference_map"], figures["transmitted_maximum"]
+    screen = f"screen space, follow {figures['follow']}, " if figures["follow"] else ""
+    is_grey = figures["rmse"] is not None and figures["delta_e_2000_mean"] is None
+    words = {
+        "how": f"{screen}{figures['border']} borders",
+        "most": by_channel(figures["channels"], most, ".3g") if most is not None else None,
+        "no_colour": len(figures["channels"]) if is_grey else None,
+        "magnified": figures["difference_gain"] if kind is None else None,
+        **{key: figures["difference_end"] if kind == key else None for key in MAPS},
+        "wrote": ", ".join(figures["output"]),
     }
-    alpha = _alpha(scene, kernel, common)
-    if "picture" not in targets:
-        save_image(binary_stdout(), result.picture, format="exr", **settings, **alpha)
-        binary_stdout().flush()
-    shown = exposure or (result.score.exposure if result.score else auto_exposure(result.picture))
-    for what, path in targets.items():
-        own = settings | (alpha if what != "difference" else {})
-        own["exposure"] = shown if image_format(path) == "png" else 1.0
-        if what == "difference" and "map" in lost:  # its colours are no light
-            own |= {"exposure": 1.0, "channels": ("R", "G", "B")}
-        for note in save_image(path, pictures[what], **own):
-            say(common, f"{path}: {note}")
-
-
-def _alpha(scene: Scene, kernel: SeparableKernel, common: Common) -> dict[str, Any]:
-    """Return what `save_image` takes of the picture's alpha, where a file can hold it."""
-    if scene.alpha is None:
-        return {}
-    if len(kernel.channels) not in (1, 3) or "A" in kernel.channels:
-        say(common, f"alpha left out beside the channels {', '.join(kernel.channels)}")
-        return {}
-    return {"alpha": scene.alpha, "alpha_is_multiplied": scene.alpha_is_multiplied}
+    return report(RENDERED, {**figures, **words})

@@ -83,7 +83,7 @@ def editing_rows(found):
 def pareto():
     """Draw skin1's kernels by error and weights; write the fronts, and what they come to."""
     profile = simulate_exact(load_material("skin1"))
-    found = compare_kernels(profile, scenes(), mm_per_pixel=0.3)
+    found = compare_kernels(profile, scenes())
     draw("skin1-pareto.png", pareto_figure(found))
     rows = front_rows(found)
     write("pareto", PARETO.format(pixels=found.pixels, pitch=found.mm_per_pixel, rows=rows))

@@ -30,8 +30,8 @@ class Setting:
     name : str
         Name of the option, with underscores.
     kind : str
-        "number", "numbers" (one, or one per channel), "share", "seconds", "whole", "count" (a whole
-        number, 1e7 is understood), "choice" or "flag".
+        "number", "numbers" (one, or one per channel), "length", "share", "seconds", "whole",
+        "count" (a whole number, 1e7 is understood), "choice" or "flag".
     help : str
         Help text; the names of its methods are put before it.
     metavar : str
@@ -58,7 +58,7 @@ class Setting:
 
 @dataclass(frozen=True, slots=True)
 class Method:
-    """A method from a material to a profile, or from a profile to a kernel.
+    """A method from a material to a profile, from a profile to a kernel, or to a made picture.
 
     Parameters
     ----------

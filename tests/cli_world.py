@@ -419,7 +419,7 @@ def comparison() -> Any:
         for name, own in (("disk", {}), ("edge", {"angle_degrees": 20.0}))
     ]
     real = _unrecorded(pareto.compare_kernels)
-    return real(profile(), scenes, mm_per_pixel=0.5, support_mm=3.0, candidates=some)
+    return real(profile(), scenes, support_mm=3.0, candidates=some)
 
 
 def small_comparison(_real, given):
@@ -491,7 +491,7 @@ _CHARTS = (
 )
 STAND_INS = {
     "sssfit.simulate.simulate_montecarlo_many": few_photons,
-    "sssfit.simulate.simulate_exact": (lambda _, given: exact_profile(given["material"].name)),
+    "sssfit.simulate.truth.true_profile": (lambda _, given: exact_profile(given["material"].name)),
     "sssfit.simulate.simulate_exact_many": (
         lambda _, given: [exact_profile(each.name) for each in given["materials"]]
     ),

@@ -509,8 +509,8 @@ def _pictures(
     ]
 
 
-def _compared(scenes: list[Scene], mm_per_pixel: float = 0.3) -> Any:
-    return called("sssfit.compare.compare_kernels", profile(), scenes, mm_per_pixel=mm_per_pixel)
+def _compared(scenes: list[Scene]) -> Any:
+    return called("sssfit.compare.compare_kernels", profile(), scenes)
 
 
 def _budgeted(**settings: Any) -> Any:
@@ -562,7 +562,7 @@ COMPARE = {
         _BOTH,
         "--what kernels",
         lambda ran: [name for name, _ in calls(ran)],
-        lambda: ["simulate_exact", "compare_kernels"],
+        lambda: ["true_profile", "compare_kernels"],
         words="budget and kernels",
     ),
     "--picture": Row(
@@ -576,7 +576,7 @@ COMPARE = {
         _KERNELS,
         "--mm-per-pixel .45",
         calls,
-        lambda: _compared(_pictures("disk", "edge", "points", "head", mm_per_pixel=0.45), 0.45),
+        lambda: _compared(_pictures("disk", "edge", "points", "head", mm_per_pixel=0.45)),
         default="0.3",
         words="what your own file says, else 0.3",
     ),
@@ -591,14 +591,14 @@ COMPARE = {
         f"{_OF_LAYERS} --layer near",
         "--layer far",
         calls,
-        lambda: _compared([_from_file(0.4, "far")], 0.4),
+        lambda: _compared([_from_file(0.4, "far")]),
         words=_LAYER,
     ),
     "--mask": Row(
         f"{_OF_LAYERS} --layer far",
         "--mask alpha",
         calls,
-        lambda: _compared([_from_file(0.4, "far", alpha_is_mask=True)], 0.4),
+        lambda: _compared([_from_file(0.4, "far", alpha_is_mask=True)]),
         words=_ALPHA,
     ),
     "--chart": Row(_KERNELS, "--chart c.png", is_written("png"), lambda: ["c.png"]),

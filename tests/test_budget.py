@@ -12,8 +12,7 @@ from reference_render import random_kernel
 
 from sssfit.chart.budget import budget_figure
 from sssfit.cli import main
-from sssfit.compare._budget_causes import stored, true_picture
-from sssfit.compare._budget_profiles import make_sources
+from sssfit.compare._budget_causes import make_sources, stored, true_picture
 from sssfit.compare.budget import error_budget, error_budgets
 from sssfit.compare.judge import judge
 from sssfit.errors import FitError, KernelError, RenderError, SimulationError
@@ -276,7 +275,7 @@ def test_bad_input_is_one_line():
         error_budget(skin1, even)
     with pytest.raises(RenderError, match="no picture"):
         error_budgets(skin1, [])
-    with pytest.raises(RenderError, match=r"0\.3 to 1 mm; expected one size"):
+    with pytest.raises(RenderError, match=r"noise has 0\.3 mm per pixel and edge 1; expected"):
         error_budgets(skin1, [scene_of(), noise_scene()])
     with pytest.raises(SimulationError, match=r"model = 'photon'.*dipole, dipole-grosjean, burley"):
         error_budget(skin1, noise_scene(), model="photon")

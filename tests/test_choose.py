@@ -11,7 +11,7 @@ from scipy.signal import convolve2d
 
 import sssfit.choose.choice as rooms
 import sssfit.choose.truth as truths
-import sssfit.compare._all_light as all_light
+import sssfit.simulate.truth as all_light
 from sssfit.choose import truth as photon_walks
 from sssfit.choose.choice import choose, is_exact, mm_per_pixel_at
 from sssfit.choose.options import SHARES, Option, supports

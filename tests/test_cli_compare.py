@@ -6,26 +6,23 @@ import json
 import math
 import os
 import re
-from dataclasses import replace
+from importlib import import_module
 
 import numpy as np
 import pytest
 
 from sssfit.cli import main
-from sssfit.cli._compare_input import scenes_of
-from sssfit.cli._compare_parts import PICTURES
-from sssfit.cli._options import Common
 from sssfit.compare import pareto
 from sssfit.compare.candidates import candidates
 from sssfit.compare.table import is_table_file
 from sssfit.errors import RenderError
 from sssfit.formats.pictures import save_image
 from sssfit.material import load_material
-from sssfit.scene.made import make_scene
+from sssfit.scene.load import load_scenes
+from sssfit.scene.made import COMPARED, make_scene
 from sssfit.simulate import exact, simulate_dipole, simulate_exact
 
 SMALL = ("--picture", "disk", "--size", "32x32", "--mm-per-pixel", "2.5")
-COMMON = Common(quiet=True, verbose=False, json=False, threads=None, seed=1)
 SLAB = (
     "eta = 1.3\ng = 0\nsigma_a_per_mm = [0.1, 0.1, 0.1]\nsigma_s_per_mm = [9, 9, 9]\n"
     "thickness_mm = 2\n"
@@ -193,7 +190,7 @@ def test_pictures_that_do_not_agree_are_refused(run, tmp_path):
     for name, pitch in (("a.exr", 2.0), ("b.exr", 3.0)):
         save_image(tmp_path / name, light, mm_per_pixel=pitch)
     line = one_line(run("skin1", "--picture", "a.exr", "--picture", "b.exr", status=1))
-    assert "b.exr has 3 mm per pixel and the kernels 2" in line
+    assert "b.exr has 3 mm per pixel and a.exr 2" in line
     assert "each once" in one_line(run("skin1", "--picture", "disk,disk", status=1))
 
 
@@ -289,16 +286,16 @@ def test_the_verdict_says_from_where_on_nothing_shows(run):
 
 
 def test_default_pictures_have_no_method_at_home_on_all():
-    scenes, pitch = scenes_of(PICTURES.split(","), (64, 64), None, COMMON)
+    scenes, _ = load_scenes(COMPARED, otherwise=0.3, size=(64, 64))
     assert [each.name for each in scenes] == ["disk", "edge", "points", "head"]
-    tilted = make_scene("edge", height=64, width=64, mm_per_pixel=pitch, angle_degrees=30.0)
+    tilted = make_scene("edge", height=64, width=64, mm_per_pixel=0.3, angle_degrees=30.0)
     np.testing.assert_array_equal(scenes[1].irradiance, tilted.irradiance)
 
 
 @pytest.mark.parametrize("seed", [1, 5])
 def test_noise_has_the_seed_that_was_asked_for(seed):
-    (scene,), pitch = scenes_of(["noise"], (16, 16), None, replace(COMMON, seed=seed))
-    wanted = make_scene("noise", height=16, width=16, mm_per_pixel=pitch, seed=seed)
+    (scene,), _ = load_scenes(["noise"], 0.3, size=(16, 16), seed=seed)
+    wanted = make_scene("noise", height=16, width=16, mm_per_pixel=0.3, seed=seed)
     np.testing.assert_array_equal(scene.irradiance, wanted.irradiance)
 
 
@@ -345,15 +342,13 @@ def test_a_chart_may_go_to_stdout(tmp_path, monkeypatch, capfdbinary):
 
 def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch):
     from sssfit import material
-    from sssfit.cli import _compare_parts as verb
 
-    real = verb.profile_of
+    verb = import_module("sssfit.cli.compare")
+    real = verb.load_source
     (tmp_path / "marble.toml").write_text(SLAB)
     # In place of the shipped marble, a slab.
     paths = {"marble": "marble.toml"}
-    monkeypatch.setattr(
-        verb, "profile_of", lambda name, common: real(paths.get(name, name), common)
-    )
+    monkeypatch.setattr(verb, "load_source", lambda name: real(paths.get(name, name)))
     monkeypatch.setattr(material, "material_names", lambda **_: ("marble", "skin1"))
     (tmp_path / "out").mkdir()
     err = run("--all", "-o", "out", *SMALL, status=1)

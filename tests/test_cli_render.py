@@ -506,9 +506,9 @@ def test_transmitted_light_in_screen_space(run, coarse):
 @pytest.mark.parametrize(
     ("options", "word"),
     [
-        (("--irradiance", "disk", "--transmit"), "--transmit is for the head"),
-        (("--irradiance", "disk", "--light", "20"), "--light is not for disk"),
-        (("--irradiance", "mine.png", "--transmit"), "--transmit is for the head"),
+        (("--irradiance", "disk", "--transmit"), "--transmit is for --irradiance head"),
+        (("--irradiance", "disk", "--light", "20"), "--light is for --irradiance head"),
+        (("--irradiance", "mine.png", "--transmit"), "--transmit is for --irradiance head"),
         ((*HEAD, "--light", "190"), "light_degrees = 190; expected -180 to 180"),
     ],
 )

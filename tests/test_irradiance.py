@@ -184,7 +184,7 @@ def test_none_stands_for_the_default():
 @pytest.mark.parametrize(
     ("name", "options", "message"),
     [
-        ("dsik", {}, "no made picture 'dsik'; expected one of disk, edge, separable, stripes"),
+        ("dsik", {}, "no made picture 'dsik'; expected one of head, disk, edge, separable"),
         ("disk", {"period_mm": 1.0}, "disk: no option 'period_mm'; expected one of radius_mm."),
         ("disk", {"height": 0}, "disk: height = 0; expected a whole number, 1 or more."),
         ("disk", {"width": 2.5}, "disk: width = 2.5; expected a whole number"),

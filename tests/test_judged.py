@@ -94,7 +94,7 @@ def test_the_size_of_the_picture_does_not_change_the_figures(name):
     found = {}
     for size in (54, 90, 128):  # 65, 108 and 154 mm
         scenes = [scene_of("disk", size), scene_of("edge", size, angle_degrees=30.0)]
-        rows = compare_kernels(profile, scenes, mm_per_pixel=PITCH, candidates=SOME).rows
+        rows = compare_kernels(profile, scenes, candidates=SOME).rows
         for row in rows:
             assert row.delta_e_2000_mean > 0.05
             figures = (row.delta_e_2000_mean, row.delta_e_2000_p95, row.relative_l2)

@@ -51,7 +51,7 @@ def scenes():
 
 @pytest.fixture(scope="module")
 def comparison(skin1, scenes):
-    return compare_kernels(skin1, scenes, mm_per_pixel=PITCH, candidates=SOME)
+    return compare_kernels(skin1, scenes, candidates=SOME)
 
 
 def flat(value=0.5, name="flat", pitch=PITCH):
@@ -166,7 +166,7 @@ def test_verdicts_weigh_all_pictures_alike_and_name_the_worst(comparison, error,
 
 
 def test_the_same_call_gives_the_same_rows_but_for_seconds(skin1, scenes, comparison):
-    again = compare_kernels(skin1, scenes, mm_per_pixel=PITCH, candidates=SOME, threads=1)
+    again = compare_kernels(skin1, scenes, candidates=SOME, threads=1)
     for row, other in zip(comparison.rows, again.rows, strict=True):
         for field in dataclasses.fields(row):
             if "seconds" in field.name:
@@ -179,9 +179,7 @@ def test_the_same_call_gives_the_same_rows_but_for_seconds(skin1, scenes, compar
 
 def test_all_candidates_are_tried_unless_some_are_named(skin1):
     seen, scene = [], make_scene("disk", height=32, width=32, mm_per_pixel=4.0)
-    found = compare_kernels(
-        skin1, [scene], mm_per_pixel=4.0, progress=lambda *each: seen.append(each)
-    )
+    found = compare_kernels(skin1, [scene], progress=lambda *each: seen.append(each))
     wanted = [each.label for each in candidates(found.pixels)]
     assert [row.label for row in found.rows] == wanted
     steps = [*wanted, "timing"]
@@ -189,15 +187,13 @@ def test_all_candidates_are_tried_unless_some_are_named(skin1):
 
 
 def test_support_is_handed_to_the_fits(skin1, scenes):
-    found = compare_kernels(
-        skin1, scenes[:1], mm_per_pixel=PITCH, support_mm=4.0, candidates=SOME[:1]
-    )
+    found = compare_kernels(skin1, scenes[:1], support_mm=4.0, candidates=SOME[:1])
     assert found.pixels == 9
     assert found.rows[0].taps_per_pixel == 18
 
 
 def test_what_cannot_be_fitted_is_left_out_by_name(skin1, scenes):
-    found = compare_kernels(skin1, scenes, mm_per_pixel=PITCH, candidates=[SOME[0], IMPOSSIBLE])
+    found = compare_kernels(skin1, scenes, candidates=[SOME[0], IMPOSSIBLE])
     assert [row.label for row in found.rows] == ["svd 1", "svd 1"]
     ((label, reason),) = found.left_out
     assert label == "svd 0"
@@ -206,38 +202,39 @@ def test_what_cannot_be_fitted_is_left_out_by_name(skin1, scenes):
 
 def test_nothing_fitted_is_an_error(skin1, scenes):
     with pytest.raises(FitError, match=r"skin1: no kernel of 1 could be fitted: .*rank"):
-        compare_kernels(skin1, scenes, mm_per_pixel=PITCH, candidates=[IMPOSSIBLE])
+        compare_kernels(skin1, scenes, candidates=[IMPOSSIBLE])
 
 
 @pytest.mark.parametrize("value", [0.0, 0.5])
 def test_a_picture_of_one_colour_is_refused(skin1, value):
     with pytest.raises(RenderError, match="flat is of one colour"):
-        compare_kernels(skin1, [flat(value)], mm_per_pixel=PITCH, candidates=SOME)
+        compare_kernels(skin1, [flat(value)], candidates=SOME)
 
 
 def test_a_picture_of_one_colour_within_its_mask_is_refused():
     light, mask = np.zeros((8, 8, 1)), np.zeros((8, 8), dtype=int)
     light[:, :4], mask[:, :4] = 1.0, 1
     with pytest.raises(RenderError, match="one colour"):
-        check_scenes([Scene("half", light, PITCH, mask=mask)], PITCH, 3)
-    check_scenes([Scene("half", light, PITCH)], PITCH, 3)
+        check_scenes([Scene("half", light, PITCH, mask=mask)], 3)
+    check_scenes([Scene("half", light, PITCH)], 3)
 
 
 def test_pictures_that_cannot_be_told_apart_or_compared_are_refused(scenes):
     with pytest.raises(RenderError, match="each once"):
-        check_scenes([scenes[0], scenes[0]], PITCH, 3)
+        check_scenes([scenes[0], scenes[0]], 3)
     with pytest.raises(RenderError, match="one or more"):
-        check_scenes([], PITCH, 3)
-    with pytest.raises(RenderError, match=r"disk has 1 mm per pixel and the kernels 0\.5"):
-        check_scenes(scenes, 0.5, 3)
+        check_scenes([], 3)
+    finer = make_scene("edge", height=8, width=8, mm_per_pixel=0.5)
+    with pytest.raises(RenderError, match=r"edge has 0\.5 mm per pixel and disk 1; expected"):
+        check_scenes([scenes[0], finer], 3)
     colours = Scene("colours", np.random.default_rng(1).random((8, 8, 3)), PITCH)
     with pytest.raises(RenderError, match="channels"):
-        check_scenes([colours], PITCH, 2)
+        check_scenes([colours], 2)
 
 
 def test_delta_e_needs_channels_that_have_a_colour(scenes):
     profile = make_profile([0.0, 2.0, 8.0], [[0.3, 0.2], [0.1, 0.1]])
-    found = compare_kernels(profile, scenes, mm_per_pixel=PITCH, candidates=SOME[:2])
+    found = compare_kernels(profile, scenes, candidates=SOME[:2])
     assert all(np.isnan(row.delta_e_2000_mean) for row in found.rows)
     assert found.front("disk", "delta-e", "passes") == []
     assert found.front("disk", "l2", "passes")
@@ -259,5 +256,5 @@ def test_seconds_are_by_pixels(skin1, monkeypatch):
     ticks = itertools.count()
     monkeypatch.setattr(pareto, "perf_counter", lambda: 0.001 * next(ticks))
     oblong = make_scene("disk", height=20, width=50, mm_per_pixel=PITCH)
-    found = compare_kernels(skin1, [oblong], mm_per_pixel=PITCH, candidates=SOME[:1])
+    found = compare_kernels(skin1, [oblong], candidates=SOME[:1])
     assert found.rows[0].seconds_per_megapixel == pytest.approx(0.001 * 1e6 / (20 * 50))

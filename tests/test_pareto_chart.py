@@ -26,7 +26,7 @@ def comparison():
     """Every candidate, as the verb has it."""
     profile = simulate_exact(load_material("skin1"))
     scenes = [make_scene(name, height=32, width=32, mm_per_pixel=PITCH) for name in PICTURES]
-    return compare_kernels(profile, scenes, mm_per_pixel=PITCH)
+    return compare_kernels(profile, scenes)
 
 
 def panels_of(figure):
@@ -136,7 +136,7 @@ def test_one_kernel_and_one_picture_are_drawn(comparison):
     profile = comparison.profile
     scenes = [make_scene("points", height=32, width=48, mm_per_pixel=PITCH)]
     one = [Candidate("svd 1", "svd", 1, {"rank": 1}), Candidate("svd 0", "svd", 0, {"rank": 0})]
-    found = compare_kernels(profile, scenes, mm_per_pixel=PITCH, candidates=one)
+    found = compare_kernels(profile, scenes, candidates=one)
     figure = pareto_figure(found)
     assert_legible(lambda: pareto_figure(found))
     text = words_of(figure)

@@ -3,4 +3,55 @@
 `page` has their common parts and writes them: the same figure gives the same bytes. Only this room
 imports matplotlib, and never its pyplot, which takes 0.8 s to import and keeps global state.
 `files` and `data` do not import it, because they are needed before a figure is drawn.
+`figure_of` draws any record that has a chart.
 """
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from sssfit.methods import imported
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+# Where a record is drawn, by the record's class; a new chart is one file and one line.
+FIGURES: Mapping[str, str] = {
+    "Budget": "sssfit.chart.budget:budget_figure",
+    "Comparison": "sssfit.chart.pareto:pareto_figure",
+    "Guide": "sssfit.chart.guide:guide_figure",
+    "KernelView": "sssfit.chart.kernel:kernel_figure",
+    "Material": "sssfit.chart.material:material_figure",
+    "ModelComparison": "sssfit.chart.models:models_figure",
+    "Profile": "sssfit.chart.profile:profile_figure",
+    "Sheet": "sssfit.chart.sheet:sheet_figure",
+    "Spectrum": "sssfit.chart.spectrum:spectrum_figure",
+}
+
+
+def figure_of(record: Any, **options: Any) -> Figure:
+    """Draw a record, by what it is.
+
+    Parameters
+    ----------
+    record : Profile, Material, KernelView, Comparison, ...
+        Of a class in ``FIGURES``; of budgets a list.
+    **options
+        Those of the record's figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        `sssfit.chart.page.save_figure` writes it.
+
+    Raises
+    ------
+    TypeError
+        No chart is of such a record.
+    """
+    kind = type(record[0] if isinstance(record, list) else record).__name__
+    if kind not in FIGURES:
+        raise TypeError(f"no chart of {kind}; expected one of {', '.join(FIGURES)}.")
+    figure: Figure = imported(FIGURES[kind])(record, **options)
+    return figure

@@ -12,14 +12,16 @@ import numpy as np
 from sssfit.arrays import plain
 from sssfit.choose.options import Option
 from sssfit.choose.views import Views
-from sssfit.compare._all_light import exact_with_all_light, radius_of
 from sssfit.errors import FitError, RenderError, SssfitError, SssfitWarning
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
+from sssfit.messages import number
 from sssfit.profile import Profile
 from sssfit.simulate import simulate_montecarlo
+from sssfit.simulate.truth import exact_with_all_light, radius_of
 
 WALK_PHOTONS = 10_000_000  # the papers' number
+_WORTH_A_NOTE = 1e-3  # of the light
 _TRANSPORT = ("exact", "montecarlo")
 
 
@@ -43,6 +45,20 @@ def truth_of(
     else:
         profile = simulate_montecarlo(source, photons=WALK_PHOTONS, seed=seed, threads=threads)
     return profile, time.perf_counter() - begun
+
+
+def notes_on(source: Material | Profile) -> list[str]:
+    """Say, before a choice is made, what a profile cannot tell and what takes long."""
+    if isinstance(source, Material):
+        walk = f"{source.name} has no exact solution: tracing 1e7 photons for its true profile."
+        return [] if is_exact(source) else [walk]
+    missing = source.beyond_grid.sum() / max(source.diffuse_reflectance.sum(), 1e-300)
+    if missing <= _WORTH_A_NOTE:
+        return []
+    return [
+        f"{number(missing, '.2g%')} of the light lies beyond the profile's grid, where the true "
+        "picture lacks it and a kernel does not: simulate with a larger radius."
+    ]
 
 
 def is_exact(material: Material) -> bool:

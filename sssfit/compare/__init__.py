@@ -3,7 +3,7 @@
 from sssfit.compare.comparison import Comparison, KernelRow, pareto_front
 from sssfit.compare.guide import Guide, compute_guide
 from sssfit.compare.kernel_view import KernelView, view_kernel
-from sssfit.compare.models import ModelComparison, ModelCurve, compare_models
+from sssfit.compare.models import ModelComparison, ModelCurve, compare_models, material_of_walk
 from sssfit.compare.pareto import compare_kernels
 from sssfit.compare.spectrum import Spectrum, compute_spectrum
 from sssfit.measure.asymmetry import asymmetry_by_radius, radial_asymmetry
@@ -29,6 +29,7 @@ __all__ = [
     "compute_spectrum",
     "cost_of",
     "flip",
+    "material_of_walk",
     "measure",
     "pareto_front",
     "radial_asymmetry",

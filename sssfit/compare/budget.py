@@ -6,7 +6,7 @@ it does to the picture is its difference. Differences are pictures and add up: t
 `interaction` that is stated, make the difference of the kernel that a user has. Norms and Delta E
 of differences do not add up, since differences cancel in places.
 
-``_budget_profiles`` has the profiles, ``_budget_causes`` what each cause does.
+``_budget_causes`` has the profiles, and what each cause does.
 """
 
 import dataclasses
@@ -17,11 +17,18 @@ from typing import Any
 import numpy as np
 
 from sssfit.arrays import FloatArray, plain
-from sssfit.compare._all_light import radius_of
-from sssfit.compare._budget_causes import STORAGES, Cause, Switches, causes_of, everything
-from sssfit.compare._budget_profiles import MODELS, make_sources, picture_reach_mm
+from sssfit.compare._budget_causes import (
+    MODELS,
+    STORAGES,
+    Cause,
+    Switches,
+    causes_of,
+    everything,
+    make_sources,
+    picture_reach_mm,
+)
 from sssfit.compare.candidates import Candidate
-from sssfit.compare.judged import judged_scene
+from sssfit.compare.judged import check_one_pitch, judged_scene
 from sssfit.errors import RenderError, SimulationError
 from sssfit.grid import make_grid
 from sssfit.kernel import SeparableKernel
@@ -31,6 +38,7 @@ from sssfit.measure.score import COLOUR_FIGURES, ImageScore
 from sssfit.scene.patterns import DISK_RADIUS_MM
 from sssfit.scene.record import Scene
 from sssfit.simulate import Progress
+from sssfit.simulate.truth import radius_of
 
 __all__ = ["MODELS", "STORAGES", "Budget", "Cause", "error_budget", "error_budgets"]
 
@@ -283,12 +291,7 @@ def _check(scenes: Sequence[Scene], model: str | None) -> None:
         raise SimulationError(f"model = {model!r}; expected one of {', '.join(MODELS)}, or none.")
     if not scenes:
         raise RenderError("no picture: an error budget is of at least one.")
-    pitches = sorted({each.mm_per_pixel for each in scenes})
-    if len(pitches) > 1:
-        raise RenderError(
-            f"pictures have pixels of {pitches[0]:g} to {pitches[-1]:g} mm; expected one size: a "
-            "kernel belongs to its pixels."
-        )
+    check_one_pitch(scenes)
     for scene in scenes:
         if np.ptp(scene.irradiance, axis=(0, 1)).max() == 0.0:
             raise RenderError(

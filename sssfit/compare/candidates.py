@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from sssfit.errors import SssfitWarning
-from sssfit.fit import METHODS, FitResult
+from sssfit.fit import FitResult, fit_result
 from sssfit.fit.guided import MOST_PIXELS
 from sssfit.profile import Profile
 
@@ -37,9 +37,8 @@ class Candidate:
         """Fit a profile on pixels; what the fit would warn of, a comparison shows in figures."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SssfitWarning)
-            return METHODS[self.method].fit(
-                profile, mm_per_pixel=mm_per_pixel, support_mm=support_mm, **self.settings
-            )
+            pixels = {"mm_per_pixel": mm_per_pixel, "support_mm": support_mm}
+            return fit_result(profile, self.method, **pixels, **self.settings)
 
 
 def candidates(pixels: int, *, most_terms: int = MOST_TERMS) -> tuple[Candidate, ...]:

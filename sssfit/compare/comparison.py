@@ -217,11 +217,21 @@ class Comparison:
         found = [row for row in self.rows_of(picture) if (error, cost) in row.fronts]
         return sorted(found, key=lambda row: row.cost(cost))
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return the figures that ``sssfit compare --json`` prints, a row for each kernel."""
+    def to_dict(self, error: str | None = None, cost: str | None = None) -> dict[str, Any]:
+        """Return the figures that ``sssfit compare --json`` prints, a row for each kernel.
+
+        With an error and a cost also the `verdicts` by them.
+        """
         material = self.profile.material_name
+        asked: dict[str, Any] = {}
+        last: dict[str, Any] = {}
+        if error is not None and cost is not None:
+            found = [asdict(each) for each in verdicts(self, error, cost)]
+            asked = {"error": error, "cost": cost}
+            last = {"verdict": found}
         return plain(
             {
+                **asked,
                 "material": material,
                 "profile_method": self.profile.meta.get("method"),
                 "channels": self.profile.channels,
@@ -232,6 +242,7 @@ class Comparison:
                 "missing_share": self.missing_share,
                 "left_out": [{"label": label, "reason": why} for label, why in self.left_out],
                 "rows": [{"material": material, **row.to_dict()} for row in self.rows],
+                **last,
             }
         )
 

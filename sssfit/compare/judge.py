@@ -1,22 +1,26 @@
 """A kernel on a picture, compared with the truth: what it shows, loses and costs."""
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from sssfit.arrays import FloatArray, plain
 from sssfit.errors import RenderError
+from sssfit.formats.pictures import image_format, save_image
 from sssfit.kernel import SeparableKernel
 from sssfit.measure.asymmetry import radial_asymmetry
 from sssfit.measure.cost import Cost, cost_of, seconds_per_megapixel
-from sssfit.measure.score import SCORE_FIGURES, ImageScore, measure
+from sssfit.measure.difference import DifferenceMap, difference_map
+from sssfit.measure.score import SCORE_FIGURES, ImageScore, auto_exposure, measure
 from sssfit.profile import Profile, full_kernel
 from sssfit.render.reference import render_reference
 from sssfit.render.screen import render_screen
 from sssfit.render.separable import render_separable
+from sssfit.render.transmittance import transmitted, with_transmitted
 from sssfit.scene.record import Scene
 
 _FROM_PIXELS = 4  # skin1's round kernel has .06 from the first circle on, .003 from the fourth on
@@ -30,6 +34,9 @@ class Judgement:
 
     Parameters
     ----------
+    scene : Scene
+        What was lit; with the light that came through it, where that was asked for.
+    kernel : SeparableKernel
     picture : array (H, W, C)
         Radiant exitance by the kernel; black outside the scene's mask, where it has one: a flat
         kernel carries light past an outline.
@@ -43,26 +50,103 @@ class Judgement:
         `radial_asymmetry` of the kernel, and of the profile's on the same pixels: round kernels
         whose light lies within a few pixels have much of it, since pixels are square. NaN where
         kernel or profile do not say.
+    transmitted_maximum : array (C,), optional
+        The most that comes through the object, where that was asked for.
+    difference : DifferenceMap, optional
+        Of picture and truth, by `with_difference`.
     """
 
+    scene: Scene
+    kernel: SeparableKernel
     picture: FloatArray
     truth: FloatArray | None
     score: ImageScore | None
     cost: Cost
     asymmetry: FloatArray
     true_asymmetry: FloatArray
+    transmitted_maximum: FloatArray | None = None
+    difference: DifferenceMap | None = None
+
+    def with_difference(self, kind: str | None = None, gain: float = 1.0) -> "Judgement":
+        """Add the difference from the truth, as `difference_map` draws it."""
+        if self.truth is None:
+            raise RenderError("there is no truth to differ from; give the kernel's profile.")
+        drawn = difference_map(self.picture, self.truth, kind=kind, gain=gain)
+        return replace(self, difference=drawn)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return cost and score as ``sssfit render --json`` prints them; None: not measured."""
+        """Return the figures that ``sssfit render --json`` prints; None: not measured."""
+        scene, kernel = self.scene, self.kernel
         score = dict.fromkeys(SCORE_FIGURES) if self.score is None else self.score.to_dict()
+        keys = ("gain", "map", "of", "end")
+        lost = self.difference.to_dict() if self.difference else dict.fromkeys(keys)
         return plain(
             {
+                "material": kernel.meta.get("material"),
+                "method": kernel.method,
+                "rank": kernel.rank,
+                "channels": list(kernel.channels),
+                "irradiance": scene.name,
+                "width": scene.width,
+                "height": scene.height,
+                "mm_per_pixel": scene.mm_per_pixel,
                 **asdict(self.cost),
+                "transmitted_maximum": self.transmitted_maximum,
                 "radial_asymmetry": self.asymmetry,
                 "true_radial_asymmetry": self.true_asymmetry,
                 **score,
+                **{f"difference_{key}": each for key, each in lost.items()},
             }
         )
+
+    def save(
+        self, targets: Mapping[str, Path | BinaryIO], *, exposure: float | None = None
+    ) -> list[str]:
+        """Write the pictures; return what is to be known of the files, in sentences.
+
+        Parameters
+        ----------
+        targets : mapping of str to path or stream
+            Of "picture", "truth" and "difference"; a stream is given EXR.
+        exposure : float, optional
+            Of PNG files; by default the one that Delta E was measured at.
+
+        Raises
+        ------
+        RenderError, FileError
+            There is no truth or difference, or as `save_image`.
+        """
+        pixels = {"picture": self.picture, "truth": self.truth}
+        pixels["difference"] = None if self.difference is None else self.difference.pixels
+        own = self.score.exposure if self.score else auto_exposure(self.picture)
+        alpha, notes = self._alpha()
+        for what, target in targets.items():
+            image = pixels[what]
+            if image is None:
+                raise RenderError(f"there is no {what} to write; give the kernel's profile.")
+            is_light = what != "difference"
+            is_map = not is_light and self.difference and self.difference.kind
+            settings: dict[str, Any] = {
+                "channels": ("R", "G", "B") if is_map else self.kernel.channels,
+                "mm_per_pixel": self.scene.mm_per_pixel,
+                **(alpha if is_light else {}),
+            }
+            if not isinstance(target, Path):
+                settings["format"] = "exr"
+            elif image_format(target) == "png" and not is_map:  # false colours are no light
+                settings["exposure"] = exposure or own
+            notes += [f"{target}: {note}" for note in save_image(target, image, **settings)]
+        return notes
+
+    def _alpha(self) -> tuple[dict[str, Any], list[str]]:
+        """Return what `save_image` takes of the scene's alpha, where a file can hold it."""
+        if self.scene.alpha is None:
+            return {}, []
+        channels = self.kernel.channels
+        if len(channels) not in (1, 3) or "A" in channels:
+            return {}, [f"alpha left out beside the channels {', '.join(channels)}"]
+        multiplied = self.scene.alpha_is_multiplied
+        return {"alpha": self.scene.alpha, "alpha_is_multiplied": multiplied}, []
 
 
 def judge(
@@ -71,6 +155,7 @@ def judge(
     profile: Profile | None = None,
     *,
     truth: FloatArray | None = None,
+    transmit: bool = False,
     border: str = "mirror",
     exposure: float | None = None,
     structure: bool = False,
@@ -88,6 +173,8 @@ def judge(
         What the truth is made from; without it nothing is measured but the cost.
     truth : array (H, W, C), optional
         Rendered already, as `render_reference` does it with this border; no profile is needed then.
+    transmit : bool
+        Add the light that the kernel lets through the scene's objects, by `with_transmitted`.
     border, threads
         As `render_separable`.
     exposure, structure
@@ -98,6 +185,9 @@ def judge(
     RenderError
         The kernel does not fit the scene or the profile, or as `measure`.
     """
+    through = _most_through(scene, kernel) if transmit else None
+    if transmit:
+        scene = with_transmitted(scene, kernel)
     picture, seconds = timed(
         lambda shown: np.asarray(
             render_separable(shown, kernel, border=border, threads=threads), dtype=np.float64
@@ -112,13 +202,22 @@ def judge(
         score = measure(picture, truth, exposure=exposure, mask=scene.mask, structure=structure)
         truth = _within(scene, truth)
     return Judgement(
+        scene,
+        kernel,
         _within(scene, picture),
         truth,
         score,
         cost_of(kernel, seconds),
         asymmetry_of(kernel),
         _true_asymmetry(kernel, profile),
+        through,
     )
+
+
+def _most_through(scene: Scene, kernel: SeparableKernel) -> FloatArray | None:
+    """Return the most light that arrives through the object (C,)."""
+    arrives = transmitted(scene, kernel)
+    return None if arrives is None else arrives.max(axis=(0, 1))
 
 
 def _within(scene: Scene, picture: FloatArray) -> FloatArray:
@@ -178,17 +277,21 @@ def judge_in_screen_space(
     scene: Scene,
     kernel: SeparableKernel,
     *,
+    transmit: bool = False,
     follow: str = "gaussian",
     border: str = "mirror",
     threads: int | None = None,
 ) -> Judgement:
     """Render a scene as a shader does; in perspective there is no truth to compare it with.
 
-    Parameters and errors are those of `render_screen`.
+    Parameters and errors are those of `render_screen`, which adds the light through a scene that
+    has any; ``transmit`` says how much that is.
     """
+    through = _most_through(scene, kernel) if transmit else None
     picture, seconds = timed(
         lambda shown: render_screen(shown, kernel, follow=follow, border=border, threads=threads),
         scene,
     )
     cost, asymmetry = cost_of(kernel, seconds), asymmetry_of(kernel)
-    return Judgement(picture, None, None, cost, asymmetry, _true_asymmetry(kernel, None))
+    unknown = _true_asymmetry(kernel, None)
+    return Judgement(scene, kernel, picture, None, None, cost, asymmetry, unknown, through)

@@ -6,15 +6,64 @@ smaller its mean. 512 x 512 pixels of .3 mm gave a fourth of the Delta E of 200 
 
 import dataclasses
 import math
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import BoolArray
+from sssfit.arrays import BoolArray, FloatArray
+from sssfit.errors import RenderError
 from sssfit.fit import support_of
+from sssfit.measure.score import auto_exposure
 from sssfit.profile import Profile
+from sssfit.render.reference import render_reference
 from sssfit.scene.patterns import DISK_RADIUS_MM
 from sssfit.scene.record import Scene
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class Reference:
+    """A picture by a profile's whole 2D kernel, with which those by others are compared.
+
+    Parameters
+    ----------
+    scene : Scene
+        What is lit, with a mask of the pixels that count.
+    border : str
+        How it goes on past its rim.
+    truth : array (H, W, C)
+    exposure : float
+        `auto_exposure` of the truth.
+    """
+
+    scene: Scene
+    border: str
+    truth: FloatArray
+    exposure: float
+
+
+def references(
+    scenes: Sequence[Scene], profile: Profile, *, threads: int | None = None
+) -> list[Reference]:
+    """Render scenes by the profile itself, each with the pixels that count of it."""
+    found = []
+    for each in scenes:
+        scene = judged_scene(each, profile)
+        border = border_of(scene)
+        truth = render_reference(scene, profile, border=border, threads=threads)
+        found.append(Reference(scene, border, truth, auto_exposure(truth, scene.mask)))
+    return found
+
+
+def check_one_pitch(scenes: Sequence[Scene]) -> None:
+    """Refuse pictures of several pixel sizes; those of files are equal up to rounding."""
+    first = scenes[0]
+    for each in scenes:
+        if abs(each.mm_per_pixel - first.mm_per_pixel) > 1e-6 * first.mm_per_pixel:
+            raise RenderError(
+                f"{each.name} has {each.mm_per_pixel:.7g} mm per pixel and {first.name} "
+                f"{first.mm_per_pixel:.7g}; expected the same: a kernel belongs to its pixels."
+            )
 
 
 def judged_scene(scene: Scene, profile: Profile) -> Scene:

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit.arrays import FloatArray, plain
-from sssfit.errors import SimulationError
+from sssfit.errors import ProfileError, SimulationError
 from sssfit.material import Material
 from sssfit.profile import Profile
 from sssfit.profile.bins import merged
@@ -184,6 +184,24 @@ def compare_models(
         edges_mm=tuple(walk.r_edges_mm[each] for each in cuts),
         curves=tuple(_curve(each, exact, cuts) for each in profiles),
     )
+
+
+def material_of_walk(profile: Profile) -> Material:
+    """Return the material that a profile is a photon walk of.
+
+    Raises
+    ------
+    ProfileError
+        It is of another method, or does not say its material.
+    """
+    material = profile.material
+    is_walk = profile.meta.get("method") == "montecarlo" and profile.photons is not None
+    if material is None or not is_walk or profile.channels != material.channels:
+        raise ProfileError(
+            f"the profile of {profile.label} is not a photon walk of a known material; name a "
+            "material, or the profile of its walk."
+        )
+    return material
 
 
 def _diffusion(

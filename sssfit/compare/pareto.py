@@ -15,15 +15,14 @@ from sssfit.compare.candidates import Candidate
 from sssfit.compare.candidates import candidates as every_candidate
 from sssfit.compare.comparison import COSTS, ERRORS, Comparison, KernelRow, Picture, pareto_front
 from sssfit.compare.judge import Judgement, judge
-from sssfit.compare.judged import border_of, judged_scene
+from sssfit.compare.judged import Reference, check_one_pitch, references
 from sssfit.errors import FitError, RenderError
 from sssfit.fit import FitResult, make_target
 from sssfit.measure.delta_e import selected_pixels, selection
-from sssfit.measure.score import COLOUR_FIGURES, auto_exposure
+from sssfit.measure.score import COLOUR_FIGURES
 from sssfit.process import thread_count
 from sssfit.profile import Profile
 from sssfit.render._checks import check_channels
-from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
 from sssfit.scene.record import Scene
 
@@ -38,7 +37,6 @@ def compare_kernels(
     profile: Profile,
     scenes: Sequence[Scene],
     *,
-    mm_per_pixel: float,
     support_mm: float | None = None,
     candidates: Sequence[Candidate] | None = None,
     threads: int | None = None,
@@ -51,8 +49,9 @@ def compare_kernels(
     profile : Profile
         What is fitted, and what the true pictures are made from.
     scenes : sequence of Scene
-        On pixels of ``mm_per_pixel``, of different names; what counts of them says `judged_scene`.
-    mm_per_pixel, support_mm : float [mm]
+        Of different names and of one pixel size, which the kernels have; what counts of them says
+        `judged_scene`.
+    support_mm : float, optional [mm]
         As `make_target`.
     candidates : sequence of Candidate, optional
         By default all that ``sssfit.compare.candidates`` knows for these pixels.
@@ -73,34 +72,22 @@ def compare_kernels(
     RenderError
         As `check_scenes`, or as `judge`.
     """
-    check_scenes(scenes, mm_per_pixel, profile.n_channels)
-    target = make_target(profile, mm_per_pixel, support_mm)
+    check_scenes(scenes, profile.n_channels)
+    target = make_target(profile, scenes[0].mm_per_pixel, support_mm)
     pixels = 2 * target.half_pixels + 1
     wanted = every_candidate(pixels) if candidates is None else tuple(candidates)
-    judged_scenes = [judged_scene(scene, profile) for scene in scenes]
-    borders = [border_of(scene) for scene in judged_scenes]
-    truths = [
-        render_reference(scene, profile, border=border, threads=threads)
-        for scene, border in zip(judged_scenes, borders, strict=True)
-    ]
-    exposures = [auto_exposure(t, s.mask) for t, s in zip(truths, judged_scenes, strict=True)]
+    true = references(scenes, profile, threads=threads)
     judged: list[_Judged] = []
     left_out: list[tuple[str, str]] = []
     for done, candidate in enumerate(wanted):
         if progress is not None:
             progress(done, len(wanted), candidate.label)
         try:
-            fit = candidate.fit(profile, mm_per_pixel, support_mm)
+            fit = candidate.fit(profile, target.mm_per_pixel, support_mm)
         except FitError as error:
             left_out.append((candidate.label, str(error)))
             continue
-        scores = [
-            judge(scene, fit.kernel, truth=truth, border=border, exposure=exposure, threads=threads)
-            for scene, truth, border, exposure in zip(
-                judged_scenes, truths, borders, exposures, strict=True
-            )
-        ]
-        judged.append((candidate, fit, scores))
+        judged.append((candidate, fit, [_judged(each, fit, threads) for each in true]))
     if not judged:
         reason = left_out[0][1] if left_out else "there are none."
         raise FitError(f"{target.name}: no kernel of {len(wanted)} could be fitted: {reason}")
@@ -114,43 +101,51 @@ def compare_kernels(
     ]
     return Comparison(
         profile=profile,
-        mm_per_pixel=mm_per_pixel,
+        mm_per_pixel=target.mm_per_pixel,
         pixels=pixels,
         threads=thread_count(threads),
-        pictures=tuple(map(_picture, scenes, exposures)),
+        pictures=tuple(
+            Picture(scene.name, scene.width, scene.height, each.exposure)
+            for scene, each in zip(scenes, true, strict=True)
+        ),
         rows=_with_fronts(rows),
         left_out=tuple(left_out),
     )
 
 
-def check_scenes(scenes: Sequence[Scene], mm_per_pixel: float, channels: int) -> None:
+def _judged(true: Reference, fit: FitResult, threads: int | None) -> Judgement:
+    """Compare a kernel's picture with the true one."""
+    return judge(
+        true.scene,
+        fit.kernel,
+        truth=true.truth,
+        border=true.border,
+        exposure=true.exposure,
+        threads=threads,
+    )
+
+
+def check_scenes(scenes: Sequence[Scene], channels: int) -> None:
     """Refuse pictures that say nothing, before anything is fitted.
 
     Raises
     ------
     RenderError
-        No picture, two of one name, another pixel size or other channels, or one colour all over.
+        No picture, two of one name, of several pixel sizes or other channels, or one colour all
+        over.
     """
     names = [scene.name for scene in scenes]
     if not scenes or len(set(names)) < len(names):
         raise RenderError(f"pictures {', '.join(names) or '-'}; expected one or more, each once.")
+    check_one_pitch(scenes)
     for scene in scenes:
         check_channels(scene.channels, channels)
-        if abs(scene.mm_per_pixel - mm_per_pixel) > 1e-6 * mm_per_pixel:
-            raise RenderError(
-                f"{scene.name} has {scene.mm_per_pixel:.7g} mm per pixel and the kernels "
-                f"{mm_per_pixel:.7g}; expected the same."
-            )
         lit = selected_pixels(scene.irradiance, selection(scene.mask, scene.irradiance))
         if not np.ptp(lit, axis=0).any():
             raise RenderError(
                 f"{scene.name} is of one colour: blurred it is the same, and no kernel can be told "
                 "from another; give a picture with edges in it."
             )
-
-
-def _picture(scene: Scene, exposure: float) -> Picture:
-    return Picture(scene.name, scene.width, scene.height, exposure)
 
 
 def _timed_in_turn(

@@ -13,17 +13,15 @@ import numpy as np
 from sssfit.arrays import FloatArray, plain
 from sssfit.compare._panels import Panel, check_colours, make_panel
 from sssfit.compare.candidates import MOST_TERMS, Candidate
-from sssfit.compare.judged import border_of, judged_scene
+from sssfit.compare.judged import references
 from sssfit.compare.pictures import picture_error
 from sssfit.fit import Pitch, pitch_of, support_of
 from sssfit.kernel import SeparableKernel
 from sssfit.measure.cost import cost_of
-from sssfit.measure.score import COLOUR_FIGURES, auto_exposure
+from sssfit.measure.score import COLOUR_FIGURES
 from sssfit.profile import Profile
-from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
 from sssfit.scene.made import make_scene
-from sssfit.scene.record import Scene
 
 SCENES = ("disk", "edge", "head")
 PIXELS = 200  # 60 mm at that pitch: between the eyes and the mouth
@@ -222,29 +220,24 @@ class _PanelRenderer:
             for name in names
         ]
         self._outlines = [scene.mask for scene in asked]
-        self._scenes: list[Scene] = [judged_scene(scene, profile) for scene in asked]
-        self._parts = [(_middle(s.height, pixels), _middle(s.width, pixels)) for s in self._scenes]
-        self.truths = [
-            render_reference(scene, profile, border=border_of(scene), threads=threads)
-            for scene in self._scenes
-        ]
-        self.exposures = tuple(
-            auto_exposure(truth, scene.mask)
-            for truth, scene in zip(self.truths, self._scenes, strict=True)
-        )
+        self._references = references(asked, profile, threads=threads)
+        scenes = [each.scene for each in self._references]
+        self._parts = [(_middle(s.height, pixels), _middle(s.width, pixels)) for s in scenes]
+        self.truths = [each.truth for each in self._references]
+        self.exposures = tuple(each.exposure for each in self._references)
 
     def inputs(self) -> list[FloatArray]:
         """Return what a surface without scattering, of the same albedo, would show."""
-        return [scene.irradiance * self._albedo for scene in self._scenes]
+        return [each.scene.irradiance * self._albedo for each in self._references]
 
     def rendered(self, kernel: SeparableKernel) -> list[FloatArray]:
         """Return the pictures by a kernel."""
         return [
             np.asarray(
-                render_separable(scene, kernel, border=border_of(scene), threads=self._threads),
+                render_separable(each.scene, kernel, border=each.border, threads=self._threads),
                 dtype=np.float64,
             )
-            for scene in self._scenes
+            for each in self._references
         ]
 
     def row(
@@ -254,16 +247,14 @@ class _PanelRenderer:
         panels = [
             make_panel(
                 picture,
-                truth,
-                exposure=exposure,
+                each.truth,
+                exposure=each.exposure,
                 mask=outline,
-                counts=scene.mask,
+                counts=each.scene.mask,
                 shown_part=part,
             )
-            for picture, truth, exposure, outline, scene, part in zip(
-                *(pictures, self.truths, self.exposures, self._outlines),
-                *(self._scenes, self._parts),
-                strict=True,
+            for picture, each, outline, part in zip(
+                pictures, self._references, self._outlines, self._parts, strict=True
             )
         ]
         return SheetRow(label, passes, tuple(panels))

@@ -1,16 +1,17 @@
-"""Tables of a comparison of kernels: its rows as Markdown, CSV or JSON files, and in words."""
+"""Comparisons in words and tables: rows as Markdown, CSV or JSON files, budgets, sheets."""
 
 import csv
 import io
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from sssfit.compare.comparison import Comparison, KernelRow, Picture, Verdict, verdicts
+from sssfit.errors import FileError
 from sssfit.files import has_mark
-from sssfit.messages import number
+from sssfit.messages import filled, number, table
 
 FORMATS = (".md", ".csv", ".json")
 HEADS = (
@@ -26,6 +27,42 @@ _MARKS = {
     ".csv": f"# {_FORMAT}\n",
     ".json": f'{{"format": "{_FORMAT}"',
 }
+
+
+def check_table_name(path: Path) -> None:
+    """Refuse a name whose ending is of no table.
+
+    Raises
+    ------
+    FileError
+    """
+    if path.suffix.lower() not in FORMATS:
+        raise FileError(f"{path}: tables are Markdown, CSV or JSON; end it in .md, .csv or .json.")
+
+
+def kernels_text(comparison: Comparison, error: str, cost: str) -> str:
+    """Write a table for each picture, sorted by cost and error, the front marked with a star."""
+    parts = [setting_of(comparison)]
+    for picture in comparison.pictures:
+        rows = sorted_rows(comparison, picture, error, cost)
+        cells = [cells_of(row, "* " if (error, cost) in row.fronts else "  ") for row in rows]
+        parts.append(f"{picture_line(picture)}\n{table(['  kernel', *HEADS[1:]], cells)}")
+    parts.append(f"* {front_words(error, cost)}")
+    parts += left_out_lines(comparison)
+    parts.append("\n".join(verdict_lines(comparison, error, cost)))
+    return "\n\n".join(parts)
+
+
+def fronts_text(done: Sequence[Comparison], error: str, cost: str) -> str:
+    """Write the kernels that no other beats, a line a material and picture."""
+    cells = []
+    for comparison in done:
+        name = comparison.profile.material_name or "profile"
+        for picture in comparison.pictures:
+            front = comparison.front(picture.name, error, cost)
+            kernels = ", ".join(f"{row.label} {row.error(error):.2g}" for row in front)
+            cells.append([name, picture.name, kernels])
+    return table(["material", "picture", f"front of {error} by {cost}, cheapest first"], cells)
 
 
 def left_out_lines(comparison: Comparison) -> list[str]:
@@ -171,3 +208,58 @@ def picture_line(picture: Picture) -> str:
     """Name a picture with its size and exposure."""
     size = f"{picture.width} x {picture.height} pixels"
     return f"{picture.name}, {size}, exposure {picture.exposure:.4g}"
+
+
+_CAUSES = ("", "Delta E mean", "p95", "p99", "relative L2", "largest drift", "of the whole")
+
+
+def budget_text(figures: Mapping[str, Any]) -> str:
+    """Write the budget of a picture, and what to do about its two largest causes.
+
+    What is not in the whole comes last, in brackets: it has no share in it.
+    """
+    *causes, interaction, whole = figures["rows"]
+    inside = [each for each in causes if each["in_whole"]]
+    others = [each for each in causes if not each["in_whole"]]
+    simulated = figures["model"] or f"{figures['photons']:,} photons"
+    head = filled(
+        "{material} on {picture}, {width} x {height} pixels of {mm_per_pixel:.4g} mm: {simulated} "
+        "to {radius_mm:.4g} mm, {method}, {rank} terms",
+        {**figures, **whole, "simulated": simulated},
+    )
+    rows = [_cause(each) for each in (*inside, interaction, whole, *others)]
+    first, second = inside[:2]
+    advice = (
+        f"First: {first['cause']} ({first['hint']}). Then: {second['cause']} ({second['hint']})."
+    )
+    return "\n".join([head, table(_CAUSES, rows), advice])
+
+
+def _cause(row: Mapping[str, Any]) -> list[str]:
+    """Write the figures of one cause."""
+    name = row["cause"] if row["in_whole"] else f"({row['cause']})"
+    if row["relative_l2"] is None:
+        return [name, row["hint"], "", "", "", "", ""]
+    return [
+        name,
+        number(row["delta_e_2000_mean"], ".4f"),
+        number(row["delta_e_2000_p95"], ".3f"),
+        number(row["delta_e_2000_p99"], ".3f"),
+        f"{100.0 * row['relative_l2']:.4f} %",
+        number(max(row["energy_drift"], key=abs), "+.3f%"),
+        number(row["share_of_whole"], "+.1f%|nan %") if row["in_whole"] else "",
+    ]
+
+
+def sheet_text(figures: Mapping[str, Any]) -> str:
+    """Write mean Delta E of every kernel on every picture."""
+    head = "{material}: mean Delta E 2000 on {pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm"
+    rows = [
+        [
+            each["label"],
+            str(each["passes"] or "-"),
+            *(f"{value:.3g}" for value in each["delta_e_2000_mean"]),
+        ]
+        for each in figures["rows"]
+    ]
+    return f"{filled(head, figures)}\n{table(['kernel', 'passes', *figures['scenes']], rows)}"

@@ -42,6 +42,7 @@ __all__ = [
     "fit_gaussians",
     "fit_guided",
     "fit_preintegrated",
+    "fit_result",
     "fit_svd",
     "make_target",
     "pitch_of",
@@ -60,8 +61,8 @@ class FitMethod:
 METHODS = {name: FitMethod(each.load(), each.summary) for name, each in FITS.items()}
 
 
-def fit(profile: Profile | str | Path, method: str = "svd", **settings: Any) -> SeparableKernel:
-    """Fit a separable kernel to a profile.
+def fit_result(profile: Profile | str | Path, method: str = "svd", **settings: Any) -> FitResult:
+    """Fit a separable kernel to a profile, and say how well.
 
     Parameters
     ----------
@@ -74,9 +75,7 @@ def fit(profile: Profile | str | Path, method: str = "svd", **settings: Any) -> 
 
     Returns
     -------
-    SeparableKernel
-        The kernel. Call the method's ``fit_x`` instead for its `FitResult` with stop reasons and
-        seconds.
+    FitResult
 
     Raises
     ------
@@ -91,7 +90,19 @@ def fit(profile: Profile | str | Path, method: str = "svd", **settings: Any) -> 
         profile = Profile.load(profile)
     if not isinstance(profile, Profile):
         raise FitError(f"profile = {shown(profile)}; expected a Profile, or the path of its file.")
-    return METHODS[method].fit(profile, **settings).kernel
+    return METHODS[method].fit(profile, **settings)
+
+
+def fit(profile: Profile | str | Path, method: str = "svd", **settings: Any) -> SeparableKernel:
+    """Fit a separable kernel to a profile.
+
+    Parameters and errors are those of `fit_result`, which also has stop reasons and seconds.
+
+    Returns
+    -------
+    SeparableKernel
+    """
+    return fit_result(profile, method, **settings).kernel
 
 
 class _CallableRoom(ModuleType):

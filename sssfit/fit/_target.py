@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import FitError, SssfitWarning
-from sssfit.messages import printable, shown
+from sssfit.messages import shown
 from sssfit.profile import Profile
 
 MM_PER_PIXEL = 0.3  # a head 0.6 m away on 1080 rows; skin1's whole kernel is 143 pixels
@@ -38,7 +38,7 @@ class Target:
     @property
     def name(self) -> str:
         """The name of the profile in messages and kernels."""
-        return name_of(self.profile)
+        return self.profile.label
 
     @property
     def total(self) -> FloatArray:
@@ -169,14 +169,9 @@ def _check_light(target: Target) -> None:
         )
 
 
-def name_of(profile: Profile) -> str:
-    """Return the name of the profile in messages and kernels: its material, or its source file."""
-    return profile.material_name or printable(str(profile.meta.get("source") or "unknown material"))
-
-
 def _check_profile(profile: Profile) -> None:
     """Raise FitError for data that no fit can use."""
-    energy, name = profile.annulus_energy, name_of(profile)
+    energy, name = profile.annulus_energy, profile.label
     if not np.isfinite(energy).all():
         raise FitError(f"{name}: the profile holds NaN or infinite energies; make it again.")
     if (energy < 0.0).any():

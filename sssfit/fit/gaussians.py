@@ -26,7 +26,7 @@ from threadpoolctl import threadpool_limits
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._gaussians_search import GaussianSum, is_steep, make_annuli, rings, search
 from sssfit.fit._result import ChannelFit, FitResult, factor_to, fit_channels, restores
-from sssfit.fit._target import Pitch, Target, make_target, name_of
+from sssfit.fit._target import Pitch, Target, make_target
 from sssfit.profile import Profile
 from sssfit.shapes import gaussian_line_integral
 
@@ -153,7 +153,7 @@ def _check_annuli(profile: Profile, terms: int) -> None:
     """Raise FitError if there are more unknowns than data."""
     if profile.n_annuli < 2 * terms:
         raise FitError(
-            f"{name_of(profile)}: a profile of {profile.n_annuli} annuli cannot fix the width and "
+            f"{profile.label}: a profile of {profile.n_annuli} annuli cannot fix the width and "
             f"the weight of each Gaussian, terms = {terms}; give a finer profile or fewer terms."
         )
 

@@ -7,6 +7,7 @@ van der Walt 2015). Both maps are readable with the common kinds of colour blind
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -31,25 +32,32 @@ _VIRIDIS = (
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DifferenceMap:
-    """Differences in false colours.
+    """Differences of two pictures, magnified or in false colours.
 
     Parameters
     ----------
-    pixels : array (H, W, 3)
-        Linear R, G, B, for `save_image` at exposure 1.
-    kind : str
-        "signed" or "absolute".
-    what : str
+    pixels : array (H, W, 3), or (H, W, C) where magnified
+        Linear R, G, B, for `save_image` at exposure 1; magnified they are light of the pictures.
+    kind : str, optional
+        "signed" or "absolute" false colours; None: magnified.
+    what : str, optional
         Description of the number that a colour shows.
-    end : float
+    end : float, optional
         The difference at the ends of the scale, in the pictures' unit: blue means -end or less in a
         signed map, red and yellow mean end or more.
+    gain : float
+        What the difference is multiplied with; of a map the scale is divided by it.
     """
 
     pixels: FloatArray
-    kind: str
-    what: str
-    end: float
+    kind: str | None
+    what: str | None
+    end: float | None
+    gain: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures that ``sssfit render --json`` has of it."""
+        return {"gain": self.gain, "map": self.kind, "of": self.what, "end": self.end}
 
 
 def magnified_difference(
@@ -61,17 +69,17 @@ def magnified_difference(
 
 
 def difference_map(
-    picture: npt.ArrayLike, truth: npt.ArrayLike, *, kind: str = "signed", gain: float = 1.0
+    picture: npt.ArrayLike, truth: npt.ArrayLike, *, kind: str | None = "signed", gain: float = 1.0
 ) -> DifferenceMap:
-    """Draw picture - truth in false colours.
+    """Draw picture - truth in false colours, or magnify it.
 
     Parameters
     ----------
     picture, truth : array (H, W, C)
         Linear light.
-    kind : str
+    kind : str, optional
         "signed" shows the luminance for three channels, else the mean of the channels; "absolute"
-        shows the largest of the channels.
+        shows the largest of the channels. None: `magnified_difference`.
     gain : float
         The scale ends at the largest difference over the gain, so at 1 no pixel is beyond it.
 
@@ -80,13 +88,16 @@ def difference_map(
     RenderError
         The pictures differ in shape, the kind is unknown, or the gain is not above 0.
     """
+    if kind is None:
+        magnified = magnified_difference(picture, truth, gain=gain)
+        return DifferenceMap(magnified, None, None, None, gain)
     if kind not in MAPS:
         raise RenderError(f"kind = {kind!r}; expected {' or '.join(MAPS)}.")
     values, what = _values(_difference(picture, truth), kind)
     end = float(np.abs(values).max(initial=0.0)) / _gain(gain)
     at = values / end if end > 0.0 else values  # no difference: the colour of 0
     colours = _coloured(0.5 + 0.5 * at, _RED_BLUE) if kind == "signed" else _coloured(at, _VIRIDIS)
-    return DifferenceMap(colours, kind, what, end)
+    return DifferenceMap(colours, kind, what, end, gain)
 
 
 def _difference(picture: npt.ArrayLike, truth: npt.ArrayLike) -> FloatArray:

@@ -230,6 +230,11 @@ class Profile:
         return name if is_name(name) else None
 
     @property
+    def label(self) -> str:
+        """What messages and kernels call it: its material, or the file that it came from."""
+        return self.material_name or printable(str(self.meta.get("source") or "unknown material"))
+
+    @property
     def material(self) -> Material | None:
         """The material that the profile records as its source; None if there is none."""
         record = self.meta.get("material")

@@ -1,35 +1,80 @@
 """Made pictures for judging kernels, with light given by formulas.
 
 All are grey and linear. Except for the head's silhouette they are averaged over each pixel's area
-in closed form, so edges have no staircase. `head` is lit in perspective and comes with depth and
-mask.
+in closed form, so edges have no staircase. The head is lit in perspective and comes with depth and
+mask. A picture's function is imported when it is made, so that help answers at once.
 """
 
+from __future__ import annotations
+
 import inspect
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
-from sssfit.errors import RenderError
-from sssfit.scene.head import head_scene
-from sssfit.scene.patterns import disk, edge, highlights, noise, points, separable, stripes
-from sssfit.scene.record import Scene
+from sssfit.methods import Method, Setting
 
-MADE: dict[str, Callable[..., Scene]] = {
-    "disk": disk,
-    "edge": edge,
-    "separable": separable,
-    "stripes": stripes,
-    "points": points,
-    "noise": noise,
-    "highlights": highlights,
-    "head": head_scene,
+if TYPE_CHECKING:
+    from sssfit.scene.record import Scene
+
+_ANGLE = Setting(
+    "angle", "number", "direction of the normal.", "DEGREES", words="0", keyword="angle_degrees"
+)
+_RADIUS = Setting("radius", "length", "radius of the disk or of a spot.", "MM", keyword="radius_mm")
+_PERIOD = Setting("period", "length", "length of a period.", "MM", keyword="period_mm")
+
+MADE: Mapping[str, Method] = {
+    "head": Method(
+        "sssfit.scene.head:head_scene",
+        "a lit head in perspective",
+        (
+            Setting(
+                *("distance", "length", "camera distance.", "MM"),
+                words="600",
+                keyword="distance_mm",
+            ),
+            Setting(
+                "light",
+                "number",
+                "angle of the key light to the left of the view axis; beyond 90 it is behind the "
+                "head.",
+                "DEGREES",
+                words="45; for transmit 170",
+                keyword="light_degrees",
+            ),
+            Setting(
+                "transmit",
+                "flag",
+                "add the key light that the kernel lets through ears and nose.",
+            ),
+        ),
+    ),
+    "disk": Method("sssfit.scene.patterns:disk", "a lit disk", (_RADIUS,)),
+    "edge": Method("sssfit.scene.patterns:edge", "light beside shadow", (_ANGLE,)),
+    "separable": Method("sssfit.scene.patterns:separable", "a product of two waves", (_PERIOD,)),
+    "stripes": Method("sssfit.scene.patterns:stripes", "a wave", (_ANGLE, _PERIOD)),
+    "points": Method(
+        "sssfit.scene.patterns:points",
+        "a lattice of single pixels",
+        (
+            Setting(
+                *("spacing", "length", "distance between neighbours.", "MM"), keyword="spacing_mm"
+            ),
+        ),
+    ),
+    "noise": Method("sssfit.scene.patterns:noise", "1/f noise"),
+    "highlights": Method("sssfit.scene.patterns:highlights", "spots", (_RADIUS,)),
 }
+# Those that kernels are compared on. The edge is oblique: along an axis a pre-integrated kernel is
+# exact.
+COMPARED = ("disk", "edge", "points", "head")
+EDGE_DEGREES = 30.0
 _COMMON = {"height", "width", "mm_per_pixel"}
 
 
 def options_of(name: str) -> tuple[str, ...]:
     """Return the options of a made picture, apart from its size."""
-    return tuple(key for key in inspect.signature(MADE[name]).parameters if key not in _COMMON)
+    parameters = inspect.signature(MADE[name].load()).parameters
+    return tuple(key for key in parameters if key not in _COMMON)
 
 
 def make_scene(name: str, *, height: int, width: int, mm_per_pixel: float, **options: Any) -> Scene:
@@ -56,6 +101,8 @@ def make_scene(name: str, *, height: int, width: int, mm_per_pixel: float, **opt
     RenderError
         The picture or option is unknown, or a value is invalid.
     """
+    from sssfit.errors import RenderError
+
     if name not in MADE:
         raise RenderError(f"no made picture {name!r}; expected one of {', '.join(MADE)}.")
     known = options_of(name)
@@ -63,4 +110,5 @@ def make_scene(name: str, *, height: int, width: int, mm_per_pixel: float, **opt
     for key in given:
         if key not in known:
             raise RenderError(f"{name}: no option {key!r}; expected one of {', '.join(known)}.")
-    return MADE[name](height=height, width=width, mm_per_pixel=mm_per_pixel, **given)
+    scene: Scene = MADE[name].load()(height=height, width=width, mm_per_pixel=mm_per_pixel, **given)
+    return scene

@@ -1,15 +1,33 @@
-"""The exact profile on a grid wide enough for all of the light."""
+"""The exact profile of a half space, the truth that others are compared with."""
 
 import numpy as np
 
+from sssfit.errors import SimulationError
 from sssfit.grid import MOST_ANNULI, RadialGrid
 from sssfit.material import Material
 from sssfit.profile import Profile
-from sssfit.simulate import simulate_exact
+from sssfit.simulate.exact import simulate_exact
 
 # Share of a channel's light that may lie beyond the truth's grid, where the place it falls on is
 # not known: with .01 % of the energy wrong, Delta E is under .01.
 _FAR_SHARE = 1e-4
+
+
+def true_profile(material: Material, *, threads: int | None = None) -> Profile:
+    """Return the exact profile of a half space on the paper's grid.
+
+    Raises
+    ------
+    SimulationError
+        The material is not one half space.
+    """
+    if not material.is_semi_infinite:
+        raise SimulationError(
+            f"{material.name} is not one half space, the only thing that is solved exactly: walk "
+            f"its photons with `simulate_montecarlo(material)`, and compare {material.name}"
+            ".profile.npz."
+        )
+    return simulate_exact(material, threads=threads)
 
 
 def exact_with_all_light(

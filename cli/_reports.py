@@ -1,0 +1,133 @@
+"""What verbs print for people: lines and tables by the keys of their JSON objects.
+
+`sssfit.messages.report` fills them.
+"""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from sssfit.messages import Columns, Part
+
+# fmt: off
+KERNEL_DRAWN: tuple[Part, ...] = (
+    "{method}, rank {rank}, {pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm; {against}",
+    Columns("channel", "channels", (
+        ("energy", "energy", ".6f"),
+        ("energy error", "energy_error", "+.2g%|unknown"),
+        ("Frobenius error", "relative_frobenius_error", ".3g%|unknown"),
+        ("misplaced", "misplaced", ".3g%"),
+    )),
+)
+SPECTRUM: tuple[Part, ...] = (
+    "Share of the first singular value; {pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm",
+    Columns("channel", "channels", (
+        ("first, squared", "first_squared", ".2f%"),
+        ("first, absolute", "first_absolute", ".2f%"),
+        ("terms for an error of 1 %", "rank_for_1_percent", ""),
+    )),
+)
+GUIDE: tuple[Part, ...] = (
+    "Channel {channel}; {pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm",
+    Columns("k", "fits", (
+        ("middle pixel", "centre_share", ".2f%"),
+        ("misplaced", "misplaced", ".2f%"),
+        ("Frobenius error", "relative_frobenius_error", ".2f%"),
+        ("weighted misfit", "weighted_residual", ".2f%"),
+    )),
+)
+MODELS: tuple[Part, ...] = (
+    "{material}: errors against the exact solution; {photons:,} photons on {annuli} annuli of "
+    "{dr_mm:.4g} mm",
+    Columns("method, channel", "curves", (
+        ("diffuse reflectance", "diffuse_reflectance", ".6f"),
+        ("error", "total_error", ".3f%"),
+        ("largest of F(r)", "cumulative_error", ".3f%"),
+        ("L2 of R_d", "l2_error", ".3f%"),
+    )),
+)
+
+CHOSEN: tuple[Part, ...] = (
+    "{material} at {metres:g} m, {mm_per_pixel:.4g} mm per pixel, {figure} of Delta E within "
+    "{tolerance:g}:",
+    "{sentences}",
+    "{wrote}",
+)
+
+FITTED: tuple[Part, ...] = (
+    "{material}: {method}, {rank} term{s[rank]}, {pixels} pixel{s[pixels]} of {mm_per_pixel:.4g} "
+    "mm, {seconds:.1f} s",
+    Columns("channel", "channels", (
+        ("Frobenius error", "relative_frobenius_error", ".3g%"),
+        ("energy error", "energy_error", "+.2g%"),
+        ("energy", "energy", ".6f"),
+        ("ended", "stop_reason", ""),
+    )),
+)
+
+RENDERED: tuple[Part, ...] = (
+    "{irradiance}: {width} x {height} pixels of {mm_per_pixel:.4g} mm, {how}; {kernel}",
+    "cost: {passes} passes, {taps_per_pixel} weights a pixel, {kernel_bytes:,} bytes, "
+    "{seconds_per_megapixel:.2g} s a megapixel",
+    ("transmitted_maximum", "through the object at most: {most}, face on the key light is 1"),
+    ("rmse", "against the 2D kernel of {profile}:"),
+    ("delta_e_2000_mean", "  Delta E 2000 mean {delta_e_2000_mean:.3g}, 95th percentile "
+     "{delta_e_2000_p95:.3g}, 99th {delta_e_2000_p99:.3g}, {share_above_1:.2g%} of pixels above 1, "
+     "at exposure {exposure:.4g}"),
+    ("no_colour", "  no Delta E: {no_colour} channels are no colour"),
+    ("rmse", "  relative L2 {relative_l2:.3g%|inf %}, RMSE {rmse:.3g}, largest {maximum:.3g}, PSNR "
+     "{psnr_db:.1f|inf} dB"),
+    ("ssim", "  SSIM {ssim:.4f}, FLIP {flip:.4f}"),
+    ("rmse", Columns("channel", "channels", (
+        ("energy drift", "energy_drift", "+.2g%|inf %"),
+        ("radial asymmetry", "radial_asymmetry", ".3g"),
+        ("of the true kernel", "true_radial_asymmetry", ".3g"),
+    ))),
+    ("magnified", "difference: absolute, {magnified:.4g} times"),
+    ("signed", "difference map: {difference_of}, blue -{signed:.3g}, white 0, red {signed:.3g}"),
+    ("absolute", "difference map: {difference_of}, violet 0, green to yellow {absolute:.3g}"),
+    "Wrote {wrote}",
+)
+# fmt: on
+
+
+def kernel_words(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Say what a kernel's errors are against."""
+    profile = figures["profile"]
+    return {"against": f"against {profile}" if profile else "errors as the fit recorded them"}
+
+
+def spectrum_words(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what the report of a spectrum says beyond its figures: the first terms."""
+    return {f"first_{key}": figures[f"{key}_share"][0] for key in ("squared", "absolute")}
+
+
+def guide_words(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the columns of guided fits, the pre-integrated one last."""
+    last = {
+        "centre_share": "preintegrated_centre_share",
+        "misplaced": "preintegrated_misplaced",
+        "relative_frobenius_error": "preintegrated_frobenius_error",
+        "weighted_residual": "preintegrated_weighted_residual",
+    }
+    names = [*(f"{k:g}" for k in figures["k"]), "pre-integrated"]
+    return {"fits": names, **{key: [*figures[key], figures[own]] for key, own in last.items()}}
+
+
+def models_words(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the columns of methods, a row a method and channel; the exact one has no errors."""
+    rows = [(row, c) for row in figures["rows"] for c in range(len(figures["channels"]))]
+    found = {
+        key: [None if row["method"] == "exact" else row[key][c] for row, c in rows]
+        for key in ("total_error", "cumulative_error", "l2_error")
+    }
+    found["diffuse_reflectance"] = [row["diffuse_reflectance"][c] for row, c in rows]
+    return {"curves": [f"{row['method']} {figures['channels'][c]}" for row, c in rows], **found}
+
+
+# Report of a chart by what is drawn, and what its words add to the figures.
+CHARTS: dict[str, tuple[tuple[Part, ...], Callable[[Mapping[str, Any]], dict[str, Any]]]] = {
+    "kernel": (KERNEL_DRAWN, kernel_words),
+    "spectrum": (SPECTRUM, spectrum_words),
+    "guide": (GUIDE, guide_words),
+    "models": (MODELS, models_words),
+}

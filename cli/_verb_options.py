@@ -1,0 +1,172 @@
+"""The options of verbs, a row an option: name, type, what stands for the value, help, default.
+
+Those of methods and of made pictures are made from their entries, in ``_methods``.
+"""
+
+from sssfit.methods import FITS
+from sssfit.scene.made import COMPARED, EDGE_DEGREES, MADE
+
+from ._options import (
+    Count,
+    Length,
+    LengthOr,
+    ListOf,
+    Number,
+    NumberRange,
+    WholeRange,
+    flag,
+    option,
+)
+from ._picture import Size
+
+MAPS = ("signed", "absolute")
+_FACTOR = NumberRange(min=0.0, min_open=True)
+_ANGLE = NumberRange(0.0, 180.0, min_open=True, max_open=True)
+_FILE = f"{', '.join(MADE)}, or your own EXR, HDR, TIFF, PNG, JPG or TGA"
+
+# fmt: off
+_OF_FILES = (
+    option("--layer", None, "NAME", "Your own EXR: the layer to read, such as ViewLayer.Combined.  "
+           "[default: R, G, B without a layer, or the only layer with them]"),
+    option("--mask", ["alpha"], None, "Your own file: only what its alpha covers by half or more "
+           "is the object, lit and judged.  [default: all of it]"),
+)
+
+RENDER_PICTURE = (
+    option("--irradiance", None, "NAME|FILE", f"What is lit: {_FILE} file.", next(iter(MADE))),
+    option("--size", Size(), "WxH", "Made pictures: columns and rows.  [default: 512x512; head: "
+           "the whole face, up to 1080x1080]"),
+    option("--mm-per-pixel", Length(), "MM", "Size of a pixel of your own file, unless its header "
+           "says, and of the made head with --screen.  [default: 0.3 with --screen, else the "
+           "kernel's]"),
+    *_OF_FILES,
+)
+RENDER = (
+    option("--border", ["mirror", "clamp", "zero"], None, "Continuation of the picture beyond its "
+           "border.", "mirror"),
+    flag("--screen", "Render like a shader: in perspective, by depth, within the mask; head only."),
+    option("--follow", ["gaussian", "lerp", "none"], None, "With --screen: how a depth difference "
+           "weights a sample.  [default: gaussian]"),
+    option("--profile", None, "FILE", "Reference profile.  [default: the profile here that the "
+           "kernel was fitted to]"),
+    option("--exposure", _FACTOR, "FACTOR", "Exposure for Delta E and PNG files.  [default: from "
+           "the true picture]"),
+    flag("--structure", 'Also SSIM and FLIP (needs "sssfit[metrics]").'),
+    option("-o --output", None, "FILE", "Where the picture goes, .exr, .tif or .png (16 bits, "
+           "sRGB); - for EXR on stdout.  [default: KERNEL.PICTURE.exr]"),
+    option("--truth", None, "FILE", "Write the true picture as well."),
+    option("--difference", None, "FILE", "Write the absolute difference as well."),
+    option("--gain", _FACTOR, "FACTOR", "--difference: magnify it.", 1.0),
+    option("--difference-map", MAPS, None, "--difference: in false colours. signed: luminance, "
+           "blue where the kernel is darker, red where it is brighter; absolute: the largest of "
+           "the channels, violet to yellow. The scale is printed; it ends at the largest "
+           "difference over --gain."),
+    flag("--force", "Replace an input, or a file that is not our picture."),
+)
+
+COMPARE = (
+    flag("--all every", "All materials that ship with sssfit."),
+    flag("--paper", "The eleven of them that the SSSS paper has."),
+    option("--what", ["front", "budget", "kernels", "sheet"], None, "budget: why a kernel is off; "
+           "kernels: every one by error and cost; front: those that no other beats, a line a "
+           "picture; sheet: pictures of all, drawn into --chart.  [default: budget and kernels]"),
+    option("--picture pictures", None, "NAME|FILE,...", f"What is lit: {_FILE} files. The edge is "
+           f"at {EDGE_DEGREES:g} degrees.  [default: {','.join(COMPARED)}]", multiple=True),
+    option("--mm-per-pixel", LengthOr("profile"), "MM|profile", "Size of all pixels; profile is "
+           "the width of the profile's first annulus.  [default: what your own file says, else "
+           "0.3]"),
+    option("--size", Size(), "WxH", "Made pictures: columns and rows.  [default: 512x512]"),
+    *_OF_FILES,
+    option("--chart", None, "FILE", "Draw the kernels by error and cost, or the sheet, as PNG, SVG "
+           "or PDF by the ending; - for PNG on stdout."),
+    option("--table", None, "FILE", "Write the kernels' rows, .md, .csv or .json."),
+    option("--error", ["delta-e", "l2"], None, "Of chart and front: mean Delta E 2000, or relative "
+           "L2 of linear light.", "delta-e"),
+    option("--cost", ["weights", "passes", "seconds"], None, "Of chart and front: weights applied "
+           "to a pixel, passes, or measured seconds.", "weights"),
+    option("--budget-chart", None, "FILE", "Draw the budget."),
+    option("--photons", Count(2, 10**12), "N", "Of the budget's photon walk.  [default: 1e6]"),
+    option("--method", list(FITS), None, "The kernel whose budget it is.", "svd"),
+    option("--rank", WholeRange(1, 1000), "N", "Its rank, svd.  [default: 3]"),
+    option("--terms", WholeRange(1, 10), "N", "Its Gaussians.  [default: 4]"),
+    option("--model", ["dipole", "dipole-grosjean", "burley"], None, "The budget of a kernel of "
+           "this model.  [default: of the photon walk]"),
+    option("-o --output", None, "FOLDER", "Where --all and --paper put NAME-pareto.png and "
+           "NAME-pareto.md.  [default: here]"),
+    flag("--force", "Replace an input, or files that are not our charts or tables."),
+)
+
+CHOOSE = (
+    option("--distance distance_mm", Length(), "LENGTH", "Camera distance.", "0.6m"),
+    option("--fov fov_degrees", _ANGLE, "DEGREES", "Vertical field of view.", 30.0),
+    option("--resolution", Size(), "WxH", "Columns and rows of the frame.", "1920x1080"),
+    option("--tolerance", Number(), "DELTA-E", "Largest CIE Delta E 2000 against the true 2D "
+           "kernel.", 1.0),
+    option("--tolerance-of", ["p95", "p99", "mean"], None, "The figure to compare with it: a "
+           "percentile over the picture, or the mean, which hides the pixels that are far off.",
+           "p95"),
+    option("--irradiance", None, "NAME|FILE", f"Picture to judge by: {_FILE} file. The edge is at "
+           f"{EDGE_DEGREES:g} degrees.", "head"),
+    *_OF_FILES,
+    option("-o --output", None, "FILE", "Kernel file, - for stdout; the profile goes beside it.  "
+           "[default: MATERIAL.chosen.kernel.json]"),
+    flag("--force", "Replace an input, or files that are not our kernel or profile."),
+)
+
+CHART = (
+    flag("--models", "Draw a material by every method, and the methods' errors."),
+    flag("--spectrum", "Draw the energy of the kernel's singular values."),
+    flag("--guide", "Draw the guide function beside the residual of the guided fit."),
+    option("--mm-per-pixel", LengthOr("profile"), "MM|profile", "Pixels of the kernel, with "
+           "--spectrum or --guide; profile is the width of the profile's first annulus.  "
+           "[default: 0.3]"),
+    option("--k ks", ListOf(Number()), "0..4,...", "One to four values, with --guide.  "
+           "[default: 0,1.55,4]"),
+    option("--channel", None, "NAME", "Channel to draw, with --guide or of a kernel.  [default: "
+           "the first that returns light; of a kernel up to three]"),
+    option("--profile", None, "FILE", "Profile that a kernel was fitted to.  [default: found "
+           "beside it or here, by its hash]"),
+    option("--photons", Count(2, 10**12), "N", "Photons of the walk, with --models.  "
+           "[default: 1e7]"),
+    option("-o --output", None, "FILE", "Where the chart goes, as PNG, SVG or PDF by its ending; - "
+           "for PNG on stdout.  [default: NAME.profile.png, NAME.kernel.png, NAME.material.png, "
+           "NAME.checkpoint.png, NAME.spectrum.png, NAME.guide.png, MATERIAL.models.png]"),
+    flag("--force", "Replace an input, or a file that is not our chart."),
+)
+
+FIT_PIXELS = (
+    flag("--list listing", "List the methods."),
+    option("--method", list(FITS), None, "Fit method; --list describes each."),
+    option("--mm-per-pixel", LengthOr("profile"), "MM|profile", "Size of a pixel of the kernel; "
+           "profile is the width of the profile's first annulus.  [default: 0.3]"),
+    option("--support", LengthOr("auto"), "MM|auto", "Half width of the kernel; auto is the "
+           "smallest that keeps 99.9 % of every channel.", "auto"),
+    flag("--normalize", "Scale every channel to unit energy, and store its energy as a factor."),
+)
+FIT_OUTPUT = (
+    option("-o --output", None, "FILE", "Where the kernel goes, - for stdout.  [default: "
+           "PROFILE.METHOD.kernel.json]"),
+    flag("--force", "Replace an input, or a file that is not our kernel."),
+)
+
+EXPORT = (
+    option("--format form", ["hlsl", "json", "csv"], None, "Output format. hlsl: a kernel as "
+           "shader source; json: a kernel as a document; csv: a profile as a table.",
+           required=True),
+    option("-o --output", None, "FILE", "Output file, - for stdout.  [default: NAME.FORMAT]"),
+    flag("--force", "Replace an input, or a file that sssfit did not write."),
+)
+# fmt: on
+
+_OF_CHARTS = {  # options of single charts: what of it they are for, and the charts
+    "photons": ("the walk of --models", {"models"}),
+    "mm_per_pixel": ("the kernel of --spectrum or --guide", {"spectrum", "guide"}),
+    "ks": ("the fits of --guide", {"guide"}),
+    "channel": ("the fits of --guide, or for a kernel", {"guide", "kernel"}),
+    "profile": ("a kernel", {"kernel"}),
+}
+
+
+def of_other_charts(charts: set[str]) -> dict[str, str]:
+    """Return the options that are for other charts than these, with what they are for."""
+    return {key: what for key, (what, owners) in _OF_CHARTS.items() if not owners & charts}

@@ -1,0 +1,67 @@
+"""Which profile a kernel was fitted to, among files."""
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from sssfit.errors import SssfitError
+from sssfit.kernel.record import SeparableKernel
+from sssfit.messages import printable
+from sssfit.profile import Profile
+
+
+def find_profile(
+    kernel: SeparableKernel, kernel_file: str, folders: Iterable[Path]
+) -> tuple[Profile | None, str | None, str | None]:
+    """Find the profile whose light has the fingerprint that a kernel recorded, from any program.
+
+    Parameters
+    ----------
+    kernel : SeparableKernel
+    kernel_file : str
+        What the note calls it.
+    folders : iterable of Path
+        Where to look; of several such profiles the newest is taken.
+
+    Returns
+    -------
+    profile : Profile or None
+    file : str or None
+        Its path.
+    note : str or None
+        Why there is none, in a sentence: the kernel records no profile, or it changed, or it is
+        not there.
+    """
+    files = [path for folder in folders for path in folder.glob("*.npz") if path.is_file()]
+    files.sort(key=lambda each: each.stat().st_mtime_ns, reverse=True)
+    profiles = [(path, found) for path in files if (found := _read(path)) is not None]
+    for path, profile in profiles:
+        if profile.sha256 == kernel.meta.get("profile_sha256"):
+            return profile, str(path), None
+    return None, None, _missing(kernel, printable(kernel_file), profiles)
+
+
+def _read(path: Path) -> Profile | None:
+    """Read a profile; one that cannot be read is not the one that is looked for."""
+    try:
+        return Profile.load(path)
+    except SssfitError:
+        return None
+
+
+def _missing(kernel: SeparableKernel, name: str, profiles: Sequence[tuple[Path, Profile]]) -> str:
+    """Say why there is none."""
+    end = "so nothing is measured"
+    if kernel.meta.get("profile_sha256") is None:
+        return (
+            f"{name} does not record which profile it was fitted to, {end}: fit it again, or name "
+            "the profile with `profile`."
+        )
+    made_as = (kernel.meta.get("material"), kernel.meta.get("profile_method"))
+    for path, profile in profiles:
+        if (profile.label, profile.meta.get("method")) == made_as:
+            return (
+                f"{printable(str(path))} is a profile of {made_as[0]} by the same method, but not "
+                f"the one that {name} was fitted to, or it has changed since, {end}: fit the "
+                "kernel again, or name its profile with `profile`."
+            )
+    return f"No profile here is the one that {name} was fitted to, {end}: name it with `profile`."

@@ -1,0 +1,124 @@
+"""A picture by its name or its file, as what kernels are applied to."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from sssfit.errors import RenderError
+from sssfit.formats.pictures import load_image
+from sssfit.scene.head import whole_face_mm_per_pixel
+from sssfit.scene.made import EDGE_DEGREES, MADE, make_scene, options_of
+from sssfit.scene.record import Scene
+
+_ROWS = 512  # and columns, of made pictures
+_MOST_ROWS = 1080  # of a head whose size is not given
+
+
+def load_scene(
+    name: str,
+    mm_per_pixel: float | None = None,
+    *,
+    otherwise: float | None = None,
+    size: tuple[int, int] | None = None,
+    layer: str | None = None,
+    mask: str | None = None,
+    seed: int = 1,
+    **options: Any,
+) -> tuple[Scene, tuple[str, ...]]:
+    """Make a picture of ``MADE``, or read any other from its file.
+
+    Parameters
+    ----------
+    name : str
+        Of a made picture, or of a file that `load_image` reads.
+    mm_per_pixel, otherwise : float, optional [mm]
+        Size of a pixel; ``otherwise`` is for a file whose header does not say it.
+    size : tuple of int, optional
+        Rows and columns of a made picture; by default 512 of each, and of the head as many as the
+        whole face takes, up to 1080.
+    layer : str, optional
+        Of a file; see `load_image`.
+    mask : {"alpha"}, optional
+        Of a file: what its alpha covers by half or more is the object.
+    seed : int
+        Of made pictures that are random.
+    **options
+        A made picture's own; see `make_scene`.
+
+    Returns
+    -------
+    scene : Scene
+    notes : tuple of str
+        What is to be known about it, in sentences.
+
+    Raises
+    ------
+    RenderError
+        Invalid options, or pixels of unknown size.
+    FileError
+        The file cannot be read.
+
+    Examples
+    --------
+    >>> scene, notes = load_scene("edge", 0.5, size=(8, 8), angle_degrees=30.0)
+    >>> scene.irradiance.shape
+    (8, 8, 1)
+    """
+    if name in MADE:
+        pitch = mm_per_pixel or otherwise
+        if pitch is None:
+            raise RenderError(f"{name} is made on pixels of any size; give `mm_per_pixel`.")
+        (height, width), notes = (size, ()) if size else _default_size(name, pitch)
+        if "seed" in options_of(name):
+            options["seed"] = seed
+        made = make_scene(name, height=height, width=width, mm_per_pixel=pitch, **options)
+        return made, notes
+    image = load_image(name, layer=layer)
+    pitch = mm_per_pixel or image.mm_per_pixel or otherwise
+    if pitch is None:
+        raise RenderError(f"{name} does not say how large its pixels are; give `mm_per_pixel`.")
+    scene = Scene.from_image(image, pitch, alpha_is_mask=mask == "alpha")
+    return scene, tuple(f"{name}: {note}" for note in image.notes)
+
+
+def load_scenes(
+    names: Sequence[str],
+    mm_per_pixel: float | None = None,
+    *,
+    otherwise: float | None = None,
+    size: tuple[int, int] | None = None,
+    layer: str | None = None,
+    mask: str | None = None,
+    seed: int = 1,
+) -> tuple[list[Scene], tuple[str, ...]]:
+    """Return pictures to compare kernels on, all on the same pixels; edges are at 30 degrees.
+
+    Parameters and errors are those of `load_scene`; made pictures have 512 x 512 pixels by default,
+    of ``mm_per_pixel``, else of what the first file says, else of ``otherwise``.
+    """
+    found = {
+        name: load_scene(name, mm_per_pixel, layer=layer, mask=mask)
+        for name in names
+        if name not in MADE
+    }
+    pitch = next((scene.mm_per_pixel for scene, _ in found.values()), mm_per_pixel or otherwise)
+    for name in names:
+        if name in MADE:
+            own: dict[str, Any] = {"angle_degrees": EDGE_DEGREES} if name == "edge" else {}
+            whole = size or (_ROWS, _ROWS)
+            found[name] = load_scene(name, pitch, size=whole, seed=seed, **own)
+    return [found[name][0] for name in names], tuple(n for each in found.values() for n in each[1])
+
+
+def _default_size(name: str, mm_per_pixel: float) -> tuple[tuple[int, int], tuple[str, ...]]:
+    """512 x 512; for a head as many rows as it takes, up to 1080, saying so where it is cut."""
+    if name != "head":
+        return (_ROWS, _ROWS), ()
+    # The face takes the more rows, the smaller a pixel.
+    wanted = math.ceil(whole_face_mm_per_pixel(1, 1) / mm_per_pixel)
+    rows = min(wanted, _MOST_ROWS)
+    note = (
+        f"The whole face takes {wanted} rows of {mm_per_pixel:.4g} mm; {_MOST_ROWS} show its "
+        f"middle. Give `size = {wanted}x{wanted}`, or fit the kernel to larger pixels."
+    )
+    return (rows, rows), (note,) if wanted > _MOST_ROWS else ()

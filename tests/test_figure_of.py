@@ -1,0 +1,45 @@
+"""Any record that has a chart is drawn by what it is."""
+
+import ast
+from pathlib import Path
+
+import pytest
+from matplotlib.figure import Figure
+from reference_pixels import make_profile
+
+import sssfit.chart
+from sssfit.chart import FIGURES, figure_of
+from sssfit.compare import compute_spectrum
+from sssfit.material import load_material
+from sssfit.methods import imported
+
+ROOM = Path(sssfit.chart.__file__).parent
+
+
+def test_the_registry_has_every_figure_of_the_room():
+    drawn = {
+        f"sssfit.chart.{path.stem}:{node.name}"
+        for path in ROOM.glob("*.py")
+        for node in ast.parse(path.read_text()).body
+        if isinstance(node, ast.FunctionDef)
+        and node.name.endswith("_figure")
+        and node.returns is not None
+        and ast.unparse(node.returns) == "Figure"
+    }
+    assert drawn == set(FIGURES.values())
+
+
+@pytest.mark.parametrize("kind", FIGURES)
+def test_a_figure_takes_the_record_that_it_is_registered_for(kind):
+    annotations = [str(each) for each in imported(FIGURES[kind]).__annotations__.values()]
+    assert any(kind in each for each in annotations), annotations
+
+
+def test_a_record_is_drawn_by_what_it_is():
+    profile = make_profile([0.0, 1.0, 4.0, 9.0], [[0.2, 0.1], [0.1, 0.1], [0.1, 0.05]])
+    spectrum = compute_spectrum(profile, mm_per_pixel=1.0)
+    for each in (load_material("skin1"), profile, spectrum):
+        assert isinstance(figure_of(each), Figure)
+    assert isinstance(profile.plot(), Figure)
+    with pytest.raises(TypeError, match="no chart of str; expected one of Budget, "):
+        figure_of("skin1")

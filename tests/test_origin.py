@@ -1,0 +1,58 @@
+"""The profile that a kernel was fitted to, found among files by its fingerprint."""
+
+import dataclasses
+import os
+from pathlib import Path
+
+import pytest
+from reference_pixels import make_profile
+
+from sssfit.fit import fit_svd
+from sssfit.kernel.origin import find_profile
+
+EDGES = [0.0, 1.0, 4.0, 9.0]
+MADE_OF = {"material": {"name": "wax"}, "method": "exact"}
+
+
+@pytest.fixture
+def profile():
+    made = make_profile(EDGES, [[0.2, 0.1], [0.1, 0.1], [0.1, 0.05]])
+    return dataclasses.replace(made, meta={**made.meta, **MADE_OF})
+
+
+@pytest.fixture
+def kernel(profile):
+    return fit_svd(profile, rank=1, mm_per_pixel=1.0).kernel
+
+
+def look(kernel, folder):
+    return find_profile(kernel, "k.kernel.json", [folder])
+
+
+def test_it_is_known_by_its_light_under_any_name(tmp_path, profile, kernel):
+    (tmp_path / "torn.npz").write_bytes(b"torn")
+    make_profile(EDGES, [[0.3, 0.1], [0.1, 0.1], [0.1, 0.05]]).save(tmp_path / "other.npz")
+    profile.save(tmp_path / "any name.npz")
+    found, file, note = look(kernel, tmp_path)
+    assert found is not None
+    assert found.sha256 == profile.sha256
+    assert (Path(file), note) == (tmp_path / "any name.npz", None)
+
+
+def test_of_several_the_newest_is_taken(tmp_path, profile, kernel):
+    for age, name in enumerate(("new.npz", "old.npz")):
+        profile.save(tmp_path / name)
+        os.utime(tmp_path / name, (1e9 - age, 1e9 - age))
+    assert Path(look(kernel, tmp_path)[1]).name == "new.npz"
+
+
+def test_why_there_is_none_is_said(tmp_path, profile, kernel):
+    found, file, note = look(kernel, tmp_path)
+    assert found is file is None
+    assert note.startswith("No profile here is the one that k.kernel.json was fitted to")
+    changed = make_profile(EDGES, [[0.3, 0.1], [0.1, 0.1], [0.1, 0.05]])
+    dataclasses.replace(changed, meta={**changed.meta, **MADE_OF}).save(tmp_path / "wax.npz")
+    assert "wax.npz is a profile of wax by the same method, but not" in look(kernel, tmp_path)[2]
+    without = {key: each for key, each in kernel.meta.items() if key != "profile_sha256"}
+    old = dataclasses.replace(kernel, meta=without)
+    assert "does not record which profile it was fitted to" in look(old, tmp_path)[2]
