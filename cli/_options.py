@@ -1,16 +1,18 @@
-"""Options every verb shares, and the parameter types of this command line."""
+"""Options that verbs share, those of methods, made from their entries, and types of parameters."""
 
 import functools
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
 from sssfit import text
 from sssfit.errors import ArgumentError
+from sssfit.methods import SIMULATIONS, Method, Setting, settings_of
 from sssfit.process import check_memory, check_threads_of_numba
 
 # The library's messages have arguments and calls of Python between backquotes.
@@ -38,38 +40,25 @@ class Common:
 def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add -q, -v, --json, --threads, --seed and hand them to the command as ``common``."""
 
-    @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
-    @click.option("-v", "--verbose", is_flag=True, help="Print more.")
-    @click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")
-    @click.option(
-        "--threads",
-        type=WholeRange(1, 1024),
-        metavar="N",
-        help="Threads to use; results do not depend on it.  [default: all cores]",
-    )
-    @click.option(
-        "--seed",
-        type=WholeRange(0, 2**63 - 1),
-        default=1,
-        show_default=True,
-        metavar="N",
-        help="Random seed.",
+    @options(
+        flag("-q --quiet", "Print errors only."),
+        flag("-v --verbose", "Print more."),
+        flag("--json", "Print one JSON object on stdout."),
+        option(
+            "--threads",
+            WholeRange(1, 1024),
+            "N",
+            "Threads to use; results do not depend on it.  [default: all cores]",
+        ),
+        option("--seed", WholeRange(0, 2**63 - 1), "N", "Random seed.", 1),
     )
     @functools.wraps(command)
-    def wrapper(
-        *args: Any,
-        quiet: bool,
-        verbose: bool,
-        as_json: bool,
-        threads: int | None,
-        seed: int,
-        **kwargs: Any,
-    ) -> Any:
+    def wrapper(*args: Any, **given: Any) -> Any:
+        common = Common(**{each.name: given.pop(each.name) for each in fields(Common)})
         check_threads_of_numba()
-        check_memory(command.__name__.rstrip("_"), threads)
-        common = Common(quiet, verbose, as_json, threads, seed)
+        check_memory(command.__name__.rstrip("_"), common.threads)
         try:
-            return command(*args, common=common, **kwargs)
+            return command(*args, common=common, **given)
         except ArgumentError as error:
             raise click.UsageError(in_options(str(error))) from None
 
@@ -218,3 +207,81 @@ Lengths = functools.partial(Value, "list of lengths", text.lengths_mm)
 Count = functools.partial(Value, "count", text.whole_number)
 Share = functools.partial(Value, "share", text.share)
 BaseColour = functools.partial(Value, "list of reflectances", text.base_colour)
+
+
+_KINDS: dict[str, Callable[[Setting], Any]] = {
+    "number": lambda _: Number(),
+    "numbers": lambda _: ListOf(Number()),
+    "length": lambda _: Length(),
+    "share": lambda _: Share(),
+    "seconds": lambda _: NumberRange(min=0),
+    "count": lambda each: Count(*each.among),
+    "whole": lambda each: WholeRange(*each.among),
+    "choice": lambda each: click.Choice(each.among),
+}
+
+
+def method_options(methods: Mapping[str, Method]) -> Callable[..., Any]:
+    """Return what adds the settings of all methods as options, in the order of the methods."""
+    return options(*(_of_setting(*each) for each in settings_of(methods).values()))
+
+
+def _of_setting(each: Setting, owners: tuple[str, ...]) -> Any:
+    """Return the option that asks for a setting; its help begins with the methods that have it."""
+    name, text = f"--{each.name.replace('_', '-')}", f"{', '.join(owners)}: {each.help}"
+    if each.kind == "flag":
+        return flag(name, text)
+    words = f"  [default: {each.words}]" if each.words else ""
+    return option(name, _KINDS[each.kind](each), each.metavar or None, text + words, each.default)
+
+
+def own_settings(
+    context: click.Context,
+    methods: Mapping[str, Method],
+    method: str,
+    given: Mapping[str, Any],
+    by: str = "--method",
+) -> dict[str, Any]:
+    """Keep the method's own settings that were given, by keyword; refuse those of others.
+
+    ``by`` is the option that names the method.
+    """
+    known = settings_of(methods)
+    for option in given:
+        is_given = context.get_parameter_source(option) is ParameterSource.COMMANDLINE
+        owners = known[option][1]
+        if is_given and method not in owners:
+            raise click.UsageError(
+                f"--{option.replace('_', '-')} is for {by} {' or '.join(owners)}, and this is "
+                f"{method}; leave it out."
+            )
+    settings = methods[method].settings if method in methods else ()
+    own = {each.name: each.keyword or each.name for each in settings}
+    return {
+        own[key]: value
+        for key, value in given.items()
+        if key in own and value is not None and value is not False  # 0 is a value
+    }
+
+
+def method_for(context: click.Context, method: str, material: str | None) -> str:
+    """Return the method that a name asks for; refuse a method and a name that do not go together.
+
+    A name of a profile that a method makes has no coefficients, and no other method can use it.
+    """
+    made = SIMULATIONS[method].makes
+    if made is not None and material != made:
+        asked = "--all" if material is None else material
+        raise click.UsageError(
+            f"--method {method} makes {made} only, and this is {asked}; for sums of Gaussians of a "
+            "material's profile use sssfit fit --method gaussians."
+        )
+    owners = [name for name, each in SIMULATIONS.items() if each.makes == material]
+    if material is None or not owners or method in owners:
+        return method
+    if context.get_parameter_source("method") is ParameterSource.COMMANDLINE:
+        raise click.UsageError(
+            f"{material} has no coefficients, and --method {method} needs them; use --method "
+            f"{owners[0]} or leave it out."
+        )
+    return owners[0]
