@@ -266,7 +266,7 @@ def test_a_kernel_cannot_be_changed():
             "parameters.c0: variances_mm2 and weights differ in number",
         ),
         ({"scale": [1.0, 1.0]}, "scale has shape (2,); expected (1,)"),
-        ({"signs": [[0.5]]}, "signs have to be +1 or -1"),
+        ({"signs": [[0.5]]}, "signs must be +1 or -1"),
         ({"channels": ("R", "G")}, "2 channel names for 1 channels"),
         (
             {"weights": np.ones((1, 3, 2)), "signs": [[1, 1]], "scale": [1, 1]}

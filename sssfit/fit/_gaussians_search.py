@@ -124,7 +124,7 @@ class Annuli:
 
     def _positive_weights(self, columns: FloatArray) -> npt.NDArray[np.intp]:
         """Return the indices of the weights that are not 0 at the optimum."""
-        from scipy.optimize import nnls  # 0.8 s that ``fit --list`` need not wait for
+        from scipy.optimize import nnls  # 0.8 s that ``fit --list`` does not need
 
         terms = columns.shape[1]
         if self.signed:
