@@ -275,7 +275,7 @@ def test_bad_input_is_one_line():
         error_budget(skin1, even)
     with pytest.raises(RenderError, match="no picture"):
         error_budgets(skin1, [])
-    with pytest.raises(RenderError, match=r"noise has 0\.3 mm per pixel and edge 1; expected"):
+    with pytest.raises(RenderError, match=r"random has 0\.3 mm per pixel and edge 1; expected"):
         error_budgets(skin1, [scene_of(), noise_scene()])
     with pytest.raises(SimulationError, match=r"model = 'photon'.*dipole, dipole-grosjean, burley"):
         error_budget(skin1, noise_scene(), model="photon")
