@@ -13,7 +13,7 @@ from sssfit.fit import fit_falloff, make_target
 from sssfit.fit.falloff import (
     STRETCH,
     sampled_misfit,
-    samples,
+    sampled_pixels,
     scale_of,
     stretched_skin,
 )
@@ -63,7 +63,7 @@ def left_by(quadrants, edges_mm, strengths, scales):
 
 def square(quadrant):
     """Sum of the squares of the sampled pixels: eq. 3 for no kernel at all, in energy squared."""
-    at = samples(len(quadrant))
+    at = sampled_pixels(len(quadrant))
     copies = np.where(at == 0, 1.0, 2.0)
     return copies @ (quadrant[np.ix_(at, at)] ** 2 @ copies)
 

@@ -92,7 +92,7 @@ def a_pass_of_unit_sum(_) -> Pair:
     slopes = numbers().normal(size=(4, PIXELS))
     return of_slopes(
         "_by_hand.py",
-        lambda x: _by_hand.of_unit_sum(a_line() + x @ slopes, slopes),
+        lambda x: _by_hand.normalised(a_line() + x @ slopes, slopes),
         np.array([0.02, -0.01, 0.03, 0.0]),
     )
 

@@ -10,7 +10,7 @@ from scipy.optimize import check_grad
 
 from sssfit.errors import FitError
 from sssfit.fit import fit_artist, fit_preintegrated, make_target
-from sssfit.fit._by_hand import gaussian_pixels, kernel_misfit, line_misfit, of_unit_sum
+from sssfit.fit._by_hand import gaussian_pixels, kernel_misfit, line_misfit, normalised
 from sssfit.fit.artist import fit_two_gaussians, two_gaussians
 from sssfit.material import load_material
 from sssfit.shapes import gaussian_cdf, gaussian_marginal
@@ -57,7 +57,7 @@ def test_gradients_are_those_of_finite_differences(kind):
     }[kind]
 
     def function(x, part):
-        half, slopes = of_unit_sum(*two_gaussians(edges, x))
+        half, slopes = normalised(*two_gaussians(edges, x))
         value, gradient = misfit(half, wanted, copies)
         return value if part == 0 else slopes @ gradient
 
@@ -74,7 +74,7 @@ def test_a_line_of_two_gaussians_refits(near, far, weight):
     edges = 0.1 * (np.arange(62) - 0.5)
     copies = np.where(np.arange(61) == 0, 1.0, 2.0)
     x = np.array((weight, np.log(near), np.log(far)))
-    line, _ = of_unit_sum(*two_gaussians(edges, x))
+    line, _ = normalised(*two_gaussians(edges, x))
     found = fit_two_gaussians(edges, lambda half: line_misfit(half, line, copies))
     np.testing.assert_allclose(found.x, x, atol=1e-7)
     assert found.value < 1e-16
@@ -122,7 +122,7 @@ def test_more_freedom_than_a_grid_of_variances(skin1):
     for channel, found in enumerate(result.kernel.parameters.values()):
 
         def misfit(x, channel=channel):
-            half, _ = of_unit_sum(*two_gaussians(target.edges_mm(), x))
+            half, _ = normalised(*two_gaussians(target.edges_mm(), x))
             return line_misfit(half, line[:, channel], target.copies)[0]
 
         ours = misfit(
@@ -184,7 +184,7 @@ def test_seconds_are_those_of_all_of_the_fit(skin1, monkeypatch):
         time.sleep(0.3)
         return lambda x: float(x[0].sum())
 
-    monkeypatch.setattr("sssfit.fit.artist._MOST_EVALUATIONS", 20)
+    monkeypatch.setattr("sssfit.fit.artist._MAX_EVALUATIONS", 20)
     result = fit_artist(skin1, mm_per_pixel=0.5, target=slow)
     assert result.seconds > 0.3
     assert result.evaluations == (47,) * 3  # 27 starts, and 20 more

@@ -21,7 +21,7 @@ from sssfit.chart.text import count, shortened, with_error
 from sssfit.errors import FileError
 from sssfit.material import Layer, Material, load_material
 from sssfit.profile import Profile
-from sssfit.profile.bins import LEAST_HITS, effective_hits, merged
+from sssfit.profile.bins import MIN_HITS, effective_hits, merged
 from sssfit.simulate import simulate_montecarlo
 
 CHARTS = Path(chart.__file__).parent
@@ -158,7 +158,7 @@ def test_merged_annuli_conserve_energy_and_hold_enough_hits(skin1, channel):
     assert bins.edges_mm[-1] == skin1.r_edges_mm[-1]
     mean_square = (skin1.photons - 1) * bins.stderr**2 + bins.energy**2
     hits = effective_hits(bins.energy, mean_square, skin1.photons)
-    assert (hits[bins.is_drawn] >= LEAST_HITS).all()
+    assert (hits[bins.is_drawn] >= MIN_HITS).all()
     assert bins.is_drawn.sum() > 10
     assert (np.diff(bins.is_drawn.astype(int)) <= 0).all()  # drawn to the end, no holes
 

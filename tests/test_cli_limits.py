@@ -15,7 +15,7 @@ from sssfit.cli import main
 from sssfit.errors import FitError, SimulationError
 from sssfit.fit import fit_svd
 from sssfit.process import is_out_of_memory
-from sssfit.simulate._run import Ending
+from sssfit.simulate._run import EndCondition
 
 posix = pytest.mark.skipif(os.name != "posix", reason="limits are POSIX")
 
@@ -302,16 +302,16 @@ def test_numbers_at_the_end_of_their_range(folder, capfd, option):
 
 
 def test_the_estimate_of_photons_does_not_overflow():
-    assert Ending(10**6, 1e-300).expected_photons(1000, 0.1) == 10**6
-    assert Ending(10**6, 0.01).expected_photons(1000, 0.1) == 100_000
+    assert EndCondition(10**6, 1e-300).expected_photons(1000, 0.1) == 10**6
+    assert EndCondition(10**6, 0.01).expected_photons(1000, 0.1) == 100_000
 
 
 @pytest.mark.parametrize("target", [1e-320, 1e-300, 1e-8])
 def test_targets_out_of_reach_are_refused(target):
-    from sssfit.simulate._finished import ending_of
+    from sssfit.simulate._finished import end_condition
 
     with pytest.raises(SimulationError, match=r"give a share from 1e-07, which takes 1e12 photons"):
-        ending_of(None, target)
+        end_condition(None, target)
 
 
 def test_a_pitch_out_of_range_is_not_warned_of_first(made, recwarn):

@@ -17,7 +17,7 @@ from sssfit.fit.falloff import (
     STRETCH,
     fit_scale,
     sampled_misfit,
-    samples,
+    sampled_pixels,
     scale_of,
     stretched_skin,
 )
@@ -35,13 +35,13 @@ def skin():
 
 
 def test_samples_are_dense_near_the_middle_and_reach_far_out():
-    at = samples(400)
+    at = sampled_pixels(400)
     np.testing.assert_array_equal(at[:10], range(10))
     steps = np.diff(at)
     assert (np.diff(steps) >= 0).all()
     assert steps[-1] > 20
     assert 400 - at[-1] <= 400 / 8
-    assert list(samples(1)) == [0]
+    assert list(sampled_pixels(1)) == [0]
 
 
 def test_eq_3_is_summed_over_the_sampled_pixels_of_the_plane():
@@ -49,7 +49,7 @@ def test_eq_3_is_summed_over_the_sampled_pixels_of_the_plane():
     half, quadrant = rng.random(20), rng.random((20, 20))
     quadrant += quadrant.T
     value, gradient = sampled_misfit(half, quadrant)
-    whole = {sign * int(i) for i in samples(20) for sign in (1, -1)}
+    whole = {sign * int(i) for i in sampled_pixels(20) for sign in (1, -1)}
     left = sum(
         (quadrant[abs(i), abs(j)] - half[abs(i)] * half[abs(j)]) ** 2 for i in whole for j in whole
     )

@@ -11,7 +11,7 @@ from sssfit.cli import main
 from sssfit.errors import FitError, SssfitError, SssfitWarning
 from sssfit.fit import METHODS, fit_svd, make_target
 from sssfit.fit import _result as fit_result
-from sssfit.fit._result import ChannelFit, factor_to, fit_channels
+from sssfit.fit._result import ChannelFit, energy_factor, fit_channels
 from sssfit.formats.csv import parse_csv
 from sssfit.kernel import SeparableKernel
 from sssfit.simulate import simulate_dipole, simulate_montecarlo
@@ -124,13 +124,13 @@ def test_terms_that_cancel_cannot_be_scaled():
     copies = np.array([1.0, 2.0, 2.0, 2.0, 2.0])
     energies = (half @ copies) ** 2
     apart = energies[1] - energies[0]
-    assert factor_to(0.5, target, 0, np.array([-1.0, 1.0]), half) == pytest.approx(0.5 / apart)
+    assert energy_factor(0.5, target, 0, np.array([-1.0, 1.0]), half) == pytest.approx(0.5 / apart)
     with pytest.raises(FitError, match=r"channel c0: the terms have the energy -2.43 within the"):
-        factor_to(0.5, target, 0, np.array([1.0, -1.0]), half)
+        energy_factor(0.5, target, 0, np.array([1.0, -1.0]), half)
     with pytest.raises(
         FitError, match=r"which cannot be scaled to -0.1; use `energy = \"keep\"`, an"
     ):
-        factor_to(-0.1, target, 0, np.array([-1.0, 1.0]), half)
+        energy_factor(-0.1, target, 0, np.array([-1.0, 1.0]), half)
 
 
 def test_a_support_without_light_is_refused():

@@ -23,7 +23,7 @@ import sssfit.fit._gaussians_search as annuli_module
 from sssfit import shapes
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import METHODS, fit_gaussians, make_target
-from sssfit.fit._gaussians_search import rings
+from sssfit.fit._gaussians_search import fitted_annuli
 from sssfit.material import load_material, material_names
 from sssfit.simulate.dipole import simulate_dipole
 from sssfit.simulate.exact import simulate_exact
@@ -351,7 +351,7 @@ def test_a_steep_profile_is_seen_as_finely_as_its_pixels():
 
 def test_rings_keep_the_energy_and_smooth_profiles_their_annuli():
     steep = one_over_r_profile(40, 0.02, [0.5])
-    edges, energy = rings(make_target(steep, 0.011), 0)
+    edges, energy = fitted_annuli(make_target(steep, 0.011), 0)
     assert len(energy) == 10 * 4 + 30
     np.testing.assert_allclose(np.diff(edges)[:40], 0.005, rtol=1e-9)
     np.testing.assert_allclose(energy[:40].reshape(10, 4).sum(axis=1), steep.annulus_energy[:10, 0])
@@ -359,7 +359,7 @@ def test_rings_keep_the_energy_and_smooth_profiles_their_annuli():
     exact = np.diff(-0.5 * np.expm1(-edges / 0.5))
     np.testing.assert_allclose(energy, exact, rtol=1e-3)
     for profile, pitch in ((steep, 0.04), (simulate_dipole(load_material("skin1")), 0.01)):
-        edges, energy = rings(make_target(profile, pitch), 0)
+        edges, energy = fitted_annuli(make_target(profile, pitch), 0)
         np.testing.assert_array_equal(edges, profile.r_edges_mm)
         np.testing.assert_array_equal(energy, profile.annulus_energy[:, 0])
 
@@ -405,7 +405,7 @@ def test_a_solver_that_gives_up_costs_a_start_and_not_the_fit(monkeypatch):
 
 
 def test_a_search_that_runs_out_says_so(monkeypatch):
-    monkeypatch.setattr("sssfit.fit._gaussians_search._MOST_EVALUATIONS", 2)
+    monkeypatch.setattr("sssfit.fit._gaussians_search._MAX_EVALUATIONS", 2)
     result = fit(simulate_dipole(load_material("skin1")), 3)
     assert result.stop_reasons == ("stopped after 2 evaluations",) * 3
     assert np.isfinite(result.kernel.weights).all()

@@ -14,7 +14,7 @@ from sssfit.fit import fit_guided, fit_preintegrated, make_target, support_of
 from sssfit.fit.guided import (
     _levels,
     _misfit,
-    _refined,
+    _resampled,
     fit_one_pass,
     gamma,
     guided_target,
@@ -232,11 +232,11 @@ def test_levels_double():
 @pytest.mark.parametrize("half", [4, 9, 20])
 def test_a_refined_pass_keeps_sum_and_sign(half):
     coarse = np.array((0.4, 0.1, 0.15, 0.05, 0.0))
-    fine = _refined(coarse, half)
+    fine = _resampled(coarse, half)
     assert fine.size == half + 1
     assert 2 * fine.sum() - fine[0] == pytest.approx(2 * coarse.sum() - coarse[0], rel=1e-14)
     assert (fine >= 0).all()
-    np.testing.assert_allclose(_refined(coarse, 4), coarse, atol=1e-15)
+    np.testing.assert_allclose(_resampled(coarse, 4), coarse, atol=1e-15)
 
 
 def test_the_spike_is_reported_warned_of_and_bounded(skin1):

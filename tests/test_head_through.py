@@ -8,7 +8,7 @@ from test_head import SEEN, plane_point
 from sssfit.errors import RenderError
 from sssfit.scene._field import HeightField, Lighting, Solid, light_field, light_through
 from sssfit.scene._head_shape import EAR_MM, FLOOR_MM
-from sssfit.scene._head_surface import SOLID_MM, body
+from sssfit.scene._head_surface import SOLID_MM, solid_head
 from sssfit.scene.head import _direction, head_scene
 
 DISTANCE = SEEN["distance_mm"]
@@ -35,7 +35,7 @@ def points_of(depth_mm):
 @pytest.fixture(scope="module")
 def head():
     """The smooth head as a body, and its front as what is seen: no sliver lies between them."""
-    solid = body(2)
+    solid = solid_head(2)
     return solid, HeightField(solid.front, solid.x0_mm, solid.y0_mm, solid.spacing_mm)
 
 

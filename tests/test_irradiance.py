@@ -5,7 +5,7 @@ import pytest
 
 from sssfit.errors import RenderError
 from sssfit.scene.made import MADE, make_scene, options_of
-from sssfit.scene.patterns import disk_coverage, half_plane_coverage, middle_out
+from sssfit.scene.patterns import centred, disk_coverage, half_plane_coverage
 
 SIZE = {"height": 60, "width": 80, "mm_per_pixel": 0.5}
 
@@ -51,7 +51,7 @@ def test_the_disk_is_a_quarter_of_the_smaller_side_and_symmetric():
 
 
 def test_each_pixel_of_the_disk_holds_what_it_covers():
-    light = disk_coverage(middle_out(24), middle_out(21), 8.7)
+    light = disk_coverage(centred(24), centred(21), 8.7)
     points = subsampled(lambda x, y: np.hypot(x, y) < 8.7, 21, 24)
     # The edge crosses at most 2 x 64 of the 4096 points' cells; half of each may be wrong.
     assert np.abs(light - points).max() < 1.0 / 64.0

@@ -38,7 +38,7 @@ def fitted(skin1):
 @pytest.fixture
 def no_patience(monkeypatch):
     """End the search early."""
-    monkeypatch.setattr("sssfit.fit.artist._MOST_EVALUATIONS", 30)
+    monkeypatch.setattr("sssfit.fit.artist._MAX_EVALUATIONS", 30)
 
 
 def numbers(kernel):

@@ -226,8 +226,8 @@ def test_light_that_models_put_at_the_wrong_radius(exact):
     page = " ".join(page.split())
     skin1 = Material("skin1", ("R", "G", "B"), (SKIN1,))
     for model, words in (
-        (simulate_dipole, "the classical dipole puts {:.0f} to {:.0f} % of skin1's light"),
-        (simulate_burley, "normalised diffusion, told the true total, {:.0f} to {:.0f} %"),
+        (simulate_dipole, "The classical dipole puts {:.0f} to {:.0f} % of skin1's light"),
+        (simulate_burley, "although it uses the true total, {:.0f} to {:.0f} %"),
     ):
         away = np.abs(model(skin1).cumulative - exact.cumulative).max(axis=0)
         share = 100.0 * away / exact.diffuse_reflectance

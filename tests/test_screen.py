@@ -204,8 +204,8 @@ def test_what_is_no_object_comes_back_as_it_was(rng):
         assert nothing.any()
         expected = np.broadcast_to(irradiance, out.shape)[nothing]
         np.testing.assert_array_equal(out[nothing], expected)
-    objects = (mask > 0) & np.isfinite(depth)
-    assert (out[objects] != irradiance[objects]).all()
+    object_mask = (mask > 0) & np.isfinite(depth)
+    assert (out[object_mask] != irradiance[object_mask]).all()
     assert np.isfinite(out).all()
 
 

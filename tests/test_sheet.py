@@ -37,7 +37,7 @@ PITCH, PIXELS = 0.6, 40
 def no_patience():
     """End the search by pictures early: how near it comes is for test_pictures.py to see."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("sssfit.fit.artist._MOST_EVALUATIONS", 40)
+        patch.setattr("sssfit.fit.artist._MAX_EVALUATIONS", 40)
         yield
 
 

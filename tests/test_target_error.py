@@ -116,7 +116,7 @@ def test_progress_estimates_the_photons_a_target_takes():
         assert now.photons_done <= now.photons
         if now.photons_done > 10 * BATCH_PHOTONS:
             assert 0.8 < now.photons / profile.photons < 1.25
-    ending = runs.Ending(10**6, 0.01)
+    ending = runs.EndCondition(10**6, 0.01)
     assert ending.expected_photons(1000, 0.04) == 16_000
     assert ending.expected_photons(1000, 0.9) == 10**6
     assert ending.expected_photons(1000, float("inf")) == 10**6

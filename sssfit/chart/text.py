@@ -7,7 +7,7 @@ import numpy as np
 from sssfit.arrays import FloatArray
 from sssfit.chart.data import Picture
 from sssfit.profile import Profile
-from sssfit.profile.bins import LEAST_HITS
+from sssfit.profile.bins import MIN_HITS
 
 WEIGHTED = r"$2\pi r\,R_d$ (1/mm)"
 _METHODS = {
@@ -136,7 +136,7 @@ def footnotes(profile: Profile, image: str) -> list[str]:
     ]
     if profile.photons is not None:
         notes.append(
-            f"Steps: means over annuli merged to {LEAST_HITS} effective photons or more; curves "
+            f"Steps: means over annuli merged to {MIN_HITS} effective photons or more; curves "
             "end where there are too few. Bands: ±1 standard error."
         )
     if profile.n_channels > _MOST_IN_LEGEND:

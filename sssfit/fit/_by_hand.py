@@ -30,7 +30,7 @@ def gaussian_pixels(edges_mm: FloatArray, sigmas_mm: FloatArray) -> tuple[FloatA
     return energy, slope[:, :-1] - slope[:, 1:]
 
 
-def of_unit_sum(half: FloatArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
+def normalised(half: FloatArray, slopes: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Scale a half line (h+1,) and its derivatives (m, h+1) to a whole pass of sum 1.
 
     Raises

@@ -74,7 +74,7 @@ class Annuli:
         columns, slopes = self._columns(log_variances)
         weights = np.zeros(len(log_variances))
         try:
-            free = self._free(columns)
+            free = self._positive_weights(columns)
         except RuntimeError:  # columns equal to rounding can make the solver cycle
             return self._infeasible_point(log_variances)
         basis, wanted = self._unconstrained(columns[:, free])
@@ -109,7 +109,7 @@ class Annuli:
         slope = a * energy - step * (at_inner - energy)
         return energy / self.scale, slope / self.scale
 
-    def _free(self, columns: FloatArray) -> npt.NDArray[np.intp]:
+    def _positive_weights(self, columns: FloatArray) -> npt.NDArray[np.intp]:
         """Return the indices of the weights that are not 0 at the optimum."""
         from scipy.optimize import nnls  # 0.8 s that ``fit --list`` need not wait for
 
@@ -179,7 +179,7 @@ def is_steep(target: Target, channel: int) -> bool:
     return apart - together > _STEEP * norm
 
 
-def rings(target: Target, channel: int) -> tuple[FloatArray, FloatArray]:
+def fitted_annuli(target: Target, channel: int) -> tuple[FloatArray, FloatArray]:
     """Return the edges (m+1,) [mm] and energies (m,) that a channel is fitted to.
 
     The profile's own, unless the profile is steep; then the ten innermost annuli are cut into equal
@@ -199,8 +199,8 @@ def rings(target: Target, channel: int) -> tuple[FloatArray, FloatArray]:
 
 _ROUGH, _FINE = 1e-3, 1e-8  # relative gain of a step at which a start, or the fit, has converged
 _STEP_SCALE = 1.5  # of a log variance, a factor of 4.5: the unit of the trust region
-_LEAST_STEP = 1e-9  # shorter ones are rounding
-_MOST_EVALUATIONS = 300  # from one start; 5 to 40 are usual
+_MIN_STEP = 1e-9  # shorter ones are rounding
+_MAX_EVALUATIONS = 300  # from one start; 5 to 40 are usual
 _MET = 1e-28  # square of a relative error that is rounding
 _SINGLE_STARTS = 5  # for the first Gaussian, over the whole range
 _FINISHED = 2  # of the starts, the best ones, go on to the end
@@ -236,7 +236,7 @@ def search(annuli: Annuli, terms: int, least_mm2: float, most_mm2: float) -> Gau
             reason = f"{kept} of {terms} terms are enough: one more does not lower the error"
             break
         best = _without_zero_weights(found)
-        reason = "converged" if settled else f"stopped after {_MOST_EVALUATIONS} evaluations"
+        reason = "converged" if settled else f"stopped after {_MAX_EVALUATIONS} evaluations"
         if best.cost <= _MET:
             reason = f"{len(best.weights)} of {terms} terms meet the profile to rounding"
             break
@@ -277,7 +277,7 @@ def _descend(
 
     if not np.isfinite(point.cost):
         return point, True, 0
-    seen = _Seen(annuli, point)
+    seen = _LastPoint(annuli, point)
     found = least_squares(
         seen.residual,
         point.log_variances,
@@ -285,14 +285,14 @@ def _descend(
         bounds,
         x_scale=_STEP_SCALE,
         ftol=tolerance,
-        xtol=_LEAST_STEP,
+        xtol=_MIN_STEP,
         gtol=None,
-        max_nfev=_MOST_EVALUATIONS,
+        max_nfev=_MAX_EVALUATIONS,
     )
     return annuli.at(found.x), bool(found.status > 0), int(found.nfev)
 
 
-class _Seen:
+class _LastPoint:
     """Keeps the last point, whose weights serve the residual and the Jacobian."""
 
     def __init__(self, annuli: Annuli, point: Point) -> None:

@@ -21,14 +21,14 @@ Function = Callable[[FloatArray], tuple[float, FloatArray]]
 
 FEASIBLE = 1e-9  # a point is feasible if the equality holds to this
 _TO_ZERO = 1e-26  # absolute change that counts as none, for objectives whose optimum is 0
-_MOST_EVALUATIONS = 2000
+_MAX_EVALUATIONS = 2000
 
 # By nlopt's names, because the numbers differ between releases.
 _WORDS = {
     "SUCCESS": "converged",
     "FTOL_REACHED": "converged: the objective no longer changes",
     "XTOL_REACHED": "converged: the parameters no longer change",
-    "MAXEVAL_REACHED": f"stopped after {_MOST_EVALUATIONS} evaluations, the best of them kept",
+    "MAXEVAL_REACHED": f"stopped after {_MAX_EVALUATIONS} evaluations, the best of them kept",
     "ROUNDOFF_LIMITED": "converged as far as rounding allows",
     "FORCED_STOP": "stopped where the objective was not a number; the best point before is kept",
     "FAILURE": "stopped without progress, the best point kept",
@@ -113,7 +113,7 @@ def minimise(
     solver.set_upper_bounds(upper)
     solver.set_ftol_rel(relative_change)
     solver.set_ftol_abs(_TO_ZERO)
-    solver.set_maxeval(_MOST_EVALUATIONS)
+    solver.set_maxeval(_MAX_EVALUATIONS)
     reason = _run(solver, np.clip(start, lower, upper))
     if tracked.x is None:
         raise FitError(

@@ -20,14 +20,14 @@ from sssfit.kernel import SeparableKernel
 ENERGIES = ("rescale", "keep")
 
 
-def restores(energy: str) -> bool:
+def rescales_energy(energy: str) -> bool:
     """Return True for "rescale" and False for "keep"; any other word raises FitError."""
     if energy not in ENERGIES:
         raise FitError(f"energy = {energy!r}; expected {' or '.join(map(repr, ENERGIES))}.")
     return energy == "rescale"
 
 
-def factor_to(
+def energy_factor(
     wanted: float, target: Target, channel: int, signs: FloatArray, half: FloatArray
 ) -> float:
     """Return the factor that brings the energy of a channel's terms to ``wanted``.
@@ -46,7 +46,7 @@ def factor_to(
 
 
 # Share of a channel's energy. Default fits of the eleven materials are off by up to 2.7 %.
-_MOST_ENERGY_ERROR = 0.1
+_MAX_ENERGY_ERROR = 0.1
 
 
 def check_finite(what: str, method: str, *errors: FloatArray) -> None:
@@ -70,7 +70,7 @@ def warn_of_misfit(what: str, kernel: SeparableKernel, *, keeps_energy: bool) ->
         problems.append(
             f"is farther from the profile than no kernel at all ({_listed(kernel, errors, worse)})"
         )
-    if keeps_energy and (off := np.abs(energies) > _MOST_ENERGY_ERROR).any():
+    if keeps_energy and (off := np.abs(energies) > _MAX_ENERGY_ERROR).any():
         listed = _listed(kernel, energies, off, "+")
         problems.append(f"does not preserve the profile's energy ({listed})")
     if problems:

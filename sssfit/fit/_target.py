@@ -22,8 +22,8 @@ MM_PER_PIXEL = 0.3  # a head 0.6 m away on 1080 rows; skin1's whole kernel is 14
 Pitch: TypeAlias = float | Literal["profile"]
 KEPT = 0.999  # support "auto": share of every channel's on-grid energy within it
 _FAINTEST = 1e-145  # energy: squares of fainter pixels underflow, and with them relative errors
-_MOST_BYTES = 2e9
-_LEAST_MM, _MOST_MM = 1e-12, 1e12  # sizes of a kernel's pixels
+_MAX_BYTES = 2e9
+_MIN_MM, _MAX_MM = 1e-12, 1e12  # sizes of a kernel's pixels
 _WIDEST = 1e15  # pixels: more would exceed the memory limit anyway; keeps floor() finite
 
 
@@ -101,10 +101,10 @@ def make_target(
     pitch = pitch_of(profile, mm_per_pixel)
     support = support_of(profile) if support_mm is None else float(support_mm)
     for name, value in (("mm_per_pixel", pitch), ("support", support)):
-        if not _LEAST_MM <= value <= _MOST_MM:
+        if not _MIN_MM <= value <= _MAX_MM:
             raise FitError(
-                f"{name} = {value:g}; expected a length in mm above 0, from {_LEAST_MM:g} to "
-                f"{_MOST_MM:g}."
+                f"{name} = {value:g}; expected a length in mm above 0, from {_MIN_MM:g} to "
+                f"{_MAX_MM:g}."
             )
     # 1e-9: a ratio that is an integer up to rounding must not lose a pixel.
     half = math.floor(min(support / pitch, _WIDEST) + 1e-9)
@@ -148,11 +148,11 @@ def _check_memory(target: Target) -> None:
     Every fit holds two quadrants at once, the target's and its own, at least for the error.
     """
     size = 2.0 * 8.0 * (target.half_pixels + 1.0) ** 2
-    if size > _MOST_BYTES:
+    if size > _MAX_BYTES:
         pixels = 2 * target.half_pixels + 1
         raise FitError(
             f"a kernel of {pixels} x {pixels} pixels of {target.mm_per_pixel:.4g} mm would need "
-            f"{size / 1e9:.3g} GB of memory a channel, and {_MOST_BYTES / 1e9:.3g} GB is the "
+            f"{size / 1e9:.3g} GB of memory a channel, and {_MAX_BYTES / 1e9:.3g} GB is the "
             "most: use a larger `mm_per_pixel` or a smaller support."
         )
 

@@ -24,7 +24,7 @@ from sssfit.fit._by_hand import (
     gaussian_pixels,
     kernel_misfit,
     line_misfit,
-    of_unit_sum,
+    normalised,
     per_channel,
 )
 from sssfit.fit._nlopt import Minimum, minimise, minimise_by_simplex
@@ -41,9 +41,9 @@ _NEAR = (-3.0, -1.5, 0.0)
 _FAR = (1.0, 2.0, 3.0)
 # Step and tolerance of these parameters; tolerance of a Delta E.
 _STEP, _CHANGE, _VALUE_CHANGE = 0.5, 0.02, 1e-3
-_MOST_EVALUATIONS = 1000
+_MAX_EVALUATIONS = 1000
 # By hand; the limits of kernel files, and squares of less underflow.
-_LEAST_MM2, _MOST_MM2 = 1e-18, 1e18
+_MIN_MM2, _MAX_MM2 = 1e-18, 1e18
 
 PerChannel = float | Sequence[float]
 Misfit = Callable[[FloatArray], tuple[float, FloatArray]]
@@ -154,7 +154,7 @@ def fit_two_gaussians(edges_mm: FloatArray, misfit: Misfit) -> Minimum:
     def objective(x: FloatArray) -> tuple[float, FloatArray]:
         # With the energy of the final pass; otherwise a pass wider than the support would look
         # good.
-        half, slopes = of_unit_sum(*two_gaussians(edges_mm, x))
+        half, slopes = normalised(*two_gaussians(edges_mm, x))
         value, gradient = misfit(half)
         return value, slopes @ gradient
 
@@ -203,7 +203,7 @@ def fit_to_pictures(pixels: Target, objective: Callable[[FloatArray], float]) ->
         upper=np.repeat((np.inf, log_v[1], log_v[1]), lit.size),
         change=_CHANGE,
         value_change=_VALUE_CHANGE,
-        most_evaluations=_MOST_EVALUATIONS,
+        most_evaluations=_MAX_EVALUATIONS,
     )
     evaluations = len(starts) + found.evaluations
     return [
@@ -214,7 +214,7 @@ def fit_to_pictures(pixels: Target, objective: Callable[[FloatArray], float]) ->
 
 def artist_pass(pixels: Target, channel: int, x: FloatArray) -> FloatArray:
     """Return the half line (h+1,) for (w, log v_near, log v_far), with the channel's energy."""
-    half, _ = of_unit_sum(*two_gaussians(pixels.edges_mm(), x))
+    half, _ = normalised(*two_gaussians(pixels.edges_mm(), x))
     return math.sqrt(float(pixels.total[channel])) * half
 
 
@@ -277,9 +277,9 @@ def _by_hand(
         return None
     if ((values[0] < 0.0) | (values[0] > 1.0)).any():
         raise FitError(f"weight = {weight}; expected shares from 0 to 1.")
-    if ((values[1:] < _LEAST_MM2) | (values[1:] > _MOST_MM2)).any():
+    if ((values[1:] < _MIN_MM2) | (values[1:] > _MAX_MM2)).any():
         raise FitError(
             f"near_mm2 = {near_mm2}, far_mm2 = {far_mm2}; expected variances above 0, from "
-            f"{_LEAST_MM2:g} to {_MOST_MM2:g} mm^2."
+            f"{_MIN_MM2:g} to {_MAX_MM2:g} mm^2."
         )
     return np.concatenate((values[:1], np.log(values[1:])))

@@ -20,14 +20,14 @@ import numpy as np
 from sssfit.arrays import FloatArray
 from sssfit.errors import FitError
 from sssfit.fit._nlopt import root
-from sssfit.fit._result import ChannelFit, FitResult, fit_channels, restores
+from sssfit.fit._result import ChannelFit, FitResult, fit_channels, rescales_energy
 from sssfit.fit._target import Pitch, make_target
 from sssfit.profile import Profile
 from sssfit.shapes import diffusion_cdf, diffusion_line_integral
 
 _PER_DECADE = 20  # starts tried: the shape is bracketed to 12 % before it is refined
 # Of s r: 1e-2 at the last edge leaves 0.5 % of the energy on the grid, 100 at the first all of it.
-_LEAST, _MOST = 1e-2, 1e2
+_MIN, _MAX = 1e-2, 1e2
 
 
 def fit_burley(
@@ -64,7 +64,7 @@ def fit_burley(
         The profile, the pitch, the support or the energy is invalid, or a channel's grid does not
         determine its shape.
     """
-    rescale = restores(energy)
+    rescale = rescales_energy(energy)
     target = make_target(profile, mm_per_pixel, support_mm)
     edges_mm = target.edges_mm()
 
@@ -109,7 +109,7 @@ def _fit_shape(r_mm: FloatArray, shares: FloatArray, channel: str) -> tuple[floa
         rise = 0.25 * t * (np.exp(-t) + np.exp(-t / 3.0))  # of the CDF, by log s
         return float(weights @ ((diffusion_cdf(t, 1.0) - shares) * rise))
 
-    first, last = math.log(_LEAST / r_mm[-1]), math.log(_MOST / r_mm[1])
+    first, last = math.log(_MIN / r_mm[-1]), math.log(_MAX / r_mm[1])
     scan = np.linspace(first, last, math.ceil(_PER_DECADE * (last - first) / math.log(10.0)))
     best = int(np.argmin([objective(each) for each in scan]))
     low, high = scan[max(best - 1, 0)], scan[min(best + 1, len(scan) - 1)]

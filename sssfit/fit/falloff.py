@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import FitError
-from sssfit.fit._by_hand import gaussian_pixels, kernel_misfit, of_unit_sum, per_channel
+from sssfit.fit._by_hand import gaussian_pixels, kernel_misfit, normalised, per_channel
 from sssfit.fit._nlopt import Minimum, minimise
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
 from sssfit.fit._target import Pitch, make_target
@@ -35,8 +35,8 @@ STRETCH = 127.7
 
 _SIGMAS_MM = np.sqrt(SKIN_VARIANCES_MM2)
 _RED = np.array([row[0] for row in SKIN_WEIGHTS])
-_LEAST_FALLOFF = 0.001
-_WIDTHS, _MOST_FALLOFF = (1e-9, 1e9), 1e6  # by hand; beyond them squares overflow double precision
+_MIN_FALLOFF = 0.001
+_WIDTHS, _MAX_FALLOFF = (1e-9, 1e9), 1e6  # by hand; beyond them squares overflow double precision
 # Every pixel is a sample up to here; farther out samples are an eighth of their distance apart.
 _DENSE = 8
 _SCALES = 24  # scales tried with each strength, before the best are refined
@@ -98,7 +98,7 @@ def fit_falloff(
         if given is not None:
             return {}, given
         found = {c: fit_scale(quadrant_of(c), edges) for c in lit}
-        return found, _named(found, profile.n_channels)
+        return found, _model_parameters(found, profile.n_channels)
 
     def fit_channel(channel: int) -> ChannelFit:
         found, values = all_channels()
@@ -131,7 +131,7 @@ def fit_falloff(
 
 def scale_of(width: float, falloff: float) -> float:
     """Return the width of a channel relative to red skin: m = STRETCH w (0.001 + f)."""
-    return STRETCH * width * (_LEAST_FALLOFF + falloff)
+    return STRETCH * width * (_MIN_FALLOFF + falloff)
 
 
 def stretched_skin(x: FloatArray, edges_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -144,7 +144,7 @@ def stretched_skin(x: FloatArray, edges_mm: FloatArray) -> tuple[FloatArray, Flo
     delta[0] = 1.0
     skin = _RED @ energy
     slopes = np.stack((skin - delta, x[0] * (_RED @ slope)))
-    return of_unit_sum(x[0] * skin + (1.0 - x[0]) * delta, slopes)
+    return normalised(x[0] * skin + (1.0 - x[0]) * delta, slopes)
 
 
 def sampled_misfit(half: FloatArray, quadrant: FloatArray) -> tuple[float, FloatArray]:
@@ -152,14 +152,14 @@ def sampled_misfit(half: FloatArray, quadrant: FloatArray) -> tuple[float, Float
 
     Summed over pairs of sampled pixels of a quadrant (h+1, h+1) and their copies in the plane.
     """
-    at = samples(half.size)
+    at = sampled_pixels(half.size)
     value, sampled = kernel_misfit(half[at], quadrant[np.ix_(at, at)], np.where(at == 0, 1.0, 2.0))
     gradient = np.zeros(half.size)
     gradient[at] = sampled
     return value, gradient
 
 
-def samples(pixels: int) -> npt.NDArray[np.int64]:
+def sampled_pixels(pixels: int) -> npt.NDArray[np.int64]:
     """Return the pixels of a half line that eq. 3 samples, dense near the middle."""
     at = [0]
     while (farther := at[-1] + max(1, at[-1] // _DENSE)) < pixels:
@@ -186,14 +186,14 @@ def fit_scale(quadrant: FloatArray, edges_mm: FloatArray) -> Minimum:
     return Minimum(best.x, best.value, evaluations, best.stop_reason)
 
 
-def _named(found: dict[int, Minimum], channels: int) -> FloatArray:
+def _model_parameters(found: dict[int, Minimum], channels: int) -> FloatArray:
     """Return width, strength and falloff (3, C): the widest channel has the falloff 1."""
     widest = math.exp(max(each.x[1] for each in found.values()))
     values = np.zeros((3, channels))
-    values[0] = widest / (STRETCH * (_LEAST_FALLOFF + 1.0))
+    values[0] = widest / (STRETCH * (_MIN_FALLOFF + 1.0))
     for c, each in found.items():
         share = math.exp(each.x[1]) / widest
-        values[1:, c] = each.x[0], max(0.0, share * (_LEAST_FALLOFF + 1.0) - _LEAST_FALLOFF)
+        values[1:, c] = each.x[0], max(0.0, share * (_MIN_FALLOFF + 1.0) - _MIN_FALLOFF)
     return values
 
 
@@ -216,6 +216,6 @@ def _by_hand(
         )
     if ((values[1] < 0.0) | (values[1] > 1.0)).any():
         raise FitError(f"strength = {strength}; expected shares from 0 to 1.")
-    if ((values[2] < 0.0) | (values[2] > _MOST_FALLOFF)).any():
-        raise FitError(f"falloff = {falloff}; expected numbers from 0 to {_MOST_FALLOFF:g}.")
+    if ((values[2] < 0.0) | (values[2] > _MAX_FALLOFF)).any():
+        raise FitError(f"falloff = {falloff}; expected numbers from 0 to {_MAX_FALLOFF:g}.")
     return values

@@ -24,8 +24,8 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from sssfit.errors import FitError, SssfitWarning
-from sssfit.fit._gaussians_search import GaussianSum, is_steep, make_annuli, rings, search
-from sssfit.fit._result import ChannelFit, FitResult, factor_to, fit_channels, restores
+from sssfit.fit._gaussians_search import GaussianSum, fitted_annuli, is_steep, make_annuli, search
+from sssfit.fit._result import ChannelFit, FitResult, energy_factor, fit_channels, rescales_energy
 from sssfit.fit._target import Pitch, Target, make_target
 from sssfit.profile import Profile
 from sssfit.shapes import gaussian_line_integral
@@ -85,13 +85,13 @@ def fit_gaussians(
     SssfitWarning
         R_d rises towards the beam like 1/r, so Gaussians and errors depend on the pixel size.
     """
-    number, rescale = _checked_terms(terms), restores(energy)
+    number, rescale = _checked_terms(terms), rescales_energy(energy)
     target = make_target(profile, mm_per_pixel, support_mm)
     _check_annuli(profile, number)
     _warn_of_pitch(target)
 
     def fit_channel(channel: int) -> ChannelFit:
-        edges_mm, annulus_energy = rings(target, channel)
+        edges_mm, annulus_energy = fitted_annuli(target, channel)
         on_grid = float(annulus_energy.sum())
         total = None if free_energy else float(target.total[channel]) / on_grid
         annuli = make_annuli(edges_mm, annulus_energy, total, signed=signed)
@@ -124,7 +124,7 @@ def _as_passes(
     columns = gaussian_line_integral(edges_mm[:-1], edges_mm[1:], found.variances_mm2[:, None])
     signs, half = np.sign(weights), np.sqrt(np.abs(weights))[:, None] * columns
     wanted = float(weights.sum())
-    factor = factor_to(wanted, target, channel, signs, half) if rescale else 1.0
+    factor = energy_factor(wanted, target, channel, signs, half) if rescale else 1.0
     return ChannelFit(
         signs=signs,
         half=math.sqrt(factor) * half,

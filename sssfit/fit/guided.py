@@ -34,8 +34,8 @@ _COARSEST = 8  # half pixels of the first level; each level has twice as many as
 _SPIKE = (
     0.25  # share of sum(a): warn of a middle pixel above it and above twice the pre-integrated one
 )
-_LEAST_B, _MOST_B = 1e-3, 1e9  # beyond these, Gamma is 0 or 1 to rounding
-_LEAST_BOUND = 1e-9
+_MIN_B, _MAX_B = 1e-3, 1e9  # beyond these, Gamma is 0 or 1 to rounding
+_MIN_BOUND = 1e-9
 _ACROSS = 64  # least number of quadrature nodes of Gamma along a half line; its steps are 1/7 wide
 
 
@@ -221,7 +221,7 @@ def fit_one_pass(
         pitch = target.mm_per_pixel * (target.half_pixels + 0.5) / (half + 0.5)
         level = Target(target.profile, pitch, half)
         line = level.half_line()[:, channel]
-        start = line if found is None else _refined(found.x, half)
+        start = line if found is None else _resampled(found.x, half)
         found = rank_one(
             level.quadrant(channel) / total,
             gamma(half, k, b, extent),
@@ -259,7 +259,7 @@ def _levels(half_pixels: int) -> list[int]:
     return halves
 
 
-def _refined(half_line: FloatArray, half_pixels: int) -> FloatArray:
+def _resampled(half_line: FloatArray, half_pixels: int) -> FloatArray:
     """Resample a pass (h'+1,) to more pixels on the same support, keeping its sum and sign."""
     from scipy.interpolate import PchipInterpolator
 
@@ -286,13 +286,13 @@ def _normalised_pass(a: FloatArray, most: float) -> FloatArray:
 def _check_settings(k: float, b: float, centre_bound: float | None) -> None:
     if not 0.0 <= k <= 4.0:
         raise FitError(f"k = {k:g} is outside [0, 4]; 0 favours near scattering, 4 far scattering.")
-    if not _LEAST_B <= b <= _MOST_B:
+    if not _MIN_B <= b <= _MAX_B:
         raise FitError(
-            f"b = {b:g}; expected a number above 0, from {_LEAST_B:g} to {_MOST_B:g}, such as 50."
+            f"b = {b:g}; expected a number above 0, from {_MIN_B:g} to {_MAX_B:g}, such as 50."
         )
-    if centre_bound is not None and not _LEAST_BOUND <= centre_bound <= 1.0:
+    if centre_bound is not None and not _MIN_BOUND <= centre_bound <= 1.0:
         raise FitError(
-            f"centre_bound = {centre_bound:g}; expected a share from {_LEAST_BOUND:g} to 1."
+            f"centre_bound = {centre_bound:g}; expected a share from {_MIN_BOUND:g} to 1."
         )
 
 

@@ -13,7 +13,7 @@ import math
 
 import numpy as np
 
-from sssfit.fit._result import ChannelFit, FitResult, fit_channels, restores
+from sssfit.fit._result import ChannelFit, FitResult, fit_channels, rescales_energy
 from sssfit.fit._target import Pitch, make_target
 from sssfit.profile import Profile
 
@@ -49,7 +49,7 @@ def fit_preintegrated(
     FitError, ProfileError
         The profile, the pitch, the support or the energy is invalid.
     """
-    rescale = restores(energy)
+    rescale = rescales_energy(energy)
     target = make_target(profile, mm_per_pixel, support_mm)
     lines = target.half_line()
 

@@ -24,10 +24,10 @@ from sssfit.errors import FitError
 from sssfit.fit._result import (
     ChannelFit,
     FitResult,
-    factor_to,
+    energy_factor,
     fit_channels,
     frobenius_error,
-    restores,
+    rescales_energy,
 )
 from sssfit.fit._target import Pitch, Target, make_target
 from sssfit.profile import Profile
@@ -76,7 +76,7 @@ def fit_svd(
     """
     target = make_target(profile, mm_per_pixel, support_mm)
     rank = _checked_rank(rank, target)
-    rescale = restores(energy)
+    rescale = rescales_energy(energy)
 
     def fit_channel(channel: int) -> ChannelFit:
         return _fit_channel(target, channel, rank, rescale=rescale)
@@ -160,7 +160,7 @@ def _fit_channel(target: Target, channel: int, rank: int, *, rescale: bool) -> C
     signs = np.where(values < 0.0, -1.0, 1.0)
     half = np.sqrt(np.abs(values))[:, None] * vectors
     total = float(target.total[channel])
-    factor = factor_to(total, target, channel, signs, half) if rescale else 1.0
+    factor = energy_factor(total, target, channel, signs, half) if rescale else 1.0
     half *= math.sqrt(factor)
     return ChannelFit(
         signs,

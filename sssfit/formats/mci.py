@@ -32,7 +32,7 @@ from sssfit.errors import MaterialError, SssfitError
 from sssfit.formats._mci_lines import INPUT_COMMENT, Line, Lines, other_version
 from sssfit.grid import MOST_ANNULI, RadialGrid
 from sssfit.material import Layer, Material
-from sssfit.material.checks import LEAST_ETA, MOST_ETA
+from sssfit.material.checks import MAX_ETA, MIN_ETA
 from sssfit.messages import printable, shown
 from sssfit.text import read_text
 
@@ -42,11 +42,11 @@ SEMI_INFINITE_CM = 1e6  # 10 km; the manual writes 1E8 cm, "Separable Subsurface
 _MOST = 10**12
 _LENGTH = "a length above 0, in cm"
 _COEFFICIENT = "a number of 0 or more, in 1/cm"
-_INDEX = f"a refractive index from {LEAST_ETA} to {MOST_ETA}"
+_INDEX = f"a refractive index from {MIN_ETA} to {MAX_ETA}"
 
 # The columns of a layer's line: name, valid values, expectation in messages, power of ten to mm.
 _COLUMNS: tuple[tuple[str, Callable[[float], bool], str, int], ...] = (
-    ("n", lambda v: LEAST_ETA <= v <= MOST_ETA, _INDEX, 0),
+    ("n", lambda v: MIN_ETA <= v <= MAX_ETA, _INDEX, 0),
     ("mua", lambda v: 0 <= v <= 1e9, _COEFFICIENT, -1),
     ("mus", lambda v: 0 <= v <= 1e9, _COEFFICIENT, -1),
     ("g", lambda v: -1 < v <= 1, "a number above -1 and up to 1", 0),

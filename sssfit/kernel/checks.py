@@ -17,8 +17,8 @@ from sssfit.errors import KernelError
 from sssfit.messages import shown
 
 # Limit of weights and scales: their squares are finite in single precision, as in shaders.
-_MOST = 1e18
-_LEAST_MM, _MOST_MM = 1e-12, 1e12
+_MAX = 1e18
+_MIN_MM, _MAX_MM = 1e-12, 1e12
 _ARRAYS = ("signs", "weights", "relative_frobenius_error", "energy_error", "scale")
 
 
@@ -28,10 +28,10 @@ def checked(given: Mapping[str, Any]) -> dict[str, Any]:
         name: number_array(name, given[name], KernelError) for name in _ARRAYS
     }
     pitch = number_array("mm_per_pixel", given["mm_per_pixel"], KernelError)
-    if pitch.shape != () or not _LEAST_MM <= pitch <= _MOST_MM:
+    if pitch.shape != () or not _MIN_MM <= pitch <= _MAX_MM:
         raise KernelError(
             f"mm_per_pixel = {shown(given['mm_per_pixel'])}; expected a length above 0, from "
-            f"{_LEAST_MM:g} to {_MOST_MM:g} mm."
+            f"{_MIN_MM:g} to {_MAX_MM:g} mm."
         )
     check_label("method", given["method"], KernelError)
     names = given["channels"]
@@ -68,11 +68,11 @@ def _check_shapes(fields: Mapping[str, FloatArray], n_names: int) -> None:
 def _check_numbers(fields: Mapping[str, FloatArray]) -> None:
     """Check that numbers are finite in single precision and in range."""
     weights, signs, scale = fields["weights"], fields["signs"], fields["scale"]
-    _check_range("weights", weights, -_MOST)
+    _check_range("weights", weights, -_MAX)
     _check_range("scale", scale, 0.0)
     frobenius, energy = fields["relative_frobenius_error"], fields["energy_error"]
     _check_range("relative_frobenius_error", frobenius, 0.0, or_unknown=True)
-    _check_range("energy_error", energy, -(_MOST**2), or_unknown=True)
+    _check_range("energy_error", energy, -(_MAX**2), or_unknown=True)
     if not np.isin(signs, (-1.0, 1.0)).all():
         raise KernelError("signs have to be +1 or -1.")
     if not np.array_equal(weights, weights[:, ::-1]):
@@ -88,7 +88,7 @@ def _check_numbers(fields: Mapping[str, FloatArray]) -> None:
 
 def _check_range(name: str, values: FloatArray, least: float, *, or_unknown: bool = False) -> None:
     """Check for numbers of at least ``least``, and below the limit; NaN if unknown."""
-    most = max(_MOST, -least)
+    most = max(_MAX, -least)
     bad = ~((values >= least) & (values <= most)) & ~(or_unknown & np.isnan(values))
     if bad.any():
         raise KernelError(
@@ -114,10 +114,10 @@ def _check_parameters(path: str, found: object) -> None:
         raise KernelError(f"{path} = {shown(found)}; expected a mapping.")
     for name in {*_LISTS, *_NUMBERS} & found.keys():
         values = number_array(f"{path}.{name}", found[name], KernelError)
-        if values.ndim != (name in _LISTS) or not (np.abs(values) <= _MOST).all():
+        if values.ndim != (name in _LISTS) or not (np.abs(values) <= _MAX).all():
             raise KernelError(
                 f"{path}.{name} = {shown(found[name])}; expected "
-                f"{'a list of numbers' if name in _LISTS else 'a number'} up to {_MOST:g}."
+                f"{'a list of numbers' if name in _LISTS else 'a number'} up to {_MAX:g}."
             )
         if name.endswith("_mm2") and not (values > 0.0).all():
             raise KernelError(f"{path}.{name} = {shown(found[name])}; expected variances above 0.")

@@ -23,24 +23,24 @@ if TYPE_CHECKING:
 
 DENSE_PER_MM = 10.0  # cream, the densest of Jensen et al. 2001, has 7.38; skin1 in 1/cm has 7.7
 # Only ratios of indices count: relative to air or water as 1, a vacuum is below 1.
-LEAST_ETA, MOST_ETA = 0.5, 4
-_LEAST, _MOST = 1e-9, 1e9  # 1/mm and mm: 1000 km and an atom's width are beyond any material
+MIN_ETA, MAX_ETA = 0.5, 4
+_MIN, _MAX = 1e-9, 1e9  # 1/mm and mm: 1000 km and an atom's width are beyond any material
 _NAME = r"[A-Za-z0-9][A-Za-z0-9._+-]{0,99}"
 
 # For each number of a material: whether it is valid, and the expectation for messages.
 _RULES: dict[str, tuple[Callable[[float], bool], str]] = {
     "eta": (
-        lambda v: LEAST_ETA <= v <= MOST_ETA,
-        f"one refractive index from {LEAST_ETA} to {MOST_ETA}, such as 1.4",
+        lambda v: MIN_ETA <= v <= MAX_ETA,
+        f"one refractive index from {MIN_ETA} to {MAX_ETA}, such as 1.4",
     ),
     "g": (
         lambda v: -1 < v <= 1,
         "a number above -1 and up to 1 (no scattering); 0 if sigma_s is a reduced one (sigma_s')",
     ),
-    "sigma": (lambda v: 0 <= v <= _MOST, f"a number from 0 to {_MOST:g}, in 1/mm"),
+    "sigma": (lambda v: 0 <= v <= _MAX, f"a number from 0 to {_MAX:g}, in 1/mm"),
     "thickness_mm": (
-        lambda v: _LEAST <= v <= _MOST or v == math.inf,
-        f"a length from {_LEAST:g} to {_MOST:g} mm; leave it out for a semi-infinite layer",
+        lambda v: _MIN <= v <= _MAX or v == math.inf,
+        f"a length from {_MIN:g} to {_MAX:g} mm; leave it out for a semi-infinite layer",
     ),
 }
 
@@ -97,10 +97,10 @@ def check_lengths(layer: "Layer") -> None:
 def check_clear_or_not(layer: "Layer") -> None:
     """Raise an error for a channel that is almost clear."""
     sigma_t = layer.sigma_t_per_mm
-    for c in np.flatnonzero((sigma_t > 0) & (sigma_t < _LEAST)):
+    for c in np.flatnonzero((sigma_t > 0) & (sigma_t < _MIN)):
         raise MaterialError(
             f"sigma_a_per_mm[{c}] + sigma_s_per_mm[{c}] = {sigma_t[c]:g} is next to nothing; "
-            f"expected {_LEAST:g} per mm or more, or 0 for a clear layer."
+            f"expected {_MIN:g} per mm or more, or 0 for a clear layer."
         )
 
 

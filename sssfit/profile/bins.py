@@ -27,7 +27,7 @@ def mean_free_paths_mm(profile: Profile) -> FloatArray | None:
 
 
 # 100 hits of equal weight have a standard error of 10 %: a tenth of the 2.3 that make a decade.
-LEAST_HITS = 100
+MIN_HITS = 100
 # No bin is narrower than 1/40 of its radius. Over that width R_d falls by under 10 % out to 4 decay
 # lengths, and 1236 annuli become 163 steps without a visible change of the curve.
 _RADII_PER_WIDTH = 40
@@ -35,7 +35,7 @@ _WIDENING = 1.25
 # In an exponential tail of equally full bins, widths grow by under 1.7 per bin until the photons
 # run out; later bins with 100 hits span decades. Near the beam, up to 8 annuli, the widths are
 # random.
-_MOST_WIDENING = 2
+_MAX_WIDENING = 2
 _WIDTH_OF_LUCK = 8
 
 
@@ -83,7 +83,7 @@ def merged(profile: Profile, channel: int) -> Bins:
     summed = np.add.reduceat(energy, cuts[:-1])
     summed_square = np.add.reduceat(mean_square, cuts[:-1])
     variance = np.maximum(summed_square - summed**2, 0.0) / (photons - 1)
-    is_full = effective_hits(summed, summed_square, photons) >= LEAST_HITS
+    is_full = effective_hits(summed, summed_square, photons) >= MIN_HITS
     n_drawn = int(np.max(np.flatnonzero(is_full & _is_in_step(cuts)), initial=-1)) + 1
     is_drawn = np.arange(len(summed)) < n_drawn
     return Bins(profile.r_edges_mm[cuts], summed, np.sqrt(variance), is_drawn)
@@ -102,7 +102,7 @@ def _cuts(energy: FloatArray, mean_square: FloatArray, photons: int) -> list[int
         # Sums of slices, because differences of running sums lose the tails: S2 spans 20 decades.
         annuli = slice(first, last)
         total = energy[annuli].sum(keepdims=True), mean_square[annuli].sum(keepdims=True)
-        return bool(effective_hits(*total, photons)[0] >= LEAST_HITS)
+        return bool(effective_hits(*total, photons)[0] >= MIN_HITS)
 
     cuts, width, end = [0], 1, len(energy)
     while (first := cuts[-1]) < end:
@@ -119,5 +119,5 @@ def _cuts(energy: FloatArray, mean_square: FloatArray, photons: int) -> list[int
 def _is_in_step(cuts: list[int]) -> npt.NDArray[np.bool_]:
     """Return whether each bin is not too wide after the one before it."""
     widths = np.diff(cuts)
-    widest = np.maximum(_MOST_WIDENING * widths[:-1], _WIDTH_OF_LUCK)
+    widest = np.maximum(_MAX_WIDENING * widths[:-1], _WIDTH_OF_LUCK)
     return np.concatenate(([True], widths[1:] <= widest))

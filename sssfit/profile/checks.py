@@ -12,8 +12,8 @@ from sssfit.messages import shown
 from sssfit.profile.npz import FORMAT, OPTIONAL
 
 # Limits of shares of light and of mm, beyond any grid or table; squares stay far from overflow.
-_MOST = 1e12
-_LEAST_MM = 1e-12
+_MAX = 1e12
+_MIN_MM = 1e-12
 # Least width of an annulus as a share of its radius, so that the 64 parts used for pixels stay
 # distinct in double precision. 100 000 annuli, the maximum, have 1e-5 at the rim.
 _NARROWEST = 1e-9
@@ -72,10 +72,10 @@ def _check_values(name: str, value: FloatArray, shape: tuple[int, ...]) -> None:
     if value.shape != shape:
         raise ProfileError(f"{name} has shape {value.shape}; expected {shape}.")
     if name.endswith("_stderr"):
-        bad = (value < 0.0) | (value > _MOST)
-        wanted = f"a number from 0 to {_MOST:g}, or NaN for none"
+        bad = (value < 0.0) | (value > _MAX)
+        wanted = f"a number from 0 to {_MAX:g}, or NaN for none"
     else:
-        bad, wanted = ~(np.abs(value) <= _MOST), f"a finite number, at most {_MOST:g}"
+        bad, wanted = ~(np.abs(value) <= _MAX), f"a finite number, at most {_MAX:g}"
     if bad.any():
         at = f" at {np.argwhere(bad)[0].tolist()}" if shape else ""
         raise ProfileError(f"{name} holds {value[bad].flat[0]}{at}; expected {wanted}.")
@@ -91,10 +91,10 @@ def _check_edges(r_edges_mm: FloatArray, n_annuli: int) -> None:
         raise ProfileError("r_edges_mm is not strictly increasing; expected finite, rising radii.")
     if r_edges_mm[0] != 0:
         raise ProfileError(f"r_edges_mm starts at {r_edges_mm[0]}; expected 0.")
-    if r_edges_mm[1] < _LEAST_MM or r_edges_mm[-1] > _MOST:
+    if r_edges_mm[1] < _MIN_MM or r_edges_mm[-1] > _MAX:
         raise ProfileError(
             f"r_edges_mm reaches from {r_edges_mm[1]:g} to {r_edges_mm[-1]:g} mm; expected radii "
-            f"from {_LEAST_MM:g} to {_MOST:g} mm."
+            f"from {_MIN_MM:g} to {_MAX:g} mm."
         )
     narrow = np.flatnonzero(np.diff(r_edges_mm) < _NARROWEST * r_edges_mm[1:])
     if narrow.size:

@@ -25,7 +25,7 @@ PARTS_PER_ANNULUS = 64
 # jth of equal annuli, so parts in proportion to 1/j are all similar. skin1's kernel at p = dr is
 # off by 1.2e-3 of its norm with steps from the eleventh annulus on and by 4e-5 with these parts;
 # beyond the 320th, two parts reduce a pixel's error from 1 % or less to a quarter of it.
-LEAST_PARTS = 2
+MIN_PARTS = 2
 
 _LARGEST_KERNEL_BYTES = 2e9
 
@@ -73,7 +73,7 @@ def _parts(annuli: int) -> npt.NDArray[np.intp]:
     """Return the number of parts of each annulus (n,): 64 for the first ten, then fewer."""
     share = SUBDIVIDED_ANNULI / np.arange(1, annuli + 1)
     parts = np.ceil(PARTS_PER_ANNULUS * np.minimum(share, 1.0)).astype(np.intp)
-    at_least: npt.NDArray[np.intp] = np.maximum(parts, min(LEAST_PARTS, PARTS_PER_ANNULUS))
+    at_least: npt.NDArray[np.intp] = np.maximum(parts, min(MIN_PARTS, PARTS_PER_ANNULUS))
     return at_least
 
 

@@ -22,7 +22,7 @@ from sssfit.scene.record import Scene
 
 ComplexArray = npt.NDArray[np.complex128]
 
-_LEAST_REACH = 256
+_MIN_REACH = 256
 
 
 def render_reference(
@@ -82,7 +82,7 @@ def reference_half_pixels(profile: Profile, mm_per_pixel: float, height: int, wi
     and with mirrored borders 20 x 20 pixels of 0.4 mm were .6 % off for skin1.
     """
     covering = checked_support(profile.r_edges_mm[-1], mm_per_pixel, None, dimensions=1)[1]
-    return min(covering, max(height, width, _LEAST_REACH) - 1)
+    return min(covering, max(height, width, _MIN_REACH) - 1)
 
 
 def reference_quadrant(

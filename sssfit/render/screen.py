@@ -65,7 +65,7 @@ def make_view(
     ):
         if name not in known:
             raise RenderError(f"{word} = {name!r}; expected one of {', '.join(known)}.")
-    mask = objects(scene)
+    mask = object_mask(scene)
     depth_mm = depths(scene, mask)
     sizes = _sizes(scale, mask.shape)
     rate, stretch = _factor(kernel, follow, depth_variance_mm2, falloff_per_mm, sizes)
@@ -104,7 +104,7 @@ def _factor(
     return rate, stretch
 
 
-def objects(scene: Scene) -> npt.NDArray[np.int32]:
+def object_mask(scene: Scene) -> npt.NDArray[np.int32]:
     """Return the mask (H, W): 1 everywhere if there is none, and 0 on the background."""
     mask = np.ones((scene.height, scene.width), np.int32) if scene.mask is None else scene.mask
     there = True if scene.depth_mm is None else np.isfinite(scene.depth_mm)

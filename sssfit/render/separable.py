@@ -129,12 +129,14 @@ def apply_passes(
     out = np.zeros((height, width, channels), pixels.dtype)
     with thread_pool(thread_count(threads), "sssfit-passes") as pool:
         for t in range(len(weights)):
-            _share(pool, height, pass_across, pixels, columns, across[t], reach[t], planes)
-            _share(pool, height, pass_down, planes, rows, down[t], reach[t], out)
+            _run_blocks(pool, height, pass_across, pixels, columns, across[t], reach[t], planes)
+            _run_blocks(pool, height, pass_down, planes, rows, down[t], reach[t], out)
     return out
 
 
-def _share(pool: ThreadPoolExecutor, rows: int, work: Callable[..., None], *given: object) -> None:
+def _run_blocks(
+    pool: ThreadPoolExecutor, rows: int, work: Callable[..., None], *given: object
+) -> None:
     """Run ``work(*given, first, last)`` on blocks of rows and wait for all of them."""
     edges = [*range(0, rows, _ROWS), rows]
     for done in [pool.submit(work, *given, *block) for block in itertools.pairwise(edges)]:

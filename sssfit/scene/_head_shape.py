@@ -184,12 +184,12 @@ def shape(x: FloatArray, y: FloatArray) -> FloatArray:
 
 def back(x: FloatArray, y: FloatArray) -> FloatArray:
     """Return the back of head, neck and ears; above the front outside them."""
-    z = loft(_turned(HEAD_BACK), x, y, 2.25, 3.0)
+    z = loft(_seen_from_behind(HEAD_BACK), x, y, 2.25, 3.0)
     z = smooth_max(z, -ear(np.abs(x), y)[1], 3.0)
-    neck = loft(_turned(NECK_BACK), x, y, 2.0, 4.0)
+    neck = loft(_seen_from_behind(NECK_BACK), x, y, 2.0, 4.0)
     return -smooth_max(z, neck - 6.0 * np.maximum(y + 62.0, 0.0), 7.0)
 
 
-def _turned(outline: Outline) -> Outline:
+def _seen_from_behind(outline: Outline) -> Outline:
     """Return an outline seen from behind."""
     return tuple((y, width, -end, -side) for y, width, end, side in outline)

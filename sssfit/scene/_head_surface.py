@@ -287,7 +287,7 @@ def bust(spacing_mm: float, detail_mm: float, threads: int) -> HeightField:
     return head_field(x, y, spacing_mm, detail_mm, threads)
 
 
-def body(threads: int) -> Solid:
+def solid_head(threads: int) -> Solid:
     """Return the smooth model with its back, the solid that light crosses."""
     front = bust(SOLID_MM, 0.0, threads)
     rows, columns = front.heights.shape
@@ -306,7 +306,7 @@ def body(threads: int) -> Solid:
     return Solid(front.heights, behind, front.x0_mm, front.y0_mm, SOLID_MM)
 
 
-def seen_part(
+def visible_part(
     height: int,
     width: int,
     mm_per_pixel: float,

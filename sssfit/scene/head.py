@@ -11,7 +11,7 @@ from typing import Any
 from sssfit.process import thread_count
 from sssfit.scene._field import Lighting, light_field, light_through
 from sssfit.scene._head_shape import FLOOR_MM
-from sssfit.scene._head_surface import COARSE_MM, body, bust, seen_part
+from sssfit.scene._head_surface import COARSE_MM, bust, solid_head, visible_part
 from sssfit.scene.patterns import check_range, check_size
 from sssfit.scene.record import Scene
 
@@ -109,10 +109,10 @@ def head_scene(
     check_range("head", "detail_mm", detail_mm, 0.0, 0.5)
     cores = thread_count(threads)
     view = (height, width, mm_per_pixel, distance_mm)
-    fine, whole = seen_part(*view, detail_mm, cores)
+    fine, whole = visible_part(*view, detail_mm, cores)
     key = _direction(light_degrees, light_up_degrees)
     is_behind = abs(light_degrees) > FRONT_DEGREES
-    solid = body(cores) if transmit or is_behind else None
+    solid = solid_head(cores) if transmit or is_behind else None
     seeing: dict[str, Any] = {
         "shape": (height, width),
         "mm_per_pixel": mm_per_pixel,

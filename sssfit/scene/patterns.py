@@ -13,26 +13,26 @@ from sssfit.scene.record import Scene
 
 # A render needs about 120 bytes per RGB pixel, and 8 GB is its limit. Checked before a head is
 # made, which takes half a minute for 11000 x 11000.
-_MOST = 1e12  # mm, degrees or pieces
-_LEAST_MM = 1e-12  # of a pixel, as in the fits: a made head of 1e-320 mm per pixel took minutes
+_MAX = 1e12  # mm, degrees or pieces
+_MIN_MM = 1e-12  # of a pixel, as in the fits: a made head of 1e-320 mm per pixel took minutes
 MAX_PIXELS = 60_000_000
 
 
-def is_whole(value: float) -> bool:
+def is_integer(value: float) -> bool:
     """Return whether a number is finite and an integer."""
     return math.isfinite(value) and value == int(value)
 
 
 def check_seed(name: str, seed: float) -> None:
     """Check the seed of the random numbers."""
-    if not is_whole(seed) or seed < 0:
+    if not is_integer(seed) or seed < 0:
         raise RenderError(f"{name}: seed = {seed}; expected a whole number from 0.")
 
 
 def check_size(name: str, height: int, width: int, mm_per_pixel: float) -> None:
     """Check the number and the size of the pixels, and the memory they need."""
     for word, value in (("height", height), ("width", width)):
-        if not is_whole(value) or value < 1:
+        if not is_integer(value) or value < 1:
             raise RenderError(f"{name}: {word} = {value}; expected a whole number, 1 or more.")
     if height * width > MAX_PIXELS:
         raise RenderError(
@@ -40,14 +40,14 @@ def check_size(name: str, height: int, width: int, mm_per_pixel: float) -> None:
             f"render; make it no larger than {MAX_PIXELS:.0e} pixels."
         )
     check_above(name, "mm_per_pixel", mm_per_pixel, 0.0)
-    check_range(name, "mm_per_pixel", mm_per_pixel, _LEAST_MM, _MOST)
+    check_range(name, "mm_per_pixel", mm_per_pixel, _MIN_MM, _MAX)
 
 
 def check_above(name: str, option: str, value: float, least: float) -> None:
     """Check for a number above ``least`` that can be counted in pixels."""
-    if not least < value <= _MOST:
+    if not least < value <= _MAX:
         raise RenderError(
-            f"{name}: {option} = {value:g}; expected a number above {least:g}, up to {_MOST:g}."
+            f"{name}: {option} = {value:g}; expected a number above {least:g}, up to {_MAX:g}."
         )
 
 
@@ -59,9 +59,9 @@ def check_range(name: str, option: str, value: float, low: float, high: float) -
 
 def check_finite(name: str, option: str, value: float) -> None:
     """Check for a finite number that can be counted in pixels."""
-    if not abs(value) <= _MOST:
+    if not abs(value) <= _MAX:
         raise RenderError(
-            f"{name}: {option} = {value:g}; expected a finite number, up to {_MOST:g}."
+            f"{name}: {option} = {value:g}; expected a finite number, up to {_MAX:g}."
         )
 
 
@@ -183,7 +183,7 @@ def stripes(
     check_finite("stripes", "angle_degrees", angle_degrees)
     turn = np.radians(angle_degrees)
     across, along = np.array((np.cos(turn), np.sin(turn))) * mm_per_pixel / period_mm
-    phase = across * middle_out(width)[None, :] - along * middle_out(height)[:, None]
+    phase = across * centred(width)[None, :] - along * centred(height)[:, None]
     return Scene("stripes", wave(phase, across, along)[..., None], mm_per_pixel)
 
 
@@ -199,8 +199,8 @@ def separable(
         period_mm = max(0.5 * height, 2.0) * mm_per_pixel
     check_period("separable", period_mm, mm_per_pixel)
     step = mm_per_pixel / period_mm
-    across = half_plane_coverage(middle_out(width), 0.0)[None, :]
-    down = wave(step * middle_out(height)[:, None], 0.0, step)
+    across = half_plane_coverage(centred(width), 0.0)[None, :]
+    down = wave(step * centred(height)[:, None], 0.0, step)
     return Scene("separable", 0.5 * (across + down)[..., None], mm_per_pixel)
 
 
@@ -208,7 +208,7 @@ def separable(
 DISK_RADIUS_MM = 19.2
 
 
-def middle_out(pixels: int) -> FloatArray:
+def centred(pixels: int) -> FloatArray:
     """Return coordinates of pixel centres from the middle of the picture, in pixels."""
     return np.arange(pixels, dtype=np.float64) - 0.5 * (pixels - 1)
 
@@ -275,7 +275,7 @@ def disk(*, height: int, width: int, mm_per_pixel: float, radius_mm: float | Non
         side_mm = min(height, width) * mm_per_pixel
         radius_mm = DISK_RADIUS_MM if side_mm >= 2.0 * DISK_RADIUS_MM else 0.25 * side_mm
     check_above("disk", "radius_mm", radius_mm, 0.0)
-    area = disk_coverage(middle_out(width), middle_out(height), radius_mm / mm_per_pixel)
+    area = disk_coverage(centred(width), centred(height), radius_mm / mm_per_pixel)
     return Scene("disk", area[..., None], mm_per_pixel)
 
 
@@ -295,7 +295,7 @@ def edge(
     check_finite("edge", "angle_degrees", angle_degrees)
     check_finite("edge", "offset_mm", offset_mm)
     turn = np.radians(angle_degrees)
-    up = -middle_out(height)[:, None]
-    distance = middle_out(width)[None, :] * np.cos(turn) + up * np.sin(turn)
+    up = -centred(height)[:, None]
+    distance = centred(width)[None, :] * np.cos(turn) + up * np.sin(turn)
     area = half_plane_coverage(distance - offset_mm / mm_per_pixel, angle_degrees)
     return Scene("edge", area[..., None], mm_per_pixel)

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from sssfit.formats.pictures import Image
 
 
-_MOST_OBJECTS = 2**31 - 1  # largest number of 32 bits
+_MAX_OBJECTS = 2**31 - 1  # largest number of 32 bits
 _HALF = 0.5  # of coverage: a pixel on an outline belongs to the object that covers more of it
 
 
@@ -141,9 +141,9 @@ class Scene:
             raise RenderError(
                 f"{self.name}: {field} has {count} {what} values; expected numbers from 0 up."
             )
-        if field == "mask" and ((values % 1.0 != 0.0) | (values > _MOST_OBJECTS)).any():
+        if field == "mask" and ((values % 1.0 != 0.0) | (values > _MAX_OBJECTS)).any():
             raise RenderError(
-                f"{self.name}: mask holds other values than whole numbers up to {_MOST_OBJECTS}."
+                f"{self.name}: mask holds other values than whole numbers up to {_MAX_OBJECTS}."
             )
         # Always row-major: sums over pixels in another order round differently.
         kept = values.astype(dtype, order="C")

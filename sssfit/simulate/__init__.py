@@ -110,12 +110,12 @@ def simulate(
         )
     profiles = chosen.load()
     if own is not None:
-        return _one(profiles(**settings))
+        return _single_profile(profiles(**settings))
     record = load_material(material) if isinstance(material, str | Path) else material
-    return _one(profiles([record] if chosen.shares else record, **settings))
+    return _single_profile(profiles([record] if chosen.shares else record, **settings))
 
 
-def _one(found: Profile | list[Profile]) -> Profile:
+def _single_profile(found: Profile | list[Profile]) -> Profile:
     """Return the profile of a method that takes one material or several."""
     return found[0] if isinstance(found, list) else found
 

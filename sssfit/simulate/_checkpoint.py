@@ -40,7 +40,7 @@ _MARKS = KINDS["checkpoint"].marks
 # At most this much work is lost. skin1's checkpoint takes 1 ms to write, the largest (64 channels
 # of 100 000 annuli, 100 MB) a quarter of a second.
 EVERY_SECONDS = 30.0
-_MOST_META_BYTES = 16_000_000  # numpy's text has 4 bytes a character
+_MAX_META_BYTES = 16_000_000  # numpy's text has 4 bytes a character
 _HEADER_BYTES = 10_000  # numpy's own limit
 
 
@@ -102,7 +102,7 @@ class Checkpoint:
                 f"a checkpoint every {self.every_seconds} s; give a time from 0 s up."
             )
 
-    def begin(
+    def start_state(
         self, empty: Tally, settings: Mapping[str, str], materials: Sequence[Material]
     ) -> State:
         """Return the state to start from: the one saved with the same ``settings``, or ``empty``.
@@ -209,14 +209,14 @@ def _write(
 
 def _load(path: Path, empty: Tally, settings: Mapping[str, str]) -> State:
     """Fill ``empty`` with the contents of a file that was made with the same settings."""
-    with opened(path, str(path)) as archive:
+    with open_checkpoint(path, str(path)) as archive:
         meta = read_meta(archive)
         _check_settings(path, meta["settings"], settings)
         return read_state(archive, meta, empty)
 
 
 @contextlib.contextmanager
-def opened(source: Path | BinaryIO, origin: str) -> Iterator[zipfile.ZipFile]:
+def open_checkpoint(source: Path | BinaryIO, origin: str) -> Iterator[zipfile.ZipFile]:
     """Open a checkpoint; errors are one line that begins with ``origin``."""
     try:
         with zipfile.ZipFile(source) as archive:
@@ -239,7 +239,7 @@ def opened(source: Path | BinaryIO, origin: str) -> Iterator[zipfile.ZipFile]:
 
 def read_meta(archive: zipfile.ZipFile) -> dict[str, Any]:
     """Read the metadata of a checkpoint; raises CheckpointError, or other errors if damaged."""
-    meta = dict(json.loads(str(read_npy(archive, "meta", "U", _MOST_META_BYTES))))
+    meta = dict(json.loads(str(read_npy(archive, "meta", "U", _MAX_META_BYTES))))
     if meta.get("format") != FORMAT:
         raise CheckpointError(f"has format {shown(meta.get('format'))}, not {FORMAT!r}")
     settings = meta.get("settings")
@@ -321,7 +321,7 @@ def _check_sums(name: str, sums: npt.NDArray[Any], mine: npt.NDArray[Any], photo
 def _check_settings(path: Path, there: Mapping[str, str], here: Mapping[str, str]) -> None:
     """Raise an error that names every setting in which a checkpoint differs from the run."""
     differing = [
-        f"{_short(name)} = {_short(there.get(name))} (now {_short(here.get(name))})"
+        f"{_shortened(name)} = {_shortened(there.get(name))} (now {_shortened(here.get(name))})"
         for name in {**here, **there}
         if there.get(name) != here.get(name)
     ]
@@ -332,7 +332,7 @@ def _check_settings(path: Path, there: Mapping[str, str], here: Mapping[str, str
         )
 
 
-def _short(text: str | None) -> str:
+def _shortened(text: str | None) -> str:
     """Shorten a value to one line: many materials in a walk would fill a page."""
     return printable(str(text))[:200]
 

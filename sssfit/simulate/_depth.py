@@ -39,7 +39,7 @@ from sssfit.optics import Cone, gauss_legendre, is_matched, normal_transmittance
 _DEPTH = 26.0
 _WIDEST = 2.5  # panel: C0 = exp(-z) needs it
 _BEYOND = 40.0  # exp(-40) = 4e-18: tables end here
-_MOST_ENTRIES = 8000  # largest size of the table of X; only indices under 1.005 need more
+_MAX_ENTRIES = 8000  # largest size of the table of X; only indices under 1.005 need more
 _OfTau = Callable[[FloatArray, FloatArray], FloatArray]
 _STRETCHES, _PER_STRETCH = 14, 8  # Gauss nodes over w; 14 times 8 give K_d to 1e-12
 
@@ -225,7 +225,7 @@ def _tables(
     steepest = float(cone.tangent[0])
     reach = min(_BEYOND, resolution.phase / (k * steepest)) if k > 0.0 else _BEYOND
     rate = 1.0 / float(cone.cosine[0]) + k * steepest
-    step = max(resolution.step / rate, reach / _MOST_ENTRIES)
+    step = max(resolution.step / rate, reach / _MAX_ENTRIES)
     along = step * np.arange(int(reach / step) + 4, dtype=np.float64)
     escape_table = _over_cone(along, k, cone, cone.weight / cone.cosine)
     near = z <= reach

@@ -16,7 +16,7 @@ from sssfit.material import Layer
 from sssfit.optics import fresnel_reflectance, gauss_legendre
 
 # The polynomials for F_dr are within 0.006 of the integral in this range, and above 1 from 3.9 on.
-LEAST_ETA, MOST_ETA = 0.5, 2.5
+MIN_ETA, MAX_ETA = 0.5, 2.5
 _NODES = 200
 
 
@@ -73,10 +73,10 @@ def mismatch_by_polynomial(eta: float) -> float:
     SimulationError
         eta is outside 0.5 to 2.5, where the polynomials do not approximate Fresnel's formulas.
     """
-    if not LEAST_ETA <= eta <= MOST_ETA:
+    if not MIN_ETA <= eta <= MAX_ETA:
         raise SimulationError(
             f"an interface has the relative refractive index {eta:.4g}; this method covers "
-            f"{LEAST_ETA} to {MOST_ETA}: use montecarlo (or, without a bottom, dipole-grosjean)."
+            f"{MIN_ETA} to {MAX_ETA}: use montecarlo (or, without a bottom, dipole-grosjean)."
         )
     if eta == 1.0:
         return 1.0

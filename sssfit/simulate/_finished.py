@@ -16,7 +16,7 @@ from sssfit.grid import make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
 from sssfit.simulate._batches import MAX_PHOTONS, Sums, Tally, Walk
-from sssfit.simulate._run import Ending
+from sssfit.simulate._run import EndCondition
 
 AUTO_BEYOND = 1e-3  # radius "auto": less than this share of any channel lies beyond the grid
 
@@ -54,7 +54,7 @@ def _mean_and_error(sums: FloatArray, photons: int) -> tuple[FloatArray, FloatAr
 
 
 def profile_of(
-    task: Walk, tally: Tally, index: int, ending: Ending, error: float, *, trim: bool
+    task: Walk, tally: Tally, index: int, ending: EndCondition, error: float, *, trim: bool
 ) -> Profile:
     """Turn one material's part of the tally into a profile; weights start at 1 - specular."""
     material, grid = task.materials[index], task.grids[index]
@@ -116,11 +116,11 @@ def _warn_unfinished(material: Material, profile: Profile) -> None:
 
 # N photons give a total R a relative error of sqrt((1/R - 1) / N): 1e-7 for .99 and the most
 # photons.
-LEAST_TARGET = 1e-7
+MIN_TARGET = 1e-7
 DEFAULT_PHOTONS = 10_000_000
 
 
-def ending_of(photons: int | None, target_error: float | None) -> Ending:
+def end_condition(photons: int | None, target_error: float | None) -> EndCondition:
     """Return the end condition of a run; without a number of photons, the target alone decides.
 
     Raises
@@ -130,18 +130,18 @@ def ending_of(photons: int | None, target_error: float | None) -> Ending:
     """
     if photons is None:
         photons = DEFAULT_PHOTONS if target_error is None else MAX_PHOTONS
-    photons = whole("photons", photons)
+    photons = whole_number("photons", photons)
     if not 2 <= photons <= MAX_PHOTONS:
         raise SimulationError(f"photons = {photons}; give a whole number from 2 to 1e12.")
-    if target_error is not None and not LEAST_TARGET <= target_error < 1.0:
+    if target_error is not None and not MIN_TARGET <= target_error < 1.0:
         raise SimulationError(
-            f"target_error = {target_error}; give a share from {LEAST_TARGET:g}, which takes 1e12 "
+            f"target_error = {target_error}; give a share from {MIN_TARGET:g}, which takes 1e12 "
             "photons or more, to 1."
         )
-    return Ending(photons, target_error)
+    return EndCondition(photons, target_error)
 
 
-def whole(name: str, value: int) -> int:
+def whole_number(name: str, value: int) -> int:
     """Convert any whole number (numpy's too) to int, or raise an error."""
     try:
         return operator.index(value)
@@ -150,7 +150,7 @@ def whole(name: str, value: int) -> int:
 
 
 def provenance(
-    materials: Sequence[Material], dr_mm: float, ending: Ending, *, auto: bool
+    materials: Sequence[Material], dr_mm: float, ending: EndCondition, *, auto: bool
 ) -> dict[str, Any]:
     """Return the settings of a run as stored in a profile's meta.
 
@@ -169,7 +169,7 @@ def provenance(
 def is_complete(profile: Profile) -> bool:
     """Whether the run of a profile of this method reached its end and was not stopped."""
     settings, error = profile.meta["settings"], profile.meta["relative_error"]
-    ending = Ending(settings["photons"], settings["target_error"])
+    ending = EndCondition(settings["photons"], settings["target_error"])
     return ending.is_reached(profile.photons or 0, math.inf if error is None else error)
 
 
@@ -193,7 +193,7 @@ def is_finished(
     grid = make_grid(
         material, dr_mm=dr_mm, radius_mm=None if isinstance(radius_mm, str) else radius_mm
     )
-    expected = provenance(materials, grid.dr_mm, ending_of(photons, target_error), auto=auto)
+    expected = provenance(materials, grid.dr_mm, end_condition(photons, target_error), auto=auto)
     return (
         meta.get("method") == "montecarlo"
         and meta.get("settings") == expected

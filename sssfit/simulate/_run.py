@@ -41,7 +41,7 @@ class Progress:
 
 
 @dataclass(frozen=True, slots=True)
-class Ending:
+class EndCondition:
     """The end of a run: a number of photons, or a check that finds the target error met."""
 
     photons: int
@@ -79,13 +79,13 @@ class _Monitor:
     """Checks between batches: the error, the end of the run, and progress reports."""
 
     task: Walk
-    ending: Ending
+    ending: EndCondition
     state: State
     progress: Callable[[Progress], None] | None
     error: float = math.inf
     reported: float = -math.inf
 
-    def look(self) -> None:
+    def check_error(self) -> None:
         """Update the error if a check is due, or at the end."""
         photons = self.state.tally.photons
         if not is_check(photons) and photons < self.ending.photons:
@@ -96,7 +96,7 @@ class _Monitor:
         if self.ending.target_error is not None and photons >= HOPELESS_PHOTONS:
             _check_target_is_reachable(self.task, photons, errors)
 
-    def is_over(self) -> bool:
+    def is_finished(self) -> bool:
         """Whether the run is complete."""
         return self.ending.is_reached(self.state.tally.photons, self.error)
 
@@ -125,28 +125,28 @@ def run(
     Ends early, after a whole batch, when ``stop`` returns true. ``settings`` must agree with those
     of a checkpoint.
     """
-    ending = Ending(task.photons, target_error)
+    ending = EndCondition(task.photons, target_error)
     state = State(task.empty_tally())
     if checkpoint:
-        state = checkpoint.begin(state.tally, settings or {}, task.materials)
+        state = checkpoint.start_state(state.tally, settings or {}, task.materials)
         _check_not_finished(checkpoint, state, ending)
     monitor = _Monitor(task, ending, state, progress)
     if state.tally.photons:
-        monitor.look()
+        monitor.check_error()
         monitor.report(now=True)
     begun = perf_counter() - state.seconds
     with closing(_in_order(task, threads, stop, state.tally.photons)) as tallies:
         for tally in tallies:
             state.tally.add(tally)
             state.seconds = perf_counter() - begun
-            monitor.look()
-            if monitor.is_over():
+            monitor.check_error()
+            if monitor.is_finished():
                 break
             monitor.report()
             if checkpoint:
                 checkpoint.save_if_due(state)
     monitor.report(now=True)
-    if checkpoint and state.tally.photons and not monitor.is_over():
+    if checkpoint and state.tally.photons and not monitor.is_finished():
         checkpoint.save_at_stop(state)
     return state.tally
 
@@ -176,7 +176,7 @@ def _in_order(
             pool.shutdown(wait=True, cancel_futures=True)
 
 
-def _check_not_finished(checkpoint: Checkpoint, state: State, ending: Ending) -> None:
+def _check_not_finished(checkpoint: Checkpoint, state: State, ending: EndCondition) -> None:
     """Raise an error if a run with these settings from the start would have ended earlier."""
     done = state.tally.photons
     if done > ending.photons:

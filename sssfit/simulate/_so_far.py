@@ -19,13 +19,13 @@ from sssfit.simulate._batches import MAX_PHOTONS, Walk, relative_errors
 from sssfit.simulate._checkpoint import (
     FORMAT,
     CheckpointError,
-    opened,
+    open_checkpoint,
     read_meta,
     read_state,
     settings_of,
 )
 from sssfit.simulate._finished import profile_of
-from sssfit.simulate._run import Ending
+from sssfit.simulate._run import EndCondition
 from sssfit.simulate.montecarlo import check_media, make_walk
 
 
@@ -77,12 +77,12 @@ def read_checkpoint(source: str | Path | BinaryIO, origin: str | None = None) ->
     """
     if isinstance(source, str | Path):
         source, origin = Path(source), origin or str(source)
-    with opened(source, origin or "the checkpoint") as archive:
+    with open_checkpoint(source, origin or "the checkpoint") as archive:
         meta = read_meta(archive)
         walk = _walk_of(meta)
         state = read_state(archive, meta, walk.empty_tally())
     tally, error = state.tally, float(relative_errors(walk, state.tally).max())
-    ending = Ending(tally.photons)
+    ending = EndCondition(tally.photons)
     profiles = [
         profile_of(walk, tally, k, ending, error, trim=False) for k in range(len(walk.materials))
     ]

@@ -19,8 +19,8 @@ from sssfit.profile import Profile
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS, gaussian_between, gaussian_beyond
 from sssfit.simulate._deterministic import ROUNDING, ProfileSource, computed_profile
 
-_MOST_TOTAL = 1.0 + 1e-6  # published weights are rounded, but by no more than this
-_LEAST_VARIANCE, _MOST_VARIANCE = 1e-18, 1e18  # mm^2
+_MAX_TOTAL = 1.0 + 1e-6  # published weights are rounded, but by no more than this
+_MIN_VARIANCE, _MAX_VARIANCE = 1e-18, 1e18  # mm^2
 
 
 def checked_name(name: str, source: str | None, channels: Sequence[str]) -> ProfileSource:
@@ -47,18 +47,18 @@ def checked_numbers(
             f"weights has the shape {shares.shape}; expected {(variances.size, n_channels)}: a row "
             "for each variance, a column for each channel."
         )
-    is_right = (variances >= _LEAST_VARIANCE) & (variances <= _MOST_VARIANCE)
+    is_right = (variances >= _MIN_VARIANCE) & (variances <= _MAX_VARIANCE)
     if not is_right.all():
         k = int(np.argmin(is_right))
         raise SimulationError(
             f"variances_mm2[{k}] = {shown(variances[k])}; expected a number from "
-            f"{_LEAST_VARIANCE:g} to {_MOST_VARIANCE:g}, in mm^2."
+            f"{_MIN_VARIANCE:g} to {_MAX_VARIANCE:g}, in mm^2."
         )
     if not np.isfinite(shares).all():
         k, c = (int(each[0]) for each in np.nonzero(~np.isfinite(shares)))
         raise SimulationError(f"weights[{k}][{c}] = {shown(shares[k, c])}; expected a finite one.")
     total = float(shares.sum(axis=0).max())
-    if total > _MOST_TOTAL:
+    if total > _MAX_TOTAL:
         raise SimulationError(
             f"weights add up to {total:.7g} in a channel; expected 1 at most: no more light leaves "
             "than arrives."
@@ -78,7 +78,7 @@ def _numbers(key: str, values: npt.ArrayLike) -> FloatArray:
 DEON_SKIN = ProfileSource("deon-skin", "d'Eon, Luebke, Enderton 2007", ("R", "G", "B"))
 
 _RINGS_PER_SIGMA = 10  # of the narrowest: the energy of pixels of 2.5 annuli is then right to 3e-4
-_MOST_BEYOND = 1e-9
+_MAX_BEYOND = 1e-9
 
 
 def simulate_deon_skin(*, dr_mm: float | None = None, radius_mm: float | None = None) -> Profile:
@@ -157,12 +157,14 @@ def simulate_gaussians(
     inner, outer = grid.r_edges_mm[:-1, None], grid.r_edges_mm[1:, None]
     annuli = gaussian_between(inner, outer, variances) @ shares
     beyond = gaussian_beyond(outer[-1:], variances) @ shares
-    energies = _not_negative(np.vstack((annuli, beyond)), shares, named)
+    energies = _check_not_negative(np.vstack((annuli, beyond)), shares, named)
     settings = {"variances_mm2": variances.tolist(), "weights": shares.tolist()}
     return computed_profile(named, "gaussians", grid, energies, settings=settings)
 
 
-def _not_negative(energies: FloatArray, weights: FloatArray, named: ProfileSource) -> FloatArray:
+def _check_not_negative(
+    energies: FloatArray, weights: FloatArray, named: ProfileSource
+) -> FloatArray:
     """Raise an error if R_d is negative; rounding errors become 0."""
     is_wrong = energies < -ROUNDING * np.abs(weights).max()
     if is_wrong.any():
@@ -182,7 +184,7 @@ def _grid(
     if dr_mm is None:
         dr_mm = float(sigmas_mm.min()) / _RINGS_PER_SIGMA
     if radius_mm is None:
-        most = np.abs(weights).max(axis=1) * len(variances) / _MOST_BEYOND
+        most = np.abs(weights).max(axis=1) * len(variances) / _MAX_BEYOND
         reach_mm = sigmas_mm * np.sqrt(2.0 * np.log(np.maximum(most, 1.0)))
         radius_mm = float(max(reach_mm.max(), sigmas_mm.max()))
     return grid_of_lengths(dr_mm, radius_mm)

@@ -24,8 +24,14 @@ from sssfit.process import available_cores
 from sssfit.profile import Profile
 from sssfit.simulate._batches import Walk, relative_errors
 from sssfit.simulate._checkpoint import Checkpoint, settings_of
-from sssfit.simulate._finished import AUTO_BEYOND, ending_of, profile_of, share_beyond, whole
-from sssfit.simulate._run import Ending, Progress, run
+from sssfit.simulate._finished import (
+    AUTO_BEYOND,
+    end_condition,
+    profile_of,
+    share_beyond,
+    whole_number,
+)
+from sssfit.simulate._run import EndCondition, Progress, run
 from sssfit.simulate._walks import LayeredWalk, SemiInfiniteWalk, relative_eta
 
 # With fewer, a channel may have a handful of hits, and its error estimate is unreliable.
@@ -33,7 +39,7 @@ HONEST_PHOTONS = 1000
 PILOT_PHOTONS = 200_000
 # Beyond these, single precision does not resolve the peak (see ``sample_hg``, which is made for a
 # forward one).
-LEAST_G, MOST_G = -0.99, 0.9999
+MIN_G, MAX_G = -0.99, 0.9999
 
 
 def simulate_montecarlo(
@@ -155,9 +161,9 @@ def simulate_montecarlo_many(
         In the order of ``materials``; their noise is correlated.
     """
     check_media(materials)
-    ending = ending_of(photons, target_error)
-    seed = whole("seed", seed)
-    threads = available_cores() if threads is None else whole("threads", threads)
+    ending = end_condition(photons, target_error)
+    seed = whole_number("seed", seed)
+    threads = available_cores() if threads is None else whole_number("threads", threads)
     _check_settings(ending.photons, seed, threads)
     auto = radius_mm == "auto"
     if isinstance(radius_mm, str):
@@ -195,15 +201,15 @@ def check_media(materials: Sequence[Material]) -> None:
                 f"{material!r} is not a Material; load one with sssfit.material.load_material."
             )
         every_g = np.concatenate([layer.g for layer in material.layers])
-        for g in every_g[(every_g < LEAST_G) | (every_g > MOST_G)].tolist():
+        for g in every_g[(every_g < MIN_G) | (every_g > MAX_G)].tolist():
             raise SimulationError(
-                f"{material.name}: g = {g:.9g}; the photon walk covers {LEAST_G} to {MOST_G}: give "
+                f"{material.name}: g = {g:.9g}; the photon walk covers {MIN_G} to {MAX_G}: give "
                 "a smaller g, with sigma_s such that (1 - g) sigma_s stays as it is."
             )
     if len(materials) == 1:
         return
     for material in materials:
-        if not is_plain(material):
+        if not has_fast_walk(material):
             raise SimulationError(
                 f"{material.name} is layered, of finite thickness or has g other than 0: "
                 "it cannot share a walk with other materials; simulate it by itself."
@@ -212,7 +218,7 @@ def check_media(materials: Sequence[Material]) -> None:
         raise SimulationError("one walk serves one refractive index; group the materials by eta.")
 
 
-def is_plain(material: Material) -> bool:
+def has_fast_walk(material: Material) -> bool:
     """Whether the fast walk applies: a half space, g = 0, index at least that of the top medium."""
     layer = material.layers[0]
     plain = material.is_semi_infinite and not np.any(layer.g)
@@ -227,21 +233,21 @@ def shared_walks(materials: Sequence[Material]) -> list[list[int]]:
     groups: dict[object, list[int]] = {}
     for k, material in enumerate(materials):
         groups.setdefault(
-            relative_eta(material) if is_plain(material) else ("alone", k), []
+            relative_eta(material) if has_fast_walk(material) else ("alone", k), []
         ).append(k)
     return list(groups.values())
 
 
 def is_compiled(material: Material) -> bool:
     """Whether the walk of a material can start at once; otherwise it compiles first, about 10 s."""
-    return compiled_before("semi_infinite" if is_plain(material) else "layered")
+    return compiled_before("semi_infinite" if has_fast_walk(material) else "layered")
 
 
 def make_walk(
     materials: Sequence[Material], grids: Sequence[RadialGrid], seed: int, photons: int
 ) -> Walk:
     """Choose the simplest walk for the material."""
-    kind = SemiInfiniteWalk if is_plain(materials[0]) else LayeredWalk
+    kind = SemiInfiniteWalk if has_fast_walk(materials[0]) else LayeredWalk
     return kind(tuple(materials), tuple(grids), seed, photons)
 
 
@@ -290,7 +296,7 @@ def _auto_grids(
         ]
 
 
-def _warn_target(ending: Ending, photons: int, error: float) -> None:
+def _warn_target(ending: EndCondition, photons: int, error: float) -> None:
     """Warn if a run reached its last photon before its target error."""
     target = ending.target_error
     if target is not None and photons == ending.photons and error >= target:

@@ -201,22 +201,22 @@ def _layers(material: Material) -> list[_Layer]:
 
 def _stack(layers: list[_Layer], k_per_mm: FloatArray) -> _Response:
     """Return the response of a stack, from the top down, at wavenumbers (n, 1) [1/mm]."""
-    whole = _one(layers[0], k_per_mm)
+    whole = _single_layer(layers[0], k_per_mm)
     for layer in layers[1:]:
-        whole = _added(whole, _one(layer, k_per_mm))
+        whole = _layer_on_stack(whole, _single_layer(layer, k_per_mm))
     return whole
 
 
-def _one(layer: _Layer, k_per_mm: FloatArray) -> _Response:
+def _single_layer(layer: _Layer, k_per_mm: FloatArray) -> _Response:
     """Return the response of one layer."""
     # sinh(s d) / sinh(s H) has a limit at s = 0, which a length of 1e100 mm reaches to the bit
     s = np.maximum(np.hypot(layer.medium.sigma_tr_per_mm, k_per_mm), 1e-100)
-    down = _both_ways(layer.medium, layer.thickness_mm, layer.above, layer.below, s)
-    up = _both_ways(layer.medium, layer.thickness_mm, layer.below, layer.above, s)
+    down = _transforms(layer.medium, layer.thickness_mm, layer.above, layer.below, s)
+    up = _transforms(layer.medium, layer.thickness_mm, layer.below, layer.above, s)
     return _Response(*down, *up)
 
 
-def _both_ways(
+def _transforms(
     medium: Diffusion, thickness_mm: float, entered: float, other: float, s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return Rhat and That (n, C) of the module docstring, for light from the side ``entered``.
@@ -245,7 +245,7 @@ def _one_minus_exp(exponent: FloatArray) -> FloatArray:
     return np.asarray(-np.expm1(-exponent), dtype=np.float64)
 
 
-def _added(top: _Response, bottom: _Response) -> _Response:
+def _layer_on_stack(top: _Response, bottom: _Response) -> _Response:
     """Return the response of one layer on another."""
     between = 1.0 / (1.0 - top.reflected_up * bottom.reflected)
     back = top.transmitted * bottom.reflected * top.transmitted_up * between
