@@ -90,7 +90,7 @@ def compared(
     given: Mapping[str, Any],
     common: Common,
 ) -> Comparison:
-    """Fit and judge every kernel of a profile; write chart and table, which are held by now."""
+    """Fit and evaluate every kernel of a profile; write chart and table, which are held by now."""
     from sssfit.chart import figure_of
     from sssfit.compare import compare_kernels
     from sssfit.compare.comparison import check_error

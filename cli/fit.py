@@ -53,7 +53,7 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
     counted, stem = FITS[method].counted, stem_of(name, source.material_name)
     count = settings.get(counted, known[counted][0].words) if counted else ""
     path = target(given["output"], f"{stem}.{method}{count}.kernel.json")
-    settings |= _judge(settings, common.threads)
+    settings |= _picture_target(settings, common.threads)
     settings |= {key: given[key] for key in ("mm_per_pixel", "normalize")}
     settings["support_mm"] = None if given["support"] == "auto" else given["support"]
     with held([path], is_kernel_file, inputs=[name], force=given["force"], named=KERNEL):
@@ -65,7 +65,7 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
     finish_one(common, "fit", path, figures, text, "the kernel")
 
 
-def _judge(settings: dict[str, Any], threads: int | None) -> dict[str, Any]:
+def _picture_target(settings: dict[str, Any], threads: int | None) -> dict[str, Any]:
     """Return what judges pictures, if they are the target: the fits by themselves render none."""
     if settings.get("target") != "picture":
         return {}

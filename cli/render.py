@@ -21,7 +21,7 @@ from ._reports import RENDERED
 from ._verb_options import MAPS, RENDER, RENDER_PICTURE
 
 if TYPE_CHECKING:
-    from sssfit.compare.judge import Judgement
+    from sssfit.compare.evaluate import Evaluation
     from sssfit.kernel import SeparableKernel
 
 # Of the head's key light: behind both ears.
@@ -107,9 +107,9 @@ def _rendered(
     given: Mapping[str, Any],
     own: dict[str, Any],
     common: Common,
-) -> tuple[str | None, Judgement]:
+) -> tuple[str | None, Evaluation]:
     """Light the picture and render it; return the file of its profile, too."""
-    from sssfit.compare.judge import judge, judge_in_screen_space
+    from sssfit.compare.evaluate import evaluate, evaluate_in_screen_space
     from sssfit.fit import MM_PER_PIXEL
     from sssfit.scene.load import load_scene
 
@@ -122,12 +122,12 @@ def _rendered(
     how = {key: given[key] for key in ("transmit", "border")} | {"threads": common.threads}
     if screen:
         follow = given["follow"] or "gaussian"
-        return None, judge_in_screen_space(scene, kernel, follow=follow, **how)
+        return None, evaluate_in_screen_space(scene, kernel, follow=follow, **how)
     profile, source = profile_of_kernel(kernel, name, given["profile"], common)
     if profile is None and (given["truth"] or given["difference"]):
         raise click.UsageError("--truth and --difference need the profile; name it.")
     how |= {key: given[key] for key in ("exposure", "structure")}
-    made = judge(scene, kernel, profile, **how)
+    made = evaluate(scene, kernel, profile, **how)
     if given["difference"]:
         made = made.with_difference(given["difference_map"], given["gain"])
     return source, made
