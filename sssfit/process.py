@@ -1,7 +1,7 @@
 """The process: its cores and threads, the memory it may use, Ctrl-C and SIGTERM.
 
 Memory: under a limit (``ulimit -v``, a batch system's) compiled libraries do not raise MemoryError.
-At 400 MB scipy's BLAS tried for ever to get its buffers, at 520 MB the process ended in a
+At 400 MB scipy's BLAS tried forever to get its buffers, at 520 MB the process ended in a
 segmentation fault. So the limit is compared with the measured needs of libraries and threads.
 
 Signals: the first requests an orderly end, the second ends the program at once. The first raises

@@ -72,7 +72,7 @@ def gaussian_line_integral(
 
     A difference of two tails, on the side of 0 where these are small and keep their digits.
     """
-    from scipy.special import ndtr  # 0.2 s that the photon walk need not wait for
+    from scipy.special import ndtr  # 0.2 s that the photon walk does not need
 
     sigma = np.sqrt(np.asarray(variance, dtype=np.float64))
     a, b = np.asarray(left) / sigma, np.asarray(right) / sigma
@@ -127,7 +127,7 @@ def diffusion_marginal(x: npt.ArrayLike, s: npt.ArrayLike) -> FloatArray:
 
     Infinite at x = 0: pixels take `diffusion_line_integral`. Its second moment is 7 / s^2.
     """
-    from scipy.special import k0  # 0.2 s that the photon walk need not wait for
+    from scipy.special import k0  # 0.2 s that the photon walk does not need
 
     s = np.asarray(s, dtype=np.float64)
     t = s * np.abs(x)

@@ -294,8 +294,8 @@ def costs(name, distances_mm, tolerance, rows):
 @pytest.mark.parametrize("name", ["skin1", "marble", "ketchup"])
 def test_cost_never_rises_with_distance(name, monkeypatch):
     quick(monkeypatch)
-    distances = np.geomspace(100.0, 50_000.0, 6)
-    found = list(costs(name, distances, 1.0, 64))
+    distances = np.geomspace(100.0, 50_000.0, 5)
+    found = list(costs(name, distances, 1.0, 48))
     assert found == sorted(found, reverse=True)
     assert found[0] > 10
     assert found[-1] == 0

@@ -186,7 +186,7 @@ def test_profile_is_that_of_the_walk():
 
 
 def test_eleven_profiles_are_those_of_the_walk():
-    for figure in checks_exact.against_walk(1_000_000):
+    for figure in checks_exact.against_walk(300_000):
         assert abs(figure.sigmas) < checks.LIMIT, figure
 
 
@@ -234,6 +234,7 @@ def test_energy_that_is_missing_counts_as_error(monkeypatch):
     assert profile.meta["relative_error"] == pytest.approx(0.003 / total, rel=1e-3)
     np.testing.assert_allclose(profile.meta["energy_balance_stderr"], 0.003, rtol=1e-3)
     assert (profile.diffuse_reflectance_stderr >= 0.00299).all()
+    monkeypatch.setattr(exact, "_LEVELS", _LEVELS[:2])  # each of the others takes ten times longer
     with pytest.raises(SimulationError, match="cannot be met"):
         simulate_exact(material, tolerance=0.01)
 
@@ -307,7 +308,7 @@ def test_only_the_relative_index_counts():
     np.testing.assert_allclose(immersed.annulus_energy, in_air.annulus_energy, rtol=1e-9)
 
 
-@pytest.mark.parametrize("channels", [1, 64])
+@pytest.mark.parametrize("channels", [1, 24])
 def test_any_number_of_channels(channels):
     albedos = np.linspace(0.0, 1.0, channels) if channels > 1 else np.array([0.5])
     profile = simulate_exact(checks.medium(1.0 - albedos + 1e-15, albedos, 1.3))

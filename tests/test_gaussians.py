@@ -424,3 +424,28 @@ def test_fewer_annuli_than_unknowns():
         assert fit_gaussians(four, terms=2, mm_per_pixel="profile").kernel.rank == 2
     with pytest.raises(FitError, match="fewer terms"):
         fit_gaussians(four, terms=3, mm_per_pixel="profile")
+
+
+def test_sums_are_searched_once_whatever_the_support(monkeypatch, marble):
+    searched = []
+    original = annuli_module._best_of
+
+    def counted(annuli, starts, bounds):
+        searched.append(len(starts[0]))
+        return original(annuli, starts, bounds)
+
+    monkeypatch.setattr(annuli_module, "_best_of", counted)
+    annuli_module.forget_searches()
+    first = fit_gaussians(marble, terms=3, mm_per_pixel=0.5, support_mm=6.0)
+    assert searched == [1, 2, 3] * 3
+    wider = fit_gaussians(marble, terms=2, mm_per_pixel=0.5, support_mm=9.0)
+    assert len(searched) == 9
+    fit_gaussians(marble, terms=4, mm_per_pixel=0.5, support_mm=6.0)
+    assert searched[9:] == [4] * 3
+    fit_gaussians(marble, terms=1, signed=True, mm_per_pixel=0.5)
+    assert searched[12:] == [1] * 3  # another objective
+    annuli_module.forget_searches()
+    again = fit_gaussians(marble, terms=2, mm_per_pixel=0.5, support_mm=9.0)
+    np.testing.assert_array_equal(again.kernel.weights, wider.kernel.weights)
+    assert (again.evaluations, again.stop_reasons) == (wider.evaluations, wider.stop_reasons)
+    assert wider.evaluations != first.evaluations

@@ -1,7 +1,6 @@
-"""Any record in figures and in words: what ``sssfit show`` and ``sssfit materials`` print.
+"""Any record as figures and as a report, for ``sssfit show`` and ``sssfit materials``.
 
-`figures_of` returns what ``--json`` has, and `summary` writes the page for people from the same
-figures.
+`figures_of` returns the figures of ``--json``, and `summary` makes the printed report from them.
 """
 
 import json
@@ -31,7 +30,7 @@ def figures_of(found: "Loaded") -> dict[str, Any]:
 
 
 def summary(figures: Figures) -> str:
-    """Write the figures of any record for people, a table for what has values a channel."""
+    """Return the figures of any record as a report, with a table for values per channel."""
     return _PAGES[figures["kind"]](figures)
 
 
@@ -79,8 +78,8 @@ def shipped_figures() -> dict[str, Any]:
 
 
 def deon_skin_figures() -> dict[str, Any]:
-    """Return what deon-skin stands for: its Gaussians, with the weights (6, 3) of the channels."""
-    from sssfit.simulate import DEON_SKIN as SKIN  # it takes numba
+    """Return the Gaussians of deon-skin, with the weights (6, 3) of the channels."""
+    from sssfit.simulate import DEON_SKIN as SKIN  # it needs numba
 
     return {
         **SKIN.to_dict(),
@@ -91,7 +90,7 @@ def deon_skin_figures() -> dict[str, Any]:
 
 
 def _grid(material: Material) -> RadialGrid | None:
-    """Return the paper's grid, or None where that would have too many annuli."""
+    """Return the paper's grid, or None if it would have too many annuli."""
     try:
         return paper_grid(material)
     except SimulationError:
@@ -118,7 +117,7 @@ _LAYER = (
 
 
 def material_page(figures: Figures) -> str:
-    """Write a material's figures for people."""
+    """Return a material's figures as a report."""
     source = printable(figures["source"]) or "not given"
     grid = filled(_GRID, figures) if figures["dr_mm"] else _NO_GRID
     lines = [filled(_MATERIAL_HEAD, {**figures, "source": source, "grid": grid})]
@@ -140,7 +139,7 @@ def material_page(figures: Figures) -> str:
 
 
 def shipped_page(figures: Figures) -> str:
-    """Write the rows of the shipped materials."""
+    """Return the rows of the shipped materials as text."""
     rows = figures["rows"]
 
     def values(key: str, form: str = "") -> list[Any]:
@@ -163,7 +162,7 @@ def shipped_page(figures: Figures) -> str:
 
 
 def deon_skin_page(figures: Figures) -> str:
-    """Write the Gaussians, a line each."""
+    """Return a line of text for each Gaussian."""
     rows = [
         [f"{variance:g}", *(f"{weight:.3f}" for weight in weights)]
         for variance, weights in zip(figures["variances_mm2"], figures["weights"], strict=True)
@@ -212,7 +211,7 @@ _EMPTY = (
 
 
 def profile_page(figures: Figures) -> str:
-    """Write a profile's figures for people."""
+    """Return a profile's figures as a report."""
     material = figures["material"] or {"name": "unknown material", "source": "", "layers": []}
     source, layers = material["source"], material["layers"]
     names, diffuse = figures["channels"], figures["diffuse_reflectance"]
@@ -243,7 +242,7 @@ def profile_page(figures: Figures) -> str:
 
 
 def _walks(figures: Figures) -> str:
-    """Say how many photons there were."""
+    """Return the number of photons as text."""
     return (
         "no photons"
         if figures["photons"] is None
@@ -252,7 +251,7 @@ def _walks(figures: Figures) -> str:
 
 
 def _coefficients(material: Figures) -> str:
-    """One line a layer and channel."""
+    """Return one line per layer and channel."""
     layers = material["layers"]
     rows = [
         [
@@ -272,7 +271,7 @@ def _coefficients(material: Figures) -> str:
 
 
 def _balance(figures: Figures, channel: int) -> str:
-    """Sum of all energies - 1, with the standard error where the run gave one."""
+    """Return the sum of all energies - 1, with its standard error if the run has one."""
     if figures["absorbed"] is None:
         return "-"
     balance = f"{figures['energy_balance'][channel]:+.0e}"
@@ -281,7 +280,7 @@ def _balance(figures: Figures, channel: int) -> str:
 
 
 def checkpoint_page(figures: Figures) -> str:
-    """Write where a walk stands: the walk, then the page of each profile."""
+    """Return a report on an unfinished walk, followed by that of each profile."""
     head = (
         "so far    {photons:,} photons, {flights:,} flights, {seconds:.1f} s; `resume = True` "
         "continues from there\nerror     {relative_error:.3g%} of F(r), in the worst channel"
@@ -312,7 +311,7 @@ _CHANNELS = Columns(
 
 
 def kernel_page(figures: Figures) -> str:
-    """Write a kernel's figures for people."""
+    """Return a kernel's figures as a report."""
     sha, rank = figures["profile_sha256"], figures["rank"]
     told = {
         **figures,
@@ -345,12 +344,12 @@ def kernel_page(figures: Figures) -> str:
 
 
 def _pairs(values: Figures, separator: str) -> str:
-    """Write names and values, each after the separator."""
+    """Return names and values as text, each after the separator."""
     return "".join(f"{separator}{_name(key)} {_value(each)}" for key, each in values.items())
 
 
 def _value(value: Any) -> str:
-    """Write numbers with six digits, lists of them in brackets, anything else as JSON has it."""
+    """Return numbers with six digits, lists of them in brackets, and other values as JSON."""
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, list | tuple):

@@ -62,7 +62,7 @@ METHODS = {name: FitMethod(each.load(), each.summary) for name, each in FITS.ite
 
 
 def fit_result(profile: Profile | str | Path, method: str = "svd", **settings: Any) -> FitResult:
-    """Fit a separable kernel to a profile, and say how well.
+    """Fit a separable kernel to a profile, and return it with its errors and stop reasons.
 
     Parameters
     ----------

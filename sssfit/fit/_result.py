@@ -167,6 +167,7 @@ def fit_channels(
     Parameters
     ----------
     target : Target
+        The profile and its pixels.
     method : str
         Its name on the command line.
     fit_channel : callable

@@ -69,6 +69,7 @@ def fit_artist(
     Parameters
     ----------
     profile : Profile
+        The profile to fit.
     mm_per_pixel, support_mm : float, optional [mm]
         Pixel size and half width of the support; see ``sssfit.fit.make_target``.
     normalize : bool
@@ -93,7 +94,7 @@ def fit_artist(
     Raises
     ------
     FitError, ProfileError
-        Invalid profile, pixels or setting.
+        The profile, the pixels or a setting is invalid.
     """
     if not callable(target) and target not in ("line", "kernel"):
         raise FitError(
@@ -176,6 +177,7 @@ def fit_to_pictures(pixels: Target, objective: Callable[[FloatArray], float]) ->
     Parameters
     ----------
     pixels : Target
+        The profile and its pixels.
     objective : callable
         Takes these parameters by channel (3, C); returns the error of the pictures. Channels
         without light get 1, 0, 0 and are not fitted.

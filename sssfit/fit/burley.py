@@ -43,6 +43,7 @@ def fit_burley(
     Parameters
     ----------
     profile : Profile
+        The profile to fit.
     energy : str
         "rescale" (default) scales every channel to its diffuse reflectance A; "keep" keeps the
         energy of the model's strips within the support.

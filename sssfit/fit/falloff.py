@@ -63,6 +63,7 @@ def fit_falloff(
     Parameters
     ----------
     profile : Profile
+        The profile to fit.
     mm_per_pixel, support_mm : float, optional [mm]
         Pixel size and half width of the support; see ``sssfit.fit.make_target``.
     normalize : bool
@@ -83,7 +84,7 @@ def fit_falloff(
     Raises
     ------
     FitError, ProfileError
-        Invalid profile, pixels or setting.
+        The profile, the pixels or a setting is invalid.
     """
     target = make_target(profile, mm_per_pixel, support_mm)
     given = _by_hand(width, strength, falloff, profile.channels)

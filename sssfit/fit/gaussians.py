@@ -52,6 +52,7 @@ def fit_gaussians(
     Parameters
     ----------
     profile : Profile
+        The profile to fit.
     terms : int
         Number N of Gaussians, 1 to 10; the result has fewer if one more does not lower the error.
     signed : bool

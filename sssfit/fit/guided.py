@@ -54,6 +54,7 @@ def fit_guided(
     Parameters
     ----------
     profile : Profile
+        The profile to fit.
     mm_per_pixel, support_mm : float, optional [mm]
         Pixel size and half width of the support, 513 pixels at most; see
         ``sssfit.fit.make_target``. The default and "profile" are widened if they would take more
@@ -78,7 +79,7 @@ def fit_guided(
     Raises
     ------
     FitError, ProfileError
-        Invalid profile, pixels or setting.
+        The profile, the pixels or a setting is invalid.
 
     Warns
     -----

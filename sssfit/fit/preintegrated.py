@@ -31,6 +31,7 @@ def fit_preintegrated(
     Parameters
     ----------
     profile : Profile
+        The profile to fit.
     energy : str
         "rescale" (default) scales every channel to its diffuse reflectance; "keep" keeps the energy
         of its strips within the support.

@@ -52,6 +52,7 @@ def fit_svd(
     Parameters
     ----------
     profile : Profile
+        The profile to fit.
     rank : int, optional
         Number of terms, from 1 to the pixels of a half line, which is the full rank of the kernel.
         By default 3, or all of a smaller kernel.
@@ -72,7 +73,7 @@ def fit_svd(
     Raises
     ------
     FitError, ProfileError
-        Invalid rank, profile, pitch or support.
+        The rank, profile, pixel size or support is invalid.
     """
     target = make_target(profile, mm_per_pixel, support_mm)
     rank = _checked_rank(rank, target)

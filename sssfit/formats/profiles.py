@@ -1,4 +1,4 @@
-"""A profile from another program's files, told apart by what they hold: CSV or MCML's .mco."""
+"""A profile from another program's files, recognised by content: CSV or MCML's .mco."""
 
 from collections.abc import Sequence
 from pathlib import Path
@@ -40,21 +40,21 @@ def import_profile(
     unit: str | None = None,
     density_unit: str | None = None,
 ) -> Profile:
-    """Read a table (CSV), or MCML's output (.mco): one file a channel.
+    """Read a table (CSV), or MCML's output (.mco) with one file per channel.
 
     Parameters
     ----------
     files : sequence of str, Path or binary stream
-        One CSV, or one .mco or several of one grid. Messages call a stream "stdin".
+        One CSV, or one or several .mco on the same grid. Messages call a stream "stdin".
     channels : sequence of str, optional
         Names for several .mco, in their order; by default R, G, B for three.
     quantity, unit, density_unit : str, optional
-        Of a CSV; see `sssfit.formats.csv.parse_csv`.
+        For a CSV; see `sssfit.formats.csv.parse_csv`.
 
     Raises
     ------
     ArgumentError
-        Arguments that the files have no use for, or one that they need.
+        An argument does not apply to the files, or is missing.
     ProfileError
         A file cannot be read, is damaged or of another format.
     """
@@ -95,7 +95,7 @@ def _text_of(source: str | Path | BinaryIO, origin: str) -> Text:
 
 
 def imported_figures(profile: Profile) -> dict[str, Any]:
-    """Return the figures of ``sssfit import --json``; None where the files do not say."""
+    """Return the figures of ``sssfit import --json``; None if the files do not say."""
     figures, material = profile.to_dict(), profile.meta["material"]
     return {
         "source": profile.meta["source"],
@@ -105,5 +105,5 @@ def imported_figures(profile: Profile) -> dict[str, Any]:
 
 
 def imported_page(figures: dict[str, Any]) -> str:
-    """Write `imported_figures` for people: one line a channel."""
+    """Return `imported_figures` as a report with one line per channel."""
     return report(_PAGE, figures)

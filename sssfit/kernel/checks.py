@@ -74,7 +74,7 @@ def _check_numbers(fields: Mapping[str, FloatArray]) -> None:
     _check_range("relative_frobenius_error", frobenius, 0.0, or_unknown=True)
     _check_range("energy_error", energy, -(_MAX**2), or_unknown=True)
     if not np.isin(signs, (-1.0, 1.0)).all():
-        raise KernelError("signs have to be +1 or -1.")
+        raise KernelError("signs must be +1 or -1.")
     if not np.array_equal(weights, weights[:, ::-1]):
         raise KernelError("weights are not symmetric about the middle pixel.")
     sums = np.abs(weights).sum(axis=1)

@@ -1,4 +1,4 @@
-"""Which profile a kernel was fitted to, among files."""
+"""Finds the profile that a kernel was fitted to, among files."""
 
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -12,15 +12,15 @@ from sssfit.profile import Profile
 def find_profile(
     kernel: SeparableKernel, kernel_file: str, folders: Iterable[Path]
 ) -> tuple[Profile | None, str | None, str | None]:
-    """Find the profile whose light has the fingerprint that a kernel recorded, from any program.
+    """Find the profile with the fingerprint that a kernel recorded, from any program.
 
     Parameters
     ----------
     kernel : SeparableKernel
     kernel_file : str
-        What the note calls it.
+        The kernel's name in the note.
     folders : iterable of Path
-        Where to look; of several such profiles the newest is taken.
+        Folders to search; the newest of several such profiles is taken.
 
     Returns
     -------
@@ -28,8 +28,8 @@ def find_profile(
     file : str or None
         Its path.
     note : str or None
-        Why there is none, in a sentence: the kernel records no profile, or it changed, or it is
-        not there.
+        Why there is none, in a sentence: the kernel records no profile, or it changed, or is
+        missing.
     """
     files = [path for folder in folders for path in folder.glob("*.npz") if path.is_file()]
     files.sort(key=lambda each: each.stat().st_mtime_ns, reverse=True)
@@ -41,7 +41,7 @@ def find_profile(
 
 
 def _read(path: Path) -> Profile | None:
-    """Read a profile; one that cannot be read is not the one that is looked for."""
+    """Read a profile; an unreadable one cannot be the right one."""
     try:
         return Profile.load(path)
     except SssfitError:
@@ -49,7 +49,7 @@ def _read(path: Path) -> Profile | None:
 
 
 def _missing(kernel: SeparableKernel, name: str, profiles: Sequence[tuple[Path, Profile]]) -> str:
-    """Say why there is none."""
+    """Return why there is none, as text."""
     end = "so nothing is measured"
     if kernel.meta.get("profile_sha256") is None:
         return (

@@ -37,16 +37,16 @@ class DifferenceMap:
     Parameters
     ----------
     pixels : array (H, W, 3), or (H, W, C) where magnified
-        Linear R, G, B, for `save_image` at exposure 1; magnified they are light of the pictures.
+        Linear R, G, B, for `save_image` at exposure 1; if magnified, in the pictures' unit.
     kind : str, optional
-        "signed" or "absolute" false colours; None: magnified.
+        "signed" or "absolute" false colours; None if magnified.
     what : str, optional
         Description of the number that a colour shows.
     end : float, optional
         The difference at the ends of the scale, in the pictures' unit: blue means -end or less in a
         signed map, red and yellow mean end or more.
     gain : float
-        What the difference is multiplied with; of a map the scale is divided by it.
+        Factor of the difference; the scale of a map is divided by it.
     """
 
     pixels: FloatArray
@@ -56,7 +56,7 @@ class DifferenceMap:
     gain: float
 
     def figures(self) -> dict[str, Any]:
-        """Return the figures that ``sssfit render --json`` has of it."""
+        """Return its figures of ``sssfit render --json``."""
         return {"gain": self.gain, "map": self.kind, "of": self.what, "end": self.end}
 
 

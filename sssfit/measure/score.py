@@ -60,7 +60,7 @@ class ImageScore:
     exposure : float [1 / as the pictures]
         Factor applied to both pictures before they were clipped to [0, 1].
     ssim, flip : float, optional [1]
-        See ``sssfit.measure.structure``; None unless asked for.
+        See ``sssfit.measure.structure``; None unless requested.
     """
 
     rmse: float
@@ -103,9 +103,14 @@ def measure(
     exposure : float, optional
         Factor before display; `auto_exposure` of the truth unless given.
     mask : array (H, W), optional
-        Restricts every figure to pixels above 0.
+        Restricts every figure to the pixels where it is above 0.
     structure : bool
         Also compute SSIM and FLIP, which need the extra ``metrics``. FLIP is NaN where Delta E is.
+
+    Returns
+    -------
+    ImageScore
+        Errors in linear light, and Delta E 2000 of the displayed pictures.
 
     Raises
     ------

@@ -36,8 +36,8 @@ def render(image: Irradiance, kernel: SeparableKernel | str | Path, **settings: 
     ----------
     image : array (H, W) or (H, W, C), Scene, Image, str or Path
         Linear light, or the path of a picture file. An array or file takes the kernel's pixel size;
-        a scene has its own. Two dimensions are one channel, light without colour; like C = 1 they
-        fit kernels with any number of channels.
+        a scene has its own. A two-dimensional array has one channel, light without colour; like C =
+        1 it fits kernels with any number of channels.
     kernel : SeparableKernel, str or Path
         The record, or the path of a ``.kernel.json`` file.
     **settings

@@ -247,7 +247,7 @@ def render_screen(
     falloff_per_mm : float, optional [1/mm]
         Falloff of "lerp". By default it ends at 3.8 standard deviations of the widest channel.
     scale : float or array (H, W), optional
-        Size of the kernel: 0 leaves a pixel unblurred.
+        Relative size of the kernel; 0 leaves a pixel unblurred.
     border : str
         Beyond the picture: "mirror", "clamp", or "zero" (dark, at the middle's depth).
     threads : int, optional
@@ -256,7 +256,7 @@ def render_screen(
     Returns
     -------
     array (H, W, C)
-        Blurred irradiance, times the kernel's energy and its ``scale``, plus specular light.
+        Blurred irradiance, times the kernel's energy and ``kernel.scale``, plus specular light.
 
     Raises
     ------

@@ -73,7 +73,7 @@ def transmittance(
             "the same (Gaussians, channels) for both."
         )
     if not ((variances > 0.0) & np.isfinite(variances) & np.isfinite(shares)).all():
-        raise RenderError("variances have to be above 0 and weights numbers, and some are not.")
+        raise RenderError("variances must be above 0, and weights must be finite numbers.")
     if not (np.isfinite(widths) and widths > 0.0):
         raise RenderError(f"widths = {widths:g}; expected a number above 0, such as 2.")
     total = np.zeros((*s.shape, shares.shape[1]))

@@ -72,7 +72,8 @@ def head_scene(
         Angle of the key light to the left of the view axis, -180 to 180; beyond 90 it is behind the
         head.
     light_up_degrees : float [degrees]
-        Angle above it, -85 to 85. At normal incidence the key light gives an irradiance of 1.
+        Angle of the key light above it, -85 to 85. At normal incidence the key light gives an
+        irradiance of 1.
     fill, ambient : float
         Irradiance of a weak light from the other side and of a sky above; neither casts shadows.
     detail_mm : float [mm]

@@ -1,4 +1,4 @@
-"""A picture by its name or its file, as what kernels are applied to."""
+"""Loads a scene by the name of a made picture or from a picture file."""
 
 import math
 from collections.abc import Sequence
@@ -10,8 +10,8 @@ from sssfit.scene.head import whole_face_mm_per_pixel
 from sssfit.scene.made import EDGE_DEGREES, MADE, make_scene, options_of
 from sssfit.scene.record import Scene
 
-_ROWS = 512  # and columns, of made pictures
-_MOST_ROWS = 1080  # of a head whose size is not given
+_ROWS = 512  # rows and columns of made pictures
+_MOST_ROWS = 1080  # largest head whose size is not given
 
 
 def load_scene(
@@ -25,36 +25,36 @@ def load_scene(
     seed: int = 1,
     **options: Any,
 ) -> tuple[Scene, tuple[str, ...]]:
-    """Make a picture of ``MADE``, or read any other from its file.
+    """Make a picture of ``MADE``, or read one from a file.
 
     Parameters
     ----------
     name : str
-        Of a made picture, or of a file that `load_image` reads.
+        Name of a made picture, or path of a file that `load_image` reads.
     mm_per_pixel, otherwise : float, optional [mm]
-        Size of a pixel; ``otherwise`` is for a file whose header does not say it.
+        Size of a pixel; ``otherwise`` is used for a file without it in its header.
     size : tuple of int, optional
-        Rows and columns of a made picture; by default 512 of each, and of the head as many as the
-        whole face takes, up to 1080.
+        Rows and columns of a made picture; by default 512 of each, and for the head as many as the
+        whole face needs, up to 1080.
     layer : str, optional
-        Of a file; see `load_image`.
+        Layer of a file; see `load_image`.
     mask : {"alpha"}, optional
-        Of a file: what its alpha covers by half or more is the object.
+        For a file: the object is the part that its alpha covers by half or more.
     seed : int
-        Of made pictures that are random.
+        Seed of random made pictures.
     **options
-        A made picture's own; see `make_scene`.
+        Options of a made picture; see `make_scene`.
 
     Returns
     -------
     scene : Scene
     notes : tuple of str
-        What is to be known about it, in sentences.
+        Remarks on the scene, in sentences.
 
     Raises
     ------
     RenderError
-        Invalid options, or pixels of unknown size.
+        Options are invalid, or the pixel size is unknown.
     FileError
         The file cannot be read.
 
@@ -93,8 +93,8 @@ def load_scenes(
 ) -> tuple[list[Scene], tuple[str, ...]]:
     """Return pictures to compare kernels on, all on the same pixels; edges are at 30 degrees.
 
-    Parameters and errors are those of `load_scene`; made pictures have 512 x 512 pixels by default,
-    of ``mm_per_pixel``, else of what the first file says, else of ``otherwise``.
+    Parameters and errors are those of `load_scene`; made pictures have 512 x 512 pixels by default.
+    The pixel size is ``mm_per_pixel``, else that of the first file, else ``otherwise``.
     """
     found = {
         name: load_scene(name, mm_per_pixel, layer=layer, mask=mask)
@@ -111,10 +111,10 @@ def load_scenes(
 
 
 def _default_size(name: str, mm_per_pixel: float) -> tuple[tuple[int, int], tuple[str, ...]]:
-    """512 x 512; for a head as many rows as it takes, up to 1080, saying so where it is cut."""
+    """Return 512 x 512, or the rows of a head, up to 1080, with a note if it is cropped."""
     if name != "head":
         return (_ROWS, _ROWS), ()
-    # The face takes the more rows, the smaller a pixel.
+    # The smaller a pixel, the more rows the face needs.
     wanted = math.ceil(whole_face_mm_per_pixel(1, 1) / mm_per_pixel)
     rows = min(wanted, _MOST_ROWS)
     note = (

@@ -64,11 +64,11 @@ def simulate_montecarlo(
     Parameters
     ----------
     material : Material
-        Any stack of layers that ``Material`` accepts, g from -0.99 to 0.99.
+        Any stack of layers that ``Material`` accepts, g from -0.99 to 0.9999.
     photons : int, optional
         Number of walks, 2 to 1e12; by default the paper's 1e7, or 1e12 with a target error.
     seed : int
-        The same seed gives the same bits on any number of threads.
+        Random seed, 0 or above. It gives the same bits on any number of threads.
     threads : int, optional
         Threads to use; all cores by default.
     dr_mm : float, optional

@@ -209,7 +209,7 @@ def _stack(layers: list[_Layer], k_per_mm: FloatArray) -> _Response:
 
 def _single_layer(layer: _Layer, k_per_mm: FloatArray) -> _Response:
     """Return the response of one layer."""
-    # sinh(s d) / sinh(s H) has a limit at s = 0, which a length of 1e100 mm reaches to the bit
+    # sinh(s d) / sinh(s H) has a limit at s = 0, which a length of 1e100 mm reaches exactly
     s = np.maximum(np.hypot(layer.medium.sigma_tr_per_mm, k_per_mm), 1e-100)
     down = _transforms(layer.medium, layer.thickness_mm, layer.above, layer.below, s)
     up = _transforms(layer.medium, layer.thickness_mm, layer.below, layer.above, s)

@@ -1,8 +1,8 @@
-"""Profiles computed and written to files: each output held, walks saved half done and resumed.
+"""Computes profiles and writes them to files, with locked outputs and resumable walks.
 
-What ``sssfit simulate`` does, for a script that runs for hours: `simulate_to_files` refuses outputs
-that cannot be written before it begins, writes each profile as its run ends, and leaves a
-checkpoint from which a killed run goes on to the same bits. Next: ``sssfit.simulate.summary``.
+This is the work of ``sssfit simulate``, for scripts that run for hours: `simulate_to_files` checks
+before it begins that the outputs can be written, writes each profile when its run ends, and keeps a
+checkpoint from which a killed run continues to the same bits. Next: ``sssfit.simulate.summary``.
 """
 
 import time
@@ -30,7 +30,7 @@ _COMPILING = "Compiling the {}, some {} s; it is kept for later runs where it ca
 
 
 def compiling_note(walk: Material | None = None) -> str:
-    """Say that the walk of a material, or the exact solver, is about to be compiled, if it is."""
+    """Return a note if the walk of a material, or the exact solver, is about to be compiled."""
     if walk is None:
         return "" if is_solver_compiled() else _COMPILING.format("solver", 3)
     return "" if is_compiled(walk) else _COMPILING.format("photon walk", 10)
@@ -44,11 +44,11 @@ class Outcome:
     ----------
     profile : Profile
     path : Path or None
-        Where it was written; None where no file was asked for.
+        Path of its file; None if it was not written.
     seconds : float, optional [s]
-        What its run took; None where it was finished before.
+        Duration of its run; None if it was already finished.
     is_complete : bool
-        Whether the run came to its end, and was not stopped.
+        Whether the run reached its end and was not stopped.
     is_resumable : bool
         Whether a checkpoint is kept.
     """
@@ -71,9 +71,9 @@ class Results:
     Parameters
     ----------
     outcomes : tuple of Outcome
-        Of the materials that were done, or saved as far as they came.
+        Outcomes of the materials that were finished, or saved before their end.
     not_begun : tuple of str
-        Names of those that were not when ``stop`` said so.
+        Names of the materials that had not begun when ``stop`` returned true.
     """
 
     outcomes: tuple[Outcome, ...]
@@ -81,12 +81,12 @@ class Results:
 
     @property
     def is_interrupted(self) -> bool:
-        """Whether anything that was asked for is missing."""
+        """Whether any requested profile is missing."""
         return bool(self.not_begun) or not all(each.is_complete for each in self.outcomes)
 
     @property
     def note(self) -> str:
-        """What an interruption left, in a sentence or two; empty without one."""
+        """State after an interruption, in one or two sentences; empty without one."""
         left = ", ".join(self.not_begun)
         if not self.is_interrupted:
             return ""
@@ -108,7 +108,7 @@ class Results:
         }
 
     def summary(self, *, several: bool) -> str:
-        """Return the page for people; see `sssfit.simulate.summary.summary`."""
+        """Return the printed report; see `sssfit.simulate.summary.summary`."""
         lines = [summary([each.to_dict() for each in self.outcomes], several=several)]
         for start, is_old in (("Wrote", False), ("Finished before, nothing to do:", True)):
             paths = [
@@ -134,34 +134,34 @@ def simulate_to_files(
     tell: Callable[[str], object] = lambda line: None,  # noqa: ARG005
     watch: Watch = lambda label: nullcontext(),  # noqa: ARG005
 ) -> Results:
-    """Compute the profile of each material and write it as soon as it is done.
+    """Compute the profile of each material and write it as soon as it is finished.
 
     Parameters
     ----------
     materials : sequence of Material or ProfileSource
-        Those that one run can serve share it. For a method that makes one profile without a
+        Materials that can share a run do so. For a method that makes one profile without a
         material, the source of that profile.
     paths : sequence of Path or None
-        Where each profile goes; None leaves it to the caller.
+        Path of each profile; None if the caller writes it.
     method : str
         A name of `sssfit.methods.SIMULATIONS`.
     settings : mapping or sequence of mappings, optional
         Keyword arguments of the method's function: for all, or for each material, which then has
         its own run.
     resume : bool
-        Continue a walk from its checkpoint; what is finished is not computed again.
+        Continue a walk from its checkpoint; finished profiles are not computed again.
     checkpoint_every : float [s]
-        Time between two saves of a walk, beside its first path.
+        Time between two saves of a walk, which lie beside its first path.
     force : bool
-        Replace files that are not ours, and inputs.
+        Also replace files that are not ours, and inputs.
     inputs : iterable of str or Path
-        Files that are read, and not to be written.
+        Files that are read and must not be overwritten.
     stop : callable
-        Once it returns true, a walk ends with the photons done so far, and nothing else begins.
+        When it returns true, a walk ends with the photons so far, and no other run begins.
     tell : callable
-        Given sentences for people while it runs.
+        Called with messages for the user during the run.
     watch : callable
-        Given a label for each walk, returns a context whose value is told of the progress.
+        Takes a label for each walk, and returns a context whose value is called with the progress.
 
     Returns
     -------
@@ -170,7 +170,7 @@ def simulate_to_files(
     Raises
     ------
     SimulationError, FileError
-        Settings, outputs or checkpoints that cannot be used.
+        Settings, outputs or checkpoints are invalid.
     """
     if settings is None or isinstance(settings, Mapping):
         every, shares = [settings or {}] * len(paths), SIMULATIONS[method].shares
@@ -206,7 +206,7 @@ def simulate_to_files(
 
 
 def _beside(path: Path) -> Path:
-    """Where a walk is saved: beside its first output, and so under its lock."""
+    """Return the path of a walk's checkpoint: beside its first output, and so under its lock."""
     return path.with_name(f"{path.name}.checkpoint")
 
 
@@ -217,7 +217,7 @@ def _computed(
     method: str,
     stop: Stop,
 ) -> list[Outcome]:
-    """One call of the method's function; those that share work between materials can be stopped."""
+    """Call the method's function once; methods that share work between materials can be stopped."""
     chosen, begun = SIMULATIONS[method], time.perf_counter()
     function = chosen.load()
     if chosen.shares:
@@ -240,7 +240,7 @@ def _walk(
     tell: Callable[[str], object],
     watch: Watch,
 ) -> list[Outcome]:
-    """One walk for all ``materials``, from its checkpoint if there is one to go on from."""
+    """Run one walk for all ``materials``, from its checkpoint if there is one to continue from."""
     resumes = save is not None and save.resume and save.path.exists()
     if save and save.resume and not resumes:
         if before := _finished(materials, paths, settings):
@@ -281,7 +281,7 @@ def _walk(
 def _finished(
     materials: Sequence[Material], paths: Sequence[Path | None], settings: Mapping[str, Any]
 ) -> list[Profile]:
-    """Return the profiles of this very walk if all are there, complete; else none."""
+    """Return the profiles of this walk if all are complete; else none."""
     asked = {key: each for key, each in settings.items() if key != "threads"}
     try:
         profiles = [Profile.load(path) for path in paths if path and path.exists()]

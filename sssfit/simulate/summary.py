@@ -1,4 +1,4 @@
-"""What runs found, in words: the page that ``sssfit simulate`` prints of its figures."""
+"""The results of runs in words: the report that ``sssfit simulate`` prints."""
 
 import math
 from collections.abc import Sequence
@@ -6,22 +6,22 @@ from typing import Any
 
 from sssfit.messages import columns
 
-_NOTED_BEYOND = 1e-3  # share of a channel beyond the grid that is worth a remark
-_SIGMAS = 4.5  # a deviation beyond so many standard errors is no accident
+_NOTED_BEYOND = 1e-3  # share of a channel beyond the grid that causes a remark
+_SIGMAS = 4.5  # a deviation beyond this many standard errors is not random
 _ROUNDING = 1e-12  # below this an energy balance is rounding, not roulette
 
 Rows = Sequence[dict[str, Any]]
 
 
 def summary(rows: Rows, *, several: bool) -> str:
-    """Return a page on runs of one method.
+    """Return a report on runs of one method.
 
     Parameters
     ----------
     rows : sequence of dict
-        By `sssfit.simulate.run_figures`.
+        Figures from `sssfit.simulate.run_figures`.
     several : bool
-        Whether more than one material was asked for; then the page begins with their number.
+        Whether there is more than one material; then the report begins with their number.
     """
     lines = [
         _heading(rows, several=several),
@@ -39,7 +39,7 @@ def summary(rows: Rows, *, several: bool) -> str:
 
 
 def _channels(rows: Rows) -> list[tuple[str, dict[str, Any], int]]:
-    """Each channel of each row: its name with that of the material, the row, its index."""
+    """Yield each channel of each row: its name with that of the material, the row, its index."""
     return [
         (f"{row['material']} {name}", row, c)
         for row in rows
@@ -48,7 +48,7 @@ def _channels(rows: Rows) -> list[tuple[str, dict[str, Any], int]]:
 
 
 def _heading(rows: Rows, *, several: bool) -> str:
-    """Say who, by what method, how fast, on which grid."""
+    """Return lines with the material, the method, the speed and the grid."""
     row = rows[0]
     if several:
         return f"{len(rows)} materials: {_how(rows)}"
@@ -62,7 +62,7 @@ def _heading(rows: Rows, *, several: bool) -> str:
 
 
 def _how(rows: Rows) -> str:
-    """Say how many photons were traced, or what was computed."""
+    """Return text on the number of photons, or on the computation."""
     row = rows[0]
     if row["photons"] is not None:
         counts = sorted({each["photons"] for each in rows})
@@ -77,7 +77,7 @@ def _how(rows: Rows) -> str:
 
 
 def _table(rows: Rows) -> str:
-    """One line a channel; the material's name where there are several."""
+    """Return a line per channel, with the material's name if there are several."""
     walked = rows[0]["photons"]
     # The error of a walk has its figure's decimals; that of a computation is far smaller.
     error, form = ("std. error", ".6f") if walked else ("est. error", ".1e")
@@ -102,7 +102,7 @@ def _table(rows: Rows) -> str:
 
 
 def energy_lines(rows: Rows) -> list[str]:
-    """Say whether specular + diffuse + absorbed = 1 within the runs' own error, where known."""
+    """Return whether specular + diffuse + absorbed = 1 within the runs' own errors, as text."""
     lines = [] if len(rows) > 1 else [f"specular reflectance {rows[0]['specular_reflectance']:.6f}"]
     if any(row["energy_balance_stderr"] is None for row in rows):
         return lines
@@ -128,7 +128,7 @@ def energy_lines(rows: Rows) -> list[str]:
 
 
 def _beyond(rows: Rows) -> list[str]:
-    """Remark on channels that lose a noticeable share beyond the grid."""
+    """Return a remark on channels with a noticeable share beyond the grid."""
     lost = [
         f"{name} {100.0 * share:.1f} %"
         for name, row, c in _channels(rows)
@@ -141,7 +141,7 @@ def _beyond(rows: Rows) -> list[str]:
 
 
 def _target(rows: Rows) -> list[str]:
-    """Say whether the target error was met, and how many photons that took."""
+    """Return text on the target error and the photons it took."""
     target = rows[0]["target_error"]
     if target is None:
         return []
