@@ -6,7 +6,6 @@ from typing import Any
 
 import click
 
-from sssfit.messages import report
 from sssfit.methods import FITS, lines_of, settings_of
 from sssfit.process import check_memory
 
@@ -14,7 +13,6 @@ from ._input import load, profile_name
 from ._methods import method_options, own_settings
 from ._options import Common, common_options, options
 from ._output import KERNEL, finish_one, held, stem_of, target, write
-from ._reports import FITTED
 from ._verb_options import FIT_OUTPUT, FIT_PIXELS
 
 
@@ -42,6 +40,7 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
         return
     if method is None:
         raise click.UsageError("name a --method; `sssfit fit --list` has them.")
+    from sssfit.export.reports import page
     from sssfit.fit import fit_result
     from sssfit.kernel import is_kernel_file
     from sssfit.profile import Profile
@@ -60,9 +59,7 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
         result = fit_result(source, method, **settings)
         write(result.kernel, path)
     figures = {"profile": name, **result.to_dict()}
-    plural = {key: "s" * (figures[key] > 1) for key in ("rank", "pixels")}
-    text = report(FITTED, {**figures, "s": plural})
-    finish_one(common, "fit", path, figures, text, "the kernel")
+    finish_one(common, "fit", path, figures, page("fit", figures), "the kernel")
 
 
 def _picture_target(settings: dict[str, Any], threads: int | None) -> dict[str, Any]:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sssfit.messages import by_channel, report
 from sssfit.methods import settings_of
 from sssfit.scene.made import MADE
 
@@ -17,8 +16,7 @@ from ._methods import method_options, own_settings
 from ._options import Common, common_options, options
 from ._output import binary_stdout, finish, held, say_notes, stem_of, target
 from ._picture import check_pictures
-from ._reports import RENDERED
-from ._verb_options import MAPS, RENDER, RENDER_PICTURE
+from ._verb_options import RENDER, RENDER_PICTURE
 
 if TYPE_CHECKING:
     from sssfit.compare.evaluate import Evaluation
@@ -49,6 +47,7 @@ def render(context: click.Context, /, kernel: str | None, common: Common, **give
       sssfit render --screen --irradiance head
       sssfit render --irradiance head --transmit -o ears.png
     """
+    from sssfit.export.reports import page
     from sssfit.formats.pictures import image_format, is_image_file
     from sssfit.kernel import SeparableKernel
 
@@ -75,7 +74,7 @@ def render(context: click.Context, /, kernel: str | None, common: Common, **give
         "follow": (given["follow"] or "gaussian") if given["screen"] else None,
         **made.to_dict(),
     }
-    finish(common, figures, _text(figures), to_stderr=path is None)
+    finish(common, figures, page("render", figures), to_stderr=path is None)
 
 
 def _check(context: click.Context, given: dict[str, Any]) -> dict[str, Any]:
@@ -131,19 +130,3 @@ def _rendered(
     if given["difference"]:
         made = made.with_difference(given["difference_map"], given["gain"])
     return source, made
-
-
-def _text(figures: Mapping[str, Any]) -> str:
-    """Write the figures for people."""
-    kind, most = figures["difference_map"], figures["transmitted_maximum"]
-    screen = f"screen space, follow {figures['follow']}, " if figures["follow"] else ""
-    is_grey = figures["rmse"] is not None and figures["delta_e_2000_mean"] is None
-    words = {
-        "how": f"{screen}{figures['border']} borders",
-        "most": by_channel(figures["channels"], most, ".3g") if most is not None else None,
-        "no_colour": len(figures["channels"]) if is_grey else None,
-        "magnified": figures["difference_gain"] if kind is None else None,
-        **{key: figures["difference_end"] if kind == key else None for key in MAPS},
-        "wrote": ", ".join(figures["output"]),
-    }
-    return report(RENDERED, {**figures, **words})
