@@ -16,6 +16,7 @@ import click
 
 from sssfit import __version__
 from sssfit.errors import SssfitError, SssfitWarning
+from sssfit.files import reason
 from sssfit.messages import printable
 from sssfit.process import is_out_of_memory
 
@@ -65,7 +66,10 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
     Lengths are mm unless written with a unit (3cm, 0.6m). Every verb explains itself with --help.
     """
     if version:
-        _print_version(with_libraries=verbose)
+        from importlib.metadata import version as of  # read, not imported
+
+        found = [f"python {sys.version.split()[0]}", *(f"{each} {of(each)}" for each in _LIBRARIES)]
+        click.echo("\n".join([f"sssfit {__version__}", *(found if verbose else [])]))
         ctx.exit(0)
     if ctx.invoked_subcommand is None:
         click.echo(ctx.get_help())
@@ -74,17 +78,6 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
 
 for _verb in (*(materials, simulate, fit, render, compare, choose, import_, export, chart, show),):
     cli.add_command(_verb)
-
-
-def _print_version(*, with_libraries: bool) -> None:
-    """Print our version, then what is installed underneath (read from metadata, not imported)."""
-    click.echo(f"sssfit {__version__}")
-    if with_libraries:
-        from importlib.metadata import version
-
-        click.echo(f"python {sys.version.split()[0]}")
-        for library in _LIBRARIES:
-            click.echo(f"{library} {version(library)}")
 
 
 def run(args: Sequence[str] | None) -> NoReturn:
@@ -104,15 +97,11 @@ def run(args: Sequence[str] | None) -> NoReturn:
             sys.exit(130)
         except BrokenPipeError:
             _leave_quietly()
-        except OSError as error:
-            if is_out_of_memory(error):
-                _fail(_OUT_OF_MEMORY)
-            _fail(
-                f"{error.filename or 'operating system'}: {(error.strerror or str(error)).lower()}."
-            )
         except Exception as error:
             if is_out_of_memory(error):
                 _fail(_OUT_OF_MEMORY)
+            if isinstance(error, OSError):
+                _fail(f"{error.filename or 'operating system'}: {reason(error)}.")
             if os.environ.get("SSSFIT_TRACEBACK"):
                 raise
             _fail(

@@ -1,15 +1,18 @@
-"""Options every verb shares, and the parameter types of this command line."""
+"""Options that verbs share, those of methods, made from their entries, and types of parameters."""
 
 import functools
 import math
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import click
+from click.core import ParameterSource
 
+from sssfit import text
 from sssfit.errors import ArgumentError
+from sssfit.methods import SIMULATIONS, Method, Setting, settings_of
 from sssfit.process import check_memory, check_threads_of_numba
 
 # The library's messages have arguments and calls of Python between backquotes.
@@ -21,8 +24,6 @@ _COMMANDS = {
     "`simulate_montecarlo(material)`": "`sssfit simulate`",
     '`load_material("skin1").to_toml()`': "`sssfit materials skin1 --toml`",
 }
-
-_MM_PER_UNIT = {"": 1.0, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 
 
 @dataclass(frozen=True)
@@ -39,38 +40,25 @@ class Common:
 def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add -q, -v, --json, --threads, --seed and hand them to the command as ``common``."""
 
-    @click.option("-q", "--quiet", is_flag=True, help="Print errors only.")
-    @click.option("-v", "--verbose", is_flag=True, help="Print more.")
-    @click.option("--json", "as_json", is_flag=True, help="Print one JSON object on stdout.")
-    @click.option(
-        "--threads",
-        type=WholeRange(1, 1024),
-        metavar="N",
-        help="Threads to use; results do not depend on it.  [default: all cores]",
-    )
-    @click.option(
-        "--seed",
-        type=WholeRange(0, 2**63 - 1),
-        default=1,
-        show_default=True,
-        metavar="N",
-        help="Random seed.",
+    @options(
+        flag("-q --quiet", "Print errors only."),
+        flag("-v --verbose", "Print more."),
+        flag("--json", "Print one JSON object on stdout."),
+        option(
+            "--threads",
+            WholeRange(1, 1024),
+            "N",
+            "Threads to use; results do not depend on it.  [default: all cores]",
+        ),
+        option("--seed", WholeRange(0, 2**63 - 1), "N", "Random seed.", 1),
     )
     @functools.wraps(command)
-    def wrapper(
-        *args: Any,
-        quiet: bool,
-        verbose: bool,
-        as_json: bool,
-        threads: int | None,
-        seed: int,
-        **kwargs: Any,
-    ) -> Any:
+    def wrapper(*args: Any, **given: Any) -> Any:
+        common = Common(**{each.name: given.pop(each.name) for each in fields(Common)})
         check_threads_of_numba()
-        check_memory(command.__name__.rstrip("_"), threads)
-        common = Common(quiet, verbose, as_json, threads, seed)
+        check_memory(command.__name__.rstrip("_"), common.threads)
         try:
-            return command(*args, common=common, **kwargs)
+            return command(*args, common=common, **given)
         except ArgumentError as error:
             raise click.UsageError(in_options(str(error))) from None
 
@@ -184,115 +172,20 @@ class NumberRange(click.FloatRange):
         return number
 
 
-class Length(click.ParamType[float]):
-    """A length: a plain number is mm; 250um, 3cm and 0.6m are understood. Gives mm."""
+class Value(click.ParamType[Any]):
+    """What a function of the library reads from a text; its ArgumentError is a usage error."""
 
-    name = "length"
+    def __init__(self, name: str, read: Callable[..., Any], *how: Any) -> None:
+        self.name, self.read, self.how = name, read, how
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """Parse ``value``; a usage error (exit 2) names what was expected."""
-        if isinstance(value, float):
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Read ``value``; a default that is no text stays as it is."""
+        if not isinstance(value, str):
             return value
-        match = re.fullmatch(r"\s*([-+.\deE]+?)\s*(um|mm|cm|m|)\s*", str(value))
         try:
-            number = float(match[1]) * _MM_PER_UNIT[match[2]] if match else math.nan
-        except ValueError:
-            number = math.nan
-        if not (math.isfinite(number) and number > 0):
-            self.fail(f"{value!r} is not {self.expected()}.", param, ctx)
-        return number
-
-    def expected(self) -> str:
-        """Return what a value may be."""
-        return "a length above 0, such as 0.05, 3cm or 0.6m"
-
-
-class LengthOr(Length):
-    """A length, or one word that comes through as it is."""
-
-    def __init__(self, word: str) -> None:
-        self.word = word
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Parse ``value``; a usage error (exit 2) names what was expected."""
-        return value if value == self.word else super().convert(value, param, ctx)
-
-    def expected(self) -> str:
-        return f"{super().expected()}, or {self.word}"
-
-
-class Count(click.ParamType[int]):
-    """A whole number that may be written 1e7."""
-
-    name = "count"
-
-    def __init__(self, least: int, most: int) -> None:
-        self.least, self.most = least, most
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
-        """Parse ``value``; a usage error (exit 2) names what was expected."""
-        try:
-            number = float(str(value).replace("_", ""))
-        except ValueError:
-            number = math.nan
-        if not (number.is_integer() and self.least <= number <= self.most):
-            self.fail(
-                f"{value!r} is not a whole number from {self.least} to {self.most:.0e} "
-                "(10000000 and 1e7 are both understood).",
-                param,
-                ctx,
-            )
-        return int(number)
-
-
-class Reflectance(click.ParamType[float]):
-    """A number that may be written in percent; which can be reached the library knows."""
-
-    name = "reflectance"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """Parse ``value``; a usage error (exit 2) names what was expected."""
-        number = _number_or_percent(str(value))
-        if number is None:
-            self.fail(f"{value!r} is not a reflectance, such as 0.44 or 44%.", param, ctx)
-        return number
-
-
-class BaseColour(click.ParamType[Any]):
-    """Reflectances with commas between them, or an sRGB colour in hex, which stays a text."""
-
-    name = "list of reflectances"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """Parse ``value``; a usage error (exit 2) names what was expected."""
-        text = str(value).strip()
-        if not text.startswith("#"):
-            return ListOf(Reflectance()).convert(text, param, ctx)
-        if not re.fullmatch("#(?:[0-9a-fA-F]{3}|[0-9a-fA-F]{6})", text):
-            self.fail(f"{text!r} is not an sRGB colour in hex, such as '#c58c6b'.", param, ctx)
-        return text
-
-
-class Lengths(click.ParamType[list[float]]):
-    """Lengths with commas between them; the unit of the last serves those that have none."""
-
-    name = "list of lengths"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> list[float]:
-        """Parse each; a usage error (exit 2) names the one that is wrong."""
-        texts = [each.strip() for each in str(value).split(",")]
-        units = [re.sub(r"[-+.\deE\s]", "", each) for each in texts]
-        if units[-1] and not any(units[:-1]):
-            texts[:-1] = [f"{each}{units[-1]}" for each in texts[:-1]]
-        elif not all(units) and any(units):
-            self.fail(f"{value!r} has a unit for some lengths only; give it to all.", param, ctx)
-        return [Length().convert(each, param, ctx) for each in texts]
+            return self.read(value, *self.how)
+        except ArgumentError as error:
+            self.fail(str(error), param, ctx)
 
 
 class ListOf(click.ParamType[list[float]]):
@@ -308,27 +201,87 @@ class ListOf(click.ParamType[list[float]]):
         return [self.item.convert(each, param, ctx) for each in str(value).split(",")]
 
 
-class Share(click.ParamType[float]):
-    """A share between 0 and 1, which may be written in percent: 0.5% or 0.005."""
+Length = functools.partial(Value, "length", text.length_mm)
+LengthOr = Length  # and one word, which comes through as it is
+Lengths = functools.partial(Value, "list of lengths", text.lengths_mm)
+Count = functools.partial(Value, "count", text.whole_number)
+Share = functools.partial(Value, "share", text.share)
+BaseColour = functools.partial(Value, "list of reflectances", text.base_colour)
 
-    name = "share"
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """Parse ``value``; a usage error (exit 2) names what was expected."""
-        number = _number_or_percent(str(value))
-        if number is None or not 0.0 < number < 1.0:
-            self.fail(
-                f"{value!r} is not a share between 0 and 100 %, such as 0.5% or 0.005.", param, ctx
+_KINDS: dict[str, Callable[[Setting], Any]] = {
+    "number": lambda _: Number(),
+    "numbers": lambda _: ListOf(Number()),
+    "length": lambda _: Length(),
+    "share": lambda _: Share(),
+    "seconds": lambda _: NumberRange(min=0),
+    "count": lambda each: Count(*each.among),
+    "whole": lambda each: WholeRange(*each.among),
+    "choice": lambda each: click.Choice(each.among),
+}
+
+
+def method_options(methods: Mapping[str, Method]) -> Callable[..., Any]:
+    """Return what adds the settings of all methods as options, in the order of the methods."""
+    return options(*(_of_setting(*each) for each in settings_of(methods).values()))
+
+
+def _of_setting(each: Setting, owners: tuple[str, ...]) -> Any:
+    """Return the option that asks for a setting; its help begins with the methods that have it."""
+    name, text = f"--{each.name.replace('_', '-')}", f"{', '.join(owners)}: {each.help}"
+    if each.kind == "flag":
+        return flag(name, text)
+    words = f"  [default: {each.words}]" if each.words else ""
+    return option(name, _KINDS[each.kind](each), each.metavar or None, text + words, each.default)
+
+
+def own_settings(
+    context: click.Context,
+    methods: Mapping[str, Method],
+    method: str,
+    given: Mapping[str, Any],
+    by: str = "--method",
+) -> dict[str, Any]:
+    """Keep the method's own settings that were given, by keyword; refuse those of others.
+
+    ``by`` is the option that names the method.
+    """
+    known = settings_of(methods)
+    for option in given:
+        is_given = context.get_parameter_source(option) is ParameterSource.COMMANDLINE
+        owners = known[option][1]
+        if is_given and method not in owners:
+            raise click.UsageError(
+                f"--{option.replace('_', '-')} is for {by} {' or '.join(owners)}, and this is "
+                f"{method}; leave it out."
             )
-        return number
+    settings = methods[method].settings if method in methods else ()
+    own = {each.name: each.keyword or each.name for each in settings}
+    return {
+        own[key]: value
+        for key, value in given.items()
+        if key in own and value is not None and value is not False  # 0 is a value
+    }
 
 
-def _number_or_percent(text: str) -> float | None:
-    """Read 0.44 or 44%; None for what is no number."""
-    text = text.strip()
-    try:
-        return float(text[:-1]) / 100.0 if text.endswith("%") else float(text)
-    except ValueError:
-        return None
+def method_for(context: click.Context, method: str, material: str | None) -> str:
+    """Return the method that a name asks for; refuse a method and a name that do not go together.
+
+    A name of a profile that a method makes has no coefficients, and no other method can use it.
+    """
+    made = SIMULATIONS[method].makes
+    if made is not None and material != made:
+        asked = "--all" if material is None else material
+        raise click.UsageError(
+            f"--method {method} makes {made} only, and this is {asked}; for sums of Gaussians of a "
+            "material's profile use sssfit fit --method gaussians."
+        )
+    owners = [name for name, each in SIMULATIONS.items() if each.makes == material]
+    if material is None or not owners or method in owners:
+        return method
+    if context.get_parameter_source("method") is ParameterSource.COMMANDLINE:
+        raise click.UsageError(
+            f"{material} has no coefficients, and --method {method} needs them; use --method "
+            f"{owners[0]} or leave it out."
+        )
+    return owners[0]

@@ -7,7 +7,7 @@ import json
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, BinaryIO, Protocol
+from typing import Any, BinaryIO
 
 import click
 
@@ -18,16 +18,6 @@ from ._options import Common, in_options
 # What is written, and the ending of its name.
 PROFILE, KERNEL = ("a profile", ".npz"), ("a kernel", ".json")
 _ENDINGS = (".checkpoint", ".npz", ".json", ".toml", ".kernel", ".profile")
-
-
-class _Record(Protocol):
-    """A profile or a kernel."""
-
-    def write(self, stream: BinaryIO) -> None: ...
-    def save(self, path: str | Path) -> None: ...
-
-
-# Words and results
 
 
 def say(common: Common, line: str) -> None:
@@ -74,9 +64,6 @@ def _legible(text: str, figures: Mapping[str, Any]) -> str:
     return "\n".join(printable(line) for line in text.split("\n"))
 
 
-# Streams
-
-
 def binary_stdout() -> BinaryIO:
     """Return stdout for bytes, or say in one line that it is closed."""
     from sssfit.errors import FileError
@@ -84,9 +71,6 @@ def binary_stdout() -> BinaryIO:
     if sys.stdout is None:
         raise FileError("stdout is closed; name a file with -o, or pipe the output somewhere.")
     return sys.stdout.buffer
-
-
-# Files
 
 
 def target(output: str | None, default: str = "-") -> Path | None:
@@ -144,22 +128,18 @@ def check_outputs(paths: Sequence[Path | None]) -> None:
     check_distinct(path for path in paths if path is not None)
 
 
-def write(content: bytes | _Record, path: Path | None) -> None:
-    """Write bytes or a record to a file that is held, whole or not at all; None is stdout."""
+def write(content: Any, path: Path | None) -> None:
+    """Write bytes, or what writes itself to a stream, to a file that is held; None is stdout."""
     from sssfit.files import write_atomically
 
-    if isinstance(content, bytes):
-        data = content  # bound here: the function below outlives the test above
-        if path is not None:
-            write_atomically(path, lambda stream: stream.write(data))
-            return
-        binary_stdout().write(data)
-    elif path is not None:
-        content.save(path)
-        return
+    def write_to(stream: BinaryIO) -> None:
+        stream.write(content) if isinstance(content, bytes) else content.write(stream)
+
+    if path is not None:
+        write_atomically(path, write_to)
     else:
-        content.write(binary_stdout())
-    binary_stdout().flush()
+        write_to(binary_stdout())
+        binary_stdout().flush()
 
 
 def write_chart(figure: Any, path: Path | None) -> None:
@@ -168,6 +148,6 @@ def write_chart(figure: Any, path: Path | None) -> None:
 
     if path is not None:
         save_figure(figure, path)
-        return
-    save_figure(figure, binary_stdout(), format="png")
-    binary_stdout().flush()
+    else:
+        save_figure(figure, binary_stdout(), format="png")
+        binary_stdout().flush()

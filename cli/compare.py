@@ -21,8 +21,7 @@ from ._compare_parts import (
     scenes_of,
 )
 from ._input import load_source
-from ._methods import own_settings
-from ._options import Common, common_options, options, refuse
+from ._options import Common, common_options, options, own_settings, refuse
 from ._output import finish, finish_one, held_charts, target, write_chart
 from ._picture import check_pictures
 from ._verb_options import COMPARE

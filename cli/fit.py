@@ -10,8 +10,7 @@ from sssfit.methods import FITS, lines_of, settings_of
 from sssfit.process import check_memory
 
 from ._input import load, profile_name
-from ._methods import method_options, own_settings
-from ._options import Common, common_options, options
+from ._options import Common, common_options, method_options, options, own_settings
 from ._output import KERNEL, finish_one, held, stem_of, target, write
 from ._verb_options import FIT_OUTPUT, FIT_PIXELS
 

@@ -13,39 +13,26 @@ from ._output import PROFILE, finish_one, held, target, write
 
 _UNITS = ("um", "mm", "cm", "m")
 
+# fmt: off
+_OPTIONS = (
+    option("--quantity", ["density", "energy"], None, "Meaning of the numbers of a CSV.  [default: "
+           "what its own comment says]"),
+    option("--unit", _UNITS, None, "Unit of a CSV's column r; r_um, r_mm, r_cm and r_m say "
+           "theirs."),
+    option("--density-unit", _UNITS, None, "A CSV's densities are per square of this unit.  "
+           "[default: the unit of its radii]"),
+    option("--channels", None, "A,B,...", "Names for several .mco, in their order.  [default: "
+           "R,G,B for three]"),
+    option("-o --output", None, "FILE", "Where the profile goes, - for stdout.  [default: "
+           "NAME.profile.npz]"),
+    flag("--force", "Replace an input, or a file that is not our profile."),
+)
+# fmt: on
+
 
 @click.command("import")
 @click.argument("files", nargs=-1, required=True, metavar="FILE...")
-@options(
-    option(
-        "--quantity",
-        ["density", "energy"],
-        None,
-        "Meaning of the numbers of a CSV.  [default: what its own comment says]",
-    ),
-    option(
-        "--unit", _UNITS, None, "Unit of a CSV's column r; r_um, r_mm, r_cm and r_m say theirs."
-    ),
-    option(
-        "--density-unit",
-        _UNITS,
-        None,
-        "A CSV's densities are per square of this unit.  [default: the unit of its radii]",
-    ),
-    option(
-        "--channels",
-        None,
-        "A,B,...",
-        "Names for several .mco, in their order.  [default: R,G,B for three]",
-    ),
-    option(
-        "-o --output",
-        None,
-        "FILE",
-        "Where the profile goes, - for stdout.  [default: NAME.profile.npz]",
-    ),
-    flag("--force", "Replace an input, or a file that is not our profile."),
-)
+@options(*_OPTIONS)
 @common_options
 def import_(
     files: tuple[str, ...],

@@ -19,39 +19,31 @@ from ._progress import say_if_compiling
 _OURS = "# Made by `sssfit materials --from-reflectance`, which may replace this file;"
 
 
-@click.command()
-@click.argument("material", required=False)
-@options(
+# fmt: off
+_OPTIONS = (
     flag("--toml as_toml", "Print MATERIAL as TOML, to start your own."),
-    option(
-        "--from-reflectance",
-        BaseColour(),
-        "A,B,...|HEX",
-        "Make a material of this total diffuse reflectance, per channel, such as 0.44,0.23,0.13 "
-        "or 44%, or of an sRGB base colour, such as '#c58c6b'.",
-    ),
+    option("--from-reflectance", BaseColour(), "A,B,...|HEX", "Make a material of this total "
+           "diffuse reflectance, per channel, such as 0.44,0.23,0.13 or 44%, or of an sRGB base "
+           "colour, such as '#c58c6b'."),
     flag("--srgb", "A,B,... are 8-bit sRGB codes, such as 197,140,107."),
-    option(
-        "--mean-free-path",
-        Lengths(),
-        "MM,MM,...",
-        "Its mean free paths, 1 / (sigma_a + sigma_s), such as 3.67,1.37,0.68 or 0.4cm; one "
-        "serves all channels.",
-    ),
+    option("--mean-free-path", Lengths(), "MM,MM,...", "Its mean free paths, 1 / (sigma_a + "
+           "sigma_s), such as 3.67,1.37,0.68 or 0.4cm; one serves all channels."),
     option("--eta", Number(), "N", "Its refractive index; 1.4 is that of skin.", 1.4),
-    option(
-        "--light",
-        ["diffuse", "normal"],
-        None,
-        "The light that A,B,... are meant for. normal: a beam along the normal, as in profiles; "
-        "diffuse: the same radiance from everywhere above, as base colours mean it, and shares of "
-        "the light that enters.  [default: diffuse for sRGB colours, else normal]",
-    ),
+    option("--light", ["diffuse", "normal"], None, "The light that A,B,... are meant for. normal: "
+           "a beam along the normal, as in profiles; diffuse: the same radiance from everywhere "
+           "above, as base colours mean it, and shares of the light that enters.  [default: "
+           "diffuse for sRGB colours, else normal]"),
     option("--name", None, "NAME", "Its name.  [default: that of FILE]"),
     option("--channels", None, "A,B,...", "Names of its channels.  [default: R,G,B for three]"),
     option("-o --output", None, "FILE", "Where it goes, - for stdout.  [default: NAME.toml]"),
     flag("--force", "Replace a file that --from-reflectance did not make."),
 )
+# fmt: on
+
+
+@click.command()
+@click.argument("material", required=False)
+@options(*_OPTIONS)
 @common_options
 @click.pass_context
 def materials(

@@ -12,8 +12,7 @@ from sssfit.methods import settings_of
 from sssfit.scene.made import MADE
 
 from ._input import kernel_name, load, profile_of_kernel
-from ._methods import method_options, own_settings
-from ._options import Common, common_options, options
+from ._options import Common, common_options, method_options, options, own_settings
 from ._output import binary_stdout, finish, held, say_notes, stem_of, target
 from ._picture import check_pictures
 from ._verb_options import RENDER, RENDER_PICTURE

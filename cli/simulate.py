@@ -11,39 +11,42 @@ import click
 from sssfit.methods import SIMULATIONS, lines_of
 
 from ._input import is_mci
-from ._methods import method_for, method_options, own_settings
-from ._options import Common, Length, LengthOr, WholeRange, common_options, flag, option, options
-from ._output import check_outputs, finish, say, write
+from ._options import (
+    Common,
+    Length,
+    WholeRange,
+    common_options,
+    flag,
+    method_for,
+    method_options,
+    option,
+    options,
+    own_settings,
+)
+from ._output import check_outputs, finish, say, say_notes, write
 from ._progress import walk_progress
+
+_FIRST = "montecarlo"  # the only walk of photons
+# fmt: off
+_OPTIONS = (
+    flag("--all every", "All materials that ship with sssfit."),
+    flag("--paper", "The eleven of them that the SSSS paper has."),
+    option("--method", [*SIMULATIONS], "METHOD", "Simulation method, as listed below.", _FIRST),
+    option("--run number", WholeRange(1), "N", "Simulate only this run of an .mci file."),
+    method_options(SIMULATIONS),
+    option("--dr", Length(), "MM", "Annulus width.  [default: MFP_min / 20; deon-skin: 0.008]"),
+    option("--radius", Length("auto"), "MM|auto", "Grid radius; auto (montecarlo) grows it until "
+           "under 0.1 % of any channel lies beyond.  [default: 32 MFP_max; deon-skin: 17.2]"),
+    option("-o --output", None, "FILE", "Where the profile goes, - for stdout; with --all a folder."
+           "  [default: MATERIAL.profile.npz, MATERIAL.METHOD.profile.npz]"),
+    flag("--force", "Replace an input, or a file that is not our profile."),
+)
+# fmt: on
 
 
 @click.command(epilog="\b\nMethods:\n" + lines_of(SIMULATIONS))
 @click.argument("material", required=False)
-@options(
-    flag("--all every", "All materials that ship with sssfit."),
-    flag("--paper", "The eleven of them that the SSSS paper has."),
-    option(
-        "--method", [*SIMULATIONS], "METHOD", "Simulation method, as listed below.", "montecarlo"
-    ),
-    option("--run number", WholeRange(1), "N", "Simulate only this run of an .mci file."),
-    method_options(SIMULATIONS),
-    option("--dr", Length(), "MM", "Annulus width.  [default: MFP_min / 20; deon-skin: 0.008]"),
-    option(
-        "--radius",
-        LengthOr("auto"),
-        "MM|auto",
-        "Grid radius; auto (montecarlo) grows it until under 0.1 % of any channel lies beyond."
-        "  [default: 32 MFP_max; deon-skin: 17.2]",
-    ),
-    option(
-        "-o --output",
-        None,
-        "FILE",
-        "Where the profile goes, - for stdout; with --all a folder."
-        "  [default: MATERIAL.profile.npz, MATERIAL.METHOD.profile.npz]",
-    ),
-    flag("--force", "Replace an input, or a file that is not our profile."),
-)
+@options(*_OPTIONS)
 @common_options
 @click.pass_context
 def simulate(
@@ -76,13 +79,12 @@ def simulate(
         raise click.UsageError("--run chooses a run of an MCML input file, .mci.")
     method = method_for(context, method, material)
     own = own_settings(context, SIMULATIONS, method, given) | {"dr_mm": dr, "radius_mm": radius}
-    if radius == "auto" and method != "montecarlo":
+    if radius == "auto" and method != _FIRST:
         raise click.UsageError("--radius auto is for --method montecarlo; give a length.")
-    how: dict[str, Any] = {
-        key: own.pop(key) for key in ("checkpoint_every", "resume") if key in own
-    }
+    of_walk = own.keys() & {"checkpoint_every", "resume"}
+    how: dict[str, Any] = {key: own.pop(key) for key in of_walk}
     own |= {"threads": common.threads} if SIMULATIONS[method].shares else {}
-    own |= {"seed": common.seed} if method == "montecarlo" else {}
+    own |= {"seed": common.seed} if method == _FIRST else {}
     materials, settings = _asked(method, material, number, own, paper=paper)
     several = every or paper or len(materials) > 1
     paths = _paths(materials, method, output, several=several)
@@ -105,7 +107,7 @@ def _asked(
     if material is not None and is_mci(material):
         runs = load_mci(material, number)
         # A target error alone decides when a walk ends; then the file's photons are no limit.
-        photons = method == "montecarlo" and not {"photons", "target_error"} & given.keys()
+        photons = method == _FIRST and not {"photons", "target_error"} & given.keys()
         each = [run.settings(given, photons=photons) for run in runs]
         return [run.material for run in runs], each
     names = material_names(paper=paper) if material is None else (material,)
@@ -121,7 +123,7 @@ def _paths(
             raise click.UsageError("there are several profiles; -o names a folder for them.")
         return [None]
     if several or output is None:
-        folder, kind = Path(output or "."), "" if method == "montecarlo" else f".{method}"
+        folder, kind = Path(output or "."), "" if method == _FIRST else f".{method}"
         return [folder / f"{each.name}{kind}.profile.npz" for each in materials]
     return [Path(output)]
 
@@ -140,8 +142,7 @@ def _run(asked: Any, common: Common, *, several: bool, **how: Any) -> None:
             raise KeyboardInterrupt
         if to_stdout := asked[1] == [None]:
             write(found.outcomes[0].profile, None)
-    if found.note:
-        say(common, found.note)
+    say_notes(common, [found.note] if found.note else [])
     figures = {"command": "simulate", **found.to_dict(several=several)}
     text = found.summary(several=several) + "\nWrote the profile to stdout" * to_stdout
     finish(common, figures, text, to_stderr=to_stdout)

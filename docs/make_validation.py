@@ -19,8 +19,9 @@ HEAD = """# Validation
 
 Figures that books and papers print, and the program's values for them. Made by
 `python docs/make_validation.py` from tests/validation, where each source is one file. In a row of
-several numbers, the difference is the largest. A test fails if a value differs by more than half a
-unit of its last printed digit; walks may differ by up to 4.5 standard errors.
+several numbers, the difference is the largest. Where a source prints a formula, the published value
+is that formula by hand. A test fails if a value differs by more than half a unit of its last
+printed digit, or than the row allows; walks may differ by up to 4.5 standard errors.
 [verification.md](verification.md) has the walks at full size and comparisons with other programs.
 """
 

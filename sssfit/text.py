@@ -1,4 +1,4 @@
-"""Text files of other programs: decoded, and their numbers parsed strictly.
+"""Text files of other programs, decoded, their numbers parsed strictly; values as people type them.
 
 ``sssfit.formats`` and ``sssfit.material`` read their files by it. UTF-8 is what is meant; UTF-16
 and the Western code page of Windows are what editors there also write, and are read: names and
@@ -15,7 +15,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
 
-from sssfit.errors import SssfitError
+from sssfit.errors import ArgumentError, SssfitError
 from sssfit.files import read_at_most, reason
 from sssfit.messages import printable
 
@@ -140,3 +140,84 @@ def decimal_shifted(word: str, power: int) -> float:
     """
     # Not for 0, which may be written 0e999999999999999999999, beyond what Decimal knows.
     return float(Decimal(word).scaleb(power)) if finite_number(word) else 0.0
+
+
+# Values as people type them: each function raises ArgumentError for what it cannot read.
+
+_MM_PER_UNIT = {"": 1.0, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
+_LENGTH = re.compile(r"\s*([-+.\deE]+?)\s*(um|mm|cm|m|)\s*")
+_HEX = re.compile("#(?:[0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
+
+
+def length_mm(text: str, word: str | None = None) -> float | str:
+    """Read a length: a plain number is mm; 250um, 3cm and 0.6m are understood.
+
+    ``word`` is one that comes through as it is.
+    """
+    if text == word:
+        return text
+    found = _LENGTH.fullmatch(text)
+    number = (_number(found[1]) or 0.0) * _MM_PER_UNIT[found[2]] if found else 0.0
+    if not 0.0 < number < math.inf:
+        other = f", or {word}" if word else ""
+        raise ArgumentError(f"{text!r} is not a length above 0, such as 0.05, 3cm or 0.6m{other}.")
+    return number
+
+
+def lengths_mm(text: str) -> list[float | str]:
+    """Read lengths with commas between them; the unit of the last serves those that have none."""
+    parts = [each.strip() for each in text.split(",")]
+    units = [re.sub(r"[-+.\deE\s]", "", each) for each in parts]
+    if units[-1] and not any(units[:-1]):
+        parts[:-1] = [f"{each}{units[-1]}" for each in parts[:-1]]
+    elif not all(units) and any(units):
+        raise ArgumentError(f"{text!r} has a unit for some lengths only; give it to all.")
+    return [length_mm(each) for each in parts]
+
+
+def whole_number(text: str, least: int, most: int) -> int:
+    """Read a whole number that may be written 1e7."""
+    number = _number(text.replace("_", ""))
+    if number is None or not (number.is_integer() and least <= number <= most):
+        raise ArgumentError(
+            f"{text!r} is not a whole number from {least} to {most:.0e} "
+            "(10000000 and 1e7 are both understood)."
+        )
+    return int(number)
+
+
+def share(text: str) -> float:
+    """Read a share between 0 and 1, which may be written in per cent: 0.5% or 0.005."""
+    number = _number_or_percent(text)
+    if number is None or not 0.0 < number < 1.0:
+        raise ArgumentError(f"{text!r} is not a share between 0 and 100 %, such as 0.5% or 0.005.")
+    return number
+
+
+def base_colour(text: str) -> list[float] | str:
+    """Read reflectances, 0.44 or 44%, with commas between them; an sRGB colour in hex stays."""
+    text = text.strip()
+    if text.startswith("#"):
+        if not _HEX.fullmatch(text):
+            raise ArgumentError(f"{text!r} is not an sRGB colour in hex, such as '#c58c6b'.")
+        return text
+    found = []
+    for each in text.split(","):
+        if (number := _number_or_percent(each)) is None:
+            raise ArgumentError(f"{each!r} is not a reflectance, such as 0.44 or 44%.")
+        found.append(number)
+    return found
+
+
+def _number_or_percent(text: str) -> float | None:
+    """Read 0.44 or 44%; None for what is no number."""
+    text = text.strip()
+    number = _number(text.removesuffix("%"))
+    return number / 100.0 if number is not None and text.endswith("%") else number
+
+
+def _number(text: str) -> float | None:
+    try:
+        return float(text)
+    except ValueError:
+        return None

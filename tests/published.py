@@ -57,7 +57,10 @@ class Published:
         shown = (f"{value:.{k + 2}f}" for value, k in zip(ours, decimals, strict=True))
         # 1e-15: of a tie between two decimals.
         holds = bool(np.all(apart <= np.array(allowed) * (1.0 + 1e-9) + 1e-15))
-        return Row(" ".join(shown), f"{apart.max():.1e}", holds)
+        difference = f"{apart.max():.1e}"
+        if self.within is not None and self.within > 0.5 * 10.0 ** -min(decimals):
+            difference += f", allowed {self.within:g}"
+        return Row(" ".join(shown), difference, holds)
 
 
 def cells(figure: Published) -> list[str]:

@@ -272,6 +272,12 @@ ODD_PHRASES = {
     r"leaves? off": "omits",
     r"\bwhatever\b": "any, independent of",
     r"held against": "compared with",
+    r"\bby custom\b": "by convention",
+    r"\bis no file\b": "is missing",
+    r"\btakes? the place\b": "replaces",
+    r"\bis said to\b": "the page that says it",
+    r"\bnow and then\b": "at intervals",
+    r"\bto be looked at\b": "to be used",
 }
 
 

@@ -12,7 +12,7 @@ from option_rows import ROWS
 
 from sssfit import fit
 from sssfit.cli import cli
-from sssfit.cli._methods import method_options
+from sssfit.cli._options import method_options
 from sssfit.methods import FITS, SIMULATIONS, Method, Setting, lines_of, settings_of
 
 VERBS = {"simulate": SIMULATIONS, "fit": FITS}

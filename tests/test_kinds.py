@@ -1,0 +1,60 @@
+"""`sssfit.load` reads any file of ours by what it holds; each kind has figures and a page."""
+
+import io
+
+import cli_world as world
+import pytest
+
+import sssfit
+from sssfit.errors import FileError
+from sssfit.export.summary import figures_of, summary
+from sssfit.kinds import KINDS, load
+from sssfit.simulate import simulate_to_files
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    """One file of every kind, under a name that says nothing."""
+    folder = tmp_path_factory.mktemp("kinds")
+    world.profile().save(folder / "profile")
+    world.kernel().save(folder / "kernel")
+    (folder / "material").write_text(world.WAX)
+    asked = iter([False] * 6)
+    settings = {"photons": 10**9, "threads": 1, "dr_mm": 0.4, "radius_mm": 8.0}
+    stopped = lambda: next(asked, True)  # noqa: E731
+    simulate_to_files([world.wax()], [folder / "walk.npz"], settings=settings, stop=stopped)
+    (folder / "walk.npz.checkpoint").rename(folder / "checkpoint")
+    return folder
+
+
+@pytest.mark.parametrize("kind", list(KINDS))
+def test_every_kind_is_told_by_what_it_holds(files, kind):
+    path = files / kind
+    found = sssfit.load(path)
+    assert type(found) is type(load(io.BytesIO(path.read_bytes())))
+    assert figures_of(found) == figures_of(sssfit.load(str(path)))
+    assert figures_of(found)["kind"] == kind
+    assert len(summary(figures_of(found)).splitlines()) > 5
+
+
+def test_a_stream_need_not_seek(files):
+    class Pipe(io.RawIOBase):
+        def __init__(self, content):
+            self.rest = io.BytesIO(content)
+
+        def readable(self):
+            return True
+
+        def readinto(self, buffer):
+            return self.rest.readinto(buffer)
+
+    found = load(io.BufferedReader(Pipe((files / "profile").read_bytes())))
+    assert found.to_dict() == world.profile().to_dict()
+
+
+def test_what_is_foreign_is_refused_by_its_name():
+    with pytest.raises(FileError, match=r"the stream is not a sssfit file; expected a profile"):
+        load(io.BytesIO(b"mine\n"))
+    with pytest.raises(FileError, match=r"skin11 cannot be read: .*did you mean skin1\?"):
+        load("skin11")
+    assert load("skin1").name == "skin1"
