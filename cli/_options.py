@@ -1,7 +1,6 @@
 """Options that verbs share, those of methods, made from their entries, and types of parameters."""
 
 import functools
-import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
@@ -144,34 +143,6 @@ class WholeRange(click.IntRange):
     name = "whole number"
 
 
-class Number(click.types.FloatParamType):
-    """A finite number; float("nan") compares as no limit expects."""
-
-    name = "number"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """Parse ``value``; a usage error (exit 2) names what was expected."""
-        number: float = super().convert(value, param, ctx)
-        if not math.isfinite(number):
-            self.fail(f"{value!r} is not a finite number.", param, ctx)
-        return number
-
-
-class NumberRange(click.FloatRange):
-    """A range of finite numbers."""
-
-    name = "number"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> float:
-        """Parse ``value``; a usage error (exit 2) names what was expected."""
-        number: float = super().convert(Number().convert(value, param, ctx), param, ctx)
-        return number
-
-
 class Value(click.ParamType[Any]):
     """What a function of the library reads from a text; its ArgumentError is a usage error."""
 
@@ -188,19 +159,8 @@ class Value(click.ParamType[Any]):
             self.fail(str(error), param, ctx)
 
 
-class ListOf(click.ParamType[list[float]]):
-    """Values of another type with commas between them."""
-
-    def __init__(self, item: click.ParamType[float]) -> None:
-        self.item, self.name = item, f"list of {item.name}s"
-
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> list[float]:
-        """Parse each item; a usage error (exit 2) names the one that is wrong."""
-        return [self.item.convert(each, param, ctx) for each in str(value).split(",")]
-
-
+Number = functools.partial(Value, "number", text.number)
+Numbers = functools.partial(Value, "list of numbers", text.numbers)
 Length = functools.partial(Value, "length", text.length_mm)
 LengthOr = Length  # and one word, which comes through as it is
 Lengths = functools.partial(Value, "list of lengths", text.lengths_mm)
@@ -209,9 +169,22 @@ Share = functools.partial(Value, "share", text.share)
 BaseColour = functools.partial(Value, "list of reflectances", text.base_colour)
 
 
+class NumberRange(click.FloatRange):
+    """A range of finite numbers; float("nan") compares as no limit expects."""
+
+    name = "number"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """Parse ``value``; a usage error (exit 2) names what was expected."""
+        number: float = super().convert(Number().convert(value, param, ctx), param, ctx)
+        return number
+
+
 _KINDS: dict[str, Callable[[Setting], Any]] = {
     "number": lambda _: Number(),
-    "numbers": lambda _: ListOf(Number()),
+    "numbers": lambda _: Numbers(),
     "length": lambda _: Length(),
     "share": lambda _: Share(),
     "seconds": lambda _: NumberRange(min=0),

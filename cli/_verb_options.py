@@ -10,9 +10,9 @@ from ._options import (
     Count,
     Length,
     LengthOr,
-    ListOf,
     Number,
     NumberRange,
+    Numbers,
     WholeRange,
     flag,
     option,
@@ -120,7 +120,7 @@ CHART = (
     option("--mm-per-pixel", LengthOr("profile"), "MM|profile", "Pixels of the kernel, with "
            "--spectrum or --guide; profile is the width of the profile's first annulus.  "
            "[default: 0.3]"),
-    option("--k ks", ListOf(Number()), "0..4,...", "One to four values, with --guide.  "
+    option("--k ks", Numbers(), "0..4,...", "One to four values, with --guide.  "
            "[default: 0,1.55,4]"),
     option("--channel", None, "NAME", "Channel to draw, with --guide or of a kernel.  [default: "
            "the first that returns light; of a kernel up to three]"),

@@ -149,6 +149,20 @@ _LENGTH = re.compile(r"\s*([-+.\deE]+?)\s*(um|mm|cm|m|)\s*")
 _HEX = re.compile("#(?:[0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
 
 
+def number(text: str) -> float:
+    """Read a finite number."""
+    if (found := _number(text)) is None:
+        raise ArgumentError(f"{text!r} is not a valid number.")
+    if not math.isfinite(found):
+        raise ArgumentError(f"{text!r} is not a finite number.")
+    return found
+
+
+def numbers(text: str) -> list[float]:
+    """Read finite numbers with commas between them."""
+    return [number(each) for each in text.split(",")]
+
+
 def length_mm(text: str, word: str | None = None) -> float | str:
     """Read a length: a plain number is mm; 250um, 3cm and 0.6m are understood.
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sssfit.cli import main
-from sssfit.cli._progress import time_left, walk_progress
+from sssfit.cli._progress import walk_progress
 from sssfit.errors import SimulationError, SssfitWarning
 from sssfit.material import load_material
 from sssfit.profile import Profile
@@ -124,9 +124,9 @@ def test_progress_estimates_the_photons_a_target_takes():
 
 def test_time_left_is_that_of_this_sitting():
     first = Progress(1000, 10_000, 100.0, 0.1)
-    assert time_left(first, first) == "-:--:--"
-    assert time_left(first, Progress(2000, 10_000, 110.0, 0.1)) == "0:01:20"
-    assert time_left(first, Progress(2000, 2000, 110.0, 0.1)) == "0:00:00"
+    assert first.time_left(first) == "-:--:--"
+    assert Progress(2000, 10_000, 110.0, 0.1).time_left(first) == "0:01:20"
+    assert Progress(2000, 2000, 110.0, 0.1).time_left(first) == "0:00:00"
 
 
 def test_the_bar_says_how_much_is_done_how_fast_and_how_well(capsys, monkeypatch):

@@ -3,7 +3,7 @@
 import pytest
 
 from sssfit.errors import ArgumentError
-from sssfit.text import base_colour, length_mm, lengths_mm, share, whole_number
+from sssfit.text import base_colour, length_mm, lengths_mm, number, numbers, share, whole_number
 
 GOOD = [
     (length_mm, (" 250um ",), 0.25),
@@ -12,6 +12,8 @@ GOOD = [
     (length_mm, ("auto", "auto"), "auto"),
     (lengths_mm, ("0.37,0.14,0.07cm",), [3.7, 1.4, 0.7]),
     (lengths_mm, ("1mm, 2cm",), [1.0, 20.0]),
+    (number, (" -1e-3 ",), -1e-3),
+    (numbers, ("1,2.5",), [1.0, 2.5]),
     (whole_number, ("1e7", 2, 10**12), 10**7),
     (whole_number, ("10_000", 2, 10**12), 10_000),
     (share, ("0.5%",), 0.005),
@@ -27,6 +29,8 @@ BAD = [
     (length_mm, ("wide", "auto")),
     *((lengths_mm, (each,)) for each in ("1,2cm,3", "1,,2", "1mm,2")),
     *((whole_number, (each, 2, 100)) for each in ("1", "101", "2.5", "many", "nan", "inf")),
+    *((number, (each,)) for each in ("", "nan", "inf", "1,2", "many")),
+    *((numbers, (each,)) for each in ("1,,2", "1,nan")),
     *((share, (each,)) for each in ("0", "1", "100%", "half", "nan")),
     *((base_colour, (each,)) for each in ("#c58c6", "#xyzxyz", "red", "1,,2")),
 ]

@@ -10,6 +10,7 @@ from collections.abc import Callable, Generator, Mapping
 from concurrent.futures import Future
 from contextlib import closing
 from dataclasses import dataclass
+from datetime import timedelta
 from time import perf_counter
 
 from sssfit._jit import thread_pool
@@ -38,6 +39,19 @@ class Progress:
     photons: int
     seconds: float
     relative_error: float
+
+    def time_left(self, first: "Progress") -> str:
+        """Return how long the rest takes at the rate since the ``first`` report, as h:mm:ss.
+
+        That rate knows neither compilation nor earlier sittings.
+        """
+        done = self.photons_done - first.photons_done
+        if self.photons == self.photons_done:
+            return "0:00:00"
+        if done <= 0:
+            return "-:--:--"
+        rest = (self.photons - self.photons_done) / done * (self.seconds - first.seconds)
+        return str(timedelta(seconds=round(rest)))
 
 
 @dataclass(frozen=True, slots=True)
