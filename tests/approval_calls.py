@@ -20,7 +20,7 @@ from approval_run import copied_files, stand_ins
 from sssfit import compare, export, measure
 from sssfit.arrays import plain_value
 from sssfit.choose import choice
-from sssfit.compare import budget, judge, sheet, table
+from sssfit.compare import budget, evaluate, sheet, table
 from sssfit.errors import SssfitError
 from sssfit.fit import fit_artist, fit_svd
 from sssfit.formats import colours, csv, mci, mco, pictures
@@ -87,7 +87,7 @@ NAMES = {
     "cost": cost,
     "csv": csv,
     "difference": difference,
-    "judge": judge,
+    "evaluate": evaluate,
     "mci": mci,
     "mco": mco,
     "np": np,
@@ -304,12 +304,12 @@ COMPARE = [
     "fields(compare.view_kernel(kernel('wax.svd2'), world.wax(), channels=['G']))",
     "compare.view_kernel(kernel('vier.gaussians4'))",
     "compare.view_kernel(kernel('wax.svd2'), world.plate())",
-    "judge.judge(scene('disk'), kernel('wax.svd2'), world.wax(), border='clamp', structure=True, exposure=2.0)",
-    "judge.judge(scene('edge', pitch=0.2125), kernel('plate.artist'), world.plate(), border='zero')",
-    "judge.judge(scene('disk'), kernel('wax.svd2'))",
-    "judge.judge_in_screen_space(scene('head', pitch=3.0), kernel('wax.svd2'), follow='lerp', border='clamp')",
-    "judge.judge_in_screen_space(scene('head', pitch=3.0), kernel('wax.svd2'))",
-    "judge.judge_in_screen_space(scene('disk'), kernel('wax.svd2'))",
+    "evaluate.evaluate(scene('disk'), kernel('wax.svd2'), world.wax(), border='clamp', structure=True, exposure=2.0)",
+    "evaluate.evaluate(scene('edge', pitch=0.2125), kernel('plate.artist'), world.plate(), border='zero')",
+    "evaluate.evaluate(scene('disk'), kernel('wax.svd2'))",
+    "evaluate.evaluate_in_screen_space(scene('head', pitch=3.0), kernel('wax.svd2'), follow='lerp', border='clamp')",
+    "evaluate.evaluate_in_screen_space(scene('head', pitch=3.0), kernel('wax.svd2'))",
+    "evaluate.evaluate_in_screen_space(scene('disk'), kernel('wax.svd2'))",
     "budget.error_budget(world.parse_material(world.WAX, 'w'), scene('edge', pitch=0.5, angle_degrees=20.0),"
     " photons=2000, method='burley', storage='8-bit', radius_mm=9.0, seed=3)",
     "budget.error_budget(world.parse_material(world.WAX, 'w'), scene('disk', pitch=0.5),"
