@@ -90,7 +90,7 @@ def compared(
     given: Mapping[str, Any],
     common: Common,
 ) -> Comparison:
-    """Fit and judge every kernel of a profile; write chart and table, which are held by now."""
+    """Fit and evaluate every kernel of a profile; write chart and table, which are held by now."""
     from sssfit.chart import figure_of
     from sssfit.compare import compare_kernels
     from sssfit.compare.comparison import check_error
@@ -108,6 +108,19 @@ def compared(
     return found
 
 
+def check_budget(name: str) -> None:
+    """Refuse a profile where a budget is all that was asked for: it has no light to trace."""
+    from sssfit.errors import ProfileError
+
+    if name == DEON_SKIN:
+        raise ProfileError(f"{name} has no coefficients to simulate with; name a material.")
+    if name == "-" or name.endswith(".npz"):
+        raise ProfileError(
+            f"{name} is a profile, and a budget simulates a material: name that, such as skin1 or "
+            "a .toml file of your own."
+        )
+
+
 def budgets_of(
     name: str,
     source: Material | Profile,
@@ -122,18 +135,13 @@ def budgets_of(
     """
     from sssfit.chart import figure_of
     from sssfit.compare.budget import error_budgets
-    from sssfit.errors import ProfileError, SimulationError
+    from sssfit.errors import SimulationError
     from sssfit.material import Material
 
     is_all = given["what"] == "budget"
     if not isinstance(source, Material):
-        why = f"{name} is a profile, and a budget simulates a material"
-        if not is_all:
-            say(common, f"No budget: {why}.")
-            return []
-        if name == DEON_SKIN:
-            raise ProfileError(f"{name} has no coefficients to simulate with; name a material.")
-        raise ProfileError(f"{why}: name that, such as skin1 or a .toml file of your own.")
+        say(common, f"No budget: {name} is a profile, and a budget simulates a material.")
+        return []
     say_if_compiling(common, walk=source, solver=True)
     try:
         with walk_progress(source.name, quiet=common.quiet) as show:

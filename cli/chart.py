@@ -7,20 +7,19 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sssfit.messages import report
 from sssfit.process import check_memory
 
 from ._input import load_any, load_source, profile_name, profile_of_kernel
 from ._options import Common, common_options, options, refuse
 from ._output import finish_one, held_charts, say, stem_of, target, write_chart
 from ._progress import say_if_compiling, walk_progress
-from ._reports import CHARTS
 from ._verb_options import CHART, of_other_charts
 
 if TYPE_CHECKING:
     from sssfit.profile import Profile
 
 _VIEWS = ("models", "spectrum", "guide")
+_COMPUTED = ("kernel", *_VIEWS)
 _FILES = ("profile", "kernel", "material", "checkpoint")
 _MEMORY = {"kernel": "kernel chart", **dict.fromkeys(_VIEWS, "figures")}
 
@@ -63,6 +62,7 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
     """
     from sssfit.chart import figure_of
     from sssfit.chart.files import chart_format
+    from sssfit.export.reports import page
     from sssfit.kernel import SeparableKernel
     from sssfit.profile import Profile
 
@@ -81,14 +81,14 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
     stem = made_of if kind == "models" else stem_of(name, made_of)
     path = target(given["output"], f"{stem}.{kind}.png")
     with held_charts([path], inputs=[name, source], force=given["force"]):
-        record = _computed(found, kind, profile, given, common) if kind in CHARTS else found
+        record = _computed(found, kind, profile, given, common) if kind in _COMPUTED else found
         write_chart(figure_of(record), path)
     figures: dict[str, Any] = {} if view else {"kind": kind, "file": name}
     figures |= {"profile": source} if kind != "models" else {}
-    own = {"material": made_of, "channels": found.channels} if kind not in CHARTS else {}
+    own = {"material": made_of, "channels": found.channels} if kind not in _COMPUTED else {}
     figures |= own or record.to_dict()
-    parts, words = CHARTS.get(kind, ((), dict))
-    finish_one(common, "chart", path, figures, report(parts, figures | words(figures)), "a PNG")
+    text = page(kind, figures) if kind in _COMPUTED else ""
+    finish_one(common, "chart", path, figures, text, "a PNG")
 
 
 def _view(file: str | None, given: Mapping[str, Any]) -> str:

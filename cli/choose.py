@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sssfit.messages import report
 from sssfit.scene.made import EDGE_DEGREES
 
 from ._input import load_source
@@ -15,7 +14,6 @@ from ._options import Common, common_options, options
 from ._output import KERNEL, PROFILE, finish, held, say, say_notes, stem_of, target, write
 from ._picture import check_pictures
 from ._progress import say_if_compiling
-from ._reports import CHOSEN
 from ._verb_options import CHOOSE
 
 if TYPE_CHECKING:
@@ -26,7 +24,6 @@ if TYPE_CHECKING:
 
 _METRES = (0.1, 9.0)  # plain numbers that may have been meant in metres; 1cm is 10 mm and was not
 _MOST_PIXELS = 512  # of a made picture, along an edge
-_FIGURES = {"p95": "95th percentile", "p99": "99th percentile", "mean": "mean"}
 
 
 @click.command()
@@ -55,6 +52,7 @@ def choose(material: str, common: Common, **given: Any) -> None:
     """
     from sssfit.choose import choice as library
     from sssfit.choose.report import sentences, step_line
+    from sssfit.export.reports import page
     from sssfit.kernel import is_kernel_file
     from sssfit.material import Material
     from sssfit.profile import is_profile_file
@@ -92,13 +90,8 @@ def choose(material: str, common: Common, **given: Any) -> None:
         written = _write(choice, path, profile_path)
     view["resolution"] = given["resolution"][::-1]
     figures = {"command": "choose", "output": written, **view, **choice.to_dict()}
-    words = {
-        "metres": given["distance_mm"] / 1000.0,
-        "figure": _FIGURES[choice.tolerance_of],
-        "sentences": "\n".join(sentences(choice)),
-        "wrote": f"Wrote {', '.join(written)}" if written else "No kernel is written.",
-    }
-    finish(common, figures, report(CHOSEN, {**figures, **words}), to_stderr=written == ["-"])
+    text = page("choose", {**figures, "sentences": "\n".join(sentences(choice))})
+    finish(common, figures, text, to_stderr=written == ["-"])
     if not written and path is not None and path.exists():
         say(common, f"{path} is from an earlier run; this view needs no kernel.")
 

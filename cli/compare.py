@@ -11,7 +11,15 @@ import click
 from sssfit.methods import FITS
 from sssfit.scene.made import COMPARED
 
-from ._compare_parts import budgets_of, compared, fronts, held_outputs, profile_of, scenes_of
+from ._compare_parts import (
+    budgets_of,
+    check_budget,
+    compared,
+    fronts,
+    held_outputs,
+    profile_of,
+    scenes_of,
+)
 from ._input import load_source
 from ._options import Common, common_options, options, own_settings, refuse
 from ._output import finish, finish_one, held_charts, target, write_chart
@@ -102,6 +110,8 @@ def _budget_and_kernels(
 
     figures: dict[str, Any] = {"rows": []}
     front, what, texts = (given["error"], given["cost"]), given["what"], []
+    if what == "budget":
+        check_budget(name)
     charts = [given["chart"], given["budget_chart"]]
     with held_outputs(charts, [given["table"]], [name, *pictures], given):
         source = load_source(name)

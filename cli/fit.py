@@ -6,14 +6,12 @@ from typing import Any
 
 import click
 
-from sssfit.messages import report
 from sssfit.methods import FITS, lines_of, settings_of
 from sssfit.process import check_memory
 
 from ._input import load, profile_name
 from ._options import Common, common_options, method_options, options, own_settings
 from ._output import KERNEL, finish_one, held, stem_of, target, write
-from ._reports import FITTED
 from ._verb_options import FIT_OUTPUT, FIT_PIXELS
 
 
@@ -41,6 +39,7 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
         return
     if method is None:
         raise click.UsageError("name a --method; `sssfit fit --list` has them.")
+    from sssfit.export.reports import page
     from sssfit.fit import fit_result
     from sssfit.kernel import is_kernel_file
     from sssfit.profile import Profile
@@ -52,19 +51,17 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
     counted, stem = FITS[method].counted, stem_of(name, source.material_name)
     count = settings.get(counted, known[counted][0].words) if counted else ""
     path = target(given["output"], f"{stem}.{method}{count}.kernel.json")
-    settings |= _judge(settings, common.threads)
+    settings |= _picture_target(settings, common.threads)
     settings |= {key: given[key] for key in ("mm_per_pixel", "normalize")}
     settings["support_mm"] = None if given["support"] == "auto" else given["support"]
     with held([path], is_kernel_file, inputs=[name], force=given["force"], named=KERNEL):
         result = fit_result(source, method, **settings)
         write(result.kernel, path)
     figures = {"profile": name, **result.to_dict()}
-    plural = {key: "s" * (figures[key] > 1) for key in ("rank", "pixels")}
-    text = report(FITTED, {**figures, "s": plural})
-    finish_one(common, "fit", path, figures, text, "the kernel")
+    finish_one(common, "fit", path, figures, page("fit", figures), "the kernel")
 
 
-def _judge(settings: dict[str, Any], threads: int | None) -> dict[str, Any]:
+def _picture_target(settings: dict[str, Any], threads: int | None) -> dict[str, Any]:
     """Return what judges pictures, if they are the target: the fits by themselves render none."""
     if settings.get("target") != "picture":
         return {}

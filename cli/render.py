@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sssfit.messages import by_channel, report
 from sssfit.methods import settings_of
 from sssfit.scene.made import MADE
 
@@ -16,11 +15,10 @@ from ._input import kernel_name, load, profile_of_kernel
 from ._options import Common, common_options, method_options, options, own_settings
 from ._output import binary_stdout, finish, held, say_notes, stem_of, target
 from ._picture import check_pictures
-from ._reports import RENDERED
-from ._verb_options import MAPS, RENDER, RENDER_PICTURE
+from ._verb_options import RENDER, RENDER_PICTURE
 
 if TYPE_CHECKING:
-    from sssfit.compare.judge import Judgement
+    from sssfit.compare.evaluate import Evaluation
     from sssfit.kernel import SeparableKernel
 
 # Of the head's key light: behind both ears.
@@ -48,6 +46,7 @@ def render(context: click.Context, /, kernel: str | None, common: Common, **give
       sssfit render --screen --irradiance head
       sssfit render --irradiance head --transmit -o ears.png
     """
+    from sssfit.export.reports import page
     from sssfit.formats.pictures import image_format, is_image_file
     from sssfit.kernel import SeparableKernel
 
@@ -74,7 +73,7 @@ def render(context: click.Context, /, kernel: str | None, common: Common, **give
         "follow": (given["follow"] or "gaussian") if given["screen"] else None,
         **made.to_dict(),
     }
-    finish(common, figures, _text(figures), to_stderr=path is None)
+    finish(common, figures, page("render", figures), to_stderr=path is None)
 
 
 def _check(context: click.Context, given: dict[str, Any]) -> dict[str, Any]:
@@ -106,9 +105,9 @@ def _rendered(
     given: Mapping[str, Any],
     own: dict[str, Any],
     common: Common,
-) -> tuple[str | None, Judgement]:
+) -> tuple[str | None, Evaluation]:
     """Light the picture and render it; return the file of its profile, too."""
-    from sssfit.compare.judge import judge, judge_in_screen_space
+    from sssfit.compare.evaluate import evaluate, evaluate_in_screen_space
     from sssfit.fit import MM_PER_PIXEL
     from sssfit.scene.load import load_scene
 
@@ -121,28 +120,12 @@ def _rendered(
     how = {key: given[key] for key in ("transmit", "border")} | {"threads": common.threads}
     if screen:
         follow = given["follow"] or "gaussian"
-        return None, judge_in_screen_space(scene, kernel, follow=follow, **how)
+        return None, evaluate_in_screen_space(scene, kernel, follow=follow, **how)
     profile, source = profile_of_kernel(kernel, name, given["profile"], common)
     if profile is None and (given["truth"] or given["difference"]):
         raise click.UsageError("--truth and --difference need the profile; name it.")
     how |= {key: given[key] for key in ("exposure", "structure")}
-    made = judge(scene, kernel, profile, **how)
+    made = evaluate(scene, kernel, profile, **how)
     if given["difference"]:
         made = made.with_difference(given["difference_map"], given["gain"])
     return source, made
-
-
-def _text(figures: Mapping[str, Any]) -> str:
-    """Write the figures for people."""
-    kind, most = figures["difference_map"], figures["transmitted_maximum"]
-    screen = f"screen space, follow {figures['follow']}, " if figures["follow"] else ""
-    is_grey = figures["rmse"] is not None and figures["delta_e_2000_mean"] is None
-    words = {
-        "how": f"{screen}{figures['border']} borders",
-        "most": by_channel(figures["channels"], most, ".3g") if most is not None else None,
-        "no_colour": len(figures["channels"]) if is_grey else None,
-        "magnified": figures["difference_gain"] if kind is None else None,
-        **{key: figures["difference_end"] if kind == key else None for key in MAPS},
-        "wrote": ", ".join(figures["output"]),
-    }
-    return report(RENDERED, {**figures, **words})

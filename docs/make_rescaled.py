@@ -6,7 +6,7 @@ python docs/make_rescaled.py
 from sections import put_section
 
 from sssfit.compare.candidates import Candidate
-from sssfit.compare.judged import border_of, judged_scene
+from sssfit.compare.references import border_of, evaluated_scene
 from sssfit.compare.sheet import PIXELS, SCENES
 from sssfit.fit import MM_PER_PIXEL, support_of
 from sssfit.material import load_material
@@ -50,7 +50,7 @@ def judged(material):
     support = support_of(profile)
     found = {}
     size = {"height": PIXELS, "width": PIXELS, "mm_per_pixel": MM_PER_PIXEL}
-    scenes = [judged_scene(make_scene(each, **size), profile) for each in SCENES]
+    scenes = [evaluated_scene(make_scene(each, **size), profile) for each in SCENES]
     truths = [render_reference(each, profile, border=border_of(each)) for each in scenes]
     for n in RANKS:
         kernels = [each.fit(profile, MM_PER_PIXEL, support).kernel for each in methods(n)]

@@ -20,7 +20,7 @@ from approval_run import copied_files, stand_ins
 from sssfit import compare, export, measure
 from sssfit.arrays import plain_value
 from sssfit.choose import choice
-from sssfit.compare import budget, judge, sheet, table
+from sssfit.compare import budget, evaluate, sheet, table
 from sssfit.errors import SssfitError
 from sssfit.fit import fit_artist, fit_svd
 from sssfit.formats import colours, csv, mci, mco, pictures
@@ -67,7 +67,7 @@ def saved(pixels: Any, **own: Any) -> tuple[Any, bytes]:
 @functools.cache
 def comparison() -> Any:
     scenes = [scene("disk", pitch=0.5), scene("edge", pitch=0.5, angle_degrees=30.0)]
-    return compare.compare_kernels(world.wax(), scenes, mm_per_pixel=0.5, support_mm=3.0)
+    return compare.compare_kernels(world.wax(), scenes, support_mm=3.0)
 
 
 def fields(record: Any) -> dict[str, Any]:
@@ -87,7 +87,7 @@ NAMES = {
     "cost": cost,
     "csv": csv,
     "difference": difference,
-    "judge": judge,
+    "evaluate": evaluate,
     "mci": mci,
     "mco": mco,
     "np": np,
@@ -271,10 +271,10 @@ COMPARE = [
     "table.table_text(comparison(), '.csv', 'l2', 'passes')",
     "[table.verdict_lines(comparison(), e, c) for e in ('l2', 'delta-e') for c in ('passes', 'seconds')]",
     "compare.pareto_front([1, 2, 2, 3, 4], [5, 4, 4, 4, 1])",
-    "compare.compare_kernels(world.leaf(), [scene('edge')], mm_per_pixel=0.25, support_mm=1.0).to_dict()['rows'][:2]",
-    "compare.compare_kernels(world.wax(), [], mm_per_pixel=0.5)",
-    "compare.compare_kernels(world.wax(), [scene('edge'), scene('edge')], mm_per_pixel=0.25)",
-    "compare.compare_kernels(world.wax(), [scene('edge')], mm_per_pixel=0.5)",
+    "compare.compare_kernels(world.leaf(), [scene('edge')], support_mm=1.0).to_dict()['rows'][:2]",
+    "compare.compare_kernels(world.wax(), [])",
+    "compare.compare_kernels(world.wax(), [scene('edge'), scene('edge')])",
+    "compare.compare_kernels(world.wax(), [scene('edge'), scene('disk', pitch=0.5)])",
     "compare.compute_guide(world.plate(), ks=[0.5], channel='G', mm_per_pixel=0.4, support_mm=2.0)",
     "fields(compare.compute_guide(world.plate(), ks=[0.5, 3.0], mm_per_pixel=0.4, support_mm=2.0))",
     "compare.compute_guide(world.plate(), ks=[])",
@@ -284,10 +284,10 @@ COMPARE = [
     "fields(compare.view_kernel(kernel('wax.svd2'), world.wax(), channels=['G']))",
     "compare.view_kernel(kernel('vier.gaussians4'))",
     "compare.view_kernel(kernel('wax.svd2'), world.plate())",
-    "judge.judge(scene('disk'), kernel('wax.svd2'), world.wax(), border='clamp', structure=True, exposure=2.0)",
-    "judge.judge(scene('edge', pitch=0.2125), kernel('plate.artist'), world.plate(), border='zero')",
-    "judge.judge(scene('disk'), kernel('wax.svd2'))",
-    "judge.judge_in_screen_space(scene('head', pitch=3.0), kernel('wax.svd2'), follow='lerp', border='clamp')",
+    "evaluate.evaluate(scene('disk'), kernel('wax.svd2'), world.wax(), border='clamp', structure=True, exposure=2.0)",
+    "evaluate.evaluate(scene('edge', pitch=0.2125), kernel('plate.artist'), world.plate(), border='zero')",
+    "evaluate.evaluate(scene('disk'), kernel('wax.svd2'))",
+    "evaluate.evaluate_in_screen_space(scene('head', pitch=3.0), kernel('wax.svd2'), follow='lerp', border='clamp')",
     "budget.error_budget(world.parse_material(world.WAX, 'w'), scene('edge', pitch=0.5, angle_degrees=20.0),"
     " photons=2000, method='burley', storage='8-bit', radius_mm=9.0, seed=3)",
     "budget.error_budget(world.parse_material(world.WAX, 'w'), scene('disk', pitch=0.5),"

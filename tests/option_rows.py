@@ -17,7 +17,7 @@ from cli_world import DR_MM, GRID, PHOTONS, RADIUS_MM, Ran, called, kernel, pict
 
 from sssfit import fit
 from sssfit.compare import view_kernel
-from sssfit.compare.judge import judge, judge_in_screen_space
+from sssfit.compare.evaluate import evaluate, evaluate_in_screen_space
 from sssfit.compare.pictures import picture_error
 from sssfit.export import json_document
 from sssfit.formats.csv import csv_text, load_csv
@@ -321,7 +321,7 @@ def _scene(name: str, **own: Any) -> Scene:
 
 
 def _rendered(scene: Scene, **settings: Any) -> Any:
-    return np.float32(judge(scene, kernel(), **settings).picture)
+    return np.float32(evaluate(scene, kernel(), **settings).picture)
 
 
 def _lit(name: str, option: str, value: str, default: str = "", words: str = "", **own: Any) -> Row:
@@ -333,7 +333,7 @@ def _lit(name: str, option: str, value: str, default: str = "", words: str = "",
 
 def _measured(**settings: Any) -> Any:
     """Figures of a disk."""
-    score = judge(_scene("disk"), kernel(), profile(), **settings).score
+    score = evaluate(_scene("disk"), kernel(), profile(), **settings).score
     assert score is not None
     return [score.delta_e_2000_mean, score.exposure, score.ssim, score.flip]
 
@@ -412,21 +412,21 @@ RENDER = {
         f"render --irradiance head {_SIZE}",
         "--screen",
         made_picture,
-        lambda: np.float32(judge_in_screen_space(_head_on_screen(16, 24), kernel()).picture),
+        lambda: np.float32(evaluate_in_screen_space(_head_on_screen(16, 24), kernel()).picture),
     ),
     "--light": _lit("head", "--light", "100", "45", light_degrees=100.0),
     "--transmit": Row(
         f"render wax.gaussians2.kernel.json --irradiance head {_SIZE}",
         "--transmit",
         made_picture,
-        lambda: np.float32(judge(_lit_through(), world.gaussians()).picture),
+        lambda: np.float32(evaluate(_lit_through(), world.gaussians()).picture),
     ),
     "--follow": Row(
         "render --irradiance head --size 48x48 --distance 200 --screen",
         "--follow none",
         made_picture,
         lambda: np.float32(
-            judge_in_screen_space(
+            evaluate_in_screen_space(
                 _head_on_screen(48, 48, distance_mm=200.0), kernel(), follow="none"
             ).picture
         ),
@@ -436,7 +436,7 @@ RENDER = {
         f"{_DISK} --json",
         "--profile plate.profile.npz",
         fields("rmse"),
-        lambda: [judge(_scene("disk"), kernel(), world.plate_profile()).score.rmse],
+        lambda: [evaluate(_scene("disk"), kernel(), world.plate_profile()).score.rmse],
         default="wax.profile.npz",
         words="the profile here that the kernel was fitted to",
     ),

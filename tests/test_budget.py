@@ -14,7 +14,7 @@ from sssfit.chart.budget import budget_figure
 from sssfit.cli import main
 from sssfit.compare._budget_causes import make_sources, stored, true_picture
 from sssfit.compare.budget import error_budget, error_budgets
-from sssfit.compare.judge import judge
+from sssfit.compare.evaluate import evaluate
 from sssfit.errors import FitError, KernelError, RenderError, SimulationError
 from sssfit.fit import fit_svd
 from sssfit.kernel import SeparableKernel
@@ -89,7 +89,7 @@ def test_the_whole_is_the_kernel_a_user_has(budget):
     # The verbs' way to it: the walk on its own grid, its fit, weights in half float.
     walk = simulate_montecarlo(budget.material, photons=PHOTONS)
     kernel = fit_svd(walk, rank=3, mm_per_pixel=1.0).kernel
-    found = judge(scene_of(), stored(kernel, "half"))
+    found = evaluate(scene_of(), stored(kernel, "half"))
     picture = budget.truth + budget.whole.difference
     # One more ulp of a weight where sums are taken in another order: half float has 2^-11.
     np.testing.assert_allclose(picture, found.picture, rtol=2.0**-11)
@@ -122,7 +122,7 @@ def test_separability_alone_is_judges_score_where_no_light_is_beyond(budget):
         pytest.skip("light lies beyond the grid")
     profile = exact_of(budget.material.name)
     kernel = fit_svd(profile, rank=3, mm_per_pixel=1.0).kernel
-    judged = judge(budget.scene, kernel, truth=budget.truth).score
+    judged = evaluate(budget.scene, kernel, truth=budget.truth).score
     ours = cause(budget, "separability").score
     # 1e-6 of the light is not on the grid; Delta E is of some 100 steps of lightness.
     assert ours.delta_e_2000_mean == pytest.approx(judged.delta_e_2000_mean, abs=1e-3)
@@ -275,7 +275,7 @@ def test_bad_input_is_one_line():
         error_budget(skin1, even)
     with pytest.raises(RenderError, match="no picture"):
         error_budgets(skin1, [])
-    with pytest.raises(RenderError, match=r"noise has 0\.3 mm per pixel and edge 1; expected"):
+    with pytest.raises(RenderError, match=r"random has 0\.3 mm per pixel and edge 1; expected"):
         error_budgets(skin1, [scene_of(), noise_scene()])
     with pytest.raises(SimulationError, match=r"model = 'photon'.*dipole, dipole-grosjean, burley"):
         error_budget(skin1, noise_scene(), model="photon")

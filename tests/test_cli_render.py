@@ -12,7 +12,7 @@ import pytest
 from reference_pixels import make_profile
 
 from sssfit.cli import main
-from sssfit.compare.judge import judge
+from sssfit.compare.evaluate import evaluate
 from sssfit.fit import fit_svd
 from sssfit.formats.pictures import load_image, save_image
 from sssfit.kernel import SeparableKernel
@@ -380,7 +380,7 @@ def test_alpha_serves_as_the_mask(run, folder):
     inside = COVERED >= 0.5
     scene = Scene("mine", np.where(inside[..., None], lit(), 0.0), 0.2, mask=inside)
     kernel, profile = SeparableKernel.load(KERNEL), Profile.load("wax.profile.npz")
-    result = judge(scene, kernel, profile)
+    result = evaluate(scene, kernel, profile)
     status, out, _ = run(
         "render", "--irradiance", "mine.exr", "--mask", "alpha", "-o", "out.tif", "--json"
     )

@@ -14,9 +14,9 @@ from reference_pixels import make_profile
 from sssfit.compare import pareto
 from sssfit.compare.candidates import Candidate, candidates
 from sssfit.compare.comparison import COSTS, ERRORS, check_error, pareto_front, verdicts
-from sssfit.compare.judge import judge
-from sssfit.compare.judged import border_of, judged_scene
+from sssfit.compare.evaluate import evaluate
 from sssfit.compare.pareto import check_scenes, compare_kernels
+from sssfit.compare.references import border_of, evaluated_scene
 from sssfit.errors import FitError, RenderError
 from sssfit.material import load_material
 from sssfit.measure.score import COLOUR_FIGURES, measure
@@ -90,9 +90,9 @@ def test_rows_are_what_judge_and_measure_say(skin1, scenes, comparison):
     for candidate in SOME:
         fit = candidate.fit(skin1, PITCH, None)
         for scene in scenes:
-            row, shown = next(rows), judged_scene(scene, skin1)
+            row, shown = next(rows), evaluated_scene(scene, skin1)
             border = {"disk": "zero", "head": "mirror"}[scene.name]
-            alone = judge(shown, fit.kernel, skin1, border=border)
+            alone = evaluate(shown, fit.kernel, skin1, border=border)
             truth = render_reference(shown, skin1, border=border)
             picture = render_separable(shown, fit.kernel, border=border)
             score = measure(picture, truth, mask=shown.mask)
@@ -117,9 +117,9 @@ def test_rows_are_what_judge_and_measure_say(skin1, scenes, comparison):
 
 def test_pictures_are_named_with_the_exposure_of_their_truth(skin1, scenes, comparison):
     for scene, picture in zip(scenes, comparison.pictures, strict=True):
-        shown = judged_scene(scene, skin1)
+        shown = evaluated_scene(scene, skin1)
         kernel = SOME[0].fit(skin1, PITCH, None).kernel
-        score = judge(shown, kernel, skin1, border=border_of(shown)).score
+        score = evaluate(shown, kernel, skin1, border=border_of(shown)).score
         assert dataclasses.astuple(picture) == (scene.name, 64, 64, score.exposure)
 
 
@@ -246,7 +246,7 @@ def test_delta_e_needs_channels_that_have_a_colour(scenes):
 def test_a_truth_that_is_there_is_not_rendered_again(skin1, scenes):
     kernel = SOME[0].fit(skin1, PITCH, None).kernel
     truth = 2.0 * render_reference(scenes[0], skin1)
-    found = judge(scenes[0], kernel, truth=truth)
+    found = evaluate(scenes[0], kernel, truth=truth)
     assert found.truth is truth
     score = measure(found.picture, truth)
     assert found.score.rmse == score.rmse

@@ -8,7 +8,7 @@ import pytest
 from reference_pixels import make_profile
 
 from sssfit.cli import main
-from sssfit.compare.judge import judge
+from sssfit.compare.evaluate import evaluate
 from sssfit.compare.pictures import PIXELS, picture_error
 from sssfit.errors import RenderError
 from sssfit.fit import fit_artist, make_target
@@ -87,7 +87,7 @@ def shown(profile, kernel):
     found = []
     for name, own in (("disk", {"radius_mm": 15.0}), ("edge", {}), ("head", {})):
         scene = make_scene(name, height=200, width=200, mm_per_pixel=0.3, **own)
-        found.append(judge(scene, kernel, profile).score.delta_e_2000_mean)
+        found.append(evaluate(scene, kernel, profile).score.delta_e_2000_mean)
     return np.array(found)
 
 

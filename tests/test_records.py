@@ -45,12 +45,12 @@ def view():
 
 def judged(**settings):
     """What the command below renders, against the truth."""
-    from sssfit.compare.judge import judge
+    from sssfit.compare.evaluate import evaluate
     from sssfit.scene.made import make_scene
 
     kernel = world.kernel()
     scene = make_scene("disk", height=16, width=24, mm_per_pixel=kernel.mm_per_pixel)
-    return judge(scene, kernel, world.profile(), **settings)
+    return evaluate(scene, kernel, world.profile(), **settings)
 
 
 def burley():

@@ -15,9 +15,9 @@ from sssfit.chart.page import save_figure
 from sssfit.chart.sheet import sheet_figure
 from sssfit.cli import main
 from sssfit.compare._panels import lightness, make_panel
-from sssfit.compare.judge import judge
-from sssfit.compare.judged import border_of, judged_scene
+from sssfit.compare.evaluate import evaluate
 from sssfit.compare.pictures import picture_error
+from sssfit.compare.references import border_of, evaluated_scene
 from sssfit.compare.sheet import compute_sheet, production_look
 from sssfit.errors import RenderError, SssfitWarning
 from sssfit.fit import METHODS, fit_artist, fit_falloff, support_of
@@ -93,8 +93,8 @@ def test_figures_are_those_of_direct_calls(skin1, sheet, label, method, settings
     row = row_of(sheet, label)
     for name, panel in zip(sheet.scenes, row.panels, strict=True):
         scene = make_scene(name, height=PIXELS, width=PIXELS, mm_per_pixel=PITCH)
-        shown = judged_scene(scene, skin1)
-        found = judge(shown, kernel, skin1, border=border_of(shown))
+        shown = evaluated_scene(scene, skin1)
+        found = evaluate(shown, kernel, skin1, border=border_of(shown))
         assert panel.score.delta_e_2000_mean == pytest.approx(found.score.delta_e_2000_mean)
         assert panel.score.exposure == pytest.approx(found.score.exposure)
         assert row.passes == found.cost.passes
@@ -109,7 +109,7 @@ def test_the_true_kernel_is_no_different_from_itself(sheet):
 def test_the_input_is_the_irradiance_times_the_albedo(skin1, sheet):
     scene = make_scene("edge", height=PIXELS, width=PIXELS, mm_per_pixel=PITCH)
     truth = render_reference(scene, skin1)
-    mask = judged_scene(scene, skin1).mask
+    mask = evaluated_scene(scene, skin1).mask
     expected = measure(scene.irradiance * skin1.diffuse_reflectance, truth, mask=mask)
     panel = sheet.rows[0].panels[sheet.scenes.index("edge")]
     assert panel.score.delta_e_2000_mean == pytest.approx(expected.delta_e_2000_mean)

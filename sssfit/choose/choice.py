@@ -44,8 +44,8 @@ from sssfit.choose.views import (
     head_scenes,
     mm_per_pixel_at,
 )
-from sssfit.compare.judge import timed
-from sssfit.compare.judged import judged_scene
+from sssfit.compare.evaluate import timed
+from sssfit.compare.references import evaluated_scene
 from sssfit.errors import FitError, RenderError
 from sssfit.fit import FitResult, support_of
 from sssfit.material import Material
@@ -288,7 +288,7 @@ def choose(
     if half_pixels(support_mm, mm_per_pixel) == 0:
         return Choice(*given)
     scenes = (
-        [judged_scene(own, profile)]
+        [evaluated_scene(own, profile)]
         if own
         else head_scenes(mm_per_pixel, distance_mm, frame, threads)
     )
@@ -366,14 +366,14 @@ class _Search:
 
     def _try(self, option: Option | None) -> Step | None:
         """Judge an option and keep its step; None where it cannot be fitted."""
-        step = self._judged(option)
+        step = self._evaluated(option)
         if step is not None:
             self.steps.append(step)
             if self.progress:
                 self.progress(step)
         return step
 
-    def _judged(self, option: Option | None) -> Step | None:
+    def _evaluated(self, option: Option | None) -> Step | None:
         try:
             found = self.views.score_of_option(option)
         except FitError:
@@ -434,8 +434,8 @@ class _Search:
         for option in (*more, *wider[:1], *dearest):
             if option != chosen and option not in picked:
                 picked.append(option)
-        judged = (self._judged(each) for each in picked)
-        return tuple(each for each in judged if each is not None)
+        evaluated = (self._evaluated(each) for each in picked)
+        return tuple(each for each in evaluated if each is not None)
 
     def _seconds(self, fitted: FitResult) -> float:
         """Measure what the chosen kernel takes [s a megapixel]."""

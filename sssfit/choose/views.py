@@ -8,7 +8,7 @@ import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.choose.options import Option
-from sssfit.compare.judged import border_of
+from sssfit.compare.references import border_of
 from sssfit.errors import RenderError
 from sssfit.fit import FitResult
 from sssfit.measure.score import ImageScore, measure
@@ -82,7 +82,7 @@ def mm_per_pixel_at(distance_mm: float, fov_degrees: float, rows: int) -> float:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Viewed:
+class ViewScore:
     """The worst view of an option, or the first that is out of tolerance.
 
     Parameters
@@ -132,18 +132,18 @@ class Views:
 
     def score_of_option(
         self, option: Option | None, profile: Profile | None = None, *, wider: float = WIDER
-    ) -> Viewed:
+    ) -> ViewScore:
         """Judge an option on every view until one is out of tolerance.
 
         No option is no blur. Wider views may have the share ``wider`` of the tolerance. ``profile``
         is what is fitted, the truth's by default.
         """
-        worst: Viewed | None = None
+        worst: ViewScore | None = None
         for k in range(len(self.scenes)):
             score = self._measured(k, self._blurred(k, option, profile or self.profile))
             error = self.error_of(score)
             within = error <= self.tolerance * (wider if k else 1.0)
-            found = Viewed(score, self.scenes[k].mm_per_pixel, error, within)
+            found = ViewScore(score, self.scenes[k].mm_per_pixel, error, within)
             if not within:
                 return found
             worst = found if worst is None or error > worst.error else worst

@@ -28,7 +28,7 @@ from sssfit.compare._budget_causes import (
     picture_reach_mm,
 )
 from sssfit.compare.candidates import Candidate
-from sssfit.compare.judged import check_one_pitch, judged_scene
+from sssfit.compare.references import check_one_pitch, evaluated_scene
 from sssfit.errors import RenderError, SimulationError
 from sssfit.grid import make_grid
 from sssfit.kernel import SeparableKernel
@@ -186,7 +186,7 @@ def error_budgets(
         A homogeneous half space with g = 0: what the exact solver covers.
     scenes : sequence of Scene
         Flat, all of the same pixel size; their profiles and kernels are shared. What counts of
-        them says `judged_scene`.
+        them says `evaluated_scene`.
     photons, seed, progress
         Of the photon walk; see ``simulate_montecarlo``.
     radius_mm : float, optional [mm]
@@ -238,8 +238,8 @@ def error_budgets(
         "storage": storage,
         "kernel": switches.whole_stored,
     }
-    judged = [judged_scene(each, switches.on_grid) for each in scenes]
-    return [_budget(material, scene, switches, threads, about) for scene in judged]
+    evaluated = [evaluated_scene(each, switches.on_grid) for each in scenes]
+    return [_budget(material, scene, switches, threads, about) for scene in evaluated]
 
 
 def _reach_mm(scene: Scene, grid_mm: float) -> float:

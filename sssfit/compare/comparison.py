@@ -98,7 +98,7 @@ class KernelRow:
     energy_drift : array (C,)
         As in `ImageScore`.
     radial_asymmetry : array (C,)
-        As in `Judgement`; NaN for kernels of fewer than 9 pixels.
+        As in `Evaluation`; NaN for kernels of fewer than 9 pixels.
     passes, taps_per_pixel, kernel_bytes : int
         As in `Cost`.
     seconds_per_megapixel : float [s]

@@ -1,4 +1,4 @@
-"""Speed against accuracy: every kernel that can be fitted, judged on the same pictures.
+"""Speed against accuracy: every kernel that can be fitted, evaluated on the same pictures.
 
 A row is one kernel on one picture. Errors are against the picture by the profile's whole 2D kernel;
 `sssfit.compare.comparison` says which rows are worth their cost, `sssfit.chart` draws them.
@@ -14,8 +14,8 @@ import numpy.typing as npt
 from sssfit.compare.candidates import Candidate
 from sssfit.compare.candidates import candidates as every_candidate
 from sssfit.compare.comparison import COSTS, ERRORS, Comparison, KernelRow, Picture, pareto_front
-from sssfit.compare.judge import Judgement, judge
-from sssfit.compare.judged import Reference, check_one_pitch, references
+from sssfit.compare.evaluate import Evaluation, evaluate
+from sssfit.compare.references import Reference, check_one_pitch, references
 from sssfit.errors import FitError, RenderError
 from sssfit.fit import FitResult, make_target
 from sssfit.measure.delta_e import selected_pixels, selection
@@ -27,7 +27,7 @@ from sssfit.render.separable import render_separable
 from sssfit.scene.record import Scene
 
 Report = Callable[[int, int, str], None]
-_Judged = tuple[Candidate, FitResult, Sequence[Judgement]]
+_Evaluated = tuple[Candidate, FitResult, Sequence[Evaluation]]
 
 # Turns in which kernels are timed: two at least, then until so much time has gone.
 _LEAST_TURNS, _MOST_TURNS, _TIMED_SECONDS = 2, 12, 8.0
@@ -42,7 +42,7 @@ def compare_kernels(
     threads: int | None = None,
     progress: Report | None = None,
 ) -> Comparison:
-    """Fit every candidate once, and judge each on every picture.
+    """Fit every candidate once, and evaluate each on every picture.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def compare_kernels(
         What is fitted, and what the true pictures are made from.
     scenes : sequence of Scene
         Of different names and of one pixel size, which the kernels have; what counts of them says
-        `judged_scene`.
+        `evaluated_scene`.
     support_mm : float, optional [mm]
         As `make_target`.
     candidates : sequence of Candidate, optional
@@ -70,14 +70,14 @@ def compare_kernels(
     FitError
         The profile cannot be used, or no candidate could be fitted.
     RenderError
-        As `check_scenes`, or as `judge`.
+        As `check_scenes`, or as `evaluate`.
     """
     check_scenes(scenes, profile.n_channels)
     target = make_target(profile, scenes[0].mm_per_pixel, support_mm)
     pixels = 2 * target.half_pixels + 1
     wanted = every_candidate(pixels) if candidates is None else tuple(candidates)
     true = references(scenes, profile, threads=threads)
-    judged: list[_Judged] = []
+    evaluated: list[_Evaluated] = []
     left_out: list[tuple[str, str]] = []
     for done, candidate in enumerate(wanted):
         if progress is not None:
@@ -87,16 +87,16 @@ def compare_kernels(
         except FitError as error:
             left_out.append((candidate.label, str(error)))
             continue
-        judged.append((candidate, fit, [_judged(each, fit, threads) for each in true]))
-    if not judged:
+        evaluated.append((candidate, fit, [_evaluated(each, fit, threads) for each in true]))
+    if not evaluated:
         reason = left_out[0][1] if left_out else "there are none."
         raise FitError(f"{target.name}: no kernel of {len(wanted)} could be fitted: {reason}")
     if progress is not None:
         progress(len(wanted), len(wanted), "timing")
-    seconds = _timed_in_turn([fit for _, fit, _ in judged], scenes, threads)
+    seconds = _timed_in_turn([fit for _, fit, _ in evaluated], scenes, threads)
     rows = [
         row
-        for each, price in zip(judged, seconds, strict=True)
+        for each, price in zip(evaluated, seconds, strict=True)
         for row in _rows(*each, scenes, price)
     ]
     return Comparison(
@@ -113,9 +113,9 @@ def compare_kernels(
     )
 
 
-def _judged(true: Reference, fit: FitResult, threads: int | None) -> Judgement:
+def _evaluated(true: Reference, fit: FitResult, threads: int | None) -> Evaluation:
     """Compare a kernel's picture with the true one."""
-    return judge(
+    return evaluate(
         true.scene,
         fit.kernel,
         truth=true.truth,
@@ -172,14 +172,14 @@ def _timed_in_turn(
 def _rows(
     candidate: Candidate,
     fit: FitResult,
-    judged: Sequence[Judgement],
+    evaluated: Sequence[Evaluation],
     scenes: Sequence[Scene],
     seconds: float,
 ) -> list[KernelRow]:
     """Return the rows of one kernel, yet without fronts."""
-    cost = judged[0].cost
+    cost = evaluated[0].cost
     found = []
-    for scene, each in zip(scenes, judged, strict=True):
+    for scene, each in zip(scenes, evaluated, strict=True):
         assert each.score is not None  # a truth was given
         found.append(
             KernelRow(

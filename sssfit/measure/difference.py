@@ -55,7 +55,7 @@ class DifferenceMap:
     end: float | None
     gain: float
 
-    def to_dict(self) -> dict[str, Any]:
+    def figures(self) -> dict[str, Any]:
         """Return its figures of ``sssfit render --json``."""
         return {"gain": self.gain, "map": self.kind, "of": self.what, "end": self.end}
 

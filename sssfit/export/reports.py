@@ -1,15 +1,17 @@
-"""What verbs print for people: lines and tables by the keys of their JSON objects.
+"""What the verbs print of their results: lines and tables by the keys of their JSON objects.
 
-`sssfit.messages.report` fills them.
+`page` fills them, from the figures that a record's ``to_dict`` returns.
 """
 
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from sssfit.messages import Columns, Part
+from sssfit.messages import Columns, Part, by_channel, report
+
+_FIGURES = {"p95": "95th percentile", "p99": "99th percentile", "mean": "mean"}
 
 # fmt: off
-KERNEL_DRAWN: tuple[Part, ...] = (
+_KERNEL: tuple[Part, ...] = (
     "{method}, rank {rank}, {pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm; {against}",
     Columns("channel", "channels", (
         ("energy", "energy", ".6f"),
@@ -18,7 +20,7 @@ KERNEL_DRAWN: tuple[Part, ...] = (
         ("misplaced", "misplaced", ".3g%"),
     )),
 )
-SPECTRUM: tuple[Part, ...] = (
+_SPECTRUM: tuple[Part, ...] = (
     "Share of the first singular value; {pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm",
     Columns("channel", "channels", (
         ("first, squared", "first_squared", ".2f%"),
@@ -26,7 +28,7 @@ SPECTRUM: tuple[Part, ...] = (
         ("terms for an error of 1 %", "rank_for_1_percent", ""),
     )),
 )
-GUIDE: tuple[Part, ...] = (
+_GUIDE: tuple[Part, ...] = (
     "Channel {channel}; {pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm",
     Columns("k", "fits", (
         ("middle pixel", "centre_share", ".2f%"),
@@ -35,7 +37,7 @@ GUIDE: tuple[Part, ...] = (
         ("weighted misfit", "weighted_residual", ".2f%"),
     )),
 )
-MODELS: tuple[Part, ...] = (
+_MODELS: tuple[Part, ...] = (
     "{material}: errors against the exact solution; {photons:,} photons on {annuli} annuli of "
     "{dr_mm:.4g} mm",
     Columns("method, channel", "curves", (
@@ -46,14 +48,14 @@ MODELS: tuple[Part, ...] = (
     )),
 )
 
-CHOSEN: tuple[Part, ...] = (
+_CHOSEN: tuple[Part, ...] = (
     "{material} at {metres:g} m, {mm_per_pixel:.4g} mm per pixel, {figure} of Delta E within "
     "{tolerance:g}:",
     "{sentences}",
     "{wrote}",
 )
 
-FITTED: tuple[Part, ...] = (
+_FITTED: tuple[Part, ...] = (
     "{material}: {method}, {rank} term{s[rank]}, {pixels} pixel{s[pixels]} of {mm_per_pixel:.4g} "
     "mm, {seconds:.1f} s",
     Columns("channel", "channels", (
@@ -64,7 +66,7 @@ FITTED: tuple[Part, ...] = (
     )),
 )
 
-RENDERED: tuple[Part, ...] = (
+_RENDERED: tuple[Part, ...] = (
     "{irradiance}: {width} x {height} pixels of {mm_per_pixel:.4g} mm, {how}; {kernel}",
     "cost: {passes} passes, {taps_per_pixel} weights a pixel, {kernel_bytes:,} bytes, "
     "{seconds_per_megapixel:.2g} s a megapixel",
@@ -90,18 +92,49 @@ RENDERED: tuple[Part, ...] = (
 # fmt: on
 
 
-def kernel_words(figures: Mapping[str, Any]) -> dict[str, Any]:
+def _chosen_words(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Say which figure the tolerance is of, how far away the camera is, and what was written."""
+    written = figures["output"]
+    return {
+        "metres": figures["distance_mm"] / 1000.0,
+        "figure": _FIGURES[figures["tolerance_of"]],
+        "wrote": f"Wrote {', '.join(written)}" if written else "No kernel is written.",
+    }
+
+
+def _fitted_words(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the endings of plurals."""
+    return {"s": {key: "s" * (figures[key] > 1) for key in ("rank", "pixels")}}
+
+
+def _rendered_words(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Say how it was rendered, and what the difference shows."""
+    kind, most = figures["difference_map"], figures["transmitted_maximum"]
+    screen = f"screen space, follow {figures['follow']}, " if figures["follow"] else ""
+    is_grey = figures["rmse"] is not None and figures["delta_e_2000_mean"] is None
+    return {
+        "how": f"{screen}{figures['border']} borders",
+        "most": by_channel(figures["channels"], most, ".3g") if most is not None else None,
+        "no_colour": len(figures["channels"]) if is_grey else None,
+        "magnified": figures["difference_gain"] if kind is None else None,
+        "signed": figures["difference_end"] if kind == "signed" else None,
+        "absolute": figures["difference_end"] if kind == "absolute" else None,
+        "wrote": ", ".join(figures["output"]),
+    }
+
+
+def _kernel_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     """Say what a kernel's errors are against."""
     profile = figures["profile"]
     return {"against": f"against {profile}" if profile else "errors as the fit recorded them"}
 
 
-def spectrum_words(figures: Mapping[str, Any]) -> dict[str, Any]:
+def _spectrum_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     """Return what the report of a spectrum says beyond its figures: the first terms."""
     return {f"first_{key}": figures[f"{key}_share"][0] for key in ("squared", "absolute")}
 
 
-def guide_words(figures: Mapping[str, Any]) -> dict[str, Any]:
+def _guide_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     """Return the columns of guided fits, the pre-integrated one last."""
     last = {
         "centre_share": "preintegrated_centre_share",
@@ -113,7 +146,7 @@ def guide_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     return {"fits": names, **{key: [*figures[key], figures[own]] for key, own in last.items()}}
 
 
-def models_words(figures: Mapping[str, Any]) -> dict[str, Any]:
+def _models_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     """Return the columns of methods, a row a method and channel; the exact one has no errors."""
     rows = [(row, c) for row in figures["rows"] for c in range(len(figures["channels"]))]
     found = {
@@ -124,10 +157,28 @@ def models_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     return {"curves": [f"{row['method']} {figures['channels'][c]}" for row, c in rows], **found}
 
 
-# Report of a chart by what is drawn, and what its words add to the figures.
-CHARTS: dict[str, tuple[tuple[Part, ...], Callable[[Mapping[str, Any]], dict[str, Any]]]] = {
-    "kernel": (KERNEL_DRAWN, kernel_words),
-    "spectrum": (SPECTRUM, spectrum_words),
-    "guide": (GUIDE, guide_words),
-    "models": (MODELS, models_words),
+# By what is told, and what the words of its lines add to the figures.
+_PAGES: dict[str, tuple[tuple[Part, ...], Callable[[Mapping[str, Any]], dict[str, Any]]]] = {
+    "choose": (_CHOSEN, _chosen_words),
+    "fit": (_FITTED, _fitted_words),
+    "guide": (_GUIDE, _guide_words),
+    "kernel": (_KERNEL, _kernel_words),
+    "models": (_MODELS, _models_words),
+    "render": (_RENDERED, _rendered_words),
+    "spectrum": (_SPECTRUM, _spectrum_words),
 }
+
+
+def page(kind: str, figures: Mapping[str, Any]) -> str:
+    """Return figures as a report.
+
+    Parameters
+    ----------
+    kind : str
+        "choose", "fit" or "render", the verbs; or "guide", "kernel", "models" or "spectrum",
+        which are drawn.
+    figures : mapping
+        The JSON object.
+    """
+    parts, words = _PAGES[kind]
+    return report(parts, {**figures, **words(figures)})

@@ -29,7 +29,7 @@ _QUICK_SECONDS = 0.5  # a picture rendered faster is timed again, since other pr
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Judgement:
+class Evaluation:
     """A rendered picture with its score and price.
 
     Parameters
@@ -67,7 +67,7 @@ class Judgement:
     transmitted_maximum: FloatArray | None = None
     difference: DifferenceMap | None = None
 
-    def with_difference(self, kind: str | None = None, gain: float = 1.0) -> "Judgement":
+    def with_difference(self, kind: str | None = None, gain: float = 1.0) -> "Evaluation":
         """Add the difference from the truth, as `difference_map` draws it."""
         if self.truth is None:
             raise RenderError("there is no truth to differ from; give the kernel's profile.")
@@ -79,7 +79,7 @@ class Judgement:
         scene, kernel = self.scene, self.kernel
         score = dict.fromkeys(SCORE_FIGURES) if self.score is None else self.score.to_dict()
         keys = ("gain", "map", "of", "end")
-        lost = self.difference.to_dict() if self.difference else dict.fromkeys(keys)
+        lost = self.difference.figures() if self.difference else dict.fromkeys(keys)
         return plain(
             {
                 "material": kernel.meta.get("material"),
@@ -149,7 +149,7 @@ class Judgement:
         return {"alpha": self.scene.alpha, "alpha_is_multiplied": multiplied}, []
 
 
-def judge(
+def evaluate(
     scene: Scene,
     kernel: SeparableKernel,
     profile: Profile | None = None,
@@ -160,7 +160,7 @@ def judge(
     exposure: float | None = None,
     structure: bool = False,
     threads: int | None = None,
-) -> Judgement:
+) -> Evaluation:
     """Render a scene with a kernel and with a profile's 2D kernel, and compare.
 
     Parameters
@@ -201,7 +201,7 @@ def judge(
     if truth is not None:
         score = measure(picture, truth, exposure=exposure, mask=scene.mask, structure=structure)
         truth = _within(scene, truth)
-    return Judgement(
+    return Evaluation(
         scene,
         kernel,
         _within(scene, picture),
@@ -273,7 +273,7 @@ def timed(render: Callable[[Scene], FloatArray], scene: Scene) -> tuple[FloatArr
     return picture, seconds * 1e6 / pixels
 
 
-def judge_in_screen_space(
+def evaluate_in_screen_space(
     scene: Scene,
     kernel: SeparableKernel,
     *,
@@ -281,7 +281,7 @@ def judge_in_screen_space(
     follow: str = "gaussian",
     border: str = "mirror",
     threads: int | None = None,
-) -> Judgement:
+) -> Evaluation:
     """Render a scene as a shader does; in perspective there is no truth to compare it with.
 
     Parameters and errors are those of `render_screen`, which adds the light through a scene that
@@ -294,4 +294,4 @@ def judge_in_screen_space(
     )
     cost, asymmetry = cost_of(kernel, seconds), asymmetry_of(kernel)
     unknown = _true_asymmetry(kernel, None)
-    return Judgement(scene, kernel, picture, None, None, cost, asymmetry, unknown, through)
+    return Evaluation(scene, kernel, picture, None, None, cost, asymmetry, unknown, through)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sssfit.compare.candidates import Candidate
-from sssfit.compare.judged import border_of, judged_scene
 from sssfit.compare.pareto import compare_kernels
+from sssfit.compare.references import border_of, evaluated_scene
 from sssfit.fit import support_of
 from sssfit.material import load_material
 from sssfit.scene.made import make_scene
@@ -39,7 +39,7 @@ def near(places, chosen, reach):
 def test_of_a_disk_what_is_near_a_lit_pixel_counts(skin1):
     # 57.6 mm: the disk fits, its light (19.2 + 21.4 mm to every side) does not.
     scene = scene_of("disk", 48)
-    found = judged_scene(scene, skin1)
+    found = evaluated_scene(scene, skin1)
     added = (found.width - 48) // 2
     assert found.width * PITCH >= 2.0 * (19.2 + support_of(skin1))
     inside = found.irradiance[added : added + 48, added : added + 48]
@@ -54,7 +54,7 @@ def test_of_a_disk_what_is_near_a_lit_pixel_counts(skin1):
 @pytest.mark.parametrize("angle", [0.0, 30.0, 90.0, 120.0])
 def test_of_an_edge_what_is_near_it_and_off_its_ends_counts(skin1, angle):
     scene = scene_of("edge", 56, angle_degrees=angle)
-    found = judged_scene(scene, skin1)
+    found = evaluated_scene(scene, skin1)
     np.testing.assert_array_equal(found.irradiance, scene.irradiance)
     light, reach = scene.irradiance[..., 0], support_of(skin1) / PITCH
     places = list(np.ndindex(light.shape))
@@ -74,17 +74,17 @@ def test_of_an_edge_what_is_near_it_and_off_its_ends_counts(skin1, angle):
 
 def test_pictures_of_ones_own_count_as_they_are(skin1):
     own = Scene("mine.exr", scene_of("disk", 48).irradiance, PITCH)
-    assert judged_scene(own, skin1) is own
+    assert evaluated_scene(own, skin1) is own
     masked = Scene("disk", own.irradiance, PITCH, mask=np.ones((48, 48), int))
-    assert judged_scene(masked, skin1) is masked
+    assert evaluated_scene(masked, skin1) is masked
     points = scene_of("points", 48)
-    assert judged_scene(points, skin1) is points
+    assert evaluated_scene(points, skin1) is points
     assert border_of(points) == "mirror"
 
 
 def test_where_the_disk_does_not_fit_the_picture_stays_as_it_is(skin1):
     small = scene_of("disk", 31)  # 37.2 mm
-    assert judged_scene(small, skin1).width == 31
+    assert evaluated_scene(small, skin1).width == 31
 
 
 @pytest.mark.parametrize("name", ["skin1", "marble"])

@@ -5,7 +5,7 @@ import pytest
 from checks import medium
 
 from sssfit.compare import measure, radial_asymmetry
-from sssfit.compare.judge import judge, timed
+from sssfit.compare.evaluate import evaluate, timed
 from sssfit.errors import RenderError
 from sssfit.fit import fit_svd
 from sssfit.profile import full_kernel
@@ -36,7 +36,7 @@ def masked_scene():
 
 def test_only_the_object_counts_and_is_shown(profile, kernel):
     scene = masked_scene()
-    found = judge(scene, kernel, profile)
+    found = evaluate(scene, kernel, profile)
     picture, truth = render_separable(scene, kernel), render_reference(scene, profile)
     wanted = measure(picture, truth, mask=scene.mask)
     whole = measure(picture, truth)
@@ -49,7 +49,7 @@ def test_only_the_object_counts_and_is_shown(profile, kernel):
 
 
 def test_asymmetry_stands_beside_that_of_the_true_kernel(profile, kernel):
-    found = judge(make_scene("disk", height=16, width=16, mm_per_pixel=0.4), kernel, profile)
+    found = evaluate(make_scene("disk", height=16, width=16, mm_per_pixel=0.4), kernel, profile)
     quadrants = profile.quadrant_kernel(0.4, kernel.half_pixels)
     for c in range(len(kernel.channels)):
         assert found.asymmetry[c] == radial_asymmetry(kernel.full(c), from_pixels=4)
@@ -62,13 +62,13 @@ def test_small_kernels_have_no_asymmetry(profile):
     small = fit_svd(profile, rank=1, mm_per_pixel=4.0, energy="keep").kernel
     assert small.half_pixels < 4
     scene = make_scene("disk", height=16, width=16, mm_per_pixel=4.0)
-    found = judge(scene, small, profile)
+    found = evaluate(scene, small, profile)
     assert np.isnan(found.asymmetry).all()
     assert np.isnan(found.true_asymmetry).all()
 
 
 def test_without_a_profile_only_the_cost_is_known(kernel):
-    found = judge(make_scene("edge", height=16, width=16, mm_per_pixel=0.4), kernel)
+    found = evaluate(make_scene("edge", height=16, width=16, mm_per_pixel=0.4), kernel)
     assert found.truth is None
     assert found.score is None
     assert found.cost.passes == 4
@@ -79,7 +79,7 @@ def test_a_profile_of_other_channels_is_refused(kernel):
     scene = make_scene("edge", height=16, width=16, mm_per_pixel=0.4)
     other = simulate_dipole(medium([0.03, 0.1], [2.0, 2.0], 1.3), dr_mm=0.1)
     with pytest.raises(RenderError, match="fitted to"):
-        judge(scene, kernel, other)
+        evaluate(scene, kernel, other)
 
 
 def test_a_corner_goes_first_and_is_not_the_picture():

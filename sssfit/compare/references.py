@@ -1,4 +1,4 @@
-"""Which pixels of a disk or edge count, so that a figure does not depend on the picture's size.
+"""Reference pictures, and which of their pixels count: a figure must not depend on the size.
 
 Far from a border every kernel that keeps energy is right: the more of that a picture has, the
 smaller its mean. 512 x 512 pixels of .3 mm gave a fourth of the Delta E of 200 x 200.
@@ -48,7 +48,7 @@ def references(
     """Render scenes by the profile itself, each with the pixels that count of it."""
     found = []
     for each in scenes:
-        scene = judged_scene(each, profile)
+        scene = evaluated_scene(each, profile)
         border = border_of(scene)
         truth = render_reference(scene, profile, border=border, threads=threads)
         found.append(Reference(scene, border, truth, auto_exposure(truth, scene.mask)))
@@ -66,7 +66,7 @@ def check_one_pitch(scenes: Sequence[Scene]) -> None:
             )
 
 
-def judged_scene(scene: Scene, profile: Profile) -> Scene:
+def evaluated_scene(scene: Scene, profile: Profile) -> Scene:
     """Return a scene with a mask of the pixels that count; others than disk and edge as they are.
 
     With R the radius that keeps 99.9 % of the profile's widest channel: of a disk, pixels within R
