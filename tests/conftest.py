@@ -1,8 +1,13 @@
-"""What holds for all tests: Ctrl-C arrives, no child process is left, and none runs for ever."""
+"""What holds for all tests: Ctrl-C arrives, no child process is left, and none runs for ever.
+
+Half of the tests start from the exact profile of some material and a quarter from the lit head, so
+each of these is computed once a worker (``shared_work``).
+"""
 
 import signal
 
 import pytest
+import shared_work
 from processes import end_all
 
 SLOW_SECONDS = 4 * 3600.0  # the longest, a walk of 1e8 photons through layers, takes under one
@@ -11,6 +16,17 @@ SLOW_SECONDS = 4 * 3600.0  # the longest, a walk of 1e8 photons through layers, 
 # would wait for ever.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def pytest_sessionstart():
+    """Share work between tests from here on."""
+    shared_work.begin()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item):
+    """Share nothing in the tests of that work itself."""
+    shared_work.allow(item.path.stem)
 
 
 def pytest_collection_modifyitems(items):
