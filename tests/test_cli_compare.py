@@ -343,7 +343,7 @@ def test_a_chart_may_go_to_stdout(tmp_path, monkeypatch, capfdbinary):
 def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch):
     from sssfit import material
 
-    verb = import_module("sssfit.cli.compare")
+    verb = import_module("sssfit.cli._compare_parts")
     real = verb.load_source
     (tmp_path / "marble.toml").write_text(SLAB)
     # In place of the shipped marble, a slab.
