@@ -196,7 +196,7 @@ def test_import_through_pipes(tmp_path, content):
         (("picture.png",), 1, "picture.png is not text; expected a CSV or MCML's output in ASCII"),
         (("a.mco", "g.mco"), 2, "name the profile of several files with -o"),
         (("a.mco", "g.mco", "-o", "x.npz"), 2, "give --channels with 2 names"),
-        (("a.mco", "g.mco", "-o", "x.npz", "--channels", "R"), 1, "1 channel names"),
+        (("a.mco", "g.mco", "-o", "x.npz", "--channels", "R"), 1, "1 channel name"),
         (("a.mco", "mine.csv", "-o", "x.npz"), 1, "mine.csv is not an .mco file"),
         (("a.mco", "-o", "no/x.npz"), 1, "there is no folder no"),
         (("none.mco",), 1, "none.mco cannot be read: no such file"),

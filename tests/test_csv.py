@@ -301,7 +301,7 @@ def test_a_table_that_begins_far_out_says_what_the_gap_may_hide():
     with pytest.warns(SssfitWarning) as caught:
         parse_csv(text, "a.csv", quantity="density")
     (line,) = (str(each.message) for each in caught)
-    assert line.startswith("a.csv begins at r = 1 mm: what leaves nearer to the beam is not in it.")
+    assert line.startswith("a.csv begins at r = 1 mm: light nearer to the beam is missing.")
     assert f"has {np.pi * 0.1:.3g} of its" in line
     assert f"another {np.pi * 0.1:.3g} is missing" in line
     # Centres of bins begin at half a bin: no gap.

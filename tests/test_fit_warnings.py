@@ -222,7 +222,7 @@ def test_bad_energies_are_one_line(run, method, profile, fragment):
 
 @pytest.mark.parametrize("method", METHODS)
 def test_nan_is_one_line(run, method):
-    with pytest.raises(FitError, match="holds NaN or infinite energies; make it again"):
+    with pytest.raises(FitError, match="holds NaN or infinite energies; compute it again"):
         METHODS[method].fit(not_a_number())
 
 

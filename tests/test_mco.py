@@ -263,9 +263,9 @@ def test_what_does_not_belong_together_is_not_joined(other, channels, said):
     ("text", "said"),
     [
         ("", "ends after line 0, before A1"),
-        ("r_mm,R\n1,2\n", "line 1: 'r_mm,R' stands where A1 should"),
+        ("r_mm,R\n1,2\n", "line 1: 'r_mm,R' is where A1 was expected"),
         ("B1 # Version\n", "line 1: this is binary output; run MCML with format A"),
-        ("A1\nRAT\n", "line 2: 'RAT' stands where InParm should"),
+        ("A1\nRAT\n", "line 2: 'RAT' is where InParm was expected"),
         ("mcmloA2.0 # v\n", "line 1: this is a file of MCML 2.0; only the output of MCML 1 (ve"),
         (
             "mcmlo_3.0\n",
@@ -276,9 +276,12 @@ def test_what_does_not_belong_together_is_not_joined(other, channels, said):
         (mco_text(A_l=None), "before the block A_l"),
         (mco_text(Rd_r=None), "before the block Rd_r"),
         (mco_text(Tt_r=None), "before the block Tt_r"),
-        (mco_text(A_z="A_l\n1\n2\n"), "'A_l' stands where the name of a block should"),
-        (mco_text(A_z="Fluence\n1\n"), "'Fluence' stands where the name of a block should"),
-        (mco_text(A_z=block("A_z", np.ones(N_Z + 1))), "left are Rd_r, Rd_a"),
+        (mco_text(A_z="A_l\n1\n2\n"), "'A_l' is where the name of a block or the end was expected"),
+        (
+            mco_text(A_z="Fluence\n1\n"),
+            "'Fluence' is where the name of a block or the end was expected",
+        ),
+        (mco_text(A_z=block("A_z", np.ones(N_Z + 1))), "missing are Rd_r, Rd_a"),
         (
             mco_text(A_z=block("A_z", np.ones(N_Z - 1))),
             "'Rd_r' in the block A_z; expected a number",
@@ -294,7 +297,7 @@ def test_what_does_not_belong_together_is_not_joined(other, channels, said):
         (mco_text(n_r=1), "1 bin over r holds all"),
         (mco_text(n_r=0), "number of dr = '0'"),
         (mco_text(layers=("1.4 1 100 2 0.1",)), "g = '2' is out of range"),
-        (mco_text() + "more\n", "'more' stands where the name of a block should"),
+        (mco_text() + "more\n", "'more' is where the name of a block or the end was expected"),
     ],
 )
 def test_bad_files_are_refused_in_one_line(text, said):

@@ -173,12 +173,12 @@ def _check_profile(profile: Profile) -> None:
     """Raise FitError for data that no fit can use."""
     energy, name = profile.annulus_energy, profile.label
     if not np.isfinite(energy).all():
-        raise FitError(f"{name}: the profile holds NaN or infinite energies; make it again.")
+        raise FitError(f"{name}: the profile holds NaN or infinite energies; compute it again.")
     if (energy < 0.0).any():
         k, c = (int(each[0]) for each in np.nonzero(energy < 0.0))
         raise FitError(
             f"{name}: annulus {k} of channel {profile.channels[c]} has the negative energy "
-            f"{energy[k, c]:.3g}; expected energies from 0 up: measured noise has to be cut at 0."
+            f"{energy[k, c]:.3g}; expected energies from 0 up: set negative noise to 0."
         )
     if profile.n_annuli == 1:
         raise FitError(

@@ -310,7 +310,8 @@ class _Table:
             if name not in channels and name.removesuffix(_STDERR) not in channels:
                 raise self._failure(
                     self._head,
-                    f"the column {shown(name)} has standard errors of a column that is not there.",
+                    f"the column {shown(name)} has standard errors of a column that does not "
+                    "exist.",
                 )
         return channels
 
@@ -465,10 +466,10 @@ def _warn_of_gap(profile: Profile, radii_mm: FloatArray, table: _Table) -> None:
     worst = int(np.argmax(share))
     first = decimal_shifted(repr(first_mm), -_TO_MM[table.unit])
     warnings.warn(
-        f"{table.origin} begins at r = {first:g} {table.unit}: what leaves nearer to the beam is "
-        f"not in it. Taken as flat there, {shown(profile.channels[worst])} has {inside[worst]:.3g} "
-        f"of its {total[worst]:.3g} inside; if it rises like 1/r, as near a beam, another "
-        f"{inside[worst]:.3g} is missing.",
+        f"{table.origin} begins at r = {first:g} {table.unit}: light nearer to the beam is "
+        f"missing. With constant R_d there, {shown(profile.channels[worst])} has "
+        f"{inside[worst]:.3g} of its {total[worst]:.3g} inside; if it rises like 1/r, as near a "
+        f"beam, another {inside[worst]:.3g} is missing.",
         SssfitWarning,
         stacklevel=3,
     )
@@ -494,8 +495,8 @@ def _check_energies(profile: Profile) -> None:
         k, c = (int(each[0]) for each in np.nonzero(energy < 0.0))
         raise ProfileError(
             f"channel {shown(profile.channels[c])} has the negative energy {energy[k, c]:.6g} in "
-            f"line {k + 1} of the table; expected energies from 0 up: measured noise has to be cut "
-            "at 0."
+            f"line {k + 1} of the table; expected energies from 0 up: set negative noise "
+            "to 0."
         )
     total = profile.diffuse_reflectance
     worst = int(np.argmax(total))

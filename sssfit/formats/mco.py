@@ -87,7 +87,7 @@ def parse_mco(text: str, origin: str) -> Profile:
     _take_version(lines)
     name = lines.take_words("the block InParm")
     if name.words[0] not in _HEADS:
-        raise lines.failure(name.number, f"{shown(name.words[0])} stands where InParm should.")
+        raise lines.failure(name.number, f"{shown(name.words[0])} is where InParm was expected.")
     if name.words[0] == "InParam":
         lines.comment = INPUT_COMMENT
     run = read_run(lines, "the run", f"{Path(origin).name} (MCML)")
@@ -160,7 +160,8 @@ def _take_version(lines: Lines) -> None:
     if line.words != ("A1",):
         raise lines.failure(
             line.number,
-            f"{shown(' '.join(line.words))} stands where A1 should, the version of MCML's output.",
+            f"{shown(' '.join(line.words))} is where A1 was expected, the version of MCML's "
+            "output.",
         )
 
 
@@ -188,9 +189,9 @@ def _read_blocks(lines: Lines, run: MciRun) -> dict[str, FloatArray]:
             left = [each for each in sizes if each not in blocks]
             raise lines.failure(
                 line.number,
-                f"{shown(' '.join(line.words))} stands where the name of a block should, or the "
-                f"end; left are {', '.join(left) or 'none'}. Is the block before as long as InParm "
-                "says?",
+                f"{shown(' '.join(line.words))} is where the name of a block or the end was "
+                f"expected; missing are {', '.join(left) or 'none'}. Is the block before as long "
+                "as InParm says?",
             )
         lines.take_words(name)
         blocks[name] = _read_numbers(lines, name, sizes[name])

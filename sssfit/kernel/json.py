@@ -222,7 +222,7 @@ def _parsed(text: bytes, origin: str) -> Mapping[str, Any]:
             raise KernelError(f"{origin}: {error}; fit the kernel again.") from None
         how = "; save it as UTF-8" if isinstance(error, UnicodeDecodeError) else ", or cut short"
         raise KernelError(
-            f"{origin}: the kernel is damaged (not valid JSON{how}); make it again."
+            f"{origin}: the kernel is damaged (not valid JSON{how}); make a new one."
         ) from None
     found = whole.get("format") if isinstance(whole, dict) else None
     if found == FORMAT:

@@ -270,7 +270,7 @@ class Material:
             return cls(**{**content, "layers": layers})
         except (KeyError, TypeError) as error:
             raise MaterialError(
-                f"a material's record is damaged ({printable(str(error))}); make it again."
+                f"a material's record is damaged ({printable(str(error))}); make a new one."
             ) from None
 
     def to_toml(self) -> str:
@@ -316,7 +316,7 @@ def load_material(name_or_path: str | Path) -> Material:
         return read_material(Path(wanted), wanted)
     raise MaterialError(
         f"there is no material {shown(wanted)}; {did_you_mean(wanted, material_names())}"
-        "`material_names()` lists those there are, and a file of your own ends in .toml."
+        "`material_names()` lists them, and your own file ends in .toml."
     )
 
 

@@ -195,7 +195,7 @@ def warn_of_similarity(material: Material, method: str) -> None:
         warnings.warn(
             f"{material.name}: g = {steepest:g} in absolute value; the method {method} takes "
             "scattering as isotropic with sigma_s' = (1 - g) sigma_s, which is an approximation: "
-            "montecarlo has no need of it.",
+            "montecarlo does not need it.",
             SssfitWarning,
             stacklevel=5,
         )

@@ -215,7 +215,7 @@ def check_media(materials: Sequence[Material]) -> None:
                 "it cannot share a walk with other materials; simulate it by itself."
             )
     if len({relative_eta(each) for each in materials}) != 1:
-        raise SimulationError("one walk serves one refractive index; group the materials by eta.")
+        raise SimulationError("a walk takes one refractive index; group the materials by eta.")
 
 
 def has_fast_walk(material: Material) -> bool:

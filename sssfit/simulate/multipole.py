@@ -291,7 +291,7 @@ def _warn_of_thin(material: Material) -> None:
     if unscattered > UNSCATTERED:
         warnings.warn(
             f"{material.name}: {100.0 * unscattered:.2g} % of the light that enters crosses "
-            "without a collision; multipole takes it to scatter: compare with montecarlo.",
+            "without a collision; multipole assumes that it scatters: compare with montecarlo.",
             SssfitWarning,
             stacklevel=3,
         )

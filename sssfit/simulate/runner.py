@@ -21,11 +21,12 @@ from sssfit.simulate._checkpoint import EVERY_SECONDS, Checkpoint, is_checkpoint
 from sssfit.simulate._finished import is_complete, is_finished, run_figures
 from sssfit.simulate._run import Progress
 from sssfit.simulate.exact import is_solver_compiled
-from sssfit.simulate.montecarlo import is_compiled, shared_walks, simulate_montecarlo_many
+from sssfit.simulate.montecarlo import is_compiled, shared_walks
 from sssfit.simulate.summary import summary
 
 Stop = Callable[[], bool]
 Watch = Callable[[str], AbstractContextManager[Callable[[Progress], None] | None]]
+WALK = "montecarlo"  # the method that can be saved half done, and resumed
 _COMPILING = "Compiling the {}, some {} s; it is kept for later runs where it can be."
 
 
@@ -123,7 +124,7 @@ class Results:
 def simulate_to_files(
     materials: Sequence[Any],
     paths: Sequence[Path | None],
-    method: str = "montecarlo",
+    method: str = WALK,
     settings: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
     *,
     resume: bool = False,
@@ -177,7 +178,7 @@ def simulate_to_files(
     else:
         every, shares = list(settings), False
     groups = shared_walks(materials) if shares else [[k] for k in range(len(paths))]
-    is_walk = method == "montecarlo"
+    is_walk = method == WALK
     inputs = tuple(inputs)
     found: dict[int, Outcome] = {}
     with held(paths, is_profile_file, inputs=inputs, force=force, named=("a profile", ".npz")):
@@ -259,7 +260,7 @@ def _walk(
             if show:
                 show(now)
 
-        profiles = simulate_montecarlo_many(
+        profiles = SIMULATIONS[WALK].load()(
             materials, checkpoint=save, progress=note, stop=stop, **settings
         )
     try:
