@@ -182,7 +182,8 @@ def fronts(
 
     done, wrote, failed = [], [], []
     charts, tables = zip(*outputs.values(), strict=True)
-    inputs = [*([] if given["every"] else outputs), *pictures]
+    several = given["every"] or given["paper"]
+    inputs = [*([] if several else outputs), *pictures]
     with held_outputs(charts, tables, inputs, given):
         first = None
         if given["mm_per_pixel"] == "profile":  # of one material, as was checked
@@ -194,7 +195,7 @@ def fronts(
                 done.append(compared(profile, scenes, *files, given, common))
                 wrote += [each for each in files if each]
             except SssfitError as error:
-                if not given["every"]:
+                if not several:
                     raise
                 failed.append(f"{name}: {error}")
     if done:

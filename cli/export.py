@@ -56,7 +56,7 @@ def export(file: str | None, form: str, output: str | None, force: bool, common:
         "json": is_kernel_file,
         "csv": is_profile_csv,
     }
-    named = (f"--format {form}", f".{form}")
+    named = ({"hlsl": "shader source", "json": "a kernel", "csv": "a table"}[form], f".{form}")
     with held([path], is_ours[form], inputs=[name], force=force, named=named):
         write(text.encode(), path)
     what = "the table" if form == "csv" else "the kernel"

@@ -189,6 +189,11 @@ FORMATS = [
     "csv.parse_csv('r_mm,a\\n1e13,.1\\n2,1\\n', 'a.csv', quantity='energy')",
     "csv.csv_text(csv.load_csv('energy.csv'))",
     "csv.csv_text(world.plate())",
+    *(
+        f"csv.parse_csv('r_mm,a\\n1,.1\\n2,.01\\n{word},.5\\n', 'a.csv', quantity='energy').beyond_grid"
+        for word in ("inf", "+INF", "Infinity", "-inf", "nan")
+    ),
+    "csv.parse_csv('r_mm,a,a_stderr\\n1,.1,NaN\\n2,.01,.001\\n', 'a.csv', quantity='energy').annulus_energy_stderr",
     "csv.UNITS, csv.QUANTITIES",
     "mci.load_mci('two.mci')",
     "mci.load_mci('sample.mci')",
@@ -211,6 +216,8 @@ FORMATS = [
     "mco.parse_mco(world.mco_text().replace('InParm #', 'Input #'), 'a.mco')",
     "mco.parse_mco(world.mco_text().replace('2 4 1', '2 1 1'), 'a.mco')",
     "mco.parse_mco(world.mco_text(rat='.9\\n.3\\n0\\n0'), 'a.mco')",
+    "mco.parse_mco(world.mco_text(rat='.9\\n.3\\n0\\n0', absorbed='0\\n0', through='0\\n0\\n0\\n0'), 'a.mco')",
+    "mco.parse_mco(world.mco_text(name='x' * 120 + '.mco'), 'a.mco').material_name",
     "mco.parse_mco(world.mco_text(absorbed='0.4\\n0.16'), 'a.mco')",
     "mco.parse_mco(world.mco_text(through='1\\n1\\n1\\n1'), 'a.mco')",
     "mco.parse_mco(world.mco_text(reflected='1 2\\n3 4 5'), 'a.mco')",
@@ -225,13 +232,26 @@ FORMATS = [
     "matrix_to_bt709([.64, .33, .3, .6, .15, .06, .3457, .3585], 'a.exr')",
     "matrix_to_bt709([.64, .33, .3, .6, .15, .06, .3127, .329], 'a.exr')",
     "matrix_to_bt709([.64, .33, .3, .6, .15, .06, .3127, 0], 'a.exr')",
+    "matrix_to_bt709([.3, .6, .64, .33, .15, .06, .3127, .329], 'a.exr')",
+    "matrix_to_bt709([.3, .6, .3, .6, .15, .06, .3127, .329], 'a.exr')",
     *(
         f"pictures.load_image('{name}')"
         for name in (
             *("mine.exr", "depth.exr", "vier.exr", "two.exr", "wide.exr", "ebu.exr", "rgb8.png"),
             *("rgba16.png", "grey.png", "turned.tif", "rgba8.tif", "photo.tga", "photo.jpg"),
+            *(f"o{k}.tif" for k in range(1, 9)),
+            *("inside.exr", "across.exr", "half.exr", "y.exr", "place.exr", "wide.tif"),
+            *(
+                f"t{name}.tga"
+                for name in ("1_8", "2_15", "2_16", "2_24", "2_32", "2_48", "3_8", "4_8")
+            ),
+            *("associated.tif", "palette.png", "p3.png", "srgb_and_p3.png"),
             *("old.hdr", "xyz.hdr", "negative.exr", "foreign.png", "out", "missing.png"),
         )
+    ),
+    *(
+        f"pictures.load_image('packed{code}.tif')"
+        for code in (34661, 34712, 34887, 34925, 50000, 50002, 52546, 40000)
     ),
     "pictures.load_image('layers.exr', layer='near')",
     "pictures.load_image('layers.exr', layer=3)",
@@ -288,12 +308,20 @@ COMPARE = [
     "evaluate.evaluate(scene('edge', pitch=0.2125), kernel('plate.artist'), world.plate(), border='zero')",
     "evaluate.evaluate(scene('disk'), kernel('wax.svd2'))",
     "evaluate.evaluate_in_screen_space(scene('head', pitch=3.0), kernel('wax.svd2'), follow='lerp', border='clamp')",
+    "evaluate.evaluate_in_screen_space(scene('head', pitch=3.0), kernel('wax.svd2'))",
+    "evaluate.evaluate_in_screen_space(scene('disk'), kernel('wax.svd2'))",
     "budget.error_budget(world.parse_material(world.WAX, 'w'), scene('edge', pitch=0.5, angle_degrees=20.0),"
     " photons=2000, method='burley', storage='8-bit', radius_mm=9.0, seed=3)",
     "budget.error_budget(world.parse_material(world.WAX, 'w'), scene('disk', pitch=0.5),"
     " photons=2000, settings={'rank': 2}, model='dipole', storage='float32')",
     "budget.error_budget(world.parse_material(world.WAX, 'w'), scene('disk'), storage='16-bit')",
     "budget.error_budget(world.parse_material(world.LEAF, 'w'), scene('disk'))",
+    "budget.error_budgets(world.parse_material(world.WAX, 'w'), [])",
+    "budget.error_budgets(world.parse_material(world.WAX, 'w'), [scene('disk'), scene('edge', pitch=0.5)])",
+    "budget.error_budget(world.parse_material(world.WAX, 'w'), scene('disk'), model='multipole')",
+    "budget.error_budget(world.parse_material(world.WAX, 'w'), Scene('flat', np.ones((4, 5, 1)), 0.5))",
+    "compare.compare_kernels(world.wax(), [scene('disk')], candidates=[])",
+    "compare.compare_kernels(world.wax(), [scene('disk', pitch=2.5), scene('edge', pitch=2.5)]).to_dict()['rows'][:2]",
     "sheet.compute_sheet(world.mono(), mm_per_pixel=0.8, pixels=12, scenes=('edge',), most_terms=1)",
     "sheet.production_look(fit_artist(world.plate(), mm_per_pixel=0.4).kernel)",
 ]
@@ -333,13 +361,13 @@ MEASURE = [
     "[structure.flip(near(TRUTH), TRUTH, 0.7), structure.flip(near(TRUTH), TRUTH, mask=MASK, pixels_per_degree=20.0)]",
     "structure.flip(near(TRUTH), TRUTH, pixels_per_degree=0.0)",
     "structure.ssim(TRUTH[:4], TRUTH[:4])",
-    "difference.difference_map(near(TRUTH), TRUTH, kind='signed', gain=3.0)",
-    "difference.difference_map(near(TRUTH), TRUTH, kind='absolute')",
-    "difference.difference_map(near(TRUTH)[..., :2], TRUTH[..., :2])",
-    "difference.difference_map(near(TRUTH)[..., :1], TRUTH[..., :1], kind='absolute', gain=2.0)",
-    "difference.difference_map(TRUTH, TRUTH)",
-    "difference.difference_map(TRUTH, TRUTH, kind='relative')",
-    "difference.difference_map(TRUTH, TRUTH[1:])",
+    "fields(difference.difference_map(near(TRUTH), TRUTH, kind='signed', gain=3.0))",
+    "fields(difference.difference_map(near(TRUTH), TRUTH, kind='absolute'))",
+    "fields(difference.difference_map(near(TRUTH)[..., :2], TRUTH[..., :2]))",
+    "fields(difference.difference_map(near(TRUTH)[..., :1], TRUTH[..., :1], kind='absolute', gain=2.0))",
+    "fields(difference.difference_map(TRUTH, TRUTH))",
+    "fields(difference.difference_map(TRUTH, TRUTH, kind='relative'))",
+    "fields(difference.difference_map(TRUTH, TRUTH[1:]))",
     "difference.magnified_difference(near(TRUTH), TRUTH, gain=2.5)",
     "difference.magnified_difference(near(TRUTH), TRUTH, gain=-1.0)",
     "[asymmetry.radial_asymmetry(kernel('wax.svd2').full(1), from_pixels=k) for k in (1, 2, 4)]",

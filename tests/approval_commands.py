@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable
 from pathlib import Path
 
+import approval_world as world
 from approval_run import Command
 
 C = Command
@@ -212,6 +213,9 @@ FIT = [
     C("fit foreign.npz --method svd"),
     C("fit wax.svd2.kernel.json --method svd"),
     C("fit wax.profile.npz --method svd -o x.txt"),
+    C("fit wax.profile.npz --method svd -o x.npz"),
+    C("simulate wax.toml --photons 2000 -o x.toml"),
+    C("materials --from-reflectance .4,.3,.2 --mean-free-path 1 -o lard.json"),
     C("fit --method svd", set_up=_into("empty"), note="in an empty folder"),
 ]
 
@@ -333,6 +337,9 @@ COMPARE = [
     C(f"compare wax.profile.npz --picture disk {TINY} --what front --chart f.png --table f.md"),
     C("compare wax.profile.npz --picture mine.exr --what front"),
     C(
+        "compare wax.profile.npz --picture edge,mine.exr,bare.exr --size 9x30 --cost seconds --what kernels --mm-per-pixel .25"
+    ),
+    C(
         "compare wax.profile.npz --picture layers.exr --layer far --mask alpha --mm-per-pixel profile"
     ),
     C("compare wax.profile.npz --size 24x16 --mm-per-pixel .1cm --what front -q"),
@@ -365,12 +372,20 @@ COMPARE = [
     C(f"compare wax.profile.npz --what budget --picture disk {TINY}"),
     C("compare plate.toml --what budget --picture disk --size 20x20"),
     C("compare"),
+    C("compare --all --picture disk --size 16x12 --mm-per-pixel .4 -o out", few=True),
+    C("compare --paper --picture edge --size 16x12 --mm-per-pixel .9 --error l2 --json", few=True),
+    C("simulate --paper --method burley --dr 2 --radius 20 -o out", few=True),
+    C("compare wax.profile.npz --picture disk --size 16x12 --mm-per-pixel 20 --what kernels"),
+    C("simulate --all --method burley --dr 2 --radius 20 -o out", few=True),
     C("compare wax.toml --all"),
     C("compare --all --what budget"),
     C("compare --all --chart x.png"),
     C("compare --paper --mm-per-pixel profile"),
     C("compare wax.toml -o out"),
     C("compare wax.toml --what front --photons 20"),
+    C("compare wax.toml --what front --budget-chart x.png"),
+    C("compare wax.toml --what sheet --chart x.png --table x.md"),
+    C("compare --all --model dipole"),
     C("compare wax.toml --what budget --chart x.png"),
     C("compare wax.toml --what sheet --picture disk --chart x.png"),
     C("compare wax.toml --what sheet"),
@@ -448,6 +463,18 @@ CHOOSE = [
         " -o foreign.json --force"
     ),
     C("choose missing.toml"),
+    C(
+        "choose plate.toml --distance 40cm --fov 3 --resolution 40x48 --irradiance disk --tolerance 9"
+    ),
+    C("choose leaf.toml --distance 40cm --fov 3 --resolution 40x48 --irradiance disk"),
+    C("choose wax.profile.npz --distance 30cm --fov 10 --resolution 64x48 --tolerance 6"),
+    C(
+        "choose wax.profile.npz --irradiance mine.exr --distance .6m --fov 25.6 --resolution 14x1090 --tolerance 9"
+    ),
+    C(
+        "choose mono.profile.npz --irradiance noise --distance 40cm --fov 3 --resolution 900x600 --tolerance 9"
+    ),
+    C("choose wax.profile.npz -o x.npz"),
 ]
 
 IMPORT = [
@@ -514,6 +541,28 @@ IMPORT = [
     C("import"),
 ]
 
+OWN = [
+    *(
+        C(f"render wax.svd2.kernel.json --irradiance disk {SMALL} -o own.{ending}")
+        for ending in ("exr", "tif", "png")
+    ),
+    C(f"render wax.svd2.kernel.json --irradiance disk {SMALL} -o own_chart.png"),
+    *(C(f"chart plate.toml -o own_chart.{ending}") for ending in ("png", "svg", "pdf")),
+    C("chart plate.toml -o own.png"),
+    *(
+        C(f"compare mono.profile.npz --what front --picture disk {TINY} --table {name}")
+        for name in ("own.md", "own_table.csv", "own_table.json", "own.csv")
+    ),
+    C("export wax.svd2.kernel.json --format hlsl -o own.hlsl"),
+    C("export wax.profile.npz --format csv -o own.csv"),
+    C("export wax.profile.npz --format csv -o own_table.csv"),
+    C("import density.csv -o mono.profile.npz"),
+    C("fit wax.profile.npz --method svd --mm-per-pixel 1 -o grau.kernel.json"),
+    C("materials --from-reflectance .3 --channels Y --mean-free-path 1 -o own.toml"),
+    C("materials --from-reflectance .3 --channels Y --mean-free-path 1 -o wax.toml"),
+    C("simulate wax.toml --method dipole --dr 1 --radius 5 -o mono.profile.npz"),
+]
+
 EXPORT = [
     C("export --format hlsl"),
     C("export wax.svd2.kernel.json --format json"),
@@ -542,7 +591,15 @@ EXPORT = [
     C("export wax.svd2.kernel.json --format json -o wax.svd2.kernel.json"),
     C("export wax.svd2.kernel.json --format json -o wax.svd2.kernel.json --force"),
     C("export wax.profile.npz --format csv -o foreign.csv"),
-    C("export wax.svd2.kernel.json --format hlsl -o x.txt"),
+    *(
+        C(f"export {name} --format {form} -o {output}")
+        for name, form, output in (
+            ("wax.svd2.kernel.json", "hlsl", "x.txt"),
+            ("wax.svd2.kernel.json", "hlsl", "x.JSON"),
+            ("wax.svd2.kernel.json", "json", "x.hlsl"),
+            ("wax.profile.npz", "csv", "x.npz"),
+        )
+    ),
     C("export wax.profile.npz --format csv -o out"),
     C("export damaged.kernel.json --format json"),
     C("export --format hlsl", set_up=_into("empty"), note="in an empty folder"),
@@ -615,6 +672,28 @@ def _checkpoint() -> None:
     )
 
 
+def _checkpoint_of_two() -> None:
+    """A walk of three materials that was never finished."""
+    from sssfit.material import load_material
+    from sssfit.simulate import Checkpoint, simulate_montecarlo_many
+
+    asked: list[int] = []
+
+    def stop() -> bool:
+        asked.append(1)
+        return len(asked) > 2
+
+    Path("lard.toml").write_text(world.WAX.replace("wax", "lard").replace("0.7", "0.6"))
+    simulate_montecarlo_many(
+        [load_material("wax.toml"), load_material("lard.toml")],
+        photons=200_000,
+        dr_mm=0.5,
+        radius_mm=4.0,
+        checkpoint=Checkpoint(Path("w.npz.checkpoint"), 0.0),
+        stop=stop,
+    )
+
+
 SHOW = [
     C("show"),
     C("show wax.profile.npz --json"),
@@ -648,6 +727,9 @@ SHOW = [
         set_up=_checkpoint,
     ),
     C("simulate wax.toml --photons 2e5 --dr .5 --radius 3 -o w.npz --resume", set_up=_checkpoint),
+    C("show w.npz.checkpoint", set_up=_checkpoint_of_two, note="of two"),
+    C("show w.npz.checkpoint --json", set_up=_checkpoint_of_two, note="of two"),
+    C("chart w.npz.checkpoint -o two.svg", set_up=_checkpoint_of_two, note="of two"),
     C("show skin2"),
     C("show missing.npz"),
     C("show out"),
@@ -671,4 +753,5 @@ COMMANDS = {
     "export": EXPORT,
     "chart": CHART,
     "show": SHOW,
+    "own": OWN,
 }

@@ -56,8 +56,9 @@ class Command:
     ``line`` is what stands behind "sssfit" in a shell; ``stdin`` names the file that is piped in;
     ``terminal``: stderr is one; ``set_up`` is called in the folder before; ``hidden`` are patterns
     of what no two machines have alike; ``compiled``: nothing has to be compiled first;
-    ``environment`` are variables; ``brief``: files are named alone; ``note`` tells apart what has
-    the same command line.
+    ``environment`` are variables; ``brief``: files are named alone; ``few``: two materials
+    are all that ship with sssfit, and of the paper's two one is not there; ``note`` tells apart
+    what has the same command line.
     """
 
     line: str
@@ -68,6 +69,7 @@ class Command:
     compiled: bool = True
     environment: tuple[tuple[str, str], ...] = ()
     brief: bool = False
+    few: bool = False
     note: str = ""
 
     @property
@@ -163,9 +165,12 @@ class _Time(types.ModuleType):
 
 
 @contextlib.contextmanager
-def stand_ins(charts: dict[bytes, list[str]], *, compiled: bool = True) -> Iterator[None]:
+def stand_ins(
+    charts: dict[bytes, list[str]], *, compiled: bool = True, few: bool = False
+) -> Iterator[None]:
     """All that stands in for what depends on the machine; ``charts`` receives descriptions."""
-    from sssfit import simulate
+    from sssfit import material, simulate
+    from sssfit.choose import truth
     from sssfit.compare import pictures, sheet
     from sssfit.measure import cost
 
@@ -185,11 +190,14 @@ def stand_ins(charts: dict[bytes, list[str]], *, compiled: bool = True) -> Itera
             *_in_place_of(simulate.is_compiled, lambda *_: compiled),
             *_in_place_of(simulate.is_solver_compiled, lambda: compiled),
             *_in_place_of(available_cores, lambda: 2),
+            *(_in_place_of(material.material_names, _few_names) if few else ()),
             *_in_place_of(every_candidate, _some_candidates),
             *_in_place_of(
                 sheet.compute_sheet, functools.partial(sheet.compute_sheet, pixels=24, most_terms=2)
             ),
             mock.patch.object(pictures, "PIXELS", 13),
+            mock.patch.object(truth, "WALK_PHOTONS", 3000),
+            mock.patch.object(truth, "COUNTS", (1000, 2000, 4000)),
             mock.patch.object(cost.seconds_per_megapixel, "__defaults__", (5, clock)),
             mock.patch.object(rich.progress, "Progress", Bar),
             mock.patch.object(matplotlib.figure.Figure, "savefig", describe),
@@ -198,6 +206,10 @@ def stand_ins(charts: dict[bytes, list[str]], *, compiled: bool = True) -> Itera
         for each in patches:
             stack.enter_context(each)
         yield
+
+
+def _few_names(*, paper: bool = False) -> tuple[str, ...]:
+    return ("espresso", "gone") if paper else ("espresso", "mintmocha")
 
 
 def _some_candidates(pixels: int, **settings: int) -> tuple[Candidate, ...]:
@@ -219,7 +231,7 @@ def run(command: Command) -> Ran:
     """Run in a fresh copy of the folder of files."""
     charts: dict[bytes, list[str]] = {}
     with copied_files() as folder:
-        with stand_ins(charts, compiled=command.compiled):
+        with stand_ins(charts, compiled=command.compiled, few=command.few):
             if command.set_up is not None:
                 command.set_up()
             before = contents(folder)

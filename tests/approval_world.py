@@ -12,12 +12,14 @@ import os
 import shutil
 import struct
 import tempfile
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import OpenImageIO
+from PIL import Image
 
 from sssfit.formats.pictures import save_image
 from sssfit.kernel import SeparableKernel
@@ -366,7 +368,9 @@ def light(height: int, width: int, count: int) -> np.ndarray:
 def _write(path: Path, pixels: np.ndarray, channels: Sequence[str] = (), **attributes: Any) -> None:
     """A picture as other programs write it."""
     height, width, count = pixels.shape
-    kind = {"float32": "float", "float16": "half"}.get(pixels.dtype.name, pixels.dtype.name)
+    kind = {"float32": "float", "float16": "half", "uint32": "uint"}.get(
+        pixels.dtype.name, pixels.dtype.name
+    )
     spec = OpenImageIO.ImageSpec(width, height, count, kind)
     if channels:
         spec.channelnames = tuple(channels)
@@ -410,6 +414,8 @@ def _pictures(folder: Path) -> None:
     _write(folder / "turned.tif", light(8, 13, 3), Orientation=3)
     _write(folder / "rgba8.tif", _codes(np.uint8, 8, 13, 4), oiio__UnassociatedAlpha=1)
     _write(folder / "photo.tga", _codes(np.uint8, 8, 13, 3))
+    _compressed(folder)
+    _unusual(folder)
     smooth = np.broadcast_to(np.linspace(40, 200, 16)[:, None, None], (16, 24, 3))
     _write(folder / "photo.jpg", smooth.astype(np.uint8), Compression="jpeg:95")
     (folder / "old.hdr").write_bytes(
@@ -421,6 +427,56 @@ def _pictures(folder: Path) -> None:
     )
     (folder / "cut.exr").write_bytes((folder / "mine.exr").read_bytes()[:400])
     (folder / "cut.png").write_bytes((folder / "rgb8.png").read_bytes()[:-30])
+
+
+def _unusual(folder: Path) -> None:
+    """What other programs write now and then."""
+    for orientation in range(1, 9):
+        _write(folder / f"o{orientation}.tif", light(2, 3, 1), Orientation=orientation)
+    for name, x, y in (("inside", 2, 1), ("across", -1, 3)):
+        spec = OpenImageIO.ImageSpec(4, 3, 3, "float")
+        spec.x, spec.y, spec.full_width, spec.full_height = x, y, 9, 5
+        writer = OpenImageIO.ImageOutput.create(str(folder / f"{name}.exr"))
+        assert writer.open(str(folder / f"{name}.exr"), spec)
+        assert writer.write_image(np.ascontiguousarray(light(3, 4, 3)))
+        writer.close()
+    _write(folder / "half.exr", light(3, 4, 3).astype(np.float16))
+    _write(folder / "y.exr", light(3, 4, 2), ["Y", "A"])
+    _write(folder / "place.exr", light(3, 4, 3), ["X", "Y", "Z"])
+    _write(folder / "wide.tif", (1e6 * light(3, 4, 3)).astype(np.uint32))
+    _write(folder / "associated.tif", _codes(np.uint16, 3, 4, 4))
+    for kind, depth in ((1, 8), (2, 15), (2, 16), (2, 24), (2, 32), (2, 48), (3, 8), (4, 8)):
+        head = struct.pack("<3B2HB4H2B", 0, 0, kind, 0, 0, 0, 0, 0, 2, 1, depth, 0x20)
+        (folder / f"t{kind}_{depth}.tga").write_bytes(head + bytes(range(10, 10 + depth // 4)))
+    palette = Image.fromarray(_codes(np.uint8, 3, 4, 1)[..., 0] % 4, "P")
+    palette.putpalette([200, 30, 40, 50, 160, 70, 80, 90, 250, 110, 120, 130])
+    palette.save(folder / "palette.png")
+    plain = _without((folder / "rgb8.png").read_bytes(), b"cHRM")
+    numbers = (31270, 32900, 68000, 32000, 26500, 69000, 15000, 6000)  # of DCI P3, white first
+    content = b"cHRM" + struct.pack(">8I", *numbers)
+    chunk = struct.pack(">I", 32) + content + struct.pack(">I", zlib.crc32(content))
+    both = plain[:33] + chunk + plain[33:]
+    (folder / "srgb_and_p3.png").write_bytes(both)
+    (folder / "p3.png").write_bytes(_without(both, b"sRGB"))
+
+
+def _without(png: bytes, chunk: bytes) -> bytes:
+    """Take out a chunk, if it is there."""
+    at = png.find(chunk) - 4
+    if at < 0:
+        return png
+    return png[:at] + png[at + 12 + struct.unpack(">I", png[at : at + 4])[0] :]
+
+
+def _compressed(folder: Path) -> None:
+    """TIFF files that say they are compressed in ways that readers may lack; they are not."""
+    plain = (folder / "turned.tif").read_bytes()
+    tag = struct.pack("<HHI", 259, 3, 1)  # compression, a short, one of them
+    assert plain.count(tag) == 1
+    for code in (34661, 34712, 34887, 34925, 50000, 50002, 52546, 40000):
+        at = plain.index(tag) + len(tag)
+        packed = plain[:at] + struct.pack("<H", code) + plain[at + 2 :]
+        (folder / f"packed{code}.tif").write_bytes(packed)
 
 
 # Tables and MCML's files
@@ -554,6 +610,25 @@ def _mcml(folder: Path) -> None:
 # All
 
 
+def _own(folder: Path) -> None:
+    """Files of ours from earlier runs, which may be replaced."""
+    for ending in ("exr", "tif", "png"):
+        save_image(folder / f"own.{ending}", light(4, 5, 3))
+    (folder / "own_chart.png").write_bytes(b"\x89PNG\r\n\x1a\n....tEXtSoftware\0sssfit chart")
+    texts = {
+        "own_chart.svg": "<?xml version='1.0'?>\n<dc:title>sssfit chart</dc:title>\n",
+        "own_chart.pdf": "%PDF-1.4\n/Creator (sssfit chart)\n",
+        "own.md": "<!-- sssfit.table/1 -->\n",
+        "own_table.csv": "# sssfit.table/1\n",
+        "own_table.json": '{"format": "sssfit.table/1"}\n',
+        "own.hlsl": "// sssfit.hlsl/1\n",
+        "own.csv": "# sssfit.profile.csv/1\n",
+        "own.toml": "# Made by `sssfit materials --from-reflectance`, which may replace this file;",
+    }
+    for name, text in texts.items():
+        (folder / name).write_text(text)
+
+
 def _records(folder: Path) -> None:
     for name, text in (("wax", WAX), ("plate", PLATE), ("leaf", LEAF), ("varnish", CLEAR)):
         (folder / f"{name}.toml").write_text(text, encoding="utf-8")
@@ -581,6 +656,7 @@ def files() -> Path:
     _pictures(folder)
     _tables(folder)
     _mcml(folder)
+    _own(folder)
     (folder / "out").mkdir()
     (folder / "empty").mkdir()
     newest = ("damaged.kernel.json", "wax.svd2.kernel.json", "wax.profile.npz")

@@ -190,10 +190,11 @@ def setting_of(comparison: Comparison) -> str:
     """Say what was compared, on which pixels."""
     profile = comparison.profile
     threads = "1 thread" if comparison.threads == 1 else f"{comparison.threads} threads"
+    pixels = "1 pixel" if comparison.pixels == 1 else f"{comparison.pixels} pixels"
     missing = comparison.missing_share.max()
     return (
         f"{profile.material_name or 'profile'}, {profile.meta.get('method') or 'no method'}: "
-        f"kernels of {comparison.pixels} pixels of {comparison.mm_per_pixel:.4g} mm against the "
+        f"kernels of {pixels} of {comparison.mm_per_pixel:.4g} mm against the "
         f"whole 2D kernel, which lacks up to {number(missing, '.2g%')} of a channel's light beyond "
         f"the grid; seconds on {threads}, float64"
     )
@@ -253,7 +254,10 @@ def _cause(row: Mapping[str, Any]) -> list[str]:
 
 def sheet_text(figures: Mapping[str, Any]) -> str:
     """Write mean Delta E of every kernel on every picture."""
-    head = "{material}: mean Delta E 2000 on {pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm"
+    head = (
+        "{material:s|unknown material}: mean Delta E 2000 on {pixels} x {pixels} pixels of "
+        "{mm_per_pixel:.4g} mm"
+    )
     rows = [
         [
             each["label"],

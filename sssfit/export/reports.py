@@ -49,8 +49,8 @@ _MODELS: tuple[Part, ...] = (
 )
 
 _CHOSEN: tuple[Part, ...] = (
-    "{material} at {metres:g} m, {mm_per_pixel:.4g} mm per pixel, {figure} of Delta E within "
-    "{tolerance:g}:",
+    "{material:s|unknown material} at {metres:g} m, {mm_per_pixel:.4g} mm per pixel, {figure} of "
+    "Delta E within {tolerance:g}:",
     "{sentences}",
     "{wrote}",
 )
