@@ -340,10 +340,11 @@ def test_a_chart_may_go_to_stdout(tmp_path, monkeypatch, capfdbinary):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch):
+@pytest.mark.parametrize("which", ["--all", "--paper"])
+def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch, which):
     from sssfit import material
 
-    verb = import_module("sssfit.cli.compare")
+    verb = import_module("sssfit.cli._compare_parts")
     real = verb.load_source
     (tmp_path / "marble.toml").write_text(SLAB)
     # In place of the shipped marble, a slab.
@@ -351,7 +352,7 @@ def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch):
     monkeypatch.setattr(verb, "load_source", lambda name: real(paths.get(name, name)))
     monkeypatch.setattr(material, "material_names", lambda **_: ("marble", "skin1"))
     (tmp_path / "out").mkdir()
-    err = run("--all", "-o", "out", *SMALL, status=1)
+    err = run(which, "-o", "out", *SMALL, status=1)
     assert "1 of 2 materials failed; marble: marble is not one half space" in err
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         "skin1-pareto.md",
