@@ -166,6 +166,41 @@ def budgets_of(
     return budgets
 
 
+def budget_and_kernels(
+    name: str,
+    pictures: Sequence[str],
+    settings: Mapping[str, Any],
+    given: Mapping[str, Any],
+    common: Common,
+) -> None:
+    """Do both parts, or the one that was asked for, and print them; ``settings`` are of the fit."""
+    from sssfit.compare.table import budget_text, kernels_text
+
+    figures: dict[str, Any] = {"rows": []}
+    front, what, texts = (given["error"], given["cost"]), given["what"], []
+    if what == "budget":
+        check_budget(name)
+    charts = [given["chart"], given["budget_chart"]]
+    with held_outputs(charts, [given["table"]], [name, *pictures], given):
+        source = load_source(name)
+        first = profile_of(source, common) if given["mm_per_pixel"] == "profile" else None
+        scenes = scenes_of(pictures, first, given, common)
+        if what != "budget":
+            profile = first or profile_of(source, common)
+            found = compared(profile, scenes, given["chart"], given["table"], given, common)
+            figures = found.to_dict(*front)
+            texts.append(kernels_text(found, *front))
+        budgets = []
+        if what != "kernels":
+            budgets = budgets_of(name, source, scenes, settings, given, common)
+    each = [one.to_dict() for one in budgets]
+    budget = {**each[0], "rows": [row for one in each for row in one["rows"]]} if each else None
+    output = [given[key] for key in ("budget_chart", "chart", "table") if given[key]]
+    texts = [*map(budget_text, each), *texts, *([f"Wrote {', '.join(output)}"] if output else [])]
+    whole = {"command": "compare", "output": output, **figures, "budget": budget}
+    finish(common, whole, "\n\n".join(texts), to_stderr="-" in output)
+
+
 def fronts(
     outputs: Mapping[str, tuple[str | None, str | None]],
     pictures: Sequence[str],

@@ -11,18 +11,10 @@ import click
 from sssfit.methods import FITS
 from sssfit.scene.made import COMPARED
 
-from ._compare_parts import (
-    budgets_of,
-    check_budget,
-    compared,
-    fronts,
-    held_outputs,
-    profile_of,
-    scenes_of,
-)
+from ._compare_parts import budget_and_kernels, fronts, profile_of
 from ._input import load_source
 from ._options import Common, common_options, options, own_settings, refuse
-from ._output import finish, finish_one, held_charts, target, write_chart
+from ._output import finish_one, held_charts, target, write_chart
 from ._picture import check_pictures
 from ._verb_options import COMPARE
 
@@ -71,7 +63,7 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
     else:
         settings = {key: given[key] for key in ("rank", "terms")}
         own = own_settings(context, FITS, given["method"], settings)
-        _budget_and_kernels(material, names, own, given, common)
+        budget_and_kernels(material, names, own, given, common)
 
 
 def _check(material: str | None, given: Mapping[str, Any], names: Sequence[str]) -> None:
@@ -96,41 +88,6 @@ def _check(material: str | None, given: Mapping[str, Any], names: Sequence[str])
     if given["chart"] == given["budget_chart"] == "-":
         raise click.UsageError("only one of --chart and --budget-chart can go to stdout.")
     check_pictures(names, given["layer"], given["mask"], given["size"])
-
-
-def _budget_and_kernels(
-    name: str,
-    pictures: Sequence[str],
-    settings: Mapping[str, Any],
-    given: Mapping[str, Any],
-    common: Common,
-) -> None:
-    """Do both parts, or the one that was asked for, and print them; ``settings`` are of the fit."""
-    from sssfit.compare.table import budget_text, kernels_text
-
-    figures: dict[str, Any] = {"rows": []}
-    front, what, texts = (given["error"], given["cost"]), given["what"], []
-    if what == "budget":
-        check_budget(name)
-    charts = [given["chart"], given["budget_chart"]]
-    with held_outputs(charts, [given["table"]], [name, *pictures], given):
-        source = load_source(name)
-        first = profile_of(source, common) if given["mm_per_pixel"] == "profile" else None
-        scenes = scenes_of(pictures, first, given, common)
-        if what != "budget":
-            profile = first or profile_of(source, common)
-            found = compared(profile, scenes, given["chart"], given["table"], given, common)
-            figures = found.to_dict(*front)
-            texts.append(kernels_text(found, *front))
-        budgets = []
-        if what != "kernels":
-            budgets = budgets_of(name, source, scenes, settings, given, common)
-    each = [one.to_dict() for one in budgets]
-    budget = {**each[0], "rows": [row for one in each for row in one["rows"]]} if each else None
-    output = [given[key] for key in ("budget_chart", "chart", "table") if given[key]]
-    texts = [*map(budget_text, each), *texts, *([f"Wrote {', '.join(output)}"] if output else [])]
-    whole = {"command": "compare", "output": output, **figures, "budget": budget}
-    finish(common, whole, "\n\n".join(texts), to_stderr="-" in output)
 
 
 def _sheet(name: str, given: Mapping[str, Any], common: Common) -> None:

@@ -46,3 +46,14 @@ def test_the_way_of_a_photon_is_a_chain_of_records():
     rooms = [re.findall(r"`sssfit/(\w+)/", text)[-1] for _, text in steps]
     assert rooms == ["material", "simulate", "_jit", "profile", "fit", "kernel", "export"]
     assert all(int(b) == int(a) + 1 for (a, _), (b, _) in pairwise(steps))
+
+
+def test_a_verb_parses_calls_and_writes_in_150_lines():
+    verbs = [each for each in (ROOT / "cli").glob("*.py") if not each.name.startswith("_")]
+    lengths = {each.name: len(each.read_text(encoding="utf-8").splitlines()) for each in verbs}
+    assert len(lengths) == 10
+    assert {name: length for name, length in lengths.items() if length > 150} == {}
+
+
+def test_the_ground_is_at_most_twelve_files():
+    assert len(list((ROOT / "sssfit").glob("*.py"))) <= 12

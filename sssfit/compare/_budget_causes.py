@@ -3,6 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from sssfit.measure.score import ImageScore, measure
 from sssfit.profile import Profile
 from sssfit.render.reference import convolve, reference_quadrant
 from sssfit.render.separable import render_separable
+from sssfit.scene.patterns import DISK_RADIUS_MM
 from sssfit.scene.record import Scene
 from sssfit.simulate import Progress, simulate
 from sssfit.simulate.truth import exact_with_all_light, radius_of
@@ -136,9 +138,13 @@ def _check_solvable(material: Material) -> None:
         )
 
 
-def picture_reach_mm(height: int, width: int, mm_per_pixel: float) -> float:
-    """Return how far two pixels of a picture can be apart [mm], corner to corner."""
-    return mm_per_pixel * math.hypot(height - 1, width - 1)
+def _reach_mm(scene: Scene, grid_mm: float) -> float:
+    """Return how far two pixels can be apart [mm]; disks are enlarged by what their light takes."""
+    least = math.ceil(2.0 * (DISK_RADIUS_MM + grid_mm) / scene.mm_per_pixel)
+    height, width = (
+        max(each, least) if scene.name == "disk" else each for each in (scene.height, scene.width)
+    )
+    return scene.mm_per_pixel * math.hypot(height - 1, width - 1)
 
 
 def stored(kernel: SeparableKernel, storage: str) -> SeparableKernel:
@@ -233,9 +239,24 @@ class Switches:
 
     @classmethod
     def make(
-        cls, sources: Sources, fit: Candidate, mm_per_pixel: float, model: str | None, storage: str
+        cls,
+        material: Material,
+        scenes: Sequence[Scene],
+        fit: Candidate,
+        *,
+        model: str | None,
+        storage: str,
+        radius_mm: float | None = None,
+        **walk: Any,
     ) -> "Switches":
-        """Fit the kernels."""
+        """Simulate the profiles as far as the scenes reach, and fit the kernels.
+
+        ``radius_mm`` and ``walk`` are of `make_sources`.
+        """
+        grid_mm = radius_of(make_grid(material, radius_mm=radius_mm))
+        reach_mm = max(_reach_mm(each, grid_mm) for each in scenes)
+        sources = make_sources(material, reach_mm, radius_mm=radius_mm, **walk)
+        mm_per_pixel = scenes[0].mm_per_pixel
         on_grid, cut = sources.on_grid(sources.exact), sources.cut(sources.exact)
         simulated = sources.walk if model is None else sources.models[model]
         kernel, kernel_of_cut, whole = (

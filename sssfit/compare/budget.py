@@ -24,21 +24,16 @@ from sssfit.compare._budget_causes import (
     Switches,
     causes_of,
     everything,
-    make_sources,
-    picture_reach_mm,
 )
 from sssfit.compare.candidates import Candidate
 from sssfit.compare.references import check_one_pitch, evaluated_scene
 from sssfit.errors import RenderError, SimulationError
-from sssfit.grid import make_grid
 from sssfit.kernel import SeparableKernel
 from sssfit.material import Material
 from sssfit.measure.delta_e import selected_pixels, selection
 from sssfit.measure.score import COLOUR_FIGURES, ImageScore
-from sssfit.scene.patterns import DISK_RADIUS_MM
 from sssfit.scene.record import Scene
 from sssfit.simulate import Progress
-from sssfit.simulate.truth import radius_of
 
 __all__ = ["MODELS", "STORAGES", "Budget", "Cause", "error_budget", "error_budgets"]
 
@@ -215,20 +210,11 @@ def error_budgets(
         No such fit or storage.
     """
     _check(scenes, model)
-    grid_mm = radius_of(make_grid(material, radius_mm=radius_mm))
-    reach_mm = max(_reach_mm(each, grid_mm) for each in scenes)
-    sources = make_sources(
-        material,
-        reach_mm,
-        photons=photons,
-        seed=seed,
-        radius_mm=radius_mm,
-        threads=threads,
-        progress=progress,
-    )
     default = {"rank": 3} if method == "svd" else {}
     fit = Candidate(method, method, 0, default if settings is None else settings)
-    switches = Switches.make(sources, fit, scenes[0].mm_per_pixel, model, storage)
+    walk: dict[str, Any] = {"photons": photons, "seed": seed, "radius_mm": radius_mm}
+    walk |= {"threads": threads, "progress": progress}
+    switches = Switches.make(material, scenes, fit, model=model, storage=storage, **walk)
     about = {
         "photons": photons,
         "seed": seed,
@@ -240,15 +226,6 @@ def error_budgets(
     }
     evaluated = [evaluated_scene(each, switches.on_grid) for each in scenes]
     return [_budget(material, scene, switches, threads, about) for scene in evaluated]
-
-
-def _reach_mm(scene: Scene, grid_mm: float) -> float:
-    """Return how far two pixels can be apart [mm]; disks are enlarged by what their light takes."""
-    least = math.ceil(2.0 * (DISK_RADIUS_MM + grid_mm) / scene.mm_per_pixel)
-    height, width = (
-        max(each, least) if scene.name == "disk" else each for each in (scene.height, scene.width)
-    )
-    return picture_reach_mm(height, width, scene.mm_per_pixel)
 
 
 def _budget(
