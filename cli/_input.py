@@ -36,12 +36,12 @@ def newest(common: Common, pattern: str, made_by: str) -> str:
 
 
 def profile_name(given: str | None, common: Common) -> str:
-    """Return the profile that was named, by default the newest of this folder."""
+    """Return the profile that was named, by default the newest in this folder."""
     return given or newest(common, "*.profile.npz", "sssfit simulate skin1")
 
 
 def kernel_name(given: str | None, common: Common) -> str:
-    """Return the kernel that was named, by default the newest of this folder."""
+    """Return the kernel that was named, by default the newest in this folder."""
     return given or newest(common, "*.kernel.json", "sssfit fit --method svd --rank 3")
 
 

@@ -28,16 +28,17 @@ _FILE = f"{', '.join(MADE)}, or your own EXR, HDR, TIFF, PNG, JPG or TGA"
 _OF_FILES = (
     option("--layer", None, "NAME", "Your own EXR: the layer to read, such as ViewLayer.Combined.  "
            "[default: R, G, B without a layer, or the only layer with them]"),
-    option("--mask", ["alpha"], None, "Your own file: only what its alpha covers by half or more "
-           "is the object, lit and judged.  [default: all of it]"),
+    option("--mask", ["alpha"], None, "Your own file: the object is the part that its alpha "
+           "covers by half or more; only it is lit and judged.  [default: all of it]"),
 )
 
 RENDER_PICTURE = (
-    option("--irradiance", None, "NAME|FILE", f"What is lit: {_FILE} file.", next(iter(MADE))),
+    option("--irradiance", None, "NAME|FILE", f"Irradiance picture: {_FILE} file.",
+           next(iter(MADE))),
     option("--size", Size(), "WxH", "Made pictures: columns and rows.  [default: 512x512; head: "
            "the whole face, up to 1080x1080]"),
-    option("--mm-per-pixel", Length(), "MM", "Size of a pixel of your own file, unless its header "
-           "says, and of the made head with --screen.  [default: 0.3 with --screen, else the "
+    option("--mm-per-pixel", Length(), "MM", "Pixel size of your own file, if its header does not "
+           "say, and of the made head with --screen.  [default: 0.3 with --screen, else the "
            "kernel's]"),
     *_OF_FILES,
 )
@@ -47,13 +48,13 @@ RENDER = (
     flag("--screen", "Render like a shader: in perspective, by depth, within the mask; head only."),
     option("--follow", ["gaussian", "lerp", "none"], None, "With --screen: how a depth difference "
            "weights a sample.  [default: gaussian]"),
-    option("--profile", None, "FILE", "Reference profile.  [default: the profile here that the "
-           "kernel was fitted to]"),
+    option("--profile", None, "FILE", "Reference profile.  [default: the profile in this folder "
+           "that the kernel was fitted to]"),
     option("--exposure", _FACTOR, "FACTOR", "Exposure for Delta E and PNG files.  [default: from "
            "the true picture]"),
     flag("--structure", 'Also SSIM and FLIP (needs "sssfit[metrics]").'),
-    option("-o --output", None, "FILE", "Where the picture goes, .exr, .tif or .png (16 bits, "
-           "sRGB); - for EXR on stdout.  [default: KERNEL.PICTURE.exr]"),
+    option("-o --output", None, "FILE", "Output file, .exr, .tif or .png (16 bits, sRGB); - for "
+           "EXR on stdout.  [default: KERNEL.PICTURE.exr]"),
     option("--truth", None, "FILE", "Write the true picture as well."),
     option("--difference", None, "FILE", "Write the absolute difference as well."),
     option("--gain", _FACTOR, "FACTOR", "--difference: magnify it.", 1.0),
@@ -66,33 +67,34 @@ RENDER = (
 
 COMPARE = (
     flag("--all every", "All materials that ship with sssfit."),
-    flag("--paper", "The eleven of them that the SSSS paper has."),
-    option("--what", ["front", "budget", "kernels", "sheet"], None, "budget: why a kernel is off; "
-           "kernels: every one by error and cost; front: those that no other beats, a line a "
-           "picture; sheet: pictures of all, drawn into --chart.  [default: budget and kernels]"),
-    option("--picture pictures", None, "NAME|FILE,...", f"What is lit: {_FILE} files. The edge is "
-           f"at {EDGE_DEGREES:g} degrees.  [default: {','.join(COMPARED)}]", multiple=True),
+    flag("--paper", "The eleven materials of the Separable Subsurface Scattering paper."),
+    option("--what", ["front", "budget", "kernels", "sheet"], None, "budget: the causes of a "
+           "kernel's error; kernels: all kernels by error and cost; front: the kernels that no "
+           "other beats, one line per picture; sheet: pictures of all kernels, drawn into "
+           "--chart.  [default: budget and kernels]"),
+    option("--picture pictures", None, "NAME|FILE,...", f"Irradiance pictures: {_FILE} files. The "
+           f"edge is at {EDGE_DEGREES:g} degrees.  [default: {','.join(COMPARED)}]", multiple=True),
     option("--mm-per-pixel", LengthOr("profile"), "MM|profile", "Size of all pixels; profile is "
-           "the width of the profile's first annulus.  [default: what your own file says, else "
-           "0.3]"),
+           "the width of the profile's first annulus.  [default: from your own file, else 0.3]"),
     option("--size", Size(), "WxH", "Made pictures: columns and rows.  [default: 512x512]"),
     *_OF_FILES,
     option("--chart", None, "FILE", "Draw the kernels by error and cost, or the sheet, as PNG, SVG "
            "or PDF by the ending; - for PNG on stdout."),
     option("--table", None, "FILE", "Write the kernels' rows, .md, .csv or .json."),
-    option("--error", ["delta-e", "l2"], None, "Of chart and front: mean Delta E 2000, or relative "
-           "L2 of linear light.", "delta-e"),
-    option("--cost", ["weights", "passes", "seconds"], None, "Of chart and front: weights applied "
-           "to a pixel, passes, or measured seconds.", "weights"),
+    option("--error", ["delta-e", "l2"], None, "Error in chart and front: mean Delta E 2000, or "
+           "relative L2 of linear light.", "delta-e"),
+    option("--cost", ["weights", "passes", "seconds"], None, "Cost in chart and front: weights "
+           "applied to a pixel, passes, or measured seconds.", "weights"),
     option("--budget-chart", None, "FILE", "Draw the budget."),
-    option("--photons", Count(2, 10**12), "N", "Of the budget's photon walk.  [default: 1e6]"),
-    option("--method", list(FITS), None, "The kernel whose budget it is.", "svd"),
-    option("--rank", WholeRange(1, 1000), "N", "Its rank, svd.  [default: 3]"),
-    option("--terms", WholeRange(1, 10), "N", "Its Gaussians.  [default: 4]"),
-    option("--model", ["dipole", "dipole-grosjean", "burley"], None, "The budget of a kernel of "
-           "this model.  [default: of the photon walk]"),
-    option("-o --output", None, "FOLDER", "Where --all and --paper put NAME-pareto.png and "
-           "NAME-pareto.md.  [default: here]"),
+    option("--photons", Count(2, 10**12), "N", "Photons of the budget's walk.  [default: 1e6]"),
+    option("--method", list(FITS), None, "Fit method of the budget's kernel.", "svd"),
+    option("--rank", WholeRange(1, 1000), "N", "svd: rank of the budget's kernel.  [default: 3]"),
+    option("--terms", WholeRange(1, 10), "N", "gaussians: number of Gaussians of the budget's "
+           "kernel.  [default: 4]"),
+    option("--model", ["dipole", "dipole-grosjean", "burley"], None, "Profile model of the "
+           "budget's kernel.  [default: the photon walk]"),
+    option("-o --output", None, "FOLDER", "Folder of NAME-pareto.png and NAME-pareto.md with "
+           "--all or --paper.  [default: here]"),
     flag("--force", "Replace an input, or files that are not our charts or tables."),
 )
 
@@ -102,8 +104,8 @@ CHOOSE = (
     option("--resolution", Size(), "WxH", "Columns and rows of the frame.", "1920x1080"),
     option("--tolerance", Number(), "DELTA-E", "Largest CIE Delta E 2000 against the true 2D "
            "kernel.", 1.0),
-    option("--tolerance-of", ["p95", "p99", "mean"], None, "The figure to compare with it: a "
-           "percentile over the picture, or the mean, which hides the pixels that are far off.",
+    option("--tolerance-of", ["p95", "p99", "mean"], None, "Figure that --tolerance limits: a "
+           "percentile over the pixels, or the mean, which hides large errors of a few pixels.",
            "p95"),
     option("--irradiance", None, "NAME|FILE", f"Picture to judge by: {_FILE} file. The edge is at "
            f"{EDGE_DEGREES:g} degrees.", "head"),
@@ -128,8 +130,8 @@ CHART = (
            "beside it or here, by its hash]"),
     option("--photons", Count(2, 10**12), "N", "Photons of the walk, with --models.  "
            "[default: 1e7]"),
-    option("-o --output", None, "FILE", "Where the chart goes, as PNG, SVG or PDF by its ending; - "
-           "for PNG on stdout.  [default: NAME.profile.png, NAME.kernel.png, NAME.material.png, "
+    option("-o --output", None, "FILE", "Output file, PNG, SVG or PDF by its ending; - for PNG on "
+           "stdout.  [default: NAME.profile.png, NAME.kernel.png, NAME.material.png, "
            "NAME.checkpoint.png, NAME.spectrum.png, NAME.guide.png, MATERIAL.models.png]"),
     flag("--force", "Replace an input, or a file that is not our chart."),
 )
@@ -144,7 +146,7 @@ FIT_PIXELS = (
     flag("--normalize", "Scale every channel to unit energy, and store its energy as a factor."),
 )
 FIT_OUTPUT = (
-    option("-o --output", None, "FILE", "Where the kernel goes, - for stdout.  [default: "
+    option("-o --output", None, "FILE", "Output file, - for stdout.  [default: "
            "PROFILE.METHOD.kernel.json]"),
     flag("--force", "Replace an input, or a file that is not our kernel."),
 )

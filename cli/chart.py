@@ -31,8 +31,8 @@ _MEMORY = {"kernel": "kernel chart", **dict.fromkeys(_VIEWS, "figures")}
 def chart(file: str | None, common: Common, **given: Any) -> None:
     """Draw FILE: a profile, a kernel, a material or the checkpoint of a walk.
 
-    FILE is any of these, under any name, or - for stdin; by default the newest .profile.npz of
-    this folder.
+    FILE is any of these, under any name, or - for stdin; by default the newest .profile.npz in this
+    folder.
 
     A profile, and the profile so far of a checkpoint: 2 pi r R_d over r, linear and logarithmic;
     R_d over r in mean free paths; R_d(x, y) as an image; with error bands.
@@ -40,16 +40,16 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
     A kernel: its passes, the 2D kernel beside the profile's, their difference, and slices along the
     axis and the diagonal. A material: coefficients, mean free paths and albedos.
 
-    With --spectrum the share that each term of a separable kernel has in the 2D kernel, of its
-    squares and of its absolute values; how many terms leave an error of 1 %.
+    With --spectrum: the share of each separable term in the 2D kernel, of the sum of squares and of
+    the sum of absolute values, and the number of terms for an error of 1 %.
 
     With --guide, for each k, the guide function of the guided fit, the residual that the fit leaves
     of one channel, and its pass beside the pre-integrated one; and the same for the pre-integrated
     pass, under the guide function for which it is optimal.
 
-    With --models FILE is a material, or a profile of the photon walk, which is then not simulated
-    again: the exact solution, the walk and the diffusion models in one figure, and how far
-    each is from the exact solution. Only for one half space.
+    With --models, FILE is a material, or a profile of the photon walk, which is then not simulated
+    again. The figure shows the exact solution, the walk and the diffusion models, with the error of
+    each compared with the exact solution. Half spaces only.
 
     \b
       sssfit chart skin1.profile.npz

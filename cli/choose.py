@@ -35,11 +35,11 @@ def choose(material: str, common: Common, **given: Any) -> None:
 
     Tries every method and rank at seven supports, cheapest first, and stops at the first whose
     Delta E is within --tolerance. Cost is weights applied to a pixel. By default 95 % of the pixels
-    have to be within a Delta E of 1, about what an eye can tell side by side.
+    must be within a Delta E of 1, about the smallest difference seen side by side.
 
     Distance, field of view and rows give the size of a pixel. The picture is the middle of the
-    frame, 512 x 512 pixels at most. A close-up of the head, less than 88 mm across, has to hold on
-    wider views as well.
+    frame, 512 x 512 pixels at most. For a close-up of the head, less than 88 mm across, the kernel
+    must also hold on wider views.
 
     MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or a .profile.npz
     file, - for one on stdin. The profile of a material is saved beside its kernel.

@@ -27,15 +27,15 @@ _OF_BUDGETS = ("budget_chart", "photons", "rank", "terms", "model")
 @common_options
 @click.pass_context
 def compare(context: click.Context, /, material: str | None, common: Common, **given: Any) -> None:
-    """Compare all kernels of MATERIAL by error and cost, and take an error apart by cause.
+    """Compare all kernels of MATERIAL by error and cost, and split an error by cause.
 
-    The error budget comes first: noise of the simulation, energy beyond the grid, separability and
-    storage, each alone against the exact profile's whole 2D kernel, largest first. Then come every
-    method, rank and number of Gaussians on the pictures' pixels, with error and cost. A star marks
-    the Pareto front: no other kernel is better in both. Seconds are those of this machine.
+    The error budget comes first: simulation noise, energy beyond the grid, separability and
+    storage, each alone compared with the exact profile's 2D kernel, the largest first. Then come
+    every method, rank and number of Gaussians on the pictures' pixels, with error and cost. A star
+    marks the Pareto front: no other kernel is better in both. Seconds are measured on this machine.
 
     MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or a .profile.npz
-    file, - for one on stdin; a budget takes a half space with g = 0.
+    file, - for one on stdin; a budget needs a half space with g = 0.
 
     \b
       sssfit compare skin1

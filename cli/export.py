@@ -22,10 +22,10 @@ def export(file: str | None, form: str, output: str | None, force: bool, common:
     """Export FILE for other programs.
 
     FILE is a .kernel.json file, for csv a .profile.npz file, or - for stdin; by default the newest
-    of this folder. Shader source holds the signs and weights of every separable term, and a comment
+    in this folder. Shader source holds the signs and weights of every separable term, and a comment
     with material, fit, pixels, energy and errors. The table has the energy of each annulus and its
     standard error, against the annulus' outer edge r_mm (inf: beyond the grid), with every digit;
-    `sssfit import` reads it back. It leaves out specular reflectance, absorption and
+    `sssfit import` reads it back. It does not include specular reflectance, absorption and
     transmittance.
 
     \b

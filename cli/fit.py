@@ -23,9 +23,10 @@ from ._verb_options import FIT_OUTPUT, FIT_PIXELS
 def fit(context: click.Context, /, profile: str | None, common: Common, **given: Any) -> None:
     """Fit a separable kernel to PROFILE and write it.
 
-    PROFILE is a .profile.npz file, or - for stdin; by default the newest of this folder. A kernel
-    belongs to its pixels: weights are energies of pixels of --mm-per-pixel. The default is that of
-    a head 0.6 m away on 1080 rows; `sssfit choose` works it out for another view.
+    PROFILE is a .profile.npz file, or - for stdin; by default the newest in this folder. A kernel
+    is made for one pixel size, because its weights are energies of pixels of --mm-per-pixel. The
+    default is the pixel size of a head 0.6 m away on 1080 rows; `sssfit choose` computes it for
+    another view.
 
     \b
       sssfit fit --method svd --rank 3

@@ -16,14 +16,14 @@ _UNITS = ("um", "mm", "cm", "m")
 # fmt: off
 _OPTIONS = (
     option("--quantity", ["density", "energy"], None, "Meaning of the numbers of a CSV.  [default: "
-           "what its own comment says]"),
-    option("--unit", _UNITS, None, "Unit of a CSV's column r; r_um, r_mm, r_cm and r_m say "
-           "theirs."),
+           "from its own comment]"),
+    option("--unit", _UNITS, None, "Unit of a CSV's column r; r_um, r_mm, r_cm and r_m include "
+           "it."),
     option("--density-unit", _UNITS, None, "A CSV's densities are per square of this unit.  "
            "[default: the unit of its radii]"),
     option("--channels", None, "A,B,...", "Names for several .mco, in their order.  [default: "
            "R,G,B for three]"),
-    option("-o --output", None, "FILE", "Where the profile goes, - for stdout.  [default: "
+    option("-o --output", None, "FILE", "Output file, - for stdout.  [default: "
            "NAME.profile.npz]"),
     flag("--force", "Replace an input, or a file that is not our profile."),
 )
@@ -44,19 +44,19 @@ def import_(
 ) -> None:
     """Convert FILE to a profile: a table (CSV) or MCML output (.mco, ASCII); - for stdin.
 
-    A CSV has a header with r_mm (radii in mm, of any spacing) and one column a channel; r_um, r_cm
-    and r_m are read as well and converted. X_stderr holds standard errors of X, and lines that
-    begin with # are comments.
+    A CSV has a header with r_mm (radii in mm, of any spacing) and one column per channel; r_um,
+    r_cm and r_m are converted. X_stderr holds standard errors of X, and lines that begin with # are
+    comments.
 
     \b
       density: R_d per square of the radius' unit (1/mm^2 beside r_mm, 1/cm^2 beside
                r_cm) at that radius; annuli meet half-way between radii
       energy:  share of the light that leaves in the annulus whose OUTER edge is the
-               radius; a last line with radius inf is what leaves beyond
+               radius; a last line with radius inf holds the energy beyond
 
-    An .mco is one channel, in cm, without standard errors, as MCML 1 and its ports to GPUs write
-    it; several of one grid become the channels of one profile. Their last bin, where MCML counts
-    all beyond, becomes the energy beyond the grid.
+    An .mco file of MCML 1 or one of its GPU ports has one channel, in cm, without standard errors;
+    several on the same grid become the channels of one profile. Their last bin, to which MCML adds
+    all light beyond, becomes the energy beyond the grid.
 
     \b
       sssfit import profile.csv --quantity density

@@ -22,20 +22,20 @@ _OURS = "# Made by `sssfit materials --from-reflectance`, which may replace this
 # fmt: off
 _OPTIONS = (
     flag("--toml as_toml", "Print MATERIAL as TOML, to start your own."),
-    option("--from-reflectance", BaseColour(), "A,B,...|HEX", "Make a material of this total "
-           "diffuse reflectance, per channel, such as 0.44,0.23,0.13 or 44%, or of an sRGB base "
+    option("--from-reflectance", BaseColour(), "A,B,...|HEX", "Make a material with this total "
+           "diffuse reflectance per channel, such as 0.44,0.23,0.13 or 44%, or with an sRGB base "
            "colour, such as '#c58c6b'."),
     flag("--srgb", "A,B,... are 8-bit sRGB codes, such as 197,140,107."),
     option("--mean-free-path", Lengths(), "MM,MM,...", "Its mean free paths, 1 / (sigma_a + "
-           "sigma_s), such as 3.67,1.37,0.68 or 0.4cm; one serves all channels."),
+           "sigma_s), such as 3.67,1.37,0.68 or 0.4cm; one applies to all channels."),
     option("--eta", Number(), "N", "Its refractive index; 1.4 is that of skin.", 1.4),
-    option("--light", ["diffuse", "normal"], None, "The light that A,B,... are meant for. normal: "
-           "a beam along the normal, as in profiles; diffuse: the same radiance from everywhere "
-           "above, as base colours mean it, and shares of the light that enters.  [default: "
+    option("--light", ["diffuse", "normal"], None, "Incident light of A,B,... normal: a beam "
+           "along the normal, as in profiles; diffuse: equal radiance from all directions above, "
+           "as for base colours, with A,B,... as shares of the light that enters.  [default: "
            "diffuse for sRGB colours, else normal]"),
     option("--name", None, "NAME", "Its name.  [default: that of FILE]"),
     option("--channels", None, "A,B,...", "Names of its channels.  [default: R,G,B for three]"),
-    option("-o --output", None, "FILE", "Where it goes, - for stdout.  [default: NAME.toml]"),
+    option("-o --output", None, "FILE", "Output file, - for stdout.  [default: NAME.toml]"),
     flag("--force", "Replace a file that --from-reflectance did not make."),
 )
 # fmt: on
@@ -52,10 +52,10 @@ def materials(
     """List the materials that ship with sssfit, show one in full, or make one.
 
     MATERIAL is one of their names, the path of a TOML file, or - for standard input.
-    --from-reflectance inverts the exact solver: it finds the albedos, for isotropic scattering,
-    that have this total diffuse reflectance, and prints what the approximate inversions of
-    renderers give. A base colour in sRGB is decoded to linear light and inverted for diffuse light;
-    give --light diffuse with a linear base colour.
+    --from-reflectance inverts the exact solver: it finds the albedos that give this total diffuse
+    reflectance under isotropic scattering, and prints the results of renderers' approximate
+    inversions for comparison. A base colour in sRGB is decoded to linear light and inverted for
+    diffuse light; give --light diffuse with a linear base colour.
 
     \b
       sssfit materials skin1                        coefficients, mean free paths, grid

@@ -33,11 +33,11 @@ _BEHIND_DEGREES = 170.0
 def render(context: click.Context, /, kernel: str | None, common: Common, **given: Any) -> None:
     """Apply KERNEL to a picture of irradiance, and measure its error.
 
-    KERNEL is a .kernel.json file, or - for stdin; by default the newest of this folder. The result
-    is radiant exitance in linear light. Made pictures have the kernel's pixels; a file of your own
-    (EXR, HDR, TIFF, PNG, JPG, TGA) has to have them too, except with --screen. The truth is the
-    same picture convolved with the whole 2D kernel of the profile; Delta E 2000 is of both in sRGB
-    at the exposure. The alpha of your file goes into the result and the truth as it is.
+    KERNEL is a .kernel.json file, or - for stdin; by default the newest in this folder. The result
+    is radiant exitance in linear light. Made pictures use the kernel's pixel size; your own file
+    (EXR, HDR, TIFF, PNG, JPG, TGA) must have it too, except with --screen. The true picture is the
+    same irradiance convolved with the whole 2D kernel of the profile; Delta E 2000 compares the two
+    in sRGB at the exposure. The alpha channel of your file is copied unchanged.
 
     \b
       sssfit render skin1.svd3.kernel.json --irradiance head -o out.exr

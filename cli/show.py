@@ -22,8 +22,8 @@ _TITLES = {
 def show(file: str | None, common: Common) -> None:
     """Print what FILE holds: a profile, a kernel, a material or the checkpoint of a walk.
 
-    FILE is any of these, under any name, or - for stdin; by default the newest .profile.npz of
-    this folder.
+    FILE is any of these, under any name, or - for stdin; by default the newest .profile.npz in this
+    folder.
 
     \b
       sssfit show skin1.profile.npz              provenance, grid, energies, standard errors

@@ -30,14 +30,14 @@ _FIRST = "montecarlo"  # the only walk of photons
 # fmt: off
 _OPTIONS = (
     flag("--all every", "All materials that ship with sssfit."),
-    flag("--paper", "The eleven of them that the SSSS paper has."),
+    flag("--paper", "The eleven materials of the Separable Subsurface Scattering paper."),
     option("--method", [*SIMULATIONS], "METHOD", "Simulation method, as listed below.", _FIRST),
     option("--run number", WholeRange(1), "N", "Simulate only this run of an .mci file."),
     method_options(SIMULATIONS),
     option("--dr", Length(), "MM", "Annulus width.  [default: MFP_min / 20; deon-skin: 0.008]"),
-    option("--radius", Length("auto"), "MM|auto", "Grid radius; auto (montecarlo) grows it until "
-           "under 0.1 % of any channel lies beyond.  [default: 32 MFP_max; deon-skin: 17.2]"),
-    option("-o --output", None, "FILE", "Where the profile goes, - for stdout; with --all a folder."
+    option("--radius", Length("auto"), "MM|auto", "Grid radius; auto (montecarlo) enlarges it "
+           "until under 0.1 % of any channel lies beyond.  [default: 32 MFP_max; deon-skin: 17.2]"),
+    option("-o --output", None, "FILE", "Output file, - for stdout; a folder with --all."
            "  [default: MATERIAL.profile.npz, MATERIAL.METHOD.profile.npz]"),
     flag("--force", "Replace an input, or a file that is not our profile."),
 )
@@ -57,8 +57,8 @@ def simulate(
     MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or - for stdin; or
     an MCML input file (.mci), which gives one profile per run, with the file's photons and grid
     unless options set them. The profile is R_d(r) per channel as energy in annuli with errors, for
-    a normally incident pencil beam, in mm. Ctrl-C saves the photons traced so far, with their true
-    count. --resume continues from there, or from the last checkpoint of a killed run, and ends in
+    a normally incident pencil beam, in mm. Ctrl-C saves the photons traced so far and records their
+    number. --resume continues from there, or from the last checkpoint of a killed run, and ends in
     the same bits as an undisturbed run.
 
     \b
