@@ -19,6 +19,13 @@ def _write(name: str, text: str) -> Callable[[], object]:
     return lambda: Path(name).write_text(text, encoding="utf-8")
 
 
+def _as(source: str, name: str, old: str, new: str) -> Callable[[], object]:
+    """Copy a file under another name, with a change."""
+    return lambda: Path(name).write_text(
+        Path(source).read_text(encoding="utf-8").replace(old, new), encoding="utf-8"
+    )
+
+
 def _into(folder: str) -> Callable[[], object]:
     return lambda: os.chdir(folder)
 
@@ -55,6 +62,13 @@ MATERIALS = [
     C("materials plate.toml --toml"),
     C("materials leaf.toml --toml"),
     C("materials -", stdin="leaf.toml"),
+    C("materials in_air.toml", set_up=_as("plate.toml", "in_air.toml", "eta_above = 1.1\n", "")),
+    C("materials on_air.toml", set_up=_as("plate.toml", "on_air.toml", "eta_below = 1.2\n", "")),
+    C(
+        "materials even.toml",
+        set_up=_as("plate.toml", "even.toml", "g = [0.1, 0.2, 0.3]", "g = 0"),
+        note="g in the upper layer only",
+    ),
     C("materials deon-skin"),
     C("materials deon-skin --json"),
     C("materials deon-skin --toml"),
@@ -115,6 +129,11 @@ SIMULATE = [
     C("simulate two.mci --run 2 --dr .5 --radius 3 --photons 500 -v"),
     C("simulate sample.mci --run 1 --photons 300"),
     C("simulate two.mci --run 3"),
+    C(
+        "simulate few.mci --run 1 --target-error 20%",
+        set_up=_as("two.mci", "few.mci", "\n2000\n", "\n20\n"),
+        note="its photons are fewer than needed",
+    ),
     C("simulate two.mci --run 1 --method multipole"),
     C(f"simulate wax.toml {GRID} --method exact"),
     C(f"simulate wax.toml {GRID} --method exact --tolerance 2% --json"),
@@ -220,6 +239,7 @@ FIT = [
 ]
 
 RENDER = [
+    C("render wax.svd2.kernel.json --irradiance disk --size 40X24"),
     C(f"render --irradiance disk {SMALL}"),
     C(f"render wax.svd2.kernel.json --irradiance edge --angle 30 {SMALL} --border zero --json"),
     C(f"render wax.svd2.kernel.json --irradiance disk --radius 1.1mm {SMALL} -o 'Scheibe ß.exr'"),
@@ -488,6 +508,7 @@ IMPORT = [
     C("import gap.csv --quantity density"),
     C("import - --quantity density", stdin="cm.csv"),
     C("import density.csv -o -"),
+    C("import density.v2.csv", set_up=_as("density.csv", "density.v2.csv", "", "")),
     C("import density.csv -q --threads 1 --seed 2"),
     C("import latin1.csv --quantity density"),
     C("import latin1-comment.csv --quantity density"),
@@ -496,6 +517,11 @@ IMPORT = [
     C("import r.mco"),
     C("import r.mco g.mco -o rg.npz --channels G,R --json"),
     C("import r.mco g.mco r.mco -o rgb.npz"),
+    C(
+        "import r.mco b.mco -o rb.npz --channels R,B --json",
+        set_up=lambda: Path("b.mco").write_text(world.mco_text(photons="777"), encoding="utf-8"),
+        note="of other photons",
+    ),
     C("import g.mco --channels grün"),
     C("import - --channels ' λ '", stdin="g.mco"),
     C("import lossy.mco"),
