@@ -210,6 +210,7 @@ def weights_of(made: SeparableKernel) -> list[Any]:
 
 
 CALLS: list[Any] = []
+_within: list[str] = []  # the recorded call that is running
 ASIDE = {"progress", "stop", "clock"}  # arguments that only report, stop or measure
 
 
@@ -307,8 +308,15 @@ def recorded(real, stand_in):
         noted = {key: told(each) for key, each in bound.arguments.items() if key not in ASIDE}
         if noted.get("photons", 0) is None and noted.get("target_error") is None:
             noted["photons"] = DEFAULT_PHOTONS  # what None stands for
+        # A stand-in computes a result once and hands it on, so what it calls itself is not told.
+        if _within:
+            return stand_in(real, dict(bound.arguments))
         CALLS.append((real.__name__, noted))
-        return stand_in(real, dict(bound.arguments))
+        _within.append(real.__name__)
+        try:
+            return stand_in(real, dict(bound.arguments))
+        finally:
+            _within.pop()
 
     return call
 
