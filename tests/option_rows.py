@@ -438,7 +438,7 @@ RENDER = {
         fields("rmse"),
         lambda: [evaluate(_scene("disk"), kernel(), world.plate_profile()).score.rmse],
         default="wax.profile.npz",
-        words="the profile here that the kernel was fitted to",
+        words="the profile in this folder that the kernel was fitted to",
     ),
     "--exposure": Row(
         f"{_DISK} --json",
@@ -578,7 +578,7 @@ COMPARE = {
         calls,
         lambda: _compared(_pictures("disk", "edge", "points", "head", mm_per_pixel=0.45)),
         default="0.3",
-        words="what your own file says, else 0.3",
+        words="from your own file, else 0.3",
     ),
     "--size": Row(
         "compare wax.profile.npz --what kernels --picture disk,edge",
@@ -641,7 +641,7 @@ COMPARE = {
         "--model burley",
         calls,
         lambda: _budgeted(model="burley"),
-        words="of the photon walk",
+        words="the photon walk",
     ),
     "--output": Row(
         "compare --all --size 24x16",
@@ -859,7 +859,7 @@ IMPORT = {
         "--quantity density",
         lambda ran: ran.status or ran.profile,
         lambda: _table("bare.csv", quantity="density"),
-        words="what its own comment says",
+        words="from its own comment",
     ),
     "--unit": Row(
         "import plain.csv --quantity density -o x.profile.npz",
