@@ -10,6 +10,8 @@ from pathlib import Path
 import approval_world as world
 from approval_run import Command
 
+from sssfit.formats.profiles import import_profile
+
 C = Command
 GRID = "--dr .2 --radius 6"
 SMALL = "--size 40x24"
@@ -24,6 +26,12 @@ def _as(source: str, name: str, old: str, new: str) -> Callable[[], object]:
     return lambda: Path(name).write_text(
         Path(source).read_text(encoding="utf-8").replace(old, new), encoding="utf-8"
     )
+
+
+def _coarse() -> None:
+    """A profile of three annuli, to which no two Gaussians can be fitted."""
+    profile = import_profile(["density.csv"], quantity="density")
+    profile.save("coarse.profile.npz")
 
 
 def _into(folder: str) -> Callable[[], object]:
@@ -341,6 +349,12 @@ TINY = "--size 32x20 --mm-per-pixel .5"
 COMPARE = [
     C(f"compare wax.profile.npz --picture disk,edge {TINY}"),
     C(f"compare wax.profile.npz --picture disk --picture points {TINY} --what kernels --json"),
+    C(f"compare wax.profile.npz --picture disk,edge {TINY} --error l2 --what kernels --json"),
+    C(
+        f"compare coarse.profile.npz --picture edge {TINY} --error l2 --what kernels --table t.md",
+        set_up=_coarse,
+        note="three annuli",
+    ),
     C(
         f"compare wax.profile.npz --picture disk {TINY} --error l2 --cost passes --table t.md --chart c.svg"
     ),

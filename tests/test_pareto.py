@@ -165,6 +165,15 @@ def test_verdicts_weigh_all_pictures_alike_and_name_the_worst(comparison, error,
     assert [dataclasses.asdict(each) for each in verdicts(comparison, error, cost)] == wanted
 
 
+def test_the_95_percent_of_a_verdict_are_those_of_every_picture(comparison):
+    disk, head = (row for row in comparison.rows if row.label == "svd 1")
+    disk = dataclasses.replace(disk, relative_l2=0.5, delta_e_2000_p95=1.0)
+    head = dataclasses.replace(head, relative_l2=0.1, delta_e_2000_p95=7.0)
+    for rows in ((disk, head), (head, disk)):
+        (found,) = verdicts(dataclasses.replace(comparison, rows=rows), "l2", "weights")
+        assert (found.error, found.picture, found.delta_e_2000_p95) == (0.5, disk.picture, 7.0)
+
+
 def test_the_same_call_gives_the_same_rows_but_for_seconds(skin1, scenes, comparison):
     again = compare_kernels(skin1, scenes, candidates=SOME, threads=1)
     for row, other in zip(comparison.rows, again.rows, strict=True):

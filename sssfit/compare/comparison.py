@@ -104,6 +104,7 @@ class KernelRow:
     seconds_per_megapixel : float [s]
         Wall time of `render_separable` in float64 on the largest picture, the least of several.
     fit_seconds : float [s]
+        A sum of Gaussians continues from the smaller ones found before, whose time is not counted.
     relative_frobenius_error : array (C,)
         Of the kernel, as in `FitResult`.
     stop_reasons : tuple of str

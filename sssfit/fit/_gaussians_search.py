@@ -19,7 +19,7 @@ the new one each start is as good as the previous optimum, so the error cannot r
 import functools
 import math
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -240,11 +240,10 @@ def search(annuli: Annuli, terms: int, least_mm2: float, most_mm2: float) -> Gau
     """
     bounds = float(np.log(least_mm2)), float(np.log(most_mm2))
     step = _chain(annuli, bounds).step(terms)
-    best = step.best
     return GaussianSum(
-        np.exp(best.log_variances),
-        best.weights,
-        best.cost**0.5,
+        np.exp(step.log_variances),
+        step.weights,
+        step.cost**0.5,
         step.evaluations,
         step.stop_reason(terms),
     )
@@ -252,25 +251,30 @@ def search(annuli: Annuli, terms: int, least_mm2: float, most_mm2: float) -> Gau
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Step:
-    """The best sum after one Gaussian more; the evaluations of all steps so far."""
+    """The best sum after adding one Gaussian; ``evaluations`` are those of all steps so far.
 
-    best: Point
+    Unlike a `Point` it has no residual and no Jacobian, which would take 1 MB a channel.
+    """
+
+    log_variances: FloatArray
+    weights: FloatArray
+    cost: float
     evaluations: int
     settled: bool
-    is_enough: bool  # one more than ``best`` has did not lower the error
+    is_enough: bool = False  # adding this Gaussian did not lower the error, and it was left out
 
     @property
     def is_last(self) -> bool:
-        return self.is_enough or self.best.cost <= _MET
+        return self.is_enough or self.cost <= _MET
 
     def stop_reason(self, terms: int) -> str:
-        kept = f"{len(self.best.weights)} of {terms} terms"
+        kept = f"{len(self.weights)} of {terms} terms"
         if self.is_enough:
             return f"{kept} are enough: one more does not lower the error"
-        if self.best.cost <= _MET:
+        if self.cost <= _MET:
             return f"{kept} meet the profile to rounding"
         reason = "converged" if self.settled else f"stopped after {_MAX_EVALUATIONS} evaluations"
-        return f"{reason}; {kept} have a weight" if len(self.best.weights) < terms else reason
+        return f"{reason}; {kept} have a weight" if len(self.weights) < terms else reason
 
 
 class _Chain:
@@ -289,19 +293,17 @@ class _Chain:
             return self._steps[min(terms, len(self._steps)) - 1]
 
     def _next(self, before: _Step | None) -> _Step:
-        starts = _starts(None if before is None else before.best.log_variances, self._bounds)
+        starts = _starts(None if before is None else before.log_variances, self._bounds)
         found, settled, count = _best_of(self._annuli, starts, self._bounds)
-        if before is None:
-            return _Step(_without_zero_weights(found), count, settled, is_enough=False)
-        count += before.evaluations
-        if not found.cost < before.best.cost:
-            return _Step(before.best, count, before.settled, is_enough=True)
-        return _Step(_without_zero_weights(found), count, settled, is_enough=False)
+        if before is not None:
+            count += before.evaluations
+            if not found.cost < before.cost:
+                return replace(before, evaluations=count, is_enough=True)
+        return _Step(*_without_zero_weights(found), found.cost, count, settled)
 
 
 # The sums depend neither on the support nor, mostly, on the pixels: a comparison or a choice asks
-# for 1 to 10 Gaussians of the same channels on up to seven supports and four views. 48 channels
-# take up to 50 MB.
+# for 1 to 10 Gaussians of the same channels on up to seven supports and four views.
 @functools.lru_cache(maxsize=48)
 def _chain(annuli: Annuli, bounds: tuple[float, float]) -> _Chain:
     return _Chain(annuli, bounds)
@@ -372,10 +374,8 @@ class _LastPoint:
         return self._point.jacobian
 
 
-def _without_zero_weights(point: Point) -> Point:
-    """Drop Gaussians of weight 0 and sort the others by variance."""
+def _without_zero_weights(point: Point) -> tuple[FloatArray, FloatArray]:
+    """Return log variances, ascending, and weights, without the Gaussians of weight 0."""
     order = np.argsort(point.log_variances)
     kept = order[point.weights[order] != 0.0]
-    return Point(
-        point.log_variances[kept], point.weights[kept], point.residual, point.jacobian[:, kept]
-    )
+    return point.log_variances[kept], point.weights[kept]
