@@ -15,9 +15,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from sssfit.arrays import plain
-from sssfit.chart.page import new_page
-from sssfit.chart.panels import draw_bar, new_mosaic, put_difference, put_picture
-from sssfit.compare._panels import Panel, make_panel
+from sssfit.chart.page import draw_bar, new_mosaic, new_page, put_difference, put_picture
+from sssfit.compare.pictures import Panel, make_panel
 from sssfit.fit import fit_falloff
 from sssfit.measure.score import COLOUR_FIGURES, ImageScore, auto_exposure, measure
 from sssfit.profile import Profile

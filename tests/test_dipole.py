@@ -12,7 +12,7 @@ from sssfit.errors import SimulationError
 from sssfit.grid import paper_grid
 from sssfit.material import load_material, material_names
 from sssfit.simulate import simulate_dipole, simulate_dipole_grosjean
-from sssfit.simulate._diffusion import (
+from sssfit.simulate.dipole import (
     fresnel_moments,
     mismatch_by_moments,
     mismatch_by_polynomial,

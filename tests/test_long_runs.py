@@ -30,7 +30,7 @@ from sssfit.simulate import (
     simulate_montecarlo,
     simulate_montecarlo_many,
 )
-from sssfit.simulate._batches import BATCH_PHOTONS
+from sssfit.simulate._walks import BATCH_PHOTONS
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
 COMMAND = [sys.executable, "-m", "sssfit.cli", "simulate"]

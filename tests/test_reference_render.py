@@ -7,7 +7,7 @@ from reference_render import convolve_directly, place, random_quadrant
 
 from sssfit.errors import RenderError
 from sssfit.profile import full_kernel
-from sssfit.render import _checks
+from sssfit.render import borders as shared
 from sssfit.render.borders import BORDERS, source_indices
 from sssfit.render.reference import convolve, reference_quadrant, render_reference
 from sssfit.scene.record import Scene
@@ -165,6 +165,6 @@ def test_what_cannot_be_rendered_is_refused_in_one_line():
 def test_a_picture_too_large_is_refused_before_anything_is_allocated():
     # 20000 x 20000 that take no memory themselves
     picture = np.broadcast_to(np.ones((1, 1, 1)), (20000, 20000, 1))
-    assert _checks.LARGEST_BYTES == 8e9
+    assert shared.LARGEST_BYTES == 8e9
     with pytest.raises(RenderError, match=r"^20000 x 20000 pixels .* 12\.\d GB of .* than 8 GB;"):
         convolve(picture, np.ones((1, 1, 1)))

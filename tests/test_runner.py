@@ -6,7 +6,7 @@ import pytest
 from sssfit.errors import SssfitError
 from sssfit.profile import Profile
 from sssfit.simulate import run_figures, simulate_montecarlo_many, simulate_to_files
-from sssfit.simulate._batches import BATCH_PHOTONS
+from sssfit.simulate._walks import BATCH_PHOTONS
 from sssfit.simulate.summary import summary
 
 GRID = {"dr_mm": 0.4, "radius_mm": 8.0}

@@ -10,7 +10,7 @@ from reference_render import convolve_directly, random_kernel
 import sssfit._jit.passes  # noqa: F401
 from sssfit.errors import RenderError
 from sssfit.fit import fit_preintegrated, fit_svd
-from sssfit.render import _checks
+from sssfit.render import borders as shared
 from sssfit.render.borders import BORDERS
 from sssfit.render.reference import convolve, reference_quadrant
 from sssfit.render.separable import apply_passes, render_separable
@@ -216,7 +216,7 @@ def test_the_picture_and_the_kernel_have_to_match():
 
 
 def test_a_picture_too_large_is_refused(monkeypatch):
-    monkeypatch.setattr(_checks, "LARGEST_BYTES", 1000.0)
+    monkeypatch.setattr(shared, "LARGEST_BYTES", 1000.0)
     kernel = random_kernel(1, 2, 3, seed=9)
     render_separable(Scene("wall", np.ones((3, 4, 1)), 0.5), kernel)
     with pytest.raises(RenderError, match=r"^wall: 4 x 4 pixels would take .* GB of memory, more"):

@@ -14,9 +14,8 @@ from reference_pixels import make_profile, one_over_r_profile
 from sssfit.chart.page import save_figure
 from sssfit.chart.sheet import sheet_figure
 from sssfit.cli import main
-from sssfit.compare._panels import lightness, make_panel
 from sssfit.compare.evaluate import evaluate
-from sssfit.compare.pictures import picture_error
+from sssfit.compare.pictures import lightness, make_panel, picture_error
 from sssfit.compare.references import border_of, evaluated_scene
 from sssfit.compare.sheet import compute_sheet, production_look
 from sssfit.errors import RenderError, SssfitWarning

@@ -14,7 +14,7 @@ from sssfit.material import load_material
 from sssfit.profile import Profile
 from sssfit.simulate import Progress, simulate_montecarlo, simulate_montecarlo_many
 from sssfit.simulate import _run as runs
-from sssfit.simulate._batches import BATCH_PHOTONS
+from sssfit.simulate._walks import BATCH_PHOTONS
 
 
 def skin1(**settings):

@@ -15,8 +15,7 @@ import pytest
 from sssfit.grid import RadialGrid
 from sssfit.material import Layer, Material
 from sssfit.simulate import montecarlo, simulate_montecarlo
-from sssfit.simulate._batches import BATCH_PHOTONS
-from sssfit.simulate._walks import LayeredWalk, SemiInfiniteWalk
+from sssfit.simulate._walks import BATCH_PHOTONS, LayeredWalk, SemiInfiniteWalk
 
 HALF_SPACE = checks.medium(0.1, 0.9, 1.3)
 SLAB = Material("slab", ("c",), (Layer(1.3, [0.8], [0.01], [20.0], 5.0),))

@@ -22,10 +22,12 @@ from sssfit.chart.page import (
     LINE_WIDTH,
     Style,
     add_table,
+    draw_plane,
     name_axes,
     new_page,
+    signed_norm,
+    tick_powers,
 )
-from sssfit.chart.panels import draw_plane, signed_norm, tick_powers
 from sssfit.chart.text import kernel_subtitle, shortened
 
 if TYPE_CHECKING:

@@ -33,11 +33,13 @@ from sssfit.chart.page import (
     Style,
     add_legend,
     add_table,
+    draw_plane,
     name_axes,
     new_page,
+    signed_norm,
     tick_decades,
+    tick_powers,
 )
-from sssfit.chart.panels import draw_plane, signed_norm, tick_powers
 from sssfit.chart.text import count, method_name, shortened
 
 if TYPE_CHECKING:

@@ -10,8 +10,15 @@ from typing import TYPE_CHECKING
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from sssfit.chart.page import RC, drawable, new_page
-from sssfit.chart.panels import draw_bar, new_mosaic, put_difference, put_picture
+from sssfit.chart.page import (
+    RC,
+    draw_bar,
+    drawable,
+    new_mosaic,
+    new_page,
+    put_difference,
+    put_picture,
+)
 from sssfit.chart.text import method_name, shortened, titled
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ from sssfit.measure.delta_e import selected_pixels, selection
 from sssfit.measure.score import COLOUR_FIGURES
 from sssfit.process import thread_count
 from sssfit.profile import Profile
-from sssfit.render._checks import check_channels
+from sssfit.render.borders import check_channels
 from sssfit.render.separable import render_separable
 from sssfit.scene.record import Scene
 

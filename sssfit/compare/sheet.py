@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 
 from sssfit.arrays import FloatArray, plain
-from sssfit.compare._panels import Panel, check_colours, make_panel
 from sssfit.compare.candidates import MOST_TERMS, Candidate
-from sssfit.compare.pictures import picture_error
+from sssfit.compare.pictures import Panel, check_colours, make_panel, picture_error
 from sssfit.compare.references import references
 from sssfit.fit import Pitch, pitch_of, support_of
 from sssfit.kernel import SeparableKernel

@@ -1,5 +1,8 @@
 """MCML input files (``.mci``): the runs they describe, as materials and grids in mm.
 
+`Lines` reads the data lines of MCML's files, inputs and outputs, in order; every message names the
+file, the line, its content and what was expected there.
+
 The format is that of MCML 1.2.2: L. Wang, S. L. Jacques, "Monte Carlo modeling of light transport
 in multi-layered tissues in standard C" (the manual), 1992-1995, section 9.1; Wang, Jacques, Zheng,
 Computer Methods and Programs in Biomedicine 47, 1995. A file holds a version (1.0), the number of
@@ -24,17 +27,140 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from sssfit.errors import MaterialError, SssfitError
-from sssfit.formats._mci_lines import INPUT_COMMENT, Line, Lines, other_version
 from sssfit.grid import MOST_ANNULI, RadialGrid
 from sssfit.material import Layer, Material
 from sssfit.material.checks import MAX_ETA, MIN_ETA
 from sssfit.messages import printable, shown
-from sssfit.text import read_text
+from sssfit.text import decimal_shifted, finite_number, read_text
+
+# Comments of the two formats. In an input a comment begins at any #. In an output that would turn
+# the 1.#INF of some C libraries into 1, so a space or tab must precede it, as in MCML's own
+# comments.
+INPUT_COMMENT = re.compile(r"#")
+OUTPUT_COMMENT = re.compile(r"(?:^|\s)#")
+
+
+# First words of files of MCML 2 and 3: mcmli2.0 and mcmli_3.0 (inputs), mcmloA2.0 and mcmlo_3.0
+# (outputs in ASCII).
+_OTHER_VERSION = re.compile(r"mcml[io][ab]?_?(\d+(?:\.\d+)*)", re.IGNORECASE | re.ASCII)
+
+
+def other_version(word: str) -> str | None:
+    """Return the version of MCML that a file's first word names; None for MCML 1, and others."""
+    match = _OTHER_VERSION.fullmatch(word)
+    return match[1] if match else None
+
+
+class Line(NamedTuple):
+    """A line's number in the file, from 1, and its words without the comment, at least one."""
+
+    number: int
+    words: tuple[str, ...]
+
+
+class Lines:
+    """The data lines of a text, without blank lines and comments.
+
+    Parameters
+    ----------
+    text : str
+        The whole file.
+    origin : str
+        Its name in messages.
+    comment : re.Pattern
+        Pattern of the start of a comment.
+    error : type
+        Class of the errors to raise.
+    """
+
+    def __init__(
+        self, text: str, origin: str, *, comment: re.Pattern[str], error: type[SssfitError]
+    ) -> None:
+        self._raw = text.split("\n")
+        self._taken = 0
+        self._origin, self._error = printable(origin), error
+        self.comment = comment
+
+    def failure(self, number: int, said: str) -> SssfitError:
+        """Return the error to raise for a line."""
+        return self._error(f"{self._origin}: line {number}: {said}")
+
+    def peek(self) -> Line | None:
+        """Return the next data line without consuming it; None at the end."""
+        while self._taken < len(self._raw):
+            words = self.comment.split(self._raw[self._taken], maxsplit=1)[0].split()
+            if words:
+                return Line(self._taken + 1, tuple(words))
+            self._taken += 1
+        return None
+
+    def take(self, expected: str) -> Line:
+        """Consume the next data line, which should hold ``expected``."""
+        line = self.peek()
+        if line is None:
+            end = len(self._raw) - (self._raw[-1] == "")
+            raise self._error(
+                f"{self._origin}: ends after line {end}, before {expected}; it is cut short, or a "
+                "number in it announces more than there is."
+            )
+        self._taken += 1
+        return line
+
+    def take_words(self, *names: str) -> Line:
+        """Consume a line with as many words as there are names."""
+        wanted = ", ".join(names)
+        line = self.take(wanted)
+        if len(line.words) != len(names):
+            values = "1 value" if len(line.words) == 1 else f"{len(line.words)} values"
+            raise self.failure(
+                line.number,
+                f"{shown(' '.join(line.words))} has {values}; expected {len(names)} ({wanted}). A "
+                "comment begins with #.",
+            )
+        return line
+
+    def whole(self, line: Line, k: int, name: str, most: int) -> int:
+        """Return word k as a whole number from 1 to ``most``."""
+        word = line.words[k]
+        value = int(word) if re.fullmatch(r"\+?[0-9]{1,18}", word) else 0
+        if not 1 <= value <= most:
+            raise self.failure(
+                line.number,
+                f"{name} = {shown(word)}; expected a whole number from 1 to {most}, in digits.",
+            )
+        return value
+
+    def real(
+        self,
+        line: Line,
+        k: int,
+        name: str,
+        allowed: Callable[[float], bool],
+        expected: str,
+        *,
+        tenfold: int = 0,
+    ) -> float:
+        """Return word k, checked as written, times 10 to the power ``tenfold``.
+
+        The shift is decimal: 7.4 per cm gives the same bits as 0.74 per mm.
+        """
+        word = line.words[k]
+        value = finite_number(word)
+        if value is None:
+            raise self.failure(
+                line.number, f"{name} = {shown(word)} is not a number; expected {expected}."
+            )
+        if not allowed(value):
+            raise self.failure(
+                line.number, f"{name} = {shown(word)} is out of range; expected {expected}."
+            )
+        return decimal_shifted(word, tenfold)
+
 
 CHANNEL = "mono"
 SEMI_INFINITE_CM = 1e6  # 10 km; the manual writes 1E8 cm, "Separable Subsurface Scattering" 1e7

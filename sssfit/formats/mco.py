@@ -21,8 +21,15 @@ import numpy as np
 from sssfit import __version__
 from sssfit.arrays import FloatArray, check_names
 from sssfit.errors import MaterialError, ProfileError, SssfitWarning
-from sssfit.formats._mci_lines import INPUT_COMMENT, OUTPUT_COMMENT, Line, Lines, other_version
-from sssfit.formats.mci import MciRun, read_run
+from sssfit.formats.mci import (
+    INPUT_COMMENT,
+    OUTPUT_COMMENT,
+    Line,
+    Lines,
+    MciRun,
+    other_version,
+    read_run,
+)
 from sssfit.material import Layer, Material
 from sssfit.messages import printable, shown
 from sssfit.profile import FORMAT, Profile

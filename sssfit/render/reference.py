@@ -16,8 +16,7 @@ from sssfit.arrays import FloatArray
 from sssfit.process import thread_count
 from sssfit.profile import Profile
 from sssfit.profile.pixels import checked_support
-from sssfit.render._checks import check_channels, check_memory
-from sssfit.render.borders import source_indices
+from sssfit.render.borders import check_channels, check_memory, source_indices
 from sssfit.scene.record import Scene
 
 ComplexArray = npt.NDArray[np.complex128]

@@ -16,8 +16,7 @@ import numpy.typing as npt
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
 from sssfit.process import thread_count
-from sssfit.render._checks import check_channels, check_memory
-from sssfit.render.borders import source_indices
+from sssfit.render.borders import check_channels, check_memory, source_indices
 from sssfit.scene.record import Scene
 
 FloatArray = npt.NDArray[np.floating[Any]]

@@ -33,7 +33,7 @@ from sssfit.kinds import KINDS
 from sssfit.material import Material
 from sssfit.messages import printable, shown
 from sssfit.profile.npz import read_npy
-from sssfit.simulate._batches import BATCH_PHOTONS, MAX_PHOTONS, Tally
+from sssfit.simulate._walks import BATCH_PHOTONS, MAX_PHOTONS, Tally
 
 FORMAT = "sssfit.checkpoint/1"
 _MARKS = KINDS["checkpoint"].marks

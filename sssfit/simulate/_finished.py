@@ -15,8 +15,8 @@ from sssfit.errors import SimulationError, SssfitWarning
 from sssfit.grid import make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
-from sssfit.simulate._batches import MAX_PHOTONS, Sums, Tally, Walk
 from sssfit.simulate._run import EndCondition
+from sssfit.simulate._walks import MAX_PHOTONS, Sums, Tally, Walk
 
 AUTO_BEYOND = 1e-3  # radius "auto": less than this share of any channel lies beyond the grid
 

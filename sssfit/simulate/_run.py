@@ -16,8 +16,8 @@ from time import perf_counter
 from sssfit._jit import thread_pool
 from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError
-from sssfit.simulate._batches import BATCH_PHOTONS, Tally, Walk, relative_errors
 from sssfit.simulate._checkpoint import Checkpoint, State
+from sssfit.simulate._walks import BATCH_PHOTONS, Tally, Walk, relative_errors
 
 REPORT_SECONDS = 0.1
 # A channel that returned no light in as many photons as a default run has would need 10 000 times

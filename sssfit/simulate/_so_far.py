@@ -15,7 +15,6 @@ from sssfit.grid import RadialGrid
 from sssfit.material import Material
 from sssfit.messages import shown
 from sssfit.profile import Profile
-from sssfit.simulate._batches import MAX_PHOTONS, Walk, relative_errors
 from sssfit.simulate._checkpoint import (
     FORMAT,
     CheckpointError,
@@ -26,6 +25,7 @@ from sssfit.simulate._checkpoint import (
 )
 from sssfit.simulate._finished import profile_of
 from sssfit.simulate._run import EndCondition
+from sssfit.simulate._walks import MAX_PHOTONS, Walk, relative_errors
 from sssfit.simulate.montecarlo import check_media, make_walk
 
 

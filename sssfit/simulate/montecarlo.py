@@ -22,7 +22,6 @@ from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
 from sssfit.process import available_cores
 from sssfit.profile import Profile
-from sssfit.simulate._batches import Walk, relative_errors
 from sssfit.simulate._checkpoint import Checkpoint, settings_of
 from sssfit.simulate._finished import (
     AUTO_BEYOND,
@@ -32,7 +31,13 @@ from sssfit.simulate._finished import (
     whole_number,
 )
 from sssfit.simulate._run import EndCondition, Progress, run
-from sssfit.simulate._walks import LayeredWalk, SemiInfiniteWalk, relative_eta
+from sssfit.simulate._walks import (
+    LayeredWalk,
+    SemiInfiniteWalk,
+    Walk,
+    relative_errors,
+    relative_eta,
+)
 
 # With fewer, a channel may have a handful of hits, and its error estimate is unreliable.
 HONEST_PHOTONS = 1000

@@ -37,8 +37,7 @@ from sssfit.simulate._deterministic import (
     energies_from_beyond,
     energies_from_cumulative,
 )
-from sssfit.simulate._diffusion import Diffusion, classical, mismatch_by_polynomial
-from sssfit.simulate.dipole import dipole_beyond
+from sssfit.simulate.dipole import Diffusion, classical, dipole_beyond, mismatch_by_polynomial
 
 # Step of ln k; 0.02 would do. The bias, a factor k^0.5, makes both ends of the range fade: without
 # it the periodic transform wraps Rhat(0) around, with an error of 1e-7 instead of 1e-14.
