@@ -58,6 +58,24 @@ def thread_count(threads: int | None) -> int:
     return count
 
 
+def one_blas_thread() -> contextlib.AbstractContextManager[Any]:
+    """Return a context in which numpy's and scipy's linear algebra use one thread.
+
+    BLAS waits for its threads: up to ten times longer if another process holds a core.
+    """
+    limit: contextlib.AbstractContextManager[Any]
+    limit = _blas("scipy.linalg._fblas" in sys.modules).limit(limits=1, user_api="blas")
+    return limit
+
+
+@functools.cache
+def _blas(_scipys: bool) -> Any:
+    """Return the loaded BLAS libraries; scipy has its own. Looking for them takes 3 ms."""
+    from threadpoolctl import ThreadpoolController
+
+    return ThreadpoolController()
+
+
 # Memory
 
 # Address space [MB] of a small run with one thread, some 10 % more than was seen.

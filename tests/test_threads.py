@@ -14,6 +14,7 @@ import pytest
 
 from sssfit.grid import RadialGrid
 from sssfit.material import Layer, Material
+from sssfit.process import one_blas_thread
 from sssfit.simulate import montecarlo, simulate_montecarlo
 from sssfit.simulate._walks import BATCH_PHOTONS, LayeredWalk, SemiInfiniteWalk
 
@@ -100,3 +101,17 @@ def test_a_compiled_batch_lets_other_threads_run(kind, material):
 def test_the_yardstick_notices_work_that_holds_the_interpreter():
     values = list(np.linspace(0.0, 1.0, 100_000))
     assert not any(runs_beside(lambda: math.fsum(values)) for _ in range(10))
+
+
+def test_all_linear_algebra_is_held_to_one_thread():
+    import scipy.linalg  # noqa: F401 (brings a BLAS of its own)
+    from threadpoolctl import threadpool_info
+
+    def threads():
+        return [each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"]
+
+    before = threads()
+    with one_blas_thread():
+        assert set(threads()) == {1}
+    assert threads() == before
+    assert len(before) >= 2

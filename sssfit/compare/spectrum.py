@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from sssfit.arrays import FloatArray, plain
 from sssfit.fit import Pitch, make_target
 from sssfit.fit.svd import all_eigenvalues
+from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
 
 _MOST = 12  # terms in figures; the chart shows as many
@@ -101,7 +101,7 @@ def compute_spectrum(
     """
     target = make_target(profile, mm_per_pixel, support_mm)
     values = np.zeros((target.half_pixels + 1, profile.n_channels))
-    with threadpool_limits(1, user_api="blas"):  # as ``sssfit.fit`` does
+    with one_blas_thread():  # as ``sssfit.fit`` does
         for c in np.flatnonzero(~target.is_empty):
             values[:, c] = all_eigenvalues(target.quadrant(int(c)))
     return Spectrum(profile, target.mm_per_pixel, values)

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from threadpoolctl import threadpool_limits
 
 from sssfit import __version__
 from sssfit.arrays import FloatArray, plain
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._target import Target
 from sssfit.kernel import SeparableKernel
+from sssfit.process import one_blas_thread
 
 ENERGIES = ("rescale", "keep")
 
@@ -197,7 +197,7 @@ def fit_channels(
     channels = range(target.profile.n_channels)
     # One thread: BLAS waits for its threads, up to ten times longer if another process holds a
     # core.
-    with threadpool_limits(1, user_api="blas"):
+    with one_blas_thread():
         fits = [_zero_fit(target) if empty[c] else fit_channel(c) for c in channels]
         errors = _frobenius_errors(target, fits)
     signs, half = _stacked(fits)

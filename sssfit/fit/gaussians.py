@@ -21,12 +21,12 @@ import operator
 import warnings
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._gaussians_search import GaussianSum, fitted_annuli, is_steep, make_annuli, search
 from sssfit.fit._result import ChannelFit, FitResult, energy_factor, fit_channels, rescales_energy
 from sssfit.fit._target import Pitch, Target, make_target
+from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
 from sssfit.shapes import gaussian_line_integral
 
@@ -101,7 +101,7 @@ def fit_gaussians(
         return _as_passes(target, channel, found, on_grid, rescale=rescale)
 
     # One BLAS thread: matrices of a few thousand rows and 10 columns do not profit from more.
-    with threadpool_limits(1, user_api="blas"):
+    with one_blas_thread():
         return fit_channels(
             target,
             "gaussians",

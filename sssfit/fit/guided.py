@@ -23,6 +23,7 @@ from sssfit.fit._nlopt import Function, Minimum, minimise
 from sssfit.fit._result import ChannelFit, FitResult, fit_channels
 from sssfit.fit._target import Pitch, Target, make_target
 from sssfit.optics import gauss_legendre
+from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
 from sssfit.profile.bins import mean_free_paths_mm
 
@@ -86,8 +87,6 @@ def fit_guided(
     SssfitWarning
         The middle pixel holds over a quarter of sum(a) and over twice its pre-integrated share.
     """
-    from threadpoolctl import threadpool_limits
-
     _check_settings(k, b, centre_bound)
     target = guided_target(profile, mm_per_pixel, support_mm)
     extents_mm = extents_of(target)
@@ -97,7 +96,7 @@ def fit_guided(
         return fit_one_pass(target, channel, extents_mm[channel], k, b, most)
 
     # Matrices of at most 257 x 257: a second thread only waits for the first.
-    with threadpool_limits(1, user_api="blas"):
+    with one_blas_thread():
         result = fit_channels(
             target,
             "guided",

@@ -22,7 +22,6 @@ from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
-from threadpoolctl import threadpool_limits
 
 from sssfit._jit import compiled_before, thread_pool
 from sssfit.arrays import FloatArray
@@ -30,7 +29,7 @@ from sssfit.errors import SimulationError, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
 from sssfit.optics import entering_of_diffuse, normal_transmittance
-from sssfit.process import available_cores
+from sssfit.process import available_cores, one_blas_thread
 from sssfit.profile import Profile
 from sssfit.simulate._depth import (
     Resolution,
@@ -166,7 +165,7 @@ def simulate_exact_many(
     # with another process on one core BLAS's waiting threads made skin1 take 14 s instead of 1.8.
     from scipy import optimize, special  # noqa: F401 (before the threads, which need them)
 
-    with thread_pool(threads) as pool, threadpool_limits(1, user_api="blas"):
+    with thread_pool(threads) as pool, one_blas_thread():
         for eta, group in groups.items():
             own = [materials[k] for k in group], [grids[k] for k in group]
             found = _solve_group(eta, *own, tolerance, _Workers(pool, stop))
@@ -209,7 +208,7 @@ def diffuse_reflectance(
         raise SimulationError(f"albedo = {albedo!r}; expected numbers from 0 to 1.")
     _check_light(eta, light)
     level = _LEVELS[3]
-    with threadpool_limits(1, user_api="blas"):
+    with one_blas_thread():
         if light == "diffuse":
             once = single_scattering_of_diffuse_light(eta)
             response = respond_to_diffuse_light(eta, albedos, level.depth)
