@@ -12,7 +12,7 @@ from ._options import Common
 from ._output import say, say_notes
 
 if TYPE_CHECKING:
-    from sssfit.kernel import SeparableKernel
+    from sssfit.kernel import Kernel, SeparableKernel
     from sssfit.kinds import Loaded
     from sssfit.material import Material
     from sssfit.profile import Profile
@@ -46,7 +46,7 @@ def kernel_name(given: str | None, common: Common) -> str:
 
 
 def profile_of_kernel(
-    kernel: SeparableKernel, name: str, given: str | None, common: Common
+    kernel: Kernel, name: str, given: str | None, common: Common
 ) -> tuple[Profile | None, str | None]:
     """Return a kernel's profile and its file: the one given, else the one it was fitted to.
 
@@ -74,6 +74,13 @@ def is_mci(name: str | None) -> bool:
 def load(kind: type[_Record], name: str) -> _Record:
     """Read a profile or a kernel; ``-`` is stdin."""
     return kind.read(binary_stdin(), "stdin") if name == "-" else kind.load(name)
+
+
+def load_kernel(name: str) -> Kernel:
+    """Read a separable kernel or a table of taps; ``-`` is stdin."""
+    from sssfit.kernel import read_kernel
+
+    return read_kernel(binary_stdin(), "stdin") if name == "-" else read_kernel(name)
 
 
 def load_source(name: str) -> Material | Profile:

@@ -190,6 +190,7 @@ _KINDS: dict[str, Callable[[Setting], Any]] = {
     "seconds": lambda _: NumberRange(min=0),
     "count": lambda each: Count(*each.among),
     "whole": lambda each: WholeRange(*each.among),
+    "text": lambda _: None,
     "choice": lambda each: click.Choice(each.among),
 }
 

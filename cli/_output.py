@@ -17,7 +17,7 @@ from ._options import Common, in_options
 
 # What is written, and the ending of its name.
 PROFILE, KERNEL = ("a profile", ".npz"), ("a kernel", ".json")
-_ENDINGS = (".checkpoint", ".npz", ".json", ".toml", ".kernel", ".profile")
+_ENDINGS = (".checkpoint", ".npz", ".json", ".toml", ".kernel", ".taps", ".profile")
 
 
 def say(common: Common, line: str) -> None:

@@ -3,7 +3,7 @@
 Those of methods and of made pictures are made from their entries, in ``_methods``.
 """
 
-from sssfit.methods import FITS
+from sssfit.methods import ALL_FITS, FITS
 from sssfit.scene.made import COMPARED, EDGE_DEGREES, MADE
 
 from ._options import (
@@ -138,7 +138,7 @@ CHART = (
 
 FIT_PIXELS = (
     flag("--list listing", "List the methods."),
-    option("--method", list(FITS), None, "Fit method; --list describes each."),
+    option("--method", list(ALL_FITS), None, "Fit method; --list describes each."),
     option("--mm-per-pixel", LengthOr("profile"), "MM|profile", "Size of a pixel of the kernel; "
            "profile is the width of the profile's first annulus.  [default: 0.3]"),
     option("--support", LengthOr("auto"), "MM|auto", "Half width of the kernel; auto is the "
@@ -147,7 +147,7 @@ FIT_PIXELS = (
 )
 FIT_OUTPUT = (
     option("-o --output", None, "FILE", "Output file, - for stdout.  [default: "
-           "PROFILE.METHOD.kernel.json]"),
+           "PROFILE.METHOD.kernel.json, .taps.json for cascade]"),
     flag("--force", "Replace an input, or a file that is not our kernel."),
 )
 

@@ -19,9 +19,9 @@ if TYPE_CHECKING:
     from sssfit.profile import Profile
 
 _VIEWS = ("models", "spectrum", "guide")
-_COMPUTED = ("kernel", *_VIEWS)
-_FILES = ("profile", "kernel", "material", "checkpoint")
-_MEMORY = {"kernel": "kernel chart", **dict.fromkeys(_VIEWS, "figures")}
+_COMPUTED = ("kernel", "taps", *_VIEWS)
+_FILES = ("profile", "kernel", "taps", "material", "checkpoint")
+_MEMORY = {"kernel": "kernel chart", "taps": "kernel chart", **dict.fromkeys(_VIEWS, "figures")}
 
 
 @click.command()
@@ -29,7 +29,7 @@ _MEMORY = {"kernel": "kernel chart", **dict.fromkeys(_VIEWS, "figures")}
 @options(*CHART)
 @common_options
 def chart(file: str | None, common: Common, **given: Any) -> None:
-    """Draw FILE: a profile, a kernel, a material or the checkpoint of a walk.
+    """Draw FILE: a profile, a kernel, a table of taps, a material or the checkpoint of a walk.
 
     FILE is any of these, under any name, or - for stdin; by default the newest .profile.npz in this
     folder.
@@ -38,7 +38,8 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
     R_d over r in mean free paths; R_d(x, y) as an image; with error bands.
 
     A kernel: its passes, the 2D kernel beside the profile's, their difference, and slices along the
-    axis and the diagonal. A material: coefficients, mean free paths and albedos.
+    axis and the diagonal. A table of taps: one point of light, stage by stage. A material:
+    coefficients, mean free paths and albedos.
 
     With --spectrum: the share of each separable term in the 2D kernel, of the sum of squares and of
     the sum of absolute values, and the number of terms for an error of 1 %.
@@ -63,7 +64,7 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
     from sssfit.chart import figure_of
     from sssfit.chart.files import chart_format
     from sssfit.export.reports import page
-    from sssfit.kernel import SeparableKernel
+    from sssfit.kernel import SeparableKernel, Taps
     from sssfit.profile import Profile
 
     if given["output"] not in (None, "-"):
@@ -76,7 +77,7 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
         refuse(given, {"photons": "a new walk, and FILE is already one"})
     check_memory(_MEMORY.get(kind, "chart"), common.threads)
     profile, source = None, name if kind in ("profile", "spectrum", "guide") else None
-    if isinstance(found, SeparableKernel):
+    if isinstance(found, SeparableKernel | Taps):
         profile, source = profile_of_kernel(found, name, given["profile"], common)
     stem = made_of if kind == "models" else stem_of(name, made_of)
     path = target(given["output"], f"{stem}.{kind}.png")
@@ -106,7 +107,7 @@ def _view(file: str | None, given: Mapping[str, Any]) -> str:
 def _found(name: str, view: str, common: Common) -> tuple[Any, str, str | None]:
     """Read the file; return what is drawn of it, and the name of what it was made from."""
     from sssfit.errors import ProfileError
-    from sssfit.kernel import SeparableKernel
+    from sssfit.kernel import SeparableKernel, Taps
     from sssfit.material import Material
     from sssfit.material.checks import is_name
     from sssfit.profile import Profile
@@ -118,9 +119,10 @@ def _found(name: str, view: str, common: Common) -> tuple[Any, str, str | None]:
         return found, view or "material", found.name
     if isinstance(found, Profile):
         return found, view or "profile", found.material_name
-    if isinstance(found, SeparableKernel):
+    if isinstance(found, SeparableKernel | Taps):
         made_of = found.meta.get("material")
-        return found, "kernel", f"{made_of}.{found.method}" if is_name(made_of) else None
+        kind = "kernel" if isinstance(found, SeparableKernel) else "taps"
+        return found, kind, f"{made_of}.{found.method}" if is_name(made_of) else None
     first, count = found.profiles[0], len(found.profiles)
     if count > 1:
         say(common, f"Drawing {first.label}, the first of the walk's {count} materials.")
@@ -138,6 +140,8 @@ def _computed(
     if kind == "kernel":
         channels = [given["channel"]] if asked else None
         return compare.view_kernel(found, profile, channels=channels)
+    if kind == "taps":
+        return compare.view_taps(found, profile)
     if kind != "models":
         compute = compare.compute_guide if kind == "guide" else compare.compute_spectrum
         return compute(found, mm_per_pixel=given["mm_per_pixel"], **asked)

@@ -6,18 +6,18 @@ from typing import Any
 
 import click
 
-from sssfit.methods import FITS, lines_of, settings_of
+from sssfit.methods import ALL_FITS, TAPS, lines_of, settings_of
 from sssfit.process import check_memory
 
 from ._input import load, profile_name
-from ._options import Common, common_options, method_options, options, own_settings
+from ._options import Common, common_options, method_options, options, own_settings, refuse
 from ._output import KERNEL, finish_one, held, stem_of, target, write
 from ._verb_options import FIT_OUTPUT, FIT_PIXELS
 
 
-@click.command(epilog="\b\nMethods:\n" + lines_of(FITS))
+@click.command(epilog="\b\nMethods:\n" + lines_of(ALL_FITS))
 @click.argument("profile", required=False)
-@options(*FIT_PIXELS, method_options(FITS), *FIT_OUTPUT)
+@options(*FIT_PIXELS, method_options(ALL_FITS), *FIT_OUTPUT)
 @common_options
 @click.pass_context
 def fit(context: click.Context, /, profile: str | None, common: Common, **given: Any) -> None:
@@ -36,25 +36,36 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
     """
     method = given["method"]
     if given["listing"]:
-        click.echo(lines_of(FITS))
+        click.echo(lines_of(ALL_FITS))
         return
     if method is None:
         raise click.UsageError("name a --method; `sssfit fit --list` has them.")
     from sssfit.export.reports import page
-    from sssfit.fit import fit_result
-    from sssfit.kernel import is_kernel_file
+    from sssfit.fit import fit_result, fit_taps
+    from sssfit.kernel import is_kernel_file, is_taps_file
     from sssfit.profile import Profile
 
-    known = settings_of(FITS)
-    settings = own_settings(context, FITS, method, {key: given[key] for key in known})
+    known = settings_of(ALL_FITS)
+    settings = own_settings(context, ALL_FITS, method, {key: given[key] for key in known})
     name = profile_name(profile, common)
     source = load(Profile, name)
-    counted, stem = FITS[method].counted, stem_of(name, source.material_name)
+    counted, stem = ALL_FITS[method].counted, stem_of(name, source.material_name)
     count = settings.get(counted, known[counted][0].words) if counted else ""
+    settings["mm_per_pixel"] = given["mm_per_pixel"]
+    settings["support_mm"] = None if given["support"] == "auto" else given["support"]
+    if method in TAPS:
+        refuse(given, {"normalize": "separable kernels"})
+        count = settings.get("stages", f"{float(count):g}").replace("|", "_")
+        path = target(given["output"], f"{stem}.{method}{count}.taps.json")
+        with held([path], is_taps_file, inputs=[name], force=given["force"], named=KERNEL):
+            found = fit_taps(source, method, seed=common.seed, **settings)
+            write(found.taps, path)
+        figures = {"profile": name, **found.to_dict()}
+        finish_one(common, "fit", path, figures, page("fit-taps", figures), "the table of taps")
+        return
     path = target(given["output"], f"{stem}.{method}{count}.kernel.json")
     settings |= _picture_target(settings, common.threads)
-    settings |= {key: given[key] for key in ("mm_per_pixel", "normalize")}
-    settings["support_mm"] = None if given["support"] == "auto" else given["support"]
+    settings["normalize"] = given["normalize"]
     with held([path], is_kernel_file, inputs=[name], force=given["force"], named=KERNEL):
         result = fit_result(source, method, **settings)
         write(result.kernel, path)

@@ -11,7 +11,7 @@ import click
 from sssfit.methods import settings_of
 from sssfit.scene.made import MADE
 
-from ._input import kernel_name, load, profile_of_kernel
+from ._input import kernel_name, load_kernel, profile_of_kernel
 from ._options import Common, common_options, method_options, options, own_settings
 from ._output import binary_stdout, finish, held, say_notes, stem_of, target
 from ._picture import check_pictures
@@ -19,7 +19,7 @@ from ._verb_options import RENDER, RENDER_PICTURE
 
 if TYPE_CHECKING:
     from sssfit.compare.evaluate import Evaluation
-    from sssfit.kernel import SeparableKernel
+    from sssfit.kernel import Kernel
 
 # Of the head's key light: behind both ears.
 _BEHIND_DEGREES = 170.0
@@ -33,11 +33,12 @@ _BEHIND_DEGREES = 170.0
 def render(context: click.Context, /, kernel: str | None, common: Common, **given: Any) -> None:
     """Apply KERNEL to a picture of irradiance, and measure its error.
 
-    KERNEL is a .kernel.json file, or - for stdin; by default the newest in this folder. The result
-    is radiant exitance in linear light. Made pictures use the kernel's pixel size; your own file
-    (EXR, HDR, TIFF, PNG, JPG, TGA) must have it too, except with --screen. The true picture is the
-    same irradiance convolved with the whole 2D kernel of the profile; Delta E 2000 compares the two
-    in sRGB at the exposure. The alpha channel of your file is copied unchanged.
+    KERNEL is a .kernel.json or .taps.json file, or - for stdin; by default the newest .kernel.json
+    in this folder. The result is radiant exitance in linear light. Made pictures use the kernel's
+    pixel size; your own file (EXR, HDR, TIFF, PNG, JPG, TGA) must have it too, except with --screen
+    and for a table of taps, which serves any size. The true picture is the same irradiance
+    convolved with the whole 2D kernel of the profile; Delta E 2000 compares the two in sRGB at the
+    exposure. The alpha channel of your file is copied unchanged.
 
     \b
       sssfit render skin1.svd3.kernel.json --irradiance head -o out.exr
@@ -48,11 +49,10 @@ def render(context: click.Context, /, kernel: str | None, common: Common, **give
     """
     from sssfit.export.reports import page
     from sssfit.formats.pictures import image_format, is_image_file
-    from sssfit.kernel import SeparableKernel
 
     own = _check(context, given)
     name, irradiance = kernel_name(kernel, common), given["irradiance"]
-    loaded = load(SeparableKernel, name)
+    loaded = load_kernel(name)
     path = target(given["output"], f"{stem_of(name)}.{Path(irradiance).stem}.exr")
     asked = {"picture": path, "truth": given["truth"], "difference": given["difference"]}
     files = {key: Path(each) for key, each in asked.items() if each}
@@ -100,7 +100,7 @@ def _check(context: click.Context, given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _rendered(
-    kernel: SeparableKernel,
+    kernel: Kernel,
     name: str,
     given: Mapping[str, Any],
     own: dict[str, Any],
@@ -109,6 +109,7 @@ def _rendered(
     """Light the picture and render it; return the file of its profile, too."""
     from sssfit.compare.evaluate import evaluate, evaluate_in_screen_space
     from sssfit.fit import MM_PER_PIXEL
+    from sssfit.kernel import SeparableKernel
     from sssfit.scene.load import load_scene
 
     screen, picture = given["screen"], given["irradiance"]
@@ -119,6 +120,8 @@ def _rendered(
     say_notes(common, notes)
     how = {key: given[key] for key in ("transmit", "border")} | {"threads": common.threads}
     if screen:
+        if not isinstance(kernel, SeparableKernel):
+            raise click.UsageError(f"--screen needs a separable kernel; {name} is a table of taps.")
         follow = given["follow"] or "gaussian"
         return None, evaluate_in_screen_space(scene, kernel, follow=follow, **how)
     profile, source = profile_of_kernel(kernel, name, given["profile"], common)

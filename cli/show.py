@@ -11,6 +11,7 @@ from ._output import finish
 _TITLES = {
     "profile": "{name}: diffuse reflectance profile ({format})\n",
     "kernel": "{name}: separable kernel ({format})\n",
+    "taps": "{name}: table of taps ({format})\n",
     "material": "",
     "checkpoint": "{name}: checkpoint of a photon walk\n",
 }
@@ -20,7 +21,7 @@ _TITLES = {
 @click.argument("file", required=False)
 @common_options
 def show(file: str | None, common: Common) -> None:
-    """Print what FILE holds: a profile, a kernel, a material or the checkpoint of a walk.
+    """Print what FILE holds: a profile, kernel, table of taps, material or checkpoint of a walk.
 
     FILE is any of these, under any name, or - for stdin; by default the newest .profile.npz in this
     folder.

@@ -283,6 +283,34 @@ FITS: Mapping[str, Method] = {
     ),
 }
 
+# Fits whose result is a table of taps, as a shader runs it; the others make separable kernels.
+TAPS: Mapping[str, Method] = {
+    "cascade": Method(
+        "sssfit.fit.cascade:fit_cascade",
+        "few fetches: a chain of small blurs, whose stages are all added up",
+        (
+            Setting("fetches", "number", "most texture fetches a pixel.", "N", words="24"),
+            Setting(
+                "stages",
+                "text",
+                "tap pairs a pass of each stage, such as 1-1|2-2|2-2; | halves the picture.",
+                "STAGES",
+            ),
+            Setting("passes", "whole", "most passes of the stages.", "N", (2, 1000)),
+            Setting("full_resolution", "flag", "do not halve the picture."),
+            Setting(
+                "spectrum",
+                "choice",
+                "pictures that the kernel is for: natural ones, or white noise.",
+                among=("natural", "white"),
+                default="natural",
+            ),
+        ),
+        counted="fetches",
+    ),
+}
+ALL_FITS: Mapping[str, Method] = {**FITS, **TAPS}
+
 
 def settings_of(methods: Mapping[str, Method]) -> dict[str, tuple[Setting, tuple[str, ...]]]:
     """Return every setting once by its name, with the names of the methods that have it."""

@@ -38,7 +38,7 @@ from sssfit.errors import SssfitWarning
 from sssfit.fit import fit_gaussians, fit_svd
 from sssfit.formats.csv import csv_text
 from sssfit.formats.pictures import load_image, save_image
-from sssfit.kernel import SeparableKernel
+from sssfit.kernel import SeparableKernel, Taps
 from sssfit.material import Material, parse_material
 from sssfit.profile import Profile
 from sssfit.scene.made import make_scene
@@ -192,6 +192,11 @@ class Ran:
     @property
     def kernel(self) -> Any:
         return weights_of(self.loaded(SeparableKernel.load, ".kernel.json"))
+
+    @property
+    def taps(self) -> Any:
+        found = self.loaded(Taps.load, ".taps.json")
+        return [found.structure, found.mm_per_pixel, found.blend]
 
     @property
     def picture(self) -> np.ndarray:

@@ -4,19 +4,19 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from sssfit.errors import SssfitError
-from sssfit.kernel.record import SeparableKernel
+from sssfit.kernel import Kernel
 from sssfit.messages import printable
 from sssfit.profile import Profile
 
 
 def find_profile(
-    kernel: SeparableKernel, kernel_file: str, folders: Iterable[Path]
+    kernel: Kernel, kernel_file: str, folders: Iterable[Path]
 ) -> tuple[Profile | None, str | None, str | None]:
     """Find the profile with the fingerprint that a kernel recorded, from any program.
 
     Parameters
     ----------
-    kernel : SeparableKernel
+    kernel : SeparableKernel or Taps
     kernel_file : str
         The kernel's name in the note.
     folders : iterable of Path
@@ -48,7 +48,7 @@ def _read(path: Path) -> Profile | None:
         return None
 
 
-def _missing(kernel: SeparableKernel, name: str, profiles: Sequence[tuple[Path, Profile]]) -> str:
+def _missing(kernel: Kernel, name: str, profiles: Sequence[tuple[Path, Profile]]) -> str:
     """Return why there is none, as text."""
     end = "so nothing is measured"
     if kernel.meta.get("profile_sha256") is None:
