@@ -49,8 +49,7 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
     settings = own_settings(context, ALL_FITS, method, {key: given[key] for key in known})
     name = profile_name(profile, common)
     source = load(Profile, name)
-    counted, stem = ALL_FITS[method].counted, stem_of(name, source.material_name)
-    count = settings.get(counted, known[counted][0].words) if counted else ""
+    count, stem = ALL_FITS[method].count_of(settings), stem_of(name, source.material_name)
     settings["mm_per_pixel"] = given["mm_per_pixel"]
     settings["support_mm"] = None if given["support"] == "auto" else given["support"]
     if method in TAPS:

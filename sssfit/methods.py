@@ -8,7 +8,7 @@ function is asked for, so that help answers at once.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from operator import attrgetter
 from typing import Any
@@ -68,8 +68,7 @@ class Method:
         Help text on one line.
     settings : tuple of Setting
     counted : str
-        The setting whose value becomes part of the kernel's file name (svd3), by ``words`` if it is
-        not given.
+        The setting whose value becomes part of the kernel's file name (svd3); see `count_of`.
     shares : bool
         Whether the function takes a list of materials, shares their common work, and takes
         ``threads`` and ``stop``; the others take one material.
@@ -87,6 +86,11 @@ class Method:
     def load(self) -> Callable[..., Any]:
         """Import the method's function."""
         return imported(self.function)
+
+    def count_of(self, given: Mapping[str, Any]) -> Any:
+        """Return the value of the counted setting among those given, by default its ``words``."""
+        own = {each.name: each.words for each in self.settings}
+        return given.get(self.counted, own.get(self.counted, ""))
 
 
 DEON_SKIN = "deon-skin"  # a profile that is made without a material
@@ -176,6 +180,14 @@ _ENERGY = Setting(
     "least error).",
     among=("rescale", "keep"),
     words="rescale",
+)
+
+_SPECTRUM = Setting(
+    "spectrum",
+    "choice",
+    "pictures that the kernel is for: natural ones, or white noise.",
+    among=("natural", "white"),
+    words="natural",
 )
 
 FITS: Mapping[str, Method] = {
@@ -276,6 +288,15 @@ FITS: Mapping[str, Method] = {
             ),
         ),
     ),
+    "weighted": Method(
+        "sssfit.fit.weighted:fit_weighted",
+        "1 to 8 terms, fitted as pictures see them; two do what five of svd do",
+        (
+            Setting("rank", "whole", "number of terms.", "N", (1, 1000), words="2"),
+            _SPECTRUM,
+        ),
+        counted="rank",
+    ),
     "burley": Method(
         "sssfit.fit.burley:fit_burley",
         "one term: normalised diffusion with one shape per channel, as engines use it",
@@ -298,13 +319,7 @@ TAPS: Mapping[str, Method] = {
             ),
             Setting("passes", "whole", "most passes of the stages.", "N", (2, 1000)),
             Setting("full_resolution", "flag", "do not halve the picture."),
-            Setting(
-                "spectrum",
-                "choice",
-                "pictures that the kernel is for: natural ones, or white noise.",
-                among=("natural", "white"),
-                default="natural",
-            ),
+            _SPECTRUM,
         ),
         counted="fetches",
     ),
@@ -313,12 +328,21 @@ ALL_FITS: Mapping[str, Method] = {**FITS, **TAPS}
 
 
 def settings_of(methods: Mapping[str, Method]) -> dict[str, tuple[Setting, tuple[str, ...]]]:
-    """Return every setting once by its name, with the names of the methods that have it."""
-    found: dict[str, tuple[Setting, tuple[str, ...]]] = {}
+    """Return every setting once by its name, with the names of the methods that have it.
+
+    Where methods describe a default differently, all say theirs: "3 for svd, 2 for weighted".
+    """
+    owned: dict[str, dict[str, Setting]] = {}
     for name, method in methods.items():
         for each in method.settings:
-            owners = found[each.name][1] if each.name in found else ()
-            found[each.name] = each, (*owners, name)
+            owned.setdefault(each.name, {})[name] = each
+    found = {}
+    for key, owners in owned.items():
+        first, words = next(iter(owners.values())), {each.words for each in owners.values()}
+        if len(words) > 1:
+            said = ", ".join(f"{each.words} for {name}" for name, each in owners.items())
+            first = replace(first, words=said)
+        found[key] = first, tuple(owners)
     return found
 
 

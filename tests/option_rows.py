@@ -282,7 +282,7 @@ FIT = {
     ),
     "--support": _fitted("--support", "2.1", "svd", "auto", support_mm=2.1),
     "--normalize": _fitted("--normalize", "", "preintegrated", normalize=True),
-    "--rank": _fitted("--rank", "2", "svd", "3", rank=2),
+    "--rank": _fitted("--rank", "2", "svd", "3 for svd, 2 for weighted", rank=2),
     "--energy": _fitted("--energy", "keep", "svd", "rescale", energy="keep"),
     "--terms": _fitted("--terms", "2", "gaussians", "4", terms=2),
     "--signed": _fitted("--signed", "", "gaussians", signed=True),
@@ -1100,7 +1100,11 @@ THREADS = {
 FITS = {
     f"--energy of {method}": _fitted("--energy", "keep", method, energy="keep")
     for method in ("preintegrated", "burley", "gaussians")
-} | {"--target picture": _fitted("--target", "picture", "artist", target=picture_error)}
+} | {
+    "--target picture": _fitted("--target", "picture", "artist", target=picture_error),
+    "--rank of weighted": _fitted("--rank", "1", "weighted", rank=1),
+    "--spectrum of weighted": _fitted("--spectrum", "white", "weighted", spectrum="white"),
+}
 
 VERBOSE = {"choose"}  # where --verbose has something to say
 

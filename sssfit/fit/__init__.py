@@ -24,6 +24,7 @@ from sssfit.fit.gaussians import fit_gaussians
 from sssfit.fit.guided import fit_guided
 from sssfit.fit.preintegrated import fit_preintegrated
 from sssfit.fit.svd import fit_svd
+from sssfit.fit.weighted import fit_weighted
 from sssfit.kernel import SeparableKernel, Taps
 from sssfit.messages import shown
 from sssfit.methods import ALL_FITS, FITS, TAPS
@@ -46,6 +47,7 @@ __all__ = [
     "fit_result",
     "fit_svd",
     "fit_taps",
+    "fit_weighted",
     "make_target",
     "pitch_of",
     "support_of",

@@ -46,6 +46,10 @@ class SpectralTarget:
     energy: FloatArray
     half_pixels: int
 
+    def cosines(self, target: Target) -> FloatArray:
+        """Return the spectra (n, h+1) of the pixels of an even line."""
+        return _cosines(self.frequencies, target)
+
     def error(self, spectrum: FloatArray) -> FloatArray:
         """Return the norm of the difference from a spectrum (C, n, n), as a share, (C,)."""
         apart = spectrum - self.wanted
@@ -53,7 +57,12 @@ class SpectralTarget:
         return np.sqrt(squares)
 
 
-def spectral_target(target: Target, channels: list[int], spectrum: str) -> SpectralTarget:
+def spectral_target(
+    target: Target,
+    channels: list[int],
+    spectrum: str,
+    grid: tuple[FloatArray, FloatArray] | None = None,
+) -> SpectralTarget:
     """Return the spectrum of a target's kernel, scaled to all of its energy.
 
     Parameters
@@ -64,6 +73,8 @@ def spectral_target(target: Target, channels: list[int], spectrum: str) -> Spect
         Channels that return light.
     spectrum : {"natural", "white"}
         Of the pictures that the kernel is for.
+    grid : tuple of array (n,), optional
+        Frequencies and their weights; by default `graded_frequencies`.
 
     Raises
     ------
@@ -72,8 +83,8 @@ def spectral_target(target: Target, channels: list[int], spectrum: str) -> Spect
     """
     if spectrum not in SPECTRA:
         raise FitError(f"spectrum = {spectrum!r}; expected {' or '.join(map(repr, SPECTRA))}.")
-    w, cell = graded_frequencies(target.half_pixels)
-    cosines = np.cos(np.outer(w, np.arange(target.half_pixels + 1))) * target.copies
+    w, cell = graded_frequencies(target.half_pixels) if grid is None else grid
+    cosines = _cosines(w, target)
     energy = target.total[channels]
     wanted = np.empty((len(channels), w.size, w.size))
     for row, channel, total in zip(wanted, channels, energy, strict=True):
@@ -86,6 +97,22 @@ def spectral_target(target: Target, channels: list[int], spectrum: str) -> Spect
         power /= np.maximum(sine[:, None] + sine, sine[1])
     norm = np.einsum("ij,cij->c", power, wanted**2)
     return SpectralTarget(w, wanted, power / norm[:, None, None], energy, target.half_pixels)
+
+
+def _cosines(w: FloatArray, target: Target) -> FloatArray:
+    found: FloatArray = np.cos(np.outer(w, np.arange(target.half_pixels + 1))) * target.copies
+    return found
+
+
+def even_frequencies(half_pixels: int) -> tuple[FloatArray, FloatArray]:
+    """Return evenly spaced frequencies (n,) up to pi and trapezoid weights (n,).
+
+    They are so many that sums of squares over them are those over pixels (Parseval).
+    """
+    count = 2 * half_pixels + 2
+    weights = np.ones(count)
+    weights[[0, -1]] = 0.5
+    return np.pi * np.arange(count) / (count - 1), weights
 
 
 def graded_frequencies(half_pixels: int) -> tuple[FloatArray, FloatArray]:
