@@ -1077,7 +1077,6 @@ SHOW = [
     C("show plate.toml --json"),
     C("show deon-skin"),
     C("show Skin1"),
-    C("show 'a\nb'"),
 ]
 
 COMMANDS = {

@@ -219,7 +219,7 @@ def _some_candidates(pixels: int, **settings: int) -> tuple[Candidate, ...]:
 
 @contextlib.contextmanager
 def copied_files() -> Iterator[Path]:
-    """Be in a fresh folder of the files; they are links, because copies would take most of the time.
+    """Be in a fresh folder of the files: links, because copies would take most of the time.
 
     What is written replaces a link and leaves the file behind it alone; that is checked.
     """
