@@ -282,7 +282,7 @@ FIT = {
     ),
     "--support": _fitted("--support", "2.1", "svd", "auto", support_mm=2.1),
     "--normalize": _fitted("--normalize", "", "preintegrated", normalize=True),
-    "--rank": _fitted("--rank", "2", "svd", "3 for svd, 2 for weighted", rank=2),
+    "--rank": _fitted("--rank", "2", "svd", "3", "3 for svd, 2 for weighted", rank=2),
     "--energy": _fitted("--energy", "keep", "svd", "rescale", energy="keep"),
     "--terms": _fitted("--terms", "2", "gaussians", "4", terms=2),
     "--signed": _fitted("--signed", "", "gaussians", signed=True),

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from reference_pixels import one_over_r_profile
 
-from sssfit.fit import _by_hand, artist, burley, falloff, guided
+from sssfit.fit import _by_hand, artist, burley, falloff, guided, weighted
 from sssfit.fit._chain import Chain
 from sssfit.fit._gaussians_search import make_annuli
 from sssfit.fit._spectrum import spectral_target
@@ -238,7 +238,19 @@ def misfit_of_a_chain(_) -> Pair:
     return of_value("_chain.py", chain.value_and_gradient, chain.start(numbers()))
 
 
+def misfit_of_weighted_terms(monkeypatch) -> Pair:
+    profile = one_over_r_profile(60, 0.1, [0.3])
+    (given, *_), _ = caught(
+        monkeypatch,
+        weighted.optimize,
+        "minimize",
+        lambda: weighted.fit_weighted(profile, rank=2, mm_per_pixel=0.3, support_mm=3.0),
+    )
+    return of_value("weighted.py", given, numbers().random(2 * 11))
+
+
 PAIRS = {
+    "misfit of weighted terms": misfit_of_weighted_terms,
     "misfit of a chain": misfit_of_a_chain,
     "Gaussians over pixels": gaussians_over_pixels,
     "a pass of unit sum": a_pass_of_unit_sum,

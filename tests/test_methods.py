@@ -7,7 +7,7 @@ import sys
 import cli_world as world
 import click
 import pytest
-from option_rows import ALL_FITS, FITS as SHARED_ROWS
+from option_rows import FITS as SHARED_ROWS
 from option_rows import ROWS
 
 from sssfit import fit
