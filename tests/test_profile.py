@@ -467,7 +467,7 @@ def test_unusable_files_are_refused_in_one_line_that_names_them(tmp_path, conten
 def test_missing_files_and_folders_are_named(tmp_path):
     with pytest.raises(ProfileError, match="cannot be read: no such file"):
         Profile.load(tmp_path / "none.profile.npz")
-    with pytest.raises(ProfileError, match="is a folder; name a .profile.npz file"):
+    with pytest.raises(ProfileError, match=r"is a folder; name a \.profile\.npz file"):
         Profile.load(tmp_path)
     with pytest.raises(ProfileError, match=r"^a\\nb\.npz cannot be read"):  # on one line
         Profile.load("a\nb.npz")
