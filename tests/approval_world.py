@@ -471,6 +471,11 @@ def _named(folder: Path) -> None:
     _write(folder / "dotted.exr", light(3, 4, 2), ["x.N", "x.D"])
     _write(folder / "alpha.exr", light(3, 4, 4), ["R", "G", "B", "alpha"])
     _write(folder / "far.exr", light(3, 4, 4), [*(f"far.{each}" for each in "RGB"), "far.Alpha"])
+    holed = light(3, 4, 4)
+    holed[2, 1, 3] = np.nan
+    _write(folder / "holed.exr", holed, ["R", "G", "B", "A"])
+    holed[1, 3, 2] = np.inf
+    _write(folder / "infinite.exr", holed, ["R", "G", "B", "A"])
     _write(folder / "red.exr", light(3, 4, 4), ["Red", "Green", "Blue", "A"])
     _write(folder / "aov.exr", light(3, 4, 12), [f"c{k}" for k in range(11)] + ["Y"])
     _write(folder / "greys.exr", light(3, 4, 2), ["b.Y", "a.Y"])
