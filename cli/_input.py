@@ -6,10 +6,8 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, TypeVar
 
+from sssfit.messages import note
 from sssfit.methods import DEON_SKIN
-
-from ._options import Common
-from ._output import say, say_notes
 
 if TYPE_CHECKING:
     from sssfit.kernel import SeparableKernel
@@ -21,7 +19,7 @@ if TYPE_CHECKING:
 _Record = TypeVar("_Record", "Profile", "SeparableKernel")
 
 
-def newest(common: Common, pattern: str, made_by: str) -> str:
+def newest(pattern: str, made_by: str) -> str:
     """Return the newest file of the current folder that matches, saying on stderr which."""
     from sssfit.errors import FileError
 
@@ -31,22 +29,22 @@ def newest(common: Common, pattern: str, made_by: str) -> str:
             f"there is no {pattern} in this folder: name one, or make one with `{made_by}`."
         )
     path = max(found, key=lambda each: each.stat().st_mtime_ns)
-    say(common, f"Using {path}, the newest {pattern} here.")
+    note(f"Using {path}, the newest {pattern} here.")
     return str(path)
 
 
-def profile_name(given: str | None, common: Common) -> str:
+def profile_name(given: str | None) -> str:
     """Return the profile that was named, by default the newest in this folder."""
-    return given or newest(common, "*.profile.npz", "sssfit simulate skin1")
+    return given or newest("*.profile.npz", "sssfit simulate skin1")
 
 
-def kernel_name(given: str | None, common: Common) -> str:
+def kernel_name(given: str | None) -> str:
     """Return the kernel that was named, by default the newest in this folder."""
-    return given or newest(common, "*.kernel.json", "sssfit fit --method svd --rank 3")
+    return given or newest("*.kernel.json", "sssfit fit --method svd --rank 3")
 
 
 def profile_of_kernel(
-    kernel: SeparableKernel, name: str, given: str | None, common: Common
+    kernel: SeparableKernel, name: str, given: str | None
 ) -> tuple[Profile | None, str | None]:
     """Return a kernel's profile and its file: the one given, else the one it was fitted to.
 
@@ -57,12 +55,10 @@ def profile_of_kernel(
 
     if given is None:
         folders = {Path(), Path() if name == "-" else Path(name).parent}
-        profile, file, note = find_profile(kernel, name, folders)
-        say_notes(common, [] if note is None else [note])
-        return profile, file
+        return find_profile(kernel, name, folders)
     asked = Profile.load(given)
     if kernel.meta.get("profile_sha256") not in (None, asked.sha256):
-        say(common, f"{given} is not the profile that {name} was fitted to.")
+        note(f"{given} is not the profile that {name} was fitted to.")
     return asked, given
 
 

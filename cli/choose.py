@@ -7,19 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from sssfit.messages import note
 from sssfit.scene.made import EDGE_DEGREES
 
 from ._input import load_source
 from ._options import Common, common_options, options
-from ._output import KERNEL, PROFILE, finish, held, say, say_notes, stem_of, target, write
+from ._output import KERNEL, PROFILE, finish, held, stem_of, target, write
 from ._picture import check_pictures
-from ._progress import say_if_compiling
 from ._verb_options import CHOOSE
 
 if TYPE_CHECKING:
     from sssfit.choose.choice import Choice
-    from sssfit.material import Material
-    from sssfit.profile import Profile
     from sssfit.scene.record import Scene
 
 _METRES = (0.1, 9.0)  # plain numbers that may have been meant in metres; 1cm is 10 mm and was not
@@ -76,7 +74,6 @@ def choose(material: str, common: Common, **given: Any) -> None:
         held([profile_path] if profile_path else [], is_profile_file, named=PROFILE, **hold),
     ):
         scene = None if given["irradiance"] == "head" else _scene(pitch, given, common)
-        _say_first(source, common)
         choice = library.choose(
             source,
             mm_per_pixel=pitch,
@@ -85,15 +82,15 @@ def choose(material: str, common: Common, **given: Any) -> None:
             **asked,
             seed=common.seed,
             threads=common.threads,
-            progress=(lambda step: say(common, step_line(step))) if common.verbose else None,
+            progress=(lambda step: note(step_line(step))) if common.verbose else None,
         )
         written = _write(choice, path, profile_path)
     view["resolution"] = given["resolution"][::-1]
-    figures = {"command": "choose", "output": written, **view, **choice.to_dict()}
+    figures = {"output": written, **view, **choice.to_dict()}
     text = page("choose", {**figures, "sentences": "\n".join(sentences(choice))})
-    finish(common, figures, text, to_stderr=written == ["-"])
+    finish(common, figures, text)
     if not written and path is not None and path.exists():
-        say(common, f"{path} is from an earlier run; this view needs no kernel.")
+        note(f"{path} is from an earlier run; this view needs no kernel.")
 
 
 def _check_distance(distance_mm: float) -> None:
@@ -115,22 +112,7 @@ def _scene(pitch: float, given: dict[str, Any], common: Common) -> Scene:
     name, asked = given["irradiance"], {key: given[key] for key in ("layer", "mask")}
     asked |= {"angle_degrees": EDGE_DEGREES} if name == "edge" else {}
     rows, columns = (min(each, _MOST_PIXELS) for each in given["resolution"])
-    scene, notes = load_scene(
-        name, otherwise=pitch, size=(rows, columns), seed=common.seed, **asked
-    )
-    say_notes(common, notes)
-    return scene
-
-
-def _say_first(source: Material | Profile, common: Common) -> None:
-    """Say what takes longest, and what a profile cannot tell."""
-    from sssfit.choose.truth import is_exact, notes_on
-    from sssfit.material import Material
-
-    if isinstance(source, Material):
-        exact = is_exact(source)
-        say_if_compiling(common, solver=exact, walk=None if exact else source)
-    say_notes(common, notes_on(source))
+    return load_scene(name, otherwise=pitch, size=(rows, columns), seed=common.seed, **asked)
 
 
 def _write(choice: Choice, path: Path | None, profile_path: Path | None) -> list[str]:
@@ -138,6 +120,6 @@ def _write(choice: Choice, path: Path | None, profile_path: Path | None) -> list
     if choice.fit is None:
         return []
     if profile_path is not None:
-        write(choice.profile, profile_path)
-    write(choice.fit.kernel, path)
+        write(choice.profile.write, profile_path)
+    write(choice.fit.kernel.write, path)
     return [str(path or "-"), *([] if profile_path is None else [str(profile_path)])]

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from sssfit.methods import FITS
 from sssfit.scene.made import COMPARED
 
-from ._compare_parts import budget_and_kernels, fronts, profile_of
 from ._input import load_source
 from ._options import Common, common_options, options, own_settings, refuse
-from ._output import finish_one, held_charts, target, write_chart
+from ._output import finish, held, target, write, write_chart
 from ._picture import check_pictures
+from ._progress import step_progress, walk_progress
 from ._verb_options import COMPARE
+
+if TYPE_CHECKING:
+    from sssfit.compare.runner import Part
 
 _OF_BUDGETS = ("budget_chart", "photons", "rank", "terms", "model")
 
@@ -47,23 +50,80 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
       sssfit compare --all -o charts
       sssfit compare skin1 --what sheet --chart skin1-sheet.png
     """
-    names = [name for each in given["pictures"] or COMPARED for name in each.split(",")]
-    _check(material, given, names)
-    if material is None:
-        from sssfit.material import material_names
+    pictures = [name for each in given["pictures"] or COMPARED for name in each.split(",")]
+    _check(material, given, pictures)
+    own = own_settings(context, FITS, given["method"], {k: given[k] for k in ("rank", "terms")})
+    from sssfit.compare import runner
+    from sssfit.errors import FitError, SssfitError
 
-        folder = Path(given["output"] or ".")
-        stems = {name: folder / f"{name}-pareto" for name in material_names(paper=given["paper"])}
-        files = {each: (f"{stem}.png", f"{stem}.md") for each, stem in stems.items()}
-        fronts(files, names, given, common)
-    elif given["what"] == "front":
-        fronts({material: (given["chart"], given["table"])}, names, given, common)
-    elif given["what"] == "sheet":
-        _sheet(material, given, common)
-    else:
-        settings = {key: given[key] for key in ("rank", "terms")}
-        own = own_settings(context, FITS, given["method"], settings)
-        budget_and_kernels(material, names, own, given, common)
+    what = given["what"] if material else "front"
+    run = {"seed": common.seed, "threads": common.threads}
+    on = {key: given[key] for key in ("mm_per_pixel", "size", "layer", "mask")} | run
+    asked = {key: given[key] for key in ("error", "mm_per_pixel", "photons", "method", "model")}
+    asked |= {"settings": own or None, "steps": step_progress, "walk": walk_progress, **run}
+    front = {key: given[key] for key in ("error", "cost")}
+    files, wrote, failed = _files(material, given), set[str](), []
+    parts: list[Part] = []
+    with held(*_outputs(files), inputs=[material, *pictures], force=given["force"]):
+        source = load_source(material) if material else None
+        scenes = [] if what == "sheet" else runner.scenes_for(source, pictures, **on)
+        for name, own_files in files.items():
+            try:
+                of_name = source or load_source(name)
+                for part in runner.compare(of_name, scenes, what, name=name, **asked):
+                    wrote |= _write(part, own_files, front)
+                    parts.append(part)
+            except SssfitError as error:
+                if material:
+                    raise
+                failed.append(f"{name}: {error}")
+    output = [each for own in files.values() for each in own.values() if each in wrote]
+    if parts:
+        finish(common, *runner.told(what, parts, output, **front))
+    if failed:
+        raise FitError(f"{len(failed)} of {len(files)} materials failed; {' '.join(failed)}")
+
+
+def _files(material: str | None, given: Mapping[str, Any]) -> dict[str, dict[str, str]]:
+    """Return the files of each material's budget chart, chart and table that are asked for."""
+    if material is not None:
+        keys = ("budget_chart", "chart", "table")
+        return {material: {key: given[key] for key in keys if given[key]}}
+    from sssfit.material import material_names
+
+    folder = Path(given["output"] or ".")
+    stems = {name: folder / f"{name}-pareto" for name in material_names(paper=given["paper"])}
+    return {name: {"chart": f"{each}.png", "table": f"{each}.md"} for name, each in stems.items()}
+
+
+def _outputs(
+    files: Mapping[str, Mapping[str, str]],
+) -> tuple[list[Path | None], Callable[[Path], bool]]:
+    """Refuse names of no chart or table; return all, and what tells one of ours."""
+    from sssfit.chart.files import chart_format, is_chart_file
+    from sssfit.compare.table import check_table_name, is_table_file
+
+    named = [(key, target(each)) for own in files.values() for key, each in own.items()]
+    for key, path in named:
+        if path is not None:
+            check_table_name(path) if key == "table" else chart_format(path)
+    return [path for _, path in named], lambda path: is_chart_file(path) or is_table_file(path)
+
+
+def _write(part: Part, files: Mapping[str, str], front: Mapping[str, str]) -> set[str]:
+    """Draw a part, and write the table of kernels, into files that are held; return which."""
+    from sssfit.chart import figure_of
+    from sssfit.compare import Comparison
+    from sssfit.compare.table import table_text
+
+    chart = files.get("budget_chart" if isinstance(part, list) else "chart")
+    if chart:
+        options = front if isinstance(part, Comparison) else {}
+        write_chart(figure_of(part, **options), target(chart))
+    table = files.get("table")
+    if table and isinstance(part, Comparison):
+        write(table_text(part, Path(table).suffix.lower(), **front).encode(), Path(table))
+    return {each for each in (chart, table) if each}
 
 
 def _check(material: str | None, given: Mapping[str, Any], names: Sequence[str]) -> None:
@@ -88,19 +148,3 @@ def _check(material: str | None, given: Mapping[str, Any], names: Sequence[str])
     if given["chart"] == given["budget_chart"] == "-":
         raise click.UsageError("only one of --chart and --budget-chart can go to stdout.")
     check_pictures(names, given["layer"], given["mask"], given["size"])
-
-
-def _sheet(name: str, given: Mapping[str, Any], common: Common) -> None:
-    """Draw a contact sheet of a profile's kernels, and print its figures."""
-    from sssfit.chart import figure_of
-    from sssfit.compare.sheet import compute_sheet
-    from sssfit.compare.table import sheet_text
-
-    path = target(given["chart"])
-    with held_charts([path], inputs=[name], force=given["force"]):
-        profile = profile_of(load_source(name), common)
-        pitch = given["mm_per_pixel"]
-        found = compute_sheet(profile, mm_per_pixel=pitch, threads=common.threads)
-        write_chart(figure_of(found), path)
-    told = found.to_dict()
-    finish_one(common, "compare", path, told, sheet_text(told), "a PNG")

@@ -40,12 +40,12 @@ def export(file: str | None, form: str, output: str | None, force: bool, common:
 
     figures: dict[str, Any]
     if form == "csv":
-        name = profile_name(file, common)
+        name = profile_name(file)
         profile = load(Profile, name)
         text = csv_text(profile)
         figures = {"profile": name, "channels": profile.channels, "annuli": profile.n_annuli}
     else:
-        name = kernel_name(file, common)
+        name = kernel_name(file)
         kernel = load(SeparableKernel, name)
         text = (hlsl if form == "hlsl" else json_document)(kernel)
         keys = ("channels", "rank", "pixels", "mm_per_pixel")
@@ -60,4 +60,4 @@ def export(file: str | None, form: str, output: str | None, force: bool, common:
     with held([path], is_ours[form], inputs=[name], force=force, named=named):
         write(text.encode(), path)
     what = "the table" if form == "csv" else "the kernel"
-    finish_one(common, "export", path, {"format": form, **figures}, "", what)
+    finish_one(common, path, {"format": form, **figures}, "", what)

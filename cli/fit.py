@@ -47,7 +47,7 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
 
     known = settings_of(FITS)
     settings = own_settings(context, FITS, method, {key: given[key] for key in known})
-    name = profile_name(profile, common)
+    name = profile_name(profile)
     source = load(Profile, name)
     counted, stem = FITS[method].counted, stem_of(name, source.material_name)
     count = settings.get(counted, known[counted][0].words) if counted else ""
@@ -57,9 +57,9 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
     settings["support_mm"] = None if given["support"] == "auto" else given["support"]
     with held([path], is_kernel_file, inputs=[name], force=given["force"], named=KERNEL):
         result = fit_result(source, method, **settings)
-        write(result.kernel, path)
+        write(result.kernel.write, path)
     figures = {"profile": name, **result.to_dict()}
-    finish_one(common, "fit", path, figures, page("fit", figures), "the kernel")
+    finish_one(common, path, figures, page("fit", figures), "the kernel")
 
 
 def _picture_target(settings: dict[str, Any], threads: int | None) -> dict[str, Any]:

@@ -13,7 +13,6 @@ from sssfit.methods import DEON_SKIN
 
 from ._options import BaseColour, Common, Lengths, Number, common_options, flag, option, options
 from ._output import finish, finish_one, held, target, write
-from ._progress import say_if_compiling
 
 # Heads the files we make: only a file that begins with it is replaced without --force.
 _OURS = "# Made by `sssfit materials --from-reflectance`, which may replace this file;"
@@ -96,7 +95,7 @@ def materials(
     else:
         figures = summary.material_figures(load_material(material))
         page = summary.material_page
-    finish(common, {"command": "materials", "output": [], **figures}, page(figures))
+    finish(common, figures, page(figures))
 
 
 def _make(asked: list[float] | str, common: Common, given: dict[str, Any]) -> None:
@@ -118,7 +117,6 @@ def _make(asked: list[float] | str, common: Common, given: dict[str, Any]) -> No
     path = target(output, f"{name}.toml")
     is_ours = functools.partial(has_mark, marks={_OURS.encode(): b""})
     with held([path], is_ours, inputs=[], force=given["force"], named=("a material", ".toml")):
-        say_if_compiling(common, solver=True)
         from sssfit.simulate import inversion
 
         material = inversion.material_from_reflectance(
@@ -126,7 +124,7 @@ def _make(asked: list[float] | str, common: Common, given: dict[str, Any]) -> No
         )
         figures = inversion.inversion_figures(material, asked, light)
         write(f"{_OURS} delete this line to keep it.\n{material.to_toml()}".encode(), path)
-    finish_one(common, "materials", path, figures, inversion.summary(figures), "the material")
+    finish_one(common, path, figures, inversion.summary(figures), "the material")
 
 
 def _channels(given: str | None, count: int) -> list[str]:

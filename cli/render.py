@@ -13,7 +13,7 @@ from sssfit.scene.made import MADE
 
 from ._input import kernel_name, load, profile_of_kernel
 from ._options import Common, common_options, method_options, options, own_settings
-from ._output import binary_stdout, finish, held, say_notes, stem_of, target
+from ._output import binary_stdout, finish, held, stem_of, target
 from ._picture import check_pictures
 from ._verb_options import RENDER, RENDER_PICTURE
 
@@ -51,7 +51,7 @@ def render(context: click.Context, /, kernel: str | None, common: Common, **give
     from sssfit.kernel import SeparableKernel
 
     own = _check(context, given)
-    name, irradiance = kernel_name(kernel, common), given["irradiance"]
+    name, irradiance = kernel_name(kernel), given["irradiance"]
     loaded = load(SeparableKernel, name)
     path = target(given["output"], f"{stem_of(name)}.{Path(irradiance).stem}.exr")
     asked = {"picture": path, "truth": given["truth"], "difference": given["difference"]}
@@ -63,9 +63,8 @@ def render(context: click.Context, /, kernel: str | None, common: Common, **give
     with held(outputs, is_image_file, inputs=inputs, force=given["force"]):
         source, made = _rendered(loaded, name, given, own, common)
         targets: dict[str, Any] = files if path else {"picture": binary_stdout(), **files}
-        say_notes(common, made.save(targets, exposure=given["exposure"]))
+        made.save(targets, exposure=given["exposure"])
     figures = {
-        "command": "render",
         "output": [*(["-"] if path is None else []), *map(str, files.values())],
         "kernel": name,
         "profile": source,
@@ -73,7 +72,7 @@ def render(context: click.Context, /, kernel: str | None, common: Common, **give
         "follow": (given["follow"] or "gaussian") if given["screen"] else None,
         **made.to_dict(),
     }
-    finish(common, figures, page("render", figures), to_stderr=path is None)
+    finish(common, figures, page("render", figures))
 
 
 def _check(context: click.Context, given: dict[str, Any]) -> dict[str, Any]:
@@ -115,13 +114,12 @@ def _rendered(
     made_mm = (given["mm_per_pixel"] or MM_PER_PIXEL) if screen else kernel.mm_per_pixel
     asked = {key: given[key] for key in ("size", "layer", "mask")} | own
     pitch = made_mm if picture in MADE else given["mm_per_pixel"]
-    scene, notes = load_scene(picture, pitch, seed=common.seed, **asked)
-    say_notes(common, notes)
+    scene = load_scene(picture, pitch, seed=common.seed, **asked)
     how = {key: given[key] for key in ("transmit", "border")} | {"threads": common.threads}
     if screen:
         follow = given["follow"] or "gaussian"
         return None, evaluate_in_screen_space(scene, kernel, follow=follow, **how)
-    profile, source = profile_of_kernel(kernel, name, given["profile"], common)
+    profile, source = profile_of_kernel(kernel, name, given["profile"])
     if profile is None and (given["truth"] or given["difference"]):
         raise click.UsageError("--truth and --difference need the profile; name it.")
     how |= {key: given[key] for key in ("exposure", "structure")}

@@ -32,11 +32,10 @@ def show(file: str | None, common: Common) -> None:
       sssfit show skin1.profile.npz.checkpoint   the profile so far
       sssfit simulate skin1 -o - | sssfit show - --json
     """
-    name = profile_name(file, common)
+    name = profile_name(file)
     found = load_any(name)
     from sssfit.export.summary import figures_of, summary
 
     figures = figures_of(found)
     title = _TITLES[figures["kind"]].format_map({"name": name, "format": figures.get("format")})
-    told = {"command": "show", "output": [], "file": name, **figures}
-    finish(common, told, title + summary(figures))
+    finish(common, {"file": name, **figures}, title + summary(figures))

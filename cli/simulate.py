@@ -8,38 +8,38 @@ from typing import Any
 
 import click
 
+from sssfit.messages import note
 from sssfit.methods import SIMULATIONS, lines_of
 
 from ._input import is_mci
 from ._options import (
+    SHIPPED,
     Common,
     Length,
     WholeRange,
     common_options,
-    flag,
     method_for,
     method_options,
     option,
     options,
+    output,
     own_settings,
 )
-from ._output import check_outputs, finish, say, say_notes, write
+from ._output import binary_stdout, finish, write
 from ._progress import walk_progress
 
 _FIRST = "montecarlo"  # the only walk of photons
 # fmt: off
 _OPTIONS = (
-    flag("--all every", "All materials that ship with sssfit."),
-    flag("--paper", "The eleven materials of the Separable Subsurface Scattering paper."),
+    *SHIPPED,
     option("--method", [*SIMULATIONS], "METHOD", "Simulation method, as listed below.", _FIRST),
     option("--run number", WholeRange(1), "N", "Simulate only this run of an .mci file."),
     method_options(SIMULATIONS),
     option("--dr", Length(), "MM", "Annulus width.  [default: MFP_min / 20; deon-skin: 0.008]"),
     option("--radius", Length("auto"), "MM|auto", "Grid radius; auto (montecarlo) enlarges it "
            "until under 0.1 % of any channel lies beyond.  [default: 32 MFP_max; deon-skin: 17.2]"),
-    option("-o --output", None, "FILE", "Output file, - for stdout; a folder with --all."
-           "  [default: MATERIAL.profile.npz, MATERIAL.METHOD.profile.npz]"),
-    flag("--force", "Replace an input, or a file that is not our profile."),
+    *output("MATERIAL.profile.npz, MATERIAL.METHOD.profile.npz", "is not our profile",
+            "Output file, - for stdout; a folder with --all"),
 )
 # fmt: on
 
@@ -133,18 +133,18 @@ def _run(asked: Any, common: Common, *, several: bool, **how: Any) -> None:
     from sssfit.process import asked_to_stop
     from sssfit.simulate import simulate_to_files
 
-    how["tell"] = lambda line: say(common, line)
-    how["watch"] = lambda label: walk_progress(label, quiet=common.quiet)
-    check_outputs(asked[1])
+    if asked[1] == [None]:
+        binary_stdout()
     with asked_to_stop() as stop:
-        found = simulate_to_files(*asked, stop=stop, **how)
+        found = simulate_to_files(*asked, stop=stop, watch=walk_progress, **how)
         if not found.outcomes:
             raise KeyboardInterrupt
         if to_stdout := asked[1] == [None]:
-            write(found.outcomes[0].profile, None)
-    say_notes(common, [found.note] if found.note else [])
-    figures = {"command": "simulate", **found.to_dict(several=several)}
+            write(found.outcomes[0].profile.write, None)
+    if found.note:
+        note(found.note)
+    figures = found.to_dict(several=several)
     text = found.summary(several=several) + "\nWrote the profile to stdout" * to_stdout
-    finish(common, figures, text, to_stderr=to_stdout)
+    finish(common, figures, text)
     if found.is_interrupted:
         sys.exit(130)

@@ -28,7 +28,14 @@ from sssfit.material import Layer, Material
 from sssfit.material.checks import check_texts, number
 from sssfit.messages import Columns, report
 from sssfit.optics import normal_transmittance
-from sssfit.simulate.exact import LIGHTS, Light, diffuse_reflectance, entering_light
+from sssfit.simulate._walks import note_compiling
+from sssfit.simulate.exact import (
+    LIGHTS,
+    Light,
+    diffuse_reflectance,
+    entering_light,
+    is_solver_compiled,
+)
 
 SKIN_ETA = 1.4  # d'Eon and Luebke 2007, GPU Gems 3, chapter 14: .028 at normal incidence
 _CLOSE = 1e-8  # in reflectance; the precision of the exact solver
@@ -230,6 +237,7 @@ def material_from_reflectance(
         raise MaterialError(
             f"mean free paths {paths_mm.tolist()}; expected lengths from 1e-9 to 1e9 mm."
         )
+    note_compiling("solver", 3, is_solver_compiled())
     albedo = invert_reflectance(asked, eta, light=light).albedo
     words = ", ".join(f"{each:g}" for each in asked)
     return Material(
