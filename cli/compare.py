@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -17,9 +17,6 @@ from ._output import finish, held, target, write, write_chart
 from ._picture import check_pictures
 from ._progress import step_progress, walk_progress
 from ._verb_options import COMPARE
-
-if TYPE_CHECKING:
-    from sssfit.compare.runner import Part
 
 _OF_BUDGETS = ("budget_chart", "photons", "rank", "terms", "model")
 
@@ -56,6 +53,8 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
     from sssfit.compare import runner
     from sssfit.errors import FitError, SssfitError
 
+    if given["what"] == "budget" and material:
+        runner.check_budget(material)
     what = given["what"] if material else "front"
     run = {"seed": common.seed, "threads": common.threads}
     on = {key: given[key] for key in ("mm_per_pixel", "size", "layer", "mask")} | run
@@ -63,7 +62,7 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
     asked |= {"settings": own or None, "steps": step_progress, "walk": walk_progress, **run}
     front = {key: given[key] for key in ("error", "cost")}
     files, wrote, failed = _files(material, given), set[str](), []
-    parts: list[Part] = []
+    parts: list[Any] = []
     with held(*_outputs(files), inputs=[material, *pictures], force=given["force"]):
         source = load_source(material) if material else None
         scenes = [] if what == "sheet" else runner.scenes_for(source, pictures, **on)
@@ -110,7 +109,7 @@ def _outputs(
     return [path for _, path in named], lambda path: is_chart_file(path) or is_table_file(path)
 
 
-def _write(part: Part, files: Mapping[str, str], front: Mapping[str, str]) -> set[str]:
+def _write(part: Any, files: Mapping[str, str], front: Mapping[str, str]) -> set[str]:
     """Draw a part, and write the table of kernels, into files that are held; return which."""
     from sssfit.chart import figure_of
     from sssfit.compare import Comparison

@@ -106,8 +106,6 @@ def compare(
     SssfitError
         As `compare_kernels`, `error_budgets` and `compute_sheet`.
     """
-    if what == "budget" and isinstance(source, Profile):
-        raise ProfileError(_no_coefficients(name))
     if what == "sheet":
         profile = _profile_of(source, threads)
         yield compute_sheet(profile, mm_per_pixel=mm_per_pixel, threads=threads)
@@ -117,7 +115,7 @@ def compare(
         with steps(profile.material_name or "profile") as show:
             kernels = compare_kernels(profile, scenes, threads=threads, progress=show)
         yield kernels
-    if what is None and isinstance(source, Profile):
+    if what in (None, "budget") and isinstance(source, Profile):
         note(f"No budget: {name} is a profile, and a budget simulates a material.")
     elif what in (None, "budget") and isinstance(source, Material):
         fit |= {"photons": photons or PHOTONS, "threads": threads}
@@ -137,14 +135,20 @@ def _profile_of(source: Material | Profile, threads: int | None) -> Profile:
     return source if isinstance(source, Profile) else true_profile(source, threads=threads)
 
 
-def _no_coefficients(name: str) -> str:
-    """Say why there is no budget of a profile where it is all that was asked for."""
+def check_budget(name: str) -> None:
+    """Refuse the name of a profile where a budget is all that is asked for.
+
+    Raises
+    ------
+    ProfileError
+    """
     if name == DEON_SKIN:
-        return f"{name} has no coefficients to simulate with; name a material."
-    return (
-        f"{name} is a profile, and a budget simulates a material: name that, such as skin1 or "
-        "a .toml file of your own."
-    )
+        raise ProfileError(f"{name} has no coefficients to simulate with; name a material.")
+    if name == "-" or name.endswith(".npz"):
+        raise ProfileError(
+            f"{name} is a profile, and a budget simulates a material: name that, such as skin1 or "
+            "a .toml file of your own."
+        )
 
 
 def told(
