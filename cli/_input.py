@@ -62,11 +62,6 @@ def profile_of_kernel(
     return asked, given
 
 
-def is_mci(name: str | None) -> bool:
-    """Whether a name given for a material means an MCML input file."""
-    return name is not None and name.lower().endswith(".mci")
-
-
 def load(kind: type[_Record], name: str) -> _Record:
     """Read a profile or a kernel; ``-`` is stdin."""
     return kind.read(binary_stdin(), "stdin") if name == "-" else kind.load(name)

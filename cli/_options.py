@@ -198,6 +198,7 @@ Numbers = functools.partial(Value, "list of numbers", text.numbers)
 Length = functools.partial(Value, "length", text.length_mm)
 Lengths = functools.partial(Value, "list of lengths", text.lengths_mm)
 Count = functools.partial(Value, "count", text.whole_number)
+Size = functools.partial(Value, "size", text.size)
 Share = functools.partial(Value, "share", text.share)
 BaseColour = functools.partial(Value, "list of reflectances", text.base_colour)
 

@@ -13,12 +13,12 @@ from ._options import (
     Number,
     NumberRange,
     Numbers,
+    Size,
     WholeRange,
     flag,
     option,
     output,
 )
-from ._picture import Size
 
 MAPS = ("signed", "absolute")
 _FACTOR = NumberRange(min=0.0, min_open=True)

@@ -9,12 +9,11 @@ from typing import Any
 import click
 
 from sssfit.methods import FITS
-from sssfit.scene.made import COMPARED
+from sssfit.scene.made import COMPARED, check_pictures
 
 from ._input import load_source
 from ._options import Common, common_options, options, own_settings, refuse
 from ._output import finish, held, target, write, write_chart
-from ._picture import check_pictures
 from ._progress import step_progress, walk_progress
 from ._verb_options import COMPARE
 
@@ -146,4 +145,4 @@ def _check(material: str | None, given: Mapping[str, Any], names: Sequence[str])
         raise click.UsageError("--what sheet is a picture; name its file with --chart.")
     if given["chart"] == given["budget_chart"] == "-":
         raise click.UsageError("only one of --chart and --budget-chart can go to stdout.")
-    check_pictures(names, given["layer"], given["mask"], given["size"])
+    check_pictures(names, **{key: given[key] for key in ("layer", "mask", "size")})

@@ -9,12 +9,11 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sssfit.methods import settings_of
-from sssfit.scene.made import MADE
+from sssfit.scene.made import MADE, check_pictures
 
 from ._input import kernel_name, load, profile_of_kernel
 from ._options import Common, common_options, method_options, options, own_settings
 from ._output import binary_stdout, finish, held, stem_of, target
-from ._picture import check_pictures
 from ._verb_options import RENDER, RENDER_PICTURE
 
 if TYPE_CHECKING:
@@ -87,7 +86,7 @@ def _check(context: click.Context, given: dict[str, Any]) -> dict[str, Any]:
         raise click.UsageError("--follow is for --screen; leave it out.")
     if given["difference"] is None and (given["difference_map"] or given["gain"] != 1.0):
         raise click.UsageError("--gain and --difference-map are for --difference; name its file.")
-    check_pictures([name], given["layer"], given["mask"], given["size"])
+    check_pictures([name], **{key: given[key] for key in ("layer", "mask", "size")})
     if is_made and not screen and given["mm_per_pixel"] is not None:
         raise click.UsageError(
             f"--mm-per-pixel is for pictures from files and for --screen; {name} is made on the "

@@ -14,13 +14,15 @@ from typing import Any
 
 from sssfit.errors import FileError, ProfileError, StoppedError
 from sssfit.files import check_output, held
-from sssfit.material import Material
+from sssfit.formats.mci import is_mci, load_mci
+from sssfit.material import Material, load_material, material_names
 from sssfit.messages import note
 from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile, is_profile_file
 from sssfit.simulate._checkpoint import EVERY_SECONDS, Checkpoint, is_checkpoint_file
 from sssfit.simulate._finished import is_complete, is_finished, run_figures
 from sssfit.simulate._run import Progress
+from sssfit.simulate.gaussians import DEON_SKIN
 from sssfit.simulate.montecarlo import shared_walks
 from sssfit.simulate.summary import summary
 
@@ -111,6 +113,58 @@ class Results:
             ]
             lines += [f"{start} {', '.join(paths)}"] if paths else []
         return "\n".join(lines)
+
+
+def runs_of(
+    method: str,
+    material: str | None,
+    given: dict[str, Any],
+    *,
+    run: int | None = None,
+    paper: bool = False,
+) -> tuple[list[Any], dict[str, Any] | list[dict[str, Any]]]:
+    """Return what `simulate_to_files` takes for a name: materials, and their settings.
+
+    Parameters
+    ----------
+    method : str
+    material : str, optional
+        A name or a file; of an MCML input file every run, with settings of its own. By default all
+        materials that ship with sssfit.
+    given : dict
+        Settings for all, which also replace those of a file.
+    run : int, optional
+        The only run of an MCML input file.
+    paper : bool
+        By default only the paper's eleven.
+    """
+    if SIMULATIONS[method].makes is not None:
+        return [DEON_SKIN], given
+    if material is None:
+        return [load_material(name) for name in material_names(paper=paper)], given
+    if not is_mci(material):
+        return [load_material(material)], given
+    runs = load_mci(material, run)
+    # A target error alone decides when a walk ends; then the file's photons are no limit.
+    photons = method == WALK and not {"photons", "target_error"} & given.keys()
+    return [each.material for each in runs], [
+        each.settings(given, photons=photons) for each in runs
+    ]
+
+
+def paths_of(
+    materials: Sequence[Any], method: str, output: str | None, *, several: bool
+) -> list[Path | None]:
+    """Return where each profile goes; None is a stream. Only the walk's files do not name it.
+
+    ``output`` is the file, or the folder of several; by default this one.
+    """
+    if output == "-":
+        return [None]
+    if output is not None and not several:
+        return [Path(output)]
+    kind = "" if method == WALK else f".{method}"
+    return [Path(output or ".", f"{each.name}{kind}.profile.npz") for each in materials]
 
 
 def simulate_to_files(
