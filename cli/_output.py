@@ -111,9 +111,10 @@ def write(content: bytes | Callable[[BinaryIO], object], path: Path | None) -> N
         binary_stdout().flush()
 
 
-def write_chart(figure: Any, path: Path | None) -> None:
-    """Write a figure to a file that is held; None is PNG on stdout."""
+def write_chart(record: Any, path: Path | None, **options: Any) -> None:
+    """Draw a record, and write its figure to a file that is held; None is PNG on stdout."""
+    from sssfit.chart import figure_of
     from sssfit.chart.page import save_figure
 
     form = "png" if path is None else path.suffix.removeprefix(".")
-    write(functools.partial(save_figure, figure, format=form), path)
+    write(functools.partial(save_figure, figure_of(record, **options), format=form), path)

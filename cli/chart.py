@@ -61,7 +61,6 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
       sssfit chart --guide skin1.profile.npz --mm-per-pixel 0.1
       sssfit chart --models skin1
     """
-    from sssfit.chart import figure_of
     from sssfit.chart.files import chart_format, is_chart_file
     from sssfit.export.reports import page
     from sssfit.kernel import SeparableKernel
@@ -81,10 +80,9 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
         profile, source = profile_of_kernel(found, name, given["profile"])
     stem = made_of if kind == "models" else stem_of(name, made_of)
     path = target(given["output"], f"{stem}.{kind}.png")
-    chart_format(path or "-.png")
     with held([path], is_chart_file, inputs=[name, source], force=given["force"]):
         record = _computed(found, kind, profile, given, common) if kind in _COMPUTED else found
-        write_chart(figure_of(record), path)
+        write_chart(record, path)
     figures: dict[str, Any] = {} if view else {"kind": kind, "file": name}
     figures |= {"profile": source} if kind != "models" else {}
     own = {"material": made_of, "channels": found.channels} if kind not in _COMPUTED else {}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -56,15 +56,19 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
         runner.check_budget(material)
     what = given["what"] if material else "front"
     run = {"seed": common.seed, "threads": common.threads}
-    on = {key: given[key] for key in ("mm_per_pixel", "size", "layer", "mask")} | run
+    on = {key: given[key] for key in ("mm_per_pixel", "size", "layer", "mask")}
+    on["seed"] = common.seed
     asked = {key: given[key] for key in ("error", "mm_per_pixel", "photons", "method", "model")}
     asked |= {"settings": own or None, "steps": step_progress, "walk": walk_progress, **run}
     front = {key: given[key] for key in ("error", "cost")}
     files, wrote, failed = _files(material, given), set[str](), []
+    outputs = [target(each) for own in files.values() for each in own.values()]
     parts: list[Any] = []
-    with held(*_outputs(files), inputs=[material, *pictures], force=given["force"]):
+    with held(outputs, _is_ours, inputs=[material, *pictures], force=given["force"]):
         source = load_source(material) if material else None
-        scenes = [] if what == "sheet" else runner.scenes_for(source, pictures, **on)
+        if source is not None and given["mm_per_pixel"] == "profile":
+            asked["profile"] = runner.profile_of(source, threads=common.threads)
+        scenes = [] if what == "sheet" else runner.scenes_for(asked.get("profile"), pictures, **on)
         for name, own_files in files.items():
             try:
                 of_name = source or load_source(name)
@@ -84,40 +88,38 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
 
 def _files(material: str | None, given: Mapping[str, Any]) -> dict[str, dict[str, str]]:
     """Return the files of each material's budget chart, chart and table that are asked for."""
-    if material is not None:
-        keys = ("budget_chart", "chart", "table")
-        return {material: {key: given[key] for key in keys if given[key]}}
+    from sssfit.chart.files import chart_format
+    from sssfit.compare.table import check_table_name
     from sssfit.material import material_names
 
-    folder = Path(given["output"] or ".")
-    stems = {name: folder / f"{name}-pareto" for name in material_names(paper=given["paper"])}
-    return {name: {"chart": f"{each}.png", "table": f"{each}.md"} for name, each in stems.items()}
+    keys, folder = ("budget_chart", "chart", "table"), Path(given["output"] or ".")
+    if material is None:
+        stems = {name: folder / f"{name}-pareto" for name in material_names(paper=given["paper"])}
+        return {key: {"chart": f"{each}.png", "table": f"{each}.md"} for key, each in stems.items()}
+    files = {key: given[key] for key in keys if given[key]}
+    for key, name in files.items():
+        if name != "-":
+            check_table_name(Path(name)) if key == "table" else chart_format(name)
+    return {material: files}
 
 
-def _outputs(
-    files: Mapping[str, Mapping[str, str]],
-) -> tuple[list[Path | None], Callable[[Path], bool]]:
-    """Refuse names of no chart or table; return all, and what tells one of ours."""
-    from sssfit.chart.files import chart_format, is_chart_file
-    from sssfit.compare.table import check_table_name, is_table_file
+def _is_ours(path: Path) -> bool:
+    """Tell whether a file is a chart or a table that we wrote."""
+    from sssfit.chart.files import is_chart_file
+    from sssfit.compare.table import is_table_file
 
-    named = [(key, target(each)) for own in files.values() for key, each in own.items()]
-    for key, path in named:
-        if path is not None:
-            check_table_name(path) if key == "table" else chart_format(path)
-    return [path for _, path in named], lambda path: is_chart_file(path) or is_table_file(path)
+    return is_chart_file(path) or is_table_file(path)
 
 
 def _write(part: Any, files: Mapping[str, str], front: Mapping[str, str]) -> set[str]:
     """Draw a part, and write the table of kernels, into files that are held; return which."""
-    from sssfit.chart import figure_of
     from sssfit.compare import Comparison
     from sssfit.compare.table import table_text
 
     chart = files.get("budget_chart" if isinstance(part, list) else "chart")
     if chart:
         options = front if isinstance(part, Comparison) else {}
-        write_chart(figure_of(part, **options), target(chart))
+        write_chart(part, target(chart), **options)
     table = files.get("table")
     if table and isinstance(part, Comparison):
         write(table_text(part, Path(table).suffix.lower(), **front).encode(), Path(table))

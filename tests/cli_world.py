@@ -528,10 +528,11 @@ def recording():
             patch.setattr(owner, function, call)
             if hasattr(runner, function):  # it has imported them by now
                 patch.setattr(runner, function, call)
-        patch.setattr(
-            "sssfit.material.material_names",
-            lambda *, paper=False: ("marble",) if paper else ("skin1", "marble"),
-        )
+        for module in ("sssfit.material", "sssfit.simulate.runner"):
+            patch.setattr(
+                f"{module}.material_names",
+                lambda *, paper=False: ("marble",) if paper else ("skin1", "marble"),
+            )
         yield
 
 

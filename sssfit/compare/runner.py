@@ -34,30 +34,24 @@ Watch = Callable[[str], AbstractContextManager[Any]]
 
 
 def scenes_for(
-    source: Material | Profile | None,
-    names: Sequence[str],
-    mm_per_pixel: Pitch | None,
-    *,
-    threads: int | None = None,
-    **settings: Any,
+    profile: Profile | None, names: Sequence[str], mm_per_pixel: Pitch | None, **settings: Any
 ) -> list[Scene]:
     """Return the pictures that kernels are compared on.
 
     Parameters
     ----------
-    source : Material or Profile, optional
+    profile : Profile, optional
         Whose first annulus is a pixel's width, for ``mm_per_pixel = "profile"``.
     names : sequence of str
     mm_per_pixel : float or "profile", optional [mm]
         By default from the first file that has it, else 0.3.
-    threads : int, optional
     **settings
         Those of `load_scenes`.
     """
     if mm_per_pixel == "profile":
-        if source is None:
+        if profile is None:
             raise RenderError("pixels of a profile's width need the profile; give a length in mm.")
-        mm_per_pixel = pitch_of(_profile_of(source, threads), mm_per_pixel)
+        mm_per_pixel = pitch_of(profile, mm_per_pixel)
     return load_scenes(names, mm_per_pixel, otherwise=MM_PER_PIXEL, **settings)
 
 
@@ -67,6 +61,7 @@ def compare(
     what: str | None = None,
     *,
     name: str,
+    profile: Profile | None = None,
     error: str = "delta-e",
     mm_per_pixel: Pitch | None = None,
     photons: int | None = None,
@@ -88,6 +83,8 @@ def compare(
         one.
     name : str
         The source's name in messages.
+    profile : Profile, optional
+        That of the source, where it is computed already.
     error : str
         The error of the front that will be drawn: "delta-e" needs channels that have a colour.
     mm_per_pixel : float or "profile", optional [mm]
@@ -106,11 +103,11 @@ def compare(
     SssfitError
         As `compare_kernels`, `error_budgets` and `compute_sheet`.
     """
-    if what == "sheet":
-        profile = _profile_of(source, threads)
+    if what != "budget" and profile is None:
+        profile = profile_of(source, threads=threads)
+    if profile is not None and what == "sheet":
         yield compute_sheet(profile, mm_per_pixel=mm_per_pixel, threads=threads)
-    if what in (None, "kernels", "front"):
-        profile = _profile_of(source, threads)
+    elif profile is not None and what != "budget":
         check_error(error, profile.n_channels)
         with steps(profile.material_name or "profile") as show:
             kernels = compare_kernels(profile, scenes, threads=threads, progress=show)
@@ -130,7 +127,7 @@ def compare(
             yield budgets
 
 
-def _profile_of(source: Material | Profile, threads: int | None) -> Profile:
+def profile_of(source: Material | Profile, *, threads: int | None = None) -> Profile:
     """Return a material's exact profile; a profile is its own."""
     return source if isinstance(source, Profile) else true_profile(source, threads=threads)
 

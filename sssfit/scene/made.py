@@ -137,6 +137,7 @@ def check_pictures(
     files = [name for name in names if name not in MADE]
     if size is not None and len(files) == len(names):
         raise ArgumentError("`size` is for made pictures; leave it out.")
-    for given, value in (("layer", layer), ("mask", mask)):
-        if value is not None and not files:
-            raise ArgumentError(f"`{given}` is for pictures from files; leave it out.")
+    if layer is not None and not files:
+        raise ArgumentError("`layer` is for pictures from files; leave it out.")
+    if mask is not None and not files:
+        raise ArgumentError("`mask` is for pictures from files; leave it out.")

@@ -1,7 +1,5 @@
 """The exact profile of a half space, the truth that others are compared with."""
 
-import functools
-
 import numpy as np
 
 from sssfit.errors import SimulationError
@@ -15,7 +13,6 @@ from sssfit.simulate.exact import simulate_exact
 _FAR_SHARE = 1e-4
 
 
-@functools.lru_cache(maxsize=1)  # what asks again asks of the same material
 def true_profile(material: Material, *, threads: int | None = None) -> Profile:
     """Return the exact profile of a half space on the paper's grid.
 
