@@ -1077,6 +1077,7 @@ SHOW = [
     C("show plate.toml --json"),
     C("show deon-skin"),
     C("show Skin1"),
+    C(f"show {'abcdefghij' * 120}"),
 ]
 
 COMMANDS = {

@@ -265,6 +265,7 @@ RECORDS = [
     "[profile(each).transmittance_stderr for each in ('plate', 'wax')]",
     "profile('plate', beyond_grid_transmittance=None, beyond_grid_transmittance_stderr=None)"
     ".transmittance",
+    "profile('plate', beyond_grid_transmittance=None).transmittance_stderr",
     "[profile(each).energy_balance for each in ('plate', 'four')]",
     "profile('four').plot()",
     # A profile's file.

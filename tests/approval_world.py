@@ -408,6 +408,7 @@ def _pictures(folder: Path) -> None:
     negative = light(6, 9, 3)
     negative[4, 2, 1] = -0.25
     _write(folder / "negative.exr", negative, ["R", "G", "B"])
+    _write(folder / "negative_wide.exr", negative, ["R", "G", "B"], chromaticities=wide)
     _write(folder / "rgb8.png", _codes(np.uint8, 8, 13, 3))
     _write(folder / "rgba16.png", _codes(np.uint16, 8, 13, 4), oiio__UnassociatedAlpha=1)
     _write(folder / "grey.png", _codes(np.uint8, 8, 13, 1), oiio__Gamma=1.8)
@@ -469,6 +470,12 @@ def _named(folder: Path) -> None:
     _write(folder / "only.exr", light(3, 4, 4), [*(f"only.{each}" for each in "RGB"), "Z"])
     _write(folder / "dotted.exr", light(3, 4, 2), ["x.N", "x.D"])
     _write(folder / "alpha.exr", light(3, 4, 4), ["R", "G", "B", "alpha"])
+    _write(folder / "far.exr", light(3, 4, 4), [*(f"far.{each}" for each in "RGB"), "far.Alpha"])
+    holed = light(3, 4, 4)
+    holed[2, 1, 3] = np.nan
+    _write(folder / "holed.exr", holed, ["R", "G", "B", "A"])
+    holed[1, 3, 2] = np.inf
+    _write(folder / "infinite.exr", holed, ["R", "G", "B", "A"])
     _write(folder / "red.exr", light(3, 4, 4), ["Red", "Green", "Blue", "A"])
     _write(folder / "aov.exr", light(3, 4, 12), [f"c{k}" for k in range(11)] + ["Y"])
     _write(folder / "greys.exr", light(3, 4, 2), ["b.Y", "a.Y"])
@@ -588,9 +595,10 @@ def _tables(folder: Path) -> None:
         "zero.csv": "r_mm,R\n0,.2\n2,.1\n",
         "quoted.csv": 'r_mm,R\n1,".2\n2,.1\n',
         "said.csv": "# quantity = weight\nr_mm,R\n1,.2\n2,.1\n",
-        "spaced.csv": '\n#quantity=density\n\n r_cm , "R" , G \n\n# half-way\n .05, 2 , "1.5"\n'
-        "  .2 ,1,.25 \n\n",
-        "shifted.csv": "R_stderr,G,r_um,R\n.01,.2,500,.1\nNaN,.02,1500,.05\n.002,.001,2500,.02\n",
+        "spaced.csv": '\n#quantity=density\n\n r_cm , "R", G \n\n# half-way\n .05, 2 , "1.5"\n'
+        "  .15 ,.25,.125 \n\n",
+        "shifted.csv": "R_stderr,G,r_um,R\n1e-9,2e-8,500,1e-8\nNaN,2e-9,1500,5e-9\n"
+        "2e-10,1e-10,2500,2e-9\n",
         "narrow.csv": "r_mm,R\n1,.2\n1.0000000000001,.1\n",
         "tight.csv": "r_cm,R,G\n.050001,.02,.07\n.15,.01,.001\n",
         "exact.csv": "r_mm,R,G\n1,.5,.25\n2,.5000005,.25\n",
@@ -603,7 +611,9 @@ def _tables(folder: Path) -> None:
     plain = "r_mm,R\n.5,.02\n1.5,.01\n"
     (folder / "utf16le.csv").write_bytes(plain.encode("utf-16-le"))
     (folder / "utf16be.csv").write_bytes(plain.encode("utf-16-be"))
-    (folder / "windows.csv").write_bytes(b"\xef\xbb\xbfr_mm,R\r\n.5,.02\r\ninf,.01\r\n\x1a")
+    (folder / "windows.csv").write_bytes(
+        b"\xef\xbb\xbfr_mm,R\r\n.5,.02\r\n.75,.25\r\ninf,.01\r\n\x1a"
+    )
     (folder / "bom.csv").write_text("r_mm,R\n.5,.02\n1.5,.01\n", encoding="utf-8-sig")
     for name in ("cudamcml-inparam.mco", "mcml2.mco", "sample.mci", "latin1-comment.csv"):
         (folder / name).write_bytes((DATA / name).read_bytes())
