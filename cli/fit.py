@@ -45,31 +45,24 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
     from sssfit.kernel import is_kernel_file, is_taps_file
     from sssfit.profile import Profile
 
-    known = settings_of(ALL_FITS)
+    is_taps, known = method in TAPS, settings_of(ALL_FITS)
     settings = own_settings(context, ALL_FITS, method, {key: given[key] for key in known})
-    name = profile_name(profile, common)
-    source = load(Profile, name)
-    count, stem = ALL_FITS[method].count_of(settings), stem_of(name, source.material_name)
+    if is_taps:
+        refuse(given, {"normalize": "separable kernels"})
+    name = profile_name(profile)
+    source = load(Profile.read, name)
+    stem = f"{stem_of(name, source.material_name)}.{method}{ALL_FITS[method].count_of(settings)}"
+    path = target(given["output"], f"{stem}.{'taps' if is_taps else 'kernel'}.json")
+    settings |= {"seed": common.seed} if is_taps else {"normalize": given["normalize"]}
+    settings |= _picture_target(settings, common.threads)
     settings["mm_per_pixel"] = given["mm_per_pixel"]
     settings["support_mm"] = None if given["support"] == "auto" else given["support"]
-    if method in TAPS:
-        refuse(given, {"normalize": "separable kernels"})
-        count = settings.get("stages", f"{float(count):g}").replace("|", "_")
-        path = target(given["output"], f"{stem}.{method}{count}.taps.json")
-        with held([path], is_taps_file, inputs=[name], force=given["force"], named=KERNEL):
-            found = fit_taps(source, method, seed=common.seed, **settings)
-            write(found.taps, path)
-        figures = {"profile": name, **found.to_dict()}
-        finish_one(common, "fit", path, figures, page("fit-taps", figures), "the table of taps")
-        return
-    path = target(given["output"], f"{stem}.{method}{count}.kernel.json")
-    settings |= _picture_target(settings, common.threads)
-    settings["normalize"] = given["normalize"]
-    with held([path], is_kernel_file, inputs=[name], force=given["force"], named=KERNEL):
-        result = fit_result(source, method, **settings)
-        write(result.kernel, path)
+    is_own = is_taps_file if is_taps else is_kernel_file
+    with held([path], is_own, inputs=[name], force=given["force"], named=KERNEL):
+        result = (fit_taps if is_taps else fit_result)(source, method, **settings)
+        write(result.kernel.write, path)
     figures = {"profile": name, **result.to_dict()}
-    finish_one(common, "fit", path, figures, page("fit", figures), "the kernel")
+    finish_one(common, path, figures, page("fit-taps" if is_taps else "fit", figures), "the kernel")
 
 
 def _picture_target(settings: dict[str, Any], threads: int | None) -> dict[str, Any]:

@@ -88,7 +88,7 @@ def row(cells):
 def budget_rows(profiles):
     """Return a row for each budget."""
     for budget in BUDGETS:
-        found = [fit_taps(each, fetches=budget).taps for each in profiles.values()]
+        found = [fit_taps(each, fetches=budget).kernel for each in profiles.values()]
         first = found[0]
         shown = [p99(*each) for each in zip(found, profiles.values(), strict=True)]
         structure = text_of(structure_for(budget, None, None)).replace("|", "\\|")
@@ -114,7 +114,7 @@ def main():
     """Write the page's figures and the picture."""
     profiles = {name: simulate_exact(load_material(name)) for name in MATERIALS}
     skin1 = profiles["skin1"]
-    taps: Taps = fit_taps(skin1, fetches=24).taps
+    taps: Taps = fit_taps(skin1, fetches=24).kernel
     each = scores(taps, skin1)
     figures = ("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99")
     names = [f"{name} {own.get('angle_degrees', '')}".strip() for name, own in PICTURES]

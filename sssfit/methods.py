@@ -67,8 +67,9 @@ class Method:
     summary : str
         Help text on one line.
     settings : tuple of Setting
-    counted : str
-        The setting whose value becomes part of the kernel's file name (svd3); see `count_of`.
+    counted : tuple of str
+        Settings of which the first that is given becomes part of the kernel's file name (svd3); if
+        none is, the ``words`` of the last.
     shares : bool
         Whether the function takes a list of materials, shares their common work, and takes
         ``threads`` and ``stop``; the others take one material.
@@ -79,7 +80,7 @@ class Method:
     function: str
     summary: str
     settings: tuple[Setting, ...] = ()
-    counted: str = ""
+    counted: tuple[str, ...] = ()
     shares: bool = False
     makes: str | None = None
 
@@ -87,10 +88,13 @@ class Method:
         """Import the method's function."""
         return imported(self.function)
 
-    def count_of(self, given: Mapping[str, Any]) -> Any:
-        """Return the value of the counted setting among those given, by default its ``words``."""
-        own = {each.name: each.words for each in self.settings}
-        return given.get(self.counted, own.get(self.counted, ""))
+    def count_of(self, given: Mapping[str, Any]) -> str:
+        """Return what becomes part of the kernel's file name."""
+        known = {each.name: each.words for each in self.settings}
+        words = [known[name] for name in self.counted[-1:]]
+        value = [given[name] for name in self.counted if name in given] + [*words, ""]
+        text = f"{value[0]:g}" if isinstance(value[0], float) else str(value[0])
+        return text.replace("|", "_")  # no file of Windows may have a bar in its name
 
 
 DEON_SKIN = "deon-skin"  # a profile that is made without a material
@@ -195,7 +199,7 @@ FITS: Mapping[str, Method] = {
         "sssfit.fit.svd:fit_svd",
         "rank N: the largest terms of the singular value decomposition; the smallest error",
         (Setting("rank", "whole", "number of terms.", "N", (1, 1000), words="3"), _ENERGY),
-        counted="rank",
+        counted=("rank",),
     ),
     "gaussians": Method(
         "sssfit.fit.gaussians:fit_gaussians",
@@ -206,7 +210,7 @@ FITS: Mapping[str, Method] = {
             Setting("free_energy", "flag", "do not constrain the sum of the weights."),
             _ENERGY,
         ),
-        counted="terms",
+        counted=("terms",),
     ),
     "preintegrated": Method(
         "sssfit.fit.preintegrated:fit_preintegrated",
@@ -295,7 +299,7 @@ FITS: Mapping[str, Method] = {
             Setting("rank", "whole", "number of terms.", "N", (1, 1000), words="2"),
             _SPECTRUM,
         ),
-        counted="rank",
+        counted=("rank",),
     ),
     "burley": Method(
         "sssfit.fit.burley:fit_burley",
@@ -321,7 +325,7 @@ TAPS: Mapping[str, Method] = {
             Setting("full_resolution", "flag", "do not halve the picture."),
             _SPECTRUM,
         ),
-        counted="fetches",
+        counted=("stages", "fetches"),
     ),
 }
 ALL_FITS: Mapping[str, Method] = {**FITS, **TAPS}

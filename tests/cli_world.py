@@ -32,7 +32,7 @@ from test_mco import BELOW, DR_CM, IN_LAYERS, N_R, REFLECTED, SPECULAR, block, m
 from sssfit import compare, simulate
 from sssfit.choose import choice as choose
 from sssfit.cli import cli
-from sssfit.compare import budget, pareto, sheet
+from sssfit.compare import budget, pareto, runner, sheet
 from sssfit.compare.candidates import Candidate, candidates
 from sssfit.errors import SssfitWarning
 from sssfit.fit import fit_gaussians, fit_svd
@@ -256,7 +256,7 @@ def finishing(both: bool):
 
     real = _output.finish
 
-    def twice(common, figures, text, *, to_stderr=False):
+    def twice(common, figures, text):
         for as_json in (True, False):
             real(replace(common, json=as_json, quiet=False), figures, text)
 
@@ -529,11 +529,15 @@ def recording():
         for name, stand_in in STAND_INS.items():
             module, function = name.rsplit(".", 1)
             owner = importlib.import_module(module)
-            patch.setattr(owner, function, recorded(getattr(owner, function), stand_in))
-        patch.setattr(
-            "sssfit.material.material_names",
-            lambda *, paper=False: ("marble",) if paper else ("skin1", "marble"),
-        )
+            call = recorded(getattr(owner, function), stand_in)
+            patch.setattr(owner, function, call)
+            if hasattr(runner, function):  # it has imported them by now
+                patch.setattr(runner, function, call)
+        for module in ("sssfit.material", "sssfit.simulate.runner"):
+            patch.setattr(
+                f"{module}.material_names",
+                lambda *, paper=False: ("marble",) if paper else ("skin1", "marble"),
+            )
         yield
 
 

@@ -233,7 +233,7 @@ def _tapped(option: str, value: str, default: str = "", **own: Any) -> Row:
     """An option of a cascade, by the table of taps; without others the first is a quick one."""
 
     def made() -> Any:
-        found = fit.fit_taps(profile(), mm_per_pixel=0.6, **(usual | own)).taps
+        found = fit.fit_taps(profile(), mm_per_pixel=0.6, **(usual | own)).kernel
         return [found.structure, found.mm_per_pixel, found.blend]
 
     free = {"passes", "fetches", "full_resolution"} & own.keys()

@@ -152,7 +152,7 @@ def fitted(skin1):
 
 
 def test_everything_is_positive_and_energy_is_exact(skin1, fitted):
-    taps = fitted.taps
+    taps = fitted.kernel
     assert (taps.blend >= 0.0).all()
     assert all((each.weights >= 0.0).all() for each in taps.stages)
     np.testing.assert_allclose(taps.energy, skin1.diffuse_reflectance, rtol=1e-9)
@@ -164,8 +164,8 @@ def test_everything_is_positive_and_energy_is_exact(skin1, fitted):
 
 def test_the_same_seed_gives_the_same_bits(skin1, fitted):
     again = fit(skin1, "cascade", stages="1|1-1", seed=3)
-    assert again.blend.tobytes() == fitted.taps.blend.tobytes()
-    for ours, theirs in zip(again.stages, fitted.taps.stages, strict=True):
+    assert again.blend.tobytes() == fitted.kernel.blend.tobytes()
+    for ours, theirs in zip(again.stages, fitted.kernel.stages, strict=True):
         assert ours.offsets_mm.tobytes() == theirs.offsets_mm.tobytes()
 
 
@@ -181,9 +181,9 @@ def test_the_error_is_that_over_all_frequencies(skin1, fitted):
     for c in range(3):
         wanted = cosines @ target.quadrant(c) @ cosines.T
         wanted *= skin1.diffuse_reflectance[c] / wanted[0, 0]
-        apart = _spectrum_of(fitted.taps, c, w) - wanted
+        apart = _spectrum_of(fitted.kernel, c, w) - wanted
         error = np.sqrt((power * apart**2).sum() / (power * wanted**2).sum())
-        assert error == pytest.approx(fitted.taps.errors["spectral"][c], rel=0.05)
+        assert error == pytest.approx(fitted.kernel.errors["spectral"][c], rel=0.05)
 
 
 def _spectrum_of(taps, channel, w):
@@ -212,7 +212,7 @@ def test_white_pictures_are_another_optimum(skin1):
         errors = {
             name: (
                 judge.error(
-                    np.stack([_spectrum_of(fit.taps, c, judge.frequencies) for c in range(3)])
+                    np.stack([_spectrum_of(fit.kernel, c, judge.frequencies) for c in range(3)])
                 )
                 ** 2
             ).sum()
@@ -226,7 +226,7 @@ def test_a_channel_without_light_stays_black(skin1):
     energy[:, 1] = 0.0
     beyond = skin1.beyond_grid * [1, 0, 1]
     dark = replace(skin1, annulus_energy=energy, beyond_grid=beyond)
-    taps = fit_taps(dark, stages="1|1").taps
+    taps = fit_taps(dark, stages="1|1").kernel
     assert (taps.blend[:, 1] == 0.0).all()
     assert taps.errors["spectral"][1] == 0.0
     np.testing.assert_allclose(taps.energy, dark.diffuse_reflectance, rtol=1e-9)
@@ -235,7 +235,7 @@ def test_a_channel_without_light_stays_black(skin1):
 @pytest.mark.parametrize("lengths_mm", [[0.4], [0.1, 0.4, 0.2, 0.6]])
 def test_any_number_of_channels(lengths_mm):
     profile = one_over_r_profile(100, 0.1, lengths_mm)
-    taps = fit_taps(profile, stages="1|1", mm_per_pixel=0.5).taps
+    taps = fit_taps(profile, stages="1|1", mm_per_pixel=0.5).kernel
     assert taps.channels == profile.channels
     np.testing.assert_allclose(taps.energy, profile.diffuse_reflectance, rtol=1e-9)
 

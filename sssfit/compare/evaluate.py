@@ -16,6 +16,7 @@ from sssfit.measure.asymmetry import radial_asymmetry
 from sssfit.measure.cost import Cost, cost_of, seconds_per_megapixel
 from sssfit.measure.difference import DifferenceMap, difference_map
 from sssfit.measure.score import SCORE_FIGURES, ImageScore, auto_exposure, measure
+from sssfit.messages import note
 from sssfit.profile import Profile, full_kernel
 from sssfit.render import render
 from sssfit.render.reference import render_reference
@@ -102,8 +103,8 @@ class Evaluation:
 
     def save(
         self, targets: Mapping[str, Path | BinaryIO], *, exposure: float | None = None
-    ) -> list[str]:
-        """Write the pictures; return what is to be known of the files, in sentences.
+    ) -> None:
+        """Write the pictures; what is to be known of the files is noted.
 
         Parameters
         ----------
@@ -120,7 +121,7 @@ class Evaluation:
         pixels = {"picture": self.picture, "truth": self.truth}
         pixels["difference"] = None if self.difference is None else self.difference.pixels
         own = self.score.exposure if self.score else auto_exposure(self.picture)
-        alpha, notes = self._alpha()
+        alpha = self._alpha()
         for what, target in targets.items():
             image = pixels[what]
             if image is None:
@@ -136,18 +137,19 @@ class Evaluation:
                 settings["format"] = "exr"
             elif image_format(target) == "png" and not is_map:  # false colours are no light
                 settings["exposure"] = exposure or own
-            notes += [f"{target}: {note}" for note in save_image(target, image, **settings)]
-        return notes
+            for each in save_image(target, image, **settings):
+                note(f"{target}: {each}")
 
-    def _alpha(self) -> tuple[dict[str, Any], list[str]]:
+    def _alpha(self) -> dict[str, Any]:
         """Return what `save_image` takes of the scene's alpha, where a file can hold it."""
         if self.scene.alpha is None:
-            return {}, []
+            return {}
         channels = self.kernel.channels
         if len(channels) not in (1, 3) or "A" in channels:
-            return {}, [f"alpha left out beside the channels {', '.join(channels)}"]
+            note(f"alpha left out beside the channels {', '.join(channels)}")
+            return {}
         multiplied = self.scene.alpha_is_multiplied
-        return {"alpha": self.scene.alpha, "alpha_is_multiplied": multiplied}, []
+        return {"alpha": self.scene.alpha, "alpha_is_multiplied": multiplied}
 
 
 def evaluate(
@@ -294,7 +296,7 @@ def timed(render: Callable[[Scene], FloatArray], scene: Scene) -> tuple[FloatArr
 
 def evaluate_in_screen_space(
     scene: Scene,
-    kernel: SeparableKernel,
+    kernel: Kernel,
     *,
     transmit: bool = False,
     follow: str = "gaussian",
@@ -306,6 +308,11 @@ def evaluate_in_screen_space(
     Parameters and errors are those of `render_screen`, which adds the light through a scene that
     has any; ``transmit`` says how much that is.
     """
+    if isinstance(kernel, Taps):
+        raise RenderError(
+            "screen space by depth needs a separable kernel, and this is a table of taps; "
+            "leave out `screen`."
+        )
     through = _most_through(scene, kernel) if transmit else None
     picture, seconds = timed(
         lambda shown: render_screen(shown, kernel, follow=follow, border=border, threads=threads),

@@ -138,7 +138,7 @@ def fit(
     SeparableKernel, or Taps from the methods of ``sssfit.methods.TAPS``
     """
     if isinstance(method, str) and method in TAPS:
-        return fit_taps(profile, method, **settings).taps
+        return fit_taps(profile, method, **settings).kernel
     if not isinstance(method, str) or method not in METHODS:
         raise FitError(f"method = {shown(method)}; expected one of {', '.join(ALL_FITS)}.")
     return fit_result(profile, method, **settings).kernel

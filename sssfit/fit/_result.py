@@ -156,20 +156,20 @@ class FitResult:
 class TapsFit:
     """A table of taps and how it was found."""
 
-    taps: Taps
+    kernel: Taps
     evaluations: int
     seconds: float
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures that ``sssfit fit --json`` prints, as lists and numbers."""
-        figures = self.taps.figures()
+        figures = self.kernel.figures()
         names = (
             *("channels", "method", "structure", "mm_per_pixel", "fetches", "passes"),
             *("all_passes", "bytes_per_pixel", "spectral_error", "energy_error", "energy"),
         )
         return plain(
             {
-                "material": self.taps.meta.get("material"),
+                "material": self.kernel.meta.get("material"),
                 **{name: figures[name] for name in names},
                 "evaluations": self.evaluations,
                 "seconds": self.seconds,

@@ -5,14 +5,14 @@ from pathlib import Path
 
 from sssfit.errors import SssfitError
 from sssfit.kernel import Kernel
-from sssfit.messages import printable
+from sssfit.messages import note, printable
 from sssfit.profile import Profile
 
 
 def find_profile(
     kernel: Kernel, kernel_file: str, folders: Iterable[Path]
-) -> tuple[Profile | None, str | None, str | None]:
-    """Find the profile with the fingerprint that a kernel recorded, from any program.
+) -> tuple[Profile | None, str | None]:
+    """Find the profile with the fingerprint that a kernel recorded, or note why there is none.
 
     Parameters
     ----------
@@ -27,17 +27,15 @@ def find_profile(
     profile : Profile or None
     file : str or None
         Its path.
-    note : str or None
-        Why there is none, in a sentence: the kernel records no profile, or it changed, or is
-        missing.
     """
     files = [path for folder in folders for path in folder.glob("*.npz") if path.is_file()]
     files.sort(key=lambda each: each.stat().st_mtime_ns, reverse=True)
     profiles = [(path, found) for path in files if (found := _read(path)) is not None]
     for path, profile in profiles:
         if profile.sha256 == kernel.meta.get("profile_sha256"):
-            return profile, str(path), None
-    return None, None, _missing(kernel, printable(kernel_file), profiles)
+            return profile, str(path)
+    note(_missing(kernel, printable(kernel_file), profiles))
+    return None, None
 
 
 def _read(path: Path) -> Profile | None:
