@@ -145,7 +145,7 @@ def test_a_report_leaves_out_what_is_not_known():
 
 def test_a_note_is_printed_by_the_command_line_alone_and_not_under_q(capsys, monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("sssfit.simulate.exact.is_solver_compiled", lambda: False)
+    monkeypatch.setattr("sssfit.simulate.inversion.is_solver_compiled", lambda: False)
     make = ["materials", "--from-reflectance", "0.4", "--channels", "A", "--mean-free-path", "1"]
     for quiet, is_said in ((["-q"], False), ([], True)):
         with pytest.raises(SystemExit):
