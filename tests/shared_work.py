@@ -9,6 +9,7 @@ import contextlib
 import dataclasses
 import functools
 import json
+from collections.abc import Mapping
 from types import NoneType
 
 import numpy as np
@@ -21,6 +22,7 @@ OWN = {
     *("test_deterministic", "test_exact", "test_head", "test_head_through", "test_interrupts"),
     *("test_memory_order", "test_processes", "test_runner"),
 }
+_PLAIN = str | int | float | NoneType  # a setting that is a function, or a scene, is not shared
 _state = {"allowed": True}
 
 
@@ -83,9 +85,10 @@ def _fitted_once(real):
 
     @functools.wraps(real)
     def fit_result(profile, method="svd", **settings):
-        if not _state["allowed"]:
+        values = settings.values()
+        if not _state["allowed"] or not all(isinstance(each, _PLAIN) for each in values):
             return real(profile, method, **settings)
-        key = _contents(profile), method, json.dumps(settings, sort_keys=True)
+        key = _contents(profile), method, *sorted(settings.items())
         if key not in known:
             known[key] = real(profile, method, **settings)
         return known[key]
@@ -96,10 +99,9 @@ def _fitted_once(real):
 def _contents(profile):
     """Everything in a profile, provenance included: a kernel takes over some of it."""
     fields = [getattr(profile, each.name) for each in dataclasses.fields(profile)]
-    arrays = (each.tobytes() if isinstance(each, np.ndarray) else each for each in fields)
     return tuple(
-        each
-        if isinstance(each, bytes | float | NoneType)
-        else json.dumps(dict(each), sort_keys=True)
-        for each in arrays
-    )
+        each.tobytes() if isinstance(each, np.ndarray)
+        else json.dumps(dict(each), sort_keys=True) if isinstance(each, Mapping)
+        else each
+        for each in fields
+    )  # fmt: skip
