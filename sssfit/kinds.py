@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
 
 from sssfit.errors import FileError
 from sssfit.files import is_marked, read_at_most, reason
-from sssfit.messages import did_you_mean
+from sssfit.messages import did_you_mean, printable
 from sssfit.methods import imported
 from sssfit.text import decode
 
@@ -95,12 +95,12 @@ def load(source: "str | Path | BinaryIO", origin: str | None = None) -> "Loaded"
     'skin1'
     """
     if not isinstance(source, str | Path):
-        origin = origin or "the stream"
+        origin = printable(origin or "the stream")
         source = _whole(source, origin)
         kind = _kind(source)
         source.seek(0)
     else:
-        origin = origin or str(source)
+        origin = printable(origin or str(source))
         names = imported("sssfit.material:material_names")()
         path = Path(source)
         if source in names and not path.exists():

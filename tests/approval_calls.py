@@ -12,16 +12,20 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import approval_records as records
 import approval_world as world
 import numpy as np
+from approval_figures import figure_lines
 from approval_files import array_text, file_lines, masked, text_lines
 from approval_run import copied_files, stand_ins
+from matplotlib.figure import Figure
 
 from sssfit import compare, export, measure
 from sssfit.arrays import plain_value
-from sssfit.choose import choice
+from sssfit.choose import choice, report
 from sssfit.compare import budget, evaluate, sheet, table
 from sssfit.errors import SssfitError
+from sssfit.export import document
 from sssfit.fit import fit_artist, fit_svd
 from sssfit.formats import colours, csv, mci, mco, pictures
 from sssfit.kernel import SeparableKernel
@@ -41,10 +45,6 @@ class Call:
     @property
     def title(self) -> str:
         return self.line
-
-
-def kernel(name: str) -> SeparableKernel:
-    return world.kernels()[name]
 
 
 @functools.cache
@@ -77,6 +77,7 @@ def fields(record: Any) -> dict[str, Any]:
 TRUTH = world.light(13, 17, 3).astype(np.float64)
 MASK = (np.arange(13)[:, None] + np.arange(17) > 2).astype(np.float64)
 NAMES = {
+    **records.NAMES,
     **{name: value for name, value in vars(colours).items() if not name.startswith("_")},
     **{name: value for name, value in vars(delta_e).items() if not name.startswith("_")},
     **vars(export),
@@ -87,18 +88,21 @@ NAMES = {
     "cost": cost,
     "csv": csv,
     "difference": difference,
+    "document": document,
     "evaluate": evaluate,
     "mci": mci,
     "mco": mco,
     "np": np,
     "measure": measure,
     "pictures": pictures,
+    "report": report,
     "score": score,
     "sheet": sheet,
     "table": table,
     "structure": structure,
     "world": world,
-    "kernel": kernel,
+    "file_lines": file_lines,
+    "io": io,
     "scene": scene,
     "near": near,
     "saved": saved,
@@ -141,6 +145,8 @@ def told(value: Any) -> Iterator[str]:
         value.write(stream)
         yield repr(value)
         yield from file_lines("result", stream.getvalue())
+    elif isinstance(value, Figure):
+        yield from figure_lines(value, {})
     elif isinstance(value, Material):
         yield from text_lines(value.to_toml())
     elif hasattr(value, "to_dict"):
@@ -174,6 +180,15 @@ EXPORT = [
     "hlsl(kernel('five'))",
     "json_document(kernel('grau'))",
     "hlsl(fit_svd(world.mono(), rank=2, mm_per_pixel=0.8, normalize=True).kernel)",
+    "hlsl(kernel('grau', weights=put(world.kernels()['grau'].weights, (0, [0, 4], 0), 3e-39)))",
+    "hlsl(kernel('grau', weights=put(world.kernels()['grau'].weights, (0, [0, 4], 0), 1.2e-38)))",
+    "hlsl(kernel('grau', weights=put(world.kernels()['grau'].weights, (0, [0, 4], 0), -12345678.9)))",
+    "hlsl(kernel('leaf.burley', mm_per_pixel=0.123456789, scale=[1e-7, 123456789.0]))",
+    "json_document(kernel('five', mm_per_pixel=1 / 7, scale=[0.5, 1 / 3, 2, 1e-9, 7e7]))",
+    "hlsl(kernel('five', meta={'material': 'a\\nb', 'photons': 0, 'seed': 0, 'settings': {'x\\n': 1}}))",
+    "hlsl(kernel('five', meta={'material_sha256': 'ab' * 32, 'profile_method': 'exact', 'seed': 3}))",
+    "document.description(kernel('wax.svd2', energy_error=[1e-13, -2e-12, np.nan],"
+    " relative_frobenius_error=[0.0, 9e-13, 1.23456789]))",
 ]
 
 FORMATS = [
@@ -283,6 +298,103 @@ FORMATS = [
     "pictures.Image(TRUTH, ('R', 'G', 'B'), alpha=MASK[1:])",
     "pictures.Image(TRUTH[0], ('R', 'G', 'B'))",
     "[pictures.image_format(name) for name in ('a.EXR', 'a.tif', 'a.tiff', 'a.png')]",
+    *(
+        f"pictures.load_image('{name}')"
+        for name in (
+            *("only.exr", "dotted.exr", "alpha.exr", "red.exr", "aov.exr", "greys.exr"),
+            *("acescg.exr", "same.exr", "small.exr", "y_small.exr", "gamma1.png", "gamma1.8.png"),
+            *("plain.png", "gamma2.2.png"),
+            *(
+                "scaled.exr",
+                "parts.exr",
+                "primaries.hdr",
+                "wrong_factors.hdr",
+                "wrong_exposure.hdr",
+            ),
+            *(
+                "negative.hdr",
+                "far.exr",
+                "negative_wide.exr",
+                "holed.exr",
+                "infinite.exr",
+                "wrong_primaries.hdr",
+                "far.hdr",
+                "twice.hdr",
+                "cut.tif",
+            ),
+            *("flipped.png", "unended.png", "noise.jpg", "grey.dat", "nearly.dat", "short.tga"),
+            *("depth7.tga", "wide0.tga", "flat.exr", "empty.csv", "x" * 500),
+        )
+    ),
+    "pictures.load_image('parts.exr', layer='second')",
+    "pictures.load_image('parts.exr', layer='third')",
+    "pictures.load_image('greys.exr', layer='a')",
+    "pictures.load_image('only.exr', layer='')",
+    "pictures.load_image('bare.exr', layer='R')",
+    "pictures.load_image('only.exr', layer='only')",
+    *(f"pictures.load_image({path})" for path in ("3", "'a\\0b'", "b'mine.exr'")),
+    "[pictures.is_image_file(each) for each in ('own.exr', 'own.png', 'own.tif', 'bare.exr',"
+    " 'rgb8.png', 'foreign.png', 'missing.png', 3)]",
+    "pictures.load_image('mine.exr', largest_bytes=32 * 10 * 14 * 3).pixels.shape",
+    "pictures.load_image('mine.exr', largest_bytes=32 * 10 * 14 * 3 - 1)",
+    "saved(np.zeros((1, 1000001, 1)), format='png')",
+    "saved([[[1.0], [2.0, 3.0]]], format='exr')",
+    "saved(1j * TRUTH, format='exr')",
+    "saved(TRUTH[:0], format='exr')",
+    "saved(1.0000005 * TRUTH / TRUTH.max(), format='png')",
+    "saved(1.01 * TRUTH / TRUTH.max(), format='png')",
+    "saved(TRUTH[..., :1], format='tiff', alpha=MASK, mm_per_pixel=0.25)",
+    "saved(TRUTH, format='tiff', alpha=0.25 + 0.5 * MASK, alpha_is_multiplied=True)",
+    "saved(TRUTH, format='exr', alpha=MASK * np.nan)",
+    "saved(TRUTH, format='exr', channels=['λ' * 127, 'b', 'c'])[0]",
+    "saved(TRUTH, format='exr', channels=['λ' * 128, 'b', 'c'])",
+    "saved(TRUTH, format='exr', channels=['', 'b', 'c'])",
+    "saved(TRUTH, format='exr', exposure=True)",
+    "[reflectance_of_codes(each) for each in ('#fff', [197, 140, 107], [40.0], [0, 255])]",
+    "reflectance_of_codes([1.5, 2, 3])",
+    "reflectance_of_codes([1, 256, 3])",
+    *(
+        f"csv.csv_text(profile('wax', {change}))"
+        for change in (
+            *("meta={'channels': ['r_cm', 'G', 'B'], 'material': None}",),
+            *("meta={'channels': ['G_stderr', 'G', 'B'], 'material': None}",),
+            *("meta={'channels': ['#a', 'b,c', 'd \"e\"'], 'material': None, 'source': 's\\nt'}",),
+            "annulus_energy=put(world.wax().annulus_energy, ([3, 9], [2, 0]), -1e-3)",
+            "beyond_grid=[0.1, -0.25, 0.1]",
+            "beyond_grid=[0.1, 0.9, 0.1]",
+            "beyond_grid_stderr=[np.nan, 0.125, np.nan]",
+        )
+    ),
+    "mco.parse_mco(world.mco_text(layers='0.5 1 100 0.9 0.1\\n1.4 2.5 10 0 0.2'), 'a.mco')",
+    "mci.parse_mci(world.TWO_RUNS.replace('1.4 2.5 10 0 0.2', '1.4 2.5 10 0 1e6'), 'a.mci')[0]"
+    ".material",
+    "mci.parse_mci(world.TWO_RUNS.replace('1.4 2.5 10 0 0.2', '1.4 2.5 10 0 999999'), 'a.mci')[0]"
+    ".material",
+    "mci.parse_mci(world.TWO_RUNS.replace('1.4 1 100 0.9', '1.4 0 0 0.9').replace('1.4 2.5 10',"
+    " '1.4 0 0'), 'a.mci')",
+    "mci.parse_mci(world.TWO_RUNS.replace('1.4 1 100 0.9', '1.4 1e9 1e9 0.9'), 'a.mci')",
+    "mci.parse_mci(world.TWO_RUNS.replace('0.9 0.1', '1 1e-8'), 'a.mci')[0].material",
+    "mci.load_mci('two.mci', 0)",
+    "mci.parse_mci('x', 'a\\nb')",
+    "mci.load_mci('a\\nb')",
+    "mco.parse_mco('x', 'a\\nb')",
+    "csv.parse_csv('x', 'a\\nb')",
+    "pictures.load_image('a\\nb')",
+    "mci.load_mci('two.mci', 2)",
+    "[run.settings({'dr_mm': 0.7, 'radius_mm': None}, photons=k == 1) for k, run in"
+    " enumerate(mci.load_mci('two.mci'))]",
+    "mco.join_channels([mco.load_mco('deep.mco'), mco.load_mco('through.mco')], ['a', 'b'])",
+    "mco.join_channels([mco.parse_mco(world.mco_text(name=n, photons=p), n) for n, p in"
+    " (('x.mco', 7), ('y.mco', 9))], ['a', 'b'])",
+    "mco.join_channels([mco.load_mco('r.mco'), mco.parse_mco(world.mco_text().replace('2 4 1', '2 5 1')"
+    ".replace('4.5473E+00', '4.5473E+00\\n0').replace('1.1368E+00', '1.1368E+00\\n0'), 'more.mco')],"
+    " ['a', 'b'])",
+    "mco.join_channels([mco.parse_mco(world.mco_text(above=1.1, below=1.5), 'x.mco')] * 2, ['a', 'b']).material",
+    "mco.parse_mco(world.mco_text().replace('A1 #', '# a comment\\n\\nA1 #'), 'a.mco')",
+    "mco.parse_mco(world.mco_text().replace('InParm #', 'InParam #').replace('r.mco A #',"
+    " 'r.mco A#7 '), 'a.mco').meta",
+    "mco.parse_mco(world.mco_text().replace('1.4 2.5 10 0 0.2', '1.4 2.5 10 0 0.2 # µ'), 'a.mco')"
+    ".meta",
 ]
 
 COMPARE = [
@@ -323,6 +435,31 @@ COMPARE = [
     "compare.compare_kernels(world.wax(), [scene('disk')], candidates=[])",
     "compare.compare_kernels(world.wax(), [scene('disk', pitch=2.5), scene('edge', pitch=2.5)]).to_dict()['rows'][:2]",
     "sheet.compute_sheet(world.mono(), mm_per_pixel=0.8, pixels=12, scenes=('edge',), most_terms=1)",
+    "evaluate.evaluate(scene('disk'), kernel('wax.svd2')).with_difference()",
+    "evaluate.evaluate(scene('disk'), kernel('wax.svd2')).save({'truth': io.BytesIO()})",
+    "evaluate.evaluate(scene('disk'), kernel('wax.svd2'), world.plate())",
+    "[evaluate.evaluate(scene('disk'), kernel('wax.svd2')).save({'picture': Path('p.png')}, exposure=e)"
+    " for e in (None, 5.0)], file_lines('p.png', Path('p.png').read_bytes())",
+    "evaluate.evaluate(scene('edge', 9, 14, angle_degrees=25.0), kernel('wax.svd2'), world.wax(),"
+    " structure=True)",
+    "evaluate.evaluate(scene('edge', 13, 14, angle_degrees=25.0), kernel('wax.svd2'), world.wax(),"
+    " border='zero', exposure=0.25, structure=True)",
+    "compare.pareto_front([1, 2, 3], [1, 2])",
+    "compare.pareto_front([[1]], [[2]])",
+    "compare.pareto_front([np.nan, 2, 2, 1], [0, 3, 3, np.inf])",
+    "compare.compare_kernels(world.wax(), [Scene('flat', np.ones((4, 5, 1)), 0.5)])",
+    "compare.compare_kernels(world.wax(), [Scene('pair', TRUTH[..., :2], 0.5)])",
+    "compare.compare_models(parse_material(world.WAX, 'w'), walk=world.four())",
+    "compare.compare_models(parse_material(world.WAX, 'w'), walk=world.leaf())",
+    "[compare.view_kernel(fit_svd(world.mono(), rank=1, mm_per_pixel=0.004, support_mm=p).kernel).to_dict()"
+    " for p in (1.2, 1.208)]",
+    "fields(compare.view_kernel(fit_svd(world.mono(), rank=1, mm_per_pixel=0.002, support_mm=1.205).kernel,"
+    " world.mono()))",
+    "compare.view_kernel(kernel('wax.svd2'), channels=['X'])",
+    "budget.error_budget(world.parse_material(world.WAX, 'w'), scene('disk', pitch=0.5), photons=2000,"
+    " settings={}, method='svd')",
+    "table.table_text(comparison(), '.json', 'l2', 'passes')",
+    "[table.kernels_text(comparison(), 'l2', 'seconds'), table.fronts_text([comparison()], 'l2', 'passes')]",
     "sheet.production_look(fit_artist(world.plate(), mm_per_pixel=0.4).kernel)",
 ]
 
@@ -339,6 +476,28 @@ CHOOSE = [
     "choice.mm_per_pixel_at(600.0, 181.0, 1080)",
     "choice.mm_per_pixel_at(-1.0, 30.0, 1080)",
     "choice.mm_per_pixel_at(600.0, 30.0, 0)",
+    "choice.mm_per_pixel_at(1e308, 179.0, 1)",
+    "choice.mm_per_pixel_at(600.0, 0.0, 1080)",
+    "choice.mm_per_pixel_at(600.0, 180.0, 1080)",
+    "choice.mm_per_pixel_at(0.0, 30.0, 1080)",
+    "choice.mm_per_pixel_at(1.0, 0.001, 1000)",
+    "choice.choose(world.four(), mm_per_pixel=0.5)",
+    "report.sentences(choice.choose(profile('mono', r_edges_mm=1000 * world.mono().r_edges_mm), mm_per_pixel=1500.0))",
+    "report.sentences(choice.choose(world.mono(), mm_per_pixel=1.0, distance_mm=200.0, frame=(40, 40), tolerance=2.2))",
+    "report.sentences(choice.choose(parse_material(world.WAX, 'w'), mm_per_pixel=0.5, scene=scene('disk', pitch=0.5), tolerance=5.7))",
+    "choice.choose(world.mono(), mm_per_pixel=0.5, scene=Scene('flat', np.ones((4, 5, 1)), 0.5))",
+    "choice.choose(world.mono(), mm_per_pixel=0.5, scene=Scene('masked', TRUTH[..., :1], 0.5, mask=0 * MASK))",
+    "choice.choose(world.mono(), mm_per_pixel=0.5, scene=Scene('masked', TRUTH[..., :1], 0.5, mask=MASK),"
+    " tolerance=8.0)",
+    "report.sentences(choice.choose(world.mono(), mm_per_pixel=2.0, distance_mm=1e7, frame=(2, 2)))",
+    "choice.choose(profile('mono', annulus_energy=0 * world.mono().annulus_energy, beyond_grid=[0]),"
+    " mm_per_pixel=0.5)",
+    "report.sentences(choice.choose(profile('wax', meta={'material': {'name': 'x'}, 'material_sha256': None}),"
+    " mm_per_pixel=1.5, scene=scene('disk', pitch=1.5), tolerance=9.0))",
+    "report.sentences(choice.choose(world.plate(), mm_per_pixel=0.5, scene=scene('disk', pitch=0.5),"
+    " tolerance=2.5, seed=4))",
+    "[report.sentences(choice.choose(world.mono(), mm_per_pixel=p, tolerance=t, distance_mm=200.0,"
+    " frame=(24, 30))) for p, t in ((1.5, 3.0),)]",
 ]
 
 MEASURE = [
@@ -379,6 +538,26 @@ MEASURE = [
     "[cost.cost_of(kernel(name), 0.25) for name in ('wax.svd2', 'five', 'grau')]",
     "cost.seconds_per_megapixel(lambda: None, 40, repeats=3)",
     "cost.seconds_per_megapixel(lambda: None, 0)",
+    "cost.seconds_per_megapixel(lambda: None, 4, repeats=0)",
+    "cost.cost_of(kernel('wax.gaussians3', weights=world.kernels()['wax.gaussians3'].weights"
+    " * np.array([1, 0, 1])[:, None, None]))",
+    "score.measure(TRUTH[0], TRUTH[0])",
+    "score.measure(TRUTH[:0], TRUTH[:0])",
+    "structure.flip(TRUTH[..., :2], TRUTH[..., :2])",
+    "score.measure(near(TRUTH)[..., :2], TRUTH[..., :2], structure=True)",
+    "score.auto_exposure(0 * TRUTH)",
+    "score.measure(near(TRUTH), np.where(TRUTH > 0.1, TRUTH, 0), exposure=2.0)",
+    "score.measure(TRUTH - 0.5, TRUTH)",
+    "score.measure(near(TRUTH), -TRUTH, exposure=1.0)",
+    "[score.auto_exposure(np.where(TRUTH > t, TRUTH, 0)) for t in (0.0, 0.5, 0.98)]",
+    "structure.ssim(near(TRUTH)[:12, :11], TRUTH[:12, :11])",
+    "structure.ssim(near(TRUTH)[:, :11], TRUTH[:, :11], mask=MASK[:, :11] * np.eye(13)[:, :11])",
+    "fields(difference.difference_map(near(TRUTH), TRUTH, kind=None, gain=3.0))",
+    "fields(difference.difference_map(near(TRUTH)[..., :1], TRUTH[..., :1], kind='signed'))",
+    "fields(difference.difference_map(near(TRUTH)[..., :2], TRUTH[..., :2], kind='absolute', gain=.5))",
+    "[asymmetry.radial_asymmetry(np.outer([1, 2, 9, 2, 1], [1, 3, 7, 3, 1]), from_pixels=k) for k in (1, 2)]",
+    "asymmetry.radial_asymmetry(np.zeros((5, 5)))",
+    "asymmetry.asymmetry_by_radius(np.eye(5))",
 ]
 
 CALLS = {
@@ -387,4 +566,5 @@ CALLS = {
     "python-compare": [*map(Call, COMPARE)],
     "python-choose": [*map(Call, CHOOSE)],
     "python-measure": [*map(Call, MEASURE)],
+    "python-records": [*map(Call, records.RECORDS)],
 }

@@ -3,7 +3,9 @@
 A new option or message takes a line here; ``python tests/approve.py`` then records what it does.
 """
 
+import dataclasses
 import os
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -18,7 +20,7 @@ SMALL = "--size 40x24"
 
 
 def _write(name: str, text: str) -> Callable[[], object]:
-    return lambda: Path(name).write_text(text, encoding="utf-8")
+    return lambda: Path(name).write_text(text, encoding="utf-8")  # a new file
 
 
 def _as(source: str, name: str, old: str, new: str) -> Callable[[], object]:
@@ -36,6 +38,37 @@ def _coarse() -> None:
 
 def _into(folder: str) -> Callable[[], object]:
     return lambda: os.chdir(folder)
+
+
+def _copied(source: str, name: str) -> Callable[[], object]:
+    def copy() -> None:
+        Path(name).unlink(missing_ok=True)  # links are not written to
+        shutil.copy(source, name)
+
+    return copy
+
+
+def _moved(*names: str) -> Callable[[], object]:
+    """Put files into the folder "out", their times with them."""
+    return lambda: [shutil.move(name, f"out/{name}") for name in names]
+
+
+def _as_own(path: Path) -> None:
+    """Put a copy in the place of a link."""
+    data = path.read_bytes()
+    path.unlink()
+    path.write_bytes(data)
+
+
+def _newest(*names: str) -> Callable[[], object]:
+    """Make files the newest, each newer than the one before."""
+
+    def touch() -> None:
+        for k, name in enumerate(names):
+            _as_own(Path(name))
+            os.utime(name, (2e9 + k, 2e9 + k))
+
+    return touch
 
 
 def _gone(*names: str) -> Callable[[], object]:
@@ -189,6 +222,14 @@ SIMULATE = [
     C("simulate missing.toml"),
     *(C(f"simulate {name}.mci") for name in ("short", "twice", "extra", "bad_g", "bad_photons")),
     *(C(f"simulate {name}.mci") for name in ("words", "thick", "missing")),
+    C("simulate leaf.toml --method burley --dr .5 --radius 5 -o - --json"),
+    C("simulate leaf.toml --method burley --dr .5 --radius 5 -o out/leaf.npz --json -q"),
+    C("simulate out/leaf.toml --method dipole --dr .5 --radius 5", set_up=_moved("leaf.toml")),
+    C("simulate wax.toml --method burley --dr .5 --radius 5 -o wax.toml"),
+    C("simulate wax.toml --photons 1e13"),
+    C("simulate wax.toml --dr .2 --radius 1e9"),
+    C("simulate wax.toml --method exact --tolerance 100%"),
+    C("simulate plate.toml --method multipole --dr .5 --radius 4 --json"),
 ]
 
 FIT = [
@@ -244,7 +285,30 @@ FIT = [
     C("simulate wax.toml --photons 2000 -o x.toml"),
     C("materials --from-reflectance .4,.3,.2 --mean-free-path 1 -o lard.json"),
     C("fit --method svd", set_up=_into("empty"), note="in an empty folder"),
+    C(
+        "fit --method svd --rank 2 --mm-per-pixel 1 --support 2",
+        set_up=_newest("wax.profile.npz", "leaf.profile.npz"),
+        note="another newest",
+    ),
+    C("fit out/leaf.profile.npz --method svd --mm-per-pixel 1", set_up=_moved("leaf.profile.npz")),
+    C("fit - --method gaussians --terms 1 --mm-per-pixel 1", stdin="mono.profile.npz"),
+    C("fit leaf.profile.npz --method svd --mm-per-pixel 1 --rank 2 -o - --json"),
+    C("fit leaf.profile.npz --method svd --mm-per-pixel 1 --support 2 -o - -q"),
+    C("fit leaf.profile.npz --method svd --mm-per-pixel 1 --support .2 --rank 1"),
+    C("fit leaf.json --method svd -o leaf.json", set_up=_copied("leaf.profile.npz", "leaf.json")),
+    C("fit leaf.profile.npz --method svd --support 0"),
+    C("fit four.profile.npz --method guided --mm-per-pixel .5"),
+    C("fit four.profile.npz --method artist --mm-per-pixel .5 --target picture"),
+    C("fit four.profile.npz --method falloff --mm-per-pixel .5"),
 ]
+
+
+def _darker() -> None:
+    """A profile of the same channels as that of wax."""
+    profile = world.wax()
+    energy = profile.annulus_energy * [0.5, 0.75, 1.25]
+    dataclasses.replace(profile, annulus_energy=energy).save("other.npz")
+
 
 RENDER = [
     C("render wax.svd2.kernel.json --irradiance disk --size 40X24"),
@@ -338,6 +402,71 @@ RENDER = [
     C("render wax.profile.npz"),
     C("render missing.kernel.json"),
     C("render", set_up=_into("empty"), note="in an empty folder"),
+    C(
+        f"render --irradiance disk {SMALL}",
+        set_up=_newest("wax.svd2.kernel.json", "plate.artist.kernel.json"),
+        note="another newest",
+    ),
+    C(
+        f"render out/wax.svd2.kernel.json --irradiance edge {SMALL}",
+        set_up=_moved("wax.svd2.kernel.json"),
+        note="the profile here",
+    ),
+    C(
+        f"render out/wax.svd2.kernel.json --irradiance edge {SMALL}",
+        set_up=_moved("wax.svd2.kernel.json", "wax.profile.npz"),
+        note="the profile beside it",
+    ),
+    C(f"render grau.kernel.json --irradiance disk {SMALL} --exposure 1.75 -o x.png"),
+    C(f"render grau.kernel.json --irradiance disk {SMALL} -o x.png", note="exposed by itself"),
+    C(f"render wax.svd2.kernel.json --screen --border clamp {SMALL} --mm-per-pixel 1.5"),
+    C(
+        f"render wax.svd2.kernel.json --screen --border zero {SMALL} --mm-per-pixel 1.5 --exposure 3"
+        " -o x.png"
+    ),
+    C(f"render wax.svd2.kernel.json --irradiance disk {SMALL} -o - --json"),
+    C(f"render wax.svd2.kernel.json --irradiance disk {SMALL} -o - --truth t.tif -q"),
+    C("render wax.svd2.kernel.json --irradiance mine.exr --truth mine.exr"),
+    C("render wax.svd2.kernel.json --irradiance mine.exr --difference mine.exr"),
+    C("render wax.svd2.kernel.json --irradiance mine.exr --truth mine.exr --force"),
+    C(
+        f"render wax.svd2.kernel.json --irradiance disk {SMALL} --profile p.exr -o p.exr",
+        set_up=_copied("wax.profile.npz", "p.exr"),
+    ),
+    C(
+        f"render k.exr --irradiance disk {SMALL} -o k.exr",
+        set_up=_copied("wax.svd2.kernel.json", "k.exr"),
+    ),
+    C("render wax.svd2.kernel.json --irradiance own.png --mm-per-pixel .25 --difference own.png"),
+    C("render wax.svd2.kernel.json --irradiance layers.exr --layer near --mm-per-pixel .25 -q"),
+    C(
+        "render wax.svd2.kernel.json --irradiance layers.exr --layer far --mask alpha"
+        " --mm-per-pixel .25 --border zero --structure -o x.exr --truth t.tif --difference d.png"
+        " --difference-map signed --json"
+    ),
+    C(
+        "render wax.svd2.kernel.json --irradiance rgba8.tif --mm-per-pixel .25 --mask alpha -o x.png"
+    ),
+    C("render vier.gaussians4.kernel.json --irradiance y.exr --mm-per-pixel .3"),
+    C("render grau.kernel.json --irradiance y.exr --mm-per-pixel .3333333333333333 -o x.png"),
+    C("render wax.svd2.kernel.json --irradiance disk --radius 1 --size 4x3"),
+    C("render wax.svd2.kernel.json --irradiance disk --size 700x1 -o x.png"),
+    C(f"render five.kernel.json --irradiance disk {SMALL} --difference d.exr"),
+    C(f"render five.kernel.json --irradiance disk {SMALL} -o x.png"),
+    C(
+        f"render vier.gaussians4.kernel.json --irradiance disk {SMALL} --difference d.png"
+        " --difference-map absolute"
+    ),
+    C(
+        f"render wax.svd2.kernel.json --irradiance disk {SMALL} --profile other.npz",
+        set_up=_darker,
+        note="of the same channels",
+    ),
+    C(f"render wax.svd2.kernel.json --irradiance disk {SMALL} --profile mono.profile.npz"),
+    C(f"render wax.svd2.kernel.json --irradiance disk {SMALL} --structure --exposure .5"),
+    C("render wax.svd2.kernel.json --irradiance disk --size 9x9 --structure"),
+    C("render wax.svd2.kernel.json --irradiance parts.exr --mm-per-pixel .25"),
+    C("render wax.svd2.kernel.json --irradiance parts.exr --layer second --mm-per-pixel .25"),
     C(
         f"render wax.svd2.kernel.json --irradiance disk {SMALL}",
         set_up=_gone("wax.profile.npz"),
@@ -436,7 +565,37 @@ COMPARE = [
     C("compare wax.toml --chart x.png --budget-chart x.png"),
     C("compare wax.toml --photons 1"),
     C(f"compare missing.toml --picture disk {TINY}"),
+    C("compare mono.profile.npz --what front --mm-per-pixel profile --picture disk --size 16x12"),
+    C("compare --all --picture flat.exr --mm-per-pixel .5", few=True),
+    C(f"compare mono.profile.npz --what kernels --picture disk {TINY} --chart - --json"),
+    C(f"compare mono.profile.npz --what front --picture disk {TINY} --chart - -q"),
+    C("compare mono.profile.npz --what front --picture own.png --mm-per-pixel .5 --chart own.png"),
+    C("compare w.md --what front --table w.md", set_up=_copied("wax.toml", "w.md")),
+    C("compare w.csv --what kernels --table w.csv", set_up=_copied("wax.toml", "w.csv")),
+    C(
+        f"compare mono.profile.npz --what front --picture edge {TINY} --error l2 --cost passes"
+        " --table t.csv --json"
+    ),
+    C("compare mono.profile.npz --picture disk --size 7x5 --mm-per-pixel .5 --what kernels"),
+    C("compare mono.profile.npz --picture flat.exr --mm-per-pixel .5 --what kernels"),
+    C("compare wax.profile.npz --picture grey.png --mm-per-pixel .5 --what front"),
+    C("compare wax.profile.npz --picture disk,disk --what front"),
+    C("compare four.profile.npz --what sheet --chart s.png"),
 ]
+
+
+def _dark() -> None:
+    """A profile that returns no light."""
+    profile = world.mono()
+    none = {"annulus_energy": 0 * profile.annulus_energy, "beyond_grid": [0.0]}
+    dataclasses.replace(profile, **none).save("dark.profile.npz")
+
+
+def _coarse_grey() -> None:
+    """A profile of three annuli and one channel."""
+    Path("coarse.csv").write_text("r_mm,Y\n.5,.02\n1.5,.01\n2.5,.002\n", encoding="utf-8")
+    import_profile(["coarse.csv"], quantity="density").save("coarse.profile.npz")
+
 
 VIEW = "--distance .6m --fov 20 --resolution 64x48"
 CHOOSE = [
@@ -509,6 +668,43 @@ CHOOSE = [
         "choose mono.profile.npz --irradiance noise --distance 40cm --fov 3 --resolution 900x600 --tolerance 9"
     ),
     C("choose wax.profile.npz -o x.npz"),
+    C("choose m.json --irradiance disk -o m.json", set_up=_copied("wax.toml", "m.json")),
+    C(
+        "choose mono.profile.npz --irradiance m.json -o m.json",
+        set_up=_copied("mine.exr", "m.json"),
+    ),
+    C(
+        "choose wax.toml --irradiance disk -o mono.kernel.json",
+        set_up=_copied("foreign.npz", "mono.profile.npz"),
+        note="a profile that is not ours",
+    ),
+    C(
+        "choose mono.profile.npz --distance .3m --fov 2 --resolution 30x40 --irradiance disk"
+        " --tolerance 8 -o - --json"
+    ),
+    C(
+        "choose out/mono.profile.npz --distance .3m --fov 2 --resolution 30x40 --irradiance disk"
+        " --tolerance 8 -v",
+        set_up=_moved("mono.profile.npz"),
+    ),
+    C("choose mono.profile.npz --distance 60m --resolution 40x24 --json"),
+    C("choose mono.profile.npz --distance 60m --resolution 40x24 -o -"),
+    C("choose mono.profile.npz --distance .3m --fov 10 --resolution 30x40 --tolerance 3"),
+    C(
+        "choose mono.profile.npz --distance .3m --fov 2 --resolution 30x40 --irradiance disk"
+        " --tolerance .001"
+    ),
+    C("choose dark.profile.npz --irradiance disk", set_up=_dark, note="no light"),
+    C(
+        "choose coarse.profile.npz --irradiance edge --distance .3m --fov 20 --resolution 30x40"
+        " --tolerance 3 --json",
+        set_up=_coarse_grey,
+        note="three annuli",
+    ),
+    C("choose mono.profile.npz --irradiance flat.exr --fov 40"),
+    C("choose wax.toml --fov 1e-300"),
+    C("choose wax.toml --distance 1e300"),
+    C("choose wax.toml --distance 5000m --resolution 4x3 --irradiance disk"),
 ]
 
 IMPORT = [
@@ -579,6 +775,36 @@ IMPORT = [
     C("import density.csv -o foreign.npz --force"),
     C("import density.csv -o x.csv"),
     C("import"),
+    C("import density.csv -o - --json"),
+    C("import density.csv -o - -q"),
+    C("import gap.csv --quantity density -q"),
+    C("import gap.csv --quantity density --json"),
+    C("import lossy.mco -q"),
+    C("import out/density.csv", set_up=_moved("density.csv")),
+    C("import out/r.mco", set_up=_moved("r.mco")),
+    C("import d.npz -o d.npz", set_up=_copied("density.csv", "d.npz")),
+    C("import r.npz g.mco -o r.npz --channels R,G", set_up=_copied("r.mco", "r.npz")),
+    C("import r.mco r.npz -o r.npz --channels R,G", set_up=_copied("g.mco", "r.npz")),
+    C("import d.npz -o d.npz --force --json", set_up=_copied("density.csv", "d.npz")),
+    C("import plain.csv --quantity density --unit m --density-unit um"),
+    C("import plain.csv --quantity energy --unit cm --json"),
+    C("import plain.csv --quantity density --unit inch"),
+    C("import notail.mco"),
+    C("import deep.mco through.mco -o x.npz --channels a,b"),
+    C("import through.mco"),
+    C("import utf16le.csv --quantity density"),
+    C("import utf16be.csv --quantity density"),
+    C("import windows.csv --quantity energy"),
+    C("import spaced.csv"),
+    C("import shifted.csv --quantity density"),
+    C("import narrow.csv --quantity energy"),
+    C("import zero.csv --quantity density --json"),
+    C("import tight.csv --quantity density"),
+    C("import exact.csv --quantity energy"),
+    C("import latin1-bad.csv --quantity density"),
+    C("import foreign.exr"),
+    C("import mine.exr"),
+    C("import out"),
 ]
 
 OWN = [
@@ -602,6 +828,20 @@ OWN = [
     C("materials --from-reflectance .3 --channels Y --mean-free-path 1 -o wax.toml"),
     C("simulate wax.toml --method dipole --dr 1 --radius 5 -o mono.profile.npz"),
 ]
+
+
+def _over() -> None:
+    profile = world.wax()
+    energy = profile.annulus_energy * [1.0, 6.0, 1.0]
+    dataclasses.replace(profile, annulus_energy=energy).save("over.profile.npz")
+
+
+def _below() -> None:
+    profile = world.wax()
+    energy = profile.annulus_energy.copy()
+    energy[6, 1] = energy[9, 0] = -1.25e-4
+    dataclasses.replace(profile, annulus_energy=energy).save("below.profile.npz")
+
 
 EXPORT = [
     C("export --format hlsl"),
@@ -644,6 +884,30 @@ EXPORT = [
     C("export damaged.kernel.json --format json"),
     C("export --format hlsl", set_up=_into("empty"), note="in an empty folder"),
     C("export --format csv", set_up=_into("empty"), note="in an empty folder"),
+    C("export grau.kernel.json --format json -o - --json"),
+    C("export leaf.profile.npz --format csv -o - --json"),
+    *(
+        C(f"export out/wax.svd2.kernel.json --format {form}", set_up=_moved("wax.svd2.kernel.json"))
+        for form in ("hlsl", "json")
+    ),
+    C("export out/mono.profile.npz --format csv -q", set_up=_moved("mono.profile.npz")),
+    C(
+        "export --format hlsl",
+        set_up=_newest("wax.svd2.kernel.json", "grau.kernel.json"),
+        note="another newest",
+    ),
+    C(
+        "export --format csv",
+        set_up=_newest("wax.profile.npz", "mono.profile.npz"),
+        note="another newest",
+    ),
+    C("export p.csv --format csv -o p.csv", set_up=_copied("mono.profile.npz", "p.csv")),
+    C("export k.hlsl --format hlsl -o k.hlsl", set_up=_copied("grau.kernel.json", "k.hlsl")),
+    C("export k.json --format json -o x.json", set_up=_copied("grau.kernel.json", "k.json")),
+    C("export wax.profile.npz --format json"),
+    C("export missing.kernel.json --format hlsl"),
+    C("export over.profile.npz --format csv", set_up=_over, note="more light than arrives"),
+    C("export below.profile.npz --format csv", set_up=_below, note="negative energy"),
 ]
 
 CHART = [
@@ -688,6 +952,31 @@ CHART = [
     C("chart wax.profile.npz -o foreign.png"),
     C("chart wax.profile.npz -o foreign.png --force"),
     C("chart foreign.csv"),
+    C("chart", set_up=_newest("wax.profile.npz", "mono.profile.npz"), note="another newest"),
+    C("chart out/wax.svd2.kernel.json --channel G", set_up=_moved("wax.svd2.kernel.json")),
+    C("chart out/mono.profile.npz", set_up=_moved("mono.profile.npz")),
+    C("chart --spectrum out/mono.profile.npz --mm-per-pixel .8", set_up=_moved("mono.profile.npz")),
+    C("chart plate.toml -o - --json"),
+    C("chart plate.toml -o - -q"),
+    C("chart p.png -o p.png", set_up=_copied("mono.profile.npz", "p.png")),
+    C(
+        "chart wax.svd2.kernel.json --profile p.png -o p.png",
+        set_up=_copied("wax.profile.npz", "p.png"),
+    ),
+    C("chart wax.svd2.kernel.json --profile mono.profile.npz"),
+    C("chart --spectrum four.profile.npz --mm-per-pixel .9 -o s.svg"),
+    C("chart --guide four.profile.npz --mm-per-pixel .9 --k 1.25 -o - "),
+    C("chart --models m.png -o m.png", set_up=_copied("wax.toml", "m.png")),
+    C("chart -", stdin="leaf.profile.npz"),
+    C("chart plate.toml --channel R"),
+    C("chart plate.toml --photons 20"),
+    C("chart wax.svd2.kernel.json --k 2"),
+    C("chart wax.svd2.kernel.json --mm-per-pixel 2"),
+    C("chart --guide wax.profile.npz --photons 20"),
+    C("chart --spectrum --guide"),
+    C("chart --guide wax.profile.npz --k 5"),
+    C("chart --guide wax.profile.npz --mm-per-pixel 9"),
+    C("chart --models varnish.toml"),
 ]
 
 
@@ -779,6 +1068,16 @@ SHOW = [
     C("show damaged.profile.npz"),
     C("show damaged.kernel.json"),
     C("show", set_up=_into("empty"), note="in an empty folder"),
+    C("show", set_up=_newest("wax.profile.npz", "mono.profile.npz"), note="another newest"),
+    C("show varnish.toml"),
+    C("show mono.profile.npz --json"),
+    C("show leaf.burley.kernel.json --json"),
+    C("show wax.svd2.kernel.json --json"),
+    C("show vier.gaussians4.kernel.json --json"),
+    C("show plate.toml --json"),
+    C("show deon-skin"),
+    C("show Skin1"),
+    C(f"show {'abcdefghij' * 120}"),
 ]
 
 COMMANDS = {

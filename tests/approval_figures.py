@@ -71,6 +71,8 @@ def _points(points: Any) -> str:
         return "no points"
     ends = " to ".join(f"({number(x)}, {number(y)})" for x, y in (found[0], found[-1]))
     y = found[:, 1]
+    if np.isnan(y).all():
+        return f"{len(found)} points, {ends}, none of them drawn"
     return f"{len(found)} points, {ends}, y {number(np.nanmin(y))} to {number(np.nanmax(y))}"
 
 

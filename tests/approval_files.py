@@ -225,7 +225,7 @@ def _picture(name: str, data: bytes) -> Iterator[str]:
     yield f"mean {_row(values.mean(axis=(0, 1)))}"
     places = [
         (height // 3, width // 4),
-        (height // 2 - 1, width // 2 + 2),
+        (height // 2 - 1, min(width // 2 + 2, width - 1)),
         (height - 2, width // 2),
     ]
     for row, column in (*places, (0, width - 1)):

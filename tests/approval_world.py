@@ -408,6 +408,7 @@ def _pictures(folder: Path) -> None:
     negative = light(6, 9, 3)
     negative[4, 2, 1] = -0.25
     _write(folder / "negative.exr", negative, ["R", "G", "B"])
+    _write(folder / "negative_wide.exr", negative, ["R", "G", "B"], chromaticities=wide)
     _write(folder / "rgb8.png", _codes(np.uint8, 8, 13, 3))
     _write(folder / "rgba16.png", _codes(np.uint16, 8, 13, 4), oiio__UnassociatedAlpha=1)
     _write(folder / "grey.png", _codes(np.uint8, 8, 13, 1), oiio__Gamma=1.8)
@@ -416,6 +417,9 @@ def _pictures(folder: Path) -> None:
     _write(folder / "photo.tga", _codes(np.uint8, 8, 13, 3))
     _compressed(folder)
     _unusual(folder)
+    _named(folder)
+    _radiance(folder)
+    _damaged(folder)
     smooth = np.broadcast_to(np.linspace(40, 200, 16)[:, None, None], (16, 24, 3))
     _write(folder / "photo.jpg", smooth.astype(np.uint8), Compression="jpeg:95")
     (folder / "old.hdr").write_bytes(
@@ -458,6 +462,85 @@ def _unusual(folder: Path) -> None:
     both = plain[:33] + chunk + plain[33:]
     (folder / "srgb_and_p3.png").write_bytes(both)
     (folder / "p3.png").write_bytes(_without(both, b"sRGB"))
+
+
+def _named(folder: Path) -> None:
+    """Channels, layers, parts and colour spaces by other names."""
+    _write(folder / "flat.exr", np.full((5, 7, 3), 0.375, dtype=np.float32), ["R", "G", "B"])
+    _write(folder / "only.exr", light(3, 4, 4), [*(f"only.{each}" for each in "RGB"), "Z"])
+    _write(folder / "dotted.exr", light(3, 4, 2), ["x.N", "x.D"])
+    _write(folder / "alpha.exr", light(3, 4, 4), ["R", "G", "B", "alpha"])
+    _write(folder / "far.exr", light(3, 4, 4), [*(f"far.{each}" for each in "RGB"), "far.Alpha"])
+    holed = light(3, 4, 4)
+    holed[2, 1, 3] = np.nan
+    _write(folder / "holed.exr", holed, ["R", "G", "B", "A"])
+    holed[1, 3, 2] = np.inf
+    _write(folder / "infinite.exr", holed, ["R", "G", "B", "A"])
+    _write(folder / "red.exr", light(3, 4, 4), ["Red", "Green", "Blue", "A"])
+    _write(folder / "aov.exr", light(3, 4, 12), [f"c{k}" for k in range(11)] + ["Y"])
+    _write(folder / "greys.exr", light(3, 4, 2), ["b.Y", "a.Y"])
+    _write(folder / "acescg.exr", light(3, 4, 3), ["R", "G", "B"], oiio__ColorSpace="ACEScg")
+    ours = (0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329)
+    _write(folder / "same.exr", light(3, 4, 3), ["R", "G", "B"], chromaticities=ours)
+    small = (0.55, 0.35, 0.31, 0.52, 0.18, 0.1, 0.34, 0.36)
+    _write(folder / "small.exr", light(3, 4, 3), ["R", "G", "B"], chromaticities=small)
+    _write(folder / "y_small.exr", light(3, 4, 1), ["Y"], chromaticities=small)
+    _write(folder / "plain.png", _codes(np.uint8, 3, 4, 3))
+    plain = _without(_without((folder / "plain.png").read_bytes(), b"sRGB"), b"gAMA")
+    for gamma in (1.0, 1.8, 2.2):
+        content = b"gAMA" + struct.pack(">I", round(1e5 / gamma))
+        chunk = struct.pack(">I", 4) + content + struct.pack(">I", zlib.crc32(content))
+        (folder / f"gamma{gamma:g}.png").write_bytes(plain[:33] + chunk + plain[33:])
+    _write(folder / "scaled.exr", light(3, 4, 3), ["R", "G", "B"], sssfit__mm_per_pixel="-0.25")
+    specs = []
+    for name, width, more in (("first", 5, ()), ("second", 5, ("Z",))):
+        spec = OpenImageIO.ImageSpec(width, 3, 3 + len(more), "float")
+        spec.channelnames = ("R", "G", "B", *more)
+        spec.attribute("oiio:subimagename", name)
+        specs.append(spec)
+    path = str(folder / "parts.exr")
+    writer = OpenImageIO.ImageOutput.create(path)
+    assert writer.open(path, tuple(specs)), writer.geterror()
+    for k, spec in enumerate(specs):
+        assert k == 0 or writer.open(path, spec, "AppendSubimage"), writer.geterror()
+        assert writer.write_image(light(k + 3, 5, spec.nchannels)[k:])
+    writer.close()
+
+
+def _radiance(folder: Path) -> None:
+    """Headers of Radiance files."""
+    heads = {
+        "primaries": "PRIMARIES=.708 .292 .17 .797 .131 .046 .3127 .329",
+        "wrong_factors": "COLORCORR=1 1.5",
+        "wrong_exposure": "EXPOSURE=bright",
+        "negative": "COLORCORR=1 -1.5 2",
+        "wrong_primaries": "PRIMARIES=.7 .3 .2 .7 .1 .05 .3",
+        "far": "EXPOSURE=1e60",
+        "twice": "COLORCORR=2 1 1\r\nCOLORCORR=1 4 .5\r\nEXPOSURE= 3",
+    }
+    for name, head in heads.items():
+        (folder / f"{name}.hdr").write_bytes(
+            f"#?RGBE\n{head}\nFORMAT=32-bit_rle_rgbe\n\n-Y 2 +X 3\n".encode()
+            + bytes(90 + 7 * k % 41 for k in range(24))
+        )
+
+
+def _damaged(folder: Path) -> None:
+    """Files that were cut or changed."""
+    (folder / "cut.tif").write_bytes((folder / "rgba8.tif").read_bytes()[:-200])
+    whole = (folder / "rgb8.png").read_bytes()
+    at = whole.index(b"IDAT")
+    (folder / "flipped.png").write_bytes(whole[: at + 8] + b"\0" + whole[at + 9 :])
+    (folder / "unended.png").write_bytes(whole[:-12])
+    (folder / "noise.jpg").write_bytes(b"\xff\xd8\xff\xe0" + bytes(range(200)))
+    head = struct.pack("<3B2HB4H2B", 0, 0, 3, 0, 0, 0, 0, 0, 3, 2, 8, 0x20)
+    body = bytes(range(40, 100, 10))
+    mark = b"TRUEVISION-XFILE.\0"
+    (folder / "grey.dat").write_bytes(head + body + bytes(8) + mark)
+    (folder / "nearly.dat").write_bytes(head + body + bytes(8) + mark[:-2] + b"!\0")
+    (folder / "short.tga").write_bytes(head[:17])
+    (folder / "depth7.tga").write_bytes(head[:16] + b"\7" + head[17:] + body)
+    (folder / "wide0.tga").write_bytes(head[:12] + b"\0\0" + head[14:] + body)
 
 
 def _without(png: bytes, chunk: bytes) -> bytes:
@@ -512,11 +595,25 @@ def _tables(folder: Path) -> None:
         "zero.csv": "r_mm,R\n0,.2\n2,.1\n",
         "quoted.csv": 'r_mm,R\n1,".2\n2,.1\n',
         "said.csv": "# quantity = weight\nr_mm,R\n1,.2\n2,.1\n",
+        "spaced.csv": '\n#quantity=density\n\n r_cm , "R", G \n\n# half-way\n .05, 2 , "1.5"\n'
+        "  .15 ,.25,.125 \n\n",
+        "shifted.csv": "R_stderr,G,r_um,R\n1e-9,2e-8,500,1e-8\nNaN,2e-9,1500,5e-9\n"
+        "2e-10,1e-10,2500,2e-9\n",
+        "narrow.csv": "r_mm,R\n1,.2\n1.0000000000001,.1\n",
+        "tight.csv": "r_cm,R,G\n.050001,.02,.07\n.15,.01,.001\n",
+        "exact.csv": "r_mm,R,G\n1,.5,.25\n2,.5000005,.25\n",
     }
     for name, text in texts.items():
         (folder / name).write_text(text, encoding="utf-8")
     (folder / "latin1.csv").write_bytes("r_mm,grün\n.5,.02\n1.5,.01\n".encode("latin-1"))
     (folder / "utf16.csv").write_text("r_mm,R\n.5,.02\n1.5,.01\n", encoding="utf-16")
+    (folder / "latin1-bad.csv").write_bytes("r_mm,grün\n.5,.02\n1.5,viel\n".encode("latin-1"))
+    plain = "r_mm,R\n.5,.02\n1.5,.01\n"
+    (folder / "utf16le.csv").write_bytes(plain.encode("utf-16-le"))
+    (folder / "utf16be.csv").write_bytes(plain.encode("utf-16-be"))
+    (folder / "windows.csv").write_bytes(
+        b"\xef\xbb\xbfr_mm,R\r\n.5,.02\r\n.75,.25\r\ninf,.01\r\n\x1a"
+    )
     (folder / "bom.csv").write_text("r_mm,R\n.5,.02\n1.5,.01\n", encoding="utf-8-sig")
     for name in ("cudamcml-inparam.mco", "mcml2.mco", "sample.mci", "latin1-comment.csv"):
         (folder / name).write_bytes((DATA / name).read_bytes())
@@ -591,6 +688,8 @@ def _mcml(folder: Path) -> None:
         "rat": "0.0277778\n0.675\n0.0722222\n0.225",
         "absorbed": "0.05\n0.02222",
     }
+    deep = {"layers": "1.4 1 100 0.9 0.1\n1.4 2.5 10 0 1E8"}
+    dark = {"through": "0\n0\n0\n0", "rat": "0.0277778\n0.3\n0.572222\n0"}
     texts = {
         "r.mco": mco_text(),
         "g.mco": mco_text(**other),
@@ -602,6 +701,9 @@ def _mcml(folder: Path) -> None:
         "negative.mco": mco_text(through="1.9\n-6.6\n1.5\n1.1"),
         "extra.mco": mco_text() + "Rd_r # again\n1\n",
         "binary.mco": "B1\n",
+        "notail.mco": mco_text().partition("Tt_r #")[0],
+        "deep.mco": mco_text(**deep, **dark),
+        "through.mco": mco_text(**deep, name="through.mco"),
     }
     for name, text in texts.items():
         (folder / name).write_text(text)

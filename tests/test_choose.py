@@ -15,7 +15,8 @@ import sssfit.choose.truth as truths
 import sssfit.simulate.truth as all_light
 from sssfit.choose import truth as photon_walks
 from sssfit.choose.choice import choose, is_exact, mm_per_pixel_at
-from sssfit.choose.options import SHARES, Option, supports
+from sssfit.choose.options import SHARES, Option, options, supports
+from sssfit.choose.report import step_line
 from sssfit.choose.truth import material_of, photons_needed
 from sssfit.choose.views import TOLERANCES, Views, checked_scene, head_scenes
 from sssfit.compare.candidates import candidates
@@ -120,7 +121,7 @@ def test_unless_told_otherwise_95_percent_of_the_pixels_are_within_1(choice):
 def test_dearer_steps_are_a_term_more_a_wider_support_and_the_dearest(skin1, choice):
     chosen, profile = choice.chosen.option, choice.profile
     every = [
-        Option(candidate, share, radius, 2 * int(radius / 0.6 + 1e-9) + 1)
+        Option(candidate, share, radius, 2 * int(radius / 0.6 + 1e-9) + 1, 0.6)
         for share, radius in supports(profile, 0.6)
         for candidate in candidates(2 * int(radius / 0.6 + 1e-9) + 1, most_terms=10)
     ]
@@ -530,3 +531,12 @@ def test_supports_that_are_too_narrow_are_named(skin1):
     assert found.too_narrow
     assert not tried & set(found.too_narrow)
     assert max(found.too_narrow) < min(tried)
+
+
+def test_half_widths_are_those_of_the_pixels_asked_for():
+    """And not of the wider view on which an option is worst: 5 pixels either way, each of .5 mm."""
+    option = options([(0.99, 2.6)], 0.5)[0]
+    assert (option.pixels, option.half_mm) == (11, 2.5)
+    figures = dict.fromkeys(COLOUR_FIGURES, 0.25)
+    step = rooms.Step(option, 22, 0.25, **figures, mm_per_pixel=1.6, within=True)
+    assert f"{step.label} on 11 pixels (+-2.5 mm): 22 weights" in step_line(step)

@@ -6,8 +6,9 @@ import cli_world as world
 import pytest
 
 import sssfit
-from sssfit.errors import FileError
+from sssfit.errors import FileError, SssfitError
 from sssfit.export.summary import figures_of, summary
+from sssfit.kernel import SeparableKernel
 from sssfit.kinds import KINDS, load
 from sssfit.simulate import simulate_to_files
 
@@ -58,3 +59,9 @@ def test_what_is_foreign_is_refused_by_its_name():
     with pytest.raises(FileError, match=r"skin11 cannot be read: .*did you mean skin1\?"):
         load("skin11")
     assert load("skin1").name == "skin1"
+
+
+def test_a_path_stays_on_its_line():
+    for read in (load, SeparableKernel.load):
+        with pytest.raises(SssfitError, match=r"^a\\nb: no such file|^a\\nb cannot be read"):
+            read("a\nb")

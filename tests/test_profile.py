@@ -467,8 +467,17 @@ def test_unusable_files_are_refused_in_one_line_that_names_them(tmp_path, conten
 def test_missing_files_and_folders_are_named(tmp_path):
     with pytest.raises(ProfileError, match="cannot be read: no such file"):
         Profile.load(tmp_path / "none.profile.npz")
-    with pytest.raises(ProfileError, match="is a folder"):
+    with pytest.raises(ProfileError, match=r"is a folder; name a \.profile\.npz file"):
         Profile.load(tmp_path)
+    with pytest.raises(ProfileError, match=r"^a\\nb\.npz cannot be read"):  # on one line
+        Profile.load("a\nb.npz")
+
+
+@pytest.mark.parametrize("share", [0.0, -0.5, 1.0000001, float("nan")])
+def test_shares_of_energy_are_above_0_and_at_most_1(share):
+    profile = make_profile([0.0, 1.0, 2.0], [[0.5], [0.25]])
+    with pytest.raises(ProfileError, match=r"^share = .*; expected a share above 0 and at most 1"):
+        profile.energy_radii_mm([0.5, share])
 
 
 def read_or_refuse(content):

@@ -34,12 +34,20 @@ class Option:
         Half width of the kernel.
     pixels : int
         Of a pass, at the pitch asked for.
+    mm_per_pixel : float [mm]
+        The pitch asked for; wider views have other pixels.
     """
 
     candidate: Candidate
     share: float
     support_mm: float
     pixels: int
+    mm_per_pixel: float
+
+    @property
+    def half_mm(self) -> float:
+        """Distance of the outermost pixel from the middle one, at the pitch asked for [mm]."""
+        return self.pixels // 2 * self.mm_per_pixel
 
     @property
     def taps_per_pixel(self) -> int:
@@ -84,7 +92,7 @@ def options(kept: Sequence[tuple[float, float]], mm_per_pixel: float) -> list[Op
     for share, radius in kept:
         pixels = 2 * half_pixels(radius, mm_per_pixel) + 1
         found += [
-            Option(candidate, share, radius, pixels)
+            Option(candidate, share, radius, pixels, mm_per_pixel)
             for candidate in candidates(pixels, most_terms=MOST_TERMS)
             if candidate.settings.get("energy") != "keep"
         ]

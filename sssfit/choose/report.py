@@ -101,8 +101,7 @@ def _what(step: Step) -> str:
     """Name a step with its pixels."""
     if step.option is None:
         return step.label
-    half_mm = step.option.pixels // 2 * step.mm_per_pixel
-    return f"{step.label} on {step.option.pixels} pixels (+-{half_mm:.3g} mm)"
+    return f"{step.label} on {step.option.pixels} pixels (+-{step.option.half_mm:.3g} mm)"
 
 
 def _loss(step: Step) -> str:

@@ -21,7 +21,7 @@ from sssfit.files import write_atomically
 from sssfit.kernel import checks
 from sssfit.kernel import json as kernel_json
 from sssfit.kernel.json import FORMAT, is_kernel_file
-from sssfit.messages import by_channel, html_table, number, of_material
+from sssfit.messages import by_channel, html_table, number, of_material, printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -248,6 +248,7 @@ class SeparableKernel:
         """
         if origin is None:
             origin = str(source) if isinstance(source, str | Path) else "the kernel"
+        origin = printable(origin)
         fields = kernel_json.unpack(source, origin)
         try:
             return cls(**fields)

@@ -88,7 +88,8 @@ def unpack(
         # A pipe cannot seek, but an archive's directory is at its end.
         return _unpack_known(io.BytesIO(read_at_most(source, _LARGEST_FILE_BYTES)))
     except ProfileError as error:
-        remedy = _FOREIGN if str(error).startswith("is not ") else _REMEDY
+        is_other = str(error).startswith(("is not ", "is a folder"))
+        remedy = _FOREIGN if is_other else _REMEDY
         raise ProfileError(f"{origin} {error}; {remedy}.") from None
     except OSError as error:
         raise ProfileError(f"{origin} cannot be read: {reason(error)}.") from error

@@ -202,8 +202,12 @@ def energy_radii_mm(
 ) -> FloatArray:
     """Return the radii (k, C) [mm] that contain k shares of each channel's energy.
 
-    ``r_edges_mm`` (n+1,) and ``annulus_energy`` (n, C) are a profile's.
+    ``r_edges_mm`` (n+1,) and ``annulus_energy`` (n, C) are a profile's. Raises ProfileError for a
+    share that is not above 0 and at most 1.
     """
+    for share in shares:
+        if not 0.0 < share <= 1.0:
+            raise ProfileError(f"share = {share}; expected a share above 0 and at most 1.")
     within = cumulative(annulus_energy)
     total = within[-1]
     radii_mm = np.full((len(shares), total.size), np.nan)

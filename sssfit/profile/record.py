@@ -394,6 +394,11 @@ class Profile:
         -------
         array (k, C) [mm]
             NaN for a channel without energy on the grid.
+
+        Raises
+        ------
+        ProfileError
+            A share is not above 0 and at most 1.
         """
         return integrals.energy_radii_mm(self.r_edges_mm, self.annulus_energy, shares)
 
@@ -484,6 +489,7 @@ class Profile:
         """
         if origin is None:
             origin = str(source) if isinstance(source, str | Path) else "the profile"
+        origin = printable(origin)
         arrays, meta = npz.unpack(source, origin)
         fields: dict[str, Any] = {"annulus_transmittance": None, **arrays, "meta": meta}
         try:
