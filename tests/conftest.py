@@ -1,14 +1,20 @@
 """What holds for all tests: Ctrl-C arrives, no child process is left, and none runs for ever.
 
 Half of the tests start from the exact profile of some material and a quarter from the lit head, so
-each of these is computed once a worker (``shared_work``).
+each of these is computed once a worker (``shared_work``), as are fits of the same profile.
+
+Linear algebra has one thread in the tests' own process: a worker a core leaves no core for BLAS's
+threads, and waiting for each other they took a tenth of the processor time. Children of the tests
+have as many as a user's process.
 """
 
 import signal
 
 import pytest
+import scipy.linalg  # noqa: F401 (its BLAS has to be there to be limited)
 import shared_work
 from processes import end_all
+from threadpoolctl import threadpool_limits
 
 SLOW_SECONDS = 4 * 3600.0  # the longest, a walk of 1e8 photons through layers, takes under one
 
@@ -19,8 +25,9 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 
 def pytest_sessionstart():
-    """Share work between tests from here on."""
+    """Share work between tests from here on, and leave each worker its core."""
     shared_work.begin()
+    threadpool_limits(limits=1, user_api="blas")
 
 
 @pytest.hookimpl(tryfirst=True)

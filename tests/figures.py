@@ -8,7 +8,10 @@ from matplotlib.text import Text
 
 
 def assert_legible(draw):
-    """Draw without a warning; every text lies inside the page and clear of the others."""
+    """Draw without a warning; every text lies inside the page and clear of the others.
+
+    Returns the figure.
+    """
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         figure = draw()
@@ -19,6 +22,7 @@ def assert_legible(draw):
         assert inside, (text, box)
     for (text, box), (other, other_box) in itertools.combinations(texts, 2):
         assert not box.padded(-1).overlaps(other_box.padded(-1)), (text, other)
+    return figure
 
 
 def drawn_texts(figure):

@@ -17,7 +17,7 @@ from scipy.integrate import quad
 MAX_COLLISIONS = 1_000_000
 
 
-@numba.njit(error_model="numpy")
+@numba.njit(error_model="numpy", cache=True)
 def scalar_walk(seed, photons, albedo, mean_free_path, eta, dr, annuli):
     """Walk photons one by one; semi-infinite, g = 0, all channels carried as weights.
 
@@ -142,7 +142,7 @@ def duntley_specular(eta):
     )
 
 
-@numba.njit(error_model="numpy")
+@numba.njit(error_model="numpy", cache=True)
 def diffuse_light_walk(seed, photons, albedo, eta):
     """Photons of diffuse light, one by one, all weights 1 or 0: what becomes of each.
 
@@ -248,7 +248,7 @@ def splitmix64(start, count):
     return outputs
 
 
-@numba.njit(error_model="numpy")
+@numba.njit(error_model="numpy", cache=True)
 def scalar_layered_walk(
     seed, photons, sigma_a, sigma_s, g, eta, thickness, specular, first, dr, annuli, max_mm=1e30
 ):

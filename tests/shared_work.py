@@ -1,11 +1,20 @@
-"""Work that tests share: solutions of the exact solver, and lit heads.
+"""Work that tests share: solutions of the exact solver, lit heads, and fits of candidates.
 
-Both depend on their arguments alone and cannot be changed. The tests of the solver and of the head
-compute them themselves, as do those that count threads or interrupt a run.
+All depend on their arguments alone and cannot be changed. The tests of the solver and of the head
+compute them themselves, as do those that count threads or interrupt a run, and whatever runs within
+``alone``.
 """
 
+import contextlib
+import dataclasses
 import functools
+import json
+from collections.abc import Mapping
+from types import NoneType
 
+import numpy as np
+
+import sssfit.compare.candidates
 import sssfit.scene.head
 import sssfit.simulate.exact
 
@@ -13,6 +22,7 @@ OWN = {
     *("test_deterministic", "test_exact", "test_head", "test_head_through", "test_interrupts"),
     *("test_memory_order", "test_processes", "test_runner"),
 }
+_PLAIN = str | int | float | NoneType  # a setting that is a function, or a scene, is not shared
 _state = {"allowed": True}
 
 
@@ -21,11 +31,22 @@ def allow(file):
     _state["allowed"] = file not in OWN
 
 
+@contextlib.contextmanager
+def alone():
+    """Compute everything in this block, and keep nothing of it."""
+    before, _state["allowed"] = _state["allowed"], False
+    try:
+        yield
+    finally:
+        _state["allowed"] = before
+
+
 def begin():
-    """Put both in front of the real functions."""
-    exact, head = sssfit.simulate.exact, sssfit.scene.head
+    """Put all three in front of the real functions."""
+    exact, head, fits = sssfit.simulate.exact, sssfit.scene.head, sssfit.compare.candidates
     exact._solve = _solved_once(exact._solve)
     head.head_scene = _lit_once(head.head_scene)
+    fits.fit_result = _fitted_once(fits.fit_result)
 
 
 def _solved_once(real):
@@ -56,3 +77,31 @@ def _lit_once(real):
         return known[key]
 
     return head_scene
+
+
+def _fitted_once(real):
+    """Comparisons and choices fit the same candidates to the same few profiles."""
+    known = {}
+
+    @functools.wraps(real)
+    def fit_result(profile, method="svd", **settings):
+        values = settings.values()
+        if not _state["allowed"] or not all(isinstance(each, _PLAIN) for each in values):
+            return real(profile, method, **settings)
+        key = _contents(profile), method, *sorted(settings.items())
+        if key not in known:
+            known[key] = real(profile, method, **settings)
+        return known[key]
+
+    return fit_result
+
+
+def _contents(profile):
+    """Everything in a profile, provenance included: a kernel takes over some of it."""
+    fields = [getattr(profile, each.name) for each in dataclasses.fields(profile)]
+    return tuple(
+        each.tobytes() if isinstance(each, np.ndarray)
+        else json.dumps(dict(each), sort_keys=True) if isinstance(each, Mapping)
+        else each
+        for each in fields
+    )  # fmt: skip

@@ -18,7 +18,13 @@ from sssfit.material import Layer, Material, load_material
 from sssfit.optics import normal_transmittance
 from sssfit.profile import Profile
 from sssfit.simulate import exact
-from sssfit.simulate._depth import _Equation, decay_rate, respond, respond_to_diffuse_light
+from sssfit.simulate._depth import (
+    _Equation,
+    _integrate_over_w,
+    decay_rate,
+    respond,
+    respond_to_diffuse_light,
+)
 from sssfit.simulate._mixture import (
     mixture_of,
     single_scattering_beyond,
@@ -139,6 +145,13 @@ def test_energy_is_conserved_at_every_albedo(eta):
     once = albedos * single_scattering_beyond(np.zeros(1), eta, 0.05)
     enters = 1.0 - ((eta - 1.0) / (eta + 1.0)) ** 2
     np.testing.assert_allclose(response.multiple + once + response.absorbed, enters, atol=1e-7)
+
+
+def test_an_integral_is_that_of_its_distance_alone():
+    distances = np.geomspace(1e-9, 40.0, 300)  # more than one block of them
+    whole = _integrate_over_w(distances, 0.7, lambda tau, p: p / tau)
+    alone = [_integrate_over_w(each, 0.7, lambda tau, p: p / tau) for each in distances[:, None]]
+    np.testing.assert_allclose(whole, np.ravel(alone), rtol=1e-13)
 
 
 @pytest.mark.parametrize("albedo", [0.0, 0.01, 0.05, 0.0501, 0.3, 1 - 1e-5, 1 - 2e-6, 1 - 1e-9])

@@ -153,9 +153,12 @@ def _differences(pixels: FloatArray, true: FloatArray) -> dict[str, float]:
 
 
 def _root_mean_square(values: FloatArray) -> float:
-    """Return sqrt(mean(values^2)) without a second array of squares."""
+    """Return sqrt(mean(values^2)) without a second array of squares.
+
+    By einsum: a dot product waits for BLAS's threads, 3 ms beside another process in place of 0.1.
+    """
     flat = values.reshape(-1)
-    return float(np.sqrt(np.dot(flat, flat) / flat.size))
+    return float(np.sqrt(np.einsum("i,i->", flat, flat) / flat.size))
 
 
 def _ratio(part: npt.ArrayLike, whole: npt.ArrayLike) -> FloatArray:
