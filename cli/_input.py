@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, BinaryIO, TypeVar
 
+from sssfit.messages import note
 from sssfit.methods import DEON_SKIN
 
-from ._options import Common
-from ._output import say, say_notes
-
 if TYPE_CHECKING:
-    from sssfit.kernel import SeparableKernel
-    from sssfit.kinds import Loaded
+    from sssfit.kernel import Kernel
     from sssfit.material import Material
     from sssfit.profile import Profile
 
 
-_Record = TypeVar("_Record", "Profile", "SeparableKernel")
+_Record = TypeVar("_Record")
 
 
-def newest(common: Common, pattern: str, made_by: str) -> str:
+def newest(pattern: str, made_by: str) -> str:
     """Return the newest file of the current folder that matches, saying on stderr which."""
     from sssfit.errors import FileError
 
@@ -31,22 +29,22 @@ def newest(common: Common, pattern: str, made_by: str) -> str:
             f"there is no {pattern} in this folder: name one, or make one with `{made_by}`."
         )
     path = max(found, key=lambda each: each.stat().st_mtime_ns)
-    say(common, f"Using {path}, the newest {pattern} here.")
+    note(f"Using {path}, the newest {pattern} here.")
     return str(path)
 
 
-def profile_name(given: str | None, common: Common) -> str:
+def profile_name(given: str | None) -> str:
     """Return the profile that was named, by default the newest in this folder."""
-    return given or newest(common, "*.profile.npz", "sssfit simulate skin1")
+    return given or newest("*.profile.npz", "sssfit simulate skin1")
 
 
-def kernel_name(given: str | None, common: Common) -> str:
+def kernel_name(given: str | None) -> str:
     """Return the kernel that was named, by default the newest in this folder."""
-    return given or newest(common, "*.kernel.json", "sssfit fit --method svd --rank 3")
+    return given or newest("*.kernel.json", "sssfit fit --method svd --rank 3")
 
 
 def profile_of_kernel(
-    kernel: SeparableKernel, name: str, given: str | None, common: Common
+    kernel: Kernel, name: str, given: str | None
 ) -> tuple[Profile | None, str | None]:
     """Return a kernel's profile and its file: the one given, else the one it was fitted to.
 
@@ -57,23 +55,16 @@ def profile_of_kernel(
 
     if given is None:
         folders = {Path(), Path() if name == "-" else Path(name).parent}
-        profile, file, note = find_profile(kernel, name, folders)
-        say_notes(common, [] if note is None else [note])
-        return profile, file
+        return find_profile(kernel, name, folders)
     asked = Profile.load(given)
     if kernel.meta.get("profile_sha256") not in (None, asked.sha256):
-        say(common, f"{given} is not the profile that {name} was fitted to.")
+        note(f"{given} is not the profile that {name} was fitted to.")
     return asked, given
 
 
-def is_mci(name: str | None) -> bool:
-    """Whether a name given for a material means an MCML input file."""
-    return name is not None and name.lower().endswith(".mci")
-
-
-def load(kind: type[_Record], name: str) -> _Record:
-    """Read a profile or a kernel; ``-`` is stdin."""
-    return kind.read(binary_stdin(), "stdin") if name == "-" else kind.load(name)
+def load(read: Callable[..., _Record], name: str) -> _Record:
+    """Read a record from a file; ``-`` is stdin."""
+    return read(binary_stdin(), "stdin") if name == "-" else read(name)
 
 
 def load_source(name: str) -> Material | Profile:
@@ -85,14 +76,7 @@ def load_source(name: str) -> Material | Profile:
         from sssfit.simulate import simulate_deon_skin
 
         return simulate_deon_skin()
-    return load(Profile, name) if name == "-" or name.endswith(".npz") else load_material(name)
-
-
-def load_any(name: str) -> Loaded:
-    """Read a file of any kind, or a material that ships with sssfit; ``-`` is stdin."""
-    from sssfit.kinds import load
-
-    return load(binary_stdin(), "stdin") if name == "-" else load(name)
+    return load(Profile.read, name) if name == "-" or name.endswith(".npz") else load_material(name)
 
 
 def binary_stdin() -> BinaryIO:

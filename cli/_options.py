@@ -1,8 +1,10 @@
 """Options that verbs share, those of methods, made from their entries, and types of parameters."""
 
+import contextlib
 import functools
+import logging
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -11,6 +13,7 @@ from click.core import ParameterSource
 
 from sssfit import text
 from sssfit.errors import ArgumentError
+from sssfit.messages import printable
 from sssfit.methods import SIMULATIONS, Method, Setting, settings_of
 from sssfit.process import check_memory, check_threads_of_numba
 
@@ -57,11 +60,30 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
         check_threads_of_numba()
         check_memory(command.__name__.rstrip("_"), common.threads)
         try:
-            return command(*args, common=common, **given)
+            with _notes_on_stderr(common.quiet):
+                return command(*args, common=common, **given)
         except ArgumentError as error:
             raise click.UsageError(in_options(str(error))) from None
 
     return wrapper
+
+
+class _Notes(logging.Handler):
+    def emit(self, record: logging.LogRecord) -> None:
+        click.echo(printable(in_options(record.getMessage())), err=True)
+
+
+@contextlib.contextmanager
+def _notes_on_stderr(quiet: bool) -> Iterator[None]:
+    """Print what the library notes, and our own notes, on stderr, unless ``quiet``."""
+    log, handler = logging.getLogger("sssfit"), _Notes()
+    log.setLevel(logging.ERROR if quiet else logging.INFO)
+    log.addHandler(handler)
+    try:
+        yield
+    finally:
+        log.removeHandler(handler)
+        log.setLevel(logging.NOTSET)
 
 
 def in_options(message: str) -> str:
@@ -129,6 +151,18 @@ def options(*rows: Any) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     return add
 
 
+def output(default: str, what: str, text: str = "Output file, - for stdout") -> tuple[Any, Any]:
+    """Return the options of the file to write, and of replacing one that is not ``what``."""
+    file = option("-o --output", None, "FILE", f"{text}.  [default: {default}]")
+    return file, flag("--force", f"Replace an input, or a file that {what}.")
+
+
+SHIPPED = (
+    flag("--all every", "All materials that ship with sssfit."),
+    flag("--paper", "The eleven materials of the Separable Subsurface Scattering paper."),
+)
+
+
 def refuse(given: Mapping[str, Any], whose: Mapping[str, str]) -> None:
     """Refuse options that would do nothing; ``whose`` says of each parameter what it is for."""
     named = {each.name: each.opts[-1] for each in click.get_current_context().command.params}
@@ -162,9 +196,9 @@ class Value(click.ParamType[Any]):
 Number = functools.partial(Value, "number", text.number)
 Numbers = functools.partial(Value, "list of numbers", text.numbers)
 Length = functools.partial(Value, "length", text.length_mm)
-LengthOr = Length  # and one word, which comes through as it is
 Lengths = functools.partial(Value, "list of lengths", text.lengths_mm)
 Count = functools.partial(Value, "count", text.whole_number)
+Size = functools.partial(Value, "size", text.size)
 Share = functools.partial(Value, "share", text.share)
 BaseColour = functools.partial(Value, "list of reflectances", text.base_colour)
 
@@ -190,6 +224,7 @@ _KINDS: dict[str, Callable[[Setting], Any]] = {
     "seconds": lambda _: NumberRange(min=0),
     "count": lambda each: Count(*each.among),
     "whole": lambda each: WholeRange(*each.among),
+    "text": lambda _: None,
     "choice": lambda each: click.Choice(each.among),
 }
 

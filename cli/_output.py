@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -17,28 +18,17 @@ from ._options import Common, in_options
 
 # What is written, and the ending of its name.
 PROFILE, KERNEL = ("a profile", ".npz"), ("a kernel", ".json")
-_ENDINGS = (".checkpoint", ".npz", ".json", ".toml", ".kernel", ".profile")
+_ENDINGS = (".checkpoint", ".npz", ".json", ".toml", ".kernel", ".taps", ".profile")
 
 
-def say(common: Common, line: str) -> None:
-    """Put a word on stderr, unless -q."""
-    if not common.quiet:
-        click.echo(printable(in_options(line)), err=True)
-
-
-def say_notes(common: Common, notes: Iterable[str]) -> None:
-    """Put the library's notes on stderr, unless -q."""
-    for note in notes:
-        say(common, note)
-
-
-def finish(
-    common: Common, figures: Mapping[str, Any], text: str, *, to_stderr: bool = False
-) -> None:
+def finish(common: Common, figures: Mapping[str, Any], text: str) -> None:
     """End a verb: its JSON object with ``--json``, else its text unless ``-q``.
 
-    ``to_stderr`` moves the text out of the way of data that went to stdout (``-o -``).
+    Either is on stderr where data went to stdout (``-o -``).
     """
+    verb = click.get_current_context().command.name
+    figures = {"command": verb, "output": [], **figures}
+    to_stderr = "-" in figures["output"]
     if common.json:
         from sssfit.arrays import plain
 
@@ -48,12 +38,11 @@ def finish(
 
 
 def finish_one(
-    common: Common, verb: str, path: Path | None, figures: Mapping[str, Any], text: str, what: str
+    common: Common, path: Path | None, figures: Mapping[str, Any], text: str, what: str
 ) -> None:
     """End a verb that wrote one file; None is ``what`` on stdout."""
-    whole = {"command": verb, "output": [str(path or "-")], **figures}
     words = f"{text}\n" * bool(text) + f"Wrote {path or f'{what} to stdout'}"
-    finish(common, whole, words, to_stderr=path is None)
+    finish(common, {"output": [str(path or "-")], **figures}, words)
 
 
 def _legible(text: str, figures: Mapping[str, Any]) -> str:
@@ -103,37 +92,17 @@ def held(
     """
     from sssfit.files import held as files_held
 
-    check_outputs(paths)
+    if None in paths:
+        binary_stdout()
     return files_held(paths, is_own, inputs=inputs, force=force, named=named)
 
 
-def held_charts(
-    paths: Sequence[Path | None], *, inputs: Iterable[str | Path | None], force: bool
-) -> contextlib.AbstractContextManager[None]:
-    """Hold the outputs of charts; formats are known by their endings."""
-    from sssfit.chart.files import chart_format, is_chart_file
-
-    for path in paths:
-        if path is not None:
-            chart_format(path)
-    return held(paths, is_chart_file, inputs=inputs, force=force)
-
-
-def check_outputs(paths: Sequence[Path | None]) -> None:
-    """Refuse a closed stdout, which is None, and two outputs into one file, before the work."""
-    from sssfit.files import check_distinct
-
-    if None in paths:
-        binary_stdout()
-    check_distinct(path for path in paths if path is not None)
-
-
-def write(content: Any, path: Path | None) -> None:
-    """Write bytes, or what writes itself to a stream, to a file that is held; None is stdout."""
+def write(content: bytes | Callable[[BinaryIO], object], path: Path | None) -> None:
+    """Write bytes, or what writes to a stream, to a file that is held; None is stdout."""
     from sssfit.files import write_atomically
 
     def write_to(stream: BinaryIO) -> None:
-        stream.write(content) if isinstance(content, bytes) else content.write(stream)
+        stream.write(content) if isinstance(content, bytes) else content(stream)
 
     if path is not None:
         write_atomically(path, write_to)
@@ -142,12 +111,10 @@ def write(content: Any, path: Path | None) -> None:
         binary_stdout().flush()
 
 
-def write_chart(figure: Any, path: Path | None) -> None:
-    """Write a figure to a file that is held; None is PNG on stdout."""
+def write_chart(record: Any, path: Path | None, **options: Any) -> None:
+    """Draw a record, and write its figure to a file that is held; None is PNG on stdout."""
+    from sssfit.chart import figure_of
     from sssfit.chart.page import save_figure
 
-    if path is not None:
-        save_figure(figure, path)
-    else:
-        save_figure(figure, binary_stdout(), format="png")
-        binary_stdout().flush()
+    form = "png" if path is None else path.suffix.removeprefix(".")
+    write(functools.partial(save_figure, figure_of(record, **options), format=form), path)

@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import math
 import sys
 from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
-from ._options import Common
-from ._output import say
-
 if TYPE_CHECKING:
-    from sssfit.material import Material
     from sssfit.simulate import Progress as WalkProgress
 
 
 @contextlib.contextmanager
-def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[[WalkProgress], None] | None]:
+def walk_progress(label: str) -> Iterator[Callable[[WalkProgress], None] | None]:
     """Yield a progress callback; None unless in a terminal, where the bar goes once it is full."""
-    if not _is_shown(quiet):
+    if not _is_shown():
         yield None
         return
     from rich.progress import TextColumn
@@ -54,9 +51,9 @@ def walk_progress(label: str, *, quiet: bool) -> Iterator[Callable[[WalkProgress
 
 
 @contextlib.contextmanager
-def step_progress(label: str, *, quiet: bool) -> Iterator[Callable[[int, int, str], None] | None]:
+def step_progress(label: str) -> Iterator[Callable[[int, int, str], None] | None]:
     """Yield a callback for (done, of how many, the next one's name); None unless in a terminal."""
-    if not _is_shown(quiet):
+    if not _is_shown():
         yield None
         return
     from rich.progress import TextColumn, TimeElapsedColumn
@@ -79,15 +76,7 @@ def _bar(label: str, width: int | None, columns: list[Any], **fields: Any) -> tu
     return bar, bar.add_task(label, total=None, **fields)
 
 
-def _is_shown(quiet: bool) -> bool:
+def _is_shown() -> bool:
     """Tell whether somebody looks on: a bar that was redrawn is litter in a log."""
-    return not quiet and sys.stderr is not None and sys.stderr.isatty()
-
-
-def say_if_compiling(common: Common, *, walk: Material | None = None, solver: bool = False) -> None:
-    """Say that the walk of a material, or the exact solver, is about to be compiled."""
-    from sssfit.simulate import compiling_note
-
-    wanted = [None] * solver + [walk] * (walk is not None)
-    for note in filter(None, map(compiling_note, wanted)):
-        say(common, note)
+    shown = logging.getLogger("sssfit").isEnabledFor(logging.INFO)  # not under -q
+    return shown and sys.stderr is not None and sys.stderr.isatty()

@@ -3,21 +3,22 @@
 Those of methods and of made pictures are made from their entries, in ``_methods``.
 """
 
-from sssfit.methods import FITS
+from sssfit.methods import ALL_FITS, FITS
 from sssfit.scene.made import COMPARED, EDGE_DEGREES, MADE
 
 from ._options import (
+    SHIPPED,
     Count,
     Length,
-    LengthOr,
     Number,
     NumberRange,
     Numbers,
+    Size,
     WholeRange,
     flag,
     option,
+    output,
 )
-from ._picture import Size
 
 MAPS = ("signed", "absolute")
 _FACTOR = NumberRange(min=0.0, min_open=True)
@@ -66,15 +67,14 @@ RENDER = (
 )
 
 COMPARE = (
-    flag("--all every", "All materials that ship with sssfit."),
-    flag("--paper", "The eleven materials of the Separable Subsurface Scattering paper."),
+    *SHIPPED,
     option("--what", ["front", "budget", "kernels", "sheet"], None, "budget: the causes of a "
            "kernel's error; kernels: all kernels by error and cost; front: the kernels that no "
            "other beats, one line per picture; sheet: pictures of all kernels, drawn into "
            "--chart.  [default: budget and kernels]"),
     option("--picture pictures", None, "NAME|FILE,...", f"Irradiance pictures: {_FILE} files. The "
            f"edge is at {EDGE_DEGREES:g} degrees.  [default: {','.join(COMPARED)}]", multiple=True),
-    option("--mm-per-pixel", LengthOr("profile"), "MM|profile", "Size of all pixels; profile is "
+    option("--mm-per-pixel", Length("profile"), "MM|profile", "Size of all pixels; profile is "
            "the width of the profile's first annulus.  [default: from your own file, else 0.3]"),
     option("--size", Size(), "WxH", "Made pictures: columns and rows.  [default: 512x512]"),
     *_OF_FILES,
@@ -119,7 +119,7 @@ CHART = (
     flag("--models", "Draw a material by every method, and the methods' errors."),
     flag("--spectrum", "Draw the energy of the kernel's singular values."),
     flag("--guide", "Draw the guide function beside the residual of the guided fit."),
-    option("--mm-per-pixel", LengthOr("profile"), "MM|profile", "Pixels of the kernel, with "
+    option("--mm-per-pixel", Length("profile"), "MM|profile", "Pixels of the kernel, with "
            "--spectrum or --guide; profile is the width of the profile's first annulus.  "
            "[default: 0.3]"),
     option("--k ks", Numbers(), "0..4,...", "One to four values, with --guide.  "
@@ -130,33 +130,27 @@ CHART = (
            "beside it or here, by its hash]"),
     option("--photons", Count(2, 10**12), "N", "Photons of the walk, with --models.  "
            "[default: 1e7]"),
-    option("-o --output", None, "FILE", "Output file, PNG, SVG or PDF by its ending; - for PNG on "
-           "stdout.  [default: NAME.profile.png, NAME.kernel.png, NAME.material.png, "
-           "NAME.checkpoint.png, NAME.spectrum.png, NAME.guide.png, MATERIAL.models.png]"),
-    flag("--force", "Replace an input, or a file that is not our chart."),
+    *output("NAME.profile.png, NAME.kernel.png, NAME.material.png, NAME.checkpoint.png, "
+            "NAME.spectrum.png, NAME.guide.png, MATERIAL.models.png", "is not our chart",
+            "Output file, PNG, SVG or PDF by its ending; - for PNG on stdout"),
 )
 
 FIT_PIXELS = (
     flag("--list listing", "List the methods."),
-    option("--method", list(FITS), None, "Fit method; --list describes each."),
-    option("--mm-per-pixel", LengthOr("profile"), "MM|profile", "Size of a pixel of the kernel; "
+    option("--method", list(ALL_FITS), None, "Fit method; --list describes each."),
+    option("--mm-per-pixel", Length("profile"), "MM|profile", "Size of a pixel of the kernel; "
            "profile is the width of the profile's first annulus.  [default: 0.3]"),
-    option("--support", LengthOr("auto"), "MM|auto", "Half width of the kernel; auto is the "
+    option("--support", Length("auto"), "MM|auto", "Half width of the kernel; auto is the "
            "smallest that keeps 99.9 % of every channel.", "auto"),
     flag("--normalize", "Scale every channel to unit energy, and store its energy as a factor."),
 )
-FIT_OUTPUT = (
-    option("-o --output", None, "FILE", "Output file, - for stdout.  [default: "
-           "PROFILE.METHOD.kernel.json]"),
-    flag("--force", "Replace an input, or a file that is not our kernel."),
-)
+FIT_OUTPUT = output("PROFILE.METHOD.kernel.json, .taps.json for cascade", "is not our kernel")
 
 EXPORT = (
     option("--format form", ["hlsl", "json", "csv"], None, "Output format. hlsl: a kernel as "
            "shader source; json: a kernel as a document; csv: a profile as a table.",
            required=True),
-    option("-o --output", None, "FILE", "Output file, - for stdout.  [default: NAME.FORMAT]"),
-    flag("--force", "Replace an input, or a file that sssfit did not write."),
+    *output("NAME.FORMAT", "sssfit did not write"),
 )
 # fmt: on
 
@@ -165,7 +159,7 @@ _OF_CHARTS = {  # options of single charts: what of it they are for, and the cha
     "mm_per_pixel": ("the kernel of --spectrum or --guide", {"spectrum", "guide"}),
     "ks": ("the fits of --guide", {"guide"}),
     "channel": ("the fits of --guide, or for a kernel", {"guide", "kernel"}),
-    "profile": ("a kernel", {"kernel"}),
+    "profile": ("a kernel", {"kernel", "taps"}),
 }
 
 

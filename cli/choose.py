@@ -7,23 +7,16 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sssfit.scene.made import EDGE_DEGREES
+from sssfit.messages import note
+from sssfit.scene.made import check_pictures
 
 from ._input import load_source
 from ._options import Common, common_options, options
-from ._output import KERNEL, PROFILE, finish, held, say, say_notes, stem_of, target, write
-from ._picture import check_pictures
-from ._progress import say_if_compiling
+from ._output import KERNEL, PROFILE, finish, held, stem_of, target, write
 from ._verb_options import CHOOSE
 
 if TYPE_CHECKING:
     from sssfit.choose.choice import Choice
-    from sssfit.material import Material
-    from sssfit.profile import Profile
-    from sssfit.scene.record import Scene
-
-_METRES = (0.1, 9.0)  # plain numbers that may have been meant in metres; 1cm is 10 mm and was not
-_MOST_PIXELS = 512  # of a made picture, along an edge
 
 
 @click.command()
@@ -51,17 +44,19 @@ def choose(material: str, common: Common, **given: Any) -> None:
       sssfit choose mine.toml --irradiance mine.exr -v
     """
     from sssfit.choose import choice as library
+    from sssfit.choose import views
     from sssfit.choose.report import sentences, step_line
     from sssfit.export.reports import page
     from sssfit.kernel import is_kernel_file
     from sssfit.material import Material
     from sssfit.profile import is_profile_file
 
-    _check_distance(given["distance_mm"])
-    check_pictures([given["irradiance"]], given["layer"], given["mask"])
+    views.check_distance(given["distance_mm"])
+    check_pictures([given["irradiance"]], layer=given["layer"], mask=given["mask"])
     source = load_source(material)
     view = {key: given[key] for key in ("distance_mm", "fov_degrees")}
-    pitch = library.mm_per_pixel_at(**view, rows=given["resolution"][0])
+    frame, on = given["resolution"], {key: given[key] for key in ("layer", "mask")}
+    pitch = library.mm_per_pixel_at(**view, rows=frame[0])
     asked = {key: given[key] for key in ("distance_mm", "tolerance", "tolerance_of")}
     is_file = material == "-" or material.endswith(".npz")
     name = source.name if isinstance(source, Material) else stem_of(material, source.material_name)
@@ -75,62 +70,23 @@ def choose(material: str, common: Common, **given: Any) -> None:
         held([path], is_kernel_file, named=KERNEL, **hold),
         held([profile_path] if profile_path else [], is_profile_file, named=PROFILE, **hold),
     ):
-        scene = None if given["irradiance"] == "head" else _scene(pitch, given, common)
-        _say_first(source, common)
         choice = library.choose(
             source,
             mm_per_pixel=pitch,
-            scene=scene,
-            frame=given["resolution"],
+            scene=views.scene_for(given["irradiance"], pitch, frame, seed=common.seed, **on),
+            frame=frame,
             **asked,
             seed=common.seed,
             threads=common.threads,
-            progress=(lambda step: say(common, step_line(step))) if common.verbose else None,
+            progress=(lambda step: note(step_line(step))) if common.verbose else None,
         )
         written = _write(choice, path, profile_path)
-    view["resolution"] = given["resolution"][::-1]
-    figures = {"command": "choose", "output": written, **view, **choice.to_dict()}
+    view["resolution"] = frame[::-1]
+    figures = {"output": written, **view, **choice.to_dict()}
     text = page("choose", {**figures, "sentences": "\n".join(sentences(choice))})
-    finish(common, figures, text, to_stderr=written == ["-"])
+    finish(common, figures, text)
     if not written and path is not None and path.exists():
-        say(common, f"{path} is from an earlier run; this view needs no kernel.")
-
-
-def _check_distance(distance_mm: float) -> None:
-    """Refuse a camera nearer than the head can be seen from; the number may have meant metres."""
-    from sssfit.scene.head import MIN_DISTANCE_MM
-
-    if distance_mm < MIN_DISTANCE_MM:
-        metres = f"a plain number is mm: did you mean {distance_mm:g}m?"
-        raise click.UsageError(
-            f"--distance: {distance_mm:g} mm is nearer than {MIN_DISTANCE_MM:g} mm; "
-            f"{metres if _METRES[0] <= distance_mm <= _METRES[1] else 'move away.'}"
-        )
-
-
-def _scene(pitch: float, given: dict[str, Any], common: Common) -> Scene:
-    """Make or read what the choice is judged on; a file that does not say has the pitch."""
-    from sssfit.scene.load import load_scene
-
-    name, asked = given["irradiance"], {key: given[key] for key in ("layer", "mask")}
-    asked |= {"angle_degrees": EDGE_DEGREES} if name == "edge" else {}
-    rows, columns = (min(each, _MOST_PIXELS) for each in given["resolution"])
-    scene, notes = load_scene(
-        name, otherwise=pitch, size=(rows, columns), seed=common.seed, **asked
-    )
-    say_notes(common, notes)
-    return scene
-
-
-def _say_first(source: Material | Profile, common: Common) -> None:
-    """Say what takes longest, and what a profile cannot tell."""
-    from sssfit.choose.truth import is_exact, notes_on
-    from sssfit.material import Material
-
-    if isinstance(source, Material):
-        exact = is_exact(source)
-        say_if_compiling(common, solver=exact, walk=None if exact else source)
-    say_notes(common, notes_on(source))
+        note(f"{path} is from an earlier run; this view needs no kernel.")
 
 
 def _write(choice: Choice, path: Path | None, profile_path: Path | None) -> list[str]:
@@ -138,6 +94,6 @@ def _write(choice: Choice, path: Path | None, profile_path: Path | None) -> list
     if choice.fit is None:
         return []
     if profile_path is not None:
-        write(choice.profile, profile_path)
-    write(choice.fit.kernel, path)
+        write(choice.profile.write, profile_path)
+    write(choice.fit.kernel.write, path)
     return [str(path or "-"), *([] if profile_path is None else [str(profile_path)])]

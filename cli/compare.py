@@ -9,13 +9,12 @@ from typing import Any
 import click
 
 from sssfit.methods import FITS
-from sssfit.scene.made import COMPARED
+from sssfit.scene.made import COMPARED, check_pictures
 
-from ._compare_parts import budget_and_kernels, fronts, profile_of
 from ._input import load_source
 from ._options import Common, common_options, options, own_settings, refuse
-from ._output import finish_one, held_charts, target, write_chart
-from ._picture import check_pictures
+from ._output import finish, held, target, write, write_chart
+from ._progress import step_progress, walk_progress
 from ._verb_options import COMPARE
 
 _OF_BUDGETS = ("budget_chart", "photons", "rank", "terms", "model")
@@ -47,23 +46,84 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
       sssfit compare --all -o charts
       sssfit compare skin1 --what sheet --chart skin1-sheet.png
     """
-    names = [name for each in given["pictures"] or COMPARED for name in each.split(",")]
-    _check(material, given, names)
-    if material is None:
-        from sssfit.material import material_names
+    pictures = [name for each in given["pictures"] or COMPARED for name in each.split(",")]
+    _check(material, given, pictures)
+    own = own_settings(context, FITS, given["method"], {k: given[k] for k in ("rank", "terms")})
+    from sssfit.compare import runner
+    from sssfit.errors import FitError, SssfitError
 
-        folder = Path(given["output"] or ".")
+    if given["what"] == "budget" and material:
+        runner.check_budget(material)
+    what = given["what"] if material else "front"
+    run = {"seed": common.seed, "threads": common.threads}
+    on = {key: given[key] for key in ("mm_per_pixel", "size", "layer", "mask")}
+    on["seed"] = common.seed
+    asked = {key: given[key] for key in ("error", "mm_per_pixel", "photons", "method", "model")}
+    asked |= {"settings": own or None, "steps": step_progress, "walk": walk_progress, **run}
+    front = {key: given[key] for key in ("error", "cost")}
+    files, wrote, failed = _files(material, given), set[str](), []
+    outputs = [target(each) for own in files.values() for each in own.values()]
+    parts: list[Any] = []
+    with held(outputs, _is_ours, inputs=[material, *pictures], force=given["force"]):
+        source = load_source(material) if material else None
+        if source is not None and given["mm_per_pixel"] == "profile":
+            asked["profile"] = runner.profile_of(source, threads=common.threads)
+        scenes = [] if what == "sheet" else runner.scenes_for(asked.get("profile"), pictures, **on)
+        for name, own_files in files.items():
+            try:
+                of_name = source or load_source(name)
+                for part in runner.compare(of_name, scenes, what, name=name, **asked):
+                    wrote |= _write(part, own_files, front)
+                    parts.append(part)
+            except SssfitError as error:
+                if material:
+                    raise
+                failed.append(f"{name}: {error}")
+    output = [each for own in files.values() for each in own.values() if each in wrote]
+    if parts:
+        finish(common, *runner.told(what, parts, output, **front))
+    if failed:
+        raise FitError(f"{len(failed)} of {len(files)} materials failed; {' '.join(failed)}")
+
+
+def _files(material: str | None, given: Mapping[str, Any]) -> dict[str, dict[str, str]]:
+    """Return the files of each material's budget chart, chart and table that are asked for."""
+    from sssfit.chart.files import chart_format
+    from sssfit.compare.table import check_table_name
+    from sssfit.material import material_names
+
+    keys, folder = ("budget_chart", "chart", "table"), Path(given["output"] or ".")
+    if material is None:
         stems = {name: folder / f"{name}-pareto" for name in material_names(paper=given["paper"])}
-        files = {each: (f"{stem}.png", f"{stem}.md") for each, stem in stems.items()}
-        fronts(files, names, given, common)
-    elif given["what"] == "front":
-        fronts({material: (given["chart"], given["table"])}, names, given, common)
-    elif given["what"] == "sheet":
-        _sheet(material, given, common)
-    else:
-        settings = {key: given[key] for key in ("rank", "terms")}
-        own = own_settings(context, FITS, given["method"], settings)
-        budget_and_kernels(material, names, own, given, common)
+        return {key: {"chart": f"{each}.png", "table": f"{each}.md"} for key, each in stems.items()}
+    files = {key: given[key] for key in keys if given[key]}
+    for key, name in files.items():
+        if name != "-":
+            check_table_name(Path(name)) if key == "table" else chart_format(name)
+    return {material: files}
+
+
+def _is_ours(path: Path) -> bool:
+    """Tell whether a file is a chart or a table that we wrote."""
+    from sssfit.chart.files import is_chart_file
+    from sssfit.compare.table import is_table_file
+
+    return is_chart_file(path) or is_table_file(path)
+
+
+def _write(part: Any, files: Mapping[str, str], front: Mapping[str, str]) -> set[str]:
+    """Draw a part, and write the table of kernels, into files that are held; return which."""
+    from sssfit.compare import Comparison
+    from sssfit.compare.table import table_text
+
+    chart = files.get("budget_chart" if isinstance(part, list) else "chart")
+    if chart:
+        options = front if isinstance(part, Comparison) else {}
+        write_chart(part, target(chart), **options)
+    table = files.get("table")
+    if table and isinstance(part, Comparison):
+        write(table_text(part, Path(table).suffix.lower(), **front).encode(), Path(table))
+    return {each for each in (chart, table) if each}
 
 
 def _check(material: str | None, given: Mapping[str, Any], names: Sequence[str]) -> None:
@@ -87,20 +147,4 @@ def _check(material: str | None, given: Mapping[str, Any], names: Sequence[str])
         raise click.UsageError("--what sheet is a picture; name its file with --chart.")
     if given["chart"] == given["budget_chart"] == "-":
         raise click.UsageError("only one of --chart and --budget-chart can go to stdout.")
-    check_pictures(names, given["layer"], given["mask"], given["size"])
-
-
-def _sheet(name: str, given: Mapping[str, Any], common: Common) -> None:
-    """Draw a contact sheet of a profile's kernels, and print its figures."""
-    from sssfit.chart import figure_of
-    from sssfit.compare.sheet import compute_sheet
-    from sssfit.compare.table import sheet_text
-
-    path = target(given["chart"])
-    with held_charts([path], inputs=[name], force=given["force"]):
-        profile = profile_of(load_source(name), common)
-        pitch = given["mm_per_pixel"]
-        found = compute_sheet(profile, mm_per_pixel=pitch, threads=common.threads)
-        write_chart(figure_of(found), path)
-    told = found.to_dict()
-    finish_one(common, "compare", path, told, sheet_text(told), "a PNG")
+    check_pictures(names, **{key: given[key] for key in ("layer", "mask", "size")})

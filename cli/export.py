@@ -40,13 +40,13 @@ def export(file: str | None, form: str, output: str | None, force: bool, common:
 
     figures: dict[str, Any]
     if form == "csv":
-        name = profile_name(file, common)
-        profile = load(Profile, name)
+        name = profile_name(file)
+        profile = load(Profile.read, name)
         text = csv_text(profile)
         figures = {"profile": name, "channels": profile.channels, "annuli": profile.n_annuli}
     else:
-        name = kernel_name(file, common)
-        kernel = load(SeparableKernel, name)
+        name = kernel_name(file)
+        kernel = load(SeparableKernel.read, name)
         text = (hlsl if form == "hlsl" else json_document)(kernel)
         keys = ("channels", "rank", "pixels", "mm_per_pixel")
         figures = {"kernel": name, **{key: getattr(kernel, key) for key in keys}}
@@ -60,4 +60,4 @@ def export(file: str | None, form: str, output: str | None, force: bool, common:
     with held([path], is_ours[form], inputs=[name], force=force, named=named):
         write(text.encode(), path)
     what = "the table" if form == "csv" else "the kernel"
-    finish_one(common, "export", path, {"format": form, **figures}, "", what)
+    finish_one(common, path, {"format": form, **figures}, "", what)

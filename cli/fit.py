@@ -6,18 +6,18 @@ from typing import Any
 
 import click
 
-from sssfit.methods import FITS, lines_of, settings_of
+from sssfit.methods import ALL_FITS, TAPS, lines_of, settings_of
 from sssfit.process import check_memory
 
 from ._input import load, profile_name
-from ._options import Common, common_options, method_options, options, own_settings
+from ._options import Common, common_options, method_options, options, own_settings, refuse
 from ._output import KERNEL, finish_one, held, stem_of, target, write
 from ._verb_options import FIT_OUTPUT, FIT_PIXELS
 
 
-@click.command(epilog="\b\nMethods:\n" + lines_of(FITS))
+@click.command(epilog="\b\nMethods:\n" + lines_of(ALL_FITS))
 @click.argument("profile", required=False)
-@options(*FIT_PIXELS, method_options(FITS), *FIT_OUTPUT)
+@options(*FIT_PIXELS, method_options(ALL_FITS), *FIT_OUTPUT)
 @common_options
 @click.pass_context
 def fit(context: click.Context, /, profile: str | None, common: Common, **given: Any) -> None:
@@ -36,30 +36,33 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
     """
     method = given["method"]
     if given["listing"]:
-        click.echo(lines_of(FITS))
+        click.echo(lines_of(ALL_FITS))
         return
     if method is None:
         raise click.UsageError("name a --method; `sssfit fit --list` has them.")
     from sssfit.export.reports import page
-    from sssfit.fit import fit_result
-    from sssfit.kernel import is_kernel_file
+    from sssfit.fit import fit_result, fit_taps
+    from sssfit.kernel import is_kernel_file, is_taps_file
     from sssfit.profile import Profile
 
-    known = settings_of(FITS)
-    settings = own_settings(context, FITS, method, {key: given[key] for key in known})
-    name = profile_name(profile, common)
-    source = load(Profile, name)
-    counted, stem = FITS[method].counted, stem_of(name, source.material_name)
-    count = settings.get(counted, known[counted][0].words) if counted else ""
-    path = target(given["output"], f"{stem}.{method}{count}.kernel.json")
+    is_taps, known = method in TAPS, settings_of(ALL_FITS)
+    settings = own_settings(context, ALL_FITS, method, {key: given[key] for key in known})
+    if is_taps:
+        refuse(given, {"normalize": "separable kernels"})
+    name = profile_name(profile)
+    source = load(Profile.read, name)
+    stem = f"{stem_of(name, source.material_name)}.{method}{ALL_FITS[method].count_of(settings)}"
+    path = target(given["output"], f"{stem}.{'taps' if is_taps else 'kernel'}.json")
+    settings |= {"seed": common.seed} if is_taps else {"normalize": given["normalize"]}
     settings |= _picture_target(settings, common.threads)
-    settings |= {key: given[key] for key in ("mm_per_pixel", "normalize")}
+    settings["mm_per_pixel"] = given["mm_per_pixel"]
     settings["support_mm"] = None if given["support"] == "auto" else given["support"]
-    with held([path], is_kernel_file, inputs=[name], force=given["force"], named=KERNEL):
-        result = fit_result(source, method, **settings)
-        write(result.kernel, path)
+    is_own = is_taps_file if is_taps else is_kernel_file
+    with held([path], is_own, inputs=[name], force=given["force"], named=KERNEL):
+        result = (fit_taps if is_taps else fit_result)(source, method, **settings)
+        write(result.kernel.write, path)
     figures = {"profile": name, **result.to_dict()}
-    finish_one(common, "fit", path, figures, page("fit", figures), "the kernel")
+    finish_one(common, path, figures, page("fit-taps" if is_taps else "fit", figures), "the kernel")
 
 
 def _picture_target(settings: dict[str, Any], threads: int | None) -> dict[str, Any]:

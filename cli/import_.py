@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from ._input import binary_stdin
-from ._options import Common, common_options, flag, option, options
+from ._options import Common, common_options, option, options, output
 from ._output import PROFILE, finish_one, held, target, write
 
 _UNITS = ("um", "mm", "cm", "m")
@@ -23,9 +23,7 @@ _OPTIONS = (
            "[default: the unit of its radii]"),
     option("--channels", None, "A,B,...", "Names for several .mco, in their order.  [default: "
            "R,G,B for three]"),
-    option("-o --output", None, "FILE", "Output file, - for stdout.  [default: "
-           "NAME.profile.npz]"),
-    flag("--force", "Replace an input, or a file that is not our profile."),
+    *output("NAME.profile.npz", "is not our profile"),
 )
 # fmt: on
 
@@ -75,6 +73,6 @@ def import_(
     stem = "stdin" if files[0] == "-" else Path(files[0]).stem
     path = target(output, f"{stem}.profile.npz")
     with held([path], is_profile_file, inputs=files, force=force, named=PROFILE):
-        write(profile, path)
+        write(profile.write, path)
     figures = imported_figures(profile)
-    finish_one(common, "import", path, figures, imported_page(figures), "the profile")
+    finish_one(common, path, figures, imported_page(figures), "the profile")

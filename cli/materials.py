@@ -13,7 +13,6 @@ from sssfit.methods import DEON_SKIN
 
 from ._options import BaseColour, Common, Lengths, Number, common_options, flag, option, options
 from ._output import finish, finish_one, held, target, write
-from ._progress import say_if_compiling
 
 # Heads the files we make: only a file that begins with it is replaced without --force.
 _OURS = "# Made by `sssfit materials --from-reflectance`, which may replace this file;"
@@ -96,47 +95,28 @@ def materials(
     else:
         figures = summary.material_figures(load_material(material))
         page = summary.material_page
-    finish(common, {"command": "materials", "output": [], **figures}, page(figures))
+    finish(common, figures, page(figures))
 
 
-def _make(asked: list[float] | str, common: Common, given: dict[str, Any]) -> None:
+def _make(reflectance: list[float] | str, common: Common, given: dict[str, Any]) -> None:
     """Invert, write the TOML, and print what was found beside the published approximations."""
     from sssfit.files import has_mark
-    from sssfit.formats.colours import reflectance_of_codes
     from sssfit.process import check_memory
 
     check_memory("inversion", common.threads)
-    if given["mean_free_path"] is None:
+    if (paths_mm := given["mean_free_path"]) is None:
         raise click.UsageError("--from-reflectance needs --mean-free-path.")
-    light: Any = given["light"] or (
-        "diffuse" if given["srgb"] or isinstance(asked, str) else "normal"
-    )
-    asked = reflectance_of_codes(asked) if given["srgb"] else asked
-    names = _channels(given["channels"], 3 if isinstance(asked, str) else len(asked))
+    from sssfit.simulate import inversion
+
+    asked, light = inversion.asked_for(reflectance, srgb=given["srgb"], light=given["light"])
+    names = inversion.channel_names(given["channels"], asked)
     output = given["output"]
     name = given["name"] or ("from-reflectance" if output in (None, "", "-") else Path(output).stem)
     path = target(output, f"{name}.toml")
     is_ours = functools.partial(has_mark, marks={_OURS.encode(): b""})
     with held([path], is_ours, inputs=[], force=given["force"], named=("a material", ".toml")):
-        say_if_compiling(common, solver=True)
-        from sssfit.simulate import inversion
-
-        material = inversion.material_from_reflectance(
-            asked, given["mean_free_path"], given["eta"], name=name, channels=names, light=light
-        )
+        how: dict[str, Any] = {"name": name, "channels": names, "light": light}
+        material = inversion.material_from_reflectance(asked, paths_mm, given["eta"], **how)
         figures = inversion.inversion_figures(material, asked, light)
         write(f"{_OURS} delete this line to keep it.\n{material.to_toml()}".encode(), path)
-    finish_one(common, "materials", path, figures, inversion.summary(figures), "the material")
-
-
-def _channels(given: str | None, count: int) -> list[str]:
-    """Names of the channels: R, G, B for three."""
-    if given is None and count != 3:
-        raise click.UsageError(
-            f"--from-reflectance has {count} value{'s' * (count != 1)}; name "
-            f"{'its channel' if count == 1 else 'their channels'} with --channels."
-        )
-    names = [each.strip() for each in (given or "R,G,B").split(",")]
-    if len(names) != count:
-        raise click.UsageError(f"--channels has {len(names)} names for {count} reflectances.")
-    return names
+    finish_one(common, path, figures, inversion.summary(figures), "the material")

@@ -9,17 +9,16 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from sssfit.methods import settings_of
-from sssfit.scene.made import MADE
+from sssfit.scene.made import MADE, check_pictures
 
 from ._input import kernel_name, load, profile_of_kernel
 from ._options import Common, common_options, method_options, options, own_settings
-from ._output import binary_stdout, finish, held, say_notes, stem_of, target
-from ._picture import check_pictures
+from ._output import binary_stdout, finish, held, stem_of, target
 from ._verb_options import RENDER, RENDER_PICTURE
 
 if TYPE_CHECKING:
     from sssfit.compare.evaluate import Evaluation
-    from sssfit.kernel import SeparableKernel
+    from sssfit.kernel import Kernel
 
 # Of the head's key light: behind both ears.
 _BEHIND_DEGREES = 170.0
@@ -33,11 +32,12 @@ _BEHIND_DEGREES = 170.0
 def render(context: click.Context, /, kernel: str | None, common: Common, **given: Any) -> None:
     """Apply KERNEL to a picture of irradiance, and measure its error.
 
-    KERNEL is a .kernel.json file, or - for stdin; by default the newest in this folder. The result
-    is radiant exitance in linear light. Made pictures use the kernel's pixel size; your own file
-    (EXR, HDR, TIFF, PNG, JPG, TGA) must have it too, except with --screen. The true picture is the
-    same irradiance convolved with the whole 2D kernel of the profile; Delta E 2000 compares the two
-    in sRGB at the exposure. The alpha channel of your file is copied unchanged.
+    KERNEL is a .kernel.json or .taps.json file, or - for stdin; by default the newest .kernel.json
+    in this folder. The result is radiant exitance in linear light. Made pictures use the kernel's
+    pixel size; your own file (EXR, HDR, TIFF, PNG, JPG, TGA) must have it too, except with --screen
+    and for a table of taps, which serves any size. The true picture is the same irradiance
+    convolved with the whole 2D kernel of the profile; Delta E 2000 compares the two in sRGB at the
+    exposure. The alpha channel of your file is copied unchanged.
 
     \b
       sssfit render skin1.svd3.kernel.json --irradiance head -o out.exr
@@ -48,11 +48,11 @@ def render(context: click.Context, /, kernel: str | None, common: Common, **give
     """
     from sssfit.export.reports import page
     from sssfit.formats.pictures import image_format, is_image_file
-    from sssfit.kernel import SeparableKernel
+    from sssfit.kernel import read_kernel
 
     own = _check(context, given)
-    name, irradiance = kernel_name(kernel, common), given["irradiance"]
-    loaded = load(SeparableKernel, name)
+    name, irradiance = kernel_name(kernel), given["irradiance"]
+    loaded = load(read_kernel, name)
     path = target(given["output"], f"{stem_of(name)}.{Path(irradiance).stem}.exr")
     asked = {"picture": path, "truth": given["truth"], "difference": given["difference"]}
     files = {key: Path(each) for key, each in asked.items() if each}
@@ -63,9 +63,8 @@ def render(context: click.Context, /, kernel: str | None, common: Common, **give
     with held(outputs, is_image_file, inputs=inputs, force=given["force"]):
         source, made = _rendered(loaded, name, given, own, common)
         targets: dict[str, Any] = files if path else {"picture": binary_stdout(), **files}
-        say_notes(common, made.save(targets, exposure=given["exposure"]))
+        made.save(targets, exposure=given["exposure"])
     figures = {
-        "command": "render",
         "output": [*(["-"] if path is None else []), *map(str, files.values())],
         "kernel": name,
         "profile": source,
@@ -73,7 +72,7 @@ def render(context: click.Context, /, kernel: str | None, common: Common, **give
         "follow": (given["follow"] or "gaussian") if given["screen"] else None,
         **made.to_dict(),
     }
-    finish(common, figures, page("render", figures), to_stderr=path is None)
+    finish(common, figures, page("render", figures))
 
 
 def _check(context: click.Context, given: dict[str, Any]) -> dict[str, Any]:
@@ -88,7 +87,7 @@ def _check(context: click.Context, given: dict[str, Any]) -> dict[str, Any]:
         raise click.UsageError("--follow is for --screen; leave it out.")
     if given["difference"] is None and (given["difference_map"] or given["gain"] != 1.0):
         raise click.UsageError("--gain and --difference-map are for --difference; name its file.")
-    check_pictures([name], given["layer"], given["mask"], given["size"])
+    check_pictures([name], **{key: given[key] for key in ("layer", "mask", "size")})
     if is_made and not screen and given["mm_per_pixel"] is not None:
         raise click.UsageError(
             f"--mm-per-pixel is for pictures from files and for --screen; {name} is made on the "
@@ -100,7 +99,7 @@ def _check(context: click.Context, given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _rendered(
-    kernel: SeparableKernel,
+    kernel: Kernel,
     name: str,
     given: Mapping[str, Any],
     own: dict[str, Any],
@@ -115,13 +114,12 @@ def _rendered(
     made_mm = (given["mm_per_pixel"] or MM_PER_PIXEL) if screen else kernel.mm_per_pixel
     asked = {key: given[key] for key in ("size", "layer", "mask")} | own
     pitch = made_mm if picture in MADE else given["mm_per_pixel"]
-    scene, notes = load_scene(picture, pitch, seed=common.seed, **asked)
-    say_notes(common, notes)
+    scene = load_scene(picture, pitch, seed=common.seed, **asked)
     how = {key: given[key] for key in ("transmit", "border")} | {"threads": common.threads}
     if screen:
         follow = given["follow"] or "gaussian"
         return None, evaluate_in_screen_space(scene, kernel, follow=follow, **how)
-    profile, source = profile_of_kernel(kernel, name, given["profile"], common)
+    profile, source = profile_of_kernel(kernel, name, given["profile"])
     if profile is None and (given["truth"] or given["difference"]):
         raise click.UsageError("--truth and --difference need the profile; name it.")
     how |= {key: given[key] for key in ("exposure", "structure")}

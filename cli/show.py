@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import click
 
-from ._input import load_any, profile_name
+from ._input import load, profile_name
 from ._options import Common, common_options
 from ._output import finish
 
 _TITLES = {
     "profile": "{name}: diffuse reflectance profile ({format})\n",
     "kernel": "{name}: separable kernel ({format})\n",
+    "taps": "{name}: table of taps ({format})\n",
     "material": "",
     "checkpoint": "{name}: checkpoint of a photon walk\n",
 }
@@ -20,7 +21,7 @@ _TITLES = {
 @click.argument("file", required=False)
 @common_options
 def show(file: str | None, common: Common) -> None:
-    """Print what FILE holds: a profile, a kernel, a material or the checkpoint of a walk.
+    """Print what FILE holds: a profile, kernel, table of taps, material or checkpoint of a walk.
 
     FILE is any of these, under any name, or - for stdin; by default the newest .profile.npz in this
     folder.
@@ -32,11 +33,10 @@ def show(file: str | None, common: Common) -> None:
       sssfit show skin1.profile.npz.checkpoint   the profile so far
       sssfit simulate skin1 -o - | sssfit show - --json
     """
-    name = profile_name(file, common)
-    found = load_any(name)
+    name = profile_name(file)
+    from sssfit import kinds
     from sssfit.export.summary import figures_of, summary
 
-    figures = figures_of(found)
+    figures = figures_of(load(kinds.load, name))
     title = _TITLES[figures["kind"]].format_map({"name": name, "format": figures.get("format")})
-    told = {"command": "show", "output": [], "file": name, **figures}
-    finish(common, told, title + summary(figures))
+    finish(common, {"file": name, **figures}, title + summary(figures))

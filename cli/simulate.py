@@ -3,43 +3,41 @@
 from __future__ import annotations
 
 import sys
-from pathlib import Path
 from typing import Any
 
 import click
 
+from sssfit.messages import note
 from sssfit.methods import SIMULATIONS, lines_of
 
-from ._input import is_mci
 from ._options import (
+    SHIPPED,
     Common,
     Length,
     WholeRange,
     common_options,
-    flag,
     method_for,
     method_options,
     option,
     options,
+    output,
     own_settings,
 )
-from ._output import check_outputs, finish, say, say_notes, write
+from ._output import binary_stdout, finish, write
 from ._progress import walk_progress
 
 _FIRST = "montecarlo"  # the only walk of photons
 # fmt: off
 _OPTIONS = (
-    flag("--all every", "All materials that ship with sssfit."),
-    flag("--paper", "The eleven materials of the Separable Subsurface Scattering paper."),
+    *SHIPPED,
     option("--method", [*SIMULATIONS], "METHOD", "Simulation method, as listed below.", _FIRST),
     option("--run number", WholeRange(1), "N", "Simulate only this run of an .mci file."),
     method_options(SIMULATIONS),
     option("--dr", Length(), "MM", "Annulus width.  [default: MFP_min / 20; deon-skin: 0.008]"),
     option("--radius", Length("auto"), "MM|auto", "Grid radius; auto (montecarlo) enlarges it "
            "until under 0.1 % of any channel lies beyond.  [default: 32 MFP_max; deon-skin: 17.2]"),
-    option("-o --output", None, "FILE", "Output file, - for stdout; a folder with --all."
-           "  [default: MATERIAL.profile.npz, MATERIAL.METHOD.profile.npz]"),
-    flag("--force", "Replace an input, or a file that is not our profile."),
+    *output("MATERIAL.profile.npz, MATERIAL.METHOD.profile.npz", "is not our profile",
+            "Output file, - for stdout; a folder with --all"),
 )
 # fmt: on
 
@@ -75,76 +73,39 @@ def simulate(
     )
     if [material is not None, every, paper].count(True) != 1:
         raise click.UsageError("name one MATERIAL, or give --all or --paper.")
+    from sssfit.formats.mci import is_mci
+    from sssfit.process import asked_to_stop
+    from sssfit.simulate import runner
+
     if number is not None and not is_mci(material):
         raise click.UsageError("--run chooses a run of an MCML input file, .mci.")
     method = method_for(context, method, material)
     own = own_settings(context, SIMULATIONS, method, given) | {"dr_mm": dr, "radius_mm": radius}
     if radius == "auto" and method != _FIRST:
         raise click.UsageError("--radius auto is for --method montecarlo; give a length.")
-    of_walk = own.keys() & {"checkpoint_every", "resume"}
-    how: dict[str, Any] = {key: own.pop(key) for key in of_walk}
+    how = {key: own.pop(key) for key in own.keys() & {"checkpoint_every", "resume"}}
     own |= {"threads": common.threads} if SIMULATIONS[method].shares else {}
     own |= {"seed": common.seed} if method == _FIRST else {}
-    materials, settings = _asked(method, material, number, own, paper=paper)
-    several = every or paper or len(materials) > 1
-    paths = _paths(materials, method, output, several=several)
-    if how.get("resume") and paths == [None]:
+    materials, settings = runner.runs_of(method, material, own, run=number, paper=paper)
+    several, to_stdout = every or paper or len(materials) > 1, output == "-"
+    if to_stdout and several:
+        raise click.UsageError("there are several profiles; -o names a folder for them.")
+    if to_stdout and how.get("resume"):
         raise click.UsageError("--resume needs a file to go on beside; leave -o - out.")
+    if to_stdout:
+        binary_stdout()
+    paths = runner.paths_of(materials, method, output, several=several)
     how["inputs"] = [material] if material and SIMULATIONS[method].makes is None else []
-    _run((materials, paths, method, settings), common, several=several, force=force, **how)
-
-
-def _asked(
-    method: str, material: str | None, number: int | None, given: dict[str, Any], *, paper: bool
-) -> tuple[list[Any], Any]:
-    """Load what is asked for, with the settings for all, or for each run of an .mci file."""
-    from sssfit.formats.mci import load_mci
-    from sssfit.material import load_material, material_names
-    from sssfit.simulate import DEON_SKIN
-
-    if SIMULATIONS[method].makes is not None:
-        return [DEON_SKIN], given
-    if material is not None and is_mci(material):
-        runs = load_mci(material, number)
-        # A target error alone decides when a walk ends; then the file's photons are no limit.
-        photons = method == _FIRST and not {"photons", "target_error"} & given.keys()
-        each = [run.settings(given, photons=photons) for run in runs]
-        return [run.material for run in runs], each
-    names = material_names(paper=paper) if material is None else (material,)
-    return [load_material(name) for name in names], given
-
-
-def _paths(
-    materials: list[Any], method: str, output: str | None, *, several: bool
-) -> list[Path | None]:
-    """Where each profile goes; None is stdout. Methods but the first put their name into it."""
-    if output == "-":
-        if several:
-            raise click.UsageError("there are several profiles; -o names a folder for them.")
-        return [None]
-    if several or output is None:
-        folder, kind = Path(output or "."), "" if method == _FIRST else f".{method}"
-        return [folder / f"{each.name}{kind}.profile.npz" for each in materials]
-    return [Path(output)]
-
-
-def _run(asked: Any, common: Common, *, several: bool, **how: Any) -> None:
-    """Compute and write each profile, and report; what was done by Ctrl-C or SIGTERM stays."""
-    from sssfit.process import asked_to_stop
-    from sssfit.simulate import simulate_to_files
-
-    how["tell"] = lambda line: say(common, line)
-    how["watch"] = lambda label: walk_progress(label, quiet=common.quiet)
-    check_outputs(asked[1])
-    with asked_to_stop() as stop:
-        found = simulate_to_files(*asked, stop=stop, **how)
+    asked = (materials, paths, method, settings)
+    with asked_to_stop() as stop:  # what was done by then stays
+        found = runner.simulate_to_files(*asked, force=force, stop=stop, watch=walk_progress, **how)
         if not found.outcomes:
             raise KeyboardInterrupt
-        if to_stdout := asked[1] == [None]:
-            write(found.outcomes[0].profile, None)
-    say_notes(common, [found.note] if found.note else [])
-    figures = {"command": "simulate", **found.to_dict(several=several)}
+        if to_stdout:
+            write(found.outcomes[0].profile.write, None)
+    if found.note:
+        note(found.note)
     text = found.summary(several=several) + "\nWrote the profile to stdout" * to_stdout
-    finish(common, figures, text, to_stderr=to_stdout)
+    finish(common, found.to_dict(several=several), text)
     if found.is_interrupted:
         sys.exit(130)

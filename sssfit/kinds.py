@@ -17,12 +17,12 @@ from sssfit.methods import imported
 from sssfit.text import decode
 
 if TYPE_CHECKING:
-    from sssfit.kernel import SeparableKernel
+    from sssfit.kernel import SeparableKernel, Taps
     from sssfit.material import Material
     from sssfit.profile import Profile
     from sssfit.simulate import SoFar
 
-    Loaded: TypeAlias = Profile | SeparableKernel | Material | SoFar
+    Loaded: TypeAlias = Profile | SeparableKernel | Taps | Material | SoFar
 
 MOST_BYTES = 500_000_000  # the most that a file of ours may have
 _MOST_TOML_BYTES = 1_000_001
@@ -61,6 +61,7 @@ KINDS: Mapping[str, Kind] = {
     "kernel": Kind(
         "a kernel (.kernel.json)", "sssfit.kernel:SeparableKernel.read", (b'"sssfit.kernel/',)
     ),
+    "taps": Kind("a table of taps (.taps.json)", "sssfit.kernel:Taps.read", (b'"sssfit.taps/',)),
     "material": Kind("a material (.toml)", "sssfit.material:read_material"),
     "checkpoint": Kind(
         "a walk's checkpoint (.checkpoint)",
@@ -71,7 +72,7 @@ KINDS: Mapping[str, Kind] = {
 
 
 def load(source: "str | Path | BinaryIO", origin: str | None = None) -> "Loaded":
-    """Read a profile, a kernel, a material or a walk's checkpoint, recognised by content.
+    """Read a profile, kernel, table of taps, material or walk's checkpoint, told by its content.
 
     Parameters
     ----------
@@ -82,7 +83,7 @@ def load(source: "str | Path | BinaryIO", origin: str | None = None) -> "Loaded"
 
     Returns
     -------
-    Profile, SeparableKernel, Material or SoFar
+    Profile, SeparableKernel, Taps, Material or SoFar
 
     Raises
     ------

@@ -1,5 +1,6 @@
 """Wording of figures, values and names: on one line, in printable characters."""
 
+import logging
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from string import Formatter
@@ -7,6 +8,14 @@ from typing import Any, TypeAlias
 
 _MOST_NAMED = 4  # channels named in a record's repr
 _MOST_SHOWN = 60  # characters of a value that a message repeats
+
+
+def note(line: str) -> None:
+    """Tell the user what a result does not show: a record of the logger "sssfit", level INFO.
+
+    The command line prints it; in Python ``logging.basicConfig(level="INFO")`` does.
+    """
+    logging.getLogger("sssfit").info("%s", line)
 
 
 def printable(text: str) -> str:

@@ -8,7 +8,7 @@ function is asked for, so that help answers at once.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import import_module
 from operator import attrgetter
 from typing import Any
@@ -67,9 +67,9 @@ class Method:
     summary : str
         Help text on one line.
     settings : tuple of Setting
-    counted : str
-        The setting whose value becomes part of the kernel's file name (svd3), by ``words`` if it is
-        not given.
+    counted : tuple of str
+        Settings of which the first that is given becomes part of the kernel's file name (svd3); if
+        none is, the ``words`` of the last.
     shares : bool
         Whether the function takes a list of materials, shares their common work, and takes
         ``threads`` and ``stop``; the others take one material.
@@ -80,13 +80,21 @@ class Method:
     function: str
     summary: str
     settings: tuple[Setting, ...] = ()
-    counted: str = ""
+    counted: tuple[str, ...] = ()
     shares: bool = False
     makes: str | None = None
 
     def load(self) -> Callable[..., Any]:
         """Import the method's function."""
         return imported(self.function)
+
+    def count_of(self, given: Mapping[str, Any]) -> str:
+        """Return what becomes part of the kernel's file name."""
+        known = {each.name: each.words for each in self.settings}
+        words = [known[name] for name in self.counted[-1:]]
+        value = [given[name] for name in self.counted if name in given] + [*words, ""]
+        text = f"{value[0]:g}" if isinstance(value[0], float) else str(value[0])
+        return text.replace("|", "_")  # no file of Windows may have a bar in its name
 
 
 DEON_SKIN = "deon-skin"  # a profile that is made without a material
@@ -178,12 +186,20 @@ _ENERGY = Setting(
     words="rescale",
 )
 
+_SPECTRUM = Setting(
+    "spectrum",
+    "choice",
+    "pictures that the kernel is for: natural ones, or white noise.",
+    among=("natural", "white"),
+    words="natural",
+)
+
 FITS: Mapping[str, Method] = {
     "svd": Method(
         "sssfit.fit.svd:fit_svd",
         "rank N: the largest terms of the singular value decomposition; the smallest error",
         (Setting("rank", "whole", "number of terms.", "N", (1, 1000), words="3"), _ENERGY),
-        counted="rank",
+        counted=("rank",),
     ),
     "gaussians": Method(
         "sssfit.fit.gaussians:fit_gaussians",
@@ -194,7 +210,7 @@ FITS: Mapping[str, Method] = {
             Setting("free_energy", "flag", "do not constrain the sum of the weights."),
             _ENERGY,
         ),
-        counted="terms",
+        counted=("terms",),
     ),
     "preintegrated": Method(
         "sssfit.fit.preintegrated:fit_preintegrated",
@@ -276,6 +292,15 @@ FITS: Mapping[str, Method] = {
             ),
         ),
     ),
+    "weighted": Method(
+        "sssfit.fit.weighted:fit_weighted",
+        "1 to 8 terms, fitted as pictures see them; two do what five of svd do",
+        (
+            Setting("rank", "whole", "number of terms.", "N", (1, 1000), words="2"),
+            _SPECTRUM,
+        ),
+        counted=("rank",),
+    ),
     "burley": Method(
         "sssfit.fit.burley:fit_burley",
         "one term: normalised diffusion with one shape per channel, as engines use it",
@@ -283,14 +308,45 @@ FITS: Mapping[str, Method] = {
     ),
 }
 
+# Fits whose result is a table of taps, as a shader runs it; the others make separable kernels.
+TAPS: Mapping[str, Method] = {
+    "cascade": Method(
+        "sssfit.fit.cascade:fit_cascade",
+        "few fetches: a chain of small blurs, whose stages are all added up",
+        (
+            Setting("fetches", "number", "most texture fetches a pixel.", "N", words="24"),
+            Setting(
+                "stages",
+                "text",
+                "tap pairs a pass of each stage, such as 1-1|2-2|2-2; | halves the picture.",
+                "STAGES",
+            ),
+            Setting("passes", "whole", "most passes of the stages.", "N", (2, 1000)),
+            Setting("full_resolution", "flag", "do not halve the picture."),
+            _SPECTRUM,
+        ),
+        counted=("stages", "fetches"),
+    ),
+}
+ALL_FITS: Mapping[str, Method] = {**FITS, **TAPS}
+
 
 def settings_of(methods: Mapping[str, Method]) -> dict[str, tuple[Setting, tuple[str, ...]]]:
-    """Return every setting once by its name, with the names of the methods that have it."""
-    found: dict[str, tuple[Setting, tuple[str, ...]]] = {}
+    """Return every setting once by its name, with the names of the methods that have it.
+
+    Where methods describe a default differently, all say theirs: "3 for svd, 2 for weighted".
+    """
+    owned: dict[str, dict[str, Setting]] = {}
     for name, method in methods.items():
         for each in method.settings:
-            owners = found[each.name][1] if each.name in found else ()
-            found[each.name] = each, (*owners, name)
+            owned.setdefault(each.name, {})[name] = each
+    found = {}
+    for key, owners in owned.items():
+        first, words = next(iter(owners.values())), {each.words for each in owners.values()}
+        if len(words) > 1:
+            said = ", ".join(f"{each.words} for {name}" for name, each in owners.items())
+            first = replace(first, words=said)
+        found[key] = first, tuple(owners)
     return found
 
 

@@ -146,6 +146,7 @@ def decimal_shifted(word: str, power: int) -> float:
 
 _MM_PER_UNIT = {"": 1.0, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 _LENGTH = re.compile(r"\s*([-+.\deE]+?)\s*(um|mm|cm|m|)\s*")
+_PIXELS = re.compile("0*[1-9][0-9]{0,8}")  # a picture of more columns than that has no memory
 _HEX = re.compile("#(?:[0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
 
 
@@ -198,6 +199,14 @@ def whole_number(text: str, least: int, most: int) -> int:
             "(10000000 and 1e7 are both understood)."
         )
     return int(number)
+
+
+def size(text: str) -> tuple[int, int]:
+    """Read columns and rows, as 1920x1080; return (rows, columns)."""
+    width, _, height = text.lower().partition("x")
+    if not all(_PIXELS.fullmatch(each) for each in (width, height)):
+        raise ArgumentError(f"{text!r} is not a size in pixels, such as 1920x1080.")
+    return int(height), int(width)
 
 
 def share(text: str) -> float:

@@ -15,6 +15,14 @@ from approval_run import Command
 from sssfit.formats.profiles import import_profile
 
 C = Command
+# What a search for a cascade ends with, and how long it took.
+ERRORS = (
+    r"[\d.]+ %",
+    r", [\d.]+ s$",
+    r'("spectral_error": )\[.*\]',
+    r'("seconds": )[\d.e-]+',
+    r'("energy_error": )\[.*\]',
+)
 GRID = "--dr .2 --radius 6"
 SMALL = "--size 40x24"
 
@@ -254,6 +262,32 @@ FIT = [
     C("fit wax.profile.npz --method falloff --width .3 --strength .8,.7,.75 --falloff .6,.2,.1"),
     C("fit four.profile.npz --method burley --mm-per-pixel .4 --energy keep"),
     C("fit wax.profile.npz --method burley --mm-per-pixel .4 --seed 3 --threads 1"),
+    C("fit wax.profile.npz --method weighted --mm-per-pixel .5 --spectrum white"),
+    C("fit wax.profile.npz --method weighted --rank 1 --mm-per-pixel .5", brief=True),
+    *(
+        C(
+            f"fit wax.profile.npz --method cascade --mm-per-pixel .6 {own}",
+            brief=True,
+            hidden=ERRORS,
+        )
+        for own in (
+            "--stages 1-1 --seed 4",
+            "--stages 1-1 --json --spectrum white",
+            "--fetches 7.5 -o x.taps.json",
+            "--passes 2 -q",
+            "--full-resolution --passes 4 --support 3mm",
+        )
+    ),
+    C("fit wax.profile.npz --method cascade --fetches 5"),
+    C("fit wax.profile.npz --method cascade --stages '1-1|1' --fetches 12"),
+    C("fit wax.profile.npz --method cascade --stages '1-x'"),
+    C("fit wax.profile.npz --method cascade --stages '*|1'"),
+    C("fit wax.profile.npz --method cascade --stages '1||1'"),
+    C("fit wax.profile.npz --method cascade --passes 1"),
+    C("fit wax.profile.npz --method cascade --normalize"),
+    C("fit wax.profile.npz --method cascade --rank 2"),
+    C("fit wax.profile.npz --method cascade -o foreign.json"),
+    C("fit wax.profile.npz --method weighted --rank 9"),
     C("fit - --method svd --mm-per-pixel 1 -o -", stdin="leaf.profile.npz"),
     C("fit - --method svd --mm-per-pixel 1 --rank 1", stdin="Größe λ.profile.npz"),
     C("fit wax.profile.npz --method svd --mm-per-pixel .5 -q"),
@@ -311,6 +345,11 @@ def _darker() -> None:
 
 
 RENDER = [
+    C(f"render wax.hand.taps.json --irradiance disk {SMALL}"),
+    C(f"render - --irradiance points {SMALL} --border zero --json", stdin="wax.hand.taps.json"),
+    C("render wax.hand.taps.json --screen"),
+    C(f"render wax.hand.taps.json --irradiance head {SMALL} --transmit"),
+    C("render damaged.taps.json --irradiance disk"),
     C("render wax.svd2.kernel.json --irradiance disk --size 40X24"),
     C(f"render --irradiance disk {SMALL}"),
     C(f"render wax.svd2.kernel.json --irradiance edge --angle 30 {SMALL} --border zero --json"),
@@ -912,6 +951,9 @@ EXPORT = [
 
 CHART = [
     C("chart"),
+    C("chart wax.hand.taps.json"),
+    C("chart wax.hand.taps.json --profile plate.toml"),
+    C("chart wax.hand.taps.json --json -o x.svg"),
     C("chart 'Größe λ.profile.npz' -o 'Bild λ.svg' --json"),
     C("chart four.profile.npz -q --threads 1"),
     C("chart leaf.profile.npz -o -"),
@@ -1025,6 +1067,9 @@ def _checkpoint_of_two() -> None:
 
 SHOW = [
     C("show"),
+    C("show wax.hand.taps.json"),
+    C("show - --json", stdin="wax.hand.taps.json"),
+    C("show damaged.taps.json"),
     C("show wax.profile.npz --json"),
     C("show 'Größe λ.profile.npz'"),
     C("show 'Größe λ.profile.npz' --json"),

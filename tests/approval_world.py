@@ -22,7 +22,7 @@ import OpenImageIO
 from PIL import Image
 
 from sssfit.formats.pictures import save_image
-from sssfit.kernel import SeparableKernel
+from sssfit.kernel import SeparableKernel, Stage, Taps
 from sssfit.material import Material, parse_material
 from sssfit.profile import FORMAT, Profile
 
@@ -731,6 +731,41 @@ def _own(folder: Path) -> None:
         (folder / name).write_text(text)
 
 
+def taps() -> Taps:
+    """A cascade by hand, on the pixels and with the energy of wax's profile, more or less."""
+    own = wax()
+    stages = (
+        Stage(0, "pair", np.array([0.21]), np.array([[0.5, 0.4, 0.6], [0.25, 0.3, 0.2]])),
+        Stage(
+            1,
+            "pair",
+            np.array([0.55, 1.3]),
+            np.array([[0.4, 0.5, 0.3], [0.2, 0.15, 0.3], [0.1, 0.1, 0.05]]),
+        ),
+        Stage(
+            1,
+            "star",
+            np.array([0.9, 1.1]),
+            np.array([[0.2, 0.4, 0.6], [0.15, 0.1, 0.07], [0.05, 0.05, 0.03]]),
+        ),
+    )
+    return Taps(
+        method="cascade",
+        mm_per_pixel=0.3,
+        channels=own.channels,
+        chained=True,
+        stages=stages,
+        blend=np.outer([0.1, 0.2, 0.3, 0.4], own.diffuse_reflectance),
+        errors={"spectral": np.array([0.012, 0.0345, 0.0678]), "energy": np.zeros(3)},
+        meta={
+            "material": "wax",
+            "profile_sha256": own.sha256,
+            "profile_method": "dipole",
+            "settings": {"fetches": 17.0, "stages": None, "spectrum": "natural"},
+        },
+    )
+
+
 def _records(folder: Path) -> None:
     for name, text in (("wax", WAX), ("plate", PLATE), ("leaf", LEAF), ("varnish", CLEAR)):
         (folder / f"{name}.toml").write_text(text, encoding="utf-8")
@@ -738,6 +773,9 @@ def _records(folder: Path) -> None:
     (folder / "nottoml.toml").write_text("eta = = 1\n")
     for name, kernel in kernels().items():
         kernel.save(folder / f"{name}.kernel.json")
+    taps().save(folder / "wax.hand.taps.json")
+    text = (folder / "wax.hand.taps.json").read_text(encoding="utf-8")
+    (folder / "damaged.taps.json").write_text(text.replace('"passes": 5', '"passes": 4'))
     for name, profile in (("four", four()), ("mono", mono()), ("leaf", leaf())):
         profile.save(folder / f"{name}.profile.npz")
     plate().save(folder / "Größe λ.profile.npz")

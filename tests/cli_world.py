@@ -32,13 +32,13 @@ from test_mco import BELOW, DR_CM, IN_LAYERS, N_R, REFLECTED, SPECULAR, block, m
 from sssfit import compare, simulate
 from sssfit.choose import choice as choose
 from sssfit.cli import cli
-from sssfit.compare import budget, pareto, sheet
+from sssfit.compare import budget, pareto, runner, sheet
 from sssfit.compare.candidates import Candidate, candidates
 from sssfit.errors import SssfitWarning
 from sssfit.fit import fit_gaussians, fit_svd
 from sssfit.formats.csv import csv_text
 from sssfit.formats.pictures import load_image, save_image
-from sssfit.kernel import SeparableKernel
+from sssfit.kernel import SeparableKernel, Taps
 from sssfit.material import Material, parse_material
 from sssfit.profile import Profile
 from sssfit.scene.made import make_scene
@@ -194,6 +194,11 @@ class Ran:
         return weights_of(self.loaded(SeparableKernel.load, ".kernel.json"))
 
     @property
+    def taps(self) -> Any:
+        found = self.loaded(Taps.load, ".taps.json")
+        return [found.structure, found.mm_per_pixel, found.blend]
+
+    @property
     def picture(self) -> np.ndarray:
         return self.loaded(load_image, ".exr").pixels
 
@@ -251,7 +256,7 @@ def finishing(both: bool):
 
     real = _output.finish
 
-    def twice(common, figures, text, *, to_stderr=False):
+    def twice(common, figures, text):
         for as_json in (True, False):
             real(replace(common, json=as_json, quiet=False), figures, text)
 
@@ -524,11 +529,15 @@ def recording():
         for name, stand_in in STAND_INS.items():
             module, function = name.rsplit(".", 1)
             owner = importlib.import_module(module)
-            patch.setattr(owner, function, recorded(getattr(owner, function), stand_in))
-        patch.setattr(
-            "sssfit.material.material_names",
-            lambda *, paper=False: ("marble",) if paper else ("skin1", "marble"),
-        )
+            call = recorded(getattr(owner, function), stand_in)
+            patch.setattr(owner, function, call)
+            if hasattr(runner, function):  # it has imported them by now
+                patch.setattr(runner, function, call)
+        for module in ("sssfit.material", "sssfit.simulate.runner"):
+            patch.setattr(
+                f"{module}.material_names",
+                lambda *, paper=False: ("marble",) if paper else ("skin1", "marble"),
+            )
         yield
 
 

@@ -26,6 +26,7 @@ from sssfit.formats.mco import join_channels, load_mco
 from sssfit.formats.pictures import load_image
 from sssfit.measure.difference import difference_map, magnified_difference
 from sssfit.measure.score import auto_exposure
+from sssfit.methods import ALL_FITS
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
 from sssfit.render.transmittance import with_transmitted
@@ -228,6 +229,20 @@ def _fitted(
     return Row(command, f"{option} {value}".strip(), made_kernel, library, default, words)
 
 
+def _tapped(option: str, value: str, default: str = "", **own: Any) -> Row:
+    """An option of a cascade, by the table of taps; without others the first is a quick one."""
+
+    def made() -> Any:
+        found = fit.fit_taps(profile(), mm_per_pixel=0.6, **(usual | own)).kernel
+        return [found.structure, found.mm_per_pixel, found.blend]
+
+    free = {"passes", "fetches", "full_resolution"} & own.keys()
+    usual: dict[str, Any] = {"passes": 4} if free else {"stages": "1-1"}
+    command = "fit wax.profile.npz --method cascade --mm-per-pixel .6"
+    typed = "".join(f" --{key} {each}" for key, each in usual.items())
+    return Row(command + typed, f"{option} {value}".strip(), lambda ran: ran.taps, made, default)
+
+
 _HAND = {"near_mm2": [0.2, 0.1, 0.05], "far_mm2": [2.0, 1.0, 0.7], "weight": [0.4, 0.5, 0.6]}
 _SKIN = {"width": 0.3, "strength": [0.8, 0.7, 0.75], "falloff": [0.6, 0.2, 0.1]}
 
@@ -250,7 +265,7 @@ FIT = {
         "fit wax.profile.npz --method svd",
         "fit --list",
         lambda ran: [line.split()[0] for line in ran.stdout.splitlines()],
-        lambda: list(fit.METHODS),
+        lambda: list(ALL_FITS),
     ),
     "--method": Row(
         "fit wax.profile.npz --method svd",
@@ -267,7 +282,7 @@ FIT = {
     ),
     "--support": _fitted("--support", "2.1", "svd", "auto", support_mm=2.1),
     "--normalize": _fitted("--normalize", "", "preintegrated", normalize=True),
-    "--rank": _fitted("--rank", "2", "svd", "3", rank=2),
+    "--rank": _fitted("--rank", "2", "svd", "3", "3 for svd, 2 for weighted", rank=2),
     "--energy": _fitted("--energy", "keep", "svd", "rescale", energy="keep"),
     "--terms": _fitted("--terms", "2", "gaussians", "4", terms=2),
     "--signed": _fitted("--signed", "", "gaussians", signed=True),
@@ -282,13 +297,18 @@ FIT = {
     "--width": _by_hand("--width", ".2", "falloff", _SKIN, width=0.2),
     "--strength": _by_hand("--strength", ".5,.6,.9", "falloff", _SKIN, strength=[0.5, 0.6, 0.9]),
     "--falloff": _by_hand("--falloff", ".3,.4,.5", "falloff", _SKIN, falloff=[0.3, 0.4, 0.5]),
+    "--fetches": _tapped("--fetches", "7.5", "24", fetches=7.5),
+    "--stages": _tapped("--stages", "1|1-1", stages="1|1-1"),
+    "--passes": _tapped("--passes", "2", passes=2),
+    "--full-resolution": _tapped("--full-resolution", "", full_resolution=True),
+    "--spectrum": _tapped("--spectrum", "white", "natural", spectrum="white"),
     "--output": Row(
         "fit wax.profile.npz --method svd",
         "-o x.kernel.json",
         names,
         lambda: ["x.kernel.json"],
         default="wax.svd3.kernel.json",
-        words="PROFILE.METHOD.kernel.json",
+        words="PROFILE.METHOD.kernel.json, .taps.json for cascade",
     ),
     "--force": Row(
         "fit wax.profile.npz --method svd -o foreign.json",
@@ -1080,7 +1100,11 @@ THREADS = {
 FITS = {
     f"--energy of {method}": _fitted("--energy", "keep", method, energy="keep")
     for method in ("preintegrated", "burley", "gaussians")
-} | {"--target picture": _fitted("--target", "picture", "artist", target=picture_error)}
+} | {
+    "--target picture": _fitted("--target", "picture", "artist", target=picture_error),
+    "--rank of weighted": _fitted("--rank", "1", "weighted", rank=1),
+    "--spectrum of weighted": _fitted("--spectrum", "white", "weighted", spectrum="white"),
+}
 
 VERBOSE = {"choose"}  # where --verbose has something to say
 

@@ -11,9 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from reference_pixels import one_over_r_profile
 
-from sssfit.fit import _by_hand, artist, burley, falloff, guided
+from sssfit.fit import _by_hand, artist, burley, falloff, guided, weighted
+from sssfit.fit._chain import Chain
 from sssfit.fit._gaussians_search import make_annuli
+from sssfit.fit._spectrum import spectral_target
+from sssfit.fit._target import Target
+from sssfit.kernel.structure import parse
 from sssfit.shapes import diffusion_cdf
 
 SEEDS = range(4)
@@ -226,7 +231,27 @@ def shape_of_burley(monkeypatch) -> Pair:
     )
 
 
+def misfit_of_a_chain(_) -> Pair:
+    half, pairs = 20, parse("1-2|1")
+    profile = one_over_r_profile(60, 0.1, [0.3, 0.6])
+    chain = Chain(spectral_target(Target(profile, 0.3, half), [0, 1], "natural"), pairs)
+    return of_value("_chain.py", chain.value_and_gradient, chain.start(numbers()))
+
+
+def misfit_of_weighted_terms(monkeypatch) -> Pair:
+    profile = one_over_r_profile(60, 0.1, [0.3])
+    (given, *_), _ = caught(
+        monkeypatch,
+        weighted.optimize,
+        "minimize",
+        lambda: weighted.fit_weighted(profile, rank=2, mm_per_pixel=0.3, support_mm=3.0),
+    )
+    return of_value("weighted.py", given, numbers().random(2 * 11))
+
+
 PAIRS = {
+    "misfit of weighted terms": misfit_of_weighted_terms,
+    "misfit of a chain": misfit_of_a_chain,
     "Gaussians over pixels": gaussians_over_pixels,
     "a pass of unit sum": a_pass_of_unit_sum,
     "misfit of a line": misfit_of_a_line,
@@ -283,7 +308,7 @@ def test_a_wrong_adjoint_is_seen(monkeypatch):
 
 
 def test_every_file_that_writes_derivatives_has_a_pair(monkeypatch):
-    """``_nlopt`` hands on what it is given."""
+    """``_nlopt`` and ``cascade`` hand on what they are given."""
     folder = Path(artist.__file__).parent
     words = ("gradient", "derivative", "jacobian", "slope")
     written = {
@@ -292,4 +317,4 @@ def test_every_file_that_writes_derivatives_has_a_pair(monkeypatch):
         if any(word in path.read_text(encoding="utf-8") for word in words)
     }
     tested = {make(monkeypatch).file for make in PAIRS.values()}
-    assert written - {"_nlopt.py"} == tested
+    assert written - {"_nlopt.py", "cascade.py"} == tested

@@ -5,7 +5,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
-from test_imports import IN_ROOMS, ROOMS, imports, module_of, name_of, room_of
+from test_imports import CLI, IN_ROOMS, ROOMS, imports, module_of, name_of, room_of
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
@@ -53,6 +53,12 @@ def test_a_verb_parses_calls_and_writes_in_150_lines():
     lengths = {each.name: len(each.read_text(encoding="utf-8").splitlines()) for each in verbs}
     assert len(lengths) == 10
     assert {name: length for name, length in lengths.items() if length > 150} == {}
+
+
+def test_the_command_line_is_at_most_2000_lines():
+    """What a verb does is a call of the library; here are its options, and what it writes."""
+    lengths = [len(each.read_text(encoding="utf-8").splitlines()) for each in CLI]
+    assert sum(lengths) <= 2000, lengths
 
 
 def test_the_ground_is_at_most_twelve_files():

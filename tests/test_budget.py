@@ -315,7 +315,7 @@ def test_a_million_photons_unless_told_otherwise(monkeypatch, capsys):
         asked.append((settings["photons"], settings["seed"]))
         raise SimulationError("enough")
 
-    monkeypatch.setattr("sssfit.compare.budget.error_budgets", error_budgets_of)
+    monkeypatch.setattr("sssfit.compare.runner.error_budgets", error_budgets_of)
     run(capsys, "skin1", "--what", "budget", *("--picture", "disk", "--size", "8x8"))
     given = ("--photons", "2e4", "--seed", "3", "--picture", "disk", "--size", "8x8")
     run(capsys, "skin1", "--what", "budget", *given)

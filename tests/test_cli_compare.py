@@ -158,7 +158,7 @@ def test_layer_and_mask_of_a_file(run, tmp_path, monkeypatch):
         seen.append(scenes)
         raise RenderError("seen")
 
-    monkeypatch.setattr("sssfit.compare.compare_kernels", stop)
+    monkeypatch.setattr("sssfit.compare.runner.compare_kernels", stop)
     pixels = np.random.default_rng(1).random((16, 16, 7))
     names = ["a.R", "a.G", "a.B", "b.R", "b.G", "b.B", "b.A"]
     pixels[:, :8, 6], pixels[:, 8:, 6] = 0.25, 1.0
@@ -286,7 +286,7 @@ def test_the_verdict_says_from_where_on_nothing_shows(run):
 
 
 def test_default_pictures_have_no_method_at_home_on_all():
-    scenes, _ = load_scenes(COMPARED, otherwise=0.3, size=(64, 64))
+    scenes = load_scenes(COMPARED, otherwise=0.3, size=(64, 64))
     assert [each.name for each in scenes] == ["disk", "edge", "points", "head"]
     tilted = make_scene("edge", height=64, width=64, mm_per_pixel=0.3, angle_degrees=30.0)
     np.testing.assert_array_equal(scenes[1].irradiance, tilted.irradiance)
@@ -294,7 +294,7 @@ def test_default_pictures_have_no_method_at_home_on_all():
 
 @pytest.mark.parametrize("seed", [1, 5])
 def test_noise_has_the_seed_that_was_asked_for(seed):
-    (scene,), _ = load_scenes(["noise"], 0.3, size=(16, 16), seed=seed)
+    (scene,) = load_scenes(["noise"], 0.3, size=(16, 16), seed=seed)
     wanted = make_scene("noise", height=16, width=16, mm_per_pixel=0.3, seed=seed)
     np.testing.assert_array_equal(scene.irradiance, wanted.irradiance)
 
@@ -344,7 +344,7 @@ def test_a_chart_may_go_to_stdout(tmp_path, monkeypatch, capfdbinary):
 def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch, which):
     from sssfit import material
 
-    verb = import_module("sssfit.cli._compare_parts")
+    verb = import_module("sssfit.cli.compare")
     real = verb.load_source
     (tmp_path / "marble.toml").write_text(SLAB)
     # In place of the shipped marble, a slab.

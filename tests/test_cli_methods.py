@@ -234,7 +234,7 @@ def test_a_foreign_file_is_not_replaced_without_force(run, tmp_path):
 
 
 def test_what_compiles_says_so_unless_quiet(run, monkeypatch):
-    monkeypatch.setattr(simulate.runner, "is_solver_compiled", lambda: False)
+    monkeypatch.setattr(simulate.exact, "is_solver_compiled", lambda: False)
     asked = ("skin1", "--method", "exact", "--tolerance", "1%", *GRID)
     assert run(*asked)[2].startswith("Compiling the solver")
     assert run(*asked, "-q") == (0, "", "")

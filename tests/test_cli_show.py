@@ -451,7 +451,8 @@ def test_foreign_files_are_called_foreign(run, tmp_path, verb, name):
         assert (status, out) == (1, "")
         assert err == (
             f"Error: {said} is not a sssfit file; expected a profile (.profile.npz), a kernel "
-            "(.kernel.json), a material (.toml) or a walk's checkpoint (.checkpoint).\n"
+            "(.kernel.json), a table of taps (.taps.json), a material (.toml) or a walk's "
+            "checkpoint (.checkpoint).\n"
         )
 
 

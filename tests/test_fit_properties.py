@@ -26,6 +26,8 @@ CASES = [
     ("gaussians", {"terms": 2, "signed": True}),
     ("gaussians", {"terms": 2, "free_energy": True}),
     ("gaussians", {"terms": 3, "energy": "keep"}),
+    ("weighted", {}),
+    ("weighted", {"rank": 3}),
     ("preintegrated", {}),
     ("preintegrated", {"energy": "keep"}),
     ("guided", {"k": 0.0}),
@@ -108,7 +110,7 @@ def test_shapes_signs_and_ends(method, own, fit):
     assert np.isin(kernel.signs, (-1.0, 1.0)).all()
     if method != "svd" and not own.get("signed"):
         assert (kernel.signs == 1.0).all()
-        assert (kernel.weights >= 0.0).all()
+        assert (kernel.weights >= 0.0).all() or method == "weighted"
     np.testing.assert_array_equal(kernel.weights, kernel.weights[:, ::-1])
     assert np.isfinite(kernel.relative_frobenius_error).all()
     assert np.isfinite(kernel.energy_error).all()

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from sssfit.cli import main
 from sssfit.cli._options import in_options
-from sssfit.messages import Columns, filled, number, report
+from sssfit.messages import Columns, filled, note, number, report
 
 LIBRARY = sorted((Path(__file__).parents[1] / "sssfit").rglob("*.py"))
 # A long option, a short one, or a command: none of these stands in text for Python.
@@ -140,3 +141,15 @@ def test_a_report_leaves_out_what_is_not_known():
         "G            -",
     ]
     assert report([("nothing", error)], FIGURES) == ""
+
+
+def test_a_note_is_printed_by_the_command_line_alone_and_not_under_q(capsys, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sssfit.simulate.inversion.is_solver_compiled", lambda: False)
+    make = ["materials", "--from-reflectance", "0.4", "--channels", "A", "--mean-free-path", "1"]
+    for quiet, is_said in ((["-q"], False), ([], True)):
+        with pytest.raises(SystemExit):
+            main([*make, "-o", "x.toml", "--force", *quiet])
+        assert ("Compiling the solver, some 3 s" in capsys.readouterr().err) is is_said
+        note("to nobody")
+        assert capsys.readouterr() == ("", "")

@@ -13,7 +13,7 @@ from option_rows import ROWS
 from sssfit import fit
 from sssfit.cli import cli
 from sssfit.cli._options import method_options
-from sssfit.methods import FITS, SIMULATIONS, Method, Setting, lines_of, settings_of
+from sssfit.methods import ALL_FITS, FITS, SIMULATIONS, Method, Setting, lines_of, settings_of
 
 VERBS = {"simulate": SIMULATIONS, "fit": FITS}
 ENTRIES = [(verb, name) for verb, methods in VERBS.items() for name in methods]
@@ -66,11 +66,12 @@ def test_every_setting_has_a_row_in_the_tests_of_options(verb):
 
 
 def test_a_setting_of_several_fits_is_tried_with_each_of_them():
-    shared = {name: owners for name, (_, owners) in settings_of(FITS).items() if len(owners) > 1}
+    known = settings_of(ALL_FITS)
+    shared = {name: owners for name, (_, owners) in known.items() if len(owners) > 1}
     tried = " ".join(row.command + row.given for row in SHARED_ROWS.values())
-    tried += ROWS["fit"]["--energy"].command
-    assert list(shared) == ["energy"]
-    assert all(f"--method {owner}" in tried for owner in shared["energy"])
+    tried += " ".join(ROWS["fit"][f"--{name}"].command for name in shared)
+    assert sorted(shared) == ["energy", "rank", "spectrum"]
+    assert all(f"--method {owner}" in tried for owners in shared.values() for owner in owners)
 
 
 def test_the_library_has_the_methods_of_the_registry():
@@ -82,9 +83,8 @@ def test_the_library_has_the_methods_of_the_registry():
 
 @pytest.mark.parametrize("name", [name for name, each in FITS.items() if each.counted])
 def test_the_number_in_a_file_name_is_that_of_the_kernel(name):
-    setting, _ = settings_of(FITS)[FITS[name].counted]
     kernel = world.quietly(FITS[name].load(), world.profile(), mm_per_pixel=0.4).kernel
-    assert kernel.rank == int(setting.words)
+    assert kernel.rank == int(FITS[name].count_of({}))
 
 
 def test_one_entry_is_a_method_with_help_and_options():

@@ -29,14 +29,16 @@ def look(kernel, folder):
     return find_profile(kernel, "k.kernel.json", [folder])
 
 
-def test_it_is_known_by_its_light_under_any_name(tmp_path, profile, kernel):
+def test_it_is_known_by_its_light_under_any_name(tmp_path, profile, kernel, caplog):
+    caplog.set_level("INFO", "sssfit")
     (tmp_path / "torn.npz").write_bytes(b"torn")
     make_profile(EDGES, [[0.3, 0.1], [0.1, 0.1], [0.1, 0.05]]).save(tmp_path / "other.npz")
     profile.save(tmp_path / "any name.npz")
-    found, file, note = look(kernel, tmp_path)
+    found, file = look(kernel, tmp_path)
     assert found is not None
     assert found.sha256 == profile.sha256
-    assert (Path(file), note) == (tmp_path / "any name.npz", None)
+    assert Path(file) == tmp_path / "any name.npz"
+    assert caplog.messages == []
 
 
 def test_of_several_the_newest_is_taken(tmp_path, profile, kernel):
@@ -46,13 +48,18 @@ def test_of_several_the_newest_is_taken(tmp_path, profile, kernel):
     assert Path(look(kernel, tmp_path)[1]).name == "new.npz"
 
 
-def test_why_there_is_none_is_said(tmp_path, profile, kernel):
-    found, file, note = look(kernel, tmp_path)
+def test_why_there_is_none_is_noted(tmp_path, profile, kernel, caplog):
+    caplog.set_level("INFO", "sssfit")
+    found, file = look(kernel, tmp_path)
     assert found is file is None
-    assert note.startswith("No profile here is the one that k.kernel.json was fitted to")
+    assert caplog.messages[-1].startswith(
+        "No profile here is the one that k.kernel.json was fitted to"
+    )
     changed = make_profile(EDGES, [[0.3, 0.1], [0.1, 0.1], [0.1, 0.05]])
     dataclasses.replace(changed, meta={**changed.meta, **MADE_OF}).save(tmp_path / "wax.npz")
-    assert "wax.npz is a profile of wax by the same method, but not" in look(kernel, tmp_path)[2]
+    look(kernel, tmp_path)
+    assert "wax.npz is a profile of wax by the same method, but not" in caplog.messages[-1]
     without = {key: each for key, each in kernel.meta.items() if key != "profile_sha256"}
     old = dataclasses.replace(kernel, meta=without)
-    assert "does not record which profile it was fitted to" in look(old, tmp_path)[2]
+    look(old, tmp_path)
+    assert "does not record which profile it was fitted to" in caplog.messages[-1]

@@ -243,7 +243,7 @@ def test_two_outputs_into_one_file_are_refused(run, folder):
 
 
 def test_a_budgets_chart_is_checked_before_the_kernels_are_compared(run, folder, monkeypatch):
-    monkeypatch.setattr("sssfit.compare.compare_kernels", pytest.fail)
+    monkeypatch.setattr("sssfit.compare.runner.compare_kernels", pytest.fail)
     (folder / "b.png").write_text("mine")
     assert run("compare wax.profile.npz --picture disk --budget-chart b.png")[0] == 1
 

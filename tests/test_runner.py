@@ -32,20 +32,19 @@ def test_profiles_are_written_and_told(tmp_path):
     assert (found.is_interrupted, found.note) == (False, "")
 
 
-def test_a_stopped_walk_goes_on_to_the_same_bits(tmp_path):
-    path, said = tmp_path / "wax.npz", []
+def test_a_stopped_walk_goes_on_to_the_same_bits(tmp_path, caplog):
+    caplog.set_level("INFO", "sssfit")
+    path = tmp_path / "wax.npz"
     settings = {"photons": FAR, "threads": 2, **GRID}
     first = simulate_to_files(
         [world.wax(), world.plate()], [path, tmp_path / "plate.npz"],
-        settings=settings, stop=stop_after(6), tell=said.append,
+        settings=settings, stop=stop_after(6),
     )  # fmt: skip
     assert first.not_begun == ("plate",)
     assert first.note.endswith("`resume = True` continues from there. Not begun: plate.")
     assert Profile.load(path).photons < FAR
-    again = simulate_to_files(
-        [world.wax()], [path], settings=settings, resume=True, tell=said.append
-    )
-    assert "Continuing from" in said[-1]
+    again = simulate_to_files([world.wax()], [path], settings=settings, resume=True)
+    assert "Continuing from" in caplog.messages[-1]
     assert not again.is_interrupted
     (whole,) = simulate_montecarlo_many([world.wax()], **settings)
     assert Profile.load(path).annulus_energy.tobytes() == whole.annulus_energy.tobytes()

@@ -257,7 +257,7 @@ def run(tmp_path, monkeypatch, capfd):
 
 def test_the_verb_draws_a_sheet_and_tabulates_it(run, tmp_path, monkeypatch, skin1):
     small = functools.partial(compute_sheet, pixels=12, most_terms=1)
-    monkeypatch.setattr("sssfit.compare.sheet.compute_sheet", small)
+    monkeypatch.setattr("sssfit.compare.runner.compute_sheet", small)
     status, out, _ = run(*SHEET, "a.png", "--mm-per-pixel", "3", "--json")
     assert status == 0
     assert (tmp_path / "a.png").read_bytes().startswith(b"\x89PNG")

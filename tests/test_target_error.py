@@ -130,11 +130,11 @@ def test_time_left_is_that_of_this_sitting():
 
 
 def test_the_bar_says_how_much_is_done_how_fast_and_how_well(capsys, monkeypatch):
-    monkeypatch.setattr("sssfit.cli._progress._is_shown", lambda quiet: not quiet)
+    monkeypatch.setattr("sssfit.cli._progress._is_shown", lambda: True)
     monkeypatch.setenv("FORCE_COLOR", "1")  # rich then takes stderr for a terminal
     monkeypatch.setenv("COLUMNS", "100")
     now = Progress(2500, 10_000, 20.0, 0.0123)
-    with walk_progress("wax", quiet=False) as show:
+    with walk_progress("wax") as show:
         show(Progress(1000, 10_000, 5.0, float("inf")))
         show(now)
     drawn = re.split(r"[\r\n]", re.sub(r"\x1b\[[\d;?]*[A-Za-z]", "", capsys.readouterr().err))

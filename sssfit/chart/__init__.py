@@ -27,6 +27,7 @@ FIGURES: Mapping[str, str] = {
     "Profile": "sssfit.chart.profile:profile_figure",
     "Sheet": "sssfit.chart.sheet:sheet_figure",
     "Spectrum": "sssfit.chart.spectrum:spectrum_figure",
+    "TapsView": "sssfit.chart.taps:taps_figure",
 }
 
 

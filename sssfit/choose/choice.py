@@ -32,6 +32,7 @@ from sssfit.choose.truth import (
     is_exact,
     material_of,
     name_of,
+    note_truth,
     photons_needed,
     truth_of,
 )
@@ -276,6 +277,7 @@ def choose(
     SimulationError, FitError
         No profile, or one that cannot be fitted.
     """
+    note_truth(source)
     _check(mm_per_pixel, tolerance, tolerance_of)
     check_colours(source)
     own = None if scene is None else checked_scene(scene, mm_per_pixel)

@@ -15,7 +15,7 @@ from sssfit.choose.views import Views
 from sssfit.errors import FitError, RenderError, SssfitError, SssfitWarning
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
-from sssfit.messages import number
+from sssfit.messages import note, number
 from sssfit.profile import Profile
 from sssfit.simulate import simulate_montecarlo
 from sssfit.simulate.truth import exact_with_all_light, radius_of
@@ -47,18 +47,18 @@ def truth_of(
     return profile, time.perf_counter() - begun
 
 
-def notes_on(source: Material | Profile) -> list[str]:
+def note_truth(source: Material | Profile) -> None:
     """Say, before a choice is made, what a profile cannot tell and what takes long."""
     if isinstance(source, Material):
-        walk = f"{source.name} has no exact solution: tracing 1e7 photons for its true profile."
-        return [] if is_exact(source) else [walk]
+        if not is_exact(source):
+            note(f"{source.name} has no exact solution: tracing 1e7 photons for its true profile.")
+        return
     missing = source.beyond_grid.sum() / max(source.diffuse_reflectance.sum(), 1e-300)
-    if missing <= _WORTH_A_NOTE:
-        return []
-    return [
-        f"{number(missing, '.2g%')} of the light lies beyond the profile's grid, where the true "
-        "picture lacks it and a kernel does not: simulate with a larger radius."
-    ]
+    if missing > _WORTH_A_NOTE:
+        note(
+            f"{number(missing, '.2g%')} of the light lies beyond the profile's grid, where the "
+            "true picture lacks it and a kernel does not: simulate with a larger radius."
+        )
 
 
 def is_exact(material: Material) -> bool:

@@ -3,21 +3,25 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.choose.options import Option
 from sssfit.compare.references import border_of
-from sssfit.errors import RenderError
+from sssfit.errors import ArgumentError, RenderError
 from sssfit.fit import FitResult
 from sssfit.measure.score import ImageScore, measure
 from sssfit.profile import Profile
 from sssfit.render.reference import convolve, render_reference
 from sssfit.render.separable import render_separable
-from sssfit.scene.made import make_scene
+from sssfit.scene.head import MIN_DISTANCE_MM
+from sssfit.scene.load import load_scene
+from sssfit.scene.made import EDGE_DEGREES, make_scene
 from sssfit.scene.record import Scene
 
+_METRES = (0.1, 9.0)  # plain numbers that may have been meant in metres; 1cm is 10 mm and was not
 MOST_PIXELS = 512  # of a picture, along an edge
 # Middle of the head on which most is lost: 95th percentile of Delta E of the pre-integrated skin1,
 # and no blur: 25 mm .53, 8.0; 51 mm .75, 8.3; 64 mm .99, 11.0; 80 mm .97, 11.7; 88 mm .98, 11.2;
@@ -35,6 +39,36 @@ TOLERANCES = {
 }
 # The finest pixel a choice is made for: the wavelength of the light that is scattered.
 LEAST_MM_PER_PIXEL = 5e-4
+
+
+def check_distance(distance_mm: float) -> None:
+    """Refuse a camera nearer than the head can be seen from; the number may have meant metres.
+
+    Raises
+    ------
+    ArgumentError
+    """
+    if distance_mm < MIN_DISTANCE_MM:
+        metres = f"a plain number is mm: did you mean {distance_mm:g}m?"
+        raise ArgumentError(
+            f"`distance_mm`: {distance_mm:g} mm is nearer than {MIN_DISTANCE_MM:g} mm; "
+            f"{metres if _METRES[0] <= distance_mm <= _METRES[1] else 'move away.'}"
+        )
+
+
+def scene_for(
+    name: str, mm_per_pixel: float, frame: tuple[int, int], **settings: Any
+) -> Scene | None:
+    """Make or read what a choice is judged on, 512 x 512 pixels at most; the head is made later.
+
+    A file that does not say how large its pixels are has ``mm_per_pixel``; settings are those of
+    `load_scene`.
+    """
+    if name == "head":
+        return None
+    size = min(frame[0], MOST_PIXELS), min(frame[1], MOST_PIXELS)
+    own: dict[str, Any] = {"angle_degrees": EDGE_DEGREES} if name == "edge" else {}
+    return load_scene(name, otherwise=mm_per_pixel, size=size, **settings, **own)
 
 
 def mm_per_pixel_at(distance_mm: float, fov_degrees: float, rows: int) -> float:

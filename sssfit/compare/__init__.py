@@ -6,6 +6,7 @@ from sssfit.compare.kernel_view import KernelView, view_kernel
 from sssfit.compare.models import ModelComparison, ModelCurve, compare_models, material_of_walk
 from sssfit.compare.pareto import compare_kernels
 from sssfit.compare.spectrum import Spectrum, compute_spectrum
+from sssfit.compare.taps_view import TapsView, view_taps
 from sssfit.measure.asymmetry import asymmetry_by_radius, radial_asymmetry
 from sssfit.measure.cost import Cost, cost_of, seconds_per_megapixel
 from sssfit.measure.score import ImageScore, auto_exposure, measure
@@ -21,6 +22,7 @@ __all__ = [
     "ModelComparison",
     "ModelCurve",
     "Spectrum",
+    "TapsView",
     "asymmetry_by_radius",
     "auto_exposure",
     "compare_kernels",
@@ -36,4 +38,5 @@ __all__ = [
     "seconds_per_megapixel",
     "ssim",
     "view_kernel",
+    "view_taps",
 ]

@@ -130,7 +130,7 @@ class KernelRow:
     energy_drift: FloatArray
     radial_asymmetry: FloatArray
     passes: int
-    taps_per_pixel: int
+    taps_per_pixel: float
     kernel_bytes: int
     seconds_per_megapixel: float
     fit_seconds: float

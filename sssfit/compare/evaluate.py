@@ -11,15 +11,17 @@ import numpy as np
 from sssfit.arrays import FloatArray, plain
 from sssfit.errors import RenderError
 from sssfit.formats.pictures import image_format, save_image
-from sssfit.kernel import SeparableKernel
+from sssfit.kernel import Kernel, SeparableKernel, Taps
 from sssfit.measure.asymmetry import radial_asymmetry
 from sssfit.measure.cost import Cost, cost_of, seconds_per_megapixel
 from sssfit.measure.difference import DifferenceMap, difference_map
 from sssfit.measure.score import SCORE_FIGURES, ImageScore, auto_exposure, measure
+from sssfit.messages import note
 from sssfit.profile import Profile, full_kernel
+from sssfit.render import render
 from sssfit.render.reference import render_reference
 from sssfit.render.screen import render_screen
-from sssfit.render.separable import render_separable
+from sssfit.render.taps import reach_pixels, response
 from sssfit.render.transmittance import transmitted, with_transmitted
 from sssfit.scene.record import Scene
 
@@ -36,7 +38,7 @@ class Evaluation:
     ----------
     scene : Scene
         What was lit; with the light that came through it, where that was asked for.
-    kernel : SeparableKernel
+    kernel : SeparableKernel or Taps
     picture : array (H, W, C)
         Radiant exitance by the kernel; black outside the scene's mask, where it has one: a flat
         kernel carries light past an outline.
@@ -57,7 +59,7 @@ class Evaluation:
     """
 
     scene: Scene
-    kernel: SeparableKernel
+    kernel: Kernel
     picture: FloatArray
     truth: FloatArray | None
     score: ImageScore | None
@@ -84,7 +86,7 @@ class Evaluation:
             {
                 "material": kernel.meta.get("material"),
                 "method": kernel.method,
-                "rank": kernel.rank,
+                "rank": None if isinstance(kernel, Taps) else kernel.rank,
                 "channels": list(kernel.channels),
                 "irradiance": scene.name,
                 "width": scene.width,
@@ -101,8 +103,8 @@ class Evaluation:
 
     def save(
         self, targets: Mapping[str, Path | BinaryIO], *, exposure: float | None = None
-    ) -> list[str]:
-        """Write the pictures; return what is to be known of the files, in sentences.
+    ) -> None:
+        """Write the pictures; what is to be known of the files is noted.
 
         Parameters
         ----------
@@ -119,7 +121,7 @@ class Evaluation:
         pixels = {"picture": self.picture, "truth": self.truth}
         pixels["difference"] = None if self.difference is None else self.difference.pixels
         own = self.score.exposure if self.score else auto_exposure(self.picture)
-        alpha, notes = self._alpha()
+        alpha = self._alpha()
         for what, target in targets.items():
             image = pixels[what]
             if image is None:
@@ -135,23 +137,24 @@ class Evaluation:
                 settings["format"] = "exr"
             elif image_format(target) == "png" and not is_map:  # false colours are no light
                 settings["exposure"] = exposure or own
-            notes += [f"{target}: {note}" for note in save_image(target, image, **settings)]
-        return notes
+            for each in save_image(target, image, **settings):
+                note(f"{target}: {each}")
 
-    def _alpha(self) -> tuple[dict[str, Any], list[str]]:
+    def _alpha(self) -> dict[str, Any]:
         """Return what `save_image` takes of the scene's alpha, where a file can hold it."""
         if self.scene.alpha is None:
-            return {}, []
+            return {}
         channels = self.kernel.channels
         if len(channels) not in (1, 3) or "A" in channels:
-            return {}, [f"alpha left out beside the channels {', '.join(channels)}"]
+            note(f"alpha left out beside the channels {', '.join(channels)}")
+            return {}
         multiplied = self.scene.alpha_is_multiplied
-        return {"alpha": self.scene.alpha, "alpha_is_multiplied": multiplied}, []
+        return {"alpha": self.scene.alpha, "alpha_is_multiplied": multiplied}
 
 
 def evaluate(
     scene: Scene,
-    kernel: SeparableKernel,
+    kernel: Kernel,
     profile: Profile | None = None,
     *,
     truth: FloatArray | None = None,
@@ -167,8 +170,8 @@ def evaluate(
     ----------
     scene : Scene
         Flat: its depth is not looked at.
-    kernel : SeparableKernel
-        On the scene's pixels.
+    kernel : SeparableKernel or Taps
+        On the scene's pixels; a table of taps serves others, too.
     profile : Profile, optional
         What the truth is made from; without it nothing is measured but the cost.
     truth : array (H, W, C), optional
@@ -185,12 +188,18 @@ def evaluate(
     RenderError
         The kernel does not fit the scene or the profile, or as `measure`.
     """
-    through = _most_through(scene, kernel) if transmit else None
+    through = None
     if transmit:
+        if isinstance(kernel, Taps):
+            raise RenderError(
+                "light through an object follows a kernel's Gaussians, and a table of taps has "
+                "none; use a separable kernel."
+            )
+        through = _most_through(scene, kernel)
         scene = with_transmitted(scene, kernel)
     picture, seconds = timed(
         lambda shown: np.asarray(
-            render_separable(shown, kernel, border=border, threads=threads), dtype=np.float64
+            render(shown, kernel, border=border, threads=threads), dtype=np.float64
         ),
         scene,
     )
@@ -225,7 +234,7 @@ def _within(scene: Scene, picture: FloatArray) -> FloatArray:
     return picture if scene.mask is None else np.where(scene.mask[..., None] > 0, picture, 0.0)
 
 
-def _check_channels(kernel: SeparableKernel, profile: Profile) -> None:
+def _check_channels(kernel: Kernel, profile: Profile) -> None:
     """Refuse a profile of other channels than the kernel's."""
     if kernel.channels != profile.channels:
         raise RenderError(
@@ -234,19 +243,31 @@ def _check_channels(kernel: SeparableKernel, profile: Profile) -> None:
         )
 
 
-def asymmetry_of(kernel: SeparableKernel) -> FloatArray:
+def asymmetry_of(kernel: Kernel) -> FloatArray:
     """`radial_asymmetry` of each channel's 2D kernel (C,), from the fourth circle on.
 
     Nearer circles see the squareness of pixels. NaN where the kernel does not reach that far.
     """
-    return _asymmetry([kernel.full(c) for c in range(len(kernel.channels))])
+    return _asymmetry(_responses(kernel))
 
 
-def _true_asymmetry(kernel: SeparableKernel, profile: Profile | None) -> FloatArray:
+def _responses(kernel: Kernel) -> list[FloatArray]:
+    """Return the 2D kernel (P, P) of each channel; of a table of taps what one point becomes."""
+    if isinstance(kernel, Taps):
+        seen = response(kernel)
+        return [seen[:, :, c] for c in range(seen.shape[2])]
+    return [kernel.full(c) for c in range(len(kernel.channels))]
+
+
+def _half_pixels(kernel: Kernel) -> int:
+    return reach_pixels(kernel) if isinstance(kernel, Taps) else kernel.half_pixels
+
+
+def _true_asymmetry(kernel: Kernel, profile: Profile | None) -> FloatArray:
     """Return the same of the profile's own kernel on the kernel's pixels."""
     if profile is None:
         return np.full(len(kernel.channels), np.nan)
-    quadrants = profile.quadrant_kernel(kernel.mm_per_pixel, kernel.half_pixels)
+    quadrants = profile.quadrant_kernel(kernel.mm_per_pixel, _half_pixels(kernel))
     return _asymmetry([full_kernel(quadrants[:, :, c]) for c in range(quadrants.shape[2])])
 
 
@@ -275,7 +296,7 @@ def timed(render: Callable[[Scene], FloatArray], scene: Scene) -> tuple[FloatArr
 
 def evaluate_in_screen_space(
     scene: Scene,
-    kernel: SeparableKernel,
+    kernel: Kernel,
     *,
     transmit: bool = False,
     follow: str = "gaussian",
@@ -287,6 +308,11 @@ def evaluate_in_screen_space(
     Parameters and errors are those of `render_screen`, which adds the light through a scene that
     has any; ``transmit`` says how much that is.
     """
+    if isinstance(kernel, Taps):
+        raise RenderError(
+            "screen space by depth needs a separable kernel, and this is a table of taps; "
+            "leave out `screen`."
+        )
     through = _most_through(scene, kernel) if transmit else None
     picture, seconds = timed(
         lambda shown: render_screen(shown, kernel, follow=follow, border=border, threads=threads),

@@ -6,7 +6,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from sssfit.messages import Columns, Part, by_channel, report
+from sssfit.messages import Columns, Part, by_channel, number, report
 
 _FIGURES = {"p95": "95th percentile", "p99": "99th percentile", "mean": "mean"}
 
@@ -66,10 +66,27 @@ _FITTED: tuple[Part, ...] = (
     )),
 )
 
+_TAPS_FITTED: tuple[Part, ...] = (
+    "{material}: {method} {structure}, {fetches:.4g} fetches in {passes} passes on pixels of "
+    "{mm_per_pixel:.4g} mm, {seconds:.1f} s",
+    Columns("channel", "channels", (
+        ("spectral error", "spectral_error", ".3g%"),
+        ("energy error", "energy_error", "+.2g%"),
+        ("energy", "energy", ".6f"),
+    )),
+)
+
+_TAPS: tuple[Part, ...] = (
+    "{structure}, {fetches:.4g} fetches in {passes} passes; share of the energy by stage:",
+    Columns("stage", "stages", (("share", "shares", ""),)),
+)
+
 _RENDERED: tuple[Part, ...] = (
     "{irradiance}: {width} x {height} pixels of {mm_per_pixel:.4g} mm, {how}; {kernel}",
-    "cost: {passes} passes, {taps_per_pixel} weights a pixel, {kernel_bytes:,} bytes, "
-    "{seconds_per_megapixel:.2g} s a megapixel",
+    ("weights", "cost: {passes} passes, {weights} weights a pixel, {kernel_bytes:,} bytes, "
+     "{seconds_per_megapixel:.2g} s a megapixel"),
+    ("fetches", "cost: {passes} passes, {fetches:.4g} fetches a pixel, {kernel_bytes:,} bytes, "
+     "{seconds_per_megapixel:.2g} s a megapixel"),
     ("transmitted_maximum", "through the object at most: {most}, face on the key light is 1"),
     ("rmse", "against the 2D kernel of {profile}:"),
     ("delta_e_2000_mean", "  Delta E 2000 mean {delta_e_2000_mean:.3g}, 95th percentile "
@@ -107,12 +124,31 @@ def _fitted_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     return {"s": {key: "s" * (figures[key] > 1) for key in ("rank", "pixels")}}
 
 
+def _taps_words(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the shares of the energy that the irradiance and each stage have, by channel."""
+    energy, rows = figures["energy"], figures["stage_energy"]
+    shares = [
+        ", ".join(
+            number(each / total if total else 0.0, ".3g%")
+            for each, total in zip(row, energy, strict=True)
+        )
+        for row in rows
+    ]
+    return {
+        "stages": ["irradiance", *map(str, range(1, len(rows)))],
+        "shares": [", ".join(each) for each in shares],
+    }
+
+
 def _rendered_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     """Say how it was rendered, and what the difference shows."""
     kind, most = figures["difference_map"], figures["transmitted_maximum"]
     screen = f"screen space, follow {figures['follow']}, " if figures["follow"] else ""
     is_grey = figures["rmse"] is not None and figures["delta_e_2000_mean"] is None
+    is_taps, cost = figures["rank"] is None, figures["taps_per_pixel"]
     return {
+        "weights": None if is_taps else cost,
+        "fetches": cost if is_taps else None,
         "how": f"{screen}{figures['border']} borders",
         "most": by_channel(figures["channels"], most, ".3g") if most is not None else None,
         "no_colour": len(figures["channels"]) if is_grey else None,
@@ -165,6 +201,8 @@ _PAGES: dict[str, tuple[tuple[Part, ...], Callable[[Mapping[str, Any]], dict[str
     "kernel": (_KERNEL, _kernel_words),
     "models": (_MODELS, _models_words),
     "render": (_RENDERED, _rendered_words),
+    "fit-taps": (_TAPS_FITTED, dict),
+    "taps": (_TAPS, _taps_words),
     "spectrum": (_SPECTRUM, _spectrum_words),
 }
 

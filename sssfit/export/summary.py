@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from sssfit.arrays import plain
 from sssfit.errors import SimulationError
 from sssfit.grid import RadialGrid, paper_grid
-from sssfit.kernel import SeparableKernel
+from sssfit.kernel import SeparableKernel, Taps
 from sssfit.material import Material, load_material, material_names
 from sssfit.messages import Columns, columns, filled, number, printable, report, table
 from sssfit.methods import DEON_SKIN
@@ -26,7 +26,7 @@ def figures_of(found: "Loaded") -> dict[str, Any]:
     """Return the figures of a record that `sssfit.load` reads; ``kind`` is the first."""
     if isinstance(found, Material):
         return {"kind": "material", **material_figures(found)}
-    return found.figures() if isinstance(found, SeparableKernel) else found.to_dict()
+    return found.figures() if isinstance(found, SeparableKernel | Taps) else found.to_dict()
 
 
 def summary(figures: Figures) -> str:
@@ -343,6 +343,50 @@ def kernel_page(figures: Figures) -> str:
     return "\n\n".join([*parts, *(["\n".join(["the fit found", *found])] if found else [])])
 
 
+_TAPS_HEAD = """\
+material  {material}
+profile   {origin}, {walks}{sha}
+fit       {method}{pairs}, sssfit {version}
+stages    {structure}, {reads}
+cost      {fetches:.4g} fetches a pixel, {passes} passes ({all_passes} with the changes of size), \
+{bytes_per_pixel:.4g} bytes a pixel in half precision
+made for  pixels of {mm_per_pixel:.6g} mm
+"""
+_TAPS_CHANNELS = Columns(
+    "channel",
+    "channels",
+    (
+        ("energy", "energy", ".6f"),
+        ("spectral error", "spectral_error", ".3g%|unknown"),
+        ("energy error", "energy_error", "+.2g%|unknown"),
+    ),
+)
+
+
+def taps_page(figures: Figures) -> str:
+    """Return the figures of a table of taps as a report."""
+    sha, settings = figures["profile_sha256"], figures["settings"]
+    told = {
+        **figures,
+        "material": _name(figures["material"], "unknown material"),
+        "origin": _name(figures["profile_method"], "unknown"),
+        "walks": _walks(figures),
+        "sha": f", sha256 {sha[:16]}" if sha else "",
+        "method": _name(figures["method"]),
+        "pairs": _pairs({key: each for key, each in settings.items() if each is not None}, ", "),
+        "version": _name(figures["version"], "version unknown"),
+        "reads": "each reads the one before" if figures["chained"] else "all read the irradiance",
+    }
+    names = ["irradiance", *(f"stage {k + 1}" for k in range(len(figures["reach_mm"])))]
+    reach = ["0", *(f"{each:.4g}" for each in figures["reach_mm"])]
+    rows = [
+        [name, far, *(f"{each:.6f}" for each in row)]
+        for name, far, row in zip(names, reach, figures["blend"], strict=True)
+    ]
+    heads = ["blend", "farthest tap, mm", *figures["channels"]]
+    return "\n\n".join([report([_TAPS_HEAD, _TAPS_CHANNELS], told), table(heads, rows)])
+
+
 def _pairs(values: Figures, separator: str) -> str:
     """Return names and values as text, each after the separator."""
     return "".join(f"{separator}{_name(key)} {_value(each)}" for key, each in values.items())
@@ -364,6 +408,7 @@ def _name(value: object, unknown: str = "") -> str:
 _PAGES: Mapping[str, Callable[[Figures], str]] = {
     "profile": profile_page,
     "kernel": kernel_page,
+    "taps": taps_page,
     "material": material_page,
     "checkpoint": checkpoint_page,
 }

@@ -15,7 +15,7 @@ from types import ModuleType
 from typing import Any
 
 from sssfit.errors import FitError
-from sssfit.fit._result import FitResult
+from sssfit.fit._result import FitResult, TapsFit
 from sssfit.fit._target import MM_PER_PIXEL, Pitch, make_target, pitch_of, support_of
 from sssfit.fit.artist import fit_artist
 from sssfit.fit.burley import fit_burley
@@ -24,9 +24,10 @@ from sssfit.fit.gaussians import fit_gaussians
 from sssfit.fit.guided import fit_guided
 from sssfit.fit.preintegrated import fit_preintegrated
 from sssfit.fit.svd import fit_svd
-from sssfit.kernel import SeparableKernel
+from sssfit.fit.weighted import fit_weighted
+from sssfit.kernel import SeparableKernel, Taps
 from sssfit.messages import shown
-from sssfit.methods import FITS
+from sssfit.methods import ALL_FITS, FITS, TAPS
 from sssfit.profile import Profile
 
 __all__ = [
@@ -35,6 +36,7 @@ __all__ = [
     "FitMethod",
     "FitResult",
     "Pitch",
+    "TapsFit",
     "fit",
     "fit_artist",
     "fit_burley",
@@ -44,6 +46,8 @@ __all__ = [
     "fit_preintegrated",
     "fit_result",
     "fit_svd",
+    "fit_taps",
+    "fit_weighted",
     "make_target",
     "pitch_of",
     "support_of",
@@ -63,6 +67,8 @@ METHODS = {name: FitMethod(each.load(), each.summary) for name, each in FITS.ite
 
 def fit_result(profile: Profile | str | Path, method: str = "svd", **settings: Any) -> FitResult:
     """Fit a separable kernel to a profile, and return it with its errors and stop reasons.
+
+    `fit_taps` does the same for the methods that make a table of taps.
 
     Parameters
     ----------
@@ -86,22 +92,55 @@ def fit_result(profile: Profile | str | Path, method: str = "svd", **settings: A
     """
     if not isinstance(method, str) or method not in METHODS:
         raise FitError(f"method = {shown(method)}; expected one of {', '.join(METHODS)}.")
+    return METHODS[method].fit(_loaded(profile), **settings)
+
+
+def fit_taps(profile: Profile | str | Path, method: str = "cascade", **settings: Any) -> TapsFit:
+    """Fit a table of taps to a profile, and return it with the effort it took.
+
+    Parameters
+    ----------
+    profile : Profile, str or Path
+        The record, or the path of a ``.profile.npz`` file.
+    method : str
+        A name of ``sssfit.methods.TAPS``.
+    **settings
+        Keyword arguments of the method's ``fit_x``: ``fetches``, ``stages``, ...
+
+    Raises
+    ------
+    FitError, ProfileError
+        As `fit_result`.
+    """
+    if not isinstance(method, str) or method not in TAPS:
+        raise FitError(f"method = {shown(method)}; expected one of {', '.join(TAPS)}.")
+    found: TapsFit = TAPS[method].load()(_loaded(profile), **settings)
+    return found
+
+
+def _loaded(profile: object) -> Profile:
     if isinstance(profile, str | Path):
         profile = Profile.load(profile)
     if not isinstance(profile, Profile):
         raise FitError(f"profile = {shown(profile)}; expected a Profile, or the path of its file.")
-    return METHODS[method].fit(profile, **settings)
+    return profile
 
 
-def fit(profile: Profile | str | Path, method: str = "svd", **settings: Any) -> SeparableKernel:
-    """Fit a separable kernel to a profile.
+def fit(
+    profile: Profile | str | Path, method: str = "svd", **settings: Any
+) -> SeparableKernel | Taps:
+    """Fit a kernel to a profile.
 
     Parameters and errors are those of `fit_result`, which also has stop reasons and seconds.
 
     Returns
     -------
-    SeparableKernel
+    SeparableKernel, or Taps from the methods of ``sssfit.methods.TAPS``
     """
+    if isinstance(method, str) and method in TAPS:
+        return fit_taps(profile, method, **settings).kernel
+    if not isinstance(method, str) or method not in METHODS:
+        raise FitError(f"method = {shown(method)}; expected one of {', '.join(ALL_FITS)}.")
     return fit_result(profile, method, **settings).kernel
 
 
@@ -110,7 +149,7 @@ class _CallableRoom(ModuleType):
 
     def __call__(
         self, profile: Profile | str | Path, method: str = "svd", **settings: Any
-    ) -> SeparableKernel:
+    ) -> SeparableKernel | Taps:
         return fit(profile, method, **settings)
 
     __call__.__doc__ = fit.__doc__

@@ -14,7 +14,7 @@ from sssfit import __version__
 from sssfit.arrays import FloatArray, plain
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._target import Target
-from sssfit.kernel import SeparableKernel
+from sssfit.kernel import SeparableKernel, Taps
 from sssfit.process import one_blas_thread
 
 ENERGIES = ("rescale", "keep")
@@ -152,6 +152,31 @@ class FitResult:
         )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class TapsFit:
+    """A table of taps and how it was found."""
+
+    kernel: Taps
+    evaluations: int
+    seconds: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures that ``sssfit fit --json`` prints, as lists and numbers."""
+        figures = self.kernel.figures()
+        names = (
+            *("channels", "method", "structure", "mm_per_pixel", "fetches", "passes"),
+            *("all_passes", "bytes_per_pixel", "spectral_error", "energy_error", "energy"),
+        )
+        return plain(
+            {
+                "material": self.kernel.meta.get("material"),
+                **{name: figures[name] for name in names},
+                "evaluations": self.evaluations,
+                "seconds": self.seconds,
+            }
+        )
+
+
 def fit_channels(
     target: Target,
     method: str,
@@ -222,7 +247,7 @@ def fit_channels(
         energy_error=energy_error,
         scale=scale,
         parameters=_parameters(fits, target.profile.channels),
-        meta=_provenance(target, settings, normalize=normalize),
+        meta=provenance(target, {**settings, "normalize": normalize}),
     )
     if is_fitted:
         warn_of_misfit(name, kernel, keeps_energy=keeps_energy)
@@ -298,8 +323,8 @@ def _parameters(fits: list[ChannelFit], channels: tuple[str, ...]) -> dict[str, 
     }
 
 
-def _provenance(target: Target, settings: Mapping[str, Any], *, normalize: bool) -> dict[str, Any]:
-    """Return the provenance of the kernel."""
+def provenance(target: Target, settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the provenance of a kernel: its profile, and the settings of its fit."""
     meta = target.profile.meta
     return {
         "material": target.name,
@@ -309,5 +334,5 @@ def _provenance(target: Target, settings: Mapping[str, Any], *, normalize: bool)
         "photons": meta.get("photons"),
         "seed": meta.get("seed"),
         "version": __version__,
-        "settings": {**settings, "normalize": normalize},
+        "settings": dict(settings),
     }

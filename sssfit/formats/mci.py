@@ -217,6 +217,11 @@ class MciRun:
         return own | ({"photons": self.photons} if photons else {})
 
 
+def is_mci(name: str | None) -> bool:
+    """Whether a name given for a material means an MCML input file."""
+    return name is not None and name.lower().endswith(".mci")
+
+
 def load_mci(path: str | Path, number: int | None = None) -> tuple[MciRun, ...]:
     """Read the runs of an MCML input file, or one of them, from 1 up; see `parse_mci`."""
     text = read_text(path, str(path), expected="an MCML input file", error=MaterialError)

@@ -4,19 +4,19 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from sssfit.errors import SssfitError
-from sssfit.kernel.record import SeparableKernel
-from sssfit.messages import printable
+from sssfit.kernel import Kernel
+from sssfit.messages import note, printable
 from sssfit.profile import Profile
 
 
 def find_profile(
-    kernel: SeparableKernel, kernel_file: str, folders: Iterable[Path]
-) -> tuple[Profile | None, str | None, str | None]:
-    """Find the profile with the fingerprint that a kernel recorded, from any program.
+    kernel: Kernel, kernel_file: str, folders: Iterable[Path]
+) -> tuple[Profile | None, str | None]:
+    """Find the profile with the fingerprint that a kernel recorded, or note why there is none.
 
     Parameters
     ----------
-    kernel : SeparableKernel
+    kernel : SeparableKernel or Taps
     kernel_file : str
         The kernel's name in the note.
     folders : iterable of Path
@@ -27,17 +27,15 @@ def find_profile(
     profile : Profile or None
     file : str or None
         Its path.
-    note : str or None
-        Why there is none, in a sentence: the kernel records no profile, or it changed, or is
-        missing.
     """
     files = [path for folder in folders for path in folder.glob("*.npz") if path.is_file()]
     files.sort(key=lambda each: each.stat().st_mtime_ns, reverse=True)
     profiles = [(path, found) for path in files if (found := _read(path)) is not None]
     for path, profile in profiles:
         if profile.sha256 == kernel.meta.get("profile_sha256"):
-            return profile, str(path), None
-    return None, None, _missing(kernel, printable(kernel_file), profiles)
+            return profile, str(path)
+    note(_missing(kernel, printable(kernel_file), profiles))
+    return None, None
 
 
 def _read(path: Path) -> Profile | None:
@@ -48,7 +46,7 @@ def _read(path: Path) -> Profile | None:
         return None
 
 
-def _missing(kernel: SeparableKernel, name: str, profiles: Sequence[tuple[Path, Profile]]) -> str:
+def _missing(kernel: Kernel, name: str, profiles: Sequence[tuple[Path, Profile]]) -> str:
     """Return why there is none, as text."""
     end = "so nothing is measured"
     if kernel.meta.get("profile_sha256") is None:

@@ -7,7 +7,7 @@ from time import perf_counter
 import numpy as np
 
 from sssfit.errors import RenderError
-from sssfit.kernel import SeparableKernel
+from sssfit.kernel import Kernel, Taps
 
 # Bytes of a weight in a shader, a float32.
 FLOAT_BYTES = 4
@@ -20,28 +20,29 @@ class Cost:
     Parameters
     ----------
     passes : int
-        One-dimensional passes over the picture, two per term.
-    taps_per_pixel : int
-        Weights applied to a pixel in all passes; one weight counts for all channels together.
+        One-dimensional passes over the picture, two per term; of a table of taps all passes.
+    taps_per_pixel : int or float
+        Weights applied to a pixel in all passes; one weight counts for all channels together. Of a
+        table of taps its fetches.
     kernel_bytes : int
         Size of a float32 table of all terms, pixels and channels: T P C 4, with both halves of a
-        pass.
+        pass. Of a table of taps, of offsets, weights and blend.
     seconds_per_megapixel : float, optional [s]
         Measured time of 1e6 pixels with all their channels; None if nothing was timed.
     """
 
     passes: int
-    taps_per_pixel: int
+    taps_per_pixel: float
     kernel_bytes: int
     seconds_per_megapixel: float | None = None
 
 
-def cost_of(kernel: SeparableKernel, seconds_per_megapixel: float | None = None) -> Cost:
+def cost_of(kernel: Kernel, seconds_per_megapixel: float | None = None) -> Cost:
     """Return the cost of a kernel; terms that are 0 in every channel cost nothing.
 
     Parameters
     ----------
-    kernel : SeparableKernel
+    kernel : SeparableKernel or Taps
     seconds_per_megapixel : float, optional [s]
         Measured by the function of that name.
 
@@ -54,6 +55,14 @@ def cost_of(kernel: SeparableKernel, seconds_per_megapixel: float | None = None)
     >>> cost_of(fit_svd(profile, rank=3, mm_per_pixel=0.5, support_mm=8).kernel)
     Cost(passes=6, taps_per_pixel=198, kernel_bytes=1188, seconds_per_megapixel=None)
     """
+    if isinstance(kernel, Taps):
+        numbers = sum(each.offsets_mm.size + each.weights.size for each in kernel.stages)
+        return Cost(
+            passes=kernel.cost.all_passes,
+            taps_per_pixel=kernel.fetches,
+            kernel_bytes=(numbers + kernel.blend.size) * FLOAT_BYTES,
+            seconds_per_megapixel=seconds_per_megapixel,
+        )
     terms = int(np.count_nonzero(np.any(kernel.weights != 0.0, axis=(1, 2))))
     return Cost(
         passes=2 * terms,

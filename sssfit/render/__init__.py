@@ -1,8 +1,8 @@
 """Kernels applied to irradiance: radiant exitance of a lit, translucent surface.
 
 `sssfit.scene` has the lit scenes. `reference` convolves with the true 2D kernel, `separable` with a
-fitted one, `screen` works like a shader in screen space, and `transmittance` adds light through
-thin slabs.
+fitted one, `taps` as a table of taps says; `screen` works like a shader in screen space, and
+`transmittance` adds light through thin slabs.
 
 The package can also be called like the function `render`: ``sssfit.render(image, kernel)``.
 """
@@ -18,9 +18,10 @@ import numpy.typing as npt
 from sssfit.errors import RenderError
 from sssfit.formats.colours import as_light
 from sssfit.formats.pictures import Image, load_image
-from sssfit.kernel import SeparableKernel
+from sssfit.kernel import Kernel, SeparableKernel, Taps, read_kernel
 from sssfit.messages import shown
 from sssfit.render.separable import render_separable
+from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
 
 __all__ = ["render"]
@@ -29,7 +30,7 @@ FloatArray = npt.NDArray[np.floating[Any]]  # in the requested precision
 Irradiance = Scene | Image | npt.ArrayLike | str | Path
 
 
-def render(image: Irradiance, kernel: SeparableKernel | str | Path, **settings: Any) -> FloatArray:
+def render(image: Irradiance, kernel: Kernel | str | Path, **settings: Any) -> FloatArray:
     """Apply a kernel to a flat picture of irradiance.
 
     Parameters
@@ -38,11 +39,11 @@ def render(image: Irradiance, kernel: SeparableKernel | str | Path, **settings: 
         Linear light, or the path of a picture file. An array or file takes the kernel's pixel size;
         a scene has its own. A two-dimensional array has one channel, light without colour; like C =
         1 it fits kernels with any number of channels.
-    kernel : SeparableKernel, str or Path
-        The record, or the path of a ``.kernel.json`` file.
+    kernel : SeparableKernel, Taps, str or Path
+        The record, or the path of a ``.kernel.json`` or ``.taps.json`` file.
     **settings
-        Keyword arguments of `sssfit.render.separable.render_separable`: ``border``, ``threads``,
-        ``dtype``.
+        Keyword arguments of `sssfit.render.separable.render_separable` and
+        `sssfit.render.taps.render_taps`: ``border``, ``threads``, ``dtype``.
 
     Returns
     -------
@@ -58,12 +59,15 @@ def render(image: Irradiance, kernel: SeparableKernel | str | Path, **settings: 
         A file cannot be read.
     """
     if isinstance(kernel, str | Path):
-        kernel = SeparableKernel.load(kernel)
-    if not isinstance(kernel, SeparableKernel):
+        kernel = read_kernel(kernel)
+    if not isinstance(kernel, SeparableKernel | Taps):
         raise RenderError(
             f"kernel = {shown(kernel)}; expected a SeparableKernel, or the path of its file."
         )
-    return render_separable(_scene(image, kernel.mm_per_pixel), kernel, **settings)
+    scene = _scene(image, kernel.mm_per_pixel)
+    if isinstance(kernel, Taps):
+        return render_taps(scene, kernel, **settings)
+    return render_separable(scene, kernel, **settings)
 
 
 def _scene(image: Irradiance, mm_per_pixel: float) -> Scene:
@@ -82,7 +86,7 @@ class _CallableRoom(ModuleType):
     """Makes the package callable, as `import sssfit.render` binds it to the function's name."""
 
     def __call__(
-        self, image: Irradiance, kernel: SeparableKernel | str | Path, **settings: Any
+        self, image: Irradiance, kernel: Kernel | str | Path, **settings: Any
     ) -> FloatArray:
         return render(image, kernel, **settings)
 

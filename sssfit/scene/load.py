@@ -6,6 +6,7 @@ from typing import Any
 
 from sssfit.errors import RenderError
 from sssfit.formats.pictures import load_image
+from sssfit.messages import note
 from sssfit.scene.head import whole_face_mm_per_pixel
 from sssfit.scene.made import EDGE_DEGREES, MADE, make_scene, options_of
 from sssfit.scene.record import Scene
@@ -24,8 +25,8 @@ def load_scene(
     mask: str | None = None,
     seed: int = 1,
     **options: Any,
-) -> tuple[Scene, tuple[str, ...]]:
-    """Make a picture of ``MADE``, or read one from a file.
+) -> Scene:
+    """Make a picture of ``MADE``, or read one from a file; see `sssfit.messages.note`.
 
     Parameters
     ----------
@@ -47,9 +48,7 @@ def load_scene(
 
     Returns
     -------
-    scene : Scene
-    notes : tuple of str
-        Remarks on the scene, in sentences.
+    Scene
 
     Raises
     ------
@@ -60,7 +59,7 @@ def load_scene(
 
     Examples
     --------
-    >>> scene, notes = load_scene("edge", 0.5, size=(8, 8), angle_degrees=30.0)
+    >>> scene = load_scene("edge", 0.5, size=(8, 8), angle_degrees=30.0)
     >>> scene.irradiance.shape
     (8, 8, 1)
     """
@@ -68,17 +67,18 @@ def load_scene(
         pitch = mm_per_pixel or otherwise
         if pitch is None:
             raise RenderError(f"{name} is made on pixels of any size; give `mm_per_pixel`.")
-        (height, width), notes = (size, ()) if size else _default_size(name, pitch)
+        height, width = size or _default_size(name, pitch)
         if "seed" in options_of(name):
             options["seed"] = seed
-        made = make_scene(name, height=height, width=width, mm_per_pixel=pitch, **options)
-        return made, notes
+        return make_scene(name, height=height, width=width, mm_per_pixel=pitch, **options)
     image = load_image(name, layer=layer)
     pitch = mm_per_pixel or image.mm_per_pixel or otherwise
     if pitch is None:
         raise RenderError(f"{name} does not say how large its pixels are; give `mm_per_pixel`.")
     scene = Scene.from_image(image, pitch, alpha_is_mask=mask == "alpha")
-    return scene, tuple(f"{name}: {note}" for note in image.notes)
+    for each in image.notes:
+        note(f"{name}: {each}")
+    return scene
 
 
 def load_scenes(
@@ -90,7 +90,7 @@ def load_scenes(
     layer: str | None = None,
     mask: str | None = None,
     seed: int = 1,
-) -> tuple[list[Scene], tuple[str, ...]]:
+) -> list[Scene]:
     """Return pictures to compare kernels on, all on the same pixels; edges are at 30 degrees.
 
     Parameters and errors are those of `load_scene`; made pictures have 512 x 512 pixels by default.
@@ -101,24 +101,25 @@ def load_scenes(
         for name in names
         if name not in MADE
     }
-    pitch = next((scene.mm_per_pixel for scene, _ in found.values()), mm_per_pixel or otherwise)
+    pitch = next((scene.mm_per_pixel for scene in found.values()), mm_per_pixel or otherwise)
     for name in names:
         if name in MADE:
             own: dict[str, Any] = {"angle_degrees": EDGE_DEGREES} if name == "edge" else {}
             whole = size or (_ROWS, _ROWS)
             found[name] = load_scene(name, pitch, size=whole, seed=seed, **own)
-    return [found[name][0] for name in names], tuple(n for each in found.values() for n in each[1])
+    return [found[name] for name in names]
 
 
-def _default_size(name: str, mm_per_pixel: float) -> tuple[tuple[int, int], tuple[str, ...]]:
-    """Return 512 x 512, or the rows of a head, up to 1080, with a note if it is cropped."""
+def _default_size(name: str, mm_per_pixel: float) -> tuple[int, int]:
+    """Return 512 x 512, or the rows of a head, up to 1080, noting if it is cropped."""
     if name != "head":
-        return (_ROWS, _ROWS), ()
+        return _ROWS, _ROWS
     # The smaller a pixel, the more rows the face needs.
     wanted = math.ceil(whole_face_mm_per_pixel(1, 1) / mm_per_pixel)
     rows = min(wanted, _MOST_ROWS)
-    note = (
-        f"The whole face takes {wanted} rows of {mm_per_pixel:.4g} mm; {_MOST_ROWS} show its "
-        f"middle. Give `size = {wanted}x{wanted}`, or fit the kernel to larger pixels."
-    )
-    return (rows, rows), (note,) if wanted > _MOST_ROWS else ()
+    if wanted > rows:
+        note(
+            f"The whole face takes {wanted} rows of {mm_per_pixel:.4g} mm; {rows} show its "
+            f"middle. Give `size = {wanted}x{wanted}`, or fit the kernel to larger pixels."
+        )
+    return rows, rows

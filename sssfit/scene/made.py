@@ -8,9 +8,11 @@ mask. A picture's function is imported when it is made, so that help answers at 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from sssfit.errors import ArgumentError
 from sssfit.methods import Method, Setting
 
 if TYPE_CHECKING:
@@ -112,3 +114,30 @@ def make_scene(name: str, *, height: int, width: int, mm_per_pixel: float, **opt
             raise RenderError(f"{name}: no option {key!r}; expected one of {', '.join(known)}.")
     scene: Scene = MADE[name].load()(height=height, width=width, mm_per_pixel=mm_per_pixel, **given)
     return scene
+
+
+def check_pictures(
+    names: Sequence[str],
+    *,
+    layer: str | None = None,
+    mask: str | None = None,
+    size: tuple[int, int] | None = None,
+) -> None:
+    """Refuse pictures that do not exist, and settings that would do nothing to them.
+
+    Raises
+    ------
+    ArgumentError
+    """
+    for name in names:
+        if not name or (name not in MADE and not Path(name).exists()):
+            raise ArgumentError(
+                f"there is no picture {name!r}; expected {', '.join(MADE)}, or your own file."
+            )
+    files = [name for name in names if name not in MADE]
+    if size is not None and len(files) == len(names):
+        raise ArgumentError("`size` is for made pictures; leave it out.")
+    if layer is not None and not files:
+        raise ArgumentError("`layer` is for pictures from files; leave it out.")
+    if mask is not None and not files:
+        raise ArgumentError("`mask` is for pictures from files; leave it out.")

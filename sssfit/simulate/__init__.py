@@ -33,7 +33,7 @@ from sssfit.simulate.montecarlo import (
     simulate_montecarlo_many,
 )
 from sssfit.simulate.multipole import simulate_multipole
-from sssfit.simulate.runner import Outcome, Results, compiling_note, simulate_to_files
+from sssfit.simulate.runner import Outcome, Results, simulate_to_files
 
 __all__ = [
     "DEON_SKIN",
@@ -44,7 +44,6 @@ __all__ = [
     "Progress",
     "Results",
     "SoFar",
-    "compiling_note",
     "is_checkpoint_file",
     "is_compiled",
     "is_complete",

@@ -19,11 +19,18 @@ from sssfit._jit import layered, semi_infinite
 from sssfit.arrays import FloatArray
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
+from sssfit.messages import note
 
 # 16384 photons of skin1 take 4 ms, those of a medium of eta 1.3 without absorption half a second:
 # short enough for Ctrl-C, long enough to hide the cost of starting a batch (about 0.1 ms).
 BATCH_PHOTONS = 16_384
 MAX_PHOTONS = 10**12
+
+
+def note_compiling(what: str, seconds: int, is_compiled: bool) -> None:
+    """Say what is about to be compiled, and how long that takes."""
+    if not is_compiled:
+        note(f"Compiling the {what}, some {seconds} s; it is kept for later runs where it can be.")
 
 
 @dataclass(slots=True)

@@ -49,7 +49,7 @@ from sssfit.simulate._mixture import (
     single_scattering_beyond,
     single_scattering_of_diffuse_light,
 )
-from sssfit.simulate._walks import relative_eta
+from sssfit.simulate._walks import note_compiling, relative_eta
 
 Light = Literal["normal", "diffuse"]
 LIGHTS: tuple[Light, ...] = get_args(Light)
@@ -156,6 +156,7 @@ def simulate_exact_many(
     _check_settings(tolerance, threads)
     for material in materials:
         _check_medium(material)
+    note_compiling("solver", 3, is_solver_compiled())
     grids = [make_grid(each, dr_mm=dr_mm, radius_mm=radius_mm) for each in materials]
     groups: dict[float, list[int]] = {}
     for k, material in enumerate(materials):

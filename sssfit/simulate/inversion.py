@@ -22,13 +22,20 @@ from scipy.optimize.elementwise import find_root
 
 from sssfit import __version__
 from sssfit.arrays import FloatArray, check_names, plain
-from sssfit.errors import MaterialError, RenderError, SimulationError
-from sssfit.formats.colours import linear_from_hex
+from sssfit.errors import ArgumentError, MaterialError, RenderError, SimulationError
+from sssfit.formats.colours import linear_from_hex, reflectance_of_codes
 from sssfit.material import Layer, Material
 from sssfit.material.checks import check_texts, number
 from sssfit.messages import Columns, report
 from sssfit.optics import normal_transmittance
-from sssfit.simulate.exact import LIGHTS, Light, diffuse_reflectance, entering_light
+from sssfit.simulate._walks import note_compiling
+from sssfit.simulate.exact import (
+    LIGHTS,
+    Light,
+    diffuse_reflectance,
+    entering_light,
+    is_solver_compiled,
+)
 
 SKIN_ETA = 1.4  # d'Eon and Luebke 2007, GPU Gems 3, chapter 14: .028 at normal incidence
 _CLOSE = 1e-8  # in reflectance; the precision of the exact solver
@@ -230,6 +237,7 @@ def material_from_reflectance(
         raise MaterialError(
             f"mean free paths {paths_mm.tolist()}; expected lengths from 1e-9 to 1e9 mm."
         )
+    note_compiling("solver", 3, is_solver_compiled())
     albedo = invert_reflectance(asked, eta, light=light).albedo
     words = ", ".join(f"{each:g}" for each in asked)
     return Material(
@@ -238,6 +246,45 @@ def material_from_reflectance(
         (Layer(eta, np.zeros_like(albedo), (1.0 - albedo) / paths_mm, albedo / paths_mm),),
         source=f"{meant}{_ASKED[light]} {words} by exact albedo inversion, sssfit {__version__}",
     )
+
+
+def asked_for(
+    reflectance: list[float] | str, *, srgb: bool = False, light: Light | None = None
+) -> tuple[list[float] | str, Light]:
+    """Return the reflectance or colour that is meant, and its light.
+
+    Parameters
+    ----------
+    reflectance : list of float or str
+        Shares, or a colour in hex.
+    srgb : bool
+        The numbers are 8-bit sRGB codes.
+    light : "normal" or "diffuse", optional
+        By default that of the colours, "diffuse", else "normal".
+    """
+    is_colour = srgb or isinstance(reflectance, str)
+    asked = reflectance_of_codes(reflectance) if srgb else reflectance
+    return asked, light or ("diffuse" if is_colour else "normal")
+
+
+def channel_names(given: str | None, reflectance: list[float] | str) -> list[str]:
+    """Return names with commas between them, one for each reflectance; R, G, B for three.
+
+    Raises
+    ------
+    ArgumentError
+        They are missing, or not as many.
+    """
+    count = 3 if isinstance(reflectance, str) else len(reflectance)
+    if given is None and count != 3:
+        raise ArgumentError(
+            f"`from_reflectance` has {count} value{'s' * (count != 1)}; name "
+            f"{'its channel' if count == 1 else 'their channels'} with `channels`."
+        )
+    names = [each.strip() for each in (given or "R,G,B").split(",")]
+    if len(names) != count:
+        raise ArgumentError(f"`channels` has {len(names)} names for {count} reflectances.")
+    return names
 
 
 def inversion_figures(

@@ -35,6 +35,7 @@ from sssfit.simulate._walks import (
     LayeredWalk,
     SemiInfiniteWalk,
     Walk,
+    note_compiling,
     relative_errors,
     relative_eta,
 )
@@ -170,6 +171,7 @@ def simulate_montecarlo_many(
     seed = whole_number("seed", seed)
     threads = available_cores() if threads is None else whole_number("threads", threads)
     _check_settings(ending.photons, seed, threads)
+    note_compiling("photon walk", 10, is_compiled(materials[0]))
     auto = radius_mm == "auto"
     if isinstance(radius_mm, str):
         if not auto:

@@ -14,27 +14,21 @@ from typing import Any
 
 from sssfit.errors import FileError, ProfileError, StoppedError
 from sssfit.files import check_output, held
-from sssfit.material import Material
+from sssfit.formats.mci import is_mci, load_mci
+from sssfit.material import Material, load_material, material_names
+from sssfit.messages import note
 from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile, is_profile_file
 from sssfit.simulate._checkpoint import EVERY_SECONDS, Checkpoint, is_checkpoint_file
 from sssfit.simulate._finished import is_complete, is_finished, run_figures
 from sssfit.simulate._run import Progress
-from sssfit.simulate.exact import is_solver_compiled
-from sssfit.simulate.montecarlo import is_compiled, shared_walks
+from sssfit.simulate.gaussians import DEON_SKIN
+from sssfit.simulate.montecarlo import shared_walks
 from sssfit.simulate.summary import summary
 
 Stop = Callable[[], bool]
 Watch = Callable[[str], AbstractContextManager[Callable[[Progress], None] | None]]
 WALK = "montecarlo"  # the method that can be saved half done, and resumed
-_COMPILING = "Compiling the {}, some {} s; it is kept for later runs where it can be."
-
-
-def compiling_note(walk: Material | None = None) -> str:
-    """Return a note if the walk of a material, or the exact solver, is about to be compiled."""
-    if walk is None:
-        return "" if is_solver_compiled() else _COMPILING.format("solver", 3)
-    return "" if is_compiled(walk) else _COMPILING.format("photon walk", 10)
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,6 +115,58 @@ class Results:
         return "\n".join(lines)
 
 
+def runs_of(
+    method: str,
+    material: str | None,
+    given: dict[str, Any],
+    *,
+    run: int | None = None,
+    paper: bool = False,
+) -> tuple[list[Any], dict[str, Any] | list[dict[str, Any]]]:
+    """Return what `simulate_to_files` takes for a name: materials, and their settings.
+
+    Parameters
+    ----------
+    method : str
+    material : str, optional
+        A name or a file; of an MCML input file every run, with settings of its own. By default all
+        materials that ship with sssfit.
+    given : dict
+        Settings for all, which also replace those of a file.
+    run : int, optional
+        The only run of an MCML input file.
+    paper : bool
+        By default only the paper's eleven.
+    """
+    if SIMULATIONS[method].makes is not None:
+        return [DEON_SKIN], given
+    if material is None:
+        return [load_material(name) for name in material_names(paper=paper)], given
+    if not is_mci(material):
+        return [load_material(material)], given
+    runs = load_mci(material, run)
+    # A target error alone decides when a walk ends; then the file's photons are no limit.
+    photons = method == WALK and not {"photons", "target_error"} & given.keys()
+    return [each.material for each in runs], [
+        each.settings(given, photons=photons) for each in runs
+    ]
+
+
+def paths_of(
+    materials: Sequence[Any], method: str, output: str | None, *, several: bool
+) -> list[Path | None]:
+    """Return where each profile goes; None is a stream. Only the walk's files do not name it.
+
+    ``output`` is the file, or the folder of several; by default this one.
+    """
+    if output == "-":
+        return [None]
+    if output is not None and not several:
+        return [Path(output)]
+    kind = "" if method == WALK else f".{method}"
+    return [Path(output or ".", f"{each.name}{kind}.profile.npz") for each in materials]
+
+
 def simulate_to_files(
     materials: Sequence[Any],
     paths: Sequence[Path | None],
@@ -132,7 +178,6 @@ def simulate_to_files(
     force: bool = False,
     inputs: Iterable[str | Path] = (),
     stop: Stop = lambda: False,
-    tell: Callable[[str], object] = lambda line: None,  # noqa: ARG005
     watch: Watch = lambda label: nullcontext(),  # noqa: ARG005
 ) -> Results:
     """Compute the profile of each material and write it as soon as it is finished.
@@ -159,8 +204,6 @@ def simulate_to_files(
         Files that are read and must not be overwritten.
     stop : callable
         When it returns true, a walk ends with the photons so far, and no other run begins.
-    tell : callable
-        Called with messages for the user during the run.
     watch : callable
         Takes a label for each walk, and returns a context whose value is called with the progress.
 
@@ -189,14 +232,12 @@ def simulate_to_files(
         for save in saves:
             if save and not resume:
                 check_output(save.path, is_checkpoint_file, force=force, inputs=inputs)
-        if method == "exact" and (note := compiling_note()):
-            tell(note)
         for group, save in zip(groups, saves, strict=True):
             own = [materials[k] for k in group], [paths[k] for k in group]
             given = every[group[0]]
             try:
                 if is_walk:
-                    made = _walk(*own, given, save, stop, tell, watch)
+                    made = _walk(*own, given, save, stop, watch)
                 else:
                     made = _computed(*own, given, method, stop)
             except StoppedError:
@@ -238,7 +279,6 @@ def _walk(
     settings: Mapping[str, Any],
     save: Checkpoint | None,
     stop: Stop,
-    tell: Callable[[str], object],
     watch: Watch,
 ) -> list[Outcome]:
     """Run one walk for all ``materials``, from its checkpoint if there is one to continue from."""
@@ -246,22 +286,20 @@ def _walk(
     if save and save.resume and not resumes:
         if before := _finished(materials, paths, settings):
             return [Outcome(*each, None) for each in zip(before, paths, strict=True)]
-        tell(f"No {save.path} to continue from: starting a new run.")
-    if compiling := compiling_note(materials[0]):
-        tell(compiling)
+        note(f"No {save.path} to continue from: starting a new run.")
     last: list[Progress] = []
     label = materials[0].name if len(materials) == 1 else f"{len(materials)} materials"
     with watch(label) as show:
 
-        def note(now: Progress) -> None:
+        def report(now: Progress) -> None:
             if save and resumes and not last:
-                tell(f"Continuing from {save.path}: {now.photons_done:,} photons done.")
+                note(f"Continuing from {save.path}: {now.photons_done:,} photons done.")
             last[:] = [now]
             if show:
                 show(now)
 
         profiles = SIMULATIONS[WALK].load()(
-            materials, checkpoint=save, progress=note, stop=stop, **settings
+            materials, checkpoint=save, progress=report, stop=stop, **settings
         )
     try:
         _write(profiles, paths)

@@ -1,0 +1,416 @@
+"""Tables of taps: a kernel as a shader runs it, a few fetches a pass, several stages added up.
+
+Stage l reads the picture of the stage before it (a cascade, ``chained``) or the irradiance E (the
+terms of a separable kernel), and the kernel is the sum
+
+    M = sum_{l=0..L} m_l E_l,    E_0 = E,    E_l = B_l E_{l-1}  or  E_l = B_l E,
+
+with the blend m_l by channel, which adds up to the energy. Signs live in the blend. A stage's fetch
+at a fractional offset is bilinear. Stages of level v work on pictures halved v times: a texel of
+those is the mean of four, and their sum comes back by bilinear fetches.
+
+``taps_json`` has the file format, ``sssfit/taps.schema.json`` its JSON Schema.
+"""
+
+import dataclasses
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, BinaryIO, Self
+
+import numpy as np
+
+from sssfit.arrays import (
+    FloatArray,
+    check_label,
+    check_names,
+    check_provenance,
+    json_object,
+    number_array,
+    plain,
+)
+from sssfit.errors import KernelError
+from sssfit.files import write_atomically
+from sssfit.kernel import taps_json
+from sssfit.kernel.record import SeparableKernel
+from sssfit.kernel.structure import (
+    MOST_LEVELS,
+    MOST_PAIRS,
+    MOST_STAGES,
+    Cost,
+    Shape,
+    cost_of_chain,
+    cost_of_terms,
+    text_of,
+)
+from sssfit.kernel.taps_json import is_taps_file
+from sssfit.messages import by_channel, number, of_material, shown
+
+__all__ = ["Stage", "Taps", "is_taps_file"]
+
+KINDS = ("pair", "star")
+# Fetches with one weight: a pair of passes has the middle and mirrored pairs, a star the middle,
+# four diagonal neighbours and four on the axes.
+_COPIES = {"pair": 2.0, "star": 4.0}
+_MIN_MM, _MAX_MM = 1e-12, 1e12
+_MAX = 1e18  # weights and blend: squares are finite in single precision
+_ROUNDING = 1e-9  # of sums that are computed in another order
+BYTES = {"float32": 16, "half": 8, "r11g11b10": 4}  # of a texel of three channels, as stored
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class Stage:
+    """One blur of a table of taps.
+
+    Parameters
+    ----------
+    level : int
+        How many times its picture is halved.
+    kind : {"pair", "star"}
+        "pair" is a pass along x and the same pass along y; "star" one pass of nine fetches.
+    offsets_mm : array (n,) [mm]
+        Of a pair rising, without the middle; of a star the distances (diagonal, axis), where the
+        diagonal fetches lie at (+-o, +-o).
+    weights : array (n+1, C)
+        The middle first; the middle and all fetches of its passes add up to 1.
+    """
+
+    level: int
+    kind: str
+    offsets_mm: FloatArray
+    weights: FloatArray
+
+    @property
+    def shape(self) -> Shape:
+        """The stage without its numbers."""
+        return Shape(self.kind, len(self.offsets_mm) if self.kind == "pair" else 1, self.level)
+
+    def line(self, offsets_mm: FloatArray, weights: FloatArray, mm_per_texel: float) -> FloatArray:
+        """Return weights on texels (2m+1, C) of mirrored bilinear fetches along a line.
+
+        A fetch at offset o between texels i and i + 1 gives them 1 - f and f, f = o - i.
+
+        Parameters
+        ----------
+        offsets_mm : array (n,) [mm]
+        weights : array (n, C)
+        mm_per_texel : float [mm]
+            Of the stage's own picture.
+        """
+        texels = offsets_mm / mm_per_texel
+        whole = np.floor(texels)
+        part = (texels - whole)[:, None]
+        reach = int(whole.max()) + 1
+        half = np.zeros((reach + 1, weights.shape[1]))
+        np.add.at(half, whole.astype(np.intp), weights * (1.0 - part))
+        np.add.at(half, whole.astype(np.intp) + 1, weights * part)
+        half[0] *= 2.0  # both fetches of a pair touch the middle texel
+        return np.concatenate((half[:0:-1], half))
+
+    def pass_weights(self, mm_per_texel: float) -> FloatArray:
+        """Return the pass of a pair on texels of its picture, (2m+1, C)."""
+        line = self.line(self.offsets_mm, self.weights[1:], mm_per_texel)
+        line[len(line) // 2] += self.weights[0]
+        return line
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class Taps:
+    """A kernel as a shader runs it: stages of few fetches and how their pictures are added up.
+
+    L stages, C channels, the channel axis last. Arrays are stored as read-only float64.
+
+    Parameters
+    ----------
+    method : str
+        The fit that made it, by its name on the command line.
+    mm_per_pixel : float [mm]
+        Pixel size that it was made for; offsets are in mm and serve others too.
+    channels : tuple of str
+        Names of the C channels.
+    chained : bool
+        Whether a stage reads the picture of the stage before it, or the irradiance.
+    stages : tuple of Stage
+        In the order of their passes; levels never fall, and rise by one.
+    blend : array (L+1, C)
+        Share of the irradiance (row 0) and of each stage's picture; adds up to the energy.
+    errors : mapping
+        Arrays (C,), NaN if unknown: ``spectral``, the norm of the difference from the profile's
+        kernel under the spectrum that was fitted, as a share of its norm, and ``energy``, relative
+        to the diffuse reflectance.
+    meta : mapping
+        Provenance as of `SeparableKernel`.
+
+    Raises
+    ------
+    KernelError
+        A field has the wrong shape, is not a number, or contradicts another.
+    """
+
+    method: str
+    mm_per_pixel: float
+    channels: tuple[str, ...]
+    chained: bool
+    stages: tuple[Stage, ...]
+    blend: FloatArray
+    errors: Mapping[str, FloatArray]
+    meta: Mapping[str, Any]
+
+    def __post_init__(self) -> None:
+        for name, value in _checked(self).items():
+            object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        errors = by_channel(self.channels, self.errors["spectral"].tolist(), ".3g%|unknown")
+        return (
+            f"<Taps of {of_material(self.meta.get('material'))} by {self.method}, "
+            f"{self.structure}, {number(self.fetches, '.4g')} fetches of {self.mm_per_pixel:.4g} "
+            f"mm pixels: error {errors}>"
+        )
+
+    @property
+    def structure(self) -> str:
+        """The stages as text, such as 1-1|2-2|2-2."""
+        return text_of([each.shape for each in self.stages])
+
+    @property
+    def energy(self) -> FloatArray:
+        """Sum of the kernel (C,)."""
+        total: FloatArray = self.blend.sum(axis=0)
+        return total
+
+    @property
+    def cost(self) -> Cost:
+        """Fetches, passes and pictures moved per pixel."""
+        rows = [bool(row.any()) for row in self.blend]
+        if self.chained:
+            return cost_of_chain([each.shape for each in self.stages], rows)
+        offsets = [tuple(each.offsets_mm.tolist()) for each in self.stages]
+        return cost_of_terms(offsets, shows_irradiance=rows[0])
+
+    @property
+    def fetches(self) -> float:
+        """Texture fetches a pixel."""
+        return self.cost.fetches
+
+    @property
+    def passes(self) -> int:
+        """Passes of the stages: two of a pair, one of a star."""
+        return self.cost.passes
+
+    def bytes_per_pixel(self, texel: str = "half") -> float:
+        """Return bytes read and written a pixel, each picture once a pass.
+
+        Parameters
+        ----------
+        texel : {"float32", "half", "r11g11b10"}
+            Format of the pictures between the passes.
+        """
+        return BYTES[texel] * self.cost.pictures
+
+    @property
+    def is_separable(self) -> bool:
+        """Whether `separable_kernel` exists: all stages are pairs on the full picture."""
+        return all(each.kind == "pair" and each.level == 0 for each in self.stages)
+
+    def separable_kernel(self) -> SeparableKernel:
+        """Return the same kernel as a sum of separable terms, on pixels of its pitch.
+
+        Exact, with the bilinear fetches: the pass of term l is that of all stages up to l, one
+        after the other.
+
+        Raises
+        ------
+        KernelError
+            A stage is a star or works on a halved picture.
+        """
+        if not self.is_separable:
+            raise KernelError(
+                f"{self.structure} has stars or halved pictures; only pairs of passes on the full "
+                "picture are a sum of separable terms."
+            )
+        passes = [np.ones((1, len(self.channels)))]
+        for stage in self.stages:
+            own = stage.pass_weights(self.mm_per_pixel)
+            passes.append(_convolved(passes[-1], own) if self.chained else own)
+        half = max(len(each) for each in passes) // 2
+        padded = np.zeros((len(passes), 2 * half + 1, len(self.channels)))
+        for row, each in zip(padded, passes, strict=True):
+            reach = len(each) // 2
+            # Convolutions are symmetric up to rounding only.
+            row[half - reach : half + reach + 1] = 0.5 * (each + each[::-1])
+        kept = self.blend.any(axis=1)
+        return SeparableKernel(
+            method=self.method,
+            mm_per_pixel=self.mm_per_pixel,
+            channels=self.channels,
+            signs=np.where(self.blend < 0.0, -1.0, 1.0)[kept],
+            weights=(padded * np.sqrt(np.abs(self.blend))[:, None, :])[kept],
+            relative_frobenius_error=np.full(len(self.channels), np.nan),
+            energy_error=self.errors["energy"],
+            scale=np.ones(len(self.channels)),
+            parameters={},
+            meta=self.meta,
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the contents of the file."""
+        return taps_json.content(self)
+
+    def figures(self) -> dict[str, Any]:
+        """Return the figures of ``sssfit show --json``, as lists and numbers, None if unknown."""
+        cost = self.cost
+        return plain(
+            {
+                "kind": "taps",
+                "format": taps_json.FORMAT,
+                **{name: self.meta.get(name) for name in PROVENANCE},
+                "settings": self.meta.get("settings") or {},
+                "method": self.method,
+                "structure": self.structure,
+                "chained": self.chained,
+                "mm_per_pixel": self.mm_per_pixel,
+                "channels": self.channels,
+                "fetches": cost.fetches,
+                "passes": cost.passes,
+                "all_passes": cost.all_passes,
+                "bytes_per_pixel": self.bytes_per_pixel(),
+                "energy": self.energy,
+                "spectral_error": self.errors["spectral"],
+                "energy_error": self.errors["energy"],
+                "reach_mm": [float(each.offsets_mm.max()) for each in self.stages],
+                "blend": self.blend,
+            }
+        )
+
+    def write(self, stream: BinaryIO) -> None:
+        """Write JSON to a binary stream; the same table gives the same bytes."""
+        stream.write(taps_json.pack(self))
+
+    def save(self, path: str | Path) -> None:
+        """Write the table to ``path`` (by convention ``NAME.taps.json``), whole or not at all.
+
+        Raises
+        ------
+        FileError
+            The file cannot be written; an older file at ``path`` stays unchanged.
+        """
+        write_atomically(Path(path), self.write)
+
+    @classmethod
+    def read(cls, source: str | Path | BinaryIO, origin: str | None = None) -> Self:
+        """Read a table from a path or a binary stream; numbers are read back bit for bit.
+
+        Raises
+        ------
+        KernelError
+            The file is missing, damaged, foreign, or of another version; the one-line message names
+            the origin.
+        """
+        if origin is None:
+            origin = str(source) if isinstance(source, str | Path) else "the table of taps"
+        fields, said = taps_json.unpack(source, origin)
+        try:
+            fields["stages"] = tuple(Stage(**each) for each in fields["stages"])
+            taps = cls(**fields)
+            taps_json.check_derived(said, taps)
+        except KernelError as error:
+            raise KernelError(f"{origin}: {error} Fit it again.") from None
+        return taps
+
+    @classmethod
+    def load(cls, path: str | Path) -> Self:
+        """Read a file of taps; see `read`."""
+        return cls.read(path)
+
+
+PROVENANCE = ("material", "profile_method", "photons", "seed", "version", "profile_sha256")
+
+
+def _convolved(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Convolve passes (P, C) and (Q, C) channel by channel."""
+    pairs = zip(first.T, second.T, strict=True)
+    return np.stack([np.convolve(a, b) for a, b in pairs], axis=1)
+
+
+def _checked(taps: Taps) -> dict[str, Any]:
+    """Return the fields as stored, or raise KernelError."""
+    check_label("method", taps.method, KernelError)
+    pitch = number_array("mm_per_pixel", taps.mm_per_pixel, KernelError)
+    if pitch.shape != () or not _MIN_MM <= pitch <= _MAX_MM:
+        raise KernelError(
+            f"mm_per_pixel = {shown(taps.mm_per_pixel)}; expected a length from {_MIN_MM:g} to "
+            f"{_MAX_MM:g} mm."
+        )
+    check_names(taps.channels, KernelError)
+    stages = tuple(_checked_stage(k, each, taps) for k, each in enumerate(taps.stages))
+    _check_levels(stages, chained=taps.chained)
+    blend = number_array("blend", taps.blend, KernelError)
+    expected = len(stages) + 1, len(taps.channels)
+    if blend.shape != expected:
+        raise KernelError(f"blend has shape {blend.shape}; expected {expected}.")
+    if not (np.abs(blend) <= _MAX).all():
+        raise KernelError(f"blend holds numbers that are not between -{_MAX:g} and {_MAX:g}.")
+    meta = json_object("meta", taps.meta, KernelError)
+    check_provenance(meta, KernelError)
+    return {
+        "mm_per_pixel": float(pitch),
+        "channels": tuple(taps.channels),
+        "stages": stages,
+        "blend": blend,
+        "errors": {name: _checked_error(name, taps) for name in ("spectral", "energy")},
+        "meta": meta,
+    }
+
+
+def _checked_error(name: str, taps: Taps) -> FloatArray:
+    values = number_array(f"errors.{name}", taps.errors[name], KernelError)
+    if values.shape != (len(taps.channels),):
+        raise KernelError(
+            f"errors.{name} has shape {values.shape}; expected {(len(taps.channels),)}."
+        )
+    return values
+
+
+def _checked_stage(k: int, stage: Stage, taps: Taps) -> Stage:
+    """Check the numbers of a stage, and return it with read-only arrays."""
+    path = f"stages[{k}]"
+    if stage.kind not in KINDS:
+        raise KernelError(f"{path}.kind = {shown(stage.kind)}; expected {' or '.join(KINDS)}.")
+    offsets = number_array(f"{path}.offsets_mm", stage.offsets_mm, KernelError)
+    weights = number_array(f"{path}.weights", stage.weights, KernelError)
+    many = 2 if stage.kind == "star" else min(max(offsets.size, 1), MOST_PAIRS)
+    if offsets.shape != (many,):
+        raise KernelError(
+            f"{path}.offsets_mm has shape {offsets.shape}; expected "
+            f"{'(2,)' if stage.kind == 'star' else f'1 to {MOST_PAIRS} offsets'}."
+        )
+    if not ((offsets >= _MIN_MM) & (offsets <= _MAX_MM)).all():
+        raise KernelError(f"{path}.offsets_mm = {shown(offsets.tolist())}; expected lengths in mm.")
+    if stage.kind == "pair" and (np.diff(offsets) <= 0.0).any():
+        raise KernelError(f"{path}.offsets_mm = {shown(offsets.tolist())}; expected rising ones.")
+    expected = many + 1, len(taps.channels)
+    if weights.shape != expected:
+        raise KernelError(f"{path}.weights has shape {weights.shape}; expected {expected}.")
+    sums = weights[0] + _COPIES[stage.kind] * weights[1:].sum(axis=0)
+    if not (np.abs(weights) <= _MAX).all() or not (np.abs(sums - 1.0) <= _ROUNDING).all():
+        raise KernelError(
+            f"{path}.weights add up to {shown(sums.tolist())} over all fetches; expected 1."
+        )
+    return dataclasses.replace(stage, level=int(stage.level), offsets_mm=offsets, weights=weights)
+
+
+def _check_levels(stages: tuple[Stage, ...], *, chained: bool) -> None:
+    """Check that every level has a stage, in order, and that terms have none but the first."""
+    if not 1 <= len(stages) <= MOST_STAGES:
+        raise KernelError(f"there are {len(stages)} stages; expected 1 to {MOST_STAGES}.")
+    levels = [each.level for each in stages]
+    rises = {b - a for a, b in zip([0, *levels], levels, strict=False)}
+    if not rises <= {0, 1} or max(levels) >= MOST_LEVELS:
+        raise KernelError(
+            f"the stages have the levels {shown(levels)}; expected 0 first, rising by at most 1, "
+            f"below {MOST_LEVELS}."
+        )
+    if not chained and any(levels):
+        raise KernelError(f"stages that read the irradiance have the level 0; found {levels}.")
+    if not chained and any(each.kind != "pair" for each in stages):
+        raise KernelError("stages that read the irradiance are pairs of passes; found a star.")

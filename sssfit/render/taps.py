@@ -1,0 +1,253 @@
+"""A table of taps on a flat picture, as a shader runs it.
+
+Bilinear fetches on a grid of texels are fixed weights, so a stage's pass is a short convolution.
+Halving takes the mean of 2 x 2 texels, one bilinear fetch at their corner; the sum of a halved
+level comes back by one bilinear fetch a pixel, which sees its texels with 3/4 and 1/4.
+
+With coverage A (1 on the object, averaged on the halved pictures) every pass and every change of
+level is sum w A E / sum w A: constant light stays constant to the object's border, and nothing
+comes in from outside it. The blend is not touched.
+"""
+
+import math
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from sssfit.errors import RenderError
+from sssfit.kernel.taps import Stage, Taps
+from sssfit.render.borders import check_channels, check_memory, source_indices
+from sssfit.render.separable import apply_passes
+from sssfit.scene.record import Scene
+
+FloatArray = npt.NDArray[np.floating[Any]]
+
+_Mode = Literal["reflect", "nearest", "constant"]
+_MODES: dict[str, _Mode] = {
+    "mirror": "reflect",
+    "clamp": "nearest",
+    "zero": "constant",
+}  # of scipy.ndimage
+
+
+def render_taps(
+    scene: Scene,
+    taps: Taps,
+    *,
+    border: str = "mirror",
+    coverage: npt.ArrayLike | None = None,
+    threads: int | None = None,
+    dtype: npt.DTypeLike = np.float64,
+) -> FloatArray:
+    """Blur irradiance by a table of taps.
+
+    Parameters
+    ----------
+    scene : Scene
+        A flat picture: only its irradiance and pixel size are used. Offsets in mm serve any pixel
+        size; the table is best at its own.
+    taps : Taps
+    border : str
+        One of ``sssfit.render.borders.BORDERS``.
+    coverage : array (H, W), optional
+        Part of each pixel that the object covers, 0 to 1; other pixels neither give nor show light.
+    threads : int, optional
+        Threads to use, by default all cores; the result does not depend on them.
+    dtype : float64 or float32
+        Precision of the pictures between the passes.
+
+    Returns
+    -------
+    array (H, W, C)
+        Radiant exitance, in the irradiance's unit.
+
+    Raises
+    ------
+    RenderError
+        Channels or coverage do not fit the picture, or a setting is invalid.
+    """
+    channels = len(taps.channels)
+    check_channels(scene.channels, channels)
+    precision = np.dtype(dtype)
+    if precision not in (np.float32, np.float64):
+        raise RenderError(f"dtype = {precision}; expected float32 or float64.")
+    size = scene.height, scene.width
+    check_memory(
+        6.0 * scene.height * scene.width * channels * precision.itemsize,
+        f"{scene.name}: {scene.height} x {scene.width} pixels",
+        "render a part of the picture",
+    )
+    pixels = np.empty((*size, channels), precision)
+    pixels[...] = scene.irradiance
+    passes = _Passes(border, threads, _checked(coverage, size, precision))
+    blend = taps.blend.astype(precision)
+    add_up = _chained if taps.chained else _unchained
+    return add_up(passes, pixels, taps, blend, scene.mm_per_pixel)
+
+
+def reach_pixels(taps: Taps, mm_per_pixel: float | None = None) -> int:
+    """Return how far light moves along an axis [pixels], with all changes of size."""
+    pitch_mm = mm_per_pixel or taps.mm_per_pixel
+    each = [
+        float(stage.offsets_mm.max()) / pitch_mm + 3.0 * 2.0**stage.level for stage in taps.stages
+    ]
+    return math.ceil(sum(each) if taps.chained else max(each))
+
+
+def response(taps: Taps, mm_per_pixel: float | None = None) -> npt.NDArray[np.float64]:
+    """Return what one lit pixel becomes, (2h+1, 2h+1, C), the pixel in the middle.
+
+    With halved pictures it depends on the pixel's place among their texels; this is the place of
+    the middle.
+    """
+    half = reach_pixels(taps, mm_per_pixel)
+    point = np.zeros((2 * half + 1, 2 * half + 1, 1))
+    point[half, half] = 1.0
+    seen = render_taps(Scene("a point", point, mm_per_pixel or taps.mm_per_pixel), taps)
+    return np.asarray(seen, dtype=np.float64)
+
+
+def _checked(
+    coverage: npt.ArrayLike | None, size: tuple[int, int], precision: np.dtype[Any]
+) -> FloatArray | None:
+    if coverage is None:
+        return None
+    covered = np.asarray(coverage, dtype=precision)
+    if covered.shape != size or not ((covered >= 0.0) & (covered <= 1.0)).all():
+        raise RenderError(
+            f"coverage of shape {covered.shape}; expected {size}, with numbers from 0 to 1."
+        )
+    return covered[..., None]
+
+
+def _unchained(
+    passes: "_Passes", pixels: FloatArray, taps: Taps, blend: FloatArray, pitch_mm: float
+) -> FloatArray:
+    """Add up stages that all read the irradiance."""
+    found: FloatArray = pixels * blend[0]
+    for stage, share in zip(taps.stages, blend[1:], strict=True):
+        found += share * passes.blurred(pixels, stage, pitch_mm)
+    return passes.shown(found)
+
+
+def _chained(
+    passes: "_Passes", pixels: FloatArray, taps: Taps, blend: FloatArray, pitch_mm: float
+) -> FloatArray:
+    """Add up stages that each read the one before, level by level."""
+    sums = [pixels * blend[0]]
+    levels = [passes]
+    current = pixels
+    for stage, share in zip(taps.stages, blend[1:], strict=True):
+        while len(levels) <= stage.level:
+            current, halved = levels[-1].halved(current)
+            levels.append(halved)
+            sums.append(np.zeros_like(current))
+        current = levels[-1].blurred(current, stage, pitch_mm * 2.0**stage.level)
+        sums[-1] += share * current
+    for fine in range(len(levels) - 2, -1, -1):
+        sums[fine] += levels[fine + 1].doubled(sums[fine + 1], sums[fine].shape[:2])
+    return passes.shown(sums[0])
+
+
+class _Passes:
+    """The passes on pictures of one size, with their border and coverage (H, W, 1)."""
+
+    def __init__(self, border: str, threads: int | None, coverage: FloatArray | None) -> None:
+        source_indices(1, 0, border)  # raises for an unknown border
+        self.border, self.threads, self.coverage = border, threads, coverage
+
+    def blurred(self, pixels: FloatArray, stage: Stage, mm_per_texel: float) -> FloatArray:
+        """Return the picture of a stage that reads ``pixels``."""
+        if stage.kind == "star":
+            return self._star(pixels, stage, mm_per_texel)
+        weights = stage.pass_weights(mm_per_texel)
+        if self.coverage is None:
+            ones = np.ones((1, weights.shape[1]))
+            return apply_passes(
+                pixels, weights[None], ones, border=self.border, threads=self.threads
+            )
+        across = self._divided(pixels, lambda each: self._line(each, weights, 1))
+        return self._divided(across, lambda each: self._line(each, weights, 0))
+
+    def _star(self, pixels: FloatArray, stage: Stage, mm_per_texel: float) -> FloatArray:
+        """Nine fetches in one pass: four diagonal ones are the product of two mirrored pairs."""
+        one = np.ones((1, stage.weights.shape[1]))
+        diagonal, axis = (stage.line(each[None], one, mm_per_texel) for each in stage.offsets_mm)
+        middle, corners, beside = stage.weights.astype(pixels.dtype)
+
+        def fetch(picture: FloatArray) -> FloatArray:
+            on_axes = self._line(picture, axis, 0) + self._line(picture, axis, 1)
+            on_diagonals = self._line(self._line(picture, diagonal, 1), diagonal, 0)
+            found: FloatArray = middle * picture + corners * on_diagonals + beside * on_axes
+            return found
+
+        return fetch(pixels) if self.coverage is None else self._divided(pixels, fetch)
+
+    def _line(self, pixels: FloatArray, weights: FloatArray, axis: int) -> FloatArray:
+        """Convolve every channel along an axis with weights (P, C)."""
+        found = np.empty((*pixels.shape[:2], weights.shape[1]), pixels.dtype)
+        for c in range(weights.shape[1]):
+            source = pixels[..., min(c, pixels.shape[2] - 1)]
+            ndimage.correlate1d(
+                source, weights[:, c], axis, found[..., c], mode=_MODES[self.border]
+            )
+        return found
+
+    def _divided(self, pixels: FloatArray, fetch: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        """Return fetches of light times coverage over those of coverage; 0 where it is 0."""
+        covered = np.broadcast_to(self.coverage, pixels.shape)  # type: ignore[arg-type]
+        light, part = fetch(pixels * covered), fetch(covered)
+        return np.divide(light, part, out=np.zeros_like(light), where=part > 0.0)
+
+    def halved(self, pixels: FloatArray) -> tuple[FloatArray, "_Passes"]:
+        """Return the picture of means of 2 x 2 texels, and the passes of its size.
+
+        The row or column that an odd size lacks is the border's.
+        """
+        if self.coverage is None:
+            return self._means(pixels), _Passes(self.border, self.threads, None)
+        part = self._means(self.coverage)
+        light = self._means(pixels * self.coverage)
+        covered = np.divide(light, part, out=np.zeros_like(light), where=part > 0.0)
+        return covered, _Passes(self.border, self.threads, part)
+
+    def _means(self, pixels: FloatArray) -> FloatArray:
+        for axis in (0, 1):
+            even, odd = self._beyond(pixels, axis, slice(0, None, 2), slice(1, None, 2))
+            pixels = 0.5 * (even + odd)
+        return pixels
+
+    def _beyond(self, pixels: FloatArray, axis: int, *parts: slice) -> list[FloatArray]:
+        """Return parts of the picture, continued along an axis to an even number of texels."""
+        size = pixels.shape[axis]
+        places = source_indices(size, 1, self.border)[1 : size + 1 + size % 2]
+        black = np.zeros_like(pixels.take([0], axis))
+        continued = np.concatenate((pixels, black), axis)  # a border's place n is black
+        return [continued.take(places[each], axis) for each in parts]
+
+    def doubled(self, pixels: FloatArray, size: tuple[int, int]) -> FloatArray:
+        """Return a picture of twice the size by bilinear fetches."""
+        if self.coverage is None:
+            return self._enlarged(pixels, size)
+        light = self._enlarged(pixels * self.coverage, size)
+        part = self._enlarged(self.coverage, size)
+        return np.divide(light, part, out=np.zeros_like(light), where=part > 0.0)
+
+    def _enlarged(self, pixels: FloatArray, size: tuple[int, int]) -> FloatArray:
+        for axis in (0, 1):
+            count = pixels.shape[axis]
+            places = source_indices(count, 1, self.border)
+            continued = np.concatenate((pixels, np.zeros_like(pixels.take([0], axis))), axis)
+            lower, upper = (continued.take(places[k : k + count], axis) for k in (0, 2))
+            fine = np.stack((0.75 * pixels + 0.25 * lower, 0.75 * pixels + 0.25 * upper), axis + 1)
+            shape = list(pixels.shape)
+            shape[axis] = 2 * count
+            pixels = fine.reshape(shape).take(np.arange(size[axis]), axis)
+        return pixels
+
+    def shown(self, pixels: FloatArray) -> FloatArray:
+        """Return the sum, black outside the object."""
+        return pixels if self.coverage is None else np.where(self.coverage > 0.0, pixels, 0.0)
