@@ -73,6 +73,11 @@ def skin1_figure(skin1):
     return profile_figure(skin1)
 
 
+@pytest.fixture(scope="module")
+def skin1_again(skin1):
+    return profile_figure(skin1)
+
+
 def steps(axes, *, filled):
     """The curves of a panel, or its bands."""
     return [each for each in axes.patches if isinstance(each, StepPatch) and each.fill == filled]
@@ -251,9 +256,9 @@ def test_no_text_is_cut_off_or_runs_into_another(name):
 
 
 @pytest.mark.parametrize("format", FORMATS)
-def test_same_profile_gives_same_bytes_in_every_format(skin1, skin1_figure, tmp_path, format):
+def test_same_profile_gives_same_bytes_in_every_format(skin1_figure, skin1_again, tmp_path, format):
     written = []
-    for k, figure in enumerate((skin1_figure, profile_figure(skin1))):
+    for k, figure in enumerate((skin1_figure, skin1_again)):
         path = tmp_path / f"{k}.{format}"
         save_figure(figure, path)
         written.append(path.read_bytes())
