@@ -14,7 +14,8 @@ import pytest
 from reference_pixels import one_over_r_profile
 
 from sssfit.fit import _by_hand, artist, burley, falloff, guided, weighted
-from sssfit.fit._chain import Chain
+from sssfit.fit._chain_pairs import PairChain
+from sssfit.fit._chain_stars import StarChain
 from sssfit.fit._gaussians_search import make_annuli
 from sssfit.fit._spectrum import spectral_target
 from sssfit.fit._target import Target
@@ -231,11 +232,14 @@ def shape_of_burley(monkeypatch) -> Pair:
     )
 
 
-def misfit_of_a_chain(_) -> Pair:
-    half, pairs = 20, parse("1-2|1")
-    profile = one_over_r_profile(60, 0.1, [0.3, 0.6])
-    chain = Chain(spectral_target(Target(profile, 0.3, half), [0, 1], "natural"), pairs)
-    return of_value("_chain.py", chain.value_and_gradient, chain.start(numbers()))
+def misfit_of_a_chain(file: str, kind: type, structure: str) -> Callable:
+    def make(_) -> Pair:
+        profile = one_over_r_profile(60, 0.1, [0.3, 0.6])
+        target = spectral_target(Target(profile, 0.3, 20), [0, 1], "natural")
+        chain = kind(target, parse(structure))
+        return of_value(file, chain.value_and_gradient, chain.start(numbers()))
+
+    return make
 
 
 def misfit_of_weighted_terms(monkeypatch) -> Pair:
@@ -251,7 +255,8 @@ def misfit_of_weighted_terms(monkeypatch) -> Pair:
 
 PAIRS = {
     "misfit of weighted terms": misfit_of_weighted_terms,
-    "misfit of a chain": misfit_of_a_chain,
+    "misfit of pairs": misfit_of_a_chain("_chain_pairs.py", PairChain, "1-2|1"),
+    "misfit of stars": misfit_of_a_chain("_chain_stars.py", StarChain, "*|1-*"),
     "Gaussians over pixels": gaussians_over_pixels,
     "a pass of unit sum": a_pass_of_unit_sum,
     "misfit of a line": misfit_of_a_line,
@@ -308,7 +313,7 @@ def test_a_wrong_adjoint_is_seen(monkeypatch):
 
 
 def test_every_file_that_writes_derivatives_has_a_pair(monkeypatch):
-    """``_nlopt`` and ``cascade`` hand on what they are given."""
+    """``_nlopt`` and ``cascade`` hand on what they are given, ``_chain`` from its two kinds."""
     folder = Path(artist.__file__).parent
     words = ("gradient", "derivative", "jacobian", "slope")
     written = {
@@ -317,4 +322,4 @@ def test_every_file_that_writes_derivatives_has_a_pair(monkeypatch):
         if any(word in path.read_text(encoding="utf-8") for word in words)
     }
     tested = {make(monkeypatch).file for make in PAIRS.values()}
-    assert written - {"_nlopt.py", "cascade.py"} == tested
+    assert written - {"_nlopt.py", "cascade.py", "_chain.py"} == tested

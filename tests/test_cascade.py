@@ -10,7 +10,8 @@ from reference_pixels import one_over_r_profile
 from sssfit import fit
 from sssfit.errors import FitError
 from sssfit.fit import cascade, fit_taps, make_target
-from sssfit.fit._chain import Chain
+from sssfit.fit._chain_pairs import PairChain
+from sssfit.fit._chain_stars import StarChain
 from sssfit.fit._spectrum import graded_frequencies, spectral_target
 from sssfit.kernel import Taps
 from sssfit.kernel.structure import cost_of_chain, parse, text_of
@@ -32,14 +33,15 @@ def skin1():
 def chain_of(profile, structure, spectrum="natural", support_mm=9.0):
     target = make_target(profile, 0.3, support_mm)
     lit = list(range(profile.n_channels))
-    return Chain(spectral_target(target, lit, spectrum), parse(structure))
+    kind = StarChain if "*" in structure else PairChain
+    return kind(spectral_target(target, lit, spectrum), parse(structure))
 
 
 def taps_of(chain, x, pitch=0.3):
     """The table of taps of some parameters."""
     numbers = chain.numbers(x)
     stages = tuple(
-        cascade.Stage(shape.level, "pair", offsets * pitch * 2.0**shape.level, weights)
+        cascade.Stage(shape.level, shape.kind, offsets * pitch * 2.0**shape.level, weights)
         for shape, offsets, weights in zip(
             chain.shapes, numbers.offsets, numbers.weights, strict=True
         )
@@ -53,7 +55,7 @@ def taps_of(chain, x, pitch=0.3):
 # The spectrum
 
 
-@pytest.mark.parametrize("structure", ["1-2", "1|1", "2|1-1", "1|1|1"])
+@pytest.mark.parametrize("structure", ["1-2", "1|1", "2|1-1", "1|1|1", "*", "1|*-1", "*|*"])
 def test_the_spectrum_is_that_of_points_at_all_places(skin1, structure):
     """Halving sees a point by its place among the texels; the fit is to the mean over places."""
     chain = chain_of(skin1, structure)
@@ -99,7 +101,7 @@ def test_weights_of_the_spectra(skin1):
     assert cell.sum() == pytest.approx(np.pi, rel=0.02)
 
 
-@pytest.mark.parametrize("structure", ["1", "1-2", "1|1-2", "1|2|1"])
+@pytest.mark.parametrize("structure", ["1", "1-2", "1|1-2", "1|2|1", "*", "*|1-*", "2|*-*"])
 def test_derivatives_are_those_of_differences(skin1, structure):
     chain = chain_of(skin1, structure)
     x = chain.start(np.random.default_rng(3))
@@ -113,9 +115,10 @@ def test_derivatives_are_those_of_differences(skin1, structure):
         assert gradient[k] == pytest.approx((after - before) / 2e-5, abs=1e-8, rel=1e-6)
 
 
-def test_the_matrix_is_that_of_the_residuals_slopes(skin1):
+@pytest.mark.parametrize("structure", ["1|1-2", "*|1-*"])
+def test_the_matrix_is_that_of_the_residuals_slopes(skin1, structure):
     """Twice the slopes of the weighted spectrum times themselves: Gauss and Newton."""
-    chain = chain_of(skin1, "1|1-2")
+    chain = chain_of(skin1, structure)
     x = chain.start(np.random.default_rng(4))
     root, rows = np.sqrt(chain.target.power), []
     for k in range(chain.size):
@@ -126,9 +129,22 @@ def test_the_matrix_is_that_of_the_residuals_slopes(skin1):
     np.testing.assert_allclose(chain.hessian(x), 2 * np.array(rows) @ np.array(rows).T, atol=1e-8)
 
 
-def test_an_offset_beyond_the_kernel_is_held_back(skin1):
+def test_pairs_are_the_same_in_one_dimension_and_in_two(skin1):
+    one = chain_of(skin1, "1|1-2")
+    two = StarChain(one.target, one.shapes)
+    x = one.start(np.random.default_rng(6))
+    for ours, theirs in zip(
+        (*one.misfit(x), one.matrix(x), one.spectrum(x)),
+        (*two.misfit(x), two.matrix(x), two.spectrum(x)),
+        strict=True,
+    ):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize("structure", ["1|1", "*|*"])
+def test_an_offset_beyond_the_kernel_is_held_back(skin1, structure):
     """The graded frequencies cannot tell it from one inside."""
-    chain = chain_of(skin1, "1|1")
+    chain = chain_of(skin1, structure)
     x = chain.start(np.random.default_rng(5))
     last = chain.step_parameters[-1]
     half = make_target(skin1, 0.3, 9.0).half_pixels
@@ -281,7 +297,6 @@ def test_known_structures_leave_what_is_said_of_them(skin1, text):
         ({"fetches": 10, "stages": "1-1|2-2"}, "the stages 1-1|2-2 take"),
         ({"stages": "1-1|2-2", "passes": 6}, "allow more, or use fewer or smaller stages"),
         ({"stages": "1-x"}, "stages = '1-x'; expected numbers of tap pairs"),
-        ({"stages": "*|1"}, "has a star; this fit makes pairs of passes"),
         ({"passes": 1}, "no cascade has at most 1 passes"),
         ({"spectrum": "pink"}, "spectrum = 'pink'; expected 'natural' or 'white'"),
         ({"stages": "1", "mm_per_pixel": -1.0}, "mm_per_pixel = -1"),
@@ -332,7 +347,7 @@ def test_skin1_is_as_near_as_was_asked(skin1, budget, most):
 @pytest.mark.slow
 def test_no_start_of_64_is_much_better(skin1):
     target = make_target(skin1, 0.3, cascade._reach_mm(skin1, 0.3))
-    chain = Chain(spectral_target(target, [0, 1, 2], "natural"), parse("1-1|2-2|2-2"))
+    chain = PairChain(spectral_target(target, [0, 1, 2], "natural"), parse("1-1|2-2|2-2"))
     ours = (fit(skin1, "cascade").errors["spectral"] ** 2).sum()
     best = np.inf
     for seed in range(64):

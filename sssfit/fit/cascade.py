@@ -22,6 +22,8 @@ from scipy import optimize
 from sssfit.arrays import FloatArray
 from sssfit.errors import FitError, KernelError
 from sssfit.fit._chain import Chain
+from sssfit.fit._chain_pairs import PairChain
+from sssfit.fit._chain_stars import StarChain
 from sssfit.fit._result import TapsFit, provenance
 from sssfit.fit._spectrum import spectral_target
 from sssfit.fit._target import Pitch, Target, make_target, pitch_of
@@ -126,7 +128,8 @@ def fit_cascade(
     target = make_target(profile, mm_per_pixel, support_mm)
     lit = [int(c) for c in np.flatnonzero(~target.is_empty)]
     with one_blas_thread():
-        chain = Chain(spectral_target(target, lit, spectrum), shapes)
+        kind = StarChain if any(each.kind == "star" for each in shapes) else PairChain
+        chain = kind(spectral_target(target, lit, spectrum), shapes)
         x, evaluations = _search(chain, seed)
         error = chain.target.error(chain.spectrum(x))
     settings = {
@@ -196,12 +199,9 @@ def structure_for(
 
 def _parsed(stages: str) -> tuple[Shape, ...]:
     try:
-        shapes = parse(stages)
+        return parse(stages)
     except KernelError as error:
         raise FitError(str(error)) from None
-    if any(each.kind != "pair" for each in shapes):
-        raise FitError(f"stages = {shown(stages)} has a star; this fit makes pairs of passes.")
-    return shapes
 
 
 def _search(chain: Chain, seed: int) -> tuple[FloatArray, int]:
@@ -277,7 +277,7 @@ def _taps(
     stages = [
         Stage(
             shape.level,
-            "pair",
+            shape.kind,
             offsets * target.mm_per_pixel * 2.0**shape.level,
             weights[:, source],
         )
