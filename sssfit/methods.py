@@ -318,10 +318,11 @@ TAPS: Mapping[str, Method] = {
             Setting(
                 "stages",
                 "text",
-                "tap pairs a pass of each stage, such as 1-1|2-2|2-2; | halves the picture.",
+                "tap pairs a pass of each stage, or * for nine fetches in one pass, such as 1-1|2-2|2-2; "
+                "| halves the picture.",
                 "STAGES",
             ),
-            Setting("passes", "whole", "most passes of the stages.", "N", (2, 1000)),
+            Setting("passes", "whole", "most passes of the stages.", "N", (1, 1000)),
             Setting("full_resolution", "flag", "do not halve the picture."),
             _SPECTRUM,
         ),
