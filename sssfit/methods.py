@@ -94,7 +94,7 @@ class Method:
         words = [known[name] for name in self.counted[-1:]]
         value = [given[name] for name in self.counted if name in given] + [*words, ""]
         text = f"{value[0]:g}" if isinstance(value[0], float) else str(value[0])
-        return text.replace("|", "_")  # no file of Windows may have a bar in its name
+        return text.replace("|", "_").replace("*", "x")  # as file names of Windows may have it
 
 
 DEON_SKIN = "deon-skin"  # a profile that is made without a material
@@ -318,8 +318,8 @@ TAPS: Mapping[str, Method] = {
             Setting(
                 "stages",
                 "text",
-                "tap pairs a pass of each stage, or * for nine fetches in one pass, such as 1-1|2-2|2-2; "
-                "| halves the picture.",
+                "tap pairs a pass of each stage, or * for nine fetches in one pass, such as "
+                "1-1|2-2|2-2; | halves the picture.",
                 "STAGES",
             ),
             Setting("passes", "whole", "most passes of the stages.", "N", (1, 1000)),
