@@ -25,7 +25,7 @@ from sssfit.fit._chain import Chain
 from sssfit.fit._chain_pairs import PairChain
 from sssfit.fit._chain_stars import StarChain
 from sssfit.fit._result import TapsFit, provenance
-from sssfit.fit._spectrum import SpectralTarget, spectral_target
+from sssfit.fit._spectrum import spectral_target
 from sssfit.fit._target import Pitch, Target, make_target, pitch_of
 from sssfit.kernel.structure import Shape, cost_of_chain, parse
 from sssfit.kernel.taps import Stage, Taps
@@ -82,7 +82,6 @@ STRUCTURES: Mapping[str, float] = {
     "1-1-1-1-2-2-2": 0.288,
 }
 _KEPT, _MOST_PIXELS = 0.9999, 320
-_TRIED = 3  # known structures of a budget that are fitted roughly
 _STARTS = 4
 # Standard deviations of the hops, in logarithms of offset steps: past the texel at which a local
 # optimum ends.
@@ -134,16 +133,15 @@ def fit_cascade(
         The budget, structure, profile, pixel size or support is invalid.
     """
     begun = time.perf_counter()
-    known = structures_for(fetches, stages, passes, full_resolution=full_resolution)
+    shapes = structure_for(fetches, stages, passes, full_resolution=full_resolution)
     support_mm = _reach_mm(profile, mm_per_pixel) if support_mm is None else support_mm
     target = make_target(profile, mm_per_pixel, support_mm)
     lit = [int(c) for c in np.flatnonzero(~target.is_empty)]
     with one_blas_thread():
-        wanted = spectral_target(target, lit, spectrum)
-        chains = [_chain(wanted, shapes) for shapes in known[:_TRIED]]
-        chain = min(chains, key=lambda each: _tried(each, seed)) if len(chains) > 1 else chains[0]
+        kind = StarChain if any(each.kind == "star" for each in shapes) else PairChain
+        chain = kind(spectral_target(target, lit, spectrum), shapes)
         x, evaluations = _search(chain, seed)
-        error = wanted.error(chain.spectrum(x))
+        error = chain.target.error(chain.spectrum(x))
     settings = {
         "fetches": fetches,
         "stages": stages,
@@ -167,14 +165,14 @@ def _reach_mm(profile: Profile, mm_per_pixel: Pitch | None) -> float:
     return min(reach_mm, _MOST_PIXELS * pitch_of(profile, mm_per_pixel))
 
 
-def structures_for(
+def structure_for(
     fetches: float | None,
     stages: str | None,
     passes: int | None,
     *,
     full_resolution: bool = False,
-) -> list[tuple[Shape, ...]]:
-    """Return the structure asked for, or the known ones within a budget, the best of skin1 first.
+) -> tuple[Shape, ...]:
+    """Return the structure asked for, or the best known one within a budget.
 
     Raises
     ------
@@ -196,7 +194,7 @@ def structures_for(
                 f"the stages {stages} take {cost.fetches:.4g} fetches and {cost.passes} passes; "
                 "allow more, or use fewer or smaller stages."
             )
-        return [shapes]
+        return shapes
     fitting = [
         text
         for text in STRUCTURES
@@ -209,7 +207,7 @@ def structures_for(
             f"no known cascade has at most {shown(budget)} fetches and {shown(passes)} passes; "
             "allow more of either."
         )
-    return [parse(text) for text in sorted(fitting, key=STRUCTURES.__getitem__)]
+    return parse(min(fitting, key=STRUCTURES.__getitem__))
 
 
 def _parsed(stages: str) -> tuple[Shape, ...]:
@@ -217,19 +215,6 @@ def _parsed(stages: str) -> tuple[Shape, ...]:
         return parse(stages)
     except KernelError as error:
         raise FitError(str(error)) from None
-
-
-def _chain(wanted: SpectralTarget, shapes: tuple[Shape, ...]) -> Chain:
-    kind = StarChain if any(each.kind == "star" for each in shapes) else PairChain
-    return kind(wanted, shapes)
-
-
-def _tried(chain: Chain, seed: int) -> float:
-    """Return the misfit of a rough search, which ranks the structures of a budget."""
-    rng = np.random.default_rng([seed])
-    starts = [_rough(chain, chain.start(rng)) for _ in range(3)]
-    best = min(starts, key=lambda each: each.fun)
-    return float(_descend(chain, best.x, 40).fun)
 
 
 def _search(chain: Chain, seed: int) -> tuple[FloatArray, int]:
