@@ -23,6 +23,8 @@ RIVALS = [
     ("gaussians", {"terms": 3, "signed": True}, 3),
     ("gaussians", {"terms": 3, "free_energy": True}, 3),
     ("gaussians", {"terms": 2, "signed": True, "free_energy": True}, 2),
+    *(("weighted", {"rank": n}, n) for n in (1, 3)),
+    ("weighted", {"rank": 2, "spectrum": "white"}, 2),
     ("preintegrated", {}, 1),
     ("guided", {"k": 0.0}, 1),
     ("guided", {"k": 4.0}, 1),

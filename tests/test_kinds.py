@@ -8,6 +8,7 @@ import pytest
 import sssfit
 from sssfit.errors import FileError, SssfitError
 from sssfit.export.summary import figures_of, summary
+from sssfit.fit import fit_taps
 from sssfit.kernel import SeparableKernel
 from sssfit.kinds import KINDS, load
 from sssfit.simulate import simulate_to_files
@@ -19,6 +20,7 @@ def files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("kinds")
     world.profile().save(folder / "profile")
     world.kernel().save(folder / "kernel")
+    fit_taps(world.profile(), stages="1", mm_per_pixel=0.6).kernel.save(folder / "taps")
     (folder / "material").write_text(world.WAX)
     asked = iter([False] * 6)
     settings = {"photons": 10**9, "threads": 1, "dr_mm": 0.4, "radius_mm": 8.0}

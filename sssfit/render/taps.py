@@ -15,7 +15,6 @@ from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
 
 from sssfit.errors import RenderError
 from sssfit.kernel.taps import Stage, Taps
@@ -188,6 +187,8 @@ class _Passes:
 
     def _line(self, pixels: FloatArray, weights: FloatArray, axis: int) -> FloatArray:
         """Convolve every channel along an axis with weights (P, C)."""
+        from scipy import ndimage  # .1 s that most tables of taps do not need
+
         found = np.empty((*pixels.shape[:2], weights.shape[1]), pixels.dtype)
         for c in range(weights.shape[1]):
             source = pixels[..., min(c, pixels.shape[2] - 1)]
