@@ -13,6 +13,7 @@ from sssfit.fit import cascade, fit_taps, make_target
 from sssfit.fit._chain_pairs import PairChain
 from sssfit.fit._chain_stars import StarChain
 from sssfit.fit._spectrum import graded_frequencies, spectral_target
+from sssfit.grid import paper_grid
 from sssfit.kernel import Taps
 from sssfit.kernel.structure import cost_of_chain, parse, text_of
 from sssfit.material import load_material
@@ -23,6 +24,7 @@ from sssfit.render.taps import render_taps
 from sssfit.scene.made import make_scene
 from sssfit.scene.record import Scene
 from sssfit.simulate import simulate_exact
+from sssfit.simulate.truth import exact_with_all_light
 
 
 @pytest.fixture(scope="module")
@@ -343,6 +345,22 @@ def test_skin1_is_as_near_as_was_asked(skin1, budget, most):
     taps = fit(skin1, "cascade", fetches=budget)
     assert taps.fetches <= budget
     assert mean_p99(taps, skin1) <= most
+
+
+@pytest.mark.slow
+def test_skin1_at_a_tenth_of_a_millimetre_is_as_near_as_was_asked(skin1):
+    taps = fit(skin1, "cascade", fetches=24, mm_per_pixel=0.1)
+    assert mean_p99(taps, skin1, size=512) <= 0.2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "most"), [("marble", 0.25), ("ketchup", 0.35), ("chicken1", 0.7), ("skimmilk", 0.5)]
+)
+def test_other_materials_are_as_near_as_was_asked(name, most):
+    material = load_material(name)
+    profile = exact_with_all_light(material, paper_grid(material), 150.0)
+    assert mean_p99(fit(profile, "cascade", fetches=24), profile) <= most
 
 
 @pytest.mark.slow
