@@ -749,13 +749,14 @@ def taps() -> Taps:
             np.array([[0.2, 0.4, 0.6], [0.15, 0.1, 0.07], [0.05, 0.05, 0.03]]),
         ),
     )
+    shares = np.array([[0.1, 0.2, 0.05], [0.2, 0.1, 0.25], [0.3, 0.45, 0.4], [0.4, 0.25, 0.3]])
     return Taps(
         method="cascade",
         mm_per_pixel=0.3,
         channels=own.channels,
         chained=True,
         stages=stages,
-        blend=np.outer([0.1, 0.2, 0.3, 0.4], own.diffuse_reflectance),
+        blend=shares * own.diffuse_reflectance,
         errors={"spectral": np.array([0.012, 0.0345, 0.0678]), "energy": np.zeros(3)},
         meta={
             "material": "wax",

@@ -6,7 +6,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from sssfit.messages import Columns, Part, by_channel, number, report
+from sssfit.messages import Columns, Part, by_channel, report
 
 _FIGURES = {"p95": "95th percentile", "p99": "99th percentile", "mean": "mean"}
 
@@ -128,15 +128,12 @@ def _taps_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     """Return the shares of the energy that the irradiance and each stage have, by channel."""
     energy, rows = figures["energy"], figures["stage_energy"]
     shares = [
-        ", ".join(
-            number(each / total if total else 0.0, ".3g%")
-            for each, total in zip(row, energy, strict=True)
-        )
+        [each / total if total else 0.0 for each, total in zip(row, energy, strict=True)]
         for row in rows
     ]
     return {
         "stages": ["irradiance", *map(str, range(1, len(rows)))],
-        "shares": [", ".join(each) for each in shares],
+        "shares": [by_channel(figures["channels"], row, ".3g%") for row in shares],
     }
 
 
