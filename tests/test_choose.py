@@ -16,7 +16,7 @@ import sssfit.simulate.truth as all_light
 from sssfit.choose import truth as photon_walks
 from sssfit.choose.choice import choose, is_exact, mm_per_pixel_at
 from sssfit.choose.options import SHARES, Option, options, supports
-from sssfit.choose.report import step_line
+from sssfit.choose.report import sentences, step_line
 from sssfit.choose.truth import material_of, photons_needed
 from sssfit.choose.views import TOLERANCES, Views, checked_scene, head_scenes
 from sssfit.compare.candidates import candidates
@@ -540,3 +540,10 @@ def test_half_widths_are_those_of_the_pixels_asked_for():
     figures = dict.fromkeys(COLOUR_FIGURES, 0.25)
     step = rooms.Step(option, 22, 0.25, **figures, mm_per_pixel=1.6, within=True)
     assert f"{step.label} on 11 pixels (+-2.5 mm): 22 weights" in step_line(step)
+
+
+@pytest.mark.parametrize("names", [("guided",), ("guided", "svd")])
+def test_what_cannot_be_fitted_is_named(choice, names):
+    said = sentences(replace(choice, unfitted=names))
+    assert f"cannot be fitted to this profile: {', '.join(names)}" in said
+    assert not any("cannot be fitted" in each for each in sentences(replace(choice, unfitted=())))
