@@ -1058,9 +1058,21 @@ COMMANDS = {
     "show": "show",
 }
 
+
+def _seeded_taps(seed: int) -> Any:
+    found = fit.fit_taps(profile(), stages="1-1", mm_per_pixel=0.6, seed=seed).kernel
+    return [found.structure, found.mm_per_pixel, found.blend]
+
+
 # Where --seed has something to do; elsewhere nothing is random and results do not depend on it.
 SEEDS = {
     "simulate": Row(_WALK, "--seed 5", calls, lambda: _walk(seed=5)),
+    "fit --method cascade": Row(
+        "fit wax.profile.npz --method cascade --stages 1-1 --mm-per-pixel .6",
+        "--seed 5",
+        lambda ran: ran.taps,
+        lambda: _seeded_taps(5),
+    ),
     "render": Row(
         f"render --irradiance noise {_SIZE}",
         "--seed 5",
