@@ -572,6 +572,7 @@ COMPARE = [
     C(f"compare plate.toml --picture disk {TINY}"),
     C(f"compare deon-skin --picture disk {TINY} --what front"),
     C(f"compare deon-skin --what budget --picture disk {TINY}"),
+    C(f"compare - --what budget --picture disk {TINY}", stdin="mono.profile.npz"),
     C(f"compare wax.profile.npz --what budget --picture disk {TINY}"),
     C("compare plate.toml --what budget --picture disk --size 20x20"),
     C("compare"),

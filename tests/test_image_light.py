@@ -209,8 +209,10 @@ def test_chromaticities_of_a_png(tmp_path):
     plain = load_bytes(tmp_path, png([row], width=2))
     wanted = plain.pixels @ other_library("ITU-R BT.2020").T
     np.testing.assert_allclose(found.pixels, wanted, atol=1e-6)
-    overruled = load_bytes(tmp_path, png([row], width=2, extra=[chrm, (b"sRGB", b"\0")]))
-    assert np.array_equal(overruled.pixels, plain.pixels)
+    for other in ((b"sRGB", b"\0"), (b"cICP", bytes([1, 13, 0, 1]))):
+        for chunks in ([chrm, other], [other, chrm]):
+            overruled = load_bytes(tmp_path, png([row], width=2, extra=chunks))
+            assert np.array_equal(overruled.pixels, plain.pixels)
 
 
 def radiance(tmp_path, *lines):
