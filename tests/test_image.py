@@ -263,6 +263,13 @@ def test_a_file_that_says_it_is_linear_stays_so(tmp_path):
     found = load_bytes(tmp_path, png([bytes([51])], width=1, colour=0, extra=[linear]))
     assert found.pixels.item() == 0.2
     assert found.notes == ("8-bit, linear as the file says",)
+    with_alpha = png([bytes([51, 102, 153, 204])], width=1, colour=6, extra=[linear])
+    found = load_bytes(tmp_path, with_alpha)
+    np.testing.assert_allclose(found.pixels[0, 0], [0.2, 0.4, 0.6], rtol=1e-12)
+    assert found.notes == (
+        "alpha kept apart, colour used as stored, without it",
+        "8-bit, linear as the file says",
+    )
 
 
 @pytest.mark.parametrize("kind", [np.float16, np.float32, np.float64])
