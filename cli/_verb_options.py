@@ -141,7 +141,7 @@ FIT_PIXELS = (
     option("--mm-per-pixel", Length("profile"), "MM|profile", "Size of a pixel of the kernel; "
            "profile is the width of the profile's first annulus.  [default: 0.3]"),
     option("--support", Length("auto"), "MM|auto", "Half width of the kernel; auto is the "
-           "smallest that keeps 99.9 % of every channel.", "auto"),
+           "smallest that keeps 99.9 % of every channel, for cascade 99.99 %.", "auto"),
     flag("--normalize", "Scale every channel to unit energy, and store its energy as a factor."),
 )
 FIT_OUTPUT = output("PROFILE.METHOD.kernel.json, .taps.json for cascade", "is not our kernel")

@@ -1,4 +1,4 @@
-"""``sssfit fit``: a profile to a separable kernel."""
+"""``sssfit fit``: a profile to a separable kernel or a table of taps."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ._verb_options import FIT_OUTPUT, FIT_PIXELS
 @common_options
 @click.pass_context
 def fit(context: click.Context, /, profile: str | None, common: Common, **given: Any) -> None:
-    """Fit a separable kernel to PROFILE and write it.
+    """Fit a kernel to PROFILE and write it: separable, or a table of taps by cascade.
 
     PROFILE is a .profile.npz file, or - for stdin; by default the newest in this folder. A kernel
     is made for one pixel size, because its weights are energies of pixels of --mm-per-pixel. The
@@ -30,6 +30,7 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
 
     \b
       sssfit fit --method svd --rank 3
+      sssfit fit --method cascade --fetches 24
       sssfit fit skin1.exact.profile.npz --method gaussians --terms 6 --mm-per-pixel 0.1
       sssfit fit --method artist --target picture
       sssfit fit --method falloff --width .014 --strength .78,.70,.75 --falloff .57,.13,.08

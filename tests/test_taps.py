@@ -1,7 +1,9 @@
 """Tables of taps: the record, its file, its cost, and what a shader would render with it."""
 
+import copy
 import io
 import json
+import pickle
 from pathlib import Path
 
 import jsonschema
@@ -203,12 +205,59 @@ def test_stages_of_terms_are_pairs_on_the_full_picture():
         taps_of("*", chained=False)
 
 
+def test_it_survives_pickling_and_copying():
+    taps = taps_of("1|*")
+    for other in (pickle.loads(pickle.dumps(taps)), copy.deepcopy(taps)):
+        assert bytes_of(other) == bytes_of(taps)
+    with pytest.raises(TypeError):
+        taps.errors["energy"] = np.zeros(2)
+
+
+PYTHON = {
+    "errors": ({"energy": np.zeros(2)}, "expected spectral and energy"),
+    "stages": (None, "stages = None; expected a list of stages"),
+    "chained": (3, "chained = 3; expected True or False"),
+    "mm_per_pixel": ("a", "mm_per_pixel is not an array of numbers"),
+    "blend": ([[1.0, 1.0]], r"blend has shape (1, 2); expected (5, 2)"),
+}
+
+
+@pytest.mark.parametrize("name", PYTHON)
+def test_a_record_made_wrongly_is_one_line(name):
+    value, expected = PYTHON[name]
+    with pytest.raises(KernelError) as caught:
+        taps_of(**{name: value})
+    assert expected in str(caught.value)
+    with pytest.raises(KernelError, match=r"stages\[0\] = 1; expected a Stage"):
+        taps_of(stages=(1,))
+
+
+def test_a_name_of_two_lines_stays_on_one():
+    for read in (Taps.load, read_kernel):
+        with pytest.raises(KernelError) as caught:
+            read("no\nthing.taps.json")
+        assert "\n" not in str(caught.value)
+    with pytest.raises(KernelError, match=r"^two\\nlines: not a kernel"):
+        read_kernel(io.BytesIO(b"x"), "two\nlines")
+
+
+def test_a_stream_that_cannot_be_read_is_one_line():
+    class Broken(io.RawIOBase):
+        def read(self, _size=-1):
+            raise OSError(5, "Input/output error")
+
+    with pytest.raises(KernelError, match="the kernel: input/output error"):
+        read_kernel(Broken())
+
+
 def test_its_words():
     taps = taps_of()
     assert repr(taps) == (
         "<Taps of wax by test, 1-2|1|1, 22.69 fetches of 0.3 mm pixels: error c0 1 %, c1 1 %>"
     )
     assert taps.figures()["fetches"] == 22.6875
+    with pytest.raises(KernelError, match="texel = 'byte'; expected float32, half, r11g11b10"):
+        taps.bytes_per_pixel("byte")
     assert taps.bytes_per_pixel("float32") == 2 * taps.bytes_per_pixel("half")
 
 

@@ -310,19 +310,27 @@ _CHANNELS = Columns(
 )
 
 
-def kernel_page(figures: Figures) -> str:
-    """Return a kernel's figures as a report."""
-    sha, rank = figures["profile_sha256"], figures["rank"]
-    told = {
+def _made_of(figures: Figures) -> dict[str, Any]:
+    """Return figures with the words of their provenance."""
+    sha = figures["profile_sha256"]
+    return {
         **figures,
         "material": _name(figures["material"], "unknown material"),
         "origin": _name(figures["profile_method"], "unknown"),
         "walks": _walks(figures),
         "sha": f", sha256 {sha[:16]}" if sha else "",
         "method": _name(figures["method"]),
+        "version": _name(figures["version"], "version unknown"),
+    }
+
+
+def kernel_page(figures: Figures) -> str:
+    """Return a kernel's figures as a report."""
+    rank = figures["rank"]
+    told = {
+        **_made_of(figures),
         "plural": "s" if rank > 1 else "",
         "pairs": _pairs(figures["settings"], ", "),
-        "version": _name(figures["version"], "version unknown"),
     }
     terms = [
         [
@@ -365,16 +373,10 @@ _TAPS_CHANNELS = Columns(
 
 def taps_page(figures: Figures) -> str:
     """Return the figures of a table of taps as a report."""
-    sha, settings = figures["profile_sha256"], figures["settings"]
+    settings = figures["settings"]
     told = {
-        **figures,
-        "material": _name(figures["material"], "unknown material"),
-        "origin": _name(figures["profile_method"], "unknown"),
-        "walks": _walks(figures),
-        "sha": f", sha256 {sha[:16]}" if sha else "",
-        "method": _name(figures["method"]),
+        **_made_of(figures),
         "pairs": _pairs({key: each for key, each in settings.items() if each is not None}, ", "),
-        "version": _name(figures["version"], "version unknown"),
         "reads": "each reads the one before" if figures["chained"] else "all read the irradiance",
     }
     names = ["irradiance", *(f"stage {k + 1}" for k in range(len(figures["reach_mm"])))]

@@ -32,6 +32,7 @@ from sssfit.profile import Profile
 
 _MOST_RANK = 8
 _STEPS = 3000  # skin1's three terms take 200
+_WHITE = "the decomposition, which is the optimum of white pictures"
 _STOPPED = f"stopped after {_STEPS} steps, the best of them kept"
 
 
@@ -114,9 +115,6 @@ def _fit_channel(
         parameters={"spectral_error": float(error[0])},
         relative_frobenius_error=frobenius_error(target, quadrant, signs, half),
     )
-
-
-_WHITE = "the decomposition, which is the optimum of white pictures"
 
 
 def _minimised(

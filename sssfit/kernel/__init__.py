@@ -4,10 +4,12 @@ import io
 from pathlib import Path
 from typing import BinaryIO, TypeAlias
 
-from sssfit.kernel.json_file import MOST_BYTES
+from sssfit.kernel.json import KERNEL
+from sssfit.kernel.json_file import read_bytes
 from sssfit.kernel.record import FORMAT, SeparableKernel, is_kernel_file
 from sssfit.kernel.taps import Stage, Taps, is_taps_file
 from sssfit.kernel.taps_json import TAPS
+from sssfit.messages import printable
 
 __all__ = [
     "FORMAT",
@@ -33,6 +35,7 @@ def read_kernel(source: str | Path | BinaryIO, origin: str | None = None) -> Ker
     """
     if isinstance(source, str | Path):
         return (Taps if is_taps_file(Path(source)) else SeparableKernel).read(source, origin)
-    content = source.read(MOST_BYTES + 1)
+    origin = "the kernel" if origin is None else printable(origin)
+    content = read_bytes(source, origin, KERNEL)
     kind = Taps if TAPS.mark in content[:200] else SeparableKernel
     return kind.read(io.BytesIO(content), origin)

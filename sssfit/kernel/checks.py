@@ -17,8 +17,8 @@ from sssfit.errors import KernelError
 from sssfit.messages import shown
 
 # Limit of weights and scales: their squares are finite in single precision, as in shaders.
-_MAX = 1e18
-_MIN_MM, _MAX_MM = 1e-12, 1e12
+MOST = 1e18
+MIN_MM, MAX_MM = 1e-12, 1e12
 _ARRAYS = ("signs", "weights", "relative_frobenius_error", "energy_error", "scale")
 
 
@@ -27,12 +27,7 @@ def checked(given: Mapping[str, Any]) -> dict[str, Any]:
     fields: dict[str, Any] = {
         name: number_array(name, given[name], KernelError) for name in _ARRAYS
     }
-    pitch = number_array("mm_per_pixel", given["mm_per_pixel"], KernelError)
-    if pitch.shape != () or not _MIN_MM <= pitch <= _MAX_MM:
-        raise KernelError(
-            f"mm_per_pixel = {shown(given['mm_per_pixel'])}; expected a length above 0, from "
-            f"{_MIN_MM:g} to {_MAX_MM:g} mm."
-        )
+    pitch_mm = checked_pitch(given["mm_per_pixel"])
     check_label("method", given["method"], KernelError)
     names = given["channels"]
     if not isinstance(names, (list, tuple)):
@@ -40,13 +35,24 @@ def checked(given: Mapping[str, Any]) -> dict[str, Any]:
     _check_shapes(fields, len(names))
     check_names(names, KernelError)
     _check_numbers(fields)
-    fields |= {"method": given["method"], "mm_per_pixel": float(pitch), "channels": tuple(names)}
+    fields |= {"method": given["method"], "mm_per_pixel": pitch_mm, "channels": tuple(names)}
     for name in ("parameters", "meta"):
         fields[name] = json_object(name, given[name], KernelError)
     for name, found in fields["parameters"].items():
         _check_parameters(f"parameters.{name}", found)
     _check_meta(fields["meta"])
     return fields
+
+
+def checked_pitch(given: object) -> float:
+    """Return the size of a pixel [mm], or raise KernelError."""
+    pitch = number_array("mm_per_pixel", given, KernelError)
+    if pitch.shape != () or not MIN_MM <= pitch <= MAX_MM:
+        raise KernelError(
+            f"mm_per_pixel = {shown(given)}; expected a length above 0, from {MIN_MM:g} to "
+            f"{MAX_MM:g} mm."
+        )
+    return float(pitch)
 
 
 def _check_shapes(fields: Mapping[str, FloatArray], n_names: int) -> None:
@@ -68,11 +74,11 @@ def _check_shapes(fields: Mapping[str, FloatArray], n_names: int) -> None:
 def _check_numbers(fields: Mapping[str, FloatArray]) -> None:
     """Check that numbers are finite in single precision and in range."""
     weights, signs, scale = fields["weights"], fields["signs"], fields["scale"]
-    _check_range("weights", weights, -_MAX)
+    _check_range("weights", weights, -MOST)
     _check_range("scale", scale, 0.0)
     frobenius, energy = fields["relative_frobenius_error"], fields["energy_error"]
     _check_range("relative_frobenius_error", frobenius, 0.0, or_unknown=True)
-    _check_range("energy_error", energy, -(_MAX**2), or_unknown=True)
+    _check_range("energy_error", energy, -(MOST**2), or_unknown=True)
     if not np.isin(signs, (-1.0, 1.0)).all():
         raise KernelError("signs must be +1 or -1.")
     if not np.array_equal(weights, weights[:, ::-1]):
@@ -88,7 +94,7 @@ def _check_numbers(fields: Mapping[str, FloatArray]) -> None:
 
 def _check_range(name: str, values: FloatArray, least: float, *, or_unknown: bool = False) -> None:
     """Check for numbers of at least ``least``, and below the limit; NaN if unknown."""
-    most = max(_MAX, -least)
+    most = max(MOST, -least)
     bad = ~((values >= least) & (values <= most)) & ~(or_unknown & np.isnan(values))
     if bad.any():
         raise KernelError(
@@ -114,10 +120,10 @@ def _check_parameters(path: str, found: object) -> None:
         raise KernelError(f"{path} = {shown(found)}; expected a mapping.")
     for name in {*_LISTS, *_NUMBERS} & found.keys():
         values = number_array(f"{path}.{name}", found[name], KernelError)
-        if values.ndim != (name in _LISTS) or not (np.abs(values) <= _MAX).all():
+        if values.ndim != (name in _LISTS) or not (np.abs(values) <= MOST).all():
             raise KernelError(
                 f"{path}.{name} = {shown(found[name])}; expected "
-                f"{'a list of numbers' if name in _LISTS else 'a number'} up to {_MAX:g}."
+                f"{'a list of numbers' if name in _LISTS else 'a number'} up to {MOST:g}."
             )
         if name.endswith("_mm2") and not (values > 0.0).all():
             raise KernelError(f"{path}.{name} = {shown(found[name])}; expected variances above 0.")

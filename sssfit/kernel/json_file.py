@@ -155,7 +155,7 @@ def _is_finite(value: float) -> bool:
         return False
 
 
-def _read(source: str | Path | BinaryIO, origin: str, form: JsonFormat) -> bytes:
+def read_bytes(source: str | Path | BinaryIO, origin: str, form: JsonFormat) -> bytes:
     """Read the whole file, up to a limit."""
     try:
         if isinstance(source, str | Path):
@@ -178,7 +178,7 @@ def read_json(source: str | Path | BinaryIO, origin: str, form: JsonFormat) -> d
     KernelError
         The file is missing, too large, no JSON, or of another format.
     """
-    text = _read(source, origin, form)
+    text = read_bytes(source, origin, form)
     try:
         whole = json.loads(text, object_pairs_hook=_unique_keys, parse_constant=_no_number)
     except (ValueError, RecursionError) as error:

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 __all__ = ["FORMAT", "SeparableKernel", "is_kernel_file"]
 
-_PROVENANCE = ("material", "profile_method", "photons", "seed", "version", "profile_sha256")
+PROVENANCE = ("material", "profile_method", "photons", "seed", "version", "profile_sha256")
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -203,7 +203,7 @@ class SeparableKernel:
             {
                 "kind": "kernel",
                 "format": FORMAT,
-                **{name: self.meta.get(name) for name in _PROVENANCE},
+                **{name: self.meta.get(name) for name in PROVENANCE},
                 "settings": self.meta.get("settings") or {},
                 "method": self.method,
                 "rank": self.rank,

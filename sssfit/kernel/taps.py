@@ -15,6 +15,7 @@ those is the mean of four, and their sum comes back by bilinear fetches.
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, BinaryIO, Self
 
 import numpy as np
@@ -31,7 +32,8 @@ from sssfit.arrays import (
 from sssfit.errors import KernelError
 from sssfit.files import write_atomically
 from sssfit.kernel import taps_json
-from sssfit.kernel.record import SeparableKernel
+from sssfit.kernel.checks import MAX_MM, MIN_MM, MOST, checked_pitch
+from sssfit.kernel.record import PROVENANCE, SeparableKernel
 from sssfit.kernel.structure import (
     MOST_LEVELS,
     MOST_PAIRS,
@@ -43,16 +45,15 @@ from sssfit.kernel.structure import (
     text_of,
 )
 from sssfit.kernel.taps_json import is_taps_file
-from sssfit.messages import by_channel, number, of_material, shown
+from sssfit.messages import by_channel, number, of_material, printable, shown
 
 __all__ = ["Stage", "Taps", "is_taps_file"]
 
 KINDS = ("pair", "star")
+_ERRORS = ("spectral", "energy")
 # Fetches with one weight: a pair of passes has the middle and mirrored pairs, a star the middle,
 # four diagonal neighbours and four on the axes.
 _COPIES = {"pair": 2.0, "star": 4.0}
-_MIN_MM, _MAX_MM = 1e-12, 1e12
-_MAX = 1e18  # weights and blend: squares are finite in single precision
 _ROUNDING = 1e-9  # of sums that are computed in another order
 BYTES = {"float32": 16, "half": 8, "r11g11b10": 4}  # of a texel of three channels, as stored
 
@@ -167,6 +168,12 @@ class Taps:
             f"mm pixels: error {errors}>"
         )
 
+    def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
+        # A mapping proxy cannot be pickled; worker processes and deep copies need the record.
+        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        plain = {"errors": dict(self.errors), "meta": dict(self.meta)}
+        return type(self), tuple((values | plain).values())
+
     @property
     def structure(self) -> str:
         """The stages as text, such as 1-1|2-2|2-2."""
@@ -204,7 +211,14 @@ class Taps:
         ----------
         texel : {"float32", "half", "r11g11b10"}
             Format of the pictures between the passes.
+
+        Raises
+        ------
+        KernelError
+            The format is another.
         """
+        if texel not in BYTES:
+            raise KernelError(f"texel = {shown(texel)}; expected {', '.join(BYTES)}.")
         return BYTES[texel] * self.cost.pictures
 
     @property
@@ -308,6 +322,7 @@ class Taps:
         """
         if origin is None:
             origin = str(source) if isinstance(source, str | Path) else "the table of taps"
+        origin = printable(origin)
         fields, said = taps_json.unpack(source, origin)
         try:
             fields["stages"] = tuple(Stage(**each) for each in fields["stages"])
@@ -323,9 +338,6 @@ class Taps:
         return cls.read(path)
 
 
-PROVENANCE = ("material", "profile_method", "photons", "seed", "version", "profile_sha256")
-
-
 def _convolved(first: FloatArray, second: FloatArray) -> FloatArray:
     """Convolve passes (P, C) and (Q, C) channel by channel."""
     pairs = zip(first.T, second.T, strict=True)
@@ -335,45 +347,48 @@ def _convolved(first: FloatArray, second: FloatArray) -> FloatArray:
 def _checked(taps: Taps) -> dict[str, Any]:
     """Return the fields as stored, or raise KernelError."""
     check_label("method", taps.method, KernelError)
-    pitch = number_array("mm_per_pixel", taps.mm_per_pixel, KernelError)
-    if pitch.shape != () or not _MIN_MM <= pitch <= _MAX_MM:
-        raise KernelError(
-            f"mm_per_pixel = {shown(taps.mm_per_pixel)}; expected a length from {_MIN_MM:g} to "
-            f"{_MAX_MM:g} mm."
-        )
     check_names(taps.channels, KernelError)
+    if type(taps.chained) is not bool:
+        raise KernelError(f"chained = {shown(taps.chained)}; expected True or False.")
+    if not isinstance(taps.stages, list | tuple):
+        raise KernelError(f"stages = {shown(taps.stages)}; expected a list of stages.")
     stages = tuple(_checked_stage(k, each, taps) for k, each in enumerate(taps.stages))
     _check_levels(stages, chained=taps.chained)
     blend = number_array("blend", taps.blend, KernelError)
     expected = len(stages) + 1, len(taps.channels)
     if blend.shape != expected:
         raise KernelError(f"blend has shape {blend.shape}; expected {expected}.")
-    if not (np.abs(blend) <= _MAX).all():
-        raise KernelError(f"blend holds numbers that are not between -{_MAX:g} and {_MAX:g}.")
+    if not (np.abs(blend) <= MOST).all():
+        raise KernelError(f"blend holds numbers that are not between -{MOST:g} and {MOST:g}.")
     meta = json_object("meta", taps.meta, KernelError)
     check_provenance(meta, KernelError)
     return {
-        "mm_per_pixel": float(pitch),
+        "mm_per_pixel": checked_pitch(taps.mm_per_pixel),
         "channels": tuple(taps.channels),
         "stages": stages,
         "blend": blend,
-        "errors": {name: _checked_error(name, taps) for name in ("spectral", "energy")},
+        "errors": MappingProxyType(_checked_errors(taps)),
         "meta": meta,
     }
 
 
-def _checked_error(name: str, taps: Taps) -> FloatArray:
-    values = number_array(f"errors.{name}", taps.errors[name], KernelError)
-    if values.shape != (len(taps.channels),):
-        raise KernelError(
-            f"errors.{name} has shape {values.shape}; expected {(len(taps.channels),)}."
-        )
-    return values
+def _checked_errors(taps: Taps) -> dict[str, FloatArray]:
+    if not isinstance(taps.errors, Mapping) or taps.errors.keys() != set(_ERRORS):
+        raise KernelError(f"errors = {shown(taps.errors)}; expected {' and '.join(_ERRORS)}.")
+    found, expected = {}, (len(taps.channels),)
+    for name in _ERRORS:
+        values = number_array(f"errors.{name}", taps.errors[name], KernelError)
+        if values.shape != expected:
+            raise KernelError(f"errors.{name} has shape {values.shape}; expected {expected}.")
+        found[name] = values
+    return found
 
 
 def _checked_stage(k: int, stage: Stage, taps: Taps) -> Stage:
     """Check the numbers of a stage, and return it with read-only arrays."""
     path = f"stages[{k}]"
+    if not isinstance(stage, Stage) or type(stage.level) is not int:
+        raise KernelError(f"{path} = {shown(stage)}; expected a Stage with a whole level.")
     if stage.kind not in KINDS:
         raise KernelError(f"{path}.kind = {shown(stage.kind)}; expected {' or '.join(KINDS)}.")
     offsets = number_array(f"{path}.offsets_mm", stage.offsets_mm, KernelError)
@@ -384,7 +399,7 @@ def _checked_stage(k: int, stage: Stage, taps: Taps) -> Stage:
             f"{path}.offsets_mm has shape {offsets.shape}; expected "
             f"{'(2,)' if stage.kind == 'star' else f'1 to {MOST_PAIRS} offsets'}."
         )
-    if not ((offsets >= _MIN_MM) & (offsets <= _MAX_MM)).all():
+    if not ((offsets >= MIN_MM) & (offsets <= MAX_MM)).all():
         raise KernelError(f"{path}.offsets_mm = {shown(offsets.tolist())}; expected lengths in mm.")
     if stage.kind == "pair" and (np.diff(offsets) <= 0.0).any():
         raise KernelError(f"{path}.offsets_mm = {shown(offsets.tolist())}; expected rising ones.")
@@ -392,11 +407,11 @@ def _checked_stage(k: int, stage: Stage, taps: Taps) -> Stage:
     if weights.shape != expected:
         raise KernelError(f"{path}.weights has shape {weights.shape}; expected {expected}.")
     sums = weights[0] + _COPIES[stage.kind] * weights[1:].sum(axis=0)
-    if not (np.abs(weights) <= _MAX).all() or not (np.abs(sums - 1.0) <= _ROUNDING).all():
+    if not (np.abs(weights) <= MOST).all() or not (np.abs(sums - 1.0) <= _ROUNDING).all():
         raise KernelError(
             f"{path}.weights add up to {shown(sums.tolist())} over all fetches; expected 1."
         )
-    return dataclasses.replace(stage, level=int(stage.level), offsets_mm=offsets, weights=weights)
+    return dataclasses.replace(stage, offsets_mm=offsets, weights=weights)
 
 
 def _check_levels(stages: tuple[Stage, ...], *, chained: bool) -> None:
