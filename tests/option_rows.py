@@ -627,7 +627,7 @@ COMPARE = {
         f"{_KERNELS} --chart c.png",
         "--error l2",
         _front,
-        lambda: front("l2", "weights"),
+        lambda: front("l2", "fetches"),
         default="delta-e",
     ),
     "--cost": Row(
@@ -635,7 +635,7 @@ COMPARE = {
         "--cost passes",
         _front,
         lambda: front("delta-e", "passes"),
-        default="weights",
+        default="fetches",
     ),
     "--budget-chart": Row(_BUDGET, "--budget-chart b.png", is_written("png"), lambda: ["b.png"]),
     "--photons": Row(_BUDGET, "--photons 2e4", calls, lambda: _budgeted(photons=20_000), "1e6"),

@@ -1,5 +1,6 @@
 """A kernel on a picture, compared with the truth: what it shows, loses and costs."""
 
+import functools
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -162,6 +163,7 @@ def evaluate(
     border: str = "mirror",
     exposure: float | None = None,
     structure: bool = False,
+    is_timed: bool = True,
     threads: int | None = None,
 ) -> Evaluation:
     """Render a scene with a kernel and with a profile's 2D kernel, and compare.
@@ -182,6 +184,8 @@ def evaluate(
         As `render_separable`.
     exposure, structure
         As `measure`.
+    is_timed : bool
+        Measure the kernel's seconds, for which it is rendered several times.
 
     Raises
     ------
@@ -197,12 +201,11 @@ def evaluate(
             )
         through = _most_through(scene, kernel)
         scene = with_transmitted(scene, kernel)
-    picture, seconds = timed(
-        lambda shown: np.asarray(
-            render(shown, kernel, border=border, threads=threads), dtype=np.float64
-        ),
-        scene,
-    )
+
+    def shown(lit: Scene) -> FloatArray:
+        return np.asarray(render(lit, kernel, border=border, threads=threads), dtype=np.float64)
+
+    picture, seconds = timed(shown, scene) if is_timed else (shown(scene), None)
     if truth is None and profile is not None:
         _check_channels(kernel, profile)
         truth = render_reference(scene, profile, border=border, threads=threads)
@@ -243,6 +246,7 @@ def _check_channels(kernel: Kernel, profile: Profile) -> None:
         )
 
 
+@functools.lru_cache(maxsize=4)  # a comparison asks once for every picture
 def asymmetry_of(kernel: Kernel) -> FloatArray:
     """`radial_asymmetry` of each channel's 2D kernel (C,), from the fourth circle on.
 
