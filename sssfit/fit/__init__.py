@@ -90,6 +90,8 @@ def fit_result(profile: Profile | str | Path, method: str = "svd", **settings: A
     ProfileError
         The file cannot be read as a profile.
     """
+    if isinstance(method, str) and method in TAPS:
+        return fit_taps(profile, method, **settings)
     if not isinstance(method, str) or method not in METHODS:
         raise FitError(f"method = {shown(method)}; expected one of {', '.join(METHODS)}.")
     return METHODS[method].fit(_loaded(profile), **settings)
