@@ -348,6 +348,9 @@ def _darker() -> None:
 RENDER = [
     C(f"render wax.hand.taps.json --irradiance disk {SMALL}"),
     C(f"render - --irradiance points {SMALL} --border zero --json", stdin="wax.hand.taps.json"),
+    C(f"render wax.hand.taps.json --irradiance disk {SMALL} --intermediate half"),
+    C(f"render wax.hand.taps.json --irradiance edge {SMALL} --intermediate r11g11b10 --json"),
+    C(f"render wax.svd2.kernel.json --irradiance disk {SMALL} --intermediate half"),
     C("render wax.hand.taps.json --screen"),
     C(f"render wax.hand.taps.json --irradiance head {SMALL} --transmit"),
     C("render damaged.taps.json --irradiance disk"),

@@ -162,6 +162,7 @@ def evaluate(
     border: str = "mirror",
     exposure: float | None = None,
     structure: bool = False,
+    intermediate: str | None = None,
     threads: int | None = None,
 ) -> Evaluation:
     """Render a scene with a kernel and with a profile's 2D kernel, and compare.
@@ -182,6 +183,8 @@ def evaluate(
         As `render_separable`.
     exposure, structure
         As `measure`.
+    intermediate
+        As `render_taps`, for tables of taps.
 
     Raises
     ------
@@ -197,11 +200,9 @@ def evaluate(
             )
         through = _most_through(scene, kernel)
         scene = with_transmitted(scene, kernel)
+    settings = {"border": border, "threads": threads, **_between_passes(kernel, intermediate)}
     picture, seconds = timed(
-        lambda shown: np.asarray(
-            render(shown, kernel, border=border, threads=threads), dtype=np.float64
-        ),
-        scene,
+        lambda shown: np.asarray(render(shown, kernel, **settings), dtype=np.float64), scene
     )
     if truth is None and profile is not None:
         _check_channels(kernel, profile)
@@ -221,6 +222,16 @@ def evaluate(
         _true_asymmetry(kernel, profile),
         through,
     )
+
+
+def _between_passes(kernel: Kernel, intermediate: str | None) -> dict[str, str]:
+    """Return the setting of the format between passes, where one is given and the kernel fits."""
+    if intermediate is not None and not isinstance(kernel, Taps):
+        raise RenderError(
+            f'`intermediate = "{intermediate}"` is for tables of taps, and this is a separable '
+            "kernel; leave it out."
+        )
+    return {} if intermediate is None else {"intermediate": intermediate}
 
 
 def _most_through(scene: Scene, kernel: SeparableKernel) -> FloatArray | None:
@@ -301,6 +312,7 @@ def evaluate_in_screen_space(
     transmit: bool = False,
     follow: str = "gaussian",
     border: str = "mirror",
+    intermediate: str | None = None,
     threads: int | None = None,
 ) -> Evaluation:
     """Render a scene as a shader does; in perspective there is no truth to compare it with.
@@ -313,6 +325,7 @@ def evaluate_in_screen_space(
             "screen space by depth needs a separable kernel, and this is a table of taps; "
             "leave out `screen`."
         )
+    _between_passes(kernel, intermediate)
     through = _most_through(scene, kernel) if transmit else None
     picture, seconds = timed(
         lambda shown: render_screen(shown, kernel, follow=follow, border=border, threads=threads),

@@ -222,6 +222,11 @@ class Taps:
         return BYTES[texel] * self.cost.pictures
 
     @property
+    def has_negative_weights(self) -> bool:
+        """Whether a fetch of any pass has a weight below 0; the blend's signs do not count."""
+        return any(bool((each.weights < 0.0).any()) for each in self.stages)
+
+    @property
     def is_separable(self) -> bool:
         """Whether `separable_kernel` exists: all stages are pairs on the full picture."""
         return all(each.kind == "pair" and each.level == 0 for each in self.stages)
