@@ -128,6 +128,18 @@ def divided_once(
     return np.where(covered > 0.0, shown * energy, 0.0)
 
 
+def four_texels(pixels: FloatArray, border: str) -> FloatArray:
+    """Return the 2 x 2 texels of a picture (H, W, ...) that a texel of half the size covers.
+
+    (4, ceil(H / 2), ceil(W / 2), ...). The row or column that an odd size lacks is the border's.
+    """
+    rows, columns = (
+        source_indices(size, 1, border)[1 : size + 1 + size % 2] for size in pixels.shape[:2]
+    )
+    black = np.pad(pixels, [(0, 1), (0, 1), *[(0, 0)] * (pixels.ndim - 2)])  # places n of a border
+    return np.stack([black[rows[i::2]][:, columns[j::2]] for i in (0, 1) for j in (0, 1)])
+
+
 def reach_pixels(taps: Taps, mm_per_pixel: float | None = None) -> int:
     """Return how far light moves along an axis [pixels], with all changes of size."""
     pitch_mm = mm_per_pixel or taps.mm_per_pixel
@@ -264,23 +276,13 @@ class _Passes:
 
         The row or column that an odd size lacks is the border's.
         """
-        part = None if self.coverage is None else self._means(self.coverage)
+        part = (
+            None if self.coverage is None else four_texels(self.coverage, self.border).mean(axis=0)
+        )
         smaller = _Passes(self.border, self.threads, part, self.store)
-        return self.stored(self._divided(pixels, self._means)), smaller
-
-    def _means(self, pixels: FloatArray) -> FloatArray:
-        for axis in (0, 1):
-            even, odd = self._beyond(pixels, axis, slice(0, None, 2), slice(1, None, 2))
-            pixels = 0.5 * (even + odd)
-        return pixels
-
-    def _beyond(self, pixels: FloatArray, axis: int, *parts: slice) -> list[FloatArray]:
-        """Return parts of the picture, continued along an axis to an even number of texels."""
-        size = pixels.shape[axis]
-        places = source_indices(size, 1, self.border)[1 : size + 1 + size % 2]
-        black = np.zeros_like(pixels.take([0], axis))
-        continued = np.concatenate((pixels, black), axis)  # a border's place n is black
-        return [continued.take(places[each], axis) for each in parts]
+        return self.stored(
+            self._divided(pixels, lambda each: four_texels(each, self.border).mean(axis=0))
+        ), smaller
 
     def doubled(self, pixels: FloatArray, size: tuple[int, int]) -> FloatArray:
         """Return a picture of twice the size by bilinear fetches."""
