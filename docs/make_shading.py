@@ -7,11 +7,11 @@ import numpy as np
 from make_triptych import page
 from sections import DOCS, put_section
 
+from sssfit.compare.motion import motion
 from sssfit.fit import fit_preintegrated, fit_taps
 from sssfit.formats.colours import srgb_encode
 from sssfit.material import load_material
 from sssfit.measure.delta_e import auto_exposure
-from sssfit.measure.motion import motion
 from sssfit.measure.score import measure
 from sssfit.render.reference import render_reference
 from sssfit.render.screen import render_screen

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from test_taps import taps_of
 
+from sssfit.compare.motion import NEAR_PIXELS, PIXELS, motion
 from sssfit.errors import RenderError
 from sssfit.fit import fit_taps
 from sssfit.material import load_material
-from sssfit.measure.motion import NEAR_PIXELS, PIXELS, motion
 from sssfit.measure.score import measure
 from sssfit.render.reference import render_reference
 from sssfit.render.taps import render_taps
