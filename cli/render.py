@@ -68,7 +68,7 @@ def render(context: click.Context, /, kernel: str | None, common: Common, **give
         "output": [*(["-"] if path is None else []), *map(str, files.values())],
         "kernel": name,
         "profile": source,
-        "border": given["border"],
+        **{key: given[key] for key in ("border", "intermediate")},
         "follow": (given["follow"] or "gaussian") if given["screen"] else None,
         **made.to_dict(),
     }
@@ -115,10 +115,11 @@ def _rendered(
     asked = {key: given[key] for key in ("size", "layer", "mask")} | own
     pitch = made_mm if picture in MADE else given["mm_per_pixel"]
     scene = load_scene(picture, pitch, seed=common.seed, **asked)
-    how = {key: given[key] for key in ("transmit", "border")} | {"threads": common.threads}
+    how = {key: given[key] for key in ("transmit", "border", "intermediate")}
+    how |= {"threads": common.threads}
     if screen:
-        follow = given["follow"] or "gaussian"
-        return None, evaluate_in_screen_space(scene, kernel, follow=follow, **how)
+        how["follow"] = given["follow"] or "gaussian"
+        return None, evaluate_in_screen_space(scene, kernel, **how)
     profile, source = profile_of_kernel(kernel, name, given["profile"])
     if profile is None and (given["truth"] or given["difference"]):
         raise click.UsageError("--truth and --difference need the profile; name it.")

@@ -38,7 +38,7 @@ from sssfit.errors import SssfitWarning
 from sssfit.fit import fit_gaussians, fit_svd
 from sssfit.formats.csv import csv_text
 from sssfit.formats.pictures import load_image, save_image
-from sssfit.kernel import SeparableKernel, Taps
+from sssfit.kernel import SeparableKernel, Stage, Taps
 from sssfit.material import Material, parse_material
 from sssfit.profile import Profile
 from sssfit.scene.made import make_scene
@@ -97,6 +97,25 @@ def gaussians() -> SeparableKernel:
 
 
 @functools.cache
+def taps() -> Taps:
+    """A cascade by hand, on the pixels of the kernels."""
+    stages = [
+        Stage(level, "pair", np.array([offset]), np.array([[0.5] * 3, [0.25] * 3]))
+        for level, offset in ((0, 0.25), (1, 0.7))
+    ]
+    return Taps(
+        method="cascade",
+        mm_per_pixel=DR_MM,
+        channels=profile().channels,
+        chained=True,
+        stages=tuple(stages),
+        blend=np.array([[0.1, 0.2, 0.1], [0.2, 0.1, 0.1], [0.3, 0.2, 0.1]]),
+        errors={"spectral": np.zeros(3), "energy": np.zeros(3)},
+        meta={},
+    )
+
+
+@functools.cache
 def picture() -> np.ndarray:
     return np.random.default_rng(3).random((12, 9, 3)).astype(np.float32)
 
@@ -124,6 +143,7 @@ def files() -> Path:
     (folder / "plate.toml").write_text(LAYERS)
     plate_profile().save(folder / "plate.profile.npz")
     profile().save(folder / "wax.profile.npz")
+    taps().save(folder / "wax.taps.json")
     gaussians().save(folder / "wax.gaussians2.kernel.json")
     kernel().save(folder / "wax.svd2.kernel.json")  # the newest of both
     save_image(folder / "mine.exr", picture(), mm_per_pixel=DR_MM)

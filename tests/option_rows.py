@@ -434,6 +434,13 @@ RENDER = {
         made_picture,
         lambda: np.float32(evaluate_in_screen_space(_head_on_screen(16, 24), kernel()).picture),
     ),
+    "--intermediate": Row(
+        f"render wax.taps.json --irradiance disk {_SIZE}",
+        "--intermediate half",
+        made_picture,
+        lambda: np.float32(evaluate(_scene("disk"), world.taps(), intermediate="half").picture),
+        words="they are not rounded",
+    ),
     "--light": _lit("head", "--light", "100", "45", light_degrees=100.0),
     "--transmit": Row(
         f"render wax.gaussians2.kernel.json --irradiance head {_SIZE}",

@@ -305,6 +305,8 @@ def fit(f: Figures) -> list[Any]:
 
 def rendering(f: Figures) -> list[Any]:
     how = Words("{} borders", f["border"])
+    if f["intermediate"]:
+        how = Words("{}, {} between passes", how, f["intermediate"])
     if f["follow"]:
         how = Words("screen space, follow {}, {}", f["follow"], how)
     parts: list[Any] = [

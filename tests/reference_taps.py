@@ -1,6 +1,9 @@
 """A slow renderer of tables of taps, fetch by fetch, from the definition alone."""
 
+import functools
 import math
+import struct
+from fractions import Fraction
 
 import numpy as np
 
@@ -83,18 +86,66 @@ def divided(over, picture, cover):
     return np.where(part > 0.0, light / np.where(part > 0.0, part, 1.0), 0.0)
 
 
-def rendered(picture, taps, channel, pitch, border="mirror", cover=None):
+def as_half(value):
+    """A half, by the standard library."""
+    return struct.unpack("e", struct.pack("e", value))[0]
+
+
+def as_small_float(value, mantissa):
+    """The nearest unsigned float of 5 bits of exponent, by all that there are; ties to even."""
+    codes = _codes(mantissa)
+    above = int(np.searchsorted(codes, value))
+    if above < len(codes) and codes[above] == value:
+        return value
+    if above == len(codes):
+        raise OverflowError(value)
+    low, high = Fraction(codes[above - 1]), Fraction(codes[above])
+    middle, exact = (low + high) / 2, Fraction(value)
+    if exact == middle:
+        return codes[above] if above % 2 == 0 else codes[above - 1]
+    return codes[above] if exact > middle else codes[above - 1]
+
+
+@functools.cache
+def _codes(mantissa):
+    """All finite numbers of the format in the order of their bits."""
+    values = []
+    for exponent in range(31):
+        for bits in range(2**mantissa):
+            if exponent == 0:
+                values.append(bits * 2.0 ** (-14 - mantissa))
+            else:
+                values.append((2**mantissa + bits) * 2.0 ** (exponent - 15 - mantissa))
+    return values
+
+
+def stored_as(name, channel):
+    """What a texel of a channel becomes in a format, for whole pictures."""
+    store = {
+        None: lambda value: value,
+        "float32": lambda value: struct.unpack("f", struct.pack("f", value))[0],
+        "half": as_half,
+        "r11g11b10": lambda value: as_small_float(value, (6, 6, 5)[channel]),
+    }[name]
+    return np.vectorize(store, otypes=[float])
+
+
+def rendered(picture, taps, channel, pitch, border="mirror", cover=None, intermediate=None):
     """The sum of the stages' pictures (H, W) of one channel."""
+    store = stored_as(intermediate, channel)
     covers, sums, current = [cover], [picture * taps.blend[0, channel]], picture
     for stage, row in zip(taps.stages, taps.blend[1:], strict=True):
         while len(sums) <= stage.level:
-            current = divided(lambda each: halved(each, border), current, covers[-1])
+            current = store(divided(lambda each: halved(each, border), current, covers[-1]))
             covers.append(None if cover is None else halved(covers[-1], border))
             sums.append(np.zeros_like(current))
         source = current if taps.chained else picture
-        for fetches in passes_of(stage, channel, pitch * 2**stage.level):
-            source = gathered(source, fetches, border, covers[-1])
-        current = source
+        passes = passes_of(stage, channel, pitch * 2**stage.level)
+        for fetches in passes[:-1]:
+            source = store(gathered(source, fetches, border, covers[-1]))
+        current = gathered(source, passes[-1], border, covers[-1])
+        if taps.chained and stage is not taps.stages[-1]:  # those of terms are added up as made
+            current = store(current)
         sums[-1] = sums[-1] + row[channel] * current
     for level in range(len(sums) - 2, -1, -1):
         size = sums[level].shape
@@ -102,5 +153,5 @@ def rendered(picture, taps, channel, pitch, border="mirror", cover=None):
         def up(each, size=size):
             return doubled(each, size, border)
 
-        sums[level] = sums[level] + divided(up, sums[level + 1], covers[level + 1])
+        sums[level] = sums[level] + divided(up, store(sums[level + 1]), covers[level + 1])
     return sums[0] if cover is None else np.where(cover > 0.0, sums[0], 0.0)

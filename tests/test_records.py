@@ -79,7 +79,7 @@ RECORDS = {
     "chart wax.svd2.kernel.json": (lambda: view().to_dict(), {"kind", "file", "profile"}),
     "render --irradiance disk --size 24x16": (
         lambda: judged().to_dict(),
-        {"kernel", "profile", "border", "follow"},
+        {"kernel", "profile", "border", "follow", "intermediate"},
     ),
 }
 CLOCKS = ("seconds", "photons_per_second", "seconds_per_megapixel")

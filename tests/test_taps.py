@@ -9,7 +9,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from reference_taps import rendered
+from reference_taps import as_half, as_small_float, rendered
 
 import sssfit
 from sssfit.errors import KernelError, RenderError
@@ -17,6 +17,7 @@ from sssfit.kernel import Stage, Taps, is_taps_file, read_kernel
 from sssfit.kernel.structure import cost_of_chain, cost_of_terms, parse, text_of
 from sssfit.render.separable import render_separable
 from sssfit.render.taps import render_taps
+from sssfit.render.texels import store_of
 from sssfit.scene.record import Scene
 from sssfit.shapes import SKIN_WEIGHTS
 
@@ -360,3 +361,122 @@ def test_bad_settings_are_one_line():
         render_taps(Scene("rgb", np.ones((4, 5, 3)), PITCH), taps)
     with pytest.raises(RenderError, match="dtype = int32"):
         render_taps(scene, taps, dtype=np.int32)
+
+
+# The formats of the pictures between passes
+
+
+def numbers_of_all_sizes(count=4000):
+    """Light from the denormals of a half to its largest, and ties between neighbours."""
+    rng = np.random.default_rng(8)
+    spread = 2.0 ** rng.uniform(-22, 15.9, count)
+    coarse = np.ldexp(rng.integers(0, 2**13, count) / 2.0**13, rng.integers(-16, 16, count))
+    return np.concatenate((spread, coarse, [0.0, 2.0**-20, 2.0**-21, 64511.9, 1.0]))
+
+
+def test_half_is_that_of_the_standard_library():
+    values = numbers_of_all_sizes()
+    ours = store_of("half", taps_of(channels=1))(values[:, None])[:, 0]
+    np.testing.assert_array_equal(ours, [as_half(each) for each in values])
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+@pytest.mark.parametrize(("channel", "mantissa"), [(0, 6), (1, 6), (2, 5)])
+def test_r11g11b10_is_the_nearest_of_all_its_numbers(channel, mantissa, dtype):
+    values = numbers_of_all_sizes().astype(dtype)
+    pixels = np.zeros((len(values), 3), dtype)
+    pixels[:, channel] = values
+    ours = store_of("r11g11b10", taps_of(channels=3))(pixels)
+    assert ours.dtype == dtype
+    expected = [as_small_float(float(each), mantissa) for each in values]
+    np.testing.assert_array_equal(ours[:, channel], expected)
+    assert (ours[:, [c for c in range(3) if c != channel]] == 0.0).all()
+
+
+@pytest.mark.parametrize("name", ["float32", "half", "r11g11b10"])
+def test_numbers_that_a_format_holds_stay_as_they_are(name):
+    held = np.array([0.0, 2.0**-14, 0.375, 1.0, 1.5, 63.0, 2.0**15])[:, None] * np.ones(3)
+    store = store_of(name, taps_of(channels=3))
+    np.testing.assert_array_equal(store(held), held)
+    noise = store(np.random.default_rng(9).uniform(0.0, 9.0, (50, 3)))
+    np.testing.assert_array_equal(store(noise), noise)
+
+
+@pytest.mark.parametrize("name", ["float32", "half", "r11g11b10"])
+@pytest.mark.parametrize("covered", [False, True])
+@pytest.mark.parametrize(
+    ("structure", "chained"), [("1-2", True), ("1-2", False), ("1|1|2", True), ("*|1-*", True)]
+)
+def test_every_picture_between_passes_is_in_the_format(structure, chained, covered, name):
+    taps = taps_of(structure, chained=chained, channels=3)
+    rng = np.random.default_rng(3)
+    picture = rng.uniform(size=(9, 7))
+    cover = rng.choice([0.0, 0.5, 1.0], (9, 7)) if covered else None
+    scene = Scene("noise", picture[..., None], 0.25)
+    ours = render_taps(scene, taps, coverage=cover, intermediate=name)
+    exact = render_taps(scene, taps, coverage=cover)
+    assert (ours != exact).any()
+    for channel in range(3):
+        slow = rendered(picture, taps, channel, 0.25, "mirror", cover, name)
+        # Sums in another order may round to the neighbour: a step, of few texels.
+        apart = np.abs(ours[..., channel] - slow)
+        assert np.median(apart) < 1e-14
+        assert apart.max() < 0.2 * {"float32": 1e-7, "half": 1e-3, "r11g11b10": 3e-2}[name]
+
+
+def test_light_beyond_a_formats_range_is_one_line():
+    taps = taps_of("1|1", channels=3)
+    bright = Scene("sun", np.full((4, 4, 1), 7e4), PITCH)
+    for name, most in (("half", "65504"), ("r11g11b10", "65024")):
+        with pytest.raises(RenderError, match=f"reaches 7e.04, and {name} holds up to {most}"):
+            render_taps(bright, taps, intermediate=name)
+    assert np.isfinite(render_taps(bright, taps, intermediate="float32")).all()
+
+
+def test_formats_that_do_not_fit_a_table_are_one_line():
+    scene = Scene("grey", np.ones((4, 5, 1)), PITCH)
+    with pytest.raises(RenderError, match="intermediate = 'byte'; expected float32, half, r11"):
+        render_taps(scene, taps_of(), intermediate="byte")
+    with pytest.raises(RenderError, match="r11g11b10 holds 1 or 3 channels, and the table has 2"):
+        render_taps(scene, taps_of(), intermediate="r11g11b10")
+    signed = taps_of("1-1", chained=False, channels=3, blend=[[0.2] * 3, [0.3] * 3, [-0.1] * 3])
+    with pytest.raises(RenderError, match="no sign, and the table has weights below 0"):
+        render_taps(scene, signed, intermediate="r11g11b10")
+    render_taps(scene, signed, intermediate="half")
+
+
+# Weights below 0
+
+
+def signed_taps():
+    """Terms whose fetches have both signs, as a decomposition's; the whole kernel is positive."""
+    taps = taps_of("2-2", chained=False)
+    wide = Stage(
+        0, "pair", taps.stages[0].offsets_mm, np.array([[0.7, 0.5], [0.2, 0.3], [-0.05] * 2])
+    )
+    return taps_of(
+        "2-2", chained=False, stages=(wide, taps.stages[1]), blend=[[0.1] * 2, [0.5] * 2, [0.2] * 2]
+    )
+
+
+def test_light_and_coverage_are_divided_once_where_weights_are_below_0():
+    taps = signed_taps()
+    rng = np.random.default_rng(4)
+    picture = rng.uniform(size=(8, 9))
+    cover = (rng.uniform(size=(8, 9)) > 0.4) * rng.choice([0.5, 1.0], (8, 9))
+    ours = render_taps(Scene("noise", picture[..., None], PITCH), taps, coverage=cover)
+    for channel in (0, 1):
+        light = rendered(picture * cover, taps, channel, PITCH)
+        part = rendered(cover, taps, channel, PITCH)
+        slow = np.where(cover > 0.0, taps.energy[channel] * light / part, 0.0)
+        np.testing.assert_allclose(ours[..., channel], slow, rtol=0, atol=1e-13)
+
+
+def test_weights_below_0_keep_constant_light_on_any_shape():
+    taps = signed_taps()
+    cover = (np.random.default_rng(5).uniform(size=(33, 26)) > 0.6).astype(float)
+    picture = np.where(cover > 0, 2.0, 1e6)
+    out = render_taps(Scene("shape", picture[..., None], PITCH), taps, coverage=cover)
+    inside = out[cover > 0]
+    np.testing.assert_allclose(inside, 2.0 * np.broadcast_to(taps.energy, inside.shape), 1e-6)
+    assert (out[cover == 0] == 0.0).all()

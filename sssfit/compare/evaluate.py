@@ -12,7 +12,7 @@ import numpy as np
 from sssfit.arrays import FloatArray, plain
 from sssfit.errors import RenderError
 from sssfit.formats.pictures import image_format, save_image
-from sssfit.kernel import Kernel, SeparableKernel, Taps
+from sssfit.kernel import Kernel, Taps
 from sssfit.measure.asymmetry import radial_asymmetry
 from sssfit.measure.cost import Cost, cost_of, seconds_per_megapixel
 from sssfit.measure.difference import DifferenceMap, difference_map
@@ -22,6 +22,7 @@ from sssfit.profile import Profile, full_kernel
 from sssfit.render import render
 from sssfit.render.reference import render_reference
 from sssfit.render.screen import render_screen
+from sssfit.render.screen_taps import render_screen_taps
 from sssfit.render.taps import reach_pixels, response
 from sssfit.render.transmittance import transmitted, with_transmitted
 from sssfit.scene.record import Scene
@@ -163,6 +164,7 @@ def evaluate(
     border: str = "mirror",
     exposure: float | None = None,
     structure: bool = False,
+    intermediate: str | None = None,
     is_timed: bool = True,
     threads: int | None = None,
 ) -> Evaluation:
@@ -184,6 +186,8 @@ def evaluate(
         As `render_separable`.
     exposure, structure
         As `measure`.
+    intermediate
+        As `render_taps`, for tables of taps.
     is_timed : bool
         Measure the kernel's seconds, for which it is rendered several times.
 
@@ -194,16 +198,12 @@ def evaluate(
     """
     through = None
     if transmit:
-        if isinstance(kernel, Taps):
-            raise RenderError(
-                "light through an object follows a kernel's Gaussians, and a table of taps has "
-                "none; use a separable kernel."
-            )
         through = _most_through(scene, kernel)
         scene = with_transmitted(scene, kernel)
+    settings = {"border": border, "threads": threads, **_between_passes(kernel, intermediate)}
 
     def shown(lit: Scene) -> FloatArray:
-        return np.asarray(render(lit, kernel, border=border, threads=threads), dtype=np.float64)
+        return np.asarray(render(lit, kernel, **settings), dtype=np.float64)
 
     picture, seconds = timed(shown, scene) if is_timed else (shown(scene), None)
     if truth is None and profile is not None:
@@ -226,7 +226,17 @@ def evaluate(
     )
 
 
-def _most_through(scene: Scene, kernel: SeparableKernel) -> FloatArray | None:
+def _between_passes(kernel: Kernel, intermediate: str | None) -> dict[str, str]:
+    """Return the setting of the format between passes, where one is given and the kernel fits."""
+    if intermediate is not None and not isinstance(kernel, Taps):
+        raise RenderError(
+            f'`intermediate = "{intermediate}"` is for tables of taps, and this is a separable '
+            "kernel; leave it out."
+        )
+    return {} if intermediate is None else {"intermediate": intermediate}
+
+
+def _most_through(scene: Scene, kernel: Kernel) -> FloatArray | None:
     """Return the most light that arrives through the object (C,)."""
     arrives = transmitted(scene, kernel)
     return None if arrives is None else arrives.max(axis=(0, 1))
@@ -305,23 +315,24 @@ def evaluate_in_screen_space(
     transmit: bool = False,
     follow: str = "gaussian",
     border: str = "mirror",
+    intermediate: str | None = None,
     threads: int | None = None,
 ) -> Evaluation:
     """Render a scene as a shader does; in perspective there is no truth to compare it with.
 
-    Parameters and errors are those of `render_screen`, which adds the light through a scene that
-    has any; ``transmit`` says how much that is.
+    Parameters and errors are those of `render_screen`, for a table of taps of `render_screen_taps`.
+    They add the light through a scene that has any; ``transmit`` says how much that is.
     """
-    if isinstance(kernel, Taps):
-        raise RenderError(
-            "screen space by depth needs a separable kernel, and this is a table of taps; "
-            "leave out `screen`."
-        )
+    settings: dict[str, Any] = {"follow": follow, "border": border, "threads": threads}
+    settings |= _between_passes(kernel, intermediate)
     through = _most_through(scene, kernel) if transmit else None
-    picture, seconds = timed(
-        lambda shown: render_screen(shown, kernel, follow=follow, border=border, threads=threads),
-        scene,
-    )
+
+    def rendered(shown: Scene) -> FloatArray:
+        if isinstance(kernel, Taps):
+            return np.asarray(render_screen_taps(shown, kernel, **settings), dtype=np.float64)
+        return render_screen(shown, kernel, **settings)
+
+    picture, seconds = timed(rendered, scene)
     cost, asymmetry = cost_of(kernel, seconds), asymmetry_of(kernel)
     unknown = _true_asymmetry(kernel, None)
     return Evaluation(scene, kernel, picture, None, None, cost, asymmetry, unknown, through)

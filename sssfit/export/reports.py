@@ -139,10 +139,11 @@ def _rendered_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     """Say how it was rendered, and what the difference shows."""
     kind, most = figures["difference_map"], figures["transmitted_maximum"]
     screen = f"screen space, follow {figures['follow']}, " if figures["follow"] else ""
+    stored = f", {figures['intermediate']} between passes" if figures["intermediate"] else ""
     is_grey = figures["rmse"] is not None and figures["delta_e_2000_mean"] is None
     return {
         "what": "fetches" if figures["rank"] is None else "weights",
-        "how": f"{screen}{figures['border']} borders",
+        "how": f"{screen}{figures['border']} borders{stored}",
         "most": by_channel(figures["channels"], most, ".3g") if most is not None else None,
         "no_colour": len(figures["channels"]) if is_grey else None,
         "magnified": figures["difference_gain"] if kind is None else None,

@@ -85,6 +85,14 @@ class Stage:
         """The stage without its numbers."""
         return Shape(self.kind, len(self.offsets_mm) if self.kind == "pair" else 1, self.level)
 
+    @property
+    def variance_mm2(self) -> FloatArray:
+        """Variance along an axis (C,) [mm^2], from the offsets."""
+        # Of a star's fetches all four diagonal ones move along an axis, and two of the others.
+        moving = (4.0, 2.0) if self.kind == "star" else 2.0
+        moment: FloatArray = (moving * self.offsets_mm**2) @ self.weights[1:]
+        return moment
+
     def line(self, offsets_mm: FloatArray, weights: FloatArray, mm_per_texel: float) -> FloatArray:
         """Return weights on texels (2m+1, C) of mirrored bilinear fetches along a line.
 
@@ -220,6 +228,11 @@ class Taps:
         if texel not in BYTES:
             raise KernelError(f"texel = {shown(texel)}; expected {', '.join(BYTES)}.")
         return BYTES[texel] * self.cost.pictures
+
+    @property
+    def has_negative_weights(self) -> bool:
+        """Whether a fetch of any pass has a weight below 0; the blend's signs do not count."""
+        return any(bool((each.weights < 0.0).any()) for each in self.stages)
 
     @property
     def is_separable(self) -> bool:

@@ -37,7 +37,7 @@ BORDER = {"mirror": compiled.MIRROR, "clamp": compiled.CLAMP, "zero": compiled.Z
 
 # End of the lerp in standard deviations of the kernel; docs/screen-space.md derives it.
 LERP_SIGMAS = 3.8
-_FARTHEST = 1e9  # largest distance of a sample in pixels; far below the overflow of indices
+FARTHEST = 1e9  # largest distance of a sample in pixels; far below the overflow of indices
 
 
 def make_view(
@@ -193,7 +193,7 @@ def _steps(
     with np.errstate(over="ignore"):  # checked below
         nearer = kernel.mm_per_pixel * scene.distance_mm / (depth_mm * scene.mm_per_pixel)
         steps: FloatArray = nearer * sizes
-    if not (steps.max() * kernel.half_pixels < _FARTHEST):
+    if not (steps.max() * kernel.half_pixels < FARTHEST):
         raise RenderError(
             f"{scene.name}: at depth {depth_mm.min():g} mm the kernel would reach "
             f"{steps.max() * kernel.half_pixels:.3g} pixels; expected mm in depth_mm and scale."
@@ -264,8 +264,7 @@ def render_screen(
         The scene has no depth or other channels than the kernel, or a setting is invalid.
     """
     channels = len(kernel.channels)
-    for field in ("irradiance", "specular", "back_irradiance"):
-        _check_channels(scene, field, channels)
+    check_buffers(scene, channels)
     workers = thread_count(threads)
     view = make_view(
         scene,
@@ -286,14 +285,15 @@ def render_screen(
     return picture if scene.specular is None else picture + scene.specular
 
 
-def _check_channels(scene: Scene, field: str, channels: int) -> None:
-    """Raise an error for a buffer that does not have the kernel's channels."""
-    buffer = getattr(scene, field)
-    if buffer is not None and (buffer.ndim != 3 or buffer.shape[2] not in (1, channels)):
-        raise RenderError(
-            f"{scene.name}: {field} of shape {buffer.shape} for a kernel of {channels} channels; "
-            f"expected 1 or {channels} channels."
-        )
+def check_buffers(scene: Scene, channels: int) -> None:
+    """Raise an error for light that does not have the kernel's channels."""
+    for field in ("irradiance", "specular", "back_irradiance"):
+        buffer = getattr(scene, field)
+        if buffer is not None and (buffer.ndim != 3 or buffer.shape[2] not in (1, channels)):
+            raise RenderError(
+                f"{scene.name}: {field} of shape {buffer.shape} for a kernel of {channels} "
+                f"channels; expected 1 or {channels} channels."
+            )
 
 
 def _blurred(

@@ -6,7 +6,8 @@ level comes back by one bilinear fetch a pixel, which sees its texels with 3/4 a
 
 With coverage A (1 on the object, averaged on the halved pictures) every pass and every change of
 level is sum w A E / sum w A: constant light stays constant to the object's border, and nothing
-comes in from outside it. The blend is not touched.
+comes in from outside it. The blend is not touched. Weights below 0 could make a pass's sum vanish:
+with them A E and A are blurred apart, added up and divided once.
 """
 
 import math
@@ -20,6 +21,7 @@ from sssfit.errors import RenderError
 from sssfit.kernel.taps import Stage, Taps
 from sssfit.render.borders import check_channels, check_memory, source_indices
 from sssfit.render.separable import apply_passes
+from sssfit.render.texels import Store, store_of
 from sssfit.scene.record import Scene
 
 FloatArray = npt.NDArray[np.floating[Any]]
@@ -38,6 +40,7 @@ def render_taps(
     *,
     border: str = "mirror",
     coverage: npt.ArrayLike | None = None,
+    intermediate: str | None = None,
     threads: int | None = None,
     dtype: npt.DTypeLike = np.float64,
 ) -> FloatArray:
@@ -53,10 +56,14 @@ def render_taps(
         One of ``sssfit.render.borders.BORDERS``.
     coverage : array (H, W), optional
         Part of each pixel that the object covers, 0 to 1; other pixels neither give nor show light.
+    intermediate : {"float32", "half", "r11g11b10"}, optional
+        Format of the pictures between the passes, as `sssfit.render.texels` has them; by default
+        they keep the precision of ``dtype``. Irradiance, coverage and result keep it always, and so
+        does a picture that is added up by the pass that made it.
     threads : int, optional
         Threads to use, by default all cores; the result does not depend on them.
     dtype : float64 or float32
-        Precision of the pictures between the passes.
+        Precision of all sums.
 
     Returns
     -------
@@ -66,7 +73,8 @@ def render_taps(
     Raises
     ------
     RenderError
-        Channels or coverage do not fit the picture, or a setting is invalid.
+        Channels or coverage do not fit the picture, a setting is invalid, or the light exceeds what
+        the intermediate format holds.
     """
     channels = len(taps.channels)
     check_channels(scene.channels, channels)
@@ -81,10 +89,55 @@ def render_taps(
     )
     pixels = np.empty((*size, channels), precision)
     pixels[...] = scene.irradiance
-    passes = _Passes(border, threads, _checked(coverage, size, precision))
-    blend = taps.blend.astype(precision)
-    add_up = _chained if taps.chained else _unchained
-    return add_up(passes, pixels, taps, blend, scene.mm_per_pixel)
+    store = store_of(intermediate, taps)
+    covered = _checked(coverage, size, precision)
+
+    def blurred(picture: FloatArray, within: FloatArray | None) -> FloatArray:
+        add_up = _chained if taps.chained else _unchained
+        passes = _Passes(border, threads, within, store)
+        return add_up(passes, picture, taps, taps.blend.astype(precision), scene.mm_per_pixel)
+
+    if covered is None or not taps.has_negative_weights:
+        return blurred(pixels, covered)
+    light = blurred(pixels * covered, None)
+    part = blurred(np.broadcast_to(covered, pixels.shape), None)
+    return divided_once(light, part, pixels, covered, taps.energy.astype(precision))
+
+
+def divided_once(
+    light: FloatArray,
+    part: FloatArray,
+    unblurred: FloatArray,
+    covered: FloatArray,
+    energy: FloatArray,
+) -> FloatArray:
+    """Return blurred light times coverage over blurred coverage, for weights below 0.
+
+    Their sums over a pass may vanish, those over the whole kernel hardly: where less than a
+    millionth of the kernel is on the object, the pixel stays unblurred. Black outside the object.
+
+    Parameters
+    ----------
+    light, part, unblurred : array (..., C)
+    covered : array (..., 1)
+    energy : array (C,)
+        What ``part`` is far inside the object.
+    """
+    enough = part * np.sign(energy) > 1e-6 * np.abs(energy)
+    shown = np.divide(light, part, out=np.array(unblurred), where=enough)
+    return np.where(covered > 0.0, shown * energy, 0.0)
+
+
+def four_texels(pixels: FloatArray, border: str) -> FloatArray:
+    """Return the 2 x 2 texels of a picture (H, W, ...) that a texel of half the size covers.
+
+    (4, ceil(H / 2), ceil(W / 2), ...). The row or column that an odd size lacks is the border's.
+    """
+    rows, columns = (
+        source_indices(size, 1, border)[1 : size + 1 + size % 2] for size in pixels.shape[:2]
+    )
+    black = np.pad(pixels, [(0, 1), (0, 1), *[(0, 0)] * (pixels.ndim - 2)])  # places n of a border
+    return np.stack([black[rows[i::2]][:, columns[j::2]] for i in (0, 1) for j in (0, 1)])
 
 
 def reach_pixels(taps: Taps, mm_per_pixel: float | None = None) -> int:
@@ -145,30 +198,43 @@ def _chained(
             levels.append(halved)
             sums.append(np.zeros_like(current))
         current = levels[-1].blurred(current, stage, pitch_mm * 2.0**stage.level)
+        if stage is not taps.stages[-1]:  # that one is added up by the pass that makes it
+            current = passes.stored(current)
         sums[-1] += share * current
     for fine in range(len(levels) - 2, -1, -1):
-        sums[fine] += levels[fine + 1].doubled(sums[fine + 1], sums[fine].shape[:2])
+        coarse = passes.stored(sums[fine + 1])
+        sums[fine] += levels[fine + 1].doubled(coarse, sums[fine].shape[:2])
     return passes.shown(sums[0])
 
 
 class _Passes:
     """The passes on pictures of one size, with their border and coverage (H, W, 1)."""
 
-    def __init__(self, border: str, threads: int | None, coverage: FloatArray | None) -> None:
+    def __init__(
+        self,
+        border: str,
+        threads: int | None,
+        coverage: FloatArray | None,
+        store: Store | None,
+    ) -> None:
         source_indices(1, 0, border)  # raises for an unknown border
-        self.border, self.threads, self.coverage = border, threads, coverage
+        self.border, self.threads, self.coverage, self.store = border, threads, coverage, store
+
+    def stored(self, pixels: FloatArray) -> FloatArray:
+        """Return a picture as the next pass reads it."""
+        return pixels if self.store is None else self.store(pixels)
 
     def blurred(self, pixels: FloatArray, stage: Stage, mm_per_texel: float) -> FloatArray:
         """Return the picture of a stage that reads ``pixels``."""
         if stage.kind == "star":
             return self._star(pixels, stage, mm_per_texel)
         weights = stage.pass_weights(mm_per_texel)
-        if self.coverage is None:
+        if self.coverage is None and self.store is None:
             ones = np.ones((1, weights.shape[1]))
             return apply_passes(
                 pixels, weights[None], ones, border=self.border, threads=self.threads
             )
-        across = self._divided(pixels, lambda each: self._line(each, weights, 1))
+        across = self.stored(self._divided(pixels, lambda each: self._line(each, weights, 1)))
         return self._divided(across, lambda each: self._line(each, weights, 0))
 
     def _star(self, pixels: FloatArray, stage: Stage, mm_per_texel: float) -> FloatArray:
@@ -183,7 +249,7 @@ class _Passes:
             found: FloatArray = middle * picture + corners * on_diagonals + beside * on_axes
             return found
 
-        return fetch(pixels) if self.coverage is None else self._divided(pixels, fetch)
+        return self._divided(pixels, fetch)
 
     def _line(self, pixels: FloatArray, weights: FloatArray, axis: int) -> FloatArray:
         """Convolve every channel along an axis with weights (P, C)."""
@@ -199,7 +265,9 @@ class _Passes:
 
     def _divided(self, pixels: FloatArray, fetch: Callable[[FloatArray], FloatArray]) -> FloatArray:
         """Return fetches of light times coverage over those of coverage; 0 where it is 0."""
-        covered = np.broadcast_to(self.coverage, pixels.shape)  # type: ignore[arg-type]
+        if self.coverage is None:
+            return fetch(pixels)
+        covered = np.broadcast_to(self.coverage, pixels.shape)
         light, part = fetch(pixels * covered), fetch(covered)
         return np.divide(light, part, out=np.zeros_like(light), where=part > 0.0)
 
@@ -208,34 +276,17 @@ class _Passes:
 
         The row or column that an odd size lacks is the border's.
         """
-        if self.coverage is None:
-            return self._means(pixels), _Passes(self.border, self.threads, None)
-        part = self._means(self.coverage)
-        light = self._means(pixels * self.coverage)
-        covered = np.divide(light, part, out=np.zeros_like(light), where=part > 0.0)
-        return covered, _Passes(self.border, self.threads, part)
-
-    def _means(self, pixels: FloatArray) -> FloatArray:
-        for axis in (0, 1):
-            even, odd = self._beyond(pixels, axis, slice(0, None, 2), slice(1, None, 2))
-            pixels = 0.5 * (even + odd)
-        return pixels
-
-    def _beyond(self, pixels: FloatArray, axis: int, *parts: slice) -> list[FloatArray]:
-        """Return parts of the picture, continued along an axis to an even number of texels."""
-        size = pixels.shape[axis]
-        places = source_indices(size, 1, self.border)[1 : size + 1 + size % 2]
-        black = np.zeros_like(pixels.take([0], axis))
-        continued = np.concatenate((pixels, black), axis)  # a border's place n is black
-        return [continued.take(places[each], axis) for each in parts]
+        part = (
+            None if self.coverage is None else four_texels(self.coverage, self.border).mean(axis=0)
+        )
+        smaller = _Passes(self.border, self.threads, part, self.store)
+        return self.stored(
+            self._divided(pixels, lambda each: four_texels(each, self.border).mean(axis=0))
+        ), smaller
 
     def doubled(self, pixels: FloatArray, size: tuple[int, int]) -> FloatArray:
         """Return a picture of twice the size by bilinear fetches."""
-        if self.coverage is None:
-            return self._enlarged(pixels, size)
-        light = self._enlarged(pixels * self.coverage, size)
-        part = self._enlarged(self.coverage, size)
-        return np.divide(light, part, out=np.zeros_like(light), where=part > 0.0)
+        return self._divided(pixels, lambda each: self._enlarged(each, size))
 
     def _enlarged(self, pixels: FloatArray, size: tuple[int, int]) -> FloatArray:
         for axis in (0, 1):

@@ -28,7 +28,8 @@ import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
-from sssfit.kernel import SeparableKernel
+from sssfit.kernel import Kernel, SeparableKernel, Taps
+from sssfit.render.taps import response
 from sssfit.scene.record import Scene
 
 # c of exp(-s^2 / (c v)): for the energy of a Gaussian beyond s, and for the 2010 listing.
@@ -90,7 +91,7 @@ def _thickness(thickness_mm: npt.ArrayLike) -> FloatArray:
     return s
 
 
-def beyond(kernel: SeparableKernel, thickness_mm: npt.ArrayLike) -> FloatArray:
+def beyond(kernel: Kernel, thickness_mm: npt.ArrayLike) -> FloatArray:
     """Return the share of a round kernel's light beyond the radius s, from its line integral.
 
     With a(x) the integral of R_d over y, Abel's transform gives for the plane outside s
@@ -103,7 +104,7 @@ def beyond(kernel: SeparableKernel, thickness_mm: npt.ArrayLike) -> FloatArray:
 
     Parameters
     ----------
-    kernel : SeparableKernel
+    kernel : SeparableKernel or Taps
     thickness_mm : array (...) [mm]
         Distances, at least 0; infinite where no light comes through.
 
@@ -118,7 +119,7 @@ def beyond(kernel: SeparableKernel, thickness_mm: npt.ArrayLike) -> FloatArray:
         A thickness is below 0 or NaN.
     """
     s = _thickness(thickness_mm)[..., None]
-    line = kernel.line[kernel.half_pixels :]
+    line = _half_line(kernel)
     edges_mm = kernel.mm_per_pixel * (np.arange(len(line)) + 0.5)
     # Integrated by parts: a falls by a step at each outer edge of a pixel, times sqrt(x^2 - s^2).
     steps = line - np.concatenate((line[1:], np.zeros((1, line.shape[1]))))
@@ -126,14 +127,25 @@ def beyond(kernel: SeparableKernel, thickness_mm: npt.ArrayLike) -> FloatArray:
     for edge_mm, step in zip(edges_mm, steps, strict=True):
         within = np.minimum(s, edge_mm)
         total += step * np.sqrt((edge_mm - within) * (edge_mm + within))
-    energy = kernel.mm_per_pixel * kernel.line.sum(axis=0)
+    energy = kernel.mm_per_pixel * (2.0 * line.sum(axis=0) - line[0])
     share = np.divide(2.0 * total, energy, out=np.zeros_like(total), where=energy > 0.0)
     lit: FloatArray = np.maximum(share, 0.0)
     return lit
 
 
-def through(kernel: SeparableKernel, thickness_mm: npt.ArrayLike) -> FloatArray:
+def _half_line(kernel: Kernel) -> FloatArray:
+    """Return the line integral from the middle outwards (h+1, C); of taps that of a lit point."""
+    if isinstance(kernel, SeparableKernel):
+        return kernel.line[kernel.half_pixels :]
+    line = response(kernel).sum(axis=0)
+    half_line: FloatArray = 0.5 * (line + line[::-1])[len(line) // 2 :]
+    return half_line
+
+
+def through(kernel: Kernel, thickness_mm: npt.ArrayLike) -> FloatArray:
     """Return T(s) of a kernel (..., C): from its Gaussians if it has any, else from `beyond`."""
+    if isinstance(kernel, Taps):
+        return beyond(kernel, thickness_mm)
     if any(_gaussians(kernel.parameters.get(name))[0] for name in kernel.channels):
         return transmittance(thickness_mm, *gaussians_of(kernel))
     return beyond(kernel, thickness_mm)
@@ -182,7 +194,7 @@ def _gaussians(parameters: Mapping[str, Any] | None) -> tuple[list[float], list[
     return [], []
 
 
-def transmitted(scene: Scene, kernel: SeparableKernel) -> FloatArray | None:
+def transmitted(scene: Scene, kernel: Kernel) -> FloatArray | None:
     """Return the light through the object, back_irradiance T(thickness) (H, W, C).
 
     To be added to the irradiance before the blur. None for a scene without these buffers.
@@ -206,7 +218,7 @@ def transmitted(scene: Scene, kernel: SeparableKernel) -> FloatArray | None:
     return arrives
 
 
-def with_transmitted(scene: Scene, kernel: SeparableKernel) -> Scene:
+def with_transmitted(scene: Scene, kernel: Kernel) -> Scene:
     """Return the scene with the light through the object added to its irradiance, (H, W, C).
 
     For renderers that use the irradiance alone; thickness and back irradiance are removed.
