@@ -84,13 +84,13 @@ def verdict_lines(comparison: Comparison, error: str, cost: str) -> list[str]:
     """Say in two lines which kernel to take for which budget, and how near that comes."""
     found = verdicts(comparison, error, cost)
     first, *others = found
-    more = "".join(f", {each.label} from {each.cost:g}" for each in others)
+    more = "".join(f", {each.label} from {each.cost:.4g}" for each in others)
     cheapest, closest = first, found[-1]
     far = f"{cheapest.label} {_error(cheapest.error, error)} ({cheapest.picture})"
     near = f"{closest.label} {_error(closest.error, error)} ({closest.picture})"
     both = f"the cheapest, {far}; the closest, {near}" if others else f"cheapest and closest, {far}"
     return [
-        f"Take {first.label} for {first.cost:g} {_COST_WORDS[cost]}{more}: over the pictures, no "
+        f"Take {first.label} for {first.cost:.4g} {_COST_WORDS[cost]}{more}: over the pictures, no "
         "other is as near for as little.",
         f"{_ERROR_WORDS[error]} on the worst picture: {both}{_unseen(found)}.",
     ]
