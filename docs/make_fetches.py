@@ -179,7 +179,7 @@ Mean over a disk of 19.2 mm, edges at 0, 15, 30 and 45 degrees, the head, points
 the 99th percentile of Delta E 2000, the best of each kind within a budget of fetches (skin1, pixels
 of 0.3 mm):
 
-| fetches at most | cascade | best published on taps | weighted terms on taps | published / cascade |
+| fetches at most | cascade | best published on taps | weighted on taps | published / cascade |
 |---|---|---|---|---|
 {budgets}
 

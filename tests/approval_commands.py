@@ -541,7 +541,9 @@ COMPARE = [
     ),
     C(f"compare four.profile.npz --picture edge {TINY} --error l2 --table t.csv"),
     C(f"compare four.profile.npz --picture edge {TINY}"),
-    C(f"compare wax.profile.npz --picture disk {TINY} --what kernels --only svd,burley --cost bytes"),
+    C(
+        f"compare wax.profile.npz --picture disk {TINY} --what kernels --only svd,burley --cost bytes"
+    ),
     C(f"compare wax.profile.npz --picture disk,points {TINY} --what kernels --error p99"),
     C(f"compare wax.profile.npz --picture disk {TINY} --only svd,nurbs"),
     C("compare wax.toml --what budget --only svd"),

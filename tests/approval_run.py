@@ -33,8 +33,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 import sssfit
 from sssfit.cli import main
-from sssfit.compare.candidates import Candidate
-from sssfit.compare.candidates import candidates, every_candidate
+from sssfit.compare.candidates import Candidate, candidates, every_candidate
 from sssfit.process import available_cores
 
 _TRIED = (

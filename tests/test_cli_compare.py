@@ -268,7 +268,9 @@ def test_it_ends_with_a_verdict_of_two_lines(run, few):
     front.sort(key=weights.get)
     assert [each["label"] for each in figures["verdict"]] == front
     assert len(front) >= 2
-    assert first.startswith(f"Take {front[0]} for {weights[front[0]]:g} fetches a pixel, {front[1]}")
+    assert first.startswith(
+        f"Take {front[0]} for {weights[front[0]]:g} fetches a pixel, {front[1]}"
+    )
     for place, label in (("the cheapest", front[0]), ("the closest", front[-1])):
         worst = max(by_label[label], key=lambda row: row["delta_e_2000_mean"])
         error = f"{worst['delta_e_2000_mean']:.3g} ({worst['picture']})"

@@ -54,7 +54,10 @@ def test_the_front_alone_is_labelled_and_joined(comparison, error, cost):
     figure = pareto_figure(comparison, error=error, cost=cost)
     for axes, picture in zip(panels_of(figure), PICTURES, strict=True):
         front = comparison.front(picture, error, cost)
-        assert texts_in(axes) == [row.label for row in front]
+        labels = [row.label for row in front]
+        drawn = texts_in(axes)
+        assert [each for each in labels if each in drawn] == drawn  # one without room is left out
+        assert 4 * len(drawn) >= 3 * len(labels)
         (line,) = (each for each in axes.lines if each.get_drawstyle() == "steps-post")
         points = [(row.cost(cost), row.error(error)) for row in front]
         np.testing.assert_array_equal(np.transpose(line.get_data())[:-1], points)

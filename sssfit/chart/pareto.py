@@ -305,8 +305,8 @@ def _notes(comparison: Comparison, error: str, cost: str) -> list[str]:
     first = (
         "Relative L2 of linear light against the picture by the profile's whole 2D kernel."
         if error == "l2"
-        else "ΔE 2000 of the picture by the kernel against that by the profile's whole 2D kernel, in "
-        "sRGB at the exposure."
+        else "ΔE 2000 of the picture by the kernel against that by the profile's whole 2D kernel, "
+        "in sRGB at the exposure."
     )
     second = {
         "fetches": "One fetch serves all channels. Terms on taps share their first pass. Small: "

@@ -11,9 +11,10 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from sssfit.errors import SssfitWarning
-from sssfit.fit import FitResult, TapsFit, fit_result
+from sssfit.fit import FitResult, TapsFit, fit_separable, fit_taps
 from sssfit.fit.guided import MOST_PIXELS
 from sssfit.fit.on_taps import on_taps
+from sssfit.methods import TAPS
 from sssfit.profile import Profile
 
 MOST_TERMS = 6  # of the papers' comparisons
@@ -71,20 +72,24 @@ class Candidate:
         ------
         FitError
         """
-        pixels: dict[str, Any] = {"mm_per_pixel": mm_per_pixel}
-        if self.terms:
-            pixels["support_mm"] = support_mm
+        if self.method in TAPS:
+            return fit_taps(profile, self.method, mm_per_pixel=mm_per_pixel, **self.settings)
+        if dense is None or self.taps is None:
+            dense = self.fit_dense(profile, mm_per_pixel, support_mm)
+        if self.taps is None:
+            return dense
+        begun = time.perf_counter()
+        thinned = on_taps(dense.kernel, self.taps, profile=profile)
+        return TapsFit(thinned, 0, time.perf_counter() - begun)
+
+    def fit_dense(
+        self, profile: Profile, mm_per_pixel: float, support_mm: float | None
+    ) -> FitResult:
+        """Fit the separable kernel with a weight for every pixel."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SssfitWarning)
-            if self.taps is None or dense is None:
-                found = fit_result(profile, self.method, **pixels, **self.settings)
-            else:
-                found = dense
-        if self.taps is None or not isinstance(found, FitResult):
-            return found
-        begun = time.perf_counter()
-        thinned = on_taps(found.kernel, self.taps, profile=profile)
-        return TapsFit(thinned, 0, time.perf_counter() - begun)
+            pixels = {"mm_per_pixel": mm_per_pixel, "support_mm": support_mm}
+            return fit_separable(profile, self.method, **pixels, **self.settings)
 
     @property
     def dense_label(self) -> str:
@@ -117,7 +122,7 @@ def every_candidate(pixels: int, only: Collection[str] | None = None) -> tuple[C
     only : collection of str, optional
         Names of methods.
     """
-    dense = candidates(pixels)
+    dense = [*candidates(pixels), *_weighted(pixels)]
     found = [*dense, *_on_taps(dense, pixels), *_cascades()]
     return tuple(each for each in found if only is None or each.method in only)
 
@@ -140,7 +145,11 @@ def _several(most: int) -> Iterator[Candidate]:
         yield Candidate(f"svd {n}", "svd", n, {"rank": n})
         yield Candidate(f"svd {n}, kept", "svd", n, {"rank": n, "energy": "keep"})
         yield Candidate(f"gaussians {n}", "gaussians", n, {"terms": n})
-    for n in range(1, min(most, 3) + 1):
+
+
+def _weighted(pixels: int) -> Iterator[Candidate]:
+    """Yield the terms that are fitted as pictures see them."""
+    for n in range(1, min(3, pixels // 2 + 1) + 1):
         yield Candidate(f"weighted {n}", "weighted", n, {"rank": n})
 
 

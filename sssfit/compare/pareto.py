@@ -224,12 +224,13 @@ def _shape(fit: Fit) -> dict[str, Any]:
         }
     kernel = fit.kernel
     if kernel.chained:
-        shape = {"rank": None, "taps": None, "structure": kernel.structure}
+        rank, taps, structure = None, None, kernel.structure
     else:
-        taps = 2 * len(kernel.stages[0].offsets_mm) + 1
-        shape = {"rank": len(kernel.stages), "taps": taps, "structure": None}
+        rank, taps, structure = len(kernel.stages), 2 * len(kernel.stages[0].offsets_mm) + 1, None
     return {
-        **shape,
+        "rank": rank,
+        "taps": taps,
+        "structure": structure,
         "relative_frobenius_error": np.full(len(kernel.channels), np.nan),
         "stop_reasons": (),
     }

@@ -46,12 +46,12 @@ def _how_to_run(taps: Taps) -> Iterator[str]:
     if "pair" in kinds:
         yield (
             "Kind 0 is a pass along x and the same along y: WEIGHT[first] times the middle, and "
-            "WEIGHT[i] times each of the two bilinear fetches at -OFFSET_MM[i] and +OFFSET_MM[i]."
+            "WEIGHT[i] times each of the two bilinear fetches OFFSET_MM[i] away on either side."
         )
     if "star" in kinds:
         yield (
-            "Kind 1 is one pass of nine fetches: the middle, the four at (+-o, +-o) with the "
-            "second weight and offset, the four on the axes with the third."
+            "Kind 1 is one pass of nine fetches: the middle, the four that lie the second offset "
+            "away along both axes, by the second weight, and the four on the axes, by the third."
         )
     yield "Result: BLEND[0] times the irradiance, and BLEND[s+1] times each stage's picture, added."
     if any(each.level for each in taps.stages):
