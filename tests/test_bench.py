@@ -110,7 +110,7 @@ def test_small_benchmarks_of_renderers_run_and_fill_every_table():
         timeout=300,
     )
     assert (ended.returncode, ended.stderr) == (0, "")
-    few, many, compiling, reference = tables(ended.stdout)
+    few, many, compiling, cascade, reference = tables(ended.stdout)
     for _, rows in (few, many):
         names = [row[0].split(",")[0] for row in rows]
         scipys = ["scipy.ndimage.convolve1d"] * 2
@@ -119,6 +119,7 @@ def test_small_benchmarks_of_renderers_run_and_fill_every_table():
             if row[1] != "not installed":
                 limit = 1e-13 if "float64" in row[0] else 1e-5  # all of them blur alike
                 assert float(row[3]) < limit
-    assert [len(compiling[1]), len(reference[1])] == [2, 2]
+    assert [len(each[1]) for each in (compiling, cascade, reference)] == [2, 2, 2]
+    assert all(float(row[1]) > 0.0 for row in cascade[1])
     for row in [*(row[1:] for row in compiling[1]), *(row[3:] for row in reference[1])]:
         assert all(float(value) >= 0.0 for value in row)

@@ -20,6 +20,7 @@ import numpy.typing as npt
 from sssfit.errors import RenderError
 from sssfit.kernel.taps import Stage, Taps
 from sssfit.render.borders import check_channels, check_memory, source_indices
+from sssfit.render.cascade import apply_cascade, is_quick
 from sssfit.render.separable import apply_passes
 from sssfit.render.texels import Store, store_of
 from sssfit.scene.record import Scene
@@ -189,6 +190,8 @@ def _chained(
     passes: "_Passes", pixels: FloatArray, taps: Taps, blend: FloatArray, pitch_mm: float
 ) -> FloatArray:
     """Add up stages that each read the one before, level by level."""
+    if passes.is_plain and is_quick(taps):
+        return apply_cascade(pixels, taps, pitch_mm, threads=passes.threads)
     sums = [pixels * blend[0]]
     levels = [passes]
     current = pixels
@@ -219,6 +222,11 @@ class _Passes:
     ) -> None:
         source_indices(1, 0, border)  # raises for an unknown border
         self.border, self.threads, self.coverage, self.store = border, threads, coverage, store
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether the picture is mirrored and all of it is there, and none is rounded."""
+        return self.border == "mirror" and self.coverage is None and self.store is None
 
     def stored(self, pixels: FloatArray) -> FloatArray:
         """Return a picture as the next pass reads it."""
