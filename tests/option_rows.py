@@ -26,7 +26,7 @@ from sssfit.formats.mco import join_channels, load_mco
 from sssfit.formats.pictures import load_image
 from sssfit.measure.difference import difference_map, magnified_difference
 from sssfit.measure.score import auto_exposure
-from sssfit.methods import ALL_FITS
+from sssfit.methods import FITS as METHODS
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
 from sssfit.render.transmittance import with_transmitted
@@ -265,7 +265,7 @@ FIT = {
         "fit wax.profile.npz --method svd",
         "fit --list",
         lambda ran: [line.split()[0] for line in ran.stdout.splitlines()],
-        lambda: list(ALL_FITS),
+        lambda: list(METHODS),
     ),
     "--method": Row(
         "fit wax.profile.npz --method svd",

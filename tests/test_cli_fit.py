@@ -10,7 +10,7 @@ from reference_pixels import make_profile
 from sssfit.cli import cli, main
 from sssfit.fit import METHODS
 from sssfit.kernel import SeparableKernel
-from sssfit.methods import ALL_FITS, FITS
+from sssfit.methods import FITS, SEPARABLE
 
 
 @pytest.fixture
@@ -86,7 +86,7 @@ def test_normalised_kernels_keep_their_energy_apart(folder):
         *(("svd", given, "rank") for given in ([], ["--rank", "2"])),
         *(("gaussians", given, "terms") for given in ([], ["--terms", "2"])),
         *(("weighted", given, "rank") for given in ([], ["--rank", "1"])),
-        *((method, [], None) for method in METHODS if not FITS[method].counted),
+        *((method, [], None) for method in METHODS if not SEPARABLE[method].counted),
     ],
 )
 def test_the_files_name_has_the_method_and_the_count_that_was_fitted(
@@ -101,8 +101,8 @@ def test_the_files_name_has_the_method_and_the_count_that_was_fitted(
 
 def test_list_has_a_line_for_each_method(folder):
     lines = ended("fit", "--list").stdout.splitlines()
-    assert [line.split()[0] for line in lines] == list(ALL_FITS)
-    for line, method in zip(lines, ALL_FITS.values(), strict=True):
+    assert [line.split()[0] for line in lines] == list(FITS)
+    for line, method in zip(lines, FITS.values(), strict=True):
         assert line.endswith(method.summary)
 
 
