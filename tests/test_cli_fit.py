@@ -115,7 +115,11 @@ def test_kernel_goes_to_stdout_and_words_to_stderr(folder):
 @pytest.mark.parametrize(
     ("arguments", "status", "word"),
     [
-        (("fit",), 2, "--list"),
+        (("fit", "--rank", "3"), 2, "this is cascade"),
+        (("fit", "--taps", "9"), 2, "this is cascade"),
+        (("fit", "--method", "svd", "--taps", "8"), 1, "odd number"),
+        (("fit", "--method", "svd", "--place", "quadratic"), 1, "number as --taps"),
+        (("fit", "--method", "svd", "--taps", "9", "--normalize"), 2, "--normalize is for"),
         (("fit", "--method", "preintegrated", "--mm-per-pixel", "0"), 2, "length"),
         (("fit", "--method", "preintegrated", "--mm-per-pixel", "1e-9"), 1, "GB"),
         (("fit", "gone.profile.npz", "--method", "preintegrated"), 1, "gone.profile.npz"),

@@ -15,7 +15,7 @@ from sssfit.cli import cli
 from sssfit.cli._options import method_options
 from sssfit.methods import FITS, SEPARABLE, SIMULATIONS, Method, Setting, lines_of, settings_of
 
-VERBS = {"simulate": SIMULATIONS, "fit": SEPARABLE}
+VERBS = {"simulate": SIMULATIONS, "fit": FITS}
 ENTRIES = [(verb, name) for verb, methods in VERBS.items() for name in methods]
 
 
@@ -37,6 +37,8 @@ def test_the_function_takes_every_setting_of_its_entry(verb, name):
     for each in method.settings:
         if each.name in ("checkpoint_every", "resume"):  # of the file beside the walk
             assert "checkpoint" in parameters
+        elif name in SEPARABLE and each.name in ("taps", "place"):  # of any of these kernels
+            assert each.name in inspect.signature(fit.fit_result).parameters
         else:
             assert (each.keyword or each.name) in parameters
     if method.shares:
@@ -70,7 +72,7 @@ def test_a_setting_of_several_fits_is_tried_with_each_of_them():
     shared = {name: owners for name, (_, owners) in known.items() if len(owners) > 1}
     tried = " ".join(row.command + row.given for row in SHARED_ROWS.values())
     tried += " ".join(ROWS["fit"][f"--{name}"].command for name in shared)
-    assert sorted(shared) == ["energy", "rank", "spectrum"]
+    assert sorted(shared) == ["energy", "place", "rank", "spectrum", "taps"]
     assert all(f"--method {owner}" in tried for owners in shared.values() for owner in owners)
 
 
