@@ -238,6 +238,8 @@ def _tapped(option: str, value: str, default: str = "", **own: Any) -> Row:
 
     free = {"passes", "fetches", "full_resolution"} & own.keys()
     usual: dict[str, Any] = {"passes": 4} if free else {"stages": "1-1"}
+    if "still" in own:  # where a picture is halved
+        usual = {"stages": "1|1"}
     command = "fit wax.profile.npz --method cascade --mm-per-pixel .6"
     typed = "".join(f" --{key} {each}" for key, each in usual.items())
     return Row(command + typed, f"{option} {value}".strip(), lambda ran: ran.taps, made, default)
@@ -301,6 +303,7 @@ FIT = {
     "--stages": _tapped("--stages", "1|1-1", stages="1|1-1"),
     "--passes": _tapped("--passes", "2", passes=2),
     "--full-resolution": _tapped("--full-resolution", "", full_resolution=True),
+    "--still": _tapped("--still", "", still=True),
     "--spectrum": _tapped("--spectrum", "white", "natural", spectrum="white"),
     "--output": Row(
         "fit wax.profile.npz --method svd",
