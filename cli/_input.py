@@ -19,28 +19,29 @@ if TYPE_CHECKING:
 _Record = TypeVar("_Record")
 
 
-def newest(pattern: str, made_by: str) -> str:
+def newest(made_by: str, *patterns: str) -> str:
     """Return the newest file of the current folder that matches, saying on stderr which."""
     from sssfit.errors import FileError
 
-    found = [path for path in Path().glob(pattern) if path.is_file()]
+    found = [path for each in patterns for path in Path().glob(each) if path.is_file()]
+    what = " or ".join(patterns)
     if not found:
         raise FileError(
-            f"there is no {pattern} in this folder: name one, or make one with `{made_by}`."
+            f"there is no {what} in this folder: name one, or make one with `{made_by}`."
         )
     path = max(found, key=lambda each: each.stat().st_mtime_ns)
-    note(f"Using {path}, the newest {pattern} here.")
+    note(f"Using {path}, the newest {what} here.")
     return str(path)
 
 
 def profile_name(given: str | None) -> str:
     """Return the profile that was named, by default the newest in this folder."""
-    return given or newest("*.profile.npz", "sssfit simulate skin1")
+    return given or newest("sssfit simulate skin1", "*.profile.npz")
 
 
 def kernel_name(given: str | None) -> str:
     """Return the kernel that was named, by default the newest in this folder."""
-    return given or newest("*.kernel.json", "sssfit fit --method svd --rank 3")
+    return given or newest("sssfit fit", "*.taps.json", "*.kernel.json")
 
 
 def profile_of_kernel(

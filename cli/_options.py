@@ -199,6 +199,7 @@ Length = functools.partial(Value, "length", text.length_mm)
 Lengths = functools.partial(Value, "list of lengths", text.lengths_mm)
 Count = functools.partial(Value, "count", text.whole_number)
 Size = functools.partial(Value, "size", text.size)
+Names = functools.partial(Value, "list of names", text.names)
 Share = functools.partial(Value, "share", text.share)
 BaseColour = functools.partial(Value, "list of reflectances", text.base_colour)
 

@@ -10,6 +10,7 @@ from ._options import (
     SHIPPED,
     Count,
     Length,
+    Names,
     Number,
     NumberRange,
     Numbers,
@@ -83,10 +84,11 @@ COMPARE = (
     option("--chart", None, "FILE", "Draw the kernels by error and cost, or the sheet, as PNG, SVG "
            "or PDF by the ending; - for PNG on stdout."),
     option("--table", None, "FILE", "Write the kernels' rows, .md, .csv or .json."),
-    option("--error", ["delta-e", "l2"], None, "Error in chart and front: mean Delta E 2000, or "
-           "relative L2 of linear light.", "delta-e"),
-    option("--cost", ["weights", "passes", "seconds"], None, "Cost in chart and front: weights "
-           "applied to a pixel, passes, or measured seconds.", "weights"),
+    option("--error", ["delta-e", "p99", "l2"], None, "Error in chart and front: mean or 99th "
+           "percentile of Delta E 2000, or relative L2 of linear light.", "delta-e"),
+    option("--cost", ["fetches", "passes", "bytes", "seconds"], None, "Cost in chart and front: "
+           "texture fetches or bytes moved a pixel, passes, or measured seconds.", "fetches"),
+    option("--only", Names(FITS), "METHOD,...", "Only kernels by these fit methods."),
     option("--budget-chart", None, "FILE", "Draw the budget."),
     option("--photons", Count(2, 10**12), "N", "Photons of the budget's walk.  [default: 1e6]"),
     option("--method", list(FITS), None, "Fit method of the budget's kernel.", "svd"),

@@ -30,8 +30,8 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
 
     The error budget comes first: simulation noise, energy beyond the grid, separability and
     storage, each alone compared with the exact profile's 2D kernel, the largest first. Then come
-    every method, rank and number of Gaussians on the pictures' pixels, with error and cost. A star
-    marks the Pareto front: no other kernel is better in both. Seconds are measured on this machine.
+    cascades, and every method dense and on taps, with error and cost. A star marks the Pareto
+    front: no other kernel is better in both. Seconds are measured on this machine.
 
     MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or a .profile.npz
     file, - for one on stdin; a budget needs a half space with g = 0.
@@ -40,7 +40,7 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
       sssfit compare skin1
       sssfit compare skin1 --chart skin1-pareto.png --table skin1.csv
       sssfit compare skin1 --what budget --method gaussians --budget-chart budget.png
-      sssfit compare skin1 --what front --cost passes
+      sssfit compare skin1 --what front --cost passes --only svd,cascade
       sssfit compare skin1 --picture head --size 1024x1024 --mm-per-pixel 0.15 --cost seconds
       sssfit compare slab.profile.npz --picture mine.exr --error l2
       sssfit compare --all -o charts
@@ -58,7 +58,7 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
     run = {"seed": common.seed, "threads": common.threads}
     on = {key: given[key] for key in ("mm_per_pixel", "size", "layer", "mask")}
     on["seed"] = common.seed
-    asked = {key: given[key] for key in ("error", "mm_per_pixel", "photons", "method", "model")}
+    asked = {k: given[k] for k in ("error", "only", "mm_per_pixel", "photons", "method", "model")}
     asked |= {"settings": own or None, "steps": step_progress, "walk": walk_progress, **run}
     front = {key: given[key] for key in ("error", "cost")}
     files, wrote, failed = _files(material, given), set[str](), []
@@ -140,8 +140,8 @@ def _check(material: str | None, given: Mapping[str, Any], names: Sequence[str])
     if given["output"] is not None and not several:
         raise click.UsageError("-o is the folder of --all; name files by --chart and --table.")
     idle = list(_OF_BUDGETS) if several or what not in (None, "budget") else []
-    idle += ["chart", "table"] if what == "budget" else []
-    idle += ["pictures", "size", "layer", "mask", "table"] if what == "sheet" else []
+    idle += ["chart", "table", "only"] if what == "budget" else []
+    idle += ["pictures", "size", "layer", "mask", "table", "only"] if what == "sheet" else []
     refuse(given, dict.fromkeys(idle, "another --what"))
     if what == "sheet" and not given["chart"]:
         raise click.UsageError("--what sheet is a picture; name its file with --chart.")

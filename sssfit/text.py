@@ -10,7 +10,7 @@ import contextlib
 import io
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from decimal import Decimal
 from pathlib import Path
 from typing import BinaryIO, NamedTuple
@@ -188,6 +188,15 @@ def lengths_mm(text: str) -> list[float | str]:
     elif not all(units) and any(units):
         raise ArgumentError(f"{text!r} has a unit for some lengths only; give it to all.")
     return [length_mm(each) for each in parts]
+
+
+def names(text: str, among: Collection[str]) -> list[str]:
+    """Read names from a list of words with commas; ArgumentError for another word."""
+    words = [word.strip() for word in text.split(",")]
+    for word in words:
+        if word not in among:
+            raise ArgumentError(f"{printable(word)!r} is not among {', '.join(among)}.")
+    return words
 
 
 def whole_number(text: str, least: int, most: int) -> int:

@@ -539,8 +539,8 @@ def _pictures(
     ]
 
 
-def _compared(scenes: list[Scene]) -> Any:
-    return called("sssfit.compare.compare_kernels", profile(), scenes)
+def _compared(scenes: list[Scene], **settings: Any) -> Any:
+    return called("sssfit.compare.compare_kernels", profile(), scenes, **settings)
 
 
 def _budgeted(**settings: Any) -> Any:
@@ -637,7 +637,7 @@ COMPARE = {
         f"{_KERNELS} --chart c.png",
         "--error l2",
         _front,
-        lambda: front("l2", "weights"),
+        lambda: front("l2", "fetches"),
         default="delta-e",
     ),
     "--cost": Row(
@@ -645,7 +645,13 @@ COMPARE = {
         "--cost passes",
         _front,
         lambda: front("delta-e", "passes"),
-        default="weights",
+        default="fetches",
+    ),
+    "--only": Row(
+        f"{_KERNELS} --picture disk",
+        "--only burley,svd",
+        calls,
+        lambda: _compared(_pictures("disk"), only=["burley", "svd"]),
     ),
     "--budget-chart": Row(_BUDGET, "--budget-chart b.png", is_written("png"), lambda: ["b.png"]),
     "--photons": Row(_BUDGET, "--photons 2e4", calls, lambda: _budgeted(photons=20_000), "1e6"),

@@ -315,8 +315,10 @@ def rendering(f: Figures) -> list[Any]:
             *(f["irradiance"], f["width"], f["height"], f["mm_per_pixel"], how, f["kernel"]),
         ),
         Words(
-            "cost: {} passes, {} weights a pixel, {} bytes, {} s a megapixel",
-            *(f["passes"], f["taps_per_pixel"], f["kernel_bytes"], f["seconds_per_megapixel"]),
+            "cost: {} weights and {} bytes moved a pixel in {} passes, {} bytes stored, {} s a "
+            "megapixel",
+            *(f["fetches"], f["bytes_per_pixel"], f["passes"]),
+            *(f["kernel_bytes"], f["seconds_per_megapixel"]),
         ),
     ]
     if f["transmitted_maximum"] is not None:
@@ -369,11 +371,21 @@ def _lost(f: Figures) -> list[Any]:
 
 # compare
 
-COSTS = {"passes": "passes", "weights": "taps_per_pixel", "seconds": "seconds_per_megapixel"}
-ERRORS = {"delta-e": "delta_e_2000_mean", "l2": "relative_l2"}
+COSTS = {
+    "fetches": "fetches",
+    "passes": "passes",
+    "bytes": "bytes_per_pixel",
+    "seconds": "seconds_per_megapixel",
+}
+ERRORS = {"delta-e": "delta_e_2000_mean", "p99": "delta_e_2000_p99", "l2": "relative_l2"}
+ERROR_WORDS = {
+    "delta-e": "Mean Delta E",
+    "p99": "99th percentile of Delta E",
+    "l2": "Relative L2",
+}
 HEADS = [
-    *("kernel", "passes", "weights", "s/Mpixel", "Delta E", "95th", "99th", "above 1"),
-    *("relative L2", "PSNR, dB", "energy drift", "asymmetry"),
+    *("kernel", "fetches", "passes", "bytes", "stored", "s/Mpixel", "Delta E", "95th", "99th"),
+    *("above 1", "relative L2", "PSNR, dB", "energy drift", "asymmetry"),
 ]
 
 
@@ -455,14 +467,17 @@ def rows_of(f: Figures, picture: Figures) -> list[Figures]:
     """Rows of a picture by cost, then by error."""
     rows = [row for row in f["rows"] if row["picture"] == picture["name"]]
     cost, error = COSTS[f["cost"]], ERRORS[f["error"]]
-    return sorted(rows, key=lambda row: (float(f"{row[cost]:.2g}"), row[error]))
+    digits = ".2g" if f["cost"] == "seconds" else ""
+    return sorted(rows, key=lambda row: (float(f"{row[cost]:{digits}}"), row[error]))
 
 
 def kernel_cells(row: Figures) -> list[Any]:
     asymmetry = [each for each in row["radial_asymmetry"] if each is not None]
     return [
+        row["fetches"],
         row["passes"],
-        row["taps_per_pixel"],
+        row["bytes_per_pixel"],
+        row["kernel_bytes"],
         row["seconds_per_megapixel"],
         row["delta_e_2000_mean"],
         row["delta_e_2000_p95"],
@@ -499,7 +514,12 @@ def kernel_tables(f: Figures) -> list[Any]:
 
 
 def verdict(f: Figures) -> list[Words]:
-    units = {"weights": "weights a pixel", "passes": "passes", "seconds": "s a megapixel"}
+    units = {
+        "fetches": "fetches a pixel",
+        "passes": "passes",
+        "bytes": "bytes a pixel",
+        "seconds": "s a megapixel",
+    }
     first, *others = f["verdict"]
     last = f["verdict"][-1]
     more = "".join(", {} from {}" for _ in others)
@@ -519,7 +539,7 @@ def verdict(f: Figures) -> list[Words]:
         ),
         Words(
             f"{{}} on the worst picture: {words}; {{}}.",
-            {"delta-e": "Mean Delta E", "l2": "Relative L2"}[f["error"]],
+            ERROR_WORDS[f["error"]],
             *(_worst(f, each) for each in ([first, last] if others else [first])),
             tail,
         ),

@@ -39,14 +39,18 @@ def gathered(picture, fetches, border, cover=None):
     """Sum of weight times fetch at (dy, dx) around each texel, divided by that of coverage."""
     out = np.zeros(picture.shape)
     for row, column in np.ndindex(*picture.shape):
-        light = sum(w * fetch(picture, row + dy, column + dx, border) for w, dy, dx in fetches)
-        if cover is not None:
-            lit = picture * cover
-            light = sum(w * fetch(lit, row + dy, column + dx, border) for w, dy, dx in fetches)
-            part = sum(w * fetch(cover, row + dy, column + dx, border) for w, dy, dx in fetches)
-            light = light / part if part > 0.0 else 0.0
-        out[row, column] = light
+        out[row, column] = around(picture, row, column, fetches, border, cover)
     return out
+
+
+def around(picture, row, column, fetches, border, cover):
+    """The sum of one texel."""
+    if cover is None:
+        return sum(w * fetch(picture, row + dy, column + dx, border) for w, dy, dx in fetches)
+    lit = picture * cover
+    light = sum(w * fetch(lit, row + dy, column + dx, border) for w, dy, dx in fetches)
+    part = sum(w * fetch(cover, row + dy, column + dx, border) for w, dy, dx in fetches)
+    return light / part if part > 0.0 else 0.0
 
 
 def passes_of(stage, channel, pitch):
@@ -155,3 +159,35 @@ def rendered(picture, taps, channel, pitch, border="mirror", cover=None, interme
 
         sums[level] = sums[level] + divided(up, store(sums[level + 1]), covers[level + 1])
     return sums[0] if cover is None else np.where(cover > 0.0, sums[0], 0.0)
+
+
+def turn_of(x, y, frame):
+    """The angle of a pixel in a frame: pcg2d of its place, on words of 32 bits."""
+    x, y = ((each * 1664525 + 1013904223) % 2**32 for each in (x, y))
+    for _ in range(2):
+        x = (x + y * 1664525) % 2**32
+        y = (y + x * 1664525) % 2**32
+        x, y = x ^ (x >> 16), y ^ (y >> 16)
+    return 2 * math.pi * ((x + frame * 2654435769) % 2**32) / 2**32
+
+
+def disk_fetches(stage, channel, pitch, turn):
+    """The fetches (weight, dy, dx) of a disk that is turned."""
+    golden = (1 + math.sqrt(5)) / 2
+    fetches = [(stage.weights[0, channel], 0.0, 0.0)]
+    for k, (radius, row) in enumerate(zip(stage.offsets_mm, stage.weights[1:], strict=True)):
+        angle = turn + 2 * math.pi * k / golden
+        r = radius / pitch
+        fetches.append((row[channel], r * math.sin(angle), r * math.cos(angle)))
+    return fetches
+
+
+def rendered_disk(picture, taps, channel, pitch, border="mirror", cover=None, frame=0):
+    """A disk's picture (H, W) of one channel, each pixel turned by its own angle."""
+    out, (row0, row1) = np.zeros(picture.shape), taps.blend[:, channel]
+    for row, column in np.ndindex(*picture.shape):
+        turn = turn_of(column, row, frame)
+        fetches = disk_fetches(taps.stages[0], channel, pitch, turn)
+        out[row, column] = around(picture, row, column, fetches, border, cover)
+    out = row0 * picture + row1 * out
+    return out if cover is None else np.where(cover > 0.0, out, 0.0)

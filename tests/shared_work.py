@@ -49,7 +49,8 @@ def begin():
     exact, head, fits = sssfit.simulate.exact, sssfit.scene.head, sssfit.compare.candidates
     exact._solve = _solved_once(exact._solve)
     head.head_scene = _lit_once(head.head_scene)
-    fits.fit_result = _fitted_once(fits.fit_result)
+    fits.fit_separable = _fitted_once(fits.fit_separable)
+    fits.fit_taps = _fitted_once(fits.fit_taps)
 
 
 def _solved_once(real):
@@ -87,7 +88,7 @@ def _fitted_once(real):
     known = {}
 
     @functools.wraps(real)
-    def fit_result(profile, method="svd", **settings):
+    def fit(profile, method, **settings):
         values = settings.values()
         if not _state["fits"] or not all(isinstance(each, _PLAIN) for each in values):
             return real(profile, method, **settings)
@@ -96,7 +97,7 @@ def _fitted_once(real):
             known[key] = real(profile, method, **settings)
         return known[key]
 
-    return fit_result
+    return fit
 
 
 def _contents(profile):

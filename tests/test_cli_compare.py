@@ -40,7 +40,7 @@ def few(monkeypatch):
     """Few kernels, quickly fitted; the verb hands what to try to the library."""
     labels = ("pre-integrated", "svd 1", "svd 2", "svd 2, kept", "gaussians 1")
     some = [each for each in candidates(17) if each.label in labels]
-    monkeypatch.setattr(pareto, "every_candidate", lambda _: some)
+    monkeypatch.setattr(pareto, "every_candidate", lambda pixels, only: some)  # noqa: ARG005
     return [each.label for each in some]
 
 
@@ -78,8 +78,8 @@ def test_rows_for_programs(run, tmp_path, few):
     row = found["rows"][0]
     assert row["taps"] is None
     assert len(row["energy_drift"]) == len(row["stop_reasons"]) == 3
-    assert set(row["on_front"]) == {"delta-e", "l2"}
-    assert set(row["on_front"]["l2"]) == {"passes", "weights", "seconds"}
+    assert set(row["on_front"]) == {"delta-e", "p99", "l2"}
+    assert set(row["on_front"]["l2"]) == {"fetches", "passes", "bytes", "seconds"}
     assert list(tmp_path.iterdir()) == []
 
 
@@ -91,7 +91,7 @@ def test_the_table_for_people_is_sorted_and_marks_the_front(run, few):
     assert len(rows) == len(few)
     parts = [line[2:].split("  ") for line in rows]
     cells = [[each.strip() for each in line if each.strip()] for line in parts]
-    key = [(int(each[1]), float(each[6].removesuffix(" %"))) for each in cells]
+    key = [(int(each[2]), float(each[10].removesuffix(" %"))) for each in cells]
     assert key == sorted(key)
     starred = [k for (k, line) in zip(key, rows, strict=True) if line.startswith("* ")]
     assert starred
@@ -121,7 +121,7 @@ def test_chart_and_tables_are_written(run, tmp_path):
     assert len(table) == 2 + len(rows)
     assert len({line.count("|") for line in table}) == 1
     assert sum(line.startswith("| **") for line in table) == sum(
-        row["on_front"]["delta-e"]["weights"] for row in rows
+        row["on_front"]["delta-e"]["fetches"] for row in rows
     )
 
 
@@ -256,7 +256,7 @@ def test_it_ends_with_a_verdict_of_two_lines(run, few):
         label: math.prod(row["delta_e_2000_mean"] for row in rows) ** (1 / 3)
         for label, rows in by_label.items()
     }
-    weights = {label: rows[0]["taps_per_pixel"] for label, rows in by_label.items()}
+    weights = {label: rows[0]["fetches"] for label, rows in by_label.items()}
     front = [
         label
         for label in by_label
@@ -268,7 +268,9 @@ def test_it_ends_with_a_verdict_of_two_lines(run, few):
     front.sort(key=weights.get)
     assert [each["label"] for each in figures["verdict"]] == front
     assert len(front) >= 2
-    assert first.startswith(f"Take {front[0]} for {weights[front[0]]} weights a pixel, {front[1]}")
+    assert first.startswith(
+        f"Take {front[0]} for {weights[front[0]]:g} fetches a pixel, {front[1]}"
+    )
     for place, label in (("the cheapest", front[0]), ("the closest", front[-1])):
         worst = max(by_label[label], key=lambda row: row["delta_e_2000_mean"])
         error = f"{worst['delta_e_2000_mean']:.3g} ({worst['picture']})"

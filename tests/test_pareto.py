@@ -12,7 +12,13 @@ from reference_front import literal_front
 from reference_pixels import make_profile
 
 from sssfit.compare import pareto
-from sssfit.compare.candidates import Candidate, candidates
+from sssfit.compare.candidates import (
+    BUDGETS,
+    CASCADES,
+    Candidate,
+    candidates,
+    every_candidate,
+)
 from sssfit.compare.comparison import COSTS, ERRORS, check_error, pareto_front, verdicts
 from sssfit.compare.evaluate import evaluate
 from sssfit.compare.pareto import check_scenes, compare_kernels
@@ -108,9 +114,14 @@ def test_rows_are_what_judge_and_measure_say(skin1, scenes, comparison):
             )
             assert row.stop_reasons == fit.stop_reasons
             assert row.passes == 2 * candidate.terms
-            assert row.taps_per_pixel == row.passes * comparison.pixels
+            assert row.all_passes == row.passes
+            used = fit.kernel.weights.any(axis=2)  # far weights of a Gaussian are 0
+            assert row.fetches == 2 * np.count_nonzero(used) <= row.passes * comparison.pixels
+            # In half floats: a pass reads and writes 8 bytes, and adding reads 8 more.
+            assert row.bytes_per_pixel == 8 * (2 * row.passes + candidate.terms - 1)
             assert row.kernel_bytes == 4 * candidate.terms * comparison.pixels * 3
-            assert row.taps is None
+            assert row.taps is row.structure is None
+            assert row.is_dense
             assert row.seconds_per_megapixel > 0 < row.fit_seconds
     assert next(rows, None) is None
 
@@ -170,7 +181,7 @@ def test_the_95_percent_of_a_verdict_are_those_of_every_picture(comparison):
     disk = dataclasses.replace(disk, relative_l2=0.5, delta_e_2000_p95=1.0)
     head = dataclasses.replace(head, relative_l2=0.1, delta_e_2000_p95=7.0)
     for rows in ((disk, head), (head, disk)):
-        (found,) = verdicts(dataclasses.replace(comparison, rows=rows), "l2", "weights")
+        (found,) = verdicts(dataclasses.replace(comparison, rows=rows), "l2", "fetches")
         assert (found.error, found.picture, found.delta_e_2000_p95) == (0.5, disk.picture, 7.0)
 
 
@@ -189,16 +200,75 @@ def test_the_same_call_gives_the_same_rows_but_for_seconds(skin1, scenes, compar
 def test_all_candidates_are_tried_unless_some_are_named(skin1):
     seen, scene = [], make_scene("disk", height=32, width=32, mm_per_pixel=4.0)
     found = compare_kernels(skin1, [scene], progress=lambda *each: seen.append(each))
-    wanted = [each.label for each in candidates(found.pixels)]
+    wanted = [each.label for each in every_candidate(found.pixels)]
     assert [row.label for row in found.rows] == wanted
     steps = [*wanted, "timing"]
     assert seen == [(k, len(wanted), step) for k, step in enumerate(steps)]
 
 
+def test_kernels_on_taps_are_those_of_the_dense_ones_within_a_budget(skin1, scenes):
+    """Each is fitted as it is alone, and costs its terms and a first pass that they share."""
+    wanted = [each for each in every_candidate(41) if each.label.startswith(("svd 2", "artist on"))]
+    found = compare_kernels(skin1, scenes[1:], support_mm=20.0, candidates=wanted)
+    rows = {row.label: row for row in found.rows}
+    assert "svd 2" in rows
+    for candidate in wanted:
+        row = rows[candidate.label]
+        assert row.taps == candidate.taps
+        if candidate.taps is None:
+            continue
+        assert row.label == f"{candidate.dense_label} on {row.taps} taps"
+        assert row.fetches == (row.rank + 1) * row.taps
+        assert row.passes == row.all_passes == row.rank + 1
+        assert min(abs(row.fetches - each) for each in BUDGETS) < 2 * (row.rank + 1)
+        assert not row.is_dense
+        assert row.stop_reasons == ()
+        assert np.isnan(row.relative_frobenius_error).all()
+        alone = candidate.fit(skin1, PITCH, 20.0)
+        score = evaluate(evaluated_scene(scenes[1], skin1), alone.kernel, skin1).score
+        assert row.delta_e_2000_p99 == score.delta_e_2000_p99
+
+
+def test_no_kernel_has_more_taps_than_pixels_or_a_budget_allows():
+    for pixels in (3, 9, 41, 143, 1001):
+        found = [each for each in every_candidate(pixels) if each.taps]
+        assert found
+        for each in found:
+            assert each.taps % 2 == 1
+            assert 3 <= each.taps <= pixels
+            assert (each.terms + 1) * each.taps <= max(BUDGETS)
+        assert len({each.label for each in found}) == len(found)
+
+
+def test_cascades_stand_at_their_fetches_and_stages(skin1, scenes):
+    cascade = next(each for each in every_candidate(41) if each.method == "cascade")
+    found = compare_kernels(skin1, scenes, candidates=[cascade, SOME[0]])
+    row = found.rows[0]
+    kernel = cascade.fit(skin1, PITCH, None).kernel
+    assert row.label == f"cascade {CASCADES[0]}"
+    assert row.structure == kernel.structure
+    assert row.rank is row.taps is None
+    assert (row.fetches, row.passes) == (kernel.fetches, kernel.passes)
+    assert row.all_passes == kernel.cost.all_passes > row.passes
+    assert row.bytes_per_pixel == kernel.bytes_per_pixel("half")
+    assert row.fetches <= CASCADES[0]
+    assert not row.is_dense
+
+
+def test_only_the_methods_asked_for_are_compared(skin1, scenes):
+    found = compare_kernels(skin1, scenes[:1], only=["preintegrated", "artist"])
+    assert {row.method for row in found.rows} == {"preintegrated", "artist"}
+    wanted = [each.label for each in every_candidate(found.pixels, ["preintegrated", "artist"])]
+    assert [row.label for row in found.rows] == wanted
+    assert {each.method for each in every_candidate(9)} > {"cascade", "svd", "weighted"}
+    dense = {each.label for each in candidates(9)}
+    assert {each.label for each in every_candidate(9)} > dense
+
+
 def test_support_is_handed_to_the_fits(skin1, scenes):
     found = compare_kernels(skin1, scenes[:1], support_mm=4.0, candidates=SOME[:1])
     assert found.pixels == 9
-    assert found.rows[0].taps_per_pixel == 18
+    assert found.rows[0].fetches == 18
 
 
 def test_what_cannot_be_fitted_is_left_out_by_name(skin1, scenes):

@@ -54,7 +54,10 @@ def test_the_front_alone_is_labelled_and_joined(comparison, error, cost):
     figure = pareto_figure(comparison, error=error, cost=cost)
     for axes, picture in zip(panels_of(figure), PICTURES, strict=True):
         front = comparison.front(picture, error, cost)
-        assert texts_in(axes) == [row.label for row in front]
+        labels = [row.label for row in front]
+        drawn = texts_in(axes)
+        assert [each for each in labels if each in drawn] == drawn  # one without room is left out
+        assert 4 * len(drawn) >= 3 * len(labels)
         (line,) = (each for each in axes.lines if each.get_drawstyle() == "steps-post")
         points = [(row.cost(cost), row.error(error)) for row in front]
         np.testing.assert_array_equal(np.transpose(line.get_data())[:-1], points)
@@ -84,22 +87,22 @@ def test_points_of_one_cost_are_apart(comparison):
 
 
 def test_a_line_at_one_marks_what_is_just_noticeable(comparison):
-    for error, wanted in (("delta-e", 1), ("l2", 0)):
+    for error, wanted in (("delta-e", 1), ("p99", 1), ("l2", 0)):
         for axes in panels_of(pareto_figure(comparison, error=error)):
             flat = [each for each in axes.lines if list(each.get_ydata()) == [1.0, 1.0]]
             assert len(flat) == wanted
 
 
 def test_title_and_notes_say_what_was_compared(comparison):
-    figure = pareto_figure(comparison, cost="weights")
+    figure = pareto_figure(comparison, cost="fetches")
     text = words_of(figure)
     exposure = f"exposure {comparison.pictures[0].exposure:.3g}"
     for part in (
-        "skin1: mean ΔE 2000 against weights",
+        "skin1: mean ΔE 2000 against fetches",
         "Exact solution",
         f"{comparison.pixels} x {comparison.pixels} pixels of 2 mm",
         "disk, 32 × 32 pixels, " + exposure,  # noqa: RUF001
-        f"passes times the {comparison.pixels} pixels of a pass",
+        f"dense kernels of {comparison.pixels} pixels at their weights",
         "Of disk and edge, what is within 21.4 mm of light or border counts",
     ):
         assert part in text
@@ -109,12 +112,14 @@ def test_title_and_notes_say_what_was_compared(comparison):
 
 def test_methods_have_a_colour_and_a_marker_of_their_own(comparison):
     axes = panels_of(pareto_figure(comparison))[0]
-    looks = {}
+    looks, sizes = {}, {}
     for row, line in zip(comparison.rows_of("disk"), axes.lines, strict=False):
         looks.setdefault(row.method, set()).add((line.get_color(), line.get_marker()))
+        sizes.setdefault(row.is_dense, set()).add(line.get_markersize())
     assert all(len(each) == 1 for each in looks.values())
-    assert len({next(iter(each))[0] for each in looks.values()}) == len(looks) == 7
-    assert len({next(iter(each))[1] for each in looks.values()}) == 7
+    assert len({next(iter(each))[0] for each in looks.values()}) == len(looks) == 9
+    assert len({next(iter(each))[1] for each in looks.values()}) == 9
+    assert max(sizes[True]) < min(sizes[False])  # what no shader applies is small
 
 
 @pytest.mark.parametrize(
@@ -123,7 +128,7 @@ def test_methods_have_a_colour_and_a_marker_of_their_own(comparison):
         pytest.param(lambda _: {"delta_e_2000_mean": 0.0}, id="no error at all"),
         pytest.param(lambda _: {"delta_e_2000_mean": 3.0}, id="all alike"),
         pytest.param(lambda row: {"delta_e_2000_mean": 1e-3 * row.delta_e_2000_mean}, id="small"),
-        pytest.param(lambda _: {"taps_per_pixel": 42}, id="one cost"),
+        pytest.param(lambda _: {"fetches": 42}, id="one cost"),
         pytest.param(lambda row: {"label": f"{row.label}, of a long name"}, id="long labels"),
     ],
 )

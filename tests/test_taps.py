@@ -176,7 +176,7 @@ def test_an_edited_file_is_one_line_that_names_the_place(name):
 
 STAGE_EDITS = {
     "level": (2, "the stages have the levels [0, 2, 1, 2]"),
-    "kind": ("disk", "stages[1].kind = 'disk'; expected pair or star"),
+    "kind": ("round", "stages[1].kind = 'round'; expected pair or star or disk"),
     "offsets_mm": ([0.5, 0.4], "stages[1].offsets_mm = [0.5, 0.4]; expected rising ones"),
     "weights": ([[1, 1], [0.1, 0], [0, 0]], "stages[1].weights add up to [1.2, 1.0]"),
 }

@@ -32,15 +32,17 @@ if TYPE_CHECKING:
 
 
 _HEAD_INCHES, _PANEL_INCHES = 1.9, 2.3  # heights of title, legend and notes; of a panel
-# Those of `COLOURS` and four more of Okabe and Ito, safe for colour blindness.
+# Those of `COLOURS` and more of Okabe and Ito's and of Tol's, safe for colour blindness.
 _METHODS: dict[str, tuple[str, str, str]] = {
+    "cascade": ("cascade", "#000000", "*"),
     "svd": ("SVD", COLOURS[2], "o"),
     "gaussians": ("sum of Gaussians", COLOURS[0], "s"),
     "preintegrated": ("pre-integrated", COLOURS[1], "^"),
     "guided": ("guided", "#cc79a7", "D"),
     "artist": ("artist", "#e69f00", "v"),
     "falloff": ("falloff", "#56b4e9", "P"),
-    "burley": ("Burley", "#000000", "X"),
+    "burley": ("Burley", "#999999", "X"),
+    "weighted": ("weighted terms", "#882255", "<"),
 }
 _GREY = "#666666"
 _FAINT = 0.35
@@ -50,17 +52,22 @@ _FARTHEST = 8  # most lines by which a label is moved down
 _JUST_NOTICEABLE = 1.0  # Delta E
 _NOTICED: Style = {"color": _GREY, "lw": 0.8, "ls": (0, (4, 2))}
 _WORTH_A_NOTE = 1e-3  # share of the light
-_LEAST = {"delta-e": 1e-3, "l2": 1e-5}  # smaller errors are drawn at this value
-_ERRORS = {"delta-e": "mean ΔE 2000", "l2": "relative L2 error"}
+_LEAST = {"delta-e": 1e-3, "p99": 1e-3, "l2": 1e-5}  # smaller errors are drawn at this value
+_ERRORS = {
+    "delta-e": "mean ΔE 2000",
+    "p99": "99th percentile of ΔE 2000",
+    "l2": "relative L2 error",
+}
 _COSTS = {
-    "passes": "one-dimensional passes over the picture",
-    "weights": "weights applied to a pixel, in all passes",
+    "fetches": "texture fetches a pixel; dense kernels: weights",
+    "passes": "passes over the picture",
+    "bytes": "bytes read and written a pixel, half floats",
     "seconds": "seconds per megapixel, measured",
 }
 
 
 def pareto_figure(
-    comparison: Comparison, *, error: str = "delta-e", cost: str = "weights"
+    comparison: Comparison, *, error: str = "delta-e", cost: str = "fetches"
 ) -> Figure:
     """Draw errors over costs, a panel for each picture, with the front as a step line.
 
@@ -68,9 +75,9 @@ def pareto_figure(
     ----------
     comparison : Comparison
     error : str
-        "delta-e" or "l2".
+        "delta-e", "p99" or "l2".
     cost : str
-        "passes", "weights" or "seconds".
+        "fetches", "passes", "bytes" or "seconds".
 
     Returns
     -------
@@ -101,7 +108,7 @@ def pareto_figure(
         for axes, picture in zip(panels, comparison.pictures, strict=True):
             front = comparison.front(picture.name, error, cost)
             points = [_point(row, error, cost) for row in front]
-            level = _JUST_NOTICEABLE if error == "delta-e" else None
+            level = _JUST_NOTICEABLE if error != "l2" else None
             place_labels(axes, points, [row.label for row in front], level=level)
     return figure
 
@@ -112,14 +119,17 @@ def _handles(comparison: Comparison, error: str) -> list[Line2D]:
         *_method_handles(comparison),
         Line2D([], [], color=_GREY, lw=1.0, label="Pareto front"),
     ]
-    if error == "delta-e":
+    if error != "l2":
         handles.append(Line2D([], [], label="ΔE 1, just noticeable", **_NOTICED))
     return handles
 
 
 def _method_handles(comparison: Comparison) -> list[Line2D]:
     """Return a marker for each method, and for kernels that keep the fit's energy."""
-    drawn = {row.method: row for row in comparison.rows}
+    drawn: dict[str, KernelRow] = {}
+    for row in comparison.rows:  # of the size that a shader's kernels have, where there is one
+        if row.method not in drawn or drawn[row.method].is_dense:
+            drawn[row.method] = row
     kept = next((row for row in comparison.rows if _is_kept(row)), None)
     handles = [
         Line2D([], [], label=_METHODS[method][0], **_style(drawn[method], is_kept=False))
@@ -137,14 +147,14 @@ def _draw_panel(
 ) -> None:
     """Draw one picture's points: the front in full colour, the others faint."""
     rows, front = comparison.rows_of(picture.name), comparison.front(picture.name, error, cost)
-    lanes = [0] * len(rows) if cost == "seconds" else _lanes(rows, front, cost)
+    lanes = _lanes(rows, front, cost) if cost == "passes" else [0] * len(rows)
     low, high = axes.get_xlim()
     lane = (high / low) ** _LANE
     for row, number in zip(rows, lanes, strict=True):
         x, y = _point(row, error, cost)
         alpha = 1.0 if row in front else _FAINT
         axes.plot(x * lane**number, y, alpha=alpha, **_style(row, is_kept=_is_kept(row)))
-    if error == "delta-e":
+    if error != "l2":
         axes.axhline(_JUST_NOTICEABLE, zorder=1, **_NOTICED)
     points = [_point(row, error, cost) for row in front]
     if not points:
@@ -237,12 +247,12 @@ def _is_kept(row: KernelRow) -> bool:
 
 
 def _style(row: KernelRow, *, is_kept: bool) -> Style:
-    """Return colour and marker of a row's method, hollow if the energy is the fit's."""
+    """Return colour and marker of a row's method: small if dense, hollow if with a fit's energy."""
     _, colour, marker = _METHODS.get(row.method, (row.method, _GREY, "*"))
     return {
         "color": colour,
         "marker": marker,
-        "ms": 5,
+        "ms": 4 if row.is_dense else 7 if row.structure else 5.5,
         "mew": 0.9,
         "ls": "none",
         "zorder": 3,
@@ -264,7 +274,7 @@ def _limit(axes: Axes, comparison: Comparison, error: str, cost: str) -> None:
     axes.set_yscale("log")
     most = max(max(costs), 1.5 * min(costs))
     axes.set_xlim(min(costs) * (min(costs) / most) ** 0.16, most * (most / min(costs)) ** 0.08)
-    top = max(*errors, 1.3 * _JUST_NOTICEABLE) if error == "delta-e" else max(errors)
+    top = max(*errors, 1.3 * _JUST_NOTICEABLE) if error != "l2" else max(errors)
     least = min(*errors, top / 10.0)
     axes.set_ylim(least * (least / top) ** 0.16, top * (top / least) ** 0.06)
     axes.yaxis.set_major_locator(LogLocator(numticks=6))
@@ -292,15 +302,18 @@ def _panel_title(picture: Picture) -> str:
 
 def _notes(comparison: Comparison, error: str, cost: str) -> list[str]:
     """Return the notes on errors, costs and omitted kernels."""
-    first = {
-        "delta-e": "ΔE 2000 of the picture by the kernel against that by the profile's whole 2D "
-        "kernel, in sRGB at the exposure.",
-        "l2": "Relative L2 of linear light against the picture by the profile's whole 2D kernel.",
-    }[error]
+    first = (
+        "Relative L2 of linear light against the picture by the profile's whole 2D kernel."
+        if error == "l2"
+        else "ΔE 2000 of the picture by the kernel against that by the profile's whole 2D kernel, "
+        "in sRGB at the exposure."
+    )
     second = {
-        "passes": "Passes: two a term, one along x and one along y.",
-        "weights": f"Weights: passes times the {comparison.pixels} pixels of a pass; one weight "
-        "serves all channels. No bilinear taps, zeros counted.",
+        "fetches": "One fetch serves all channels. Terms on taps share their first pass. Small: "
+        f"dense kernels of {comparison.pixels} pixels at their weights, which no shader applies.",
+        "passes": "Passes: two a term, one along x and one along y, one a star of nine fetches; "
+        "without those that change the picture's size.",
+        "bytes": "Bytes: each picture that a pass reads, once, and what it writes, in half floats.",
         "seconds": f"Seconds: wall time on {_threads(comparison)} of this machine, float64, all "
         "channels, the least of several. The front is of two digits; zeros at a pass's "
         "ends cost nothing.",

@@ -65,7 +65,7 @@ class Option:
             for key, value in self.candidate.settings.items()
         }
         candidate = replace(self.candidate, settings=settings)
-        return candidate.fit(profile, mm_per_pixel, self.support_mm)
+        return candidate.fit_dense(profile, mm_per_pixel, self.support_mm)
 
 
 def half_pixels(support_mm: float, mm_per_pixel: float) -> int:

@@ -260,7 +260,7 @@ class Switches:
         on_grid, cut = sources.on_grid(sources.exact), sources.cut(sources.exact)
         simulated = sources.walk if model is None else sources.models[model]
         kernel, kernel_of_cut, whole = (
-            fit.fit(each, mm_per_pixel, None).kernel
+            fit.fit_dense(each, mm_per_pixel, None).kernel
             for each in (on_grid, cut, sources.on_grid(simulated))
         )
         return cls(sources, on_grid, cut, kernel, kernel_of_cut, whole, model, storage)

@@ -1,48 +1,104 @@
-"""The kernels that are compared: every method, rank and number of Gaussians."""
+"""The kernels that are compared: every method, dense and on taps, and cascades.
 
+Dense kernels have a weight for every pixel of a pass, which no shader applies; on taps they are
+thinned to the bilinear fetches of a budget.
+"""
+
+import time
 import warnings
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from sssfit.errors import SssfitWarning
-from sssfit.fit import FitResult, fit_result
+from sssfit.fit import FitResult, TapsFit, fit_separable, fit_taps
 from sssfit.fit.guided import MOST_PIXELS
+from sssfit.fit.on_taps import on_taps
+from sssfit.methods import TAPS
 from sssfit.profile import Profile
 
 MOST_TERMS = 6  # of the papers' comparisons
+CASCADES = (12, 14, 17, 24)  # fetches a pixel; more than 24 change nothing that can be seen
+BUDGETS = (12, 24, 50, 100)  # fetches a pixel of the kernels on taps
+LEAST_TAPS = 3  # a pass: the middle and one pair
+# What is thinned: of each method the kernels that need few taps, or show the least.
+_THINNED = (
+    *("pre-integrated", "artist", "falloff", "guided k = 1.55", "svd 2", "svd 3"),
+    *("gaussians 2", "gaussians 3", "weighted 1", "weighted 2"),
+)
 
 
 @dataclass(frozen=True, slots=True)
 class Candidate:
-    """A way to fit: a method of ``sssfit.fit.METHODS`` with its settings.
+    """A way to fit: a method of ``sssfit.methods.FITS`` with its settings.
 
     Parameters
     ----------
     label : str
-        For charts and tables: "svd 3", "guided k = 4".
+        For charts and tables: "svd 3", "guided k = 4", "svd 3 on 25 taps", "cascade 24".
     method : str
     terms : int
-        Most separable terms it makes; two passes each.
+        Most separable terms it makes, two passes each; 0 for a cascade.
     settings : mapping
         Keywords of the method's function.
+    taps : int, optional
+        Fetches of a pass that a dense kernel is thinned to.
     """
 
     label: str
     method: str
     terms: int
     settings: Mapping[str, Any] = field(default_factory=dict)
+    taps: int | None = None
 
-    def fit(self, profile: Profile, mm_per_pixel: float, support_mm: float | None) -> FitResult:
-        """Fit a profile on pixels; what the fit would warn of, a comparison shows in figures."""
+    def fit(
+        self,
+        profile: Profile,
+        mm_per_pixel: float,
+        support_mm: float | None,
+        dense: FitResult | None = None,
+    ) -> FitResult | TapsFit:
+        """Fit a profile on pixels; what the fit would warn of, a comparison shows in figures.
+
+        Parameters
+        ----------
+        profile : Profile
+        mm_per_pixel, support_mm : float [mm]
+            As `sssfit.fit.make_target`. A cascade reaches as far as the profile's light.
+        dense : FitResult, optional
+            The kernel that is thinned, where it is fitted already.
+
+        Raises
+        ------
+        FitError
+        """
+        if self.method in TAPS:
+            return fit_taps(profile, self.method, mm_per_pixel=mm_per_pixel, **self.settings)
+        if dense is None or self.taps is None:
+            dense = self.fit_dense(profile, mm_per_pixel, support_mm)
+        if self.taps is None:
+            return dense
+        begun = time.perf_counter()
+        thinned = on_taps(dense.kernel, self.taps, profile=profile)
+        return TapsFit(thinned, 0, time.perf_counter() - begun)
+
+    def fit_dense(
+        self, profile: Profile, mm_per_pixel: float, support_mm: float | None
+    ) -> FitResult:
+        """Fit the separable kernel with a weight for every pixel."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SssfitWarning)
             pixels = {"mm_per_pixel": mm_per_pixel, "support_mm": support_mm}
-            return fit_result(profile, self.method, **pixels, **self.settings)
+            return fit_separable(profile, self.method, **pixels, **self.settings)
+
+    @property
+    def dense_label(self) -> str:
+        """The label of the kernel that is thinned."""
+        return self.label.partition(" on ")[0]
 
 
 def candidates(pixels: int, *, most_terms: int = MOST_TERMS) -> tuple[Candidate, ...]:
-    """Return what can be fitted on a number of pixels, cheapest first.
+    """Return the dense kernels that can be fitted on a number of pixels, cheapest first.
 
     Parameters
     ----------
@@ -54,6 +110,21 @@ def candidates(pixels: int, *, most_terms: int = MOST_TERMS) -> tuple[Candidate,
     most = min(most_terms, pixels // 2 + 1)
     found = [*_one_pass(pixels), *_several(most)]
     return tuple(sorted(found, key=lambda each: each.terms))
+
+
+def every_candidate(pixels: int, only: Collection[str] | None = None) -> tuple[Candidate, ...]:
+    """Return all that is compared on a number of pixels: dense, on taps, and cascades.
+
+    Parameters
+    ----------
+    pixels : int
+        As `candidates`.
+    only : collection of str, optional
+        Names of methods.
+    """
+    dense = [*candidates(pixels), *_weighted(pixels)]
+    found = [*dense, *_on_taps(dense, pixels), *_cascades()]
+    return tuple(each for each in found if only is None or each.method in only)
 
 
 def _one_pass(pixels: int) -> Iterator[Candidate]:
@@ -74,3 +145,26 @@ def _several(most: int) -> Iterator[Candidate]:
         yield Candidate(f"svd {n}", "svd", n, {"rank": n})
         yield Candidate(f"svd {n}, kept", "svd", n, {"rank": n, "energy": "keep"})
         yield Candidate(f"gaussians {n}", "gaussians", n, {"terms": n})
+
+
+def _weighted(pixels: int) -> Iterator[Candidate]:
+    """Yield the terms that are fitted as pictures see them."""
+    for n in range(1, min(3, pixels // 2 + 1) + 1):
+        yield Candidate(f"weighted {n}", "weighted", n, {"rank": n})
+
+
+def _on_taps(dense: Sequence[Candidate], pixels: int) -> Iterator[Candidate]:
+    """Yield the kernels that are thinned to each budget: terms share their first pass."""
+    for each in dense:
+        if each.label not in _THINNED:
+            continue
+        budgeted = (int(budget / (each.terms + 1) - 1) // 2 * 2 + 1 for budget in BUDGETS)
+        for taps in dict.fromkeys(budgeted):
+            if LEAST_TAPS <= taps <= pixels:
+                yield replace(each, label=f"{each.label} on {taps} taps", taps=taps)
+
+
+def _cascades() -> Iterator[Candidate]:
+    """Yield a cascade for each budget."""
+    for fetches in CASCADES:
+        yield Candidate(f"cascade {fetches}", "cascade", 0, {"fetches": fetches})

@@ -58,12 +58,21 @@ def pareto_front(cost: npt.ArrayLike, error: npt.ArrayLike) -> npt.NDArray[np.bo
 
 
 # What a front can be of: the names of the command line, and the rows' fields.
-ERRORS = {"delta-e": "delta_e_2000_mean", "l2": "relative_l2"}
-COSTS = {"passes": "passes", "weights": "taps_per_pixel", "seconds": "seconds_per_megapixel"}
+ERRORS = {
+    "delta-e": "delta_e_2000_mean",
+    "p99": "delta_e_2000_p99",
+    "l2": "relative_l2",
+}
+COSTS = {
+    "fetches": "fetches",
+    "passes": "passes",
+    "bytes": "bytes_per_pixel",
+    "seconds": "seconds_per_megapixel",
+}
 _ROW_FIGURES = (
-    *("picture", "label", "method", "rank", "settings", *COLOUR_FIGURES),
-    *("relative_l2", "rmse", "psnr_db", "energy_drift"),
-    *("radial_asymmetry", "passes", "taps_per_pixel", "kernel_bytes", "taps"),
+    *("picture", "label", "method", "rank", "taps", "structure", "settings"),
+    *(*COLOUR_FIGURES, "relative_l2", "rmse", "psnr_db", "energy_drift", "radial_asymmetry"),
+    *("fetches", "passes", "all_passes", "bytes_per_pixel", "kernel_bytes"),
     *("seconds_per_megapixel", "fit_seconds", "relative_frobenius_error", "stop_reasons"),
 )
 _LEAST_ERROR = 1e-9  # what a geometric mean takes for none
@@ -88,8 +97,13 @@ class KernelRow:
     ----------
     label, method : str
         The candidate's, as "svd 3, kept" and "svd".
-    rank : int
-        Separable terms.
+    rank : int, optional
+        Separable terms; None for a cascade.
+    taps : int, optional
+        Bilinear fetches of a pass; None for a dense kernel, with a weight for every pixel of a
+        pass, and for a cascade.
+    structure : str, optional
+        The stages of a cascade.
     settings : mapping
         Keywords of the fit.
     picture : str
@@ -99,25 +113,26 @@ class KernelRow:
         As in `ImageScore`.
     radial_asymmetry : array (C,)
         As in `Evaluation`; NaN for kernels of fewer than 9 pixels.
-    passes, taps_per_pixel, kernel_bytes : int
+    fetches, passes, all_passes, bytes_per_pixel, kernel_bytes : float or int
         As in `Cost`.
     seconds_per_megapixel : float [s]
-        Wall time of `render_separable` in float64 on the largest picture, the least of several.
+        Wall time of `render` in float64 on the largest picture, the least of several.
     fit_seconds : float [s]
-        A sum of Gaussians continues from the smaller ones found before, whose time is not counted.
+        A sum of Gaussians continues from the smaller ones found before, whose time is not counted;
+        nor is the fit of the dense kernel for the tables of taps that are made from it.
     relative_frobenius_error : array (C,)
-        Of the kernel, as in `FitResult`.
+        Of the kernel, as in `FitResult`; NaN for tables of taps.
     stop_reasons : tuple of str
-        Why the fit of each channel ended.
+        Why the fit of each channel ended; empty for tables of taps.
     fronts : frozenset of (error, cost)
         Keys of ``ERRORS`` and ``COSTS`` for which no row of the same picture beats this one.
-    taps : int, optional
-        Bilinear taps of a shader; None: there are none yet.
     """
 
     label: str
     method: str
-    rank: int
+    rank: int | None
+    taps: int | None
+    structure: str | None
     settings: Mapping[str, Any]
     picture: str
     delta_e_2000_mean: float
@@ -129,15 +144,21 @@ class KernelRow:
     psnr_db: float
     energy_drift: FloatArray
     radial_asymmetry: FloatArray
+    fetches: float
     passes: int
-    taps_per_pixel: float
+    all_passes: int
+    bytes_per_pixel: float
     kernel_bytes: int
     seconds_per_megapixel: float
     fit_seconds: float
     relative_frobenius_error: FloatArray
     stop_reasons: tuple[str, ...]
     fronts: frozenset[tuple[str, str]] = frozenset()
-    taps: int | None = None
+
+    @property
+    def is_dense(self) -> bool:
+        """Whether it has a weight for every pixel, which no shader applies."""
+        return self.taps is None and self.structure is None
 
     def error(self, name: str) -> float:
         """Return the error that a key of ``ERRORS`` names."""
@@ -303,7 +324,7 @@ def _verdict(rows: Sequence[KernelRow], error: str, cost: str) -> Verdict:
 
 def check_error(error: str, channels: int) -> None:
     """Refuse Delta E for channels that have no colour."""
-    if error == "delta-e" and channels not in _COLOURED:
+    if error != "l2" and channels not in _COLOURED:
         raise RenderError(
             f"Delta E of {channels} channels; expected 3, or 1 for grey: choose the error l2."
         )

@@ -1,5 +1,6 @@
 """A kernel on a picture, compared with the truth: what it shows, loses and costs."""
 
+import functools
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
@@ -164,6 +165,7 @@ def evaluate(
     exposure: float | None = None,
     structure: bool = False,
     intermediate: str | None = None,
+    is_timed: bool = True,
     threads: int | None = None,
 ) -> Evaluation:
     """Render a scene with a kernel and with a profile's 2D kernel, and compare.
@@ -186,6 +188,8 @@ def evaluate(
         As `measure`.
     intermediate
         As `render_taps`, for tables of taps.
+    is_timed : bool
+        Measure the kernel's seconds, for which it is rendered several times.
 
     Raises
     ------
@@ -197,9 +201,11 @@ def evaluate(
         through = _most_through(scene, kernel)
         scene = with_transmitted(scene, kernel)
     settings = {"border": border, "threads": threads, **_between_passes(kernel, intermediate)}
-    picture, seconds = timed(
-        lambda shown: np.asarray(render(shown, kernel, **settings), dtype=np.float64), scene
-    )
+
+    def shown(lit: Scene) -> FloatArray:
+        return np.asarray(render(lit, kernel, **settings), dtype=np.float64)
+
+    picture, seconds = timed(shown, scene) if is_timed else (shown(scene), None)
     if truth is None and profile is not None:
         _check_channels(kernel, profile)
         truth = render_reference(scene, profile, border=border, threads=threads)
@@ -250,6 +256,7 @@ def _check_channels(kernel: Kernel, profile: Profile) -> None:
         )
 
 
+@functools.lru_cache(maxsize=4)  # a comparison asks once for every picture
 def asymmetry_of(kernel: Kernel) -> FloatArray:
     """`radial_asymmetry` of each channel's 2D kernel (C,), from the fourth circle on.
 

@@ -5,30 +5,32 @@ A row is one kernel on one picture. Errors are against the picture by the profil
 """
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.compare.candidates import Candidate
-from sssfit.compare.candidates import candidates as every_candidate
+from sssfit.compare.candidates import Candidate, every_candidate
 from sssfit.compare.comparison import COSTS, ERRORS, Comparison, KernelRow, Picture, pareto_front
 from sssfit.compare.evaluate import Evaluation, evaluate
 from sssfit.compare.references import Reference, check_one_pitch, references
 from sssfit.errors import FitError, RenderError
-from sssfit.fit import FitResult, make_target
+from sssfit.fit import FitResult, TapsFit, make_target
 from sssfit.measure.delta_e import selected_pixels, selection
 from sssfit.measure.score import COLOUR_FIGURES
 from sssfit.process import thread_count
 from sssfit.profile import Profile
+from sssfit.render import render
 from sssfit.render.borders import check_channels
-from sssfit.render.separable import render_separable
 from sssfit.scene.record import Scene
 
 Report = Callable[[int, int, str], None]
-_Evaluated = tuple[Candidate, FitResult, Sequence[Evaluation]]
+Fit = FitResult | TapsFit
+_Evaluated = tuple[Candidate, Fit, Sequence[Evaluation]]
 
+_COST_FIGURES = ("fetches", "passes", "all_passes", "bytes_per_pixel", "kernel_bytes")
 # Turns in which kernels are timed: two at least, then until so much time has gone.
 _LEAST_TURNS, _MOST_TURNS, _TIMED_SECONDS = 2, 12, 8.0
 
@@ -39,6 +41,7 @@ def compare_kernels(
     *,
     support_mm: float | None = None,
     candidates: Sequence[Candidate] | None = None,
+    only: Collection[str] | None = None,
     threads: int | None = None,
     progress: Report | None = None,
 ) -> Comparison:
@@ -54,7 +57,10 @@ def compare_kernels(
     support_mm : float, optional [mm]
         As `make_target`.
     candidates : sequence of Candidate, optional
-        By default all that ``sssfit.compare.candidates`` knows for these pixels.
+        By default all that ``sssfit.compare.candidates`` knows for these pixels, dense kernels
+        before those that are thinned from them.
+    only : collection of str, optional
+        Methods of the default candidates.
     threads : int, optional
         By default all cores; only the seconds depend on it.
     progress : callable, optional
@@ -75,18 +81,22 @@ def compare_kernels(
     check_scenes(scenes, profile.n_channels)
     target = make_target(profile, scenes[0].mm_per_pixel, support_mm)
     pixels = 2 * target.half_pixels + 1
-    wanted = every_candidate(pixels) if candidates is None else tuple(candidates)
+    wanted = every_candidate(pixels, only) if candidates is None else tuple(candidates)
     true = references(scenes, profile, threads=threads)
     evaluated: list[_Evaluated] = []
+    dense: dict[str, FitResult] = {}
     left_out: list[tuple[str, str]] = []
     for done, candidate in enumerate(wanted):
         if progress is not None:
             progress(done, len(wanted), candidate.label)
         try:
-            fit = candidate.fit(profile, target.mm_per_pixel, support_mm)
+            known = dense.get(candidate.dense_label)
+            fit = candidate.fit(profile, target.mm_per_pixel, support_mm, known)
         except FitError as error:
             left_out.append((candidate.label, str(error)))
             continue
+        if isinstance(fit, FitResult):
+            dense[candidate.label] = fit
         evaluated.append((candidate, fit, [_evaluated(each, fit, threads) for each in true]))
     if not evaluated:
         reason = left_out[0][1] if left_out else "there are none."
@@ -113,7 +123,7 @@ def compare_kernels(
     )
 
 
-def _evaluated(true: Reference, fit: FitResult, threads: int | None) -> Evaluation:
+def _evaluated(true: Reference, fit: Fit, threads: int | None) -> Evaluation:
     """Compare a kernel's picture with the true one."""
     return evaluate(
         true.scene,
@@ -121,6 +131,7 @@ def _evaluated(true: Reference, fit: FitResult, threads: int | None) -> Evaluati
         truth=true.truth,
         border=true.border,
         exposure=true.exposure,
+        is_timed=False,
         threads=threads,
     )
 
@@ -149,7 +160,7 @@ def check_scenes(scenes: Sequence[Scene], channels: int) -> None:
 
 
 def _timed_in_turn(
-    fits: Sequence[FitResult], scenes: Sequence[Scene], threads: int | None
+    fits: Sequence[Fit], scenes: Sequence[Scene], threads: int | None
 ) -> npt.NDArray[np.float64]:
     """Return the least seconds per megapixel of each kernel, on the largest picture (n,).
 
@@ -164,28 +175,27 @@ def _timed_in_turn(
             break
         for k, fit in enumerate(fits):
             start = perf_counter()
-            render_separable(scene, fit.kernel, threads=threads)
+            render(scene, fit.kernel, threads=threads)
             least[k] = min(least[k], perf_counter() - start)
     return least * 1e6 / (scene.height * scene.width)
 
 
 def _rows(
     candidate: Candidate,
-    fit: FitResult,
+    fit: Fit,
     evaluated: Sequence[Evaluation],
     scenes: Sequence[Scene],
     seconds: float,
 ) -> list[KernelRow]:
     """Return the rows of one kernel, yet without fronts."""
-    cost = evaluated[0].cost
-    found = []
+    cost, found = evaluated[0].cost, []
     for scene, each in zip(scenes, evaluated, strict=True):
         assert each.score is not None  # a truth was given
         found.append(
             KernelRow(
                 label=candidate.label,
                 method=candidate.method,
-                rank=fit.kernel.rank,
+                **_shape(fit),
                 settings=candidate.settings,
                 picture=scene.name,
                 **{key: getattr(each.score, key) for key in COLOUR_FIGURES},
@@ -194,16 +204,36 @@ def _rows(
                 psnr_db=each.score.psnr_db,
                 energy_drift=each.score.energy_drift,
                 radial_asymmetry=each.asymmetry,
-                passes=cost.passes,
-                taps_per_pixel=cost.taps_per_pixel,
-                kernel_bytes=cost.kernel_bytes,
+                **{key: getattr(cost, key) for key in _COST_FIGURES},
                 seconds_per_megapixel=float(seconds),
                 fit_seconds=fit.seconds,
-                relative_frobenius_error=fit.relative_frobenius_error,
-                stop_reasons=fit.stop_reasons,
             )
         )
     return found
+
+
+def _shape(fit: Fit) -> dict[str, Any]:
+    """Return what a row says of the kernel's form, and of how its channels were fitted."""
+    if isinstance(fit, FitResult):
+        return {
+            "rank": fit.kernel.rank,
+            "taps": None,
+            "structure": None,
+            "relative_frobenius_error": fit.relative_frobenius_error,
+            "stop_reasons": fit.stop_reasons,
+        }
+    kernel = fit.kernel
+    if kernel.chained:
+        rank, taps, structure = None, None, kernel.structure
+    else:
+        rank, taps, structure = len(kernel.stages), 2 * len(kernel.stages[0].offsets_mm) + 1, None
+    return {
+        "rank": rank,
+        "taps": taps,
+        "structure": structure,
+        "relative_frobenius_error": np.full(len(kernel.channels), np.nan),
+        "stop_reasons": (),
+    }
 
 
 def _with_fronts(rows: Sequence[KernelRow]) -> tuple[KernelRow, ...]:

@@ -4,7 +4,7 @@ The parts are records: kernels by error and cost (``pareto``), error budgets (``
 contact sheet (``sheet``); ``table`` writes them in words, ``sssfit.chart`` draws them.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from typing import Any
 
@@ -63,6 +63,7 @@ def compare(
     name: str,
     profile: Profile | None = None,
     error: str = "delta-e",
+    only: Collection[str] | None = None,
     mm_per_pixel: Pitch | None = None,
     photons: int | None = None,
     threads: int | None = None,
@@ -86,7 +87,9 @@ def compare(
     profile : Profile, optional
         That of the source, where it is computed already.
     error : str
-        The error of the front that will be drawn: "delta-e" needs channels that have a colour.
+        The error of the front that will be drawn: those of Delta E need channels with a colour.
+    only : collection of str, optional
+        Methods of the kernels that are compared; by default all.
     mm_per_pixel : float or "profile", optional [mm]
         Of a sheet.
     photons : int, optional
@@ -110,7 +113,7 @@ def compare(
     elif profile is not None and what != "budget":
         check_error(error, profile.n_channels)
         with steps(profile.material_name or "profile") as show:
-            kernels = compare_kernels(profile, scenes, threads=threads, progress=show)
+            kernels = compare_kernels(profile, scenes, only=only, threads=threads, progress=show)
         yield kernels
     if what in (None, "budget") and isinstance(source, Profile):
         note(f"No budget: {name} is a profile, and a budget simulates a material.")

@@ -131,11 +131,11 @@ def compute_sheet(
     pitch = pitch_of(profile, mm_per_pixel)
     panels = _PanelRenderer(profile, tuple(scenes), pitch, pixels, threads)
     line = Candidate("Artist-friendly, line fit", "artist", 1)
-    fitted = line.fit(profile, pitch, support).kernel
+    fitted = line.fit_dense(profile, pitch, support).kernel
     production = production_look(fitted)
     rows = [panels.row("Input, times albedo", panels.inputs())]
     for candidate in _kernels(min(most_terms, fitted.pixels // 2 + 1), line, production):
-        kernel = candidate.fit(profile, pitch, support).kernel
+        kernel = candidate.fit_dense(profile, pitch, support).kernel
         rows.append(panels.row(candidate.label, panels.rendered(kernel), cost_of(kernel).passes))
     rows.append(panels.row("True kernel", panels.truths))
     return Sheet(

@@ -15,11 +15,21 @@ from sssfit.messages import filled, number, table
 
 FORMATS = (".md", ".csv", ".json")
 HEADS = (
-    *("kernel", "passes", "weights", "s/Mpixel", "Delta E", "95th", "99th", "above 1"),
-    *("relative L2", "PSNR, dB", "energy drift", "asymmetry"),
+    *("kernel", "fetches", "passes", "bytes", "stored", "s/Mpixel"),
+    *("Delta E", "95th", "99th", "above 1", "relative L2", "PSNR, dB"),
+    *("energy drift", "asymmetry"),
 )
-_COST_WORDS = {"weights": "weights a pixel", "passes": "passes", "seconds": "s a megapixel"}
-_ERROR_WORDS = {"delta-e": "Mean Delta E", "l2": "Relative L2"}
+_COST_WORDS = {
+    "fetches": "fetches a pixel",
+    "passes": "passes",
+    "bytes": "bytes a pixel",
+    "seconds": "s a megapixel",
+}
+_ERROR_WORDS = {
+    "delta-e": "Mean Delta E",
+    "p99": "99th percentile of Delta E",
+    "l2": "Relative L2",
+}
 _FORMAT = "sssfit.table/1"
 # What our files begin with, and are known by.
 _MARKS = {
@@ -74,13 +84,13 @@ def verdict_lines(comparison: Comparison, error: str, cost: str) -> list[str]:
     """Say in two lines which kernel to take for which budget, and how near that comes."""
     found = verdicts(comparison, error, cost)
     first, *others = found
-    more = "".join(f", {each.label} from {each.cost:g}" for each in others)
+    more = "".join(f", {each.label} from {each.cost:.4g}" for each in others)
     cheapest, closest = first, found[-1]
     far = f"{cheapest.label} {_error(cheapest.error, error)} ({cheapest.picture})"
     near = f"{closest.label} {_error(closest.error, error)} ({closest.picture})"
     both = f"the cheapest, {far}; the closest, {near}" if others else f"cheapest and closest, {far}"
     return [
-        f"Take {first.label} for {first.cost:g} {_COST_WORDS[cost]}{more}: over the pictures, no "
+        f"Take {first.label} for {first.cost:.4g} {_COST_WORDS[cost]}{more}: over the pictures, no "
         "other is as near for as little.",
         f"{_ERROR_WORDS[error]} on the worst picture: {both}{_unseen(found)}.",
     ]
@@ -172,8 +182,10 @@ def cells_of(row: KernelRow, mark: str) -> list[str]:
     drift = max(row.energy_drift.tolist(), key=abs)
     return [
         f"{mark}{row.label}",
+        f"{row.fetches:.4g}",
         f"{row.passes}",
-        f"{row.taps_per_pixel}",
+        f"{row.bytes_per_pixel:.4g}",
+        f"{row.kernel_bytes}",
         f"{row.seconds_per_megapixel:.2g}",
         number(row.delta_e_2000_mean, ".3f"),
         number(row.delta_e_2000_p95, ".2f"),

@@ -31,19 +31,20 @@ def description(kernel: SeparableKernel) -> list[str]:
         "K[i][j] = sum over terms of sign * weight[i] * weight[j]: a horizontal pass and the same "
         "pass vertically,",
         "then the sum over terms. Weights are energies of pixels (dimensionless), linear light.",
-        f"Energy of the 2D kernel: {_values(kernel.energy.tolist())}.",
-        f"Multiply by: {_values(kernel.scale.tolist())}.",
-        f"Relative Frobenius error: {_errors(kernel.relative_frobenius_error.tolist())}; "
-        f"energy error: {_errors(kernel.energy_error.tolist())}.",
+        f"Energy of the 2D kernel: {values_text(kernel.energy.tolist())}.",
+        f"Multiply by: {values_text(kernel.scale.tolist())}.",
+        f"Relative Frobenius error: {errors_text(kernel.relative_frobenius_error.tolist())}; "
+        f"energy error: {errors_text(kernel.energy_error.tolist())}.",
     ]
     return [printable(line) for line in lines]
 
 
-def _values(values: Sequence[float]) -> str:
+def values_text(values: Sequence[float]) -> str:
+    """Return a value for each channel as text."""
     return ", ".join(f"{each + 0.0:.6g}" for each in values)  # not -0
 
 
-def _errors(values: Sequence[float]) -> str:
+def errors_text(values: Sequence[float]) -> str:
     """Return an error for each channel as text; rounding of sums of pixels counts as 0."""
     return ", ".join(
         "unknown" if math.isnan(each) else f"{0.0 if abs(each) < _ROUNDING else each:.6g}"

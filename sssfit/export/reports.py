@@ -83,10 +83,8 @@ _TAPS: tuple[Part, ...] = (
 
 _RENDERED: tuple[Part, ...] = (
     "{irradiance}: {width} x {height} pixels of {mm_per_pixel:.4g} mm, {how}; {kernel}",
-    ("weights", "cost: {passes} passes, {weights} weights a pixel, {kernel_bytes:,} bytes, "
-     "{seconds_per_megapixel:.2g} s a megapixel"),
-    ("fetches", "cost: {passes} passes, {fetches:.4g} fetches a pixel, {kernel_bytes:,} bytes, "
-     "{seconds_per_megapixel:.2g} s a megapixel"),
+    "cost: {fetches:.4g} {what} and {bytes_per_pixel:.4g} bytes moved a pixel in {passes} passes, "
+    "{kernel_bytes:,} bytes stored, {seconds_per_megapixel:.2g} s a megapixel",
     ("transmitted_maximum", "through the object at most: {most}, face on the key light is 1"),
     ("rmse", "against the 2D kernel of {profile}:"),
     ("delta_e_2000_mean", "  Delta E 2000 mean {delta_e_2000_mean:.3g}, 95th percentile "
@@ -143,10 +141,8 @@ def _rendered_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     screen = f"screen space, follow {figures['follow']}, " if figures["follow"] else ""
     stored = f", {figures['intermediate']} between passes" if figures["intermediate"] else ""
     is_grey = figures["rmse"] is not None and figures["delta_e_2000_mean"] is None
-    is_taps, cost = figures["rank"] is None, figures["taps_per_pixel"]
     return {
-        "weights": None if is_taps else cost,
-        "fetches": cost if is_taps else None,
+        "what": "fetches" if figures["rank"] is None else "weights",
         "how": f"{screen}{figures['border']} borders{stored}",
         "most": by_channel(figures["channels"], most, ".3g") if most is not None else None,
         "no_colour": len(figures["channels"]) if is_grey else None,

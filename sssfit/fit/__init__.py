@@ -45,6 +45,7 @@ __all__ = [
     "fit_guided",
     "fit_preintegrated",
     "fit_result",
+    "fit_separable",
     "fit_svd",
     "fit_taps",
     "fit_weighted",
@@ -65,10 +66,26 @@ class FitMethod:
 METHODS = {name: FitMethod(each.load(), each.summary) for name, each in FITS.items()}
 
 
-def fit_result(profile: Profile | str | Path, method: str = "svd", **settings: Any) -> FitResult:
-    """Fit a separable kernel to a profile, and return it with its errors and stop reasons.
+def fit_result(
+    profile: Profile | str | Path, method: str = "svd", **settings: Any
+) -> FitResult | TapsFit:
+    """Fit a kernel of either kind to a profile, and return it with how it was found.
 
-    `fit_taps` does the same for the methods that make a table of taps.
+    Parameters and errors are those of `fit_separable` and `fit_taps`.
+
+    Returns
+    -------
+    FitResult, or TapsFit from the methods of ``sssfit.methods.TAPS``
+    """
+    if isinstance(method, str) and method in TAPS:
+        return fit_taps(profile, method, **settings)
+    if not isinstance(method, str) or method not in METHODS:
+        raise FitError(f"method = {shown(method)}; expected one of {', '.join(ALL_FITS)}.")
+    return fit_separable(profile, method, **settings)
+
+
+def fit_separable(profile: Profile | str | Path, method: str = "svd", **settings: Any) -> FitResult:
+    """Fit a separable kernel to a profile, and return it with its errors and stop reasons.
 
     Parameters
     ----------
@@ -110,7 +127,7 @@ def fit_taps(profile: Profile | str | Path, method: str = "cascade", **settings:
     Raises
     ------
     FitError, ProfileError
-        As `fit_result`.
+        As `fit_separable`.
     """
     if not isinstance(method, str) or method not in TAPS:
         raise FitError(f"method = {shown(method)}; expected one of {', '.join(TAPS)}.")
@@ -137,10 +154,6 @@ def fit(
     -------
     SeparableKernel, or Taps from the methods of ``sssfit.methods.TAPS``
     """
-    if isinstance(method, str) and method in TAPS:
-        return fit_taps(profile, method, **settings).kernel
-    if not isinstance(method, str) or method not in METHODS:
-        raise FitError(f"method = {shown(method)}; expected one of {', '.join(ALL_FITS)}.")
     return fit_result(profile, method, **settings).kernel
 
 

@@ -13,6 +13,7 @@ from sssfit.errors import KernelError
 from sssfit.messages import shown
 
 MOST_PAIRS, MOST_STAGES, MOST_LEVELS = 64, 24, 10
+MOST_ON_DISK = 256  # fetches
 _STAR = "*"
 STAR_FETCHES = 9
 
@@ -88,10 +89,13 @@ def _is_count(word: str) -> bool:
 
 
 def text_of(shapes: Sequence[Shape]) -> str:
-    """Return the text that `parse` reads; lines and disks are written by their kind."""
+    """Return the text that `parse` reads; lines and disks are written by their kind.
+
+    A disk is no structure of a cascade: ``disk 24`` has 24 radii.
+    """
     levels: list[list[str]] = [[] for _ in range(max(each.level for each in shapes) + 1)]
     for each in shapes:
-        name = str(each.pairs) if each.kind == "pair" else each.kind
+        name = {"pair": f"{each.pairs}", "disk": f"disk {each.pairs}"}.get(each.kind, each.kind)
         levels[each.level].append(_STAR if each.kind == "star" else name)
     return "|".join("-".join(level) for level in levels)
 
@@ -125,6 +129,11 @@ def cost_of_chain(shapes: Sequence[Shape], shown_rows: Sequence[bool] | None = N
         pictures += moved / 4.0**level
     passes = sum(each.passes for each in shapes)
     return Cost(fetches, passes, passes + 2 * last, pictures)
+
+
+def cost_of_disk(fetches: int) -> Cost:
+    """Return the cost of single fetches in one pass, which reads a picture and writes one."""
+    return Cost(float(fetches), 1, 1, 2.0)
 
 
 def cost_of_terms(offsets: Sequence[tuple[float, ...]], *, shows_irradiance: bool) -> Cost:

@@ -9,6 +9,9 @@ with the blend m_l by channel, which adds up to the energy. Signs live in the bl
 at a fractional offset is bilinear. Stages of level v work on pictures halved v times: a texel of
 those is the mean of four, and their sum comes back by bilinear fetches.
 
+A disk is one stage alone: single fetches on a spiral, which each pixel and frame turns by an angle
+of its own (`sssfit.render.disk`).
+
 ``taps_json`` has the file format, ``sssfit/taps.schema.json`` its JSON Schema.
 """
 
@@ -36,11 +39,13 @@ from sssfit.kernel.checks import MAX_MM, MIN_MM, MOST, checked_pitch
 from sssfit.kernel.record import PROVENANCE, SeparableKernel
 from sssfit.kernel.structure import (
     MOST_LEVELS,
+    MOST_ON_DISK,
     MOST_PAIRS,
     MOST_STAGES,
     Cost,
     Shape,
     cost_of_chain,
+    cost_of_disk,
     cost_of_terms,
     text_of,
 )
@@ -49,11 +54,12 @@ from sssfit.messages import by_channel, number, of_material, printable, shown
 
 __all__ = ["Stage", "Taps", "is_taps_file"]
 
-KINDS = ("pair", "star")
+KINDS = ("pair", "star", "disk")
 _ERRORS = ("spectral", "energy")
 # Fetches with one weight: a pair of passes has the middle and mirrored pairs, a star the middle,
-# four diagonal neighbours and four on the axes.
-_COPIES = {"pair": 2.0, "star": 4.0}
+# four diagonal neighbours and four on the axes, a disk single fetches.
+_COPIES = {"pair": 2.0, "star": 4.0, "disk": 1.0}
+_MOST_OFFSETS = {"pair": MOST_PAIRS, "disk": MOST_ON_DISK}
 _ROUNDING = 1e-9  # of sums that are computed in another order
 BYTES = {"float32": 16, "half": 8, "r11g11b10": 4}  # of a texel of three channels, as stored
 
@@ -66,13 +72,15 @@ class Stage:
     ----------
     level : int
         How many times its picture is halved.
-    kind : {"pair", "star"}
-        "pair" is a pass along x and the same pass along y; "star" one pass of nine fetches.
+    kind : {"pair", "star", "disk"}
+        "pair" is a pass along x and the same pass along y; "star" one pass of nine fetches; "disk"
+        one pass of single fetches on a golden-angle spiral.
     offsets_mm : array (n,) [mm]
         Of a pair rising, without the middle; of a star the distances (diagonal, axis), where the
-        diagonal fetches lie at (+-o, +-o).
+        diagonal fetches lie at (+-o, +-o); of a disk the radii of its fetches, from the inside out.
     weights : array (n+1, C)
-        The middle first; the middle and all fetches of its passes add up to 1.
+        The middle first; the middle and all fetches of its passes add up to 1. A disk whose middle
+        row is 0 does not fetch the pixel itself.
     """
 
     level: int
@@ -83,13 +91,14 @@ class Stage:
     @property
     def shape(self) -> Shape:
         """The stage without its numbers."""
-        return Shape(self.kind, len(self.offsets_mm) if self.kind == "pair" else 1, self.level)
+        return Shape(self.kind, 1 if self.kind == "star" else len(self.offsets_mm), self.level)
 
     @property
     def variance_mm2(self) -> FloatArray:
         """Variance along an axis (C,) [mm^2], from the offsets."""
-        # Of a star's fetches all four diagonal ones move along an axis, and two of the others.
-        moving = (4.0, 2.0) if self.kind == "star" else 2.0
+        # Of a star's fetches all four diagonal ones move along an axis, and two of the others; a
+        # disk's, over all its turns, by r^2 / 2.
+        moving = np.array({"pair": [2.0], "star": [4.0, 2.0], "disk": [0.5]}[self.kind])
         moment: FloatArray = (moving * self.offsets_mm**2) @ self.weights[1:]
         return moment
 
@@ -197,6 +206,9 @@ class Taps:
     def cost(self) -> Cost:
         """Fetches, passes and pictures moved per pixel."""
         rows = [bool(row.any()) for row in self.blend]
+        if self.is_disk:
+            middle = rows[0] or bool(self.stages[0].weights[0].any())
+            return cost_of_disk(len(self.stages[0].offsets_mm) + middle)
         if self.chained:
             return cost_of_chain([each.shape for each in self.stages], rows)
         offsets = [tuple(each.offsets_mm.tolist()) for each in self.stages]
@@ -209,7 +221,7 @@ class Taps:
 
     @property
     def passes(self) -> int:
-        """Passes of the stages: two of a pair, one of a star."""
+        """Passes of the stages: two of a pair, one of a star or a disk."""
         return self.cost.passes
 
     def bytes_per_pixel(self, texel: str = "half") -> float:
@@ -235,6 +247,11 @@ class Taps:
         return any(bool((each.weights < 0.0).any()) for each in self.stages)
 
     @property
+    def is_disk(self) -> bool:
+        """Whether it is single fetches on a disk, turned for each pixel and frame."""
+        return self.stages[0].kind == "disk"
+
+    @property
     def is_separable(self) -> bool:
         """Whether `separable_kernel` exists: all stages are pairs on the full picture."""
         return all(each.kind == "pair" and each.level == 0 for each in self.stages)
@@ -248,12 +265,12 @@ class Taps:
         Raises
         ------
         KernelError
-            A stage is a star or works on a halved picture.
+            A stage is a star or a disk, or works on a halved picture.
         """
         if not self.is_separable:
             raise KernelError(
-                f"{self.structure} has stars or halved pictures; only pairs of passes on the full "
-                "picture are a sum of separable terms."
+                f"{self.structure} has stars or halved pictures or is a disk; only pairs of passes "
+                "on the full picture are a sum of separable terms."
             )
         passes = [np.ones((1, len(self.channels)))]
         for stage in self.stages:
@@ -406,15 +423,18 @@ def _checked_stage(k: int, stage: Stage, taps: Taps) -> Stage:
         raise KernelError(f"{path}.kind = {shown(stage.kind)}; expected {' or '.join(KINDS)}.")
     offsets = number_array(f"{path}.offsets_mm", stage.offsets_mm, KernelError)
     weights = number_array(f"{path}.weights", stage.weights, KernelError)
-    many = 2 if stage.kind == "star" else min(max(offsets.size, 1), MOST_PAIRS)
+    most = _MOST_OFFSETS.get(stage.kind, 2)
+    many = 2 if stage.kind == "star" else min(max(offsets.size, 1), most)
     if offsets.shape != (many,):
         raise KernelError(
             f"{path}.offsets_mm has shape {offsets.shape}; expected "
-            f"{'(2,)' if stage.kind == 'star' else f'1 to {MOST_PAIRS} offsets'}."
+            f"{'(2,)' if stage.kind == 'star' else f'1 to {most} offsets'}."
         )
     if not ((offsets >= MIN_MM) & (offsets <= MAX_MM)).all():
         raise KernelError(f"{path}.offsets_mm = {shown(offsets.tolist())}; expected lengths in mm.")
-    if stage.kind == "pair" and (np.diff(offsets) <= 0.0).any():
+    steps = np.diff(offsets)
+    falls = {"pair": steps <= 0.0, "disk": steps < 0.0}.get(stage.kind)
+    if falls is not None and falls.any():
         raise KernelError(f"{path}.offsets_mm = {shown(offsets.tolist())}; expected rising ones.")
     expected = many + 1, len(taps.channels)
     if weights.shape != expected:
@@ -438,7 +458,9 @@ def _check_levels(stages: tuple[Stage, ...], *, chained: bool) -> None:
             f"the stages have the levels {shown(levels)}; expected 0 first, rising by at most 1, "
             f"below {MOST_LEVELS}."
         )
+    if any(each.kind == "disk" for each in stages) and (len(stages) > 1 or chained):
+        raise KernelError("a disk is the only stage, and reads the irradiance; found others.")
     if not chained and any(levels):
         raise KernelError(f"stages that read the irradiance have the level 0; found {levels}.")
-    if not chained and any(each.kind != "pair" for each in stages):
+    if not chained and any(each.kind == "star" for each in stages):
         raise KernelError("stages that read the irradiance are pairs of passes; found a star.")

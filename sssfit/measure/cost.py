@@ -1,4 +1,4 @@
-"""Cost of a kernel: passes and taps, which hold for any processor, and measured seconds."""
+"""Cost of a kernel: fetches, passes and bytes, which hold for any processor; measured seconds."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -7,7 +7,8 @@ from time import perf_counter
 import numpy as np
 
 from sssfit.errors import RenderError
-from sssfit.kernel import Kernel, Taps
+from sssfit.kernel import Kernel, SeparableKernel, Taps
+from sssfit.kernel.taps import BYTES
 
 # Bytes of a weight in a shader, a float32.
 FLOAT_BYTES = 4
@@ -19,11 +20,15 @@ class Cost:
 
     Parameters
     ----------
+    fetches : float
+        Texture fetches a pixel; one fetch counts for all channels together. A dense kernel has one
+        for each weight of its passes that is not 0 in every channel; no shader does so many.
     passes : int
-        One-dimensional passes over the picture, two per term; of a table of taps all passes.
-    taps_per_pixel : int or float
-        Weights applied to a pixel in all passes; one weight counts for all channels together. Of a
-        table of taps its fetches.
+        Passes over the picture, two per term; of a cascade those of its stages.
+    all_passes : int
+        With those that change the picture's size.
+    bytes_per_pixel : float
+        Read and written a pixel, each picture once a pass, in half floats.
     kernel_bytes : int
         Size of a float32 table of all terms, pixels and channels: T P C 4, with both halves of a
         pass. Of a table of taps, of offsets, weights and blend.
@@ -31,8 +36,10 @@ class Cost:
         Measured time of 1e6 pixels with all their channels; None if nothing was timed.
     """
 
+    fetches: float
     passes: int
-    taps_per_pixel: float
+    all_passes: int
+    bytes_per_pixel: float
     kernel_bytes: int
     seconds_per_megapixel: float | None = None
 
@@ -53,20 +60,33 @@ def cost_of(kernel: Kernel, seconds_per_megapixel: float | None = None) -> Cost:
     >>> from sssfit.simulate import simulate_dipole
     >>> profile = simulate_dipole(load_material("skin1"))
     >>> cost_of(fit_svd(profile, rank=3, mm_per_pixel=0.5, support_mm=8).kernel)
-    Cost(passes=6, taps_per_pixel=198, kernel_bytes=1188, seconds_per_megapixel=None)
+    Cost(fetches=198.0, passes=6, all_passes=6, bytes_per_pixel=96.0, kernel_bytes=1188, \
+seconds_per_megapixel=None)
     """
     if isinstance(kernel, Taps):
         numbers = sum(each.offsets_mm.size + each.weights.size for each in kernel.stages)
         return Cost(
-            passes=kernel.cost.all_passes,
-            taps_per_pixel=kernel.fetches,
+            fetches=kernel.fetches,
+            passes=kernel.passes,
+            all_passes=kernel.cost.all_passes,
+            bytes_per_pixel=kernel.bytes_per_pixel(),
             kernel_bytes=(numbers + kernel.blend.size) * FLOAT_BYTES,
             seconds_per_megapixel=seconds_per_megapixel,
         )
-    terms = int(np.count_nonzero(np.any(kernel.weights != 0.0, axis=(1, 2))))
+    return _dense_cost(kernel, seconds_per_megapixel)
+
+
+def _dense_cost(kernel: SeparableKernel, seconds_per_megapixel: float | None) -> Cost:
+    """Return the cost of a kernel with a weight for every pixel of its passes."""
+    used = np.any(kernel.weights != 0.0, axis=2)  # (T, P)
+    terms = int(np.count_nonzero(used.any(axis=1)))
+    # A pass reads a picture and writes one; all but the first term are added to what is there.
+    pictures = 4.0 * terms + max(terms - 1, 0)
     return Cost(
+        fetches=2.0 * float(np.count_nonzero(used)),
         passes=2 * terms,
-        taps_per_pixel=2 * terms * kernel.pixels,
+        all_passes=2 * terms,
+        bytes_per_pixel=BYTES["half"] * pictures,
         kernel_bytes=terms * kernel.pixels * len(kernel.channels) * FLOAT_BYTES,
         seconds_per_megapixel=seconds_per_megapixel,
     )

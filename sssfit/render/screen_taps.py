@@ -91,6 +91,8 @@ def render_screen_taps(
         exceeds what the intermediate format holds.
     """
     channels = len(taps.channels)
+    if taps.is_disk:
+        raise RenderError("a disk of fetches serves flat pictures only; give another table.")
     check_buffers(scene, channels)
     if follow not in FOLLOW:
         raise RenderError(f"follow = {follow!r}; a table of taps has {' or '.join(FOLLOW)}.")

@@ -21,6 +21,7 @@ from sssfit.errors import RenderError
 from sssfit.kernel.taps import Stage, Taps
 from sssfit.render.borders import check_channels, check_memory, source_indices
 from sssfit.render.cascade import apply_cascade, is_quick
+from sssfit.render.disk import apply_disk
 from sssfit.render.separable import apply_passes
 from sssfit.render.texels import Store, store_of
 from sssfit.scene.record import Scene
@@ -42,6 +43,7 @@ def render_taps(
     border: str = "mirror",
     coverage: npt.ArrayLike | None = None,
     intermediate: str | None = None,
+    frame: int = 0,
     threads: int | None = None,
     dtype: npt.DTypeLike = np.float64,
 ) -> FloatArray:
@@ -61,6 +63,9 @@ def render_taps(
         Format of the pictures between the passes, as `sssfit.render.texels` has them; by default
         they keep the precision of ``dtype``. Irradiance, coverage and result keep it always, and so
         does a picture that is added up by the pass that made it.
+    frame : int
+        From 0; a disk of fetches is turned differently in each frame (`sssfit.render.disk`), other
+        tables do not depend on it.
     threads : int, optional
         Threads to use, by default all cores; the result does not depend on them.
     dtype : float64 or float32
@@ -95,7 +100,7 @@ def render_taps(
 
     def blurred(picture: FloatArray, within: FloatArray | None) -> FloatArray:
         add_up = _chained if taps.chained else _unchained
-        passes = _Passes(border, threads, within, store)
+        passes = _Passes(border, threads, within, store, frame)
         return add_up(passes, picture, taps, taps.blend.astype(precision), scene.mm_per_pixel)
 
     if covered is None or not taps.has_negative_weights:
@@ -219,9 +224,11 @@ class _Passes:
         threads: int | None,
         coverage: FloatArray | None,
         store: Store | None,
+        frame: int,
     ) -> None:
         source_indices(1, 0, border)  # raises for an unknown border
         self.border, self.threads, self.coverage, self.store = border, threads, coverage, store
+        self.frame = frame
 
     @property
     def is_plain(self) -> bool:
@@ -236,6 +243,8 @@ class _Passes:
         """Return the picture of a stage that reads ``pixels``."""
         if stage.kind == "star":
             return self._star(pixels, stage, mm_per_texel)
+        if stage.kind == "disk":
+            return self._divided(pixels, lambda each: self._disk(each, stage, mm_per_texel))
         weights = stage.pass_weights(mm_per_texel)
         if self.coverage is None and self.store is None:
             ones = np.ones((1, weights.shape[1]))
@@ -258,6 +267,17 @@ class _Passes:
             return found
 
         return self._divided(pixels, fetch)
+
+    def _disk(self, pixels: FloatArray, stage: Stage, mm_per_texel: float) -> FloatArray:
+        """Single fetches around each pixel, turned by its own angle."""
+        return apply_disk(
+            pixels,
+            stage,
+            mm_per_texel,
+            frame=self.frame,
+            border=self.border,
+            threads=self.threads,
+        )
 
     def _line(self, pixels: FloatArray, weights: FloatArray, axis: int) -> FloatArray:
         """Convolve every channel along an axis with weights (P, C)."""
@@ -287,7 +307,7 @@ class _Passes:
         part = (
             None if self.coverage is None else four_texels(self.coverage, self.border).mean(axis=0)
         )
-        smaller = _Passes(self.border, self.threads, part, self.store)
+        smaller = _Passes(self.border, self.threads, part, self.store, self.frame)
         return self.stored(
             self._divided(pixels, lambda each: four_texels(each, self.border).mean(axis=0))
         ), smaller

@@ -1,0 +1,208 @@
+"""Write the figures of docs/how-to-choose.md on error over fetches, and draw its first chart.
+
+python docs/make_fetches.py
+"""
+
+import functools
+import itertools
+
+import numpy as np
+from make_cascades import MATERIALS, scenes, whole_profile
+from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
+from sections import put_section
+
+from sssfit.chart.page import COLOURS, add_legend, name_axes, new_page, save_figure
+from sssfit.errors import FitError
+from sssfit.fit import fit_result
+from sssfit.fit.on_taps import on_taps
+from sssfit.measure.score import measure
+from sssfit.render import render
+from sssfit.render.reference import render_reference
+
+BUDGETS = (14, 17, 20, 24, 28, 36, 50, 75, 100)
+CASCADES = (7, 10, 12, 14, 17, 20, 24, 28, 36)
+TAPS = (3, 5, 7, 9, 11, 13, 17, 21, 25, 33, 41, 49)
+MOST = 100  # fetches a pixel
+# Name, colour and marker in the chart; the method; the settings of its kernels, and their terms.
+PUBLISHED = {
+    "pre-integrated": (COLOURS[1], "^", "preintegrated", [({}, 1)]),
+    "artist": ("#e69f00", "v", "artist", [({}, 1), ({"target": "kernel"}, 1)]),
+    "falloff": ("#56b4e9", "P", "falloff", [({}, 1)]),
+    "guided": ("#cc79a7", "D", "guided", [({"k": k}, 1) for k in (0.0, 1.55, 4.0)]),
+    "SVD": (COLOURS[2], "o", "svd", [({"rank": n}, n) for n in (1, 2, 3, 4)]),
+    "sum of Gaussians": (COLOURS[0], "s", "gaussians", [({"terms": n}, n) for n in (2, 3, 4)]),
+}
+OURS = {
+    "weighted terms": ("#882255", "<", "weighted", [({"rank": n}, n) for n in (1, 2, 3)]),
+}
+PLACES = ("quadratic", "cumulative")
+
+
+@functools.cache
+def truths(name):
+    """Return the pictures of the page with the exact profile's own, once a material."""
+    profile = whole_profile(name)
+    return [(each, render_reference(each, profile)) for each in scenes(0.3)]
+
+
+def p99(picture_of, name):
+    """Return the mean over the pictures of the 99th percentile of Delta E."""
+    scores = [measure(picture_of(each), truth, mask=each.mask) for each, truth in truths(name)]
+    return float(np.mean([each.delta_e_2000_p99 for each in scores]))
+
+
+def seen(kernel, name):
+    """Return the same of a kernel."""
+    return p99(lambda scene: render(scene, kernel), name)
+
+
+def on_taps_rows(name, groups, places):
+    """Yield group, fetches, passes and error of every kernel at every number of taps."""
+    profile = whole_profile(name)
+    for group, (_, _, method, kernels) in groups.items():
+        for settings, terms in kernels:
+            dense = fit_result(profile, method, **settings).kernel
+            for taps, place in itertools.product(TAPS, places):
+                if (terms + 1) * taps > MOST:
+                    continue
+                try:
+                    kernel = on_taps(dense, taps, place=place, profile=profile)
+                except FitError:
+                    continue
+                yield group, kernel.fetches, kernel.passes, seen(kernel, name)
+
+
+def cascade_rows(name, budgets=CASCADES):
+    """Yield fetches, passes, error and structure of the cascade of each budget."""
+    profile = whole_profile(name)
+    for budget in budgets:
+        kernel = fit_result(profile, "cascade", fetches=budget).kernel
+        yield kernel.fetches, kernel.passes, seen(kernel, name), kernel.structure
+
+
+def envelope(points):
+    """Return the points that none of fewer fetches beats, the cheapest first."""
+    kept = []
+    for fetches, error in sorted(points):
+        if not kept or error < kept[-1][1]:
+            kept.append((fetches, error))
+    return kept
+
+
+def best(points, budget):
+    """Return the least error within a budget."""
+    return min((error for fetches, error in points if fetches <= budget), default=np.nan)
+
+
+def chart(rows, cascades, ours):
+    """Draw error over fetches: a line a method, each the best within its fetches."""
+    note = (
+        "Mean over a disk, edges at 0, 15, 30 and 45 degrees, a head, points and highlights of the "
+        "99th percentile of Delta E 2000 against the exact profile's 2D kernel; 256 x 256 pixels "
+        "of 0.3 mm. A method's line is the best of its kernels on quadratic or cumulative taps "
+        "within the fetches; terms share their first pass."
+    )
+    title = "skin1: what a budget of fetches shows"
+    with new_page(5.2, title, "Exact profile, 0.3 mm a pixel", [note]) as (figure, below):
+        groups = {**PUBLISHED, **OURS}
+        axes_handles, labels = [], []
+        below_legend = below
+        from matplotlib.lines import Line2D
+
+        for group, (colour, marker, *_) in groups.items():
+            axes_handles.append(Line2D([], [], color=colour, marker=marker, ms=4, lw=1.0))
+            labels.append(group)
+        axes_handles.insert(0, Line2D([], [], color="black", marker="*", ms=8, lw=1.4))
+        labels.insert(0, "cascade")
+        below_legend = add_legend(below, axes_handles, labels)
+        axes = below_legend.subplots()
+        for group, (colour, marker, *_) in groups.items():
+            own = envelope([(f, e) for g, f, _, e in (*rows, *ours) if g == group])
+            dash = "-" if group in PUBLISHED else (0, (4, 2))
+            x, y = zip(*own, strict=True)
+            axes.plot(x, y, color=colour, marker=marker, ms=4, lw=1.0, ls=dash)
+        x, y = zip(*envelope([(f, e) for f, _, e, _ in cascades]), strict=True)
+        axes.plot(x, y, color="black", marker="*", ms=9, lw=1.4)
+        axes.axhline(1.0, color="#666666", lw=0.8, ls=(0, (4, 2)), zorder=1)
+        axes.annotate("just noticeable side by side", (105, 1.0), (0, 3), ha="right",
+                      textcoords="offset points", size=7.5, color="#444444")  # fmt: skip
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+        axes.set_xticks([6, 8, 10, 14, 20, 30, 50, 70, 100])
+        axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+        axes.xaxis.set_minor_locator(NullLocator())
+        axes.yaxis.set_minor_formatter(NullFormatter())
+        name_axes(axes, "", "texture fetches a pixel", "99th percentile of ΔE 2000, mean")
+    save_figure(figure, "docs/skin1-fetches.png")
+
+
+def row(cells):
+    """Return a row of a table."""
+    return f"| {' | '.join(cells)} |"
+
+
+def budget_rows(rows, ours, cascades):
+    """Yield a line for each budget: cascade, the best published kernel and ours on taps."""
+    published = [(f, e) for _, f, _, e in rows]
+    own = [(f, e) for _, f, _, e in ours]
+    chains = [(f, e) for f, _, e, _ in cascades]
+    for budget in BUDGETS:
+        ours_best, theirs = best(chains, budget), best(published, budget)
+        group = min((e, g) for g, f, _, e in rows if f <= budget)[1]
+        yield row(
+            [
+                str(budget),
+                f"{ours_best:.2f}",
+                f"{theirs:.2f} ({group})",
+                f"{best(own, budget):.2f}",
+                f"{theirs / ours_best:.0f}",
+            ]
+        )
+
+
+def material_rows():
+    """Yield a line for each of the other materials: the smallest ratio over the budgets."""
+    for name in MATERIALS:
+        rows = list(on_taps_rows(name, PUBLISHED, ("cumulative",)))
+        published = [(f, e) for _, f, _, e in rows]
+        chains = [(f, e) for f, _, e, _ in cascade_rows(name, (14, 17, 24))]
+        ratios = {b: best(published, b) / best(chains, b) for b in BUDGETS}
+        worst = min(ratios, key=ratios.get)
+        cells = [f"{best(chains, b):.2f} / {best(published, b):.2f}" for b in (14, 24, 50, 100)]
+        yield row([name, *cells, f"{ratios[worst]:.1f} at {worst}"])
+
+
+TEXT = """![Error over fetches: cascades, and every published method on taps](skin1-fetches.png)
+
+Mean over a disk of 19.2 mm, edges at 0, 15, 30 and 45 degrees, the head, points and highlights of
+the 99th percentile of Delta E 2000, the best of each kind within a budget of fetches (skin1, pixels
+of 0.3 mm):
+
+| fetches at most | cascade | best published on taps | weighted on taps | published / cascade |
+|---|---|---|---|---|
+{budgets}
+
+The same for other materials, cascade / best published on taps, and over all budgets from 14 to 100
+fetches the smallest ratio of the two:
+
+| material | 14 fetches | 24 | 50 | 100 | smallest ratio |
+|---|---|---|---|---|---|
+{materials}
+"""
+
+
+def main():
+    """Write the section and the chart."""
+    rows = list(on_taps_rows("skin1", PUBLISHED, PLACES))
+    ours = list(on_taps_rows("skin1", OURS, PLACES))
+    cascades = list(cascade_rows("skin1"))
+    chart(rows, cascades, ours)
+    text = TEXT.format(
+        budgets="\n".join(budget_rows(rows, ours, cascades)), materials="\n".join(material_rows())
+    )
+    put_section("how-to-choose.md", "docs/make_fetches.py", text)
+
+
+if __name__ == "__main__":
+    main()

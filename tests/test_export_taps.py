@@ -1,0 +1,144 @@
+"""Tables of taps as shader source and documents: every constant is read back."""
+
+import dataclasses
+import io
+import itertools
+import json
+import re
+from pathlib import Path
+
+import jsonschema
+import numpy as np
+import pytest
+from test_export import comment_of, numbers_of, said
+from test_taps import taps_of
+
+import sssfit
+from sssfit.export import is_hlsl_file, kernel_text, taps_document, taps_hlsl
+from sssfit.kernel import Stage, Taps
+from sssfit.render.taps import render_taps
+from sssfit.scene.record import Scene
+
+SCHEMA = json.loads((Path(sssfit.__file__).parent / "taps.schema.json").read_text("utf-8"))
+STRUCTURES = ["1", "1-2|3", "*|1-2|*", "2-1"]
+
+
+def read_back(text, channels, chained):
+    """Build the table again from the constants of shader source alone."""
+    first = [int(each) for each in numbers_of(text, "SSS_FIRST")]
+    offsets = np.array(numbers_of(text, "SSS_OFFSET_MM"))
+    weights = np.array(numbers_of(text, "SSS_WEIGHT")).reshape(-1, channels)
+    blend = np.array(numbers_of(text, "SSS_BLEND")).reshape(-1, channels)
+    levels, kinds = (numbers_of(text, f"SSS_{name}") for name in ("LEVEL", "KIND"))
+    stages = []
+    for k, (begin, end) in enumerate(itertools.pairwise(first)):
+        assert offsets[begin] == 0.0
+        own = weights[begin:end]
+        copies = 4.0 if kinds[k] else 2.0
+        own = own / (own[0] + copies * own[1:].sum(axis=0))  # they are rounded to single precision
+        kind = ("pair", "star")[int(kinds[k])]
+        stages.append(Stage(int(levels[k]), kind, offsets[begin + 1 : end], own))
+    return taps_of(
+        mm_per_pixel=numbers_of(text, "SSS_MM_PER_PIXEL")[0],
+        chained=chained,
+        channels=channels,
+        stages=tuple(stages),
+        blend=blend,
+    )
+
+
+@pytest.mark.parametrize("structure", STRUCTURES)
+@pytest.mark.parametrize("channels", [1, 2, 3, 4, 6])
+def test_the_constants_make_the_same_picture(structure, channels):
+    taps = taps_of(structure, channels=channels, seed=3)
+    again = read_back(taps_hlsl(taps), channels, chained=True)
+    assert again.structure == taps.structure
+    light = Scene("light", np.random.default_rng(1).random((23, 18, 1)), 0.3)
+    np.testing.assert_allclose(render_taps(light, again), render_taps(light, taps), rtol=2e-6)
+
+
+def test_terms_that_read_the_irradiance_are_told_apart():
+    taps = taps_of("2-1", chained=False)
+    text = taps_hlsl(taps)
+    assert "all stages read the irradiance" in comment_of(text)
+    light = Scene("light", np.random.default_rng(1).random((23, 18, 1)), 0.3)
+    again = read_back(text, 2, chained=False)
+    np.testing.assert_allclose(render_taps(light, again), render_taps(light, taps), rtol=2e-6)
+
+
+def test_arrays_have_the_lengths_they_declare():
+    text = taps_hlsl(taps_of("*|1-2|*", channels=3))
+    declared = re.findall(r"SSS_(\w+)\[(\d+)\] = \{(.*?)\};", text, re.DOTALL)
+    assert {name for name, *_ in declared} == {
+        *("LEVEL", "KIND", "FIRST", "OFFSET_MM", "WEIGHT", "BLEND"),
+    }
+    for _, length, body in declared:
+        rows = body.count("float3(") or len(body.split(","))
+        assert rows == int(length)
+    assert numbers_of(text, "SSS_STAGES") == [4]
+
+
+def test_the_comment_has_origin_cost_energy_and_errors():
+    meta = {
+        "material": "wax",
+        "profile_method": "exact",
+        "profile_sha256": "0123456789abcdef0123",
+        "version": "0.1.0",
+        "settings": {"fetches": 9, "passes": None, "full_resolution": False, "fit_seed": 7},
+    }
+    taps = dataclasses.replace(
+        taps_of("1-2|3"), meta=meta, errors={"spectral": [0.0125, np.nan], "energy": [0.0, 0.0]}
+    )
+    comment = comment_of(taps_hlsl(taps))
+    for part in (
+        "Subsurface scattering taps: wax, test (fetches 9, fit_seed 7). sssfit 0.1.0.",
+        "Profile: exact, sha256 0123456789abcdef.",
+        f"1-2|3: {taps.fetches:.6g} fetches a pixel in 6 passes, 8 with those",
+        "each stage reads the one before",
+        "Made for pixels of 0.3 mm; channels c0, c1; linear light.",
+        "spectral error: 0.0125, unknown.",
+        "Kind 0 is a pass along x",
+        "Halve by one bilinear fetch",
+    ):
+        assert part in comment
+    np.testing.assert_allclose(said(comment, "Energy"), taps.energy, rtol=1e-5)
+    assert "Kind 1" not in comment
+    assert "passes None" not in comment
+    flat = comment_of(taps_hlsl(taps_of("*")))
+    assert "Kind 1 is one pass of nine fetches" in flat
+    assert "Kind 0" not in flat
+    assert "Halve" not in flat
+
+
+def test_a_name_with_a_newline_stays_in_its_comment():
+    text = taps_hlsl(taps_of(meta={"material": '"; }\n#include <x>', "settings": {}}))
+    lines = text.splitlines()
+    assert all(line.startswith(("// ", "static const", "    ", "};")) for line in lines)
+
+
+def test_a_document_is_the_file_with_a_comment():
+    taps = taps_of("1-2|*", channels=3)
+    text = taps_document(taps)
+    whole = json.loads(text)
+    jsonschema.validate(whole, SCHEMA)
+    comment = whole.pop("comment")
+    assert whole == taps.to_dict()
+    assert comment[0].startswith("Subsurface scattering taps: wax, test")
+    assert taps_document(Taps.read(io.BytesIO(text.encode()))) == text
+
+
+def test_forms_and_figures_are_those_of_the_kernel(tmp_path):
+    taps = taps_of("1|1")
+    text, figures = kernel_text(taps, "hlsl")
+    assert text == taps_hlsl(taps)
+    assert figures == {
+        "channels": ("c0", "c1"),
+        "structure": "1|1",
+        "fetches": taps.fetches,
+        "passes": 4,
+        "mm_per_pixel": 0.3,
+    }
+    path = tmp_path / "x.hlsl"
+    path.write_text(text, "utf-8")
+    assert is_hlsl_file(path)
+    assert kernel_text(taps, "json")[0] == taps_document(taps)
