@@ -17,7 +17,7 @@ from sssfit.kernel import Stage, Taps
 from sssfit.kernel.structure import Cost
 from sssfit.render.disk import averaged, turns
 from sssfit.render.screen_taps import render_screen_taps
-from sssfit.render.taps import reach_pixels, render_taps
+from sssfit.render.taps import reach_pixels, render_taps, response
 from sssfit.scene.made import make_scene
 from sssfit.scene.record import Scene
 from sssfit.simulate import simulate_dipole
@@ -204,19 +204,29 @@ def test_many_frames_come_near_the_kernel_of_all_turns():
     frames = np.stack([render_taps(scene, taps, frame=k)[..., 0] for k in range(count)])
     error = frames.std(axis=0, ddof=1) / math.sqrt(count)
     places = [(12, 12), (0, 0), (3, 20), (23, 11), (8, 5), (17, 17), (20, 2), (10, 15)]
-    off = [frames[:, r, c].mean() - all_turns(picture, taps, r, c) for r, c in places]
+    off = [frames[:, r, c].mean() - of_all_turns(picture, taps, r, c) for r, c in places]
     errors = np.array([error[each] for each in places])
     assert (np.abs(off) < 5.0 * errors).all()
     assert np.sqrt(np.mean(np.square(off))) < np.sqrt(np.mean(errors**2))
 
 
-def all_turns(picture, taps, row, column, count=720):
+def test_the_response_is_the_mean_over_all_turns():
+    taps = disk_of(6, middle=0.2, blend=[[0.1, 0.2], [0.3, 0.4]])
+    half = reach_pixels(taps)
+    kernel = response(taps)
+    np.testing.assert_allclose(kernel.sum(axis=(0, 1)), taps.energy, rtol=1e-12)
+    picture = np.random.default_rng(8).uniform(size=(2 * half + 1, 2 * half + 1))
+    slow = of_all_turns(picture, taps, half, half)
+    assert (kernel[..., 0] * picture).sum() == pytest.approx(slow, rel=1e-4)
+
+
+def of_all_turns(picture, taps, row, column, count=720):
     """The mean over turns of a pixel, fetch by fetch."""
     total = 0.0
     for turn in np.arange(count) * math.tau / count:
         for w, dy, dx in disk_fetches(taps.stages[0], 0, PITCH, turn):
             total += w * fetch(picture, row + dy, column + dx, "mirror")
-    return taps.energy[0] * total / count
+    return taps.blend[0, 0] * picture[row, column] + taps.blend[1, 0] * total / count
 
 
 def test_a_filter_over_time_starts_as_the_mean():

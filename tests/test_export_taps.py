@@ -10,6 +10,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
+from test_disk import disk_of
 from test_export import comment_of, numbers_of, said
 from test_taps import taps_of
 
@@ -34,9 +35,9 @@ def read_back(text, channels, chained):
     for k, (begin, end) in enumerate(itertools.pairwise(first)):
         assert offsets[begin] == 0.0
         own = weights[begin:end]
-        copies = 4.0 if kinds[k] else 2.0
+        copies = (2.0, 4.0, 1.0)[int(kinds[k])]
         own = own / (own[0] + copies * own[1:].sum(axis=0))  # they are rounded to single precision
-        kind = ("pair", "star")[int(kinds[k])]
+        kind = ("pair", "star", "disk")[int(kinds[k])]
         stages.append(Stage(int(levels[k]), kind, offsets[begin + 1 : end], own))
     return taps_of(
         mm_per_pixel=numbers_of(text, "SSS_MM_PER_PIXEL")[0],
@@ -61,6 +62,16 @@ def test_terms_that_read_the_irradiance_are_told_apart():
     taps = taps_of("2-1", chained=False)
     text = taps_hlsl(taps)
     assert "all stages read the irradiance" in comment_of(text)
+    light = Scene("light", np.random.default_rng(1).random((23, 18, 1)), 0.3)
+    again = read_back(text, 2, chained=False)
+    np.testing.assert_allclose(render_taps(light, again), render_taps(light, taps), rtol=2e-6)
+
+
+def test_a_disk_is_told_apart():
+    taps = disk_of(9)
+    text = taps_hlsl(taps)
+    assert "Kind 2 is one pass of single bilinear fetches" in comment_of(text)
+    assert "Kind 0" not in comment_of(text)
     light = Scene("light", np.random.default_rng(1).random((23, 18, 1)), 0.3)
     again = read_back(text, 2, chained=False)
     np.testing.assert_allclose(render_taps(light, again), render_taps(light, taps), rtol=2e-6)

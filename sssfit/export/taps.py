@@ -12,7 +12,7 @@ from sssfit.kernel.taps_json import pack
 from sssfit.messages import printable
 
 MARK = "// sssfit.hlsl/1"  # of the dense kernels' files too
-_KINDS = ("pair", "star")
+_KINDS = ("pair", "star", "disk")
 
 
 def taps_description(taps: Taps) -> list[str]:
@@ -52,6 +52,12 @@ def _how_to_run(taps: Taps) -> Iterator[str]:
         yield (
             "Kind 1 is one pass of nine fetches: the middle, the four that lie the second offset "
             "away along both axes, by the second weight, and the four on the axes, by the third."
+        )
+    if "disk" in kinds:
+        yield (
+            "Kind 2 is one pass of single bilinear fetches: tap k, from 0 after the middle, at the "
+            "distance OFFSET_MM and the angle a + 2 pi k / 1.6180339887, with a turn a for each "
+            "pixel and frame. A middle of weight 0 is not fetched."
         )
     yield "Result: BLEND[0] times the irradiance, and BLEND[s+1] times each stage's picture, added."
     if any(each.level for each in taps.stages):

@@ -127,6 +127,28 @@ def apply_disk(
     return out
 
 
+def all_turns(stage: Stage, mm_per_pixel: float, half: int) -> npt.NDArray[np.float64]:
+    """Return the mean over all turns of what one lit pixel becomes (2h+1, 2h+1, C).
+
+    Bilinear fetches of each ring at steps of 1/32 of a pixel or less along it.
+    """
+    size, channels = 2 * half + 1, stage.weights.shape[1]
+    found = np.zeros((size * size, channels))
+    found[half * size + half] = stage.weights[0]
+    for radius, weights in zip(stage.offsets_mm / mm_per_pixel, stage.weights[1:], strict=True):
+        count = 64 * math.ceil(math.pi * radius + 1.0)
+        angles = (np.arange(count) + 0.5) * (2.0 * math.pi / count)
+        places = half + radius * np.stack((np.sin(angles), np.cos(angles)))
+        whole = np.floor(places).astype(np.intp)
+        part = places - whole
+        for i, j in np.ndindex(2, 2):
+            at = (whole[0] + i) * size + whole[1] + j
+            shares = np.abs(1 - i - part[0]) * np.abs(1 - j - part[1])
+            ring = np.bincount(at, shares / count, size * size)
+            found += ring[:, None] * weights
+    return found.reshape(size, size, channels)
+
+
 def averaged(frames: Iterable[FloatArray], newest: float = NEWEST) -> Iterator[FloatArray]:
     """Yield the picture that a filter over time shows after each frame.
 

@@ -21,7 +21,7 @@ from sssfit.errors import RenderError
 from sssfit.kernel.taps import Stage, Taps
 from sssfit.render.borders import check_channels, check_memory, source_indices
 from sssfit.render.cascade import apply_cascade, is_quick
-from sssfit.render.disk import apply_disk
+from sssfit.render.disk import all_turns, apply_disk
 from sssfit.render.separable import apply_passes
 from sssfit.render.texels import Store, store_of
 from sssfit.scene.record import Scene
@@ -159,12 +159,17 @@ def response(taps: Taps, mm_per_pixel: float | None = None) -> npt.NDArray[np.fl
     """Return what one lit pixel becomes, (2h+1, 2h+1, C), the pixel in the middle.
 
     With halved pictures it depends on the pixel's place among their texels; this is the place of
-    the middle.
+    the middle. Of a disk of fetches it is the mean over all turns.
     """
-    half = reach_pixels(taps, mm_per_pixel)
+    half, pitch_mm = reach_pixels(taps, mm_per_pixel), mm_per_pixel or taps.mm_per_pixel
+    if taps.is_disk:
+        of_disk = all_turns(taps.stages[0], pitch_mm, half)
+        of_disk *= taps.blend[1]
+        of_disk[half, half] += taps.blend[0]
+        return of_disk
     point = np.zeros((2 * half + 1, 2 * half + 1, 1))
     point[half, half] = 1.0
-    seen = render_taps(Scene("a point", point, mm_per_pixel or taps.mm_per_pixel), taps)
+    seen = render_taps(Scene("a point", point, pitch_mm), taps)
     return np.asarray(seen, dtype=np.float64)
 
 
