@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from sssfit.methods import ALL_FITS, TAPS, lines_of, settings_of
+from sssfit.methods import FITS, TAPS, lines_of, settings_of
 from sssfit.process import check_memory
 
 from ._input import load, profile_name
@@ -15,13 +15,15 @@ from ._output import KERNEL, finish_one, held, stem_of, target, write
 from ._verb_options import FIT_OUTPUT, FIT_PIXELS
 
 
-@click.command(epilog="\b\nMethods:\n" + lines_of(ALL_FITS))
+@click.command(epilog="\b\nMethods:\n" + lines_of(FITS))
 @click.argument("profile", required=False)
-@options(*FIT_PIXELS, method_options(ALL_FITS), *FIT_OUTPUT)
+@options(*FIT_PIXELS, method_options(FITS), *FIT_OUTPUT)
 @common_options
 @click.pass_context
 def fit(context: click.Context, /, profile: str | None, common: Common, **given: Any) -> None:
-    """Fit a kernel to PROFILE and write it: separable, or a table of taps by cascade.
+    """Fit a kernel to PROFILE and write it: by default a cascade of 24 fetches a pixel.
+
+    The kernels of other methods have a weight for every pixel unless --taps thins them.
 
     PROFILE is a .profile.npz file, or - for stdin; by default the newest in this folder. A kernel
     is made for one pixel size, because its weights are energies of pixels of --mm-per-pixel. The
@@ -29,38 +31,38 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
     another view.
 
     \b
+      sssfit fit
+      sssfit fit --fetches 14
       sssfit fit --method svd --rank 3
-      sssfit fit --method cascade --fetches 24
+      sssfit fit --method preintegrated --taps 25
       sssfit fit skin1.exact.profile.npz --method gaussians --terms 6 --mm-per-pixel 0.1
       sssfit fit --method artist --target picture
       sssfit fit --method falloff --width .014 --strength .78,.70,.75 --falloff .57,.13,.08
     """
-    method = given["method"]
     if given["listing"]:
-        click.echo(lines_of(ALL_FITS))
+        click.echo(lines_of(FITS))
         return
-    if method is None:
-        raise click.UsageError("name a --method; `sssfit fit --list` has them.")
     from sssfit.export.reports import page
-    from sssfit.fit import fit_result, fit_taps
+    from sssfit.fit import fit_result
     from sssfit.kernel import is_kernel_file, is_taps_file
     from sssfit.profile import Profile
 
-    is_taps, known = method in TAPS, settings_of(ALL_FITS)
-    settings = own_settings(context, ALL_FITS, method, {key: given[key] for key in known})
+    method = given["method"]
+    settings = own_settings(context, FITS, method, {key: given[key] for key in settings_of(FITS)})
+    is_taps = method in TAPS or "taps" in settings
     if is_taps:
         refuse(given, {"normalize": "separable kernels"})
     name = profile_name(profile)
     source = load(Profile.read, name)
-    stem = f"{stem_of(name, source.material_name)}.{method}{ALL_FITS[method].count_of(settings)}"
+    stem = f"{stem_of(name, source.material_name)}.{method}{FITS[method].count_of(settings)}"
     path = target(given["output"], f"{stem}.{'taps' if is_taps else 'kernel'}.json")
-    settings |= {"seed": common.seed} if is_taps else {"normalize": given["normalize"]}
+    settings |= {"seed": common.seed} if method in TAPS else {"normalize": given["normalize"]}
     settings |= _picture_target(settings, common.threads)
     settings["mm_per_pixel"] = given["mm_per_pixel"]
     settings["support_mm"] = None if given["support"] == "auto" else given["support"]
-    is_own = is_taps_file if is_taps else is_kernel_file
-    with held([path], is_own, inputs=[name], force=given["force"], named=KERNEL):
-        result = (fit_taps if is_taps else fit_result)(source, method, **settings)
+    is_ours = is_taps_file if is_taps else is_kernel_file
+    with held([path], is_ours, inputs=[name], force=given["force"], named=KERNEL):
+        result = fit_result(source, method, **settings)
         write(result.kernel.write, path)
     figures = {"profile": name, **result.to_dict()}
     finish_one(common, path, figures, page("fit-taps" if is_taps else "fit", figures), "the kernel")

@@ -73,6 +73,8 @@ class Method:
     shares : bool
         Whether the function takes a list of materials, shares their common work, and takes
         ``threads`` and ``stop``; the others take one material.
+    makes_taps : bool
+        Whether a fit makes a table of taps; the others make separable kernels, which `taps` thins.
     makes : str, optional
         Name of the only profile it makes, without a material; that name needs no ``--method``.
     """
@@ -82,6 +84,7 @@ class Method:
     settings: tuple[Setting, ...] = ()
     counted: tuple[str, ...] = ()
     shares: bool = False
+    makes_taps: bool = False
     makes: str | None = None
 
     def load(self) -> Callable[..., Any]:
@@ -94,6 +97,8 @@ class Method:
         words = [known[name] for name in self.counted[-1:]]
         value = [given[name] for name in self.counted if name in given] + [*words, ""]
         text = f"{value[0]:g}" if isinstance(value[0], float) else str(value[0])
+        if "taps" in given and "taps" not in self.counted:
+            text += f".taps{given['taps']}"
         return text.replace("|", "_").replace("*", "x")  # as file names of Windows may have it
 
 
@@ -194,11 +199,49 @@ _SPECTRUM = Setting(
     words="natural",
 )
 
+# Of separable kernels: the fetches that a shader can afford.
+_TAPS = (
+    Setting(
+        "taps",
+        "whole",
+        "thin the kernel to so many bilinear fetches a pass, an odd number.",
+        "N",
+        (3, 129),
+    ),
+    Setting(
+        "place",
+        "choice",
+        "where the taps lie: by the cube root of the weights, or at distances that grow as i^2.",
+        among=("cumulative", "quadratic"),
+        words="cumulative",
+    ),
+)
+
 FITS: Mapping[str, Method] = {
+    "cascade": Method(
+        "sssfit.fit.cascade:fit_cascade",
+        "few fetches: a chain of small blurs, whose stages are all added up",
+        (
+            Setting("fetches", "number", "most texture fetches a pixel.", "N", words="24"),
+            Setting(
+                "stages",
+                "text",
+                "tap pairs a pass of each stage, or * for nine fetches in one pass, such as "
+                "1-1|2-2|2-2; | halves the picture.",
+                "STAGES",
+            ),
+            Setting("passes", "whole", "most passes of the stages.", "N", (1, 1000)),
+            Setting("full_resolution", "flag", "do not halve the picture."),
+            Setting("still", "flag", "weigh in what changes as light moves by a pixel."),
+            _SPECTRUM,
+        ),
+        counted=("stages", "fetches"),
+        makes_taps=True,
+    ),
     "svd": Method(
         "sssfit.fit.svd:fit_svd",
         "rank N: the largest terms of the singular value decomposition; the smallest error",
-        (Setting("rank", "whole", "number of terms.", "N", (1, 1000), words="3"), _ENERGY),
+        (Setting("rank", "whole", "number of terms.", "N", (1, 1000), words="3"), _ENERGY, *_TAPS),
         counted=("rank",),
     ),
     "gaussians": Method(
@@ -209,13 +252,14 @@ FITS: Mapping[str, Method] = {
             Setting("signed", "flag", "allow negative weights."),
             Setting("free_energy", "flag", "do not constrain the sum of the weights."),
             _ENERGY,
+            *_TAPS,
         ),
         counted=("terms",),
     ),
     "preintegrated": Method(
         "sssfit.fit.preintegrated:fit_preintegrated",
         "one term: the profile integrated along lines; exact for edges along the axes",
-        (_ENERGY,),
+        (_ENERGY, *_TAPS),
     ),
     "guided": Method(
         "sssfit.fit.guided:fit_guided",
@@ -237,6 +281,7 @@ FITS: Mapping[str, Method] = {
                 "SHARE",
                 words="none",
             ),
+            *_TAPS,
         ),
     ),
     "artist": Method(
@@ -271,6 +316,7 @@ FITS: Mapping[str, Method] = {
                 "share of the narrow Gaussian, one or one per channel.",
                 "SHARE,...",
             ),
+            *_TAPS,
         ),
     ),
     "falloff": Method(
@@ -290,6 +336,7 @@ FITS: Mapping[str, Method] = {
                 "relative width of a channel, one or one per channel.",
                 "F,...",
             ),
+            *_TAPS,
         ),
     ),
     "weighted": Method(
@@ -298,39 +345,20 @@ FITS: Mapping[str, Method] = {
         (
             Setting("rank", "whole", "number of terms.", "N", (1, 1000), words="2"),
             _SPECTRUM,
+            *_TAPS,
         ),
         counted=("rank",),
     ),
     "burley": Method(
         "sssfit.fit.burley:fit_burley",
         "one term: normalised diffusion with one shape per channel, as engines use it",
-        (_ENERGY,),
+        (_ENERGY, *_TAPS),
     ),
 }
 
-# Fits whose result is a table of taps, as a shader runs it; the others make separable kernels.
-TAPS: Mapping[str, Method] = {
-    "cascade": Method(
-        "sssfit.fit.cascade:fit_cascade",
-        "few fetches: a chain of small blurs, whose stages are all added up",
-        (
-            Setting("fetches", "number", "most texture fetches a pixel.", "N", words="24"),
-            Setting(
-                "stages",
-                "text",
-                "tap pairs a pass of each stage, or * for nine fetches in one pass, such as "
-                "1-1|2-2|2-2; | halves the picture.",
-                "STAGES",
-            ),
-            Setting("passes", "whole", "most passes of the stages.", "N", (1, 1000)),
-            Setting("full_resolution", "flag", "do not halve the picture."),
-            Setting("still", "flag", "weigh in what changes as light moves by a pixel."),
-            _SPECTRUM,
-        ),
-        counted=("stages", "fetches"),
-    ),
-}
-ALL_FITS: Mapping[str, Method] = {**FITS, **TAPS}
+# Fits of separable kernels, and those whose result is a table of taps, as a shader runs it.
+SEPARABLE: Mapping[str, Method] = {k: each for k, each in FITS.items() if not each.makes_taps}
+TAPS: Mapping[str, Method] = {k: each for k, each in FITS.items() if each.makes_taps}
 
 
 def settings_of(methods: Mapping[str, Method]) -> dict[str, tuple[Setting, tuple[str, ...]]]:

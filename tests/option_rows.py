@@ -26,7 +26,8 @@ from sssfit.formats.mco import join_channels, load_mco
 from sssfit.formats.pictures import load_image
 from sssfit.measure.difference import difference_map, magnified_difference
 from sssfit.measure.score import auto_exposure
-from sssfit.methods import ALL_FITS
+from sssfit.methods import FITS as METHODS
+from sssfit.methods import SEPARABLE
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
 from sssfit.render.transmittance import with_transmitted
@@ -63,6 +64,11 @@ def made_profile(ran: Ran) -> Any:
 
 def made_kernel(ran: Ran) -> Any:
     return ran.kernel
+
+
+def made_taps(ran: Ran) -> Any:
+    """The table of taps, None where a dense kernel was made."""
+    return ran.taps if any(each.endswith(".taps.json") for each in ran.written) else None
 
 
 def made_picture(ran: Ran) -> Any:
@@ -245,6 +251,22 @@ def _tapped(option: str, value: str, default: str = "", **own: Any) -> Row:
     return Row(command + typed, f"{option} {value}".strip(), lambda ran: ran.taps, made, default)
 
 
+def _thinned(option: str, value: str, method: str, **own: Any) -> Row:
+    """An option of the taps of a dense kernel, by the table of taps."""
+
+    def made() -> Any:
+        settings = {"mm_per_pixel": 0.4, "normalize": False, **own}
+        found = world.quietly(fit.fit_result, profile(), method, **settings).kernel
+        return [found.structure, found.mm_per_pixel, found.blend]
+
+    command = f"fit wax.profile.npz --method {method} --mm-per-pixel .4"
+    *before, name = option.split(" --")
+    given = f"--{name.removeprefix('--')} {value}"
+    usual = f" {before[0]}" if before else ""
+    words = "cumulative" if before else ""
+    return Row(command + usual, given, made_taps, made, words=words)
+
+
 _HAND = {"near_mm2": [0.2, 0.1, 0.05], "far_mm2": [2.0, 1.0, 0.7], "weight": [0.4, 0.5, 0.6]}
 _SKIN = {"width": 0.3, "strength": [0.8, 0.7, 0.75], "falloff": [0.6, 0.2, 0.1]}
 
@@ -267,13 +289,14 @@ FIT = {
         "fit wax.profile.npz --method svd",
         "fit --list",
         lambda ran: [line.split()[0] for line in ran.stdout.splitlines()],
-        lambda: list(ALL_FITS),
+        lambda: list(METHODS),
     ),
     "--method": Row(
         "fit wax.profile.npz --method svd",
         "--method burley",
         made_kernel,
         lambda: _fit("burley")(),
+        words="cascade",
     ),
     "--mm-per-pixel": Row(
         "fit wax.profile.npz --method svd",
@@ -304,6 +327,8 @@ FIT = {
     "--passes": _tapped("--passes", "2", passes=2),
     "--full-resolution": _tapped("--full-resolution", "", full_resolution=True),
     "--still": _tapped("--still", "", still=True),
+    "--taps": _thinned("--taps", "7", "svd", taps=7),
+    "--place": _thinned("--taps 7 --place", "quadratic", "svd", taps=7, place="quadratic"),
     "--spectrum": _tapped("--spectrum", "white", "natural", spectrum="white"),
     "--output": Row(
         "fit wax.profile.npz --method svd",
@@ -311,7 +336,7 @@ FIT = {
         names,
         lambda: ["x.kernel.json"],
         default="wax.svd3.kernel.json",
-        words="PROFILE.METHOD.kernel.json, .taps.json for cascade",
+        words="PROFILE.METHOD.taps.json, .kernel.json without taps",
     ),
     "--force": Row(
         "fit wax.profile.npz --method svd -o foreign.json",
@@ -1130,6 +1155,18 @@ FITS = {
     for method in ("preintegrated", "burley", "gaussians")
 } | {
     "--target picture": _fitted("--target", "picture", "artist", target=picture_error),
+    **{
+        f"--taps of {method}": _thinned("--taps", "5", method, taps=5)
+        for method in SEPARABLE
+        if method != "svd"
+    },
+    **{
+        f"--place of {method}": _thinned(
+            "--taps 5 --place", "quadratic", method, taps=5, place="quadratic"
+        )
+        for method in SEPARABLE
+        if method != "svd"
+    },
     "--rank of weighted": _fitted("--rank", "1", "weighted", rank=1),
     "--spectrum of weighted": _fitted("--spectrum", "white", "weighted", spectrum="white"),
 }

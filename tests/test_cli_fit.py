@@ -10,7 +10,7 @@ from reference_pixels import make_profile
 from sssfit.cli import cli, main
 from sssfit.fit import METHODS
 from sssfit.kernel import SeparableKernel
-from sssfit.methods import ALL_FITS, FITS
+from sssfit.methods import FITS, SEPARABLE
 
 
 @pytest.fixture
@@ -86,7 +86,7 @@ def test_normalised_kernels_keep_their_energy_apart(folder):
         *(("svd", given, "rank") for given in ([], ["--rank", "2"])),
         *(("gaussians", given, "terms") for given in ([], ["--terms", "2"])),
         *(("weighted", given, "rank") for given in ([], ["--rank", "1"])),
-        *((method, [], None) for method in METHODS if not FITS[method].counted),
+        *((method, [], None) for method in METHODS if not SEPARABLE[method].counted),
     ],
 )
 def test_the_files_name_has_the_method_and_the_count_that_was_fitted(
@@ -101,8 +101,8 @@ def test_the_files_name_has_the_method_and_the_count_that_was_fitted(
 
 def test_list_has_a_line_for_each_method(folder):
     lines = ended("fit", "--list").stdout.splitlines()
-    assert [line.split()[0] for line in lines] == list(ALL_FITS)
-    for line, method in zip(lines, ALL_FITS.values(), strict=True):
+    assert [line.split()[0] for line in lines] == list(FITS)
+    for line, method in zip(lines, FITS.values(), strict=True):
         assert line.endswith(method.summary)
 
 
@@ -115,7 +115,11 @@ def test_kernel_goes_to_stdout_and_words_to_stderr(folder):
 @pytest.mark.parametrize(
     ("arguments", "status", "word"),
     [
-        (("fit",), 2, "--list"),
+        (("fit", "--rank", "3"), 2, "this is cascade"),
+        (("fit", "--taps", "9"), 2, "this is cascade"),
+        (("fit", "--method", "svd", "--taps", "8"), 1, "odd number"),
+        (("fit", "--method", "svd", "--place", "quadratic"), 1, "number as --taps"),
+        (("fit", "--method", "svd", "--taps", "9", "--normalize"), 2, "--normalize is for"),
         (("fit", "--method", "preintegrated", "--mm-per-pixel", "0"), 2, "length"),
         (("fit", "--method", "preintegrated", "--mm-per-pixel", "1e-9"), 1, "GB"),
         (("fit", "gone.profile.npz", "--method", "preintegrated"), 1, "gone.profile.npz"),

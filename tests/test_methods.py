@@ -13,7 +13,7 @@ from option_rows import ROWS
 from sssfit import fit
 from sssfit.cli import cli
 from sssfit.cli._options import method_options
-from sssfit.methods import ALL_FITS, FITS, SIMULATIONS, Method, Setting, lines_of, settings_of
+from sssfit.methods import FITS, SEPARABLE, SIMULATIONS, Method, Setting, lines_of, settings_of
 
 VERBS = {"simulate": SIMULATIONS, "fit": FITS}
 ENTRIES = [(verb, name) for verb, methods in VERBS.items() for name in methods]
@@ -37,6 +37,8 @@ def test_the_function_takes_every_setting_of_its_entry(verb, name):
     for each in method.settings:
         if each.name in ("checkpoint_every", "resume"):  # of the file beside the walk
             assert "checkpoint" in parameters
+        elif name in SEPARABLE and each.name in ("taps", "place"):  # of any of these kernels
+            assert each.name in inspect.signature(fit.fit_result).parameters
         else:
             assert (each.keyword or each.name) in parameters
     if method.shares:
@@ -66,30 +68,30 @@ def test_every_setting_has_a_row_in_the_tests_of_options(verb):
 
 
 def test_a_setting_of_several_fits_is_tried_with_each_of_them():
-    known = settings_of(ALL_FITS)
+    known = settings_of(FITS)
     shared = {name: owners for name, (_, owners) in known.items() if len(owners) > 1}
     tried = " ".join(row.command + row.given for row in SHARED_ROWS.values())
     tried += " ".join(ROWS["fit"][f"--{name}"].command for name in shared)
-    assert sorted(shared) == ["energy", "rank", "spectrum"]
+    assert sorted(shared) == ["energy", "place", "rank", "spectrum", "taps"]
     assert all(f"--method {owner}" in tried for owners in shared.values() for owner in owners)
 
 
 def test_the_library_has_the_methods_of_the_registry():
-    assert list(fit.METHODS) == list(FITS)
-    for name, method in FITS.items():
+    assert list(fit.METHODS) == list(SEPARABLE)
+    for name, method in SEPARABLE.items():
         assert fit.METHODS[name].fit is method.load()
         assert fit.METHODS[name].summary == method.summary
 
 
-@pytest.mark.parametrize("name", [name for name, each in FITS.items() if each.counted])
+@pytest.mark.parametrize("name", [name for name, each in SEPARABLE.items() if each.counted])
 def test_the_number_in_a_file_name_is_that_of_the_kernel(name):
-    kernel = world.quietly(FITS[name].load(), world.profile(), mm_per_pixel=0.4).kernel
-    assert kernel.rank == int(FITS[name].count_of({}))
+    kernel = world.quietly(SEPARABLE[name].load(), world.profile(), mm_per_pixel=0.4).kernel
+    assert kernel.rank == int(SEPARABLE[name].count_of({}))
 
 
 def test_one_entry_is_a_method_with_help_and_options():
     new = Setting("sharpness", "whole", "how sharp.", "N", (1, 9), words="3")
-    methods = {**FITS, "new": Method("sssfit.fit.svd:fit_svd", "as the test says", (new,))}
+    methods = {**SEPARABLE, "new": Method("sssfit.fit.svd:fit_svd", "as the test says", (new,))}
     assert lines_of(methods).splitlines()[-1] == "  new            as the test says"
 
     @click.command()
@@ -102,4 +104,4 @@ def test_one_entry_is_a_method_with_help_and_options():
     assert option.type.convert("9", None, None) == 9
     with pytest.raises(click.BadParameter):
         option.type.convert("10", None, None)
-    assert len(command.params) == len(settings_of(FITS)) + 1
+    assert len(command.params) == len(settings_of(SEPARABLE)) + 1

@@ -86,7 +86,7 @@ def test_a_profile_and_a_kernel_are_records_or_paths(profile, kernel, tmp_path):
     kernel.save(tmp_path / "k.json")
     light = np.ones((5, 4, 3))
     for source in (tmp_path / "p.npz", str(tmp_path / "p.npz")):
-        again = sssfit.fit(source, rank=2, mm_per_pixel=1.0)
+        again = sssfit.fit(source, "svd", rank=2, mm_per_pixel=1.0)
         assert np.array_equal(again.weights, kernel.weights)
     for source in (tmp_path / "k.json", str(tmp_path / "k.json")):
         assert np.array_equal(sssfit.render(light, source), sssfit.render(light, kernel))
@@ -120,8 +120,8 @@ def test_a_picture_file_takes_its_own_pixels_or_the_kernels(kernel, tmp_path):
         (("simulate", "skin1", "exakt"), SimulationError, "expected one of montecarlo, exact"),
         (("simulate", "skin9"), MaterialError, "did you mean skin2"),
         (("simulate", 3), SimulationError, "not a Material"),
-        (("fit", "PROFILE", "svdd"), FitError, "expected one of svd, gaussians"),
-        (("fit", "PROFILE", ["svd"]), FitError, "expected one of svd, gaussians"),
+        (("fit", "PROFILE", "svdd"), FitError, "expected one of cascade, svd, gaussians"),
+        (("fit", "PROFILE", ["svd"]), FitError, "expected one of cascade, svd, gaussians"),
         (("fit", "KERNEL"), FitError, "expected a Profile"),
         (("render", np.ones((4, 4)), "PROFILE"), RenderError, "expected a SeparableKernel"),
         (("render", np.ones(4), "KERNEL"), RenderError, "rows, columns"),
@@ -157,7 +157,7 @@ for order in {ORDERS!r}:
         assert isinstance(room, types.ModuleType) and callable(room), (order, name)
         assert scope.get(name, room) is room, (order, name)
     profile = sssfit.simulate("skin1", "dipole")
-    kernel = sssfit.fit(profile, rank=1, mm_per_pixel=2.0)
+    kernel = sssfit.fit(profile, "svd", rank=1, mm_per_pixel=2.0)
     picture = sssfit.render([[1.0, 1.0], [1.0, 1.0]], kernel)
     assert isinstance(profile, sssfit.Profile) and isinstance(kernel, sssfit.SeparableKernel)
     assert abs(picture - profile.diffuse_reflectance).max() < 1e-6, order

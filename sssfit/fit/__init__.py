@@ -8,6 +8,7 @@ The package can also be called like the function `fit`: ``sssfit.fit(profile, "s
 """
 
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -22,12 +23,13 @@ from sssfit.fit.burley import fit_burley
 from sssfit.fit.falloff import fit_falloff
 from sssfit.fit.gaussians import fit_gaussians
 from sssfit.fit.guided import fit_guided
+from sssfit.fit.on_taps import PLACES, on_taps
 from sssfit.fit.preintegrated import fit_preintegrated
 from sssfit.fit.svd import fit_svd
 from sssfit.fit.weighted import fit_weighted
 from sssfit.kernel import SeparableKernel, Taps
 from sssfit.messages import shown
-from sssfit.methods import ALL_FITS, FITS, TAPS
+from sssfit.methods import FITS, SEPARABLE, TAPS
 from sssfit.profile import Profile
 
 __all__ = [
@@ -63,25 +65,57 @@ class FitMethod:
     summary: str
 
 
-METHODS = {name: FitMethod(each.load(), each.summary) for name, each in FITS.items()}
+METHODS = {name: FitMethod(each.load(), each.summary) for name, each in SEPARABLE.items()}
 
 
 def fit_result(
-    profile: Profile | str | Path, method: str = "svd", **settings: Any
+    profile: Profile | str | Path,
+    method: str = "cascade",
+    *,
+    taps: int | None = None,
+    place: str | None = None,
+    **settings: Any,
 ) -> FitResult | TapsFit:
     """Fit a kernel of either kind to a profile, and return it with how it was found.
 
-    Parameters and errors are those of `fit_separable` and `fit_taps`.
+    Parameters
+    ----------
+    profile : Profile, str or Path
+        The record, or the path of a ``.profile.npz`` file.
+    method : str
+        A name of ``sssfit.methods.FITS``; by default a cascade, of 24 fetches.
+    taps : int, optional
+        Thin a separable kernel to so many bilinear fetches a pass; see ``sssfit.fit.on_taps``.
+    place : str, optional
+        Where the taps lie, "cumulative" or "quadratic".
+    **settings
+        Keyword arguments of the method's ``fit_x``: ``rank``, ``mm_per_pixel``, ...
 
     Returns
     -------
-    FitResult, or TapsFit from the methods of ``sssfit.methods.TAPS``
+    FitResult, or TapsFit from the methods of ``sssfit.methods.TAPS`` and with ``taps``
+
+    Raises
+    ------
+    FitError
+        The method is unknown, or cannot fit this profile with these settings.
+    ProfileError
+        The file cannot be read as a profile.
     """
-    if isinstance(method, str) and method in TAPS:
-        return fit_taps(profile, method, **settings)
-    if not isinstance(method, str) or method not in METHODS:
-        raise FitError(f"method = {shown(method)}; expected one of {', '.join(ALL_FITS)}.")
-    return fit_separable(profile, method, **settings)
+    if not isinstance(method, str) or method not in FITS:
+        raise FitError(f"method = {shown(method)}; expected one of {', '.join(FITS)}.")
+    if place is not None and taps is None:
+        raise FitError(f"place = {shown(place)} is where taps lie; give their number as `taps`.")
+    if method in TAPS:
+        return fit_taps(profile, method, **({} if taps is None else {"taps": taps}), **settings)
+    profile = _loaded(profile)
+    dense = fit_separable(profile, method, **settings)
+    if taps is None:
+        return dense
+    begun = time.perf_counter()
+    thinned = on_taps(dense.kernel, taps, place=place or PLACES[0], profile=profile)
+    seconds = dense.seconds + time.perf_counter() - begun
+    return TapsFit(thinned, sum(dense.evaluations), seconds)
 
 
 def fit_separable(profile: Profile | str | Path, method: str = "svd", **settings: Any) -> FitResult:
@@ -144,7 +178,7 @@ def _loaded(profile: object) -> Profile:
 
 
 def fit(
-    profile: Profile | str | Path, method: str = "svd", **settings: Any
+    profile: Profile | str | Path, method: str = "cascade", **settings: Any
 ) -> SeparableKernel | Taps:
     """Fit a kernel to a profile.
 
@@ -152,7 +186,7 @@ def fit(
 
     Returns
     -------
-    SeparableKernel, or Taps from the methods of ``sssfit.methods.TAPS``
+    SeparableKernel, or Taps from the methods of ``sssfit.methods.TAPS`` and with ``taps``
     """
     return fit_result(profile, method, **settings).kernel
 
@@ -161,7 +195,7 @@ class _CallableRoom(ModuleType):
     """Makes the package callable, because `import sssfit.fit` binds it to the function's name."""
 
     def __call__(
-        self, profile: Profile | str | Path, method: str = "svd", **settings: Any
+        self, profile: Profile | str | Path, method: str = "cascade", **settings: Any
     ) -> SeparableKernel | Taps:
         return fit(profile, method, **settings)
 
