@@ -5,14 +5,17 @@ python docs/make_fetches.py
 
 import functools
 import itertools
+import warnings
 
 import numpy as np
 from make_cascades import MATERIALS, scenes, whole_profile
+from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 from sections import put_section
 
 from sssfit.chart.page import COLOURS, add_legend, name_axes, new_page, save_figure
-from sssfit.errors import FitError
+from sssfit.compare.engines import engines
+from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import fit_result
 from sssfit.fit.on_taps import on_taps
 from sssfit.measure.score import measure
@@ -80,6 +83,14 @@ def cascade_rows(name, budgets=CASCADES):
         yield kernel.fetches, kernel.passes, seen(kernel, name), kernel.structure
 
 
+def engine_rows(name):
+    """Yield name, fetches, passes and error of the samplers that engines ship."""
+    profile = whole_profile(name)
+    for each in engines():
+        shown = functools.partial(each.render, profile=profile)
+        yield each.label, each.fetches, each.passes, p99(shown, name)
+
+
 def envelope(points):
     """Return the points that none of fewer fetches beats, the cheapest first."""
     kept = []
@@ -94,41 +105,40 @@ def best(points, budget):
     return min((error for fetches, error in points if fetches <= budget), default=np.nan)
 
 
-def chart(rows, cascades, ours):
+def chart(rows, cascades, ours, shipped):
     """Draw error over fetches: a line a method, each the best within its fetches."""
     note = (
         "Mean over a disk, edges at 0, 15, 30 and 45 degrees, a head, points and highlights of the "
         "99th percentile of Delta E 2000 against the exact profile's 2D kernel; 256 x 256 pixels "
         "of 0.3 mm. A method's line is the best of its kernels on quadratic or cumulative taps "
-        "within the fetches; terms share their first pass."
+        "within the fetches; terms share their first pass. Engines: one frame, as they ship."
     )
     title = "skin1: what a budget of fetches shows"
-    with new_page(5.2, title, "Exact profile, 0.3 mm a pixel", [note]) as (figure, below):
+    with new_page(5.6, title, "Exact profile, 0.3 mm a pixel", [note]) as (figure, below):
         groups = {**PUBLISHED, **OURS}
-        axes_handles, labels = [], []
-        below_legend = below
-        from matplotlib.lines import Line2D
-
+        styles = {"cascade": {"color": "black", "marker": "*", "ms": 8, "lw": 1.4}}
         for group, (colour, marker, *_) in groups.items():
-            axes_handles.append(Line2D([], [], color=colour, marker=marker, ms=4, lw=1.0))
-            labels.append(group)
-        axes_handles.insert(0, Line2D([], [], color="black", marker="*", ms=8, lw=1.4))
-        labels.insert(0, "cascade")
-        below_legend = add_legend(below, axes_handles, labels)
-        axes = below_legend.subplots()
-        for group, (colour, marker, *_) in groups.items():
+            styles[group] = {"color": colour, "marker": marker, "ms": 4, "lw": 1.0}
+        styles["weighted terms"]["ls"] = (0, (4, 2))
+        styles["engines"] = {"color": "#666666", "marker": "x", "ms": 5, "ls": "none"}
+        handles = [Line2D([], [], **each) for each in styles.values()]
+        axes = add_legend(below, handles, list(styles)).subplots()
+        for group in groups:
             own = envelope([(f, e) for g, f, _, e in (*rows, *ours) if g == group])
-            dash = "-" if group in PUBLISHED else (0, (4, 2))
-            x, y = zip(*own, strict=True)
-            axes.plot(x, y, color=colour, marker=marker, ms=4, lw=1.0, ls=dash)
-        x, y = zip(*envelope([(f, e) for f, _, e, _ in cascades]), strict=True)
-        axes.plot(x, y, color="black", marker="*", ms=9, lw=1.4)
+            axes.plot(*zip(*own, strict=True), **styles[group])
+        own = envelope([(f, e) for f, _, e, _ in cascades])
+        axes.plot(*zip(*own, strict=True), **styles["cascade"])
+        axes.plot([own[-1][0], 110], [own[-1][1]] * 2, color="black", lw=0.8, ls=(0, (1, 2)))
+        for label, fetches, _, error in shipped:
+            axes.plot([fetches], [error], **styles["engines"])
+            axes.annotate(label, (fetches, error), (4, 2), textcoords="offset points", size=6.5,
+                          color="#444444")  # fmt: skip
         axes.axhline(1.0, color="#666666", lw=0.8, ls=(0, (4, 2)), zorder=1)
         axes.annotate("just noticeable side by side", (105, 1.0), (0, 3), ha="right",
                       textcoords="offset points", size=7.5, color="#444444")  # fmt: skip
         axes.set_xscale("log")
         axes.set_yscale("log")
-        axes.set_xticks([6, 8, 10, 14, 20, 30, 50, 70, 100])
+        axes.set_xticks([6, 8, 10, 14, 20, 30, 50, 70, 100, 200])
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.xaxis.set_minor_locator(NullLocator())
@@ -143,7 +153,10 @@ def row(cells):
 
 
 def budget_rows(rows, ours, cascades):
-    """Yield a line for each budget: cascade, the best published kernel and ours on taps."""
+    """Yield a line for each budget: cascade, the best published kernel and ours on taps.
+
+    ``rows`` are the published methods' and the engines'.
+    """
     published = [(f, e) for _, f, _, e in rows]
     own = [(f, e) for _, f, _, e in ours]
     chains = [(f, e) for f, _, e, _ in cascades]
@@ -164,7 +177,7 @@ def budget_rows(rows, ours, cascades):
 def material_rows():
     """Yield a line for each of the other materials: the smallest ratio over the budgets."""
     for name in MATERIALS:
-        rows = list(on_taps_rows(name, PUBLISHED, ("cumulative",)))
+        rows = [*on_taps_rows(name, PUBLISHED, ("cumulative",)), *engine_rows(name)]
         published = [(f, e) for _, f, _, e in rows]
         chains = [(f, e) for f, _, e, _ in cascade_rows(name, (14, 17, 24))]
         ratios = {b: best(published, b) / best(chains, b) for b in BUDGETS}
@@ -183,6 +196,12 @@ of 0.3 mm):
 |---|---|---|---|---|
 {budgets}
 
+The samplers of engines, in one frame as they ship (sources in `sssfit/compare/engines.py`):
+
+| engine | fetches | passes | mean of the 99th percentiles |
+|---|---|---|---|
+{engines}
+
 The same for other materials, cascade / best published on taps, and over all budgets from 14 to 100
 fetches the smallest ratio of the two:
 
@@ -196,13 +215,17 @@ def main():
     """Write the section and the chart."""
     rows = list(on_taps_rows("skin1", PUBLISHED, PLACES))
     ours = list(on_taps_rows("skin1", OURS, PLACES))
-    cascades = list(cascade_rows("skin1"))
-    chart(rows, cascades, ours)
+    cascades, shipped = list(cascade_rows("skin1")), list(engine_rows("skin1"))
+    chart(rows, cascades, ours, shipped)
     text = TEXT.format(
-        budgets="\n".join(budget_rows(rows, ours, cascades)), materials="\n".join(material_rows())
+        budgets="\n".join(budget_rows([*rows, *shipped], ours, cascades)),
+        engines="\n".join(row([n, f"{f:g}", str(p), f"{e:.2f}"]) for n, f, p, e in shipped),
+        materials="\n".join(material_rows()),
     )
     put_section("how-to-choose.md", "docs/make_fetches.py", text)
 
 
 if __name__ == "__main__":
-    main()
+    with warnings.catch_warnings():  # of misfits, which the tables show
+        warnings.simplefilter("ignore", SssfitWarning)
+        main()
