@@ -280,6 +280,12 @@ FIT = [
             "--stages '1|1' --still",
         )
     ),
+    C("fit wax.profile.npz --method disk --mm-per-pixel .6"),
+    C("fit wax.profile.npz --method disk --taps 5 --mm-per-pixel .6 --json"),
+    C("fit wax.profile.npz --method disk --taps 3"),
+    C("fit wax.profile.npz --method disk --taps 257"),
+    C("fit wax.profile.npz --method disk --taps 90 --mm-per-pixel .6 --support 1.8mm"),
+    C("fit wax.profile.npz --method disk --place quadratic"),
     C("fit wax.profile.npz --method cascade --fetches 5"),
     C("fit wax.profile.npz --method cascade --stages '1-1|1' --fetches 12"),
     C("fit wax.profile.npz --method cascade --stages '1-x'"),

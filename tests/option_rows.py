@@ -263,8 +263,13 @@ def _thinned(option: str, value: str, method: str, **own: Any) -> Row:
     *before, name = option.split(" --")
     given = f"--{name.removeprefix('--')} {value}"
     usual = f" {before[0]}" if before else ""
-    words = "cumulative" if before else ""
+    words = "cumulative" if before else "24 for disk"
     return Row(command + usual, given, made_taps, made, words=words)
+
+
+def _sampled_disk() -> Any:
+    found = fit.fit_taps(profile(), "disk", taps=5, mm_per_pixel=0.4).kernel
+    return [found.structure, found.mm_per_pixel, found.blend]
 
 
 _HAND = {"near_mm2": [0.2, 0.1, 0.05], "far_mm2": [2.0, 1.0, 0.7], "weight": [0.4, 0.5, 0.6]}
@@ -1167,6 +1172,12 @@ FITS = {
         for method in SEPARABLE
         if method != "svd"
     },
+    "--taps of disk": Row(
+        "fit wax.profile.npz --method disk --mm-per-pixel .4",
+        "--taps 5",
+        lambda ran: ran.taps,
+        _sampled_disk,
+    ),
     "--rank of weighted": _fitted("--rank", "1", "weighted", rank=1),
     "--spectrum of weighted": _fitted("--spectrum", "white", "weighted", spectrum="white"),
 }
