@@ -277,6 +277,7 @@ FIT = [
             "--passes 2 -q",
             "--stages '*|1'",
             "--full-resolution --passes 4 --support 3mm",
+            "--stages '1|1' --still",
         )
     ),
     C("fit wax.profile.npz --method disk --mm-per-pixel .6"),
@@ -288,6 +289,7 @@ FIT = [
     C("fit wax.profile.npz --method cascade --fetches 5"),
     C("fit wax.profile.npz --method cascade --stages '1-1|1' --fetches 12"),
     C("fit wax.profile.npz --method cascade --stages '1-x'"),
+    C("fit wax.profile.npz --method cascade --stages '1|*' --still"),
     C("fit wax.profile.npz --method cascade --stages '1||1'"),
     C("fit wax.profile.npz --method cascade --passes 0"),
     C("fit wax.profile.npz --method cascade --passes 1 --fetches 8"),

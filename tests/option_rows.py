@@ -244,6 +244,8 @@ def _tapped(option: str, value: str, default: str = "", **own: Any) -> Row:
 
     free = {"passes", "fetches", "full_resolution"} & own.keys()
     usual: dict[str, Any] = {"passes": 4} if free else {"stages": "1-1"}
+    if "still" in own:  # where a picture is halved
+        usual = {"stages": "1|1"}
     command = "fit wax.profile.npz --method cascade --mm-per-pixel .6"
     typed = "".join(f" --{key} {each}" for key, each in usual.items())
     return Row(command + typed, f"{option} {value}".strip(), lambda ran: ran.taps, made, default)
@@ -329,6 +331,7 @@ FIT = {
     "--stages": _tapped("--stages", "1|1-1", stages="1|1-1"),
     "--passes": _tapped("--passes", "2", passes=2),
     "--full-resolution": _tapped("--full-resolution", "", full_resolution=True),
+    "--still": _tapped("--still", "", still=True),
     "--taps": _thinned("--taps", "7", "svd", taps=7),
     "--place": _thinned("--taps 7 --place", "quadratic", "svd", taps=7, place="quadratic"),
     "--spectrum": _tapped("--spectrum", "white", "natural", spectrum="white"),
