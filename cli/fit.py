@@ -56,7 +56,7 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
     source = load(Profile.read, name)
     stem = f"{stem_of(name, source.material_name)}.{method}{FITS[method].count_of(settings)}"
     path = target(given["output"], f"{stem}.{'taps' if is_taps else 'kernel'}.json")
-    settings |= {"seed": common.seed} if method in TAPS else {"normalize": given["normalize"]}
+    settings |= FITS[method].shared(seed=common.seed, normalize=given["normalize"])
     settings |= _picture_target(settings, common.threads)
     settings["mm_per_pixel"] = given["mm_per_pixel"]
     settings["support_mm"] = None if given["support"] == "auto" else given["support"]

@@ -75,6 +75,8 @@ class Method:
         ``threads`` and ``stop``; the others take one material.
     makes_taps : bool
         Whether a fit makes a table of taps; the others make separable kernels, which `taps` thins.
+    is_seeded : bool
+        Whether a fit starts at random places, and takes a ``seed``.
     makes : str, optional
         Name of the only profile it makes, without a material; that name needs no ``--method``.
     """
@@ -85,6 +87,7 @@ class Method:
     counted: tuple[str, ...] = ()
     shares: bool = False
     makes_taps: bool = False
+    is_seeded: bool = False
     makes: str | None = None
 
     def load(self) -> Callable[..., Any]:
@@ -100,6 +103,11 @@ class Method:
         if "taps" in given and "taps" not in self.counted:
             text += f".taps{given['taps']}"
         return text.replace("|", "_").replace("*", "x")  # as file names of Windows may have it
+
+    def shared(self, *, seed: int, normalize: bool) -> dict[str, Any]:
+        """Return those of the options of all fits that this one takes."""
+        found = {} if self.makes_taps else {"normalize": normalize}
+        return found | ({"seed": seed} if self.is_seeded else {})
 
 
 DEON_SKIN = "deon-skin"  # a profile that is made without a material
@@ -204,9 +212,10 @@ _TAPS = (
     Setting(
         "taps",
         "whole",
-        "thin the kernel to so many bilinear fetches a pass, an odd number.",
+        "bilinear fetches a pass, an odd number up to 129 that a kernel is thinned to; of disk all "
+        "of them, from 4.",
         "N",
-        (3, 129),
+        (3, 256),
     ),
     Setting(
         "place",
@@ -232,9 +241,18 @@ FITS: Mapping[str, Method] = {
             ),
             Setting("passes", "whole", "most passes of the stages.", "N", (1, 1000)),
             Setting("full_resolution", "flag", "do not halve the picture."),
+            Setting("still", "flag", "weigh in what changes as light moves by a pixel."),
             _SPECTRUM,
         ),
         counted=("stages", "fetches"),
+        makes_taps=True,
+        is_seeded=True,
+    ),
+    "disk": Method(
+        "sssfit.fit.disk:fit_disk",
+        "single fetches on a spiral, turned at each pixel and frame, as engines sample",
+        (replace(_TAPS[0], words="24"),),
+        counted=("taps",),
         makes_taps=True,
     ),
     "svd": Method(
@@ -373,7 +391,8 @@ def settings_of(methods: Mapping[str, Method]) -> dict[str, tuple[Setting, tuple
     for key, owners in owned.items():
         first, words = next(iter(owners.values())), {each.words for each in owners.values()}
         if len(words) > 1:
-            said = ", ".join(f"{each.words} for {name}" for name, each in owners.items())
+            given = {name: each.words for name, each in owners.items() if each.words}
+            said = ", ".join(f"{words} for {name}" for name, words in given.items())
             first = replace(first, words=said)
         found[key] = first, tuple(owners)
     return found

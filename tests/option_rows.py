@@ -244,6 +244,8 @@ def _tapped(option: str, value: str, default: str = "", **own: Any) -> Row:
 
     free = {"passes", "fetches", "full_resolution"} & own.keys()
     usual: dict[str, Any] = {"passes": 4} if free else {"stages": "1-1"}
+    if "still" in own:  # where a picture is halved
+        usual = {"stages": "1|1"}
     command = "fit wax.profile.npz --method cascade --mm-per-pixel .6"
     typed = "".join(f" --{key} {each}" for key, each in usual.items())
     return Row(command + typed, f"{option} {value}".strip(), lambda ran: ran.taps, made, default)
@@ -261,8 +263,13 @@ def _thinned(option: str, value: str, method: str, **own: Any) -> Row:
     *before, name = option.split(" --")
     given = f"--{name.removeprefix('--')} {value}"
     usual = f" {before[0]}" if before else ""
-    words = "cumulative" if before else ""
+    words = "cumulative" if before else "24 for disk"
     return Row(command + usual, given, made_taps, made, words=words)
+
+
+def _sampled_disk() -> Any:
+    found = fit.fit_taps(profile(), "disk", taps=5, mm_per_pixel=0.4).kernel
+    return [found.structure, found.mm_per_pixel, found.blend]
 
 
 _HAND = {"near_mm2": [0.2, 0.1, 0.05], "far_mm2": [2.0, 1.0, 0.7], "weight": [0.4, 0.5, 0.6]}
@@ -324,6 +331,7 @@ FIT = {
     "--stages": _tapped("--stages", "1|1-1", stages="1|1-1"),
     "--passes": _tapped("--passes", "2", passes=2),
     "--full-resolution": _tapped("--full-resolution", "", full_resolution=True),
+    "--still": _tapped("--still", "", still=True),
     "--taps": _thinned("--taps", "7", "svd", taps=7),
     "--place": _thinned("--taps 7 --place", "quadratic", "svd", taps=7, place="quadratic"),
     "--spectrum": _tapped("--spectrum", "white", "natural", spectrum="white"),
@@ -1164,6 +1172,12 @@ FITS = {
         for method in SEPARABLE
         if method != "svd"
     },
+    "--taps of disk": Row(
+        "fit wax.profile.npz --method disk --mm-per-pixel .4",
+        "--taps 5",
+        lambda ran: ran.taps,
+        _sampled_disk,
+    ),
     "--rank of weighted": _fitted("--rank", "1", "weighted", rank=1),
     "--spectrum of weighted": _fitted("--spectrum", "white", "weighted", spectrum="white"),
 }

@@ -66,7 +66,7 @@ def test_the_file_of_a_disk_comes_back_bit_for_bit(count):
     taps = disk_of(count, channels=3)
     whole = json.loads(bytes_of(taps))
     jsonschema.validate(whole, SCHEMA)
-    assert whole["structure"] == f"disk {count}"
+    assert whole["structure"] == f"{count} rings"
     assert (whole["fetches"], whole["passes"], whole["all_passes"]) == (count, 1, 1)
     back = Taps.read(io.BytesIO(bytes_of(taps)))
     assert bytes_of(back) == bytes_of(taps)

@@ -31,6 +31,7 @@ from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
 from sssfit.shapes import diffusion_cdf, diffusion_radius
 
+AnyFloats = npt.NDArray[np.floating[Any]]
 Places = Iterable[tuple[npt.ArrayLike, npt.ArrayLike]]
 
 _GOLDEN = (1.0 + math.sqrt(5.0)) / 2.0
@@ -325,7 +326,7 @@ def _likelihood(radii_mm: FloatArray, s: FloatArray, sampled: float | None = Non
     return np.asarray(density(s) / density(least))
 
 
-def _turned(radii: FloatArray, angles: FloatArray, turn: npt.NDArray[np.floating[Any]]) -> Places:
+def _turned(radii: AnyFloats, angles: AnyFloats, turn: AnyFloats) -> Places:
     """Yield whole steps down and right (H, W) of each fetch, turned at each pixel."""
     for radius, angle in zip(radii, angles, strict=True):
         yield np.rint(radius * np.sin(angle + turn)), np.rint(radius * np.cos(angle + turn))

@@ -107,6 +107,8 @@ def fit_result(
     if place is not None and taps is None:
         raise FitError(f"place = {shown(place)} is where taps lie; give their number as `taps`.")
     if method in TAPS:
+        if place is not None:
+            raise FitError(f"place = {shown(place)} is of separable kernels; leave it out.")
         return fit_taps(profile, method, **({} if taps is None else {"taps": taps}), **settings)
     profile = _loaded(profile)
     dense = fit_separable(profile, method, **settings)

@@ -91,11 +91,11 @@ def _is_count(word: str) -> bool:
 def text_of(shapes: Sequence[Shape]) -> str:
     """Return the text that `parse` reads; lines and disks are written by their kind.
 
-    A disk is no structure of a cascade: ``disk 24`` has 24 radii.
+    A disk is no structure of a cascade: ``24 rings`` has 24 radii.
     """
     levels: list[list[str]] = [[] for _ in range(max(each.level for each in shapes) + 1)]
     for each in shapes:
-        name = {"pair": f"{each.pairs}", "disk": f"disk {each.pairs}"}.get(each.kind, each.kind)
+        name = {"pair": f"{each.pairs}", "disk": f"{each.pairs} rings"}.get(each.kind, each.kind)
         levels[each.level].append(_STAR if each.kind == "star" else name)
     return "|".join("-".join(level) for level in levels)
 
