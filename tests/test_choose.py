@@ -19,7 +19,7 @@ from sssfit.choose.report import sentences, step_line
 from sssfit.choose.truth import material_of, photons_needed
 from sssfit.choose.views import Views, checked_scene, head_scenes
 from sssfit.errors import FitError, RenderError, SimulationError, SssfitError
-from sssfit.fit import fit_result
+from sssfit.fit import cascade, fit_result
 from sssfit.fit.cascade import STRUCTURES
 from sssfit.kernel import structure
 from sssfit.material import Layer, Material, load_material, material_names
@@ -37,6 +37,15 @@ from sssfit.simulate import (
 )
 
 FRAME = (128, 128)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def short_searches():
+    """Search from one start: these tests fit dozens of cascades, and ask for no good ones."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(cascade, "_STARTS", 1)
+        patch.setattr(cascade, "_HOPS", ())
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -185,8 +194,14 @@ def test_photons_are_tried_until_a_walk_will_do(skin1, choice):
     need = choice.photons
     assert need.truth_method == "exact"
     walk = simulate_montecarlo(skin1, photons=need.photons, seed=1)
-    again = rendered_again(choice.profile, choice.chosen.option, 0.6, fitted_to=walk)
-    assert need.errors[-1] == pytest.approx(again.delta_e_2000_p95, rel=1e-6)
+    views = [(each.mm_per_pixel, each.distance_mm) for each in choice.scenes]
+    assert len(views) > 1
+    again = [
+        rendered_again(choice.profile, choice.chosen.option, *view, fitted_to=walk)
+        for view in views
+    ]
+    worst = max(each.delta_e_2000_p95 for each in again)
+    assert need.errors[-1] == pytest.approx(worst, rel=1e-6)
     assert need.counts == tuple(10**k for k in range(4, 4 + len(need.counts)))
     assert need.photons == need.counts[-1]
 
