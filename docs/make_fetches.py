@@ -192,7 +192,7 @@ def short(rows, shipped, cascades):
     published = [(f, e) for _, f, _, e in (*rows, *shipped)]
     two = min((e, g, f) for g, f, passes, e in rows if passes == 2)
     figures = {
-        "eleven": best(published, 11.0),
+        "eleven": best([*published, *chains], 11.0),
         "fourteen": best(chains, 14.0),
         "twenty_four": best(chains, 24.0),
         "hundred": best(published, 100.0),
@@ -209,8 +209,8 @@ percentile of Delta E):
 - **From 12 fetches a pixel on, take a cascade.** With 14 fetches it leaves {fourteen:.2f}, with 24
   {twenty_four:.2f}; the best published kernel or engine's sampler at 100 fetches leaves
   {hundred:.1f}. `sssfit fit` makes one of 24 fetches, `sssfit fit --fetches 14` the cheaper one.
-- **Let the scene say how few will do:** `sssfit choose skin1 --distance 0.6m`. It also knows when no
-  blur is needed.
+- **Let the scene say how few will do:** `sssfit choose skin1 --distance 0.6m`. It also knows when
+  no blur is needed.
 - **Under 12 fetches nothing comes near:** the best of 11 fetches leaves {eleven:.0f}.
 - **Where two passes are all there is**, {two} on {two_fetches:.0f} fetches leaves {two_error:.1f};
   four passes of stars (`--passes 4`) leave less than half of that for 16.
