@@ -662,6 +662,13 @@ VIEW = "--distance .6m --fov 20 --resolution 64x48"
 CHOOSE = [
     C("choose wax.toml --distance 3m --resolution 40x24 --irradiance edge"),
     C("choose wax.toml --distance 60m --resolution 40x24"),
+    C("choose wax.profile.npz --distance 3m --resolution 40x24 --irradiance disk --fetches 12"),
+    C(
+        "choose wax.profile.npz --distance 3m --resolution 40x24 --irradiance disk --fetches 16 "
+        "--passes 4 --tolerance 9 --json"
+    ),
+    C("choose wax.profile.npz --fetches 7 --passes 1"),
+    C("choose wax.profile.npz --fetches 5"),
     C(
         "choose wax.profile.npz --distance 40cm --fov 3 --resolution 40x48 --irradiance disk --tolerance 2"
     ),

@@ -783,8 +783,14 @@ CHOOSE = {
         default="1920x1080",
     ),
     "--tolerance": Row(
-        _CHOOSE, "--tolerance .7", _asked, lambda: _rounded(_chosen(tolerance=0.7)), default="1.0"
+        _CHOOSE,
+        "--tolerance .7",
+        _asked,
+        lambda: _rounded(_chosen(tolerance=0.7)),
+        words="1; none with --fetches",
     ),
+    "--fetches": Row(_CHOOSE, "--fetches 17.5", _asked, lambda: _rounded(_chosen(fetches=17.5))),
+    "--passes": Row(_CHOOSE, "--passes 6", _asked, lambda: _rounded(_chosen(passes=6))),
     "--tolerance-of": Row(
         _CHOOSE,
         "--tolerance-of p99",
@@ -815,11 +821,11 @@ CHOOSE = {
     ),
     "--output": Row(
         _CHOOSE,
-        "-o x.kernel.json",
+        "-o x.taps.json",
         names,
-        lambda: ["x.kernel.json", "x.profile.npz"],
-        default="wax.chosen.kernel.json",
-        words="MATERIAL.chosen.kernel.json",
+        lambda: ["x.profile.npz", "x.taps.json"],
+        default="wax.chosen.taps.json",
+        words="MATERIAL.chosen.taps.json",
     ),
     "--force": Row(
         f"{_CHOOSE} -o foreign.json",
@@ -1189,7 +1195,7 @@ STREAMS = (
     f"{_BURLEY} -o x.profile.npz",
     "fit wax.profile.npz --method svd -o x.kernel.json",
     f"{_DISK} -o x.exr",
-    f"{_CHOOSE} -o x.kernel.json",
+    f"{_CHOOSE} -o x.json",
     "import table.csv -o x.profile.npz",
     "export --format csv -o x.csv",
     "export --format hlsl -o x.hlsl",
