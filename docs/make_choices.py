@@ -100,8 +100,6 @@ def budgets():
 
 def figures(cause):
     """Write Delta E and relative L2 of a cause."""
-    if cause.score is None:
-        return "not made yet"
     return f"{cause.score.delta_e_2000_mean:.3f}, {100.0 * cause.score.relative_l2:.3f}"
 
 

@@ -426,8 +426,6 @@ def _budget(f: Figures, causes: list[Figures]) -> list[Any]:
 
 def _cause(row: Figures) -> list[Any]:
     name = row["cause"] if row["in_whole"] else f"({row['cause']})"
-    if row["relative_l2"] is None:
-        return [name, row["hint"], "", "", "", "", ""]
     return [
         name,
         row["delta_e_2000_mean"],
