@@ -14,7 +14,9 @@ from types import NoneType
 
 import numpy as np
 
+import sssfit.choose.options
 import sssfit.compare.candidates
+import sssfit.fit.cascade
 import sssfit.scene.head
 import sssfit.simulate.exact
 
@@ -23,6 +25,12 @@ OWN = {
     *("test_memory_order", "test_processes", "test_runner"),
 }
 _OWN_FITS = {"test_approved"}  # its clock counts how often it is asked, fits included
+# What these ask is how good a cascade is; the others fit dozens, and one start will do for them.
+LONG_SEARCHES = {
+    *("test_cascade", "test_disks_page", "test_docs", "test_docs_tables", "test_engines"),
+    *("test_frames", "test_motion", "test_readme_figures", "test_shading"),
+}
+_SEARCH = sssfit.fit.cascade._STARTS, sssfit.fit.cascade._HOPS
 _PLAIN = str | int | float | NoneType  # a setting that is a function, or a scene, is not shared
 _state = {"allowed": True, "fits": True}
 
@@ -31,6 +39,8 @@ def allow(file):
     """Share from now on, unless this file of tests computes everything itself."""
     _state["allowed"] = file not in OWN
     _state["fits"] = _state["allowed"] and file not in _OWN_FITS
+    cascade = sssfit.fit.cascade
+    cascade._STARTS, cascade._HOPS = _SEARCH if file in LONG_SEARCHES else (1, ())
 
 
 @contextlib.contextmanager
@@ -51,6 +61,7 @@ def begin():
     head.head_scene = _lit_once(head.head_scene)
     fits.fit_separable = _fitted_once(fits.fit_separable)
     fits.fit_taps = _fitted_once(fits.fit_taps)
+    sssfit.choose.options.fit_result = _fitted_once(sssfit.choose.options.fit_result)
 
 
 def _solved_once(real):
@@ -92,7 +103,8 @@ def _fitted_once(real):
         values = settings.values()
         if not _state["fits"] or not all(isinstance(each, _PLAIN) for each in values):
             return real(profile, method, **settings)
-        key = _contents(profile), method, *sorted(settings.items())
+        searches = sssfit.fit.cascade._STARTS, sssfit.fit.cascade._HOPS
+        key = _contents(profile), method, searches, *sorted(settings.items())
         if key not in known:
             known[key] = real(profile, method, **settings)
         return known[key]

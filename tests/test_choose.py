@@ -19,7 +19,7 @@ from sssfit.choose.report import sentences, step_line
 from sssfit.choose.truth import material_of, photons_needed
 from sssfit.choose.views import Views, checked_scene, head_scenes
 from sssfit.errors import FitError, RenderError, SimulationError, SssfitError
-from sssfit.fit import cascade, fit_result
+from sssfit.fit import fit_result
 from sssfit.fit.cascade import STRUCTURES
 from sssfit.kernel import structure
 from sssfit.material import Layer, Material, load_material, material_names
@@ -37,15 +37,6 @@ from sssfit.simulate import (
 )
 
 FRAME = (128, 128)
-
-
-@pytest.fixture(scope="module", autouse=True)
-def short_searches():
-    """Search from one start: these tests fit dozens of cascades, and ask for no good ones."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cascade, "_STARTS", 1)
-        patch.setattr(cascade, "_HOPS", ())
-        yield
 
 
 @pytest.fixture(scope="module")

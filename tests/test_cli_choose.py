@@ -9,7 +9,6 @@ from click.testing import CliRunner
 
 from sssfit.cli import cli, main
 from sssfit.errors import RenderError
-from sssfit.fit import cascade
 from sssfit.formats.csv import parse_csv
 from sssfit.formats.pictures import save_image
 from sssfit.kernel import Taps
@@ -21,15 +20,6 @@ from sssfit.simulate import simulate_exact
 # A tolerance that short searches end within.
 SMALL = ("--resolution", "128x128", "--distance", "0.14m", "--tolerance", "3")
 EDGE = ("--resolution", "64x64", "--distance", "0.14m", "--tolerance", "3", "--irradiance", "edge")
-
-
-@pytest.fixture(scope="module", autouse=True)
-def short_searches():
-    """Search from one start: these tests fit dozens of cascades, and ask for no good ones."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(cascade, "_STARTS", 1)
-        patch.setattr(cascade, "_HOPS", ())
-        yield
 
 
 @pytest.fixture(autouse=True)

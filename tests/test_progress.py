@@ -12,7 +12,10 @@ BAR = "\N{BOX DRAWINGS HEAVY HORIZONTAL}"
 ERASED = "\x1b[2K"
 WALK = ["simulate", "skin1", "--photons", "3e4", "-o", "a.npz"]
 BUDGET = ["compare", "skin1", "--what", "budget", "--picture", "disk", "--size", "16x16"]
-KERNELS = ["compare", "skin1", "--what", "kernels", "--picture", "disk", "--size", "16x16"]
+KERNELS = [
+    *("compare", "skin1", "--what", "kernels", "--picture", "disk", "--size", "16x16"),
+    *("--only", "preintegrated,svd"),
+]
 COMMANDS = [WALK, [*BUDGET, "--photons", "1e4"], [*KERNELS, "--mm-per-pixel", "4"]]
 
 

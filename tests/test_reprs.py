@@ -179,7 +179,7 @@ def test_records_do_not_import_matplotlib_until_they_draw():
     program = """
 import sys, sssfit
 profile = sssfit.simulate("skin1", "dipole")
-kernel = sssfit.fit(profile, mm_per_pixel=2.0)
+kernel = sssfit.fit(profile, stages="1", mm_per_pixel=2.0)
 repr(profile), profile._repr_html_(), repr(kernel), kernel._repr_html_()
 assert "matplotlib" not in sys.modules
 kernel.plot(profile)
