@@ -106,16 +106,17 @@ CHOOSE = (
     option("--distance distance_mm", Length(), "LENGTH", "Camera distance.", "0.6m"),
     option("--fov fov_degrees", _ANGLE, "DEGREES", "Vertical field of view.", 30.0),
     option("--resolution", Size(), "WxH", "Columns and rows of the frame.", "1920x1080"),
-    option("--tolerance", Number(), "DELTA-E", "Largest CIE Delta E 2000 against the true 2D "
-           "kernel.", 1.0),
+    option("--tolerance", Number(), "E", "Largest Delta E.  [default: 1; none with --fetches]"),
+    option("--fetches", Number(), "N", "Most texture fetches a pixel."),
+    option("--passes", WholeRange(1, 1000), "N", "Most passes of the stages."),
     option("--tolerance-of", ["p95", "p99", "mean"], None, "Figure that --tolerance limits: a "
            "percentile over the pixels, or the mean, which hides large errors of a few pixels.",
            "p95"),
     option("--irradiance", None, "NAME|FILE", f"Picture to judge by: {_FILE} file. The edge is at "
            f"{EDGE_DEGREES:g} degrees.", "head"),
     *_OF_FILES,
-    option("-o --output", None, "FILE", "Kernel file, - for stdout; the profile goes beside it.  "
-           "[default: MATERIAL.chosen.kernel.json]"),
+    option("-o --output", None, "FILE", "Table of taps, - for stdout; the profile goes beside it.  "
+           "[default: MATERIAL.chosen.taps.json]"),
     flag("--force", "Replace an input, or files that are not our kernel or profile."),
 )
 

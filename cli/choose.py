@@ -1,4 +1,4 @@
-"""``sssfit choose``: the cheapest kernel whose error a scene does not show."""
+"""``sssfit choose``: the table of taps for a scene, by its error or by a budget of fetches."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 @options(*CHOOSE)
 @common_options
 def choose(material: str, common: Common, **given: Any) -> None:
-    """Choose the cheapest kernel whose error the scene does not show, and save it.
+    """Choose the cheapest table of taps whose error the scene does not show, and save it.
 
-    Tries every method and rank at seven supports, cheapest first, and stops at the first whose
-    Delta E is within --tolerance. Cost is weights applied to a pixel. By default 95 % of the pixels
-    must be within a Delta E of 1, about the smallest difference seen side by side.
+    Cost is texture fetches a pixel. By default 95 % of the pixels must be within a Delta E of 1,
+    about the smallest difference seen side by side. With --fetches alone it is the table that shows
+    the least within them; with --tolerance as well, the cheapest of those within both.
 
     Distance, field of view and rows give the size of a pixel. The picture is the middle of the
     frame, 512 x 512 pixels at most. For a close-up of the head, less than 88 mm across, the kernel
@@ -39,6 +39,7 @@ def choose(material: str, common: Common, **given: Any) -> None:
 
     \b
       sssfit choose skin1 --distance 0.6m --fov 30 --resolution 1920x1080
+      sssfit choose skin1 --fetches 14 --passes 8
       sssfit choose marble --distance 2m --tolerance 0.5 --irradiance edge
       sssfit choose slab.profile.npz --tolerance-of mean --tolerance 0.3
       sssfit choose mine.toml --irradiance mine.exr -v
@@ -47,27 +48,26 @@ def choose(material: str, common: Common, **given: Any) -> None:
     from sssfit.choose import views
     from sssfit.choose.report import sentences, step_line
     from sssfit.export.reports import page
-    from sssfit.kernel import is_kernel_file
+    from sssfit.kernel import is_taps_file
     from sssfit.material import Material
     from sssfit.profile import is_profile_file
 
     views.check_distance(given["distance_mm"])
-    check_pictures([given["irradiance"]], layer=given["layer"], mask=given["mask"])
+    on = {key: given[key] for key in ("layer", "mask")}
+    check_pictures([given["irradiance"]], **on)
     source = load_source(material)
-    view = {key: given[key] for key in ("distance_mm", "fov_degrees")}
-    frame, on = given["resolution"], {key: given[key] for key in ("layer", "mask")}
+    frame, view = given["resolution"], {k: given[k] for k in ("distance_mm", "fov_degrees")}
     pitch = library.mm_per_pixel_at(**view, rows=frame[0])
-    asked = {key: given[key] for key in ("distance_mm", "tolerance", "tolerance_of")}
+    asked = {k: given[k] for k in ("distance_mm", "tolerance", "tolerance_of", "fetches", "passes")}
     is_file = material == "-" or material.endswith(".npz")
     name = source.name if isinstance(source, Material) else stem_of(material, source.material_name)
-    path = target(given["output"], f"{name}.chosen.kernel.json")
+    path = target(given["output"], f"{name}.chosen.taps.json")
     profile_path = None
     if path is not None and not is_file:  # not simulate's name: a longer walk may lie there
-        stem = path.name.removesuffix(".json").removesuffix(".kernel")
-        profile_path = path.with_name(f"{stem}.profile.npz")
+        profile_path = path.with_name(f"{stem_of(path.name)}.profile.npz")
     hold = {"inputs": [material, given["irradiance"]], "force": given["force"]}
     with (
-        held([path], is_kernel_file, named=KERNEL, **hold),
+        held([path], is_taps_file, named=KERNEL, **hold),
         held([profile_path] if profile_path else [], is_profile_file, named=PROFILE, **hold),
     ):
         choice = library.choose(

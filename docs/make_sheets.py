@@ -2,7 +2,7 @@
 
 python docs/make_sheets.py [sheet] [editing] [pareto] [budget]
 
-A picture and its table come from one computation; `pareto` writes what the page says in short, too.
+A picture and its table come from one computation.
 """
 
 import sys
@@ -81,51 +81,27 @@ def editing_rows(found):
 
 
 def pareto():
-    """Draw skin1's kernels by error and weights; write the fronts, and what they come to."""
+    """Draw skin1's kernels by error and fetches, and write the fronts."""
     profile = simulate_exact(load_material("skin1"))
     found = compare_kernels(profile, scenes())
     draw("skin1-pareto.png", pareto_figure(found))
     rows = front_rows(found)
     write("pareto", PARETO.format(pixels=found.pixels, pitch=found.mm_per_pixel, rows=rows))
-    write("short", SHORT.format(**short_words(found)))
 
 
 def front_rows(found):
     """Tabulate the front of every picture, and of all together."""
-    lines = [["picture", "kernels that no other beats: mean Delta E (weights)"], ["---"] * 2]
+    lines = [["picture", "kernels that no other beats: mean Delta E (fetches)"], ["---"] * 2]
     for picture in found.pictures:
-        front = found.front(picture.name, "delta-e", "weights")
-        words = (f"{row.label} {row.delta_e_2000_mean:.3f} ({row.taps_per_pixel})" for row in front)
+        front = found.front(picture.name, "delta-e", "fetches")
+        words = (f"{row.label} {row.delta_e_2000_mean:.3f} ({row.fetches:.4g})" for row in front)
         lines.append([picture.name, ", ".join(words)])
     together = (
-        f"{each.label} {each.typical_error:.3f} ({each.cost:g})"
-        for each in verdicts(found, "delta-e", "weights")
+        f"{each.label} {each.typical_error:.3f} ({each.cost:.4g})"
+        for each in verdicts(found, "delta-e", "fetches")
     )
     lines.append(["all, geometric mean", ", ".join(together)])
     return table(lines)
-
-
-def short_words(found):
-    """Return what the page says first: the cheapest, and from where on nothing shows."""
-    all_of = verdicts(found, "delta-e", "weights")
-    unseen = next((each for each in all_of if each.delta_e_2000_p95 <= 1.0), None)
-    first = all_of[0]
-    return {
-        "first": first.label,
-        "first_weights": f"{first.cost:g}",
-        "first_error": f"{first.error:.2f}",
-        "first_picture": first.picture,
-        "unseen": f"{unseen.label} ({unseen.cost:g} weights) on" if unseen else "none of these on",
-        "two": ", ".join(two_passes(found)),
-    }
-
-
-def two_passes(found):
-    """Name the nearest kernel of two passes on each picture."""
-    for picture in found.pictures:
-        rows = [row for row in found.rows_of(picture.name) if row.passes == 2]
-        best = min(rows, key=lambda row: row.delta_e_2000_mean)
-        yield f"{best.label} on {picture.name} ({best.delta_e_2000_mean:.2f})"
 
 
 def budget():
@@ -148,8 +124,7 @@ def draw(name, figure):
 
 def write(word, text):
     """Put a section in its place."""
-    command = f"python docs/make_sheets.py {'pareto' if word == 'short' else word}"
-    put_section(PAGE, f"docs/make_sheets.py {word}", text, command)
+    put_section(PAGE, f"docs/make_sheets.py {word}", text, f"python docs/make_sheets.py {word}")
 
 
 WORK = {
@@ -158,16 +133,6 @@ WORK = {
     "pareto": pareto,
     "budget": budget,
 }
-
-SHORT = """In short, for skin1 on pixels of .3 mm (disk, edge at 30 degrees, points, head):
-
-- **Two passes, {first_weights} weights: {first}**, whose worst picture is {first_picture}: mean
-  Delta E {first_error}. The best kernel depends on the picture: {two}.
-- **More passes: SVD, energy rescaled.** 95 % of the pixels of every picture are within a Delta E
-  of 1 from {unseen}.
-- **Run `sssfit choose`** before either: the cost depends on what the pixels of your scene show.
-- **Simulate exactly** where possible: half spaces with isotropic scattering. Elsewhere 1e6
-  photons are enough."""
 
 SHEET = """`sssfit compare skin1 --what sheet --chart skin1-sheet.png` draws the rows of figure S.3
 (Jimenez et al. 2015, supplement), preceded by the input times the albedo, which is the picture
@@ -184,10 +149,10 @@ original:
 
 The original compared with the 2D kernel of the six Gaussians, mean and 95th percentile: {own}."""
 
-PARETO = """`sssfit compare skin1 --chart skin1-pareto.png` fits every method, rank and number of
-Gaussians and plots their error against their cost. The line is the Pareto front; kernels that
-another one beats are faint. By weights, skin1 at {pitch:g} mm ({pixels} pixels a pass, pictures of
-512 x 512 pixels):
+PARETO = """`sssfit compare skin1 --chart skin1-pareto.png` fits cascades and every method, rank and
+number of Gaussians, dense and on taps, and plots their error against fetches a pixel. The line is
+the Pareto front; kernels that another one beats are faint, dense ones small. skin1 at {pitch:g} mm
+({pixels} pixels a pass, pictures of 512 x 512 pixels):
 
 {rows}"""
 

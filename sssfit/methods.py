@@ -242,6 +242,7 @@ FITS: Mapping[str, Method] = {
             ),
             Setting("passes", "whole", "most passes of the stages.", "N", (1, 1000)),
             Setting("full_resolution", "flag", "do not halve the picture."),
+            Setting("still", "flag", "weigh in what changes as light moves by a pixel."),
             _SPECTRUM,
         ),
         counted=("stages", "fetches"),

@@ -277,6 +277,7 @@ FIT = [
             "--passes 2 -q",
             "--stages '*|1'",
             "--full-resolution --passes 4 --support 3mm",
+            "--stages '1|1' --still",
         )
     ),
     C("fit wax.profile.npz --method disk --mm-per-pixel .6"),
@@ -288,6 +289,7 @@ FIT = [
     C("fit wax.profile.npz --method cascade --fetches 5"),
     C("fit wax.profile.npz --method cascade --stages '1-1|1' --fetches 12"),
     C("fit wax.profile.npz --method cascade --stages '1-x'"),
+    C("fit wax.profile.npz --method cascade --stages '1|*' --still"),
     C("fit wax.profile.npz --method cascade --stages '1||1'"),
     C("fit wax.profile.npz --method cascade --passes 0"),
     C("fit wax.profile.npz --method cascade --passes 1 --fetches 8"),
@@ -665,6 +667,13 @@ VIEW = "--distance .6m --fov 20 --resolution 64x48"
 CHOOSE = [
     C("choose wax.toml --distance 3m --resolution 40x24 --irradiance edge"),
     C("choose wax.toml --distance 60m --resolution 40x24"),
+    C("choose wax.profile.npz --distance 3m --resolution 40x24 --irradiance disk --fetches 12"),
+    C(
+        "choose wax.profile.npz --distance 3m --resolution 40x24 --irradiance disk --fetches 16 "
+        "--passes 4 --tolerance 9 --json"
+    ),
+    C("choose wax.profile.npz --fetches 7 --passes 1"),
+    C("choose wax.profile.npz --fetches 5"),
     C(
         "choose wax.profile.npz --distance 40cm --fov 3 --resolution 40x48 --irradiance disk --tolerance 2"
     ),

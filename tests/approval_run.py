@@ -173,6 +173,7 @@ def stand_ins(
     from sssfit import material, simulate
     from sssfit.choose import truth
     from sssfit.compare import pictures, sheet
+    from sssfit.fit import cascade
     from sssfit.measure import cost
 
     clock = Clock()
@@ -198,6 +199,9 @@ def stand_ins(
                 sheet.compute_sheet, functools.partial(sheet.compute_sheet, pixels=24, most_terms=2)
             ),
             mock.patch.object(pictures, "PIXELS", 13),
+            # A shorter search for cascades: choices fit dozens of them.
+            mock.patch.object(cascade, "_STARTS", 1),
+            mock.patch.object(cascade, "_HOPS", ()),
             mock.patch.object(truth, "WALK_PHOTONS", 3000),
             mock.patch.object(truth, "COUNTS", (1000, 2000, 4000)),
             mock.patch.object(cost.seconds_per_megapixel, "__defaults__", (5, clock)),

@@ -400,16 +400,17 @@ def under_a_pixel() -> Any:
 
 
 def head_under_a_pixel() -> Any:
-    return choose.Choice(choice().profile, 30.0, 7.0, "mean", choice().scenes)
+    return choose.Choice(choice().profile, 30.0, 7.0, "mean", scenes=choice().scenes)
 
 
 def no_blur_is_within() -> Any:
     nothing = replace(choice().steps[0], within=True)
-    return choose.Choice(choice().profile, 0.5, 9.0, "p99", choice().scenes, (nothing,), nothing)
+    given = {"scenes": choice().scenes, "steps": (nothing,), "chosen": nothing}
+    return choose.Choice(choice().profile, 0.5, 9.0, "p99", **given)
 
 
 def other_reasons() -> Any:
-    """What the small choice does not come to: a wider view, supports left out, too few photons."""
+    """What the small choice does not come to: a wider view, a budget, too few photons."""
     found = choice()
     photons = replace(
         found.photons,
@@ -419,17 +420,15 @@ def other_reasons() -> Any:
         seconds=(0.5, 1.5),
         truth_method="montecarlo",
     )
-    option = found.chosen.option
-    guided = replace(option, candidate=Candidate("guided k = 4", "guided", 1, {"k": 4.0}))
     return replace(
         found,
         tolerance=found.tolerance + 0.0625,
         cheaper=replace(found.cheaper, error=0.5, within=False),
-        dearer=(*found.dearer, replace(found.dearer[0], within=False)),
-        steps=(*found.steps, replace(found.chosen, option=guided)),
+        dearer=replace(found.dearer, within=False),
+        fetches=31.5,
+        passes=18,
         photons=photons,
-        too_narrow=(5, 9),
-        unfitted=("gaussians 3", "gaussians 4"),
+        unfitted=("cascade 1", "cascade *"),
     )
 
 

@@ -244,6 +244,8 @@ def _tapped(option: str, value: str, default: str = "", **own: Any) -> Row:
 
     free = {"passes", "fetches", "full_resolution"} & own.keys()
     usual: dict[str, Any] = {"passes": 4} if free else {"stages": "1-1"}
+    if "still" in own:  # where a picture is halved
+        usual = {"stages": "1|1"}
     command = "fit wax.profile.npz --method cascade --mm-per-pixel .6"
     typed = "".join(f" --{key} {each}" for key, each in usual.items())
     return Row(command + typed, f"{option} {value}".strip(), lambda ran: ran.taps, made, default)
@@ -329,6 +331,7 @@ FIT = {
     "--stages": _tapped("--stages", "1|1-1", stages="1|1-1"),
     "--passes": _tapped("--passes", "2", passes=2),
     "--full-resolution": _tapped("--full-resolution", "", full_resolution=True),
+    "--still": _tapped("--still", "", still=True),
     "--taps": _thinned("--taps", "7", "svd", taps=7),
     "--place": _thinned("--taps 7 --place", "quadratic", "svd", taps=7, place="quadratic"),
     "--spectrum": _tapped("--spectrum", "white", "natural", spectrum="white"),
@@ -780,8 +783,14 @@ CHOOSE = {
         default="1920x1080",
     ),
     "--tolerance": Row(
-        _CHOOSE, "--tolerance .7", _asked, lambda: _rounded(_chosen(tolerance=0.7)), default="1.0"
+        _CHOOSE,
+        "--tolerance .7",
+        _asked,
+        lambda: _rounded(_chosen(tolerance=0.7)),
+        words="1; none with --fetches",
     ),
+    "--fetches": Row(_CHOOSE, "--fetches 17.5", _asked, lambda: _rounded(_chosen(fetches=17.5))),
+    "--passes": Row(_CHOOSE, "--passes 6", _asked, lambda: _rounded(_chosen(passes=6))),
     "--tolerance-of": Row(
         _CHOOSE,
         "--tolerance-of p99",
@@ -812,11 +821,11 @@ CHOOSE = {
     ),
     "--output": Row(
         _CHOOSE,
-        "-o x.kernel.json",
+        "-o x.taps.json",
         names,
-        lambda: ["x.kernel.json", "x.profile.npz"],
-        default="wax.chosen.kernel.json",
-        words="MATERIAL.chosen.kernel.json",
+        lambda: ["x.profile.npz", "x.taps.json"],
+        default="wax.chosen.taps.json",
+        words="MATERIAL.chosen.taps.json",
     ),
     "--force": Row(
         f"{_CHOOSE} -o foreign.json",
@@ -1186,7 +1195,7 @@ STREAMS = (
     f"{_BURLEY} -o x.profile.npz",
     "fit wax.profile.npz --method svd -o x.kernel.json",
     f"{_DISK} -o x.exr",
-    f"{_CHOOSE} -o x.kernel.json",
+    f"{_CHOOSE} -o x.json",
     "import table.csv -o x.profile.npz",
     "export --format csv -o x.csv",
     "export --format hlsl -o x.hlsl",

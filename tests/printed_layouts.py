@@ -426,8 +426,6 @@ def _budget(f: Figures, causes: list[Figures]) -> list[Any]:
 
 def _cause(row: Figures) -> list[Any]:
     name = row["cause"] if row["in_whole"] else f"({row['cause']})"
-    if row["relative_l2"] is None:
-        return [name, row["hint"], "", "", "", "", ""]
     return [
         name,
         row["delta_e_2000_mean"],
@@ -614,11 +612,18 @@ def convergence(f: Figures) -> list[Any]:
 
 
 def choice(f: Figures) -> list[Any]:
+    figure = {"p95": "95th percentile", "p99": "99th percentile", "mean": "mean"}[f["tolerance_of"]]
+    budgets = [
+        Words(f", at most {{}} {key.removeprefix('most_')}", f[key])
+        for key in ("most_fetches", "most_passes")
+        if f[key] is not None
+    ]
+    asked = Words("least {} of Delta E", figure)
+    if f["tolerance"] is not None:
+        asked = Words("{} of Delta E within {}", figure, f["tolerance"])
     head = Words(
-        "{} at {} m, {} mm per pixel, {} of Delta E within {}:",
-        *(f["material"], f["distance_mm"] / 1000.0, f["mm_per_pixel"]),
-        {"p95": "95th percentile", "p99": "99th percentile", "mean": "mean"}[f["tolerance_of"]],
-        f["tolerance"],
+        "{} at {} m, {} mm per pixel, {}" + "{}" * len(budgets) + ":",
+        *(f["material"], f["distance_mm"] / 1000.0, f["mm_per_pixel"], asked, *budgets),
     )
     judged = [
         Words(
@@ -648,51 +653,30 @@ def _no_blur(f: Figures) -> Words:
 
 
 def _kernel_lines(f: Figures) -> list[Any]:
-    chosen, kernel, cheaper = f["chosen"], f["kernel"], f["cheaper"]
-    why: Any = Words("")
-    if cheaper["error"] <= f["tolerance"]:  # 95 % of it are for wider views
-        why = Words(", on a wider view, which may have {}", 0.95 * f["tolerance"])
+    chosen, cheaper, dearer = f["chosen"], f["cheaper"], f["dearer"]
     lines = [
         Words(
-            f"{{}}: {{}} {plural(kernel['rank'], 'term')}, {{}} weights a pixel, {{}}, {{}} s a "
-            "megapixel here",
-            *(_what(chosen), kernel["rank"], chosen["taps_per_pixel"], _loss(chosen)),
-            kernel["seconds_per_megapixel"],
-        ),
-        Words("runner-up: {}", _beside(f["runner_up"], chosen)),
-        Words("cheaper is not enough: {}{}", _beside(cheaper, chosen), why),
-    ]
-    for each in f["dearer"]:
-        what = "is not needed" if each["within"] else "is not enough"
-        lines.append(Words("dearer {}: {}", what, _beside(each, chosen)))
-    return [*lines, *_not_tried(f), _photons(f["photons"])]
-
-
-def _not_tried(f: Figures) -> list[Words]:
-    lines = []
-    if f["too_narrow"]:
-        pixels = ", ".join(map(str, f["too_narrow"]))
-        lines.append(
-            Words(
-                f"not tried: kernels of {pixels} pixels, to which even the true one cannot be cut"
-            )
+            "{}: {} fetches a pixel in {} passes, {}, {} s a megapixel here",
+            *(chosen["label"], chosen["fetches"], chosen["passes"], _loss(chosen)),
+            f["kernel"]["seconds_per_megapixel"],
         )
+    ]
+    if cheaper:
+        why: Any = Words("")
+        if f["tolerance"] is not None and cheaper["error"] <= f["tolerance"]:
+            why = Words(", on a wider view, which may have {}", 0.95 * f["tolerance"])
+        lines.append(Words("cheaper{}: {}{}", _judged(f, cheaper), _beside(cheaper, chosen), why))
+    if dearer:
+        lines.append(Words("dearer{}: {}", _judged(f, dearer), _beside(dearer, chosen)))
     if f["unfitted"]:
         lines.append(Words(f"cannot be fitted to this profile: {', '.join(f['unfitted'])}"))
-    if not any(row["method"] == "guided" for row in f["rows"]):
-        lines.append(
-            Words(
-                "not tried: guided fits, for their time, where another pass will do or one is wide"
-            )
-        )
-    return lines
+    return [*lines, *([_photons(f["photons"])] if f["photons"] else [])]
 
 
-def _what(step: Figures) -> Any:
-    if step["method"] is None:
-        return step["label"]
-    half_mm = step["pixels"] // 2 * step["mm_per_pixel"]
-    return Words("{} on {} pixels (+-{} mm)", step["label"], step["pixels"], half_mm)
+def _judged(f: Figures, step: Figures) -> str:
+    if f["tolerance"] is None:
+        return ""
+    return " is not needed" if step["within"] else " is not enough"
 
 
 def _loss(step: Figures) -> Words:
@@ -704,10 +688,12 @@ def _loss(step: Figures) -> Words:
 
 
 def _beside(step: Figures, chosen: Figures) -> Words:
-    times = step["taps_per_pixel"] / chosen["taps_per_pixel"]
-    price: Any = "as many weights" if times == 1.0 else Words("{} times the weights", times)
-    price = price if step["method"] else "no weights"
-    return Words("{}, {} for {}", _what(step), _loss(step), price)
+    price: Any = "no fetches"
+    if step["method"]:
+        price = Words("{} fetches in {} passes", step["fetches"], step["passes"])
+        if step["fetches"] != chosen["fetches"]:
+            price = Words("{}, {} times as many", price, step["fetches"] / chosen["fetches"])
+    return Words("{}, {} for {}", step["label"], _loss(step), price)
 
 
 def _photons(f: Figures) -> Words:

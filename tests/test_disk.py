@@ -296,3 +296,9 @@ def test_a_number_out_of_range_is_one_line(skin1, taps):
 def test_more_fetches_than_pixels_are_refused(skin1):
     with pytest.raises(FitError, match="taps = 50, but the support has 49 pixels"):
         fit_disk(skin1, taps=50, mm_per_pixel=PITCH, support_mm=3 * PITCH)
+
+
+def test_the_door_of_all_fits_makes_a_disk(skin1):
+    assert bytes_of(sssfit.fit(skin1, "disk", taps=9)) == bytes_of(fit_disk(skin1, taps=9).kernel)
+    with pytest.raises(FitError, match="place = 'quadratic' is of separable kernels"):
+        sssfit.fit(skin1, "disk", taps=9, place="quadratic")

@@ -37,10 +37,12 @@ LIGHT_CHART_FILES = {"data", "files"}
 PLOT_MAY_IMPORT = {
     "sssfit/profile/record.py": {"sssfit.chart.profile"},
     "sssfit/kernel/record.py": {"sssfit.chart.kernel", "sssfit.compare.kernel_view"},
+    "sssfit/kernel/taps.py": {"sssfit.chart.taps", "sssfit.compare.taps_view"},
 }
 FOR_TYPES = {
     "sssfit/profile/record.py": {"matplotlib.figure"},
     "sssfit/kernel/record.py": {"matplotlib.figure"},
+    "sssfit/kernel/taps.py": {"matplotlib.figure"},
     # What `load` returns; a reader is imported by its name once a file of its kind is read.
     "sssfit/kinds.py": {f"sssfit.{room}" for room in ("kernel", "material", "profile", "simulate")},
 }

@@ -15,6 +15,7 @@ from sssfit.compare import pareto
 from sssfit.compare.candidates import (
     BUDGETS,
     CASCADES,
+    DISKS,
     Candidate,
     candidates,
     every_candidate,
@@ -253,6 +254,18 @@ def test_cascades_stand_at_their_fetches_and_stages(skin1, scenes):
     assert row.bytes_per_pixel == kernel.bytes_per_pixel("half")
     assert row.fetches <= CASCADES[0]
     assert not row.is_dense
+
+
+def test_disks_stand_at_their_fetches_in_one_pass(skin1, scenes):
+    disks = [each for each in every_candidate(41) if each.method == "disk"]
+    found = compare_kernels(skin1, scenes[:1], support_mm=6.0, candidates=[*disks, SOME[0]])
+    for taps, candidate, row in zip(DISKS, disks, found.rows, strict=False):
+        assert row.label == f"disk {taps}"
+        assert (row.fetches, row.passes, row.bytes_per_pixel) == (taps, 1, 16.0)
+        kernel = candidate.fit(skin1, PITCH, 6.0).kernel
+        assert kernel.stages[0].offsets_mm.max() < 6.0 + PITCH / 2
+        assert not row.is_dense
+    assert [each.label for each in every_candidate(4) if each.method == "disk"] == ["disk 16"]
 
 
 def test_only_the_methods_asked_for_are_compared(skin1, scenes):

@@ -92,7 +92,7 @@ def test_64_channels_and_long_names_stay_one_line(kind, spectral):
     record = {
         "material": lambda: long,
         "profile": lambda: profile,
-        "kernel": lambda: sssfit.fit(profile, rank=1, mm_per_pixel=1.0),
+        "kernel": lambda: sssfit.fit(profile, "svd", rank=1, mm_per_pixel=1.0),
     }[kind]()
     assert len(repr(record)) < 200
     assert repr(record).isprintable()
@@ -123,6 +123,28 @@ def test_a_kernels_table_has_a_row_for_each_channel(kernel):
         assert float(row[1]) == pytest.approx(kernel.energy[c], abs=5e-7)
         error = float(row[3].removesuffix(" %")) / 100.0
         assert error == pytest.approx(kernel.relative_frobenius_error[c], rel=5e-3)
+
+
+def test_a_table_of_taps_has_a_row_for_each_channel(profile):
+    taps = sssfit.fit(profile, "disk", taps=8)
+    caption, rows = table_of(taps)
+    assert repr(taps).startswith(f"<{caption}: error R unknown")
+    assert caption == "Taps of skin1 by disk, 8 rings, 8 fetches of 0.3 mm pixels"
+    assert rows[0] == ["channel", "energy", "spectral error", "energy error"]
+    for c, row in enumerate(rows[1:]):
+        assert row[0] == taps.channels[c]
+        assert float(row[1]) == pytest.approx(taps.energy[c], abs=5e-7)
+        assert row[2] == "unknown"
+    assert isinstance(taps.plot(profile), Figure)
+    with pytest.raises(KernelError, match="has the channels"):
+        taps.plot(_grey())
+
+
+def _grey():
+    """A profile of one channel."""
+    return simulate_burley(
+        sssfit.Material("grey", ("grey",), (sssfit.Layer(1.3, 0.0, [0.1], [1.0]),))
+    )
 
 
 def test_a_profiles_plot_is_its_chart_and_shows_as_it_is_written(profile):

@@ -91,7 +91,7 @@ def _subtitle(budget: Budget) -> str:
 
 def _names(budget: Budget) -> list[tuple[str, str]]:
     """Return the causes from the top down with their labels, then the whole."""
-    measured = [each for each in budget.causes if each.score is not None]
+    measured = list(budget.causes)
     inside = [(each.name, each.name) for each in measured if each.is_in_whole]
     others = [(each.name, f"({each.name})") for each in measured if not each.is_in_whole]
     together = [(each.name, each.name) for each in (budget.interaction, budget.whole)]
@@ -138,7 +138,7 @@ def _write_share(axes: Axes, row: int, middle: float, percent: float) -> None:
 
 def _draw_alone(axes: Axes, budgets: Sequence[Budget], names: Sequence[tuple[str, str]]) -> None:
     """Draw a line per cause with a marker for each picture; hollow is the 99th percentile."""
-    is_seen = all(not math.isnan(b.whole.score.delta_e_2000_mean) for b in budgets if b.whole.score)
+    is_seen = all(not math.isnan(b.whole.score.delta_e_2000_mean) for b in budgets)
     for k, budget in enumerate(budgets):
         for row, (name, _) in enumerate(names):
             values = _figures(_cause(budget, name), is_seen=is_seen)
@@ -180,8 +180,6 @@ def _legend(axes: Axes, title: str, handles: Sequence[Patch | Line2D], columns: 
 
 def _figures(cause: Cause, *, is_seen: bool) -> list[float]:
     """Return mean and 99th percentile of Delta E, or relative L2 in percent."""
-    if cause.score is None:
-        return [math.nan]
     if not is_seen:
         return [100.0 * cause.score.relative_l2]
     return [cause.score.delta_e_2000_mean, cause.score.delta_e_2000_p99]

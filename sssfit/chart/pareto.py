@@ -43,6 +43,7 @@ _METHODS: dict[str, tuple[str, str, str]] = {
     "falloff": ("falloff", "#56b4e9", "P"),
     "burley": ("Burley", "#999999", "X"),
     "weighted": ("weighted terms", "#882255", "<"),
+    "disk": ("disk, one frame", "#999933", "p"),
 }
 _GREY = "#666666"
 _FAINT = 0.35

@@ -1,31 +1,25 @@
-"""The cheapest kernel whose picture stays within a tolerance.
+"""The table of taps for a scene: the cheapest within a tolerance, or the best within a budget.
 
 What is judged is CIE Delta E 2000 of a picture against the profile's own 2D kernel, its 95th
-percentile unless another figure is asked for (``views``); what counts as cheap is weights
-applied to a pixel, ties going to the smaller error (``options``). Neither depends on a
-clock, so the same seed gives the same choice.
+percentile unless another figure is asked for (``views``); what counts as cheap is texture fetches a
+pixel, then passes (``options``). Neither depends on a clock, so the same seed gives the same
+choice.
 
-No blur at all is tried first, then every option in the order of its cost until one will do. Left
-out are supports too narrow for any kernel: those to which the profile's own kernel cannot be cut
-(its energy kept) without leaving the tolerance, except for the widest of them.
+No blur at all is tried first. Then the options that none cheaper beats on skin1 are halved until
+the cheapest that will do is found, and the one before the next cheaper is tried as well: the order
+of their errors on another material and picture is nearly that on skin1. So what is chosen holds,
+and the next cheaper of those options does not; that nothing else would do for less is not proved.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from sssfit.arrays import FloatArray, plain
-from sssfit.choose.options import (
-    Option,
-    by_cost,
-    half_pixels,
-    options,
-    split_guided,
-    supports,
-)
+from sssfit.choose.options import Option, check_caps, half_pixels, options
 from sssfit.choose.truth import (
     PhotonNeed,
     check_colours,
@@ -48,18 +42,20 @@ from sssfit.choose.views import (
 from sssfit.compare.evaluate import timed
 from sssfit.compare.references import evaluated_scene
 from sssfit.errors import FitError, RenderError
-from sssfit.fit import FitResult, support_of
+from sssfit.fit import TapsFit, support_of
 from sssfit.material import Material
 from sssfit.measure.score import COLOUR_FIGURES
 from sssfit.profile import Profile
-from sssfit.render.separable import render_separable
+from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
 
 __all__ = ["TOLERANCES", "Choice", "PhotonNeed", "Step", "choose", "is_exact", "mm_per_pixel_at"]
 
-# Kernels of 8193 pixels: skin1 on pixels of .005 mm. On finer ones a picture of 512 pixels shows
-# less than a ninth of the kernel, and the search would take hours.
+TOLERANCE = 1.0  # of Delta E, unless there is a budget: about what an eye sees side by side
+# Truths of 8193 pixels: skin1 on pixels of .005 mm. On finer ones a picture of 512 pixels shows
+# less than a ninth of the kernel.
 MOST_HALF_PIXELS = 4096
+_BEST_OF = 3  # tables within a budget that are compared: those that leave the least of skin1
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +66,6 @@ class Step:
     ----------
     option : Option, optional
         None is no blur: irradiance times diffuse reflectance.
-    taps_per_pixel : int
-        Its cost.
     error : float
         The figure that the tolerance is of, on its worst view; on the first that was out of
         tolerance, where one was.
@@ -84,7 +78,6 @@ class Step:
     """
 
     option: Option | None
-    taps_per_pixel: int
     error: float
     delta_e_2000_mean: float
     delta_e_2000_p95: float
@@ -95,22 +88,28 @@ class Step:
 
     @property
     def label(self) -> str:
-        """In words, without the support."""
-        return "no blur" if self.option is None else self.option.candidate.label
+        """In words."""
+        return "no blur" if self.option is None else self.option.label
+
+    @property
+    def fetches(self) -> float:
+        """Texture fetches a pixel."""
+        return 0.0 if self.option is None else self.option.fetches
+
+    @property
+    def passes(self) -> int:
+        """Passes of the stages."""
+        return 0 if self.option is None else self.option.passes
 
     def to_dict(self) -> dict[str, Any]:
         """Return a row of ``sssfit choose --json``; without a method it is no blur."""
-        option = self.option
         return plain(
             {
                 "label": self.label,
-                "method": option and option.candidate.method,
-                "rank": option.candidate.terms if option else 0,
-                "settings": option.candidate.settings if option else {},
-                "share": option and option.share,
-                "support_mm": option and option.support_mm,
-                "pixels": option.pixels if option else 1,
-                "taps_per_pixel": self.taps_per_pixel,
+                "method": self.option and self.option.method,
+                "settings": self.option.settings if self.option else {},
+                "fetches": self.fetches,
+                "passes": self.passes,
                 "error": self.error,
                 **{key: getattr(self, key) for key in COLOUR_FIGURES},
                 "mm_per_pixel": self.mm_per_pixel,
@@ -121,62 +120,60 @@ class Step:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Choice:
-    """The cheapest that will do, and why neither less nor more is needed.
+    """The table of taps to take, and why neither less nor more is needed.
 
     Parameters
     ----------
     profile : Profile
-        What the kernel is fitted to and the truth is made from.
+        What the table is fitted to and the truth is made from.
     mm_per_pixel : float [mm]
-    tolerance : float
-        Largest error.
+    tolerance : float, optional
+        Largest error; None where the best within a budget was asked for.
     tolerance_of : str
         A key of `TOLERANCES`: which figure of Delta E 2000 the error is.
+    fetches, passes : float and int, optional
+        The budgets.
     scenes : tuple of Scene
         The pictures; the first has the pixels asked for. Empty where none was needed.
     steps : tuple of Step
         Everything tried, in order; the first is no blur.
     chosen : Step, optional
         None where the profile, or the head, is under a pixel.
-    fit : FitResult, optional
+    fit : TapsFit, optional
         None where no blur is needed.
-    runner_up : Step, optional
-        The next best that will do as well.
     cheaper : Step, optional
-        The next cheaper step, which will not do.
-    dearer : tuple of Step
-        What another term, a wider support and the dearest option would give.
+        The next cheaper step.
+    dearer : Step, optional
+        The next dearer option.
     photons : PhotonNeed, optional
-        How few photons would have done; None where no blur is needed, or where no walk can tell:
-        the profile is of no material, or not by transport.
+        How few photons would have done; None where no blur is needed, without a tolerance, or where
+        no walk can tell: the profile is of no material, or not by transport.
     seconds_per_megapixel : float, optional [s]
-        Measured, of the chosen kernel.
-    too_narrow : tuple of int
-        Pixels of the supports that were left out: the true kernel itself cannot be cut to them.
+        Measured, of the chosen table.
     unfitted : tuple of str
-        Candidates that cannot be fitted to this profile: seven Gaussians to six annuli, say.
+        Options that cannot be fitted to this profile.
     """
 
     profile: Profile
     mm_per_pixel: float
-    tolerance: float
+    tolerance: float | None
     tolerance_of: str
+    fetches: float | None = None
+    passes: int | None = None
     scenes: tuple[Scene, ...] = ()
     steps: tuple[Step, ...] = ()
     chosen: Step | None = None
-    fit: FitResult | None = None
-    runner_up: Step | None = None
+    fit: TapsFit | None = None
     cheaper: Step | None = None
-    dearer: tuple[Step, ...] = ()
+    dearer: Step | None = None
     photons: PhotonNeed | None = None
     seconds_per_megapixel: float | None = None
-    too_narrow: tuple[int, ...] = ()
     unfitted: tuple[str, ...] = ()
 
     @property
-    def wider_tolerance(self) -> float:
+    def wider_tolerance(self) -> float | None:
         """Largest error of a close-up's wider views."""
-        return WIDER * self.tolerance
+        return None if self.tolerance is None else WIDER * self.tolerance
 
     @property
     def support_mm(self) -> float:
@@ -188,7 +185,7 @@ class Choice:
 
         ``rows`` has every step that was tried, in order.
         """
-        steps = {"chosen": self.chosen, "runner_up": self.runner_up, "cheaper": self.cheaper}
+        steps = {"chosen": self.chosen, "cheaper": self.cheaper, "dearer": self.dearer}
         return plain(
             {
                 "material": self.profile.material_name,
@@ -197,6 +194,8 @@ class Choice:
                 "support_mm": self.support_mm,
                 "tolerance": self.tolerance,
                 "tolerance_of": self.tolerance_of,
+                "most_fetches": self.fetches,
+                "most_passes": self.passes,
                 "pictures": [
                     {
                         "irradiance": each.name,
@@ -208,8 +207,6 @@ class Choice:
                 ],
                 "kernel": self._kernel_figures(),
                 **{key: each and each.to_dict() for key, each in steps.items()},
-                "dearer": [each.to_dict() for each in self.dearer],
-                "too_narrow": self.too_narrow,
                 "unfitted": self.unfitted,
                 "photons": self.photons and self.photons.to_dict(),
                 "rows": [each.to_dict() for each in self.steps],
@@ -223,11 +220,13 @@ class Choice:
         kernel = self.fit.kernel
         return {
             "method": kernel.method,
-            "rank": kernel.rank,
-            "pixels": kernel.pixels,
-            "support_mm": kernel.support_mm,
+            "structure": kernel.structure,
+            "fetches": kernel.fetches,
+            "passes": kernel.passes,
+            "all_passes": kernel.cost.all_passes,
+            "bytes_per_pixel": kernel.bytes_per_pixel(),
             "seconds_per_megapixel": self.seconds_per_megapixel,
-            "relative_frobenius_error": self.fit.relative_frobenius_error,
+            "spectral_error": kernel.errors["spectral"],
         }
 
 
@@ -238,13 +237,15 @@ def choose(
     scene: Scene | None = None,
     distance_mm: float = 600.0,
     frame: tuple[int, int] = (1080, 1920),
-    tolerance: float = 1.0,
+    tolerance: float | None = None,
     tolerance_of: str = "p95",
+    fetches: float | None = None,
+    passes: int | None = None,
     seed: int = 1,
     threads: int | None = None,
     progress: Callable[[Step], None] | None = None,
 ) -> Choice:
-    """Find the cheapest method, support and rank that keep within a tolerance.
+    """Find the cheapest table of taps within a tolerance, or the best within a budget.
 
     Parameters
     ----------
@@ -259,10 +260,15 @@ def choose(
         From the eye to the head, 100 or more.
     frame : tuple of int
         Rows and columns that are rendered; of more than 512 the middle ones show the head.
-    tolerance : float
-        Largest error, above 0.
+    tolerance : float, optional
+        Largest error, above 0; by default 1, without one where ``fetches`` are given.
     tolerance_of : str
         A key of `TOLERANCES`: "p95", "p99" or "mean" of Delta E 2000.
+    fetches : float, optional
+        Most texture fetches a pixel, from 7 up. Without a tolerance the table that leaves the least
+        error is chosen.
+    passes : int, optional
+        Most passes of the stages.
     seed : int
         Of the walks.
     threads : int, optional
@@ -278,7 +284,10 @@ def choose(
         No profile, or one that cannot be fitted.
     """
     note_truth(source)
+    if tolerance is None and fetches is None:
+        tolerance = TOLERANCE
     _check(mm_per_pixel, tolerance, tolerance_of)
+    check_caps(fetches, passes)
     check_colours(source)
     own = None if scene is None else checked_scene(scene, mm_per_pixel)
     profile, seconds = truth_of(source, seed=seed, threads=threads)
@@ -286,27 +295,36 @@ def choose(
         raise FitError(f"{name_of(source)} returns no light: there is nothing to blur.")
     support_mm = support_of(profile)
     _check_kernel(support_mm, mm_per_pixel)
-    given = (profile, mm_per_pixel, tolerance, tolerance_of)
+    given: dict[str, Any] = {
+        "profile": profile,
+        "mm_per_pixel": mm_per_pixel,
+        "tolerance": tolerance,
+        "tolerance_of": tolerance_of,
+        "fetches": fetches,
+        "passes": passes,
+    }
     if half_pixels(support_mm, mm_per_pixel) == 0:
-        return Choice(*given)
+        return Choice(**given)
     scenes = (
         [evaluated_scene(own, profile)]
         if own
         else head_scenes(mm_per_pixel, distance_mm, frame, threads)
     )
     if not any(each.mask is None or (each.mask > 0).any() for each in scenes):
-        return Choice(*given, tuple(scenes))
-    views = Views(profile, scenes, threads, tolerance=tolerance, tolerance_of=tolerance_of)
-    return _Search(views, progress).run(material_of(source), seconds, seed)
+        return Choice(**given, scenes=tuple(scenes))
+    limit = math.inf if tolerance is None else tolerance
+    views = Views(profile, scenes, threads, tolerance=limit, tolerance_of=tolerance_of)
+    search = _Search(views, options(fetches, passes), progress)
+    return search.run(given, material_of(source), seconds, seed)
 
 
-def _check(mm_per_pixel: float, tolerance: float, tolerance_of: str) -> None:
+def _check(mm_per_pixel: float, tolerance: float | None, tolerance_of: str) -> None:
     """Refuse values out of their range, before anything is simulated."""
     if tolerance_of not in TOLERANCES:
         raise RenderError(
             f"tolerance_of = {tolerance_of!r}; expected one of {', '.join(TOLERANCES)}."
         )
-    if not (math.isfinite(tolerance) and tolerance > 0.0):
+    if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
         raise RenderError(f"tolerance = {tolerance:g}; expected a Delta E above 0.")
     if not LEAST_MM_PER_PIXEL <= mm_per_pixel < math.inf:
         raise RenderError(
@@ -327,48 +345,82 @@ def _check_kernel(support_mm: float, mm_per_pixel: float) -> None:
 class _Search:
     """The steps, and the pictures they are tried on."""
 
-    def __init__(self, views: Views, progress: Callable[[Step], None] | None) -> None:
-        self.views, self.progress = views, progress
+    def __init__(
+        self, views: Views, found: list[Option], progress: Callable[[Step], None] | None
+    ) -> None:
+        self.views, self.options, self.progress = views, found, progress
         self.steps: list[Step] = []
+        self.tried: dict[int, Step | None] = {}
         self.unfitted: list[str] = []
 
-    def run(self, material: Material | None, seconds: float, seed: int) -> Choice:
-        """Try no blur, then options by cost; then what is beside the one that will do."""
-        views, pitch = self.views, self.views.scenes[0].mm_per_pixel
-        given = (views.profile, pitch, views.tolerance, views.tolerance_of, tuple(views.scenes))
-        nothing = self._try(None)
-        if nothing is not None and nothing.within:
-            return Choice(*given, steps=tuple(self.steps), chosen=nothing)
-        every = supports(views.profile, pitch)
-        kept = self._useful_supports(every)
-        found = options(kept, pitch)
-        chosen, runner_up = self._cheapest(found)
-        if chosen is None or chosen.option is None:
-            raise RenderError(self._too_tight())
-        fitted = chosen.option.fit(views.profile, pitch)
+    def run(
+        self, given: Mapping[str, Any], material: Material | None, seconds: float, seed: int
+    ) -> Choice:
+        """Try no blur, then options; then what is beside the one that is taken."""
+        views = self.views
+        given = {**given, "scenes": tuple(views.scenes)}
+        nothing = self._keep(self._evaluated(None))
+        is_limited = math.isfinite(views.tolerance)
+        if is_limited and nothing is not None and nothing.within:
+            return Choice(**given, steps=tuple(self.steps), chosen=nothing)
+        place = self._cheapest() if is_limited else self._best()
+        chosen = self.tried[place]
+        assert chosen is not None  # one that was judged
+        assert chosen.option is not None
+        fitted = views.fit_of(chosen.option)
         if fitted is None:
-            raise FitError(f"{chosen.label} has no kernel on pixels of {pitch:.4g} mm.")
+            raise FitError(f"{chosen.label} has no kernel on pixels of this size.")
+        dearer = self._step(place + 1) if place + 1 < len(self.options) else None
         return Choice(
-            *given,
+            **given,
             steps=tuple(self.steps),
             chosen=chosen,
             fit=fitted,
-            runner_up=runner_up,
-            cheaper=_next_cheaper(self.steps, chosen),
-            dearer=self._dearer(chosen.option, found),
-            photons=photons_needed(material, chosen.option, views, seed, seconds),
-            seconds_per_megapixel=self._seconds(fitted),
-            too_narrow=tuple(
-                2 * half_pixels(radius, pitch) + 1
-                for share, radius in every
-                if (share, radius) not in kept
+            cheaper=self._next_cheaper(chosen),
+            dearer=dearer,
+            photons=(
+                photons_needed(material, chosen.option, views, seed, seconds)
+                if is_limited
+                else None
             ),
-            unfitted=tuple(dict.fromkeys(self.unfitted)),
+            seconds_per_megapixel=self._seconds(fitted),
+            unfitted=tuple(self.unfitted),
         )
 
-    def _try(self, option: Option | None) -> Step | None:
-        """Judge an option and keep its step; None where it cannot be fitted."""
-        step = self._evaluated(option)
+    def _cheapest(self) -> int:
+        """Return the place of the cheapest option that was found within the tolerance."""
+        first, last = 0, len(self.options)
+        while first < last:
+            middle = (first + last) // 2
+            if self._is_within(middle):
+                last = middle
+            else:
+                first = middle + 1
+        if last == len(self.options):
+            raise RenderError(self._too_tight())
+        if last > 1 and self._is_within(last - 2):
+            return last - 2
+        return last
+
+    def _best(self) -> int:
+        """Return the place of the option with the least error, of the last few."""
+        count = len(self.options)
+        places = [k for k in range(count) if count - k <= _BEST_OF and self._step(k) is not None]
+        if not places:
+            raise FitError("no table within this budget can be fitted to the profile.")
+        return min(places, key=lambda k: self.tried[k].error)  # type: ignore[union-attr]
+
+    def _is_within(self, place: int) -> bool:
+        step = self._step(place)
+        return step is not None and step.within
+
+    def _step(self, place: int) -> Step | None:
+        """Judge an option once; None where it cannot be fitted."""
+        if place not in self.tried:
+            self.tried[place] = self._keep(self._evaluated(self.options[place]))
+        return self.tried[place]
+
+    def _keep(self, step: Step | None) -> Step | None:
         if step is not None:
             self.steps.append(step)
             if self.progress:
@@ -381,69 +433,26 @@ class _Search:
         except FitError:
             if option is None:
                 raise
-            self.unfitted.append(option.candidate.label)
+            self.unfitted.append(option.label)
             return None
         return Step(
             option=option,
-            taps_per_pixel=option.taps_per_pixel if option else 0,
             error=found.error,
             **{key: getattr(found.score, key) for key in COLOUR_FIGURES},
             mm_per_pixel=found.mm_per_pixel,
             within=found.within,
         )
 
-    def _useful_supports(self, found: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-        """Leave out supports to which even the true kernel cannot be cut, except for the widest.
+    def _next_cheaper(self, chosen: Step) -> Step | None:
+        """Return the step that costs the most of those that cost less."""
+        below = [each for each in self.steps if each.fetches < chosen.fetches]
+        return max(below, key=lambda each: each.fetches, default=None)
 
-        That one is kept so that the next cheaper step is one that was tried.
-        """
-        pitch = self.views.scenes[0].mm_per_pixel
-        for k, (_, radius) in enumerate(found):
-            if self.views.error_of_cut(half_pixels(radius, pitch)) <= self.views.tolerance:
-                return list(found[max(k - 1, 0) :])
-        return list(found[-1:])
-
-    def _cheapest(self, found: Sequence[Option]) -> tuple[Step | None, Step | None]:
-        """Return the cheapest option within the tolerance and the next best that is too."""
-        within: list[Step] = []
-        for group in by_cost(found):
-            quick, slow = split_guided(group)
-            steps = [self._try(each) for each in quick]
-            if not within and not any(each and each.within for each in steps):
-                steps += [self._try(each) for each in slow]
-            best = [each for each in steps if each and each.within]
-            within += sorted(best, key=lambda each: each.error)
-            if len(within) > 1:
-                break
-        first, second, *_ = (*within, None, None)
-        return first, second
-
-    def _dearer(self, chosen: Option, found: Sequence[Option]) -> tuple[Step, ...]:
-        """Judge one term more, the next wider support, and the dearest of all."""
-        terms = chosen.candidate.terms + 1
-        more = [
-            each
-            for each in found
-            if (each.candidate.label, each.share) == (f"svd {terms}", chosen.share)
-        ]
-        wider = [
-            each
-            for each in found
-            if each.candidate == chosen.candidate and each.pixels > chosen.pixels
-        ]
-        dearest = [each for each in found if each.candidate.method == "svd"][-1:]
-        picked: list[Option] = []
-        for option in (*more, *wider[:1], *dearest):
-            if option != chosen and option not in picked:
-                picked.append(option)
-        evaluated = (self._evaluated(each) for each in picked)
-        return tuple(each for each in evaluated if each is not None)
-
-    def _seconds(self, fitted: FitResult) -> float:
-        """Measure what the chosen kernel takes [s a megapixel]."""
+    def _seconds(self, fitted: TapsFit) -> float:
+        """Measure what the chosen table takes [s a megapixel]."""
 
         def render(scene: Scene) -> FloatArray:
-            blurred = render_separable(scene, fitted.kernel, threads=self.views.threads)
+            blurred = render_taps(scene, fitted.kernel, threads=self.views.threads)
             return np.asarray(blurred, dtype=np.float64)
 
         return timed(render, self.views.scenes[0])[1]
@@ -453,11 +462,5 @@ class _Search:
         return (
             f"nothing is within a Delta E ({self.views.tolerance_of}) of {self.views.tolerance:g}: "
             f"the best of {len(self.steps)}, {best.label}, has {best.error:.2g} on pixels of "
-            f"{best.mm_per_pixel:.3g} mm; give a larger tolerance."
+            f"{best.mm_per_pixel:.3g} mm; give a larger tolerance, more fetches or more passes."
         )
-
-
-def _next_cheaper(steps: Sequence[Step], chosen: Step) -> Step | None:
-    """Return the step that costs the most of those that cost less; the best of several such."""
-    below = [each for each in steps if each.taps_per_pixel < chosen.taps_per_pixel]
-    return max(below, key=lambda each: (each.taps_per_pixel, -each.error), default=None)

@@ -1,71 +1,73 @@
-"""The options of a choice: every candidate on several supports, with its cost."""
+"""The options of a choice: tables of taps with what each costs, and what it leaves of skin1.
+
+Cascades of known structures, and the pre-integrated pass on few taps, which is nearer where there
+is room for one stage or for two passes. On taps no other published method came nearer than that at
+any number of fetches (docs/how-to-choose.md).
+"""
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
-from itertools import groupby
-from operator import attrgetter
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
-import numpy as np
-
-from sssfit.compare.candidates import Candidate, candidates
-from sssfit.fit import FitResult
+from sssfit.errors import RenderError
+from sssfit.fit import TapsFit, fit_result, support_of
+from sssfit.fit.cascade import FEWEST, STRUCTURES
+from sssfit.kernel.structure import cost_of_chain, parse
+from sssfit.messages import number, shown
 from sssfit.profile import Profile
 
-# Of every channel's energy. skin1 keeps 70 % within 4.6 mm and 99.9 % within 21.4: where 70 % will
-# do, a pass has a fifth of the weights.
-SHARES = (0.5, 0.7, 0.8, 0.9, 0.95, 0.99, 0.999)
-MOST_TERMS = 10
-# A guided fit of 57 pixels takes 0.08 s, one of 287 pixels 0.65 s, of which there are three a
-# support; on skin1 none came nearer than the pre-integrated pass.
-GUIDED_PIXELS = 57
+# Taps of the pre-integrated pass, and the mean over eight pictures of the 99th percentile of Delta
+# E that each leaves of skin1 on pixels of .3 mm, as `STRUCTURES` has it.
+PREINTEGRATED: Mapping[int, float] = {
+    3: 35.8,
+    5: 26.4,
+    9: 18.4,
+    13: 12.9,
+    17: 10.7,
+    25: 7.91,
+    33: 7.03,
+    49: 6.83,
+}
 
 
 @dataclass(frozen=True, slots=True)
 class Option:
-    """A candidate on a support that keeps ``share`` of every channel's energy.
+    """A table of taps that can be fitted.
 
     Parameters
     ----------
-    candidate : Candidate
-    share : float
-        Of the energy on the profile's grid.
-    support_mm : float [mm]
-        Half width of the kernel.
-    pixels : int
-        Of a pass, at the pitch asked for.
-    mm_per_pixel : float [mm]
-        The pitch asked for; wider views have other pixels.
+    label : str
+        For reports: "cascade 1-1|2-2|2-2", "pre-integrated on 5 taps".
+    method : str
+    fetches : float
+        A pixel. What decides.
+    passes : int
+        Of its stages.
+    known : float
+        What it leaves of skin1.
+    settings : mapping
+        Keywords of the fit.
     """
 
-    candidate: Candidate
-    share: float
-    support_mm: float
-    pixels: int
-    mm_per_pixel: float
+    label: str
+    method: str
+    fetches: float
+    passes: int
+    known: float
+    settings: Mapping[str, Any] = field(default_factory=dict)
 
-    @property
-    def half_mm(self) -> float:
-        """Distance of the outermost pixel from the middle one, at the pitch asked for [mm]."""
-        return self.pixels // 2 * self.mm_per_pixel
-
-    @property
-    def taps_per_pixel(self) -> int:
-        """Weights applied to a pixel: two passes a term. What decides."""
-        return 2 * self.candidate.terms * self.pixels
-
-    def fit(self, profile: Profile, mm_per_pixel: float) -> FitResult | None:
-        """Fit a profile; on pixels wider than the support there is no kernel, None."""
-        half = half_pixels(self.support_mm, mm_per_pixel)
-        if half == 0:
-            return None
-        # On wider pixels a kernel has fewer terms: no more than pixels of a quadrant's edge.
-        settings = {
-            key: min(value, half + 1) if key in ("rank", "terms") else value
-            for key, value in self.candidate.settings.items()
-        }
-        candidate = replace(self.candidate, settings=settings)
-        return candidate.fit_dense(profile, mm_per_pixel, self.support_mm)
+    def fit(self, profile: Profile, mm_per_pixel: float) -> TapsFit | None:
+        """Fit a profile; on pixels wider than its reach there is no kernel, None."""
+        settings = dict(self.settings)
+        if "taps" in settings:
+            pixels = 2 * half_pixels(support_of(profile), mm_per_pixel) + 1
+            settings["taps"] = min(settings["taps"], pixels)
+            if pixels == 1:
+                return None
+        found = fit_result(profile, self.method, mm_per_pixel=mm_per_pixel, **settings)
+        assert isinstance(found, TapsFit)  # all options make tables of taps
+        return found
 
 
 def half_pixels(support_mm: float, mm_per_pixel: float) -> int:
@@ -73,41 +75,67 @@ def half_pixels(support_mm: float, mm_per_pixel: float) -> int:
     return math.floor(support_mm / mm_per_pixel + 1e-9)
 
 
-def supports(profile: Profile, mm_per_pixel: float) -> list[tuple[float, float]]:
-    """Shares of energy and the radii [mm] that keep them, narrowest first, each of other pixels."""
-    cumulative = profile.cumulative
-    found: dict[int, tuple[float, float]] = {}
-    for share in SHARES:
-        kept = (cumulative >= share * cumulative[-1]).all(axis=1)
-        radius = float(profile.r_edges_mm[int(np.argmax(kept))])
-        half = half_pixels(radius, mm_per_pixel)
-        if half > 0:
-            found[half] = share, radius
-    return [found[half] for half in sorted(found)]
+def check_caps(fetches: float | None, passes: int | None) -> None:
+    """Refuse budgets that nothing can keep.
+
+    Raises
+    ------
+    RenderError
+    """
+    if fetches is not None and not fetches >= FEWEST:
+        raise RenderError(f"fetches = {shown(fetches)}; expected a number from {FEWEST} up.")
+    if passes is not None and passes < 1:
+        raise RenderError(f"passes = {shown(passes)}; expected a whole number from 1 up.")
 
 
-def options(kept: Sequence[tuple[float, float]], mm_per_pixel: float) -> list[Option]:
-    """Return what can be fitted on these supports; fits that lose energy are left out."""
-    found = []
-    for share, radius in kept:
-        pixels = 2 * half_pixels(radius, mm_per_pixel) + 1
-        found += [
-            Option(candidate, share, radius, pixels, mm_per_pixel)
-            for candidate in candidates(pixels, most_terms=MOST_TERMS)
-            if candidate.settings.get("energy") != "keep"
-        ]
+def options(fetches: float | None = None, passes: int | None = None) -> list[Option]:
+    """Return the options within a budget that none cheaper beats on skin1, cheapest first.
+
+    Parameters
+    ----------
+    fetches : float, optional
+        The most fetches a pixel.
+    passes : int, optional
+        The most passes of the stages.
+
+    Raises
+    ------
+    RenderError
+        There is none.
+    """
+    most = math.inf if fetches is None else fetches + 1e-9
+    kept = [
+        each
+        for each in (*_cascades(), *_preintegrated())
+        if each.fetches <= most and (passes is None or each.passes <= passes)
+    ]
+    found: list[Option] = []
+    for each in sorted(kept, key=lambda each: (each.fetches, each.passes, each.known)):
+        if not found or each.known < found[-1].known:
+            found.append(each)
+    if not found:
+        raise RenderError(
+            f"no known table has at most {number(fetches, 'g|any number of')} fetches and "
+            f"{passes or 'any number of'} passes; allow more of either."
+        )
     return found
 
 
-def by_cost(found: Sequence[Option]) -> Iterator[list[Option]]:
-    """Yield options of the same cost, cheapest first."""
-    cost = attrgetter("taps_per_pixel")
-    for _, group in groupby(sorted(found, key=cost), key=cost):
-        yield list(group)
+def _cascades() -> list[Option]:
+    found = []
+    for text, known in STRUCTURES.items():
+        cost = cost_of_chain(parse(text))
+        settings = {"stages": text}
+        found.append(
+            Option(f"cascade {text}", "cascade", cost.fetches, cost.passes, known, settings)
+        )
+    return found
 
 
-def split_guided(group: Sequence[Option]) -> tuple[list[Option], list[Option]]:
-    """Return the quick fits of a cost, and the guided ones that are not too slow to try."""
-    quick = [each for each in group if each.candidate.method != "guided"]
-    slow = [each for each in group if each.candidate.method == "guided"]
-    return quick, [each for each in slow if each.pixels <= GUIDED_PIXELS]
+def _preintegrated() -> list[Option]:
+    return [
+        Option(
+            f"pre-integrated on {taps} taps", "preintegrated", 2.0 * taps, 2, known, {"taps": taps}
+        )
+        for taps, known in PREINTEGRATED.items()
+    ]

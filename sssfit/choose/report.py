@@ -1,4 +1,4 @@
-"""What a choice found, in sentences: the kernel, and why neither less nor more will do."""
+"""What a choice found, in sentences: the table of taps, and what less and more would do."""
 
 from collections.abc import Iterator
 
@@ -7,8 +7,8 @@ from sssfit.choose.truth import PhotonNeed
 from sssfit.messages import filled
 
 _KERNEL = (
-    "{what}: {rank} term{s}, {taps_per_pixel} weights a pixel, {loss}, {seconds:.2g} s a megapixel "
-    "here"
+    "{label}: {fetches:.4g} fetches a pixel in {passes} passes, {loss}, {seconds:.2g} s a "
+    "megapixel here"
 )
 _LOSS = (
     "Delta E {delta_e_2000_mean:.3g} (95 % of pixels within {delta_e_2000_p95:.3g}, 99 % within "
@@ -29,7 +29,7 @@ def sentences(choice: Choice) -> list[str]:
 def step_line(step: Step) -> str:
     """Say what a step is, what it costs and what it loses."""
     enough = "within" if step.within else "not enough"
-    return f"{_what(step)}: {step.taps_per_pixel} weights, {_loss(step)}, {enough}"
+    return f"{step.label}: {step.fetches:.4g} fetches, {_loss(step)}, {enough}"
 
 
 def _no_blur(choice: Choice) -> Iterator[str]:
@@ -49,38 +49,30 @@ def _no_blur(choice: Choice) -> Iterator[str]:
 
 
 def _kernel(choice: Choice) -> Iterator[str]:
-    """Say what was chosen, what else would do, and what would not."""
+    """Say what was chosen, and what less and more would do."""
     chosen, fit = choice.chosen, choice.fit
     if chosen is None or fit is None:
         return
-    rank, seconds = fit.kernel.rank, choice.seconds_per_megapixel
-    words = {"what": _what(chosen), "loss": _loss(chosen), "s": "s" * (rank > 1)}
-    yield filled(_KERNEL, {**chosen.to_dict(), **words, "rank": rank, "seconds": seconds})
-    if choice.runner_up:
-        yield f"runner-up: {_beside(choice.runner_up, chosen)}"
+    words = {"loss": _loss(chosen), "seconds": choice.seconds_per_megapixel}
+    yield filled(_KERNEL, {**chosen.to_dict(), **words})
     if choice.cheaper:
         step, why = choice.cheaper, ""
-        if not step.within and step.error <= choice.tolerance:
+        if choice.tolerance is not None and not step.within and step.error <= choice.tolerance:
             why = f", on a wider view, which may have {choice.wider_tolerance:.3g}"
-        yield f"cheaper is not enough: {_beside(step, chosen)}{why}"
-    for each in choice.dearer:
-        needed = "is not needed" if each.within else "is not enough"
-        yield f"dearer {needed}: {_beside(each, chosen)}"
-    yield from _untried(choice)
+        yield f"cheaper{_judged(choice, step)}: {_beside(step, chosen)}{why}"
+    if choice.dearer:
+        yield f"dearer{_judged(choice, choice.dearer)}: {_beside(choice.dearer, chosen)}"
+    if choice.unfitted:
+        yield f"cannot be fitted to this profile: {', '.join(choice.unfitted)}"
     if choice.photons is not None:
         yield _photons(choice.photons)
 
 
-def _untried(choice: Choice) -> Iterator[str]:
-    """Say which supports and guided fits were left out."""
-    if choice.too_narrow:
-        pixels = ", ".join(map(str, choice.too_narrow))
-        yield f"not tried: kernels of {pixels} pixels, to which even the true one cannot be cut"
-    if choice.unfitted:
-        yield f"cannot be fitted to this profile: {', '.join(choice.unfitted)}"
-    tried = [each.option.candidate.method for each in choice.steps if each.option]
-    if "guided" not in tried:
-        yield "not tried: guided fits, for their time, where another pass will do or one is wide"
+def _judged(choice: Choice, step: Step) -> str:
+    """Say whether a step that was not taken is enough, where there is a tolerance."""
+    if choice.tolerance is None:
+        return ""
+    return " is not needed" if step.within else " is not enough"
 
 
 def _photons(need: PhotonNeed) -> str:
@@ -97,13 +89,6 @@ def _photons(need: PhotonNeed) -> str:
     return text.replace("e+0", "e")
 
 
-def _what(step: Step) -> str:
-    """Name a step with its pixels."""
-    if step.option is None:
-        return step.label
-    return f"{step.label} on {step.option.pixels} pixels (+-{step.option.half_mm:.3g} mm)"
-
-
 def _loss(step: Step) -> str:
     """Say how far colours are off: mean and percentiles of Delta E, and how many pixels show."""
     return filled(_LOSS, step.to_dict())
@@ -111,8 +96,7 @@ def _loss(step: Step) -> str:
 
 def _beside(step: Step, chosen: Step) -> str:
     """Compare a step with the chosen one."""
-    times = step.taps_per_pixel / chosen.taps_per_pixel
-    price = "as many weights" if times == 1.0 else f"{times:.3g} times the weights"
-    if step.option is None:
-        price = "no weights"
-    return f"{_what(step)}, {_loss(step)} for {price}"
+    price = f"{step.fetches:.4g} fetches in {step.passes} passes" if step.option else "no fetches"
+    if step.option and step.fetches != chosen.fetches:
+        price += f", {step.fetches / chosen.fetches:.3g} times as many"
+    return f"{step.label}, {_loss(step)} for {price}"

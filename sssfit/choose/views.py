@@ -11,11 +11,11 @@ from sssfit.arrays import FloatArray
 from sssfit.choose.options import Option
 from sssfit.compare.references import border_of
 from sssfit.errors import ArgumentError, RenderError
-from sssfit.fit import FitResult
+from sssfit.fit import TapsFit
 from sssfit.measure.score import ImageScore, measure
 from sssfit.profile import Profile
-from sssfit.render.reference import convolve, render_reference
-from sssfit.render.separable import render_separable
+from sssfit.render.reference import render_reference
+from sssfit.render.taps import render_taps
 from sssfit.scene.head import MIN_DISTANCE_MM
 from sssfit.scene.load import load_scene
 from sssfit.scene.made import EDGE_DEGREES, make_scene
@@ -147,6 +147,7 @@ class Views:
         The first is what was asked for.
     threads : int, optional
     tolerance : float
+        Infinite where there is none.
     tolerance_of : str
         A key of `TOLERANCES`: which figure of Delta E has to be within the tolerance.
     """
@@ -163,6 +164,7 @@ class Views:
         self.profile, self.scenes, self.threads = profile, scenes, threads
         self.tolerance, self.tolerance_of = tolerance, tolerance_of
         self._truths: dict[int, FloatArray] = {}
+        self._fits: dict[tuple[str, int], TapsFit | None] = {}
 
     def score_of_option(
         self, option: Option | None, profile: Profile | None = None, *, wider: float = WIDER
@@ -184,6 +186,13 @@ class Views:
         assert worst is not None  # there is a view
         return worst
 
+    def fit_of(self, option: Option, k: int = 0) -> TapsFit | None:
+        """Fit an option to the truth's profile on the pixels of a view, once."""
+        key = option.label, k
+        if key not in self._fits:
+            self._fits[key] = option.fit(self.profile, self.scenes[k].mm_per_pixel)
+        return self._fits[key]
+
     def error_of(self, score: ImageScore) -> float:
         """Return the figure of a score that the tolerance is of."""
         return float(getattr(score, TOLERANCES[self.tolerance_of]))
@@ -191,25 +200,14 @@ class Views:
     def _blurred(self, k: int, option: Option | None, profile: Profile) -> FloatArray:
         """Render a view with an option fitted to a profile."""
         scene = self.scenes[k]
-        fitted = _fitted(option, profile, scene.mm_per_pixel)
+        if option is None or profile is self.profile:
+            fitted = None if option is None else self.fit_of(option, k)
+        else:
+            fitted = option.fit(profile, scene.mm_per_pixel)
         if fitted is None:
             return scene.irradiance * self.profile.diffuse_reflectance
-        blurred = render_separable(
-            scene, fitted.kernel, border=border_of(scene), threads=self.threads
-        )
+        blurred = render_taps(scene, fitted.kernel, border=border_of(scene), threads=self.threads)
         return np.asarray(blurred, dtype=np.float64)
-
-    def error_of_cut(self, half: int) -> float:
-        """Error of the profile's own 2D kernel on 2h+1 pixels a side, with all its energy."""
-        scene = self.scenes[0]
-        quadrant = self.profile.quadrant_kernel(scene.mm_per_pixel, half)
-        copies = np.where(np.arange(half + 1) == 0, 1.0, 2.0)
-        energy = np.einsum("i,k,ikc->c", copies, copies, quadrant)
-        lacking = self.profile.diffuse_reflectance / np.where(energy > 0.0, energy, 1.0)
-        picture = convolve(
-            scene.irradiance, quadrant * lacking, border=border_of(scene), threads=self.threads
-        )
-        return self.error_of(self._measured(0, picture))
 
     def _measured(self, k: int, picture: FloatArray) -> ImageScore:
         """Compare a picture of a view with its truth."""
@@ -221,10 +219,6 @@ class Views:
         return measure(picture, self._truths[k], mask=scene.mask)
 
 
-def _fitted(option: Option | None, profile: Profile, mm_per_pixel: float) -> FitResult | None:
-    return None if option is None else option.fit(profile, mm_per_pixel)
-
-
 def head_scenes(
     mm_per_pixel: float, distance_mm: float, frame: tuple[int, int], threads: int | None
 ) -> list[Scene]:
@@ -232,7 +226,7 @@ def head_scenes(
 
     Nearer than these the picture shows less and less of the eyes and their shadows, and less
     is lost on it; what is needed near would be less than what is needed farther out. So a close-up
-    has to hold there too: at a greater distance, on larger pixels, with the same support in mm.
+    has to hold there too: at a greater distance, on larger pixels, with a table made for these.
     """
     height, width = (min(each, MOST_PIXELS) for each in frame)
     seen_mm = min(height, width) * mm_per_pixel

@@ -9,7 +9,8 @@ import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.compare.candidates import Candidate
-from sssfit.errors import KernelError, SimulationError
+from sssfit.errors import KernelError, RenderError, SimulationError
+from sssfit.fit.on_taps import LEAST_TAPS, on_taps
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.kernel import SeparableKernel
 from sssfit.material import Material
@@ -17,6 +18,7 @@ from sssfit.measure.score import ImageScore, measure
 from sssfit.profile import Profile
 from sssfit.render.reference import convolve, reference_quadrant
 from sssfit.render.separable import render_separable
+from sssfit.render.taps import render_taps
 from sssfit.scene.patterns import DISK_RADIUS_MM
 from sssfit.scene.record import Scene
 from sssfit.simulate import Progress, simulate
@@ -193,21 +195,20 @@ class Cause:
         What to do about it.
     is_in_whole : bool
         Whether the kernel that a user has contains it; if not, it is an alternative.
-    difference : array (H, W, C), optional
-        The picture with this cause alone less the true one; None for what is not made yet.
-    score : ImageScore, optional
+    difference : array (H, W, C)
+        The picture with this cause alone less the true one.
+    score : ImageScore
         Of truth + difference against the truth, within the scene's mask.
     """
 
     name: str
     hint: str
     is_in_whole: bool
-    difference: FloatArray | None
-    score: ImageScore | None
+    difference: FloatArray
+    score: ImageScore
 
     def __post_init__(self) -> None:
-        if self.difference is not None:
-            self.difference.setflags(write=False)
+        self.difference.setflags(write=False)
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -279,10 +280,9 @@ def causes_of(
     differences = [
         *_of_profiles(scene, switches, truth, threads),
         *_of_kernels(scene, switches, truth, threads),
+        *_of_shaders(scene, switches.kernel, threads),
     ]
-    causes = [_measured(scene, truth, *each) for each in differences]
-    taps = Cause("taps", "not made yet", True, None, None)
-    return truth, [*causes, taps]
+    return truth, [_measured(scene, truth, *each) for each in differences]
 
 
 def everything(
@@ -294,7 +294,7 @@ def everything(
 ) -> tuple[Cause, Cause]:
     """Return the whole, and what it has beyond the sum of its causes."""
     whole = render_separable(scene, switches.whole_stored, threads=threads) - truth
-    parts = [each.difference for each in causes if each.is_in_whole and each.difference is not None]
+    parts = [each.difference for each in causes if each.is_in_whole]
     interaction = whole - np.sum(parts, axis=0)
     return (
         _measured(scene, truth, "everything at once", "the kernel that a user has", True, whole),
@@ -355,6 +355,33 @@ def _of_kernels(
         yield name, hint, storage == switches.storage, kept
 
 
+def _of_shaders(
+    scene: Scene, kernel: SeparableKernel, threads: int | None
+) -> Iterator[_Difference]:
+    """Yield the same of few taps, and of the formats that a shader keeps pictures in.
+
+    A format without a sign or without as many channels has no row.
+    """
+    count = min(TAPS, kernel.pixels)
+    if count < LEAST_TAPS:
+        return
+    taps = on_taps(kernel, count)
+    dense = np.asarray(render_separable(scene, kernel, threads=threads), dtype=np.float64)
+    thinned = render_taps(scene, taps, threads=threads)
+    yield f"taps, {count} a pass", "more taps, or a cascade", False, thinned - dense
+    for each, hint in _INTERMEDIATES.items():
+        try:
+            rounded = render_taps(scene, taps, intermediate=each, threads=threads)
+        except RenderError:
+            continue
+        yield f"pictures between passes, {each}", hint, False, rounded - thinned
+
+
+TAPS = 25  # fetches a pass, as shaders have them
+_INTERMEDIATES = {
+    "half": "float32 in place of half",
+    "r11g11b10": "half in place of R11G11B10",
+}
 _STORAGE_HINTS = {
     "float64": "nothing",
     "float32": "nothing",

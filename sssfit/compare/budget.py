@@ -98,8 +98,6 @@ class Budget:
         count. Shares of the causes in the whole and of the interaction add up to 1; a share is
         negative where the cause makes up for others.
         """
-        if cause.difference is None or self.whole.difference is None:
-            return math.nan
         selected = selection(self.scene.mask, self.truth)
         part, whole = (
             selected_pixels(each, selected).ravel()
@@ -111,7 +109,7 @@ class Budget:
     def to_dict(self) -> dict[str, Any]:
         """Return the figures that ``sssfit compare --json`` prints, a row for each cause.
 
-        Then a row for the interaction and one for the whole; None for what is not made.
+        Then a row for the interaction and one for the whole.
         """
         return plain(
             {
@@ -250,14 +248,12 @@ def _budget(
 
 
 def _order(cause: Cause) -> tuple[bool, float]:
-    """Those in the whole first, the largest first, what is not there last."""
+    """Those in the whole first, the largest first."""
     return not cause.is_in_whole, -size_of(cause.score)
 
 
-def size_of(score: ImageScore | None) -> float:
-    """Return what causes are ordered by: mean Delta E, relative L2 without colours, -1 if none."""
-    if score is None:
-        return -1.0
+def size_of(score: ImageScore) -> float:
+    """Return what causes are ordered by: mean Delta E, or relative L2 without colours."""
     seen = score.delta_e_2000_mean
     return score.relative_l2 if math.isnan(seen) else seen
 

@@ -19,6 +19,7 @@ from sssfit.profile import Profile
 
 MOST_TERMS = 6  # of the papers' comparisons
 CASCADES = (12, 14, 17, 24)  # fetches a pixel; more than 24 change nothing that can be seen
+DISKS = (16, 24, 40)  # fetches a pixel and frame
 BUDGETS = (12, 24, 50, 100)  # fetches a pixel of the kernels on taps
 LEAST_TAPS = 3  # a pass: the middle and one pair
 # What is thinned: of each method the kernels that need few taps, or show the least.
@@ -38,7 +39,7 @@ class Candidate:
         For charts and tables: "svd 3", "guided k = 4", "svd 3 on 25 taps", "cascade 24".
     method : str
     terms : int
-        Most separable terms it makes, two passes each; 0 for a cascade.
+        Most separable terms it makes, two passes each; 0 for a cascade or a disk.
     settings : mapping
         Keywords of the method's function.
     taps : int, optional
@@ -73,7 +74,9 @@ class Candidate:
         FitError
         """
         if self.method in TAPS:
-            return fit_taps(profile, self.method, mm_per_pixel=mm_per_pixel, **self.settings)
+            reach = {} if self.method == "cascade" else {"support_mm": support_mm}
+            pixels = {"mm_per_pixel": mm_per_pixel, **reach}
+            return fit_taps(profile, self.method, **pixels, **self.settings)
         if dense is None or self.taps is None:
             dense = self.fit_dense(profile, mm_per_pixel, support_mm)
         if self.taps is None:
@@ -113,7 +116,7 @@ def candidates(pixels: int, *, most_terms: int = MOST_TERMS) -> tuple[Candidate,
 
 
 def every_candidate(pixels: int, only: Collection[str] | None = None) -> tuple[Candidate, ...]:
-    """Return all that is compared on a number of pixels: dense, on taps, and cascades.
+    """Return all that is compared on a number of pixels: dense, on taps, cascades and disks.
 
     Parameters
     ----------
@@ -123,7 +126,7 @@ def every_candidate(pixels: int, only: Collection[str] | None = None) -> tuple[C
         Names of methods.
     """
     dense = [*candidates(pixels), *_weighted(pixels)]
-    found = [*dense, *_on_taps(dense, pixels), *_cascades()]
+    found = [*dense, *_on_taps(dense, pixels), *_cascades(), *_disks(pixels)]
     return tuple(each for each in found if only is None or each.method in only)
 
 
@@ -168,3 +171,10 @@ def _cascades() -> Iterator[Candidate]:
     """Yield a cascade for each budget."""
     for fetches in CASCADES:
         yield Candidate(f"cascade {fetches}", "cascade", 0, {"fetches": fetches})
+
+
+def _disks(pixels: int) -> Iterator[Candidate]:
+    """Yield fetches on a disk, as one frame shows them."""
+    for taps in DISKS:
+        if taps <= pixels**2:
+            yield Candidate(f"disk {taps}", "disk", 0, {"taps": taps})

@@ -251,8 +251,6 @@ def budget_text(figures: Mapping[str, Any]) -> str:
 def _cause(row: Mapping[str, Any]) -> list[str]:
     """Write the figures of one cause."""
     name = row["cause"] if row["in_whole"] else f"({row['cause']})"
-    if row["relative_l2"] is None:
-        return [name, row["hint"], "", "", "", "", ""]
     return [
         name,
         number(row["delta_e_2000_mean"], ".4f"),

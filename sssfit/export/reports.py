@@ -49,8 +49,7 @@ _MODELS: tuple[Part, ...] = (
 )
 
 _CHOSEN: tuple[Part, ...] = (
-    "{material:s|unknown material} at {metres:g} m, {mm_per_pixel:.4g} mm per pixel, {figure} of "
-    "Delta E within {tolerance:g}:",
+    "{material:s|unknown material} at {metres:g} m, {mm_per_pixel:.4g} mm per pixel, {asked}:",
     "{sentences}",
     "{wrote}",
 )
@@ -112,9 +111,21 @@ def _chosen_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     written = figures["output"]
     return {
         "metres": figures["distance_mm"] / 1000.0,
-        "figure": _FIGURES[figures["tolerance_of"]],
+        "asked": _asked_words(figures),
         "wrote": f"Wrote {', '.join(written)}" if written else "No kernel is written.",
     }
+
+
+def _asked_words(figures: Mapping[str, Any]) -> str:
+    """Say what was asked for: an error, the least of it, and within which budgets."""
+    figure, tolerance = _FIGURES[figures["tolerance_of"]], figures["tolerance"]
+    text = f"least {figure} of Delta E"
+    if tolerance is not None:
+        text = f"{figure} of Delta E within {tolerance:g}"
+    for key, unit in (("most_fetches", "fetches"), ("most_passes", "passes")):
+        if figures[key] is not None:
+            text += f", at most {figures[key]:g} {unit}"
+    return text
 
 
 def _fitted_words(figures: Mapping[str, Any]) -> dict[str, Any]:

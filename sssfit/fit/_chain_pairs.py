@@ -1,6 +1,15 @@
 """The misfit of a chain whose stages are all pairs of passes: its spectrum is separable.
 
 K^ = sum_l m_l u_l(wx) u_l(wy), so nothing but the sum has two dimensions; see ``_chain``.
+
+A picture halved v times also shows light of the frequency w as if it were of w - 2 pi / 2^v, by its
+place among the texels: it shimmers under motion. Along x these images have the amplitude
+
+    A_v = sum_l m_l c_l(wx) up_l(wx - 2 pi / 2^v) u_l(wy),    u_l = c_l up_l,
+
+over the stages l of level v and coarser (those with the other sign), c_l the product of all
+halvings and stages up to l. Their squares are added to the misfit with the spectrum of the pictures
+and the weight ``aliasing``. Those along y are equal, and those of other images much smaller.
 """
 
 from collections.abc import Sequence
@@ -9,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sssfit.arrays import FloatArray
-from sssfit.fit._chain import Chain, fetches, normalised
+from sssfit.fit._chain import Chain, fetches, normalised, resampling
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -20,48 +29,80 @@ class _Blur:
     slopes: FloatArray
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _View:
+    """One fitted sum over stages: what the chain up to each stage is multiplied by, by axis."""
+
+    x: FloatArray  # (L+1, n)
+    y: FloatArray  # (L+1, n)
+    wanted: FloatArray | float
+    weight: float  # of its squares
+
+
 class PairChain(Chain):
     """See `Chain`."""
 
+    aliasing = 0.0  # weight of the squared images in the misfit
+
     def spectrum(self, x: FloatArray) -> FloatArray:
         """Return the chain's spectrum (C, n, n)."""
-        stages = self._stage_spectra([self._blur(x, k) for k in range(len(self.shapes))])
-        shared: FloatArray = stages * self._blend(x).T[:, None, :] @ stages.transpose(0, 2, 1)
-        return shared
+        chain = self._chain([self._blur(x, k) for k in range(len(self.shapes))])
+        return _sum(chain, self._views()[0], self._blend(x))
 
     def misfit(self, x: FloatArray) -> tuple[float, FloatArray]:
         """Return the sum over channels of the squared relative misfit, and its gradient."""
         blurs = [self._blur(x, k) for k in range(len(self.shapes))]
-        u, m = self._stage_spectra(blurs), self._blend(x)  # (C, n, L+1), (L+1, C)
-        apart = (u * m.T[:, None, :]) @ u.transpose(0, 2, 1) - self.target.wanted
-        weighted = self.target.power * apart
-        value = float(np.vdot(weighted, apart))
-        across = weighted @ u
-        by_blend = 2.0 * m * np.einsum("cnl,cnl->lc", u, across)
+        chain, m = self._chain(blurs), self._blend(x)  # (C, n, L+1), (L+1, C)
+        value, by_blend, by_chain = 0.0, np.zeros_like(m), np.zeros_like(chain)
+        for view in self._views():
+            ux, uy = chain * view.x.T, chain * view.y.T
+            apart = _sum(chain, view, m) - view.wanted
+            weighted = view.weight * self.target.power * apart
+            value += float(np.vdot(weighted, apart))
+            across, along = weighted @ uy, weighted.transpose(0, 2, 1) @ ux
+            by_blend += 2.0 * m * np.einsum("cnl,cnl->lc", ux, across)
+            by_chain += 2.0 * m.T[:, None, :] * (across * view.x.T + along * view.y.T)
         share = m / self.target.energy
         gradient = np.empty(self.size)
         gradient[: m.size] = (by_blend - share * by_blend.sum(axis=0)).ravel()
-        self._backwards(blurs, 4.0 * across * m.T[:, None, :], gradient)
+        self._backwards(blurs, by_chain, gradient)
         return value, gradient
 
     def matrix(self, x: FloatArray) -> FloatArray:
         """Return the Gauss-Newton part of its second derivatives, (size, size)."""
         blurs = [self._blur(x, k) for k in range(len(self.shapes))]
-        u, m = self._stage_spectra(blurs), self._blend(x)
+        chain, m = self._chain(blurs), self._blend(x)
         slopes = self._slopes(blurs)  # (C, parameters, n, L+1)
-        half = slopes @ (u * m.T[:, None, :]).transpose(0, 2, 1)[:, None]
-        by_stage = half + half.transpose(0, 1, 3, 2)
-        layers = u.transpose(0, 2, 1)[..., None] * u.transpose(0, 2, 1)[:, :, None]
-        whole = np.einsum("lc,clij->cij", m, layers) / self.target.energy[:, None, None]
-        by_blend = m.T[:, :, None, None] * (layers - whole[:, None])
-        rows = np.concatenate((by_blend, by_stage), axis=1)
-        rows *= np.sqrt(self.target.power)[:, None]
         found = np.zeros((self.size, self.size))
-        for c in range(self.channels):
-            flat = rows[c].reshape(rows.shape[1], -1)
-            own = self._parameters_of(c)
-            found[np.ix_(own, own)] += 2.0 * flat @ flat.T
+        for view in self._views():
+            ux, uy = chain * view.x.T, chain * view.y.T
+            shares = m.T[:, None, :]
+            by_stage = (slopes * view.x.T) @ (uy * shares).transpose(0, 2, 1)[:, None]
+            by_stage += (ux * shares)[:, None] @ (slopes * view.y.T).transpose(0, 1, 3, 2)
+            layers = ux.transpose(0, 2, 1)[..., None] * uy.transpose(0, 2, 1)[:, :, None]
+            whole = np.einsum("lc,clij->cij", m, layers) / self.target.energy[:, None, None]
+            by_blend = m.T[:, :, None, None] * (layers - whole[:, None])
+            rows = np.concatenate((by_blend, by_stage), axis=1)
+            rows *= np.sqrt(view.weight * self.target.power)[:, None]
+            for c in range(self.channels):
+                flat = rows[c].reshape(rows.shape[1], -1)
+                own = self._parameters_of(c)
+                found[np.ix_(own, own)] += 2.0 * flat @ flat.T
         return found
+
+    def _views(self) -> list[_View]:
+        """Return the kernel, and what aliasing adds to each level, where it counts."""
+        irradiance = np.ones((1, self.target.frequencies.size))
+        up = np.concatenate((irradiance, self._up))
+        views = [_View(up, up, self.target.wanted, 1.0)]
+        levels = [each.level for each in self.shapes]
+        for level in range(1, levels[-1] + 1 if self.aliasing > 0.0 else 1):
+            _, image = resampling(self.target.frequencies - 2.0 * np.pi / 2.0**level, levels)
+            # Texels of coarser levels lie between those, where the image has the other sign.
+            image *= np.sign(level + 0.5 - np.array(levels))[:, None]
+            image[np.array(levels) < level] = 0.0
+            views.append(_View(np.concatenate((0.0 * irradiance, image)), up, 0.0, self.aliasing))
+        return views
 
     def _blur(self, x: FloatArray, k: int) -> _Blur:
         steps, logits = self._stage(x, k)
@@ -77,40 +118,41 @@ class PairChain(Chain):
         by_step = np.cumsum(by_offset[:, ::-1], axis=1)[:, ::-1] * step[:, None]
         return _Blur(spectrum, np.concatenate((by_step, by_weight), axis=1))
 
-    def _stage_spectra(self, blurs: Sequence[_Blur]) -> FloatArray:
-        """Return the spectrum of each stage's picture, (C, n, L+1)."""
+    def _chain(self, blurs: Sequence[_Blur]) -> FloatArray:
+        """Return the product of all stages and halvings up to each stage, (C, n, L+1)."""
         found = np.ones((self.channels, self.target.frequencies.size, len(blurs) + 1))
-        chain = np.ones(found.shape[:2])
         for k, blur in enumerate(blurs):
-            chain = chain * (self._down[k] * blur.spectrum)
-            found[:, :, k + 1] = chain * self._up[k]
+            found[:, :, k + 1] = found[:, :, k] * (self._down[k] * blur.spectrum)
         return found
 
     def _backwards(self, blurs: Sequence[_Blur], by_u: FloatArray, gradient: FloatArray) -> None:
-        """Fill in the gradient by the stages from that by their spectra (C, n, L+1)."""
-        before = [np.ones(by_u.shape[:2])]
-        for k, blur in enumerate(blurs):
-            before.append(before[-1] * (self._down[k] * blur.spectrum))
+        """Fill in the gradient by the stages from that by their chain (C, n, L+1)."""
+        before = self._chain(blurs)
         by_chain = np.zeros(by_u.shape[:2])
         for k in range(len(blurs) - 1, -1, -1):
-            by_chain = by_chain + by_u[:, :, k + 1] * self._up[k]
-            own = np.einsum("cn,cpn->cp", by_chain * before[k] * self._down[k], blurs[k].slopes)
-            self._put_stage(gradient, k, own)
+            by_chain = by_chain + by_u[:, :, k + 1]
+            moved = by_chain * before[:, :, k] * self._down[k]
+            self._put_stage(gradient, k, np.einsum("cn,cpn->cp", moved, blurs[k].slopes))
             by_chain = by_chain * (self._down[k] * blurs[k].spectrum)
 
     def _slopes(self, blurs: Sequence[_Blur]) -> FloatArray:
-        """Return derivatives of the stages' spectra by a channel's parameters, (C, p, n, L+1)."""
+        """Return derivatives of the chain by a channel's parameters, (C, p, n, L+1)."""
         counts = [each.slopes.shape[1] for each in blurs]
         n = self.target.frequencies.size
         found = np.zeros((self.channels, sum(counts), n, len(blurs) + 1))
-        chain, moving = np.ones((self.channels, n)), np.zeros((self.channels, sum(counts), n))
+        before, moving = self._chain(blurs), np.zeros((self.channels, sum(counts), n))
         done = 0
         for k, blur in enumerate(blurs):
-            factor = self._down[k] * blur.spectrum
-            moving[:, :done] *= factor[:, None]
+            moving[:, :done] *= (self._down[k] * blur.spectrum)[:, None]
             own = slice(done, done + counts[k])
-            moving[:, own] = (chain * self._down[k])[:, None] * blur.slopes
-            chain = chain * factor
+            moving[:, own] = (before[:, :, k] * self._down[k])[:, None] * blur.slopes
             done += counts[k]
-            found[:, :done, :, k + 1] = moving[:, :done] * self._up[k]
+            found[:, :done, :, k + 1] = moving[:, :done]
         return found
+
+
+def _sum(chain: FloatArray, view: _View, blend: FloatArray) -> FloatArray:
+    """Return a view's sum over stages (C, n, n)."""
+    ux, uy = chain * view.x.T, chain * view.y.T
+    found: FloatArray = ux * blend.T[:, None, :] @ uy.transpose(0, 2, 1)
+    return found

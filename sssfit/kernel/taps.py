@@ -19,7 +19,7 @@ import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, BinaryIO, Self
+from typing import TYPE_CHECKING, Any, BinaryIO, Self
 
 import numpy as np
 
@@ -50,7 +50,12 @@ from sssfit.kernel.structure import (
     text_of,
 )
 from sssfit.kernel.taps_json import is_taps_file
-from sssfit.messages import by_channel, number, of_material, printable, shown
+from sssfit.messages import by_channel, html_table, number, of_material, printable, shown
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from sssfit.profile import Profile
 
 __all__ = ["Stage", "Taps", "is_taps_file"]
 
@@ -179,11 +184,52 @@ class Taps:
 
     def __repr__(self) -> str:
         errors = by_channel(self.channels, self.errors["spectral"].tolist(), ".3g%|unknown")
-        return (
-            f"<Taps of {of_material(self.meta.get('material'))} by {self.method}, "
-            f"{self.structure}, {number(self.fetches, '.4g')} fetches of {self.mm_per_pixel:.4g} "
-            f"mm pixels: error {errors}>"
+        return f"<{self._in_words()}: error {errors}>"
+
+    def _repr_html_(self) -> str:
+        columns = (
+            (self.energy, ".6f"),
+            (self.errors["spectral"], ".3g%|unknown"),
+            (self.errors["energy"], "+.2g%|unknown"),
         )
+        rows = [
+            [name, *(number(values[c], form) for values, form in columns)]
+            for c, name in enumerate(self.channels)
+        ]
+        return html_table(
+            self._in_words(), ["channel", "energy", "spectral error", "energy error"], rows
+        )
+
+    def _in_words(self) -> str:
+        """Return one line with material, method, stages and cost."""
+        return (
+            f"Taps of {of_material(self.meta.get('material'))} by {self.method}, "
+            f"{self.structure}, {number(self.fetches, '.4g')} fetches of {self.mm_per_pixel:.4g} "
+            "mm pixels"
+        )
+
+    def plot(self, profile: "Profile | None" = None) -> "Figure":
+        """Draw the table stage by stage, for a notebook; see `sssfit.chart.taps.taps_figure`.
+
+        Parameters
+        ----------
+        profile : Profile, optional
+            The profile that it was fitted to, drawn beside it.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+            `sssfit.chart.page.save_figure` writes it.
+
+        Raises
+        ------
+        KernelError
+            The profile has other channels.
+        """
+        from sssfit.chart.taps import taps_figure
+        from sssfit.compare.taps_view import view_taps
+
+        return taps_figure(view_taps(self, profile))
 
     def __reduce__(self) -> tuple[type[Self], tuple[Any, ...]]:
         # A mapping proxy cannot be pickled; worker processes and deep copies need the record.
