@@ -23,7 +23,7 @@ from sssfit.render import render
 from sssfit.render.reference import render_reference
 
 BUDGETS = (14, 17, 20, 24, 28, 36, 50, 75, 100)
-CASCADES = (7, 10, 12, 14, 17, 20, 24, 28, 36)
+CASCADES = (7, 10, 11, 12, 14, 17, 20, 24, 28, 36)
 TAPS = (3, 5, 7, 9, 11, 13, 17, 21, 25, 33, 41, 49)
 MOST = 100  # fetches a pixel
 # Name, colour and marker in the chart; the method; the settings of its kernels, and their terms.
@@ -111,16 +111,22 @@ def chart(rows, cascades, ours, shipped):
         "Mean over a disk, edges at 0, 15, 30 and 45 degrees, a head, points and highlights of the "
         "99th percentile of Delta E 2000 against the exact profile's 2D kernel; 256 x 256 pixels "
         "of 0.3 mm. A method's line is the best of its kernels on quadratic or cumulative taps "
-        "within the fetches; terms share their first pass. Engines: one frame, as they ship."
+        "within the fetches; terms share their first pass."
     )
+    letters = dict(zip("abcdefghijklmnopqrstuvwxyz", (each[0] for each in shipped), strict=False))
+    key = ", ".join(f"{letter} {label}" for letter, label in letters.items())
+    engines_note = f"Letters: samplers of engines as they ship, one frame: {key}."
     title = "skin1: what a budget of fetches shows"
-    with new_page(5.6, title, "Exact profile, 0.3 mm a pixel", [note]) as (figure, below):
+    with new_page(5.6, title, "Exact profile, 0.3 mm a pixel", [note, engines_note]) as (
+        figure,
+        below,
+    ):
         groups = {**PUBLISHED, **OURS}
         styles = {"cascade": {"color": "black", "marker": "*", "ms": 8, "lw": 1.4}}
         for group, (colour, marker, *_) in groups.items():
             styles[group] = {"color": colour, "marker": marker, "ms": 4, "lw": 1.0}
         styles["weighted terms"]["ls"] = (0, (4, 2))
-        styles["engines"] = {"color": "#666666", "marker": "x", "ms": 5, "ls": "none"}
+        styles["engines"] = {"color": "#444444", "marker": "$a$", "ms": 5, "ls": "none"}
         handles = [Line2D([], [], **each) for each in styles.values()]
         axes = add_legend(below, handles, list(styles)).subplots()
         for group in groups:
@@ -129,15 +135,16 @@ def chart(rows, cascades, ours, shipped):
         own = envelope([(f, e) for f, _, e, _ in cascades])
         axes.plot(*zip(*own, strict=True), **styles["cascade"])
         axes.plot([own[-1][0], 110], [own[-1][1]] * 2, color="black", lw=0.8, ls=(0, (1, 2)))
-        for label, fetches, _, error in shipped:
-            axes.plot([fetches], [error], **styles["engines"])
-            axes.annotate(label, (fetches, error), (4, 2), textcoords="offset points", size=6.5,
-                          color="#444444")  # fmt: skip
+        for letter, (_, fetches, _, error) in zip(letters, shipped, strict=True):
+            axes.text(fetches, error, letter, size=7.5, weight="bold", ha="center", va="center",
+                      color="#222222", zorder=6, bbox={"boxstyle": "circle,pad=0.15", "fc": "white",
+                                                       "ec": "#666666", "lw": 0.6})  # fmt: skip
         axes.axhline(1.0, color="#666666", lw=0.8, ls=(0, (4, 2)), zorder=1)
         axes.annotate("just noticeable side by side", (105, 1.0), (0, 3), ha="right",
                       textcoords="offset points", size=7.5, color="#444444")  # fmt: skip
         axes.set_xscale("log")
         axes.set_yscale("log")
+        axes.set_xlim(5.4, 240.0)
         axes.set_xticks([6, 8, 10, 14, 20, 30, 50, 70, 100, 200])
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
@@ -248,7 +255,8 @@ def main():
     ours = list(on_taps_rows("skin1", OURS, PLACES))
     cascades, shipped = list(cascade_rows("skin1")), list(engine_rows("skin1"))
     chart(rows, cascades, ours, shipped)
-    put_section("how-to-choose.md", "docs/make_fetches.py short", short(rows, shipped, cascades))
+    words, command = short(rows, shipped, cascades), "python docs/make_fetches.py"
+    put_section("how-to-choose.md", "docs/make_fetches.py short", words, command)
     text = TEXT.format(
         budgets="\n".join(budget_rows([*rows, *shipped], ours, cascades)),
         engines="\n".join(row([n, f"{f:g}", str(p), f"{e:.2f}"]) for n, f, p, e in shipped),

@@ -1195,7 +1195,7 @@ STREAMS = (
     f"{_BURLEY} -o x.profile.npz",
     "fit wax.profile.npz --method svd -o x.kernel.json",
     f"{_DISK} -o x.exr",
-    f"{_CHOOSE} -o x.json",
+    f"{_CHOOSE} -o x.taps.json",
     "import table.csv -o x.profile.npz",
     "export --format csv -o x.csv",
     "export --format hlsl -o x.hlsl",

@@ -371,7 +371,7 @@ def test_bad_settings_are_one_line(skin1, settings, said):
 def test_unknown_methods_are_named(skin1):
     with pytest.raises(FitError, match="method = 'svd'; expected one of cascade"):
         fit_taps(skin1, "svd")
-    with pytest.raises(FitError, match="expected one of cascade, svd, "):
+    with pytest.raises(FitError, match="expected one of cascade, disk, svd, "):
         fit(skin1, "cascada")
 
 

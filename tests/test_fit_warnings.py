@@ -290,7 +290,7 @@ FALLOFF = ("--method", "falloff")
         ),
         ((*FALLOFF, "--width", "0", "--strength", "1", "--falloff", "1"), 1, "width = 0.0; expect"),
         (("--method", "svd", "--k", "1"), 2, "--k is for --method guided, and this is svd"),
-        (("--method", "nothing"), 2, "'nothing' is not one of 'svd'"),
+        (("--method", "nothing"), 2, "'nothing' is not one of 'cascade', 'disk', 'svd'"),
     ],
     ids=str,
 )

@@ -249,7 +249,8 @@ def test_cost_counts_what_a_shader_does():
         parameters={},
         meta={},
     )
-    assert cost_of(kernel) == Cost(4, 28, 2 * 7 * 2 * 4, None)
+    # Two terms: four passes read and write 8 bytes, and the second term is added to the first.
+    assert cost_of(kernel) == Cost(28.0, 4, 4, 8.0 * (8 + 1), 2 * 7 * 2 * 4, None)
     assert cost_of(kernel, 0.5).seconds_per_megapixel == 0.5
 
 

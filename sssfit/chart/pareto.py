@@ -139,7 +139,8 @@ def _method_handles(comparison: Comparison) -> list[Line2D]:
     ]
     if kept is not None:
         name = f"{_METHODS[kept.method][0]}, energy kept"
-        handles.insert(1, Line2D([], [], label=name, **_style(kept, is_kept=True)))
+        place = [method for method in _METHODS if method in drawn].index(kept.method)
+        handles.insert(place + 1, Line2D([], [], label=name, **_style(kept, is_kept=True)))
     return handles
 
 
@@ -320,7 +321,7 @@ def _notes(comparison: Comparison, error: str, cost: str) -> list[str]:
         "ends cost nothing.",
     }[cost]
     third = "Faint: another kernel is no worse in both."
-    if cost != "seconds":
+    if cost == "passes":
         third += " Of one cost they stand side by side, to the right of it."
     notes = [f"{first} {second} {third}"]
     if any(picture.name in ("disk", "edge") for picture in comparison.pictures):
