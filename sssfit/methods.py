@@ -220,8 +220,9 @@ _TAPS = (
     Setting(
         "place",
         "choice",
-        "where the taps lie: by the cube root of the weights, or at distances that grow as i^2.",
-        among=("cumulative", "quadratic"),
+        "where the taps lie: by the cube root of the weights, at distances that grow as i^2, or "
+        "fitted with their weights as pictures see them.",
+        among=("cumulative", "quadratic", "fitted"),
         words="cumulative",
     ),
 )

@@ -296,6 +296,11 @@ FIT = [
     C("fit wax.profile.npz --method cascade --normalize"),
     C("fit wax.profile.npz --method cascade --rank 2"),
     C("fit wax.profile.npz --method cascade -o foreign.json"),
+    C(
+        "fit wax.profile.npz --method svd --taps 5 --place fitted --mm-per-pixel .6",
+        brief=True,
+        hidden=ERRORS,
+    ),
     C("fit wax.profile.npz --method weighted --rank 9"),
     C("fit - --method svd --mm-per-pixel 1 -o -", stdin="leaf.profile.npz"),
     C("fit - --method svd --mm-per-pixel 1 --rank 1", stdin="Größe λ.profile.npz"),

@@ -1,6 +1,7 @@
 """Kernels thinned to taps: energy, second moment, what is rendered, and what it costs."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,14 +9,16 @@ from reference_taps import rendered
 
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import fit_result, make_target
+from sssfit.fit._fitted_taps import _Terms
 from sssfit.fit._spectrum import spectral_target
-from sssfit.fit.on_taps import PLACES, on_taps
+from sssfit.fit.on_taps import on_taps
 from sssfit.material import load_material
 from sssfit.render.separable import render_separable
 from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
 from sssfit.simulate import simulate_exact
 
+PLACES = ("cumulative", "quadratic")
 KERNELS = {
     "preintegrated": {},
     "svd": {"rank": 3},
@@ -123,6 +126,60 @@ def test_the_spectral_error_is_that_of_the_2d_kernel(skin1, dense):
     assert np.isnan(on_taps(kernel, 5).errors["spectral"]).all()
 
 
+@pytest.mark.parametrize("name", KERNELS)
+def test_fitted_taps_are_better_than_both_starts_and_keep_the_energy(skin1, dense, name):
+    """The sum of squares over the channels is what is minimised."""
+    kernel = dense[name]
+    errors = {
+        place: np.sum(on_taps(kernel, 9, place=place, profile=skin1).errors["spectral"] ** 2)
+        for place in (*PLACES, "fitted")
+    }
+    assert errors["fitted"] < 0.999 * min(errors[place] for place in PLACES)
+    taps = on_taps(kernel, 9, place="fitted", profile=skin1)
+    np.testing.assert_allclose(taps.energy, kernel.energy, rtol=1e-9)
+    np.testing.assert_array_equal(taps.blend[0], 0.0)
+    assert taps.fetches == (kernel.rank + 1) * 9
+    assert taps.stages[0].offsets_mm[-1] < 1.05 * kernel.half_pixels * 0.6
+
+
+def test_the_gradient_of_fitted_taps_is_that_of_differences(skin1, dense):
+    kernel = dense["svd"]
+    rng = np.random.default_rng(2)
+    terms = _Terms(
+        spectral_target(make_target(skin1, 0.6, 13.8), [0, 1, 2], "natural"),
+        kernel.signs,
+        kernel.energy,
+    )
+    for last in (20.3, 24.6):  # within the kernel of 23 pixels, and beyond
+        offsets = np.array([1.3, 3.7, 8.2, last])
+        half = kernel.weights[:, kernel.half_pixels :][:, [0, 1, 4, 8, 20]].transpose(0, 2, 1)
+        x = np.concatenate((np.log(np.diff(offsets, prepend=0.0)), 2.0 * half.ravel()))
+        x += rng.normal(0.0, 1e-3, x.size)
+        _, gradient = terms.misfit(x, 4)
+        for along in rng.normal(size=(5, x.size)):
+            step = 1e-5 * along
+            difference = terms.misfit(x + step, 4)[0] - terms.misfit(x - step, 4)[0]
+            assert difference / 2e-5 == pytest.approx(gradient @ along, rel=1e-5)
+
+
+def test_fitted_taps_of_a_normalised_kernel_are_those_of_the_plain_one(skin1):
+    settings = {"mm_per_pixel": 0.6, "support_mm": 13.8, "rank": 2}
+    plain, unit = (
+        fit_result(skin1, "svd", normalize=each, taps=9, place="fitted", **settings).kernel
+        for each in (False, True)
+    )
+    np.testing.assert_allclose(unit.energy, plain.energy, rtol=1e-9)
+    np.testing.assert_allclose(unit.errors["spectral"], plain.errors["spectral"], rtol=1e-3)
+
+
+def test_a_channel_without_light_stays_black_where_taps_are_fitted(skin1):
+    energy = skin1.annulus_energy * [1.0, 0.0, 1.0]
+    dark = replace(skin1, annulus_energy=energy, beyond_grid=skin1.beyond_grid * [1, 0, 1])
+    taps = fit_result(dark, "svd", taps=9, place="fitted", mm_per_pixel=0.6).kernel
+    assert (taps.blend[:, 1] == 0.0).all()
+    np.testing.assert_allclose(taps.energy, dark.diffuse_reflectance, rtol=1e-9)
+
+
 def test_a_normalised_kernel_keeps_its_energy(skin1):
     settings = {"mm_per_pixel": 0.6, "support_mm": 13.8, "rank": 2}
     plain = fit_result(skin1, "svd", **settings).kernel
@@ -147,7 +204,11 @@ def test_settings_and_origin_are_kept(dense):
         ({"taps": 131}, "taps = 131; expected an odd number"),
         ({"taps": 9.0}, "taps = 9.0; expected an odd number"),
         ({"taps": 49}, "taps = 49 for a kernel of 47 pixels; expected at most as many"),
-        ({"taps": 9, "place": "even"}, "place = 'even'; expected 'cumulative' or 'quadratic'"),
+        ({"taps": 9, "place": "fitted"}, 'place = "fitted" needs the profile'),
+        (
+            {"taps": 9, "place": "even"},
+            "place = 'even'; expected 'cumulative' or 'quadratic' or 'fitted'",
+        ),
     ],
 )
 def test_what_cannot_be_thinned_is_refused(dense, given, message):

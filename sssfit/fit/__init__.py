@@ -87,7 +87,7 @@ def fit_result(
     taps : int, optional
         Thin a separable kernel to so many bilinear fetches a pass; see ``sssfit.fit.on_taps``.
     place : str, optional
-        Where the taps lie, "cumulative" or "quadratic".
+        Where the taps lie, "cumulative", "quadratic" or "fitted".
     **settings
         Keyword arguments of the method's ``fit_x``: ``rank``, ``mm_per_pixel``, ...
 

@@ -12,7 +12,8 @@ and each dense weight at x is given to the two taps around it by hats in x^2,
     o_{i+1},
 
 so that what is rendered has the energy and the second moment of every term and channel. The
-farthest tap lies at the end of the kernel.
+farthest tap lies at the end of the kernel. Offsets and weights can also be fitted to the profile's
+kernel as pictures see it (``_fitted_taps``); that keeps the energy only.
 """
 
 import operator
@@ -22,6 +23,7 @@ import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import FitError, KernelError
+from sssfit.fit._fitted_taps import refined
 from sssfit.fit._spectrum import spectral_target
 from sssfit.fit._target import make_target
 from sssfit.kernel import SeparableKernel, Stage, Taps
@@ -29,7 +31,7 @@ from sssfit.kernel.structure import MOST_PAIRS
 from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
 
-PLACES = ("cumulative", "quadratic")
+PLACES = ("cumulative", "quadratic", "fitted")
 LEAST_TAPS, MOST_TAPS = 3, 2 * MOST_PAIRS + 1
 
 
@@ -48,11 +50,14 @@ def on_taps(
     taps : int
         Fetches of a pass, N: odd, 3 to 129, at most the kernel's pixels; with all of them the table
         is the kernel.
-    place : {"cumulative", "quadratic"}
+    place : {"cumulative", "quadratic", "fitted"}
         Where the taps lie: each with a like share of the cube root of the weights, or at
-        distances that grow as i^2, as in Jimenez' shaders; one texel apart at least.
+        distances that grow as i^2, as in Jimenez' shaders, one texel apart at least; or fitted,
+        with their weights, to the profile's kernel under the power of natural pictures, from the
+        better of the two. Second moments are then not kept.
     profile : Profile, optional
-        What the kernel was fitted to, for ``errors["spectral"]``; NaN without it.
+        What the kernel was fitted to, for ``errors["spectral"]``; NaN without it. "fitted" needs
+        it.
 
     Returns
     -------
@@ -66,10 +71,12 @@ def on_taps(
     """
     count = _checked(taps, kernel, place)
     half = kernel.weights[:, kernel.half_pixels :]  # (T, h+1, C)
-    offsets = _places(half, count, place)
+    if place == "fitted":
+        offsets, passes = _fitted(kernel, half, count, profile)
+    else:
+        offsets, passes = _thinned(half, count, place)
     stages, blend = [], [np.zeros(len(kernel.channels))]
-    for signs, weights in zip(kernel.signs, half, strict=True):
-        own = _spread(weights, offsets)
+    for signs, own in zip(kernel.signs, passes, strict=True):
         sums = own[0] + 2.0 * own[1:].sum(axis=0)
         empty = sums == 0.0  # a term that a channel does not have
         own = np.where(empty, np.eye(len(own))[:, :1], own / np.where(empty, 1.0, sums))
@@ -116,6 +123,33 @@ def _checked(taps: object, kernel: SeparableKernel, place: str) -> int:
             "as pixels, or a larger support."
         )
     return count
+
+
+def _thinned(half: FloatArray, count: int, place: str) -> tuple[FloatArray, FloatArray]:
+    """Return offsets (n,) [pixels] and the weights (T, n+1, C) that each tap stands for."""
+    offsets = _places(half, count, place)
+    return offsets, np.stack([_spread(each, offsets) for each in half])
+
+
+def _fitted(
+    kernel: SeparableKernel, half: FloatArray, count: int, profile: Profile | None
+) -> tuple[FloatArray, FloatArray]:
+    """Return offsets (n,) [pixels] and weights (T, n+1, C) fitted to the profile's kernel."""
+    if profile is None:
+        raise FitError('place = "fitted" needs the profile that the kernel was fitted to.')
+    target = make_target(profile, kernel.mm_per_pixel, kernel.support_mm)
+    lit = [int(c) for c in np.flatnonzero(~target.is_empty)]
+    scale = np.sqrt(kernel.scale[lit])
+    starts = [_thinned(half, count, each) for each in ("cumulative", "quadratic")]
+    with one_blas_thread():
+        offsets, own = refined(
+            spectral_target(target, lit, "natural"),
+            [(at, weights[:, :, lit] * scale) for at, weights in starts],
+            kernel.signs[:, lit],
+        )
+    passes = np.stack([_spread(each, offsets) for each in half])
+    passes[:, :, lit] = own / scale
+    return offsets, passes
 
 
 def _places(half: FloatArray, taps: int, place: str) -> FloatArray:
