@@ -139,6 +139,76 @@ def test_within_a_budget_the_least_error_is_chosen(skin1, budget, monkeypatch):
     assert (found.fetches, found.passes) == (budget["fetches"], budget.get("passes"))
 
 
+def judged(monkeypatch, errors):
+    """Choices on given errors, an option each, within a tolerance of 1."""
+    found = [Option(f"option {k}", "", 8.0 + k, 2, 9.0 - k) for k in range(len(errors))]
+    views = SimpleNamespace(tolerance=1.0, tolerance_of="p95")
+    search = rooms._Search(views, found, None)
+
+    def step(option):
+        error = errors[found.index(option)]
+        figures = dict.fromkeys(COLOUR_FIGURES, error)
+        return rooms.Step(option, error, **figures, mm_per_pixel=0.3, within=error <= 1.0)
+
+    monkeypatch.setattr(search, "_evaluated", step)
+    return search
+
+
+@pytest.mark.parametrize(
+    ("errors", "place"),
+    [
+        ([9, 7, 5, 3, 0.9, 0.5], 4),
+        ([0.9, 0.8, 0.7], 0),
+        ([9, 7, 5, 3, 2, 0.9, 1.2], 5),  # the last is worse than the one before
+        ([9, 7, 5, 3, 0.9, 1.1, 1.2], 4),
+        ([9, 7, 0.9, 3, 0.8, 0.7], 2),  # the last but one cheaper holds, too
+        ([9, 0.95, 0.9, 3, 0.8, 0.7], 1),
+    ],
+)
+def test_the_cheapest_that_holds_is_found_though_errors_do_not_always_fall(
+    monkeypatch, errors, place
+):
+    search = judged(monkeypatch, errors)
+    assert search._cheapest() == place
+    assert place == 0 or not search.tried[place - 1].within
+
+
+def test_nothing_within_names_the_best_of_the_last(monkeypatch):
+    search = judged(monkeypatch, [9, 7, 5, 3, 1.2, 1.1, 1.3])
+    with pytest.raises(RenderError, match=r"the best of .*, option 5, has 1\.1"):
+        search._cheapest()
+
+
+def test_of_equal_fetches_fewer_passes_are_cheaper(monkeypatch):
+    search = judged(monkeypatch, [9.0, 8.0, 7.0])
+    star, taps = (replace(search.options[1], passes=passes) for passes in (1, 2))
+    steps = [rooms.Step(each, 9.0, *[9.0] * 4, mm_per_pixel=0.3, within=False)
+             for each in (search.options[0], taps, star)]  # fmt: skip
+    search.steps = steps
+    assert search._next_cheaper(steps[1]) == steps[2]
+    assert search._next_cheaper(steps[2]) == steps[0]
+
+
+def test_no_blur_is_taken_where_a_budget_has_nothing_better(skin1, monkeypatch):
+    quick(monkeypatch)
+    real = rooms._Search._evaluated
+
+    def evaluated(self, option):
+        step = real(self, option)
+        return replace(step, error=0.0) if option is None else step
+
+    monkeypatch.setattr(rooms._Search, "_evaluated", evaluated)
+    found = choose(skin1, mm_per_pixel=0.7, frame=(48, 48), fetches=11.0)
+    assert found.chosen.option is None
+    assert found.fit is None
+
+
+def test_dearer_looks_beyond_the_budget(skin1, monkeypatch):
+    quick(monkeypatch)
+    found = choose(skin1, mm_per_pixel=0.7, frame=(48, 48), fetches=12.0)
+    assert found.dearer.fetches > 12.0 >= found.chosen.fetches
+
+
 def test_a_tolerance_and_a_budget_hold_together(skin1, monkeypatch):
     quick(monkeypatch)
     view = {"mm_per_pixel": 0.6, "frame": FRAME}

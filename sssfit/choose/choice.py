@@ -6,14 +6,16 @@ pixel, then passes (``options``). Neither depends on a clock, so the same seed g
 choice.
 
 No blur at all is tried first. Then the options that none cheaper beats on skin1 are halved until
-the cheapest that will do is found, and the one before the next cheaper is tried as well: the order
-of their errors on another material and picture is nearly that on skin1. So what is chosen holds,
-and the next cheaper of those options does not; that nothing else would do for less is not proved.
+the cheapest that will do is found, and the one before the next cheaper is tried as well, or where
+none seems to do the last three: the order of their errors on another material and picture is nearly
+that on skin1. So what is chosen holds, and the next cheaper of those options does not; that nothing
+else would do for less is not proved.
 """
 
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -144,7 +146,7 @@ class Choice:
     cheaper : Step, optional
         The next cheaper step.
     dearer : Step, optional
-        The next dearer option.
+        The next dearer option, which may be beyond the budget.
     photons : PhotonNeed, optional
         How few photons would have done; None where no blur is needed, without a tolerance, or where
         no walk can tell: the profile is of no material, or not by transport.
@@ -370,14 +372,15 @@ class _Search:
         fitted = views.fit_of(chosen.option)
         if fitted is None:
             raise FitError(f"{chosen.label} has no kernel on pixels of this size.")
-        dearer = self._step(place + 1) if place + 1 < len(self.options) else None
+        if not is_limited and nothing is not None and nothing.error <= chosen.error:
+            return Choice(**given, steps=tuple(self.steps), chosen=nothing)
         return Choice(
             **given,
             steps=tuple(self.steps),
             chosen=chosen,
             fit=fitted,
             cheaper=self._next_cheaper(chosen),
-            dearer=dearer,
+            dearer=self._next_dearer(chosen, given["passes"]),
             photons=(
                 photons_needed(material, chosen.option, views, seed, seconds)
                 if is_limited
@@ -397,15 +400,22 @@ class _Search:
             else:
                 first = middle + 1
         if last == len(self.options):
+            last = next((k for k in self._last_few() if self._is_within(k)), last)
+        if last == len(self.options):
             raise RenderError(self._too_tight())
         if last > 1 and self._is_within(last - 2):
-            return last - 2
+            last -= 2
+        while last > 0 and self._is_within(last - 1):
+            last -= 1
         return last
+
+    def _last_few(self) -> range:
+        """Return the places of the options that leave the least of skin1."""
+        return range(max(len(self.options) - _BEST_OF, 0), len(self.options))
 
     def _best(self) -> int:
         """Return the place of the option with the least error, of the last few."""
-        count = len(self.options)
-        places = [k for k in range(count) if count - k <= _BEST_OF and self._step(k) is not None]
+        places = [k for k in self._last_few() if self._step(k) is not None]
         if not places:
             raise FitError("no table within this budget can be fitted to the profile.")
         return min(places, key=lambda k: self.tried[k].error)  # type: ignore[union-attr]
@@ -444,9 +454,19 @@ class _Search:
         )
 
     def _next_cheaper(self, chosen: Step) -> Step | None:
-        """Return the step that costs the most of those that cost less."""
-        below = [each for each in self.steps if each.fetches < chosen.fetches]
-        return max(below, key=lambda each: each.fetches, default=None)
+        """Return the step that costs the most of those that cost less, in fetches, then passes."""
+        cost = attrgetter("fetches", "passes")
+        below = [each for each in self.steps if cost(each) < cost(chosen)]
+        return max(below, key=cost, default=None)
+
+    def _next_dearer(self, chosen: Step, passes: int | None) -> Step | None:
+        """Judge the next option that costs more fetches, in the budget or beyond it."""
+        above = (each for each in options(None, passes) if each.fetches > chosen.fetches)
+        dearer = next(above, None)
+        if dearer is None:
+            return None
+        tried = (each for each in self.steps if each.option == dearer)
+        return next(tried, None) or self._evaluated(dearer)
 
     def _seconds(self, fitted: TapsFit) -> float:
         """Measure what the chosen table takes [s a megapixel]."""
