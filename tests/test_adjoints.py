@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from reference_pixels import one_over_r_profile
 
-from sssfit.fit import _by_hand, artist, burley, falloff, guided, weighted
+from sssfit.fit import _by_hand, _fitted_taps, artist, burley, falloff, guided, weighted
 from sssfit.fit._chain_pairs import PairChain
 from sssfit.fit._chain_stars import StarChain
 from sssfit.fit._gaussians_search import make_annuli
@@ -253,7 +253,20 @@ def misfit_of_weighted_terms(monkeypatch) -> Pair:
     return of_value("weighted.py", given, numbers().random(2 * 11))
 
 
+def misfit_of_fitted_taps(_) -> Pair:
+    """Two terms of different signs on two offsets between texels, for two channels."""
+    profile = one_over_r_profile(60, 0.1, [0.3, 0.6])
+    target = spectral_target(Target(profile, 0.3, 20), [0, 1], "natural")
+    signs = np.array([[1.0, 1.0], [-1.0, 1.0]])
+    terms = _fitted_taps._Terms(target, signs, target.energy)
+    amplitudes = 0.2 + 0.1 * numbers().random(2 * 2 * 3)
+    amplitudes[:6] += 0.3  # the first term has more energy than the second takes away
+    at = np.concatenate((np.log([1.4, 2.2]), amplitudes))
+    return of_value("_fitted_taps.py", lambda x: terms.misfit(x, 2), at)
+
+
 PAIRS = {
+    "misfit of fitted taps": misfit_of_fitted_taps,
     "misfit of weighted terms": misfit_of_weighted_terms,
     "misfit of pairs": misfit_of_a_chain("_chain_pairs.py", PairChain, "1-2|1"),
     "misfit of stars": misfit_of_a_chain("_chain_stars.py", StarChain, "*|1-*"),
