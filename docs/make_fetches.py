@@ -17,6 +17,7 @@ from sssfit.chart.page import COLOURS, add_legend, name_axes, new_page, save_fig
 from sssfit.compare.engines import engines
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import fit_result
+from sssfit.fit.cascade import STRUCTURES
 from sssfit.fit.on_taps import on_taps
 from sssfit.measure.score import measure
 from sssfit.render import render
@@ -206,6 +207,7 @@ def short(rows, shipped, cascades):
         "two_error": two[0],
         "two": two[1],
         "two_fetches": two[2],
+        "stars": STRUCTURES["*|*|*|*"],
     }
     return SHORT.format(**figures)
 
@@ -220,7 +222,7 @@ percentile of Delta E):
   no blur is needed.
 - **Under 12 fetches nothing comes near:** the best of 11 fetches leaves {eleven:.0f}.
 - **Where two passes are all there is**, {two} on {two_fetches:.0f} fetches leaves {two_error:.1f};
-  four passes of stars (`--passes 4`) leave less than half of that for 16.
+  four passes of stars (`--passes 4`) leave {stars:.1f} for 16.
 - **Simulate exactly** where possible: half spaces with isotropic scattering. Elsewhere 1e6 photons
   are enough."""
 
