@@ -126,7 +126,7 @@ def fit_cascade(
         Of the pictures that the kernel is for.
     still : bool
         Weigh the aliasing of halved pictures three times as much as for the least error: a point
-        that moves by a pixel changes less. For stages of pairs.
+        that moves by a pixel changes less.
     seed : int
         Of the random starts; the same seed gives the same bits.
     mm_per_pixel, support_mm : float, optional [mm]
@@ -145,11 +145,6 @@ def fit_cascade(
     """
     begun = time.perf_counter()
     shapes = structure_for(fetches, stages, passes, full_resolution=full_resolution)
-    if still and any(each.kind == "star" for each in shapes):
-        raise FitError(
-            "still is for stages of pairs, and the structure has stars; name another, or allow "
-            "more passes."
-        )
     support_mm = _reach_mm(profile, mm_per_pixel) if support_mm is None else support_mm
     target = make_target(profile, mm_per_pixel, support_mm)
     lit = [int(c) for c in np.flatnonzero(~target.is_empty)]
@@ -157,7 +152,7 @@ def fit_cascade(
         kind = StarChain if any(each.kind == "star" for each in shapes) else PairChain
         chain = kind(spectral_target(target, lit, spectrum), shapes)
         x, evaluations = _search(chain, seed)
-        if isinstance(chain, PairChain) and shapes[-1].level > 0:
+        if shapes[-1].level > 0:
             chain.aliasing = _STILL if still else _ALIASING
             calmed = _descend(chain, x, 100, gain=1e-4)
             x, evaluations = calmed.x, evaluations + calmed.nfev
