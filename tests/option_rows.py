@@ -335,6 +335,7 @@ FIT = {
     "--taps": _thinned("--taps", "7", "svd", taps=7),
     "--place": _thinned("--taps 7 --place", "quadratic", "svd", taps=7, place="quadratic"),
     "--spectrum": _tapped("--spectrum", "white", "natural", spectrum="white"),
+    "--irradiance": _tapped("--irradiance", "edge", irradiance="edge"),
     "--output": Row(
         "fit wax.profile.npz --method svd",
         "-o x.kernel.json",
@@ -1186,6 +1187,7 @@ FITS = {
     ),
     "--rank of weighted": _fitted("--rank", "1", "weighted", rank=1),
     "--spectrum of weighted": _fitted("--spectrum", "white", "weighted", spectrum="white"),
+    "--irradiance of weighted": _fitted("--irradiance", "edge", "weighted", irradiance="edge"),
 }
 
 VERBOSE = {"choose"}  # where --verbose has something to say
