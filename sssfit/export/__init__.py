@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from sssfit.export.document import json_document
-from sssfit.export.shader import hlsl, is_hlsl_file
+from sssfit.export.dense import hlsl, is_hlsl_file
 from sssfit.export.taps import taps_document, taps_hlsl
 from sssfit.kernel import Kernel, Taps, is_kernel_file, is_taps_file
 

@@ -1,0 +1,129 @@
+"""The passes of a table of taps: what each reads and writes, on which size, for how many fetches.
+
+Pictures are named by what they hold: E the irradiance, A<n> what the first pass of stage n leaves,
+B<n> stage n's picture, H<v> the picture halved v times, M<v> the sum of level v and of all that are
+coarser. The sum of level 0 is the result.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from sssfit.kernel import Taps
+from sssfit.kernel.structure import STAR_FETCHES
+
+
+@dataclass(frozen=True, slots=True)
+class Pass:
+    """One draw over a picture.
+
+    Parameters
+    ----------
+    kind : {"across", "down", "star", "disk", "halve", "sum"}
+        "across" and "down" are the two passes of a pair. A stage's last pass may add up, too.
+    level : int
+        How often the picture that it writes is halved.
+    stages : tuple of int
+        Stages that it runs, from 0: of the first pass of terms with the same offsets, all of these.
+    reads : tuple of str
+        What it fetches from all around, or of a sum the coarser one; "" if there is none.
+    adds : tuple of tuple of (str, int)
+        Pictures that it adds at the pixel itself, each with its row of the blend; its own stage is
+        then added with the blend as well.
+    writes : tuple of str
+    fetches : int
+        Of each pixel of what it writes.
+    is_added : bool
+        Whether the target adds what is written to what it holds.
+    """
+
+    kind: str
+    level: int
+    stages: tuple[int, ...]
+    reads: str
+    adds: tuple[tuple[str, int], ...]
+    writes: tuple[str, ...]
+    fetches: int
+    is_added: bool = False
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it has a function of its own, not one that several passes call."""
+        return self.writes[0].startswith("M") or len(self.stages) > 1
+
+    @property
+    def name(self) -> str:
+        """The name of its function, without prefix."""
+        if len(self.stages) > 1:
+            return f"Terms{self.stages[0]}"
+        if self.is_own:
+            return f"Term{self.stages[0]}" if self.is_added else f"Sum{self.level}"
+        return {"halve": "Halve", "star": "Star"}.get(self.kind, "Blur")
+
+    @property
+    def call(self) -> str:
+        """Its function with the stage and the direction."""
+        if self.is_own or self.kind == "halve":
+            return self.name
+        direction = {"across": ", x", "down": ", y"}.get(self.kind, "")
+        return f"{self.name}({self.stages[0]}{direction})"
+
+
+def pass_list(taps: Taps) -> tuple[Pass, ...]:
+    """Return a table's passes in their order; their fetches, times 1/4 a halving, are its own."""
+    return tuple(_chain(taps) if taps.chained else _terms(taps))
+
+
+def _chain(taps: Taps) -> Iterator[Pass]:
+    """Yield the passes of stages that each read the one before."""
+    last = taps.stages[-1].level
+    level, picture = 0, "E"
+    for k, stage in enumerate(taps.stages):
+        if stage.level > level:
+            level = stage.level
+            yield Pass("halve", level, (), picture, (), (f"H{level}",), 1)
+            picture = f"H{level}"
+        adds = _added(taps, last) if k == len(taps.stages) - 1 else ()
+        writes = (f"M{last}" if k == len(taps.stages) - 1 else f"B{k + 1}",)
+        if stage.kind == "pair":
+            count = 2 * len(stage.offsets_mm) + 1
+            yield Pass("across", level, (k,), picture, (), (f"A{k + 1}",), count)
+            yield Pass("down", level, (k,), f"A{k + 1}", adds, writes, count + len(adds))
+        else:
+            count = STAR_FETCHES + len(adds)
+            yield Pass(stage.kind, level, (k,), picture, adds, writes, count)
+        picture = writes[0]
+    for level in range(last - 1, -1, -1):
+        adds = _added(taps, level)
+        yield Pass("sum", level, (), f"M{level + 1}", adds, (f"M{level}",), 1 + len(adds))
+
+
+def _added(taps: Taps, level: int) -> tuple[tuple[str, int], ...]:
+    """Return what the sum of a level adds, but for its last stage where that is at hand."""
+    found = [("E", 0)] if level == 0 else []
+    found += [(f"B{k + 1}", k + 1) for k, each in enumerate(taps.stages) if each.level == level]
+    if level == taps.stages[-1].level:
+        found.pop()
+    return tuple((name, row) for name, row in found if taps.blend[row].any())
+
+
+def _terms(taps: Taps) -> Iterator[Pass]:
+    """Yield the passes of stages that all read the irradiance; terms share their first pass."""
+    irradiance = (("E", 0),) if taps.blend[0].any() else ()
+    if taps.is_disk:
+        yield Pass("disk", 0, (0,), "E", irradiance, ("M0",), int(taps.fetches))
+        return
+    groups: dict[tuple[float, ...], list[int]] = {}
+    for k, stage in enumerate(taps.stages):
+        groups.setdefault(tuple(stage.offsets_mm.tolist()), []).append(k)
+    for own in groups.values():
+        count = 2 * len(taps.stages[own[0]].offsets_mm) + 1
+        yield Pass("across", 0, tuple(own), "E", (), tuple(f"A{k + 1}" for k in own), count)
+        for k in own:
+            adds = irradiance if k == 0 else ()
+            total = count + len(adds)
+            yield Pass("down", 0, (k,), f"A{k + 1}", adds, ("M0",), total, is_added=k > 0)
+
+
+def fetches_of(passes: Sequence[Pass]) -> float:
+    """Return the fetches a pixel of the full picture."""
+    return sum(each.fetches / 4.0**each.level for each in passes)

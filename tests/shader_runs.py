@@ -1,0 +1,334 @@
+"""Runs exported passes on a software driver, in the order of the pass list.
+
+GLSL runs by moderngl (EGL, llvmpipe), HLSL too after glslang and spirv-cross, and WGSL by wgpu
+(Vulkan, lavapipe). In CI these must be there; elsewhere a test skips with a reason.
+"""
+
+import functools
+import importlib.util
+import os
+import shutil
+import struct
+import subprocess
+import tempfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sssfit.export.passes import pass_list
+
+TOOLS = {"glsl": ("moderngl",), "hlsl": ("moderngl",), "wgsl": ("wgpu",)}
+PROGRAMS = ("glslangValidator", "spirv-val", "spirv-cross")
+_AXES = {"across": (1.0, 0.0), "down": (0.0, 1.0)}
+_TRIANGLE = np.array([-1, -1, 3, -1, -1, 3], np.float32)
+_GLSL_VERTEX = "#version 450\nin vec2 at; void main() { gl_Position = vec4(at, 0.0, 1.0); }"
+
+
+def needs(dialect):
+    """Skip where a driver or compiler is missing, but not in CI."""
+    missing = [each for each in TOOLS[dialect] if importlib.util.find_spec(each) is None]
+    if dialect == "hlsl":
+        missing += [each for each in PROGRAMS if shutil.which(each) is None]
+    if missing and os.environ.get("CI") == "true":
+        pytest.fail(f"{', '.join(missing)} missing, and CI installs them")
+    if missing:
+        pytest.skip(f"needs {', '.join(missing)}")
+
+
+def run(text, dialect, taps, light, mm_per_pixel, *, cover=None, prefix="SSS", half=False, frame=0, profile=None):
+    """The result (H, W, C) of exported source on light (H, W, C), with clamped borders."""
+    needs(dialect)
+    height, width = light.shape[:2]
+    whole = np.zeros((height, width, 4), np.float32)
+    cover = np.ones((height, width)) if cover is None else cover
+    whole[..., : light.shape[2]] = light * cover[..., None]
+    whole[..., 3] = cover
+    device = _device(dialect)
+    pictures = {"E": device.picture(whole, half=False)}
+    for each in pass_list(taps):
+        size = [-(-side // 2**each.level) for side in (width, height)]
+        reads = list(dict.fromkeys((each.reads, *(name for name, _ in each.adds))))
+        source = _read(pictures[reads[0]])
+        texel = [1.0 / side for side in source]
+        number = each.stages[0] if each.stages else 0
+        call = _call(each, dialect, prefix, reads, number, frame, profile)
+        held = pictures.get(each.writes[0]) if each.is_added else None
+        outputs = device.draw(
+            text, call, [pictures[name] for name in reads], size, texel, mm_per_pixel,
+            count=len(each.stages) if len(each.stages) > 1 else 1, onto=held,
+            half=half and each.writes[0] != "M0", prefix=prefix,
+        )  # fmt: skip
+        pictures |= dict(zip(each.writes, outputs, strict=True))
+    found = device.pixels(pictures["M0"])
+    return found[..., : light.shape[2]]
+
+
+def _read(picture):
+    return picture.size[:2]
+
+
+def _call(each, dialect, prefix, reads, number, frame, profile):
+    """The call of a pass's function in the words of a dialect."""
+    vec2 = {"hlsl": "float2", "glsl": "vec2", "wgsl": "vec2f"}[dialect]
+    pictures = [f"t{k}" for k in range(len(reads))]
+    sampler = [] if dialect == "glsl" else ["bilinear"]
+    arguments = [*pictures, *sampler, "position", "texel"]
+    if each.name in ("Blur", "Star"):
+        axis = _AXES.get(each.kind)
+        first = [f"{number}u", *([f"{vec2}{axis}"] if axis else [])]
+        arguments = [*first, *arguments]
+    if each.kind not in ("halve", "sum"):
+        arguments.append("mm")
+    if each.kind == "disk":
+        arguments.append(f"{frame}u")
+    if profile is not None and each.kind != "halve":
+        arguments.append(f"{profile}u")
+    return f"{prefix}_{each.name}({', '.join(arguments)})"
+
+
+@functools.cache
+def _device(dialect):
+    return _Vulkan() if dialect == "wgsl" else _OpenGL(dialect)
+
+
+@functools.cache
+def _context():
+    """One context serves both, since only the last that was made is current."""
+    import moderngl
+
+    return moderngl.create_context(standalone=True, backend="egl")
+
+
+class _OpenGL:
+    def __init__(self, dialect):
+        import moderngl
+
+        self.dialect, self.gl = dialect, moderngl
+        self.context = _context()
+        self.vertices = self.context.buffer(_TRIANGLE.tobytes())
+        self.programs = {}
+
+    def picture(self, pixels, half):
+        height, width = pixels.shape[:2]
+        kind = np.float16 if half else np.float32
+        made = self.context.texture(
+            (width, height), 4, np.ascontiguousarray(pixels, kind).tobytes(), dtype="f2" if half else "f4"
+        )
+        made.repeat_x = made.repeat_y = False
+        made.filter = self.gl.LINEAR, self.gl.LINEAR
+        return made
+
+    def pixels(self, picture):
+        kind = np.float16 if picture.dtype == "f2" else np.float32
+        found = np.frombuffer(picture.read(), kind).reshape(picture.height, picture.width, 4)
+        return found.astype(np.float64)
+
+    def draw(self, text, call, pictures, size, texel, mm, *, count, onto, half, prefix):
+        program = self._program(text, call, len(pictures), count, prefix)
+        targets = [onto] if onto is not None else [
+            self.picture(np.zeros((size[1], size[0], 4)), half) for _ in range(count)
+        ]
+        frame = self.context.framebuffer(color_attachments=targets)
+        frame.use()
+        for k, each in enumerate(pictures):
+            each.use(k)
+        for name in program:
+            member = program[name]
+            if isinstance(member, self.gl.Uniform):
+                if member.name.endswith("texel"):
+                    member.value = tuple(texel)
+                elif member.name.endswith("mm"):
+                    member.value = mm
+                elif name.startswith(("t", "SPIRV_Cross_Combinedt")):
+                    member.value = int(name.removeprefix("SPIRV_Cross_Combined")[1])
+        if onto is not None:
+            self.context.enable(self.gl.BLEND)
+            self.context.blend_func = self.gl.ONE, self.gl.ONE
+        self.context.simple_vertex_array(program, self.vertices, "at").render(vertices=3)
+        self.context.disable(self.gl.BLEND)
+        return targets
+
+    def _program(self, text, call, pictures, count, prefix):
+        key = text, call, pictures, count
+        if key not in self.programs:
+            make = glsl_program if self.dialect == "glsl" else hlsl_program
+            fragment = make(text, call, pictures, count, prefix)
+            self.programs[key] = self.context.program(_GLSL_VERTEX, fragment)
+        return self.programs[key]
+
+
+def glsl_program(text, call, pictures, count, prefix):
+    """A fragment shader around exported GLSL."""
+    textures = "".join(f"uniform sampler2D t{k};\n" for k in range(pictures))
+    outs = "".join(f"layout(location = {k}) out vec4 out{k};\n" for k in range(count))
+    body = f"out0 = {call};"
+    if count > 1:
+        body = f"{prefix}_Terms all = {call};" + "".join(f" out{k} = all.term[{k}];" for k in range(count))
+    return (
+        f"#version 450\n{text}\n{textures}uniform vec2 texel;\nuniform float mm;\n{outs}"
+        f"void main() {{ vec2 position = gl_FragCoord.xy; {body} }}"
+    )
+
+
+def hlsl_source(text, call, pictures, count, prefix):
+    """A pixel shader around exported HLSL."""
+    textures = "".join(f"Texture2D<float4> t{k};\n" for k in range(pictures))
+    outs = "".join(f"float4 out{k} : SV_Target{k}; " for k in range(count))
+    body = f"o.out0 = {call};"
+    if count > 1:
+        body = f"{prefix}_Terms all = {call};" + "".join(f" o.out{k} = all.term[{k}];" for k in range(count))
+    return (
+        f"{text}\n{textures}SamplerState bilinear;\nuniform float2 texel;\nuniform float mm;\n"
+        f"struct Out {{ {outs}}};\nOut main(float4 at : SV_Position) {{\n"
+        f"float2 position = at.xy; Out o; {body} return o; }}"
+    )
+
+
+def spirv_of(text, folder, language="hlsl"):
+    """Compile a fragment shader to SPIR-V that spirv-val accepts; return its path."""
+    source, binary = Path(folder) / f"shader.{language}", Path(folder) / "shader.spv"
+    source.write_text(text, encoding="utf-8")
+    flags = ["-D", "-e", "main"] if language == "hlsl" else []
+    mapped = ["--auto-map-bindings", "--auto-map-locations"]
+    done = subprocess.run(
+        ["glslangValidator", *flags, "-V", "-S", "frag", *mapped, "-o", binary, source],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, f"{done.stdout}\n{text}"
+    subprocess.run(["spirv-val", binary], check=True)
+    return binary
+
+
+def hlsl_program(text, call, pictures, count, prefix):
+    """The GLSL that spirv-cross makes of exported HLSL."""
+    with tempfile.TemporaryDirectory() as folder:
+        binary = spirv_of(hlsl_source(text, call, pictures, count, prefix), folder)
+        command = ["spirv-cross", binary, "--version", "450", "--glsl-emit-ubo-as-plain-uniforms"]
+        return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+class _Vulkan:
+    def __init__(self):
+        os.environ.setdefault("XDG_RUNTIME_DIR", tempfile.mkdtemp())
+        # Its OpenGL backend would take the current context from moderngl.
+        os.environ.setdefault("WGPU_BACKEND_TYPE", "Vulkan")
+        import wgpu
+
+        self.wgpu = wgpu
+        adapter = wgpu.gpu.request_adapter_sync()
+        self.device = adapter.request_device_sync(
+            required_features=["float32-filterable", "float32-blendable"]
+        )
+        self.sampler = self.device.create_sampler(mag_filter="linear", min_filter="linear")
+        self.pipelines = {}
+
+    def _texture(self, width, height, half):
+        use = self.wgpu.TextureUsage
+        return self.device.create_texture(
+            size=(width, height, 1),
+            format="rgba16float" if half else "rgba32float",
+            usage=use.TEXTURE_BINDING | use.COPY_DST | use.COPY_SRC | use.RENDER_ATTACHMENT,
+        )
+
+    def picture(self, pixels, half):
+        height, width = pixels.shape[:2]
+        kind = np.float16 if half else np.float32
+        made = self._texture(width, height, half)
+        self.device.queue.write_texture(
+            {"texture": made}, np.ascontiguousarray(pixels, kind).tobytes(),
+            {"bytes_per_row": width * 4 * kind().itemsize, "rows_per_image": height},
+            (width, height, 1),
+        )  # fmt: skip
+        return made
+
+    def pixels(self, picture):
+        width, height = picture.size[:2]
+        half = picture.format == "rgba16float"
+        row = width * (8 if half else 16)
+        stride = -(-row // 256) * 256
+        data = self.device.queue.read_texture(
+            {"texture": picture}, {"bytes_per_row": stride, "rows_per_image": height}, (width, height, 1)
+        )
+        rows = np.frombuffer(data, np.uint8).reshape(height, stride)[:, :row]
+        kind = np.float16 if half else np.float32
+        return np.ascontiguousarray(rows).view(kind).reshape(height, width, 4).astype(np.float64)
+
+    def draw(self, text, call, pictures, size, texel, mm, *, count, onto, half, prefix):
+        targets = [onto] if onto is not None else [self._texture(*size, half) for _ in range(count)]
+        key = text, call, len(pictures), count, targets[0].format, onto is not None
+        if key not in self.pipelines:
+            self.pipelines[key] = self._pipeline(text, call, len(pictures), targets, onto, prefix)
+        pipeline = self.pipelines[key]
+        view = self.device.create_buffer_with_data(
+            data=struct.pack("ffff", *texel, mm, 0.0), usage=self.wgpu.BufferUsage.UNIFORM
+        )
+        own = [{"binding": 0, "resource": {"buffer": view, "offset": 0, "size": 16}}]
+        own.append({"binding": 1, "resource": self.sampler})
+        own += [{"binding": 2 + k, "resource": each.create_view()} for k, each in enumerate(pictures)]
+        group = self.device.create_bind_group(layout=pipeline.get_bind_group_layout(0), entries=own)
+        encoder = self.device.create_command_encoder()
+        load = "load" if onto is not None else "clear"
+        drawn = encoder.begin_render_pass(
+            color_attachments=[
+                {"view": each.create_view(), "load_op": load, "store_op": "store", "clear_value": (0, 0, 0, 0)}
+                for each in targets
+            ]
+        )
+        drawn.set_pipeline(pipeline)
+        drawn.set_bind_group(0, group)
+        drawn.draw(3)
+        drawn.end()
+        self.device.queue.submit([encoder.finish()])
+        return targets
+
+    def _pipeline(self, text, call, pictures, targets, onto, prefix):
+        module = self.device.create_shader_module(code=wgsl_program(text, call, pictures, len(targets), prefix))
+        kind = "unfilterable-float" if False else "float"
+        stage = self.wgpu.ShaderStage.FRAGMENT
+        entries = [
+            {"binding": 0, "visibility": stage, "buffer": {"type": "uniform"}},
+            {"binding": 1, "visibility": stage, "sampler": {"type": "filtering"}},
+            *(
+                {"binding": 2 + k, "visibility": stage, "texture": {"sample_type": kind}}
+                for k in range(pictures)
+            ),
+        ]
+        layout = self.device.create_pipeline_layout(
+            bind_group_layouts=[self.device.create_bind_group_layout(entries=entries)]
+        )
+        add = {"src_factor": "one", "dst_factor": "one", "operation": "add"}
+        blend = {"blend": {"color": add, "alpha": add}} if onto is not None else {}
+        return self.device.create_render_pipeline(
+            layout=layout,
+            vertex={"module": module, "entry_point": "vertex"},
+            primitive={"topology": "triangle-list"},
+            fragment={
+                "module": module,
+                "entry_point": "fragment",
+                "targets": [{"format": each.format, **blend} for each in targets],
+            },
+        )
+
+
+def wgsl_program(text, call, pictures, count, prefix):
+    """Vertex and fragment shaders around exported WGSL."""
+    textures = "".join(
+        f"@group(0) @binding({2 + k}) var t{k}: texture_2d<f32>;\n" for k in range(pictures)
+    )
+    outs = ", ".join(f"@location({k}) out{k}: vec4f" for k in range(count))
+    body = f"o.out0 = {call};"
+    if count > 1:
+        body = f"var all = {call};" + "".join(f" o.out{k} = all.term[{k}];" for k in range(count))
+    return f"""{text}
+struct View {{ texel: vec2f, mm: f32 }}
+@group(0) @binding(0) var<uniform> view: View;
+@group(0) @binding(1) var bilinear: sampler;
+{textures}struct Out {{ {outs} }}
+@vertex fn vertex(@builtin(vertex_index) k: u32) -> @builtin(position) vec4f {{
+    return vec4f(f32(k / 2u) * 4.0 - 1.0, f32(k % 2u) * 4.0 - 1.0, 0.0, 1.0);
+}}
+@fragment fn fragment(@builtin(position) at: vec4f) -> Out {{
+    let position = at.xy; let texel = view.texel; let mm = view.mm;
+    var o: Out; {body} return o;
+}}"""
