@@ -287,6 +287,9 @@ FIT = [
             "--method weighted --rank 1 --mm-per-pixel .25 --support .5 --irradiance mine.exr",
         )
     ),
+    C("fit wax.profile.npz --method svd --rank 1 --pitches .5mm,.2cm", brief=True),
+    C("fit wax.profile.npz --method svd --rank 1 --pitches .5,1 --json", brief=True),
+    C("fit wax.profile.npz --pitches .5,1 -o x.taps.json"),
     C("fit wax.profile.npz --stages 1-1 --irradiance rgb8.png"),
     C("fit wax.profile.npz --stages 1-1 --irradiance mine.exr"),
     C("fit wax.profile.npz --stages 1-1 --irradiance hed"),
