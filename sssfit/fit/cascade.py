@@ -133,7 +133,7 @@ def fit_cascade(
         the time: the search also starts from the cascade for natural pictures.
     still : bool
         Weigh the aliasing of halved pictures three times as much as for the least error: a point
-        that moves by a pixel changes less. For stages of pairs.
+        that moves by a pixel changes less.
     seed : int
         Of the random starts; the same seed gives the same bits.
     mm_per_pixel, support_mm : float, optional [mm]
@@ -154,11 +154,6 @@ def fit_cascade(
     """
     begun = time.perf_counter()
     shapes = structure_for(fetches, stages, passes, full_resolution=full_resolution)
-    if still and any(each.kind == "star" for each in shapes):
-        raise FitError(
-            "still is for stages of pairs, and the structure has stars; name another, or allow "
-            "more passes."
-        )
     support_mm = _reach_mm(profile, mm_per_pixel) if support_mm is None else support_mm
     target = make_target(profile, mm_per_pixel, support_mm)
     lit = [int(c) for c in np.flatnonzero(~target.is_empty)]
@@ -263,7 +258,7 @@ def _optimum(
     In the end, where pictures are halved, with the weight ``aliasing`` for their images.
     """
     x, count = _search(chain, seed)
-    if isinstance(chain, PairChain) and chain.shapes[-1].level > 0:
+    if chain.shapes[-1].level > 0:
         chain.aliasing = aliasing
     elif not starts:
         return x, count
