@@ -32,6 +32,7 @@ from sssfit.fit._chain_stars import StarChain
 from sssfit.fit._result import TapsFit, provenance
 from sssfit.fit._spectrum import pictures_of, recorded, spectral_target
 from sssfit.fit._target import Pitch, Target, make_target, pitch_of
+from sssfit.fit.structures import best_structure, width_pixels
 from sssfit.kernel.structure import Shape, cost_of_chain, parse
 from sssfit.kernel.taps import Stage, Taps
 from sssfit.messages import counted, shown
@@ -41,52 +42,6 @@ from sssfit.scene.record import Scene
 
 FETCHES = 24  # skin1 at .3 mm: 99 % of a picture's pixels within a Delta E of .12
 FEWEST = 7
-# Known structures, and the mean over eight pictures of the 99th percentile of Delta E that each
-# leaves of skin1 on pixels of .3 mm; made by docs/make_cascades.py.
-STRUCTURES: Mapping[str, float] = {
-    "1": 30.9,
-    "*": 30.4,
-    "1|1": 16,
-    "1|1|1": 8.23,
-    "1|2": 13.7,
-    "1|1|2": 4.51,
-    "1|1|1|1-1": 0.718,
-    "1|1|1-1": 2.98,
-    "1|1|1-2": 1.46,
-    "1|*|*": 4.86,
-    "1|*|*|*": 3.31,
-    "1|2|2-2": 1.14,
-    "*|*": 13.5,
-    "1|1-1|2-2|1-1": 0.321,
-    "1|1-2|1-2|1-1": 0.294,
-    "*|*|*": 4.78,
-    "*|*|2": 4.13,
-    "1|*-*|*-*": 1.4,
-    "1|1-2|2-2|2-2": 0.281,
-    "*|*|*|*": 2.65,
-    "*|*|*|2": 1.29,
-    "*|*|*|*|*": 1.24,
-    "*|*|*-*|*-*": 0.692,
-    "1-2": 15.8,
-    "*|*-*|*-*|*": 0.544,
-    "1-1|1|2|1-1": 0.439,
-    "1-1|1|2-2|1-1": 0.167,
-    "1-1-1": 11.3,
-    "1-1|1-1|1-1|1-1|1-1": 0.29,
-    "1-1|1-2|1-1|2-2": 0.123,
-    "1-1|1-2|2-2|2-2": 0.113,
-    "1-1-2": 7.87,
-    "1-1-1|1-1|1-1|1-1": 0.0884,
-    "1-2-2": 4.32,
-    "1-1-1|1-2|1-1|2-2": 0.0838,
-    "1-1-1-2": 3.03,
-    "1-1-2-2": 1.93,
-    "1-1-1-1-2": 1.41,
-    "1-1-1-1-1-1": 1.08,
-    "1-1-2-2-2": 0.796,
-    "1-1-1-2-2-2": 0.609,
-    "1-1-1-1-2-2-2": 0.288,
-}
 _KEPT, _MOST_PIXELS = 0.9999, 320
 _STARTS = 4
 # Weights of aliasing. skin1, 24 fetches: mean over eight pictures of the 99th percentile of Delta
@@ -153,7 +108,8 @@ def fit_cascade(
         There is no such picture, or it cannot be read.
     """
     begun = time.perf_counter()
-    shapes = structure_for(fetches, stages, passes, full_resolution=full_resolution)
+    width = width_pixels(profile, pitch_of(profile, mm_per_pixel))
+    shapes = structure_for(fetches, stages, passes, width, full_resolution=full_resolution)
     support_mm = _reach_mm(profile, mm_per_pixel) if support_mm is None else support_mm
     target = make_target(profile, mm_per_pixel, support_mm)
     lit = [int(c) for c in np.flatnonzero(~target.is_empty)]
@@ -196,10 +152,11 @@ def structure_for(
     fetches: float | None,
     stages: str | None,
     passes: int | None,
+    width: float,
     *,
     full_resolution: bool = False,
 ) -> tuple[Shape, ...]:
-    """Return the structure asked for, or the best known one within a budget.
+    """Return the structure asked for, or the best known one for kernels so many pixels wide.
 
     Raises
     ------
@@ -223,18 +180,12 @@ def structure_for(
                 "allow more, or use fewer or smaller stages."
             )
         return shapes
-    fitting = [
-        text
-        for text in STRUCTURES
-        if (cost := cost_of_chain(shapes := parse(text))).fetches <= most
-        and (passes is None or cost.passes <= passes)
-        and not (full_resolution and shapes[-1].level)
-    ]
-    if not fitting:
+    best = best_structure(width, most, passes, full_resolution=full_resolution)
+    if best is None:
         raise FitError(
             f"no known cascade has at most {_limits(budget, passes)}; allow more of either."
         )
-    return parse(min(fitting, key=STRUCTURES.__getitem__))
+    return parse(best)
 
 
 def _limits(budget: float | None, passes: int | None) -> str:
