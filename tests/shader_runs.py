@@ -36,7 +36,19 @@ def needs(dialect):
         pytest.skip(f"needs {', '.join(missing)}")
 
 
-def run(text, dialect, taps, light, mm_per_pixel, *, cover=None, prefix="SSS", half=False, frame=0, profile=None):
+def run(
+    text,
+    dialect,
+    taps,
+    light,
+    mm_per_pixel,
+    *,
+    cover=None,
+    prefix="SSS",
+    half=False,
+    frame=0,
+    profile=None,
+):
     """The result (H, W, C) of exported source on light (H, W, C), with clamped borders."""
     needs(dialect)
     height, width = light.shape[:2]
@@ -113,7 +125,10 @@ class _OpenGL:
         height, width = pixels.shape[:2]
         kind = np.float16 if half else np.float32
         made = self.context.texture(
-            (width, height), 4, np.ascontiguousarray(pixels, kind).tobytes(), dtype="f2" if half else "f4"
+            (width, height),
+            4,
+            np.ascontiguousarray(pixels, kind).tobytes(),
+            dtype="f2" if half else "f4",
         )
         made.repeat_x = made.repeat_y = False
         made.filter = self.gl.LINEAR, self.gl.LINEAR
@@ -126,9 +141,11 @@ class _OpenGL:
 
     def draw(self, text, call, pictures, size, texel, mm, *, count, onto, half, prefix):
         program = self._program(text, call, len(pictures), count, prefix)
-        targets = [onto] if onto is not None else [
-            self.picture(np.zeros((size[1], size[0], 4)), half) for _ in range(count)
-        ]
+        targets = (
+            [onto]
+            if onto is not None
+            else [self.picture(np.zeros((size[1], size[0], 4)), half) for _ in range(count)]
+        )
         frame = self.context.framebuffer(color_attachments=targets)
         frame.use()
         for k, each in enumerate(pictures):
@@ -164,7 +181,9 @@ def glsl_program(text, call, pictures, count, prefix):
     outs = "".join(f"layout(location = {k}) out vec4 out{k};\n" for k in range(count))
     body = f"out0 = {call};"
     if count > 1:
-        body = f"{prefix}_Terms all = {call};" + "".join(f" out{k} = all.term[{k}];" for k in range(count))
+        body = f"{prefix}_Terms all = {call};" + "".join(
+            f" out{k} = all.term[{k}];" for k in range(count)
+        )
     return (
         f"#version 450\n{text}\n{textures}uniform vec2 texel;\nuniform float mm;\n{outs}"
         f"void main() {{ vec2 position = gl_FragCoord.xy; {body} }}"
@@ -177,7 +196,9 @@ def hlsl_source(text, call, pictures, count, prefix):
     outs = "".join(f"float4 out{k} : SV_Target{k}; " for k in range(count))
     body = f"o.out0 = {call};"
     if count > 1:
-        body = f"{prefix}_Terms all = {call};" + "".join(f" o.out{k} = all.term[{k}];" for k in range(count))
+        body = f"{prefix}_Terms all = {call};" + "".join(
+            f" o.out{k} = all.term[{k}];" for k in range(count)
+        )
     return (
         f"{text}\n{textures}SamplerState bilinear;\nuniform float2 texel;\nuniform float mm;\n"
         f"struct Out {{ {outs}}};\nOut main(float4 at : SV_Position) {{\n"
@@ -248,7 +269,9 @@ class _Vulkan:
         row = width * (8 if half else 16)
         stride = -(-row // 256) * 256
         data = self.device.queue.read_texture(
-            {"texture": picture}, {"bytes_per_row": stride, "rows_per_image": height}, (width, height, 1)
+            {"texture": picture},
+            {"bytes_per_row": stride, "rows_per_image": height},
+            (width, height, 1),
         )
         rows = np.frombuffer(data, np.uint8).reshape(height, stride)[:, :row]
         kind = np.float16 if half else np.float32
@@ -265,13 +288,20 @@ class _Vulkan:
         )
         own = [{"binding": 0, "resource": {"buffer": view, "offset": 0, "size": 16}}]
         own.append({"binding": 1, "resource": self.sampler})
-        own += [{"binding": 2 + k, "resource": each.create_view()} for k, each in enumerate(pictures)]
+        own += [
+            {"binding": 2 + k, "resource": each.create_view()} for k, each in enumerate(pictures)
+        ]
         group = self.device.create_bind_group(layout=pipeline.get_bind_group_layout(0), entries=own)
         encoder = self.device.create_command_encoder()
         load = "load" if onto is not None else "clear"
         drawn = encoder.begin_render_pass(
             color_attachments=[
-                {"view": each.create_view(), "load_op": load, "store_op": "store", "clear_value": (0, 0, 0, 0)}
+                {
+                    "view": each.create_view(),
+                    "load_op": load,
+                    "store_op": "store",
+                    "clear_value": (0, 0, 0, 0),
+                }
                 for each in targets
             ]
         )
@@ -283,7 +313,9 @@ class _Vulkan:
         return targets
 
     def _pipeline(self, text, call, pictures, targets, onto, prefix):
-        module = self.device.create_shader_module(code=wgsl_program(text, call, pictures, len(targets), prefix))
+        module = self.device.create_shader_module(
+            code=wgsl_program(text, call, pictures, len(targets), prefix)
+        )
         kind = "unfilterable-float" if False else "float"
         stage = self.wgpu.ShaderStage.FRAGMENT
         entries = [

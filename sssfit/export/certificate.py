@@ -1,10 +1,12 @@
-"""The comment above a table of taps: what it is, where it comes from, what it costs, how it runs."""
+"""The comment above a table of taps: what it is and comes from, what it costs, how it is run."""
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 
-from sssfit.export.document import errors_text, values_text
 from sssfit.export.passes import pass_list
 from sssfit.kernel import Taps
+
+_ROUNDING = 1e-12
 
 
 def certificate(taps: Taps) -> Iterator[str]:
@@ -48,9 +50,9 @@ def pass_table(taps: Taps, prefix: str) -> Iterator[str]:
         yield f"{call:<16}{reads:<16}{writes:<8}{size:<6}{each.fetches}"
     if any(each.is_added for each in pass_list(taps)):
         yield "A + is added to what the target holds (blend ONE, ONE)."
-    yield "position: middle of the pixel that is written (SV_Position, gl_FragCoord), in its pixels."
-    yield "texel: 1 / size of the first picture that is read. mm_per_pixel: of the full picture, for"
-    yield "a surface at depth d: 2 d tan(fov / 2) / rows; over a pixel's own scale to widen its blur."
+    yield "position: middle of the pixel that is written (SV_Position, gl_FragCoord), in pixels."
+    yield "texel: 1 / size of the first picture that is read; mm_per_pixel: of the full picture,"
+    yield "2 d tan(fov / 2) / rows at depth d, divided by a pixel's own scale of the blur."
     yield "Sampler: bilinear, clamped. Alpha is coverage, and light is multiplied by it."
 
 
@@ -79,3 +81,16 @@ def how_to_run(taps: Taps) -> Iterator[str]:
             "Halve by one bilinear fetch at the corner of 2 x 2 texels. Add up level by level, the "
             "coarsest first, each read by one bilinear fetch."
         )
+
+
+def values_text(values: Sequence[float]) -> str:
+    """Return a value for each channel as text."""
+    return ", ".join(f"{each + 0.0:.6g}" for each in values)  # not -0
+
+
+def errors_text(values: Sequence[float]) -> str:
+    """Return an error for each channel as text; rounding of sums of pixels counts as 0."""
+    return ", ".join(
+        "unknown" if math.isnan(each) else f"{0.0 if abs(each) < _ROUNDING else each:.6g}"
+        for each in values
+    )

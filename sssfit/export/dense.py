@@ -1,37 +1,26 @@
-"""A dense kernel as shader source: constant arrays with a comment that explains them."""
+"""A dense kernel as source of a language: constant arrays with a comment that explains them."""
 
-from pathlib import Path
-
+from sssfit.export.constants import Writer
+from sssfit.export.dialects import Dialect, mark
 from sssfit.export.document import description
-from sssfit.export.numbers import array, literal, value, vector_kind
-from sssfit.files import has_mark
 from sssfit.kernel import SeparableKernel
 
-MARK = "// sssfit.hlsl/1"  # the mark of our files, which may be replaced
 
+def dense(kernel: SeparableKernel, dialect: Dialect, prefix: str = "SSS") -> str:
+    """Return constant arrays of the signs and weights of each term, one term after the other.
 
-def hlsl(kernel: SeparableKernel) -> str:
-    """Return HLSL: constant arrays of the signs and weights of each term.
-
-    Weights are indexed by term and pixel. One to four channels are float to float4; more channels
-    take a third index.
+    One to four channels are one vector each; more channels follow one another.
     """
+    write = Writer(dialect, prefix)
     terms, pixels, channels = kernel.weights.shape
-    kind, last = vector_kind(channels)
-    lines = [MARK, *(f"// {line}" for line in description(kernel))]
-    lines += [
-        f"static const uint SSS_TERMS = {terms};",
-        f"static const uint SSS_PIXELS = {pixels};",
-        f"static const float SSS_MM_PER_PIXEL = {literal(kernel.mm_per_pixel)};",
-        f"static const {kind} SSS_SCALE{last} = {value(kernel.scale, kind)};",
-        *array(f"{kind} SSS_SIGN[{terms}]{last}", kernel.signs, kind),
-        f"static const {kind} SSS_WEIGHTS[{terms}][{pixels}]{last} = {{",
+    lines = [
+        mark(dialect),
+        *(f"// {line}" for line in description(kernel)),
+        write.scalar("uint", "TERMS", [terms]),
+        write.scalar("uint", "PIXELS", [pixels]),
+        write.scalar("float", "MM_PER_PIXEL", [kernel.mm_per_pixel]),
+        *write.rows("SCALE", [kernel.scale.tolist()]),
+        *write.rows("SIGN", kernel.signs.tolist()),
+        *write.rows("WEIGHT", kernel.weights.reshape(-1, channels).tolist()),
     ]
-    for weights in kernel.weights:
-        lines += ["    {", *(f"        {value(each, kind)}," for each in weights), "    },"]
-    return "\n".join([*lines, "};", ""])
-
-
-def is_hlsl_file(path: Path) -> bool:
-    """Return whether a file is shader source that `hlsl` wrote."""
-    return has_mark(path, {MARK.encode(): b""})
+    return "\n".join([*lines, ""])

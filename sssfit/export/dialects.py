@@ -125,3 +125,8 @@ C = Dialect(
     number="{value}f",
 )
 DIALECTS = {each.name: each for each in (HLSL, GLSL, WGSL, C)}
+
+
+def mark(dialect: Dialect) -> str:
+    """Return the first line of our files, which may be replaced."""
+    return f"// sssfit.{dialect.name}/1"

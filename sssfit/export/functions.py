@@ -220,7 +220,8 @@ class Functions:
         """Yield the lines that add up the pictures of a level: its last stage, or a coarser sum."""
         new = self.dialect.new
         if each.kind == "sum":
-            yield f"{new('float4', 'coarse')} = {self._fetch(each.reads, '0.5 * position * texel')};"
+            place = "0.5 * position * texel"
+            yield f"{new('float4', 'coarse')} = {self._fetch(each.reads, place)};"
             yield f"{new('float', 'cover')} = {self._load(each.adds[0][0])}.a;"
             part = self._vector(self.light, "coarse.a")
             coarse = self._call("Covered", f"coarse{self.rgb}", part, "cover")

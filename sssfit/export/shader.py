@@ -1,19 +1,20 @@
 """Tables of taps as source of a language: constants, and the passes that use them."""
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from sssfit.arrays import FloatArray
 from sssfit.errors import KernelError
 from sssfit.export.certificate import certificate, how_to_run, pass_table
-from sssfit.export.dialects import DIALECTS, KINDS, Dialect
+from sssfit.export.constants import Writer
+from sssfit.export.dialects import Dialect, mark
 from sssfit.export.functions import Functions
 from sssfit.kernel import Taps
 from sssfit.messages import printable, shown
 
-_LONGEST = 80  # of a line of numbers
 KIND_NUMBERS = ("pair", "star", "disk")
 
 
@@ -40,7 +41,6 @@ class Style:
 
 
 FEATURES = ("COVERAGE",)
-MARKS = {name: f"// sssfit.{name}/1" for name in DIALECTS}  # of our files, which may be replaced
 
 
 def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
@@ -52,12 +52,12 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
         The prefix is no identifier, the tables have other stages or channels, or passes cannot be
         written for them.
     """
-    _check(tables, dialect, style)
+    _check(tables, style)
     passes = dialect.has_passes and style.with_passes
     words = [line for each in tables for line in certificate(each)]
     words += pass_table(tables[0], style.prefix) if passes else how_to_run(tables[0])
     words += list(_notes(tables, style, passes=passes))
-    lines = [MARKS[dialect.name], *(f"// {printable(each)}".rstrip() for each in words)]
+    lines = [mark(dialect), *(f"// {printable(each)}".rstrip() for each in words)]
     lines += _defines(dialect, style) if passes else []
     lines += _constants(tables, dialect, style, passes=passes)
     if passes:
@@ -75,10 +75,10 @@ def _notes(tables: Sequence[Taps], style: Style, *, passes: bool) -> Iterator[st
     if any(each.has_negative_weights for each in tables):
         yield "Some weights are negative: unsigned formats between the passes would cut light off."
     if passes and tables[0].chained:
-        yield "Intermediate pictures: half floats cost nothing that is seen; linear light throughout."
+        yield "Half floats between the passes cost nothing that is seen. Linear light throughout."
 
 
-def _check(tables: Sequence[Taps], dialect: Dialect, style: Style) -> None:
+def _check(tables: Sequence[Taps], style: Style) -> None:
     prefix = style.prefix
     if not (prefix.isascii() and prefix.isidentifier() and not prefix.startswith("__")):
         raise KernelError(
@@ -126,14 +126,14 @@ def _constants(
     tables: Sequence[Taps], dialect: Dialect, style: Style, *, passes: bool
 ) -> Iterator[str]:
     """Yield the constants: stages, offsets, weights and blend, profile after profile."""
-    first, write = tables[0], _Writer(dialect, style.prefix)
+    first, write = tables[0], Writer(dialect, style.prefix)
     counts = [len(each.weights) for each in first.stages]
     yield write.scalar("float", "MM_PER_PIXEL", [first.mm_per_pixel])
     if len(tables) > 1:
         yield write.scalar("uint", "TAPS", [sum(counts)])
         yield write.scalar("uint", "PICTURES", [len(first.blend)])
     if style.normalized:
-        yield from write.rows("ALBEDO", [each.energy for each in tables])
+        yield from write.rows("ALBEDO", [each.energy.tolist() for each in tables])
     if passes:
         sizes = [2.0**each.level for each in first.stages]
         yield from write.rows("SIZE", [[each] for each in sizes])
@@ -143,10 +143,10 @@ def _constants(
     yield write.wholes("FIRST", [0, *np.cumsum(counts).tolist()])
     places = [row for each in tables for row in _places(each)]
     yield from write.rows("PLACE_MM" if first.is_disk else "OFFSET_MM", places)
-    yield from write.rows(
-        "WEIGHT", [row for each in tables for s in each.stages for row in s.weights]
-    )
-    yield from write.rows("BLEND", [row for each in tables for row in _blend(each, style)])
+    weights = [each.weights for table in tables for each in table.stages]
+    yield from write.rows("WEIGHT", np.concatenate(weights).tolist())
+    blends = [_blend(each, style) for each in tables]
+    yield from write.rows("BLEND", np.concatenate(blends).tolist())
 
 
 def _places(taps: Taps) -> Iterator[list[float]]:
@@ -158,52 +158,8 @@ def _places(taps: Taps) -> Iterator[list[float]]:
             yield [each * math.cos(turn), each * math.sin(turn)] if taps.is_disk else [each]
 
 
-def _blend(taps: Taps, style: Style) -> np.ndarray:
+def _blend(taps: Taps, style: Style) -> FloatArray:
     """Return the blend, of unit energy where the energy is written apart."""
     energy = np.where(taps.energy != 0.0, taps.energy, 1.0)
-    return taps.blend / energy if style.normalized else taps.blend
-
-
-class _Writer:
-    """Constants of one dialect and prefix."""
-
-    def __init__(self, dialect: Dialect, prefix: str) -> None:
-        self.dialect, self.prefix = dialect, prefix
-
-    def scalar(self, kind: str, name: str, values: Sequence[float]) -> str:
-        """Return a single constant."""
-        value = f"{values[0]:d}u" if kind == "uint" else self.dialect.literal(values)
-        return self.dialect.constant.format(
-            kind=self.dialect.types[kind], name=f"{self.prefix}_{name}", dims="", value=value
-        )
-
-    def wholes(self, name: str, values: Sequence[int]) -> str:
-        """Return an array of whole numbers, in one line."""
-        before, after = self._ends("uint", name, len(values), "")
-        return f"{before}{', '.join(f'{each}u' for each in values)}{after}"
-
-    def rows(self, name: str, rows: Iterable[Sequence[float]]) -> Iterator[str]:
-        """Yield the lines of an array with a value for each channel in a row.
-
-        Where a dialect has no type for so many channels they follow one another.
-        """
-        table = [list(each) for each in rows]
-        width = len(table[0])
-        if width > len(KINDS) and self.dialect.has_passes:
-            table, width = [[each] for row in table for each in row], 1
-        kind = KINDS[min(width, len(KINDS)) - 1]
-        before, after = self._ends(kind, name, len(table), f"[{width}]" if width > 1 else "")
-        values = [self.dialect.literal(each) for each in table]
-        lines = [", ".join(values)] if width == 1 else values
-        if len(lines[0]) > _LONGEST:
-            lines = [", ".join(values[k : k + 8]) for k in range(0, len(values), 8)]
-        if len(lines) == 1:
-            yield f"{before}{lines[0]}{after}"
-            return
-        yield from (before, *(f"    {each}," for each in lines[:-1]), f"    {lines[-1]}", after)
-
-    def _ends(self, kind: str, name: str, count: int, dims: str) -> tuple[str, str]:
-        """Return what stands before and after the rows of an array."""
-        words = {"kind": self.dialect.types[kind], "name": f"{self.prefix}_{name}"}
-        before, after = self.dialect.array
-        return before.format(count=count, dims=dims, **words), after.format()
+    blend: FloatArray = taps.blend / energy if style.normalized else taps.blend
+    return blend

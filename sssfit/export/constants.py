@@ -1,0 +1,52 @@
+"""Constants of a dialect: single numbers, and arrays with a value for each channel in a row."""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from sssfit.export.dialects import KINDS, Dialect
+
+_LONGEST = 96  # characters of a line of numbers
+
+
+class Writer:
+    """Constants of one dialect and prefix."""
+
+    def __init__(self, dialect: Dialect, prefix: str) -> None:
+        self.dialect, self.prefix = dialect, prefix
+
+    def scalar(self, kind: str, name: str, values: Sequence[float]) -> str:
+        """Return a single constant."""
+        value = f"{values[0]:d}u" if kind == "uint" else self.dialect.literal(values)
+        return self.dialect.constant.format(
+            kind=self.dialect.types[kind], name=f"{self.prefix}_{name}", dims="", value=value
+        )
+
+    def wholes(self, name: str, values: Sequence[int]) -> str:
+        """Return an array of whole numbers, in one line."""
+        before, after = self._ends("uint", name, len(values), "")
+        return f"{before}{', '.join(f'{each}u' for each in values)}{after}"
+
+    def rows(self, name: str, rows: Iterable[Sequence[float]]) -> Iterator[str]:
+        """Yield the lines of an array with a value for each channel in a row.
+
+        Where a dialect has no type for so many channels they follow one another.
+        """
+        table = [list(each) for each in rows]
+        width = len(table[0])
+        if width > len(KINDS) and self.dialect.has_passes:
+            table, width = [[each] for row in table for each in row], 1
+        kind = KINDS[min(width, len(KINDS)) - 1]
+        before, after = self._ends(kind, name, len(table), f"[{width}]" if width > 1 else "")
+        values = [self.dialect.literal(each) for each in table]
+        lines = [", ".join(values)] if width == 1 else values
+        if len(lines[0]) > _LONGEST:
+            lines = [", ".join(values[k : k + 8]) for k in range(0, len(values), 8)]
+        if len(lines) == 1:
+            yield f"{before}{lines[0]}{after}"
+            return
+        yield from (before, *(f"    {each}," for each in lines[:-1]), f"    {lines[-1]}", after)
+
+    def _ends(self, kind: str, name: str, count: int, dims: str) -> tuple[str, str]:
+        """Return what stands before and after the rows of an array."""
+        words = {"kind": self.dialect.types[kind], "name": f"{self.prefix}_{name}"}
+        before, after = self.dialect.array
+        return before.format(count=count, dims=dims, **words), after.format()
