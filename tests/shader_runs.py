@@ -48,6 +48,7 @@ def run(
     half=False,
     frame=0,
     profile=None,
+    normalized=False,
 ):
     """The result (H, W, C) of exported source on light (H, W, C), with clamped borders."""
     needs(dialect)
@@ -58,7 +59,7 @@ def run(
     whole[..., 3] = cover
     device = _device(dialect)
     pictures = {"E": device.picture(whole, half=False)}
-    for each in pass_list(taps):
+    for each in pass_list(taps, normalized=normalized):
         size = [-(-side // 2**each.level) for side in (width, height)]
         reads = list(dict.fromkeys((each.reads, *(name for name, _ in each.adds))))
         source = _read(pictures[reads[0]])
@@ -210,14 +211,16 @@ def spirv_of(text, folder, language="hlsl"):
     """Compile a fragment shader to SPIR-V that spirv-val accepts; return its path."""
     source, binary = Path(folder) / f"shader.{language}", Path(folder) / "shader.spv"
     source.write_text(text, encoding="utf-8")
-    flags = ["-D", "-e", "main"] if language == "hlsl" else []
+    # GLSL here is that of OpenGL, where a uniform needs no block.
+    flags = ["-D", "-e", "main", "-V"] if language == "hlsl" else ["-G"]
     mapped = ["--auto-map-bindings", "--auto-map-locations"]
     done = subprocess.run(
-        ["glslangValidator", *flags, "-V", "-S", "frag", *mapped, "-o", binary, source],
+        ["glslangValidator", *flags, "-S", "frag", *mapped, "-o", binary, source],
         capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, f"{done.stdout}\n{text}"
-    subprocess.run(["spirv-val", binary], check=True)
+    target = ["--target-env", "vulkan1.1" if language == "hlsl" else "opengl4.5"]
+    subprocess.run(["spirv-val", *target, binary], check=True)
     return binary
 
 

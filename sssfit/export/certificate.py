@@ -37,18 +37,19 @@ def certificate(taps: Taps) -> Iterator[str]:
     )
 
 
-def pass_table(taps: Taps, prefix: str) -> Iterator[str]:
+def pass_table(taps: Taps, prefix: str, *, normalized: bool) -> Iterator[str]:
     """Yield the passes as a table, and what their functions take."""
+    passes = pass_list(taps, normalized=normalized)
     yield ""
     yield "Passes in their order. E is the irradiance, M0 the result; sizes are rounded up."
     yield f"{'call':<16}{'reads':<16}{'writes':<8}{'size':<6}fetches"
-    for each in pass_list(taps):
+    for each in passes:
         reads = " ".join(dict.fromkeys((each.reads, *(name for name, _ in each.adds))))
         size = f"1/{2**each.level}" if each.level else "1"
         writes = " ".join(each.writes) + ("+" if each.is_added else "")
         call = f"{prefix}_{each.call}"
         yield f"{call:<16}{reads:<16}{writes:<8}{size:<6}{each.fetches}"
-    if any(each.is_added for each in pass_list(taps)):
+    if any(each.is_added for each in passes):
         yield "A + is added to what the target holds (blend ONE, ONE)."
     yield "position: middle of the pixel that is written (SV_Position, gl_FragCoord), in pixels."
     yield "texel: 1 / size of the first picture that is read; mm_per_pixel: of the full picture,"

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from sssfit.export.dialects import KINDS, Dialect
 
 _LONGEST = 96  # characters of a line of numbers
+_MANY = 8  # rows of an array from which on two share a line
 
 
 class Writer:
@@ -18,6 +19,18 @@ class Writer:
         value = f"{values[0]:d}u" if kind == "uint" else self.dialect.literal(values)
         return self.dialect.constant.format(
             kind=self.dialect.types[kind], name=f"{self.prefix}_{name}", dims="", value=value
+        )
+
+    def vector(self, name: str, values: Sequence[float]) -> str:
+        """Return a single constant with a value for each channel."""
+        count = len(values)
+        if count > len(KINDS) and self.dialect.has_passes:
+            return next(iter(self.rows(name, [values])))
+        return self.dialect.constant.format(
+            kind=self.dialect.types[KINDS[min(count, len(KINDS)) - 1]],
+            name=f"{self.prefix}_{name}",
+            dims=f"[{count}]" if count > 1 else "",
+            value=self.dialect.literal(values),
         )
 
     def wholes(self, name: str, values: Sequence[int]) -> str:
@@ -40,6 +53,8 @@ class Writer:
         lines = [", ".join(values)] if width == 1 else values
         if len(lines[0]) > _LONGEST:
             lines = [", ".join(values[k : k + 8]) for k in range(0, len(values), 8)]
+        elif width > 1 and 2 * max(map(len, values)) < _LONGEST and len(values) > _MANY:
+            lines = [", ".join(values[k : k + 2]) for k in range(0, len(values), 2)]
         if len(lines) == 1:
             yield f"{before}{lines[0]}{after}"
             return

@@ -19,7 +19,7 @@ def dense(kernel: SeparableKernel, dialect: Dialect, prefix: str = "SSS") -> str
         write.scalar("uint", "TERMS", [terms]),
         write.scalar("uint", "PIXELS", [pixels]),
         write.scalar("float", "MM_PER_PIXEL", [kernel.mm_per_pixel]),
-        *write.rows("SCALE", [kernel.scale.tolist()]),
+        write.vector("SCALE", kernel.scale.tolist()),
         *write.rows("SIGN", kernel.signs.tolist()),
         *write.rows("WEIGHT", kernel.weights.reshape(-1, channels).tolist()),
     ]

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 
 from sssfit.errors import KernelError
 from sssfit.export.dialects import KINDS, Dialect
-from sssfit.export.passes import Pass, pass_list
+from sssfit.export.passes import Pass
 from sssfit.kernel import Taps
 
 MOST_CHANNELS = 3  # of a picture whose fourth one is coverage
@@ -38,6 +38,7 @@ class Functions:
     Parameters
     ----------
     taps : Taps
+    passes : sequence of Pass
     dialect : Dialect
     prefix : str
         Of all names.
@@ -50,7 +51,15 @@ class Functions:
         The pictures have more channels than light and coverage leave room for.
     """
 
-    def __init__(self, taps: Taps, dialect: Dialect, prefix: str, *, is_indexed: bool) -> None:
+    def __init__(
+        self,
+        taps: Taps,
+        passes: Sequence[Pass],
+        dialect: Dialect,
+        prefix: str,
+        *,
+        is_indexed: bool,
+    ) -> None:
         if len(taps.channels) > MOST_CHANNELS:
             raise KernelError(
                 f"the table has {len(taps.channels)} channels; passes are written for at most "
@@ -59,7 +68,8 @@ class Functions:
         self.taps, self.dialect, self.prefix = taps, dialect, prefix
         self.profile = (("uint", "profile"),) if is_indexed else ()
         self.light, self.rgb = KINDS[len(taps.channels) - 1], f".{'rgb'[: len(taps.channels)]}"
-        self.passes = pass_list(taps)
+        self.passes = passes
+        self.has_sums = any(each.kind == "sum" for each in passes)
         counts = [len(each.weights) for each in taps.stages]
         self.first = [sum(counts[:k]) for k in range(len(counts))]
 
@@ -67,7 +77,8 @@ class Functions:
         """Yield the lines of all functions."""
         kinds = {each.kind for each in self.passes}
         helpers = {"down": self._blur, "star": self._star, "disk": self._turn, "halve": self._halve}
-        parts = [self._covered(), *(make() for kind, make in helpers.items() if kind in kinds)]
+        parts = [self._covered()] if self.has_sums or "disk" in kinds else []
+        parts += [make() for kind, make in helpers.items() if kind in kinds]
         parts += [self._pass(each) for each in self.passes if each.is_own]
         for each in parts:
             yield from each.strip("\n").split("\n")
@@ -113,18 +124,30 @@ class Functions:
         return self._vector("float4", light, *beside, cover)
 
     def _covered(self) -> str:
-        new, least = self.dialect.new, self._vector(self.light, "1e-20")
+        """Return the function that ends most passes, where several need it."""
         arguments = [(self.light, "light"), (self.light, "part"), ("float", "cover")]
         return f"""
 // Light as the next pass reads it, with its coverage.
 {self._head("float4", "Covered", arguments)} {{
-#if {self.prefix}_COVERAGE
-    {new(self.light, "shown")} = cover * light / max(part, {least});
-    return {self._whole("shown", "cover")};
-#else
-    return {self._whole("light", "1.0")};
-#endif
+{self._returned("light", "part", "cover")}
 }}"""
+
+    def _returned(self, light: str, part: str, cover: str) -> str:
+        """Return the lines that end a function: light over what was covered, times coverage."""
+        least = self._vector(self.light, "1e-20")
+        shown = f"{cover} * {light} / max({part}, {least})"
+        return f"""\
+#if {self.prefix}_COVERAGE
+    return {self._whole(shown, cover)};
+#else
+    return {self._whole(light, "1.0")};
+#endif"""
+
+    def _end(self) -> str:
+        """Return the lines that end a pass of a stage."""
+        if self.has_sums:
+            return f"    return {self._call('Covered', 'light', 'part', 'own.a')};"
+        return self._returned("light", "part", "own.a")
 
     def _begin(self, picture: str, size: str, axis: str = "") -> str:
         """Return the lines that find the pixel, a mm and the middle in texture coordinates."""
@@ -151,7 +174,7 @@ class Functions:
         light += {weight} * both{self.rgb};
         part += {weight} * both.a;
     }}
-    return {self._call("Covered", "light", "part", "own.a")};
+{self._end()}
 }}"""
 
     def _star(self) -> str:
@@ -177,7 +200,7 @@ class Functions:
     beside += {self._both("picture", y)};
     {new(self.light, "light")} = {w0} * own{rgb} + {w1} * corners{rgb} + {w2} * beside{rgb};
     {new(self.light, "part")} = {w0} * own.a + {w1} * corners.a + {w2} * beside.a;
-    return {self._call("Covered", "light", "part", "own.a")};
+{self._end()}
 }}"""
 
     def _turn(self) -> str:

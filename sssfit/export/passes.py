@@ -6,7 +6,7 @@ coarser. The sum of level 0 is the result.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sssfit.kernel import Taps
 from sssfit.kernel.structure import STAR_FETCHES
@@ -34,6 +34,8 @@ class Pass:
         Of each pixel of what it writes.
     is_added : bool
         Whether the target adds what is written to what it holds.
+    is_blended : bool
+        Whether the blend multiplies what it writes, where that is a sum.
     """
 
     kind: str
@@ -44,11 +46,12 @@ class Pass:
     writes: tuple[str, ...]
     fetches: int
     is_added: bool = False
+    is_blended: bool = True
 
     @property
     def is_own(self) -> bool:
         """Whether it has a function of its own, not one that several passes call."""
-        return self.writes[0].startswith("M") or len(self.stages) > 1
+        return (self.writes[0].startswith("M") and self.is_blended) or len(self.stages) > 1
 
     @property
     def name(self) -> str:
@@ -68,9 +71,19 @@ class Pass:
         return f"{self.name}({self.stages[0]}{direction})"
 
 
-def pass_list(taps: Taps) -> tuple[Pass, ...]:
-    """Return a table's passes in their order; their fetches, times 1/4 a halving, are its own."""
-    return tuple(_chain(taps) if taps.chained else _terms(taps))
+def pass_list(taps: Taps, *, normalized: bool = False) -> tuple[Pass, ...]:
+    """Return a table's passes in their order; their fetches, times 1/4 a halving, are its own.
+
+    Parameters
+    ----------
+    taps : Taps
+    normalized : bool
+        Whether the blend adds up to 1; a single stage alone then needs none.
+    """
+    found = list(_chain(taps) if taps.chained else _terms(taps))
+    if normalized and len(taps.stages) == 1 and not taps.blend[0].any() and not taps.is_disk:
+        found[-1] = replace(found[-1], is_blended=False)
+    return tuple(found)
 
 
 def _chain(taps: Taps) -> Iterator[Pass]:

@@ -12,6 +12,7 @@ from sssfit.export.certificate import certificate, how_to_run, pass_table
 from sssfit.export.constants import Writer
 from sssfit.export.dialects import Dialect, mark
 from sssfit.export.functions import Functions
+from sssfit.export.passes import pass_list
 from sssfit.kernel import Taps
 from sssfit.messages import printable, shown
 
@@ -55,13 +56,18 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
     _check(tables, style)
     passes = dialect.has_passes and style.with_passes
     words = [line for each in tables for line in certificate(each)]
-    words += pass_table(tables[0], style.prefix) if passes else how_to_run(tables[0])
+    words += (
+        pass_table(tables[0], style.prefix, normalized=style.normalized)
+        if passes
+        else how_to_run(tables[0])
+    )
     words += list(_notes(tables, style, passes=passes))
     lines = [mark(dialect), *(f"// {printable(each)}".rstrip() for each in words)]
     lines += _defines(dialect, style) if passes else []
     lines += _constants(tables, dialect, style, passes=passes)
     if passes:
-        functions = Functions(tables[0], dialect, style.prefix, is_indexed=len(tables) > 1)
+        listed = pass_list(tables[0], normalized=style.normalized)
+        functions = Functions(tables[0], listed, dialect, style.prefix, is_indexed=len(tables) > 1)
         lines += ["", *functions.lines()]
     text = lines if dialect.has_defines else _resolved(lines, style)
     return "\n".join(text).rstrip("\n") + "\n"
@@ -132,12 +138,15 @@ def _constants(
     if len(tables) > 1:
         yield write.scalar("uint", "TAPS", [sum(counts)])
         yield write.scalar("uint", "PICTURES", [len(first.blend)])
-    if style.normalized:
+    if style.normalized and len(tables) == 1:
+        yield write.vector("ALBEDO", first.energy.tolist())
+    elif style.normalized:
         yield from write.rows("ALBEDO", [each.energy.tolist() for each in tables])
     if passes:
         sizes = [2.0**each.level for each in first.stages]
         yield from write.rows("SIZE", [[each] for each in sizes])
     else:
+        yield write.scalar("uint", "STAGES", [len(first.stages)])
         yield write.wholes("LEVEL", [each.level for each in first.stages])
         yield write.wholes("KIND", [KIND_NUMBERS.index(each.kind) for each in first.stages])
     yield write.wholes("FIRST", [0, *np.cumsum(counts).tolist()])
@@ -145,6 +154,8 @@ def _constants(
     yield from write.rows("PLACE_MM" if first.is_disk else "OFFSET_MM", places)
     weights = [each.weights for table in tables for each in table.stages]
     yield from write.rows("WEIGHT", np.concatenate(weights).tolist())
+    if passes and not pass_list(first, normalized=style.normalized)[-1].is_blended:
+        return
     blends = [_blend(each, style) for each in tables]
     yield from write.rows("BLEND", np.concatenate(blends).tolist())
 
