@@ -287,6 +287,9 @@ FIT = [
             "--method weighted --rank 1 --mm-per-pixel .25 --support .5 --irradiance mine.exr",
         )
     ),
+    C("fit wax.profile.npz --method svd --rank 1 --pitches .5mm,.2cm", brief=True),
+    C("fit wax.profile.npz --method svd --rank 1 --pitches .5,1 --json", brief=True),
+    C("fit wax.profile.npz --pitches .5,1 -o x.taps.json"),
     C("fit wax.profile.npz --stages 1-1 --irradiance rgb8.png"),
     C("fit wax.profile.npz --stages 1-1 --irradiance mine.exr"),
     C("fit wax.profile.npz --stages 1-1 --irradiance hed"),
@@ -301,6 +304,11 @@ FIT = [
     C("fit wax.profile.npz --method cascade --fetches 5"),
     C("fit wax.profile.npz --method cascade --stages '1-1|1' --fetches 12"),
     C("fit wax.profile.npz --method cascade --stages '1-x'"),
+    C("fit wax.profile.npz --method svd --taps 4"),
+    C("fit wax.profile.npz --method svd --taps 131"),
+    C("fit wax.profile.npz --method svd --taps 99 --mm-per-pixel .5"),
+    C("fit wax.profile.npz --support 40"),
+    C("fit wax.profile.npz --stages 1-1 --irradiance flat.exr --mm-per-pixel .5"),
     C("fit wax.profile.npz --method cascade --stages '1|*' --still"),
     C("fit wax.profile.npz --method cascade --stages '1||1'"),
     C("fit wax.profile.npz --method cascade --passes 0"),
@@ -466,6 +474,8 @@ RENDER = [
     C("render wax.svd2.kernel.json --follow lerp"),
     C("render wax.svd2.kernel.json --gain 3"),
     C("render wax.svd2.kernel.json --exposure 0"),
+    C(f"render wax.svd2.kernel.json --irradiance noise {SMALL} --exposure 1e308"),
+    C(f"render wax.svd2.kernel.json --irradiance disk {SMALL} --exposure 1e-308"),
     C("render wax.svd2.kernel.json --distance 1mm --size 20x20"),
     C("render grau.kernel.json --irradiance disk --truth t.exr"),
     C("render damaged.kernel.json"),
@@ -594,6 +604,7 @@ COMPARE = [
         " --terms 2 --budget-chart b.png"
     ),
     C(f"compare wax.toml --what budget --picture disk {TINY} --photons 2000 --model dipole"),
+    C("compare wax.toml --what budget --method cascade --rank 2"),
     C(
         f"compare wax.toml --what budget --picture disk {TINY} --photons 2000 --method burley"
         " --model burley --json"

@@ -385,7 +385,7 @@ def test_known_structures_leave_what_is_said_of_them(text, place, name):
         ({"fetches": 10, "stages": "1-1|2-2"}, "the stages 1-1|2-2 take"),
         ({"stages": "1-1|2-2", "passes": 6}, "allow more, or use fewer or smaller stages"),
         ({"stages": "1-x"}, "stages = '1-x'; expected numbers of tap pairs"),
-        ({"passes": 1, "fetches": 8}, "no known cascade has at most 8 fetches and 1 passes"),
+        ({"passes": 1, "fetches": 8}, "no known cascade has at most 8 fetches and 1 pass"),
         ({"spectrum": "pink"}, "spectrum = 'pink'; expected 'natural' or 'white'"),
         ({"stages": "1", "mm_per_pixel": -1.0}, "mm_per_pixel = -1"),
     ],

@@ -538,7 +538,7 @@ def flat(value, mm_per_pixel=0.6):
         ({"fetches": 6.9}, "fetches = 6.9; expected a number from 7 up"),
         ({"fetches": math.nan}, "fetches = nan; expected a number from 7 up"),
         ({"passes": 0}, "passes = 0; expected a whole number from 1 up"),
-        ({"fetches": 7.0, "passes": 1}, "no known table has at most 7 fetches and 1 passes"),
+        ({"fetches": 7.0, "passes": 1}, "no known table has at most 7 fetches and 1 pass"),
         ({"tolerance_of": "p50"}, "tolerance_of = 'p50'; expected one of p95, p99, mean"),
         ({"mm_per_pixel": 1e-300}, "mm_per_pixel = 1e-300; expected a length from 0.0005 mm up"),
         ({"mm_per_pixel": 0.001}, "8193 are the most; expected pixels of 0.0052 mm or more"),

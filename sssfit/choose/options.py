@@ -15,7 +15,7 @@ from sssfit.fit import TapsFit, fit_result, support_of
 from sssfit.fit.cascade import FEWEST
 from sssfit.fit.structures import STRUCTURES, between
 from sssfit.kernel.structure import cost_of_chain, parse
-from sssfit.messages import number, shown
+from sssfit.messages import counted, shown
 from sssfit.profile import Profile
 
 # Taps of the pre-integrated pass, and what each number leaves, as `STRUCTURES` has it.
@@ -116,9 +116,10 @@ def options(width: float, fetches: float | None = None, passes: int | None = Non
         if not found or each.known < found[-1].known:
             found.append(each)
     if not found:
+        limits = [] if fetches is None else [counted(fetches, "fetch", "g")]
+        limits += [] if passes is None else [counted(passes, "pass")]
         raise RenderError(
-            f"no known table has at most {number(fetches, 'g|any number of')} fetches and "
-            f"{passes or 'any number of'} passes; allow more of either."
+            f"no known table has at most {' and '.join(limits)}; allow more of either."
         )
     return found
 

@@ -35,7 +35,7 @@ from sssfit.fit._target import Pitch, Target, make_target, pitch_of
 from sssfit.fit.structures import best_structure, width_pixels
 from sssfit.kernel.structure import Shape, cost_of_chain, parse
 from sssfit.kernel.taps import Stage, Taps
-from sssfit.messages import shown
+from sssfit.messages import counted, shown
 from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
 from sssfit.scene.record import Scene
@@ -175,17 +175,23 @@ def structure_for(
         cost = cost_of_chain(shapes)
         if cost.fetches > most or (passes is not None and cost.passes > passes):
             raise FitError(
-                f"the stages {stages} take {cost.fetches:.4g} fetches and {cost.passes} passes; "
+                f"the stages {stages} take {counted(cost.fetches, 'fetch', '.4g')} and "
+                f"{counted(cost.passes, 'pass')}; "
                 "allow more, or use fewer or smaller stages."
             )
         return shapes
     best = best_structure(width, most, passes, full_resolution=full_resolution)
     if best is None:
         raise FitError(
-            f"no known cascade has at most {shown(budget)} fetches and {shown(passes)} passes; "
-            "allow more of either."
+            f"no known cascade has at most {_limits(budget, passes)}; allow more of either."
         )
     return parse(best)
+
+
+def _limits(budget: float | None, passes: int | None) -> str:
+    """Return the limits that were given, in words."""
+    given = [] if budget is None else [counted(budget, "fetch", ".6g")]
+    return " and ".join([*given, *([] if passes is None else [counted(passes, "pass")])])
 
 
 def _parsed(stages: str) -> tuple[Shape, ...]:

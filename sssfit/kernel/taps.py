@@ -50,7 +50,7 @@ from sssfit.kernel.structure import (
     text_of,
 )
 from sssfit.kernel.taps_json import is_taps_file
-from sssfit.messages import by_channel, html_table, number, of_material, printable, shown
+from sssfit.messages import by_channel, counted, html_table, number, of_material, printable, shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -97,6 +97,11 @@ class Stage:
     def shape(self) -> Shape:
         """The stage without its numbers."""
         return Shape(self.kind, 1 if self.kind == "star" else len(self.offsets_mm), self.level)
+
+    @property
+    def copies(self) -> float:
+        """Fetches that one weight beside the middle stands for, but for a disk's own middle."""
+        return _COPIES[self.kind]
 
     @property
     def variance_mm2(self) -> FloatArray:
@@ -204,7 +209,7 @@ class Taps:
         """Return one line with material, method, stages and cost."""
         return (
             f"Taps of {of_material(self.meta.get('material'))} by {self.method}, "
-            f"{self.structure}, {number(self.fetches, '.4g')} fetches of {self.mm_per_pixel:.4g} "
+            f"{self.structure}, {counted(self.fetches, 'fetch', '.4g')} of {self.mm_per_pixel:.4g} "
             "mm pixels"
         )
 
@@ -496,7 +501,9 @@ def _checked_stage(k: int, stage: Stage, taps: Taps) -> Stage:
 def _check_levels(stages: tuple[Stage, ...], *, chained: bool) -> None:
     """Check that every level has a stage, in order, and that terms have none but the first."""
     if not 1 <= len(stages) <= MOST_STAGES:
-        raise KernelError(f"there are {len(stages)} stages; expected 1 to {MOST_STAGES}.")
+        raise KernelError(
+            f"the table has {counted(len(stages), 'stage')}; expected 1 to {MOST_STAGES}."
+        )
     levels = [each.level for each in stages]
     rises = {b - a for a, b in zip([0, *levels], levels, strict=False)}
     if not rises <= {0, 1} or max(levels) >= MOST_LEVELS:
