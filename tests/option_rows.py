@@ -987,7 +987,38 @@ def _exported(ran: Ran) -> Any:
     return data.decode()
 
 
+_SOURCE = "export wax.hand.taps.json --format hlsl"
+_DENSE = "export wax.svd2.kernel.json --format hlsl"
+
+
+def _source(name: str, **settings: Any) -> str:
+    from sssfit.export import kernel_text
+    from sssfit.kernel import read_kernel
+
+    return kernel_text(read_kernel(name), "hlsl", **settings)[0]
+
+
+def _taps_source(**settings: Any) -> Callable[[], str]:
+    return lambda: _source("wax.hand.taps.json", **settings)
+
+
 EXPORT = {
+    "--prefix": Row(_SOURCE, "--prefix WAX", _exported, _taps_source(prefix="WAX"), default="SSS"),
+    "--coverage": Row(_SOURCE, "--coverage", _exported, _taps_source(coverage=True)),
+    "--keep-energy": Row(_SOURCE, "--keep-energy", _exported, _taps_source(keep_energy=True)),
+    "--half": Row(_SOURCE, "--half", _exported, _taps_source(half=True)),
+    "--without-shader": Row(
+        _SOURCE, "--without-shader", _exported, _taps_source(without_shader=True)
+    ),
+    "--with-shader": Row(
+        _DENSE,
+        "--with-shader",
+        _exported,
+        lambda: _source("wax.svd2.kernel.json", with_shader=True),
+    ),
+    "--dense": Row(
+        _DENSE, "--dense", _exported, lambda: _source("wax.svd2.kernel.json", dense=True)
+    ),
     "--format": Row(
         "export wax.svd2.kernel.json --format hlsl",
         "--format json",

@@ -2,17 +2,34 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 
+import numpy as np
+
+from sssfit.errors import KernelError
 from sssfit.export.dialects import KINDS, Dialect
+from sssfit.messages import shown
 
 _LONGEST = 96  # characters of a line of numbers
 _MANY = 8  # rows of an array from which on two share a line
 
 
-class Writer:
-    """Constants of one dialect and prefix."""
+def check_prefix(prefix: str) -> None:
+    """Refuse what names cannot begin with.
 
-    def __init__(self, dialect: Dialect, prefix: str) -> None:
-        self.dialect, self.prefix = dialect, prefix
+    Raises
+    ------
+    KernelError
+    """
+    if not (prefix.isascii() and prefix.isidentifier() and not prefix.startswith("_")):
+        raise KernelError(
+            f"prefix = {shown(prefix)}; expected letters, digits and _, such as SKIN."
+        )
+
+
+class Writer:
+    """Constants of one dialect and prefix, in single precision or rounded to half floats."""
+
+    def __init__(self, dialect: Dialect, prefix: str, *, half: bool = False) -> None:
+        self.dialect, self.prefix, self.half = dialect, prefix, half
 
     def scalar(self, kind: str, name: str, values: Sequence[float]) -> str:
         """Return a single constant."""
@@ -30,7 +47,7 @@ class Writer:
             kind=self.dialect.types[KINDS[min(count, len(KINDS)) - 1]],
             name=f"{self.prefix}_{name}",
             dims=f"[{count}]" if count > 1 else "",
-            value=self.dialect.literal(values),
+            value=self._literal(values),
         )
 
     def wholes(self, name: str, values: Sequence[int]) -> str:
@@ -49,7 +66,7 @@ class Writer:
             table, width = [[each] for row in table for each in row], 1
         kind = KINDS[min(width, len(KINDS)) - 1]
         before, after = self._ends(kind, name, len(table), f"[{width}]" if width > 1 else "")
-        values = [self.dialect.literal(each) for each in table]
+        values = [self._literal(each) for each in table]
         lines = [", ".join(values)] if width == 1 else values
         if len(lines[0]) > _LONGEST:
             lines = [", ".join(values[k : k + 8]) for k in range(0, len(values), 8)]
@@ -59,6 +76,10 @@ class Writer:
             yield f"{before}{lines[0]}{after}"
             return
         yield from (before, *(f"    {each}," for each in lines[:-1]), f"    {lines[-1]}", after)
+
+    def _literal(self, values: Sequence[float]) -> str:
+        rounded = np.array(values, np.float16).astype(float).tolist() if self.half else values
+        return self.dialect.literal(rounded)
 
     def _ends(self, kind: str, name: str, count: int, dims: str) -> tuple[str, str]:
         """Return what stands before and after the rows of an array."""

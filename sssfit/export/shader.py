@@ -9,13 +9,14 @@ import numpy as np
 from sssfit.arrays import FloatArray
 from sssfit.errors import KernelError
 from sssfit.export.certificate import certificate, how_to_run, pass_table
-from sssfit.export.constants import Writer
+from sssfit.export.constants import Writer, check_prefix
 from sssfit.export.dialects import Dialect, mark
 from sssfit.export.functions import Functions
 from sssfit.export.passes import pass_list
 from sssfit.kernel import Taps
-from sssfit.messages import printable, shown
+from sssfit.messages import printable
 
+_COPIES = {"pair": 2.0, "star": 4.0, "disk": 1.0}  # fetches of a row of weights, per pass
 KIND_NUMBERS = ("pair", "star", "disk")
 
 
@@ -31,6 +32,8 @@ class Style:
         Whether the functions of the passes follow the constants.
     normalized : bool
         Whether the blend adds up to 1 and the energy is a constant of its own.
+    half : bool
+        Whether numbers are rounded to half floats.
     features : tuple of str
         Of `FEATURES`: which are on where nothing else is said.
     """
@@ -38,6 +41,7 @@ class Style:
     prefix: str = "SSS"
     with_passes: bool = True
     normalized: bool = True
+    half: bool = False
     features: tuple[str, ...] = ()
 
 
@@ -85,11 +89,7 @@ def _notes(tables: Sequence[Taps], style: Style, *, passes: bool) -> Iterator[st
 
 
 def _check(tables: Sequence[Taps], style: Style) -> None:
-    prefix = style.prefix
-    if not (prefix.isascii() and prefix.isidentifier() and not prefix.startswith("__")):
-        raise KernelError(
-            f"prefix = {shown(prefix)}; expected letters, digits and _, such as SKIN."
-        )
+    check_prefix(style.prefix)
     first = tables[0]
     for each in tables[1:]:
         if (each.structure, each.channels, each.chained) != (
@@ -132,7 +132,7 @@ def _constants(
     tables: Sequence[Taps], dialect: Dialect, style: Style, *, passes: bool
 ) -> Iterator[str]:
     """Yield the constants: stages, offsets, weights and blend, profile after profile."""
-    first, write = tables[0], Writer(dialect, style.prefix)
+    first, write = tables[0], Writer(dialect, style.prefix, half=style.half)
     counts = [len(each.weights) for each in first.stages]
     yield write.scalar("float", "MM_PER_PIXEL", [first.mm_per_pixel])
     if len(tables) > 1:
@@ -174,3 +174,18 @@ def _blend(taps: Taps, style: Style) -> FloatArray:
     energy = np.where(taps.energy != 0.0, taps.energy, 1.0)
     blend: FloatArray = taps.blend / energy if style.normalized else taps.blend
     return blend
+
+
+def energy_in_half(taps: Taps) -> FloatArray:
+    """Return the energy (C,) of a table whose weights and blend are rounded to half floats."""
+    shares = taps.blend / np.where(taps.energy != 0.0, taps.energy, 1.0)
+    blend = shares.astype(np.float16).astype(float)
+    total, passed = blend[0].copy(), np.ones(len(taps.channels))
+    for stage, share in zip(taps.stages, blend[1:], strict=True):
+        rows = stage.weights.astype(np.float16).astype(float)
+        whole = rows[0] + _COPIES[stage.kind] * rows[1:].sum(axis=0)
+        whole = whole**2 if stage.kind == "pair" else whole
+        passed = passed * whole if taps.chained else whole
+        total += share * passed
+    energy: FloatArray = total * taps.energy
+    return energy
