@@ -52,11 +52,11 @@ def taps_of_kernel(kernel: SeparableKernel, most: int) -> Taps:
             "written as fetches; thin it to taps, or fit a cascade."
         )
     middle = kernel.pixels // 2
-    offsets = kernel.mm_per_pixel * np.arange(1, middle + 1)
+    offsets_mm: FloatArray = kernel.mm_per_pixel * np.arange(1.0, middle + 1.0)
     sums = kernel.weights.sum(axis=1)  # (R, C)
     whole: FloatArray = np.where(sums != 0.0, sums, 1.0)
-    halves: FloatArray = kernel.weights[:, middle:] / whole[:, None]
-    stages = [Stage(0, "pair", offsets, halves[k]) for k in range(kernel.rank)]
+    halves: FloatArray = np.divide(kernel.weights[:, middle:], whole[:, None])
+    stages = [Stage(0, "pair", offsets_mm, halves[k]) for k in range(kernel.rank)]
     blend = np.concatenate((np.zeros((1, len(kernel.channels))), kernel.signs * sums**2))
     return Taps(
         method=kernel.method,
