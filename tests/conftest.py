@@ -72,6 +72,11 @@ def pytest_collection():
         gc.enable()
 
 
+def pytest_sessionfinish():
+    """Let everything be collected at the end: OpenImageIO complains of what is left over."""
+    gc.unfreeze()
+
+
 @pytest.fixture(autouse=True)
 def no_child_outlives_its_test():
     """End what the test started and, having failed perhaps, did not end."""
