@@ -128,7 +128,7 @@ def test_a_disk_turns_as_in_the_renderer(frame, dialect):
 @pytest.mark.parametrize("dialect", RUN)
 def test_several_materials_in_one_table(dialect):
     every = [taps_of("1-1|2", channels=3, seed=seed) for seed in (3, 4)]
-    text, _ = kernel_text(every, dialect, Style(prefix="SKIN"))
+    text, _ = kernel_text(every, dialect, prefix="SKIN")
     light = light_of((37, 50), 3)
     for k, taps in enumerate(every):
         found = run(text, dialect, taps, light, PITCH, profile=k, prefix="SKIN")
@@ -244,7 +244,7 @@ def test_a_single_pair_of_unit_energy_needs_no_blend(dialect):
 @pytest.mark.parametrize("prefix", ["", "1a", "a b", "é", 'x"', "__x"])
 def test_a_prefix_is_an_identifier(prefix):
     with pytest.raises(KernelError, match=r"prefix = .* expected letters"):
-        kernel_text(taps_of("1", channels=3), "glsl", Style(prefix=prefix))
+        kernel_text(taps_of("1", channels=3), "glsl", prefix=prefix)
 
 
 def test_what_cannot_share_a_file_is_one_line():
