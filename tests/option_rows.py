@@ -6,8 +6,9 @@ click's own objects and fails where one has no row. Options that all verbs share
 """
 
 import contextlib
+import functools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -267,6 +268,19 @@ def _thinned(option: str, value: str, method: str, **own: Any) -> Row:
     return Row(command + usual, given, made_taps, made, words=words)
 
 
+def _relative(option: str, value: str, method: str, words: str = "", **own: Any) -> Row:
+    """An option of a relative of cascades, by the table of taps."""
+    usual = {} if "stages" in own else {"stages": "1-1"}
+
+    def made() -> Any:
+        found = fit.fit_taps(profile(), method, mm_per_pixel=0.6, **(usual | own)).kernel
+        return [found.structure, found.mm_per_pixel, found.blend]
+
+    command = f"fit wax.profile.npz --method {method} --mm-per-pixel .6"
+    typed = "".join(f" --{key} {each}" for key, each in usual.items())
+    return Row(command + typed, f"{option} {value}", lambda ran: ran.taps, made, words=words)
+
+
 def _sampled_disk() -> Any:
     found = fit.fit_taps(profile(), "disk", taps=5, mm_per_pixel=0.4).kernel
     return [found.structure, found.mm_per_pixel, found.blend]
@@ -328,12 +342,16 @@ FIT = {
     "--strength": _by_hand("--strength", ".5,.6,.9", "falloff", _SKIN, strength=[0.5, 0.6, 0.9]),
     "--falloff": _by_hand("--falloff", ".3,.4,.5", "falloff", _SKIN, falloff=[0.3, 0.4, 0.5]),
     "--fetches": _tapped("--fetches", "7.5", "24", fetches=7.5),
-    "--stages": _tapped("--stages", "1|1-1", stages="1|1-1"),
+    "--stages": replace(
+        _tapped("--stages", "1|1-1", stages="1|1-1"),
+        words="3-3-3-3-3-3 for gaussian-chain, 1|1|1|1|1 for pyramid",
+    ),
     "--passes": _tapped("--passes", "2", passes=2),
     "--full-resolution": _tapped("--full-resolution", "", full_resolution=True),
     "--still": _tapped("--still", "", still=True),
     "--taps": _thinned("--taps", "7", "svd", taps=7),
     "--place": _thinned("--taps 7 --place", "quadratic", "svd", taps=7, place="quadratic"),
+    "--blur": _relative("--blur", "published", "gaussian-chain", "shape", blur="published"),
     "--spectrum": _tapped("--spectrum", "white", "natural", spectrum="white"),
     "--output": Row(
         "fit wax.profile.npz --method svd",
@@ -1111,8 +1129,8 @@ COMMANDS = {
 }
 
 
-def _seeded_taps(seed: int) -> Any:
-    found = fit.fit_taps(profile(), stages="1-1", mm_per_pixel=0.6, seed=seed).kernel
+def _seeded_taps(seed: int, method: str = "cascade") -> Any:
+    found = fit.fit_taps(profile(), method, stages="1-1", mm_per_pixel=0.6, seed=seed).kernel
     return [found.structure, found.mm_per_pixel, found.blend]
 
 
@@ -1125,6 +1143,15 @@ SEEDS = {
         lambda ran: ran.taps,
         lambda: _seeded_taps(5),
     ),
+    **{
+        f"fit --method {method}": Row(
+            f"fit wax.profile.npz --method {method} --stages 1-1 --mm-per-pixel .6",
+            "--seed 5",
+            lambda ran: ran.taps,
+            functools.partial(_seeded_taps, 5, method),
+        )
+        for method in ("gaussian-chain", "pyramid")
+    },
     "render": Row(
         f"render --irradiance noise {_SIZE}",
         "--seed 5",
@@ -1185,6 +1212,9 @@ FITS = {
         _sampled_disk,
     ),
     "--rank of weighted": _fitted("--rank", "1", "weighted", rank=1),
+    "--stages of gaussian-chain": _relative("--stages", "1-1", "gaussian-chain", stages="1-1"),
+    "--stages of pyramid": _relative("--stages", "1|1", "pyramid", stages="1|1"),
+    "--spectrum of pyramid": _relative("--spectrum", "white", "pyramid", spectrum="white"),
     "--spectrum of weighted": _fitted("--spectrum", "white", "weighted", spectrum="white"),
 }
 

@@ -43,6 +43,8 @@ _METHODS: dict[str, tuple[str, str, str]] = {
     "falloff": ("falloff", "#56b4e9", "P"),
     "burley": ("Burley", "#999999", "X"),
     "weighted": ("weighted terms", "#882255", "<"),
+    "gaussian-chain": ("chain of Gaussians", "#661100", "d"),
+    "pyramid": ("convolution pyramid", "#44aa99", "h"),
     "disk": ("disk, one frame", "#999933", "p"),
 }
 _GREY = "#666666"

@@ -18,14 +18,14 @@ makes pictures better and light that moves stiller.
 """
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 from scipy import optimize
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import FitError, KernelError
-from sssfit.fit._chain import Chain
+from sssfit.fit._chain import Chain, Searched
 from sssfit.fit._chain_pairs import PairChain
 from sssfit.fit._chain_stars import StarChain
 from sssfit.fit._result import TapsFit, provenance
@@ -48,6 +48,8 @@ STRUCTURES: Mapping[str, float] = {
     "1|1|1": 8.23,
     "1|2": 13.7,
     "1|1|2": 4.51,
+    "1|1|1|1|1": 0.876,
+    "1|1|1|1|1|1": 0.648,
     "1|1|1|1-1": 0.718,
     "1|1|1-1": 2.98,
     "1|1|1-2": 1.46,
@@ -150,18 +152,11 @@ def fit_cascade(
             "still is for stages of pairs, and the structure has stars; name another, or allow "
             "more passes."
         )
-    support_mm = _reach_mm(profile, mm_per_pixel) if support_mm is None else support_mm
-    target = make_target(profile, mm_per_pixel, support_mm)
-    lit = [int(c) for c in np.flatnonzero(~target.is_empty)]
+    target, lit = whole_target(profile, mm_per_pixel, support_mm)
     with one_blas_thread():
         kind = StarChain if any(each.kind == "star" for each in shapes) else PairChain
         chain = kind(spectral_target(target, lit, spectrum), shapes)
-        x, evaluations = _search(chain, seed)
-        if isinstance(chain, PairChain) and shapes[-1].level > 0:
-            chain.aliasing = _STILL if still else _ALIASING
-            calmed = _descend(chain, x, 100, gain=1e-4)
-            x, evaluations = calmed.x, evaluations + calmed.nfev
-        error = chain.target.error(chain.spectrum(x))
+        x, evaluations = searched(chain, chain, seed, _STILL if still else _ALIASING)
     settings = {
         "fetches": fetches,
         "stages": stages,
@@ -171,8 +166,22 @@ def fit_cascade(
         "still": still,
         "fit_seed": seed,
     }
-    taps = _taps(target, chain, x, lit, error, settings)
+    taps = table_of("cascade", target, chain, x, settings)
     return TapsFit(taps, evaluations, time.perf_counter() - begun)
+
+
+def whole_target(
+    profile: Profile, mm_per_pixel: Pitch | None, support_mm: float | None
+) -> tuple[Target, list[int]]:
+    """Return the pixels that hold nearly all light unless a support is given, and lit channels."""
+    support_mm = _reach_mm(profile, mm_per_pixel) if support_mm is None else support_mm
+    target = make_target(profile, mm_per_pixel, support_mm)
+    return target, lit_channels(target)
+
+
+def lit_channels(target: Target) -> list[int]:
+    """Return the channels that return light."""
+    return [int(c) for c in np.flatnonzero(~target.is_empty)]
 
 
 def _reach_mm(profile: Profile, mm_per_pixel: Pitch | None) -> float:
@@ -238,7 +247,30 @@ def _parsed(stages: str) -> tuple[Shape, ...]:
         raise FitError(str(error)) from None
 
 
-def _search(chain: Chain, seed: int) -> tuple[FloatArray, int]:
+def searched(
+    parameters: Searched, chain: Chain, seed: int, aliasing: float = _ALIASING
+) -> tuple[FloatArray, int]:
+    """Return the best parameters found, with aliasing weighed in last, and evaluations.
+
+    Parameters
+    ----------
+    parameters : Searched
+        The chain, or fewer parameters that it follows.
+    chain : Chain
+    seed : int
+        Of the random starts.
+    aliasing : float
+        Weight of the squared images of halved pictures, for stages of pairs.
+    """
+    x, evaluations = _search(parameters, seed)
+    if isinstance(chain, PairChain) and chain.shapes[-1].level > 0:
+        chain.aliasing = aliasing
+        calmed = _descend(parameters, x, 100, gain=1e-4)
+        x, evaluations = calmed.x, evaluations + calmed.nfev
+    return x, evaluations
+
+
+def _search(chain: Searched, seed: int) -> tuple[FloatArray, int]:
     """Return the best parameters of several starts and of hops from the best, and evaluations.
 
     The misfit is smooth between texels only, so it has local optima. Of skin1's 64 random starts
@@ -263,7 +295,7 @@ def _search(chain: Chain, seed: int) -> tuple[FloatArray, int]:
     return best.x, count + sum(each.nfev for each in found)
 
 
-def _rough(chain: Chain, x: FloatArray) -> optimize.OptimizeResult:
+def _rough(chain: Searched, x: FloatArray) -> optimize.OptimizeResult:
     """Come near an optimum in many cheap steps."""
     return optimize.minimize(
         chain.value_and_gradient,
@@ -274,7 +306,9 @@ def _rough(chain: Chain, x: FloatArray) -> optimize.OptimizeResult:
     )
 
 
-def _descend(chain: Chain, x: FloatArray, most: int, gain: float = 3e-3) -> optimize.OptimizeResult:
+def _descend(
+    chain: Searched, x: FloatArray, most: int, gain: float = 3e-3
+) -> optimize.OptimizeResult:
     """Minimise from a point by a trust region with the Gauss-Newton matrix.
 
     It ends when ten steps together gain less than ``gain`` of the value.
@@ -297,16 +331,25 @@ def _descend(chain: Chain, x: FloatArray, most: int, gain: float = 3e-3) -> opti
     )
 
 
-def _taps(
-    target: Target,
-    chain: Chain,
-    x: FloatArray,
-    lit: Sequence[int],
-    error: FloatArray,
-    settings: Mapping[str, object],
+def table_of(
+    method: str, target: Target, chain: Chain, x: FloatArray, settings: Mapping[str, object]
 ) -> Taps:
-    """Return the table of taps; channels without light take the first one's weights."""
-    numbers = chain.numbers(x)
+    """Return the table of taps; channels without light take the first one's weights.
+
+    Parameters
+    ----------
+    method : str
+    target : Target
+    chain : Chain
+        Of the target's lit channels.
+    x : array
+        The chain's parameters.
+    settings : mapping
+        For provenance.
+    """
+    numbers, lit = chain.numbers(x), lit_channels(target)
+    with one_blas_thread():
+        error = chain.target.error(chain.spectrum(x))
     channels = target.profile.n_channels
     source = [lit.index(c) if c in lit else 0 for c in range(channels)]
     stages = [
@@ -325,7 +368,7 @@ def _taps(
     total = target.total
     energy = np.where(total > 0.0, blend.sum(axis=0) / np.where(total > 0.0, total, 1.0) - 1.0, 0.0)
     return Taps(
-        method="cascade",
+        method=method,
         mm_per_pixel=target.mm_per_pixel,
         channels=target.profile.channels,
         chained=True,
