@@ -60,8 +60,8 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
     settings |= _picture_target(settings, common.threads)
     settings["mm_per_pixel"] = given["mm_per_pixel"]
     settings["support_mm"] = None if given["support"] == "auto" else given["support"]
-    is_ours = is_taps_file if is_taps else is_kernel_file
-    with held([path], is_ours, inputs=[name], force=given["force"], named=KERNEL):
+    is_ours, inputs = is_taps_file if is_taps else is_kernel_file, [name, given["irradiance"]]
+    with held([path], is_ours, inputs=inputs, force=given["force"], named=KERNEL):
         result = fit_result(source, method, **settings)
         write(result.kernel.write, path)
     figures = {"profile": name, **result.to_dict()}

@@ -31,7 +31,7 @@ class Setting:
         Name of the option, with underscores.
     kind : str
         "number", "numbers" (one, or one per channel), "length", "share", "seconds", "whole",
-        "count" (a whole number, 1e7 is understood), "choice" or "flag".
+        "count" (a whole number, 1e7 is understood), "text", "choice" or "flag".
     help : str
         Help text; the names of its methods are put before it.
     metavar : str
@@ -206,6 +206,13 @@ _SPECTRUM = Setting(
     among=("natural", "white"),
     words="natural",
 )
+_IRRADIANCE = Setting(
+    "irradiance",
+    "text",
+    "the picture that the kernel is for, in place of a spectrum: a made one, as of sssfit render, "
+    "or your own file.",
+    "NAME|FILE",
+)
 
 _STAGES = Setting(
     "stages",
@@ -246,6 +253,7 @@ FITS: Mapping[str, Method] = {
             Setting("full_resolution", "flag", "do not halve the picture."),
             Setting("still", "flag", "weigh in what changes as light moves by a pixel."),
             _SPECTRUM,
+            _IRRADIANCE,
         ),
         counted=("stages", "fetches"),
         makes_taps=True,
@@ -365,6 +373,7 @@ FITS: Mapping[str, Method] = {
         (
             Setting("rank", "whole", "number of terms.", "N", (1, 1000), words="2"),
             _SPECTRUM,
+            _IRRADIANCE,
             *_TAPS,
         ),
         counted=("rank",),

@@ -280,6 +280,18 @@ FIT = [
             "--stages '1|1' --still",
         )
     ),
+    *(
+        C(f"fit wax.profile.npz {own}", brief=True, hidden=ERRORS)
+        for own in (
+            "--stages 1-1 --mm-per-pixel .6 --irradiance edge",
+            "--method weighted --rank 1 --mm-per-pixel .25 --support .5 --irradiance mine.exr",
+        )
+    ),
+    C("fit wax.profile.npz --stages 1-1 --irradiance rgb8.png"),
+    C("fit wax.profile.npz --stages 1-1 --irradiance mine.exr"),
+    C("fit wax.profile.npz --stages 1-1 --irradiance hed"),
+    C("fit wax.profile.npz --stages 1-1 --irradiance head --spectrum natural"),
+    C("fit wax.profile.npz --method svd --irradiance head"),
     C("fit wax.profile.npz --method disk --mm-per-pixel .6"),
     C("fit wax.profile.npz --method disk --taps 5 --mm-per-pixel .6 --json"),
     C("fit wax.profile.npz --method disk --taps 3"),

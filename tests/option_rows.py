@@ -353,6 +353,7 @@ FIT = {
     "--place": _thinned("--taps 7 --place", "quadratic", "svd", taps=7, place="quadratic"),
     "--blur": _relative("--blur", "published", "gaussian-chain", "shape", blur="published"),
     "--spectrum": _tapped("--spectrum", "white", "natural", spectrum="white"),
+    "--irradiance": _tapped("--irradiance", "edge", irradiance="edge"),
     "--output": Row(
         "fit wax.profile.npz --method svd",
         "-o x.kernel.json",
@@ -1216,6 +1217,7 @@ FITS = {
     "--stages of pyramid": _relative("--stages", "1|1", "pyramid", stages="1|1"),
     "--spectrum of pyramid": _relative("--spectrum", "white", "pyramid", spectrum="white"),
     "--spectrum of weighted": _fitted("--spectrum", "white", "weighted", spectrum="white"),
+    "--irradiance of weighted": _fitted("--irradiance", "edge", "weighted", irradiance="edge"),
 }
 
 VERBOSE = {"choose"}  # where --verbose has something to say

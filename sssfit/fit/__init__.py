@@ -115,7 +115,8 @@ def fit_result(
     if taps is None:
         return dense
     begun = time.perf_counter()
-    thinned = on_taps(dense.kernel, taps, place=place or PLACES[0], profile=profile)
+    pictures = {key: settings[key] for key in ("spectrum", "irradiance") if key in settings}
+    thinned = on_taps(dense.kernel, taps, place=place or PLACES[0], profile=profile, **pictures)
     seconds = dense.seconds + time.perf_counter() - begun
     return TapsFit(thinned, sum(dense.evaluations), seconds)
 

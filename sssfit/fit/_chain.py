@@ -18,7 +18,7 @@ Everything is positive, and energy exact: v = exp(.) normalised, m = energy soft
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -66,6 +66,8 @@ class Chain(ABC):
     steps (k,), shared by the channels, and of its weights (C, k+1). The two offsets of a star stand
     in place of steps.
     """
+
+    aliasing = 0.0  # weight in the misfit of the squared images that halved pictures show
 
     def __init__(self, target: SpectralTarget, shapes: Sequence[Shape]) -> None:
         self.target, self.shapes = target, tuple(shapes)
@@ -147,6 +149,22 @@ class Chain(ABC):
         at = np.arange(self._at[k], self._at[k + 1])
         count = self.counts[k]
         return at[:count], at[count:].reshape(self.channels, count + 1)
+
+    def _images(self) -> Iterator[FloatArray]:
+        """Yield for each level by what images along an axis multiply the chain, (L+1, n).
+
+        There is none where aliasing is not weighed in; see ``_chain_pairs``.
+        """
+        levels = np.array([0, *(each.level for each in self.shapes)])
+        for level in range(1, levels[-1] + 1 if self.aliasing > 0.0 else 1):
+            image = np.zeros((levels.size, self.target.frequencies.size))
+            _, image[1:] = resampling(
+                self.target.frequencies - 2.0 * np.pi / 2.0**level, levels[1:].tolist()
+            )
+            # Texels of coarser levels lie between those, where the image has the other sign.
+            image *= np.sign(level + 0.5 - levels)[:, None]
+            image[levels < level] = 0.0
+            yield image
 
     def _steps(self, k: int) -> slice:
         """Return where a stage's offset steps are among the parameters."""

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sssfit.arrays import FloatArray
-from sssfit.fit._chain import Chain, fetches, normalised, resampling
+from sssfit.fit._chain import Chain, fetches, normalised
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,8 +41,6 @@ class _View:
 
 class PairChain(Chain):
     """See `Chain`."""
-
-    aliasing = 0.0  # weight of the squared images in the misfit
 
     def spectrum(self, x: FloatArray) -> FloatArray:
         """Return the chain's spectrum (C, n, n)."""
@@ -94,15 +92,8 @@ class PairChain(Chain):
         """Return the kernel, and what aliasing adds to each level, where it counts."""
         irradiance = np.ones((1, self.target.frequencies.size))
         up = np.concatenate((irradiance, self._up))
-        views = [_View(up, up, self.target.wanted, 1.0)]
-        levels = [each.level for each in self.shapes]
-        for level in range(1, levels[-1] + 1 if self.aliasing > 0.0 else 1):
-            _, image = resampling(self.target.frequencies - 2.0 * np.pi / 2.0**level, levels)
-            # Texels of coarser levels lie between those, where the image has the other sign.
-            image *= np.sign(level + 0.5 - np.array(levels))[:, None]
-            image[np.array(levels) < level] = 0.0
-            views.append(_View(np.concatenate((0.0 * irradiance, image)), up, 0.0, self.aliasing))
-        return views
+        images = [_View(image, up, 0.0, self.aliasing) for image in self._images()]
+        return [_View(up, up, self.target.wanted, 1.0), *images]
 
     def _blur(self, x: FloatArray, k: int) -> _Blur:
         steps, logits = self._stage(x, k)

@@ -1,7 +1,8 @@
 """The misfit of a chain with stars among its stages: its spectrum has two dimensions throughout.
 
 Every spectrum stays the same if the axes are exchanged, so the frequencies of a triangle stand for
-all; see ``_chain``.
+all; see ``_chain``. The images that halved pictures show along x (``_chain_pairs``) change with the
+exchange, so both orders of a place in the triangle are summed.
 """
 
 from collections.abc import Sequence
@@ -23,51 +24,80 @@ class _Blur:
     slopes: FloatArray
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _View:
+    """One fitted sum over stages: what the chain up to each stage is multiplied by."""
+
+    factors: FloatArray  # (L+1, M)
+    wanted: FloatArray | float
+    power: FloatArray  # (C, M), of its squares
+
+
 class StarChain(Chain):
     """See `Chain`; M is the number of frequencies (wx, wy) of the triangle."""
 
     def __init__(self, target: SpectralTarget, shapes: Sequence[Shape]) -> None:
         super().__init__(target, shapes)
         self._x, self._y = np.tril_indices(target.frequencies.size)
-        twice = np.where(self._x == self._y, 1.0, 2.0)
-        self._power = target.power[:, self._x, self._y] * twice
+        self._twice = np.where(self._x == self._y, 1.0, 2.0)
+        self._power = target.power[:, self._x, self._y]
         self._wanted = target.wanted[:, self._x, self._y]
-        self._resized = [self._both(each) for each in (self._down, self._up)]
+        self._halvings = self._both(self._down)
 
     def spectrum(self, x: FloatArray) -> FloatArray:
         """Return the chain's spectrum (C, n, n)."""
         count = self.target.frequencies.size
         found = np.empty((self.channels, count, count))
-        flat = np.einsum("lc,lcm->cm", self._blend(x), self._pictures(self._blurs(x)))
+        rows = self._blend(x)[:, :, None] * self._views()[0].factors[:, None]
+        flat = np.einsum("lcm,lcm->cm", rows, self._chain(self._blurs(x)))
         found[:, self._x, self._y] = found[:, self._y, self._x] = flat
         return found
 
     def misfit(self, x: FloatArray) -> tuple[float, FloatArray]:
         """Return the sum over channels of the squared relative misfit, and its gradient."""
         blurs, m = self._blurs(x), self._blend(x)
-        u = self._pictures(blurs)  # (L+1, C, M)
-        apart = np.einsum("lc,lcm->cm", m, u) - self._wanted
-        weighted = self._power * apart
-        by_blend = 2.0 * m * np.einsum("cm,lcm->lc", weighted, u)
+        chain = self._chain(blurs)  # (L+1, C, M)
+        value, by_blend, by_chain = 0.0, np.zeros_like(m), np.zeros_like(chain)
+        for view in self._views():
+            rows = m[:, :, None] * view.factors[:, None]
+            apart = np.einsum("lcm,lcm->cm", rows, chain) - view.wanted
+            weighted = view.power * apart
+            value += float(np.vdot(weighted, apart))
+            by_rows = 2.0 * rows * weighted
+            by_chain += by_rows
+            by_blend += np.einsum("lcm,lcm->lc", by_rows, chain)
         share = m / self.target.energy
         gradient = np.empty(self.size)
         gradient[: m.size] = (by_blend - share * by_blend.sum(axis=0)).ravel()
-        self._backwards(blurs, 2.0 * weighted, m, gradient)
-        return float(np.vdot(weighted, apart)), gradient
+        self._backwards(blurs, by_chain, gradient)
+        return value, gradient
 
     def matrix(self, x: FloatArray) -> FloatArray:
         """Return the Gauss-Newton part of its second derivatives, (size, size)."""
         blurs, m = self._blurs(x), self._blend(x)
-        u = self._pictures(blurs)
-        whole = np.einsum("lc,lcm->cm", m, u) / self.target.energy[:, None]
-        by_blend = (m[:, :, None] * (u - whole)).transpose(1, 0, 2)
-        rows = np.concatenate((by_blend, self._slopes(blurs, m)), axis=1)
-        rows *= np.sqrt(self._power)[:, None]
+        chain = self._chain(blurs)
         found = np.zeros((self.size, self.size))
-        for c in range(self.channels):
-            own = self._parameters_of(c)
-            found[np.ix_(own, own)] += 2.0 * rows[c] @ rows[c].T
+        for view in self._views():
+            shown = chain * view.factors[:, None]
+            whole = np.einsum("lc,lcm->cm", m, shown) / self.target.energy[:, None]
+            by_blend = (m[:, :, None] * (shown - whole)).transpose(1, 0, 2)
+            by_stage = self._slopes(blurs, m[:, :, None] * view.factors[:, None])
+            rows = np.concatenate((by_blend, by_stage), axis=1)
+            rows *= np.sqrt(view.power)[:, None]
+            for c in range(self.channels):
+                own = self._parameters_of(c)
+                found[np.ix_(own, own)] += 2.0 * rows[c] @ rows[c].T
         return found
+
+    def _views(self) -> list[_View]:
+        """Return the kernel, and what aliasing adds to each level, where it counts."""
+        up = np.concatenate((np.ones((1, self.target.frequencies.size)), self._up))
+        views = [_View(self._both(up), self._wanted, self._power * self._twice)]
+        power = 0.5 * self.aliasing * self._power * self._twice
+        for image in self._images():
+            for x, y in ((self._x, self._y), (self._y, self._x)):
+                views.append(_View(image[:, x] * up[:, y], 0.0, power))
+        return views
 
     def _both(self, line: FloatArray) -> FloatArray:
         """Return f(wx) f(wy) of spectra (..., n) along an axis."""
@@ -108,41 +138,35 @@ class StarChain(Chain):
         by_offset = weights[:, 1:, None] * moved
         return _Blur(spectrum, np.concatenate((by_offset, by_weight), axis=1))
 
-    def _pictures(self, blurs: Sequence[_Blur]) -> FloatArray:
-        """Return the spectrum of each stage's picture as it is added up, (L+1, C, M)."""
-        down, up = self._resized
+    def _chain(self, blurs: Sequence[_Blur]) -> FloatArray:
+        """Return the product of all stages and halvings up to each stage, (L+1, C, M)."""
         found = np.ones((len(blurs) + 1, self.channels, self._x.size))
-        chain = found[0]
         for k, blur in enumerate(blurs):
-            chain = chain * (down[k] * blur.spectrum)
-            found[k + 1] = chain * up[k]
+            found[k + 1] = found[k] * (self._halvings[k] * blur.spectrum)
         return found
 
-    def _backwards(
-        self, blurs: Sequence[_Blur], by_sum: FloatArray, m: FloatArray, gradient: FloatArray
-    ) -> None:
-        """Fill in the gradient by the stages from that by the chain's spectrum (C, M)."""
-        down, up = self._resized
-        before = [np.ones(by_sum.shape)]
-        for k, blur in enumerate(blurs):
-            before.append(before[-1] * (down[k] * blur.spectrum))
-        by_chain = np.zeros(by_sum.shape)
+    def _backwards(self, blurs: Sequence[_Blur], by_rows: FloatArray, gradient: FloatArray) -> None:
+        """Fill in the gradient by the stages from that by their chain (L+1, C, M)."""
+        before = self._chain(blurs)
+        by_chain = np.zeros(before.shape[1:])
         for k in range(len(blurs) - 1, -1, -1):
-            by_chain = by_chain + m[k + 1][:, None] * up[k] * by_sum
-            by_blur = by_chain * before[k] * down[k]
+            by_chain = by_chain + by_rows[k + 1]
+            by_blur = by_chain * before[k] * self._halvings[k]
             self._put_stage(gradient, k, np.einsum("cm,cpm->cp", by_blur, blurs[k].slopes))
-            by_chain = by_chain * (down[k] * blurs[k].spectrum)
+            by_chain = by_chain * (self._halvings[k] * blurs[k].spectrum)
 
-    def _slopes(self, blurs: Sequence[_Blur], m: FloatArray) -> FloatArray:
-        """Return derivatives of the chain's spectrum by a channel's stages, (C, p, M)."""
-        down, up = self._resized
+    def _slopes(self, blurs: Sequence[_Blur], rows: FloatArray) -> FloatArray:
+        """Return derivatives of the sum of rows (L+1, C, M) times the chain, (C, p, M).
+
+        They are by a channel's p parameters of stages.
+        """
         counts = [each.slopes.shape[1] for each in blurs]
         moving = np.zeros((self.channels, sum(counts), self._x.size))
         found, chain, done = np.zeros(moving.shape), np.ones(moving[:, 0].shape), 0
         for k, blur in enumerate(blurs):
-            factor = down[k] * blur.spectrum
+            factor = self._halvings[k] * blur.spectrum
             moving[:, :done] *= factor[:, None]
-            moving[:, done : done + counts[k]] = (chain * down[k])[:, None] * blur.slopes
+            moving[:, done : done + counts[k]] = (chain * self._halvings[k])[:, None] * blur.slopes
             chain, done = chain * factor, done + counts[k]
-            found[:, :done] += (m[k + 1][:, None] * up[k])[:, None] * moving[:, :done]
+            found[:, :done] += rows[k + 1][:, None] * moving[:, :done]
         return found

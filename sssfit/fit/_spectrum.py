@@ -6,17 +6,38 @@ of the kernel's spectrum K^(wx, wy) is seen with the weight
     S(wx, wy) = 1 / (4 sin^2(wx/2) + 4 sin^2(wy/2)),
 
 the power of the discrete Laplacian's inverse. White weights give the Frobenius norm.
+
+One picture E has its own power. Mirrored at its border it is a sum of cosines, which an even kernel
+only scales, and by Parseval
+
+    |K * E - K~ * E|^2 = sum over k of |E^_k|^2 (K^(w_k) - K~^(w_k))^2,    w_k = pi k / N,
+
+with E^ its orthonormal cosine transform (DCT-II), so the weighted misfit is the squared error of
+the rendered picture. Mirrored pictures have no edges but their own: no window is needed.
 """
 
 from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
+from scipy import fft
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import FitError
 from sssfit.fit._target import Target
+from sssfit.messages import printable
+from sssfit.scene.load import load_scene
+from sssfit.scene.made import MADE, check_pictures
+from sssfit.scene.record import Scene
 
 SPECTRA = ("natural", "white")
+Pictures: TypeAlias = str | Scene  # a word of SPECTRA, or the picture itself
+# Share of the natural spectrum in a picture's own, so that frequencies that it lacks have a weight.
+# A fit that is no worse in the mixture than the natural one, the best for the second part, is no
+# worse for the picture.
+_FLOOR = 1e-3
+_ROWS = 512  # of made pictures, as `load_scene` makes them
 # The lowest frequency above 0 is that of a picture of so many pixels, or of one that holds the
 # kernel. Over a graded grid of 72 a side the optimum of a cascade is that over 256 (a trial's).
 _PICTURE_PIXELS = 256
@@ -57,10 +78,86 @@ class SpectralTarget:
         return np.sqrt(squares)
 
 
+def pictures_of(
+    target: Target, spectrum: str | None, irradiance: str | Path | Scene | None
+) -> Pictures:
+    """Return what a kernel is for: a word for the spectrum, or one picture, read and checked.
+
+    Parameters
+    ----------
+    target : Target
+        The kernel's pixels, which are also those of a made picture.
+    spectrum : {"natural", "white"}, optional
+        By default natural, unless there is a picture.
+    irradiance : str, Path or Scene, optional
+        A made picture's name, a file, or a scene.
+
+    Raises
+    ------
+    FitError
+        Both are given; the picture has other pixels or channels, is smaller than the kernel or of
+        one colour.
+    ArgumentError, FileError, RenderError
+        There is no such picture, or it cannot be read.
+    """
+    if irradiance is None:
+        return "natural" if spectrum is None else spectrum
+    if spectrum is not None:
+        raise FitError(
+            f"`spectrum = {printable(str(spectrum))}` beside a picture, which has a spectrum of "
+            "its own; leave out one of the two."
+        )
+    scene = irradiance if isinstance(irradiance, Scene) else _loaded(target, str(irradiance))
+    _check_picture(target, scene)
+    return scene
+
+
+def recorded(pictures: Pictures) -> dict[str, str]:
+    """Return the setting that a kernel's file keeps of them."""
+    if isinstance(pictures, Scene):
+        return {"irradiance": pictures.name}
+    return {"spectrum": pictures}
+
+
+def _loaded(target: Target, name: str) -> Scene:
+    check_pictures([name])
+    if name not in MADE or name == "head":
+        return load_scene(name, otherwise=target.mm_per_pixel)
+    rows = max(_ROWS, 2 * target.half_pixels + 1)
+    return load_scene(name, target.mm_per_pixel, size=(rows, rows))
+
+
+def _check_picture(target: Target, scene: Scene) -> None:
+    """Refuse a picture whose power says nothing about the kernel's error."""
+    pitch, pixels = target.mm_per_pixel, 2 * target.half_pixels + 1
+    if abs(scene.mm_per_pixel - pitch) > 1e-6 * pitch:
+        raise FitError(
+            f"{scene.name} has pixels of {scene.mm_per_pixel:.7g} mm and the kernel of {pitch:.7g} "
+            "mm; expected the same: give `mm_per_pixel`."
+        )
+    if scene.channels not in (1, target.profile.n_channels):
+        raise FitError(
+            f"{scene.name} has {scene.channels} channels and the profile "
+            f"{target.profile.n_channels}; expected as many, or one."
+        )
+    if min(scene.height, scene.width) < pixels:
+        raise FitError(
+            f"{scene.name} has {scene.width} x {scene.height} pixels and the kernel {pixels} x "
+            f"{pixels}; expected a picture at least as large, or a smaller support."
+        )
+    flat = np.ptp(scene.irradiance, axis=(0, 1)) == 0.0
+    if flat.any():
+        where = f" in channel {target.profile.channels[np.argmax(flat)]}" * (scene.channels > 1)
+        raise FitError(
+            f"{scene.name} is of one colour{where}, which no kernel blurs; give a picture with an "
+            "edge in it."
+        )
+
+
 def spectral_target(
     target: Target,
     channels: list[int],
-    spectrum: str,
+    pictures: Pictures,
     grid: tuple[FloatArray, FloatArray] | None = None,
 ) -> SpectralTarget:
     """Return the spectrum of a target's kernel, scaled to all of its energy.
@@ -71,8 +168,8 @@ def spectral_target(
         A profile and its pixels.
     channels : list of int
         Channels that return light.
-    spectrum : {"natural", "white"}
-        Of the pictures that the kernel is for.
+    pictures : {"natural", "white"} or Scene
+        What the kernel is for: their spectrum, or the picture.
     grid : tuple of array (n,), optional
         Frequencies and their weights; by default `graded_frequencies`.
 
@@ -81,8 +178,8 @@ def spectral_target(
     FitError
         The spectrum is another word.
     """
-    if spectrum not in SPECTRA:
-        raise FitError(f"spectrum = {spectrum!r}; expected {' or '.join(map(repr, SPECTRA))}.")
+    if not isinstance(pictures, Scene) and pictures not in SPECTRA:
+        raise FitError(f"spectrum = {pictures!r}; expected {' or '.join(map(repr, SPECTRA))}.")
     w, cell = graded_frequencies(target.half_pixels) if grid is None else grid
     cosines = _cosines(w, target)
     energy = target.total[channels]
@@ -91,12 +188,49 @@ def spectral_target(
         row[...] = cosines @ target.quadrant(channel) @ cosines.T
         row *= total / row[0, 0]
     power = cell[:, None] * cell
-    if spectrum == "natural":
+    if pictures != "white":
         sine = 4.0 * np.sin(0.5 * w) ** 2
         power[0, 0] = 0.0  # the energy is exact, where S is infinite
         power /= np.maximum(sine[:, None] + sine, sine[1])
-    norm = np.einsum("ij,cij->c", power, wanted**2)
-    return SpectralTarget(w, wanted, power / norm[:, None, None], energy, target.half_pixels)
+    weights = _scaled(np.broadcast_to(power, wanted.shape), wanted)
+    if isinstance(pictures, Scene):
+        planes = np.moveaxis(pictures.irradiance, -1, 0)
+        seen = planes[channels] if len(planes) > 1 else planes
+        own = np.broadcast_to([power_of(each, w) for each in seen], wanted.shape)
+        weights = (1.0 - _FLOOR) * _scaled(own, wanted) + _FLOOR * weights
+    return SpectralTarget(w, wanted, weights, energy, target.half_pixels)
+
+
+def _scaled(power: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Return power (C, n, n) with sum power wanted^2 = 1 for each channel."""
+    norm: FloatArray = np.einsum("cij,cij->c", power, wanted**2)
+    return power / norm[:, None, None]
+
+
+def power_of(light: FloatArray, w: FloatArray) -> FloatArray:
+    """Return the power of a mirrored picture (H, W) on frequencies w (n,), (n, n).
+
+    What lies between two frequencies goes to both by hats, so the sum is the picture's own, but for
+    its mean, which is left out. Kernels are the same along both axes, and so is the mean of the
+    two.
+    """
+    power = fft.dctn(light, norm="ortho") ** 2
+    for _ in range(2):
+        power = _at(power, w).T
+    power[0, 0] = 0.0
+    found: FloatArray = 0.5 * (power + power.T)
+    return found
+
+
+def _at(power: FloatArray, w: FloatArray) -> FloatArray:
+    """Share out the rows (N, ..) of a cosine transform among frequencies w (n,), (n, ..)."""
+    own = np.pi * np.arange(len(power)) / len(power)
+    lower = np.clip(np.searchsorted(w, own, side="right") - 1, 0, w.size - 2)
+    upper = np.clip((own - w[lower]) / (w[lower + 1] - w[lower]), 0.0, 1.0)[:, None]
+    found = np.zeros((w.size, power.shape[1]))
+    np.add.at(found, lower, power * (1.0 - upper))
+    np.add.at(found, lower + 1, power * upper)
+    return found
 
 
 def _cosines(w: FloatArray, target: Target) -> FloatArray:

@@ -18,7 +18,8 @@ makes pictures better and light that moves stiller.
 """
 
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 
 import numpy as np
 from scipy import optimize
@@ -29,13 +30,14 @@ from sssfit.fit._chain import Chain, Searched
 from sssfit.fit._chain_pairs import PairChain
 from sssfit.fit._chain_stars import StarChain
 from sssfit.fit._result import TapsFit, provenance
-from sssfit.fit._spectrum import spectral_target
+from sssfit.fit._spectrum import pictures_of, recorded, spectral_target
 from sssfit.fit._target import Pitch, Target, make_target, pitch_of
 from sssfit.kernel.structure import Shape, cost_of_chain, parse
 from sssfit.kernel.taps import Stage, Taps
 from sssfit.messages import shown
 from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
+from sssfit.scene.record import Scene
 
 FETCHES = 24  # skin1 at .3 mm: 99 % of a picture's pixels within a Delta E of .12
 FEWEST = 7
@@ -104,7 +106,8 @@ def fit_cascade(
     stages: str | None = None,
     passes: int | None = None,
     full_resolution: bool = False,
-    spectrum: str = "natural",
+    spectrum: str | None = None,
+    irradiance: str | Path | Scene | None = None,
     still: bool = False,
     seed: int = 1,
     mm_per_pixel: Pitch | None = None,
@@ -124,11 +127,15 @@ def fit_cascade(
         Most passes of the stages.
     full_resolution : bool
         Use no structure that halves the picture.
-    spectrum : {"natural", "white"}
-        Of the pictures that the kernel is for.
+    spectrum : {"natural", "white"}, optional
+        Of the pictures that the kernel is for, by default natural.
+    irradiance : str, Path or Scene, optional
+        The picture that the kernel is for, in place of a spectrum: a name of
+        ``sssfit.scene.made.MADE``, a file or a scene, at least as large as the kernel. Takes twice
+        the time: the search also starts from the cascade for natural pictures.
     still : bool
         Weigh the aliasing of halved pictures three times as much as for the least error: a point
-        that moves by a pixel changes less. For stages of pairs.
+        that moves by a pixel changes less.
     seed : int
         Of the random starts; the same seed gives the same bits.
     mm_per_pixel, support_mm : float, optional [mm]
@@ -143,26 +150,29 @@ def fit_cascade(
     Raises
     ------
     FitError, ProfileError
-        The budget, structure, profile, pixel size or support is invalid.
+        The budget, structure, picture, profile, pixel size or support is invalid.
+    ArgumentError, FileError, RenderError
+        There is no such picture, or it cannot be read.
     """
     begun = time.perf_counter()
     shapes = structure_for(fetches, stages, passes, full_resolution=full_resolution)
-    if still and any(each.kind == "star" for each in shapes):
-        raise FitError(
-            "still is for stages of pairs, and the structure has stars; name another, or allow "
-            "more passes."
-        )
     target, lit = whole_target(profile, mm_per_pixel, support_mm)
+    pictures = pictures_of(target, spectrum, irradiance)
+    first = ["natural"] if isinstance(pictures, Scene) else []
+    starts: list[FloatArray] = []
+    evaluations = 0
     with one_blas_thread():
         kind = StarChain if any(each.kind == "star" for each in shapes) else PairChain
-        chain = kind(spectral_target(target, lit, spectrum), shapes)
-        x, evaluations = searched(chain, chain, seed, _STILL if still else _ALIASING)
+        for each in (*first, pictures):
+            chain = kind(spectral_target(target, lit, each), shapes)
+            x, count = searched(chain, chain, seed, _STILL if still else _ALIASING, starts)
+            starts, evaluations = [x], evaluations + count
     settings = {
         "fetches": fetches,
         "stages": stages,
         "passes": passes,
         "full_resolution": full_resolution,
-        "spectrum": spectrum,
+        **recorded(pictures),
         "still": still,
         "fit_seed": seed,
     }
@@ -248,9 +258,13 @@ def _parsed(stages: str) -> tuple[Shape, ...]:
 
 
 def searched(
-    parameters: Searched, chain: Chain, seed: int, aliasing: float = _ALIASING
+    parameters: Searched,
+    chain: Chain,
+    seed: int,
+    aliasing: float = _ALIASING,
+    starts: Sequence[FloatArray] = (),
 ) -> tuple[FloatArray, int]:
-    """Return the best parameters found, with aliasing weighed in last, and evaluations.
+    """Return the best parameters of a search and of given starts, and evaluations.
 
     Parameters
     ----------
@@ -260,14 +274,17 @@ def searched(
     seed : int
         Of the random starts.
     aliasing : float
-        Weight of the squared images of halved pictures, for stages of pairs.
+        Weight that the images of halved pictures have in the end.
+    starts : sequence of array
     """
-    x, evaluations = _search(parameters, seed)
-    if isinstance(chain, PairChain) and chain.shapes[-1].level > 0:
+    x, count = _search(parameters, seed)
+    if chain.shapes[-1].level > 0:
         chain.aliasing = aliasing
-        calmed = _descend(parameters, x, 100, gain=1e-4)
-        x, evaluations = calmed.x, evaluations + calmed.nfev
-    return x, evaluations
+    elif not starts:
+        return x, count
+    ends = [_descend(parameters, each, 100, gain=1e-4) for each in (x, *starts)]
+    best = min(ends, key=lambda each: each.fun)
+    return best.x, count + sum(each.nfev for each in ends)
 
 
 def _search(chain: Searched, seed: int) -> tuple[FloatArray, int]:

@@ -18,18 +18,20 @@ kernel as pictures see it (``_fitted_taps``); that keeps the energy only.
 
 import operator
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import FitError, KernelError
 from sssfit.fit._fitted_taps import refined
-from sssfit.fit._spectrum import spectral_target
+from sssfit.fit._spectrum import SpectralTarget, pictures_of, spectral_target
 from sssfit.fit._target import make_target
 from sssfit.kernel import SeparableKernel, Stage, Taps
 from sssfit.kernel.structure import MOST_PAIRS
 from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
+from sssfit.scene.record import Scene
 
 PLACES = ("cumulative", "quadratic", "fitted")
 LEAST_TAPS, MOST_TAPS = 3, 2 * MOST_PAIRS + 1
@@ -41,6 +43,8 @@ def on_taps(
     *,
     place: str = "cumulative",
     profile: Profile | None = None,
+    spectrum: str | None = None,
+    irradiance: str | Path | Scene | None = None,
 ) -> Taps:
     """Thin a kernel to a number of bilinear fetches a pass.
 
@@ -53,11 +57,13 @@ def on_taps(
     place : {"cumulative", "quadratic", "fitted"}
         Where the taps lie: each with a like share of the cube root of the weights, or at
         distances that grow as i^2, as in Jimenez' shaders, one texel apart at least; or fitted,
-        with their weights, to the profile's kernel under the power of natural pictures, from the
-        better of the two. Second moments are then not kept.
+        with their weights, to the profile's kernel under the power of pictures, from the better of
+        the two. Second moments are then not kept.
     profile : Profile, optional
         What the kernel was fitted to, for ``errors["spectral"]``; NaN without it. "fitted" needs
         it.
+    spectrum, irradiance : optional
+        What the kernel is for; see `sssfit.fit.weighted.fit_weighted`.
 
     Returns
     -------
@@ -67,12 +73,15 @@ def on_taps(
     Raises
     ------
     FitError
-        The number or place is invalid, or a term of the kernel has no energy.
+        The number, place or picture is invalid, or a term of the kernel has no energy.
+    ArgumentError, FileError, RenderError
+        There is no such picture, or it cannot be read.
     """
     count = _checked(taps, kernel, place)
     half = kernel.weights[:, kernel.half_pixels :]  # (T, h+1, C)
+    lit, wanted = _wanted(kernel, profile, spectrum, irradiance)
     if place == "fitted":
-        offsets, passes = _fitted(kernel, half, count, profile)
+        offsets, passes = _fitted(kernel, half, count, lit, wanted)
     else:
         offsets, passes = _thinned(half, count, place)
     stages, blend = [], [np.zeros(len(kernel.channels))]
@@ -83,8 +92,8 @@ def on_taps(
         stages.append(Stage(0, "pair", offsets * kernel.mm_per_pixel, own))
         blend.append(signs * sums**2 * kernel.scale)
     error = np.full(len(kernel.channels), np.nan)
-    if profile is not None:
-        error = _spectral_error(stages, np.array(blend), kernel, profile)
+    if wanted is not None:
+        error[lit] = _spectral_error(stages, np.array(blend)[:, lit], kernel, lit, wanted)
     settings = {**kernel.meta.get("settings", {}), "taps": count, "place": place}
     try:
         return Taps(
@@ -131,19 +140,36 @@ def _thinned(half: FloatArray, count: int, place: str) -> tuple[FloatArray, Floa
     return offsets, np.stack([_spread(each, offsets) for each in half])
 
 
-def _fitted(
-    kernel: SeparableKernel, half: FloatArray, count: int, profile: Profile | None
-) -> tuple[FloatArray, FloatArray]:
-    """Return offsets (n,) [pixels] and weights (T, n+1, C) fitted to the profile's kernel."""
+def _wanted(
+    kernel: SeparableKernel,
+    profile: Profile | None,
+    spectrum: str | None,
+    irradiance: str | Path | Scene | None,
+) -> tuple[list[int], SpectralTarget | None]:
+    """Return the channels that return light, and their spectrum, or None without any."""
     if profile is None:
-        raise FitError('place = "fitted" needs the profile that the kernel was fitted to.')
+        return [], None
     target = make_target(profile, kernel.mm_per_pixel, kernel.support_mm)
     lit = [int(c) for c in np.flatnonzero(~target.is_empty)]
+    with one_blas_thread():
+        return lit, spectral_target(target, lit, pictures_of(target, spectrum, irradiance))
+
+
+def _fitted(
+    kernel: SeparableKernel,
+    half: FloatArray,
+    count: int,
+    lit: list[int],
+    wanted: SpectralTarget | None,
+) -> tuple[FloatArray, FloatArray]:
+    """Return offsets (n,) [pixels] and weights (T, n+1, C) fitted to the profile's kernel."""
+    if wanted is None:
+        raise FitError('place = "fitted" needs the profile that the kernel was fitted to.')
     scale = np.sqrt(kernel.scale[lit])
     starts = [_thinned(half, count, each) for each in ("cumulative", "quadratic")]
     with one_blas_thread():
         offsets, own = refined(
-            spectral_target(target, lit, "natural"),
+            wanted,
             [(at, weights[:, :, lit] * scale) for at, weights in starts],
             kernel.signs[:, lit],
         )
@@ -201,21 +227,21 @@ def _spread(weights: FloatArray, offsets: FloatArray) -> FloatArray:
 
 
 def _spectral_error(
-    stages: Sequence[Stage], blend: FloatArray, kernel: SeparableKernel, profile: Profile
+    stages: Sequence[Stage],
+    blend: FloatArray,
+    kernel: SeparableKernel,
+    lit: list[int],
+    wanted: SpectralTarget,
 ) -> FloatArray:
-    """Return the norm of the difference from the profile's kernel under the power of pictures."""
-    target = make_target(profile, kernel.mm_per_pixel, kernel.support_mm)
-    lit = [int(c) for c in np.flatnonzero(~target.is_empty)]
-    error = np.full(len(kernel.channels), np.nan)
-    if not lit:
-        return error
+    """Return the norm of the difference from the profile's kernel as pictures see it.
+
+    ``blend`` (L+1, n) and the result (n,) are of the ``lit`` channels.
+    """
     with one_blas_thread():
-        wanted = spectral_target(target, lit, "natural")
         rows = [each.pass_weights(kernel.mm_per_pixel) for each in stages]
         spectrum = np.zeros_like(wanted.wanted)
         for own, share in zip(rows, blend[1:], strict=True):
             x = np.arange(len(own)) - len(own) // 2
             seen = np.cos(np.outer(wanted.frequencies, x)) @ own[:, lit]  # (n, C)
-            spectrum += np.einsum("nc,mc,c->cnm", seen, seen, share[lit])
-        error[lit] = wanted.error(spectrum)
-    return error
+            spectrum += np.einsum("nc,mc,c->cnm", seen, seen, share)
+        return wanted.error(spectrum)

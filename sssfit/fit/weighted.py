@@ -7,11 +7,15 @@ R_d ~ 1/r it spends them on the middle pixel. Here
     a^(w) = a_0 + 2 sum_i a_i cos(w i),
 
 with the power S of pictures (``_spectrum``). Where S is that of natural ones, it is infinite at
-w = 0, so the energy is exact. White S gives the decomposition itself. Terms are not nested: those
-of rank 2 are fitted as two. Two of them do what five of the decomposition do for skin1.
+w = 0, so the energy is exact. White S gives the decomposition itself. S can also be the power of
+one picture; then the search starts from the terms for natural ones, too, and the better end is
+kept. Terms are not nested: those of rank 2 are fitted as two. Two of them do what five of the
+decomposition do for skin1.
 """
 
 import operator
+from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 from scipy import optimize
@@ -25,10 +29,17 @@ from sssfit.fit._result import (
     fit_channels,
     frobenius_error,
 )
-from sssfit.fit._spectrum import SpectralTarget, even_frequencies, spectral_target
+from sssfit.fit._spectrum import (
+    SpectralTarget,
+    even_frequencies,
+    pictures_of,
+    recorded,
+    spectral_target,
+)
 from sssfit.fit._target import Pitch, Target, make_target
 from sssfit.fit.svd import eigenpairs
 from sssfit.profile import Profile
+from sssfit.scene.record import Scene
 
 _MOST_RANK = 8
 _STEPS = 3000  # skin1's three terms take 200
@@ -40,7 +51,8 @@ def fit_weighted(
     profile: Profile,
     *,
     rank: int = 2,
-    spectrum: str = "natural",
+    spectrum: str | None = None,
+    irradiance: str | Path | Scene | None = None,
     mm_per_pixel: Pitch | None = None,
     support_mm: float | None = None,
     normalize: bool = False,
@@ -53,8 +65,11 @@ def fit_weighted(
         The profile to fit.
     rank : int
         Number of terms, 1 to 8, or less for a smaller kernel.
-    spectrum : {"natural", "white"}
-        Of the pictures that the kernel is for; "white" is the decomposition.
+    spectrum : {"natural", "white"}, optional
+        Of the pictures that the kernel is for, by default natural; "white" is the decomposition.
+    irradiance : str, Path or Scene, optional
+        The picture that the kernel is for, in place of a spectrum: a name of
+        ``sssfit.scene.made.MADE``, a file or a scene, at least as large as the kernel.
     mm_per_pixel, support_mm : float, optional [mm]
         Pixel size and half width of the support; see ``sssfit.fit.make_target``.
     normalize : bool
@@ -68,17 +83,21 @@ def fit_weighted(
     Raises
     ------
     FitError, ProfileError
-        The rank, spectrum, profile, pixel size or support is invalid.
+        The rank, spectrum, picture, profile, pixel size or support is invalid.
+    ArgumentError, FileError, RenderError
+        There is no such picture, or it cannot be read.
     """
     target = make_target(profile, mm_per_pixel, support_mm)
     rank = _checked_rank(rank, target)
     grid = even_frequencies(target.half_pixels)
+    pictures = pictures_of(target, spectrum, irradiance)
+    first = ["natural"] if isinstance(pictures, Scene) else []
 
     def fit_channel(channel: int) -> ChannelFit:
-        wanted = spectral_target(target, [channel], spectrum, grid)
-        return _fit_channel(target, wanted, channel, rank, is_white=spectrum == "white")
+        stages = [spectral_target(target, [channel], each, grid) for each in (*first, pictures)]
+        return _fit_channel(target, stages, channel, rank, is_white=pictures == "white")
 
-    settings = {"rank": rank, "spectrum": spectrum}
+    settings = {"rank": rank, **recorded(pictures)}
     return fit_channels(target, "weighted", fit_channel, settings=settings, normalize=normalize)
 
 
@@ -93,9 +112,10 @@ def _checked_rank(rank: object, target: Target) -> int:
 
 
 def _fit_channel(
-    target: Target, wanted: SpectralTarget, channel: int, rank: int, *, is_white: bool
+    target: Target, stages: Sequence[SpectralTarget], channel: int, rank: int, *, is_white: bool
 ) -> ChannelFit:
-    quadrant = target.quadrant(channel)
+    """Fit a channel's terms to the last of the targets, also from those for the targets before."""
+    quadrant, wanted = target.quadrant(channel), stages[-1]
     values, vectors = eigenpairs(quadrant, rank)
     start = vectors * np.sqrt(np.abs(values))[:, None]
     if is_white:
@@ -105,16 +125,26 @@ def _fit_channel(
     else:
         signs = np.ones(rank)
         half, evaluations, reason = _minimised(target, wanted, start)
-    seen = half @ wanted.cosines(target).T
-    error = wanted.error(((seen * signs[:, None]).T @ seen)[None])
+        for before in stages[:-1]:
+            first, more, _ = _minimised(target, before, start)
+            second, still_more, other = _minimised(target, wanted, first)
+            evaluations += more + still_more
+            if _error(target, wanted, signs, second) < _error(target, wanted, signs, half):
+                half, reason = second, other
     return ChannelFit(
         signs,
         half,
         reason,
         evaluations=evaluations,
-        parameters={"spectral_error": float(error[0])},
+        parameters={"spectral_error": _error(target, wanted, signs, half)},
         relative_frobenius_error=frobenius_error(target, quadrant, signs, half),
     )
+
+
+def _error(target: Target, wanted: SpectralTarget, signs: FloatArray, half: FloatArray) -> float:
+    """Return the misfit of terms (R, h+1), as a share."""
+    seen = half @ wanted.cosines(target).T
+    return float(wanted.error(((seen * signs[:, None]).T @ seen)[None])[0])
 
 
 def _minimised(
