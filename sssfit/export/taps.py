@@ -12,7 +12,7 @@ from sssfit.kernel.taps_json import pack
 from sssfit.messages import printable
 
 MARK = "// sssfit.hlsl/1"  # of the dense kernels' files too
-_KINDS = ("pair", "star", "disk")
+_KINDS = ("pair", "star", "disk", "line")
 
 
 def taps_description(taps: Taps) -> list[str]:
@@ -59,6 +59,13 @@ def _how_to_run(taps: Taps) -> Iterator[str]:
             "distance OFFSET_MM and the angle a + 2 pi k / 1.6180339887, with a turn a for each "
             "pixel and frame. A middle of weight 0 is not fetched."
         )
+    if "line" in kinds:
+        yield (
+            "Kind 3 is one pass like one of kind 0, in the direction of ANGLE_DEGREES: from x to "
+            "the right towards y down."
+        )
+    if any(each.kind == "pair" and each.angle_degrees for each in taps.stages):
+        yield "Kind 0 with an angle runs along it and then perpendicular to it."
     yield "Result: BLEND[0] times the irradiance, and BLEND[s+1] times each stage's picture, added."
     if any(each.level for each in taps.stages):
         yield (
@@ -82,6 +89,7 @@ def taps_hlsl(taps: Taps) -> str:
         "KIND": [_KINDS.index(each.kind) for each in taps.stages],
         "FIRST": [0, *np.cumsum(counts).tolist()],
     }
+    angles = [each.angle_degrees for each in taps.stages]
     lines = [MARK, *(f"// {line}" for line in taps_description(taps))]
     lines += [
         f"static const uint SSS_STAGES = {len(taps.stages)};",
@@ -89,6 +97,14 @@ def taps_hlsl(taps: Taps) -> str:
         *(
             f"static const uint SSS_{name}[{len(values)}] = {{{', '.join(map(str, values))}}};"
             for name, values in whole.items()
+        ),
+        *(
+            [
+                f"static const float SSS_ANGLE_DEGREES[{len(angles)}] = "
+                f"{{{', '.join(map(literal, angles))}}};"
+            ]
+            if any(angles)
+            else []
         ),
         f"static const float SSS_OFFSET_MM[{len(offsets)}] = "
         f"{{{', '.join(map(literal, offsets))}}};",
