@@ -162,7 +162,7 @@ def fit_cascade(
     starts: list[FloatArray] = []
     evaluations = 0
     with one_blas_thread():
-        kind = StarChain if any(each.kind == "star" for each in shapes) else PairChain
+        kind = PairChain if all(each.is_upright for each in shapes) else StarChain
         for each in (*first, pictures):
             chain = kind(spectral_target(target, lit, each), shapes)
             x, count = searched(chain, chain, seed, _STILL if still else _ALIASING, starts)
@@ -375,6 +375,7 @@ def table_of(
             shape.kind,
             offsets * target.mm_per_pixel * 2.0**shape.level,
             weights[:, source],
+            shape.angle_degrees,
         )
         for shape, offsets, weights in zip(
             chain.shapes, numbers.offsets, numbers.weights, strict=True

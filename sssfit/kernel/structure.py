@@ -6,6 +6,7 @@ joined by ``-``, and by ``|`` where the picture is halved in both directions. Li
 direction, are written ``4@60`` with their angle in degrees; no cascade has them.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -29,6 +30,11 @@ class Shape(NamedTuple):
     angle_degrees: float = 0.0
 
     @property
+    def is_upright(self) -> bool:
+        """Whether it is a pair of passes along the axes."""
+        return self.kind == "pair" and self.angle_degrees == 0.0
+
+    @property
     def fetches(self) -> int:
         """Fetches of the stage's passes, per texel of its level."""
         return {"pair": 2, "line": 1}.get(self.kind, 0) * (2 * self.pairs + 1) or STAR_FETCHES
@@ -37,6 +43,15 @@ class Shape(NamedTuple):
     def passes(self) -> int:
         """Passes over the picture: two of a pair, one of the other kinds."""
         return 2 if self.kind == "pair" else 1
+
+
+def directions(shape: Shape) -> tuple[tuple[float, float], ...]:
+    """Return unit vectors (down, right) of the passes of a pair or a line, in their order."""
+    turns = {"pair": (0.0, 90.0), "line": (0.0,)}[shape.kind]
+    if shape.angle_degrees == 0.0:  # exactly along the axes
+        return ((0.0, 1.0), (1.0, 0.0))[: len(turns)]
+    angles = [math.radians(shape.angle_degrees + each) for each in turns]
+    return tuple((math.sin(each), math.cos(each)) for each in angles)
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,7 +16,6 @@ of its own (`sssfit.render.disk`).
 """
 
 import dataclasses
-import math
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -48,6 +47,7 @@ from sssfit.kernel.structure import (
     cost_of_chain,
     cost_of_disk,
     cost_of_terms,
+    directions,
     text_of,
 )
 from sssfit.kernel.taps_json import is_taps_file
@@ -110,16 +110,12 @@ class Stage:
     @property
     def directions(self) -> tuple[tuple[float, float], ...]:
         """Unit vectors (down, right) of the passes of a pair or a line, in their order."""
-        turns = {"pair": (0.0, 90.0), "line": (0.0,)}[self.kind]
-        angles = [math.radians(self.angle_degrees + each) for each in turns]
-        if self.angle_degrees == 0.0:  # exactly along the axes
-            return ((0.0, 1.0), (1.0, 0.0))[: len(angles)]
-        return tuple((math.sin(each), math.cos(each)) for each in angles)
+        return directions(self.shape)
 
     @property
     def is_upright(self) -> bool:
         """Whether it is a pair of passes along the axes."""
-        return self.kind == "pair" and self.angle_degrees == 0.0
+        return self.shape.is_upright
 
     @property
     def variance_mm2(self) -> FloatArray:
@@ -339,8 +335,8 @@ class Taps:
         if not self.is_separable:
             raise KernelError(
                 f"{self.structure} has stars, lines, turned stages or halved pictures or is a "
-                "disk; only pairs of passes along the axes of the full picture are a sum of separable "
-                "terms."
+                "disk; only pairs of passes along the axes of the full picture are a sum of "
+                "separable terms."
             )
         passes = [np.ones((1, len(self.channels)))]
         for stage in self.stages:
