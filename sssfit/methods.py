@@ -401,6 +401,24 @@ FITS: Mapping[str, Method] = {
         makes_taps=True,
         is_seeded=True,
     ),
+    "rotated": Method(
+        "sssfit.fit.rotated:fit_rotated",
+        "a chain of passes in three or four directions; beside the single pair",
+        (
+            Setting(
+                "directions",
+                "whole",
+                "passes: 4 at 0, 45, 90, 135 degrees, 3 at 0, 60, 120, or 2.",
+                "N",
+                (2, 4),
+                words="4",
+            ),
+            replace(_TAPS[0], words="9"),
+        ),
+        counted=("directions",),
+        makes_taps=True,
+        is_seeded=True,
+    ),
     "pyramid": Method(
         "sssfit.fit.pyramid:fit_pyramid",
         "a convolution pyramid, one small filter on all levels, after Farbman et al. 2011",

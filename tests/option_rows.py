@@ -264,13 +264,15 @@ def _thinned(option: str, value: str, method: str, **own: Any) -> Row:
     *before, name = option.split(" --")
     given = f"--{name.removeprefix('--')} {value}"
     usual = f" {before[0]}" if before else ""
-    words = "cumulative" if before else "24 for disk"
+    words = "cumulative" if before else "24 for disk, 9 for rotated"
     return Row(command + usual, given, made_taps, made, words=words)
 
 
 def _relative(option: str, value: str, method: str, words: str = "", **own: Any) -> Row:
     """An option of a relative of cascades, by the table of taps."""
-    usual = {} if "stages" in own else {"stages": "1-1"}
+    usual: dict[str, Any] = {} if own.keys() & {"stages"} else {"stages": "1-1"}
+    if method == "rotated":
+        usual = {"taps": 3}
 
     def made() -> Any:
         found = fit.fit_taps(profile(), method, mm_per_pixel=0.6, **(usual | own)).kernel
@@ -351,6 +353,7 @@ FIT = {
     "--still": _tapped("--still", "", still=True),
     "--taps": _thinned("--taps", "7", "svd", taps=7),
     "--place": _thinned("--taps 7 --place", "quadratic", "svd", taps=7, place="quadratic"),
+    "--directions": _relative("--directions", "3", "rotated", words="4", directions=3, taps=3),
     "--blur": _relative("--blur", "published", "gaussian-chain", "shape", blur="published"),
     "--spectrum": _tapped("--spectrum", "white", "natural", spectrum="white"),
     "--irradiance": _tapped("--irradiance", "edge", irradiance="edge"),
@@ -1130,8 +1133,8 @@ COMMANDS = {
 }
 
 
-def _seeded_taps(seed: int, method: str = "cascade") -> Any:
-    found = fit.fit_taps(profile(), method, stages="1-1", mm_per_pixel=0.6, seed=seed).kernel
+def _seeded_taps(seed: int, method: str, **own: Any) -> Any:
+    found = fit.fit_taps(profile(), method, mm_per_pixel=0.6, seed=seed, **own).kernel
     return [found.structure, found.mm_per_pixel, found.blend]
 
 
@@ -1142,16 +1145,20 @@ SEEDS = {
         "fit wax.profile.npz --method cascade --stages 1-1 --mm-per-pixel .6",
         "--seed 5",
         lambda ran: ran.taps,
-        lambda: _seeded_taps(5),
+        lambda: _seeded_taps(5, "cascade", stages="1-1"),
     ),
     **{
         f"fit --method {method}": Row(
-            f"fit wax.profile.npz --method {method} --stages 1-1 --mm-per-pixel .6",
+            f"fit wax.profile.npz --method {method} {typed} --mm-per-pixel .6",
             "--seed 5",
             lambda ran: ran.taps,
-            functools.partial(_seeded_taps, 5, method),
+            functools.partial(_seeded_taps, 5, method, **own),
         )
-        for method in ("gaussian-chain", "pyramid")
+        for method, typed, own in (
+            ("gaussian-chain", "--stages 1-1", {"stages": "1-1"}),
+            ("pyramid", "--stages 1-1", {"stages": "1-1"}),
+            ("rotated", "--taps 3", {"taps": 3}),
+        )
     },
     "render": Row(
         f"render --irradiance noise {_SIZE}",
@@ -1216,6 +1223,7 @@ FITS = {
     "--stages of gaussian-chain": _relative("--stages", "1-1", "gaussian-chain", stages="1-1"),
     "--stages of pyramid": _relative("--stages", "1|1", "pyramid", stages="1|1"),
     "--spectrum of pyramid": _relative("--spectrum", "white", "pyramid", spectrum="white"),
+    "--taps of rotated": _relative("--taps", "5", "rotated", taps=5),
     "--spectrum of weighted": _fitted("--spectrum", "white", "weighted", spectrum="white"),
     "--irradiance of weighted": _fitted("--irradiance", "edge", "weighted", irradiance="edge"),
 }

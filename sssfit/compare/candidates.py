@@ -27,6 +27,10 @@ RELATIVES = {
     "pyramid 12": ("pyramid", "1|1|1|1|1"),
     "pyramid 21": ("pyramid", "1-1|1-1|1-1|1-1|1-1"),
 }
+ROTATED = {
+    "hexagonal 34": {"directions": 3, "taps": 11},
+    "octagonal 37": {"directions": 4, "taps": 9},
+}
 BUDGETS = (12, 24, 50, 100)  # fetches a pixel of the kernels on taps
 LEAST_TAPS = 3  # a pass: the middle and one pair
 # What is thinned: of each method the kernels that need few taps, or show the least.
@@ -181,9 +185,11 @@ def _cascades() -> Iterator[Candidate]:
 
 
 def _relatives() -> Iterator[Candidate]:
-    """Yield chains of Gaussians and convolution pyramids."""
+    """Yield chains of Gaussians, convolution pyramids and chains of passes in many directions."""
     for label, (method, stages) in RELATIVES.items():
         yield Candidate(label, method, 0, {"stages": stages})
+    for label, settings in ROTATED.items():
+        yield Candidate(label, "rotated", 0, settings)
 
 
 def _disks(pixels: int) -> Iterator[Candidate]:
