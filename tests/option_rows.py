@@ -326,6 +326,18 @@ FIT = {
         _fit("svd", mm_per_pixel=0.5),
         default="0.3",
     ),
+    "--pitches": Row(
+        "fit wax.profile.npz --method svd --json",
+        "--pitches .4,.6",
+        lambda ran: [names(ran), [each["pixels"] for each in ran.figures.get("kernels", ())]],
+        lambda: [
+            [f"wax.svd3.{pitch}mm.kernel.json" for pitch in (0.4, 0.6)],
+            [
+                world.quietly(fit.fit_svd, profile(), mm_per_pixel=pitch).kernel.pixels
+                for pitch in (0.4, 0.6)
+            ],
+        ],
+    ),
     "--support": _fitted("--support", "2.1", "svd", "auto", support_mm=2.1),
     "--normalize": _fitted("--normalize", "", "preintegrated", normalize=True),
     "--rank": _fitted("--rank", "2", "svd", "3", "3 for svd, 2 for weighted", rank=2),

@@ -19,7 +19,7 @@ from sssfit.fit._chain_stars import StarChain
 from sssfit.fit._gaussians_search import make_annuli
 from sssfit.fit._spectrum import spectral_target
 from sssfit.fit._target import Target
-from sssfit.fit.gaussian_chain import one_shape
+from sssfit.fit._tied_chain import one_shape
 from sssfit.kernel.structure import parse
 from sssfit.shapes import diffusion_cdf
 

@@ -12,8 +12,9 @@ from scipy.special import ive
 from sssfit import fit
 from sssfit.errors import FitError
 from sssfit.fit import fit_gaussians, fit_taps, make_target
+from sssfit.fit._tied_chain import gaussian_weights
 from sssfit.fit.cascade import lit_channels
-from sssfit.fit.gaussian_chain import gaussian_weights, shared_gaussians
+from sssfit.fit.gaussian_chain import shared_gaussians
 from sssfit.kernel import Stage, Taps
 from sssfit.material import load_material
 from sssfit.render.taps import render_taps

@@ -32,7 +32,8 @@ def red(skin1):
         for each in fields(skin1)
         if isinstance(value := getattr(skin1, each.name), np.ndarray) and value.shape[-1] == 3
     }
-    by_channel["meta"] = {**skin1.meta, "channels": ["R"], "energy_balance_stderr": None}
+    left_out = {"material": None, "energy_balance_stderr": None}
+    by_channel["meta"] = {**skin1.meta, "channels": ["R"], **left_out}
     return replace(skin1, **by_channel)
 
 

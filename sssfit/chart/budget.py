@@ -17,6 +17,7 @@ from matplotlib.patches import Patch
 
 from sssfit.chart.page import COLOURS, Style, drawable, name_axes, new_page, tick
 from sssfit.chart.text import count, shortened
+from sssfit.messages import counted
 
 if TYPE_CHECKING:
     from sssfit.compare.budget import Budget, Cause
@@ -82,7 +83,7 @@ def _subtitle(budget: Budget) -> str:
     kernel, scene = budget.kernel, budget.scene
     words = [
         f"{source}, grid to {budget.radius_mm:.3g} mm",
-        f"{kernel.method}, {kernel.rank} term{'s' * (kernel.rank > 1)} on {kernel.pixels} pixels "
+        f"{kernel.method}, {counted(kernel.rank, 'term')} on {counted(kernel.pixels, 'pixel')} "
         f"of {scene.mm_per_pixel:.4g} mm",
         f"pictures {scene.width} x {scene.height}",
     ]

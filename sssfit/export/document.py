@@ -5,7 +5,7 @@ import math
 from collections.abc import Sequence
 
 from sssfit.kernel import SeparableKernel
-from sssfit.messages import printable
+from sssfit.messages import counted, printable
 
 _ROUNDING = 1e-12
 
@@ -16,17 +16,20 @@ def description(kernel: SeparableKernel) -> list[str]:
     Text is kept on one line, because a newline would end a shader's comment.
     """
     meta = kernel.meta
-    photons = f", {meta['photons']:,} photons" if meta.get("photons") is not None else ""
+    photons = (
+        f", {counted(meta['photons'], 'photon', ',')}" if meta.get("photons") is not None else ""
+    )
     photons += f", seed {meta['seed']}" if meta.get("seed") is not None else ""
     settings = ", ".join(f"{key} {value}" for key, value in meta.get("settings", {}).items())
     sha = f", sha256 {meta['material_sha256'][:16]}" if meta.get("material_sha256") else ""
-    terms = f"{kernel.rank} separable term{'s' if kernel.rank > 1 else ''}"
+    terms = counted(kernel.rank, "separable term")
     fit = f"{kernel.method}, {terms}{f' ({settings})' if settings else ''}"
     lines = [
         f"Subsurface scattering kernel: {meta.get('material') or 'unknown material'}{sha}.",
         f"Profile: {meta.get('profile_method') or 'unknown'}{photons}. Fit: {fit}. "
         f"sssfit {meta.get('version') or '(unknown)'}.",
-        f"{kernel.pixels} pixels of {kernel.mm_per_pixel:.9g} mm, the middle one on the axis; "
+        f"{counted(kernel.pixels, 'pixel')} of {kernel.mm_per_pixel:.9g} mm, the middle one on "
+        "the axis; "
         f"channels {', '.join(kernel.channels)}.",
         "K[i][j] = sum over terms of sign * weight[i] * weight[j]: a horizontal pass and the same "
         "pass vertically,",

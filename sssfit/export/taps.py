@@ -9,7 +9,7 @@ from sssfit.export.document import errors_text, values_text
 from sssfit.export.numbers import array, literal, vector_kind
 from sssfit.kernel import Taps
 from sssfit.kernel.taps_json import pack
-from sssfit.messages import printable
+from sssfit.messages import counted, printable
 
 MARK = "// sssfit.hlsl/1"  # of the dense kernels' files too
 _KINDS = ("pair", "star", "disk", "line")
@@ -28,7 +28,8 @@ def taps_description(taps: Taps) -> list[str]:
         f"Subsurface scattering taps: {meta.get('material') or 'unknown material'}, {taps.method}"
         f"{f' ({settings})' if settings else ''}. sssfit {meta.get('version') or '(unknown)'}.",
         f"Profile: {meta.get('profile_method') or 'unknown'}{sha}.",
-        f"{taps.structure}: {taps.fetches:.6g} fetches a pixel in {taps.passes} passes, "
+        f"{taps.structure}: {counted(taps.fetches, 'fetch', '.6g')} a pixel in "
+        f"{counted(taps.passes, 'pass')}, "
         f"{taps.cost.all_passes} with those that change the picture's size; {read}.",
         f"Made for pixels of {taps.mm_per_pixel:.9g} mm; channels {', '.join(taps.channels)}; "
         "linear light.",

@@ -27,6 +27,7 @@ import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
 from sssfit.fit._target import Target
+from sssfit.messages import counted
 from sssfit.profile.pixels import PARTS_PER_ANNULUS, SUBDIVIDED_ANNULI, annulus_areas
 
 # Signed weights may cancel: two of +-1e8 with nearly equal variances were seen to fit photon noise.
@@ -293,13 +294,15 @@ class _Step:
         return self.is_enough or self.cost <= _MET
 
     def stop_reason(self, terms: int) -> str:
-        kept = f"{len(self.weights)} of {terms} terms"
+        kept, is_one = f"{len(self.weights)} of {counted(terms, 'term')}", len(self.weights) == 1
         if self.is_enough:
-            return f"{kept} are enough: one more does not lower the error"
+            return f"{kept} {'is' if is_one else 'are'} enough: one more does not lower the error"
         if self.cost <= _MET:
-            return f"{kept} meet the profile to rounding"
+            return f"{kept} {'meets' if is_one else 'meet'} the profile to rounding"
         reason = "converged" if self.settled else f"stopped after {_MAX_EVALUATIONS} evaluations"
-        return f"{reason}; {kept} have a weight" if len(self.weights) < terms else reason
+        if len(self.weights) == terms:
+            return reason
+        return f"{reason}; {kept} {'has' if is_one else 'have'} a weight"
 
 
 class _Chain:

@@ -8,6 +8,7 @@ Offset steps and weights are logarithms, so that one of p can widen all offsets 
 weight that all stages and channels have.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -80,3 +81,49 @@ def equal_pairs(stages: str) -> tuple[Shape, ...]:
             "1|1|1 or 3-3-3: all stages are one blur."
         )
     return shapes
+
+
+def gaussian_weights(pairs: int) -> FloatArray:
+    """Return the shares of a Gaussian in intervals of one deviation, the middle first (n+1,).
+
+    All of them, mirrored ones included, add up to 1.
+    """
+    edges = np.arange(pairs + 2) - 0.5
+    below = np.array([math.erf(each / math.sqrt(2.0)) for each in edges])
+    shares = 0.5 * np.diff(below)
+    found: FloatArray = shares / (shares[0] + 2.0 * shares[1:].sum())
+    return found
+
+
+def one_shape(chain: Chain, *, is_fitted: bool) -> TiedChain:
+    """Return a chain whose stages have one shape, each of its own width.
+
+    The parameters are the blend's, the logarithm of each stage's first offset step, and where the
+    shape is fitted those of the other steps in relation to it and of the weights beside the middle
+    one in relation to a Gaussian's.
+    """
+    blend, count, pairs = (
+        chain.channels * (len(chain.shapes) + 1),
+        len(chain.shapes),
+        chain.counts[0],
+    )
+    shape = 2 * pairs - 1 if is_fitted else 0
+    ties = np.zeros((chain.size, blend + count + shape))
+    ties[:blend, :blend] = np.eye(blend)
+    base = np.zeros(chain.size)
+    for k in range(count):
+        steps, weights = chain.places(k)
+        ties[steps, blend + k] = 1.0
+        base[weights] = np.log(gaussian_weights(pairs))
+        if is_fitted:
+            own = blend + count + np.arange(shape)
+            ties[steps[1:], own[: pairs - 1]] = 1.0
+            ties[weights[:, 1:], own[pairs - 1 :]] = 1.0
+
+    def begin(rng: np.random.Generator) -> FloatArray:
+        width, growth = rng.uniform(0.3, 1.0), rng.uniform(1.5, 2.6)
+        levels = np.array([each.level for each in chain.shapes])
+        widths = np.log(width * growth ** np.arange(count) / 2.0**levels)
+        return np.concatenate((rng.normal(0.0, 0.3, blend), widths, np.zeros(shape)))
+
+    return TiedChain(chain, base, ties, blend + np.arange(count), begin)

@@ -17,7 +17,6 @@ Gaussian's. Where something is fitted the irradiance has a share, too. Cascades 
 stage has weights of its own in each channel.
 """
 
-import math
 import time
 
 import numpy as np
@@ -25,13 +24,12 @@ from scipy import optimize
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import FitError
-from sssfit.fit._chain import Chain
 from sssfit.fit._chain_pairs import PairChain
 from sssfit.fit._gaussians_search import SharedAnnuli, fitted_annuli, make_annuli, search
 from sssfit.fit._result import TapsFit
 from sssfit.fit._spectrum import spectral_target
 from sssfit.fit._target import Pitch, Target
-from sssfit.fit._tied_chain import TiedChain, equal_pairs
+from sssfit.fit._tied_chain import equal_pairs, gaussian_weights, one_shape
 from sssfit.fit.cascade import searched, table_of, whole_target
 from sssfit.kernel.structure import Shape
 from sssfit.process import one_blas_thread
@@ -151,18 +149,6 @@ def _parameters(variances: FloatArray, weights: FloatArray, pairs: int) -> Float
     return np.concatenate((shares.ravel(), np.log(spacings)))
 
 
-def gaussian_weights(pairs: int) -> FloatArray:
-    """Return the shares of a Gaussian in intervals of one deviation, the middle first (n+1,).
-
-    All of them, mirrored ones included, add up to 1.
-    """
-    edges = np.arange(pairs + 2) - 0.5
-    below = np.array([math.erf(each / math.sqrt(2.0)) for each in edges])
-    shares = 0.5 * np.diff(below)
-    found: FloatArray = shares / (shares[0] + 2.0 * shares[1:].sum())
-    return found
-
-
 def _spacing(variance: float, weights: FloatArray) -> float:
     """Return how far apart bilinear taps with these weights have a variance [texels].
 
@@ -179,37 +165,3 @@ def _spacing(variance: float, weights: FloatArray) -> float:
     while excess(most) < 0.0:
         most *= 2.0
     return float(optimize.brentq(excess, 0.0, most, xtol=1e-14, rtol=1e-14))
-
-
-def one_shape(chain: Chain, *, is_fitted: bool) -> TiedChain:
-    """Return a chain whose stages have one shape, each of its own width.
-
-    The parameters are the blend's, the logarithm of each stage's first offset step, and where the
-    shape is fitted those of the other steps in relation to it and of the weights beside the middle
-    one in relation to a Gaussian's.
-    """
-    blend, count, pairs = (
-        chain.channels * (len(chain.shapes) + 1),
-        len(chain.shapes),
-        chain.counts[0],
-    )
-    shape = 2 * pairs - 1 if is_fitted else 0
-    ties = np.zeros((chain.size, blend + count + shape))
-    ties[:blend, :blend] = np.eye(blend)
-    base = np.zeros(chain.size)
-    for k in range(count):
-        steps, weights = chain.places(k)
-        ties[steps, blend + k] = 1.0
-        base[weights] = np.log(gaussian_weights(pairs))
-        if is_fitted:
-            own = blend + count + np.arange(shape)
-            ties[steps[1:], own[: pairs - 1]] = 1.0
-            ties[weights[:, 1:], own[pairs - 1 :]] = 1.0
-
-    def begin(rng: np.random.Generator) -> FloatArray:
-        width, growth = rng.uniform(0.3, 1.0), rng.uniform(1.5, 2.6)
-        levels = np.array([each.level for each in chain.shapes])
-        widths = np.log(width * growth ** np.arange(count) / 2.0**levels)
-        return np.concatenate((rng.normal(0.0, 0.3, blend), widths, np.zeros(shape)))
-
-    return TiedChain(chain, base, ties, blend + np.arange(count), begin)

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from sssfit.errors import KernelError
-from sssfit.messages import shown
+from sssfit.messages import counted, shown
 
 MOST_PAIRS, MOST_STAGES, MOST_LEVELS = 64, 24, 10
 MOST_ON_DISK = 256  # fetches
@@ -94,7 +94,8 @@ def parse(text: str) -> tuple[Shape, ...]:
         )
     if len(words) > MOST_STAGES or len(groups) > MOST_LEVELS:
         raise KernelError(
-            f"stages = {shown(text)} has {len(words)} stages on {len(groups)} levels; expected at "
+            f"stages = {shown(text)} has {counted(len(words), 'stage')} on "
+            f"{counted(len(groups), 'level')}; expected at "
             f"most {MOST_STAGES} on {MOST_LEVELS}."
         )
     return tuple(

@@ -51,7 +51,7 @@ from sssfit.kernel.structure import (
     text_of,
 )
 from sssfit.kernel.taps_json import is_taps_file
-from sssfit.messages import by_channel, html_table, number, of_material, printable, shown
+from sssfit.messages import by_channel, counted, html_table, number, of_material, printable, shown
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -223,7 +223,7 @@ class Taps:
         """Return one line with material, method, stages and cost."""
         return (
             f"Taps of {of_material(self.meta.get('material'))} by {self.method}, "
-            f"{self.structure}, {number(self.fetches, '.4g')} fetches of {self.mm_per_pixel:.4g} "
+            f"{self.structure}, {counted(self.fetches, 'fetch', '.4g')} of {self.mm_per_pixel:.4g} "
             "mm pixels"
         )
 
@@ -526,7 +526,9 @@ def _checked_angle(name: str, stage: Stage) -> float:
 def _check_levels(stages: tuple[Stage, ...], *, chained: bool) -> None:
     """Check that every level has a stage, in order, and that terms have none but the first."""
     if not 1 <= len(stages) <= MOST_STAGES:
-        raise KernelError(f"there are {len(stages)} stages; expected 1 to {MOST_STAGES}.")
+        raise KernelError(
+            f"the table has {counted(len(stages), 'stage')}; expected 1 to {MOST_STAGES}."
+        )
     levels = [each.level for each in stages]
     rises = {b - a for a, b in zip([0, *levels], levels, strict=False)}
     if not rises <= {0, 1} or max(levels) >= MOST_LEVELS:

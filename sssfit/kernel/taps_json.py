@@ -8,6 +8,7 @@ import numpy as np
 
 from sssfit.errors import KernelError
 from sssfit.kernel.json_file import JsonFormat, check, line_of, or_nan, or_none, read_json
+from sssfit.messages import counted
 
 if TYPE_CHECKING:
     from sssfit.kernel.taps import Taps
@@ -99,7 +100,8 @@ def _check_sizes(whole: Mapping[str, Any]) -> None:
     for path, values in lists.items():
         if len(values) != channels:
             raise KernelError(
-                f"{path} has {len(values)} entries; expected {channels}, one for each channel."
+                f"{path} has {counted(len(values), 'entry')}; expected {channels}, one for each "
+                "channel."
             )
 
 
