@@ -92,7 +92,7 @@ COMPARE = (
     option("--only", Names(FITS), "METHOD,...", "Only kernels by these fit methods."),
     option("--budget-chart", None, "FILE", "Draw the budget."),
     option("--photons", Count(2, 10**12), "N", "Photons of the budget's walk.  [default: 1e6]"),
-    option("--method", list(SEPARABLE), None, "Fit method of the budget's kernel.", "svd"),
+    option("--method", ["cascade", *SEPARABLE], None, "Fit method of the budget's kernel.", "svd"),
     option("--rank", WholeRange(1, 1000), "N", "svd: rank of the budget's kernel.  [default: 3]"),
     option("--terms", WholeRange(1, 10), "N", "gaussians: number of Gaussians of the budget's "
            "kernel.  [default: 4]"),

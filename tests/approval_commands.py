@@ -621,6 +621,7 @@ COMPARE = [
         " --terms 2 --budget-chart b.png"
     ),
     C(f"compare wax.toml --what budget --picture disk {TINY} --photons 2000 --model dipole"),
+    C("compare wax.toml --what budget --method cascade --rank 2"),
     C(
         f"compare wax.toml --what budget --picture disk {TINY} --photons 2000 --method burley"
         " --model burley --json"

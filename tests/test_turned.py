@@ -15,10 +15,11 @@ from test_screen_taps import scene_of
 from test_taps import PITCH, bytes_of, taps_of
 
 import sssfit
-from sssfit.errors import KernelError
+from sssfit.errors import KernelError, RenderError
 from sssfit.export import taps_hlsl
-from sssfit.kernel import Stage, Taps
+from sssfit.kernel import Stage, Taps, taps_between
 from sssfit.kernel.structure import parse, text_of
+from sssfit.render.full_resolution import render_full_resolution
 from sssfit.render.screen_taps import render_screen_taps
 from sssfit.render.taps import render_taps, response, texels_of
 from sssfit.scene.record import Scene
@@ -176,3 +177,15 @@ def test_only_pairs_and_lines_are_turned_and_no_terms():
         pair.separable_kernel()
     with pytest.raises(KernelError, match="are pairs of passes along the axes"):
         dataclasses.replace(pair, chained=False)
+
+
+def test_tables_of_two_pixel_sizes_keep_their_angles():
+    first = CASES[0]
+    other = dataclasses.replace(first, mm_per_pixel=2.0 * first.mm_per_pixel)
+    between = taps_between(first, other, 1.4 * first.mm_per_pixel)
+    assert between.structure == first.structure
+
+
+def test_turned_stages_are_not_rendered_by_cosines():
+    with pytest.raises(RenderError, match="has stages in other directions than the axes"):
+        render_full_resolution(Scene("light", np.ones((8, 8, 1)), PITCH), CASES[0])

@@ -235,10 +235,11 @@ def budget_text(figures: Mapping[str, Any]) -> str:
     inside = [each for each in causes if each["in_whole"]]
     others = [each for each in causes if not each["in_whole"]]
     simulated = figures["model"] or counted(figures["photons"], "photon", ",")
+    made = figures["structure"] or counted(figures["rank"], "term")
     head = filled(
         "{material} on {picture}, {width} x {height} pixels of {mm_per_pixel:.4g} mm: {simulated} "
-        "to {radius_mm:.4g} mm, {method}, {rank:#term}",
-        {**figures, **whole, "simulated": simulated},
+        "to {radius_mm:.4g} mm, {method}, {made}",
+        {**figures, **whole, "simulated": simulated, "made": made},
     )
     rows = [_cause(each) for each in (*inside, interaction, whole, *others)]
     first, second = inside[:2]

@@ -118,6 +118,11 @@ class Stage:
         return self.shape.is_upright
 
     @property
+    def copies(self) -> float:
+        """Fetches that one weight beside the middle stands for, but for a disk's own middle."""
+        return _COPIES[self.kind]
+
+    @property
     def variance_mm2(self) -> FloatArray:
         """Variance along an axis, or of a line along itself (C,) [mm^2], from the offsets."""
         # Of a star's fetches all four diagonal ones move along an axis, and two of the others; a
