@@ -301,6 +301,23 @@ FIT = [
     C("fit wax.profile.npz --method disk --taps 257"),
     C("fit wax.profile.npz --method disk --taps 90 --mm-per-pixel .6 --support 1.8mm"),
     C("fit wax.profile.npz --method disk --place quadratic"),
+    *(
+        C(f"fit wax.profile.npz --method {own} --mm-per-pixel .6", brief=True, hidden=ERRORS)
+        for own in (
+            "gaussian-chain --stages 1-1 --seed 4",
+            "gaussian-chain --blur published --json",
+            "pyramid --stages '1|1' --spectrum white",
+            "rotated --taps 3 --seed 2",
+            "rotated --taps 3 --directions 3 --json",
+            "cascade --stages '1-1x'",
+        )
+    ),
+    C("fit wax.profile.npz --method gaussian-chain --stages 1-2"),
+    C("fit wax.profile.npz --method gaussian-chain --stages '1|1' --blur published"),
+    C("fit wax.profile.npz --method gaussian-chain --blur box"),
+    C("fit wax.profile.npz --method pyramid --stages '1|*'"),
+    C("fit wax.profile.npz --method rotated --directions 5"),
+    C("fit wax.profile.npz --method rotated --taps 4"),
     C("fit wax.profile.npz --method cascade --fetches 5"),
     C("fit wax.profile.npz --method cascade --stages '1-1|1' --fetches 12"),
     C("fit wax.profile.npz --method cascade --stages '1-x'"),
