@@ -3,13 +3,14 @@
 Those of methods and of made pictures are made from their entries, in ``_methods``.
 """
 
-from sssfit.methods import FITS, SEPARABLE
+from sssfit.methods import EXPORTS, FITS, SEPARABLE
 from sssfit.scene.made import COMPARED, EDGE_DEGREES, MADE
 
 from ._options import (
     SHIPPED,
     Count,
     Length,
+    Lengths,
     Names,
     Number,
     NumberRange,
@@ -91,7 +92,7 @@ COMPARE = (
     option("--only", Names(FITS), "METHOD,...", "Only kernels by these fit methods."),
     option("--budget-chart", None, "FILE", "Draw the budget."),
     option("--photons", Count(2, 10**12), "N", "Photons of the budget's walk.  [default: 1e6]"),
-    option("--method", list(SEPARABLE), None, "Fit method of the budget's kernel.", "svd"),
+    option("--method", ["cascade", *SEPARABLE], None, "Fit method of the budget's kernel.", "svd"),
     option("--rank", WholeRange(1, 1000), "N", "svd: rank of the budget's kernel.  [default: 3]"),
     option("--terms", WholeRange(1, 10), "N", "gaussians: number of Gaussians of the budget's "
            "kernel.  [default: 4]"),
@@ -145,18 +146,15 @@ FIT_PIXELS = (
     option("--method", list(FITS), None, "Fit method; --list describes each.", "cascade"),
     option("--mm-per-pixel", Length("profile"), "MM|profile", "Size of a pixel of the kernel; "
            "profile is the width of the profile's first annulus.  [default: 0.3]"),
+    option("--pitches", Lengths(), "MM,...", "Pixel sizes to make a kernel for, a file each."),
     option("--support", Length("auto"), "MM|auto", "Half width of the kernel; auto is the "
            "smallest that keeps 99.9 % of every channel, for cascade 99.99 %.", "auto"),
     flag("--normalize", "Scale every channel to unit energy, and store its energy as a factor."),
 )
 FIT_OUTPUT = output("PROFILE.METHOD.taps.json, .kernel.json without taps", "is not our kernel")
 
-EXPORT = (
-    option("--format form", ["hlsl", "json", "csv"], None, "Output format. hlsl: a kernel as "
-           "shader source; json: a kernel as a document; csv: a profile as a table.",
-           required=True),
-    *output("NAME.FORMAT", "sssfit did not write"),
-)
+EXPORT = (option("--format form", list(EXPORTS), None, "Output format, as below.", required=True),)
+EXPORT_OUTPUT = output("NAME.FORMAT", "sssfit did not write")
 # fmt: on
 
 _OF_CHARTS = {  # options of single charts: what of it they are for, and the charts

@@ -6,12 +6,12 @@ from typing import Any
 
 import click
 
-from sssfit.methods import FITS, TAPS, lines_of, settings_of
+from sssfit.methods import FITS, TAPS, imported, lines_of
 from sssfit.process import check_memory
 
 from ._input import load, profile_name
 from ._options import Common, common_options, method_options, options, own_settings, refuse
-from ._output import KERNEL, finish_one, held, stem_of, target, write
+from ._output import KERNEL, finish, held, stem_of, target, write
 from ._verb_options import FIT_OUTPUT, FIT_PIXELS
 
 
@@ -32,7 +32,7 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
 
     \b
       sssfit fit
-      sssfit fit --fetches 14
+      sssfit fit --fetches 14 --pitches .1,.2,.4,.8
       sssfit fit --method svd --rank 3
       sssfit fit --method preintegrated --taps 25
       sssfit fit skin1.exact.profile.npz --method gaussians --terms 6 --mm-per-pixel 0.1
@@ -47,32 +47,30 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
     from sssfit.kernel import is_kernel_file, is_taps_file
     from sssfit.profile import Profile
 
-    method = given["method"]
-    settings = own_settings(context, FITS, method, {key: given[key] for key in settings_of(FITS)})
+    method, pitches = given["method"], given["pitches"]
+    settings = own_settings(context, FITS, method, given)
     is_taps = method in TAPS or "taps" in settings
-    if is_taps:
-        refuse(given, {"normalize": "separable kernels"})
+    refuse(given, {"normalize": "separable kernels"} if is_taps else {})
+    one = ("mm_per_pixel", "output") if pitches else ()
+    refuse(given, dict.fromkeys(one, "one pixel size, without --pitches"))
     name = profile_name(profile)
     source = load(Profile.read, name)
     stem = f"{stem_of(name, source.material_name)}.{method}{FITS[method].count_of(settings)}"
-    path = target(given["output"], f"{stem}.{'taps' if is_taps else 'kernel'}.json")
+    stems = [f"{stem}.{each:g}mm" for each in pitches] if pitches else [stem]
+    ending = "taps.json" if is_taps else "kernel.json"
+    paths = [target(given["output"], f"{each}.{ending}") for each in stems]
     settings |= FITS[method].shared(seed=common.seed, normalize=given["normalize"])
-    settings |= _picture_target(settings, common.threads)
-    settings["mm_per_pixel"] = given["mm_per_pixel"]
+    if settings.get("target") == "picture":  # the fits by themselves render none
+        check_memory("picture fit", common.threads)
+        settings["target"] = imported("sssfit.compare.pictures:picture_error")
     settings["support_mm"] = None if given["support"] == "auto" else given["support"]
     is_ours, inputs = is_taps_file if is_taps else is_kernel_file, [name, given["irradiance"]]
-    with held([path], is_ours, inputs=inputs, force=given["force"], named=KERNEL):
-        result = fit_result(source, method, **settings)
-        write(result.kernel.write, path)
-    figures = {"profile": name, **result.to_dict()}
-    finish_one(common, path, figures, page("fit-taps" if is_taps else "fit", figures), "the kernel")
-
-
-def _picture_target(settings: dict[str, Any], threads: int | None) -> dict[str, Any]:
-    """Return what judges pictures, if they are the target: the fits by themselves render none."""
-    if settings.get("target") != "picture":
-        return {}
-    check_memory("picture fit", threads)
-    from sssfit.compare.pictures import picture_error
-
-    return {"target": picture_error}
+    kind, told, text = "fit-taps" if is_taps else "fit", list[dict[str, Any]](), list[str]()
+    with held(paths, is_ours, inputs=inputs, force=given["force"], named=KERNEL):
+        for path, pitch in zip(paths, pitches or [given["mm_per_pixel"]], strict=True):
+            result = fit_result(source, method, mm_per_pixel=pitch, **settings)
+            write(result.kernel.write, path)
+            told.append({"profile": name, **result.to_dict()})
+            text.append(f"{page(kind, told[-1])}\nWrote {path or 'the kernel to stdout'}")
+    figures = {"profile": name, "kernels": told} if pitches else told[0]
+    finish(common, {"output": [str(each or "-") for each in paths], **figures}, "\n".join(text))

@@ -1,7 +1,13 @@
 """Write the figures of docs/cascades.md: budgets, materials, pixel sizes; one point of light.
 
 python docs/make_cascades.py
+python docs/make_cascades.py structures '1|1-2|2-2' '*|*|*'
+
+The second prints lines for the table of ``sssfit/fit/structures.py``: of structures that are named,
+or of all that it knows.
 """
+
+import sys
 
 import numpy as np
 from sections import put_section
@@ -10,6 +16,7 @@ from sssfit.chart import figure_of
 from sssfit.chart.page import save_figure
 from sssfit.compare import view_taps
 from sssfit.fit import fit_artist, fit_preintegrated, fit_svd, fit_taps, fit_weighted
+from sssfit.fit.structures import STRUCTURES
 from sssfit.grid import paper_grid
 from sssfit.kernel import Taps
 from sssfit.material import load_material
@@ -119,8 +126,19 @@ def dense_rows(profile):
         yield row([label, str(weights), str(passes), f"{p99(kernel, profile):.2f}"])
 
 
+def print_structures(texts):
+    """Print what each structure leaves of the table's two kernels."""
+    profiles = [whole_profile(name) for name in ("skin1", "chicken1")]
+    for text in texts or STRUCTURES:
+        shown = (p99(fit_taps(each, stages=text).kernel, each) for each in profiles)
+        print(f'    "{text}": ({", ".join(f"{each:.3g}" for each in shown)}),', flush=True)
+
+
 def main():
     """Write the page's figures and the picture."""
+    if sys.argv[1:2] == ["structures"]:
+        print_structures(sys.argv[2:])
+        return
     profiles = {name: whole_profile(name) for name in MATERIALS}
     skin1 = profiles["skin1"]
     taps: Taps = fit_taps(skin1, fetches=24).kernel

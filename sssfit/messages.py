@@ -92,18 +92,41 @@ def _per_cent(value: float, form: str) -> str:
     return f"{float(text):{sign}.0f}" if "e+" in text else text
 
 
+_PLURALS = {"annulus": "annuli", "entry": "entries"}
+
+
+def counted(value: Any, noun: str, form: str = "") -> str:
+    """Return a count with its noun: "1 pass", "2 passes", "22.84 fetches".
+
+    Parameters
+    ----------
+    value : number
+    noun : str
+        In the singular, also of several words: "mean free path".
+    form : str
+        As of `number`.
+    """
+    text = number(value, form)
+    ending = "es" if noun.endswith(("s", "x", "ch", "sh")) else "s"
+    return f"{text} {noun if text == '1' else _PLURALS.get(noun, noun + ending)}"
+
+
 class _Template(Formatter):
-    """A template whose fields are formatted by `number`."""
+    """A template whose fields are formatted by `number`, or by `counted`: {fetches:.4g#fetch}."""
 
     def format_field(self, value: Any, form: str) -> str:
         """Format a figure; anything without a format stays as it is."""
+        form, _, noun = form.partition("#")
+        if noun:
+            return counted(value, noun, form)
         return number(value, form) if form else str(value)
 
 
 def filled(template: str, figures: Mapping[str, Any]) -> str:
     """Fill a template from a record's figures: "{width} pixels, off by {relative_l2:.3g%|inf %}".
 
-    See `number` for formats; "{chosen[label]}" is a figure of a part.
+    See `number` for formats; "{chosen[label]}" is a figure of a part, "{passes:#pass}" a count with
+    its noun.
     """
     return _Template().vformat(template, (), figures)
 

@@ -214,6 +214,14 @@ _IRRADIANCE = Setting(
     "NAME|FILE",
 )
 
+_STAGES = Setting(
+    "stages",
+    "text",
+    "tap pairs a pass of each stage, or * for nine fetches in one pass, such as 1-1|2-2|2-2; | "
+    "halves the picture.",
+    "STAGES",
+)
+
 # Of separable kernels: the fetches that a shader can afford.
 _TAPS = (
     Setting(
@@ -240,13 +248,7 @@ FITS: Mapping[str, Method] = {
         "few fetches: a chain of small blurs, whose stages are all added up",
         (
             Setting("fetches", "number", "most texture fetches a pixel.", "N", words="24"),
-            Setting(
-                "stages",
-                "text",
-                "tap pairs a pass of each stage, or * for nine fetches in one pass, such as "
-                "1-1|2-2|2-2; | halves the picture.",
-                "STAGES",
-            ),
+            _STAGES,
             Setting("passes", "whole", "most passes of the stages.", "N", (1, 1000)),
             Setting("full_resolution", "flag", "do not halve the picture."),
             Setting("still", "flag", "weigh in what changes as light moves by a pixel."),
@@ -381,11 +383,77 @@ FITS: Mapping[str, Method] = {
         "one term: normalised diffusion with one shape per channel, as engines use it",
         (_ENERGY, *_TAPS),
     ),
+    "gaussian-chain": Method(
+        "sssfit.fit.gaussian_chain:fit_gaussian_chain",
+        "six Gaussians, each a blur of the one before, after d'Eon and Luebke 2007",
+        (
+            replace(_STAGES, words="3-3-3-3-3-3"),
+            Setting(
+                "blur",
+                "choice",
+                "what is fitted as pictures see it: the widths of the stages and their one shape, "
+                "the widths, or nothing, where they are Gaussians of the profile as published.",
+                among=("shape", "widths", "published"),
+                words="shape",
+            ),
+        ),
+        counted=("stages",),
+        makes_taps=True,
+        is_seeded=True,
+    ),
+    "rotated": Method(
+        "sssfit.fit.rotated:fit_rotated",
+        "a chain of passes in three or four directions; beside the single pair",
+        (
+            Setting(
+                "directions",
+                "whole",
+                "passes: 4 at 0, 45, 90, 135 degrees, 3 at 0, 60, 120, or 2.",
+                "N",
+                (2, 4),
+                words="4",
+            ),
+            replace(_TAPS[0], words="9"),
+        ),
+        counted=("directions",),
+        makes_taps=True,
+        is_seeded=True,
+    ),
+    "pyramid": Method(
+        "sssfit.fit.pyramid:fit_pyramid",
+        "a convolution pyramid, one small filter on all levels, after Farbman et al. 2011",
+        (replace(_STAGES, words="1|1|1|1|1"), _SPECTRUM),
+        counted=("stages",),
+        makes_taps=True,
+        is_seeded=True,
+    ),
 }
 
 # Fits of separable kernels, and those whose result is a table of taps, as a shader runs it.
 SEPARABLE: Mapping[str, Method] = {k: each for k, each in FITS.items() if not each.makes_taps}
 TAPS: Mapping[str, Method] = {k: each for k, each in FITS.items() if each.makes_taps}
+
+_SOURCE = (
+    Setting("prefix", "text", "what all names begin with.", "NAME", words="SSS"),
+    Setting("coverage", "flag", "keep light within a mask, the fourth channel of the pictures."),
+    Setting("keep_energy", "flag", "leave the energy in the blend, not in a constant of its own."),
+    Setting("half", "flag", "round to half floats, and say what that costs."),
+    Setting("without_shader", "flag", "write the constants alone, without the passes."),
+    Setting(
+        "with_shader", "flag", "write the passes of a dense kernel too, up to 65 weights each."
+    ),
+    Setting("dense", "flag", "write them up to 129 weights a pass."),
+)
+_OF_C = tuple(each for each in _SOURCE if each.name in ("prefix", "keep_energy", "half"))
+
+EXPORTS: Mapping[str, Method] = {
+    "hlsl": Method("sssfit.export:source_text", "shader source of Direct3D", _SOURCE),
+    "glsl": Method("sssfit.export:source_text", "shader source of OpenGL and Vulkan", _SOURCE),
+    "wgsl": Method("sssfit.export:source_text", "shader source of WebGPU", _SOURCE),
+    "c": Method("sssfit.export:source_text", "constants for C and C++", _OF_C),
+    "json": Method("sssfit.export:document_text", "a kernel as a document"),
+    "csv": Method("sssfit.formats.csv:csv_text", "a profile as a table"),
+}
 
 
 def settings_of(methods: Mapping[str, Method]) -> dict[str, tuple[Setting, tuple[str, ...]]]:

@@ -287,6 +287,9 @@ FIT = [
             "--method weighted --rank 1 --mm-per-pixel .25 --support .5 --irradiance mine.exr",
         )
     ),
+    C("fit wax.profile.npz --method svd --rank 1 --pitches .5mm,.2cm", brief=True),
+    C("fit wax.profile.npz --method svd --rank 1 --pitches .5,1 --json", brief=True),
+    C("fit wax.profile.npz --pitches .5,1 -o x.taps.json"),
     C("fit wax.profile.npz --stages 1-1 --irradiance rgb8.png"),
     C("fit wax.profile.npz --stages 1-1 --irradiance mine.exr"),
     C("fit wax.profile.npz --stages 1-1 --irradiance hed"),
@@ -298,9 +301,31 @@ FIT = [
     C("fit wax.profile.npz --method disk --taps 257"),
     C("fit wax.profile.npz --method disk --taps 90 --mm-per-pixel .6 --support 1.8mm"),
     C("fit wax.profile.npz --method disk --place quadratic"),
+    *(
+        C(f"fit wax.profile.npz --method {own} --mm-per-pixel .6", brief=True, hidden=ERRORS)
+        for own in (
+            "gaussian-chain --stages 1-1 --seed 4",
+            "gaussian-chain --blur published --json",
+            "pyramid --stages '1|1' --spectrum white",
+            "rotated --taps 3 --seed 2",
+            "rotated --taps 3 --directions 3 --json",
+            "cascade --stages '1-1x'",
+        )
+    ),
+    C("fit wax.profile.npz --method gaussian-chain --stages 1-2"),
+    C("fit wax.profile.npz --method gaussian-chain --stages '1|1' --blur published"),
+    C("fit wax.profile.npz --method gaussian-chain --blur box"),
+    C("fit wax.profile.npz --method pyramid --stages '1|*'"),
+    C("fit wax.profile.npz --method rotated --directions 5"),
+    C("fit wax.profile.npz --method rotated --taps 4"),
     C("fit wax.profile.npz --method cascade --fetches 5"),
     C("fit wax.profile.npz --method cascade --stages '1-1|1' --fetches 12"),
     C("fit wax.profile.npz --method cascade --stages '1-x'"),
+    C("fit wax.profile.npz --method svd --taps 4"),
+    C("fit wax.profile.npz --method svd --taps 131"),
+    C("fit wax.profile.npz --method svd --taps 99 --mm-per-pixel .5"),
+    C("fit wax.profile.npz --support 40"),
+    C("fit wax.profile.npz --stages 1-1 --irradiance flat.exr --mm-per-pixel .5"),
     C("fit wax.profile.npz --method cascade --stages '1|*' --still"),
     C("fit wax.profile.npz --method cascade --stages '1||1'"),
     C("fit wax.profile.npz --method cascade --passes 0"),
@@ -466,6 +491,8 @@ RENDER = [
     C("render wax.svd2.kernel.json --follow lerp"),
     C("render wax.svd2.kernel.json --gain 3"),
     C("render wax.svd2.kernel.json --exposure 0"),
+    C(f"render wax.svd2.kernel.json --irradiance noise {SMALL} --exposure 1e308"),
+    C(f"render wax.svd2.kernel.json --irradiance disk {SMALL} --exposure 1e-308"),
     C("render wax.svd2.kernel.json --distance 1mm --size 20x20"),
     C("render grau.kernel.json --irradiance disk --truth t.exr"),
     C("render damaged.kernel.json"),
@@ -594,6 +621,7 @@ COMPARE = [
         " --terms 2 --budget-chart b.png"
     ),
     C(f"compare wax.toml --what budget --picture disk {TINY} --photons 2000 --model dipole"),
+    C("compare wax.toml --what budget --method cascade --rank 2"),
     C(
         f"compare wax.toml --what budget --picture disk {TINY} --photons 2000 --method burley"
         " --model burley --json"

@@ -28,7 +28,7 @@ def widest(values: Sequence[float]) -> float:
 
 
 def plural(count: int, word: str) -> str:
-    return word + "s" * (count > 1)
+    return word + ("es" if word.endswith("s") else "s") * (count > 1)
 
 
 # materials
@@ -412,7 +412,7 @@ def _budget(f: Figures, causes: list[Figures]) -> list[Any]:
     rows = [_cause(each) for each in (*named, interaction, whole, *others)]
     return [
         Words(
-            "{} on {}, {} x {} pixels of {} mm: {} to {} mm, {}, {} terms",
+            "{} on {}, {} x {} pixels of {} mm: {} to {} mm, {}, {} " + plural(f["rank"], "term"),
             *(f["material"], first["picture"], first["width"], first["height"]),
             *(f["mm_per_pixel"], simulated, f["radius_mm"], f["method"], f["rank"]),
         ),
@@ -690,7 +690,8 @@ def _loss(step: Figures) -> Words:
 def _beside(step: Figures, chosen: Figures) -> Words:
     price: Any = "no fetches"
     if step["method"]:
-        price = Words("{} fetches in {} passes", step["fetches"], step["passes"])
+        passes = plural(step["passes"], "pass")
+        price = Words(f"{{}} fetches in {{}} {passes}", step["fetches"], step["passes"])
         if step["fetches"] != chosen["fetches"]:
             price = Words("{}, {} times as many", price, step["fetches"] / chosen["fetches"])
     return Words("{}, {} for {}", step["label"], _loss(step), price)

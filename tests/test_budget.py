@@ -16,7 +16,7 @@ from sssfit.compare._budget_causes import make_sources, stored, true_picture
 from sssfit.compare.budget import error_budget, error_budgets
 from sssfit.compare.evaluate import evaluate
 from sssfit.errors import FitError, KernelError, RenderError, SimulationError
-from sssfit.fit import fit_svd
+from sssfit.fit import fit_svd, fit_taps
 from sssfit.fit.on_taps import on_taps
 from sssfit.kernel import SeparableKernel
 from sssfit.material import load_material, parse_material
@@ -433,3 +433,93 @@ def test_8_bits_are_whole_steps_of_the_largest_weight(sign, steps):
     )
     found = stored(kernel, "8-bit").weights.ravel() / 0.5 * max(np.abs(steps))
     np.testing.assert_allclose(found, steps, rtol=0, atol=1e-9)
+
+
+# Of a cascade
+
+
+@functools.cache
+def cascade_budget(stages, storage="half"):
+    settings = {"stages": stages}
+    scene = scene_of("points", 96, 0.6)
+    return error_budget(
+        *(load_material("skin1"), scene),
+        photons=PHOTONS,
+        method="cascade",
+        settings=settings,
+        storage=storage,
+    )
+
+
+def test_a_cascades_causes_make_the_whole_and_have_the_halvings_apart():
+    budget = cascade_budget("1|1-1")
+    inside = {each.name for each in budget.causes if each.is_in_whole}
+    assert inside == {
+        *("stages", "resolution", "simulation noise", "energy beyond the grid"),
+        "storage, half float",
+    }
+    parts = sum(each.difference for each in budget.causes if each.is_in_whole)
+    total = parts + budget.interaction.difference
+    np.testing.assert_allclose(total, budget.whole.difference, rtol=0, atol=1e-15)
+    assert sum(map(budget.share, (*budget.causes, budget.interaction))) - sum(
+        budget.share(each) for each in budget.causes if not each.is_in_whole
+    ) == pytest.approx(1.0)
+
+
+def test_resolution_is_what_rendering_has_beyond_the_mean_over_places():
+    """The table fitted to the light on the grid alone, at the four places among the texels."""
+    budget = cascade_budget("1|1-1")
+    walk = make_sources(load_material("skin1"), 96 * 0.6 * 1.5, photons=PHOTONS)
+    taps = fit_taps(walk.cut(walk.exact), stages="1|1-1", mm_per_pixel=0.6).kernel
+    scene = budget.scene
+    mean = np.zeros((96, 96, 3))
+    for dy in (0, 1):
+        for dx in (0, 1):
+            light = np.roll(scene.irradiance, (dy, dx), axis=(0, 1))
+            shown = render_taps(Scene("moved", light, 0.6), taps)
+            mean += np.roll(shown, (-dy, -dx), axis=(0, 1)) / 4
+    apart = render_taps(scene, taps) - mean
+    inside = slice(40, 56)  # where the mirrors are out of reach
+    found = cause(budget, "resolution").difference
+    scale = np.abs(apart[inside, inside]).max()
+    np.testing.assert_allclose(
+        found[inside, inside], apart[inside, inside], rtol=0, atol=0.01 * scale
+    )
+    assert scale > 0.0
+
+
+def test_a_cascade_at_full_resolution_has_no_such_cause():
+    names = [each.name for each in cascade_budget("1-1").causes]
+    assert "resolution" not in names
+    assert "stages" in names
+    assert not any(each.startswith("taps,") for each in names)
+
+
+def test_stages_before_the_first_halving_make_it_matter_less():
+    errors = [
+        cause(cascade_budget(each), "resolution").score.delta_e_2000_p99
+        for each in ("1|1-1", "1-1|1-1")
+    ]
+    assert errors[1] < 0.5 * errors[0]
+
+
+def test_a_cascade_is_stored_with_weights_that_add_up_to_1():
+    taps = cascade_budget("1|1-1", "8-bit").kernel
+    for stage in taps.stages:
+        sums = stage.weights[0] + 2.0 * stage.weights[1:].sum(axis=0)
+        np.testing.assert_allclose(sums, 1.0, rtol=0, atol=1e-12)
+        codes = stage.weights[1:] / stage.weights[1:].max(axis=0) * 255
+        np.testing.assert_allclose(codes, np.round(codes), rtol=0, atol=1e-9)
+    assert (cascade_budget("1|1-1", "float64").kernel.blend != taps.blend).any()
+
+
+def test_a_cascades_budget_is_drawn_and_written():
+    budget = cascade_budget("1|1-1")
+    figures = budget.to_dict()
+    assert (figures["rank"], figures["structure"]) == (None, "1|1-1")
+    assert_legible(lambda: budget_figure(budget))
+
+
+def test_a_disk_has_no_budget():
+    with pytest.raises(FitError, match="a disk shows another picture in each frame"):
+        error_budget(load_material("skin1"), scene_of(), method="disk")

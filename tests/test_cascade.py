@@ -1,5 +1,6 @@
 """Cascades: the spectrum they are fitted by, what the fit promises, and what a picture shows."""
 
+import functools
 import itertools
 from dataclasses import replace
 
@@ -10,7 +11,7 @@ from reference_pixels import one_over_r_profile
 from sssfit import fit
 from sssfit.compare.motion import motion
 from sssfit.errors import FitError
-from sssfit.fit import cascade, fit_taps, make_target
+from sssfit.fit import cascade, fit_taps, make_target, structures
 from sssfit.fit._chain_pairs import PairChain
 from sssfit.fit._chain_pairs import _sum as chain_sum
 from sssfit.fit._chain_stars import StarChain
@@ -37,7 +38,7 @@ def skin1():
 def chain_of(profile, structure, spectrum="natural", support_mm=9.0):
     target = make_target(profile, 0.3, support_mm)
     lit = list(range(profile.n_channels))
-    kind = StarChain if "*" in structure else PairChain
+    kind = StarChain if "*" in structure or "x" in structure else PairChain
     return kind(spectral_target(target, lit, spectrum), parse(structure))
 
 
@@ -45,7 +46,13 @@ def taps_of(chain, x, pitch=0.3):
     """The table of taps of some parameters."""
     numbers = chain.numbers(x)
     stages = tuple(
-        cascade.Stage(shape.level, shape.kind, offsets * pitch * 2.0**shape.level, weights)
+        cascade.Stage(
+            shape.level,
+            shape.kind,
+            offsets * pitch * 2.0**shape.level,
+            weights,
+            shape.angle_degrees,
+        )
         for shape, offsets, weights in zip(
             chain.shapes, numbers.offsets, numbers.weights, strict=True
         )
@@ -59,7 +66,9 @@ def taps_of(chain, x, pitch=0.3):
 # The spectrum
 
 
-@pytest.mark.parametrize("structure", ["1-2", "1|1", "2|1-1", "1|1|1", "*", "1|*-1", "*|*"])
+@pytest.mark.parametrize(
+    "structure", ["1-2", "1|1", "2|1-1", "1|1|1", "*", "1|*-1", "*|*", "2x", "1x|2x-1"]
+)
 def test_the_spectrum_is_that_of_points_at_all_places(skin1, structure):
     """Halving sees a point by its place among the texels; the fit is to the mean over places."""
     chain = chain_of(skin1, structure)
@@ -105,7 +114,9 @@ def test_weights_of_the_spectra(skin1):
     assert cell.sum() == pytest.approx(np.pi, rel=0.02)
 
 
-@pytest.mark.parametrize("structure", ["1", "1-2", "1|1-2", "1|2|1", "*", "*|1-*", "2|*-*"])
+@pytest.mark.parametrize(
+    "structure", ["1", "1-2", "1|1-2", "1|2|1", "*", "*|1-*", "2|*-*", "2x", "1|1x-*"]
+)
 def test_derivatives_are_those_of_differences(skin1, structure):
     chain = chain_of(skin1, structure)
     x = chain.start(np.random.default_rng(3))
@@ -319,35 +330,61 @@ def test_any_number_of_channels(lengths_mm):
 # Budgets
 
 
+@pytest.mark.parametrize("width", [5.0, 40.0, *structures.WIDTHS_PIXELS])
 @pytest.mark.parametrize("budget", [7, 10, 11.95, 12.5, 14, 17, 20, 24, 28, 36, 60, 100])
-def test_the_best_known_structure_within_a_budget_is_taken(budget):
-    found = cascade.structure_for(budget, None, None)
+def test_the_best_known_structure_within_a_budget_is_taken(budget, width):
+    found = cascade.structure_for(budget, None, None, width)
     within = {
-        error
-        for text, error in cascade.STRUCTURES.items()
+        text: structures.between(known, width)
+        for text, known in structures.STRUCTURES.items()
         if cost_of_chain(parse(text)).fetches <= budget
     }
-    assert cost_of_chain(found).fetches <= budget
-    assert cascade.STRUCTURES[text_of(found)] == min(within)
+    assert within[text_of(found)] <= 1.15 * min(within.values())
+    for text, error in within.items():  # nothing in fewer passes is as good
+        if cost_of_chain(parse(text)).passes < cost_of_chain(found).passes:
+            assert error > 1.15 * min(within.values())
+
+
+def test_errors_between_two_widths_follow_their_logarithms():
+    narrow, wide = structures.WIDTHS_PIXELS
+    assert structures.between((1.0, 16.0), (narrow * wide) ** 0.5) == pytest.approx(4.0)
+    for width in (narrow, 0.3, 0.0):
+        assert structures.between((1.0, 16.0), width) == pytest.approx(1.0)
+    for width in (wide, 1e4):
+        assert structures.between((1.0, 16.0), width) == pytest.approx(16.0)
+
+
+def test_the_width_is_that_of_ninety_per_cent_of_the_widest_channel():
+    profile = one_over_r_profile(2000, 0.01, [0.4, 1.6])  # F(r) = 1 - exp(-r / length)
+    assert structures.width_pixels(profile, 0.2) == pytest.approx(8.0 * np.log(10.0), rel=0.01)
+
+
+@pytest.mark.slow
+def test_the_known_widths_are_those_of_their_materials():
+    found = [structures.width_pixels(whole_profile(each), 0.3) for each in ("skin1", "chicken1")]
+    assert found == pytest.approx(structures.WIDTHS_PIXELS, rel=0.01)
 
 
 def test_passes_and_halvings_are_limits():
     for passes in (2, 4, 6, 8, 10, 12):
-        found = cascade.structure_for(30, None, passes)
+        found = cascade.structure_for(30, None, passes, 22.6)
         assert cost_of_chain(found).passes <= passes
     for passes in (1, 5, 6):  # stars
-        assert cost_of_chain(cascade.structure_for(30, None, passes)).passes == passes
+        found = cascade.structure_for(30, None, passes, 22.6)
+        assert cost_of_chain(found).passes == passes
     for budget in (36, 60):
-        full = cascade.structure_for(budget, None, None, full_resolution=True)
+        full = cascade.structure_for(budget, None, None, 22.6, full_resolution=True)
         assert max(each.level for each in full) == 0
         assert cost_of_chain(full).fetches > 0.7 * budget
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("text", cascade.STRUCTURES)
-def test_known_structures_leave_what_is_said_of_them(skin1, text):
-    shown = mean_p99(fit(skin1, "cascade", stages=text), skin1)
-    assert shown == pytest.approx(cascade.STRUCTURES[text], rel=0.1)
+@pytest.mark.parametrize(("place", "name"), [(0, "skin1"), (1, "chicken1")])
+@pytest.mark.parametrize("text", structures.STRUCTURES)
+def test_known_structures_leave_what_is_said_of_them(text, place, name):
+    profile = whole_profile(name)
+    shown = mean_p99(fit(profile, "cascade", stages=text), profile)
+    assert shown == pytest.approx(structures.STRUCTURES[text][place], rel=0.1)
 
 
 @pytest.mark.parametrize(
@@ -358,7 +395,7 @@ def test_known_structures_leave_what_is_said_of_them(skin1, text):
         ({"fetches": 10, "stages": "1-1|2-2"}, "the stages 1-1|2-2 take"),
         ({"stages": "1-1|2-2", "passes": 6}, "allow more, or use fewer or smaller stages"),
         ({"stages": "1-x"}, "stages = '1-x'; expected numbers of tap pairs"),
-        ({"passes": 1, "fetches": 8}, "no known cascade has at most 8 fetches and 1 passes"),
+        ({"passes": 1, "fetches": 8}, "no known cascade has at most 8 fetches and 1 pass"),
         ({"spectrum": "pink"}, "spectrum = 'pink'; expected 'natural' or 'white'"),
         ({"stages": "1", "mm_per_pixel": -1.0}, "mm_per_pixel = -1"),
     ],
@@ -399,6 +436,12 @@ PICTURES = [
 ]
 
 
+@functools.cache
+def whole_profile(name):
+    material = load_material(name)
+    return exact_with_all_light(material, paper_grid(material), 150.0)
+
+
 def mean_p99(taps, profile, size=256):
     found = []
     for name, settings in PICTURES:
@@ -410,10 +453,13 @@ def mean_p99(taps, profile, size=256):
 
 
 # The issue's figures: the mean over the pictures of the 99th percentile of Delta E.
-@pytest.mark.parametrize(("budget", "most"), [(14, 1.4), (17, 0.5), (24, 0.25)])
-def test_skin1_is_as_near_as_was_asked(skin1, budget, most):
-    taps = fit(skin1, "cascade", fetches=budget)
+@pytest.mark.parametrize(
+    ("budget", "passes", "most"), [(14, None, 1.4), (17, None, 0.5), (20, 6, 0.4), (24, None, 0.25)]
+)
+def test_skin1_is_as_near_as_was_asked(skin1, budget, passes, most):
+    taps = fit(skin1, "cascade", fetches=budget, passes=passes)
     assert taps.fetches <= budget
+    assert taps.passes <= (passes or 99)
     assert mean_p99(taps, skin1) <= most
 
 
@@ -425,12 +471,22 @@ def test_skin1_at_a_tenth_of_a_millimetre_is_as_near_as_was_asked(skin1):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "most"), [("marble", 0.25), ("ketchup", 0.35), ("chicken1", 0.7), ("skimmilk", 0.5)]
+    ("name", "budget", "most"),
+    [
+        *(("ketchup", 17, 0.6), ("chicken1", 17, 1.0)),
+        *(
+            ("marble", 24, 0.25),
+            ("ketchup", 24, 0.35),
+            ("chicken1", 24, 0.7),
+            ("skimmilk", 24, 0.5),
+        ),
+        *(("skin1", 28, 0.2), ("marble", 28, 0.2), ("ketchup", 28, 0.25), ("chicken1", 28, 0.5)),
+        ("skimmilk", 28, 0.3),
+    ],
 )
-def test_other_materials_are_as_near_as_was_asked(name, most):
-    material = load_material(name)
-    profile = exact_with_all_light(material, paper_grid(material), 150.0)
-    assert mean_p99(fit(profile, "cascade", fetches=24), profile) <= most
+def test_other_materials_are_as_near_as_was_asked(name, budget, most):
+    profile = whole_profile(name)
+    assert mean_p99(fit(profile, "cascade", fetches=budget), profile) <= most
 
 
 @pytest.mark.slow
@@ -438,7 +494,7 @@ def test_no_start_of_64_is_much_better(skin1, monkeypatch):
     monkeypatch.setattr(cascade, "_ALIASING", 0.0)  # the search is for the misfit alone
     target = make_target(skin1, 0.3, cascade._reach_mm(skin1, 0.3))
     chain = PairChain(spectral_target(target, [0, 1, 2], "natural"), parse("1-1|2-2|2-2"))
-    ours = (fit(skin1, "cascade").errors["spectral"] ** 2).sum()
+    ours = (fit(skin1, "cascade", stages="1-1|2-2|2-2").errors["spectral"] ** 2).sum()
     best = np.inf
     for seed in range(64):
         rough = chain.start(np.random.default_rng([77, seed]))

@@ -20,7 +20,7 @@ from sssfit.choose.truth import material_of, photons_needed
 from sssfit.choose.views import Views, checked_scene, head_scenes
 from sssfit.errors import FitError, RenderError, SimulationError, SssfitError
 from sssfit.fit import fit_result
-from sssfit.fit.cascade import STRUCTURES
+from sssfit.fit.structures import STRUCTURES, WIDTHS_PIXELS, between, width_pixels
 from sssfit.kernel import structure
 from sssfit.material import Layer, Material, load_material, material_names
 from sssfit.measure.score import COLOUR_FIGURES, measure
@@ -74,7 +74,7 @@ def test_the_choice_will_do_and_the_next_cheaper_will_not(skin1, of, tolerance):
     assert found.chosen.error == pytest.approx(getattr(chosen, figure), rel=1e-9)
     for key in COLOUR_FIGURES:
         assert getattr(found.chosen, key) == pytest.approx(getattr(chosen, key), rel=1e-9)
-    known = options()
+    known = options(width_pixels(exact, 0.7))
     place = known.index(found.chosen.option)
     assert found.cheaper.option == known[place - 1]
     assert found.dearer.option == known[place + 1]
@@ -97,31 +97,32 @@ def test_half_of_the_options_is_left_by_each_that_is_tried(choice):
     """No option twice, and no more than the halving, two neighbours and no blur."""
     tried = [each.option for each in choice.steps]
     assert len(set(map(id, tried))) == len(tried)
-    assert len(tried) <= 3 + math.ceil(math.log2(len(options()) + 1))
+    assert len(tried) <= 3 + math.ceil(math.log2(len(options(20.0)) + 1))
 
 
 @pytest.mark.parametrize(("fetches", "passes"), [(14.0, None), (100.0, 4), (None, 2), (12.0, 6)])
-def test_options_are_those_that_none_cheaper_beats(fetches, passes):
-    found = options(fetches, passes)
+@pytest.mark.parametrize("width", [5.0, *WIDTHS_PIXELS, 40.0])
+def test_options_are_those_that_none_cheaper_beats(fetches, passes, width):
+    found = options(width, fetches, passes)
     assert found
     costs = [each.fetches for each in found]
     assert costs == sorted(costs)
     known = [each.known for each in found]
     assert known == sorted(known, reverse=True)
-    every = [each for each in options_of_all() if each.fetches <= (fetches or 1e9)]
+    every = [each for each in options_of_all(width) if each.fetches <= (fetches or 1e9)]
     every = [each for each in every if each.passes <= (passes or 1e9)]
     assert {each.label for each in found} <= {each.label for each in every}
     for each in every:  # nothing within the budgets is nearer for as little
         assert any(other.fetches <= each.fetches and other.known <= each.known for other in found)
 
 
-def options_of_all():
+def options_of_all(width):
     """Every known table, from its own fit's cost."""
     for text, known in STRUCTURES.items():
         cost = structure.cost_of_chain(structure.parse(text))
-        yield Option(f"cascade {text}", "cascade", cost.fetches, cost.passes, known)
+        yield Option(f"cascade {text}", "cascade", cost.fetches, cost.passes, between(known, width))
     for taps, known in PREINTEGRATED.items():
-        yield Option(f"pre-integrated on {taps} taps", "", 2 * taps, 2, known)
+        yield Option(f"pre-integrated on {taps} taps", "", 2 * taps, 2, between(known, width))
 
 
 @pytest.mark.parametrize("budget", [{"fetches": 12.0}, {"fetches": 100.0, "passes": 2}])
@@ -134,7 +135,9 @@ def test_within_a_budget_the_least_error_is_chosen(skin1, budget, monkeypatch):
     assert kernel.fetches <= budget["fetches"]
     assert kernel.passes <= budget.get("passes", 99)
     tried = [each for each in found.steps if each.option]
-    assert [each.option for each in tried[:3]] == options(**budget)[-3:]
+    assert [each.option for each in tried[:3]] == options(
+        width_pixels(found.profile, 0.6), **budget
+    )[-3:]
     assert found.chosen == min(tried, key=lambda each: each.error)
     assert (found.fetches, found.passes) == (budget["fetches"], budget.get("passes"))
 
@@ -143,7 +146,7 @@ def judged(monkeypatch, errors):
     """Choices on given errors, an option each, within a tolerance of 1."""
     found = [Option(f"option {k}", "", 8.0 + k, 2, 9.0 - k) for k in range(len(errors))]
     views = SimpleNamespace(tolerance=1.0, tolerance_of="p95")
-    search = rooms._Search(views, found, None)
+    search = rooms._Search(views, found, found, None)
 
     def step(option):
         error = errors[found.index(option)]
@@ -535,7 +538,7 @@ def flat(value, mm_per_pixel=0.6):
         ({"fetches": 6.9}, "fetches = 6.9; expected a number from 7 up"),
         ({"fetches": math.nan}, "fetches = nan; expected a number from 7 up"),
         ({"passes": 0}, "passes = 0; expected a whole number from 1 up"),
-        ({"fetches": 7.0, "passes": 1}, "no known table has at most 7 fetches and 1 passes"),
+        ({"fetches": 7.0, "passes": 1}, "no known table has at most 7 fetches and 1 pass"),
         ({"tolerance_of": "p50"}, "tolerance_of = 'p50'; expected one of p95, p99, mean"),
         ({"mm_per_pixel": 1e-300}, "mm_per_pixel = 1e-300; expected a length from 0.0005 mm up"),
         ({"mm_per_pixel": 0.001}, "8193 are the most; expected pixels of 0.0052 mm or more"),
@@ -606,7 +609,7 @@ def test_what_cannot_be_fitted_to_a_profile_is_left_out_by_name(monkeypatch):
 
 
 def test_a_step_says_what_it_costs_and_loses():
-    option = options(12.0)[-1]
+    option = options(20.0, 12.0)[-1]
     figures = dict.fromkeys(COLOUR_FIGURES, 0.25)
     step = rooms.Step(option, 0.25, **figures, mm_per_pixel=1.6, within=True)
     said = step_line(step)
@@ -616,7 +619,7 @@ def test_a_step_says_what_it_costs_and_loses():
 
 def test_on_pixels_as_wide_as_the_profile_few_taps_are_all_there_are(skin1):
     """A pass of three pixels has three taps, whatever the option's number."""
-    option = next(each for each in options_of_all() if each.label.endswith("on 49 taps"))
+    option = next(each for each in options_of_all(20.0) if each.label.endswith("on 49 taps"))
     wide = replace(option, method="preintegrated", settings={"taps": 49})
     profile = simulate_exact(skin1)
     assert len(wide.fit(profile, 15.0).kernel.stages[0].offsets_mm) == 1

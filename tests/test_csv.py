@@ -340,7 +340,7 @@ def test_a_gap_is_said_in_the_unit_of_the_table(unit, mm):
         ("r_mm,R\n1,0.1\n", "a.csv has 1 radius; a profile needs 2 or more"),
         ("r_mm,R\ninf,0.1\n", "line 2, column 'r_mm': inf comes before any radius"),
         ("r_mm,R\n1,0.1\ninf,0\n3,0\n", "line 4: a line follows r_mm = inf"),
-        ("# c\n\nr_mm,R\n1,0.1\n\n2\n", "line 6: 1 cells where the header has 2"),
+        ("# c\n\nr_mm,R\n1,0.1\n\n2\n", "line 6: 1 cell where the header has 2"),
         ("r_mm,R\n1,0.1,0.2\n", "line 2: 3 cells where the header has 2"),
         ("r_mm,R\n0,5,0,1\n", "line 2: 4 cells where the header has 2"),
         ("r_mm,R,G\n1,0.1,\n", "line 2, column 'G': the cell is empty"),

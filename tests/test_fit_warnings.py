@@ -1,6 +1,7 @@
 """Profiles that no fit likes: either a kernel that is near, or a word about it. Bad input."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -319,6 +320,20 @@ def test_one_annulus_has_no_shape(tmp_path, monkeypatch, capfd):
     for method in METHODS.values():
         with pytest.raises(FitError, match="one annulus has no shape"):
             method.fit(profile)
+
+
+def test_a_support_beyond_the_profile_is_refused_where_there_is_light_beyond():
+    profile = make_profile(np.arange(21) * 0.2, np.full((20, 2), 0.02))
+    lossy = replace(profile, beyond_grid=np.array([0.0, 1e-4]))
+    with pytest.raises(FitError) as caught:
+        fit_svd(lossy, support_mm=6.0)
+    assert str(caught.value) == (
+        f"{lossy.label}: the profile ends at 4 mm and the support at 6 mm, and channel "
+        f"{lossy.channels[1]} has light beyond; use a smaller support, or simulate the profile to "
+        "a larger radius."
+    )
+    fit_svd(lossy, support_mm=4.2)  # less than a pixel
+    fit_svd(profile, support_mm=6.0)  # all of its light is on the grid: the rest is 0
 
 
 def test_a_kernel_too_large_is_refused_with_its_true_size():

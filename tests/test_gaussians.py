@@ -401,7 +401,7 @@ def test_a_solver_that_gives_up_costs_a_start_and_not_the_fit(monkeypatch):
     monkeypatch.setattr(scipy.optimize, "nnls", gives_up)
     result = fit(profile, 3)
     assert result.kernel.rank == 1
-    assert result.stop_reasons == ("1 of 3 terms are enough: one more does not lower the error",)
+    assert result.stop_reasons == ("1 of 3 terms is enough: one more does not lower the error",)
 
 
 def test_a_search_that_runs_out_says_so(monkeypatch):

@@ -267,7 +267,7 @@ def test_a_kernel_cannot_be_changed():
         ),
         ({"scale": [1.0, 1.0]}, "scale has shape (2,); expected (1,)"),
         ({"signs": [[0.5]]}, "signs must be +1 or -1"),
-        ({"channels": ("R", "G")}, "2 channel names for 1 channels"),
+        ({"channels": ("R", "G")}, "2 channel names for 1 channel"),
         (
             {"weights": np.ones((1, 3, 2)), "signs": [[1, 1]], "scale": [1, 1]}
             | {"relative_frobenius_error": [0, 0], "energy_error": [0, 0], "channels": ("R", "R")},
@@ -396,7 +396,7 @@ def damaged():
         "terms[0].weights[3][1] = true; expecte",
     )
     many[3] = [1.0]
-    yield "a row", changed(terms=[term | {"weights": many}]), "terms[0].weights[3] has 1 entries"
+    yield "a row", changed(terms=[term | {"weights": many}]), "terms[0].weights[3] has 1 entry"
     yield (
         "a term",
         changed(terms=[term, term | {"weights": many[:3]}]),

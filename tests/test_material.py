@@ -38,6 +38,23 @@ def skin(old, new):
     return SKIN.replace(old, new)
 
 
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("sample.mci", "is an input file of MCML: run `simulate` on it, and take the profile"),
+        ("MCML2.MCO", "is output of MCML: import it, and take the profile that this writes"),
+        ("table.csv", "is a table: import it, and take the profile that this writes"),
+        ("skin1.svd3.kernel.json", "is a kernel or another JSON file; expected a material (.toml"),
+    ],
+)
+def test_a_file_of_another_kind_is_told_by_its_ending(tmp_path, name, said):
+    (tmp_path / name).write_text("no material\n")
+    with pytest.raises(MaterialError, match=re.escape(f"{name} {said}")):
+        load_material(tmp_path / name)
+    (tmp_path / name).write_text(load_material("skin1").to_toml())
+    assert load_material(tmp_path / name) == load_material("skin1")
+
+
 def test_the_shipped_materials_are_listed_in_order():
     names = material_names()
     assert len(names) == 22

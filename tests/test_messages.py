@@ -9,9 +9,10 @@ import pytest
 
 from sssfit.cli import main
 from sssfit.cli._options import in_options
-from sssfit.messages import Columns, filled, note, number, report
+from sssfit.messages import Columns, counted, filled, note, number, report
 
 LIBRARY = sorted((Path(__file__).parents[1] / "sssfit").rglob("*.py"))
+APPROVED = Path(__file__).parent / "approved"
 # A long option, a short one, or a command: none of these stands in text for Python.
 OPTION = re.compile(r"(?<![\w-])--?[a-zA-Z][\w-]*(?![\w\]])")
 COMMAND = re.compile(r"`sssfit |\bsssfit (simulate|fit|render|chart|show|export|import|compare) ")
@@ -128,6 +129,43 @@ def test_templates_are_filled_by_the_formats_of_figures():
     assert filled("{chosen[label]} {error[0]:.2f}", FIGURES) == "svd 2 0.50"
     with pytest.raises(KeyError):
         filled("{unknown}", FIGURES)
+
+
+@pytest.mark.parametrize(
+    ("value", "noun", "form", "said"),
+    [
+        (1, "pass", "", "1 pass"),
+        (0, "pass", "", "0 passes"),
+        (2, "fetch", "", "2 fetches"),
+        (1.0, "fetch", ".4g", "1 fetch"),
+        (22.84375, "fetch", ".4g", "22.84 fetches"),
+        (1, "annulus", "", "1 annulus"),
+        (12, "annulus", "", "12 annuli"),
+        (2, "entry", "", "2 entries"),
+        (1000, "photon", ",", "1,000 photons"),
+        (1, "mean free path", "", "1 mean free path"),
+        (3, "mean free path", "", "3 mean free paths"),
+        (None, "photon", "", "- photons"),
+    ],
+)
+def test_a_count_has_its_noun(value, noun, form, said):
+    assert counted(value, noun, form) == said
+    assert filled(f"{{value:{form}#{noun}}}.", {"value": value}) == f"{said}."
+
+
+_NOUNS = (
+    *("annuli", "bytes", "cells", "channels", "columns", "entries", "fetches", "files", "kernels"),
+    *("layers", "levels", "materials", "numbers", "passes", "photons", "pictures", "pixels"),
+    *("points", "rows", "runs", "stages", "steps", "taps", "terms", "threads", "values", "weights"),
+)
+
+
+@pytest.mark.parametrize("path", sorted(APPROVED.glob("*.txt")), ids=lambda path: path.stem)
+def test_nothing_says_1_passes(path):
+    """In what verbs and records print; "2 x 1 pixels" is two numbers, "edge: 1 points" a list."""
+    one = re.compile(rf"(?<! x)(?<!:) 1 (?:{'|'.join(_NOUNS)})\b")
+    lines = path.read_text(encoding="utf-8").splitlines()
+    assert [line for line in lines if one.search(line)] == []
 
 
 def test_a_report_leaves_out_what_is_not_known():

@@ -264,3 +264,41 @@ def test_seconds_are_the_least_after_a_call_that_warms_up():
     assert len(calls) == 4
     with pytest.raises(RenderError, match="0 pixels, 5 repeats; expected at least 1 of each"):
         seconds_per_megapixel(lambda: None, pixels=0)
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+@pytest.mark.parametrize(
+    ("exposure", "colour", "size"),
+    [(1e308, "white", "smaller"), (40.0, "white", "smaller"), (1e-308, "black", "larger"),
+     (1e-320, "black", "larger"), (1.9e-4, "black", "larger")],
+)  # fmt: skip
+def test_an_exposure_that_shows_nothing_is_said_and_not_scored_0(exposure, colour, size, channels):
+    truth = np.linspace(0.05, 0.7, 12).reshape(3, 4, 1) * np.ones(channels)
+    with pytest.raises(RenderError) as caught:
+        measure(truth * 1.1, truth, exposure=exposure)
+    assert str(caught.value) == (
+        f"at the exposure {exposure:g} all that is lit is {colour}, so Delta E says "
+        f"nothing; use a {size} exposure, such as {auto_exposure(truth):.3g}."
+    )
+
+
+def test_rounding_of_the_convolution_is_no_light_that_could_be_white():
+    truth = np.full((3, 4, 3), 1e-18)
+    truth[1, 1] = 0.5
+    truth[2, 2] = -1e-18
+    with pytest.raises(RenderError, match="all that is lit is white"):
+        measure(truth, truth, exposure=1e308)
+
+
+@pytest.mark.parametrize("exposure", [1.0, 19.0, 3e-4])
+def test_an_exposure_that_shows_something_is_scored(exposure):
+    truth = np.linspace(0.05, 1.0, 12).reshape(3, 4, 1)
+    assert measure(truth * 0.9, truth, exposure=exposure).exposure == exposure
+    # White beside a picture that is not: that much is seen.
+    assert measure(truth * 0.9, truth * 100.0, exposure=1.0).delta_e_2000_mean > 5.0
+    assert measure(np.ones((2, 2, 1)), np.ones((2, 2, 1)), exposure=1.0).delta_e_2000_mean == 0.0
+
+
+def test_pictures_that_are_no_colour_have_no_exposure_to_miss():
+    truth = np.ones((2, 2, 2))
+    assert np.isnan(measure(truth, truth, exposure=1e308).delta_e_2000_mean)

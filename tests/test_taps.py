@@ -120,7 +120,7 @@ def test_no_structure_is_one_line(text):
 
 
 def test_too_many_stages_or_levels_are_refused():
-    with pytest.raises(KernelError, match="25 stages on 1 levels"):
+    with pytest.raises(KernelError, match="25 stages on 1 level"):
         parse("-".join("1" * 25))
     with pytest.raises(KernelError, match="11 stages on 11 levels"):
         parse("|".join("1" * 11))
@@ -157,7 +157,7 @@ EDITS = {
     "chained": (1, "chained = 1; expected true or false"),
     "channels": (["c0", "c0"], "has an entry twice"),
     "mm_per_pixel": (0, "mm_per_pixel = 0; expected 1e-12 to 1e+12"),
-    "blend": ([[0.1, 0.2]], "blend has 1 entries; expected 2 to 25"),
+    "blend": ([[0.1, 0.2]], "blend has 1 entry; expected 2 to 25"),
     "method": ("a\nb", "expected a text that prints on one line"),
 }
 
@@ -322,7 +322,7 @@ def test_pairs_on_the_full_picture_are_a_separable_kernel(chained):
     np.testing.assert_allclose(
         render_taps(scene, taps), render_separable(scene, kernel), rtol=0, atol=1e-14
     )
-    with pytest.raises(KernelError, match="stars or halved pictures"):
+    with pytest.raises(KernelError, match="turned stages or halved pictures"):
         taps_of("1|1").separable_kernel()
 
 

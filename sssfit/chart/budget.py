@@ -17,6 +17,8 @@ from matplotlib.patches import Patch
 
 from sssfit.chart.page import COLOURS, Style, drawable, name_axes, new_page, tick
 from sssfit.chart.text import count, shortened
+from sssfit.kernel import Taps
+from sssfit.messages import counted
 
 if TYPE_CHECKING:
     from sssfit.compare.budget import Budget, Cause
@@ -80,10 +82,14 @@ def _subtitle(budget: Budget) -> str:
     """Return text about the kernel's profile and the pictures."""
     source = budget.model or f"{count(budget.photons)} photons, seed {budget.seed}"
     kernel, scene = budget.kernel, budget.scene
+    made = (
+        f"{kernel.structure} on pixels"
+        if isinstance(kernel, Taps)
+        else f"{counted(kernel.rank, 'term')} on {counted(kernel.pixels, 'pixel')}"
+    )
     words = [
         f"{source}, grid to {budget.radius_mm:.3g} mm",
-        f"{kernel.method}, {kernel.rank} term{'s' * (kernel.rank > 1)} on {kernel.pixels} pixels "
-        f"of {scene.mm_per_pixel:.4g} mm",
+        f"{kernel.method}, {made} of {scene.mm_per_pixel:.4g} mm",
         f"pictures {scene.width} x {scene.height}",
     ]
     return " · ".join(words)

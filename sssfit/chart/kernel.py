@@ -41,6 +41,7 @@ from sssfit.chart.page import (
     tick_powers,
 )
 from sssfit.chart.text import count, method_name, shortened
+from sssfit.messages import counted
 
 if TYPE_CHECKING:
     from sssfit.compare.kernel_view import KernelView
@@ -87,7 +88,7 @@ def kernel_figure(view: KernelView) -> Figure:
 def _title(kernel: SeparableKernel) -> str:
     material = kernel.meta.get("material")
     name = f"{shortened(str(material), 24)}: " if material else ""
-    terms = f"{kernel.rank} term{'s' if kernel.rank > 1 else ''}"
+    terms = counted(kernel.rank, "term")
     return f"{name}{shortened(kernel.method, 24)} kernel, {terms}"
 
 

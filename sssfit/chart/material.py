@@ -20,6 +20,7 @@ from sssfit.chart.page import (
 )
 from sssfit.chart.text import shortened, spread
 from sssfit.material import Layer, Material
+from sssfit.messages import counted
 
 HEIGHT_INCHES = 3.9
 _LETTERS = 20  # letters of channel names that fit side by side under a panel
@@ -74,7 +75,7 @@ def _subtitle(material: Material) -> str:
     count = len(material.layers)
     is_deep = math.isinf(material.layers[-1].thickness_mm)
     end = "half space" if is_deep and count == 1 else "half space below" if is_deep else "slab"
-    parts = [f"{count} layer{'s' * (count > 1)}, {end}"]
+    parts = [f"{counted(count, 'layer')}, {end}"]
     if material.source:
         parts.append(shortened(material.source, 40))
     return " · ".join([*parts, f"specular reflectance {material.specular_reflectance:.4g}"])
@@ -152,7 +153,7 @@ def _notes(material: Material, shown: Sequence[int]) -> list[str]:
     clear = sum(layer.is_clear for layer in material.layers)
     left_out = len(material.layers) - clear - len(shown)
     if clear:
-        notes.append(f"{clear} clear layer{'s' * (clear > 1)} without absorption or scattering.")
+        notes.append(f"{counted(clear, 'clear layer')} without absorption or scattering.")
     if left_out:
         notes.append(f"{left_out} more layers are not drawn.")
     return notes

@@ -21,6 +21,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, StrMetho
 from sssfit.arrays import FloatArray
 from sssfit.chart.page import Handle, Style, add_table, name_axes, new_page
 from sssfit.chart.text import WEIGHTED, count, grid, method_name, shortened, spread
+from sssfit.messages import counted
 
 if TYPE_CHECKING:
     from sssfit.compare.models import ModelComparison, ModelCurve
@@ -245,5 +246,7 @@ def _notes(comparison: ModelComparison, shown: Sequence[int]) -> list[str]:
         )
     left = comparison.material.n_channels - len(shown)
     if left:
-        notes.append(f"{left} channels between these are not drawn.")
+        notes.append(
+            f"{counted(left, 'channel')} between these {'is' if left == 1 else 'are'} not drawn."
+        )
     return notes

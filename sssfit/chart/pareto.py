@@ -26,6 +26,7 @@ from sssfit.chart.page import (
     new_page,
 )
 from sssfit.chart.text import kernel_subtitle, shortened, titled
+from sssfit.messages import counted
 
 if TYPE_CHECKING:
     from sssfit.compare.comparison import Comparison, KernelRow, Picture
@@ -43,6 +44,9 @@ _METHODS: dict[str, tuple[str, str, str]] = {
     "falloff": ("falloff", "#56b4e9", "P"),
     "burley": ("Burley", "#999999", "X"),
     "weighted": ("weighted terms", "#882255", "<"),
+    "gaussian-chain": ("chain of Gaussians", "#661100", "d"),
+    "pyramid": ("convolution pyramid", "#44aa99", "h"),
+    "rotated": ("passes in 3 or 4 directions", "#aa4499", "8"),
     "disk": ("disk, one frame", "#999933", "p"),
 }
 _GREY = "#666666"
@@ -312,11 +316,13 @@ def _notes(comparison: Comparison, error: str, cost: str) -> list[str]:
     )
     second = {
         "fetches": "One fetch serves all channels. Terms on taps share their first pass. Small: "
-        f"dense kernels of {comparison.pixels} pixels at their weights, which no shader applies.",
+        f"dense kernels of {counted(comparison.pixels, 'pixel')} at their weights, which no "
+        "shader applies.",
         "passes": "Passes: two a term, one along x and one along y, one a star of nine fetches; "
         "without those that change the picture's size.",
         "bytes": "Bytes: each picture that a pass reads, once, and what it writes, in half floats.",
-        "seconds": f"Seconds: wall time on {_threads(comparison)} of this machine, float64, all "
+        "seconds": f"Seconds: wall time on {counted(comparison.threads, 'thread')} of this "
+        "machine, float64, all "
         "channels, the least of several. The front is of two digits; zeros at a pass's "
         "ends cost nothing.",
     }[cost]
@@ -338,7 +344,3 @@ def _notes(comparison: Comparison, error: str, cost: str) -> list[str]:
     if comparison.left_out:
         notes.append(f"Could not be fitted: {', '.join(name for name, _ in comparison.left_out)}.")
     return notes
-
-
-def _threads(comparison: Comparison) -> str:
-    return "1 thread" if comparison.threads == 1 else f"{comparison.threads} threads"

@@ -20,6 +20,7 @@ from sssfit.chart.page import (
     put_picture,
 )
 from sssfit.chart.text import method_name, shortened, titled
+from sssfit.messages import counted
 
 if TYPE_CHECKING:
     from sssfit.compare.sheet import Sheet, SheetRow
@@ -91,7 +92,7 @@ def _draw_row(axes: Axes, row: SheetRow, down: float, wide: float) -> None:
 def _label(row: SheetRow) -> str:
     """Split a label at its comma, and add the number of passes."""
     name = row.label.replace(", ", "\n")
-    return name if row.passes is None else f"{name}\n{row.passes} passes"
+    return name if row.passes is None else f"{name}\n{counted(row.passes, 'pass')}"
 
 
 def _notes(sheet: Sheet) -> list[str]:

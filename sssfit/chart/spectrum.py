@@ -24,6 +24,7 @@ from sssfit.chart.page import (
     new_page,
 )
 from sssfit.chart.text import kernel_subtitle, shortened, spread, titled
+from sssfit.messages import counted
 
 if TYPE_CHECKING:
     from sssfit.compare.spectrum import Spectrum
@@ -121,5 +122,7 @@ def _notes(spectrum: Spectrum, shown: Sequence[int]) -> list[str]:
     ]
     left = spectrum.profile.n_channels - len(shown)
     if left:
-        notes.append(f"{left} channels between these are not drawn.")
+        notes.append(
+            f"{counted(left, 'channel')} between these {'is' if left == 1 else 'are'} not drawn."
+        )
     return notes

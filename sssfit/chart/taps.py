@@ -29,6 +29,7 @@ from sssfit.chart.page import (
     tick_decades,
 )
 from sssfit.chart.text import method_name, shortened
+from sssfit.messages import counted
 from sssfit.profile import full_kernel
 
 if TYPE_CHECKING:
@@ -88,7 +89,7 @@ def _title(view: TapsView) -> str:
 def _subtitle(view: TapsView) -> str:
     taps = view.taps
     parts = [
-        f"{taps.fetches:.4g} fetches a pixel in {taps.passes} passes",
+        f"{counted(taps.fetches, 'fetch', '.4g')} a pixel in {counted(taps.passes, 'pass')}",
         f"pixels of {taps.mm_per_pixel:.4g} mm",
     ]
     if method := taps.meta.get("profile_method"):

@@ -6,6 +6,7 @@ import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.data import Picture
+from sssfit.messages import counted
 from sssfit.profile import Profile
 from sssfit.profile.bins import MIN_HITS
 
@@ -74,7 +75,7 @@ def grid(profile: Profile) -> str:
     """Return text about the annuli: number, width if equal, and outer radius."""
     width_mm = np.diff(profile.r_edges_mm)
     spacing = f" of {width_mm[0]:.4g} mm" if np.allclose(width_mm, width_mm[0]) else ""
-    return f"{profile.n_annuli} annuli{spacing} to r = {profile.r_edges_mm[-1]:.4g} mm"
+    return f"{counted(profile.n_annuli, 'annulus')}{spacing} to r = {profile.r_edges_mm[-1]:.4g} mm"
 
 
 def count(number: int) -> str:
@@ -141,7 +142,9 @@ def footnotes(profile: Profile, image: str) -> list[str]:
         )
     if profile.n_channels > _MOST_IN_LEGEND:
         others = profile.n_channels - _MOST_IN_LEGEND
-        notes.append(f"Thin lines: the {others} channels not named above, without bands.")
+        notes.append(
+            f"Thin lines: the {counted(others, 'channel')} not named above, without bands."
+        )
     return [*notes, image] if image else notes
 
 

@@ -5,11 +5,11 @@ percentile unless another figure is asked for (``views``); what counts as cheap 
 pixel, then passes (``options``). Neither depends on a clock, so the same seed gives the same
 choice.
 
-No blur at all is tried first. Then the options that none cheaper beats on skin1 are halved until
-the cheapest that will do is found, and the one before the next cheaper is tried as well, or where
-none seems to do the last three: the order of their errors on another material and picture is nearly
-that on skin1. So what is chosen holds, and the next cheaper of those options does not; that nothing
-else would do for less is not proved.
+No blur at all is tried first. Then the options that no cheaper one is expected to beat are halved
+until the cheapest that will do is found, and the one before the next cheaper is tried as well, or
+where none seems to do the last three: the order of their errors on other kernels and pictures is
+nearly that of the kernels known (``sssfit.fit.structures``). So what is chosen holds, and the next
+cheaper of those options does not; that nothing else would do for less is not proved.
 """
 
 import math
@@ -45,6 +45,7 @@ from sssfit.compare.evaluate import timed
 from sssfit.compare.references import evaluated_scene
 from sssfit.errors import FitError, RenderError
 from sssfit.fit import TapsFit, support_of
+from sssfit.fit.structures import width_pixels
 from sssfit.material import Material
 from sssfit.measure.score import COLOUR_FIGURES
 from sssfit.profile import Profile
@@ -316,7 +317,9 @@ def choose(
         return Choice(**given, scenes=tuple(scenes))
     limit = math.inf if tolerance is None else tolerance
     views = Views(profile, scenes, threads, tolerance=limit, tolerance_of=tolerance_of)
-    search = _Search(views, options(fetches, passes), progress)
+    width = width_pixels(profile, mm_per_pixel)
+    within, every = options(width, fetches, passes), options(width, None, passes)
+    search = _Search(views, within, every, progress)
     return search.run(given, material_of(source), seconds, seed)
 
 
@@ -348,9 +351,13 @@ class _Search:
     """The steps, and the pictures they are tried on."""
 
     def __init__(
-        self, views: Views, found: list[Option], progress: Callable[[Step], None] | None
+        self,
+        views: Views,
+        within: list[Option],
+        every: list[Option],
+        progress: Callable[[Step], None] | None,
     ) -> None:
-        self.views, self.options, self.progress = views, found, progress
+        self.views, self.options, self.every, self.progress = views, within, every, progress
         self.steps: list[Step] = []
         self.tried: dict[int, Step | None] = {}
         self.unfitted: list[str] = []
@@ -380,7 +387,7 @@ class _Search:
             chosen=chosen,
             fit=fitted,
             cheaper=self._next_cheaper(chosen),
-            dearer=self._next_dearer(chosen, given["passes"]),
+            dearer=self._next_dearer(chosen),
             photons=(
                 photons_needed(material, chosen.option, views, seed, seconds)
                 if is_limited
@@ -410,7 +417,7 @@ class _Search:
         return last
 
     def _last_few(self) -> range:
-        """Return the places of the options that leave the least of skin1."""
+        """Return the places of the options that are expected to leave the least."""
         return range(max(len(self.options) - _BEST_OF, 0), len(self.options))
 
     def _best(self) -> int:
@@ -459,9 +466,9 @@ class _Search:
         below = [each for each in self.steps if cost(each) < cost(chosen)]
         return max(below, key=cost, default=None)
 
-    def _next_dearer(self, chosen: Step, passes: int | None) -> Step | None:
+    def _next_dearer(self, chosen: Step) -> Step | None:
         """Judge the next option that costs more fetches, in the budget or beyond it."""
-        above = (each for each in options(None, passes) if each.fetches > chosen.fetches)
+        above = (each for each in self.every if each.fetches > chosen.fetches)
         dearer = next(above, None)
         if dearer is None:
             return None

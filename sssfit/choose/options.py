@@ -1,4 +1,4 @@
-"""The options of a choice: tables of taps with what each costs, and what it leaves of skin1.
+"""The options of a choice: tables of taps with what each costs, and the error to expect of it.
 
 Cascades of known structures, and the pre-integrated pass on few taps, which is nearer where there
 is room for one stage or for two passes. On taps no other published method came nearer than that at
@@ -12,22 +12,22 @@ from typing import Any
 
 from sssfit.errors import RenderError
 from sssfit.fit import TapsFit, fit_result, support_of
-from sssfit.fit.cascade import FEWEST, STRUCTURES
+from sssfit.fit.cascade import FEWEST
+from sssfit.fit.structures import STRUCTURES, between
 from sssfit.kernel.structure import cost_of_chain, parse
-from sssfit.messages import number, shown
+from sssfit.messages import counted, shown
 from sssfit.profile import Profile
 
-# Taps of the pre-integrated pass, and the mean over eight pictures of the 99th percentile of Delta
-# E that each leaves of skin1 on pixels of .3 mm, as `STRUCTURES` has it.
-PREINTEGRATED: Mapping[int, float] = {
-    3: 35.8,
-    5: 26.4,
-    9: 18.4,
-    13: 12.9,
-    17: 10.7,
-    25: 7.91,
-    33: 7.03,
-    49: 6.83,
+# Taps of the pre-integrated pass, and what each number leaves, as `STRUCTURES` has it.
+PREINTEGRATED: Mapping[int, tuple[float, float]] = {
+    3: (35.8, 41),
+    5: (26.4, 28.5),
+    9: (18.4, 23.2),
+    13: (12.9, 20.4),
+    17: (10.7, 18.5),
+    25: (7.91, 14.3),
+    33: (7.03, 12.5),
+    49: (6.83, 10.4),
 }
 
 
@@ -45,7 +45,7 @@ class Option:
     passes : int
         Of its stages.
     known : float
-        What it leaves of skin1.
+        The error to expect, from that of the known kernels.
     settings : mapping
         Keywords of the fit.
     """
@@ -88,11 +88,13 @@ def check_caps(fetches: float | None, passes: int | None) -> None:
         raise RenderError(f"passes = {shown(passes)}; expected a whole number from 1 up.")
 
 
-def options(fetches: float | None = None, passes: int | None = None) -> list[Option]:
-    """Return the options within a budget that none cheaper beats on skin1, cheapest first.
+def options(width: float, fetches: float | None = None, passes: int | None = None) -> list[Option]:
+    """Return the options within a budget that no cheaper one is expected to beat, cheapest first.
 
     Parameters
     ----------
+    width : float
+        Of the kernel, in pixels; see `sssfit.fit.structures.width_pixels`.
     fetches : float, optional
         The most fetches a pixel.
     passes : int, optional
@@ -106,7 +108,7 @@ def options(fetches: float | None = None, passes: int | None = None) -> list[Opt
     most = math.inf if fetches is None else fetches + 1e-9
     kept = [
         each
-        for each in (*_cascades(), *_preintegrated())
+        for each in (*_cascades(width), *_preintegrated(width))
         if each.fetches <= most and (passes is None or each.passes <= passes)
     ]
     found: list[Option] = []
@@ -114,28 +116,38 @@ def options(fetches: float | None = None, passes: int | None = None) -> list[Opt
         if not found or each.known < found[-1].known:
             found.append(each)
     if not found:
+        limits = [] if fetches is None else [counted(fetches, "fetch", "g")]
+        limits += [] if passes is None else [counted(passes, "pass")]
         raise RenderError(
-            f"no known table has at most {number(fetches, 'g|any number of')} fetches and "
-            f"{passes or 'any number of'} passes; allow more of either."
+            f"no known table has at most {' and '.join(limits)}; allow more of either."
         )
     return found
 
 
-def _cascades() -> list[Option]:
-    found = []
-    for text, known in STRUCTURES.items():
-        cost = cost_of_chain(parse(text))
-        settings = {"stages": text}
-        found.append(
-            Option(f"cascade {text}", "cascade", cost.fetches, cost.passes, known, settings)
-        )
-    return found
-
-
-def _preintegrated() -> list[Option]:
+def _cascades(width: float) -> list[Option]:
+    costs = {text: cost_of_chain(parse(text)) for text in STRUCTURES}
     return [
         Option(
-            f"pre-integrated on {taps} taps", "preintegrated", 2.0 * taps, 2, known, {"taps": taps}
+            f"cascade {text}",
+            method="cascade",
+            fetches=costs[text].fetches,
+            passes=costs[text].passes,
+            known=between(known, width),
+            settings={"stages": text},
+        )
+        for text, known in STRUCTURES.items()
+    ]
+
+
+def _preintegrated(width: float) -> list[Option]:
+    return [
+        Option(
+            f"pre-integrated on {taps} taps",
+            method="preintegrated",
+            fetches=2.0 * taps,
+            passes=2,
+            known=between(known, width),
+            settings={"taps": taps},
         )
         for taps, known in PREINTEGRATED.items()
     ]

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 from sssfit.choose.choice import Choice, Step
 from sssfit.choose.truth import PhotonNeed
-from sssfit.messages import filled
+from sssfit.messages import counted, filled
 
 _KERNEL = (
-    "{label}: {fetches:.4g} fetches a pixel in {passes} passes, {loss}, {seconds:.2g} s a "
+    "{label}: {fetches:.4g#fetch} a pixel in {passes:#pass}, {loss}, {seconds:.2g} s a "
     "megapixel here"
 )
 _LOSS = (
@@ -29,7 +29,7 @@ def sentences(choice: Choice) -> list[str]:
 def step_line(step: Step) -> str:
     """Say what a step is, what it costs and what it loses."""
     enough = "within" if step.within else "not enough"
-    return f"{step.label}: {step.fetches:.4g} fetches, {_loss(step)}, {enough}"
+    return f"{step.label}: {counted(step.fetches, 'fetch', '.4g')}, {_loss(step)}, {enough}"
 
 
 def _no_blur(choice: Choice) -> Iterator[str]:
@@ -96,7 +96,9 @@ def _loss(step: Step) -> str:
 
 def _beside(step: Step, chosen: Step) -> str:
     """Compare a step with the chosen one."""
-    price = f"{step.fetches:.4g} fetches in {step.passes} passes" if step.option else "no fetches"
+    price = "no fetches"
+    if step.option:
+        price = f"{counted(step.fetches, 'fetch', '.4g')} in {counted(step.passes, 'pass')}"
     if step.option and step.fetches != chosen.fetches:
         price += f", {step.fetches / chosen.fetches:.3g} times as many"
     return f"{step.label}, {_loss(step)} for {price}"

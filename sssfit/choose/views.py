@@ -13,6 +13,7 @@ from sssfit.compare.references import border_of
 from sssfit.errors import ArgumentError, RenderError
 from sssfit.fit import TapsFit
 from sssfit.measure.score import ImageScore, measure
+from sssfit.messages import counted
 from sssfit.profile import Profile
 from sssfit.render.reference import render_reference
 from sssfit.render.taps import render_taps
@@ -100,11 +101,12 @@ def mm_per_pixel_at(distance_mm: float, fov_degrees: float, rows: int) -> float:
             f"field of view = {fov_degrees:g} degrees; expected an angle between 0 and 180."
         )
     if rows < 1:
-        raise RenderError(f"{rows} rows; expected at least 1.")
+        raise RenderError(f"{counted(rows, 'row')}; expected at least 1.")
     pitch = 2.0 * distance_mm * math.tan(math.radians(fov_degrees / 2.0)) / rows
     if not LEAST_MM_PER_PIXEL <= pitch < math.inf:
         raise RenderError(
-            f"{distance_mm:g} mm away, {fov_degrees:g} degrees on {rows:.7g} rows make pixels of "
+            f"{distance_mm:g} mm away, {fov_degrees:g} degrees on "
+            f"{counted(rows, 'row', '.7g')} make pixels of "
             f"{pitch:.3g} mm; expected "
             + (
                 f"{LEAST_MM_PER_PIXEL:g} mm, the wavelength of light, or more."

@@ -12,10 +12,12 @@ from sssfit.compare.candidates import Candidate
 from sssfit.errors import KernelError, RenderError, SimulationError
 from sssfit.fit.on_taps import LEAST_TAPS, on_taps
 from sssfit.grid import RadialGrid, make_grid
-from sssfit.kernel import SeparableKernel
+from sssfit.kernel import Kernel, SeparableKernel, Stage, Taps
 from sssfit.material import Material
 from sssfit.measure.score import ImageScore, measure
 from sssfit.profile import Profile
+from sssfit.render import render
+from sssfit.render.full_resolution import render_full_resolution
 from sssfit.render.reference import convolve, reference_quadrant
 from sssfit.render.separable import render_separable
 from sssfit.render.taps import render_taps
@@ -149,12 +151,15 @@ def _reach_mm(scene: Scene, grid_mm: float) -> float:
     return scene.mm_per_pixel * math.hypot(height - 1, width - 1)
 
 
-def stored(kernel: SeparableKernel, storage: str) -> SeparableKernel:
+def stored(kernel: Kernel, storage: str) -> Kernel:
     """Return the kernel after its weights have been stored and read back.
+
+    Of a table of taps these are the weights beside the middle and the blend; the middle is what
+    they leave of 1.
 
     Parameters
     ----------
-    kernel : SeparableKernel
+    kernel : SeparableKernel or Taps
     storage : str
         "float64" changes nothing; "float32"; "half", IEEE 754 binary16; "8-bit", whole numbers
         with one scale a channel, its largest weight: 0 to 255, or -127 to 127 where a weight of
@@ -167,12 +172,29 @@ def stored(kernel: SeparableKernel, storage: str) -> SeparableKernel:
     """
     if storage not in STORAGES:
         raise KernelError(f"storage = {storage!r}; expected one of {', '.join(STORAGES)}.")
+    if isinstance(kernel, SeparableKernel):
+        return dataclasses.replace(kernel, weights=_rounded(kernel.weights, storage))
+    stages = tuple(_stored_stage(each, storage) for each in kernel.stages)
+    blend = _rounded(kernel.blend[None], storage)[0]
+    return dataclasses.replace(kernel, stages=stages, blend=blend)
+
+
+def _stored_stage(stage: Stage, storage: str) -> Stage:
+    """Round the weights of a stage beside the middle."""
+    weights = np.array(stage.weights)
+    beside = _rounded(weights[None, 1:], storage)[0]
+    weights[0] += stage.copies * (weights[1:] - beside).sum(axis=0)
+    weights[1:] = beside
+    return dataclasses.replace(stage, weights=weights)
+
+
+def _rounded(weights: FloatArray, storage: str) -> FloatArray:
+    """Return weights (T, P, C) as they are read back."""
     if storage == "8-bit":
-        weights = _eight_bit(kernel.weights)
-    else:
-        kinds = {"float64": np.float64, "float32": np.float32, "half": np.float16}
-        weights = kernel.weights.astype(kinds[storage]).astype(np.float64)
-    return dataclasses.replace(kernel, weights=weights)
+        return _eight_bit(weights)
+    kinds = {"float64": np.float64, "float32": np.float32, "half": np.float16}
+    kept: FloatArray = weights.astype(kinds[storage]).astype(np.float64)
+    return kept
 
 
 def _eight_bit(weights: FloatArray) -> FloatArray:
@@ -222,9 +244,9 @@ class Switches:
         The exact one on the user's grid; what is beyond is known as a sum.
     cut : Profile
         The same without the light beyond.
-    kernel, kernel_of_cut : SeparableKernel
+    kernel, kernel_of_cut : Kernel
         Fitted to these two.
-    whole : SeparableKernel
+    whole : Kernel
         Fitted to the walk, or to the model, on the grid.
     model, storage : str or None, str
     """
@@ -232,9 +254,9 @@ class Switches:
     sources: Sources
     on_grid: Profile
     cut: Profile
-    kernel: SeparableKernel
-    kernel_of_cut: SeparableKernel
-    whole: SeparableKernel
+    kernel: Kernel
+    kernel_of_cut: Kernel
+    whole: Kernel
     model: str | None
     storage: str
 
@@ -261,13 +283,13 @@ class Switches:
         on_grid, cut = sources.on_grid(sources.exact), sources.cut(sources.exact)
         simulated = sources.walk if model is None else sources.models[model]
         kernel, kernel_of_cut, whole = (
-            fit.fit_dense(each, mm_per_pixel, None).kernel
+            fit.fit(each, mm_per_pixel, None).kernel
             for each in (on_grid, cut, sources.on_grid(simulated))
         )
         return cls(sources, on_grid, cut, kernel, kernel_of_cut, whole, model, storage)
 
     @property
-    def whole_stored(self) -> SeparableKernel:
+    def whole_stored(self) -> Kernel:
         """What a user has."""
         return stored(self.whole, self.storage)
 
@@ -293,7 +315,7 @@ def everything(
     threads: int | None,
 ) -> tuple[Cause, Cause]:
     """Return the whole, and what it has beyond the sum of its causes."""
-    whole = render_separable(scene, switches.whole_stored, threads=threads) - truth
+    whole = render(scene, switches.whole_stored, threads=threads) - truth
     parts = [each.difference for each in causes if each.is_in_whole]
     interaction = whole - np.sum(parts, axis=0)
     return (
@@ -337,8 +359,8 @@ def _of_kernels(
 ) -> Iterator[_Difference]:
     """Yield the same of the grid's end, of the fit and of storage."""
 
-    def rendered(kernel: SeparableKernel) -> FloatArray:
-        return np.asarray(render_separable(scene, kernel, threads=threads), dtype=np.float64)
+    def rendered(kernel: Kernel) -> FloatArray:
+        return np.asarray(render(scene, kernel, threads=threads), dtype=np.float64)
 
     cut = true_picture(scene, switches.cut, threads)
     kernel, kernel_of_cut = rendered(switches.kernel), rendered(switches.kernel_of_cut)
@@ -348,27 +370,35 @@ def _of_kernels(
     yield "energy beyond the grid", hint, True, cut + put - truth
     hint = "a fit that keeps all energy, or a larger radius"
     yield "energy beyond the grid, if lost", hint, False, cut - truth
-    yield "separability", "a higher rank, or another fit", True, kernel_of_cut - cut
+    if isinstance(switches.kernel_of_cut, Taps):
+        full = render_full_resolution(scene, switches.kernel_of_cut)
+        yield "stages", "more fetches", True, full - cut
+        if switches.kernel_of_cut.stages[-1].level:
+            hint = "two stages before the first halving, or none"
+            yield "resolution", hint, True, kernel_of_cut - full
+    else:
+        yield "separability", "a higher rank, or another fit", True, kernel_of_cut - cut
     for storage in dict.fromkeys((switches.storage, "half", "8-bit")):
         kept = rendered(stored(switches.kernel, storage)) - kernel
         name, hint = f"storage, {STORAGES[storage]}", _STORAGE_HINTS[storage]
         yield name, hint, storage == switches.storage, kept
 
 
-def _of_shaders(
-    scene: Scene, kernel: SeparableKernel, threads: int | None
-) -> Iterator[_Difference]:
+def _of_shaders(scene: Scene, kernel: Kernel, threads: int | None) -> Iterator[_Difference]:
     """Yield the same of few taps, and of the formats that a shader keeps pictures in.
+
+    A table of taps has few already.
 
     A format without a sign or without as many channels has no row.
     """
-    count = min(TAPS, kernel.pixels)
+    count = TAPS if isinstance(kernel, Taps) else min(TAPS, kernel.pixels)
     if count < LEAST_TAPS:
         return
-    taps = on_taps(kernel, count)
-    dense = np.asarray(render_separable(scene, kernel, threads=threads), dtype=np.float64)
+    taps = kernel if isinstance(kernel, Taps) else on_taps(kernel, count)
     thinned = render_taps(scene, taps, threads=threads)
-    yield f"taps, {count} a pass", "more taps, or a cascade", False, thinned - dense
+    if isinstance(kernel, SeparableKernel):
+        dense = np.asarray(render_separable(scene, kernel, threads=threads), dtype=np.float64)
+        yield f"taps, {count} a pass", "more taps, or a cascade", False, thinned - dense
     for each, hint in _INTERMEDIATES.items():
         try:
             rounded = render_taps(scene, taps, intermediate=each, threads=threads)

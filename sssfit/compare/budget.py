@@ -27,8 +27,8 @@ from sssfit.compare._budget_causes import (
 )
 from sssfit.compare.candidates import Candidate
 from sssfit.compare.references import check_one_pitch, evaluated_scene
-from sssfit.errors import RenderError, SimulationError
-from sssfit.kernel import SeparableKernel
+from sssfit.errors import FitError, RenderError, SimulationError
+from sssfit.kernel import Kernel, SeparableKernel, Taps
 from sssfit.material import Material
 from sssfit.measure.delta_e import selected_pixels, selection
 from sssfit.measure.score import COLOUR_FIGURES, ImageScore
@@ -58,7 +58,7 @@ class Budget:
         Energy beyond that grid, by the exact solution.
     model, storage : str or None, str
         As they were asked for.
-    kernel : SeparableKernel
+    kernel : SeparableKernel or Taps
         What a user has, with every cause on.
     truth : array (H, W, C)
         The true picture.
@@ -79,7 +79,7 @@ class Budget:
     beyond_grid: FloatArray
     model: str | None
     storage: str
-    kernel: SeparableKernel
+    kernel: Kernel
     truth: FloatArray
     causes: tuple[Cause, ...]
     whole: Cause
@@ -116,7 +116,8 @@ class Budget:
                 "material": self.material.name,
                 "channels": self.material.channels,
                 "method": self.kernel.method,
-                "rank": self.kernel.rank,
+                "rank": self.kernel.rank if isinstance(self.kernel, SeparableKernel) else None,
+                "structure": self.kernel.structure if isinstance(self.kernel, Taps) else None,
                 "model": self.model,
                 "storage": self.storage,
                 "photons": self.photons,
@@ -185,7 +186,8 @@ def error_budgets(
     radius_mm : float, optional [mm]
         Of the grid of the kernel's profile; by default the paper's.
     method, settings
-        The fit, as ``sssfit.fit.METHODS`` has it, and its keywords; by default svd of rank 3.
+        The fit, one of ``sssfit.fit.METHODS`` or "cascade", and its keywords; by default svd of
+        rank 3.
     model : str, optional
         One of `MODELS`: the kernel is fitted to it in place of the walk, and there is no noise.
     storage : str
@@ -205,9 +207,11 @@ def error_budgets(
     RenderError
         No scene, pixels of several sizes, a picture of one colour, or what it takes to render.
     FitError, KernelError
-        No such fit or storage.
+        No such fit or storage, or a disk, which shows another picture in each frame.
     """
     _check(scenes, model)
+    if method == "disk":
+        raise FitError("a disk shows another picture in each frame; take a budget of other fits.")
     default = {"rank": 3} if method == "svd" else {}
     fit = Candidate(method, method, 0, default if settings is None else settings)
     walk: dict[str, Any] = {"photons": photons, "seed": seed, "radius_mm": radius_mm}

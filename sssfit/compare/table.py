@@ -11,7 +11,7 @@ from typing import Any
 from sssfit.compare.comparison import Comparison, KernelRow, Picture, Verdict, verdicts
 from sssfit.errors import FileError
 from sssfit.files import has_mark
-from sssfit.messages import filled, number, table
+from sssfit.messages import counted, filled, number, table
 
 FORMATS = (".md", ".csv", ".json")
 HEADS = (
@@ -201,8 +201,8 @@ def cells_of(row: KernelRow, mark: str) -> list[str]:
 def setting_of(comparison: Comparison) -> str:
     """Say what was compared, on which pixels."""
     profile = comparison.profile
-    threads = "1 thread" if comparison.threads == 1 else f"{comparison.threads} threads"
-    pixels = "1 pixel" if comparison.pixels == 1 else f"{comparison.pixels} pixels"
+    threads = counted(comparison.threads, "thread")
+    pixels = counted(comparison.pixels, "pixel")
     missing = comparison.missing_share.max()
     return (
         f"{profile.material_name or 'profile'}, {profile.meta.get('method') or 'no method'}: "
@@ -234,11 +234,12 @@ def budget_text(figures: Mapping[str, Any]) -> str:
     *causes, interaction, whole = figures["rows"]
     inside = [each for each in causes if each["in_whole"]]
     others = [each for each in causes if not each["in_whole"]]
-    simulated = figures["model"] or f"{figures['photons']:,} photons"
+    simulated = figures["model"] or counted(figures["photons"], "photon", ",")
+    made = figures["structure"] or counted(figures["rank"], "term")
     head = filled(
         "{material} on {picture}, {width} x {height} pixels of {mm_per_pixel:.4g} mm: {simulated} "
-        "to {radius_mm:.4g} mm, {method}, {rank} terms",
-        {**figures, **whole, "simulated": simulated},
+        "to {radius_mm:.4g} mm, {method}, {made}",
+        {**figures, **whole, "simulated": simulated, "made": made},
     )
     rows = [_cause(each) for each in (*inside, interaction, whole, *others)]
     first, second = inside[:2]

@@ -1,13 +1,11 @@
-"""A kernel as a JSON document: the kernel file with a comment in words."""
+"""Kernels and tables of taps as JSON documents: their files with a comment in words."""
 
 import json
-import math
-from collections.abc import Sequence
 
-from sssfit.kernel import SeparableKernel
-from sssfit.messages import printable
-
-_ROUNDING = 1e-12
+from sssfit.export.certificate import certificate, errors_text, how_to_run, values_text
+from sssfit.kernel import SeparableKernel, Taps
+from sssfit.kernel.taps_json import pack
+from sssfit.messages import counted, printable
 
 
 def description(kernel: SeparableKernel) -> list[str]:
@@ -16,17 +14,20 @@ def description(kernel: SeparableKernel) -> list[str]:
     Text is kept on one line, because a newline would end a shader's comment.
     """
     meta = kernel.meta
-    photons = f", {meta['photons']:,} photons" if meta.get("photons") is not None else ""
+    photons = (
+        f", {counted(meta['photons'], 'photon', ',')}" if meta.get("photons") is not None else ""
+    )
     photons += f", seed {meta['seed']}" if meta.get("seed") is not None else ""
     settings = ", ".join(f"{key} {value}" for key, value in meta.get("settings", {}).items())
     sha = f", sha256 {meta['material_sha256'][:16]}" if meta.get("material_sha256") else ""
-    terms = f"{kernel.rank} separable term{'s' if kernel.rank > 1 else ''}"
+    terms = counted(kernel.rank, "separable term")
     fit = f"{kernel.method}, {terms}{f' ({settings})' if settings else ''}"
     lines = [
         f"Subsurface scattering kernel: {meta.get('material') or 'unknown material'}{sha}.",
         f"Profile: {meta.get('profile_method') or 'unknown'}{photons}. Fit: {fit}. "
         f"sssfit {meta.get('version') or '(unknown)'}.",
-        f"{kernel.pixels} pixels of {kernel.mm_per_pixel:.9g} mm, the middle one on the axis; "
+        f"{counted(kernel.pixels, 'pixel')} of {kernel.mm_per_pixel:.9g} mm, the middle one on "
+        "the axis; "
         f"channels {', '.join(kernel.channels)}.",
         "K[i][j] = sum over terms of sign * weight[i] * weight[j]: a horizontal pass and the same "
         "pass vertically,",
@@ -39,19 +40,6 @@ def description(kernel: SeparableKernel) -> list[str]:
     return [printable(line) for line in lines]
 
 
-def values_text(values: Sequence[float]) -> str:
-    """Return a value for each channel as text."""
-    return ", ".join(f"{each + 0.0:.6g}" for each in values)  # not -0
-
-
-def errors_text(values: Sequence[float]) -> str:
-    """Return an error for each channel as text; rounding of sums of pixels counts as 0."""
-    return ", ".join(
-        "unknown" if math.isnan(each) else f"{0.0 if abs(each) < _ROUNDING else each:.6g}"
-        for each in values
-    )
-
-
 def json_document(kernel: SeparableKernel) -> str:
     """Return the kernel as indented JSON, with a ``comment`` (list of lines) first."""
     whole = {"comment": description(kernel), **kernel.to_dict()}
@@ -59,3 +47,11 @@ def json_document(kernel: SeparableKernel) -> str:
     head = json.dumps(whole, indent=1, allow_nan=False, ensure_ascii=False)
     lines = ",\n  ".join(json.dumps(each, allow_nan=False) for each in terms)
     return head.removesuffix("\n}") + f',\n "terms": [\n  {lines}\n ]\n}}\n'
+
+
+def taps_document(taps: Taps) -> str:
+    """Return a table's own JSON with a ``comment`` (list of lines) after its format."""
+    first, *rest = pack(taps).decode().split("\n")
+    words = [printable(each) for each in (*certificate(taps), *how_to_run(taps))]
+    lines = json.dumps(words, ensure_ascii=False)
+    return "\n".join([first, rest[0], f' "comment": {lines},', *rest[1:]])

@@ -6,7 +6,7 @@
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from sssfit.messages import Columns, Part, by_channel, report
+from sssfit.messages import Columns, Part, by_channel, counted, report
 
 _FIGURES = {"p95": "95th percentile", "p99": "99th percentile", "mean": "mean"}
 
@@ -38,7 +38,7 @@ _GUIDE: tuple[Part, ...] = (
     )),
 )
 _MODELS: tuple[Part, ...] = (
-    "{material}: errors against the exact solution; {photons:,} photons on {annuli} annuli of "
+    "{material}: errors against the exact solution; {photons:,#photon} on {annuli:#annulus} of "
     "{dr_mm:.4g} mm",
     Columns("method, channel", "curves", (
         ("diffuse reflectance", "diffuse_reflectance", ".6f"),
@@ -55,7 +55,7 @@ _CHOSEN: tuple[Part, ...] = (
 )
 
 _FITTED: tuple[Part, ...] = (
-    "{material}: {method}, {rank} term{s[rank]}, {pixels} pixel{s[pixels]} of {mm_per_pixel:.4g} "
+    "{material}: {method}, {rank:#term}, {pixels:#pixel} of {mm_per_pixel:.4g} "
     "mm, {seconds:.1f} s",
     Columns("channel", "channels", (
         ("Frobenius error", "relative_frobenius_error", ".3g%"),
@@ -66,7 +66,7 @@ _FITTED: tuple[Part, ...] = (
 )
 
 _TAPS_FITTED: tuple[Part, ...] = (
-    "{material}: {method} {structure}, {fetches:.4g} fetches in {passes} passes on pixels of "
+    "{material}: {method} {structure}, {fetches:.4g#fetch} in {passes:#pass} on pixels of "
     "{mm_per_pixel:.4g} mm, {seconds:.1f} s",
     Columns("channel", "channels", (
         ("spectral error", "spectral_error", ".3g%"),
@@ -76,20 +76,20 @@ _TAPS_FITTED: tuple[Part, ...] = (
 )
 
 _TAPS: tuple[Part, ...] = (
-    "{structure}, {fetches:.4g} fetches in {passes} passes; share of the energy by stage:",
+    "{structure}, {fetches:.4g#fetch} in {passes:#pass}; share of the energy by stage:",
     Columns("stage", "stages", (("share", "shares", ""),)),
 )
 
 _RENDERED: tuple[Part, ...] = (
     "{irradiance}: {width} x {height} pixels of {mm_per_pixel:.4g} mm, {how}; {kernel}",
-    "cost: {fetches:.4g} {what} and {bytes_per_pixel:.4g} bytes moved a pixel in {passes} passes, "
+    "cost: {price} and {bytes_per_pixel:.4g} bytes moved a pixel in {passes:#pass}, "
     "{kernel_bytes:,} bytes stored, {seconds_per_megapixel:.2g} s a megapixel",
     ("transmitted_maximum", "through the object at most: {most}, face on the key light is 1"),
     ("rmse", "against the 2D kernel of {profile}:"),
     ("delta_e_2000_mean", "  Delta E 2000 mean {delta_e_2000_mean:.3g}, 95th percentile "
      "{delta_e_2000_p95:.3g}, 99th {delta_e_2000_p99:.3g}, {share_above_1:.2g%} of pixels above 1, "
      "at exposure {exposure:.4g}"),
-    ("no_colour", "  no Delta E: {no_colour} channels are no colour"),
+    ("no_colour", "  no Delta E: {no_colour}"),
     ("rmse", "  relative L2 {relative_l2:.3g%|inf %}, RMSE {rmse:.3g}, largest {maximum:.3g}, PSNR "
      "{psnr_db:.1f|inf} dB"),
     ("ssim", "  SSIM {ssim:.4f}, FLIP {flip:.4f}"),
@@ -122,15 +122,10 @@ def _asked_words(figures: Mapping[str, Any]) -> str:
     text = f"least {figure} of Delta E"
     if tolerance is not None:
         text = f"{figure} of Delta E within {tolerance:g}"
-    for key, unit in (("most_fetches", "fetches"), ("most_passes", "passes")):
+    for key, unit in (("most_fetches", "fetch"), ("most_passes", "pass")):
         if figures[key] is not None:
-            text += f", at most {figures[key]:g} {unit}"
+            text += f", at most {counted(figures[key], unit, 'g')}"
     return text
-
-
-def _fitted_words(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the endings of plurals."""
-    return {"s": {key: "s" * (figures[key] > 1) for key in ("rank", "pixels")}}
 
 
 def _taps_words(figures: Mapping[str, Any]) -> dict[str, Any]:
@@ -153,15 +148,20 @@ def _rendered_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     stored = f", {figures['intermediate']} between passes" if figures["intermediate"] else ""
     is_grey = figures["rmse"] is not None and figures["delta_e_2000_mean"] is None
     return {
-        "what": "fetches" if figures["rank"] is None else "weights",
+        "price": counted(figures["fetches"], "weight" if figures["rank"] else "fetch", ".4g"),
         "how": f"{screen}{figures['border']} borders{stored}",
         "most": by_channel(figures["channels"], most, ".3g") if most is not None else None,
-        "no_colour": len(figures["channels"]) if is_grey else None,
+        "no_colour": _no_colour(len(figures["channels"])) if is_grey else None,
         "magnified": figures["difference_gain"] if kind is None else None,
         "signed": figures["difference_end"] if kind == "signed" else None,
         "absolute": figures["difference_end"] if kind == "absolute" else None,
         "wrote": ", ".join(figures["output"]),
     }
+
+
+def _no_colour(channels: int) -> str:
+    """Say why there is no Delta E."""
+    return f"{counted(channels, 'channel')} {'is' if channels == 1 else 'are'} no colour"
 
 
 def _kernel_words(figures: Mapping[str, Any]) -> dict[str, Any]:
@@ -201,7 +201,7 @@ def _models_words(figures: Mapping[str, Any]) -> dict[str, Any]:
 # By what is told, and what the words of its lines add to the figures.
 _PAGES: dict[str, tuple[tuple[Part, ...], Callable[[Mapping[str, Any]], dict[str, Any]]]] = {
     "choose": (_CHOSEN, _chosen_words),
-    "fit": (_FITTED, _fitted_words),
+    "fit": (_FITTED, dict),
     "guide": (_GUIDE, _guide_words),
     "kernel": (_KERNEL, _kernel_words),
     "models": (_MODELS, _models_words),

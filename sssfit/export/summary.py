@@ -105,7 +105,7 @@ source                {source}
 specular reflectance  {specular_reflectance:.5f}
 paper's grid          {grid}
 sha256                {sha256}"""
-_GRID = "dr {dr_mm:.6g} mm, {annuli} annuli, radius {radius_mm:.6g} mm"
+_GRID = "dr {dr_mm:.6g} mm, {annuli:#annulus}, radius {radius_mm:.6g} mm"
 _NO_GRID = "none: too many annuli, give simulate a `dr_mm` or `radius_mm`"
 _LAYER = (
     ("sigma_a, 1/mm", "sigma_a_per_mm", ".6g"),
@@ -180,7 +180,7 @@ _SHARES = (50, 90, 99)
 _PROFILE_HEAD = """\
 material  {name}{origin}
 method    {method:|unknown}, {walks}, sssfit {version:|version unknown}
-grid      {annuli} annuli of {width}, to {radius_mm:.4g} mm"""
+grid      {annuli:#annulus} of {width}, to {radius_mm:.4g} mm"""
 _ENERGIES = Columns(
     "channel",
     "channels",
@@ -246,7 +246,7 @@ def _walks(figures: Figures) -> str:
     return (
         "no photons"
         if figures["photons"] is None
-        else filled("{photons:,} photons, seed {seed}", figures)
+        else filled("{photons:,#photon}, seed {seed}", figures)
     )
 
 
@@ -282,7 +282,7 @@ def _balance(figures: Figures, channel: int) -> str:
 def checkpoint_page(figures: Figures) -> str:
     """Return a report on an unfinished walk, followed by that of each profile."""
     head = (
-        "so far    {photons:,} photons, {flights:,} flights, {seconds:.1f} s; `resume = True` "
+        "so far    {photons:,#photon}, {flights:,#flight}, {seconds:.1f} s; `resume = True` "
         "continues from there\nerror     {relative_error:.3g%} of F(r), in the worst channel"
     )
     pages = [f"\n{profile_page(each)}" for each in figures["profiles"]]
@@ -294,7 +294,7 @@ def checkpoint_page(figures: Figures) -> str:
 _KERNEL_HEAD = """\
 material  {material}
 profile   {origin}, {walks}{sha}
-fit       {method}, {rank} term{plural}{pairs}, sssfit {version}
+fit       {method}, {rank:#term}{pairs}, sssfit {version}
 pixels    {pixels} x {pixels} of {mm_per_pixel:.6g} mm, the outermost \
 {support_mm:.6g} mm from the axis
 """
@@ -326,10 +326,8 @@ def _made_of(figures: Figures) -> dict[str, Any]:
 
 def kernel_page(figures: Figures) -> str:
     """Return a kernel's figures as a report."""
-    rank = figures["rank"]
     told = {
         **_made_of(figures),
-        "plural": "s" if rank > 1 else "",
         "pairs": _pairs(figures["settings"], ", "),
     }
     terms = [
@@ -340,7 +338,7 @@ def kernel_page(figures: Figures) -> str:
             f"{figures['middle_weight'][t][c]:.6f}",
         ]
         for c, name in enumerate(figures["channels"])
-        for t in range(rank)
+        for t in range(figures["rank"])
     ]
     found = [
         f"{_name(name)}:{_pairs(each, '  ') if isinstance(each, Mapping) else f' {each}'}"
@@ -356,7 +354,7 @@ material  {material}
 profile   {origin}, {walks}{sha}
 fit       {method}{pairs}, sssfit {version}
 stages    {structure}, {reads}
-cost      {fetches:.4g} fetches a pixel, {passes} passes ({all_passes} with the changes of size), \
+cost      {fetches:.4g#fetch} a pixel, {passes:#pass} ({all_passes} with the changes of size), \
 {bytes_per_pixel:.4g} bytes a pixel in half precision
 made for  pixels of {mm_per_pixel:.6g} mm
 """

@@ -26,7 +26,7 @@ from scipy import fft
 from sssfit.arrays import FloatArray
 from sssfit.errors import FitError
 from sssfit.fit._target import Target
-from sssfit.messages import printable
+from sssfit.messages import counted, printable
 from sssfit.scene.load import load_scene
 from sssfit.scene.made import MADE, check_pictures
 from sssfit.scene.record import Scene
@@ -137,7 +137,7 @@ def _check_picture(target: Target, scene: Scene) -> None:
         )
     if scene.channels not in (1, target.profile.n_channels):
         raise FitError(
-            f"{scene.name} has {scene.channels} channels and the profile "
+            f"{scene.name} has {counted(scene.channels, 'channel')} and the profile "
             f"{target.profile.n_channels}; expected as many, or one."
         )
     if min(scene.height, scene.width) < pixels:

@@ -21,6 +21,7 @@ from sssfit.profile import Profile
 MM_PER_PIXEL = 0.3  # a head 0.6 m away on 1080 rows; skin1's whole kernel is 143 pixels
 Pitch: TypeAlias = float | Literal["profile"]
 KEPT = 0.999  # support "auto": share of every channel's on-grid energy within it
+_NOTHING = 1e-9  # share of a channel's light: rounding of its sum
 _FAINTEST = 1e-145  # energy: squares of fainter pixels underflow, and with them relative errors
 _MAX_BYTES = 2e9
 _MIN_MM, _MAX_MM = 1e-12, 1e12  # sizes of a kernel's pixels
@@ -89,7 +90,8 @@ def make_target(
     ------
     FitError
         Energies are NaN, negative or all zero; the pixel size or support is not a length; the
-        support holds no light of a channel; a channel would need more than 2 GB.
+        profile does not reach the support, or the support holds no light of a channel; a channel
+        would need more than 2 GB.
 
     Warns
     -----
@@ -106,6 +108,8 @@ def make_target(
                 f"{name} = {value:g}; expected a length in mm above 0, from {_MIN_MM:g} to "
                 f"{_MAX_MM:g}."
             )
+    if support_mm is not None:
+        _check_reach(profile, support, pitch)
     # 1e-9: a ratio that is an integer up to rounding must not lose a pixel.
     half = math.floor(min(support / pitch, _WIDEST) + 1e-9)
     if half == 0:
@@ -119,6 +123,19 @@ def make_target(
     _check_memory(target)
     _check_light(target)
     return target
+
+
+def _check_reach(profile: Profile, support_mm: float, pitch: float) -> None:
+    """Raise FitError for a support that goes on where the profile knows its light as a sum only."""
+    reach_mm = float(profile.r_edges_mm[-1])
+    beyond = profile.beyond_grid > _NOTHING * profile.diffuse_reflectance
+    if support_mm > reach_mm + pitch and beyond.any():
+        c = int(np.argmax(beyond))
+        raise FitError(
+            f"{profile.label}: the profile ends at {reach_mm:.4g} mm and the support at "
+            f"{support_mm:.4g} mm, and channel {profile.channels[c]} has light beyond; use a "
+            "smaller support, or simulate the profile to a larger radius."
+        )
 
 
 def pitch_of(profile: Profile, mm_per_pixel: Pitch | None = None) -> float:

@@ -23,7 +23,7 @@ from sssfit.fit._result import TapsFit, provenance
 from sssfit.fit._target import Pitch, make_target
 from sssfit.kernel.structure import MOST_ON_DISK
 from sssfit.kernel.taps import Stage, Taps
-from sssfit.messages import shown
+from sssfit.messages import counted, shown
 from sssfit.profile import Profile
 
 TAPS, FEWEST = 24, 4
@@ -67,7 +67,8 @@ def fit_disk(
     pixels = (2 * target.half_pixels + 1) ** 2
     if taps > pixels:
         raise FitError(
-            f"taps = {taps}, but the support has {pixels} pixels; use fewer taps or smaller pixels."
+            f"taps = {taps}, but the support has {counted(pixels, 'pixel')}; use fewer taps or "
+            "smaller pixels."
         )
     radius_mm = target.mm_per_pixel * (target.half_pixels + 0.5)
     radii_mm, weights = _rings(profile, taps, radius_mm)

@@ -26,6 +26,7 @@ from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit._gaussians_search import GaussianSum, fitted_annuli, is_steep, make_annuli, search
 from sssfit.fit._result import ChannelFit, FitResult, energy_factor, fit_channels, rescales_energy
 from sssfit.fit._target import Pitch, Target, make_target
+from sssfit.messages import counted
 from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
 from sssfit.shapes import gaussian_line_integral
@@ -154,7 +155,8 @@ def _check_annuli(profile: Profile, terms: int) -> None:
     """Raise FitError if there are more unknowns than data."""
     if profile.n_annuli < 2 * terms:
         raise FitError(
-            f"{profile.label}: a profile of {profile.n_annuli} annuli cannot fix the width and "
+            f"{profile.label}: a profile of {counted(profile.n_annuli, 'annulus')} cannot fix "
+            "the width and "
             f"the weight of each Gaussian, terms = {terms}; give a finer profile or fewer terms."
         )
 

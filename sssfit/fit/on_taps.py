@@ -29,6 +29,7 @@ from sssfit.fit._spectrum import SpectralTarget, pictures_of, spectral_target
 from sssfit.fit._target import make_target
 from sssfit.kernel import SeparableKernel, Stage, Taps
 from sssfit.kernel.structure import MOST_PAIRS
+from sssfit.messages import counted
 from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
 from sssfit.scene.record import Scene
@@ -128,7 +129,8 @@ def _checked(taps: object, kernel: SeparableKernel, place: str) -> int:
         )
     if count > kernel.pixels:
         raise FitError(
-            f"taps = {count} for a kernel of {kernel.pixels} pixels; expected at most as many taps "
+            f"taps = {count} for a kernel of {counted(kernel.pixels, 'pixel')}; expected at most "
+            "as many taps "
             "as pixels, or a larger support."
         )
     return count

@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, BinaryIO
 
 from sssfit.errors import FileError, RenderError
 from sssfit.files import has_mark, reason
-from sssfit.messages import printable, shown
+from sssfit.messages import counted, printable, shown
 
 if TYPE_CHECKING:
     from OpenImageIO import ImageInput, ImageSpec
@@ -102,7 +102,7 @@ def _numbers(path: Path, key: str, value: str, count: int) -> tuple[float, ...]:
     if len(numbers) != count or not all(math.isfinite(each) and each > 0.0 for each in numbers):
         raise FileError(
             f"{called(path)} is damaged ({key}={printable(value.strip()[:60])} in its header; "
-            f"expected {count} numbers above 0)."
+            f"expected {counted(count, 'number')} above 0)."
         )
     return numbers
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import ArgumentError, RenderError
-from sssfit.messages import printable, shown
+from sssfit.messages import counted, printable, shown
 
 # The rounded numbers of the standard. Its two pieces differ by 2e-8 where they meet, far below the
 # 1.5e-5 of a 16-bit code.
@@ -205,7 +205,10 @@ def channel_names(light: FloatArray, given: Sequence[str] | None, format: str) -
                 "that can be printed."
             )
     if len(set(names)) != count or "" in names:
-        raise RenderError(f"{len(names)} channel names for {count} channels; give one to each.")
+        raise RenderError(
+            f"{counted(len(names), 'channel name')} for {counted(count, 'channel')}; give one to "
+            "each."
+        )
     return names
 
 

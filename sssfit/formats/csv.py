@@ -36,7 +36,7 @@ from sssfit import __version__
 from sssfit.arrays import FloatArray, check_names
 from sssfit.errors import MaterialError, ProfileError, SssfitWarning
 from sssfit.files import has_mark
-from sssfit.messages import printable, shown
+from sssfit.messages import counted, printable, shown
 from sssfit.profile import FORMAT, Profile
 from sssfit.profile import pixels as integrals
 from sssfit.text import decimal_shifted, finite_number, read_text
@@ -327,7 +327,8 @@ class _Table:
             if len(line.cells) != len(self._head.cells):
                 raise self._failure(
                     line,
-                    f"{len(line.cells)} cells where the header has {len(self._head.cells)}; "
+                    f"{counted(len(line.cells), 'cell')} where the header has "
+                    f"{len(self._head.cells)}; "
                     "separate by commas, write decimals with a point.",
                 )
             radii_mm.append(self._radius(line, line.cells[at], radii_mm, quantity))
@@ -515,5 +516,5 @@ def _provenance(profile: Profile) -> str:
         str(meta.get("method")),
     ]
     if profile.photons is not None:
-        parts.append(f"{profile.photons} photons, seed {meta.get('seed')}")
+        parts.append(f"{counted(profile.photons, 'photon')}, seed {meta.get('seed')}")
     return ", ".join([*parts, f"sssfit {meta.get('version')}"])

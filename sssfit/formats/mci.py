@@ -35,7 +35,7 @@ from sssfit.errors import MaterialError, SssfitError
 from sssfit.grid import MOST_ANNULI, RadialGrid
 from sssfit.material import Layer, Material
 from sssfit.material.checks import MAX_ETA, MIN_ETA
-from sssfit.messages import printable, shown
+from sssfit.messages import counted, printable, shown
 from sssfit.text import decimal_shifted, finite_number, read_text
 
 # Comments of the two formats. In an input a comment begins at any #. In an output that would turn
@@ -116,7 +116,7 @@ class Lines:
         wanted = ", ".join(names)
         line = self.take(wanted)
         if len(line.words) != len(names):
-            values = "1 value" if len(line.words) == 1 else f"{len(line.words)} values"
+            values = counted(len(line.words), "value")
             raise self.failure(
                 line.number,
                 f"{shown(' '.join(line.words))} has {values}; expected {len(names)} ({wanted}). A "

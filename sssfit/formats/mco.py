@@ -31,7 +31,7 @@ from sssfit.formats.mci import (
     read_run,
 )
 from sssfit.material import Layer, Material
-from sssfit.messages import printable, shown
+from sssfit.messages import counted, printable, shown
 from sssfit.profile import FORMAT, Profile
 from sssfit.text import finite_number, read_text
 
@@ -126,8 +126,9 @@ def join_channels(profiles: Sequence[Profile], channels: Sequence[str]) -> Profi
     """
     if len(channels) != len(profiles):
         raise ProfileError(
-            f"{len(channels)} channel name{'s' * (len(channels) != 1)} "
-            f"({shown(', '.join(channels))}) for {len(profiles)} files; give one per file, such as "
+            f"{counted(len(channels), 'channel name')} "
+            f"({shown(', '.join(channels))}) for {counted(len(profiles), 'file')}; give one per "
+            "file, such as "
             "R,G,B."
         )
     try:
@@ -215,7 +216,9 @@ def _read_numbers(lines: Lines, name: str, size: int) -> FloatArray:
         line = lines.take(f"number {len(values) + 1} of {size} of the block {name}")
         values += [_energy(lines, line, name, word) for word in line.words]
         if len(values) > size:
-            raise lines.failure(line.number, f"the block {name} has more than its {size} numbers.")
+            raise lines.failure(
+                line.number, f"the block {name} has more than its {counted(size, 'number')}."
+            )
     return np.array(values)
 
 
@@ -325,7 +328,8 @@ def _check_fit(first: Profile, other: Profile, top: Material, material: Material
     ours, theirs = first.r_edges_mm, other.r_edges_mm
     if not np.array_equal(ours, theirs):
         said = (
-            f"{len(theirs) - 1} annuli of {theirs[1]:g} mm where {first.meta['source']} has "
+            f"{counted(len(theirs) - 1, 'annulus')} of {theirs[1]:g} mm where "
+            f"{first.meta['source']} has "
             f"{len(ours) - 1} of {ours[1]:g} mm"
         )
     elif _shape(material) != _shape(top) or other.specular_reflectance != (

@@ -18,7 +18,7 @@ _FIGURES = (
     *("energy_balance", "photons"),
 )
 _PAGE = (
-    "{source}: {annuli} annuli, to {radius_mm:.4g} mm",
+    "{source}: {annuli:#annulus}, to {radius_mm:.4g} mm",
     Columns(
         "channel",
         "channels",

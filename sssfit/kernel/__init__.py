@@ -4,6 +4,7 @@ import io
 from pathlib import Path
 from typing import BinaryIO, TypeAlias
 
+from sssfit.kernel.between import taps_between
 from sssfit.kernel.json import KERNEL
 from sssfit.kernel.json_file import read_bytes
 from sssfit.kernel.record import FORMAT, SeparableKernel, is_kernel_file
@@ -20,6 +21,7 @@ __all__ = [
     "is_kernel_file",
     "is_taps_file",
     "read_kernel",
+    "taps_between",
 ]
 
 Kernel: TypeAlias = SeparableKernel | Taps

@@ -14,7 +14,7 @@ from sssfit.arrays import (
     number_array,
 )
 from sssfit.errors import KernelError
-from sssfit.messages import shown
+from sssfit.messages import counted, shown
 
 # Limit of weights and scales: their squares are finite in single precision, as in shaders.
 MOST = 1e18
@@ -64,7 +64,7 @@ def _check_shapes(fields: Mapping[str, FloatArray], n_names: int) -> None:
         )
     terms, _, channels = shape
     if n_names != channels:
-        raise KernelError(f"{n_names} channel names for {channels} channels.")
+        raise KernelError(f"{counted(n_names, 'channel name')} for {counted(channels, 'channel')}.")
     for name in _ARRAYS:
         expected = {"weights": shape, "signs": (terms, channels)}.get(name, (channels,))
         if fields[name].shape != expected:

@@ -12,6 +12,7 @@ import numpy as np
 from sssfit.arrays import FloatArray
 from sssfit.errors import KernelError
 from sssfit.kernel.json_file import JsonFormat, check, line_of, or_nan, or_none, read_json
+from sssfit.messages import counted
 
 if TYPE_CHECKING:
     from sssfit.kernel import SeparableKernel
@@ -99,14 +100,16 @@ def _check_sizes(whole: Mapping[str, Any]) -> None:
         lists[f"terms[{t}].sign"] = term["sign"]
         if len(term["weights"]) != pixels:
             raise KernelError(
-                f"terms[{t}].weights has {len(term['weights'])} pixels; expected {pixels}, as in "
+                f"terms[{t}].weights has {counted(len(term['weights']), 'pixel')}; expected "
+                f"{pixels}, as in "
                 "terms[0]."
             )
         lists |= {f"terms[{t}].weights[{k}]": each for k, each in enumerate(term["weights"])}
     for path, values in lists.items():
         if len(values) != channels:
             raise KernelError(
-                f"{path} has {len(values)} entries; expected {channels}, one for each channel."
+                f"{path} has {counted(len(values), 'entry')}; expected {channels}, one for each "
+                "channel."
             )
 
 
@@ -120,7 +123,8 @@ def _check_derived(whole: Mapping[str, Any], signs: FloatArray, weights: FloatAr
             raise KernelError(f"{name} = {said}, but the terms have {found}.")
     if abs(whole["support_mm"] - support_mm) > _ROUNDING * support_mm:
         raise KernelError(
-            f"support_mm = {whole['support_mm']}, but {pixels} pixels of {whole['mm_per_pixel']} "
+            f"support_mm = {whole['support_mm']}, but {counted(pixels, 'pixel')} of "
+            f"{whole['mm_per_pixel']} "
             f"mm reach {support_mm:.9g} mm."
         )
     energy = np.sum(signs * np.sum(weights, axis=1) ** 2, axis=0)

@@ -19,7 +19,7 @@ import numpy as np
 
 from sssfit.errors import KernelError
 from sssfit.files import has_mark, read_at_most, reason
-from sssfit.messages import shown
+from sssfit.messages import counted, shown
 
 Schema = Mapping[str, Any]
 
@@ -113,7 +113,7 @@ def _check_list(value: list[Any], rules: Schema, path: str) -> None:
     if not least <= len(value) <= most:
         limits = f"{least}" if math.isinf(most) else f"{least} to {most}"
         many = "" if math.isfinite(most) else " or more"
-        raise KernelError(f"{path} has {len(value)} entries; expected {limits}{many}.")
+        raise KernelError(f"{path} has {counted(len(value), 'entry')}; expected {limits}{many}.")
     if rules.get("uniqueItems") and len(set(map(repr, value))) < len(value):
         raise KernelError(f"{path} = {shown(value)} has an entry twice; expected each once.")
     items = rules.get("items", {})

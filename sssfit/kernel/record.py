@@ -21,7 +21,7 @@ from sssfit.files import write_atomically
 from sssfit.kernel import checks
 from sssfit.kernel import json as kernel_json
 from sssfit.kernel.json import FORMAT, is_kernel_file
-from sssfit.messages import by_channel, html_table, number, of_material, printable
+from sssfit.messages import by_channel, counted, html_table, number, of_material, printable
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -111,8 +111,8 @@ class SeparableKernel:
         """Return one line with material, method, terms and pixels."""
         return (
             f"SeparableKernel of {of_material(self.meta.get('material'))} by {self.method}, "
-            f"{self.rank} term{'s' if self.rank > 1 else ''}, {self.pixels} "
-            f"pixel{'s' if self.pixels > 1 else ''} of {self.mm_per_pixel:.4g} mm"
+            f"{counted(self.rank, 'term')}, {counted(self.pixels, 'pixel')} "
+            f"of {self.mm_per_pixel:.4g} mm"
         )
 
     def plot(self, profile: "Profile | None" = None) -> "Figure":

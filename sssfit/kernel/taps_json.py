@@ -8,6 +8,7 @@ import numpy as np
 
 from sssfit.errors import KernelError
 from sssfit.kernel.json_file import JsonFormat, check, line_of, or_nan, or_none, read_json
+from sssfit.messages import counted
 
 if TYPE_CHECKING:
     from sssfit.kernel.taps import Taps
@@ -40,6 +41,7 @@ def content(taps: "Taps") -> dict[str, Any]:
                 "offsets_mm": each.offsets_mm.tolist(),
                 "weights": each.weights.tolist(),
             }
+            | ({"angle_degrees": each.angle_degrees} if each.angle_degrees else {})
             for each in taps.stages
         ],
         "blend": taps.blend.tolist(),
@@ -70,8 +72,10 @@ def unpack(source: str | Path | BinaryIO, origin: str) -> tuple[dict[str, Any], 
     except KernelError as error:
         raise KernelError(f"{origin}: {error} Fit it again.") from None
     fields = {key: whole[key] for key in ("method", "channels", "chained", "stages", "meta")}
-    names = ("level", "kind", "offsets_mm", "weights")
-    fields["stages"] = [{name: each[name] for name in names} for each in whole["stages"]]
+    names = ("level", "kind", "offsets_mm", "weights", "angle_degrees")
+    fields["stages"] = [
+        {name: each[name] for name in names if name in each} for each in whole["stages"]
+    ]
     return fields | {
         "mm_per_pixel": float(whole["mm_per_pixel"]),
         "blend": np.array(whole["blend"], dtype=np.float64),
@@ -96,7 +100,8 @@ def _check_sizes(whole: Mapping[str, Any]) -> None:
     for path, values in lists.items():
         if len(values) != channels:
             raise KernelError(
-                f"{path} has {len(values)} entries; expected {channels}, one for each channel."
+                f"{path} has {counted(len(values), 'entry')}; expected {channels}, one for each "
+                "channel."
             )
 
 

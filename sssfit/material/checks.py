@@ -15,7 +15,7 @@ import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import MaterialError
-from sssfit.messages import shown
+from sssfit.messages import counted, shown
 
 if TYPE_CHECKING:
     from sssfit.material import Layer
@@ -89,7 +89,8 @@ def check_lengths(layer: "Layer") -> None:
         size = getattr(layer, key).size
         if size != n_channels:
             raise MaterialError(
-                f"{key} has {size} values and sigma_a_per_mm has {n_channels}; give one per "
+                f"{key} has {counted(size, 'value')} and sigma_a_per_mm has {n_channels}; give "
+                "one per "
                 "channel."
             )
 
@@ -154,7 +155,8 @@ def check_stack(layers: Sequence["Layer"], channels: Sequence[str], eta_below: f
         where = f"layers[{k}]." if len(layers) > 1 else ""
         if layer.g.size != len(channels):
             raise MaterialError(
-                f"{where}sigma_a_per_mm has {layer.g.size} values for {len(channels)} channels "
+                f"{where}sigma_a_per_mm has {counted(layer.g.size, 'value')} for "
+                f"{counted(len(channels), 'channel')} "
                 f"({shown(', '.join(channels))}); give one per channel."
             )
         if k < len(layers) - 1 and math.isinf(layer.thickness_mm):

@@ -47,6 +47,7 @@ from sssfit.material.checks import (
     numbers,
 )
 from sssfit.material.toml import (
+    check_kind,
     default_channels,
     is_path,
     read_tables,
@@ -327,6 +328,8 @@ def read_material(source: Path | BinaryIO, origin: str) -> Material:
     """
     with located(f"{printable(origin)}: "):
         text = read_text(source)
+    if isinstance(source, Path):
+        check_kind(source, text.content)
     with text.hinting(MaterialError) as content:
         return parse_material(content, origin)
 

@@ -50,6 +50,13 @@ _ALIASES = {
     "sigma_t_per_mm": _FROM_ALBEDO,
 }
 _EXAMPLE = '`load_material("skin1").to_toml()` gives an example'
+# Files of other kinds by their ending.
+_OTHER_KINDS = {
+    ".mci": "an input file of MCML: run `simulate` on it, and take the profile that this writes",
+    ".mco": "output of MCML: import it, and take the profile that this writes",
+    ".csv": "a table: import it, and take the profile that this writes",
+    ".json": "a kernel or another JSON file",
+}
 _MISSING = {
     "g": "add g = 0.0 if scattering is isotropic or sigma_s is a reduced one (sigma_s')",
 }
@@ -62,6 +69,19 @@ def is_path(wanted: str) -> bool:
     with contextlib.suppress(OSError, ValueError):  # a name too long, or with a null character
         return wanted != "" and Path(wanted).exists()
     return False
+
+
+def check_kind(path: Path, content: str) -> None:
+    """Say what a file is that is no TOML and has the ending of another kind, and what to do."""
+    what = _OTHER_KINDS.get(path.suffix.lower())
+    if what is None:
+        return
+    try:
+        tomllib.loads(content)
+    except (ValueError, RecursionError):
+        raise MaterialError(
+            f"{printable(str(path))} is {what}; expected a material (.toml, or a shipped name)."
+        ) from None
 
 
 def read_text(source: Path | BinaryIO) -> Text:

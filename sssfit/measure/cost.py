@@ -9,6 +9,7 @@ import numpy as np
 from sssfit.errors import RenderError
 from sssfit.kernel import Kernel, SeparableKernel, Taps
 from sssfit.kernel.taps import BYTES
+from sssfit.messages import counted
 
 # Bytes of a weight in a shader, a float32.
 FLOAT_BYTES = 4
@@ -120,7 +121,10 @@ def seconds_per_megapixel(
         Pixels or repeats are below 1.
     """
     if pixels < 1 or repeats < 1:
-        raise RenderError(f"{pixels} pixels, {repeats} repeats; expected at least 1 of each.")
+        raise RenderError(
+            f"{counted(pixels, 'pixel')}, {counted(repeats, 'repeat')}; expected at least 1 of "
+            "each."
+        )
     render()
     times = []
     for _ in range(repeats):

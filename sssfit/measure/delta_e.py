@@ -152,6 +152,32 @@ def check_exposure(exposure: float) -> float:
     return float(exposure)
 
 
+# Of the brightest light: less is rounding of the convolution. 1e308 makes it white, too.
+_DARKEST = 1e-6
+# Displayed light that rounds to the first of 256 sRGB codes: less than 1 / (2 255 12.92).
+_BLACK = 1.5e-4
+
+
+def check_shows(exposure: float, pixels: FloatArray, true: FloatArray) -> None:
+    """Refuse an exposure at which two pictures (N, C) are all white or all black.
+
+    Delta E would be 0. Channels that are no colour have none.
+    """
+    if true.shape[1] not in (1, 3) or not true.max() > 0.0:
+        return
+    lit = true.max(axis=1) > _DARKEST * true.max()
+    # Divided, since the product may overflow or vanish.
+    for is_all, colour, other in (
+        (min(pixels[lit].min(), true[lit].min()) > 1.0 / exposure, "white", "smaller"),
+        (max(pixels.max(), true.max()) < _BLACK / exposure, "black", "larger"),
+    ):
+        if is_all:
+            raise RenderError(
+                f"at the exposure {exposure:g} all that is lit is {colour}, so Delta E says "
+                f"nothing; use a {other} exposure, such as {exposure_of(true):.3g}."
+            )
+
+
 def shown(pixels: FloatArray, exposure: float = 1.0) -> FloatArray:
     """Return the displayed picture: exposed, clipped to [0, 1], grey as three channels."""
     with np.errstate(over="ignore"):  # infinite light is clipped to 1 as well

@@ -16,6 +16,7 @@ from sssfit.measure.delta_e import (
     auto_exposure,
     check_exposure,
     check_pair,
+    check_shows,
     delta_e_2000,
     exposure_of,
     selected_pixels,
@@ -116,7 +117,8 @@ def measure(
     ------
     RenderError
         The pictures differ in shape or hold NaN, the mask does not fit or is empty, the exposure is
-        not above 0, or the truth is black and no exposure is given.
+        not above 0 or shows both as nothing but white or black, or the truth is black and no
+        exposure is given.
 
     Examples
     --------
@@ -127,7 +129,11 @@ def measure(
     pictures = check_pair(image, truth)
     selected = selection(mask, pictures[1])
     pixels, true = (selected_pixels(picture, selected) for picture in pictures)
-    exposure = exposure_of(true) if exposure is None else check_exposure(exposure)
+    if exposure is None:
+        exposure = exposure_of(true)
+    else:
+        exposure = check_exposure(exposure)
+        check_shows(exposure, pixels, true)
     return ImageScore(
         **_differences(pixels, true),
         energy_drift=_ratio(pixels.sum(axis=0) - true.sum(axis=0), true.sum(axis=0)),

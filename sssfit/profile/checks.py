@@ -8,7 +8,7 @@ import numpy as np
 from sssfit.arrays import FloatArray, check_names, check_provenance, json_object, number_array
 from sssfit.errors import MaterialError, ProfileError
 from sssfit.material import Material
-from sssfit.messages import shown
+from sssfit.messages import counted, shown
 from sssfit.profile.npz import FORMAT, OPTIONAL
 
 # Limits of shares of light and of mm, beyond any grid or table; squares stay far from overflow.
@@ -123,7 +123,7 @@ def _check_meta(meta: Mapping[str, Any], n_channels: int) -> None:
     ):
         raise ProfileError(
             f"meta.energy_balance_stderr = {shown(errors)}; expected a number from 0 up for each "
-            f"of {n_channels} channels, or null."
+            f"of {counted(n_channels, 'channel')}, or null."
         )
     _check_material(meta)
 

@@ -23,7 +23,7 @@ from sssfit.errors import MaterialError, ProfileError
 from sssfit.files import write_atomically
 from sssfit.material import Material
 from sssfit.material.checks import is_name
-from sssfit.messages import by_channel, html_table, number, of_material, printable
+from sssfit.messages import by_channel, counted, html_table, number, of_material, printable
 from sssfit.profile import checks, npz
 from sssfit.profile import pixels as integrals
 from sssfit.profile.npz import FORMAT, is_profile_file
@@ -122,7 +122,7 @@ class Profile:
         walked = "" if self.photons is None else f", {self.photons:.3g} photons"
         return (
             f"Profile of {of_material(self.material_name)} by {method}{walked}, "
-            f"{self.n_annuli} annuli to {self.r_edges_mm[-1]:.4g} mm"
+            f"{counted(self.n_annuli, 'annulus')} to {self.r_edges_mm[-1]:.4g} mm"
         )
 
     def plot(self) -> "Figure":

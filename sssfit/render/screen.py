@@ -27,6 +27,7 @@ from sssfit._jit import thread_pool
 from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
+from sssfit.messages import counted
 from sssfit.process import thread_count
 from sssfit.render.transmittance import transmitted
 from sssfit.scene.record import Scene
@@ -126,7 +127,8 @@ def depths(scene: Scene, mask: npt.NDArray[np.int32]) -> FloatArray:
     depth_mm: FloatArray = np.where(mask > 0, scene.depth_mm, 1.0)
     if (depth_mm <= 0.0).any():
         raise RenderError(
-            f"{scene.name}: depth_mm is 0 in {int((depth_mm <= 0.0).sum())} pixels of objects; "
+            f"{scene.name}: depth_mm is 0 in {counted(int((depth_mm <= 0.0).sum()), 'pixel')} of "
+            "objects; "
             "expected distances from the eye above 0, or mask 0 where nothing is."
         )
     return depth_mm

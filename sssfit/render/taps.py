@@ -220,6 +220,24 @@ def _chained(
     return passes.shown(sums[0])
 
 
+Texels = dict[tuple[int, int], npt.NDArray[np.float64]]  # weights (C,) of places (down, right)
+
+
+def texels_of(stage: Stage, direction: tuple[float, float], mm_per_texel: float) -> Texels:
+    """Return the weights that the bilinear fetches of a pass give to the texels around one."""
+    places = np.outer(stage.offsets_mm / mm_per_texel, direction)
+    found: Texels = {(0, 0): stage.weights[0]}
+    for place, weights in zip((*places, *-places), (*stage.weights[1:],) * 2, strict=True):
+        corner = np.floor(place).astype(int)
+        part = place - corner
+        for i, j in np.ndindex(2, 2):
+            share = abs(1 - i - part[0]) * abs(1 - j - part[1])
+            if share > 0.0:
+                at = int(corner[0] + i), int(corner[1] + j)
+                found[at] = found.get(at, 0.0) + share * weights
+    return found
+
+
 class _Passes:
     """The passes on pictures of one size, with their border and coverage (H, W, 1)."""
 
@@ -250,6 +268,8 @@ class _Passes:
             return self._star(pixels, stage, mm_per_texel)
         if stage.kind == "disk":
             return self._divided(pixels, lambda each: self._disk(each, stage, mm_per_texel))
+        if not stage.is_upright:
+            return self._turned(pixels, stage, mm_per_texel)
         weights = stage.pass_weights(mm_per_texel)
         if self.coverage is None and self.store is None:
             ones = np.ones((1, weights.shape[1]))
@@ -272,6 +292,31 @@ class _Passes:
             return found
 
         return self._divided(pixels, fetch)
+
+    def _turned(self, pixels: FloatArray, stage: Stage, mm_per_texel: float) -> FloatArray:
+        """Run the passes along a stage's own directions, one after the other."""
+        for k, direction in enumerate(stage.directions):
+            texels = texels_of(stage, direction, mm_per_texel)
+
+            def fetch(picture: FloatArray, texels: Texels = texels) -> FloatArray:
+                return self._gathered(picture, texels)
+
+            source = pixels if k == 0 else self.stored(pixels)
+            pixels = self._divided(source, fetch)
+        return pixels
+
+    def _gathered(self, pixels: FloatArray, texels: Texels) -> FloatArray:
+        """Return the sum of weights times the texels at places around each one."""
+        beyond = max(abs(place) for at in texels for place in at)
+        rows, columns = (source_indices(n, beyond, self.border) for n in pixels.shape[:2])
+        black = np.pad(pixels, ((0, 1), (0, 1), (0, 0)))
+        wide = black[rows][:, columns]
+        height, width = pixels.shape[:2]
+        found = np.zeros((height, width, len(next(iter(texels.values())))), pixels.dtype)
+        for (y, x), weights in texels.items():
+            own = wide[beyond + y : beyond + y + height, beyond + x : beyond + x + width]
+            found += weights.astype(pixels.dtype) * own
+        return found
 
     def _disk(self, pixels: FloatArray, stage: Stage, mm_per_texel: float) -> FloatArray:
         """Single fetches around each pixel, turned by its own angle."""

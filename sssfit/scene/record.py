@@ -9,6 +9,7 @@ import numpy.typing as npt
 from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
 from sssfit.formats.colours import as_light, positive
+from sssfit.messages import counted
 
 if TYPE_CHECKING:
     from sssfit.formats.pictures import Image
@@ -139,7 +140,8 @@ class Scene:
             what = "NaN or infinite" if bad.any() else "negative"
             count = int(bad.sum()) if bad.any() else int((values < 0).sum())
             raise RenderError(
-                f"{self.name}: {field} has {count} {what} values; expected numbers from 0 up."
+                f"{self.name}: {field} has {counted(count, f'{what} value')}; expected numbers "
+                "from 0 up."
             )
         if field == "mask" and ((values % 1.0 != 0.0) | (values > _MAX_OBJECTS)).any():
             raise RenderError(

@@ -16,6 +16,7 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError
 from sssfit.grid import make_grid
 from sssfit.material import Layer, Material
+from sssfit.messages import counted
 from sssfit.profile import Profile
 from sssfit.shapes import (
     diffusion_beyond,
@@ -112,7 +113,7 @@ def _reflectance(material: Material, layer: Layer, given: npt.ArrayLike | None) 
     if not ((total >= 0.0) & (total <= 1.0)).all():
         raise SimulationError(
             f"reflectance = {given!r}; expected a number from 0 to 1 for each of "
-            f"{material.n_channels} channels."
+            f"{counted(material.n_channels, 'channel')}."
         )
     return total
 

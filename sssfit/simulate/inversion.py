@@ -26,7 +26,7 @@ from sssfit.errors import ArgumentError, MaterialError, RenderError, SimulationE
 from sssfit.formats.colours import linear_from_hex, reflectance_of_codes
 from sssfit.material import Layer, Material
 from sssfit.material.checks import check_texts, number
-from sssfit.messages import Columns, report
+from sssfit.messages import Columns, counted, report
 from sssfit.optics import normal_transmittance
 from sssfit.simulate._walks import note_compiling
 from sssfit.simulate.exact import (
@@ -230,8 +230,8 @@ def material_from_reflectance(
     paths_mm = np.atleast_1d(np.asarray(mean_free_path_mm, dtype=np.float64))
     if paths_mm.size not in (1, asked.size) or paths_mm.ndim > 1:
         raise MaterialError(
-            f"{paths_mm.size} mean free paths for {asked.size} reflectances; give as many, or one "
-            "for all."
+            f"{counted(paths_mm.size, 'mean free path')} for "
+            f"{counted(asked.size, 'reflectance')}; give as many, or one for all."
         )
     if not ((paths_mm >= 1e-9) & (paths_mm <= 1e9)).all():  # limit of coefficients of a material
         raise MaterialError(
@@ -278,7 +278,7 @@ def channel_names(given: str | None, reflectance: list[float] | str) -> list[str
     count = 3 if isinstance(reflectance, str) else len(reflectance)
     if given is None and count != 3:
         raise ArgumentError(
-            f"`from_reflectance` has {count} value{'s' * (count != 1)}; name "
+            f"`from_reflectance` has {counted(count, 'value')}; name "
             f"{'its channel' if count == 1 else 'their channels'} with `channels`."
         )
     names = [each.strip() for each in (given or "R,G,B").split(",")]

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from sssfit.messages import columns
+from sssfit.messages import columns, counted
 
 _NOTED_BEYOND = 1e-3  # share of a channel beyond the grid that causes a remark
 _SIGMAS = 4.5  # a deviation beyond this many standard errors is not random
@@ -51,12 +51,13 @@ def _heading(rows: Rows, *, several: bool) -> str:
     """Return lines with the material, the method, the speed and the grid."""
     row = rows[0]
     if several:
-        return f"{len(rows)} materials: {_how(rows)}"
+        return f"{counted(len(rows), 'material')}: {_how(rows)}"
     seconds, rate, annuli = row["seconds"], row["photons_per_second"], row["annuli"]
     speed = "" if seconds is None else f", {seconds:.1f} s"
     speed += f" ({rate:,.0f} a second)" if rate else ""
     return (
-        f"{row['material']}: {_how(rows)}{speed}; {annuli} annuli of {row['dr_mm']:.4g} mm, "
+        f"{row['material']}: {_how(rows)}{speed}; {counted(annuli, 'annulus')} of "
+        f"{row['dr_mm']:.4g} mm, "
         f"to {annuli * row['dr_mm']:.4g} mm"
     )
 
