@@ -102,7 +102,7 @@ class PairChain(Chain):
     ) -> FloatArray:
         """Return a view's derivatives by a channel's blend and stages, (L+1 + parameters, n, n).
 
-        They stand in ``_kept``: arrays of a megabyte made for each channel anew took two fifths of
+        They stand in ``_kept``: making arrays of a megabyte for each channel took two fifths of
         a fit's time, since the system clears every page of them.
         """
         blend, many = m.size, len(slopes)
