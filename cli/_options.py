@@ -256,7 +256,7 @@ def own_settings(
     ``by`` is the option that names the method.
     """
     known = settings_of(methods)
-    for option in given:
+    for option in filter(known.__contains__, given):
         is_given = context.get_parameter_source(option) is ParameterSource.COMMANDLINE
         owners = known[option][1]
         if is_given and method not in owners:

@@ -3,7 +3,7 @@
 Those of methods and of made pictures are made from their entries, in ``_methods``.
 """
 
-from sssfit.methods import FITS, SEPARABLE
+from sssfit.methods import EXPORTS, FITS, SEPARABLE
 from sssfit.scene.made import COMPARED, EDGE_DEGREES, MADE
 
 from ._options import (
@@ -153,12 +153,8 @@ FIT_PIXELS = (
 )
 FIT_OUTPUT = output("PROFILE.METHOD.taps.json, .kernel.json without taps", "is not our kernel")
 
-EXPORT = (
-    option("--format form", ["hlsl", "json", "csv"], None, "Output format. hlsl: a kernel as "
-           "shader source; json: a kernel as a document; csv: a profile as a table.",
-           required=True),
-    *output("NAME.FORMAT", "sssfit did not write"),
-)
+EXPORT = (option("--format form", list(EXPORTS), None, "Output format, as below.", required=True),)
+EXPORT_OUTPUT = output("NAME.FORMAT", "sssfit did not write")
 # fmt: on
 
 _OF_CHARTS = {  # options of single charts: what of it they are for, and the charts

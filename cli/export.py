@@ -7,31 +7,33 @@ from typing import Any
 
 import click
 
+from sssfit.methods import EXPORTS, lines_of
+
 from ._input import kernel_name, load, profile_name
-from ._options import Common, common_options, options
+from ._options import Common, common_options, method_options, options, own_settings
 from ._output import finish_one, held, stem_of, target, write
-from ._verb_options import EXPORT
+from ._verb_options import EXPORT, EXPORT_OUTPUT
 
 
-@click.command()
-@click.argument("file", required=False)
-@options(*EXPORT)
+@click.command(epilog="\b\nFormats:\n" + lines_of(EXPORTS))
+@click.argument("files", nargs=-1)
+@options(*EXPORT, method_options(EXPORTS), *EXPORT_OUTPUT)
 @common_options
-def export(file: str | None, form: str, output: str | None, force: bool, common: Common) -> None:
-    """Export FILE for other programs.
+@click.pass_context
+def export(context: click.Context, /, files: Any, form: str, common: Common, **given: Any) -> None:
+    """Export FILES for other programs.
 
-    FILE is a .taps.json or .kernel.json file, for csv a .profile.npz file, or - for stdin; by
-    default the newest in this folder. Shader source holds the offsets, weights and blend of a table
-    of taps, or the signs and weights of every separable term, and a comment that says how they are
-    applied, with material, fit, cost, energy and errors. The table of csv has the energy of each
-    annulus and its standard error, against the annulus' outer edge r_mm (inf: beyond the grid),
-    with every digit; `sssfit import` reads it back. It does not include specular reflectance,
-    absorption and transmittance.
+    A file is a .taps.json or .kernel.json file, for csv a .profile.npz file, or - for stdin; by
+    default the newest in this folder. Source holds a table's constants and its passes, a function
+    each, or the signs and weights of every separable term, and a comment that says how they are
+    applied, with material, fit, cost, energy and errors. Several tables with the same stages share
+    one source, and an index says which. The table of csv has the energy of each annulus and its
+    standard error, against the annulus' outer edge r_mm (inf: beyond the grid), with every digit;
+    `sssfit import` reads it back. It has no specular reflectance, absorption and transmittance.
 
     \b
       sssfit export --format hlsl
-      sssfit export skin1.cascade24.taps.json --format hlsl -o -
-      sssfit export skin1.svd3.kernel.json --format json -o -
+      sssfit export skin1.cascade24.taps.json wax.cascade24.taps.json --format glsl -o sss.glsl
       sssfit export skin1.profile.npz --format csv -o - | head
     """
     from sssfit.export import is_ours, kernel_text
@@ -39,20 +41,24 @@ def export(file: str | None, form: str, output: str | None, force: bool, common:
     from sssfit.kernel import read_kernel
     from sssfit.profile import Profile
 
-    figures: dict[str, Any]
+    settings = own_settings(context, EXPORTS, form, given, "--format")
+    if len(files) > 1 and form in ("csv", "json"):
+        raise click.UsageError(f"--format {form} takes one file, and {len(files)} are named.")
     if form == "csv":
-        name = profile_name(file)
-        profile = load(Profile.read, name)
-        text = csv_text(profile)
-        figures = {"profile": name, "channels": profile.channels, "annuli": profile.n_annuli}
+        name = profile_name(*files or [None])
+        text = csv_text(profile := load(Profile.read, name))
+        figures: dict[str, Any] = {
+            "profile": name,
+            "channels": profile.channels,
+            "annuli": profile.n_annuli,
+        }
     else:
-        name = kernel_name(file)
-        text, figures = kernel_text(load(read_kernel, name), form)
-        figures = {"kernel": name, **figures}
-    path = target(output, f"{stem_of(name)}.{form}")
+        names = files or [kernel_name(None)]
+        text, figures = kernel_text([load(read_kernel, each) for each in names], form, **settings)
+        name, figures = names[0], {"kernel": names[0], **figures}
+    path = target(given["output"], f"{stem_of(name)}.{form}")
     ours = is_profile_csv if form == "csv" else partial(is_ours, form=form)
-    named = ({"hlsl": "shader source", "json": "a kernel", "csv": "a table"}[form], f".{form}")
-    with held([path], ours, inputs=[name], force=force, named=named):
+    kind = {"json": "a kernel", "csv": "a table"}.get(form, "source")
+    with held([path], ours, inputs=files, force=given["force"], named=(kind, f".{form}")):
         write(text.encode(), path)
-    what = "the table" if form == "csv" else "the kernel"
-    finish_one(common, path, {"format": form, **figures}, "", what)
+    finish_one(common, path, {"format": form, **figures}, "", kind.replace("a ", "the "))

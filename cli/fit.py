@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from sssfit.methods import FITS, TAPS, imported, lines_of, settings_of
+from sssfit.methods import FITS, TAPS, imported, lines_of
 from sssfit.process import check_memory
 
 from ._input import load, profile_name
@@ -48,7 +48,7 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
     from sssfit.profile import Profile
 
     method, pitches = given["method"], given["pitches"]
-    settings = own_settings(context, FITS, method, {key: given[key] for key in settings_of(FITS)})
+    settings = own_settings(context, FITS, method, given)
     is_taps = method in TAPS or "taps" in settings
     refuse(given, {"normalize": "separable kernels"} if is_taps else {})
     one = ("mm_per_pixel", "output") if pitches else ()

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from sssfit.methods import settings_of
 from sssfit.scene.made import MADE, check_pictures
 
 from ._input import kernel_name, load, profile_of_kernel
@@ -93,8 +92,7 @@ def _check(context: click.Context, given: dict[str, Any]) -> dict[str, Any]:
             f"--mm-per-pixel is for pictures from files and for --screen; {name} is made on the "
             "kernel's pixels."
         )
-    settings = {key: given[key] for key in settings_of(MADE)}
-    own = own_settings(context, MADE, name, settings, "--irradiance")
+    own = own_settings(context, MADE, name, given, "--irradiance")
     return ({"light_degrees": _BEHIND_DEGREES} | own) if given["transmit"] else own
 
 

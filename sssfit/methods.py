@@ -433,6 +433,28 @@ FITS: Mapping[str, Method] = {
 SEPARABLE: Mapping[str, Method] = {k: each for k, each in FITS.items() if not each.makes_taps}
 TAPS: Mapping[str, Method] = {k: each for k, each in FITS.items() if each.makes_taps}
 
+_SOURCE = (
+    Setting("prefix", "text", "what all names begin with.", "NAME", words="SSS"),
+    Setting("coverage", "flag", "keep light within a mask, the fourth channel of the pictures."),
+    Setting("keep_energy", "flag", "leave the energy in the blend, not in a constant of its own."),
+    Setting("half", "flag", "round to half floats, and say what that costs."),
+    Setting("without_shader", "flag", "write the constants alone, without the passes."),
+    Setting(
+        "with_shader", "flag", "write the passes of a dense kernel too, up to 65 weights each."
+    ),
+    Setting("dense", "flag", "write them up to 129 weights a pass."),
+)
+_OF_C = tuple(each for each in _SOURCE if each.name in ("prefix", "keep_energy", "half"))
+
+EXPORTS: Mapping[str, Method] = {
+    "hlsl": Method("sssfit.export:source_text", "shader source of Direct3D", _SOURCE),
+    "glsl": Method("sssfit.export:source_text", "shader source of OpenGL and Vulkan", _SOURCE),
+    "wgsl": Method("sssfit.export:source_text", "shader source of WebGPU", _SOURCE),
+    "c": Method("sssfit.export:source_text", "constants for C and C++", _OF_C),
+    "json": Method("sssfit.export:document_text", "a kernel as a document"),
+    "csv": Method("sssfit.formats.csv:csv_text", "a profile as a table"),
+}
+
 
 def settings_of(methods: Mapping[str, Method]) -> dict[str, tuple[Setting, tuple[str, ...]]]:
     """Return every setting once by its name, with the names of the methods that have it.

@@ -20,7 +20,7 @@ from sssfit import fit
 from sssfit.compare import view_kernel
 from sssfit.compare.evaluate import evaluate, evaluate_in_screen_space
 from sssfit.compare.pictures import picture_error
-from sssfit.export import json_document
+from sssfit.export import json_document, kernel_text
 from sssfit.formats.csv import csv_text, load_csv
 from sssfit.formats.mci import load_mci
 from sssfit.formats.mco import join_channels, load_mco
@@ -1008,7 +1008,28 @@ def _exported(ran: Ran) -> Any:
     return data.decode()
 
 
+_SOURCE = "export wax.taps.json --format hlsl"
+_DENSE = "export wax.svd2.kernel.json --format hlsl"
+
+
+def _source(made: Callable[[], Any], **settings: Any) -> Callable[[], str]:
+    return lambda: kernel_text(made(), "hlsl", **settings)[0]
+
+
+def _taps_source(**settings: Any) -> Callable[[], str]:
+    return _source(world.taps, **settings)
+
+
 EXPORT = {
+    "--prefix": Row(_SOURCE, "--prefix WAX", _exported, _taps_source(prefix="WAX"), words="SSS"),
+    "--coverage": Row(_SOURCE, "--coverage", _exported, _taps_source(coverage=True)),
+    "--keep-energy": Row(_SOURCE, "--keep-energy", _exported, _taps_source(keep_energy=True)),
+    "--half": Row(_SOURCE, "--half", _exported, _taps_source(half=True)),
+    "--without-shader": Row(
+        _SOURCE, "--without-shader", _exported, _taps_source(without_shader=True)
+    ),
+    "--with-shader": Row(_DENSE, "--with-shader", _exported, _source(kernel, with_shader=True)),
+    "--dense": Row(_DENSE, "--dense", _exported, _source(kernel, dense=True)),
     "--format": Row(
         "export wax.svd2.kernel.json --format hlsl",
         "--format json",

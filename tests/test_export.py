@@ -12,11 +12,15 @@ import pytest
 from reference_pixels import make_profile
 
 import sssfit
-from sssfit.export import hlsl, json_document
+from sssfit.export import DIALECTS, dense, json_document
 from sssfit.fit import fit_preintegrated
 from sssfit.kernel import SeparableKernel
 
 SCHEMA = json.loads((Path(sssfit.__file__).parent / "kernel.schema.json").read_text("utf-8"))
+
+
+def hlsl_of(kernel):
+    return dense(kernel, DIALECTS["hlsl"])
 
 
 def small_kernel(channels=3, terms=2, pixels=5, **changes):
@@ -55,7 +59,7 @@ def numbers_of(text, name):
     body = re.search(rf"{name}(?:\[\d+\])* = (.*?);", text, re.DOTALL).group(1)
     return [
         float(each)
-        for each in re.findall(r"-?\d[\d.]*(?:e[+-]?\d+)?", re.sub(r"float\d", "", body))
+        for each in re.findall(r"-?\d[\d.]*(?:e[+-]?\d+)?", re.sub(r"float\d|(?<=\d)u", "", body))
     ]
 
 
@@ -82,10 +86,10 @@ def said(comment, what):
 @pytest.mark.parametrize("channels", [1, 2, 3, 4, 5])
 def test_hlsl_holds_every_constant_in_single_precision(channels):
     kernel = small_kernel(channels)
-    text = hlsl(kernel)
+    text = hlsl_of(kernel)
     shape = kernel.weights.shape
     for name, values in (
-        ("SSS_WEIGHTS", kernel.weights),
+        ("SSS_WEIGHT", kernel.weights),
         ("SSS_SIGN", kernel.signs),
         ("SSS_SCALE", kernel.scale),
         ("SSS_MM_PER_PIXEL", np.array(kernel.mm_per_pixel)),
@@ -95,17 +99,18 @@ def test_hlsl_holds_every_constant_in_single_precision(channels):
         found = np.array(numbers_of(text, name)).reshape(values.shape)
         np.testing.assert_array_equal(found.astype(np.float32), values.astype(np.float32), name)
     assert len(set(numbers_of(text, "SSS_SCALE"))) == channels
-    kind, each = ("float", f"[{channels}]") if channels > 4 else (f"float{channels}", "")
+    kind, rows = ("float", channels) if channels > 4 else (f"float{channels}", 1)
     kind = "float" if channels == 1 else kind
-    assert f"static const {kind} SSS_SCALE{each} = " in text
-    assert f"static const {kind} SSS_SIGN[2]{each} = {{" in text
-    assert f"static const {kind} SSS_WEIGHTS[2][{shape[1]}]{each} = {{" in text
+    scale = "SSS_SCALE[5]" if channels > 4 else "SSS_SCALE"
+    assert f"static const {kind} {scale} = " in text
+    assert f"static const {kind} SSS_SIGN[{2 * rows}] = {{" in text
+    assert f"static const {kind} SSS_WEIGHT[{2 * shape[1] * rows}] = {{" in text
     assert text.count("{") == text.count("}")
     assert text.count("static const") == 6
 
 
 def test_hlsl_has_the_fewest_digits_that_read_back():
-    text = hlsl(small_kernel(weights=small_kernel().weights * [1e-9, 1.0, 1e6]))
+    text = hlsl_of(small_kernel(weights=small_kernel().weights * [1e-9, 1.0, 1e6]))
     literals = re.findall(r"(?<!float)-?\b\d[\d.]*(?:e[+-]?\d+)?", text.split("static const", 1)[1])
     assert len(literals) > 2 * 5 * 3
     assert [each for each in literals if not is_shortest(each)] == []
@@ -117,7 +122,7 @@ def test_hlsl_has_the_fewest_digits_that_read_back():
 def test_the_comment_has_every_figure_of_every_channel(channels, form):
     kernel = small_kernel(channels)
     comment = (
-        comment_of(hlsl(kernel))
+        comment_of(hlsl_of(kernel))
         if form == "hlsl"
         else " ".join(json.loads(json_document(kernel))["comment"])
     )
@@ -141,7 +146,7 @@ def test_the_comment_has_every_figure_of_every_channel(channels, form):
 
 def test_what_is_not_known_is_said_to_be_unknown():
     unknown = {"relative_frobenius_error": [0.1, np.nan, 0.3], "energy_error": [np.nan] * 3}
-    comment = comment_of(hlsl(small_kernel(**unknown, meta={})))
+    comment = comment_of(hlsl_of(small_kernel(**unknown, meta={})))
     assert (
         "kernel: unknown material. Profile: unknown. Fit: svd, 2 separable terms. sssf" in comment
     )
@@ -150,21 +155,21 @@ def test_what_is_not_known_is_said_to_be_unknown():
 
 def test_a_seed_of_0_is_a_seed():
     small = small_kernel()
-    comment = comment_of(hlsl(small_kernel(meta={**small.meta, "seed": 0})))
+    comment = comment_of(hlsl_of(small_kernel(meta={**small.meta, "seed": 0})))
     assert "Profile: montecarlo, 10,000,000 photons, seed 0." in comment
 
 
 def test_faint_channels_are_not_rounded_away():
     faint = small_kernel()
     faint = small_kernel(weights=faint.weights * 1e-8, scale=[1.0, 1e-14, 1e-30])
-    comment = comment_of(hlsl(faint))
+    comment = comment_of(hlsl_of(faint))
     np.testing.assert_allclose(said(comment, "Energy of the 2D kernel"), faint.energy, rtol=5e-6)
     assert said(comment, "Multiply by") == [1.0, 1e-14, 1e-30]
 
 
 def test_no_text_can_leave_the_comment():
     settings = {"note": "a\n#error b\u2028c\x1b[0m\\", "list\r": ["x\ny"]}
-    text = hlsl(small_kernel(meta={"settings": settings}))
+    text = hlsl_of(small_kernel(meta={"settings": settings}))
     for line in text.splitlines():
         assert re.match(r"// |static const |    |\};$", line), line
         assert line.isprintable()
@@ -175,7 +180,7 @@ def test_no_text_can_leave_the_comment():
 def test_numbers_at_the_ends_of_single_precision_are_written():
     ends = np.array([[1e18, 1.2e-38, 1e-46], [-1e18, 0.1, -0.0]])
     kernel = small_kernel(weights=np.stack([ends] * 3).transpose(1, 0, 2), scale=[1, 0, 0.5])
-    found = np.array(numbers_of(hlsl(kernel), "SSS_WEIGHTS")).reshape(2, 3, 3)
+    found = np.array(numbers_of(hlsl_of(kernel), "SSS_WEIGHT")).reshape(2, 3, 3)
     expected = kernel.weights.astype(np.float32)
     expected[:, :, 2][expected[:, :, 2] < 1e-38] = 0.0
     np.testing.assert_array_equal(found.astype(np.float32), expected)
@@ -212,16 +217,16 @@ def test_names_in_any_letters_are_legible_in_every_form():
     kernel = dataclasses.replace(small_kernel(method=words[0], meta=meta), channels=words[4:])
     file = io.BytesIO()
     kernel.write(file)
-    for text in (hlsl(kernel), json_document(kernel), file.getvalue().decode()):
+    for text in (hlsl_of(kernel), json_document(kernel), file.getvalue().decode()):
         assert not [each for each in words if each not in text]
 
 
 def test_the_same_kernel_gives_the_same_text():
-    assert hlsl(small_kernel()) == hlsl(small_kernel())
+    assert hlsl_of(small_kernel()) == hlsl_of(small_kernel())
     assert json_document(small_kernel()) == json_document(small_kernel())
 
 
 def test_a_fitted_kernel_is_exported():
     profile = make_profile(np.linspace(0.0, 2.0, 21), np.full((20, 2), 0.01))
-    text = hlsl(fit_preintegrated(profile, mm_per_pixel="profile").kernel)
-    assert "float2 SSS_WEIGHTS[1]" in text
+    text = hlsl_of(fit_preintegrated(profile, mm_per_pixel="profile").kernel)
+    assert "float2 SSS_WEIGHT[" in text

@@ -15,7 +15,7 @@ from test_export import comment_of, numbers_of, said
 from test_taps import taps_of
 
 import sssfit
-from sssfit.export import is_hlsl_file, kernel_text, taps_document, taps_hlsl
+from sssfit.export import DIALECTS, Style, is_ours, kernel_text, source, taps_document
 from sssfit.kernel import Stage, Taps
 from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
@@ -24,10 +24,16 @@ SCHEMA = json.loads((Path(sssfit.__file__).parent / "taps.schema.json").read_tex
 STRUCTURES = ["1", "1-2|3", "*|1-2|*", "2-1"]
 
 
+def taps_hlsl(taps, **style):
+    """The constants alone, with the table's own energy."""
+    plain = {"with_passes": False, "normalized": False, **style}
+    return source([taps], DIALECTS["hlsl"], Style(**plain))
+
+
 def read_back(text, channels, chained):
     """Build the table again from the constants of shader source alone."""
     first = [int(each) for each in numbers_of(text, "SSS_FIRST")]
-    offsets = np.array(numbers_of(text, "SSS_OFFSET_MM"))
+    offsets = offsets_of(text)
     weights = np.array(numbers_of(text, "SSS_WEIGHT")).reshape(-1, channels)
     blend = np.array(numbers_of(text, "SSS_BLEND")).reshape(-1, channels)
     levels, kinds = (numbers_of(text, f"SSS_{name}") for name in ("LEVEL", "KIND"))
@@ -46,6 +52,13 @@ def read_back(text, channels, chained):
         stages=tuple(stages),
         blend=blend,
     )
+
+
+def offsets_of(text):
+    """The distances of the taps [mm]; a disk's lie at places, right and down."""
+    if "SSS_OFFSET_MM" in text:
+        return np.array(numbers_of(text, "SSS_OFFSET_MM"))
+    return np.hypot(*np.array(numbers_of(text, "SSS_PLACE_MM")).reshape(-1, 2).T)
 
 
 @pytest.mark.parametrize("structure", STRUCTURES)
@@ -141,7 +154,7 @@ def test_a_document_is_the_file_with_a_comment():
 def test_forms_and_figures_are_those_of_the_kernel(tmp_path):
     taps = taps_of("1|1")
     text, figures = kernel_text(taps, "hlsl")
-    assert text == taps_hlsl(taps)
+    assert text == taps_hlsl(taps, with_passes=True, normalized=True)
     assert figures == {
         "channels": ("c0", "c1"),
         "structure": "1|1",
@@ -151,5 +164,6 @@ def test_forms_and_figures_are_those_of_the_kernel(tmp_path):
     }
     path = tmp_path / "x.hlsl"
     path.write_text(text, "utf-8")
-    assert is_hlsl_file(path)
+    assert is_ours(path, "hlsl")
+    assert not is_ours(path, "glsl")
     assert kernel_text(taps, "json")[0] == taps_document(taps)

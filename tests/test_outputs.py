@@ -3,6 +3,7 @@
 import os
 import shutil
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,7 @@ from sssfit.chart.files import is_chart_file
 from sssfit.chart.page import save_figure
 from sssfit.cli import main
 from sssfit.errors import FileError
-from sssfit.export import hlsl, is_hlsl_file
+from sssfit.export import is_ours, kernel_text
 from sssfit.fit import fit_svd
 from sssfit.formats.csv import csv_text, is_profile_csv
 from sssfit.formats.pictures import is_image_file, save_image
@@ -329,7 +330,7 @@ def test_a_file_that_only_its_owner_may_replace_is_refused_even_by_force(folder,
 
 def test_every_kind_is_told_from_every_other(folder):
     kernel = SeparableKernel.load("wax.kernel.json")
-    (folder / "a.hlsl").write_text(hlsl(kernel))
+    (folder / "a.hlsl").write_text(kernel_text(kernel, "hlsl")[0])
     for ending in ("exr", "tif", "png"):
         save_image(f"picture.{ending}", np.ones((300, 300, 3)))
     for ending in ("png", "svg", "pdf"):
@@ -337,7 +338,7 @@ def test_every_kind_is_told_from_every_other(folder):
     kinds = {
         is_profile_file: {"wax.profile.npz"},
         is_kernel_file: {"wax.kernel.json"},
-        is_hlsl_file: {"a.hlsl"},
+        partial(is_ours, form="hlsl"): {"a.hlsl"},
         is_profile_csv: {"wax.csv"},
         is_image_file: {f"picture.{each}" for each in ("exr", "tif", "png")},
         is_chart_file: {f"chart.{each}" for each in ("png", "svg", "pdf")},

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 from reference_taps import rendered
 from test_export import comment_of, numbers_of
+from test_export_taps import taps_hlsl
 from test_screen_taps import scene_of
 from test_taps import PITCH, bytes_of, taps_of
 
 import sssfit
 from sssfit.errors import KernelError, RenderError
-from sssfit.export import taps_hlsl
 from sssfit.kernel import Stage, Taps, taps_between
 from sssfit.kernel.structure import parse, text_of
 from sssfit.render.full_resolution import render_full_resolution

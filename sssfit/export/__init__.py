@@ -1,33 +1,161 @@
-"""Kernels as text for other programs: shader source and documents, dense or as taps."""
+"""Kernels as text for other programs: source of shaders and of C, and documents."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from sssfit.export.document import json_document
-from sssfit.export.shader import hlsl, is_hlsl_file
-from sssfit.export.taps import taps_document, taps_hlsl
-from sssfit.kernel import Kernel, Taps, is_kernel_file, is_taps_file
+import numpy as np
 
-__all__ = ["hlsl", "is_hlsl_file", "json_document", "kernel_text", "taps_document", "taps_hlsl"]
+from sssfit.arrays import FloatArray
+from sssfit.errors import KernelError
+from sssfit.export.dense import dense, taps_of_kernel
+from sssfit.export.dense import energy_in_half as dense_in_half
+from sssfit.export.dialects import DIALECTS, mark
+from sssfit.export.document import json_document, taps_document
+from sssfit.export.shader import Style, source
+from sssfit.export.shader import energy_in_half as taps_in_half
+from sssfit.files import has_mark
+from sssfit.kernel import Kernel, SeparableKernel, Taps, is_kernel_file, is_taps_file
+from sssfit.messages import by_channel, note, of_material
+from sssfit.methods import EXPORTS
 
-_DENSE, _TAPS = {"hlsl": hlsl, "json": json_document}, {"hlsl": taps_hlsl, "json": taps_document}
+__all__ = ["DIALECTS", "Style", "dense", "json_document", "kernel_text", "source", "taps_document"]
+
+MOST_WEIGHTS, MOST_DENSE = 65, 129  # of a pass that is written as a loop of fetches
 _FIGURES = ("channels", "rank", "pixels", "mm_per_pixel")
 _TAPS_FIGURES = ("channels", "structure", "fetches", "passes", "mm_per_pixel")
 
 
-def kernel_text(kernel: Kernel, form: str) -> tuple[str, dict[str, Any]]:
+def kernel_text(
+    kernels: Kernel | Sequence[Kernel], form: str, **settings: Any
+) -> tuple[str, dict[str, Any]]:
     """Return a kernel as text, and the figures of ``sssfit export --json``.
 
     Parameters
     ----------
-    kernel : SeparableKernel or Taps
-    form : {"hlsl", "json"}
+    kernels : SeparableKernel or Taps, or a sequence of them
+        Several tables with the same stages become one source, indexed by profile.
+    form : str
+        A name of ``sssfit.methods.EXPORTS`` other than "csv".
+    **settings
+        Those of the form there.
+
+    Raises
+    ------
+    KernelError
+        The form is unknown, several kernels cannot be one, or a setting is invalid or not for them.
     """
-    if isinstance(kernel, Taps):
-        return _TAPS[form](kernel), {key: getattr(kernel, key) for key in _TAPS_FIGURES}
-    return _DENSE[form](kernel), {key: getattr(kernel, key) for key in _FIGURES}
+    every = [kernels] if isinstance(kernels, SeparableKernel | Taps) else list(kernels)
+    if form not in EXPORTS or form == "csv":
+        known = ", ".join(each for each in EXPORTS if each != "csv")
+        raise KernelError(f"no format {form!r} of a kernel; expected one of {known}.")
+    first = every[0]
+    figures = {key: getattr(first, key) for key in _keys(first)}
+    if form == "json":
+        return document_text(every), figures
+    return source_text(every, form, **settings), figures
+
+
+def _keys(kernel: Kernel) -> tuple[str, ...]:
+    return _TAPS_FIGURES if isinstance(kernel, Taps) else _FIGURES
+
+
+def document_text(kernels: Sequence[Kernel]) -> str:
+    """Return a kernel's JSON document, with a comment in words.
+
+    Raises
+    ------
+    KernelError
+        There are several.
+    """
+    if len(kernels) > 1:
+        raise KernelError("a document holds one kernel; write the others one by one.")
+    (kernel,) = kernels
+    return taps_document(kernel) if isinstance(kernel, Taps) else json_document(kernel)
+
+
+def source_text(
+    kernels: Sequence[Kernel],
+    form: str,
+    *,
+    prefix: str = "SSS",
+    coverage: bool = False,
+    keep_energy: bool = False,
+    half: bool = False,
+    without_shader: bool = False,
+    with_shader: bool = False,
+    dense: bool = False,
+) -> str:
+    """Return source of a language: constants, and of tables of taps the passes that use them.
+
+    Parameters
+    ----------
+    kernels : sequence of SeparableKernel or Taps
+    form : str
+        A name of ``DIALECTS``.
+    prefix : str
+        Of all names.
+    coverage : bool
+        Whether light stays within a mask unless the shader says otherwise.
+    keep_energy : bool
+        Whether the blend keeps the energy; otherwise it is a constant of its own.
+    half : bool
+        Whether numbers are rounded to half floats; what that costs is noted.
+    without_shader : bool
+        Whether the constants stand alone.
+    with_shader : bool
+        Whether a dense kernel gets passes too, up to 65 weights each.
+    dense : bool
+        Whether it gets them up to 129.
+
+    Raises
+    ------
+    KernelError
+        The kernels cannot share a source, a setting is invalid, or a pass has too many weights.
+    """
+    tables = [each for each in kernels if isinstance(each, Taps)]
+    if not tables and len(kernels) == 1 and isinstance(kernels[0], SeparableKernel):
+        if not (with_shader or dense):
+            return _dense_text(kernels[0], form, prefix, half=half)
+        tables = [taps_of_kernel(kernels[0], MOST_DENSE if dense else MOST_WEIGHTS)]
+    if len(tables) < len(kernels):
+        raise KernelError("only tables of taps share one source; write dense kernels one by one.")
+    style = Style(
+        prefix,
+        with_passes=not without_shader,
+        normalized=not keep_energy,
+        half=half,
+        features=("COVERAGE",) if coverage else (),
+    )
+    if half:
+        for each in tables:
+            _note_half(each, taps_in_half(each))
+    return source(tables, DIALECTS[form], style)
+
+
+def _dense_text(kernel: SeparableKernel, form: str, prefix: str, *, half: bool) -> str:
+    """Return the arrays of a dense kernel, and say what its passes would cost."""
+    weights = 2 * kernel.rank * kernel.pixels
+    if weights > MOST_WEIGHTS:
+        note(
+            f"This dense kernel has {weights} weights a pixel, and a shader would fetch for each; "
+            "a cascade comes nearer for 24 fetches."
+        )
+    if half:
+        _note_half(kernel, dense_in_half(kernel))
+    return dense(kernel, DIALECTS[form], prefix, half=half)
+
+
+def _note_half(kernel: Kernel, rounded: FloatArray) -> None:
+    """Say by how much half floats change the energy."""
+    energy = kernel.energy
+    change = np.where(energy != 0.0, rounded / np.where(energy != 0.0, energy, 1.0) - 1.0, 0.0)
+    words = by_channel(kernel.channels, change.tolist(), "+.2g%|unknown")
+    note(f"Half floats change the energy of {of_material(kernel.meta.get('material'))}: {words}.")
 
 
 def is_ours(path: Path, form: str) -> bool:
     """Return whether a file is one that `kernel_text` wrote in this form."""
-    return is_hlsl_file(path) if form == "hlsl" else is_kernel_file(path) or is_taps_file(path)
+    if form == "json":
+        return is_kernel_file(path) or is_taps_file(path)
+    return has_mark(path, {mark(DIALECTS[form]).encode(): b""})

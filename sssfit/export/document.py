@@ -1,13 +1,11 @@
-"""A kernel as a JSON document: the kernel file with a comment in words."""
+"""Kernels and tables of taps as JSON documents: their files with a comment in words."""
 
 import json
-import math
-from collections.abc import Sequence
 
-from sssfit.kernel import SeparableKernel
+from sssfit.export.certificate import certificate, errors_text, how_to_run, values_text
+from sssfit.kernel import SeparableKernel, Taps
+from sssfit.kernel.taps_json import pack
 from sssfit.messages import counted, printable
-
-_ROUNDING = 1e-12
 
 
 def description(kernel: SeparableKernel) -> list[str]:
@@ -42,19 +40,6 @@ def description(kernel: SeparableKernel) -> list[str]:
     return [printable(line) for line in lines]
 
 
-def values_text(values: Sequence[float]) -> str:
-    """Return a value for each channel as text."""
-    return ", ".join(f"{each + 0.0:.6g}" for each in values)  # not -0
-
-
-def errors_text(values: Sequence[float]) -> str:
-    """Return an error for each channel as text; rounding of sums of pixels counts as 0."""
-    return ", ".join(
-        "unknown" if math.isnan(each) else f"{0.0 if abs(each) < _ROUNDING else each:.6g}"
-        for each in values
-    )
-
-
 def json_document(kernel: SeparableKernel) -> str:
     """Return the kernel as indented JSON, with a ``comment`` (list of lines) first."""
     whole = {"comment": description(kernel), **kernel.to_dict()}
@@ -62,3 +47,11 @@ def json_document(kernel: SeparableKernel) -> str:
     head = json.dumps(whole, indent=1, allow_nan=False, ensure_ascii=False)
     lines = ",\n  ".join(json.dumps(each, allow_nan=False) for each in terms)
     return head.removesuffix("\n}") + f',\n "terms": [\n  {lines}\n ]\n}}\n'
+
+
+def taps_document(taps: Taps) -> str:
+    """Return a table's own JSON with a ``comment`` (list of lines) after its format."""
+    first, *rest = pack(taps).decode().split("\n")
+    words = [printable(each) for each in (*certificate(taps), *how_to_run(taps))]
+    lines = json.dumps(words, ensure_ascii=False)
+    return "\n".join([first, rest[0], f' "comment": {lines},', *rest[1:]])

@@ -1,37 +1,198 @@
-"""A dense kernel as shader source: constant arrays with a comment that explains them."""
+"""Tables of taps as source of a language: constants, and the passes that use them."""
 
-from pathlib import Path
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
-from sssfit.export.document import description
-from sssfit.export.numbers import array, literal, value, vector_kind
-from sssfit.files import has_mark
-from sssfit.kernel import SeparableKernel
+import numpy as np
 
-MARK = "// sssfit.hlsl/1"  # the mark of our files, which may be replaced
+from sssfit.arrays import FloatArray
+from sssfit.errors import KernelError
+from sssfit.export.certificate import certificate, how_to_run, pass_table
+from sssfit.export.constants import Writer, check_prefix
+from sssfit.export.dialects import Dialect, mark
+from sssfit.export.functions import Functions
+from sssfit.export.passes import pass_list
+from sssfit.kernel import Taps
+from sssfit.messages import printable
+
+_COPIES = {
+    "pair": 2.0,
+    "star": 4.0,
+    "disk": 1.0,
+    "line": 2.0,
+}  # fetches of a row of weights, per pass
+KIND_NUMBERS = ("pair", "star", "disk", "line")
 
 
-def hlsl(kernel: SeparableKernel) -> str:
-    """Return HLSL: constant arrays of the signs and weights of each term.
+@dataclass(frozen=True, slots=True)
+class Style:
+    """How a table is written.
 
-    Weights are indexed by term and pixel. One to four channels are float to float4; more channels
-    take a third index.
+    Parameters
+    ----------
+    prefix : str
+        Of all names.
+    with_passes : bool
+        Whether the functions of the passes follow the constants.
+    normalized : bool
+        Whether the blend adds up to 1 and the energy is a constant of its own.
+    half : bool
+        Whether numbers are rounded to half floats.
+    features : tuple of str
+        Of `FEATURES`: which are on where nothing else is said.
     """
-    terms, pixels, channels = kernel.weights.shape
-    kind, last = vector_kind(channels)
-    lines = [MARK, *(f"// {line}" for line in description(kernel))]
-    lines += [
-        f"static const uint SSS_TERMS = {terms};",
-        f"static const uint SSS_PIXELS = {pixels};",
-        f"static const float SSS_MM_PER_PIXEL = {literal(kernel.mm_per_pixel)};",
-        f"static const {kind} SSS_SCALE{last} = {value(kernel.scale, kind)};",
-        *array(f"{kind} SSS_SIGN[{terms}]{last}", kernel.signs, kind),
-        f"static const {kind} SSS_WEIGHTS[{terms}][{pixels}]{last} = {{",
-    ]
-    for weights in kernel.weights:
-        lines += ["    {", *(f"        {value(each, kind)}," for each in weights), "    },"]
-    return "\n".join([*lines, "};", ""])
+
+    prefix: str = "SSS"
+    with_passes: bool = True
+    normalized: bool = True
+    half: bool = False
+    features: tuple[str, ...] = ()
 
 
-def is_hlsl_file(path: Path) -> bool:
-    """Return whether a file is shader source that `hlsl` wrote."""
-    return has_mark(path, {MARK.encode(): b""})
+FEATURES = ("COVERAGE",)
+
+
+def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
+    """Return source of a dialect for one table, or for several with the same stages.
+
+    Raises
+    ------
+    KernelError
+        The prefix is no identifier, the tables have other stages or channels, or passes cannot be
+        written for them.
+    """
+    _check(tables, style)
+    passes = dialect.has_passes and style.with_passes
+    words = [line for each in tables for line in certificate(each)]
+    words += (
+        pass_table(tables[0], style.prefix, normalized=style.normalized)
+        if passes
+        else how_to_run(tables[0])
+    )
+    words += list(_notes(tables, style, passes=passes))
+    lines = [mark(dialect), *(f"// {printable(each)}".rstrip() for each in words)]
+    lines += _defines(dialect, style) if passes else []
+    lines += _constants(tables, dialect, style, passes=passes)
+    if passes:
+        listed = pass_list(tables[0], normalized=style.normalized)
+        functions = Functions(tables[0], listed, dialect, style.prefix, is_indexed=len(tables) > 1)
+        lines += ["", *functions.lines()]
+    text = lines if dialect.has_defines else _resolved(lines, style)
+    return "\n".join(text).rstrip("\n") + "\n"
+
+
+def _notes(tables: Sequence[Taps], style: Style, *, passes: bool) -> Iterator[str]:
+    """Yield what else has to be known of the constants."""
+    p = style.prefix
+    if style.normalized:
+        yield f"The passes have unit energy: multiply by {p}_ALBEDO, or by a texture's own albedo."
+    if any(each.has_negative_weights for each in tables):
+        yield "Some weights are negative: unsigned formats between the passes would cut light off."
+    if passes and tables[0].chained:
+        yield "Half floats between the passes cost nothing that is seen. Linear light throughout."
+
+
+def _check(tables: Sequence[Taps], style: Style) -> None:
+    check_prefix(style.prefix)
+    first = tables[0]
+    for each in tables[1:]:
+        if (each.structure, each.channels, each.chained) != (
+            first.structure,
+            first.channels,
+            first.chained,
+        ):
+            raise KernelError(
+                f"tables of one file share their passes, and {each.structure} of "
+                f"{', '.join(each.channels)} is not {first.structure} of "
+                f"{', '.join(first.channels)}; fit them with the same stages."
+            )
+
+
+def _defines(dialect: Dialect, style: Style) -> Iterator[str]:
+    """Yield the switches, which may be set before the file is included."""
+    if not dialect.has_defines:
+        return
+    for each in FEATURES:
+        name = f"{style.prefix}_{each}"
+        yield from (f"#ifndef {name}", f"#define {name} {int(each in style.features)}", "#endif")
+
+
+def _resolved(lines: Sequence[str], style: Style) -> Iterator[str]:
+    """Yield the lines that a preprocessor would leave, for a dialect without one."""
+    kept = [True]
+    for line in lines:
+        word = line.split()[0] if line.strip() else ""
+        if word == "#if":
+            kept.append(line.split()[1].removeprefix(f"{style.prefix}_") in style.features)
+        elif word == "#else":
+            kept[-1] = not kept[-1]
+        elif word == "#endif":
+            kept.pop()
+        elif all(kept):
+            yield line
+
+
+def _constants(
+    tables: Sequence[Taps], dialect: Dialect, style: Style, *, passes: bool
+) -> Iterator[str]:
+    """Yield the constants: stages, offsets, weights and blend, profile after profile."""
+    first, write = tables[0], Writer(dialect, style.prefix, half=style.half)
+    counts = [len(each.weights) for each in first.stages]
+    yield write.scalar("float", "MM_PER_PIXEL", [first.mm_per_pixel])
+    if len(tables) > 1:
+        yield write.scalar("uint", "TAPS", [sum(counts)])
+        yield write.scalar("uint", "PICTURES", [len(first.blend)])
+    if style.normalized and len(tables) == 1:
+        yield write.vector("ALBEDO", first.energy.tolist())
+    elif style.normalized:
+        yield from write.rows("ALBEDO", [each.energy.tolist() for each in tables])
+    if passes:
+        sizes = [2.0**each.level for each in first.stages]
+        yield from write.rows("SIZE", [[each] for each in sizes])
+    else:
+        yield write.scalar("uint", "STAGES", [len(first.stages)])
+        yield write.wholes("LEVEL", [each.level for each in first.stages])
+        yield write.wholes("KIND", [KIND_NUMBERS.index(each.kind) for each in first.stages])
+        angles = [[each.angle_degrees] for each in first.stages]
+        yield from write.rows("ANGLE_DEGREES", angles) if any(map(any, angles)) else ()
+    yield write.wholes("FIRST", [0, *np.cumsum(counts).tolist()])
+    places = [row for each in tables for row in _places(each)]
+    yield from write.rows("PLACE_MM" if first.is_disk else "OFFSET_MM", places)
+    weights = [each.weights for table in tables for each in table.stages]
+    yield from write.rows("WEIGHT", np.concatenate(weights).tolist())
+    if passes and not pass_list(first, normalized=style.normalized)[-1].is_blended:
+        return
+    blends = [_blend(each, style) for each in tables]
+    yield from write.rows("BLEND", np.concatenate(blends).tolist())
+
+
+def _places(taps: Taps) -> Iterator[list[float]]:
+    """Yield where the taps lie [mm]: a distance, or of a disk right and down."""
+    for stage in taps.stages:
+        yield [0.0, 0.0] if taps.is_disk else [0.0]
+        for k, each in enumerate(stage.offsets_mm.tolist()):
+            turn = 2.0 * math.pi * (k * 2.0 / (1.0 + math.sqrt(5.0)) % 1.0)
+            yield [each * math.cos(turn), each * math.sin(turn)] if taps.is_disk else [each]
+
+
+def _blend(taps: Taps, style: Style) -> FloatArray:
+    """Return the blend, of unit energy where the energy is written apart."""
+    energy = np.where(taps.energy != 0.0, taps.energy, 1.0)
+    blend: FloatArray = taps.blend / energy if style.normalized else taps.blend
+    return blend
+
+
+def energy_in_half(taps: Taps) -> FloatArray:
+    """Return the energy (C,) of a table whose weights and blend are rounded to half floats."""
+    shares = taps.blend / np.where(taps.energy != 0.0, taps.energy, 1.0)
+    blend = shares.astype(np.float16).astype(float)
+    total, passed = blend[0].copy(), np.ones(len(taps.channels))
+    for stage, share in zip(taps.stages, blend[1:], strict=True):
+        rows = stage.weights.astype(np.float16).astype(float)
+        whole = rows[0] + _COPIES[stage.kind] * rows[1:].sum(axis=0)
+        whole = whole**2 if stage.kind == "pair" else whole
+        passed = passed * whole if taps.chained else whole
+        total += share * passed
+    energy: FloatArray = total * taps.energy
+    return energy

@@ -1,0 +1,104 @@
+"""The comment above a table of taps: what it is and comes from, what it costs, how it is run."""
+
+import math
+from collections.abc import Iterator, Sequence
+
+from sssfit.export.passes import pass_list
+from sssfit.kernel import Taps
+
+_ROUNDING = 1e-12
+
+
+def certificate(taps: Taps) -> Iterator[str]:
+    """Yield what a table is, where it comes from, what it costs and how near it is."""
+    meta = taps.meta
+    given = {
+        key: each for key, each in meta.get("settings", {}).items() if each not in (None, False)
+    }
+    settings = ", ".join(f"{key} {value}" for key, value in given.items())
+    sha = f", sha256 {meta['profile_sha256'][:16]}" if meta.get("profile_sha256") else ""
+    yield (
+        f"Subsurface scattering taps: {meta.get('material') or 'unknown material'}, {taps.method}"
+        f"{f' ({settings})' if settings else ''}. sssfit {meta.get('version') or '(unknown)'}."
+    )
+    yield f"Profile: {meta.get('profile_method') or 'unknown'}{sha}."
+    read = "each stage reads the one before" if taps.chained else "all stages read the irradiance"
+    yield (
+        f"{taps.structure}: {taps.fetches:.6g} fetches a pixel in {taps.passes} passes, "
+        f"{taps.cost.all_passes} with those that change the picture's size; {read}."
+    )
+    yield (
+        f"Made for pixels of {taps.mm_per_pixel:.9g} mm; channels {', '.join(taps.channels)}; "
+        "linear light."
+    )
+    yield (
+        f"Energy: {values_text(taps.energy.tolist())}; spectral error: "
+        f"{errors_text(taps.errors['spectral'].tolist())}."
+    )
+
+
+def pass_table(taps: Taps, prefix: str, *, normalized: bool) -> Iterator[str]:
+    """Yield the passes as a table, and what their functions take."""
+    passes = pass_list(taps, normalized=normalized)
+    yield ""
+    yield "Passes in their order. E is the irradiance, M0 the result; sizes are rounded up."
+    yield f"{'call':<16}{'reads':<16}{'writes':<8}{'size':<6}fetches"
+    for each in passes:
+        reads = " ".join(dict.fromkeys((each.reads, *(name for name, _ in each.adds))))
+        size = f"1/{2**each.level}" if each.level else "1"
+        writes = " ".join(each.writes) + ("+" if each.is_added else "")
+        call = f"{prefix}_{each.call}"
+        yield f"{call:<16}{reads:<16}{writes:<8}{size:<6}{each.fetches}"
+    if any(each.is_added for each in passes):
+        yield "A + is added to what the target holds (blend ONE, ONE)."
+    yield "position: middle of the pixel that is written (SV_Position, gl_FragCoord), in pixels."
+    yield "texel: 1 / size of the first picture that is read; mm_per_pixel: of the full picture,"
+    yield "2 d tan(fov / 2) / rows at depth d, divided by a pixel's own scale of the blur."
+    yield "Sampler: bilinear, clamped. Alpha is coverage, and light is multiplied by it."
+
+
+def how_to_run(taps: Taps) -> Iterator[str]:
+    """Yield what the arrays mean, for those who write the passes themselves."""
+    yield "Stage s works on the picture halved LEVEL[s] times; its taps begin at FIRST[s]."
+    kinds = {each.kind for each in taps.stages}
+    if "pair" in kinds:
+        yield (
+            "Kind 0 is a pass along x and the same along y: WEIGHT[first] times the middle, and "
+            "WEIGHT[i] times each of the two bilinear fetches OFFSET_MM[i] away on either side."
+        )
+    if "star" in kinds:
+        yield (
+            "Kind 1 is one pass of nine fetches: the middle, the four that lie the second offset "
+            "away along both axes, by the second weight, and the four on the axes, by the third."
+        )
+    if "disk" in kinds:
+        yield (
+            "Kind 2 is one pass of single bilinear fetches at PLACE_MM, right and down, turned by "
+            "an angle for each pixel and frame. A middle of weight 0 is not fetched."
+        )
+    if "line" in kinds:
+        yield (
+            "Kind 3 is one pass like one of kind 0, in the direction of ANGLE_DEGREES: from x to "
+            "the right towards y down."
+        )
+    if any(each.kind == "pair" and each.angle_degrees for each in taps.stages):
+        yield "Kind 0 with an angle runs along it and then perpendicular to it."
+    yield "Result: BLEND[0] times the irradiance, and BLEND[s+1] times each stage's picture, added."
+    if any(each.level for each in taps.stages):
+        yield (
+            "Halve by one bilinear fetch at the corner of 2 x 2 texels. Add up level by level, the "
+            "coarsest first, each read by one bilinear fetch."
+        )
+
+
+def values_text(values: Sequence[float]) -> str:
+    """Return a value for each channel as text."""
+    return ", ".join(f"{each + 0.0:.6g}" for each in values)  # not -0
+
+
+def errors_text(values: Sequence[float]) -> str:
+    """Return an error for each channel as text; rounding of sums of pixels counts as 0."""
+    return ", ".join(
+        "unknown" if math.isnan(each) else f"{0.0 if abs(each) < _ROUNDING else each:.6g}"
+        for each in values
+    )

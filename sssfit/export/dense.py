@@ -1,0 +1,77 @@
+"""A dense kernel as source of a language: constant arrays with a comment that explains them."""
+
+import numpy as np
+
+from sssfit.arrays import FloatArray
+from sssfit.errors import KernelError
+from sssfit.export.constants import Writer, check_prefix
+from sssfit.export.dialects import Dialect, mark
+from sssfit.export.document import description
+from sssfit.kernel import SeparableKernel, Stage, Taps
+
+
+def dense(
+    kernel: SeparableKernel, dialect: Dialect, prefix: str = "SSS", *, half: bool = False
+) -> str:
+    """Return constant arrays of the signs and weights of each term, one term after the other.
+
+    One to four channels are one vector each; more channels follow one another.
+
+    Raises
+    ------
+    KernelError
+        The prefix is no identifier.
+    """
+    check_prefix(prefix)
+    write = Writer(dialect, prefix, half=half)
+    terms, pixels, channels = kernel.weights.shape
+    lines = [
+        mark(dialect),
+        *(f"// {line}" for line in description(kernel)),
+        write.scalar("uint", "TERMS", [terms]),
+        write.scalar("uint", "PIXELS", [pixels]),
+        write.scalar("float", "MM_PER_PIXEL", [kernel.mm_per_pixel]),
+        write.vector("SCALE", kernel.scale.tolist()),
+        *write.rows("SIGN", kernel.signs.tolist()),
+        *write.rows("WEIGHT", kernel.weights.reshape(-1, channels).tolist()),
+    ]
+    return "\n".join([*lines, ""])
+
+
+def taps_of_kernel(kernel: SeparableKernel, most: int) -> Taps:
+    """Return a dense kernel as a table with a fetch for every pixel.
+
+    Raises
+    ------
+    KernelError
+        A pass has more weights than ``most``.
+    """
+    if kernel.pixels > most:
+        raise KernelError(
+            f"a pass of this kernel has {kernel.pixels} weights, and {most} are the most that are "
+            "written as fetches; thin it to taps, or fit a cascade."
+        )
+    middle = kernel.pixels // 2
+    offsets_mm: FloatArray = kernel.mm_per_pixel * np.arange(1.0, middle + 1.0)
+    sums = kernel.weights.sum(axis=1)  # (R, C)
+    whole: FloatArray = np.where(sums != 0.0, sums, 1.0)
+    halves: FloatArray = np.divide(kernel.weights[:, middle:], whole[:, None])
+    stages = [Stage(0, "pair", offsets_mm, halves[k]) for k in range(kernel.rank)]
+    blend = np.concatenate((np.zeros((1, len(kernel.channels))), kernel.signs * sums**2))
+    return Taps(
+        method=kernel.method,
+        mm_per_pixel=kernel.mm_per_pixel,
+        channels=kernel.channels,
+        chained=False,
+        stages=tuple(stages),
+        blend=blend * kernel.scale,
+        errors={"spectral": np.full(len(kernel.channels), np.nan), "energy": kernel.energy_error},
+        meta=kernel.meta,
+    )
+
+
+def energy_in_half(kernel: SeparableKernel) -> FloatArray:
+    """Return the energy (C,) of a kernel whose weights are rounded to half floats."""
+    sums = kernel.weights.astype(np.float16).astype(float).sum(axis=1)
+    energy: FloatArray = (kernel.signs * sums**2).sum(axis=0) * kernel.scale
+    return energy

@@ -1,0 +1,132 @@
+"""The languages of tables and passes: how each declares, calls and fetches.
+
+A dialect is data; what is written in it stands in ``tables`` and ``functions``.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from sssfit.export.numbers import literal
+
+KINDS = ("float", "float2", "float3", "float4")  # of one to four channels
+
+
+@dataclass(frozen=True, slots=True)
+class Dialect:
+    """How a language says what a shader needs; templates are those of ``str.format``.
+
+    Parameters
+    ----------
+    name : str
+    types : mapping
+        Names of float, float2, float3, float4 and uint.
+    constant : str
+        With kind, name, dims and value.
+    array : tuple of str
+        Before and after the rows, with kind, name, dims and count.
+    vector : str
+        A value for each channel, with kind and values.
+    number : str
+        With value.
+    function, argument, variable : str
+        A function's first line with kind, name and arguments; the others with kind and name.
+    picture, sampler : str
+        Types of arguments; without a sampler a picture has its own.
+    fetch, load : str
+        With picture and place: a bilinear fetch at texture coordinates; a texel at its middle.
+    struct, variable_of : str
+        A structure of an array ``term``, with kind, name and count; a variable of it.
+    has_defines : bool
+        Whether there is a preprocessor.
+    """
+
+    name: str
+    types: Mapping[str, str]
+    constant: str
+    array: tuple[str, str]
+    vector: str
+    number: str = "{value}"
+    function: str = "{kind} {name}({arguments})"
+    argument: str = "{kind} {name}"
+    variable: str = "{kind} {name}"
+    picture: str = ""
+    sampler: str = ""
+    fetch: str = ""
+    load: str = ""
+    struct: str = "struct {name} {{ {kind} term[{count}]; }};"
+    variable_of: str = "{kind} {name}"
+    has_defines: bool = True
+
+    @property
+    def has_passes(self) -> bool:
+        """Whether passes can be written in it, not tables alone."""
+        return bool(self.fetch)
+
+    def literal(self, values: Sequence[float]) -> str:
+        """Return a constant of single precision for each channel, as one value."""
+        numbers = [self.number.format(value=literal(each)) for each in values]
+        if len(numbers) == 1:
+            return numbers[0]
+        return self.vector.format(
+            kind=self.types[KINDS[len(numbers) - 1]], values=", ".join(numbers)
+        )
+
+    def new(self, kind: str, name: str) -> str:
+        """Return the left side of a variable's declaration."""
+        return self.variable.format(kind=self.types[kind], name=name)
+
+
+_HLSL_TYPES = {each: each for each in (*KINDS, "uint")}
+HLSL = Dialect(
+    "hlsl",
+    _HLSL_TYPES,
+    constant="static const {kind} {name} = {value};",
+    array=("static const {kind} {name}[{count}] = {{", "}};"),
+    vector="{kind}({values})",
+    picture="Texture2D<float4>",
+    sampler="SamplerState",
+    fetch="{picture}.SampleLevel(bilinear, {place}, 0.0)",
+    load="{picture}.Load(int3(int2({place}), 0))",
+)
+GLSL = replace(
+    HLSL,
+    name="glsl",
+    types={"float": "float", "float2": "vec2", "float3": "vec3", "float4": "vec4", "uint": "uint"},
+    constant="const {kind} {name} = {value};",
+    array=("const {kind} {name}[{count}] = {kind}[{count}](", ");"),
+    picture="sampler2D",
+    sampler="",
+    fetch="textureLod({picture}, {place}, 0.0)",
+    load="texelFetch({picture}, ivec2({place}), 0)",
+)
+WGSL = Dialect(
+    "wgsl",
+    {"float": "f32", "float2": "vec2f", "float3": "vec3f", "float4": "vec4f", "uint": "u32"},
+    constant="const {name}: {kind} = {value};",
+    array=("const {name} = array<{kind}, {count}>(", ");"),
+    vector="{kind}({values})",
+    function="fn {name}({arguments}) -> {kind}",
+    argument="{name}: {kind}",
+    variable="var {name}",
+    picture="texture_2d<f32>",
+    sampler="sampler",
+    fetch="textureSampleLevel({picture}, bilinear, {place}, 0.0)",
+    load="textureLoad({picture}, vec2i({place}), 0)",
+    struct="struct {name} {{ term: array<{kind}, {count}> }}",
+    variable_of="var {name}: {kind}",
+    has_defines=False,
+)
+C = Dialect(
+    "c",
+    {**dict.fromkeys(KINDS, "float"), "uint": "unsigned"},
+    constant="static const {kind} {name}{dims} = {value};",
+    array=("static const {kind} {name}[{count}]{dims} = {{", "}};"),
+    vector="{{{values}}}",
+    number="{value}f",
+)
+DIALECTS = {each.name: each for each in (HLSL, GLSL, WGSL, C)}
+
+
+def mark(dialect: Dialect) -> str:
+    """Return the first line of our files, which may be replaced."""
+    return f"// sssfit.{dialect.name}/1"

@@ -1,0 +1,326 @@
+"""The passes of a table of taps as functions of a shader.
+
+A function is the body of a pixel shader. It takes the pictures that the pass reads, the middle of
+the pixel that is written, and the size of a texel of the picture that is fetched from all around;
+it returns light and coverage. With coverage A a picture holds A times light, and A, so a bilinear
+fetch has the sums of both, and every pass is sum w A E / sum w A (``sssfit.render.taps``).
+"""
+
+from collections.abc import Iterator, Sequence
+
+from sssfit.errors import KernelError
+from sssfit.export.dialects import KINDS, Dialect
+from sssfit.export.numbers import literal
+from sssfit.export.passes import Pass
+from sssfit.kernel import Taps
+
+MOST_CHANNELS = 3  # of a picture whose fourth one is coverage
+_FETCHED = (("sampler", "bilinear"), ("float2", "position"), ("float2", "texel"))
+_SCALE = ("float", "mm_per_pixel")
+_LONGEST = 80  # of the arguments of a function in one line
+# The hash pcg2d of the pixel turns a disk, 2654435769 = 2^32 / phi a frame (sssfit.render.disk).
+_TURN = """\
+    {x} = {uint}(position.x) * 1664525u + 1013904223u;
+    {y} = {uint}(position.y) * 1664525u + 1013904223u;
+    x = x + y * 1664525u;
+    y = y + x * 1664525u;
+    x = x ^ (x >> 16u);
+    y = y ^ (y >> 16u);
+    x = x + y * 1664525u;
+    y = y + x * 1664525u;
+    x = (x ^ (x >> 16u)) + frame * 2654435769u;
+    return {float}(x) * 1.4629180792671596e-9; // 2 pi / 2^32"""
+
+
+class Functions:
+    """The functions of tables with the same stages, in one dialect.
+
+    Parameters
+    ----------
+    taps : Taps
+    passes : sequence of Pass
+    dialect : Dialect
+    prefix : str
+        Of all names.
+    is_indexed : bool
+        Whether the arrays hold several profiles, of which an argument names one.
+
+    Raises
+    ------
+    KernelError
+        The pictures have more channels than light and coverage leave room for.
+    """
+
+    def __init__(
+        self,
+        taps: Taps,
+        passes: Sequence[Pass],
+        dialect: Dialect,
+        prefix: str,
+        *,
+        is_indexed: bool,
+    ) -> None:
+        if len(taps.channels) > MOST_CHANNELS:
+            raise KernelError(
+                f"the table has {len(taps.channels)} channels; passes are written for at most "
+                f"{MOST_CHANNELS}, since the fourth one of a picture is coverage."
+            )
+        self.taps, self.dialect, self.prefix = taps, dialect, prefix
+        self.profile = (("uint", "profile"),) if is_indexed else ()
+        self.light, self.rgb = KINDS[len(taps.channels) - 1], f".{'rgb'[: len(taps.channels)]}"
+        self.passes = passes
+        self.has_sums = any(each.kind == "sum" for each in passes)
+        counts = [len(each.weights) for each in taps.stages]
+        self.first = [sum(counts[:k]) for k in range(len(counts))]
+
+    def lines(self) -> Iterator[str]:
+        """Yield the lines of all functions."""
+        kinds = {each.kind for each in self.passes}
+        helpers = {
+            "second": self._blur,
+            "line": self._blur,
+            "star": self._star,
+            "disk": self._turn,
+            "halve": self._halve,
+        }
+        parts = [self._covered()] if self.has_sums or "disk" in kinds else []
+        parts += dict.fromkeys(make() for kind, make in helpers.items() if kind in kinds)
+        parts += [self._pass(each) for each in self.passes if each.is_own]
+        for each in parts:
+            yield from each.strip("\n").split("\n")
+            yield ""
+
+    def _head(self, kind: str, name: str, arguments: Sequence[tuple[str, str]]) -> str:
+        """Return a function's first line."""
+        own = self.dialect
+        types = {**own.types, "picture": own.picture, "sampler": own.sampler}
+        words = [own.argument.format(kind=types[k], name=n) for k, n in arguments if types[k]]
+        kind, full = types.get(kind, kind), f"{self.prefix}_{name}"
+        apart = ",\n    " if sum(map(len, words)) > _LONGEST else ", "
+        middle = (len(words) + 1) // 2
+        halves = [", ".join(each) for each in (words[:middle], words[middle:])]
+        return own.function.format(kind=kind, name=full, arguments=apart.join(halves))
+
+    def _call(self, name: str, *arguments: str) -> str:
+        """Call one of the functions above; a dialect without samplers passes none."""
+        shown = [each for each in arguments if each != "bilinear" or self.dialect.sampler]
+        return f"{self.prefix}_{name}({', '.join(shown)})"
+
+    def _at(self, name: str, index: str, rows: str = "TAPS") -> str:
+        """Return an element of an array; each profile has so many rows of it."""
+        of_profile = f"profile * {self.prefix}_{rows} + " if self.profile else ""
+        return f"{self.prefix}_{name}[{of_profile}{index}]"
+
+    def _fetch(self, picture: str, place: str) -> str:
+        return self.dialect.fetch.format(picture=picture, place=place)
+
+    def _both(self, picture: str, away: str) -> str:
+        """Return the sum of two mirrored fetches."""
+        return " + ".join(self._fetch(picture, f"place {sign} {away}") for sign in "-+")
+
+    def _load(self, picture: str) -> str:
+        return self.dialect.load.format(picture=picture, place="position")
+
+    def _vector(self, kind: str, *values: str) -> str:
+        return values[0] if kind == "float" else f"{self.dialect.types[kind]}({', '.join(values)})"
+
+    def _axis(self, each: Pass) -> str:
+        """Return the direction of a pass, right and down."""
+        return self._vector("float2", *(literal(number) for number in each.axis or (1.0, 0.0)))
+
+    def _whole(self, light: str, cover: str) -> str:
+        """Return four numbers: light, and coverage in the last."""
+        beside = ["0.0"] * (MOST_CHANNELS - len(self.taps.channels))
+        return self._vector("float4", light, *beside, cover)
+
+    def _covered(self) -> str:
+        """Return the function that ends most passes, where several need it."""
+        arguments = [(self.light, "light"), (self.light, "part"), ("float", "cover")]
+        return f"""
+// Light as the next pass reads it, with its coverage.
+{self._head("float4", "Covered", arguments)} {{
+{self._returned("light", "part", "cover")}
+}}"""
+
+    def _returned(self, light: str, part: str, cover: str) -> str:
+        """Return the lines that end a function: light over what was covered, times coverage."""
+        least = self._vector(self.light, "1e-20")
+        shown = f"{cover} * {light} / max({part}, {least})"
+        return f"""\
+#if {self.prefix}_COVERAGE
+    return {self._whole(shown, cover)};
+#else
+    return {self._whole(light, "1.0")};
+#endif"""
+
+    def _end(self) -> str:
+        """Return the lines that end a pass of a stage."""
+        if self.has_sums:
+            return f"    return {self._call('Covered', 'light', 'part', 'own.a')};"
+        return self._returned("light", "part", "own.a")
+
+    def _begin(self, picture: str, size: str, axis: str = "") -> str:
+        """Return the lines that find the pixel, a mm and the middle in texture coordinates."""
+        new = self.dialect.new
+        return f"""\
+    {new("float2", "place")} = position * texel;
+    {new("float2", "per_mm")} = {axis}texel / (mm_per_pixel * {size});
+    {new("float4", "own")} = {self._fetch(picture, "place")};"""
+
+    def _blur(self) -> str:
+        new, p = self.dialect.new, self.prefix
+        weight, middle = self._at("WEIGHT", "i"), self._at("WEIGHT", "first")
+        numbers = (("uint", "stage"), ("float2", "axis"), ("picture", "picture"))
+        return f"""
+// A pass of a stage: the middle, and mirrored pairs of bilinear fetches.
+{self._head("float4", "Blur", [*numbers, *_FETCHED, _SCALE, *self.profile])} {{
+{self._begin("picture", f"{p}_SIZE[stage]", "axis * ")}
+    {new("uint", "first")} = {p}_FIRST[stage];
+    {new(self.light, "light")} = {middle} * own{self.rgb};
+    {new(self.light, "part")} = {middle} * own.a;
+    for ({new("uint", "i")} = first + 1u; i < {p}_FIRST[stage + 1u]; i++) {{
+        {new("float2", "away")} = {self._at("OFFSET_MM", "i")} * per_mm;
+        {new("float4", "both")} = {self._both("picture", "away")};
+        light += {weight} * both{self.rgb};
+        part += {weight} * both.a;
+    }}
+{self._end()}
+}}"""
+
+    def _star(self) -> str:
+        new, p, rgb = self.dialect.new, self.prefix, self.rgb
+        w0, w1, w2 = (self._at("WEIGHT", f"first + {k}u") for k in range(3))
+        o1, o2 = (self._at("OFFSET_MM", f"first + {k}u") for k in (1, 2))
+        turned, x, y = (
+            self._vector("float2", *each)
+            for each in (("away.x", "-away.y"), ("away.x", "0.0"), ("0.0", "away.y"))
+        )
+        numbers = (("uint", "stage"), ("picture", "picture"))
+        return f"""
+// A stage in one pass: the middle, four diagonal fetches and four on the axes.
+{self._head("float4", "Star", [*numbers, *_FETCHED, _SCALE, *self.profile])} {{
+{self._begin("picture", f"{p}_SIZE[stage]")}
+    {new("uint", "first")} = {p}_FIRST[stage];
+    {new("float2", "away")} = {o1} * per_mm;
+    {new("float2", "turned")} = {turned};
+    {new("float4", "corners")} = {self._both("picture", "away")};
+    corners += {self._both("picture", "turned")};
+    away = {o2} * per_mm;
+    {new("float4", "beside")} = {self._both("picture", x)};
+    beside += {self._both("picture", y)};
+    {new(self.light, "light")} = {w0} * own{rgb} + {w1} * corners{rgb} + {w2} * beside{rgb};
+    {new(self.light, "part")} = {w0} * own.a + {w1} * corners.a + {w2} * beside.a;
+{self._end()}
+}}"""
+
+    def _turn(self) -> str:
+        new, types = self.dialect.new, self.dialect.types
+        body = _TURN.format(
+            x=new("uint", "x"), y=new("uint", "y"), uint=types["uint"], float=types["float"]
+        )
+        arguments = [("float2", "position"), ("uint", "frame")]
+        return f"""
+// The angle by which a pixel turns its fetches in a frame: the first word of the hash pcg2d.
+{self._head("float", "Turn", arguments)} {{
+{body}
+}}"""
+
+    def _pass(self, each: Pass) -> str:
+        """Return the function of a pass that is not a call of those above alone."""
+        several = len(each.stages) > 1
+        make = self._terms if several else self._disk if each.kind == "disk" else self._sum
+        pictures = dict.fromkeys((each.reads, *(name for name, _ in each.adds)))
+        arguments = [*(("picture", name) for name in pictures), *_FETCHED]
+        arguments += [] if each.kind == "sum" else [_SCALE]
+        arguments += [("uint", "frame")] if each.kind == "disk" else []
+        struct = self.dialect.struct.format(
+            name=f"{self.prefix}_Terms", kind=self.dialect.types["float4"], count=len(each.stages)
+        )
+        head = self._head(
+            f"{self.prefix}_Terms" if several else "float4", each.name, [*arguments, *self.profile]
+        )
+        lines = [f"    {line}" for line in make(each)]
+        return "\n".join([*([struct] if several else []), f"{head} {{", *lines, "}"])
+
+    def _halve(self) -> str:
+        return f"""
+// Half the size: one fetch at the corner of four texels.
+{self._head("float4", "Halve", [("picture", "picture"), *_FETCHED])} {{
+    return {self._fetch("picture", "2.0 * position * texel")};
+}}"""
+
+    def _sum(self, each: Pass) -> Iterator[str]:
+        """Yield the lines that add up the pictures of a level: its last stage, or a coarser sum."""
+        new = self.dialect.new
+        if each.kind == "sum":
+            place = "0.5 * position * texel"
+            yield f"{new('float4', 'coarse')} = {self._fetch(each.reads, place)};"
+            yield f"{new('float', 'cover')} = {self._load(each.adds[0][0])}.a;"
+            part = self._vector(self.light, "coarse.a")
+            coarse = self._call("Covered", f"coarse{self.rgb}", part, "cover")
+            yield f"{new(self.light, 'light')} = {coarse}{self.rgb};"
+        else:
+            share = self._at("BLEND", f"{each.stages[0] + 1}u", "PICTURES")
+            yield f"{new('float4', 'blurred')} = {self._last(each)};"
+            yield f"{new('float', 'cover')} = blurred.a;"
+            yield f"{new(self.light, 'light')} = {share} * blurred{self.rgb};"
+        for name, row in each.adds:
+            share = self._at("BLEND", f"{row}u", "PICTURES")
+            yield f"light += {share} * {self._load(name)}{self.rgb};"
+        yield f"return {self._whole('light', 'cover')};"
+
+    def _last(self, each: Pass) -> str:
+        """Return a call of the last pass of a stage."""
+        profile = [name for _, name in self.profile]
+        given = [each.reads, "bilinear", "position", "texel", "mm_per_pixel", *profile]
+        stage = f"{each.stages[0]}u"
+        if each.kind == "star":
+            return self._call("Star", stage, *given)
+        return self._call("Blur", stage, self._axis(each), *given)
+
+    def _terms(self, each: Pass) -> Iterator[str]:
+        """Yield the lines of the first pass of several terms, which fetches once for all."""
+        new, first = self.dialect.new, [self.first[k] for k in each.stages]
+        yield from (
+            line.strip()
+            for line in self._begin(each.reads, "1.0", self._axis(each) + " * ").split("\n")
+        )
+        for k, start in enumerate(first):
+            middle = self._at("WEIGHT", f"{start}u")
+            yield f"{new(self.light, f'light{k}')} = {middle} * own{self.rgb};"
+        count = len(self.taps.stages[each.stages[0]].weights)
+        yield f"for ({new('uint', 'i')} = 1u; i < {count}u; i++) {{"
+        yield f"    {new('float2', 'away')} = {self._at('OFFSET_MM', f'{first[0]}u + i')} * per_mm;"
+        yield f"    {new('float4', 'both')} = {self._both(each.reads, 'away')};"
+        for k, start in enumerate(first):
+            yield f"    light{k} += {self._at('WEIGHT', f'{start}u + i')} * both{self.rgb};"
+        yield "}"
+        yield f"{self.dialect.variable_of.format(kind=f'{self.prefix}_Terms', name='all')};"
+        for k in range(len(first)):
+            yield f"all.term[{k}] = {self._whole(f'light{k}', 'own.a')};"
+        yield "return all;"
+
+    def _disk(self, each: Pass) -> Iterator[str]:
+        """Yield the lines of single fetches on a spiral that each pixel turns by its own angle."""
+        new, begin = self.dialect.new, self._begin(each.reads, "1.0").split("\n")
+        yield from (line.strip() for line in begin)
+        count, weight = len(self.taps.stages[0].weights), self._at("WEIGHT", "i")
+        yield f"{new('float', 'turn')} = {self._call('Turn', 'position', 'frame')};"
+        yield f"{new(self.light, 'light')} = {self._at('WEIGHT', '0u')} * own{self.rgb};"
+        yield f"{new(self.light, 'part')} = {self._at('WEIGHT', '0u')} * own.a;"
+        yield f"{new('float', 'c')} = cos(turn);"
+        yield f"{new('float', 's')} = sin(turn);"
+        yield f"for ({new('uint', 'i')} = 1u; i < {count}u; i++) {{"
+        x, y = (f"{self._at('PLACE_MM', 'i')}.{each}" for each in "xy")
+        turned = self._vector("float2", f"c * {x} - s * {y}", f"s * {x} + c * {y}")
+        yield f"    {new('float2', 'away')} = {turned} * per_mm;"
+        yield f"    {new('float4', 'there')} = {self._fetch(each.reads, 'place + away')};"
+        yield f"    light += {weight} * there{self.rgb};"
+        yield f"    part += {weight} * there.a;"
+        yield "}"
+        yield f"{new('float4', 'blurred')} = {self._call('Covered', 'light', 'part', 'own.a')};"
+        share = self._at("BLEND", "1u", "PICTURES")
+        yield f"{new(self.light, 'shown')} = {share} * blurred{self.rgb};"
+        if each.adds:
+            yield f"shown += {self._at('BLEND', '0u', 'PICTURES')} * own{self.rgb};"
+        yield f"return {self._whole('shown', 'own.a')};"

@@ -1,0 +1,258 @@
+"""Exported passes, compiled and run on a software driver, against the renderer pixel by pixel."""
+
+import re
+import shutil
+import subprocess
+import tempfile
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shader_runs import glsl_program, hlsl_source, needs, run, spirv_of
+from test_disk import disk_of
+from test_taps import taps_of
+from test_turned import turned
+
+from sssfit.errors import KernelError
+from sssfit.export import DIALECTS, Style, kernel_text, source
+from sssfit.export.passes import fetches_of, pass_list
+from sssfit.render import taps as renderer
+from sssfit.render.taps import render_taps
+from sssfit.scene.made import make_scene
+from sssfit.scene.record import Scene
+
+PITCH = 0.3
+RUN = ("hlsl", "glsl", "wgsl")
+PLAIN = Style(normalized=False)
+STRUCTURES = ("1", "3", "1-2|3|2", "*|1-*|*", "1-1|1-2|2-2")
+SIZES = ((37, 50), (64, 64), (1, 9), (3, 2))
+
+
+TABLES = [  # one of each kind
+    *((each, taps_of(each, channels=3)) for each in STRUCTURES),
+    ("two terms", taps_of("2-1", channels=3, chained=False)),
+    ("a disk", disk_of(9)),
+    ("lines", turned("2-2-2", ["@0", "@60", "@120"], channels=3)),
+    ("turned", turned("1-1|1-2", ["@45", "@135", "x30", ""], channels=3)),
+]
+
+
+def light_of(size, channels, seed=1):
+    return np.random.default_rng(seed).random((*size, channels))
+
+
+def rendered(light, taps, **more):
+    return render_taps(Scene("light", light, PITCH), taps, border="clamp", **more)
+
+
+def apart(found, wanted):
+    """The largest difference, as a share of the largest value."""
+    return np.abs(found - wanted).max() / np.abs(wanted).max()
+
+
+@pytest.mark.parametrize(("name", "taps"), TABLES)
+def test_the_passes_have_the_fetches_of_the_table(name, taps):
+    passes = pass_list(taps)
+    assert fetches_of(passes) == pytest.approx(taps.fetches, rel=1e-12)
+    assert len(passes) == taps.cost.all_passes
+    held = {"E"}
+    for each in passes:
+        assert {each.reads, *(picture for picture, _ in each.adds)} <= held, name
+        held |= set(each.writes)
+    assert passes[-1].writes == ("M0",)
+
+
+@pytest.mark.parametrize("dialect", RUN)
+@pytest.mark.parametrize(("name", "taps"), TABLES)
+def test_they_show_what_the_renderer_shows(name, taps, dialect):
+    light = light_of((37, 50), len(taps.channels))
+    found = run(source([taps], DIALECTS[dialect], PLAIN), dialect, taps, light, PITCH)
+    assert apart(found, rendered(light, taps)) < 1e-5, name
+
+
+@pytest.mark.parametrize("dialect", RUN)
+@pytest.mark.parametrize("size", SIZES)
+def test_pictures_of_any_size_are_halved_alike(size, dialect):
+    taps, light = taps_of("1-2|3|2", channels=3), light_of(size, 3)
+    found = run(source([taps], DIALECTS[dialect], PLAIN), dialect, taps, light, PITCH)
+    assert apart(found, rendered(light, taps)) < 1e-5
+
+
+def truncated(pixels):
+    """Half floats as the software driver stores them: the nearest towards 0."""
+    half = np.asarray(pixels).astype(np.float16)
+    beyond = np.abs(half.astype(float)) > np.abs(pixels)
+    return np.where(beyond, np.nextafter(half, np.float16(0.0)), half).astype(pixels.dtype)
+
+
+@pytest.mark.parametrize("dialect", RUN)
+@pytest.mark.parametrize("name", ["disk", "edge", "head"])
+def test_scenes(name, dialect, monkeypatch):
+    scene = make_scene(name, height=96, width=96, mm_per_pixel=PITCH)
+    taps = taps_of("1-1|2-2|2-2", channels=3)
+    text = source([taps], DIALECTS[dialect], PLAIN)
+    light = np.repeat(scene.irradiance, 3, axis=2)
+    assert apart(run(text, dialect, taps, light, PITCH), rendered(light, taps)) < 1e-5
+    found = run(text, dialect, taps, light, PITCH, half=True)
+    monkeypatch.setattr(renderer, "store_of", lambda *_: truncated)
+    assert apart(found, rendered(light, taps)) < 2e-3
+
+
+@pytest.mark.parametrize("dialect", RUN)
+@pytest.mark.parametrize("structure", ["1", "1-2|3|2", "*|1-*|*"])
+def test_light_stays_within_a_mask(structure, dialect):
+    taps, light = taps_of(structure, channels=3), light_of((45, 50), 3)
+    y, x = np.mgrid[:45, :50]
+    cover = (np.hypot(y - 20, x - 27) < 14).astype(float)
+    style = Style(normalized=False, features=("COVERAGE",))
+    text = source([taps], DIALECTS[dialect], style)
+    found = run(text, dialect, taps, light, PITCH, cover=cover)
+    assert apart(found * cover[..., None], rendered(light, taps, coverage=cover)) < 1e-5
+    bright = np.where(cover[..., None] > 0.0, light, 1e4)
+    again = run(text, dialect, taps, bright, PITCH, cover=cover)
+    np.testing.assert_array_equal(again, found)
+    ones = run(text, dialect, taps, np.ones((45, 50, 3)), PITCH, cover=cover)
+    inside = cover > 0.0
+    np.testing.assert_allclose(ones[inside], np.ones((inside.sum(), 1)) * taps.energy, rtol=1e-5)
+
+
+@pytest.mark.parametrize("dialect", RUN)
+@pytest.mark.parametrize("frame", [0, 3])
+def test_a_disk_turns_as_in_the_renderer(frame, dialect):
+    taps = disk_of(9)
+    light = light_of((37, 50), len(taps.channels))
+    text = source([taps], DIALECTS[dialect], PLAIN)
+    found = run(text, dialect, taps, light, PITCH, frame=frame)
+    assert apart(found, rendered(light, taps, frame=frame)) < 1e-5
+
+
+@pytest.mark.parametrize("dialect", RUN)
+def test_several_materials_in_one_table(dialect):
+    every = [taps_of("1-1|2", channels=3, seed=seed) for seed in (3, 4)]
+    text, _ = kernel_text(every, dialect, prefix="SKIN")
+    light = light_of((37, 50), 3)
+    for k, taps in enumerate(every):
+        found = run(text, dialect, taps, light, PITCH, profile=k, prefix="SKIN")
+        assert apart(found * taps.energy, rendered(light, taps)) < 1e-5
+
+
+@pytest.mark.parametrize("dialect", RUN)
+def test_another_pixel_size_and_one_channel(dialect):
+    taps, light = taps_of("1|2", channels=1), light_of((33, 40), 1)
+    text = source([taps], DIALECTS[dialect], PLAIN)
+    found = run(text, dialect, taps, light, 0.19)
+    wanted = render_taps(Scene("light", light, 0.19), taps, border="clamp")
+    assert apart(found, wanted) < 1e-5
+
+
+@settings(max_examples=8, deadline=None)
+@given(
+    groups=st.lists(
+        st.lists(st.sampled_from(["1", "2", "3", "*"]), min_size=1, max_size=2),
+        min_size=1,
+        max_size=3,
+    ),
+    channels=st.integers(1, 3),
+)
+def test_any_structure_compiles(groups, channels):
+    needs("hlsl")
+    taps = taps_of("|".join("-".join(each) for each in groups), channels=channels)
+    for dialect in ("hlsl", "glsl"):
+        assert_compiles(source([taps], DIALECTS[dialect], Style()), dialect, taps)
+
+
+def assert_compiles(text, dialect, taps):
+    """Every function that a pass calls, to SPIR-V that spirv-val accepts."""
+    last = pass_list(taps)[-1]
+    reads = list(dict.fromkeys((last.reads, *(name for name, _ in last.adds))))
+    pictures = [f"t{k}" for k in range(len(reads))]
+    sampler = [] if dialect == "glsl" else ["bilinear"]
+    scale = [] if last.kind == "sum" else ["mm"]
+    call = f"SSS_{last.name}({', '.join([*pictures, *sampler, 'position', 'texel', *scale])})"
+    make = glsl_program if dialect == "glsl" else hlsl_source
+    with tempfile.TemporaryDirectory() as folder:
+        spirv_of(make(text, call, len(reads), 1, "SSS"), folder, dialect)
+
+
+def declared(text):
+    """Name, length and number of values of each array."""
+    pattern = r"(\w+)\[(\d+)\](?:\[\d+\])? = (?:\w+\[\d+\]\()?\{?(.*?)\}?\)?;\n"
+    for name, length, body in re.findall(pattern, text, re.DOTALL):
+        vectors = len(re.findall(r"(?:float\d|vec\d)\(|\{", body))
+        yield name, int(length), vectors or len([each for each in body.split(",") if each.strip()])
+
+
+@pytest.mark.parametrize("dialect", ["hlsl", "glsl", "c"])
+@pytest.mark.parametrize(("name", "taps"), TABLES)
+def test_arrays_have_as_many_values_as_they_declare(name, taps, dialect):
+    """The compiler does not count them."""
+    found = list(declared(source([taps], DIALECTS[dialect], Style(with_passes=False))))
+    assert {"SSS_FIRST", "SSS_WEIGHT", "SSS_BLEND"} <= {each for each, *_ in found}
+    for array, length, values in found:
+        assert values == length, (name, array)
+
+
+@pytest.mark.parametrize(("name", "taps"), TABLES)
+def test_c_prints_the_same_numbers(name, taps, tmp_path):
+    if shutil.which("gcc") is None:
+        pytest.skip("needs gcc")
+    channels, rows = len(taps.channels), sum(len(each.weights) for each in taps.stages)
+    (tmp_path / "table.h").write_text(source([taps], DIALECTS["c"], PLAIN), "utf-8")
+    used = ("STAGES", "LEVEL", "KIND", "FIRST", "MM_PER_PIXEL", "BLEND")
+    places = "SSS_PLACE_MM" if taps.is_disk else "SSS_OFFSET_MM"
+    (tmp_path / "main.c").write_text(
+        '#include <stdio.h>\n#include "table.h"\nint main(void) {\n'
+        + "".join(f"(void)SSS_{each};" for each in used)
+        + f"(void){places};\nfor (int i = 0; i < {rows}; i++) for (int c = 0; c < {channels}; c++)"
+        ' printf("%.9g\\n", (double)SSS_WEIGHT[i][c]);\nreturn 0; }\n'
+    )
+    flags = ["-std=c99", "-Wall", "-Werror", "-pedantic"]
+    program = tmp_path / "program"
+    subprocess.run(["gcc", *flags, "-o", program, tmp_path / "main.c"], check=True)
+    printed = subprocess.run([program], capture_output=True, text=True, check=True).stdout.split()
+    weights = np.concatenate([each.weights for each in taps.stages]).astype(np.float32)
+    np.testing.assert_array_equal(np.array(printed, np.float32), weights.ravel(), name)
+
+
+def single_pair():
+    """A pre-integrated pass on 25 taps: one stage, without a share of the irradiance."""
+    blend = np.array([[0.0] * 3, [0.7, 0.5, 0.4]])
+    return replace(taps_of("12", channels=3, chained=False), blend=blend)
+
+
+@pytest.mark.parametrize(
+    ("taps", "most"),
+    [
+        (single_pair(), 60),
+        (taps_of("1-1|2-2|2-2", channels=3), 140),
+        (taps_of("1-1|1-2|2-2|2-2", channels=3), 150),
+    ],
+)
+@pytest.mark.parametrize("dialect", RUN)
+def test_it_is_as_short_as_a_reader_can_take_in(taps, most, dialect):
+    assert len(kernel_text(taps, dialect)[0].splitlines()) < most
+
+
+@pytest.mark.parametrize("dialect", RUN)
+def test_a_single_pair_of_unit_energy_needs_no_blend(dialect):
+    taps, light = single_pair(), light_of((37, 50), 3)
+    text, _ = kernel_text(taps, dialect)
+    assert "BLEND" not in text
+    found = run(text, dialect, taps, light, PITCH, normalized=True)
+    assert apart(found * taps.energy, rendered(light, taps)) < 1e-5
+
+
+@pytest.mark.parametrize("prefix", ["", "1a", "a b", "é", 'x"', "__x"])
+def test_a_prefix_is_an_identifier(prefix):
+    with pytest.raises(KernelError, match=r"prefix = .* expected letters"):
+        kernel_text(taps_of("1", channels=3), "glsl", prefix=prefix)
+
+
+def test_what_cannot_share_a_file_is_one_line():
+    one, other = taps_of("1", channels=3), taps_of("2", channels=3)
+    with pytest.raises(KernelError, match="fit them with the same stages"):
+        kernel_text([one, other], "hlsl")
+    with pytest.raises(KernelError, match="has 4 channels; passes are written for at most 3"):
+        kernel_text(taps_of("1", channels=4), "wgsl")
