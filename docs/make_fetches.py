@@ -19,8 +19,8 @@ from sssfit.chart.page import COLOURS, add_legend, name_axes, new_page, save_fig
 from sssfit.compare.engines import engines
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import fit_result
-from sssfit.fit.cascade import STRUCTURES
 from sssfit.fit.on_taps import on_taps
+from sssfit.fit.structures import STRUCTURES
 from sssfit.measure.score import measure
 from sssfit.render import render
 from sssfit.render.reference import render_reference
@@ -228,7 +228,7 @@ def short(rows, shipped, cascades):
         "two_error": two[0],
         "two": two[1],
         "two_fetches": two[2],
-        "stars": STRUCTURES["*|*|*|*"],
+        "stars": STRUCTURES["*|*|*|*"][0],
     }
     return SHORT.format(**figures)
 
