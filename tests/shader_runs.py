@@ -20,7 +20,6 @@ from sssfit.export.passes import pass_list
 
 TOOLS = {"glsl": ("moderngl",), "hlsl": ("moderngl",), "wgsl": ("wgpu",)}
 PROGRAMS = ("glslangValidator", "spirv-val", "spirv-cross")
-_AXES = {"across": (1.0, 0.0), "down": (0.0, 1.0)}
 _TRIANGLE = np.array([-1, -1, 3, -1, -1, 3], np.float32)
 _GLSL_VERTEX = "#version 450\nin vec2 at; void main() { gl_Position = vec4(at, 0.0, 1.0); }"
 
@@ -51,34 +50,72 @@ def run(
     normalized=False,
 ):
     """The result (H, W, C) of exported source on light (H, W, C), with clamped borders."""
+    settings = {"cover": cover, "prefix": prefix, "half": half, "frame": frame}
+    draws = _draws(
+        text, dialect, taps, light, mm_per_pixel, profile=profile, normalized=normalized, **settings
+    )
+    last = None
+    for targets, draw in draws:
+        draw(1.0)
+        last = targets[0]
+    return device_of(dialect).pixels(last)[..., : light.shape[2]]
+
+
+def prepared(text, dialect, taps, light, mm_per_pixel, *, normalized):
+    """A function that draws all passes in half floats, on a part of either side of the picture."""
+    settings = {"cover": None, "prefix": "SSS", "half": True, "frame": 0, "profile": None}
+    draws = list(
+        _draws(text, dialect, taps, light, mm_per_pixel, normalized=normalized, **settings)
+    )
+
+    def draw_all(part):
+        for _, draw in draws:
+            draw(part)
+
+    return draw_all
+
+
+def _draws(
+    text,
+    dialect,
+    taps,
+    light,
+    mm_per_pixel,
+    *,
+    cover,
+    prefix,
+    half,
+    frame,
+    profile,
+    normalized,
+):
+    """Yield the targets of each pass and what draws it, in the order of the passes."""
     needs(dialect)
     height, width = light.shape[:2]
     whole = np.zeros((height, width, 4), np.float32)
     cover = np.ones((height, width)) if cover is None else cover
     whole[..., : light.shape[2]] = light * cover[..., None]
     whole[..., 3] = cover
-    device = _device(dialect)
+    device = device_of(dialect)
     pictures = {"E": device.picture(whole, half=False)}
     for each in pass_list(taps, normalized=normalized):
         size = [-(-side // 2**each.level) for side in (width, height)]
         reads = list(dict.fromkeys((each.reads, *(name for name, _ in each.adds))))
-        source = _read(pictures[reads[0]])
-        texel = [1.0 / side for side in source]
         number = each.stages[0] if each.stages else 0
-        call = _call(each, dialect, prefix, reads, number, frame, profile)
-        held = pictures.get(each.writes[0]) if each.is_added else None
-        outputs = device.draw(
-            text, call, [pictures[name] for name in reads], size, texel, mm_per_pixel,
-            count=len(each.stages) if len(each.stages) > 1 else 1, onto=held,
-            half=half and each.writes[0] != "M0", prefix=prefix,
-        )  # fmt: skip
-        pictures |= dict(zip(each.writes, outputs, strict=True))
-    found = device.pixels(pictures["M0"])
-    return found[..., : light.shape[2]]
-
-
-def _read(picture):
-    return picture.size[:2]
+        targets, draw = device.prepare(
+            text,
+            _call(each, dialect, prefix, reads, number, frame, profile),
+            [pictures[name] for name in reads],
+            size,
+            [1.0 / side for side in pictures[reads[0]].size[:2]],
+            mm_per_pixel,
+            count=max(len(each.stages), 1),
+            onto=pictures.get(each.writes[0]) if each.is_added else None,
+            half=half and each.writes[0] != "M0",
+            prefix=prefix,
+        )
+        pictures |= dict(zip(each.writes, targets, strict=True))
+        yield targets, draw
 
 
 def _call(each, dialect, prefix, reads, number, frame, profile):
@@ -88,7 +125,7 @@ def _call(each, dialect, prefix, reads, number, frame, profile):
     sampler = [] if dialect == "glsl" else ["bilinear"]
     arguments = [*pictures, *sampler, "position", "texel"]
     if each.name in ("Blur", "Star"):
-        axis = _AXES.get(each.kind)
+        axis = each.axis
         first = [f"{number}u", *([f"{vec2}{axis}"] if axis else [])]
         arguments = [*first, *arguments]
     if each.kind not in ("halve", "sum"):
@@ -101,7 +138,8 @@ def _call(each, dialect, prefix, reads, number, frame, profile):
 
 
 @functools.cache
-def _device(dialect):
+def device_of(dialect):
+    """The driver that runs a dialect."""
     return _Vulkan() if dialect == "wgsl" else _OpenGL(dialect)
 
 
@@ -140,32 +178,40 @@ class _OpenGL:
         found = np.frombuffer(picture.read(), kind).reshape(picture.height, picture.width, 4)
         return found.astype(np.float64)
 
-    def draw(self, text, call, pictures, size, texel, mm, *, count, onto, half, prefix):
+    def prepare(self, text, call, pictures, size, texel, mm, *, count, onto, half, prefix):
+        """The targets of a pass, and a function that draws it."""
         program = self._program(text, call, len(pictures), count, prefix)
-        targets = (
-            [onto]
-            if onto is not None
-            else [self.picture(np.zeros((size[1], size[0], 4)), half) for _ in range(count)]
-        )
+        empty = np.zeros((size[1], size[0], 4))
+        targets = [self.picture(empty, half) for _ in range(count)] if onto is None else [onto]
         frame = self.context.framebuffer(color_attachments=targets)
-        frame.use()
-        for k, each in enumerate(pictures):
-            each.use(k)
-        for name in program:
-            member = program[name]
-            if isinstance(member, self.gl.Uniform):
-                if member.name.endswith("texel"):
-                    member.value = tuple(texel)
-                elif member.name.endswith("mm"):
-                    member.value = mm
-                elif name.startswith(("t", "SPIRV_Cross_Combinedt")):
-                    member.value = int(name.removeprefix("SPIRV_Cross_Combined")[1])
-        if onto is not None:
-            self.context.enable(self.gl.BLEND)
-            self.context.blend_func = self.gl.ONE, self.gl.ONE
-        self.context.simple_vertex_array(program, self.vertices, "at").render(vertices=3)
-        self.context.disable(self.gl.BLEND)
-        return targets
+        vertices = self.context.simple_vertex_array(program, self.vertices, "at")
+        members = {name: program[name] for name in program}
+        samplers = {
+            each: int(name.removeprefix("SPIRV_Cross_Combined")[1])
+            for name, each in members.items()
+            if name.startswith(("t0", "t1", "t2", "t3", "t4", "t5", "SPIRV_Cross_Combinedt"))
+        }
+
+        def draw(part):
+            frame.use()
+            middle = [round(0.5 * side * (1.0 - part)) for side in size]
+            frame.scissor = (*middle, *(round(side * part) for side in size))
+            for k, each in enumerate(pictures):
+                each.use(k)
+            for each, place in samplers.items():
+                each.value = place
+            for name, each in members.items():
+                if isinstance(each, self.gl.Uniform) and name.endswith("texel"):
+                    each.value = tuple(texel)
+                elif isinstance(each, self.gl.Uniform) and name.endswith("mm"):
+                    each.value = mm
+            if onto is not None:
+                self.context.enable(self.gl.BLEND)
+                self.context.blend_func = self.gl.ONE, self.gl.ONE
+            vertices.render(vertices=3)
+            self.context.disable(self.gl.BLEND)
+
+        return targets, draw
 
     def _program(self, text, call, pictures, count, prefix):
         key = text, call, pictures, count
@@ -280,8 +326,9 @@ class _Vulkan:
         kind = np.float16 if half else np.float32
         return np.ascontiguousarray(rows).view(kind).reshape(height, width, 4).astype(np.float64)
 
-    def draw(self, text, call, pictures, size, texel, mm, *, count, onto, half, prefix):
-        targets = [onto] if onto is not None else [self._texture(*size, half) for _ in range(count)]
+    def prepare(self, text, call, pictures, size, texel, mm, *, count, onto, half, prefix):
+        """The targets of a pass, and a function that draws it, on the whole picture."""
+        targets = [self._texture(*size, half) for _ in range(count)] if onto is None else [onto]
         key = text, call, len(pictures), count, targets[0].format, onto is not None
         if key not in self.pipelines:
             self.pipelines[key] = self._pipeline(text, call, len(pictures), targets, onto, prefix)
@@ -291,29 +338,23 @@ class _Vulkan:
         )
         own = [{"binding": 0, "resource": {"buffer": view, "offset": 0, "size": 16}}]
         own.append({"binding": 1, "resource": self.sampler})
-        own += [
-            {"binding": 2 + k, "resource": each.create_view()} for k, each in enumerate(pictures)
-        ]
+        views = [each.create_view() for each in pictures]
+        own += [{"binding": 2 + k, "resource": each} for k, each in enumerate(views)]
         group = self.device.create_bind_group(layout=pipeline.get_bind_group_layout(0), entries=own)
-        encoder = self.device.create_command_encoder()
-        load = "load" if onto is not None else "clear"
-        drawn = encoder.begin_render_pass(
-            color_attachments=[
-                {
-                    "view": each.create_view(),
-                    "load_op": load,
-                    "store_op": "store",
-                    "clear_value": (0, 0, 0, 0),
-                }
-                for each in targets
-            ]
-        )
-        drawn.set_pipeline(pipeline)
-        drawn.set_bind_group(0, group)
-        drawn.draw(3)
-        drawn.end()
-        self.device.queue.submit([encoder.finish()])
-        return targets
+        how = {"load_op": "clear" if onto is None else "load", "store_op": "store"}
+        how["clear_value"] = (0, 0, 0, 0)
+
+        def draw(_):
+            encoder = self.device.create_command_encoder()
+            attached = [{"view": each.create_view(), **how} for each in targets]
+            drawn = encoder.begin_render_pass(color_attachments=attached)
+            drawn.set_pipeline(pipeline)
+            drawn.set_bind_group(0, group)
+            drawn.draw(3)
+            drawn.end()
+            self.device.queue.submit([encoder.finish()])
+
+        return targets, draw
 
     def _pipeline(self, text, call, pictures, targets, onto, prefix):
         module = self.device.create_shader_module(

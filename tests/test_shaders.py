@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from shader_runs import glsl_program, hlsl_source, needs, run, spirv_of
 from test_disk import disk_of
 from test_taps import taps_of
+from test_turned import turned
 
 from sssfit.errors import KernelError
 from sssfit.export import DIALECTS, Style, kernel_text, source
@@ -33,6 +34,8 @@ TABLES = [  # one of each kind
     *((each, taps_of(each, channels=3)) for each in STRUCTURES),
     ("two terms", taps_of("2-1", channels=3, chained=False)),
     ("a disk", disk_of(9)),
+    ("lines", turned("2-2-2", ["@0", "@60", "@120"], channels=3)),
+    ("turned", turned("1-1|1-2", ["@45", "@135", "x30", ""], channels=3)),
 ]
 
 
@@ -128,7 +131,7 @@ def test_a_disk_turns_as_in_the_renderer(frame, dialect):
 @pytest.mark.parametrize("dialect", RUN)
 def test_several_materials_in_one_table(dialect):
     every = [taps_of("1-1|2", channels=3, seed=seed) for seed in (3, 4)]
-    text, _ = kernel_text(every, dialect, Style(prefix="SKIN"))
+    text, _ = kernel_text(every, dialect, prefix="SKIN")
     light = light_of((37, 50), 3)
     for k, taps in enumerate(every):
         found = run(text, dialect, taps, light, PITCH, profile=k, prefix="SKIN")
@@ -244,7 +247,7 @@ def test_a_single_pair_of_unit_energy_needs_no_blend(dialect):
 @pytest.mark.parametrize("prefix", ["", "1a", "a b", "é", 'x"', "__x"])
 def test_a_prefix_is_an_identifier(prefix):
     with pytest.raises(KernelError, match=r"prefix = .* expected letters"):
-        kernel_text(taps_of("1", channels=3), "glsl", Style(prefix=prefix))
+        kernel_text(taps_of("1", channels=3), "glsl", prefix=prefix)
 
 
 def test_what_cannot_share_a_file_is_one_line():
