@@ -97,7 +97,7 @@ def listed(taps):
         {
             "name": f"SSS_{each.name}",
             "stage": str(each.stages[0]) if each.name == "Blur" else None,
-            "axis": {"across": "x", "down": "y"}[each.kind] if each.name == "Blur" else None,
+            "axis": {(1.0, 0.0): "x", (0.0, 1.0): "y"}[each.axis] if each.name == "Blur" else None,
             "reads": list(dict.fromkeys((each.reads, *(name for name, _ in each.adds)))),
             "writes": each.writes[0],
             "size": 2**each.level,
