@@ -6,9 +6,11 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import numpy as np
 import pytest
-from shader_runs import needs, spirv_of
+from shader_runs import device_of, needs, spirv_of
 from test_docs import STRUCTURE, code_blocks
+from test_shaders import PITCH, apart, light_of, rendered
 from test_taps import taps_of
 
 from sssfit.export import DIALECTS, Style, source
@@ -127,10 +129,11 @@ def node():
     return program
 
 
-def test_javascript_makes_a_shader_for_every_pass(taps, glsl, tmp_path):
-    (tmp_path / "passes.mjs").write_text(WEBGL, encoding="utf-8")
-    (tmp_path / "export.glsl").write_text(glsl, encoding="utf-8")
-    (tmp_path / "run.mjs").write_text(
+def made_by_javascript(text, folder):
+    """The passes of exported GLSL, and their fragment shaders, as the page's script makes them."""
+    (folder / "passes.mjs").write_text(WEBGL, encoding="utf-8")
+    (folder / "export.glsl").write_text(text, encoding="utf-8")
+    (folder / "run.mjs").write_text(
         "import { readFileSync } from 'node:fs';\n"
         "import { passesOf, fragmentOf } from './passes.mjs';\n"
         "const source = readFileSync('export.glsl', 'utf8');\n"
@@ -140,13 +143,53 @@ def test_javascript_makes_a_shader_for_every_pass(taps, glsl, tmp_path):
         encoding="utf-8",
     )
     done = subprocess.run(
-        [node(), "run.mjs"], cwd=tmp_path, capture_output=True, text=True, check=True
+        [node(), "run.mjs"], cwd=folder, capture_output=True, text=True, check=True
     )
     found = json.loads(done.stdout)
-    assert [{"stage": None, "axis": None, **each} for each in found["passes"]] == listed(taps)
-    assert len(found["fragments"]) == len(listed(taps))
-    for each in found["fragments"]:
-        accepted(f"#version 300 es\n{each}", "frag", tmp_path)
+    return found["passes"], [f"#version 300 es\n{each}" for each in found["fragments"]]
+
+
+def test_javascript_makes_a_shader_for_every_pass(taps, glsl, tmp_path):
+    passes, fragments = made_by_javascript(glsl, tmp_path)
+    assert [{"stage": None, "axis": None, **each} for each in passes] == listed(taps)
+    assert len(fragments) == len(passes)
+    for each in fragments:
+        accepted(each, "frag", tmp_path)
+
+
+def test_shaders_made_by_javascript_show_what_the_renderer_shows(taps, tmp_path):
+    needs("glsl")
+    style = Style(normalized=False, features=("COVERAGE",))
+    passes, fragments = made_by_javascript(source([taps], DIALECTS["glsl"], style), tmp_path)
+    size = 37, 50
+    rows, columns = np.mgrid[: size[0], : size[1]]
+    mask = np.hypot(rows - 18, columns - 25) < 15
+    light = light_of(size, 3)
+    device = device_of("glsl")
+    covered = np.concatenate([light * mask[..., None], mask[..., None]], axis=-1)
+    pictures = {"E": device.picture(covered, half=False)}
+    for each, fragment in zip(passes, fragments, strict=True):
+        shape = *(-(-side // each["size"]) for side in size), 4
+        target = device.picture(np.zeros(shape), half=False)
+        draw(device.context, fragment, [pictures[name] for name in each["reads"]], target)
+        pictures[each["writes"]] = target
+    found = device.pixels(pictures["M0"])[..., :3]
+    assert apart(found, rendered(light, taps, coverage=mask.astype(float)) * mask[..., None]) < 1e-5
+
+
+def draw(context, fragment, reads, target):
+    """Draw a pass as the page's WebGL code does."""
+    vertex = "#version 300 es\nin vec2 at; void main() { gl_Position = vec4(at, 0.0, 1.0); }"
+    program = context.program(vertex, fragment)
+    corners = context.buffer(np.array([-1, -1, 3, -1, -1, 3], np.float32).tobytes())
+    for k, each in enumerate(reads):
+        each.use(k)
+        program[f"t{k}"].value = k
+    for name, value in (("texel", tuple(1 / s for s in reads[0].size)), ("mm_per_pixel", PITCH)):
+        if name in program:
+            program[name].value = value
+    context.framebuffer(color_attachments=[target]).use()
+    context.simple_vertex_array(program, corners, "at").render(vertices=3)
 
 
 @pytest.mark.parametrize("number", range(len(ENGINES)))
