@@ -193,7 +193,7 @@ class Functions:
         o1, o2 = (self._at("OFFSET_MM", f"first + {k}u") for k in (1, 2))
         turned, x, y = (
             self._vector("float2", *each)
-            for each in (("away.x", "-away.y"), ("away.x", "0.0"), ("0.0", "away.y"))
+            for each in (("away.x", "0.0 - away.y"), ("away.x", "0.0"), ("0.0", "away.y"))
         )
         numbers = (("uint", "stage"), ("picture", "picture"))
         return f"""
