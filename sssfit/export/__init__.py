@@ -80,6 +80,7 @@ def source_text(
     *,
     prefix: str = "SSS",
     coverage: bool = False,
+    depth: bool = False,
     keep_energy: bool = False,
     half: bool = False,
     without_shader: bool = False,
@@ -97,6 +98,8 @@ def source_text(
         Of all names.
     coverage : bool
         Whether light stays within a mask unless the shader says otherwise.
+    depth : bool
+        Whether fetches lose weight by their depth difference, too.
     keep_energy : bool
         Whether the blend keeps the energy; otherwise it is a constant of its own.
     half : bool
@@ -120,12 +123,13 @@ def source_text(
         tables = [taps_of_kernel(kernels[0], MOST_DENSE if dense else MOST_WEIGHTS)]
     if len(tables) < len(kernels):
         raise KernelError("only tables of taps share one source; write dense kernels one by one.")
+    asked = {"COVERAGE": coverage, "DEPTH": depth}
     style = Style(
         prefix,
         with_passes=not without_shader,
         normalized=not keep_energy,
         half=half,
-        features=("COVERAGE",) if coverage else (),
+        features=tuple(name for name, given in asked.items() if given),
     )
     if half:
         for each in tables:

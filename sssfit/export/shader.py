@@ -10,6 +10,7 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import KernelError
 from sssfit.export.certificate import certificate, how_to_run, pass_table
 from sssfit.export.constants import Writer, check_prefix
+from sssfit.export.depth import DepthFunctions, check_depth, depth_rates
 from sssfit.export.dialects import Dialect, mark
 from sssfit.export.functions import Functions
 from sssfit.export.passes import pass_list
@@ -44,8 +45,13 @@ class Style:
     half: bool = False
     features: tuple[str, ...] = ()
 
+    def has(self, feature: str) -> bool:
+        """Return whether a feature is on; depth is followed within coverage alone."""
+        return feature in self.features or (feature == "COVERAGE" and "DEPTH" in self.features)
 
-FEATURES = ("COVERAGE",)
+
+FEATURES = ("COVERAGE", "DEPTH")
+_WITHOUT_BEING_ASKED = ("COVERAGE",)  # has few lines, so each source has them behind its switch
 
 
 def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
@@ -58,10 +64,11 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
         written for them.
     """
     _check(tables, style)
+    depth = style.has("DEPTH")
     passes = dialect.has_passes and style.with_passes
     words = [line for each in tables for line in certificate(each)]
     words += (
-        pass_table(tables[0], style.prefix, normalized=style.normalized)
+        pass_table(tables[0], style.prefix, normalized=style.normalized, depth=depth)
         if passes
         else how_to_run(tables[0])
     )
@@ -70,8 +77,9 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
     lines += _defines(dialect, style) if passes else []
     lines += _constants(tables, dialect, style, passes=passes)
     if passes:
-        listed = pass_list(tables[0], normalized=style.normalized)
-        functions = Functions(tables[0], listed, dialect, style.prefix, is_indexed=len(tables) > 1)
+        listed = pass_list(tables[0], normalized=style.normalized, depth=depth)
+        kind = DepthFunctions if depth else Functions
+        functions = kind(tables[0], listed, dialect, style.prefix, is_indexed=len(tables) > 1)
         lines += ["", *functions.lines()]
     text = lines if dialect.has_defines else _resolved(lines, style)
     return "\n".join(text).rstrip("\n") + "\n"
@@ -91,6 +99,9 @@ def _notes(tables: Sequence[Taps], style: Style, *, passes: bool) -> Iterator[st
 def _check(tables: Sequence[Taps], style: Style) -> None:
     check_prefix(style.prefix)
     first = tables[0]
+    if style.has("DEPTH"):
+        for each in tables:
+            check_depth(each)
     for each in tables[1:]:
         if (each.structure, each.channels, each.chained) != (
             first.structure,
@@ -108,9 +119,13 @@ def _defines(dialect: Dialect, style: Style) -> Iterator[str]:
     """Yield the switches, which may be set before the file is included."""
     if not dialect.has_defines:
         return
-    for each in FEATURES:
-        name = f"{style.prefix}_{each}"
+    p = style.prefix
+    for each in dict.fromkeys((*_WITHOUT_BEING_ASKED, *style.features)):
+        name = f"{p}_{each}"
         yield from (f"#ifndef {name}", f"#define {name} {int(each in style.features)}", "#endif")
+    if style.has("DEPTH"):
+        yield f"#if {p}_DEPTH // what is near enough is divided by, as by coverage"
+        yield from (f"#undef {p}_COVERAGE", f"#define {p}_COVERAGE 1", "#endif")
 
 
 def _resolved(lines: Sequence[str], style: Style) -> Iterator[str]:
@@ -119,7 +134,7 @@ def _resolved(lines: Sequence[str], style: Style) -> Iterator[str]:
     for line in lines:
         word = line.split()[0] if line.strip() else ""
         if word == "#if":
-            kept.append(line.split()[1].removeprefix(f"{style.prefix}_") in style.features)
+            kept.append(style.has(line.split()[1].removeprefix(f"{style.prefix}_")))
         elif word == "#else":
             kept[-1] = not kept[-1]
         elif word == "#endif":
@@ -138,6 +153,8 @@ def _constants(
     if len(tables) > 1:
         yield write.scalar("uint", "TAPS", [sum(counts)])
         yield write.scalar("uint", "PICTURES", [len(first.blend)])
+    if len(tables) > 1 and passes and style.has("DEPTH"):
+        yield write.scalar("uint", "STAGES", [len(first.stages)])
     if style.normalized and len(tables) == 1:
         yield write.vector("ALBEDO", first.energy.tolist())
     elif style.normalized:
@@ -154,6 +171,8 @@ def _constants(
     yield from write.rows("PLACE_MM" if first.is_disk else "OFFSET_MM", places)
     weights = [each.weights for table in tables for each in table.stages]
     yield from write.rows("WEIGHT", np.concatenate(weights).tolist())
+    if passes and style.has("DEPTH"):
+        yield from write.rows("RATE", [row for each in tables for row in depth_rates(each)])
     if passes and not pass_list(first, normalized=style.normalized)[-1].is_blended:
         return
     blends = [_blend(each, style) for each in tables]
