@@ -268,6 +268,15 @@ def test_another_pixel_size_and_one_channel(dialect):
     assert apart(found, wanted) < 1e-5
 
 
+@pytest.mark.parametrize("depth", [False, True])
+@pytest.mark.parametrize(("name", "taps"), FOLLOWED)
+def test_hlsl_vectors_name_every_component(name, taps, depth):
+    """Compilers of Direct3D refuse float3(1.0), which glslang lets pass."""
+    text, _ = kernel_text(taps, "hlsl", depth=depth)
+    code = re.sub(r"\b[A-Z]\w*<?\w*>? \w+\(.*\{", "", text)
+    assert not re.findall(r"float[234]\((?:[^(),]|\([^()]*\))*\)", code), name
+
+
 @settings(max_examples=8, deadline=None)
 @given(
     groups=st.lists(

@@ -201,7 +201,7 @@ class DepthFunctions(Functions):
         load, depth = self._loads()
         middle = f"near + {self._corner('i')} * side"
         at = self._clamped("clamp", f"{middle}, {self._vector('float2', '0.0', '0.0')}")
-        zero = self._vector(self.light, *["0.0"] * len(self.taps.channels))
+        zero = self._all("0.0")
         rate = self._rate("stage")
         return f"""
 // Light of the smaller picture at depth z: four texels, each with a depth factor relative to the
@@ -229,7 +229,7 @@ class DepthFunctions(Functions):
         light += taken * there{self.rgb};
         part += taken * there.a;
     }}
-    return light / max(part, {self._vector(self.light, "1e-20")});
+    return light / max(part, {self._all("1e-20")});
 }}"""
 
     def _coarser(self, each: Pass) -> Iterator[str]:

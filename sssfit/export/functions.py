@@ -131,6 +131,10 @@ class Functions:
     def _vector(self, kind: str, *values: str) -> str:
         return values[0] if kind == "float" else f"{self.dialect.types[kind]}({', '.join(values)})"
 
+    def _all(self, value: str) -> str:
+        """Return the same value in each channel; HLSL makes no vector of a single number."""
+        return self._vector(self.light, *[value] * len(self.taps.channels))
+
     def _whole(self, light: str, cover: str) -> str:
         """Return four numbers: light, and coverage in the last."""
         beside = ["0.0"] * (MOST_CHANNELS - len(self.taps.channels))
@@ -147,7 +151,7 @@ class Functions:
 
     def _returned(self, light: str, part: str, cover: str) -> str:
         """Return the lines that end a function: light over what was covered, times coverage."""
-        least = self._vector(self.light, "1e-20")
+        least = self._all("1e-20")
         shown = f"{cover} * {light} / max({part}, {least})"
         return f"""\
 #if {self.prefix}_COVERAGE
@@ -282,7 +286,7 @@ class Functions:
         new, place = self.dialect.new, "0.5 * position * texel"
         yield f"{new('float4', 'coarse')} = {self._fetch(each.reads, place)};"
         yield f"{new('float', 'cover')} = {self._load(each.adds[0][0])}.a;"
-        part = self._vector(self.light, "coarse.a")
+        part = self._all("coarse.a")
         coarse = self._call("Covered", f"coarse{self.rgb}", part, "cover")
         yield f"{new(self.light, 'light')} = {coarse}{self.rgb};"
 
