@@ -10,16 +10,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from shader_runs import glsl_program, hlsl_source, needs, run, spirv_of
+from shader_runs import device_of, glsl_program, hlsl_source, needs, run, spirv_of
 from test_disk import disk_of
 from test_taps import signed_taps, taps_of
 
 from sssfit.errors import KernelError
 from sssfit.export import DIALECTS, Style, kernel_text, source
 from sssfit.export.passes import fetches_of, pass_list
+from sssfit.export.through import through_table
 from sssfit.render import taps as renderer
 from sssfit.render.screen_taps import render_screen_taps
 from sssfit.render.taps import render_taps
+from sssfit.render.transmittance import beyond
 from sssfit.scene.made import make_scene
 from sssfit.scene.record import Scene
 
@@ -275,6 +277,77 @@ def test_hlsl_vectors_name_every_component(name, taps, depth):
     text, _ = kernel_text(taps, "hlsl", depth=depth)
     code = re.sub(r"\b[A-Z]\w*<?\w*>? \w+\(.*\{", "", text)
     assert not re.findall(r"float[234]\((?:[^(),]|\([^()]*\))*\)", code), name
+
+
+THROUGH = Style(normalized=False, features=("TRANSMITTANCE",))
+
+
+def through_of(text, dialect, channels, step_mm, *more):
+    """What a shader's function says of thicknesses from half a step on."""
+    thickness = (np.arange(300) + 0.5) * step_mm
+    call = ", ".join([f"{step_mm:.9g} * position.x", *more])
+    kind = {"hlsl": "float4", "glsl": "vec4", "wgsl": "vec4f"}[dialect]
+    zeros = ", 0.0" * (4 - channels)
+    device = device_of(dialect)
+    (target,), draw = device.prepare(
+        text, f"{kind}(SSS_Through({call}){zeros})", [], (300, 1), (1.0, 1.0), 1.0,
+        count=1, onto=None, half=False, prefix="SSS",
+    )  # fmt: skip
+    draw(1.0)
+    return thickness, device.pixels(target)[0, :, :channels]
+
+
+def rows_of(text, name):
+    """The numbers of an array of shader source."""
+    body = re.search(rf"{name}(?:\[\d+\])? = [^;]*?[({{]\n?(.*?)\n?[)}}];", text, re.DOTALL)[1]
+    return np.array(re.findall(r"(?<![\w.])\d+\.\d+(?:e-?\d+)?", body), float)
+
+
+@pytest.mark.parametrize("dialect", RUN)
+@pytest.mark.parametrize("channels", [1, 3])
+def test_light_through_a_thickness(dialect, channels):
+    needs(dialect)
+    taps = taps_of("1-1|2-2|2-2", channels=channels)
+    text = source([taps], DIALECTS[dialect], THROUGH)
+    thickness, found = through_of(text, dialect, channels, 0.05)
+    mm = rows_of(text, "SSS_THROUGH_MM")
+    shares = rows_of(text, "SSS_THROUGH").reshape(len(mm), channels)
+    table = np.column_stack([np.interp(thickness, mm, each) for each in shares.T])
+    assert np.abs(found - table).max() < 1e-5
+    stated = float(re.search(r"largest error is ([\d.e-]+), of 1", text)[1])
+    error = np.abs(found - beyond(taps, thickness)).max()
+    assert 0.2 * stated < error < 1.06 * stated + 1e-5  # two digits are printed
+    assert stated < 0.02
+
+
+@pytest.mark.parametrize("dialect", RUN)
+def test_light_through_several_materials(dialect):
+    needs(dialect)
+    every = [taps_of("1-1|2", channels=3, seed=seed) for seed in (3, 4)]
+    text, _ = kernel_text(every, dialect, transmittance=True)
+    for k, taps in enumerate(every):
+        thickness, found = through_of(text, dialect, 3, 0.02, f"{k}u")
+        assert np.abs(found - beyond(taps, thickness)).max() < 0.02
+
+
+def test_light_through_a_thickness_is_written_where_it_is_asked_for():
+    taps = taps_of("1", channels=3)
+    assert "hrough(" not in kernel_text(taps, "hlsl")[0]
+    assert "\n#define SSS_TRANSMITTANCE 1\n" in kernel_text(taps, "hlsl", transmittance=True)[0]
+
+
+@pytest.mark.parametrize("switch", ["coverage", "depth", "transmittance"])
+def test_a_switch_needs_passes(switch):
+    with pytest.raises(KernelError, match=f"{switch}: a switch of passes; have these written"):
+        kernel_text(taps_of("1", channels=3), "hlsl", without_shader=True, **{switch: True})
+
+
+def test_a_kernel_without_light_lets_none_through():
+    blend = np.zeros((2, 3))
+    table = through_table(taps_of("1", channels=3, blend=blend))
+    assert (np.diff(table.thickness_mm) > 0.0).all()
+    assert not table.share.any()
+    assert table.error == 0.0
 
 
 @settings(max_examples=8, deadline=None)

@@ -231,6 +231,22 @@ class Functions:
     {new(self.light, "light")} = {w0} * own{rgb} + {w1} * corners{rgb} + {w2} * beside{rgb};
     {new(self.light, "part")} = {w0} * own.a + {w1} * corners.a + {w2} * beside.a;"""
 
+    def through(self) -> str:
+        """Return the function that reads the table of ``sssfit.export.through``."""
+        new, k = self.dialect.new, "THROUGH_ROWS"
+        mm = [self._at("THROUGH_MM", each, k) for each in ("i - 1u", "i")]
+        share = [self._at("THROUGH", each, k) for each in ("i - 1u", "i", "0u")]
+        return f"""
+{self._head(self.light, "Through", [("float", "thickness_mm"), *self.profile])} {{
+    {new(self.light, "share")} = {share[2]};
+    for ({new("uint", "i")} = 1u; i < {self.prefix}_{k}; i++) {{
+        {new("float", "width")} = max({mm[1]} - {mm[0]}, 1e-6);
+        {new("float", "part")} = clamp((thickness_mm - {mm[0]}) / width, 0.0, 1.0);
+        share += part * ({share[1]} - {share[0]});
+    }}
+    return share;
+}}"""
+
     def _turn(self) -> str:
         new, types = self.dialect.new, self.dialect.types
         body = _TURN.format(

@@ -14,6 +14,7 @@ from sssfit.export.depth import DepthFunctions, check_depth, depth_rates
 from sssfit.export.dialects import Dialect, mark
 from sssfit.export.functions import Functions
 from sssfit.export.passes import pass_list
+from sssfit.export.through import ROWS, through_table
 from sssfit.kernel import Taps
 from sssfit.messages import printable
 
@@ -50,7 +51,7 @@ class Style:
         return feature in self.features or (feature == "COVERAGE" and "DEPTH" in self.features)
 
 
-FEATURES = ("COVERAGE", "DEPTH")
+FEATURES = ("COVERAGE", "DEPTH", "TRANSMITTANCE")
 _WITHOUT_BEING_ASKED = ("COVERAGE",)  # has few lines, so each source has them behind its switch
 
 
@@ -80,6 +81,11 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
         listed = pass_list(tables[0], normalized=style.normalized, depth=depth)
         kind = DepthFunctions if depth else Functions
         functions = kind(tables[0], listed, dialect, style.prefix, is_indexed=len(tables) > 1)
+        if style.has("TRANSMITTANCE"):
+            lines += [
+                "",
+                *_through(tables, functions, Writer(dialect, style.prefix, half=style.half)),
+            ]
         lines += ["", *functions.lines()]
     text = lines if dialect.has_defines else _resolved(lines, style)
     return "\n".join(text).rstrip("\n") + "\n"
@@ -177,6 +183,23 @@ def _constants(
         return
     blends = [_blend(each, style) for each in tables]
     yield from write.rows("BLEND", np.concatenate(blends).tolist())
+
+
+def _through(tables: Sequence[Taps], functions: Functions, write: Writer) -> Iterator[str]:
+    """Yield the table of light through a thickness, and the function that reads it."""
+    found, p = [through_table(each) for each in tables], write.prefix
+    yield f"#if {p}_TRANSMITTANCE"
+    error = max(each.error for each in found)
+    yield "// The share of light that comes through a thickness in mm, linear between the rows;"
+    yield f"// the largest error is {error:.2g}, of 1. Multiply the light on the far side by it,"
+    yield "// and add it to the irradiance before the first pass."
+    yield write.scalar("uint", "THROUGH_ROWS", [ROWS])
+    yield from write.rows(
+        "THROUGH_MM", [[mm] for each in found for mm in each.thickness_mm.tolist()]
+    )
+    yield from write.rows("THROUGH", [row for each in found for row in each.share.tolist()])
+    yield from functions.through().strip("\n").split("\n")
+    yield "#endif"
 
 
 def _places(taps: Taps) -> Iterator[list[float]]:
