@@ -9,6 +9,8 @@ import warnings
 
 import numpy as np
 from make_cascades import MATERIALS, scenes, whole_profile
+from make_relatives import RELATIVES
+from make_relatives import best as best_of_searches
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
 from sections import put_section
@@ -17,8 +19,8 @@ from sssfit.chart.page import COLOURS, add_legend, name_axes, new_page, save_fig
 from sssfit.compare.engines import engines
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import fit_result
-from sssfit.fit.cascade import STRUCTURES
 from sssfit.fit.on_taps import on_taps
+from sssfit.fit.structures import STRUCTURES
 from sssfit.measure.score import measure
 from sssfit.render import render
 from sssfit.render.reference import render_reference
@@ -39,6 +41,13 @@ PUBLISHED = {
 OURS = {
     "weighted terms": ("#882255", "<", "weighted", [({"rank": n}, n) for n in (1, 2, 3)]),
 }
+# Marks of the relatives of cascades in the chart, by method.
+MARKS = {
+    "gaussian-chain": ("chain of Gaussians", {"color": "#661100", "marker": "d", "ls": "none"}),
+    "pyramid": ("convolution pyramid", {"color": "#44aa99", "marker": "h", "ls": "none"}),
+    "rotated": ("3 or 4 directions", {"color": "#aa4499", "marker": "8", "ls": "none"}),
+}
+ROTATED = [("", "rotated", {"directions": n, "taps": taps}) for n, taps in ((3, 11), (4, 9))]
 PLACES = ("quadratic", "cumulative")
 
 
@@ -84,6 +93,14 @@ def cascade_rows(name, budgets=CASCADES):
         yield kernel.fetches, kernel.passes, seen(kernel, name), kernel.structure
 
 
+def relative_rows(name):
+    """Yield method, fetches and error of the relatives of cascades."""
+    profile = whole_profile(name)
+    for _, method, settings in (*RELATIVES, *ROTATED):
+        kernel = best_of_searches(profile, method, settings)
+        yield method, kernel.fetches, seen(kernel, name)
+
+
 def engine_rows(name):
     """Yield name, fetches, passes and error of the samplers that engines ship."""
     profile = whole_profile(name)
@@ -106,7 +123,7 @@ def best(points, budget):
     return min((error for fetches, error in points if fetches <= budget), default=np.nan)
 
 
-def chart(rows, cascades, ours, shipped):
+def chart(rows, cascades, ours, shipped, relatives):
     """Draw error over fetches: a line a method, each the best within its fetches."""
     note = (
         "Mean over a disk, edges at 0, 15, 30 and 45 degrees, a head, points and highlights of the "
@@ -127,12 +144,16 @@ def chart(rows, cascades, ours, shipped):
         for group, (colour, marker, *_) in groups.items():
             styles[group] = {"color": colour, "marker": marker, "ms": 4, "lw": 1.0}
         styles["weighted terms"]["ls"] = (0, (4, 2))
+        for words, style in MARKS.values():
+            styles[words] = {**style, "ms": 5}
         styles["engines"] = {"color": "#444444", "marker": "$a$", "ms": 5, "ls": "none"}
         handles = [Line2D([], [], **each) for each in styles.values()]
         axes = add_legend(below, handles, list(styles)).subplots()
         for group in groups:
             own = envelope([(f, e) for g, f, _, e in (*rows, *ours) if g == group])
             axes.plot(*zip(*own, strict=True), **styles[group])
+        for method, fetches, error in relatives:
+            axes.plot([fetches], [error], **styles[MARKS[method][0]])
         own = envelope([(f, e) for f, _, e, _ in cascades])
         axes.plot(*zip(*own, strict=True), **styles["cascade"])
         axes.plot([own[-1][0], 110], [own[-1][1]] * 2, color="black", lw=0.8, ls=(0, (1, 2)))
@@ -207,7 +228,7 @@ def short(rows, shipped, cascades):
         "two_error": two[0],
         "two": two[1],
         "two_fetches": two[2],
-        "stars": STRUCTURES["*|*|*|*"],
+        "stars": STRUCTURES["*|*|*|*"][0],
     }
     return SHORT.format(**figures)
 
@@ -256,7 +277,7 @@ def main():
     rows = list(on_taps_rows("skin1", PUBLISHED, PLACES))
     ours = list(on_taps_rows("skin1", OURS, PLACES))
     cascades, shipped = list(cascade_rows("skin1")), list(engine_rows("skin1"))
-    chart(rows, cascades, ours, shipped)
+    chart(rows, cascades, ours, shipped, list(relative_rows("skin1")))
     words, command = short(rows, shipped, cascades), "python docs/make_fetches.py"
     put_section("how-to-choose.md", "docs/make_fetches.py short", words, command)
     text = TEXT.format(

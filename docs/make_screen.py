@@ -100,19 +100,17 @@ def percent(values):
     return " ".join(f"{100.0 * each:.1f}".replace("-0.0", "0.0") for each in values)
 
 
-def slope_row(kernel, degrees):
-    """Return a slope's errors as a line of the table."""
+def slope_row(kernel, degrees, responses):
+    """Return a slope's errors, in each of the ways, as a line of the table."""
     truth = exact(kernel, degrees)
     truth = truth / truth.sum(axis=0)  # as the pass: all of the energy within the support
-    errors = [
-        percent(np.abs(response(kernel, degrees, each) - truth).sum(axis=0)) for _, each in WAYS
-    ]
+    errors = [percent(np.abs(each - truth).sum(axis=0)) for each in responses]
     return f"| {degrees} | {' | '.join(errors)} |"
 
 
-def kept_row(kernel, degrees):
-    """Return what is kept where lost light stays lost."""
-    kept = response(kernel, degrees, WAYS[0][1]).sum(axis=0)
+def kept_row(degrees, responses):
+    """Return what is kept where lost light stays lost, the first of the ways."""
+    kept = responses[0].sum(axis=0)
     return f"| {degrees} | {100.0 * np.cos(np.radians(degrees)):.1f} | {percent(kept)} |"
 
 
@@ -150,14 +148,15 @@ def section():
     near, far, share = figures(kernel)
     names = kernel.channels
     wide_pixels = fit_artist(profile, mm_per_pixel=0.5).kernel
+    responses = {each: [response(kernel, each, way) for _, way in WAYS] for each in SLOPES}
     return TEXT.format(
         pitch=kernel.mm_per_pixel,
         v={each: f"{near[c]:.3g} and {far[c]:.3g}" for c, each in enumerate(names)},
         w=dict(zip(names, share, strict=True)),
         heads=" | ".join(name for name, _ in WAYS),
         rules="|".join("---" for _ in WAYS),
-        slopes="\n".join(slope_row(kernel, each) for each in SLOPES),
-        kept="\n".join(kept_row(kernel, each) for each in SLOPES),
+        slopes="\n".join(slope_row(kernel, *each) for each in responses.items()),
+        kept="\n".join(kept_row(*each) for each in responses.items()),
         drift="\n".join(drift_row(wide_pixels, each) for each in SLOPES),
         steps="\n".join(step_row(kernel, each, lerp_falloff(kernel)) for each in STEPS_MM),
     )

@@ -18,7 +18,7 @@ from sections import DOCS
 
 from sssfit.formats.colours import srgb_encode
 from sssfit.formats.pictures import load_image
-from sssfit.kernel import SeparableKernel
+from sssfit.kernel import Taps
 from sssfit.measure.delta_e import auto_exposure
 from sssfit.measure.score import measure
 from sssfit.scene.made import make_scene
@@ -27,7 +27,7 @@ MM_PER_PIXEL = 0.3  # the default
 CROP = (slice(205, 595), slice(170, 530))  # from the brow to the chin
 SESSION = (
     ("simulate", "skin1", "--method", "exact"),
-    ("fit", "--method", "svd", "--rank", "3"),
+    ("fit",),
     ("render", "--irradiance", "head", "-o", "kernel.exr", "--truth", "truth.exr"),
 )
 GAP, LABEL = 8, 34  # pixels
@@ -37,9 +37,9 @@ def run_session(folder):
     """Run the README's commands; return the kernel, its picture and the truth, linear."""
     for command in SESSION:
         subprocess.run([sys.executable, "-m", "sssfit.cli", *command], cwd=folder, check=True)
-    (path,) = folder.glob("*.kernel.json")
+    (path,) = folder.glob("*.taps.json")
     pictures = [load_image(folder / name).pixels for name in ("kernel.exr", "truth.exr")]
-    return SeparableKernel.load(path), *pictures
+    return Taps.load(path), *pictures
 
 
 def triptych(kernel, picture, truth):
@@ -48,7 +48,7 @@ def triptych(kernel, picture, truth):
     scene = make_scene("head", height=height, width=width, mm_per_pixel=MM_PER_PIXEL)
     unblurred = scene.irradiance * kernel.energy
     exposure = auto_exposure(truth, mask=scene.mask)
-    panels = [(unblurred, "no blur"), (picture, f"{kernel.rank} terms")]
+    panels = [(unblurred, "no blur"), (picture, f"{kernel.fetches:.0f} fetches a pixel")]
     rows = [(shown, label, error(shown, truth, scene.mask)) for shown, label in panels]
     rows.append((truth, "truth: the whole 2D kernel", None))
     return page([(codes(shown, exposure), words(*rest)) for shown, *rest in rows])

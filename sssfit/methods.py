@@ -214,6 +214,14 @@ _IRRADIANCE = Setting(
     "NAME|FILE",
 )
 
+_STAGES = Setting(
+    "stages",
+    "text",
+    "tap pairs a pass of each stage, or * for nine fetches in one pass, such as 1-1|2-2|2-2; | "
+    "halves the picture.",
+    "STAGES",
+)
+
 # Of separable kernels: the fetches that a shader can afford.
 _TAPS = (
     Setting(
@@ -240,13 +248,7 @@ FITS: Mapping[str, Method] = {
         "few fetches: a chain of small blurs, whose stages are all added up",
         (
             Setting("fetches", "number", "most texture fetches a pixel.", "N", words="24"),
-            Setting(
-                "stages",
-                "text",
-                "tap pairs a pass of each stage, or * for nine fetches in one pass, such as "
-                "1-1|2-2|2-2; | halves the picture.",
-                "STAGES",
-            ),
+            _STAGES,
             Setting("passes", "whole", "most passes of the stages.", "N", (1, 1000)),
             Setting("full_resolution", "flag", "do not halve the picture."),
             Setting("still", "flag", "weigh in what changes as light moves by a pixel."),
@@ -380,6 +382,50 @@ FITS: Mapping[str, Method] = {
         "sssfit.fit.burley:fit_burley",
         "one term: normalised diffusion with one shape per channel, as engines use it",
         (_ENERGY, *_TAPS),
+    ),
+    "gaussian-chain": Method(
+        "sssfit.fit.gaussian_chain:fit_gaussian_chain",
+        "six Gaussians, each a blur of the one before, after d'Eon and Luebke 2007",
+        (
+            replace(_STAGES, words="3-3-3-3-3-3"),
+            Setting(
+                "blur",
+                "choice",
+                "what is fitted as pictures see it: the widths of the stages and their one shape, "
+                "the widths, or nothing, where they are Gaussians of the profile as published.",
+                among=("shape", "widths", "published"),
+                words="shape",
+            ),
+        ),
+        counted=("stages",),
+        makes_taps=True,
+        is_seeded=True,
+    ),
+    "rotated": Method(
+        "sssfit.fit.rotated:fit_rotated",
+        "a chain of passes in three or four directions; beside the single pair",
+        (
+            Setting(
+                "directions",
+                "whole",
+                "passes: 4 at 0, 45, 90, 135 degrees, 3 at 0, 60, 120, or 2.",
+                "N",
+                (2, 4),
+                words="4",
+            ),
+            replace(_TAPS[0], words="9"),
+        ),
+        counted=("directions",),
+        makes_taps=True,
+        is_seeded=True,
+    ),
+    "pyramid": Method(
+        "sssfit.fit.pyramid:fit_pyramid",
+        "a convolution pyramid, one small filter on all levels, after Farbman et al. 2011",
+        (replace(_STAGES, words="1|1|1|1|1"), _SPECTRUM),
+        counted=("stages",),
+        makes_taps=True,
+        is_seeded=True,
     ),
 }
 

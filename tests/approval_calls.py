@@ -177,16 +177,19 @@ def _is_plain(values: Any) -> bool:
 
 
 EXPORT = [
-    "hlsl(kernel('five'))",
+    "kernel_text(kernel('five'), 'hlsl')[0]",
     "json_document(kernel('grau'))",
-    "hlsl(fit_svd(world.mono(), rank=2, mm_per_pixel=0.8, normalize=True).kernel)",
-    "hlsl(kernel('grau', weights=put(world.kernels()['grau'].weights, (0, [0, 4], 0), 3e-39)))",
-    "hlsl(kernel('grau', weights=put(world.kernels()['grau'].weights, (0, [0, 4], 0), 1.2e-38)))",
-    "hlsl(kernel('grau', weights=put(world.kernels()['grau'].weights, (0, [0, 4], 0), -12345678.9)))",
-    "hlsl(kernel('leaf.burley', mm_per_pixel=0.123456789, scale=[1e-7, 123456789.0]))",
+    "kernel_text(fit_svd(world.mono(), rank=2, mm_per_pixel=0.8, normalize=True).kernel, 'hlsl')[0]",
+    "kernel_text(kernel('grau', weights=put(world.kernels()['grau'].weights, (0, [0, 4], 0), 3e-39)), 'hlsl')[0]",
+    "kernel_text(kernel('grau', weights=put(world.kernels()['grau'].weights, (0, [0, 4], 0), 1.2e-38)), 'hlsl')[0]",
+    "kernel_text(kernel('grau', weights=put(world.kernels()['grau'].weights, (0, [0, 4], 0), -12345678.9)), 'hlsl')[0]",
+    "kernel_text(kernel('leaf.burley', mm_per_pixel=0.123456789, scale=[1e-7, 123456789.0]), 'hlsl')[0]",
     "json_document(kernel('five', mm_per_pixel=1 / 7, scale=[0.5, 1 / 3, 2, 1e-9, 7e7]))",
-    "hlsl(kernel('five', meta={'material': 'a\\nb', 'photons': 0, 'seed': 0, 'settings': {'x\\n': 1}}))",
-    "hlsl(kernel('five', meta={'material_sha256': 'ab' * 32, 'profile_method': 'exact', 'seed': 3}))",
+    "kernel_text(kernel('five', meta={'material': 'a\\nb', 'photons': 0, 'seed': 0, 'settings': {'x\\n': 1}}), 'hlsl')[0]",
+    "kernel_text(kernel('five', meta={'material_sha256': 'ab' * 32, 'profile_method': 'exact', 'seed': 3}), 'hlsl')[0]",
+    "kernel_text(kernel('five'), 'glsl')[0]",
+    "kernel_text(kernel('grau'), 'c', prefix='WAX', half=True)[0]",
+    "kernel_text(Taps.load('wax.hand.taps.json'), 'wgsl')[0]",
     "document.description(kernel('wax.svd2', energy_error=[1e-13, -2e-12, np.nan],"
     " relative_frobenius_error=[0.0, 9e-13, 1.23456789]))",
 ]

@@ -6,9 +6,16 @@ each of these is computed once a worker (``shared_work``), as are fits of the sa
 Linear algebra has one thread in the tests' own process: a worker a core leaves no core for BLAS's
 threads, and waiting for each other they took a tenth of the processor time. Children of the tests
 have as many as a user's process.
+
+Nor does the C library give memory back to the system between two arrays here: to have it again,
+page by page, took two fifths of the processor time of a cascade's fit. And what collecting the
+tests made is not looked through for garbage again and again: that took a third of the collection.
 """
 
+import ctypes
+import gc
 import signal
+import sys
 
 import pytest
 import scipy.linalg  # noqa: F401 (its BLAS has to be there to be limited)
@@ -16,6 +23,8 @@ import shared_work
 from processes import end_all
 from threadpoolctl import threadpool_limits
 
+_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of malloc.h
+_KEPT_BYTES = 1 << 29
 SLOW_SECONDS = 4 * 3600.0  # the longest, a walk of 1e8 photons through layers, takes under one
 
 # A shell starts its background jobs with SIGINT ignored, and children inherit that: tests of Ctrl-C
@@ -28,6 +37,15 @@ def pytest_sessionstart():
     """Share work between tests from here on, and leave each worker its core."""
     shared_work.begin()
     threadpool_limits(limits=1, user_api="blas")
+    keep_memory()
+
+
+def keep_memory():
+    """Let free memory stay with this process, where the C library is GNU's."""
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
+    if mallopt is not None:
+        mallopt(_M_TRIM_THRESHOLD, _KEPT_BYTES)
+        mallopt(_M_MMAP_THRESHOLD, _KEPT_BYTES // 16)
 
 
 @pytest.hookimpl(tryfirst=True)
@@ -41,6 +59,22 @@ def pytest_collection_modifyitems(items):
     for item in items:
         if item.get_closest_marker("slow") and not item.get_closest_marker("timeout"):
             item.add_marker(pytest.mark.timeout(SLOW_SECONDS))
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Look for garbage after the collection only, among what the tests make."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
+
+
+def pytest_sessionfinish():
+    """Let everything be collected at the end: OpenImageIO complains of what is left over."""
+    gc.unfreeze()
 
 
 @pytest.fixture(autouse=True)

@@ -6,8 +6,9 @@ click's own objects and fails where one has no row. Options that all verbs share
 """
 
 import contextlib
+import functools
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -263,8 +264,23 @@ def _thinned(option: str, value: str, method: str, **own: Any) -> Row:
     *before, name = option.split(" --")
     given = f"--{name.removeprefix('--')} {value}"
     usual = f" {before[0]}" if before else ""
-    words = "cumulative" if before else "24 for disk"
+    words = "cumulative" if before else "24 for disk, 9 for rotated"
     return Row(command + usual, given, made_taps, made, words=words)
+
+
+def _relative(option: str, value: str, method: str, words: str = "", **own: Any) -> Row:
+    """An option of a relative of cascades, by the table of taps."""
+    usual: dict[str, Any] = {} if own.keys() & {"stages"} else {"stages": "1-1"}
+    if method == "rotated":
+        usual = {"taps": 3}
+
+    def made() -> Any:
+        found = fit.fit_taps(profile(), method, mm_per_pixel=0.6, **(usual | own)).kernel
+        return [found.structure, found.mm_per_pixel, found.blend]
+
+    command = f"fit wax.profile.npz --method {method} --mm-per-pixel .6"
+    typed = "".join(f" --{key} {each}" for key, each in usual.items())
+    return Row(command + typed, f"{option} {value}", lambda ran: ran.taps, made, words=words)
 
 
 def _sampled_disk() -> Any:
@@ -340,12 +356,17 @@ FIT = {
     "--strength": _by_hand("--strength", ".5,.6,.9", "falloff", _SKIN, strength=[0.5, 0.6, 0.9]),
     "--falloff": _by_hand("--falloff", ".3,.4,.5", "falloff", _SKIN, falloff=[0.3, 0.4, 0.5]),
     "--fetches": _tapped("--fetches", "7.5", "24", fetches=7.5),
-    "--stages": _tapped("--stages", "1|1-1", stages="1|1-1"),
+    "--stages": replace(
+        _tapped("--stages", "1|1-1", stages="1|1-1"),
+        words="3-3-3-3-3-3 for gaussian-chain, 1|1|1|1|1 for pyramid",
+    ),
     "--passes": _tapped("--passes", "2", passes=2),
     "--full-resolution": _tapped("--full-resolution", "", full_resolution=True),
     "--still": _tapped("--still", "", still=True),
     "--taps": _thinned("--taps", "7", "svd", taps=7),
     "--place": _thinned("--taps 7 --place", "quadratic", "svd", taps=7, place="quadratic"),
+    "--directions": _relative("--directions", "3", "rotated", words="4", directions=3, taps=3),
+    "--blur": _relative("--blur", "published", "gaussian-chain", "shape", blur="published"),
     "--spectrum": _tapped("--spectrum", "white", "natural", spectrum="white"),
     "--irradiance": _tapped("--irradiance", "edge", irradiance="edge"),
     "--output": Row(
@@ -1147,8 +1168,8 @@ COMMANDS = {
 }
 
 
-def _seeded_taps(seed: int) -> Any:
-    found = fit.fit_taps(profile(), stages="1-1", mm_per_pixel=0.6, seed=seed).kernel
+def _seeded_taps(seed: int, method: str, **own: Any) -> Any:
+    found = fit.fit_taps(profile(), method, mm_per_pixel=0.6, seed=seed, **own).kernel
     return [found.structure, found.mm_per_pixel, found.blend]
 
 
@@ -1159,8 +1180,21 @@ SEEDS = {
         "fit wax.profile.npz --method cascade --stages 1-1 --mm-per-pixel .6",
         "--seed 5",
         lambda ran: ran.taps,
-        lambda: _seeded_taps(5),
+        lambda: _seeded_taps(5, "cascade", stages="1-1"),
     ),
+    **{
+        f"fit --method {method}": Row(
+            f"fit wax.profile.npz --method {method} {typed} --mm-per-pixel .6",
+            "--seed 5",
+            lambda ran: ran.taps,
+            functools.partial(_seeded_taps, 5, method, **own),
+        )
+        for method, typed, own in (
+            ("gaussian-chain", "--stages 1-1", {"stages": "1-1"}),
+            ("pyramid", "--stages 1-1", {"stages": "1-1"}),
+            ("rotated", "--taps 3", {"taps": 3}),
+        )
+    },
     "render": Row(
         f"render --irradiance noise {_SIZE}",
         "--seed 5",
@@ -1221,6 +1255,10 @@ FITS = {
         _sampled_disk,
     ),
     "--rank of weighted": _fitted("--rank", "1", "weighted", rank=1),
+    "--stages of gaussian-chain": _relative("--stages", "1-1", "gaussian-chain", stages="1-1"),
+    "--stages of pyramid": _relative("--stages", "1|1", "pyramid", stages="1|1"),
+    "--spectrum of pyramid": _relative("--spectrum", "white", "pyramid", spectrum="white"),
+    "--taps of rotated": _relative("--taps", "5", "rotated", taps=5),
     "--spectrum of weighted": _fitted("--spectrum", "white", "weighted", spectrum="white"),
     "--irradiance of weighted": _fitted("--irradiance", "edge", "weighted", irradiance="edge"),
 }

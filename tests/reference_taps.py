@@ -64,7 +64,9 @@ def passes_of(stage, channel, pitch):
     line = [(weights[0], 0.0)]
     for offset, weight in zip(offsets, weights[1:], strict=True):
         line += [(weight, -offset), (weight, offset)]
-    return [[(w, 0.0, o) for w, o in line], [(w, o, 0.0) for w, o in line]]
+    turns = (0, 90) if stage.kind == "pair" else (0,)
+    angles = [math.radians(stage.angle_degrees + turn) for turn in turns]
+    return [[(w, o * math.sin(angle), o * math.cos(angle)) for w, o in line] for angle in angles]
 
 
 def halved(picture, border):

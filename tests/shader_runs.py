@@ -20,7 +20,6 @@ from sssfit.export.passes import pass_list
 
 TOOLS = {"glsl": ("moderngl",), "hlsl": ("moderngl",), "wgsl": ("wgpu",)}
 PROGRAMS = ("glslangValidator", "spirv-val", "spirv-cross")
-_AXES = {"across": (1.0, 0.0), "down": (0.0, 1.0)}
 _TRIANGLE = np.array([-1, -1, 3, -1, -1, 3], np.float32)
 _GLSL_VERTEX = "#version 450\nin vec2 at; void main() { gl_Position = vec4(at, 0.0, 1.0); }"
 
@@ -140,7 +139,7 @@ def _call(each, dialect, prefix, reads, number, frame, profile):
     sampler = [] if dialect == "glsl" else ["bilinear"]
     arguments = [*pictures, *sampler, "position", "texel"]
     if each.name in ("Blur", "Star") or (each.depths and each.name == "Halve"):
-        axis = _AXES.get(each.kind)
+        axis = each.axis
         first = [f"{number}u", *([f"{vec2}{axis}"] if axis else [])]
         arguments = [*first, *arguments]
     if each.kind not in ("halve", "sum"):

@@ -19,6 +19,7 @@ from sssfit.fit._chain_stars import StarChain
 from sssfit.fit._gaussians_search import make_annuli
 from sssfit.fit._spectrum import spectral_target
 from sssfit.fit._target import Target
+from sssfit.fit._tied_chain import one_shape
 from sssfit.kernel.structure import parse
 from sssfit.shapes import diffusion_cdf
 
@@ -242,6 +243,15 @@ def misfit_of_a_chain(file: str, kind: type, structure: str) -> Callable:
     return make
 
 
+def misfit_of_a_tied_chain(_) -> Pair:
+    profile = one_over_r_profile(60, 0.1, [0.3, 0.6])
+    target = spectral_target(Target(profile, 0.3, 20), [0, 1], "natural")
+    tied = one_shape(PairChain(target, parse("2-2|2")), is_fitted=True)
+    at = tied.start(numbers())
+    at += 0.1 * numbers().random(at.size)
+    return of_value("_tied_chain.py", tied.value_and_gradient, at)
+
+
 def misfit_of_weighted_terms(monkeypatch) -> Pair:
     profile = one_over_r_profile(60, 0.1, [0.3])
     (given, *_), _ = caught(
@@ -268,6 +278,7 @@ def misfit_of_fitted_taps(_) -> Pair:
 PAIRS = {
     "misfit of fitted taps": misfit_of_fitted_taps,
     "misfit of weighted terms": misfit_of_weighted_terms,
+    "misfit of a tied chain": misfit_of_a_tied_chain,
     "misfit of pairs": misfit_of_a_chain("_chain_pairs.py", PairChain, "1-2|1"),
     "misfit of stars": misfit_of_a_chain("_chain_stars.py", StarChain, "*|1-*"),
     "Gaussians over pixels": gaussians_over_pixels,

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from shader_runs import needs
 
 from sssfit.fit import METHODS
 
@@ -123,3 +124,22 @@ def test_small_benchmarks_of_renderers_run_and_fill_every_table():
     assert all(float(row[1]) > 0.0 for row in cascade[1])
     for row in [*(row[1:] for row in compiling[1]), *(row[3:] for row in reference[1])]:
         assert all(float(value) >= 0.0 for value in row)
+
+
+def test_small_benchmarks_of_shaders_run_and_fill_every_table():
+    needs("glsl")
+    ended = subprocess.run(
+        [sys.executable, str(BENCH / "bench_shader.py"), "--small"],
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+    cases, ratios = tables(ended.stdout.replace("\\|", "/"))
+    assert [row[0].split()[0] for row in cases[1]] == [
+        *("cascade", "cascade", "cascade"),
+        *("pre-integrated,", "pre-integrated,", "pre-integrated,", "six", "disk,"),
+    ]
+    for row in cases[1]:
+        assert all(float(value) > 0.0 for value in row[1:])
+    assert [row[1] for row in ratios[1][1:]] == ["2.92", "2.26", "2.93"]

@@ -38,7 +38,7 @@ def skin1():
 def chain_of(profile, structure, spectrum="natural", support_mm=9.0):
     target = make_target(profile, 0.3, support_mm)
     lit = list(range(profile.n_channels))
-    kind = StarChain if "*" in structure else PairChain
+    kind = StarChain if "*" in structure or "x" in structure else PairChain
     return kind(spectral_target(target, lit, spectrum), parse(structure))
 
 
@@ -46,7 +46,13 @@ def taps_of(chain, x, pitch=0.3):
     """The table of taps of some parameters."""
     numbers = chain.numbers(x)
     stages = tuple(
-        cascade.Stage(shape.level, shape.kind, offsets * pitch * 2.0**shape.level, weights)
+        cascade.Stage(
+            shape.level,
+            shape.kind,
+            offsets * pitch * 2.0**shape.level,
+            weights,
+            shape.angle_degrees,
+        )
         for shape, offsets, weights in zip(
             chain.shapes, numbers.offsets, numbers.weights, strict=True
         )
@@ -60,7 +66,9 @@ def taps_of(chain, x, pitch=0.3):
 # The spectrum
 
 
-@pytest.mark.parametrize("structure", ["1-2", "1|1", "2|1-1", "1|1|1", "*", "1|*-1", "*|*"])
+@pytest.mark.parametrize(
+    "structure", ["1-2", "1|1", "2|1-1", "1|1|1", "*", "1|*-1", "*|*", "2x", "1x|2x-1"]
+)
 def test_the_spectrum_is_that_of_points_at_all_places(skin1, structure):
     """Halving sees a point by its place among the texels; the fit is to the mean over places."""
     chain = chain_of(skin1, structure)
@@ -106,7 +114,9 @@ def test_weights_of_the_spectra(skin1):
     assert cell.sum() == pytest.approx(np.pi, rel=0.02)
 
 
-@pytest.mark.parametrize("structure", ["1", "1-2", "1|1-2", "1|2|1", "*", "*|1-*", "2|*-*"])
+@pytest.mark.parametrize(
+    "structure", ["1", "1-2", "1|1-2", "1|2|1", "*", "*|1-*", "2|*-*", "2x", "1|1x-*"]
+)
 def test_derivatives_are_those_of_differences(skin1, structure):
     chain = chain_of(skin1, structure)
     x = chain.start(np.random.default_rng(3))

@@ -18,6 +18,7 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 LINES = 130  # of the README
+STRUCTURE = "1-1|1-2|2-2|2-2"  # of the default cascade of skin1; docs/integrate.md is for it
 
 
 def code_blocks(language: str = "", page: str = "") -> list[str]:
@@ -107,7 +108,7 @@ def test_python_example_does_what_its_command_line_does(tmp_path, monkeypatch, c
 def test_the_python_of_the_readme_runs(capsys):
     (example,) = code_blocks("python")
     exec(compile(example, "README.md", "exec"), {})
-    assert capsys.readouterr().out == "143 (2, 2, 3)\n"
+    assert capsys.readouterr().out == f"{STRUCTURE} (2, 2, 3)\n"
 
 
 def test_the_overview_of_the_python_pages_runs(capsys):
@@ -143,21 +144,30 @@ def session(tmp_path_factory) -> tuple[Path, dict[tuple[str, ...], str]]:
 
 def test_the_tutorial_prints_what_it_says(session):
     _, printed = session
-    assert len(printed) == 5
+    assert len(printed) == 6
     found = [figures_of(each) for each in printed.values()]
     said = [figures_of(each) for each in code_blocks("text", "tutorial.md")]
     assert found[: len(said)] == said  # the last command, export, prints the name of its file only
 
 
-@pytest.mark.parametrize("page", ["", "tutorial.md"])
-def test_the_session_ends_in_the_shader_source_that_is_shown(session, page):
+def test_the_tutorial_ends_in_the_passes_that_are_shown(session):
+    folder, printed = session
+    written = (folder / "skin1.exact.cascade24.hlsl").read_text(encoding="utf-8")
+    rows, blur = code_blocks("hlsl", "tutorial.md")
+    assert rows in written
+    assert f"\n{blur}\n" in written
+    assert abs(len(written) - 8_000) < 500, "8 kB, says the tutorial"
+    assert STRUCTURE in printed["sssfit", "fit"]
+    assert f"// {STRUCTURE}: " in written
+
+
+def test_the_readme_shows_ten_lines_of_its_session(session):
     folder, _ = session
-    (excerpt,) = code_blocks("hlsl", page)
-    written = (folder / "skin1.exact.svd3.hlsl").read_text(encoding="utf-8")
+    (excerpt,) = code_blocks("hlsl")
+    written = (folder / "skin1.exact.cascade24.hlsl").read_text(encoding="utf-8")
     assert excerpt in written
     assert len(excerpt.splitlines()) == 10
-    assert "SSS_WEIGHTS[3][143]" in excerpt
-    assert abs(len(written) - 26_000) < 500, "26 kB, says the README"
+    assert "8 kB\nof HLSL" in README
 
 
 def test_the_commands_of_the_readme_are_those_of_the_tutorial(session):

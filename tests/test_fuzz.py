@@ -286,7 +286,7 @@ def check_hlsl(text):
     constants = re.sub(r"^// .*$", "", text, flags=re.MULTILINE)
     numbers = re.findall(r"-?\d+\.?\d*(?:e[-+]?\d+)?", re.sub(r"float\d|SSS_\w+", "", constants))
     assert np.isfinite(np.array(numbers, dtype=np.float64).astype(np.float32)).all()
-    skeleton = re.sub(r"-?\d+\.?\d*(?:e[-+]?\d+)?", "0", constants)
+    skeleton = re.sub(r"-?\d+\.?\d*(?:e[-+]?\d+)?(?<=\d)u?", "0", constants)
     assert set(re.sub(r"static const (uint|float0?) SSS_\w+|float0", "", skeleton)) <= set(
         "0 \n[]{}()=;,"
     )

@@ -282,7 +282,7 @@ def test_too_many_pixels_name_a_pitch_that_would_do(skin1):
     with pytest.warns(SssfitWarning, match=rf"pixels of {pitch:.3g} mm are used"):
         assert guided_target(skin1, "profile", None).mm_per_pixel == pitch
     with pytest.warns(SssfitWarning, match="and the support is 801 pixels of 0.3 mm"):
-        wide = guided_target(skin1, None, 120.0)
+        wide = guided_target(one_over_r_profile(1500, 0.1, [1.0]), None, 120.0)
     assert 500 < 2 * wide.half_pixels + 1 <= 513
 
 

@@ -173,7 +173,7 @@ import random, sys
 from pathlib import Path
 from sssfit import _jit
 
-folder, chance = Path(sys.argv[1]), random.Random(1)
+folder, flips, chance = Path(sys.argv[1]), int(sys.argv[2]), random.Random(1)
 _jit._CACHE_FOLDER = str(folder)
 
 def tripled(x):
@@ -190,7 +190,7 @@ whole = {each: each.read_bytes() for each in files}
 for file in files:
     size = len(whole[file])
     damaged = [whole[file][:k] for k in (0, 1, 31, 32, 33, size - 1)]
-    for place in (0, 31, 32, size - 1, *(chance.randrange(size) for _ in range(40))):
+    for place in (0, 31, 32, size - 1, *(chance.randrange(size) for _ in range(flips))):
         content = bytearray(whole[file])
         content[place] ^= 1 << chance.randrange(8)
         damaged.append(bytes(content))
@@ -205,17 +205,18 @@ print(*(each.suffix for each in files), len(damaged))
 """
 
 
-def test_a_flipped_bit_in_any_file_is_compiled_again(tmp_path):
+@pytest.mark.parametrize("flips", [10, pytest.param(40, marks=pytest.mark.slow)])
+def test_a_flipped_bit_in_any_file_is_compiled_again(tmp_path, flips):
     (tmp_path / "flips.py").write_text(FLIPS, encoding="utf-8")
     (tmp_path / "cache").mkdir()
     ended = subprocess.run(
-        [sys.executable, tmp_path / "flips.py", tmp_path / "cache"],
+        [sys.executable, tmp_path / "flips.py", tmp_path / "cache", str(flips)],
         capture_output=True,
         text=True,
         timeout=300,
     )
     assert (ended.returncode, ended.stderr) == (0, "")
-    assert ended.stdout.split() == [".nbc", ".nbi", "50"]
+    assert ended.stdout.split() == [".nbc", ".nbi", str(10 + flips)]
 
 
 @pytest.mark.slow

@@ -19,6 +19,7 @@ import sssfit
 from sssfit.errors import FileError, KernelError
 from sssfit.fit import fit_preintegrated, fit_svd
 from sssfit.kernel import FORMAT, SeparableKernel, is_kernel_file
+from sssfit.kernel.record import PROVENANCE
 
 SCHEMA = json.loads((Path(sssfit.__file__).parent / "kernel.schema.json").read_text("utf-8"))
 ARRAYS = ("signs", "weights", "relative_frobenius_error", "energy_error", "scale")
@@ -71,6 +72,12 @@ json_values = st.recursive(
 json_objects = st.dictionaries(st.text(max_size=5), json_values, max_size=2)
 
 
+# What has a meaning of its own is checked.
+others = st.text(max_size=5).filter(
+    lambda key: key not in (*PROVENANCE, "settings", "material_sha256", "method")
+)
+
+
 @st.composite
 def kernels(draw):
     terms, half, channels = (draw(st.integers(1, most)) for most in (3, 4, 3))
@@ -86,7 +93,7 @@ def kernels(draw):
         energy_error=draw(errors),
         scale=draw(arrays(float, channels, elements=st.floats(0.0, 1e6))),
         parameters=draw(st.dictionaries(st.text(max_size=5), json_objects, max_size=3)),
-        meta=draw(st.dictionaries(st.text(max_size=5), json_values, max_size=3)),
+        meta=draw(st.dictionaries(others, json_values, max_size=3)),
     )
 
 

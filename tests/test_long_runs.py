@@ -677,16 +677,20 @@ class Killer:
 
 
 KILLED = ("skin1", "--photons", "4e6", "--checkpoint-every", "0.05", "-q")
+BRIEF = ("skin1", "--photons", "1e6", "--checkpoint-every", "0.02", "-q")
+
+
+def run_alone(folder, arguments):
+    """The profile's bytes of a run left alone, and how long it took."""
+    begun = time.monotonic()
+    process = start(folder, *arguments)
+    assert process.communicate(timeout=300)[1] == ""
+    return (folder / PROFILE).read_bytes(), time.monotonic() - begun
 
 
 @pytest.fixture(scope="module")
 def undisturbed(tmp_path_factory):
-    """The profile's bytes of a run left alone, and how long it took."""
-    folder = tmp_path_factory.mktemp("undisturbed")
-    begun = time.monotonic()
-    process = start(folder, *KILLED)
-    assert process.communicate(timeout=300)[1] == ""
-    return (folder / PROFILE).read_bytes(), time.monotonic() - begun
+    return run_alone(tmp_path_factory.mktemp("undisturbed"), KILLED)
 
 
 def kill_and_resume(folder, killer, moments, whole):
@@ -702,10 +706,13 @@ def kill_and_resume(folder, killer, moments, whole):
 
 
 @posix
-def test_killed_three_times_and_resumed(tmp_path, undisturbed):
-    whole, seconds = undisturbed
-    killer = Killer(KILLED, seconds, random.Random(1))
-    kill_and_resume(tmp_path, killer, list(killer.hits), whole)
+def test_killed_three_times_and_resumed(tmp_path):
+    folders = [tmp_path / each for each in ("alone", "killed")]
+    for folder in folders:
+        folder.mkdir()
+    whole, seconds = run_alone(folders[0], BRIEF)
+    killer = Killer(BRIEF, seconds, random.Random(1))
+    kill_and_resume(folders[1], killer, list(killer.hits), whole)
 
 
 @posix
@@ -735,7 +742,7 @@ def test_killed_a_hundred_times_and_resumed(tmp_path, undisturbed):
 
 @posix
 def test_all_materials_killed_and_resumed(tmp_path):
-    arguments = ("--paper", "--photons", "5e4", "--checkpoint-every", "0", "-q")
+    arguments = ("--paper", "--photons", "2e4", "--checkpoint-every", "0", "-q")
     folders = [tmp_path / each for each in ("whole", "killed")]
     for folder in folders:
         folder.mkdir()

@@ -72,7 +72,8 @@ def test_a_setting_of_several_fits_is_tried_with_each_of_them():
     shared = {name: owners for name, (_, owners) in known.items() if len(owners) > 1}
     tried = " ".join(row.command + row.given for row in SHARED_ROWS.values())
     tried += " ".join(ROWS["fit"][f"--{name}"].command for name in shared)
-    assert sorted(shared) == ["energy", "irradiance", "place", "rank", "spectrum", "taps"]
+    wanted = ["energy", "irradiance", "place", "rank", "spectrum", "stages", "taps"]
+    assert sorted(shared) == wanted
     assert all(f"--method {owner}" in tried for owners in shared.values() for owner in owners)
 
 

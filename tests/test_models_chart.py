@@ -222,8 +222,8 @@ def test_no_text_is_cut_off_or_runs_into_another(name):
     assert_legible(lambda: models_figure(comparison))
 
 
-def test_skin1_is_legible(skin1):
-    assert_legible(lambda: models_figure(skin1))
+def test_skin1_is_legible(figure):
+    assert_legible(lambda: figure)
 
 
 def test_same_comparison_gives_same_bytes(skin1, figure):

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from shader_runs import device_of, glsl_program, hlsl_source, needs, run, spirv_of
 from test_disk import disk_of
 from test_taps import signed_taps, taps_of
+from test_turned import turned
 
 from sssfit.errors import KernelError
 from sssfit.export import DIALECTS, Style, kernel_text, source
@@ -36,6 +37,8 @@ TABLES = [  # one of each kind
     *((each, taps_of(each, channels=3)) for each in STRUCTURES),
     ("two terms", taps_of("2-1", channels=3, chained=False)),
     ("a disk", disk_of(9)),
+    ("lines", turned("2-2-2", ["@0", "@60", "@120"], channels=3)),
+    ("turned", turned("1-1|1-2", ["@45", "@135", "x30", ""], channels=3)),
 ]
 
 
@@ -122,6 +125,7 @@ DEEP = Style(normalized=False, features=("DEPTH",))
 FOLLOWED = [  # one of each kind
     *((each, taps_of(each, channels=3)) for each in ("1", "*|1-*|*", "1-1|2-2|2-2")),
     ("terms", taps_of("2-1-1", channels=3, chained=False)),
+    ("turned", turned("1-1|1-2", ["@45", "@135", "x30", ""], channels=3)),
 ]
 
 

@@ -322,7 +322,7 @@ def test_pairs_on_the_full_picture_are_a_separable_kernel(chained):
     np.testing.assert_allclose(
         render_taps(scene, taps), render_separable(scene, kernel), rtol=0, atol=1e-14
     )
-    with pytest.raises(KernelError, match="stars or halved pictures"):
+    with pytest.raises(KernelError, match="turned stages or halved pictures"):
         taps_of("1|1").separable_kernel()
 
 

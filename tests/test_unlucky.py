@@ -1,6 +1,7 @@
 """What an unlucky user meets: devices for files, closed streams, links, a damaged cache."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sssfit import files
+from sssfit import _jit, files
+from sssfit._jit.semi_infinite import trace_batch
 from sssfit.errors import FileError, ProfileError, SimulationError
 from sssfit.material import load_material
 from sssfit.profile import Profile
@@ -94,13 +96,23 @@ def test_a_grid_too_large_names_the_material_and_its_lengths():
         simulate_montecarlo(load_material("skin1"), dr_mm=1e-6)
 
 
+def copy_of_our_cache(cache):
+    """What this run of the tests has compiled so far need not be compiled for a copy."""
+    ours = trace_batch.stats.cache_path
+    for path in Path(ours).glob("*.nb[ic]") if ours else ():
+        copy = cache / _jit.source_key() / path.parent.name / path.name
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copyfile(path, copy)
+
+
 def test_a_damaged_cache_is_a_miss_and_mends_itself(tmp_path):
     cache = tmp_path / "cache"
     run = ("simulate", "skin1", "--photons", "1000", "-q")
-    assert sssfit(tmp_path, *run, NUMBA_CACHE_DIR=str(cache))[0] == 0
+    copy_of_our_cache(cache)
+    assert sssfit(tmp_path, *run, NUMBA_CACHE_DIR=str(cache)) == (0, "", "")
     good = (tmp_path / "skin1.profile.npz").read_bytes()
     indexes = list(cache.rglob("*.nbi"))
-    assert indexes
+    assert any(each.name.startswith("semi_infinite.trace_batch") for each in indexes)
     for index in indexes:
         os.truncate(index, 20)
     for _ in range(2):

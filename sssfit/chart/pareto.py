@@ -44,6 +44,9 @@ _METHODS: dict[str, tuple[str, str, str]] = {
     "falloff": ("falloff", "#56b4e9", "P"),
     "burley": ("Burley", "#999999", "X"),
     "weighted": ("weighted terms", "#882255", "<"),
+    "gaussian-chain": ("chain of Gaussians", "#661100", "d"),
+    "pyramid": ("convolution pyramid", "#44aa99", "h"),
+    "rotated": ("passes in 3 or 4 directions", "#aa4499", "8"),
     "disk": ("disk, one frame", "#999933", "p"),
 }
 _GREY = "#666666"

@@ -1,4 +1,4 @@
-"""The kernels that are compared: every method, dense and on taps, and cascades.
+"""The kernels that are compared: every method, dense and on taps; cascades and relatives.
 
 Dense kernels have a weight for every pixel of a pass, which no shader applies; on taps they are
 thinned to the bilinear fetches of a budget.
@@ -20,6 +20,17 @@ from sssfit.profile import Profile
 MOST_TERMS = 6  # of the papers' comparisons
 CASCADES = (12, 14, 17, 24)  # fetches a pixel; more than 24 change nothing that can be seen
 DISKS = (16, 24, 40)  # fetches a pixel and frame
+# The relatives of cascades by fetches a pixel: as published, and as good as they were made.
+RELATIVES = {
+    "gaussian chain 90": ("gaussian-chain", "3-3-3-3-3-3"),
+    "gaussian chain 42": ("gaussian-chain", "3-3|3-3|3-3"),
+    "pyramid 12": ("pyramid", "1|1|1|1|1"),
+    "pyramid 21": ("pyramid", "1-1|1-1|1-1|1-1|1-1"),
+}
+ROTATED = {
+    "hexagonal 34": {"directions": 3, "taps": 11},
+    "octagonal 37": {"directions": 4, "taps": 9},
+}
 BUDGETS = (12, 24, 50, 100)  # fetches a pixel of the kernels on taps
 LEAST_TAPS = 3  # a pass: the middle and one pair
 # What is thinned: of each method the kernels that need few taps, or show the least.
@@ -39,7 +50,7 @@ class Candidate:
         For charts and tables: "svd 3", "guided k = 4", "svd 3 on 25 taps", "cascade 24".
     method : str
     terms : int
-        Most separable terms it makes, two passes each; 0 for a cascade or a disk.
+        Most separable terms it makes, two passes each; 0 for chains of stages and disks.
     settings : mapping
         Keywords of the method's function.
     taps : int, optional
@@ -65,7 +76,7 @@ class Candidate:
         ----------
         profile : Profile
         mm_per_pixel, support_mm : float [mm]
-            As `sssfit.fit.make_target`. A cascade reaches as far as the profile's light.
+            As `sssfit.fit.make_target`. Chains of stages reach as far as the profile's light.
         dense : FitResult, optional
             The kernel that is thinned, where it is fitted already.
 
@@ -74,7 +85,7 @@ class Candidate:
         FitError
         """
         if self.method in TAPS:
-            reach = {} if self.method == "cascade" else {"support_mm": support_mm}
+            reach = {"support_mm": support_mm} if self.method == "disk" else {}
             pixels = {"mm_per_pixel": mm_per_pixel, **reach}
             return fit_taps(profile, self.method, **pixels, **self.settings)
         if dense is None or self.taps is None:
@@ -116,7 +127,7 @@ def candidates(pixels: int, *, most_terms: int = MOST_TERMS) -> tuple[Candidate,
 
 
 def every_candidate(pixels: int, only: Collection[str] | None = None) -> tuple[Candidate, ...]:
-    """Return all that is compared on a number of pixels: dense, on taps, cascades and disks.
+    """Return all that is compared on a number of pixels: dense, on taps, chains and disks.
 
     Parameters
     ----------
@@ -126,7 +137,7 @@ def every_candidate(pixels: int, only: Collection[str] | None = None) -> tuple[C
         Names of methods.
     """
     dense = [*candidates(pixels), *_weighted(pixels)]
-    found = [*dense, *_on_taps(dense, pixels), *_cascades(), *_disks(pixels)]
+    found = [*dense, *_on_taps(dense, pixels), *_cascades(), *_relatives(), *_disks(pixels)]
     return tuple(each for each in found if only is None or each.method in only)
 
 
@@ -171,6 +182,14 @@ def _cascades() -> Iterator[Candidate]:
     """Yield a cascade for each budget."""
     for fetches in CASCADES:
         yield Candidate(f"cascade {fetches}", "cascade", 0, {"fetches": fetches})
+
+
+def _relatives() -> Iterator[Candidate]:
+    """Yield chains of Gaussians, convolution pyramids and chains of passes in many directions."""
+    for label, (method, stages) in RELATIVES.items():
+        yield Candidate(label, method, 0, {"stages": stages})
+    for label, settings in ROTATED.items():
+        yield Candidate(label, "rotated", 0, settings)
 
 
 def _disks(pixels: int) -> Iterator[Candidate]:

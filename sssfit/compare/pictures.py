@@ -17,7 +17,7 @@ from sssfit.errors import RenderError
 from sssfit.fit._target import Target
 from sssfit.fit.artist import artist_pass
 from sssfit.formats.colours import srgb_encode
-from sssfit.measure.delta_e import delta_e_2000, shown
+from sssfit.measure.delta_e import delta_e_of_lab, lab, shown
 from sssfit.measure.score import ImageScore, auto_exposure, measure
 from sssfit.profile import Profile
 from sssfit.render.borders import source_indices
@@ -130,10 +130,12 @@ def picture_error(pixels: Target) -> Callable[[FloatArray], float]:
     truth = np.concatenate([each.truth for each in pictures])
     shares = np.concatenate([np.full(len(each.truth), 1.0 / len(each.truth)) for each in pictures])
 
+    true = lab(shown(truth))
+
     def error(x: FloatArray) -> float:
         passes = [artist_pass(target, c, each) for c, each in enumerate(x.T)]
-        shown = np.concatenate([each.rendered(passes) for each in pictures])
-        return float(shares @ delta_e_2000(shown, truth)) / len(pictures)
+        seen = np.concatenate([each.rendered(passes) for each in pictures])
+        return float(shares @ delta_e_of_lab(lab(shown(seen)), true)) / len(pictures)
 
     return error
 

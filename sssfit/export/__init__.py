@@ -147,10 +147,11 @@ def source_text(
 def _dense_text(kernel: SeparableKernel, form: str, prefix: str, *, half: bool) -> str:
     """Return the arrays of a dense kernel, and say what its passes would cost."""
     weights = 2 * kernel.rank * kernel.pixels
-    note(
-        f"This dense kernel has {weights} weights a pixel, and a shader would fetch for each; a "
-        "cascade comes nearer for 24 fetches."
-    )
+    if weights > MOST_WEIGHTS:
+        note(
+            f"This dense kernel has {weights} weights a pixel, and a shader would fetch for each; "
+            "a cascade comes nearer for 24 fetches."
+        )
     if half:
         _note_half(kernel, dense_in_half(kernel))
     return dense(kernel, DIALECTS[form], prefix, half=half)

@@ -86,6 +86,13 @@ def how_to_run(taps: Taps) -> Iterator[str]:
             "Kind 2 is one pass of single bilinear fetches at PLACE_MM, right and down, turned by "
             "an angle for each pixel and frame. A middle of weight 0 is not fetched."
         )
+    if "line" in kinds:
+        yield (
+            "Kind 3 is one pass like one of kind 0, in the direction of ANGLE_DEGREES: from x to "
+            "the right towards y down."
+        )
+    if any(each.kind == "pair" and each.angle_degrees for each in taps.stages):
+        yield "Kind 0 with an angle runs along it and then perpendicular to it."
     yield "Result: BLEND[0] times the irradiance, and BLEND[s+1] times each stage's picture, added."
     if any(each.level for each in taps.stages):
         yield (

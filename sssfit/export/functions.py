@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 
 from sssfit.errors import KernelError
 from sssfit.export.dialects import KINDS, Dialect
+from sssfit.export.numbers import literal
 from sssfit.export.passes import Pass
 from sssfit.kernel import Taps
 
@@ -17,7 +18,6 @@ MOST_CHANNELS = 3  # of a picture whose fourth one is coverage
 _FETCHED = (("sampler", "bilinear"), ("float2", "position"), ("float2", "texel"))
 _SCALE = ("float", "mm_per_pixel")
 _LONGEST = 80  # of the arguments of a function in one line
-_AXES = {"across": "1.0, 0.0", "down": "0.0, 1.0"}
 # The hash pcg2d of the pixel turns a disk, 2654435769 = 2^32 / phi a frame (sssfit.render.disk).
 _TURN = """\
     {x} = {uint}(position.x) * 1664525u + 1013904223u;
@@ -84,10 +84,16 @@ class Functions:
     def lines(self) -> Iterator[str]:
         """Yield the lines of all functions."""
         kinds = self.kinds
-        helpers = {"down": self._blur, "star": self._star, "disk": self._turn, "halve": self._halve}
+        helpers = {
+            "second": self._blur,
+            "line": self._blur,
+            "star": self._star,
+            "disk": self._turn,
+            "halve": self._halve,
+        }
         parts = [self._covered()] if self.has_sums or "disk" in kinds else []
         parts += self._own_helpers()
-        parts += [make() for kind, make in helpers.items() if kind in kinds]
+        parts += dict.fromkeys(make() for kind, make in helpers.items() if kind in kinds)
         parts += [self._pass(each) for each in self.passes if each.is_own]
         for each in parts:
             yield from each.strip("\n").split("\n")
@@ -134,6 +140,10 @@ class Functions:
     def _all(self, value: str) -> str:
         """Return the same value in each channel; HLSL makes no vector of a single number."""
         return self._vector(self.light, *[value] * len(self.taps.channels))
+
+    def _axis(self, each: Pass) -> str:
+        """Return the direction of a pass, right and down."""
+        return self._vector("float2", *(literal(number) for number in each.axis or (1.0, 0.0)))
 
     def _whole(self, light: str, cover: str) -> str:
         """Return four numbers: light, and coverage in the last."""
@@ -218,7 +228,7 @@ class Functions:
         o1, o2 = (self._at("OFFSET_MM", f"first + {k}u") for k in (1, 2))
         turned, x, y = (
             self._vector("float2", *each)
-            for each in (("away.x", "-away.y"), ("away.x", "0.0"), ("0.0", "away.y"))
+            for each in (("away.x", "0.0 - away.y"), ("away.x", "0.0"), ("0.0", "away.y"))
         )
         return f"""\
     {new("float2", "away")} = {o1} * per_mm;
@@ -321,16 +331,14 @@ class Functions:
         stage = f"{each.stages[0]}u"
         if each.kind == "star":
             return self._call("Star", stage, *given)
-        return self._call("Blur", stage, self._vector("float2", _AXES[each.kind]), *given)
+        return self._call("Blur", stage, self._axis(each), *given)
 
     def _terms(self, each: Pass) -> Iterator[str]:
         """Yield the lines of the first pass of several terms, which fetches once for all."""
         new, first = self.dialect.new, [self.first[k] for k in each.stages]
         yield from (
             line.strip()
-            for line in self._begin(
-                each.reads, "1.0", self._vector("float2", _AXES["across"]) + " * "
-            ).split("\n")
+            for line in self._begin(each.reads, "1.0", self._axis(each) + " * ").split("\n")
         )
         for k, start in enumerate(first):
             middle = self._at("WEIGHT", f"{start}u")

@@ -5,10 +5,11 @@ B<n> stage n's picture, H<v> the picture halved v times, M<v> the sum of level v
 coarser. The sum of level 0 is the result. D<v> is the depth of level v, where passes follow depth.
 """
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
-from sssfit.kernel import Taps
+from sssfit.kernel import Stage, Taps
 from sssfit.kernel.structure import STAR_FETCHES
 
 
@@ -18,8 +19,8 @@ class Pass:
 
     Parameters
     ----------
-    kind : {"across", "down", "star", "disk", "halve", "sum"}
-        "across" and "down" are the two passes of a pair. A stage's last pass may add up, too.
+    kind : {"first", "second", "line", "star", "disk", "halve", "sum"}
+        "first" and "second" are the two passes of a pair. A stage's last pass may add up, too.
     level : int
         How often the picture that it writes is halved.
     stages : tuple of int
@@ -35,6 +36,8 @@ class Pass:
         Of each pixel of what it writes.
     is_added : bool
         Whether the target adds what is written to what it holds.
+    axis : tuple of float, optional
+        The direction of mirrored fetches, right and down.
     is_blended : bool
         Whether the blend multiplies what it writes, where that is a sum.
     depths : tuple of str
@@ -49,6 +52,7 @@ class Pass:
     writes: tuple[str, ...]
     fetches: int
     is_added: bool = False
+    axis: tuple[float, float] | None = None
     is_blended: bool = True
     depths: tuple[str, ...] = ()
 
@@ -76,8 +80,13 @@ class Pass:
         """Its function with the stage and the direction."""
         if self.is_own or self.kind == "halve":
             return self.name
-        direction = {"across": ", x", "down": ", y"}.get(self.kind, "")
-        return f"{self.name}({self.stages[0]}{direction})"
+        along = {None: "", (1.0, 0.0): ", x", (0.0, 1.0): ", y"}
+        return f"{self.name}({self.stages[0]}{along.get(self.axis, self._turned())})"
+
+    def _turned(self) -> str:
+        """Return the direction of a turned pass, from x towards y."""
+        right, down = self.axis or (1.0, 0.0)
+        return f", {math.degrees(math.atan2(down, right)):.4g} deg"
 
 
 def pass_list(taps: Taps, *, normalized: bool = False, depth: bool = False) -> tuple[Pass, ...]:
@@ -120,18 +129,31 @@ def _chain(taps: Taps) -> Iterator[Pass]:
             picture = f"H{level}"
         adds = _added(taps, last) if k == len(taps.stages) - 1 else ()
         writes = (f"M{last}" if k == len(taps.stages) - 1 else f"B{k + 1}",)
-        if stage.kind == "pair":
-            count = 2 * len(stage.offsets_mm) + 1
-            yield Pass("across", level, (k,), picture, (), (f"A{k + 1}",), count)
-            yield Pass("down", level, (k,), f"A{k + 1}", adds, writes, count + len(adds))
-        else:
-            count = STAR_FETCHES + len(adds)
-            yield Pass(stage.kind, level, (k,), picture, adds, writes, count)
+        yield from _of_stage(stage, k, picture, adds, writes)
         picture = writes[0]
     for level in range(last - 1, -1, -1):
         adds = _added(taps, level)
         smaller = next(k for k, each in enumerate(taps.stages) if each.level > level)
         yield Pass("sum", level, (smaller,), f"M{level + 1}", adds, (f"M{level}",), 1 + len(adds))
+
+
+def _of_stage(
+    stage: Stage,
+    k: int,
+    picture: str,
+    adds: tuple[tuple[str, int], ...],
+    writes: tuple[str, ...],
+) -> Iterator[Pass]:
+    """Yield the passes of a stage of a chain."""
+    count = STAR_FETCHES if stage.kind == "star" else 2 * len(stage.offsets_mm) + 1
+    axes = [] if stage.kind == "star" else [(right, down) for down, right in stage.directions]
+    if stage.kind == "pair":
+        between = (f"A{k + 1}",)
+        yield Pass("first", stage.level, (k,), picture, (), between, count, axis=axes[0])
+        picture = between[0]
+    kind = "second" if stage.kind == "pair" else stage.kind
+    axis = axes[-1] if axes else None
+    yield Pass(kind, stage.level, (k,), picture, adds, writes, count + len(adds), axis=axis)
 
 
 def _added(taps: Taps, level: int) -> tuple[tuple[str, int], ...]:
@@ -154,11 +176,13 @@ def _terms(taps: Taps, *, shared: bool) -> Iterator[Pass]:
         groups.setdefault(tuple(stage.offsets_mm.tolist()) if shared else (k,), []).append(k)
     for own in groups.values():
         count = 2 * len(taps.stages[own[0]].offsets_mm) + 1
-        yield Pass("across", 0, tuple(own), "E", (), tuple(f"A{k + 1}" for k in own), count)
+        writes = tuple(f"A{k + 1}" for k in own)
+        yield Pass("first", 0, tuple(own), "E", (), writes, count, axis=(1.0, 0.0))
         for k in own:
             adds = irradiance if k == 0 else ()
             total = count + len(adds)
-            yield Pass("down", 0, (k,), f"A{k + 1}", adds, ("M0",), total, is_added=k > 0)
+            given = (f"A{k + 1}", adds, ("M0",), total, k > 0)
+            yield Pass("second", 0, (k,), *given, axis=(0.0, 1.0))
 
 
 def fetches_of(passes: Sequence[Pass]) -> float:

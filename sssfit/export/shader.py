@@ -18,8 +18,13 @@ from sssfit.export.through import ROWS, through_table
 from sssfit.kernel import Taps
 from sssfit.messages import printable
 
-_COPIES = {"pair": 2.0, "star": 4.0, "disk": 1.0}  # fetches of a row of weights, per pass
-KIND_NUMBERS = ("pair", "star", "disk")
+_COPIES = {
+    "pair": 2.0,
+    "star": 4.0,
+    "disk": 1.0,
+    "line": 2.0,
+}  # fetches of a row of weights, per pass
+KIND_NUMBERS = ("pair", "star", "disk", "line")
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,6 +177,8 @@ def _constants(
         yield write.scalar("uint", "STAGES", [len(first.stages)])
         yield write.wholes("LEVEL", [each.level for each in first.stages])
         yield write.wholes("KIND", [KIND_NUMBERS.index(each.kind) for each in first.stages])
+        angles = [[each.angle_degrees] for each in first.stages]
+        yield from write.rows("ANGLE_DEGREES", angles) if any(map(any, angles)) else ()
     yield write.wholes("FIRST", [0, *np.cumsum(counts).tolist()])
     places = [row for each in tables for row in _places(each)]
     yield from write.rows("PLACE_MM" if first.is_disk else "OFFSET_MM", places)

@@ -20,6 +20,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -39,6 +40,23 @@ class Numbers:
     offsets: list[FloatArray]
     weights: list[FloatArray]
     blend: FloatArray
+
+
+class Searched(Protocol):
+    """What a search needs to know: a function of parameters, and which of them are offset steps."""
+
+    @property
+    def step_parameters(self) -> npt.NDArray[np.intp]:
+        """Indices of those to which the search gives random changes."""
+
+    def start(self, rng: np.random.Generator) -> FloatArray:
+        """Return random parameters."""
+
+    def value_and_gradient(self, x: FloatArray) -> tuple[float, FloatArray]:
+        """Return the function and its gradient."""
+
+    def hessian(self, x: FloatArray) -> FloatArray:
+        """Return its second derivatives, or an approximation that is not negative."""
 
 
 class Chain(ABC):
@@ -125,6 +143,12 @@ class Chain(ABC):
             [normalised(logits, kind)[0].T for kind, (_, logits) in zip(kinds, parts, strict=True)],
             self._blend(x),
         )
+
+    def places(self, k: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+        """Return where a stage's steps (k,) and weights (C, k+1) are among the parameters."""
+        at = np.arange(self._at[k], self._at[k + 1])
+        count = self.counts[k]
+        return at[:count], at[count:].reshape(self.channels, count + 1)
 
     def _images(self) -> Iterator[FloatArray]:
         """Yield for each level by what images along an axis multiply the chain, (L+1, n).

@@ -19,6 +19,8 @@ import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.fit._chain import Chain, fetches, normalised
+from sssfit.fit._spectrum import SpectralTarget
+from sssfit.kernel.structure import Shape
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +43,11 @@ class _View:
 
 class PairChain(Chain):
     """See `Chain`."""
+
+    def __init__(self, target: SpectralTarget, shapes: Sequence[Shape]) -> None:
+        super().__init__(target, shapes)
+        n, most = target.frequencies.size, self._parameters_of(0).size
+        self._kept, self._spare = np.empty((most, n, n)), np.empty((most, n, n))
 
     def spectrum(self, x: FloatArray) -> FloatArray:
         """Return the chain's spectrum (C, n, n)."""
@@ -74,19 +81,38 @@ class PairChain(Chain):
         found = np.zeros((self.size, self.size))
         for view in self._views():
             ux, uy = chain * view.x.T, chain * view.y.T
-            shares = m.T[:, None, :]
-            by_stage = (slopes * view.x.T) @ (uy * shares).transpose(0, 2, 1)[:, None]
-            by_stage += (ux * shares)[:, None] @ (slopes * view.y.T).transpose(0, 1, 3, 2)
-            layers = ux.transpose(0, 2, 1)[..., None] * uy.transpose(0, 2, 1)[:, :, None]
-            whole = np.einsum("lc,clij->cij", m, layers) / self.target.energy[:, None, None]
-            by_blend = m.T[:, :, None, None] * (layers - whole[:, None])
-            rows = np.concatenate((by_blend, by_stage), axis=1)
-            rows *= np.sqrt(view.weight * self.target.power)[:, None]
+            weight = np.sqrt(view.weight * self.target.power)
             for c in range(self.channels):
-                flat = rows[c].reshape(rows.shape[1], -1)
+                rows = self._rows(view, ux[c], uy[c], slopes[c], m[:, c], c)
+                rows *= weight[c]
+                flat = rows.reshape(len(rows), -1)
+                twice = np.multiply(rows, 2.0, out=self._spare[: len(rows)]).reshape(flat.shape)
                 own = self._parameters_of(c)
-                found[np.ix_(own, own)] += 2.0 * flat @ flat.T
+                found[np.ix_(own, own)] += twice @ flat.T
         return found
+
+    def _rows(
+        self,
+        view: _View,
+        ux: FloatArray,
+        uy: FloatArray,
+        slopes: FloatArray,
+        m: FloatArray,
+        c: int,
+    ) -> FloatArray:
+        """Return a view's derivatives by a channel's blend and stages, (L+1 + parameters, n, n).
+
+        They stand in ``_kept``: making arrays of a megabyte for each channel took two fifths of
+        a fit's time, since the system clears every page of them.
+        """
+        blend, many = m.size, len(slopes)
+        rows, across = self._kept[: blend + many], self._spare[:many]
+        np.matmul(slopes * view.x.T, (uy * m).T, out=rows[blend:])
+        rows[blend:] += np.matmul(ux * m, (slopes * view.y.T).transpose(0, 2, 1), out=across)
+        layers = ux.T[:, :, None] * uy.T[:, None]
+        whole = np.einsum("l,lij->ij", m, layers) / self.target.energy[c]
+        np.multiply(m[:, None, None], layers - whole, out=rows[:blend])
+        return rows
 
     def _views(self) -> list[_View]:
         """Return the kernel, and what aliasing adds to each level, where it counts."""

@@ -1,19 +1,30 @@
-"""The misfit of a chain with stars among its stages: its spectrum has two dimensions throughout.
+"""The misfit of a chain with stars or turned stages: its spectrum has two dimensions throughout.
 
-Every spectrum stays the same if the axes are exchanged, so the frequencies of a triangle stand for
-all; see ``_chain``. The images that halved pictures show along x (``_chain_pairs``) change with the
-exchange, so both orders of a place in the triangle are summed.
+A pass along the direction (y, x) fetches at o (y, x), between texels along both axes, and has the
+spectrum
+
+    v_0 + 2 sum_i v_i Re(f(o_i y, wy) f(o_i x, wx)),
+    f(o, w) = (1 - f) e^(i w k) + f e^(i w (k + 1)),    k = floor(o), f = o - k.
+
+Without single lines every spectrum stays the same if the axes are exchanged, so the frequencies of
+a triangle stand for all; see ``_chain``. The images that halved pictures show along x
+(``_chain_pairs``) change with the exchange, so both orders of a place in the triangle are summed.
+Lines come with their mirror images and are shown behind
+all of them, so that a quadrant stands for all.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
 from sssfit.fit._chain import Chain, fetches, normalised
 from sssfit.fit._spectrum import SpectralTarget
-from sssfit.kernel.structure import Shape
+from sssfit.kernel.structure import Shape, directions
+
+ComplexArray = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -38,8 +49,12 @@ class StarChain(Chain):
 
     def __init__(self, target: SpectralTarget, shapes: Sequence[Shape]) -> None:
         super().__init__(target, shapes)
-        self._x, self._y = np.tril_indices(target.frequencies.size)
+        count = target.frequencies.size
+        self._x, self._y = np.tril_indices(count)
         self._twice = np.where(self._x == self._y, 1.0, 2.0)
+        if any(each.kind == "line" for each in shapes):
+            self._x, self._y = (each.ravel() for each in np.indices((count, count)))
+            self._twice = np.ones(count**2)
         self._power = target.power[:, self._x, self._y]
         self._wanted = target.wanted[:, self._x, self._y]
         self._halvings = self._both(self._down)
@@ -50,7 +65,8 @@ class StarChain(Chain):
         found = np.empty((self.channels, count, count))
         rows = self._blend(x)[:, :, None] * self._views()[0].factors[:, None]
         flat = np.einsum("lcm,lcm->cm", rows, self._chain(self._blurs(x)))
-        found[:, self._x, self._y] = found[:, self._y, self._x] = flat
+        found[:, self._y, self._x] = flat  # the other half, where there is a triangle
+        found[:, self._x, self._y] = flat
         return found
 
     def misfit(self, x: FloatArray) -> tuple[float, FloatArray]:
@@ -105,8 +121,8 @@ class StarChain(Chain):
         return product
 
     def _blurs(self, x: FloatArray) -> list[_Blur]:
-        kinds = [each.kind for each in self.shapes]
-        made = {"pair": self._pair, "star": self._star}
+        made = {"pair": self._pair, "star": self._star, "line": self._turned}
+        kinds = ["line" if each.angle_degrees else each.kind for each in self.shapes]
         return [made[kind](*self._stage(x, k), k) for k, kind in enumerate(kinds)]
 
     def _frequencies(self, k: int) -> FloatArray:
@@ -124,6 +140,32 @@ class StarChain(Chain):
         slopes = np.concatenate((by_step, by_weight), axis=1)
         across = slopes[..., self._x] * line[:, None, self._y]
         return _Blur(self._both(line), across + slopes[..., self._y] * line[:, None, self._x])
+
+    def _turned(self, steps: FloatArray, logits: FloatArray, k: int) -> _Blur:
+        """Return the blur of a line, or of a pair that is turned."""
+        step = np.exp(steps)
+        weights, copies = normalised(logits)
+        shape = self.channels, steps.size + weights.shape[1], self._x.size
+        blur = _Blur(np.ones((shape[0], shape[2])), np.zeros(shape))
+        for direction in directions(self.shapes[k]):
+            pairs, by_offset = self._along(np.cumsum(step), direction, k)
+            fetched = np.concatenate((np.ones((1, self._x.size)), pairs))
+            line = weights @ fetched
+            by_weight = weights[:, :, None] * (fetched - copies[:, None] * line[:, None, :])
+            by_offset = weights[:, 1:, None] * by_offset
+            by_step = np.cumsum(by_offset[:, ::-1], axis=1)[:, ::-1] * step[:, None]
+            slopes = np.concatenate((by_step, by_weight), axis=1) * blur.spectrum[:, None]
+            blur = _Blur(line * blur.spectrum, slopes + line[:, None] * blur.slopes)
+        return blur
+
+    def _along(
+        self, offsets: FloatArray, direction: tuple[float, float], k: int
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the spectra (n, M) of mirrored fetches in a direction, and slopes by offset."""
+        w, (down, right) = self._frequencies(k), direction
+        y, by_y = (each[:, self._y] for each in _waves(offsets * down, w))
+        x, by_x = (each[:, self._x] for each in _waves(offsets * right, w))
+        return 2.0 * (y * x).real, 2.0 * (down * by_y * x + right * y * by_x).real
 
     def _star(self, steps: FloatArray, logits: FloatArray, k: int) -> _Blur:
         offsets = np.exp(steps)
@@ -170,3 +212,10 @@ class StarChain(Chain):
             chain, done = chain * factor, done + counts[k]
             found[:, :done] += rows[k + 1][:, None] * moving[:, :done]
         return found
+
+
+def _waves(offsets: FloatArray, w: FloatArray) -> tuple[ComplexArray, ComplexArray]:
+    """Return the spectra (n, len(w)) of bilinear fetches along an axis, and slopes by offset."""
+    whole = np.floor(offsets)[:, None]
+    near, far = np.exp(1j * whole * w), np.exp(1j * (whole + 1.0) * w)
+    return near + (offsets[:, None] - whole) * (far - near), far - near

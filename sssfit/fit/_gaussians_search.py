@@ -20,6 +20,7 @@ import functools
 import math
 import threading
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -150,6 +151,30 @@ class Annuli:
         return columns[:, :-1] - last[:, None], self.wanted - self.total * last
 
 
+@dataclass(frozen=True, slots=True)
+class SharedAnnuli:
+    """The objectives of several channels, added up, where all have the same variances."""
+
+    parts: tuple[Annuli, ...]
+
+    def at(self, log_variances: FloatArray) -> Point:
+        """Return the point of all residuals, with each Gaussian's largest weight."""
+        points = [each.at(log_variances) for each in self.parts]
+        return Point(
+            log_variances,
+            np.max([each.weights for each in points], axis=0),
+            np.concatenate([each.residual for each in points]),
+            np.concatenate([each.jacobian for each in points]),
+        )
+
+    def weights(self, log_variances: FloatArray) -> FloatArray:
+        """Return the best weights for given variances (N, C)."""
+        return np.stack([each.at(log_variances).weights for each in self.parts], axis=1)
+
+
+Objective: TypeAlias = Annuli | SharedAnnuli
+
+
 def _triangle(matrix: FloatArray) -> FloatArray:
     """Return R of the QR decomposition: a small matrix with the same inner products."""
     return np.asarray(np.linalg.qr(matrix, mode="r"), dtype=np.float64)
@@ -234,7 +259,7 @@ class GaussianSum:
     stop_reason: str
 
 
-def search(annuli: Annuli, terms: int, least_mm2: float, most_mm2: float) -> GaussianSum:
+def search(annuli: Objective, terms: int, least_mm2: float, most_mm2: float) -> GaussianSum:
     """Find up to ``terms`` Gaussians with variances between two limits [mm^2].
 
     Fewer if one more does not lower the error.
@@ -283,7 +308,7 @@ class _Step:
 class _Chain:
     """The best sums of 1, 2, 3 ... Gaussians of one channel, each searched from the one before."""
 
-    def __init__(self, annuli: Annuli, bounds: tuple[float, float]) -> None:
+    def __init__(self, annuli: Objective, bounds: tuple[float, float]) -> None:
         self._annuli, self._bounds = annuli, bounds
         self._steps: list[_Step] = []
         self._lock = threading.Lock()
@@ -308,7 +333,7 @@ class _Chain:
 # The sums depend neither on the support nor, mostly, on the pixels: a comparison or a choice asks
 # for 1 to 10 Gaussians of the same channels on up to seven supports and four views.
 @functools.lru_cache(maxsize=48)
-def _chain(annuli: Annuli, bounds: tuple[float, float]) -> _Chain:
+def _chain(annuli: Objective, bounds: tuple[float, float]) -> _Chain:
     return _Chain(annuli, bounds)
 
 
@@ -327,7 +352,7 @@ def _starts(log_variances: FloatArray | None, bounds: tuple[float, float]) -> li
 
 
 def _best_of(
-    annuli: Annuli, starts: list[FloatArray], bounds: tuple[float, float]
+    annuli: Objective, starts: list[FloatArray], bounds: tuple[float, float]
 ) -> tuple[Point, bool, int]:
     """Try all starts roughly, finish the best; return that point, if it converged, evaluations."""
     tried = [_descend(annuli, annuli.at(start), bounds, _ROUGH) for start in starts]
@@ -339,7 +364,7 @@ def _best_of(
 
 
 def _descend(
-    annuli: Annuli, point: Point, bounds: tuple[float, float], tolerance: float
+    annuli: Objective, point: Point, bounds: tuple[float, float], tolerance: float
 ) -> tuple[Point, bool, int]:
     """Run least squares from a point; return the last point, if it converged, evaluations."""
     from scipy.optimize import least_squares  # 0.8 s that ``fit --list`` does not need
@@ -364,7 +389,7 @@ def _descend(
 class _LastPoint:
     """Keeps the last point, whose weights serve the residual and the Jacobian."""
 
-    def __init__(self, annuli: Annuli, point: Point) -> None:
+    def __init__(self, annuli: Objective, point: Point) -> None:
         self._annuli, self._point = annuli, point
 
     def residual(self, log_variances: FloatArray) -> FloatArray:

@@ -54,6 +54,7 @@ def taps_between(first: Taps, second: Taps, mm_per_pixel: float) -> Taps:
             one.kind,
             np.exp((1.0 - t) * np.log(one.offsets_mm) + t * np.log(other.offsets_mm)),
             (1.0 - t) * one.weights + t * other.weights,
+            one.angle_degrees,
         )
         for one, other in zip(first.stages, second.stages, strict=True)
     ]

@@ -1,10 +1,12 @@
 """The structure of a cascade in one line of text, such as ``1-1|2-2|2-2``, and what it costs.
 
 A number is a stage of two passes with that many mirrored pairs of taps beside the middle one, ``*``
-a star: nine fetches in one pass. Stages are joined by ``-``, and by ``|`` where the picture is
-halved in both directions.
+a star: nine fetches in one pass. ``2x`` is a stage of two passes along the diagonals. Stages are
+joined by ``-``, and by ``|`` where the picture is halved in both directions. Lines, a pass in one
+direction, are written ``4@60`` with their angle in degrees; no cascade has them.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -14,16 +16,23 @@ from sssfit.messages import counted, shown
 
 MOST_PAIRS, MOST_STAGES, MOST_LEVELS = 64, 24, 10
 MOST_ON_DISK = 256  # fetches
-_STAR = "*"
+_STAR, _DIAGONAL = "*", "x"
+DIAGONAL_DEGREES = 45.0
 STAR_FETCHES = 9
 
 
 class Shape(NamedTuple):
-    """A stage without its numbers: its kind, its pairs of taps a pass, its resolution level."""
+    """A stage without its numbers: its kind, its pairs of taps a pass, resolution level, angle."""
 
     kind: str
     pairs: int
     level: int
+    angle_degrees: float = 0.0
+
+    @property
+    def is_upright(self) -> bool:
+        """Whether it is a pair of passes along the axes."""
+        return self.kind == "pair" and self.angle_degrees == 0.0
 
     @property
     def fetches(self) -> int:
@@ -34,6 +43,15 @@ class Shape(NamedTuple):
     def passes(self) -> int:
         """Passes over the picture: two of a pair, one of the other kinds."""
         return 2 if self.kind == "pair" else 1
+
+
+def directions(shape: Shape) -> tuple[tuple[float, float], ...]:
+    """Return unit vectors (down, right) of the passes of a pair or a line, in their order."""
+    turns = {"pair": (0.0, 90.0), "line": (0.0,)}[shape.kind]
+    if shape.angle_degrees == 0.0:  # exactly along the axes
+        return ((0.0, 1.0), (1.0, 0.0))[: len(turns)]
+    angles = [math.radians(shape.angle_degrees + each) for each in turns]
+    return tuple((math.sin(each), math.cos(each)) for each in angles)
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,10 +86,11 @@ def parse(text: str) -> tuple[Shape, ...]:
     """
     groups = [part.split("-") for part in text.split("|")] if isinstance(text, str) else [[""]]
     words = [(word.strip(), level) for level, group in enumerate(groups) for word in group]
-    if not all(word == _STAR or _is_count(word) for word, _ in words):
+    if not all(word == _STAR or _is_count(word.removesuffix(_DIAGONAL)) for word, _ in words):
         raise KernelError(
-            f"stages = {shown(text)}; expected numbers of tap pairs from 1 to {MOST_PAIRS} or *, "
-            "joined by - or, where the picture is halved, by |, such as '1-1|2-2|2-2'."
+            f"stages = {shown(text)}; expected numbers of tap pairs from 1 to {MOST_PAIRS}, with "
+            "an x where the passes are diagonal, or *, joined by - or, where the picture is "
+            "halved, by |, such as '1-1|2-2|2-2'."
         )
     if len(words) > MOST_STAGES or len(groups) > MOST_LEVELS:
         raise KernelError(
@@ -80,9 +99,13 @@ def parse(text: str) -> tuple[Shape, ...]:
             f"most {MOST_STAGES} on {MOST_LEVELS}."
         )
     return tuple(
-        Shape("star", 1, level) if word == _STAR else Shape("pair", int(word), level)
-        for word, level in words
+        Shape("star", 1, level) if word == _STAR else _pair(word, level) for word, level in words
     )
+
+
+def _pair(word: str, level: int) -> Shape:
+    angle = DIAGONAL_DEGREES if word.endswith(_DIAGONAL) else 0.0
+    return Shape("pair", int(word.removesuffix(_DIAGONAL)), level, angle)
 
 
 def _is_count(word: str) -> bool:
@@ -90,15 +113,24 @@ def _is_count(word: str) -> bool:
 
 
 def text_of(shapes: Sequence[Shape]) -> str:
-    """Return the text that `parse` reads; lines and disks are written by their kind.
+    """Return the text of a structure, which `parse` reads where a cascade can have it.
 
-    A disk is no structure of a cascade: ``24 rings`` has 24 radii.
+    A line is ``4@60``, a pair at another angle than 45 degrees ``4x30``; a disk of 24 radii is
+    ``24 rings``.
     """
     levels: list[list[str]] = [[] for _ in range(max(each.level for each in shapes) + 1)]
     for each in shapes:
-        name = {"pair": f"{each.pairs}", "disk": f"{each.pairs} rings"}.get(each.kind, each.kind)
-        levels[each.level].append(_STAR if each.kind == "star" else name)
+        levels[each.level].append(_word(each))
     return "|".join("-".join(level) for level in levels)
+
+
+def _word(shape: Shape) -> str:
+    count, angle = f"{shape.pairs}", f"{shape.angle_degrees:g}"
+    if shape.kind == "pair" and shape.angle_degrees:
+        return count + _DIAGONAL + ("" if shape.angle_degrees == DIAGONAL_DEGREES else angle)
+    return {"pair": count, "star": _STAR, "disk": f"{count} rings", "line": f"{count}@{angle}"}[
+        shape.kind
+    ]
 
 
 def cost_of_chain(shapes: Sequence[Shape], shown_rows: Sequence[bool] | None = None) -> Cost:

@@ -47,6 +47,7 @@ from sssfit.kernel.structure import (
     cost_of_chain,
     cost_of_disk,
     cost_of_terms,
+    directions,
     text_of,
 )
 from sssfit.kernel.taps_json import is_taps_file
@@ -59,12 +60,14 @@ if TYPE_CHECKING:
 
 __all__ = ["Stage", "Taps", "is_taps_file"]
 
-KINDS = ("pair", "star", "disk")
+KINDS = ("pair", "star", "disk", "line")
 _ERRORS = ("spectral", "energy")
-# Fetches with one weight: a pair of passes has the middle and mirrored pairs, a star the middle,
-# four diagonal neighbours and four on the axes, a disk single fetches.
-_COPIES = {"pair": 2.0, "star": 4.0, "disk": 1.0}
-_MOST_OFFSETS = {"pair": MOST_PAIRS, "disk": MOST_ON_DISK}
+# Fetches with one weight: a pair of passes and a line have the middle and mirrored pairs, a star
+# the middle, four diagonal neighbours and four on the axes, a disk single fetches.
+_COPIES = {"pair": 2.0, "star": 4.0, "disk": 1.0, "line": 2.0}
+_MOST_OFFSETS = {"pair": MOST_PAIRS, "disk": MOST_ON_DISK, "line": MOST_PAIRS}
+# Angles below which a stage is its own mirror image: the passes of a pair are perpendicular.
+_TURNS = {"pair": 90.0, "line": 180.0}
 _ROUNDING = 1e-9  # of sums that are computed in another order
 BYTES = {"float32": 16, "half": 8, "r11g11b10": 4}  # of a texel of three channels, as stored
 
@@ -77,26 +80,42 @@ class Stage:
     ----------
     level : int
         How many times its picture is halved.
-    kind : {"pair", "star", "disk"}
+    kind : {"pair", "star", "disk", "line"}
         "pair" is a pass along x and the same pass along y; "star" one pass of nine fetches; "disk"
-        one pass of single fetches on a golden-angle spiral.
+        one pass of single fetches on a golden-angle spiral; "line" one pass in one direction.
     offsets_mm : array (n,) [mm]
-        Of a pair rising, without the middle; of a star the distances (diagonal, axis), where the
-        diagonal fetches lie at (+-o, +-o); of a disk the radii of its fetches, from the inside out.
+        Of a pair or line rising, without the middle; of a star the distances (diagonal, axis),
+        where the diagonal fetches lie at (+-o, +-o); of a disk the radii of its fetches, from the
+        inside out.
     weights : array (n+1, C)
         The middle first; the middle and all fetches of its passes add up to 1. A disk whose middle
         row is 0 does not fetch the pixel itself.
+    angle_degrees : float
+        Of a pair's first pass, below 90, or of a line, below 180: from x to the right towards y
+        down. 0 otherwise.
     """
 
     level: int
     kind: str
     offsets_mm: FloatArray
     weights: FloatArray
+    angle_degrees: float = 0.0
 
     @property
     def shape(self) -> Shape:
         """The stage without its numbers."""
-        return Shape(self.kind, 1 if self.kind == "star" else len(self.offsets_mm), self.level)
+        pairs = 1 if self.kind == "star" else len(self.offsets_mm)
+        return Shape(self.kind, pairs, self.level, self.angle_degrees)
+
+    @property
+    def directions(self) -> tuple[tuple[float, float], ...]:
+        """Unit vectors (down, right) of the passes of a pair or a line, in their order."""
+        return directions(self.shape)
+
+    @property
+    def is_upright(self) -> bool:
+        """Whether it is a pair of passes along the axes."""
+        return self.shape.is_upright
 
     @property
     def copies(self) -> float:
@@ -105,11 +124,11 @@ class Stage:
 
     @property
     def variance_mm2(self) -> FloatArray:
-        """Variance along an axis (C,) [mm^2], from the offsets."""
+        """Variance along an axis, or of a line along itself (C,) [mm^2], from the offsets."""
         # Of a star's fetches all four diagonal ones move along an axis, and two of the others; a
         # disk's, over all its turns, by r^2 / 2.
-        moving = np.array({"pair": [2.0], "star": [4.0, 2.0], "disk": [0.5]}[self.kind])
-        moment: FloatArray = (moving * self.offsets_mm**2) @ self.weights[1:]
+        each = {"pair": [2.0], "line": [2.0], "star": [4.0, 2.0], "disk": [0.5]}
+        moment: FloatArray = (np.array(each[self.kind]) * self.offsets_mm**2) @ self.weights[1:]
         return moment
 
     def line(self, offsets_mm: FloatArray, weights: FloatArray, mm_per_texel: float) -> FloatArray:
@@ -304,8 +323,8 @@ class Taps:
 
     @property
     def is_separable(self) -> bool:
-        """Whether `separable_kernel` exists: all stages are pairs on the full picture."""
-        return all(each.kind == "pair" and each.level == 0 for each in self.stages)
+        """Whether `separable_kernel` exists: all stages are upright pairs on the full picture."""
+        return all(each.is_upright and each.level == 0 for each in self.stages)
 
     def separable_kernel(self) -> SeparableKernel:
         """Return the same kernel as a sum of separable terms, on pixels of its pitch.
@@ -316,12 +335,13 @@ class Taps:
         Raises
         ------
         KernelError
-            A stage is a star or a disk, or works on a halved picture.
+            A stage is a star, a line or a disk, is turned, or works on a halved picture.
         """
         if not self.is_separable:
             raise KernelError(
-                f"{self.structure} has stars or halved pictures or is a disk; only pairs of passes "
-                "on the full picture are a sum of separable terms."
+                f"{self.structure} has stars, lines, turned stages or halved pictures or is a "
+                "disk; only pairs of passes along the axes of the full picture are a sum of "
+                "separable terms."
             )
         passes = [np.ones((1, len(self.channels)))]
         for stage in self.stages:
@@ -484,7 +504,7 @@ def _checked_stage(k: int, stage: Stage, taps: Taps) -> Stage:
     if not ((offsets >= MIN_MM) & (offsets <= MAX_MM)).all():
         raise KernelError(f"{path}.offsets_mm = {shown(offsets.tolist())}; expected lengths in mm.")
     steps = np.diff(offsets)
-    falls = {"pair": steps <= 0.0, "disk": steps < 0.0}.get(stage.kind)
+    falls = {"star": None, "disk": steps < 0.0}.get(stage.kind, steps <= 0.0)
     if falls is not None and falls.any():
         raise KernelError(f"{path}.offsets_mm = {shown(offsets.tolist())}; expected rising ones.")
     expected = many + 1, len(taps.channels)
@@ -495,7 +515,17 @@ def _checked_stage(k: int, stage: Stage, taps: Taps) -> Stage:
         raise KernelError(
             f"{path}.weights add up to {shown(sums.tolist())} over all fetches; expected 1."
         )
-    return dataclasses.replace(stage, offsets_mm=offsets, weights=weights)
+    angle = _checked_angle(f"{path}.angle_degrees", stage)
+    return dataclasses.replace(stage, offsets_mm=offsets, weights=weights, angle_degrees=angle)
+
+
+def _checked_angle(name: str, stage: Stage) -> float:
+    angle, turn = stage.angle_degrees, _TURNS.get(stage.kind)
+    is_number = isinstance(angle, int | float) and not isinstance(angle, bool)
+    if not is_number or not (angle == 0.0 if turn is None else 0.0 <= angle < turn):
+        expected = "0" if turn is None else f"a number from 0 to below {turn:g}"
+        raise KernelError(f"{name} = {shown(angle)}; expected {expected} for a {stage.kind}.")
+    return float(angle)
 
 
 def _check_levels(stages: tuple[Stage, ...], *, chained: bool) -> None:
@@ -515,5 +545,7 @@ def _check_levels(stages: tuple[Stage, ...], *, chained: bool) -> None:
         raise KernelError("a disk is the only stage, and reads the irradiance; found others.")
     if not chained and any(levels):
         raise KernelError(f"stages that read the irradiance have the level 0; found {levels}.")
-    if not chained and any(each.kind == "star" for each in stages):
-        raise KernelError("stages that read the irradiance are pairs of passes; found a star.")
+    if not chained and not all(each.is_upright or each.kind == "disk" for each in stages):
+        raise KernelError(
+            "stages that read the irradiance are pairs of passes along the axes; found others."
+        )

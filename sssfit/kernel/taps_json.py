@@ -41,6 +41,7 @@ def content(taps: "Taps") -> dict[str, Any]:
                 "offsets_mm": each.offsets_mm.tolist(),
                 "weights": each.weights.tolist(),
             }
+            | ({"angle_degrees": each.angle_degrees} if each.angle_degrees else {})
             for each in taps.stages
         ],
         "blend": taps.blend.tolist(),
@@ -71,8 +72,10 @@ def unpack(source: str | Path | BinaryIO, origin: str) -> tuple[dict[str, Any], 
     except KernelError as error:
         raise KernelError(f"{origin}: {error} Fit it again.") from None
     fields = {key: whole[key] for key in ("method", "channels", "chained", "stages", "meta")}
-    names = ("level", "kind", "offsets_mm", "weights")
-    fields["stages"] = [{name: each[name] for name in names} for each in whole["stages"]]
+    names = ("level", "kind", "offsets_mm", "weights", "angle_degrees")
+    fields["stages"] = [
+        {name: each[name] for name in names if name in each} for each in whole["stages"]
+    ]
     return fields | {
         "mm_per_pixel": float(whole["mm_per_pixel"]),
         "blend": np.array(whole["blend"], dtype=np.float64),

@@ -32,13 +32,18 @@ def delta_e_2000(image: FloatArray, truth: FloatArray, exposure: float = 1.0) ->
     supplementary test data, and mathematical observations", Color Research and Application 30(1),
     2005, equations 2 to 22.
     """
-    delta_e = _load_colour().difference.delta_E_CIE2000
     differences = np.empty(len(image))
     for start in range(0, len(image), BLOCK_PIXELS):
         block = slice(start, start + BLOCK_PIXELS)
         colour, true = (lab(shown(pixels[block], exposure)) for pixels in (image, truth))
-        differences[block] = delta_e(colour, true)
+        differences[block] = delta_e_of_lab(colour, true)
     return differences
+
+
+def delta_e_of_lab(colour: FloatArray, true: FloatArray) -> FloatArray:
+    """Return CIE Delta E 2000 (N,) of colours `lab` (N, 3)."""
+    found: FloatArray = np.asarray(_load_colour().difference.delta_E_CIE2000(colour, true))
+    return found
 
 
 def lab(pixels: FloatArray) -> FloatArray:
@@ -173,7 +178,7 @@ def check_shows(exposure: float, pixels: FloatArray, true: FloatArray) -> None:
             )
 
 
-def shown(pixels: FloatArray, exposure: float) -> FloatArray:
+def shown(pixels: FloatArray, exposure: float = 1.0) -> FloatArray:
     """Return the displayed picture: exposed, clipped to [0, 1], grey as three channels."""
     with np.errstate(over="ignore"):  # infinite light is clipped to 1 as well
         cut: FloatArray = np.clip(pixels * exposure, 0.0, 1.0)

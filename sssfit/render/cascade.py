@@ -23,8 +23,8 @@ _CHUNK = 1536  # numbers of a row that the sums take at a time: 6 kB of each row
 
 
 def is_quick(taps: Taps) -> bool:
-    """Return whether `apply_cascade` can run a table: a chain of pairs."""
-    return taps.chained and all(each.kind == "pair" for each in taps.stages)
+    """Return whether `apply_cascade` can run a table: a chain of pairs along the axes."""
+    return taps.chained and all(each.is_upright for each in taps.stages)
 
 
 def apply_cascade(

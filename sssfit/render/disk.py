@@ -38,6 +38,8 @@ NEWEST = 1.0 / 8.0  # share of the newest frame; filters for stable pictures tak
 
 def turns(height: int, width: int, frame: int) -> npt.NDArray[np.float64]:
     """Return the angle of each pixel (H, W), from 0 to 2 pi."""
+    if isinstance(frame, bool) or not isinstance(frame, int) or frame < 0:
+        raise RenderError(f"frame = {shown(frame)}; expected a whole number from 0.")
     y, x = np.indices((height, width), dtype=np.uint32)
     word = _hash(x, y) + np.uint32(frame * _STEP % 2**32)
     return word.astype(np.float64) * (2.0 * math.pi / 2.0**32)
@@ -94,30 +96,52 @@ def apply_disk(
     RenderError
         The frame is not a whole number from 0, or the fetches reach too far.
     """
-    from sssfit._jit import thread_pool
-    from sssfit._jit.disk import gather  # numba: 0.4 s
-
-    if isinstance(frame, bool) or not isinstance(frame, int) or frame < 0:
-        raise RenderError(f"frame = {shown(frame)}; expected a whole number from 0.")
-    height, width = pixels.shape[:2]
-    reach = float(stage.offsets_mm.max()) / mm_per_pixel
-    check_memory(16.0 * reach, f"fetches {reach:.3g} pixels away", "use larger pixels")
-    beyond = math.ceil(reach) + 1
-    rows, columns = (source_indices(size, beyond, border) for size in (height, width))
-    angles = turns(height, width, frame)
+    angles = turns(pixels.shape[0], pixels.shape[1], frame)
     # The pixel itself comes first; a shader does not fetch it where its weight is 0.
     places = np.concatenate((np.zeros((1, 2)), spiral(stage) / mm_per_pixel))
     weights = stage.weights.astype(pixels.dtype)
     if not weights[0].any():
         places, weights = places[1:], weights[1:]
-    given = (
-        np.pad(pixels, ((0, 1), (0, 1), (0, 0))),
-        rows,
-        columns,
-        places,
-        weights,
-        np.stack((np.cos(angles), np.sin(angles))),
-    )
+    turn = np.stack((np.cos(angles), np.sin(angles)))
+    return gathered(pixels, places, weights, turn, border=border, threads=threads)
+
+
+def gathered(
+    pixels: FloatArray,
+    places: npt.NDArray[np.float64],
+    weights: FloatArray,
+    turn: npt.NDArray[np.float64],
+    *,
+    border: str,
+    threads: int | None,
+) -> FloatArray:
+    """Return the sum of weights times bilinear fetches at places that each pixel turns.
+
+    Parameters
+    ----------
+    pixels : array (H, W, 1) or (H, W, C)
+    places : array (n, 2) [pixels]
+        Down and right.
+    weights : array (n, C)
+    turn : array (2, H, W)
+        Cosine and sine of each pixel's turn, times what it scales distances by.
+    border : str
+    threads : int, optional
+
+    Raises
+    ------
+    RenderError
+        The fetches reach too far.
+    """
+    from sssfit._jit import thread_pool
+    from sssfit._jit.disk import gather  # numba: 0.4 s
+
+    height, width = pixels.shape[:2]
+    reach = float(np.hypot(*places.T).max() * np.hypot(*turn).max())
+    check_memory(16.0 * reach, f"fetches {reach:.3g} pixels away", "use larger pixels")
+    beyond = math.ceil(reach) + 1
+    rows, columns = (source_indices(size, beyond, border) for size in (height, width))
+    given = np.pad(pixels, ((0, 1), (0, 1), (0, 0))), rows, columns, places, weights, turn
     out = np.empty((height, width, weights.shape[1]), pixels.dtype)
     edges = [*range(0, height, _ROWS), height]
     with thread_pool(thread_count(threads), "sssfit-disk") as pool:

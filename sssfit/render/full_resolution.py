@@ -39,10 +39,15 @@ def render_full_resolution(scene: Scene, taps: Taps) -> FloatArray:
     Raises
     ------
     RenderError
-        The table is no chain, or its channels do not fit the picture.
+        The table is no chain or has turned stages, or its channels do not fit the picture.
     """
     if not taps.chained:
         raise RenderError("only a cascade has halved pictures; render other tables as they are.")
+    if not all(each.kind == "star" or each.is_upright for each in taps.stages):
+        raise RenderError(
+            f"{taps.structure} has stages in other directions than the axes, which mix a picture's "
+            "cosines; render it as it is."
+        )
     check_channels(scene.channels, len(taps.channels))
     wy, wx = (np.pi * np.arange(n) / n for n in (scene.height, scene.width))
     spectrum = _spectrum(taps, scene.mm_per_pixel, wy, wx)

@@ -275,6 +275,5 @@ def _fetches(stage: Stage) -> Iterator[tuple[FloatArray, FloatArray]]:
         return
     line = np.concatenate(([0.0], np.column_stack((-stage.offsets_mm, stage.offsets_mm)).ravel()))
     weights = np.concatenate((stage.weights[:1], np.repeat(stage.weights[1:], 2, axis=0)))
-    still = np.zeros_like(line)
-    yield np.column_stack((still, line)), weights
-    yield np.column_stack((line, still)), weights
+    for direction in stage.directions:
+        yield np.outer(line, direction), weights

@@ -10,6 +10,7 @@ comes in from outside it. The blend is not touched. Weights below 0 could make a
 with them A E and A are blurred apart, added up and divided once.
 """
 
+import functools
 import math
 from collections.abc import Callable
 from typing import Any, Literal
@@ -22,6 +23,7 @@ from sssfit.kernel.taps import Stage, Taps
 from sssfit.render.borders import check_channels, check_memory, source_indices
 from sssfit.render.cascade import apply_cascade, is_quick
 from sssfit.render.disk import all_turns, apply_disk
+from sssfit.render.jitter import Jitter, apply_jittered
 from sssfit.render.separable import apply_passes
 from sssfit.render.texels import Store, store_of
 from sssfit.scene.record import Scene
@@ -44,6 +46,7 @@ def render_taps(
     coverage: npt.ArrayLike | None = None,
     intermediate: str | None = None,
     frame: int = 0,
+    jitter: Jitter | None = None,
     threads: int | None = None,
     dtype: npt.DTypeLike = np.float64,
 ) -> FloatArray:
@@ -64,8 +67,11 @@ def render_taps(
         they keep the precision of ``dtype``. Irradiance, coverage and result keep it always, and so
         does a picture that is added up by the pass that made it.
     frame : int
-        From 0; a disk of fetches is turned differently in each frame (`sssfit.render.disk`), other
-        tables do not depend on it.
+        From 0; a disk of fetches is turned differently in each frame (`sssfit.render.disk`), and
+        so are jittered taps; else nothing depends on it.
+    jitter : Jitter, optional
+        Moves the outer taps of each pass by pixel and frame (`sssfit.render.jitter`); of pairs and
+        lines.
     threads : int, optional
         Threads to use, by default all cores; the result does not depend on them.
     dtype : float64 or float32
@@ -100,7 +106,7 @@ def render_taps(
 
     def blurred(picture: FloatArray, within: FloatArray | None) -> FloatArray:
         add_up = _chained if taps.chained else _unchained
-        passes = _Passes(border, threads, within, store, frame)
+        passes = _Passes(border, threads, within, store, frame, jitter)
         return add_up(passes, picture, taps, taps.blend.astype(precision), scene.mm_per_pixel)
 
     if covered is None or not taps.has_negative_weights:
@@ -220,6 +226,24 @@ def _chained(
     return passes.shown(sums[0])
 
 
+Texels = dict[tuple[int, int], npt.NDArray[np.float64]]  # weights (C,) of places (down, right)
+
+
+def texels_of(stage: Stage, direction: tuple[float, float], mm_per_texel: float) -> Texels:
+    """Return the weights that the bilinear fetches of a pass give to the texels around one."""
+    places = np.outer(stage.offsets_mm / mm_per_texel, direction)
+    found: Texels = {(0, 0): stage.weights[0]}
+    for place, weights in zip((*places, *-places), (*stage.weights[1:],) * 2, strict=True):
+        corner = np.floor(place).astype(int)
+        part = place - corner
+        for i, j in np.ndindex(2, 2):
+            share = abs(1 - i - part[0]) * abs(1 - j - part[1])
+            if share > 0.0:
+                at = int(corner[0] + i), int(corner[1] + j)
+                found[at] = found.get(at, 0.0) + share * weights
+    return found
+
+
 class _Passes:
     """The passes on pictures of one size, with their border and coverage (H, W, 1)."""
 
@@ -230,15 +254,17 @@ class _Passes:
         coverage: FloatArray | None,
         store: Store | None,
         frame: int,
+        jitter: Jitter | None,
     ) -> None:
         source_indices(1, 0, border)  # raises for an unknown border
         self.border, self.threads, self.coverage, self.store = border, threads, coverage, store
-        self.frame = frame
+        self.frame, self.jitter = frame, jitter
 
     @property
     def is_plain(self) -> bool:
         """Whether the picture is mirrored and all of it is there, and none is rounded."""
-        return self.border == "mirror" and self.coverage is None and self.store is None
+        unchanged = self.coverage is None and self.store is None and self.jitter is None
+        return self.border == "mirror" and unchanged
 
     def stored(self, pixels: FloatArray) -> FloatArray:
         """Return a picture as the next pass reads it."""
@@ -250,6 +276,8 @@ class _Passes:
             return self._star(pixels, stage, mm_per_texel)
         if stage.kind == "disk":
             return self._divided(pixels, lambda each: self._disk(each, stage, mm_per_texel))
+        if not stage.is_upright or self.jitter is not None:
+            return self._turned(pixels, stage, mm_per_texel)
         weights = stage.pass_weights(mm_per_texel)
         if self.coverage is None and self.store is None:
             ones = np.ones((1, weights.shape[1]))
@@ -272,6 +300,45 @@ class _Passes:
             return found
 
         return self._divided(pixels, fetch)
+
+    def _turned(self, pixels: FloatArray, stage: Stage, mm_per_texel: float) -> FloatArray:
+        """Run the passes along a stage's own directions, one after the other."""
+        for k, direction in enumerate(stage.directions):
+            fetch = self._pass(stage, direction, mm_per_texel)
+            source = pixels if k == 0 else self.stored(pixels)
+            pixels = self._divided(source, fetch)
+        return pixels
+
+    def _pass(
+        self, stage: Stage, direction: tuple[float, float], mm_per_texel: float
+    ) -> Callable[[FloatArray], FloatArray]:
+        """Return the sum of a pass's fetches as a function of a picture."""
+        if self.jitter is None:
+            texels = texels_of(stage, direction, mm_per_texel)
+            return lambda picture: self._gathered(picture, texels)
+        return functools.partial(
+            apply_jittered,
+            stage=stage,
+            direction=direction,
+            mm_per_texel=mm_per_texel,
+            jitter=self.jitter,
+            frame=self.frame,
+            border=self.border,
+            threads=self.threads,
+        )
+
+    def _gathered(self, pixels: FloatArray, texels: Texels) -> FloatArray:
+        """Return the sum of weights times the texels at places around each one."""
+        beyond = max(abs(place) for at in texels for place in at)
+        rows, columns = (source_indices(n, beyond, self.border) for n in pixels.shape[:2])
+        black = np.pad(pixels, ((0, 1), (0, 1), (0, 0)))
+        wide = black[rows][:, columns]
+        height, width = pixels.shape[:2]
+        found = np.zeros((height, width, len(next(iter(texels.values())))), pixels.dtype)
+        for (y, x), weights in texels.items():
+            own = wide[beyond + y : beyond + y + height, beyond + x : beyond + x + width]
+            found += weights.astype(pixels.dtype) * own
+        return found
 
     def _disk(self, pixels: FloatArray, stage: Stage, mm_per_texel: float) -> FloatArray:
         """Single fetches around each pixel, turned by its own angle."""
@@ -312,7 +379,7 @@ class _Passes:
         part = (
             None if self.coverage is None else four_texels(self.coverage, self.border).mean(axis=0)
         )
-        smaller = _Passes(self.border, self.threads, part, self.store, self.frame)
+        smaller = _Passes(self.border, self.threads, part, self.store, self.frame, self.jitter)
         return self.stored(
             self._divided(pixels, lambda each: four_texels(each, self.border).mean(axis=0))
         ), smaller

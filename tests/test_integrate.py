@@ -1,0 +1,208 @@
+"""The code of docs/integrate.md, compiled around an export, and its list of passes against ours."""
+
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from shader_runs import device_of, needs, spirv_of
+from test_docs import STRUCTURE, code_blocks
+from test_shaders import PITCH, apart, light_of, rendered
+from test_taps import taps_of
+
+from sssfit.export import DIALECTS, Style, source
+from sssfit.export.passes import pass_list
+
+PAGE = "integrate.md"
+MASKED = Style(features=("COVERAGE",))
+ENTRY = re.compile(r"^(?:float4|void) (\w+)\([^)]*\)[^{;]*\{", re.MULTILINE)
+ENTRIES = ["Light", "Blur", "Halve", "Sum3", "Sum2", "Sum1", "Sum0", "Add"]
+# What the includes of HDRP's custom passes stand for, without stereo.
+UNITY = """
+#define TEXTURE2D_X(name) Texture2DArray<float4> name
+#define LOAD_TEXTURE2D_X(name, place) name.Load(int4(int2(place), 0, 0))
+SamplerState s_linear_clamp_sampler;
+struct Varyings { float4 positionCS : SV_POSITION; };
+"""
+HLSL = dict(zip(("own", "unity", "unreal"), code_blocks("hlsl", PAGE), strict=True))
+GODOT, *ES = code_blocks("glsl", PAGE)
+WEBGL, *ENGINES = code_blocks("js", PAGE)
+
+
+@pytest.fixture(scope="module")
+def taps():
+    return taps_of(STRUCTURE, channels=3)
+
+
+@pytest.fixture(scope="module")
+def glsl(taps):
+    return source([taps], DIALECTS["glsl"], MASKED)
+
+
+def accepted(text, stage, folder, *flags):
+    """Let glslang check a shader of a stage."""
+    needs("hlsl")
+    path = Path(folder) / f"shader.{stage}"
+    path.write_text(text, encoding="utf-8")
+    done = subprocess.run(
+        ["glslangValidator", *flags, "-S", stage, path],
+        cwd=folder, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, f"{done.stdout}\n{text}"
+
+
+@pytest.mark.parametrize("engine", HLSL)
+@pytest.mark.parametrize("entry", ENTRIES)
+def test_hlsl_compiles_around_an_export(taps, engine, entry, tmp_path):
+    needs("hlsl")
+    code = HLSL[engine]
+    assert ENTRY.findall(code.replace("float Mm(float4 at) {", "")) == ENTRIES
+    export = source([taps], DIALECTS["hlsl"], MASKED)
+    before = UNITY if engine == "unity" else ""
+    # The compiler is asked for an entry point of this name.
+    spirv_of(f"#define {entry} main\n{export}\n{before}\n{code}", tmp_path)
+
+
+def test_compute_shaders_compile_around_an_export(taps, glsl, tmp_path):
+    script = "".join(code_blocks("gdscript", PAGE))
+    calls = {"light": (script_text(script, "LIGHT"), 1), "add": (script_text(script, "ADD"), 1)}
+    for each in listed(taps):
+        axis = {"x": "vec2(1.0, 0.0)", "y": "vec2(0.0, 1.0)"}.get(each["axis"])
+        words = [f"{each['stage']}u", axis] if axis else []
+        words += [f"t{k}" for k in range(len(each["reads"]))] + ["position", "texel"]
+        words += ["mm_per_pixel"] if each["name"] in ("SSS_Blur", "SSS_Sum3") else []
+        calls[each["writes"]] = f"made = {each['name']}({', '.join(words)});", len(each["reads"])
+    for code, pictures in calls.values():
+        samplers = "".join(
+            f"layout(set = 0, binding = {k + 1}) uniform sampler2D t{k};\n" for k in range(pictures)
+        )
+        text = f"#version 450\n{glsl}{samplers}{GODOT.replace('#CODE', code)}"
+        accepted(text, "comp", tmp_path, "-V")
+
+
+def script_text(script, name):
+    """A constant text of the GDScript."""
+    return re.search(rf'^const {name} := "(.*)"$', script, re.MULTILINE)[1]
+
+
+@pytest.mark.parametrize("text", ES)
+def test_webgl_shaders_compile(text, tmp_path):
+    accepted(text, "frag", tmp_path)
+
+
+def listed(taps):
+    """Our list of passes, as the scripts of the page read it from the comment."""
+    return [
+        {
+            "name": f"SSS_{each.name}",
+            "stage": str(each.stages[0]) if each.name == "Blur" else None,
+            "axis": {(1.0, 0.0): "x", (0.0, 1.0): "y"}[each.axis] if each.name == "Blur" else None,
+            "reads": list(dict.fromkeys((each.reads, *(name for name, _ in each.adds)))),
+            "writes": each.writes[0],
+            "size": 2**each.level,
+        }
+        for each in pass_list(taps, normalized=True)
+    ]
+
+
+@pytest.mark.parametrize(("language", "quote"), [("csharp", '@"'), ("gdscript", 'r"(?m)')])
+def test_regular_expressions_find_every_pass(taps, glsl, language, quote):
+    code = "".join(code_blocks(language, PAGE))
+    (pattern,) = re.findall(re.escape(quote) + r'(\^//[^"]+)"', code)
+    keys = ("name", "stage", "axis", "reads", "writes", "size")
+    found = [
+        dict(zip(keys, each.groups(), strict=True))
+        | {"reads": each[4].split(" "), "size": int(each[6] or 1)}
+        for each in re.finditer(pattern, glsl, re.MULTILINE)
+    ]
+    assert found == listed(taps)
+
+
+def node():
+    """Node.js, or no test."""
+    program = shutil.which("node")
+    if program is None:
+        pytest.skip("needs node, which nothing else here does")
+    return program
+
+
+def made_by_javascript(text, folder):
+    """The passes of exported GLSL, and their fragment shaders, as the page's script makes them."""
+    (folder / "passes.mjs").write_text(WEBGL, encoding="utf-8")
+    (folder / "export.glsl").write_text(text, encoding="utf-8")
+    (folder / "run.mjs").write_text(
+        "import { readFileSync } from 'node:fs';\n"
+        "import { passesOf, fragmentOf } from './passes.mjs';\n"
+        "const source = readFileSync('export.glsl', 'utf8');\n"
+        "const passes = passesOf(source);\n"
+        "const fragments = passes.map((pass) => fragmentOf(source, pass));\n"
+        "console.log(JSON.stringify({ passes, fragments }));\n",
+        encoding="utf-8",
+    )
+    done = subprocess.run(
+        [node(), "run.mjs"], cwd=folder, capture_output=True, text=True, check=True
+    )
+    found = json.loads(done.stdout)
+    return found["passes"], [f"#version 300 es\n{each}" for each in found["fragments"]]
+
+
+def test_javascript_makes_a_shader_for_every_pass(taps, glsl, tmp_path):
+    passes, fragments = made_by_javascript(glsl, tmp_path)
+    assert [{"stage": None, "axis": None, **each} for each in passes] == listed(taps)
+    assert len(fragments) == len(passes)
+    for each in fragments:
+        accepted(each, "frag", tmp_path)
+
+
+def test_shaders_made_by_javascript_show_what_the_renderer_shows(taps, tmp_path):
+    needs("glsl")
+    style = Style(normalized=False, features=("COVERAGE",))
+    passes, fragments = made_by_javascript(source([taps], DIALECTS["glsl"], style), tmp_path)
+    size = 37, 50
+    rows, columns = np.mgrid[: size[0], : size[1]]
+    mask = np.hypot(rows - 18, columns - 25) < 15
+    light = light_of(size, 3)
+    device = device_of("glsl")
+    covered = np.concatenate([light * mask[..., None], mask[..., None]], axis=-1)
+    pictures = {"E": device.picture(covered, half=False)}
+    for each, fragment in zip(passes, fragments, strict=True):
+        shape = *(-(-side // each["size"]) for side in size), 4
+        target = device.picture(np.zeros(shape), half=False)
+        draw(device.context, fragment, [pictures[name] for name in each["reads"]], target)
+        pictures[each["writes"]] = target
+    found = device.pixels(pictures["M0"])[..., :3]
+    assert apart(found, rendered(light, taps, coverage=mask.astype(float)) * mask[..., None]) < 1e-5
+
+
+def draw(context, fragment, reads, target):
+    """Draw a pass as the page's WebGL code does."""
+    vertex = "#version 300 es\nin vec2 at; void main() { gl_Position = vec4(at, 0.0, 1.0); }"
+    program = context.program(vertex, fragment)
+    corners = context.buffer(np.array([-1, -1, 3, -1, -1, 3], np.float32).tobytes())
+    for k, each in enumerate(reads):
+        each.use(k)
+        program[f"t{k}"].value = k
+    for name, value in (("texel", tuple(1 / s for s in reads[0].size)), ("mm_per_pixel", PITCH)):
+        if name in program:
+            program[name].value = value
+    context.framebuffer(color_attachments=[target]).use()
+    context.simple_vertex_array(program, corners, "at").render(vertices=3)
+
+
+@pytest.mark.parametrize("number", range(len(ENGINES)))
+def test_javascript_of_the_engines_is_well_formed(number, tmp_path):
+    (tmp_path / "engine.mjs").write_text(ENGINES[number], encoding="utf-8")
+    subprocess.run([node(), "--check", "engine.mjs"], cwd=tmp_path, check=True)
+
+
+def test_a_section_fits_a_screen_and_names_what_was_read():
+    text = (Path(__file__).parents[1] / "docs" / PAGE).read_text(encoding="utf-8")
+    read = text.split("## Where the names were read", 1)[1]
+    for engine in ("Unity", "Unreal", "Godot", "three.js", "Babylon.js"):
+        assert f"- {engine}: " in read
+    languages = ("hlsl", "csharp", "cpp", "gdscript", "glsl", "js")
+    blocks = [block for each in languages for block in code_blocks(each, PAGE)]
+    assert max(len(each.splitlines()) for each in blocks) <= 60
