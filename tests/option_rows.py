@@ -1023,6 +1023,8 @@ def _taps_source(**settings: Any) -> Callable[[], str]:
 EXPORT = {
     "--prefix": Row(_SOURCE, "--prefix WAX", _exported, _taps_source(prefix="WAX"), words="SSS"),
     "--coverage": Row(_SOURCE, "--coverage", _exported, _taps_source(coverage=True)),
+    "--depth": Row(_SOURCE, "--depth", _exported, _taps_source(depth=True)),
+    "--transmittance": Row(_SOURCE, "--transmittance", _exported, _taps_source(transmittance=True)),
     "--keep-energy": Row(_SOURCE, "--keep-energy", _exported, _taps_source(keep_energy=True)),
     "--half": Row(_SOURCE, "--half", _exported, _taps_source(half=True)),
     "--without-shader": Row(

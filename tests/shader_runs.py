@@ -43,14 +43,18 @@ def run(
     mm_per_pixel,
     *,
     cover=None,
+    depth=None,
     prefix="SSS",
     half=False,
     frame=0,
     profile=None,
     normalized=False,
 ):
-    """The result (H, W, C) of exported source on light (H, W, C), with clamped borders."""
-    settings = {"cover": cover, "prefix": prefix, "half": half, "frame": frame}
+    """The result (H, W, C) of exported source on light (H, W, C), with clamped borders.
+
+    With depth (H, W) [mm] the source must follow it.
+    """
+    settings = {"cover": cover, "depth": depth, "prefix": prefix, "half": half, "frame": frame}
     draws = _draws(
         text, dialect, taps, light, mm_per_pixel, profile=profile, normalized=normalized, **settings
     )
@@ -63,7 +67,14 @@ def run(
 
 def prepared(text, dialect, taps, light, mm_per_pixel, *, normalized):
     """A function that draws all passes in half floats, on a part of either side of the picture."""
-    settings = {"cover": None, "prefix": "SSS", "half": True, "frame": 0, "profile": None}
+    settings = {
+        "cover": None,
+        "depth": None,
+        "prefix": "SSS",
+        "half": True,
+        "frame": 0,
+        "profile": None,
+    }
     draws = list(
         _draws(text, dialect, taps, light, mm_per_pixel, normalized=normalized, **settings)
     )
@@ -83,6 +94,7 @@ def _draws(
     mm_per_pixel,
     *,
     cover,
+    depth,
     prefix,
     half,
     frame,
@@ -98,10 +110,12 @@ def _draws(
     whole[..., 3] = cover
     device = device_of(dialect)
     pictures = {"E": device.picture(whole, half=False)}
-    for each in pass_list(taps, normalized=normalized):
+    if depth is not None:
+        deep = np.repeat((depth * cover)[..., None], 4, axis=2).astype(np.float32)
+        pictures["D0"] = device.picture(deep, half=False)
+    for each in pass_list(taps, normalized=normalized, depth=depth is not None):
         size = [-(-side // 2**each.level) for side in (width, height)]
-        reads = list(dict.fromkeys((each.reads, *(name for name, _ in each.adds))))
-        number = each.stages[0] if each.stages else 0
+        reads, number = each.pictures, each.stages[0]
         targets, draw = device.prepare(
             text,
             _call(each, dialect, prefix, reads, number, frame, profile),
@@ -109,7 +123,7 @@ def _draws(
             size,
             [1.0 / side for side in pictures[reads[0]].size[:2]],
             mm_per_pixel,
-            count=max(len(each.stages), 1),
+            count=len(each.writes),
             onto=pictures.get(each.writes[0]) if each.is_added else None,
             half=half and each.writes[0] != "M0",
             prefix=prefix,
@@ -124,7 +138,7 @@ def _call(each, dialect, prefix, reads, number, frame, profile):
     pictures = [f"t{k}" for k in range(len(reads))]
     sampler = [] if dialect == "glsl" else ["bilinear"]
     arguments = [*pictures, *sampler, "position", "texel"]
-    if each.name in ("Blur", "Star"):
+    if each.name in ("Blur", "Star") or (each.depths and each.name == "Halve"):
         axis = each.axis
         first = [f"{number}u", *([f"{vec2}{axis}"] if axis else [])]
         arguments = [*first, *arguments]
@@ -132,7 +146,7 @@ def _call(each, dialect, prefix, reads, number, frame, profile):
         arguments.append("mm")
     if each.kind == "disk":
         arguments.append(f"{frame}u")
-    if profile is not None and each.kind != "halve":
+    if profile is not None and (each.depths or each.kind != "halve"):
         arguments.append(f"{profile}u")
     return f"{prefix}_{each.name}({', '.join(arguments)})"
 
@@ -222,13 +236,18 @@ class _OpenGL:
         return self.programs[key]
 
 
+def struct_of(prefix, call):
+    """The structure that a function of several targets returns."""
+    return f"{prefix}_{'Halved' if call.startswith(f'{prefix}_Halve(') else 'Terms'}"
+
+
 def glsl_program(text, call, pictures, count, prefix):
     """A fragment shader around exported GLSL."""
     textures = "".join(f"uniform sampler2D t{k};\n" for k in range(pictures))
     outs = "".join(f"layout(location = {k}) out vec4 out{k};\n" for k in range(count))
     body = f"out0 = {call};"
     if count > 1:
-        body = f"{prefix}_Terms all = {call};" + "".join(
+        body = f"{struct_of(prefix, call)} all = {call};" + "".join(
             f" out{k} = all.term[{k}];" for k in range(count)
         )
     return (
@@ -243,7 +262,7 @@ def hlsl_source(text, call, pictures, count, prefix):
     outs = "".join(f"float4 out{k} : SV_Target{k}; " for k in range(count))
     body = f"o.out0 = {call};"
     if count > 1:
-        body = f"{prefix}_Terms all = {call};" + "".join(
+        body = f"{struct_of(prefix, call)} all = {call};" + "".join(
             f" o.out{k} = all.term[{k}];" for k in range(count)
         )
     return (

@@ -80,6 +80,8 @@ def source_text(
     *,
     prefix: str = "SSS",
     coverage: bool = False,
+    depth: bool = False,
+    transmittance: bool = False,
     keep_energy: bool = False,
     half: bool = False,
     without_shader: bool = False,
@@ -97,6 +99,10 @@ def source_text(
         Of all names.
     coverage : bool
         Whether light stays within a mask unless the shader says otherwise.
+    depth : bool
+        Whether fetches lose weight by their depth difference, too.
+    transmittance : bool
+        Whether there is a function for the light that comes through a thickness.
     keep_energy : bool
         Whether the blend keeps the energy; otherwise it is a constant of its own.
     half : bool
@@ -111,9 +117,14 @@ def source_text(
     Raises
     ------
     KernelError
-        The kernels cannot share a source, a setting is invalid, or a pass has too many weights.
+        The kernels cannot share a source, a setting is invalid or has no passes to act on, or a
+        pass has too many weights.
     """
     tables = [each for each in kernels if isinstance(each, Taps)]
+    asked = {"COVERAGE": coverage, "DEPTH": depth, "TRANSMITTANCE": transmittance}
+    if any(asked.values()) and (without_shader or not (tables or with_shader or dense)):
+        given = ", ".join(name.lower() for name, each in asked.items() if each)
+        raise KernelError(f"{given}: a switch of passes; have these written, too.")
     if not tables and len(kernels) == 1 and isinstance(kernels[0], SeparableKernel):
         if not (with_shader or dense):
             return _dense_text(kernels[0], form, prefix, half=half)
@@ -125,7 +136,7 @@ def source_text(
         with_passes=not without_shader,
         normalized=not keep_energy,
         half=half,
-        features=("COVERAGE",) if coverage else (),
+        features=tuple(name for name, given in asked.items() if given),
     )
     if half:
         for each in tables:

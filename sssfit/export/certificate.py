@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 
-from sssfit.export.passes import pass_list
+from sssfit.export.passes import Pass, fetches_of, pass_list
 from sssfit.kernel import Taps
 
 _ROUNDING = 1e-12
@@ -37,14 +37,14 @@ def certificate(taps: Taps) -> Iterator[str]:
     )
 
 
-def pass_table(taps: Taps, prefix: str, *, normalized: bool) -> Iterator[str]:
+def pass_table(taps: Taps, prefix: str, *, normalized: bool, depth: bool = False) -> Iterator[str]:
     """Yield the passes as a table, and what their functions take."""
-    passes = pass_list(taps, normalized=normalized)
+    passes = pass_list(taps, normalized=normalized, depth=depth)
     yield ""
     yield "Passes in their order. E is the irradiance, M0 the result; sizes are rounded up."
     yield f"{'call':<16}{'reads':<16}{'writes':<8}{'size':<6}fetches"
     for each in passes:
-        reads = " ".join(dict.fromkeys((each.reads, *(name for name, _ in each.adds))))
+        reads = " ".join(each.pictures)
         size = f"1/{2**each.level}" if each.level else "1"
         writes = " ".join(each.writes) + ("+" if each.is_added else "")
         call = f"{prefix}_{each.call}"
@@ -53,8 +53,18 @@ def pass_table(taps: Taps, prefix: str, *, normalized: bool) -> Iterator[str]:
         yield "A + is added to what the target holds (blend ONE, ONE)."
     yield "position: middle of the pixel that is written (SV_Position, gl_FragCoord), in pixels."
     yield "texel: 1 / size of the first picture that is read; mm_per_pixel: of the full picture,"
-    yield "2 d tan(fov / 2) / rows at depth d, divided by a pixel's own scale of the blur."
+    if depth:
+        yield from _of_depth(passes)
+    else:
+        yield "2 d tan(fov / 2) / rows at depth d, divided by a pixel's own scale of the blur."
     yield "Sampler: bilinear, clamped. Alpha is coverage, and light is multiplied by it."
+
+
+def _of_depth(passes: Sequence[Pass]) -> Iterator[str]:
+    """Yield what passes that follow depth read besides light."""
+    yield "of a surface at depth 1 mm, 2 tan(fov / 2) / rows, divided by a pixel's own scale."
+    yield "D0 holds coverage times depth in mm in its first channel, in 32 bits; where the coverage"
+    yield f"is 0 nothing is read. {fetches_of(passes):.6g} fetches a pixel with those of depth."
 
 
 def how_to_run(taps: Taps) -> Iterator[str]:

@@ -45,11 +45,18 @@ class Functions:
     is_indexed : bool
         Whether the arrays hold several profiles, of which an argument names one.
 
+    Attributes
+    ----------
+    beside : tuple of (str, str)
+        Arguments after the pictures, of functions that several passes call.
+
     Raises
     ------
     KernelError
         The pictures have more channels than light and coverage leave room for.
     """
+
+    beside: tuple[tuple[str, str], ...] = ()
 
     def __init__(
         self,
@@ -69,13 +76,14 @@ class Functions:
         self.profile = (("uint", "profile"),) if is_indexed else ()
         self.light, self.rgb = KINDS[len(taps.channels) - 1], f".{'rgb'[: len(taps.channels)]}"
         self.passes = passes
-        self.has_sums = any(each.kind == "sum" for each in passes)
+        self.kinds = {each.kind for each in passes}
+        self.has_sums = "sum" in self.kinds
         counts = [len(each.weights) for each in taps.stages]
         self.first = [sum(counts[:k]) for k in range(len(counts))]
 
     def lines(self) -> Iterator[str]:
         """Yield the lines of all functions."""
-        kinds = {each.kind for each in self.passes}
+        kinds = self.kinds
         helpers = {
             "second": self._blur,
             "line": self._blur,
@@ -84,11 +92,16 @@ class Functions:
             "halve": self._halve,
         }
         parts = [self._covered()] if self.has_sums or "disk" in kinds else []
+        parts += self._own_helpers()
         parts += dict.fromkeys(make() for kind, make in helpers.items() if kind in kinds)
         parts += [self._pass(each) for each in self.passes if each.is_own]
         for each in parts:
             yield from each.strip("\n").split("\n")
             yield ""
+
+    def _own_helpers(self) -> list[str]:
+        """Return further functions that the others call."""
+        return []
 
     def _head(self, kind: str, name: str, arguments: Sequence[tuple[str, str]]) -> str:
         """Return a function's first line."""
@@ -98,7 +111,7 @@ class Functions:
         kind, full = types.get(kind, kind), f"{self.prefix}_{name}"
         apart = ",\n    " if sum(map(len, words)) > _LONGEST else ", "
         middle = (len(words) + 1) // 2
-        halves = [", ".join(each) for each in (words[:middle], words[middle:])]
+        halves = [", ".join(each) for each in (words[:middle], words[middle:]) if each]
         return own.function.format(kind=kind, name=full, arguments=apart.join(halves))
 
     def _call(self, name: str, *arguments: str) -> str:
@@ -124,6 +137,10 @@ class Functions:
     def _vector(self, kind: str, *values: str) -> str:
         return values[0] if kind == "float" else f"{self.dialect.types[kind]}({', '.join(values)})"
 
+    def _all(self, value: str) -> str:
+        """Return the same value in each channel; HLSL makes no vector of a single number."""
+        return self._vector(self.light, *[value] * len(self.taps.channels))
+
     def _axis(self, each: Pass) -> str:
         """Return the direction of a pass, right and down."""
         return self._vector("float2", *(literal(number) for number in each.axis or (1.0, 0.0)))
@@ -144,7 +161,7 @@ class Functions:
 
     def _returned(self, light: str, part: str, cover: str) -> str:
         """Return the lines that end a function: light over what was covered, times coverage."""
-        least = self._vector(self.light, "1e-20")
+        least = self._all("1e-20")
         shown = f"{cover} * {light} / max({part}, {least})"
         return f"""\
 #if {self.prefix}_COVERAGE
@@ -167,10 +184,17 @@ class Functions:
     {new("float2", "per_mm")} = {axis}texel / (mm_per_pixel * {size});
     {new("float4", "own")} = {self._fetch(picture, "place")};"""
 
+    def _two(self, weight: str) -> str:
+        """Return the lines that add two mirrored fetches."""
+        return f"""\
+        {self.dialect.new("float4", "both")} = {self._both("picture", "away")};
+        light += {weight} * both{self.rgb};
+        part += {weight} * both.a;"""
+
     def _blur(self) -> str:
         new, p = self.dialect.new, self.prefix
         weight, middle = self._at("WEIGHT", "i"), self._at("WEIGHT", "first")
-        numbers = (("uint", "stage"), ("float2", "axis"), ("picture", "picture"))
+        numbers = (("uint", "stage"), ("float2", "axis"), ("picture", "picture"), *self.beside)
         return f"""
 // A pass of a stage: the middle, and mirrored pairs of bilinear fetches.
 {self._head("float4", "Blur", [*numbers, *_FETCHED, _SCALE, *self.profile])} {{
@@ -180,27 +204,33 @@ class Functions:
     {new(self.light, "part")} = {middle} * own.a;
     for ({new("uint", "i")} = first + 1u; i < {p}_FIRST[stage + 1u]; i++) {{
         {new("float2", "away")} = {self._at("OFFSET_MM", "i")} * per_mm;
-        {new("float4", "both")} = {self._both("picture", "away")};
-        light += {weight} * both{self.rgb};
-        part += {weight} * both.a;
+{self._two(weight)}
     }}
 {self._end()}
 }}"""
 
     def _star(self) -> str:
-        new, p, rgb = self.dialect.new, self.prefix, self.rgb
+        new, p = self.dialect.new, self.prefix
+        numbers = (("uint", "stage"), ("picture", "picture"), *self.beside)
+        return f"""
+// A stage in one pass: the middle, four diagonal fetches and four on the axes.
+{self._head("float4", "Star", [*numbers, *_FETCHED, _SCALE, *self.profile])} {{
+{self._begin("picture", f"{p}_SIZE[stage]")}
+    {new("uint", "first")} = {p}_FIRST[stage];
+{self._nine()}
+{self._end()}
+}}"""
+
+    def _nine(self) -> str:
+        """Return the lines that add up the fetches of a star."""
+        new, rgb = self.dialect.new, self.rgb
         w0, w1, w2 = (self._at("WEIGHT", f"first + {k}u") for k in range(3))
         o1, o2 = (self._at("OFFSET_MM", f"first + {k}u") for k in (1, 2))
         turned, x, y = (
             self._vector("float2", *each)
             for each in (("away.x", "0.0 - away.y"), ("away.x", "0.0"), ("0.0", "away.y"))
         )
-        numbers = (("uint", "stage"), ("picture", "picture"))
-        return f"""
-// A stage in one pass: the middle, four diagonal fetches and four on the axes.
-{self._head("float4", "Star", [*numbers, *_FETCHED, _SCALE, *self.profile])} {{
-{self._begin("picture", f"{p}_SIZE[stage]")}
-    {new("uint", "first")} = {p}_FIRST[stage];
+        return f"""\
     {new("float2", "away")} = {o1} * per_mm;
     {new("float2", "turned")} = {turned};
     {new("float4", "corners")} = {self._both("picture", "away")};
@@ -209,8 +239,22 @@ class Functions:
     {new("float4", "beside")} = {self._both("picture", x)};
     beside += {self._both("picture", y)};
     {new(self.light, "light")} = {w0} * own{rgb} + {w1} * corners{rgb} + {w2} * beside{rgb};
-    {new(self.light, "part")} = {w0} * own.a + {w1} * corners.a + {w2} * beside.a;
-{self._end()}
+    {new(self.light, "part")} = {w0} * own.a + {w1} * corners.a + {w2} * beside.a;"""
+
+    def through(self) -> str:
+        """Return the function that reads the table of ``sssfit.export.through``."""
+        new, k = self.dialect.new, "THROUGH_ROWS"
+        mm = [self._at("THROUGH_MM", each, k) for each in ("i - 1u", "i")]
+        share = [self._at("THROUGH", each, k) for each in ("i - 1u", "i", "0u")]
+        return f"""
+{self._head(self.light, "Through", [("float", "thickness_mm"), *self.profile])} {{
+    {new(self.light, "share")} = {share[2]};
+    for ({new("uint", "i")} = 1u; i < {self.prefix}_{k}; i++) {{
+        {new("float", "width")} = max({mm[1]} - {mm[0]}, 1e-6);
+        {new("float", "part")} = clamp((thickness_mm - {mm[0]}) / width, 0.0, 1.0);
+        share += part * ({share[1]} - {share[0]});
+    }}
+    return share;
 }}"""
 
     def _turn(self) -> str:
@@ -229,8 +273,7 @@ class Functions:
         """Return the function of a pass that is not a call of those above alone."""
         several = len(each.stages) > 1
         make = self._terms if several else self._disk if each.kind == "disk" else self._sum
-        pictures = dict.fromkeys((each.reads, *(name for name, _ in each.adds)))
-        arguments = [*(("picture", name) for name in pictures), *_FETCHED]
+        arguments = [*(("picture", name) for name in each.pictures), *_FETCHED]
         arguments += [] if each.kind == "sum" else [_SCALE]
         arguments += [("uint", "frame")] if each.kind == "disk" else []
         struct = self.dialect.struct.format(
@@ -239,7 +282,7 @@ class Functions:
         head = self._head(
             f"{self.prefix}_Terms" if several else "float4", each.name, [*arguments, *self.profile]
         )
-        lines = [f"    {line}" for line in make(each)]
+        lines = [line if line.startswith("#") else f"    {line}" for line in make(each)]
         return "\n".join([*([struct] if several else []), f"{head} {{", *lines, "}"])
 
     def _halve(self) -> str:
@@ -253,12 +296,7 @@ class Functions:
         """Yield the lines that add up the pictures of a level: its last stage, or a coarser sum."""
         new = self.dialect.new
         if each.kind == "sum":
-            place = "0.5 * position * texel"
-            yield f"{new('float4', 'coarse')} = {self._fetch(each.reads, place)};"
-            yield f"{new('float', 'cover')} = {self._load(each.adds[0][0])}.a;"
-            part = self._vector(self.light, "coarse.a")
-            coarse = self._call("Covered", f"coarse{self.rgb}", part, "cover")
-            yield f"{new(self.light, 'light')} = {coarse}{self.rgb};"
+            yield from self._coarser(each)
         else:
             share = self._at("BLEND", f"{each.stages[0] + 1}u", "PICTURES")
             yield f"{new('float4', 'blurred')} = {self._last(each)};"
@@ -269,10 +307,27 @@ class Functions:
             yield f"light += {share} * {self._load(name)}{self.rgb};"
         yield f"return {self._whole('light', 'cover')};"
 
+    def _coarser(self, each: Pass) -> Iterator[str]:
+        """Yield the lines that fetch a coarser sum, one for what it has around a pixel."""
+        new, place = self.dialect.new, "0.5 * position * texel"
+        yield f"{new('float4', 'coarse')} = {self._fetch(each.reads, place)};"
+        yield f"{new('float', 'cover')} = {self._load(each.adds[0][0])}.a;"
+        part = self._all("coarse.a")
+        coarse = self._call("Covered", f"coarse{self.rgb}", part, "cover")
+        yield f"{new(self.light, 'light')} = {coarse}{self.rgb};"
+
     def _last(self, each: Pass) -> str:
         """Return a call of the last pass of a stage."""
         profile = [name for _, name in self.profile]
-        given = [each.reads, "bilinear", "position", "texel", "mm_per_pixel", *profile]
+        given = [
+            each.reads,
+            *each.depths,
+            "bilinear",
+            "position",
+            "texel",
+            "mm_per_pixel",
+            *profile,
+        ]
         stage = f"{each.stages[0]}u"
         if each.kind == "star":
             return self._call("Star", stage, *given)

@@ -2,7 +2,7 @@
 
 Pictures are named by what they hold: E the irradiance, A<n> what the first pass of stage n leaves,
 B<n> stage n's picture, H<v> the picture halved v times, M<v> the sum of level v and of all that are
-coarser. The sum of level 0 is the result.
+coarser. The sum of level 0 is the result. D<v> is the depth of level v, where passes follow depth.
 """
 
 import math
@@ -24,7 +24,8 @@ class Pass:
     level : int
         How often the picture that it writes is halved.
     stages : tuple of int
-        Stages that it runs, from 0: of the first pass of terms with the same offsets, all of these.
+        Stages that it runs, from 0: of the first pass of terms with the same offsets, all of these;
+        of a change of size, the first stage on the smaller picture.
     reads : tuple of str
         What it fetches from all around, or of a sum the coarser one; "" if there is none.
     adds : tuple of tuple of (str, int)
@@ -39,6 +40,8 @@ class Pass:
         The direction of mirrored fetches, right and down.
     is_blended : bool
         Whether the blend multiplies what it writes, where that is a sum.
+    depths : tuple of str
+        Pictures of depth that it reads, if any.
     """
 
     kind: str
@@ -51,11 +54,17 @@ class Pass:
     is_added: bool = False
     axis: tuple[float, float] | None = None
     is_blended: bool = True
+    depths: tuple[str, ...] = ()
 
     @property
     def is_own(self) -> bool:
         """Whether it has a function of its own, not one that several passes call."""
         return (self.writes[0].startswith("M") and self.is_blended) or len(self.stages) > 1
+
+    @property
+    def pictures(self) -> tuple[str, ...]:
+        """All pictures that it reads, in the order of its function's arguments."""
+        return tuple(dict.fromkeys((self.reads, *(name for name, _ in self.adds), *self.depths)))
 
     @property
     def name(self) -> str:
@@ -80,7 +89,7 @@ class Pass:
         return f", {math.degrees(math.atan2(down, right)):.4g} deg"
 
 
-def pass_list(taps: Taps, *, normalized: bool = False) -> tuple[Pass, ...]:
+def pass_list(taps: Taps, *, normalized: bool = False, depth: bool = False) -> tuple[Pass, ...]:
     """Return a table's passes in their order; their fetches, times 1/4 a halving, are its own.
 
     Parameters
@@ -88,11 +97,25 @@ def pass_list(taps: Taps, *, normalized: bool = False) -> tuple[Pass, ...]:
     taps : Taps
     normalized : bool
         Whether the blend adds up to 1; a single stage alone then needs none.
+    depth : bool
+        Whether they follow depth. Each fetch of light then comes with one of depth, a change of
+        size takes four texels one by one, and terms share no pass, since each divides by a sum of
+        its own.
     """
-    found = list(_chain(taps) if taps.chained else _terms(taps))
+    found = list(_chain(taps) if taps.chained else _terms(taps, shared=not depth))
     if normalized and len(taps.stages) == 1 and not taps.blend[0].any() and not taps.is_disk:
         found[-1] = replace(found[-1], is_blended=False)
-    return tuple(found)
+    return tuple(_with_depth(each) for each in found) if depth else tuple(found)
+
+
+def _with_depth(each: Pass) -> Pass:
+    """Return a pass with the pictures of depth that it reads and writes."""
+    own, smaller, larger = (f"D{each.level + k}" for k in (0, 1, -1))
+    if each.kind == "halve":
+        return replace(each, depths=(larger,), writes=(*each.writes, own), fetches=2 * 4)
+    if each.kind == "sum":
+        return replace(each, depths=(smaller, own), fetches=2 * 4 + 1 + len(each.adds))
+    return replace(each, depths=(own,), fetches=2 * each.fetches - len(each.adds))
 
 
 def _chain(taps: Taps) -> Iterator[Pass]:
@@ -102,7 +125,7 @@ def _chain(taps: Taps) -> Iterator[Pass]:
     for k, stage in enumerate(taps.stages):
         if stage.level > level:
             level = stage.level
-            yield Pass("halve", level, (), picture, (), (f"H{level}",), 1)
+            yield Pass("halve", level, (k,), picture, (), (f"H{level}",), 1)
             picture = f"H{level}"
         adds = _added(taps, last) if k == len(taps.stages) - 1 else ()
         writes = (f"M{last}" if k == len(taps.stages) - 1 else f"B{k + 1}",)
@@ -110,7 +133,8 @@ def _chain(taps: Taps) -> Iterator[Pass]:
         picture = writes[0]
     for level in range(last - 1, -1, -1):
         adds = _added(taps, level)
-        yield Pass("sum", level, (), f"M{level + 1}", adds, (f"M{level}",), 1 + len(adds))
+        smaller = next(k for k, each in enumerate(taps.stages) if each.level > level)
+        yield Pass("sum", level, (smaller,), f"M{level + 1}", adds, (f"M{level}",), 1 + len(adds))
 
 
 def _of_stage(
@@ -141,15 +165,15 @@ def _added(taps: Taps, level: int) -> tuple[tuple[str, int], ...]:
     return tuple((name, row) for name, row in found if taps.blend[row].any())
 
 
-def _terms(taps: Taps) -> Iterator[Pass]:
-    """Yield the passes of stages that all read the irradiance; terms share their first pass."""
+def _terms(taps: Taps, *, shared: bool) -> Iterator[Pass]:
+    """Yield the passes of stages that all read the irradiance; terms may share their first pass."""
     irradiance = (("E", 0),) if taps.blend[0].any() else ()
     if taps.is_disk:
         yield Pass("disk", 0, (0,), "E", irradiance, ("M0",), int(taps.fetches))
         return
     groups: dict[tuple[float, ...], list[int]] = {}
     for k, stage in enumerate(taps.stages):
-        groups.setdefault(tuple(stage.offsets_mm.tolist()), []).append(k)
+        groups.setdefault(tuple(stage.offsets_mm.tolist()) if shared else (k,), []).append(k)
     for own in groups.values():
         count = 2 * len(taps.stages[own[0]].offsets_mm) + 1
         writes = tuple(f"A{k + 1}" for k in own)

@@ -10,9 +10,11 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import KernelError
 from sssfit.export.certificate import certificate, how_to_run, pass_table
 from sssfit.export.constants import Writer, check_prefix
+from sssfit.export.depth import DepthFunctions, check_depth, depth_rates
 from sssfit.export.dialects import Dialect, mark
 from sssfit.export.functions import Functions
 from sssfit.export.passes import pass_list
+from sssfit.export.through import ROWS, through_table
 from sssfit.kernel import Taps
 from sssfit.messages import printable
 
@@ -49,8 +51,13 @@ class Style:
     half: bool = False
     features: tuple[str, ...] = ()
 
+    def has(self, feature: str) -> bool:
+        """Return whether a feature is on; depth is followed within coverage alone."""
+        return feature in self.features or (feature == "COVERAGE" and "DEPTH" in self.features)
 
-FEATURES = ("COVERAGE",)
+
+FEATURES = ("COVERAGE", "DEPTH", "TRANSMITTANCE")
+_WITHOUT_BEING_ASKED = ("COVERAGE",)  # has few lines, so each source has them behind its switch
 
 
 def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
@@ -63,10 +70,11 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
         written for them.
     """
     _check(tables, style)
+    depth = style.has("DEPTH")
     passes = dialect.has_passes and style.with_passes
     words = [line for each in tables for line in certificate(each)]
     words += (
-        pass_table(tables[0], style.prefix, normalized=style.normalized)
+        pass_table(tables[0], style.prefix, normalized=style.normalized, depth=depth)
         if passes
         else how_to_run(tables[0])
     )
@@ -75,8 +83,14 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
     lines += _defines(dialect, style) if passes else []
     lines += _constants(tables, dialect, style, passes=passes)
     if passes:
-        listed = pass_list(tables[0], normalized=style.normalized)
-        functions = Functions(tables[0], listed, dialect, style.prefix, is_indexed=len(tables) > 1)
+        listed = pass_list(tables[0], normalized=style.normalized, depth=depth)
+        kind = DepthFunctions if depth else Functions
+        functions = kind(tables[0], listed, dialect, style.prefix, is_indexed=len(tables) > 1)
+        if style.has("TRANSMITTANCE"):
+            lines += [
+                "",
+                *_through(tables, functions, Writer(dialect, style.prefix, half=style.half)),
+            ]
         lines += ["", *functions.lines()]
     text = lines if dialect.has_defines else _resolved(lines, style)
     return "\n".join(text).rstrip("\n") + "\n"
@@ -96,6 +110,9 @@ def _notes(tables: Sequence[Taps], style: Style, *, passes: bool) -> Iterator[st
 def _check(tables: Sequence[Taps], style: Style) -> None:
     check_prefix(style.prefix)
     first = tables[0]
+    if style.has("DEPTH"):
+        for each in tables:
+            check_depth(each)
     for each in tables[1:]:
         if (each.structure, each.channels, each.chained) != (
             first.structure,
@@ -113,9 +130,13 @@ def _defines(dialect: Dialect, style: Style) -> Iterator[str]:
     """Yield the switches, which may be set before the file is included."""
     if not dialect.has_defines:
         return
-    for each in FEATURES:
-        name = f"{style.prefix}_{each}"
+    p = style.prefix
+    for each in dict.fromkeys((*_WITHOUT_BEING_ASKED, *style.features)):
+        name = f"{p}_{each}"
         yield from (f"#ifndef {name}", f"#define {name} {int(each in style.features)}", "#endif")
+    if style.has("DEPTH"):
+        yield f"#if {p}_DEPTH // what is near enough is divided by, as by coverage"
+        yield from (f"#undef {p}_COVERAGE", f"#define {p}_COVERAGE 1", "#endif")
 
 
 def _resolved(lines: Sequence[str], style: Style) -> Iterator[str]:
@@ -124,7 +145,7 @@ def _resolved(lines: Sequence[str], style: Style) -> Iterator[str]:
     for line in lines:
         word = line.split()[0] if line.strip() else ""
         if word == "#if":
-            kept.append(line.split()[1].removeprefix(f"{style.prefix}_") in style.features)
+            kept.append(style.has(line.split()[1].removeprefix(f"{style.prefix}_")))
         elif word == "#else":
             kept[-1] = not kept[-1]
         elif word == "#endif":
@@ -143,6 +164,8 @@ def _constants(
     if len(tables) > 1:
         yield write.scalar("uint", "TAPS", [sum(counts)])
         yield write.scalar("uint", "PICTURES", [len(first.blend)])
+    if len(tables) > 1 and passes and style.has("DEPTH"):
+        yield write.scalar("uint", "STAGES", [len(first.stages)])
     if style.normalized and len(tables) == 1:
         yield write.vector("ALBEDO", first.energy.tolist())
     elif style.normalized:
@@ -161,10 +184,29 @@ def _constants(
     yield from write.rows("PLACE_MM" if first.is_disk else "OFFSET_MM", places)
     weights = [each.weights for table in tables for each in table.stages]
     yield from write.rows("WEIGHT", np.concatenate(weights).tolist())
+    if passes and style.has("DEPTH"):
+        yield from write.rows("RATE", [row for each in tables for row in depth_rates(each)])
     if passes and not pass_list(first, normalized=style.normalized)[-1].is_blended:
         return
     blends = [_blend(each, style) for each in tables]
     yield from write.rows("BLEND", np.concatenate(blends).tolist())
+
+
+def _through(tables: Sequence[Taps], functions: Functions, write: Writer) -> Iterator[str]:
+    """Yield the table of light through a thickness, and the function that reads it."""
+    found, p = [through_table(each) for each in tables], write.prefix
+    yield f"#if {p}_TRANSMITTANCE"
+    error = max(each.error for each in found)
+    yield "// The share of light that comes through a thickness in mm, linear between the rows;"
+    yield f"// the largest error is {error:.2g}, of 1. Multiply the light on the far side by it,"
+    yield "// and add it to the irradiance before the first pass."
+    yield write.scalar("uint", "THROUGH_ROWS", [ROWS])
+    yield from write.rows(
+        "THROUGH_MM", [[mm] for each in found for mm in each.thickness_mm.tolist()]
+    )
+    yield from write.rows("THROUGH", [row for each in found for row in each.share.tolist()])
+    yield from functions.through().strip("\n").split("\n")
+    yield "#endif"
 
 
 def _places(taps: Taps) -> Iterator[list[float]]:

@@ -106,7 +106,9 @@ def render_screen_taps(
     through = transmitted(scene, taps)
     lit = scene.irradiance if through is None else scene.irradiance + through
     lit = np.ascontiguousarray(np.broadcast_to(lit, (*mask.shape, channels)))
-    rates = [0.5 / each if follow == "gaussian" else 0.0 * each for each in _variances(taps)]
+    rates = [
+        0.5 / each if follow == "gaussian" else 0.0 * each for each in followed_variances(taps)
+    ]
     picture = np.array(np.broadcast_to(scene.irradiance, lit.shape))
     with thread_pool(workers) as pool:
         for number in np.unique(mask[mask > 0]):
@@ -136,8 +138,8 @@ def _check_reach(scene: Scene, taps: Taps, depth_mm: FloatArray) -> None:
         )
 
 
-def _variances(taps: Taps) -> list[FloatArray]:
-    """Return v of each stage (C,) [mm^2]; at least that of a texel, p^2 / 12."""
+def followed_variances(taps: Taps) -> list[FloatArray]:
+    """Return v of each stage's depth factor (C,) [mm^2]; at least that of a texel, p^2 / 12."""
     if not taps.chained:
         widest = second_moments(taps.separable_kernel()).max()
         return [np.full(len(taps.channels), widest)] * len(taps.stages)
