@@ -103,10 +103,24 @@ def test_scenes(name, dialect, monkeypatch):
     assert apart(found, rendered(light, taps)) < 2e-3
 
 
+def terms_of_one_pass():
+    """Two terms with the same offsets, which share their first pass."""
+    taps = taps_of("2-2", channels=3, chained=False)
+    one, other = taps.stages
+    return replace(taps, stages=(one, replace(other, offsets_mm=one.offsets_mm)))
+
+
 @pytest.mark.parametrize("dialect", RUN)
-@pytest.mark.parametrize("structure", ["1", "1-2|3|2", "*|1-*|*"])
-def test_light_stays_within_a_mask(structure, dialect):
-    taps, light = taps_of(structure, channels=3), light_of((45, 50), 3)
+@pytest.mark.parametrize(
+    "taps",
+    [
+        *(taps_of(each, channels=3) for each in ("1", "1-2|3|2", "*|1-*|*")),
+        taps_of("2-1", channels=3, chained=False),
+        terms_of_one_pass(),
+    ],
+)
+def test_light_stays_within_a_mask(taps, dialect):
+    light = light_of((45, 50), 3)
     y, x = np.mgrid[:45, :50]
     cover = (np.hypot(y - 20, x - 27) < 14).astype(float)
     style = Style(normalized=False, features=("COVERAGE",))
@@ -243,6 +257,25 @@ def test_depth_needs_sums_that_do_not_vanish():
         kernel_text(disk_of(9), "hlsl", depth=True)
     with pytest.raises(KernelError, match="weights below 0 could make the sum of a pass vanish"):
         kernel_text(signed_taps(), "hlsl", depth=True)
+
+
+@pytest.mark.parametrize("dialect", RUN)
+@pytest.mark.parametrize("depth", [False, True])
+def test_a_size_that_adds_nothing_of_its_own(dialect, depth):
+    blend = np.array([[0.0] * 3, [0.0] * 3, [0.0] * 3, [0.7, 0.5, 0.4]])
+    taps = taps_of("1|2|1", channels=3, blend=blend)
+    if depth:
+        assert apart(*on_screen(step_of(), taps, dialect)) < 1e-5
+        return
+    light = light_of((37, 50), 3)
+    found = run(source([taps], DIALECTS[dialect], PLAIN), dialect, taps, light, PITCH)
+    assert apart(found, rendered(light, taps)) < 1e-5
+
+
+def test_coverage_needs_sums_that_do_not_vanish():
+    with pytest.raises(KernelError, match="could make the sum of a pass vanish at a mask's border"):
+        kernel_text(signed_taps(), "hlsl", coverage=True)
+    assert "keep coverage for other tables" in kernel_text(signed_taps(), "hlsl")[0]
 
 
 @pytest.mark.parametrize("dialect", RUN)

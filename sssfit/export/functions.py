@@ -78,6 +78,7 @@ class Functions:
         self.passes = passes
         self.kinds = {each.kind for each in passes}
         self.has_sums = "sum" in self.kinds
+        self.shares = any(len(each.stages) > 1 for each in passes)
         counts = [len(each.weights) for each in taps.stages]
         self.first = [sum(counts[:k]) for k in range(len(counts))]
 
@@ -91,7 +92,7 @@ class Functions:
             "disk": self._turn,
             "halve": self._halve,
         }
-        parts = [self._covered()] if self.has_sums or "disk" in kinds else []
+        parts = [self._covered()] if self.has_sums or self.shares or "disk" in kinds else []
         parts += self._own_helpers()
         parts += dict.fromkeys(make() for kind, make in helpers.items() if kind in kinds)
         parts += [self._pass(each) for each in self.passes if each.is_own]
@@ -172,7 +173,7 @@ class Functions:
 
     def _end(self) -> str:
         """Return the lines that end a pass of a stage."""
-        if self.has_sums:
+        if self.has_sums or self.shares:
             return f"    return {self._call('Covered', 'light', 'part', 'own.a')};"
         return self._returned("light", "part", "own.a")
 
@@ -343,16 +344,18 @@ class Functions:
         for k, start in enumerate(first):
             middle = self._at("WEIGHT", f"{start}u")
             yield f"{new(self.light, f'light{k}')} = {middle} * own{self.rgb};"
+            yield f"{new(self.light, f'part{k}')} = {middle} * own.a;"
         count = len(self.taps.stages[each.stages[0]].weights)
         yield f"for ({new('uint', 'i')} = 1u; i < {count}u; i++) {{"
         yield f"    {new('float2', 'away')} = {self._at('OFFSET_MM', f'{first[0]}u + i')} * per_mm;"
         yield f"    {new('float4', 'both')} = {self._both(each.reads, 'away')};"
         for k, start in enumerate(first):
             yield f"    light{k} += {self._at('WEIGHT', f'{start}u + i')} * both{self.rgb};"
+            yield f"    part{k} += {self._at('WEIGHT', f'{start}u + i')} * both.a;"
         yield "}"
         yield f"{self.dialect.variable_of.format(kind=f'{self.prefix}_Terms', name='all')};"
         for k in range(len(first)):
-            yield f"all.term[{k}] = {self._whole(f'light{k}', 'own.a')};"
+            yield f"all.term[{k}] = {self._call('Covered', f'light{k}', f'part{k}', 'own.a')};"
         yield "return all;"
 
     def _disk(self, each: Pass) -> Iterator[str]:

@@ -160,9 +160,12 @@ def _added(taps: Taps, level: int) -> tuple[tuple[str, int], ...]:
     """Return what the sum of a level adds, but for its last stage where that is at hand."""
     found = [("E", 0)] if level == 0 else []
     found += [(f"B{k + 1}", k + 1) for k, each in enumerate(taps.stages) if each.level == level]
-    if level == taps.stages[-1].level:
+    is_last = level == taps.stages[-1].level
+    if is_last:
         found.pop()
-    return tuple((name, row) for name, row in found if taps.blend[row].any())
+    added = tuple((name, row) for name, row in found if taps.blend[row].any())
+    # A sum of a coarser one takes its coverage from a picture of its own size.
+    return added if added or is_last else (found[0],)
 
 
 def _terms(taps: Taps, *, shared: bool) -> Iterator[Pass]:

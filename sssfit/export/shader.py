@@ -103,6 +103,8 @@ def _notes(tables: Sequence[Taps], style: Style, *, passes: bool) -> Iterator[st
         yield f"The passes have unit energy: multiply by {p}_ALBEDO, or by a texture's own albedo."
     if any(each.has_negative_weights for each in tables):
         yield "Some weights are negative: unsigned formats between the passes would cut light off."
+        if passes:
+            yield "Within a mask their sums may vanish, so keep coverage for other tables."
     if passes and tables[0].chained:
         yield "Half floats between the passes cost nothing that is seen. Linear light throughout."
 
@@ -113,6 +115,11 @@ def _check(tables: Sequence[Taps], style: Style) -> None:
     if style.has("DEPTH"):
         for each in tables:
             check_depth(each)
+    if style.has("COVERAGE") and any(each.has_negative_weights for each in tables):
+        raise KernelError(
+            "weights below 0 could make the sum of a pass vanish at a mask's border; export the "
+            "table without coverage, or fit one without such weights, such as a cascade."
+        )
     for each in tables[1:]:
         if (each.structure, each.channels, each.chained) != (
             first.structure,
