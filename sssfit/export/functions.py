@@ -313,7 +313,7 @@ class Functions:
         new, place = self.dialect.new, "0.5 * position * texel"
         yield f"{new('float4', 'coarse')} = {self._fetch(each.reads, place)};"
         yield f"{new('float', 'cover')} = {self._load(each.adds[0][0])}.a;"
-        part = self._all("coarse.a")
+        part = f"coarse.{'a' * len(self.taps.channels)}"
         coarse = self._call("Covered", f"coarse{self.rgb}", part, "cover")
         yield f"{new(self.light, 'light')} = {coarse}{self.rgb};"
 

@@ -142,7 +142,7 @@ def _defines(dialect: Dialect, style: Style) -> Iterator[str]:
         name = f"{p}_{each}"
         yield from (f"#ifndef {name}", f"#define {name} {int(each in style.features)}", "#endif")
     if style.has("DEPTH"):
-        yield f"#if {p}_DEPTH // what is near enough is divided by, as by coverage"
+        yield f"#if {p}_DEPTH // every pass then divides by what is near and covered"
         yield from (f"#undef {p}_COVERAGE", f"#define {p}_COVERAGE 1", "#endif")
 
 
