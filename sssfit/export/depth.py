@@ -62,7 +62,7 @@ class DepthFunctions(Functions):
         new = self.dialect.new
         arguments = [("uint", "stage"), ("float4", "there"), ("float", "depth"), ("float", "z")]
         return f"""
-// What a fetch keeps: exp(-(dz^2) / (2 v)), v the stage's variance; {self.prefix}_RATE is 1 / (2 v).
+// A fetch keeps exp(-(dz^2) / (2 v)), v the stage's variance; {self.prefix}_RATE is 1 / (2 v).
 {self._head(self.light, "Near", [*arguments, *self.profile])} {{
     {new("float", "dz")} = depth / max(there.a, 1e-20) - z;
     return exp(-{self._rate("stage")} * dz * dz);
