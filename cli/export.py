@@ -45,20 +45,17 @@ def export(context: click.Context, /, files: Any, form: str, common: Common, **g
     if len(files) > 1 and form in ("csv", "json"):
         raise click.UsageError(f"--format {form} takes one file, and {len(files)} are named.")
     if form == "csv":
-        name = profile_name(*files or [None])
-        text = csv_text(profile := load(Profile.read, name))
-        figures: dict[str, Any] = {
-            "profile": name,
-            "channels": profile.channels,
-            "annuli": profile.n_annuli,
-        }
+        names = files or [profile_name(None)]
+        text = csv_text(profile := load(Profile.read, names[0]))
+        figures: dict[str, Any] = {"channels": profile.channels, "annuli": profile.n_annuli}
     else:
         names = files or [kernel_name(None)]
         text, figures = kernel_text([load(read_kernel, each) for each in names], form, **settings)
-        name, figures = names[0], {"kernel": names[0], **figures}
-    path = target(given["output"], f"{stem_of(name)}.{form}")
+    what = "profile" if form == "csv" else "kernel"
+    figures = ({what: names[0]} if len(names) == 1 else {"kernels": names}) | figures
+    path = target(given["output"], f"{stem_of(names[0])}.{form}")
     ours = is_profile_csv if form == "csv" else partial(is_ours, form=form)
     kind = {"json": "a kernel", "csv": "a table"}.get(form, "source")
-    with held([path], ours, inputs=files, force=given["force"], named=(kind, f".{form}")):
+    with held([path], ours, inputs=names, force=given["force"], named=(kind, f".{form}")):
         write(text.encode(), path)
     finish_one(common, path, {"format": form, **figures}, "", kind.replace("a ", "the "))

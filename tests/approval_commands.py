@@ -1006,6 +1006,13 @@ EXPORT = [
     C("export wax.svd2.kernel.json --format hlsl -o foreign.hlsl"),
     C("export wax.svd2.kernel.json --format hlsl -o foreign.hlsl --force"),
     C("export wax.svd2.kernel.json --format json -o wax.svd2.kernel.json"),
+    C(
+        "export --format json -o wax.svd2.kernel.json",
+        set_up=_newest("wax.hand.taps.json", "wax.svd2.kernel.json"),
+        note="the newest is the output, too",
+    ),
+    C("export wax.hand.taps.json wax.hand.taps.json --format wgsl -o two.wgsl --json"),
+    C("export five.kernel.json --format c -o -"),
     C("export wax.svd2.kernel.json --format json -o wax.svd2.kernel.json --force"),
     C("export wax.profile.npz --format csv -o foreign.csv"),
     *(

@@ -12,7 +12,11 @@ import numpy as np
 import pytest
 
 from sssfit.cli import cli
+from sssfit.formats.pictures import load_image
+from sssfit.kernel import Taps
 from sssfit.material import parse_material
+from sssfit.measure.score import measure
+from sssfit.scene.made import make_scene
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -168,6 +172,23 @@ def test_the_readme_shows_ten_lines_of_its_session(session):
     assert excerpt in written
     assert len(excerpt.splitlines()) == 10
     assert "8 kB\nof HLSL" in README
+
+
+def test_the_readme_says_how_near_its_session_ends(session):
+    folder, _ = session
+    name = "skin1.exact.cascade24.taps.json"
+    files = ["-o", "own.exr", "--truth", "truth.exr"]
+    said = printed_by(["render", name, "--irradiance", "head", *files], folder)
+    own, truth = (load_image(folder / each).pixels for each in ("own.exr", "truth.exr"))
+    scene = make_scene("head", height=len(truth), width=truth.shape[1], mm_per_pixel=0.3)
+    unblurred = scene.irradiance * Taps.load(folder / name).energy
+    near, far = (measure(each, truth, mask=scene.mask) for each in (own, unblurred))
+    assert f"95th percentile {near.delta_e_2000_p95:.3g}" in said
+    words = " ".join(README.split())
+    assert (
+        f"is {far.delta_e_2000_p95:.2g} without blur and {near.delta_e_2000_p95:.2g} with the "
+        "cascade's 23 texture fetches"
+    ) in words
 
 
 def test_the_commands_of_the_readme_are_those_of_the_tutorial(session):

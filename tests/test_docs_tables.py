@@ -162,6 +162,14 @@ def rows_named(page, start):
     ]
 
 
+def test_readme_quotes_what_fetches_show():
+    readme = " ".join((ROOT / "README.md").read_text("utf-8").split())
+    budgets = {row[0]: row for row in table_with("how-to-choose.md", "fetches at most", "cascade")}
+    ours, published = budgets["24"][1], budgets["100"][2].split()[0]
+    assert f"the 99th percentile is {ours}, and the best published kernel at 100" in readme
+    assert f"fetches leaves {float(published):.1f}" in readme
+
+
 def test_readme_quotes_its_pages():
     """The README's table has the figures of the pages it links, cell by cell."""
     (total,) = rows_named("verification.md", "skin1 R: exact against the walk")

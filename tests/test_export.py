@@ -109,6 +109,17 @@ def test_hlsl_holds_every_constant_in_single_precision(channels):
     assert text.count("static const") == 6
 
 
+@pytest.mark.parametrize("channels", [1, 4, 5, 7])
+def test_c_has_a_row_for_each_pixel_and_any_number_of_channels(channels):
+    kernel = small_kernel(channels)
+    text = dense(kernel, DIALECTS["c"])
+    dims = f"[{channels}]" if channels > 1 else ""
+    (body,) = re.findall(rf"SSS_WEIGHT\[10\]{re.escape(dims)} = \{{(.*?)\}};", text, re.DOTALL)
+    found = [float(each) for each in re.findall(r"-?\d[\d.e+-]*(?=f)", body)]
+    wanted = kernel.weights.astype(np.float32).ravel()
+    np.testing.assert_array_equal(np.array(found, np.float32), wanted)
+
+
 def test_hlsl_has_the_fewest_digits_that_read_back():
     text = hlsl_of(small_kernel(weights=small_kernel().weights * [1e-9, 1.0, 1e6]))
     literals = re.findall(r"(?<!float)-?\b\d[\d.]*(?:e[+-]?\d+)?", text.split("static const", 1)[1])

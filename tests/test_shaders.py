@@ -496,5 +496,14 @@ def test_what_cannot_share_a_file_is_one_line():
     one, other = taps_of("1", channels=3), taps_of("2", channels=3)
     with pytest.raises(KernelError, match="fit them with the same stages"):
         kernel_text([one, other], "hlsl")
+    unlit = replace(one, blend=one.blend * [[0.0], [1.0]])  # without a share of the irradiance
+    for first, second in ((one, unlit), (unlit, one)):
+        with pytest.raises(KernelError, match="fit them with the same stages"):
+            kernel_text([first, second], "hlsl")
+    apart, shared = (taps_of("1-1", channels=3, chained=False) for _ in range(2))
+    same = replace(shared.stages[1], offsets_mm=shared.stages[0].offsets_mm)
+    shared = replace(shared, stages=(shared.stages[0], same))
+    with pytest.raises(KernelError, match="fit them with the same stages"):
+        kernel_text([shared, apart], "hlsl")
     with pytest.raises(KernelError, match="has 4 channels; passes are written for at most 3"):
         kernel_text(taps_of("1", channels=4), "wgsl")

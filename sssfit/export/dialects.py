@@ -1,6 +1,6 @@
 """The languages of tables and passes: how each declares, calls and fetches.
 
-A dialect is data; what is written in it stands in ``tables`` and ``functions``.
+A dialect is data; ``constants`` and ``functions`` write in it.
 """
 
 from collections.abc import Mapping, Sequence
@@ -67,9 +67,8 @@ class Dialect:
         numbers = [self.number.format(value=literal(each)) for each in values]
         if len(numbers) == 1:
             return numbers[0]
-        return self.vector.format(
-            kind=self.types[KINDS[len(numbers) - 1]], values=", ".join(numbers)
-        )
+        kind = self.types[KINDS[min(len(numbers), len(KINDS)) - 1]]  # of C, for any number
+        return self.vector.format(kind=kind, values=", ".join(numbers))
 
     def new(self, kind: str, name: str) -> str:
         """Return the left side of a variable's declaration."""

@@ -121,14 +121,10 @@ def _check(tables: Sequence[Taps], style: Style) -> None:
             "table without coverage, or fit one without such weights, such as a cascade."
         )
     for each in tables[1:]:
-        if (each.structure, each.channels, each.chained) != (
-            first.structure,
-            first.channels,
-            first.chained,
-        ):
+        if each.channels != first.channels or pass_list(each) != pass_list(first):
             raise KernelError(
-                f"tables of one file share their passes, and {each.structure} of "
-                f"{', '.join(each.channels)} is not {first.structure} of "
+                f"tables of one file share their passes, and those of {each.structure} of "
+                f"{', '.join(each.channels)} are not those of {first.structure} of "
                 f"{', '.join(first.channels)}; fit them with the same stages."
             )
 
