@@ -47,6 +47,7 @@ def run(
     prefix="SSS",
     half=False,
     frame=0,
+    jitter=False,
     profile=None,
     normalized=False,
 ):
@@ -55,6 +56,7 @@ def run(
     With depth (H, W) [mm] the source must follow it.
     """
     settings = {"cover": cover, "depth": depth, "prefix": prefix, "half": half, "frame": frame}
+    settings["jitter"] = jitter
     draws = _draws(
         text, dialect, taps, light, mm_per_pixel, profile=profile, normalized=normalized, **settings
     )
@@ -73,6 +75,7 @@ def prepared(text, dialect, taps, light, mm_per_pixel, *, normalized):
         "prefix": "SSS",
         "half": True,
         "frame": 0,
+        "jitter": False,
         "profile": None,
     }
     draws = list(
@@ -98,6 +101,7 @@ def _draws(
     prefix,
     half,
     frame,
+    jitter,
     profile,
     normalized,
 ):
@@ -118,7 +122,7 @@ def _draws(
         reads, number = each.pictures, each.stages[0]
         targets, draw = device.prepare(
             text,
-            _call(each, dialect, prefix, reads, number, frame, profile),
+            _call(each, dialect, prefix, reads, number, frame, jitter, profile),
             [pictures[name] for name in reads],
             size,
             [1.0 / side for side in pictures[reads[0]].size[:2]],
@@ -132,7 +136,7 @@ def _draws(
         yield targets, draw
 
 
-def _call(each, dialect, prefix, reads, number, frame, profile):
+def _call(each, dialect, prefix, reads, number, frame, jitter, profile):
     """The call of a pass's function in the words of a dialect."""
     vec2 = {"hlsl": "float2", "glsl": "vec2", "wgsl": "vec2f"}[dialect]
     pictures = [f"t{k}" for k in range(len(reads))]
@@ -144,7 +148,7 @@ def _call(each, dialect, prefix, reads, number, frame, profile):
         arguments = [*first, *arguments]
     if each.kind not in ("halve", "sum"):
         arguments.append("mm")
-    if each.kind == "disk":
+    if each.takes_frame(jitter=jitter):
         arguments.append(f"{frame}u")
     if profile is not None and (each.depths or each.kind != "halve"):
         arguments.append(f"{profile}u")
@@ -379,13 +383,12 @@ class _Vulkan:
         module = self.device.create_shader_module(
             code=wgsl_program(text, call, pictures, len(targets), prefix)
         )
-        kind = "unfilterable-float" if False else "float"
         stage = self.wgpu.ShaderStage.FRAGMENT
         entries = [
             {"binding": 0, "visibility": stage, "buffer": {"type": "uniform"}},
             {"binding": 1, "visibility": stage, "sampler": {"type": "filtering"}},
             *(
-                {"binding": 2 + k, "visibility": stage, "texture": {"sample_type": kind}}
+                {"binding": 2 + k, "visibility": stage, "texture": {"sample_type": "float"}}
                 for k in range(pictures)
             ),
         ]

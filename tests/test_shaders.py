@@ -20,6 +20,7 @@ from sssfit.export import DIALECTS, Style, kernel_text, source
 from sssfit.export.passes import fetches_of, pass_list
 from sssfit.export.through import through_table
 from sssfit.render import taps as renderer
+from sssfit.render.jitter import Jitter
 from sssfit.render.screen_taps import render_screen_taps
 from sssfit.render.taps import render_taps
 from sssfit.render.transmittance import beyond
@@ -103,6 +104,11 @@ def test_scenes(name, dialect, monkeypatch):
     assert apart(found, rendered(light, taps)) < 2e-3
 
 
+def disk_mask():
+    y, x = np.mgrid[:45, :50]
+    return (np.hypot(y - 20, x - 27) < 14).astype(float)
+
+
 def terms_of_one_pass():
     """Two terms with the same offsets, which share their first pass."""
     taps = taps_of("2-2", channels=3, chained=False)
@@ -121,8 +127,7 @@ def terms_of_one_pass():
 )
 def test_light_stays_within_a_mask(taps, dialect):
     light = light_of((45, 50), 3)
-    y, x = np.mgrid[:45, :50]
-    cover = (np.hypot(y - 20, x - 27) < 14).astype(float)
+    cover = disk_mask()
     style = Style(normalized=False, features=("COVERAGE",))
     text = source([taps], DIALECTS[dialect], style)
     found = run(text, dialect, taps, light, PITCH, cover=cover)
@@ -290,6 +295,63 @@ def test_a_disk_turns_as_in_the_renderer(frame, dialect):
     assert apart(found, rendered(light, taps, frame=frame)) < 1e-5
 
 
+JITTERED = Style(normalized=False, features=("JITTER",))
+MOVED = [  # one of each kind of pass, with stars beside them
+    *((each, taps_of(each, channels=3)) for each in ("3", "1-4|3", "*|1-*|2")),
+    ("terms", taps_of("2-1-4", channels=3, chained=False)),
+    ("terms of one pass", terms_of_one_pass()),
+    ("lines", turned("2-2-2", ["@0", "@60", "@120"], channels=3)),
+    ("turned", turned("1-1|1-2", ["@45", "@135", "x30", ""], channels=3)),
+]
+
+
+@pytest.mark.parametrize("dialect", RUN)
+@pytest.mark.parametrize(("name", "taps"), MOVED)
+def test_jittered_taps_lie_where_the_renderer_puts_them(name, taps, dialect):
+    light, text = light_of((37, 50), 3), source([taps], DIALECTS[dialect], JITTERED)
+    seen = []
+    for frame in (0, 3):
+        found = run(text, dialect, taps, light, PITCH, frame=frame, jitter=True)
+        wanted = rendered(light, taps, frame=frame, jitter=Jitter())
+        assert apart(found, wanted) < 1e-5, name
+        seen.append(wanted)
+    assert apart(*seen) > 1e-3
+    assert apart(seen[0], rendered(light, taps)) > 1e-3
+
+
+@pytest.mark.parametrize("dialect", RUN)
+def test_jittered_taps_stay_within_a_mask_and_follow_depth(dialect):
+    taps, light, cover = taps_of("1-4|3", channels=3), light_of((45, 50), 3), disk_mask()
+    style = Style(normalized=False, features=("COVERAGE", "JITTER"))
+    wanted = rendered(light, taps, coverage=cover, frame=2, jitter=Jitter())
+    view = {"cover": cover, "frame": 2, "jitter": True}
+    text = source([taps], DIALECTS[dialect], style)
+    found = run(text, dialect, taps, light, PITCH, **view)
+    assert apart(found * cover[..., None], wanted) < 1e-5
+    text = source([taps], DIALECTS[dialect], Style(normalized=False, features=("DEPTH", "JITTER")))
+    level = np.full(cover.shape, 300.0)
+    found = run(text, dialect, taps, light, PITCH / 300.0, depth=level, **view)
+    assert apart(found, wanted) < 1e-5
+
+
+@pytest.mark.parametrize("dialect", ["hlsl", "glsl"])  # the third has no preprocessor
+@pytest.mark.parametrize(("name", "taps"), MOVED)
+def test_jitter_can_be_switched_off(name, taps, dialect):
+    off = f"#define SSS_JITTER 0\n{source([taps], DIALECTS[dialect], JITTERED)}"
+    light = light_of((37, 50), 3)
+    found = run(off, dialect, taps, light, PITCH, frame=3, jitter=True)
+    assert apart(found, rendered(light, taps)) < 1e-5, name
+
+
+def test_jitter_is_in_no_source_that_did_not_ask_and_needs_taps_that_can_move():
+    for _, taps in TABLES:
+        assert "JITTER" not in kernel_text(taps, "hlsl")[0]
+    with pytest.raises(KernelError, match="a disk turns its fetches for each pixel already"):
+        kernel_text(disk_of(9), "hlsl", jitter=True)
+    with pytest.raises(KernelError, match=r"\*\|\* has stars alone, and jitter moves the outer"):
+        kernel_text(taps_of("*|*", channels=3), "hlsl", jitter=True)
+
+
 @pytest.mark.parametrize("dialect", RUN)
 def test_several_materials_in_one_table(dialect):
     every = [taps_of("1-1|2", channels=3, seed=seed) for seed in (3, 4)]
@@ -375,7 +437,7 @@ def test_light_through_a_thickness_is_written_where_it_is_asked_for():
     assert "\n#define SSS_TRANSMITTANCE 1\n" in kernel_text(taps, "hlsl", transmittance=True)[0]
 
 
-@pytest.mark.parametrize("switch", ["coverage", "depth", "transmittance"])
+@pytest.mark.parametrize("switch", ["coverage", "depth", "jitter", "transmittance"])
 def test_a_switch_needs_passes(switch):
     with pytest.raises(KernelError, match=f"{switch}: a switch of passes; have these written"):
         kernel_text(taps_of("1", channels=3), "hlsl", without_shader=True, **{switch: True})

@@ -81,6 +81,7 @@ def source_text(
     prefix: str = "SSS",
     coverage: bool = False,
     depth: bool = False,
+    jitter: bool = False,
     transmittance: bool = False,
     keep_energy: bool = False,
     half: bool = False,
@@ -101,6 +102,8 @@ def source_text(
         Whether light stays within a mask unless the shader says otherwise.
     depth : bool
         Whether fetches lose weight by their depth difference, too.
+    jitter : bool
+        Whether each pixel moves the outer taps of its passes, otherwise in each frame.
     transmittance : bool
         Whether there is a function for the light that comes through a thickness.
     keep_energy : bool
@@ -121,7 +124,12 @@ def source_text(
         pass has too many weights.
     """
     tables = [each for each in kernels if isinstance(each, Taps)]
-    asked = {"COVERAGE": coverage, "DEPTH": depth, "TRANSMITTANCE": transmittance}
+    asked = {
+        "COVERAGE": coverage,
+        "DEPTH": depth,
+        "JITTER": jitter,
+        "TRANSMITTANCE": transmittance,
+    }
     if any(asked.values()) and (without_shader or not (tables or with_shader or dense)):
         given = ", ".join(name.lower() for name, each in asked.items() if each)
         raise KernelError(f"{given}: a switch of passes; have these written, too.")
