@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from reference_taps import fetch, gathered, passes_of, turn_of
 from shader_runs import device_of, glsl_program, hlsl_source, needs, run, spirv_of
 from test_disk import disk_of
 from test_taps import signed_taps, taps_of
@@ -334,6 +335,37 @@ def test_jittered_taps_stay_within_a_mask_and_follow_depth(dialect):
     assert apart(found, wanted) < 1e-5
 
 
+@pytest.mark.parametrize("dialect", RUN)
+def test_jittered_taps_turn_on_a_tilted_surface(dialect):
+    """The outer pair turns in mm of the surface, where a pixel is twice as wide as it is high."""
+    line = replace(taps_of("3", channels=3).stages[0], kind="line")
+    taps = replace(taps_of("3", channels=3), stages=(line,))
+    style = Style(normalized=False, features=("JITTER",), tilted=True)
+    light = light_of((37, 25), 3)
+    text = source([taps], DIALECTS[dialect], style)
+    found = run(text, dialect, taps, light, (2.0 * PITCH, PITCH), frame=1, jitter=True)
+    at = turned_fetches(line, 7, 12, frame=1)
+    wanted = taps.blend[0] * light[12, 7]
+    for weights, down, right in at:
+        place = 12 + down / PITCH, 7 + right / (2.0 * PITCH)
+        wanted = wanted + taps.blend[1] * weights * [
+            fetch(light[..., c], *place, "clamp") for c in range(3)
+        ]
+    np.testing.assert_allclose(found[12, 7], wanted, rtol=1e-5)
+
+
+def turned_fetches(line, x, y, frame):
+    """Weights and places [mm], down and right, of the fetches of a jittered line of one pixel."""
+    jitter, pairs = Jitter(), len(line.offsets_mm)
+    angle = np.radians(jitter.degrees) * (turn_of(x, y, frame) / np.pi - 1.0)
+    longer = 1.0 + jitter.scale * (turn_of(x + 613, y + 977, frame) / np.pi - 1.0)
+    yield line.weights[0], 0.0, 0.0
+    for k, (offset, weights) in enumerate(zip(line.offsets_mm, line.weights[1:], strict=True)):
+        r, a = (offset, 0.0) if k < jitter.still(pairs) else (longer * offset, angle)
+        for side in (-r, r):
+            yield weights, side * np.sin(a), side * np.cos(a)
+
+
 @pytest.mark.parametrize("dialect", ["hlsl", "glsl"])  # the third has no preprocessor
 @pytest.mark.parametrize(("name", "taps"), MOVED)
 def test_jitter_can_be_switched_off(name, taps, dialect):
@@ -350,6 +382,62 @@ def test_jitter_is_in_no_source_that_did_not_ask_and_needs_taps_that_can_move():
         kernel_text(disk_of(9), "hlsl", jitter=True)
     with pytest.raises(KernelError, match=r"\*\|\* has stars alone, and jitter moves the outer"):
         kernel_text(taps_of("*|*", channels=3), "hlsl", jitter=True)
+
+
+STEEP = PITCH / np.cos(np.radians(60.0))  # mm that a pixel covers of a plane tilted by so much
+
+
+def along_axes(taps, right_mm, down_mm):
+    """The same blur on square pixels: a pass each, with offsets in mm of a pixel's own side."""
+    stages, blend = [], [taps.blend[0]]
+    for stage, share in zip(taps.stages, taps.blend[1:], strict=True):
+        for down, right in stage.directions:
+            steps = down / down_mm, right / right_mm
+            angle, longer = np.degrees(np.arctan2(*steps)), PITCH * np.hypot(*steps)
+            own = {"kind": "line", "angle_degrees": float(angle % 180.0)}
+            stages.append(replace(stage, offsets_mm=longer * stage.offsets_mm, **own))
+            blend.append(0.0 * share)
+        blend[-1] = share
+    return replace(taps, stages=tuple(stages), blend=np.array(blend))
+
+
+@pytest.mark.parametrize("dialect", RUN)
+@pytest.mark.parametrize("mm", [(STEEP, PITCH), (PITCH, STEEP)])
+@pytest.mark.parametrize(
+    "taps",
+    [
+        *(taps_of(each, channels=3) for each in ("3", "1-1|1-2|2-2")),
+        turned("1-1|1-2", ["@45", "@135", "x30", ""], channels=3),
+    ],
+)
+def test_a_plane_tilted_by_60_degrees(taps, mm, dialect):
+    """Offsets along either axis in mm of the surface, as passes of their own in the renderer."""
+    text = source([taps], DIALECTS[dialect], Style(normalized=False, tilted=True))
+    light = light_of((37, 50), 3)
+    found = run(text, dialect, taps, light, mm)
+    wanted = rendered(light, along_axes(taps, *mm))
+    assert apart(found, wanted) < 1e-5
+    facing = run(text, dialect, taps, light, (PITCH, PITCH))
+    assert apart(facing, rendered(light, taps)) < 1e-5
+    assert apart(facing, wanted) > 1e-2
+
+
+@pytest.mark.parametrize("dialect", RUN)
+def test_stars_on_a_tilted_plane(dialect):
+    taps, light = taps_of("*", channels=3), light_of((9, 11), 3)
+    text = source([taps], DIALECTS[dialect], Style(normalized=False, tilted=True))
+    found = run(text, dialect, taps, light, (STEEP, PITCH))
+    for c in range(3):
+        (fetches,) = passes_of(taps.stages[0], c, 1.0)
+        places = [(w, y / PITCH, x / STEEP) for w, y, x in fetches]
+        blurred = gathered(light[..., c], places, "clamp")
+        wanted = taps.blend[0, c] * light[..., c] + taps.blend[1, c] * blurred
+        assert apart(found[..., c], wanted) < 1e-5
+
+
+def test_a_slope_is_not_followed_twice():
+    with pytest.raises(KernelError, match="depth are narrower on a slope already; export with"):
+        kernel_text(taps_of("1", channels=3), "hlsl", depth=True, tilt=True)
 
 
 @pytest.mark.parametrize("dialect", RUN)
@@ -391,7 +479,7 @@ def through_of(text, dialect, channels, step_mm, *more):
     zeros = ", 0.0" * (4 - channels)
     device = device_of(dialect)
     (target,), draw = device.prepare(
-        text, f"{kind}(SSS_Through({call}){zeros})", [], (300, 1), (1.0, 1.0), 1.0,
+        text, f"{kind}(SSS_Through({call}){zeros})", [], (300, 1), (1.0, 1.0), (1.0, 1.0),
         count=1, onto=None, half=False, prefix="SSS",
     )  # fmt: skip
     draw(1.0)
@@ -437,7 +525,7 @@ def test_light_through_a_thickness_is_written_where_it_is_asked_for():
     assert "\n#define SSS_TRANSMITTANCE 1\n" in kernel_text(taps, "hlsl", transmittance=True)[0]
 
 
-@pytest.mark.parametrize("switch", ["coverage", "depth", "jitter", "transmittance"])
+@pytest.mark.parametrize("switch", ["coverage", "depth", "jitter", "tilt", "transmittance"])
 def test_a_switch_needs_passes(switch):
     with pytest.raises(KernelError, match=f"{switch}: a switch of passes; have these written"):
         kernel_text(taps_of("1", channels=3), "hlsl", without_shader=True, **{switch: True})
@@ -473,7 +561,7 @@ def assert_compiles(text, dialect, taps):
     reads = list(dict.fromkeys((last.reads, *(name for name, _ in last.adds))))
     pictures = [f"t{k}" for k in range(len(reads))]
     sampler = [] if dialect == "glsl" else ["bilinear"]
-    scale = [] if last.kind == "sum" else ["mm"]
+    scale = [] if last.kind == "sum" else ["mm.x"]
     call = f"SSS_{last.name}({', '.join([*pictures, *sampler, 'position', 'texel', *scale])})"
     make = glsl_program if dialect == "glsl" else hlsl_source
     with tempfile.TemporaryDirectory() as folder:

@@ -17,7 +17,6 @@ from sssfit.kernel import Taps
 
 MOST_CHANNELS = 3  # of a picture whose fourth one is coverage
 _FETCHED = (("sampler", "bilinear"), ("float2", "position"), ("float2", "texel"))
-_SCALE = ("float", "mm_per_pixel")
 _LONGEST = 80  # of the arguments of a function in one line
 _PER_PI = literal(1.0 / math.pi)
 # The hash pcg2d of the pixel turns a disk, 2654435769 = 2^32 / phi a frame (sssfit.render.disk).
@@ -48,6 +47,8 @@ class Functions:
         Whether the arrays hold several profiles, of which an argument names one.
     is_jittered : bool
         Whether pixels can move the outer taps of a pass, behind a switch.
+    is_tilted : bool
+        Whether a pixel has mm of its own along either side.
 
     Attributes
     ----------
@@ -71,6 +72,7 @@ class Functions:
         *,
         is_indexed: bool,
         is_jittered: bool = False,
+        is_tilted: bool = False,
     ) -> None:
         if len(taps.channels) > MOST_CHANNELS:
             raise KernelError(
@@ -80,6 +82,7 @@ class Functions:
         self.taps, self.dialect, self.prefix = taps, dialect, prefix
         self.profile = (("uint", "profile"),) if is_indexed else ()
         self.frame = (("uint", "frame"),) if is_jittered else ()
+        self.scale = "float2" if is_tilted else "float", "mm_per_pixel"
         self.light, self.rgb = KINDS[len(taps.channels) - 1], f".{'rgb'[: len(taps.channels)]}"
         self.passes = passes
         self.kinds = {each.kind for each in passes}
@@ -227,7 +230,7 @@ class Functions:
         numbers = (("uint", "stage"), ("float2", "axis"), ("picture", "picture"), *self.beside)
         return f"""
 // A pass of a stage: the middle, and mirrored pairs of bilinear fetches.
-{self._head("float4", "Blur", [*numbers, *_FETCHED, _SCALE, *self.frame, *self.profile])} {{
+{self._head("float4", "Blur", [*numbers, *_FETCHED, self.scale, *self.frame, *self.profile])} {{
 {self._begin("picture", f"{p}_SIZE[stage]", "axis")}
     {new("uint", "first")} = {p}_FIRST[stage];
     {new(self.light, "light")} = {middle} * own{self.rgb};
@@ -244,7 +247,7 @@ class Functions:
         numbers = (("uint", "stage"), ("picture", "picture"), *self.beside)
         return f"""
 // A stage in one pass: the middle, four diagonal fetches and four on the axes.
-{self._head("float4", "Star", [*numbers, *_FETCHED, _SCALE, *self.profile])} {{
+{self._head("float4", "Star", [*numbers, *_FETCHED, self.scale, *self.profile])} {{
 {self._begin("picture", f"{p}_SIZE[stage]")}
     {new("uint", "first")} = {p}_FIRST[stage];
 {self._nine()}
@@ -324,7 +327,7 @@ class Functions:
         several = len(each.stages) > 1
         make = self._terms if several else self._disk if each.kind == "disk" else self._sum
         arguments = [*(("picture", name) for name in each.pictures), *_FETCHED]
-        arguments += [] if each.kind == "sum" else [_SCALE]
+        arguments += [] if each.kind == "sum" else [self.scale]
         arguments += [("uint", "frame")] if each.takes_frame(jitter=bool(self.frame)) else []
         struct = self.dialect.struct.format(
             name=f"{self.prefix}_Terms", kind=self.dialect.types["float4"], count=len(each.stages)

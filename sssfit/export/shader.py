@@ -44,6 +44,8 @@ class Style:
         Whether numbers are rounded to half floats.
     features : tuple of str
         Of `FEATURES`: which are on where nothing else is said.
+    tilted : bool
+        Whether passes take the mm of a pixel along either side apart.
     """
 
     prefix: str = "SSS"
@@ -51,6 +53,7 @@ class Style:
     normalized: bool = True
     half: bool = False
     features: tuple[str, ...] = ()
+    tilted: bool = False
 
     def has(self, feature: str) -> bool:
         """Return whether a feature is on; depth is followed within coverage alone."""
@@ -81,6 +84,7 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
             normalized=style.normalized,
             depth=depth,
             jitter=style.has("JITTER"),
+            tilted=style.tilted,
         )
         if passes
         else how_to_run(tables[0])
@@ -99,6 +103,7 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
             style.prefix,
             is_indexed=len(tables) > 1,
             is_jittered=style.has("JITTER"),
+            is_tilted=style.tilted,
         )
         if style.has("TRANSMITTANCE"):
             lines += [
@@ -126,6 +131,11 @@ def _notes(tables: Sequence[Taps], style: Style, *, passes: bool) -> Iterator[st
 def _check(tables: Sequence[Taps], style: Style) -> None:
     check_prefix(style.prefix)
     first = tables[0]
+    if style.has("DEPTH") and style.tilted:
+        raise KernelError(
+            "passes that follow depth are narrower on a slope already; export with depth or with "
+            "tilt, not both."
+        )
     if style.has("DEPTH"):
         for each in tables:
             check_depth(each)
