@@ -440,6 +440,8 @@ _SOURCE = (
     Setting("prefix", "text", "what all names begin with.", "NAME", words="SSS"),
     Setting("coverage", "flag", "keep light within a mask, the fourth channel of the pictures."),
     Setting("depth", "flag", "follow depth: a fetch loses weight by its depth difference."),
+    Setting("jitter", "flag", "move the outer taps of a pass by pixel and frame, against bands."),
+    Setting("tilt", "flag", "take a pixel's mm right and down apart, for tilted surfaces."),
     Setting("transmittance", "flag", "add a function for the light through a thickness."),
     Setting("keep_energy", "flag", "leave the energy in the blend, not in a constant of its own."),
     Setting("half", "flag", "round to half floats, and say what that costs."),

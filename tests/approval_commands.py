@@ -987,6 +987,9 @@ EXPORT = [
     C("export wax.hand.taps.json --format wgsl --half --keep-energy -o -"),
     C("export wax.hand.taps.json --format hlsl --depth -o -"),
     C("export wax.hand.taps.json --format wgsl --transmittance -o -"),
+    C("export wax.hand.taps.json --format glsl --jitter -o -"),
+    C("export wax.hand.taps.json --format wgsl --tilt -o -"),
+    C("export wax.hand.taps.json --format wgsl --tilt --depth -o -"),
     C("export wax.hand.taps.json --format hlsl --depth --without-shader"),
     C("export wax.hand.taps.json --format c -o w.c"),
     C(

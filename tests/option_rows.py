@@ -1036,6 +1036,8 @@ EXPORT = {
     "--prefix": Row(_SOURCE, "--prefix WAX", _exported, _taps_source(prefix="WAX"), words="SSS"),
     "--coverage": Row(_SOURCE, "--coverage", _exported, _taps_source(coverage=True)),
     "--depth": Row(_SOURCE, "--depth", _exported, _taps_source(depth=True)),
+    "--jitter": Row(_SOURCE, "--jitter", _exported, _taps_source(jitter=True)),
+    "--tilt": Row(_SOURCE, "--tilt", _exported, _taps_source(tilt=True)),
     "--transmittance": Row(_SOURCE, "--transmittance", _exported, _taps_source(transmittance=True)),
     "--keep-energy": Row(_SOURCE, "--keep-energy", _exported, _taps_source(keep_energy=True)),
     "--half": Row(_SOURCE, "--half", _exported, _taps_source(half=True)),

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from reference_taps import fetch, gathered, passes_of, turn_of
 from shader_runs import device_of, glsl_program, hlsl_source, needs, run, spirv_of
 from test_disk import disk_of
 from test_taps import signed_taps, taps_of
@@ -20,6 +21,7 @@ from sssfit.export import DIALECTS, Style, kernel_text, source
 from sssfit.export.passes import fetches_of, pass_list
 from sssfit.export.through import through_table
 from sssfit.render import taps as renderer
+from sssfit.render.jitter import Jitter
 from sssfit.render.screen_taps import render_screen_taps
 from sssfit.render.taps import render_taps
 from sssfit.render.transmittance import beyond
@@ -110,6 +112,11 @@ def test_scenes(name, dialect, monkeypatch):
     assert apart(found, rendered(light, taps)) < 2e-3
 
 
+def disk_mask():
+    y, x = np.mgrid[:45, :50]
+    return (np.hypot(y - 20, x - 27) < 14).astype(float)
+
+
 def terms_of_one_pass():
     """Two terms with the same offsets, which share their first pass."""
     taps = taps_of("2-2", channels=3, chained=False)
@@ -128,8 +135,7 @@ def terms_of_one_pass():
 )
 def test_light_stays_within_a_mask(taps, dialect):
     light = light_of((45, 50), 3)
-    y, x = np.mgrid[:45, :50]
-    cover = (np.hypot(y - 20, x - 27) < 14).astype(float)
+    cover = disk_mask()
     style = Style(normalized=False, features=("COVERAGE",))
     text = source([taps], DIALECTS[dialect], style)
     found = run(text, dialect, taps, light, PITCH, cover=cover)
@@ -297,6 +303,150 @@ def test_a_disk_turns_as_in_the_renderer(frame, dialect):
     assert apart(found, rendered(light, taps, frame=frame)) < 1e-5
 
 
+JITTERED = Style(normalized=False, features=("JITTER",))
+MOVED = [  # one of each kind of pass, with stars beside them
+    *((each, taps_of(each, channels=3)) for each in ("3", "1-4|3", "*|1-*|2")),
+    ("terms", taps_of("2-1-4", channels=3, chained=False)),
+    ("terms of one pass", terms_of_one_pass()),
+    ("lines", turned("2-2-2", ["@0", "@60", "@120"], channels=3)),
+    ("turned", turned("1-1|1-2", ["@45", "@135", "x30", ""], channels=3)),
+]
+
+
+@pytest.mark.parametrize("dialect", RUN)
+@pytest.mark.parametrize(("name", "taps"), MOVED)
+def test_jittered_taps_lie_where_the_renderer_puts_them(name, taps, dialect):
+    light, text = light_of((37, 50), 3), source([taps], DIALECTS[dialect], JITTERED)
+    seen = []
+    for frame in (0, 3):
+        found = run(text, dialect, taps, light, PITCH, frame=frame, jitter=True)
+        wanted = rendered(light, taps, frame=frame, jitter=Jitter())
+        assert apart(found, wanted) < 1e-5, name
+        seen.append(wanted)
+    assert apart(*seen) > 1e-3
+    assert apart(seen[0], rendered(light, taps)) > 1e-3
+
+
+@pytest.mark.parametrize("dialect", RUN)
+def test_jittered_taps_stay_within_a_mask_and_follow_depth(dialect):
+    taps, light, cover = taps_of("1-4|3", channels=3), light_of((45, 50), 3), disk_mask()
+    style = Style(normalized=False, features=("COVERAGE", "JITTER"))
+    wanted = rendered(light, taps, coverage=cover, frame=2, jitter=Jitter())
+    view = {"cover": cover, "frame": 2, "jitter": True}
+    text = source([taps], DIALECTS[dialect], style)
+    found = run(text, dialect, taps, light, PITCH, **view)
+    assert apart(found * cover[..., None], wanted) < 1e-5
+    text = source([taps], DIALECTS[dialect], Style(normalized=False, features=("DEPTH", "JITTER")))
+    level = np.full(cover.shape, 300.0)
+    found = run(text, dialect, taps, light, PITCH / 300.0, depth=level, **view)
+    assert apart(found, wanted) < 1e-5
+
+
+@pytest.mark.parametrize("dialect", RUN)
+def test_jittered_taps_turn_on_a_tilted_surface(dialect):
+    """The outer pair turns in mm of the surface, where a pixel is twice as wide as it is high."""
+    line = replace(taps_of("3", channels=3).stages[0], kind="line")
+    taps = replace(taps_of("3", channels=3), stages=(line,))
+    style = Style(normalized=False, features=("JITTER",), tilted=True)
+    light = light_of((37, 25), 3)
+    text = source([taps], DIALECTS[dialect], style)
+    found = run(text, dialect, taps, light, (2.0 * PITCH, PITCH), frame=1, jitter=True)
+    at = turned_fetches(line, 7, 12, frame=1)
+    wanted = taps.blend[0] * light[12, 7]
+    for weights, down, right in at:
+        place = 12 + down / PITCH, 7 + right / (2.0 * PITCH)
+        wanted = wanted + taps.blend[1] * weights * [
+            fetch(light[..., c], *place, "clamp") for c in range(3)
+        ]
+    np.testing.assert_allclose(found[12, 7], wanted, rtol=1e-5)
+
+
+def turned_fetches(line, x, y, frame):
+    """Weights and places [mm], down and right, of the fetches of a jittered line of one pixel."""
+    jitter, pairs = Jitter(), len(line.offsets_mm)
+    angle = np.radians(jitter.degrees) * (turn_of(x, y, frame) / np.pi - 1.0)
+    longer = 1.0 + jitter.scale * (turn_of(x + 613, y + 977, frame) / np.pi - 1.0)
+    yield line.weights[0], 0.0, 0.0
+    for k, (offset, weights) in enumerate(zip(line.offsets_mm, line.weights[1:], strict=True)):
+        r, a = (offset, 0.0) if k < jitter.still(pairs) else (longer * offset, angle)
+        for side in (-r, r):
+            yield weights, side * np.sin(a), side * np.cos(a)
+
+
+@pytest.mark.parametrize("dialect", ["hlsl", "glsl"])  # the third has no preprocessor
+@pytest.mark.parametrize(("name", "taps"), MOVED)
+def test_jitter_can_be_switched_off(name, taps, dialect):
+    off = f"#define SSS_JITTER 0\n{source([taps], DIALECTS[dialect], JITTERED)}"
+    light = light_of((37, 50), 3)
+    found = run(off, dialect, taps, light, PITCH, frame=3, jitter=True)
+    assert apart(found, rendered(light, taps)) < 1e-5, name
+
+
+def test_jitter_is_in_no_source_that_did_not_ask_and_needs_taps_that_can_move():
+    for _, taps in TABLES:
+        assert "JITTER" not in kernel_text(taps, "hlsl")[0]
+    with pytest.raises(KernelError, match="a disk turns its fetches for each pixel already"):
+        kernel_text(disk_of(9), "hlsl", jitter=True)
+    with pytest.raises(KernelError, match=r"\*\|\* has stars alone, and jitter moves the outer"):
+        kernel_text(taps_of("*|*", channels=3), "hlsl", jitter=True)
+
+
+STEEP = PITCH / np.cos(np.radians(60.0))  # mm that a pixel covers of a plane tilted by so much
+
+
+def along_axes(taps, right_mm, down_mm):
+    """The same blur on square pixels: a pass each, with offsets in mm of a pixel's own side."""
+    stages, blend = [], [taps.blend[0]]
+    for stage, share in zip(taps.stages, taps.blend[1:], strict=True):
+        for down, right in stage.directions:
+            steps = down / down_mm, right / right_mm
+            angle, longer = np.degrees(np.arctan2(*steps)), PITCH * np.hypot(*steps)
+            own = {"kind": "line", "angle_degrees": float(angle % 180.0)}
+            stages.append(replace(stage, offsets_mm=longer * stage.offsets_mm, **own))
+            blend.append(0.0 * share)
+        blend[-1] = share
+    return replace(taps, stages=tuple(stages), blend=np.array(blend))
+
+
+@pytest.mark.parametrize("dialect", RUN)
+@pytest.mark.parametrize("mm", [(STEEP, PITCH), (PITCH, STEEP)])
+@pytest.mark.parametrize(
+    "taps",
+    [
+        *(taps_of(each, channels=3) for each in ("3", "1-1|1-2|2-2")),
+        turned("1-1|1-2", ["@45", "@135", "x30", ""], channels=3),
+    ],
+)
+def test_a_plane_tilted_by_60_degrees(taps, mm, dialect):
+    """Offsets along either axis in mm of the surface, as passes of their own in the renderer."""
+    text = source([taps], DIALECTS[dialect], Style(normalized=False, tilted=True))
+    light = light_of((37, 50), 3)
+    found = run(text, dialect, taps, light, mm)
+    wanted = rendered(light, along_axes(taps, *mm))
+    assert apart(found, wanted) < 1e-5
+    facing = run(text, dialect, taps, light, (PITCH, PITCH))
+    assert apart(facing, rendered(light, taps)) < 1e-5
+    assert apart(facing, wanted) > 1e-2
+
+
+@pytest.mark.parametrize("dialect", RUN)
+def test_stars_on_a_tilted_plane(dialect):
+    taps, light = taps_of("*", channels=3), light_of((9, 11), 3)
+    text = source([taps], DIALECTS[dialect], Style(normalized=False, tilted=True))
+    found = run(text, dialect, taps, light, (STEEP, PITCH))
+    for c in range(3):
+        (fetches,) = passes_of(taps.stages[0], c, 1.0)
+        places = [(w, y / PITCH, x / STEEP) for w, y, x in fetches]
+        blurred = gathered(light[..., c], places, "clamp")
+        wanted = taps.blend[0, c] * light[..., c] + taps.blend[1, c] * blurred
+        assert apart(found[..., c], wanted) < 1e-5
+
+
+def test_a_slope_is_not_followed_twice():
+    with pytest.raises(KernelError, match="depth are narrower on a slope already; export with"):
+        kernel_text(taps_of("1", channels=3), "hlsl", depth=True, tilt=True)
+
+
 @pytest.mark.parametrize("dialect", RUN)
 def test_several_materials_in_one_table(dialect):
     every = of_two_materials()
@@ -336,7 +486,7 @@ def through_of(text, dialect, channels, step_mm, *more):
     zeros = ", 0.0" * (4 - channels)
     device = device_of(dialect)
     (target,), draw = device.prepare(
-        text, f"{kind}(SSS_Through({call}){zeros})", [], (300, 1), (1.0, 1.0), 1.0,
+        text, f"{kind}(SSS_Through({call}){zeros})", [], (300, 1), (1.0, 1.0), (1.0, 1.0),
         count=1, onto=None, half=False, prefix="SSS",
     )  # fmt: skip
     draw(1.0)
@@ -382,7 +532,7 @@ def test_light_through_a_thickness_is_written_where_it_is_asked_for():
     assert "\n#define SSS_TRANSMITTANCE 1\n" in kernel_text(taps, "hlsl", transmittance=True)[0]
 
 
-@pytest.mark.parametrize("switch", ["coverage", "depth", "transmittance"])
+@pytest.mark.parametrize("switch", ["coverage", "depth", "jitter", "tilt", "transmittance"])
 def test_a_switch_needs_passes(switch):
     with pytest.raises(KernelError, match=f"{switch}: a switch of passes; have these written"):
         kernel_text(taps_of("1", channels=3), "hlsl", without_shader=True, **{switch: True})
@@ -418,7 +568,7 @@ def assert_compiles(text, dialect, taps):
     reads = list(dict.fromkeys((last.reads, *(name for name, _ in last.adds))))
     pictures = [f"t{k}" for k in range(len(reads))]
     sampler = [] if dialect == "glsl" else ["bilinear"]
-    scale = [] if last.kind == "sum" else ["mm"]
+    scale = [] if last.kind == "sum" else ["mm.x"]
     call = f"SSS_{last.name}({', '.join([*pictures, *sampler, 'position', 'texel', *scale])})"
     make = glsl_program if dialect == "glsl" else hlsl_source
     with tempfile.TemporaryDirectory() as folder:

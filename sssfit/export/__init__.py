@@ -133,6 +133,8 @@ def source_text(
     prefix: str = "SSS",
     coverage: bool = False,
     depth: bool = False,
+    jitter: bool = False,
+    tilt: bool = False,
     transmittance: bool = False,
     keep_energy: bool = False,
     half: bool = False,
@@ -153,6 +155,10 @@ def source_text(
         Whether light stays within a mask unless the shader says otherwise.
     depth : bool
         Whether fetches lose weight by their depth difference, too.
+    jitter : bool
+        Whether each pixel moves the outer taps of its passes, otherwise in each frame.
+    tilt : bool
+        Whether passes take the mm of a pixel along either side apart, for tilted surfaces.
     transmittance : bool
         Whether there is a function for the light that comes through a thickness.
     keep_energy : bool
@@ -173,9 +179,15 @@ def source_text(
         pass has too many weights.
     """
     tables = [each for each in kernels if isinstance(each, Taps)]
-    asked = {"COVERAGE": coverage, "DEPTH": depth, "TRANSMITTANCE": transmittance}
-    if any(asked.values()) and (without_shader or not (tables or with_shader or dense)):
-        given = ", ".join(name.lower() for name, each in asked.items() if each)
+    asked = {
+        "COVERAGE": coverage,
+        "DEPTH": depth,
+        "JITTER": jitter,
+        "TRANSMITTANCE": transmittance,
+    }
+    switches = {**asked, "TILT": tilt}
+    if any(switches.values()) and (without_shader or not (tables or with_shader or dense)):
+        given = ", ".join(name.lower() for name, each in switches.items() if each)
         raise KernelError(f"{given}: a switch of passes; have these written, too.")
     if not tables and len(kernels) == 1 and isinstance(kernels[0], SeparableKernel):
         if not (with_shader or dense):
@@ -189,6 +201,7 @@ def source_text(
         normalized=not keep_energy,
         half=half,
         features=tuple(name for name, given in asked.items() if given),
+        tilted=tilt,
     )
     if half:
         for each in tables:

@@ -54,7 +54,15 @@ def _distances(taps: Taps) -> str:
     )
 
 
-def pass_table(taps: Taps, prefix: str, *, normalized: bool, depth: bool = False) -> Iterator[str]:
+def pass_table(
+    taps: Taps,
+    prefix: str,
+    *,
+    normalized: bool,
+    depth: bool = False,
+    jitter: bool = False,
+    tilted: bool = False,
+) -> Iterator[str]:
     """Yield the passes as a table, and what their functions take."""
     passes = pass_list(taps, normalized=normalized, depth=depth)
     yield ""
@@ -74,6 +82,11 @@ def pass_table(taps: Taps, prefix: str, *, normalized: bool, depth: bool = False
         yield from _of_depth(passes)
     else:
         yield "2 d tan(fov / 2) / rows at depth d, divided by a pixel's own scale of the blur."
+    if tilted:
+        yield "Right and down apart: each is that times sqrt(1 + s^2), s the change of depth in mm"
+        yield "over as many mm along this side, from the neighbours' depth or ddx and ddy."
+    if any(each.takes_frame(jitter=jitter) for each in passes):
+        yield "frame: its number; each moves the fetches, so filter the result over time."
     yield "Sampler: bilinear, clamped. Alpha is coverage, and light is multiplied by it."
 
 

@@ -80,7 +80,7 @@ class DepthFunctions(Functions):
         return {self._nothing()};
     }}
     {new("float", "z")} = {self._load("depth")}.x / own.a; // mm from the eye
-    {new("float2", "per_mm")} = {axis}texel / (mm_per_pixel * {size} * z);"""
+{self._per_mm(f"(mm_per_pixel * {size} * z)", axis)}"""
         return "\n".join([flat[0], self._switched(on, "\n".join(flat[1:]))])
 
     def _added(self, place: str, weight: str, indent: str) -> str:

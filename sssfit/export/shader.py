@@ -13,6 +13,7 @@ from sssfit.export.constants import Writer, check_prefix
 from sssfit.export.depth import DepthFunctions, check_depth, depth_rates
 from sssfit.export.dialects import Dialect, mark
 from sssfit.export.functions import Functions
+from sssfit.export.jitter import check_jitter, jitter_lines
 from sssfit.export.passes import pass_list
 from sssfit.export.profiles import profile_constants
 from sssfit.export.through import ROWS, through_table
@@ -44,6 +45,8 @@ class Style:
         Whether numbers are rounded to half floats.
     features : tuple of str
         Of `FEATURES`: which are on where nothing else is said.
+    tilted : bool
+        Whether passes take the mm of a pixel along either side apart.
     """
 
     prefix: str = "SSS"
@@ -51,13 +54,14 @@ class Style:
     normalized: bool = True
     half: bool = False
     features: tuple[str, ...] = ()
+    tilted: bool = False
 
     def has(self, feature: str) -> bool:
         """Return whether a feature is on; depth is followed within coverage alone."""
         return feature in self.features or (feature == "COVERAGE" and "DEPTH" in self.features)
 
 
-FEATURES = ("COVERAGE", "DEPTH", "TRANSMITTANCE")
+FEATURES = ("COVERAGE", "DEPTH", "JITTER", "TRANSMITTANCE")
 _WITHOUT_BEING_ASKED = ("COVERAGE",)  # has few lines, so each source has them behind its switch
 
 
@@ -75,7 +79,14 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
     passes = dialect.has_passes and style.with_passes
     words = [line for each in tables for line in certificate(each)]
     words += (
-        pass_table(tables[0], style.prefix, normalized=style.normalized, depth=depth)
+        pass_table(
+            tables[0],
+            style.prefix,
+            normalized=style.normalized,
+            depth=depth,
+            jitter=style.has("JITTER"),
+            tilted=style.tilted,
+        )
         if passes
         else how_to_run(tables[0])
     )
@@ -86,7 +97,15 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
     if passes:
         listed = pass_list(tables[0], normalized=style.normalized, depth=depth)
         kind = DepthFunctions if depth else Functions
-        functions = kind(tables[0], listed, dialect, style.prefix, is_indexed=len(tables) > 1)
+        functions = kind(
+            tables[0],
+            listed,
+            dialect,
+            style.prefix,
+            is_indexed=len(tables) > 1,
+            is_jittered=style.has("JITTER"),
+            is_tilted=style.tilted,
+        )
         if style.has("TRANSMITTANCE"):
             lines += [
                 "",
@@ -113,9 +132,16 @@ def _notes(tables: Sequence[Taps], style: Style, *, passes: bool) -> Iterator[st
 def _check(tables: Sequence[Taps], style: Style) -> None:
     check_prefix(style.prefix)
     first = tables[0]
+    if style.has("DEPTH") and style.tilted:
+        raise KernelError(
+            "passes that follow depth are narrower on a slope already; export with depth or with "
+            "tilt, not both."
+        )
     if style.has("DEPTH"):
         for each in tables:
             check_depth(each)
+    if style.has("JITTER"):
+        check_jitter(first)
     if style.has("COVERAGE") and any(each.has_negative_weights for each in tables):
         raise KernelError(
             "weights below 0 could make the sum of a pass vanish at a mask's border; export the "
@@ -187,6 +213,7 @@ def _constants(
     yield write.wholes("FIRST", [0, *np.cumsum(counts).tolist()])
     places = [row for each in tables for row in _places(each)]
     yield from write.rows("PLACE_MM" if first.is_disk else "OFFSET_MM", places)
+    yield from jitter_lines(first, write) if passes and style.has("JITTER") else ()
     weights = [each.weights for table in tables for each in table.stages]
     yield from write.rows("WEIGHT", np.concatenate(weights).tolist())
     if passes and style.has("DEPTH"):
