@@ -140,6 +140,7 @@ def test_a_name_with_a_newline_stays_in_its_comment():
     text = taps_hlsl(taps_of(meta={"material": '"; }\n#include <x>', "settings": {}}))
     lines = text.splitlines()
     assert all(line.startswith(("// ", "static const", "    ", "};")) for line in lines)
+    assert "#include" not in text  # Babylon.js looks for it in comments too
 
 
 def test_a_document_is_the_file_with_a_comment():

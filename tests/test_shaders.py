@@ -649,6 +649,74 @@ def test_a_prefix_is_an_identifier(prefix):
         kernel_text(taps_of("1", channels=3), "glsl", prefix=prefix)
 
 
+@pytest.mark.parametrize("prefix", ["gl_SSS", "A_", "A__B"])
+def test_a_prefix_is_none_that_languages_reserve(prefix):
+    with pytest.raises(KernelError, match=r"prefix = .*; names that begin with gl_ or have two _"):
+        kernel_text(taps_of("1", channels=3), "glsl", prefix=prefix)
+
+
+def left_by_babylon(lines, defined):
+    """Yield the lines that Babylon.js leaves, as its shaderProcessor.ts read on 2026-11-27.
+
+    It finds directives anywhere in a line, takes a name alone as the question whether it is
+    defined, compares whole numbers, and ends statements at every semicolon, in comments too.
+    """
+    for line in lines:
+        word = re.search(r"#ifdef|#else|#elif|#endif|#ifndef|#if", line)
+        if word is None:
+            if line.startswith("#d"):
+                _, name, value = line.split(" ")
+                defined[name] = value
+            yield line
+        elif word[0] in ("#else", "#endif"):
+            yield word[0]
+            return
+        else:
+            on = is_true_to_babylon(line, defined)
+            kept = list(left_by_babylon(lines, defined if on else dict(defined)))
+            other = []
+            if kept[-1] == "#else":
+                other = list(left_by_babylon(lines, dict(defined) if on else defined))
+            yield from (kept if on else other or [""])[:-1]
+
+
+def is_true_to_babylon(line, defined):
+    """Whether a condition holds."""
+    command, condition = line.split("//")[0].strip().split(" ", 1)
+    if command != "#if":
+        return (condition in defined) == (command == "#ifdef")
+    if "==" not in condition:
+        return condition in defined
+    left, right = (int(defined.get(each, each)) for each in condition.split(" == "))
+    return left == right
+
+
+def split_by_babylon(text):
+    for line in text.split("\n"):
+        if line.startswith("#") or line.strip().startswith("//"):
+            yield line
+        else:
+            yield from re.findall(r"[^;]+;?", line.strip())
+
+
+@pytest.mark.parametrize("first", ["", "COVERAGE", "DEPTH", "JITTER"])
+@pytest.mark.parametrize("on", [0, 1])
+def test_preprocessors_read_the_switches_alike(first, on, tmp_path):
+    """That of C stands for those of GLSL and HLSL; that of Babylon.js is simpler."""
+    if shutil.which("gcc") is None:
+        pytest.skip("needs gcc")
+    taps = taps_of("1-1|2|*", channels=3, meta={"material": "#endif #if 0", "settings": {}})
+    more = {"depth": first == "DEPTH", "jitter": first == "JITTER", "transmittance": True}
+    text, _ = kernel_text(taps, "glsl", **more)
+    text = (f"#define SSS_{first} {on}\n" if first else "") + text
+    (tmp_path / "shader.c").write_text(text, encoding="utf-8")
+    command = ["gcc", "-E", "-P", "-undef", "shader.c"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    left = left_by_babylon(iter([*split_by_babylon(text), "#endif"]), {})
+    kept = (each.split("//")[0] for each in left if not each.startswith("#"))
+    assert "".join("".join(kept).split()) == "".join(done.stdout.split())
+
+
 def test_what_cannot_share_a_file_is_one_line():
     one, other = taps_of("1", channels=3), taps_of("2", channels=3)
     with pytest.raises(KernelError, match="fit them with the same stages"):

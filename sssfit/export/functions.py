@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 
 from sssfit.errors import KernelError
-from sssfit.export.dialects import KINDS, Dialect
+from sssfit.export.dialects import KINDS, Dialect, switch
 from sssfit.export.numbers import literal
 from sssfit.export.passes import Pass
 from sssfit.kernel import Taps
@@ -175,7 +175,7 @@ class Functions:
         least = self._all("1e-20")
         shown = f"{cover} * {light} / max({part}, {least})"
         return f"""\
-#if {self.prefix}_COVERAGE
+{switch(self.prefix, "COVERAGE")}
     return {self._whole(shown, cover)};
 #else
     return {self._whole(light, "1.0")};
@@ -205,7 +205,7 @@ class Functions:
         return f"{line}\n{self._if_jittered(f'{moved} * texel / {mm};')}"
 
     def _if_jittered(self, lines: str) -> str:
-        return f"#if {self.prefix}_JITTER\n{lines}\n#endif"
+        return f"{switch(self.prefix, 'JITTER')}\n{lines}\n#endif"
 
     def _away(self, index: str, stage: str) -> str:
         """Return the lines that find how far away a fetch lies, in texture coordinates."""

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 from sssfit.errors import KernelError
 from sssfit.export.constants import Writer
+from sssfit.export.dialects import switch
 from sssfit.kernel import Taps
 
 _MOVED = ("pair", "line")
@@ -38,7 +39,8 @@ def jitter_lines(taps: Taps, write: Writer) -> Iterator[str]:
         still = jitter.still(len(each.offsets_mm)) if each.kind in _MOVED else len(each.offsets_mm)
         outer.append(begin + 1 + still)
         begin += len(each.weights)
-    yield f"#if {write.prefix}_JITTER // of a pass the outer third, rounded up: from OUTER on"
+    yield switch(write.prefix, "JITTER")
+    yield "// Of a pass the outer third of the taps, rounded up: those from OUTER on."
     yield write.wholes("OUTER", outer)
     yield write.scalar("float", "JITTER_RADIANS", [math.radians(jitter.degrees)])
     yield write.scalar("float", "JITTER_SCALE", [jitter.scale])

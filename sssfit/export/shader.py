@@ -11,14 +11,13 @@ from sssfit.errors import KernelError
 from sssfit.export.certificate import certificate, how_to_run, pass_table
 from sssfit.export.constants import Writer, check_prefix
 from sssfit.export.depth import DepthFunctions, check_depth, depth_rates
-from sssfit.export.dialects import Dialect, mark
+from sssfit.export.dialects import Dialect, commented, mark, switch
 from sssfit.export.functions import Functions
 from sssfit.export.jitter import check_jitter, jitter_lines
 from sssfit.export.passes import pass_list
 from sssfit.export.profiles import profile_constants
 from sssfit.export.through import ROWS, through_table
 from sssfit.kernel import Taps
-from sssfit.messages import printable
 
 _COPIES = {
     "pair": 2.0,
@@ -91,7 +90,7 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
         else how_to_run(tables[0])
     )
     words += list(_notes(tables, style, passes=passes))
-    lines = [mark(dialect), *(f"// {printable(each)}".rstrip() for each in words)]
+    lines = [mark(dialect), *(commented(each) for each in words)]
     lines += _defines(dialect, style) if passes else []
     lines += _constants(tables, dialect, style, passes=passes)
     if passes:
@@ -165,7 +164,8 @@ def _defines(dialect: Dialect, style: Style) -> Iterator[str]:
         name = f"{p}_{each}"
         yield from (f"#ifndef {name}", f"#define {name} {int(each in style.features)}", "#endif")
     if style.has("DEPTH"):
-        yield f"#if {p}_DEPTH // every pass then divides by what is near and covered"
+        yield switch(p, "DEPTH")
+        yield "// Every pass then divides by what is near and covered."
         yield from (f"#undef {p}_COVERAGE", f"#define {p}_COVERAGE 1", "#endif")
 
 
@@ -227,7 +227,7 @@ def _constants(
 def _through(tables: Sequence[Taps], functions: Functions, write: Writer) -> Iterator[str]:
     """Yield the table of light through a thickness, and the function that reads it."""
     found, p = [through_table(each) for each in tables], write.prefix
-    yield f"#if {p}_TRANSMITTANCE"
+    yield switch(p, "TRANSMITTANCE")
     error = max(each.error for each in found)
     yield "// The share of light that comes through a thickness in mm, linear between the rows;"
     yield f"// the largest error is {error:.2g}, of 1. Multiply the light on the far side by it,"
