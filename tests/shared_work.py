@@ -16,6 +16,7 @@ import numpy as np
 
 import sssfit.choose.options
 import sssfit.compare.candidates
+import sssfit.fit._spectrum
 import sssfit.fit.cascade
 import sssfit.scene.head
 import sssfit.simulate.exact
@@ -25,22 +26,34 @@ OWN = {
     *("test_memory_order", "test_processes", "test_runner"),
 }
 _OWN_FITS = {"test_approved"}  # its clock counts how often it is asked, fits included
-# What these ask is how good a cascade is; the others fit dozens, and one start will do for them.
+# What these ask is how good a cascade is, and approvals have a shorter search of their own. The
+# others fit dozens, for which one start, few frequencies and short descents will do: a fifth of a
+# fit's time.
 LONG_SEARCHES = {
-    *("test_cascade", "test_disks_page", "test_docs", "test_docs_tables", "test_engines"),
-    *("test_frames", "test_motion", "test_readme_figures", "test_shading"),
+    *(
+        "test_approved",
+        "test_cascade",
+        "test_disks_page",
+        "test_docs",
+        "test_docs_tables",
+        "test_engines",
+    ),
+    *("test_engines", "test_frames", "test_motion", "test_readme_figures", "test_shading"),
 }
-_SEARCH = sssfit.fit.cascade._STARTS, sssfit.fit.cascade._HOPS
+_LONG = sssfit.fit.cascade._STARTS, sssfit.fit.cascade._HOPS, sssfit.fit._spectrum._FREQUENCIES
+_SHORT = 1, (), 28
+_MOST_STEPS, _LEAST_GAIN = 20, 0.02  # of a short search's descents
 _PLAIN = str | int | float | NoneType  # a setting that is a function, or a scene, is not shared
-_state = {"allowed": True, "fits": True}
+_state = {"allowed": True, "fits": True, "long": True}
 
 
 def allow(file):
     """Share from now on, unless this file of tests computes everything itself."""
     _state["allowed"] = file not in OWN
     _state["fits"] = _state["allowed"] and file not in _OWN_FITS
-    cascade = sssfit.fit.cascade
-    cascade._STARTS, cascade._HOPS = _SEARCH if file in LONG_SEARCHES else (1, ())
+    _state["long"] = file in LONG_SEARCHES
+    cascade, spectrum = sssfit.fit.cascade, sssfit.fit._spectrum
+    cascade._STARTS, cascade._HOPS, spectrum._FREQUENCIES = _LONG if _state["long"] else _SHORT
 
 
 @contextlib.contextmanager
@@ -55,13 +68,14 @@ def alone():
 
 
 def begin():
-    """Put all three in front of the real functions."""
+    """Put all three in front of the real functions, and short searches in place of long ones."""
     exact, head, fits = sssfit.simulate.exact, sssfit.scene.head, sssfit.compare.candidates
     exact._solve = _solved_once(exact._solve)
     head.head_scene = _lit_once(head.head_scene)
     fits.fit_separable = _fitted_once(fits.fit_separable)
     fits.fit_taps = _fitted_once(fits.fit_taps)
     sssfit.choose.options.fit_result = _fitted_once(sssfit.choose.options.fit_result)
+    sssfit.fit.cascade._descend = _shortened(sssfit.fit.cascade._descend)
 
 
 def _solved_once(real):
@@ -103,8 +117,7 @@ def _fitted_once(real):
         values = settings.values()
         if not _state["fits"] or not all(isinstance(each, _PLAIN) for each in values):
             return real(profile, method, **settings)
-        searches = sssfit.fit.cascade._STARTS, sssfit.fit.cascade._HOPS
-        key = _contents(profile), method, searches, *sorted(settings.items())
+        key = contents(profile), method, _state["long"], *sorted(settings.items())
         if key not in known:
             known[key] = real(profile, method, **settings)
         return known[key]
@@ -112,7 +125,17 @@ def _fitted_once(real):
     return fit
 
 
-def _contents(profile):
+def _shortened(real):
+    @functools.wraps(real)
+    def descend(chain, x, most, gain=3e-3):
+        if _state["long"]:
+            return real(chain, x, most, gain)
+        return real(chain, x, min(most, _MOST_STEPS), max(gain, _LEAST_GAIN))
+
+    return descend
+
+
+def contents(profile):
     """Everything in a profile, provenance included: a kernel takes over some of it."""
     fields = [getattr(profile, each.name) for each in dataclasses.fields(profile)]
     return tuple(
