@@ -29,9 +29,9 @@ from unittest import mock
 import approval_world as world
 import matplotlib.figure
 import rich.progress
+import shared_work
 from approval_figures import figure_lines
 from matplotlib.layout_engine import ConstrainedLayoutEngine
-from shared_work import contents as contents_of_profile
 
 import sssfit
 from sssfit.cli import main
@@ -177,7 +177,6 @@ def stand_ins(
     from sssfit import material, simulate
     from sssfit.choose import options, truth
     from sssfit.compare import pictures, sheet
-    from sssfit.fit import cascade
     from sssfit.measure import cost
 
     clock = Clock()
@@ -203,9 +202,7 @@ def stand_ins(
                 sheet.compute_sheet, functools.partial(sheet.compute_sheet, pixels=24, most_terms=2)
             ),
             mock.patch.object(pictures, "PIXELS", 13),
-            # A shorter search for cascades: choices fit dozens of them.
-            mock.patch.object(cascade, "_STARTS", 1),
-            mock.patch.object(cascade, "_HOPS", ()),
+            *(mock.patch.object(*each) for each in shared_work.SHORT),  # searches of cascades
             mock.patch.object(options, "fit_result", _fitted_once(options.fit_result, clock)),
             mock.patch.object(truth, "WALK_PHOTONS", 3000),
             mock.patch.object(truth, "COUNTS", (1000, 2000, 4000)),
@@ -223,7 +220,7 @@ def _fitted_once(real: Callable[..., TapsFit], clock: Clock) -> Callable[..., Ta
     """Fit an option of a choice to the same profile once; the clock goes on by every fit."""
 
     def fit(profile: Profile, method: str, **settings: Any) -> TapsFit:
-        key = contents_of_profile(profile), method, tuple(sorted(settings.items()))
+        key = shared_work.contents(profile), method, tuple(sorted(settings.items()))
         begun = clock.asked
         if key in _FITS:
             found, asked = _FITS[key]

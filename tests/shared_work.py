@@ -26,34 +26,35 @@ OWN = {
     *("test_memory_order", "test_processes", "test_runner"),
 }
 _OWN_FITS = {"test_approved"}  # its clock counts how often it is asked, fits included
-# What these ask is how good a cascade is, and approvals have a shorter search of their own. The
-# others fit dozens, for which one start, few frequencies and short descents will do: a fifth of a
-# fit's time.
+# What these ask is how good a cascade is. The others, approvals among them, fit dozens, and one
+# start, few frequencies and short descents will do for them: a fifth of the time.
 LONG_SEARCHES = {
-    *(
-        "test_approved",
-        "test_cascade",
-        "test_disks_page",
-        "test_docs",
-        "test_docs_tables",
-        "test_engines",
-    ),
-    *("test_engines", "test_frames", "test_motion", "test_readme_figures", "test_shading"),
+    *("test_cascade", "test_disks_page", "test_docs", "test_docs_tables", "test_engines"),
+    *("test_frames", "test_motion", "test_readme_figures", "test_shading"),
 }
-_LONG = sssfit.fit.cascade._STARTS, sssfit.fit.cascade._HOPS, sssfit.fit._spectrum._FREQUENCIES
-_SHORT = 1, (), 28
-_MOST_STEPS, _LEAST_GAIN = 20, 0.02  # of a short search's descents
 _PLAIN = str | int | float | NoneType  # a setting that is a function, or a scene, is not shared
-_state = {"allowed": True, "fits": True, "long": True}
+_state = {"allowed": True, "fits": True}
+
+
+def _short_descent(chain, x, most, gain=3e-3, real=sssfit.fit.cascade._descend):
+    return real(chain, x, min(most, 20), max(gain, 0.02))
+
+
+SHORT = (
+    (sssfit.fit.cascade, "_STARTS", 1),
+    (sssfit.fit.cascade, "_HOPS", ()),
+    (sssfit.fit.cascade, "_descend", _short_descent),
+    (sssfit.fit._spectrum, "_FREQUENCIES", 28),
+)
+_LONG = tuple((module, name, getattr(module, name)) for module, name, _ in SHORT)
 
 
 def allow(file):
     """Share from now on, unless this file of tests computes everything itself."""
     _state["allowed"] = file not in OWN
     _state["fits"] = _state["allowed"] and file not in _OWN_FITS
-    _state["long"] = file in LONG_SEARCHES
-    cascade, spectrum = sssfit.fit.cascade, sssfit.fit._spectrum
-    cascade._STARTS, cascade._HOPS, spectrum._FREQUENCIES = _LONG if _state["long"] else _SHORT
+    for module, name, value in _LONG if file in LONG_SEARCHES else SHORT:
+        setattr(module, name, value)
 
 
 @contextlib.contextmanager
@@ -68,14 +69,13 @@ def alone():
 
 
 def begin():
-    """Put all three in front of the real functions, and short searches in place of long ones."""
+    """Put all three in front of the real functions."""
     exact, head, fits = sssfit.simulate.exact, sssfit.scene.head, sssfit.compare.candidates
     exact._solve = _solved_once(exact._solve)
     head.head_scene = _lit_once(head.head_scene)
     fits.fit_separable = _fitted_once(fits.fit_separable)
     fits.fit_taps = _fitted_once(fits.fit_taps)
     sssfit.choose.options.fit_result = _fitted_once(sssfit.choose.options.fit_result)
-    sssfit.fit.cascade._descend = _shortened(sssfit.fit.cascade._descend)
 
 
 def _solved_once(real):
@@ -117,22 +117,12 @@ def _fitted_once(real):
         values = settings.values()
         if not _state["fits"] or not all(isinstance(each, _PLAIN) for each in values):
             return real(profile, method, **settings)
-        key = contents(profile), method, _state["long"], *sorted(settings.items())
+        key = contents(profile), method, sssfit.fit.cascade._STARTS, *sorted(settings.items())
         if key not in known:
             known[key] = real(profile, method, **settings)
         return known[key]
 
     return fit
-
-
-def _shortened(real):
-    @functools.wraps(real)
-    def descend(chain, x, most, gain=3e-3):
-        if _state["long"]:
-            return real(chain, x, most, gain)
-        return real(chain, x, min(most, _MOST_STEPS), max(gain, _LEAST_GAIN))
-
-    return descend
 
 
 def contents(profile):
