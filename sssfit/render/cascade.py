@@ -18,8 +18,7 @@ from sssfit.render.borders import source_indices
 
 FloatArray = npt.NDArray[np.floating[Any]]
 
-_ROWS = 128  # of a block, even; a block computes twice its stages' reach of rows more
-_CHUNK = 1536  # numbers of a row that the sums take at a time: 6 kB of each row of weights
+_ROWS = 256  # of a block, even; a block computes twice its stages' reach of rows more
 
 
 def is_quick(taps: Taps) -> bool:
@@ -57,14 +56,16 @@ def apply_cascade(
             total = np.empty_like(current)
             half = _half_of(current, channels, wanted=level < taps.stages[-1].level)
             given = _numbers(taps, level, mm_per_pixel, current, channels)
-            _run_blocks(pool, len(current), run_level, current, total, half, *given, channels)
+            is_packed = level == 0
+            _run_blocks(pool, len(current), run_level, current, total, half, *given, is_packed)
             sums.append(total)
             current = half
         for fine in range(len(sums) - 2, -1, -1):
             height, width = sums[fine + 1].shape
             places = (source_indices(n, 1, "mirror") for n in (height, width // channels))
-            whole = len(sums[fine])
-            _run_blocks(pool, whole, add_doubled, sums[fine], sums[fine + 1], *places, channels)
+            both = sums[fine], sums[fine + 1]
+            whole, is_packed = len(sums[fine]), fine == 0
+            _run_blocks(pool, whole, add_doubled, *both, *places, channels, is_packed)
     return sums[0].reshape(pixels.shape)
 
 
@@ -85,19 +86,18 @@ def _numbers(
     lines = [_line(each, mm_per_pixel * 2.0**level) for each in stages]
     reach = np.array([at.max() for at, _ in lines])
     many = np.array([len(at) for at, _ in lines])
-    chunk = max(_CHUNK // channels, 1)
     at = np.zeros((len(stages), many.max()), np.intp)
-    weights = np.zeros((len(stages), many.max() + 1, chunk * channels), picture.dtype)
+    weights = np.zeros((len(stages), many.max() + 1, channels), picture.dtype)
     for s, (own, each) in enumerate(lines):
         at[s, : len(own)] = own
-        weights[s, : len(each)] = np.tile(each, chunk)
+        weights[s, : len(each)] = each
     shares = taps.blend[before : before + len(stages) + 1].copy()
     if level > 0:  # what it is halved from is part of the finer sum
         shares[0] = 0.0
     height, width = picture.shape[0], picture.shape[1] // channels
     rows = source_indices(height, 2 * int(reach.sum()) + 1, "mirror")
     columns = source_indices(width, int(reach.max()) + 1, "mirror")
-    return rows, columns, reach, many, at, weights, np.tile(shares, chunk).astype(picture.dtype)
+    return rows, columns, reach, many, at, weights, shares.astype(picture.dtype)
 
 
 def _line(stage: Stage, mm_per_texel: float) -> tuple[npt.NDArray[np.intp], FloatArray]:
