@@ -59,6 +59,15 @@ def test_offsets_far_apart_and_within_a_texel():
         )
 
 
+def test_a_picture_that_must_not_be_written_is_not():
+    for structure in ("1", "1|1"):
+        taps = taps_of(structure, channels=3)
+        picture = np.random.default_rng(24).uniform(size=(6, 9, 3))
+        expected = apply_cascade(picture, taps, PITCH)
+        picture.flags.writeable = False
+        np.testing.assert_array_equal(apply_cascade(picture, taps, PITCH), expected)
+
+
 def test_only_chains_of_pairs_are_quick():
     assert is_quick(taps_of("1-2|1"))
     assert not is_quick(taps_of("1-2", chained=False))
