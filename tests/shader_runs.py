@@ -47,14 +47,16 @@ def run(
     prefix="SSS",
     half=False,
     frame=0,
+    jitter=False,
     profile=None,
     normalized=False,
 ):
     """The result (H, W, C) of exported source on light (H, W, C), with clamped borders.
 
-    With depth (H, W) [mm] the source must follow it.
+    With depth (H, W) [mm] the source must follow it; with mm a pixel (right, down) take them apart.
     """
     settings = {"cover": cover, "depth": depth, "prefix": prefix, "half": half, "frame": frame}
+    settings["jitter"] = jitter
     draws = _draws(
         text, dialect, taps, light, mm_per_pixel, profile=profile, normalized=normalized, **settings
     )
@@ -73,6 +75,7 @@ def prepared(text, dialect, taps, light, mm_per_pixel, *, normalized):
         "prefix": "SSS",
         "half": True,
         "frame": 0,
+        "jitter": False,
         "profile": None,
     }
     draws = list(
@@ -98,6 +101,7 @@ def _draws(
     prefix,
     half,
     frame,
+    jitter,
     profile,
     normalized,
 ):
@@ -113,16 +117,17 @@ def _draws(
     if depth is not None:
         deep = np.repeat((depth * cover)[..., None], 4, axis=2).astype(np.float32)
         pictures["D0"] = device.picture(deep, half=False)
+    mm = "mm.x" if np.isscalar(mm_per_pixel) else "mm"
     for each in pass_list(taps, normalized=normalized, depth=depth is not None):
         size = [-(-side // 2**each.level) for side in (width, height)]
         reads, number = each.pictures, each.stages[0]
         targets, draw = device.prepare(
             text,
-            _call(each, dialect, prefix, reads, number, frame, profile),
+            _call(each, dialect, prefix, reads, number, frame, jitter, profile, mm),
             [pictures[name] for name in reads],
             size,
             [1.0 / side for side in pictures[reads[0]].size[:2]],
-            mm_per_pixel,
+            np.broadcast_to(mm_per_pixel, 2).tolist(),
             count=len(each.writes),
             onto=pictures.get(each.writes[0]) if each.is_added else None,
             half=half and each.writes[0] != "M0",
@@ -132,7 +137,7 @@ def _draws(
         yield targets, draw
 
 
-def _call(each, dialect, prefix, reads, number, frame, profile):
+def _call(each, dialect, prefix, reads, number, frame, jitter, profile, mm):
     """The call of a pass's function in the words of a dialect."""
     vec2 = {"hlsl": "float2", "glsl": "vec2", "wgsl": "vec2f"}[dialect]
     pictures = [f"t{k}" for k in range(len(reads))]
@@ -143,8 +148,8 @@ def _call(each, dialect, prefix, reads, number, frame, profile):
         first = [f"{number}u", *([f"{vec2}{axis}"] if axis else [])]
         arguments = [*first, *arguments]
     if each.kind not in ("halve", "sum"):
-        arguments.append("mm")
-    if each.kind == "disk":
+        arguments.append(mm)
+    if each.takes_frame(jitter=jitter):
         arguments.append(f"{frame}u")
     if profile is not None and (each.depths or each.kind != "halve"):
         arguments.append(f"{profile}u")
@@ -218,7 +223,7 @@ class _OpenGL:
                 if isinstance(each, self.gl.Uniform) and name.endswith("texel"):
                     each.value = tuple(texel)
                 elif isinstance(each, self.gl.Uniform) and name.endswith("mm"):
-                    each.value = mm
+                    each.value = tuple(mm)
             if onto is not None:
                 self.context.enable(self.gl.BLEND)
                 self.context.blend_func = self.gl.ONE, self.gl.ONE
@@ -251,7 +256,7 @@ def glsl_program(text, call, pictures, count, prefix):
             f" out{k} = all.term[{k}];" for k in range(count)
         )
     return (
-        f"#version 450\n{text}\n{textures}uniform vec2 texel;\nuniform float mm;\n{outs}"
+        f"#version 450\n{text}\n{textures}uniform vec2 texel;\nuniform vec2 mm;\n{outs}"
         f"void main() {{ vec2 position = gl_FragCoord.xy; {body} }}"
     )
 
@@ -266,7 +271,7 @@ def hlsl_source(text, call, pictures, count, prefix):
             f" o.out{k} = all.term[{k}];" for k in range(count)
         )
     return (
-        f"{text}\n{textures}SamplerState bilinear;\nuniform float2 texel;\nuniform float mm;\n"
+        f"{text}\n{textures}SamplerState bilinear;\nuniform float2 texel;\nuniform float2 mm;\n"
         f"struct Out {{ {outs}}};\nOut main(float4 at : SV_Position) {{\n"
         f"float2 position = at.xy; Out o; {body} return o; }}"
     )
@@ -353,7 +358,7 @@ class _Vulkan:
             self.pipelines[key] = self._pipeline(text, call, len(pictures), targets, onto, prefix)
         pipeline = self.pipelines[key]
         view = self.device.create_buffer_with_data(
-            data=struct.pack("ffff", *texel, mm, 0.0), usage=self.wgpu.BufferUsage.UNIFORM
+            data=struct.pack("ffff", *texel, *mm), usage=self.wgpu.BufferUsage.UNIFORM
         )
         own = [{"binding": 0, "resource": {"buffer": view, "offset": 0, "size": 16}}]
         own.append({"binding": 1, "resource": self.sampler})
@@ -379,13 +384,12 @@ class _Vulkan:
         module = self.device.create_shader_module(
             code=wgsl_program(text, call, pictures, len(targets), prefix)
         )
-        kind = "unfilterable-float" if False else "float"
         stage = self.wgpu.ShaderStage.FRAGMENT
         entries = [
             {"binding": 0, "visibility": stage, "buffer": {"type": "uniform"}},
             {"binding": 1, "visibility": stage, "sampler": {"type": "filtering"}},
             *(
-                {"binding": 2 + k, "visibility": stage, "texture": {"sample_type": kind}}
+                {"binding": 2 + k, "visibility": stage, "texture": {"sample_type": "float"}}
                 for k in range(pictures)
             ),
         ]
@@ -416,7 +420,7 @@ def wgsl_program(text, call, pictures, count, prefix):
     if count > 1:
         body = f"var all = {call};" + "".join(f" o.out{k} = all.term[{k}];" for k in range(count))
     return f"""{text}
-struct View {{ texel: vec2f, mm: f32 }}
+struct View {{ texel: vec2f, mm: vec2f }}
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var bilinear: sampler;
 {textures}struct Out {{ {outs} }}

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from reference_taps import fetch, gathered, passes_of, turn_of
 from shader_runs import device_of, glsl_program, hlsl_source, needs, run, spirv_of
 from test_disk import disk_of
 from test_taps import signed_taps, taps_of
@@ -20,6 +21,7 @@ from sssfit.export import DIALECTS, Style, kernel_text, source
 from sssfit.export.passes import fetches_of, pass_list
 from sssfit.export.through import through_table
 from sssfit.render import taps as renderer
+from sssfit.render.jitter import Jitter
 from sssfit.render.screen_taps import render_screen_taps
 from sssfit.render.taps import render_taps
 from sssfit.render.transmittance import beyond
@@ -44,6 +46,13 @@ TABLES = [  # one of each kind
 
 def light_of(size, channels, seed=1):
     return np.random.default_rng(seed).random((*size, channels))
+
+
+def of_two_materials():
+    return [
+        taps_of("1-1|2", channels=3, seed=seed, meta={"material": name})
+        for seed, name in ((3, "wax"), (4, "leaf"))
+    ]
 
 
 def rendered(light, taps, **more):
@@ -103,6 +112,11 @@ def test_scenes(name, dialect, monkeypatch):
     assert apart(found, rendered(light, taps)) < 2e-3
 
 
+def disk_mask():
+    y, x = np.mgrid[:45, :50]
+    return (np.hypot(y - 20, x - 27) < 14).astype(float)
+
+
 def terms_of_one_pass():
     """Two terms with the same offsets, which share their first pass."""
     taps = taps_of("2-2", channels=3, chained=False)
@@ -121,8 +135,7 @@ def terms_of_one_pass():
 )
 def test_light_stays_within_a_mask(taps, dialect):
     light = light_of((45, 50), 3)
-    y, x = np.mgrid[:45, :50]
-    cover = (np.hypot(y - 20, x - 27) < 14).astype(float)
+    cover = disk_mask()
     style = Style(normalized=False, features=("COVERAGE",))
     text = source([taps], DIALECTS[dialect], style)
     found = run(text, dialect, taps, light, PITCH, cover=cover)
@@ -225,7 +238,7 @@ def test_depth_can_be_switched_off(name, taps, dialect):
 
 @pytest.mark.parametrize("dialect", RUN)
 def test_depth_of_several_materials(dialect):
-    every = [taps_of("1-1|2", channels=3, seed=seed) for seed in (3, 4)]
+    every = of_two_materials()
     text, _ = kernel_text(every, dialect, depth=True, keep_energy=True)
     scene = step_of()
     light, cover = np.repeat(scene.irradiance, 3, axis=2), (scene.mask > 0).astype(float)
@@ -290,9 +303,153 @@ def test_a_disk_turns_as_in_the_renderer(frame, dialect):
     assert apart(found, rendered(light, taps, frame=frame)) < 1e-5
 
 
+JITTERED = Style(normalized=False, features=("JITTER",))
+MOVED = [  # one of each kind of pass, with stars beside them
+    *((each, taps_of(each, channels=3)) for each in ("3", "1-4|3", "*|1-*|2")),
+    ("terms", taps_of("2-1-4", channels=3, chained=False)),
+    ("terms of one pass", terms_of_one_pass()),
+    ("lines", turned("2-2-2", ["@0", "@60", "@120"], channels=3)),
+    ("turned", turned("1-1|1-2", ["@45", "@135", "x30", ""], channels=3)),
+]
+
+
+@pytest.mark.parametrize("dialect", RUN)
+@pytest.mark.parametrize(("name", "taps"), MOVED)
+def test_jittered_taps_lie_where_the_renderer_puts_them(name, taps, dialect):
+    light, text = light_of((37, 50), 3), source([taps], DIALECTS[dialect], JITTERED)
+    seen = []
+    for frame in (0, 3):
+        found = run(text, dialect, taps, light, PITCH, frame=frame, jitter=True)
+        wanted = rendered(light, taps, frame=frame, jitter=Jitter())
+        assert apart(found, wanted) < 1e-5, name
+        seen.append(wanted)
+    assert apart(*seen) > 1e-3
+    assert apart(seen[0], rendered(light, taps)) > 1e-3
+
+
+@pytest.mark.parametrize("dialect", RUN)
+def test_jittered_taps_stay_within_a_mask_and_follow_depth(dialect):
+    taps, light, cover = taps_of("1-4|3", channels=3), light_of((45, 50), 3), disk_mask()
+    style = Style(normalized=False, features=("COVERAGE", "JITTER"))
+    wanted = rendered(light, taps, coverage=cover, frame=2, jitter=Jitter())
+    view = {"cover": cover, "frame": 2, "jitter": True}
+    text = source([taps], DIALECTS[dialect], style)
+    found = run(text, dialect, taps, light, PITCH, **view)
+    assert apart(found * cover[..., None], wanted) < 1e-5
+    text = source([taps], DIALECTS[dialect], Style(normalized=False, features=("DEPTH", "JITTER")))
+    level = np.full(cover.shape, 300.0)
+    found = run(text, dialect, taps, light, PITCH / 300.0, depth=level, **view)
+    assert apart(found, wanted) < 1e-5
+
+
+@pytest.mark.parametrize("dialect", RUN)
+def test_jittered_taps_turn_on_a_tilted_surface(dialect):
+    """The outer pair turns in mm of the surface, where a pixel is twice as wide as it is high."""
+    line = replace(taps_of("3", channels=3).stages[0], kind="line")
+    taps = replace(taps_of("3", channels=3), stages=(line,))
+    style = Style(normalized=False, features=("JITTER",), tilted=True)
+    light = light_of((37, 25), 3)
+    text = source([taps], DIALECTS[dialect], style)
+    found = run(text, dialect, taps, light, (2.0 * PITCH, PITCH), frame=1, jitter=True)
+    at = turned_fetches(line, 7, 12, frame=1)
+    wanted = taps.blend[0] * light[12, 7]
+    for weights, down, right in at:
+        place = 12 + down / PITCH, 7 + right / (2.0 * PITCH)
+        wanted = wanted + taps.blend[1] * weights * [
+            fetch(light[..., c], *place, "clamp") for c in range(3)
+        ]
+    np.testing.assert_allclose(found[12, 7], wanted, rtol=1e-5)
+
+
+def turned_fetches(line, x, y, frame):
+    """Weights and places [mm], down and right, of the fetches of a jittered line of one pixel."""
+    jitter, pairs = Jitter(), len(line.offsets_mm)
+    angle = np.radians(jitter.degrees) * (turn_of(x, y, frame) / np.pi - 1.0)
+    longer = 1.0 + jitter.scale * (turn_of(x + 613, y + 977, frame) / np.pi - 1.0)
+    yield line.weights[0], 0.0, 0.0
+    for k, (offset, weights) in enumerate(zip(line.offsets_mm, line.weights[1:], strict=True)):
+        r, a = (offset, 0.0) if k < jitter.still(pairs) else (longer * offset, angle)
+        for side in (-r, r):
+            yield weights, side * np.sin(a), side * np.cos(a)
+
+
+@pytest.mark.parametrize("dialect", ["hlsl", "glsl"])  # the third has no preprocessor
+@pytest.mark.parametrize(("name", "taps"), MOVED)
+def test_jitter_can_be_switched_off(name, taps, dialect):
+    off = f"#define SSS_JITTER 0\n{source([taps], DIALECTS[dialect], JITTERED)}"
+    light = light_of((37, 50), 3)
+    found = run(off, dialect, taps, light, PITCH, frame=3, jitter=True)
+    assert apart(found, rendered(light, taps)) < 1e-5, name
+
+
+def test_jitter_is_in_no_source_that_did_not_ask_and_needs_taps_that_can_move():
+    for _, taps in TABLES:
+        assert "JITTER" not in kernel_text(taps, "hlsl")[0]
+    with pytest.raises(KernelError, match="a disk turns its fetches for each pixel already"):
+        kernel_text(disk_of(9), "hlsl", jitter=True)
+    with pytest.raises(KernelError, match=r"\*\|\* has stars alone, and jitter moves the outer"):
+        kernel_text(taps_of("*|*", channels=3), "hlsl", jitter=True)
+
+
+STEEP = PITCH / np.cos(np.radians(60.0))  # mm that a pixel covers of a plane tilted by so much
+
+
+def along_axes(taps, right_mm, down_mm):
+    """The same blur on square pixels: a pass each, with offsets in mm of a pixel's own side."""
+    stages, blend = [], [taps.blend[0]]
+    for stage, share in zip(taps.stages, taps.blend[1:], strict=True):
+        for down, right in stage.directions:
+            steps = down / down_mm, right / right_mm
+            angle, longer = np.degrees(np.arctan2(*steps)), PITCH * np.hypot(*steps)
+            own = {"kind": "line", "angle_degrees": float(angle % 180.0)}
+            stages.append(replace(stage, offsets_mm=longer * stage.offsets_mm, **own))
+            blend.append(0.0 * share)
+        blend[-1] = share
+    return replace(taps, stages=tuple(stages), blend=np.array(blend))
+
+
+@pytest.mark.parametrize("dialect", RUN)
+@pytest.mark.parametrize("mm", [(STEEP, PITCH), (PITCH, STEEP)])
+@pytest.mark.parametrize(
+    "taps",
+    [
+        *(taps_of(each, channels=3) for each in ("3", "1-1|1-2|2-2")),
+        turned("1-1|1-2", ["@45", "@135", "x30", ""], channels=3),
+    ],
+)
+def test_a_plane_tilted_by_60_degrees(taps, mm, dialect):
+    """Offsets along either axis in mm of the surface, as passes of their own in the renderer."""
+    text = source([taps], DIALECTS[dialect], Style(normalized=False, tilted=True))
+    light = light_of((37, 50), 3)
+    found = run(text, dialect, taps, light, mm)
+    wanted = rendered(light, along_axes(taps, *mm))
+    assert apart(found, wanted) < 1e-5
+    facing = run(text, dialect, taps, light, (PITCH, PITCH))
+    assert apart(facing, rendered(light, taps)) < 1e-5
+    assert apart(facing, wanted) > 1e-2
+
+
+@pytest.mark.parametrize("dialect", RUN)
+def test_stars_on_a_tilted_plane(dialect):
+    taps, light = taps_of("*", channels=3), light_of((9, 11), 3)
+    text = source([taps], DIALECTS[dialect], Style(normalized=False, tilted=True))
+    found = run(text, dialect, taps, light, (STEEP, PITCH))
+    for c in range(3):
+        (fetches,) = passes_of(taps.stages[0], c, 1.0)
+        places = [(w, y / PITCH, x / STEEP) for w, y, x in fetches]
+        blurred = gathered(light[..., c], places, "clamp")
+        wanted = taps.blend[0, c] * light[..., c] + taps.blend[1, c] * blurred
+        assert apart(found[..., c], wanted) < 1e-5
+
+
+def test_a_slope_is_not_followed_twice():
+    with pytest.raises(KernelError, match="depth are narrower on a slope already; export with"):
+        kernel_text(taps_of("1", channels=3), "hlsl", depth=True, tilt=True)
+
+
 @pytest.mark.parametrize("dialect", RUN)
 def test_several_materials_in_one_table(dialect):
-    every = [taps_of("1-1|2", channels=3, seed=seed) for seed in (3, 4)]
+    every = of_two_materials()
     text, _ = kernel_text(every, dialect, prefix="SKIN")
     light = light_of((37, 50), 3)
     for k, taps in enumerate(every):
@@ -329,7 +486,7 @@ def through_of(text, dialect, channels, step_mm, *more):
     zeros = ", 0.0" * (4 - channels)
     device = device_of(dialect)
     (target,), draw = device.prepare(
-        text, f"{kind}(SSS_Through({call}){zeros})", [], (300, 1), (1.0, 1.0), 1.0,
+        text, f"{kind}(SSS_Through({call}){zeros})", [], (300, 1), (1.0, 1.0), (1.0, 1.0),
         count=1, onto=None, half=False, prefix="SSS",
     )  # fmt: skip
     draw(1.0)
@@ -362,7 +519,7 @@ def test_light_through_a_thickness(dialect, channels):
 @pytest.mark.parametrize("dialect", RUN)
 def test_light_through_several_materials(dialect):
     needs(dialect)
-    every = [taps_of("1-1|2", channels=3, seed=seed) for seed in (3, 4)]
+    every = of_two_materials()
     text, _ = kernel_text(every, dialect, transmittance=True)
     for k, taps in enumerate(every):
         thickness, found = through_of(text, dialect, 3, 0.02, f"{k}u")
@@ -375,7 +532,7 @@ def test_light_through_a_thickness_is_written_where_it_is_asked_for():
     assert "\n#define SSS_TRANSMITTANCE 1\n" in kernel_text(taps, "hlsl", transmittance=True)[0]
 
 
-@pytest.mark.parametrize("switch", ["coverage", "depth", "transmittance"])
+@pytest.mark.parametrize("switch", ["coverage", "depth", "jitter", "tilt", "transmittance"])
 def test_a_switch_needs_passes(switch):
     with pytest.raises(KernelError, match=f"{switch}: a switch of passes; have these written"):
         kernel_text(taps_of("1", channels=3), "hlsl", without_shader=True, **{switch: True})
@@ -411,7 +568,7 @@ def assert_compiles(text, dialect, taps):
     reads = list(dict.fromkeys((last.reads, *(name for name, _ in last.adds))))
     pictures = [f"t{k}" for k in range(len(reads))]
     sampler = [] if dialect == "glsl" else ["bilinear"]
-    scale = [] if last.kind == "sum" else ["mm"]
+    scale = [] if last.kind == "sum" else ["mm.x"]
     call = f"SSS_{last.name}({', '.join([*pictures, *sampler, 'position', 'texel', *scale])})"
     make = glsl_program if dialect == "glsl" else hlsl_source
     with tempfile.TemporaryDirectory() as folder:
@@ -490,6 +647,74 @@ def test_a_single_pair_of_unit_energy_needs_no_blend(dialect):
 def test_a_prefix_is_an_identifier(prefix):
     with pytest.raises(KernelError, match=r"prefix = .* expected letters"):
         kernel_text(taps_of("1", channels=3), "glsl", prefix=prefix)
+
+
+@pytest.mark.parametrize("prefix", ["gl_SSS", "A_", "A__B"])
+def test_a_prefix_is_none_that_languages_reserve(prefix):
+    with pytest.raises(KernelError, match=r"prefix = .*; names that begin with gl_ or have two _"):
+        kernel_text(taps_of("1", channels=3), "glsl", prefix=prefix)
+
+
+def left_by_babylon(lines, defined):
+    """Yield the lines that Babylon.js leaves, as its shaderProcessor.ts read on 2026-11-27.
+
+    It finds directives anywhere in a line, takes a name alone as the question whether it is
+    defined, compares whole numbers, and ends statements at every semicolon, in comments too.
+    """
+    for line in lines:
+        word = re.search(r"#ifdef|#else|#elif|#endif|#ifndef|#if", line)
+        if word is None:
+            if line.startswith("#d"):
+                _, name, value = line.split(" ")
+                defined[name] = value
+            yield line
+        elif word[0] in ("#else", "#endif"):
+            yield word[0]
+            return
+        else:
+            on = is_true_to_babylon(line, defined)
+            kept = list(left_by_babylon(lines, defined if on else dict(defined)))
+            other = []
+            if kept[-1] == "#else":
+                other = list(left_by_babylon(lines, dict(defined) if on else defined))
+            yield from (kept if on else other or [""])[:-1]
+
+
+def is_true_to_babylon(line, defined):
+    """Whether a condition holds."""
+    command, condition = line.split("//")[0].strip().split(" ", 1)
+    if command != "#if":
+        return (condition in defined) == (command == "#ifdef")
+    if "==" not in condition:
+        return condition in defined
+    left, right = (int(defined.get(each, each)) for each in condition.split(" == "))
+    return left == right
+
+
+def split_by_babylon(text):
+    for line in text.split("\n"):
+        if line.startswith("#") or line.strip().startswith("//"):
+            yield line
+        else:
+            yield from re.findall(r"[^;]+;?", line.strip())
+
+
+@pytest.mark.parametrize("first", ["", "COVERAGE", "DEPTH", "JITTER"])
+@pytest.mark.parametrize("on", [0, 1])
+def test_preprocessors_read_the_switches_alike(first, on, tmp_path):
+    """That of C stands for those of GLSL and HLSL; that of Babylon.js is simpler."""
+    if shutil.which("gcc") is None:
+        pytest.skip("needs gcc")
+    taps = taps_of("1-1|2|*", channels=3, meta={"material": "#endif #if 0", "settings": {}})
+    more = {"depth": first == "DEPTH", "jitter": first == "JITTER", "transmittance": True}
+    text, _ = kernel_text(taps, "glsl", **more)
+    text = (f"#define SSS_{first} {on}\n" if first else "") + text
+    (tmp_path / "shader.c").write_text(text, encoding="utf-8")
+    command = ["gcc", "-E", "-P", "-undef", "shader.c"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    left = left_by_babylon(iter([*split_by_babylon(text), "#endif"]), {})
+    kept = (each.split("//")[0] for each in left if not each.startswith("#"))
+    assert "".join("".join(kept).split()) == "".join(done.stdout.split())
 
 
 def test_what_cannot_share_a_file_is_one_line():

@@ -23,6 +23,11 @@ def check_prefix(prefix: str) -> None:
         raise KernelError(
             f"prefix = {shown(prefix)}; expected letters, digits and _, such as SKIN."
         )
+    if prefix.lower().startswith("gl_") or "__" in f"{prefix}_":
+        raise KernelError(
+            f"prefix = {shown(prefix)}; names that begin with gl_ or have two _ in a row are "
+            "reserved, so choose another, such as SKIN."
+        )
 
 
 class Writer:

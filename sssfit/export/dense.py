@@ -5,7 +5,7 @@ import numpy as np
 from sssfit.arrays import FloatArray
 from sssfit.errors import KernelError
 from sssfit.export.constants import Writer, check_prefix
-from sssfit.export.dialects import Dialect, mark
+from sssfit.export.dialects import Dialect, commented, mark
 from sssfit.export.document import description
 from sssfit.kernel import SeparableKernel, Stage, Taps
 
@@ -27,7 +27,7 @@ def dense(
     terms, pixels, channels = kernel.weights.shape
     lines = [
         mark(dialect),
-        *(f"// {line}" for line in description(kernel)),
+        *(commented(line) for line in description(kernel)),
         write.scalar("uint", "TERMS", [terms]),
         write.scalar("uint", "PIXELS", [pixels]),
         write.scalar("float", "MM_PER_PIXEL", [kernel.mm_per_pixel]),

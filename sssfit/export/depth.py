@@ -11,6 +11,7 @@ Texels themselves are loaded, not fetched: with 96 texels a side, texture coordi
 from collections.abc import Iterator
 
 from sssfit.errors import KernelError
+from sssfit.export.dialects import switch
 from sssfit.export.functions import Functions
 from sssfit.export.passes import Pass
 from sssfit.kernel import Taps
@@ -50,7 +51,7 @@ class DepthFunctions(Functions):
 
     def _switched(self, on: str, off: str) -> str:
         """Return lines with depth, and those without."""
-        return f"#if {self.prefix}_DEPTH\n{on}\n#else\n{off}\n#endif"
+        return f"{switch(self.prefix, 'DEPTH')}\n{on}\n#else\n{off}\n#endif"
 
     def _nothing(self) -> str:
         return self._vector("float4", *["0.0"] * 4)
@@ -80,7 +81,7 @@ class DepthFunctions(Functions):
         return {self._nothing()};
     }}
     {new("float", "z")} = {self._load("depth")}.x / own.a; // mm from the eye
-    {new("float2", "per_mm")} = {axis}texel / (mm_per_pixel * {size} * z);"""
+{self._per_mm(f"(mm_per_pixel * {size} * z)", axis)}"""
         return "\n".join([flat[0], self._switched(on, "\n".join(flat[1:]))])
 
     def _added(self, place: str, weight: str, indent: str) -> str:
@@ -207,7 +208,7 @@ class DepthFunctions(Functions):
 // Light of the smaller picture at depth z: four texels, each with a depth factor relative to the
 // least difference, so that their sum does not vanish.
 {self._head(self.light, "Larger", [*arguments, *self.profile])} {{
-    {new("float2", "near")} = floor(0.5 * position); // its own texel; the others are on its side
+    {new("float2", "near")} = floor(0.5 * position); // its own texel, the others on its side
     {new("float2", "side")} = 2.0 * position - 4.0 * near - 2.0;
     {new("float", "least")} = 1e30;
     for ({new("uint", "i")} = 0u; i < 4u; i++) {{
@@ -234,7 +235,7 @@ class DepthFunctions(Functions):
 
     def _coarser(self, each: Pass) -> Iterator[str]:
         new, (smaller, own) = self.dialect.new, each.depths
-        yield f"#if {self.prefix}_DEPTH"
+        yield switch(self.prefix, "DEPTH")
         yield f"{new('float', 'cover')} = {self._load(each.adds[0][0])}.a;"
         yield "if (cover == 0.0) {"
         yield f"    return {self._nothing()};"

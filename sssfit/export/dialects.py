@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from sssfit.export.numbers import literal
+from sssfit.messages import printable
 
 KINDS = ("float", "float2", "float3", "float4")  # of one to four channels
 
@@ -124,6 +125,20 @@ C = Dialect(
     number="{value}f",
 )
 DIALECTS = {each.name: each for each in (HLSL, GLSL, WGSL, C)}
+
+
+def switch(prefix: str, feature: str) -> str:
+    """Return the line after which lines stand that are for a feature alone.
+
+    Babylon.js takes a name alone for the question whether it is defined, and compares numbers as
+    all others do.
+    """
+    return f"#if {prefix}_{feature} == 1"
+
+
+def commented(words: str) -> str:
+    """Return a line of comment, with # apart: Babylon.js finds directives anywhere in a line."""
+    return f"// {printable(words).replace('#', '# ')}".rstrip()
 
 
 def mark(dialect: Dialect) -> str:

@@ -6,18 +6,19 @@ it returns light and coverage. With coverage A a picture holds A times light, an
 fetch has the sums of both, and every pass is sum w A E / sum w A (``sssfit.render.taps``).
 """
 
+import math
 from collections.abc import Iterator, Sequence
 
 from sssfit.errors import KernelError
-from sssfit.export.dialects import KINDS, Dialect
+from sssfit.export.dialects import KINDS, Dialect, switch
 from sssfit.export.numbers import literal
 from sssfit.export.passes import Pass
 from sssfit.kernel import Taps
 
 MOST_CHANNELS = 3  # of a picture whose fourth one is coverage
 _FETCHED = (("sampler", "bilinear"), ("float2", "position"), ("float2", "texel"))
-_SCALE = ("float", "mm_per_pixel")
 _LONGEST = 80  # of the arguments of a function in one line
+_PER_PI = literal(1.0 / math.pi)
 # The hash pcg2d of the pixel turns a disk, 2654435769 = 2^32 / phi a frame (sssfit.render.disk).
 _TURN = """\
     {x} = {uint}(position.x) * 1664525u + 1013904223u;
@@ -44,6 +45,10 @@ class Functions:
         Of all names.
     is_indexed : bool
         Whether the arrays hold several profiles, of which an argument names one.
+    is_jittered : bool
+        Whether pixels can move the outer taps of a pass, behind a switch.
+    is_tilted : bool
+        Whether a pixel has mm of its own along either side.
 
     Attributes
     ----------
@@ -66,6 +71,8 @@ class Functions:
         prefix: str,
         *,
         is_indexed: bool,
+        is_jittered: bool = False,
+        is_tilted: bool = False,
     ) -> None:
         if len(taps.channels) > MOST_CHANNELS:
             raise KernelError(
@@ -74,6 +81,8 @@ class Functions:
             )
         self.taps, self.dialect, self.prefix = taps, dialect, prefix
         self.profile = (("uint", "profile"),) if is_indexed else ()
+        self.frame = (("uint", "frame"),) if is_jittered else ()
+        self.scale = "float2" if is_tilted else "float", "mm_per_pixel"
         self.light, self.rgb = KINDS[len(taps.channels) - 1], f".{'rgb'[: len(taps.channels)]}"
         self.passes = passes
         self.kinds = {each.kind for each in passes}
@@ -94,6 +103,7 @@ class Functions:
         }
         parts = [self._covered()] if self.has_sums or self.shares or "disk" in kinds else []
         parts += self._own_helpers()
+        parts += [self._moved()] if self.frame else []
         parts += dict.fromkeys(make() for kind, make in helpers.items() if kind in kinds)
         parts += [self._pass(each) for each in self.passes if each.is_own]
         for each in parts:
@@ -165,7 +175,7 @@ class Functions:
         least = self._all("1e-20")
         shown = f"{cover} * {light} / max({part}, {least})"
         return f"""\
-#if {self.prefix}_COVERAGE
+{switch(self.prefix, "COVERAGE")}
     return {self._whole(shown, cover)};
 #else
     return {self._whole(light, "1.0")};
@@ -182,8 +192,30 @@ class Functions:
         new = self.dialect.new
         return f"""\
     {new("float2", "place")} = position * texel;
-    {new("float2", "per_mm")} = {axis}texel / (mm_per_pixel * {size});
+{self._per_mm(f"(mm_per_pixel * {size})", axis)}
     {new("float4", "own")} = {self._fetch(picture, "place")};"""
+
+    def _per_mm(self, mm: str, axis: str) -> str:
+        """Return the lines that find a mm, along an axis if any, given the mm of a texel."""
+        new, along = self.dialect.new, f"{axis} * " if axis else ""
+        line = f"    {new('float2', 'per_mm')} = {along}texel / {mm};"
+        if not (axis and self.frame):
+            return line
+        moved = f"    {new('float2', 'moved')} = {self._call('Moved', axis, 'position', 'frame')}"
+        return f"{line}\n{self._if_jittered(f'{moved} * texel / {mm};')}"
+
+    def _if_jittered(self, lines: str) -> str:
+        return f"{switch(self.prefix, 'JITTER')}\n{lines}\n#endif"
+
+    def _away(self, index: str, stage: str) -> str:
+        """Return the lines that find how far away a fetch lies, in texture coordinates."""
+        offset, outer = self._at("OFFSET_MM", index), f"{self.prefix}_OUTER[{stage}]"
+        line = f"        {self.dialect.new('float2', 'away')} = {offset} * per_mm;"
+        if not self.frame:
+            return line
+        moved = f"            away = {offset} * moved;"
+        lines = "\n".join((f"        if ({index} >= {outer}) {{", moved, "        }"))
+        return f"{line}\n{self._if_jittered(lines)}"
 
     def _two(self, weight: str) -> str:
         """Return the lines that add two mirrored fetches."""
@@ -198,13 +230,13 @@ class Functions:
         numbers = (("uint", "stage"), ("float2", "axis"), ("picture", "picture"), *self.beside)
         return f"""
 // A pass of a stage: the middle, and mirrored pairs of bilinear fetches.
-{self._head("float4", "Blur", [*numbers, *_FETCHED, _SCALE, *self.profile])} {{
-{self._begin("picture", f"{p}_SIZE[stage]", "axis * ")}
+{self._head("float4", "Blur", [*numbers, *_FETCHED, self.scale, *self.frame, *self.profile])} {{
+{self._begin("picture", f"{p}_SIZE[stage]", "axis")}
     {new("uint", "first")} = {p}_FIRST[stage];
     {new(self.light, "light")} = {middle} * own{self.rgb};
     {new(self.light, "part")} = {middle} * own.a;
     for ({new("uint", "i")} = first + 1u; i < {p}_FIRST[stage + 1u]; i++) {{
-        {new("float2", "away")} = {self._at("OFFSET_MM", "i")} * per_mm;
+{self._away("i", "stage")}
 {self._two(weight)}
     }}
 {self._end()}
@@ -215,7 +247,7 @@ class Functions:
         numbers = (("uint", "stage"), ("picture", "picture"), *self.beside)
         return f"""
 // A stage in one pass: the middle, four diagonal fetches and four on the axes.
-{self._head("float4", "Star", [*numbers, *_FETCHED, _SCALE, *self.profile])} {{
+{self._head("float4", "Star", [*numbers, *_FETCHED, self.scale, *self.profile])} {{
 {self._begin("picture", f"{p}_SIZE[stage]")}
     {new("uint", "first")} = {p}_FIRST[stage];
 {self._nine()}
@@ -270,13 +302,33 @@ class Functions:
 {body}
 }}"""
 
+    def _moved(self) -> str:
+        """Return the function that turns and lengthens an axis, as in ``sssfit.render.jitter``."""
+        new, p = self.dialect.new, self.prefix
+        arguments = [("float2", "axis"), ("float2", "position"), ("uint", "frame")]
+        far = f"position + {self._vector('float2', '613.0', '977.0')}"
+        first, second = (self._call("Turn", each, "frame") for each in ("position", far))
+        turned = self._vector("float2", "c * axis.x - s * axis.y", "s * axis.x + c * axis.y")
+        moved = f"""{self._turn().strip()}
+
+// The axis of a pixel's outer taps, turned and made longer or shorter by two random numbers.
+{self._head("float2", "Moved", arguments)} {{
+    {new("float", "turn")} = {p}_JITTER_RADIANS * ({first} * {_PER_PI} - 1.0);
+    {new("float", "longer")} = {second} * {_PER_PI} - 1.0; // both from -1 to 1
+    longer = 1.0 + {p}_JITTER_SCALE * longer;
+    {new("float", "c")} = cos(turn);
+    {new("float", "s")} = sin(turn);
+    return longer * {turned};
+}}"""
+        return self._if_jittered(moved)
+
     def _pass(self, each: Pass) -> str:
         """Return the function of a pass that is not a call of those above alone."""
         several = len(each.stages) > 1
         make = self._terms if several else self._disk if each.kind == "disk" else self._sum
         arguments = [*(("picture", name) for name in each.pictures), *_FETCHED]
-        arguments += [] if each.kind == "sum" else [_SCALE]
-        arguments += [("uint", "frame")] if each.kind == "disk" else []
+        arguments += [] if each.kind == "sum" else [self.scale]
+        arguments += [("uint", "frame")] if each.takes_frame(jitter=bool(self.frame)) else []
         struct = self.dialect.struct.format(
             name=f"{self.prefix}_Terms", kind=self.dialect.types["float4"], count=len(each.stages)
         )
@@ -320,26 +372,18 @@ class Functions:
     def _last(self, each: Pass) -> str:
         """Return a call of the last pass of a stage."""
         profile = [name for _, name in self.profile]
-        given = [
-            each.reads,
-            *each.depths,
-            "bilinear",
-            "position",
-            "texel",
-            "mm_per_pixel",
-            *profile,
-        ]
+        given = [each.reads, *each.depths, "bilinear", "position", "texel", "mm_per_pixel"]
         stage = f"{each.stages[0]}u"
         if each.kind == "star":
-            return self._call("Star", stage, *given)
-        return self._call("Blur", stage, self._axis(each), *given)
+            return self._call("Star", stage, *given, *profile)
+        frame = [name for _, name in self.frame]
+        return self._call("Blur", stage, self._axis(each), *given, *frame, *profile)
 
     def _terms(self, each: Pass) -> Iterator[str]:
         """Yield the lines of the first pass of several terms, which fetches once for all."""
         new, first = self.dialect.new, [self.first[k] for k in each.stages]
         yield from (
-            line.strip()
-            for line in self._begin(each.reads, "1.0", self._axis(each) + " * ").split("\n")
+            line.strip() for line in self._begin(each.reads, "1.0", self._axis(each)).split("\n")
         )
         for k, start in enumerate(first):
             middle = self._at("WEIGHT", f"{start}u")
@@ -347,7 +391,8 @@ class Functions:
             yield f"{new(self.light, f'part{k}')} = {middle} * own.a;"
         count = len(self.taps.stages[each.stages[0]].weights)
         yield f"for ({new('uint', 'i')} = 1u; i < {count}u; i++) {{"
-        yield f"    {new('float2', 'away')} = {self._at('OFFSET_MM', f'{first[0]}u + i')} * per_mm;"
+        away = self._away(f"{first[0]}u + i", f"{each.stages[0]}u")
+        yield from (line.removeprefix("    ") for line in away.split("\n"))
         yield f"    {new('float4', 'both')} = {self._both(each.reads, 'away')};"
         for k, start in enumerate(first):
             yield f"    light{k} += {self._at('WEIGHT', f'{start}u + i')} * both{self.rgb};"

@@ -61,6 +61,10 @@ class Pass:
         """Whether it has a function of its own, not one that several passes call."""
         return (self.writes[0].startswith("M") and self.is_blended) or len(self.stages) > 1
 
+    def takes_frame(self, *, jitter: bool) -> bool:
+        """Whether its fetches lie elsewhere in each frame: those of a disk, jittered ones."""
+        return self.kind == "disk" or (jitter and self.axis is not None)
+
     @property
     def pictures(self) -> tuple[str, ...]:
         """All pictures that it reads, in the order of its function's arguments."""

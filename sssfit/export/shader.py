@@ -11,12 +11,13 @@ from sssfit.errors import KernelError
 from sssfit.export.certificate import certificate, how_to_run, pass_table
 from sssfit.export.constants import Writer, check_prefix
 from sssfit.export.depth import DepthFunctions, check_depth, depth_rates
-from sssfit.export.dialects import Dialect, mark
+from sssfit.export.dialects import Dialect, commented, mark, switch
 from sssfit.export.functions import Functions
+from sssfit.export.jitter import check_jitter, jitter_lines
 from sssfit.export.passes import pass_list
+from sssfit.export.profiles import profile_constants
 from sssfit.export.through import ROWS, through_table
 from sssfit.kernel import Taps
-from sssfit.messages import printable
 
 _COPIES = {
     "pair": 2.0,
@@ -43,6 +44,8 @@ class Style:
         Whether numbers are rounded to half floats.
     features : tuple of str
         Of `FEATURES`: which are on where nothing else is said.
+    tilted : bool
+        Whether passes take the mm of a pixel along either side apart.
     """
 
     prefix: str = "SSS"
@@ -50,13 +53,14 @@ class Style:
     normalized: bool = True
     half: bool = False
     features: tuple[str, ...] = ()
+    tilted: bool = False
 
     def has(self, feature: str) -> bool:
         """Return whether a feature is on; depth is followed within coverage alone."""
         return feature in self.features or (feature == "COVERAGE" and "DEPTH" in self.features)
 
 
-FEATURES = ("COVERAGE", "DEPTH", "TRANSMITTANCE")
+FEATURES = ("COVERAGE", "DEPTH", "JITTER", "TRANSMITTANCE")
 _WITHOUT_BEING_ASKED = ("COVERAGE",)  # has few lines, so each source has them behind its switch
 
 
@@ -74,18 +78,33 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
     passes = dialect.has_passes and style.with_passes
     words = [line for each in tables for line in certificate(each)]
     words += (
-        pass_table(tables[0], style.prefix, normalized=style.normalized, depth=depth)
+        pass_table(
+            tables[0],
+            style.prefix,
+            normalized=style.normalized,
+            depth=depth,
+            jitter=style.has("JITTER"),
+            tilted=style.tilted,
+        )
         if passes
         else how_to_run(tables[0])
     )
     words += list(_notes(tables, style, passes=passes))
-    lines = [mark(dialect), *(f"// {printable(each)}".rstrip() for each in words)]
+    lines = [mark(dialect), *(commented(each) for each in words)]
     lines += _defines(dialect, style) if passes else []
     lines += _constants(tables, dialect, style, passes=passes)
     if passes:
         listed = pass_list(tables[0], normalized=style.normalized, depth=depth)
         kind = DepthFunctions if depth else Functions
-        functions = kind(tables[0], listed, dialect, style.prefix, is_indexed=len(tables) > 1)
+        functions = kind(
+            tables[0],
+            listed,
+            dialect,
+            style.prefix,
+            is_indexed=len(tables) > 1,
+            is_jittered=style.has("JITTER"),
+            is_tilted=style.tilted,
+        )
         if style.has("TRANSMITTANCE"):
             lines += [
                 "",
@@ -112,9 +131,16 @@ def _notes(tables: Sequence[Taps], style: Style, *, passes: bool) -> Iterator[st
 def _check(tables: Sequence[Taps], style: Style) -> None:
     check_prefix(style.prefix)
     first = tables[0]
+    if style.has("DEPTH") and style.tilted:
+        raise KernelError(
+            "passes that follow depth are narrower on a slope already; export with depth or with "
+            "tilt, not both."
+        )
     if style.has("DEPTH"):
         for each in tables:
             check_depth(each)
+    if style.has("JITTER"):
+        check_jitter(first)
     if style.has("COVERAGE") and any(each.has_negative_weights for each in tables):
         raise KernelError(
             "weights below 0 could make the sum of a pass vanish at a mask's border; export the "
@@ -138,7 +164,8 @@ def _defines(dialect: Dialect, style: Style) -> Iterator[str]:
         name = f"{p}_{each}"
         yield from (f"#ifndef {name}", f"#define {name} {int(each in style.features)}", "#endif")
     if style.has("DEPTH"):
-        yield f"#if {p}_DEPTH // every pass then divides by what is near and covered"
+        yield switch(p, "DEPTH")
+        yield "// Every pass then divides by what is near and covered."
         yield from (f"#undef {p}_COVERAGE", f"#define {p}_COVERAGE 1", "#endif")
 
 
@@ -165,6 +192,7 @@ def _constants(
     counts = [len(each.weights) for each in first.stages]
     yield write.scalar("float", "MM_PER_PIXEL", [first.mm_per_pixel])
     if len(tables) > 1:
+        yield from profile_constants(tables, write)
         yield write.scalar("uint", "TAPS", [sum(counts)])
         yield write.scalar("uint", "PICTURES", [len(first.blend)])
     if len(tables) > 1 and passes and style.has("DEPTH"):
@@ -185,6 +213,7 @@ def _constants(
     yield write.wholes("FIRST", [0, *np.cumsum(counts).tolist()])
     places = [row for each in tables for row in _places(each)]
     yield from write.rows("PLACE_MM" if first.is_disk else "OFFSET_MM", places)
+    yield from jitter_lines(first, write) if passes and style.has("JITTER") else ()
     weights = [each.weights for table in tables for each in table.stages]
     yield from write.rows("WEIGHT", np.concatenate(weights).tolist())
     if passes and style.has("DEPTH"):
@@ -198,7 +227,7 @@ def _constants(
 def _through(tables: Sequence[Taps], functions: Functions, write: Writer) -> Iterator[str]:
     """Yield the table of light through a thickness, and the function that reads it."""
     found, p = [through_table(each) for each in tables], write.prefix
-    yield f"#if {p}_TRANSMITTANCE"
+    yield switch(p, "TRANSMITTANCE")
     error = max(each.error for each in found)
     yield "// The share of light that comes through a thickness in mm, linear between the rows;"
     yield f"// the largest error is {error:.2g}, of 1. Multiply the light on the far side by it,"

@@ -47,6 +47,10 @@ class Jitter:
             if not 0.0 <= value <= most or (name == "scale" and value == most):
                 raise RenderError(f"{name} = {value:g} of a jitter; expected 0 to {most:g}.")
 
+    def still(self, pairs: int) -> int:
+        """Return how many of a pass's mirrored pairs, the inner ones, do not move."""
+        return pairs - math.ceil(self.share * pairs - 1e-9)
+
 
 def apply_jittered(
     pixels: FloatArray,
@@ -73,7 +77,7 @@ def apply_jittered(
     threads : int, optional
     """
     pairs = len(stage.offsets_mm)
-    still = pairs - math.ceil(jitter.share * pairs - 1e-9)
+    still = jitter.still(pairs)
     places = np.outer(stage.offsets_mm / mm_per_texel, direction)
     weights = stage.weights.astype(pixels.dtype)
     height, width = pixels.shape[:2]
