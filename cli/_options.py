@@ -13,7 +13,7 @@ from click.core import ParameterSource
 
 from sssfit import text
 from sssfit.errors import ArgumentError
-from sssfit.messages import printable
+from sssfit.messages import did_you_mean, printable
 from sssfit.methods import SIMULATIONS, Method, Setting, settings_of
 from sssfit.process import check_memory, check_threads_of_numba
 
@@ -127,7 +127,7 @@ def option(
     """
     return click.option(
         *names.split(),
-        type=click.Choice(kind) if isinstance(kind, list | tuple) else kind,
+        type=Choice(kind) if isinstance(kind, list | tuple) else kind,
         metavar=metavar,
         help=text,
         **({} if default is None else {"default": default, "show_default": True}),
@@ -169,6 +169,15 @@ def refuse(given: Mapping[str, Any], whose: Mapping[str, str]) -> None:
     for key, owner in whose.items():
         if given[key] not in (None, False, ()):
             raise click.UsageError(f"{named[key]} is for {owner}; leave it out.")
+
+
+class Choice(click.Choice[str]):
+    """One of some words; what is nearly one is answered by the word that was probably meant."""
+
+    def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
+        """Name what arrived and all choices."""
+        near = did_you_mean(str(value), self.choices)
+        return f"{super().get_invalid_choice_message(value, ctx)} {near.capitalize()}".strip()
 
 
 class WholeRange(click.IntRange):
@@ -226,7 +235,7 @@ _KINDS: dict[str, Callable[[Setting], Any]] = {
     "count": lambda each: Count(*each.among),
     "whole": lambda each: WholeRange(*each.among),
     "text": lambda _: None,
-    "choice": lambda each: click.Choice(each.among),
+    "choice": lambda each: Choice(each.among),
 }
 
 

@@ -79,6 +79,8 @@ class Method:
         Whether a fit starts at random places, and takes a ``seed``.
     makes : str, optional
         Name of the only profile it makes, without a material; that name needs no ``--method``.
+    of_profiles : bool
+        Whether a format takes profiles as well as kernels; by default it is then given the newest.
     """
 
     function: str
@@ -89,6 +91,7 @@ class Method:
     makes_taps: bool = False
     is_seeded: bool = False
     makes: str | None = None
+    of_profiles: bool = False
 
     def load(self) -> Callable[..., Any]:
         """Import the method's function."""
@@ -457,7 +460,39 @@ EXPORTS: Mapping[str, Method] = {
     "wgsl": Method("sssfit.export:source_text", "shader source of WebGPU", _SOURCE),
     "c": Method("sssfit.export:source_text", "constants for C and C++", _OF_C),
     "json": Method("sssfit.export:document_text", "a kernel as a document"),
-    "csv": Method("sssfit.formats.csv:csv_text", "a profile as a table"),
+    "csv": Method(
+        "sssfit.export.table:table_text", "a profile or a kernel as a table", of_profiles=True
+    ),
+    "lut": Method(
+        "sssfit.export.lut:lut_bytes",
+        "a profile or a kernel as a texture: NAME.exr, .dds, or .png to look at",
+        (
+            Setting(
+                "table",
+                "choice",
+                "R_d over the radius, energy in strips one pixel wide, or in pixels.",
+                among=("radial", "line", "kernel"),
+                words="radial",
+            ),
+            Setting("texels", "whole", "texels of the radial table.", "N", (2, 16384), words="256"),
+            Setting(
+                "radius",
+                "length",
+                "how far a profile's table reaches [mm].",
+                "MM",
+                words="99.9 % of the light",
+                keyword="radius_mm",
+            ),
+            Setting(
+                "mm_per_pixel",
+                "length",
+                "pixel size of a profile's line or kernel [mm].",
+                "MM",
+                words="0.3",
+            ),
+        ),
+        of_profiles=True,
+    ),
 }
 
 

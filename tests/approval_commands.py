@@ -13,6 +13,7 @@ import approval_world as world
 from approval_run import Command
 
 from sssfit.formats.profiles import import_profile
+from sssfit.kernel import Taps
 
 C = Command
 # What a search for a cascade ends with, and how long it took.
@@ -956,6 +957,11 @@ def _below() -> None:
     dataclasses.replace(profile, annulus_energy=energy).save("below.profile.npz")
 
 
+def _leaf_taps() -> None:
+    taps = Taps.load("wax.hand.taps.json")
+    dataclasses.replace(taps, meta=taps.meta | {"material": "leaf"}).save("leaf.hand.taps.json")
+
+
 EXPORT = [
     C("export --format hlsl"),
     C("export wax.svd2.kernel.json --format json"),
@@ -989,7 +995,11 @@ EXPORT = [
     C("export wax.svd2.kernel.json --format glsl --compute --with-shader -o -"),
     C("export wax.hand.taps.json --format hlsl --depth --without-shader"),
     C("export wax.hand.taps.json --format c -o w.c"),
-    C("export wax.hand.taps.json wax.hand.taps.json --format hlsl --without-shader -o two.hlsl"),
+    C(
+        "export wax.hand.taps.json leaf.hand.taps.json --format hlsl --without-shader -o two.hlsl",
+        set_up=_leaf_taps,
+    ),
+    C("export wax.hand.taps.json wax.hand.taps.json --format hlsl"),
     C("export wax.svd2.kernel.json --format hlsl --with-shader"),
     C("export wax.svd2.kernel.json --format glsl --dense --half -o -"),
     C("export wax.hand.taps.json --format hlsl --prefix 'a b'"),
@@ -1017,7 +1027,10 @@ EXPORT = [
         set_up=_newest("wax.hand.taps.json", "wax.svd2.kernel.json"),
         note="the newest is the output, too",
     ),
-    C("export wax.hand.taps.json wax.hand.taps.json --format wgsl -o two.wgsl --json"),
+    C(
+        "export wax.hand.taps.json leaf.hand.taps.json --format wgsl -o two.wgsl --json",
+        set_up=_leaf_taps,
+    ),
     C("export five.kernel.json --format c -o -"),
     C("export wax.svd2.kernel.json --format json -o wax.svd2.kernel.json --force"),
     C("export wax.profile.npz --format csv -o foreign.csv"),
@@ -1055,6 +1068,23 @@ EXPORT = [
     C("export k.hlsl --format hlsl -o k.hlsl", set_up=_copied("grau.kernel.json", "k.hlsl")),
     C("export k.json --format json -o x.json", set_up=_copied("grau.kernel.json", "k.json")),
     C("export wax.profile.npz --format json"),
+    C("export wax.profile.npz --format lut"),
+    C("export wax.profile.npz --format lut --table line --mm-per-pixel 0.25 -o line.dds --json"),
+    C("export --format lut --table kernel --radius 2 -o square.png"),
+    C("export mono.profile.npz --format lut --texels 16 -o -"),
+    C("export wax.svd2.kernel.json --format lut --table kernel -q"),
+    C("export wax.svd2.kernel.json --format lut"),
+    C("export wax.hand.taps.json --format lut --table line"),
+    C("export wax.profile.npz --format lut -o x.tif"),
+    C("export wax.profile.npz --format lut -o foreign.exr"),
+    C("export wax.profile.npz --format lut --radius 1m"),
+    C("export wax.profile.npz --format lut --table lines"),
+    C("export wax.profile.npz --format lut --texels 1e6"),
+    C("export wax.profile.npz mono.profile.npz --format lut"),
+    C("export wax.toml --format lut"),
+    C("export wax.profile.npz --format csv --table line"),
+    C("export wax.hand.taps.json --format csv"),
+    C("export wax.profile.npz --format hlls"),
     C("export missing.kernel.json --format hlsl"),
     C("export over.profile.npz --format csv", set_up=_over, note="more light than arrives"),
     C("export below.profile.npz --format csv", set_up=_below, note="negative energy"),

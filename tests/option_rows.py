@@ -21,6 +21,7 @@ from sssfit.compare import view_kernel
 from sssfit.compare.evaluate import evaluate, evaluate_in_screen_space
 from sssfit.compare.pictures import picture_error
 from sssfit.export import json_document, kernel_text
+from sssfit.export.lut import lut_bytes
 from sssfit.formats.csv import csv_text, load_csv
 from sssfit.formats.mci import load_mci
 from sssfit.formats.mco import join_channels, load_mco
@@ -1008,6 +1009,17 @@ def _exported(ran: Ran) -> Any:
     return data.decode()
 
 
+def _texture(ran: Ran) -> Any:
+    (data,) = ran.written.values()
+    return data
+
+
+def _lut(**settings: Any) -> Callable[[], bytes]:
+    return lambda: lut_bytes([profile()], **settings)[0]
+
+
+_LUT = "export wax.profile.npz --format lut -o t.dds"
+_LINES = f"{_LUT} --table line"
 _SOURCE = "export wax.taps.json --format hlsl"
 _DENSE = "export wax.svd2.kernel.json --format hlsl"
 
@@ -1035,6 +1047,24 @@ EXPORT = {
     ),
     "--with-shader": Row(_DENSE, "--with-shader", _exported, _source(kernel, with_shader=True)),
     "--dense": Row(_DENSE, "--dense", _exported, _source(kernel, dense=True)),
+    "--table": Row(
+        _LUT, "--table line", _texture, _lut(ending=".dds", table="line"), words="radial"
+    ),
+    "--texels": Row(_LUT, "--texels 32", _texture, _lut(ending=".dds", texels=32), words="256"),
+    "--radius": Row(
+        _LUT,
+        "--radius 2",
+        _texture,
+        _lut(ending=".dds", radius_mm=2.0),
+        words="99.9 % of the light",
+    ),
+    "--mm-per-pixel": Row(
+        _LINES,
+        "--mm-per-pixel 0.25",
+        _texture,
+        _lut(ending=".dds", table="line", mm_per_pixel=0.25),
+        words="0.3",
+    ),
     "--format": Row(
         "export wax.svd2.kernel.json --format hlsl",
         "--format json",
@@ -1276,6 +1306,7 @@ STREAMS = (
     f"{_CHOOSE} -o x.taps.json",
     "import table.csv -o x.profile.npz",
     "export --format csv -o x.csv",
+    "export wax.profile.npz --format lut -o x.exr",
     "export --format hlsl -o x.hlsl",
     "export --format json -o x.json",
     "chart wax.profile.npz -o x.png",

@@ -83,7 +83,8 @@ def test_the_halo_limits_the_blur_of_smaller_pixels(dialect):
 
 @pytest.mark.parametrize("dialect", RUN)
 def test_several_materials(dialect):
-    every = [taps_of("1-1|2", channels=3), wide("1-1|2", by=2.0)]
+    other = replace(wide("1-1|2"), meta={"material": "clay"})
+    every = [taps_of("1-1|2", channels=3), other]
     text, _ = kernel_text(every, dialect, prefix="SKIN", compute=True)
     light = light_of((37, 50), 3)
     for k, taps in enumerate(every):

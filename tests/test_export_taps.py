@@ -15,7 +15,9 @@ from test_export import comment_of, numbers_of, said
 from test_taps import taps_of
 
 import sssfit
+from sssfit.errors import KernelError
 from sssfit.export import DIALECTS, Style, is_ours, kernel_text, source, taps_document
+from sssfit.export.certificate import SERVES
 from sssfit.kernel import Stage, Taps
 from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
@@ -168,3 +170,48 @@ def test_forms_and_figures_are_those_of_the_kernel(tmp_path):
     assert is_ours(path, "hlsl")
     assert not is_ours(path, "glsl")
     assert kernel_text(taps, "json")[0] == taps_document(taps)
+
+
+def named(material, mm_per_pixel=0.3, **changes):
+    return taps_of(meta={"material": material}, mm_per_pixel=mm_per_pixel, **changes)
+
+
+@pytest.mark.parametrize("form", ["hlsl", "glsl", "wgsl", "c"])
+def test_profiles_of_one_source_have_names(form):
+    text, _ = kernel_text([named("skin 1"), named("Größe λ"), named(None), named("wax")], form)
+    numbers = dict(re.findall(r"SSS_PROFILE_(\w+)\b[^=]*= (\d)u;", text))
+    assert numbers == {"SKIN_1": "0", "GR_SSE": "1", "WAX": "3"}
+
+
+def test_profiles_of_one_material_are_told_apart_by_their_pixels():
+    text, _ = kernel_text([named("skin1", 0.15), named("skin1"), named("wax")], "hlsl")
+    assert re.findall(r"SSS_PROFILE_(\w+) = ", text) == ["SKIN1_0_15MM", "SKIN1_0_3MM", "WAX"]
+    assert "SSS_PROFILE" not in kernel_text(named("skin1"), "hlsl")[0]
+
+
+def test_profile_names_that_clash_are_refused_in_one_line():
+    for tables in (
+        [named("skin1"), named("skin1")],
+        [named("skin 1"), named("wax"), named("skin-1")],
+    ):
+        with pytest.raises(KernelError) as caught:
+            kernel_text(tables, "hlsl")
+        assert "SKIN" in str(caught.value)
+        assert "\n" not in str(caught.value)
+
+
+def test_the_comment_says_on_which_pixels_a_table_serves():
+    words = {
+        "1-1|1": "Serves pixels of 0.228 to 0.387 mm (skin1 within 1 Delta E)",
+        "1-1": "Serves pixels of 0.3 mm and more; nearer by",
+    }
+    for structure, said_of in words.items():
+        assert said_of in kernel_text(taps_of(structure), "hlsl")[0]
+    terms = taps_of("1-1", chained=False)
+    assert "Serves pixels of any size" in kernel_text(terms, "hlsl")[0]
+
+
+def test_that_range_is_the_one_that_was_measured():
+    page = (Path(__file__).parents[1] / "docs" / "cascades.md").read_text("utf-8")
+    words = r"single table serves pixels of ([\d.]+) to ([\d.]+) times its own"
+    assert tuple(map(float, re.search(words, page).groups())) == SERVES

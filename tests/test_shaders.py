@@ -48,6 +48,13 @@ def light_of(size, channels, seed=1):
     return np.random.default_rng(seed).random((*size, channels))
 
 
+def of_two_materials():
+    return [
+        taps_of("1-1|2", channels=3, seed=seed, meta={"material": name})
+        for seed, name in ((3, "wax"), (4, "leaf"))
+    ]
+
+
 def rendered(light, taps, **more):
     return render_taps(Scene("light", light, PITCH), taps, border="clamp", **more)
 
@@ -231,7 +238,7 @@ def test_depth_can_be_switched_off(name, taps, dialect):
 
 @pytest.mark.parametrize("dialect", RUN)
 def test_depth_of_several_materials(dialect):
-    every = [taps_of("1-1|2", channels=3, seed=seed) for seed in (3, 4)]
+    every = of_two_materials()
     text, _ = kernel_text(every, dialect, depth=True, keep_energy=True)
     scene = step_of()
     light, cover = np.repeat(scene.irradiance, 3, axis=2), (scene.mask > 0).astype(float)
@@ -442,7 +449,7 @@ def test_a_slope_is_not_followed_twice():
 
 @pytest.mark.parametrize("dialect", RUN)
 def test_several_materials_in_one_table(dialect):
-    every = [taps_of("1-1|2", channels=3, seed=seed) for seed in (3, 4)]
+    every = of_two_materials()
     text, _ = kernel_text(every, dialect, prefix="SKIN")
     light = light_of((37, 50), 3)
     for k, taps in enumerate(every):
@@ -512,7 +519,7 @@ def test_light_through_a_thickness(dialect, channels):
 @pytest.mark.parametrize("dialect", RUN)
 def test_light_through_several_materials(dialect):
     needs(dialect)
-    every = [taps_of("1-1|2", channels=3, seed=seed) for seed in (3, 4)]
+    every = of_two_materials()
     text, _ = kernel_text(every, dialect, transmittance=True)
     for k, taps in enumerate(every):
         thickness, found = through_of(text, dialect, 3, 0.02, f"{k}u")

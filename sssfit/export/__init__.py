@@ -2,22 +2,26 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, NamedTuple
 
 import numpy as np
 
+from sssfit import kinds
 from sssfit.arrays import FloatArray
-from sssfit.errors import KernelError
+from sssfit.errors import FileError, KernelError
 from sssfit.export.dense import dense, taps_of_kernel
 from sssfit.export.dense import energy_in_half as dense_in_half
 from sssfit.export.dialects import DIALECTS, mark
 from sssfit.export.document import json_document, taps_document
+from sssfit.export.lut import ENDINGS, is_our_texture
 from sssfit.export.shader import Style, source
 from sssfit.export.shader import energy_in_half as taps_in_half
+from sssfit.export.table import is_our_table
 from sssfit.files import has_mark
 from sssfit.kernel import Kernel, SeparableKernel, Taps, is_kernel_file, is_taps_file
-from sssfit.messages import by_channel, note, of_material
+from sssfit.messages import by_channel, note, of_material, printable
 from sssfit.methods import EXPORTS
+from sssfit.profile import Profile
 
 __all__ = ["DIALECTS", "Style", "dense", "json_document", "kernel_text", "source", "taps_document"]
 
@@ -26,38 +30,86 @@ _FIGURES = ("channels", "rank", "pixels", "mm_per_pixel")
 _TAPS_FIGURES = ("channels", "structure", "fetches", "passes", "mm_per_pixel")
 
 
-def kernel_text(
-    kernels: Kernel | Sequence[Kernel], form: str, **settings: Any
-) -> tuple[str, dict[str, Any]]:
-    """Return a kernel as text, and the figures of ``sssfit export --json``.
+class Exported(NamedTuple):
+    """What a format makes of kernels or profiles."""
+
+    content: bytes
+    of: str  # "profile" or "kernel"
+    what: str  # it is, with the article
+    tag: str  # between the names of the input and the ending, or nothing
+    ending: str
+    figures: dict[str, Any]  # those of ``sssfit export --json``
+
+    @property
+    def stdout(self) -> str:
+        """What goes to stdout, in words."""
+        return self.what.replace("a ", "the ")
+
+
+def exported(
+    sources: Sequence[Profile | Kernel], form: str, *, ending: str = "", **settings: Any
+) -> Exported:
+    """Return kernels or a profile as a file of another program.
 
     Parameters
     ----------
-    kernels : SeparableKernel or Taps, or a sequence of them
-        Several tables with the same stages become one source, indexed by profile.
+    sources : sequence of Profile, SeparableKernel or Taps
+        Several tables of taps with the same stages become one source, indexed by profile.
     form : str
-        A name of ``sssfit.methods.EXPORTS`` other than "csv".
+        A name of ``sssfit.methods.EXPORTS``.
+    ending : str
+        That of the file's name; textures are written as it says, by default as ".exr".
     **settings
         Those of the form there.
 
     Raises
     ------
     KernelError
-        The form is unknown, several kernels cannot be one, or a setting is invalid or not for them.
+        The form is unknown or not for these records, several cannot be one, or a setting is
+        invalid.
     """
+    if form not in EXPORTS:
+        raise KernelError(f"no format {form!r} of a kernel; expected one of {', '.join(EXPORTS)}.")
+    write = EXPORTS[form].load()
+    of = "profile" if isinstance(sources[0], Profile) else "kernel"
+    if form == "lut":
+        ending = ending or ENDINGS[0]
+        content, figures = write(sources, ending=ending, **settings)
+        return Exported(content, of, "a texture", f".{figures['table']}", ending, figures)
+    text = write(sources, **({"form": form} if form in DIALECTS else {}), **settings)
+    what = {"json": "a kernel", "csv": "a table"}.get(form, "source")
+    return Exported(text.encode(), of, what, "", f".{form}", _figures(sources[0]))
+
+
+def read_exportable(source: str | Path | BinaryIO, origin: str | None = None) -> Profile | Kernel:
+    """Read a profile, a kernel or a table of taps from a path or a binary stream.
+
+    Raises
+    ------
+    SssfitError
+        It is none of them; the one-line message names the origin.
+    """
+    found = kinds.load(source, origin)
+    if not isinstance(found, Profile | SeparableKernel | Taps):
+        name = printable(origin or str(source))
+        raise FileError(f"{name} is neither a profile nor a kernel; simulate and fit make them.")
+    return found
+
+
+def kernel_text(
+    kernels: Kernel | Sequence[Kernel], form: str, **settings: Any
+) -> tuple[str, dict[str, Any]]:
+    """Return kernels as text of a form other than "lut", and their figures; see `exported`."""
     every = [kernels] if isinstance(kernels, SeparableKernel | Taps) else list(kernels)
-    if form not in EXPORTS or form == "csv":
-        known = ", ".join(each for each in EXPORTS if each != "csv")
-        raise KernelError(f"no format {form!r} of a kernel; expected one of {known}.")
-    first = every[0]
-    figures = {key: getattr(first, key) for key in _keys(first)}
-    if form == "json":
-        return document_text(every), figures
-    return source_text(every, form, **settings), figures
+    found = exported(every, form, **settings)
+    return found.content.decode(), found.figures
 
 
-def _keys(kernel: Kernel) -> tuple[str, ...]:
-    return _TAPS_FIGURES if isinstance(kernel, Taps) else _FIGURES
+def _figures(source: Profile | Kernel) -> dict[str, Any]:
+    if isinstance(source, Profile):
+        return {"channels": source.channels, "annuli": source.n_annuli}
+    keys = _TAPS_FIGURES if isinstance(source, Taps) else _FIGURES
+    return {key: getattr(source, key) for key in keys}
 
 
 def document_text(kernels: Sequence[Kernel]) -> str:
@@ -183,7 +235,11 @@ def _note_half(kernel: Kernel, rounded: FloatArray) -> None:
 
 
 def is_ours(path: Path, form: str) -> bool:
-    """Return whether a file is one that `kernel_text` wrote in this form."""
+    """Return whether a file is one that `exported` wrote in this form."""
+    if form == "csv":
+        return is_our_table(path)
+    if form == "lut":
+        return is_our_texture(path)
     if form == "json":
         return is_kernel_file(path) or is_taps_file(path)
     return has_mark(path, {mark(DIALECTS[form]).encode(): b""})

@@ -7,6 +7,8 @@ from sssfit.export.passes import Pass, fetches_of, pass_list
 from sssfit.kernel import Taps
 
 _ROUNDING = 1e-12
+# Of its own pixels, those on which skin1's cascade stays within 1 (docs/cascades.md, Distance).
+SERVES = 0.76, 1.29
 
 
 def certificate(taps: Taps) -> Iterator[str]:
@@ -31,9 +33,24 @@ def certificate(taps: Taps) -> Iterator[str]:
         f"Made for pixels of {taps.mm_per_pixel:.9g} mm; channels {', '.join(taps.channels)}; "
         "linear light."
     )
+    yield _distances(taps)
     yield (
         f"Energy: {values_text(taps.energy.tolist())}; spectral error: "
         f"{errors_text(taps.errors['spectral'].tolist())}."
+    )
+
+
+def _distances(taps: Taps) -> str:
+    """Say on which pixels the table serves, and so at which distances."""
+    own = taps.mm_per_pixel
+    if not taps.chained:
+        return "Serves pixels of any size: its error does not grow with the distance."
+    if all(each.level == 0 for each in taps.stages):
+        return f"Serves pixels of {own:.3g} mm and more; nearer by, points of light fall apart."
+    least, most = (own * each for each in SERVES)
+    return (
+        f"Serves pixels of {least:.3g} to {most:.3g} mm (skin1 within 1 Delta E); for other "
+        "distances mix the numbers of two tables an octave apart."
     )
 
 

@@ -16,6 +16,7 @@ from sssfit.export.dialects import Dialect, commented, mark, switch
 from sssfit.export.functions import Functions
 from sssfit.export.jitter import check_jitter, jitter_lines
 from sssfit.export.passes import pass_list
+from sssfit.export.profiles import profile_constants
 from sssfit.export.through import ROWS, through_table
 from sssfit.kernel import Taps
 
@@ -213,6 +214,7 @@ def _constants(
     counts = [len(each.weights) for each in first.stages]
     yield write.scalar("float", "MM_PER_PIXEL", [first.mm_per_pixel])
     if len(tables) > 1:
+        yield from profile_constants(tables, write)
         yield write.scalar("uint", "TAPS", [sum(counts)])
         yield write.scalar("uint", "PICTURES", [len(first.blend)])
     if len(tables) > 1 and passes and style.has("DEPTH"):

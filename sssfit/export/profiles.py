@@ -1,0 +1,50 @@
+"""Names of the profiles of a source that holds several tables, as constants of their numbers."""
+
+import re
+from collections.abc import Iterator, Sequence
+
+from sssfit.errors import KernelError
+from sssfit.export.constants import Writer
+from sssfit.kernel import Taps
+from sssfit.messages import of_material
+
+_OTHER = re.compile(r"[^A-Z0-9]+")
+
+
+def profile_names(tables: Sequence[Taps]) -> dict[str, int]:
+    """Return the numbers of the tables of known materials, by their names.
+
+    A name is the material's, with the pixel size where two have the same.
+
+    Raises
+    ------
+    KernelError
+        Two names are the same all the same.
+    """
+    known = {
+        k: str(each.meta["material"]) for k, each in enumerate(tables) if each.meta.get("material")
+    }
+    plain = [_identifier(each) for each in known.values()]
+    names: dict[str, int] = {}
+    for k, material in known.items():
+        name, pixel_mm = _identifier(material), tables[k].mm_per_pixel
+        if plain.count(name) > 1:
+            name += f"_{_identifier(f'{pixel_mm:.6g}mm')}"
+        if name in names:
+            raise KernelError(
+                f"profiles {names[name]} and {k} would both be called {name}: two tables of "
+                f"{of_material(material)} for pixels of {pixel_mm:.6g} mm; leave one out, or "
+                "export it on its own."
+            )
+        names[name] = k
+    return names
+
+
+def profile_constants(tables: Sequence[Taps], write: Writer) -> Iterator[str]:
+    """Yield a constant for each profile of a known material, its number in the arrays."""
+    for name, k in profile_names(tables).items():
+        yield write.scalar("uint", f"PROFILE_{name}", [k])
+
+
+def _identifier(text: str) -> str:
+    return _OTHER.sub("_", text.upper()).strip("_") or "UNKNOWN"
