@@ -141,9 +141,14 @@ def test_small_benchmarks_of_shaders_run_and_fill_every_table():
     assert (ended.returncode, ended.stderr) == (0, "")
     cases, ratios = tables(ended.stdout.replace("\\|", "/"))
     assert [row[0].split()[0] for row in cases[1]] == [
-        *("cascade", "cascade", "cascade"),
+        *["cascade"] * 6,  # each with its compute shaders
         *("pre-integrated,", "pre-integrated,", "pre-integrated,", "six", "disk,"),
     ]
-    for row in cases[1]:
-        assert all(float(value) > 0.0 for value in row[1:])
+    for name, *costs, halos, close, mid, none in cases[1]:
+        computes = name.endswith("compute")
+        assert all(float(value) > 0.0 for value in (*costs, close, mid))
+        assert (float(halos) > 0.0) == computes
+        assert none == "-" if computes else float(none) > 0.0
+    for passes, dispatches in zip(cases[1][0:6:2], cases[1][1:6:2], strict=True):
+        assert float(dispatches[3]) < 0.75 * float(passes[3])
     assert [row[1] for row in ratios[1][1:]] == ["2.92", "2.26", "2.93"]
