@@ -148,7 +148,7 @@ def main():
     if given.small:  # short searches: long ones take half the time
         shared_work.begin()
         shared_work.allow("bench_shader")
-    text = report((32, 18), 1) if given.small else report((1920, 1080), 5)
+    text = report((64, 36), 1) if given.small else report((1920, 1080), 5)
     if given.write:
         write_page("benchmarks-shader.md", Path(__file__), text)
     else:
