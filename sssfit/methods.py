@@ -494,6 +494,10 @@ EXPORTS: Mapping[str, Method] = {
     ),
 }
 
+STRESSES: Mapping[str, Method] = {
+    "noise": Method("sssfit.stability.noise:stress", "walks of 1e3 to 1e7 photons"),
+}
+
 
 def settings_of(methods: Mapping[str, Method]) -> dict[str, tuple[Setting, tuple[str, ...]]]:
     """Return every setting once by its name, with the names of the methods that have it.
