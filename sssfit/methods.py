@@ -496,6 +496,16 @@ EXPORTS: Mapping[str, Method] = {
 
 STRESSES: Mapping[str, Method] = {
     "noise": Method("sssfit.stability.noise:stress", "walks of 1e3 to 1e7 photons"),
+    "pixel-size": Method(
+        "sssfit.stability.pixel_size:stress", "pixels of .001 to 10 mean free paths"
+    ),
+    "optics": Method(
+        "sssfit.stability.optics:stress", "albedos of .01 to .99999, indices of 1 to 2"
+    ),
+    "gaussians": Method("sssfit.stability.gaussians:stress", "1 to 10 Gaussians, random starts"),
+    "hard-light": Method(
+        "sssfit.stability.hard_light:stress", "decompositions beside a highlight of 1000"
+    ),
 }
 
 

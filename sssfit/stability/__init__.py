@@ -5,14 +5,16 @@ with a function from a `Subject` to panels, and one entry there.
 """
 
 from collections.abc import Callable, Collection
+from pathlib import Path
 
 from sssfit.errors import ArgumentError, FitError
+from sssfit.files import has_mark
 from sssfit.material import Material
 from sssfit.messages import did_you_mean, shown
 from sssfit.methods import STRESSES
 from sssfit.profile import Profile
 from sssfit.simulate import simulate_exact
-from sssfit.stability.record import Curve, Edge, Finding, Panel, Stability
+from sssfit.stability.record import MARK, Curve, Edge, Finding, Panel, Stability
 from sssfit.stability.subject import Subject
 
 __all__ = ["Curve", "Edge", "Finding", "Panel", "Stability", "Subject", "stability"]
@@ -82,10 +84,15 @@ def stability(
 
 
 def _named(only: Collection[str] | None) -> list[str]:
-    """Return the stresses in their order; refuse unknown ones."""
+    """Return the stresses in the order of their table; refuse unknown ones."""
     for each in only or ():
         if each not in STRESSES:
             near = did_you_mean(each, list(STRESSES))
             known = ", ".join(STRESSES)
             raise ArgumentError(f"stress {shown(each)}: {near}expected some of {known}.")
     return [each for each in STRESSES if not only or each in only]
+
+
+def is_stability_table(path: Path) -> bool:
+    """Return whether a file is a table that we wrote."""
+    return has_mark(path, {MARK.encode(): b""})

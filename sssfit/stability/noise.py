@@ -12,12 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.arrays import FloatArray
 from sssfit.errors import FitError, SssfitError
 from sssfit.kernel import Kernel, Taps
 from sssfit.profile import Profile
 from sssfit.render.screen import second_moments
 from sssfit.simulate import simulate_montecarlo
-from sssfit.stability.record import Curve, Panel
+from sssfit.stability.record import Axis, Curve, Panel
 from sssfit.stability.subject import WAYS, Subject, Way
 
 LIMIT = 1.0  # Delta E: about what is just seen
@@ -43,36 +44,34 @@ def stress(subject: Subject) -> list[Panel]:
         raise FitError("noise: the profile does not say its material; give the material.")
     photons = 10 ** np.arange(_FIRST, _LAST + 1)
     found = [_fits(subject, way, photons) for way in WAYS]
-    axis = {
-        "stress": "noise",
-        "x_label": "photons",
-        "mild": float(photons[-1]),
-        "x_format": ".2g",
-    }
+    axis = Axis("photons", mild=float(photons[-1]), form=".2g")
     return [
         Panel(
+            stress="noise",
+            axis=axis,
             title="what noise adds to a picture",
             y_label="p99 of Delta E 2000",
             limit=LIMIT,
             curves=[each.error for each in found],
             fails="colours change with the seed",
-            **axis,
         ),
         Panel(
+            stress="noise",
+            axis=axis,
             title="spread of the kernel's width",
             y_label="standard deviation / width",
             limit=WIDTH_LIMIT,
             curves=[each.spread for each in found],
             fails="the blur changes with the seed",
-            **axis,
         ),
         Panel(
+            stress="noise",
+            axis=axis,
             title="bias of the kernel's width",
             y_label="|mean - exact| / width",
             limit=WIDTH_LIMIT,
             curves=[each.bias for each in found],
             fails="the fit chases the noise of the tail",
-            **axis,
         ),
     ]
 
@@ -85,7 +84,7 @@ class _Found:
 
 
 def _fits(subject: Subject, way: Way, photons: npt.NDArray[np.intp]) -> _Found:
-    """Return quartiles of the error, and spread and bias of the width, for each number of photons."""
+    """Return quartiles of the error, and spread and bias of the width."""
     exact = subject.true_kernel(way)
     wanted, width = subject.shows(exact), width_mm(exact)
     seeds = _SEEDS if way.method != "cascade" or subject.is_whole else _SEEDS_OF_CASCADES
@@ -98,7 +97,7 @@ def _fits(subject: Subject, way: Way, photons: npt.NDArray[np.intp]) -> _Found:
             return np.inf, np.inf
         return subject.error(kernel, wanted), width_mm(kernel)
 
-    values = np.array(subject.each(measured, work)).reshape(len(photons), seeds, 2)
+    values: FloatArray = np.array(subject.each(measured, work)).reshape(len(photons), seeds, 2)
     errors, widths = values[..., 0], values[..., 1] / width - 1.0
     low, middle, high = np.quantile(errors, (0.25, 0.5, 0.75), axis=1, method="nearest")
     with np.errstate(invalid="ignore"):  # infinite where a fit was refused
@@ -107,11 +106,14 @@ def _fits(subject: Subject, way: Way, photons: npt.NDArray[np.intp]) -> _Found:
     # A standard deviation of n seeds is known to 1 / sqrt(2 n - 2), a mean to spread / sqrt(n).
     share, of_mean = 1.0 / np.sqrt(2.0 * seeds - 2.0), spread / np.sqrt(seeds)
     advice = _ADVICE.get(way.method, "more photons")
-    own = way.label, photons
+
+    def curve(y: FloatArray, low: FloatArray, high: FloatArray) -> Curve:
+        return Curve(way.label, photons, y, low, high, advice)
+
     return _Found(
-        Curve(*own, middle, low, high, advice),
-        Curve(*own, spread, (1.0 - share) * spread, (1.0 + share) * spread, advice),
-        Curve(*own, bias, np.maximum(bias - of_mean, 0.0), bias + of_mean, advice),
+        curve(middle, low, high),
+        curve(spread, (1.0 - share) * spread, (1.0 + share) * spread),
+        curve(bias, np.maximum(bias - of_mean, 0.0), bias + of_mean),
     )
 
 
@@ -122,7 +124,7 @@ def width_mm(kernel: Kernel) -> float:
         total = np.cumsum(variances) if kernel.chained else variances
         second = float(kernel.blend[1:, 0] @ total) / kernel.energy[0]
     else:
-        second = float(second_moments(kernel)[0]) 
+        second = float(second_moments(kernel)[0])
     return math.sqrt(max(second, 0.0))
 
 

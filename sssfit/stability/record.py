@@ -5,8 +5,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from sssfit.arrays import FloatArray, plain
+from sssfit.messages import table
 
 SAFE, FROM, UP_TO, BETWEEN, NEVER = "safe", "from", "up to", "between", "never"
 
@@ -47,19 +49,40 @@ class Curve:
     """
 
     label: str
-    x: FloatArray
-    y: FloatArray
+    x: npt.NDArray[Any]
+    y: npt.NDArray[Any]
     low: FloatArray | None = None
     high: FloatArray | None = None
     advice: str = ""
 
     def __post_init__(self) -> None:
         for name in ("x", "y", "low", "high"):
-            value = getattr(self, name)
+            value: npt.ArrayLike | None = getattr(self, name)
             if value is not None:
                 stored = np.array(value, dtype=np.float64)
                 stored.setflags(write=False)
                 object.__setattr__(self, name, stored)
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """What a stress makes harder.
+
+    Parameters
+    ----------
+    label : str
+        With the unit in brackets.
+    mild : float
+        The end or place from which the search for the limit begins.
+    is_log : bool
+    form : str
+        Of its numbers in tables.
+    """
+
+    label: str
+    mild: float
+    is_log: bool = True
+    form: str = ".3g"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,32 +93,26 @@ class Panel:
     ----------
     stress : str
         A name of ``sssfit.methods.STRESSES``.
-    title, x_label, y_label : str
-        For charts; the labels have the units in brackets.
-    mild : float
-        The end or place of the axis from which the search for the limit begins.
+    title, y_label : str
+        For charts.
+    axis : Axis
     limit : float
         The largest measure that counts as safe.
     curves : sequence of Curve
     fails : str
         What goes wrong beyond the limit, in a few words.
-    x_log, y_log : bool
-        Whether the axes are logarithmic.
-    x_format : str
-        Of numbers on the axis in tables.
+    is_log : bool
+        Whether the measure is drawn and interpolated by its logarithm.
     """
 
     stress: str
     title: str
-    x_label: str
+    axis: Axis
     y_label: str
-    mild: float
     limit: float
     curves: Sequence[Curve]
     fails: str
-    x_log: bool = True
-    y_log: bool = True
-    x_format: str = ".3g"
+    is_log: bool = True
 
     def edges(self, curve: Curve) -> tuple[Edge | None, Edge | None]:
         """Return where a curve stops being safe below and above the mild place.
@@ -110,10 +127,10 @@ class Panel:
         return bool(curve.y[self._start(curve)] <= self.limit)
 
     def _start(self, curve: Curve) -> int:
-        return int(np.abs(self._scaled(curve.x) - self._scaled(np.array(self.mild))).argmin())
+        return int(np.abs(self._scaled(curve.x) - self._scaled(np.array(self.axis.mild))).argmin())
 
     def _scaled(self, x: FloatArray) -> FloatArray:
-        scaled: FloatArray = np.log(x) if self.x_log else np.asarray(x, dtype=np.float64)
+        scaled: FloatArray = np.log(x) if self.axis.is_log else np.asarray(x, dtype=np.float64)
         return scaled
 
     def _edge(self, curve: Curve, step: int) -> Edge | None:
@@ -146,10 +163,10 @@ class Panel:
             share = float(np.clip((self._measure(self.limit) - y_in) / (y_out - y_in), 0.0, 1.0))
         ends = self._scaled(np.array([inner, outer]))
         place = float(ends[0] + share * (ends[1] - ends[0]))
-        return (float(np.exp(place)) if self.x_log else place), inner, outer
+        return (float(np.exp(place)) if self.axis.is_log else place), inner, outer
 
     def _measure(self, y: float) -> float:
-        return float(np.log(max(y, 1e-300))) if self.y_log else float(y)
+        return float(np.log(max(y, 1e-300))) if self.is_log else float(y)
 
     def findings(self) -> "Iterator[Finding]":
         """Yield where each curve is safe."""
@@ -166,7 +183,7 @@ class Panel:
             {
                 "stress": self.stress,
                 "title": self.title,
-                "x": self.x_label,
+                "x": self.axis.label,
                 "y": self.y_label,
                 "limit": self.limit,
                 "curves": [
@@ -211,7 +228,9 @@ class Finding:
     def _edge(self, edge: Edge | None) -> str:
         if edge is None:
             return ""
-        at, low, high = (format(each, self.panel.x_format) for each in (edge.at, edge.low, edge.high))
+        at, low, high = (
+            format(each, self.panel.axis.form) for each in (edge.at, edge.low, edge.high)
+        )
         return at if low == high == at else f"{at} ({low} to {high})"
 
     def to_dict(self) -> dict[str, Any]:
@@ -221,7 +240,10 @@ class Finding:
             for name, edge in (("below", self.below), ("above", self.above))
         }
         own = {"method": self.label, "safe": self.kind, **edges}
-        return own | {"worst": self.worst if np.isfinite(self.worst) else None, "advice": self.advice}
+        return own | {
+            "worst": self.worst if np.isfinite(self.worst) else None,
+            "advice": self.advice,
+        }
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -263,7 +285,18 @@ class Stability:
         ]
         lines = [HEADS, ["---"] * len(HEADS), *rows]
         cells = ([each.replace("|", r"\|") for each in row] for row in lines)
-        return "".join(f"| {' | '.join(row)} |\n" for row in cells)
+        return f"{MARK}\n\n" + "".join(f"| {' | '.join(row)} |\n" for row in cells)
+
+    def text(self) -> str:
+        """Return the same table for a terminal, a block for each panel."""
+        blocks = []
+        for panel in self.panels:
+            rows = [[each.label, each.words] for each in panel.findings()]
+            head = f"{panel.stress}: {panel.title} ({panel.axis.label})"
+            fails = f"limit {panel.limit:g}; beyond it {panel.fails}"
+            blocks.append(f"{head}; {fails}\n{table(['method', 'safe'], rows)}")
+        return "\n\n".join([*blocks, *self.notes])
 
 
+MARK = "<!-- sssfit.stability/1 -->"
 HEADS = ("stress", "method", "safe", "fails by", "what to do")

@@ -32,7 +32,8 @@ PICTURES = ("disk", "points")
 SIDE = 96  # pixels of a picture
 _PERCENT = 99.0
 
-_Given, _Found = TypeVar("_Given"), TypeVar("_Found")
+_Given = TypeVar("_Given")
+_Found = TypeVar("_Found")
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -114,7 +115,7 @@ class Subject:
     def scenes(self, mm_per_pixel: float | None = None) -> Sequence[Scene]:
         """Return the pictures on pixels of a size."""
         pitch = self.mm_per_pixel if mm_per_pixel is None else mm_per_pixel
-        return _scenes(pitch, len(self.profile.channels))
+        return _scenes(pitch)
 
     def error(self, kernel: Kernel, truths: Sequence[FloatArray]) -> float:
         """Return what a kernel's pictures show beside others of the same scenes."""
@@ -138,10 +139,10 @@ def _fitted(subject: Subject, way: Way) -> Kernel:
 
 
 @functools.lru_cache(maxsize=64)
-def _scenes(mm_per_pixel: float, channels: int) -> Sequence[Scene]:
-    size = {"height": SIDE, "width": SIDE, "mm_per_pixel": mm_per_pixel}
-    found = [make_scene(each, **size) for each in PICTURES]
-    return tuple(found)
+def _scenes(mm_per_pixel: float) -> Sequence[Scene]:
+    return tuple(
+        make_scene(each, height=SIDE, width=SIDE, mm_per_pixel=mm_per_pixel) for each in PICTURES
+    )
 
 
 def shown(kernel: Kernel, scene: Scene) -> FloatArray:
