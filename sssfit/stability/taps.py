@@ -10,7 +10,7 @@ from sssfit.kernel import Kernel, Taps
 from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
 from sssfit.stability.record import Axis, Curve, Panel
-from sssfit.stability.subject import SIDE, Subject, Way, attempted, error_of, shown
+from sssfit.stability.subject import CASCADE, SIDE, Subject, Way, attempted, error_of, shown
 
 LIMIT = 1.0  # Delta E
 _TAPS = (5, 9, 17, 33, 65)  # a pass
@@ -24,13 +24,12 @@ _THINNED = (
     Way("svd 3 on taps", "svd", {"rank": 3}),
     Way("gaussians 4 on taps", "gaussians", {"terms": 4}),
 )
-_CASCADE = Way("cascade 24", "cascade", {"fetches": 24})
 _PASS = Way("pre-integrated, 25 taps", "preintegrated", {}, taps=25)
 
 
 def stress(subject: Subject) -> list[Panel]:
     """Give kernels fewer fetches, fewer bits and brighter points."""
-    tables = {each.label: subject.true_kernel(each) for each in (_CASCADE, _PASS)}
+    tables = {each.label: subject.true_kernel(each) for each in (CASCADE, _PASS)}
     return [
         _few_fetches(subject),
         Panel(
@@ -67,7 +66,10 @@ def _few_fetches(subject: Subject) -> Panel:
     """Return the error over the fetches of a pixel."""
     truths = subject.truths()
     budgets = _FETCHES_OF_PAPERS if subject.is_whole else _FETCHES
-    cascades = [Way(f"cascade {n}", "cascade", {"fetches": n}) for n in budgets]
+    cascades = [
+        CASCADE if n == CASCADE.settings["fetches"] else Way("", "cascade", {"fetches": n})
+        for n in budgets
+    ]
 
     def error(way: Way) -> float:
         return attempted(lambda: subject.error(subject.true_kernel(way), truths))
