@@ -443,6 +443,7 @@ _SOURCE = (
     Setting("jitter", "flag", "move the outer taps of a pass by pixel and frame, against bands."),
     Setting("tilt", "flag", "take a pixel's mm right and down apart, for tilted surfaces."),
     Setting("transmittance", "flag", "add a function for the light through a thickness."),
+    Setting("compute", "flag", "write compute shaders, one a level, that work in group memory."),
     Setting("keep_energy", "flag", "leave the energy in the blend, not in a constant of its own."),
     Setting("half", "flag", "round to half floats, and say what that costs."),
     Setting("without_shader", "flag", "write the constants alone, without the passes."),

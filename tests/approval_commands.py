@@ -990,6 +990,9 @@ EXPORT = [
     C("export wax.hand.taps.json --format glsl --jitter -o -"),
     C("export wax.hand.taps.json --format wgsl --tilt -o -"),
     C("export wax.hand.taps.json --format wgsl --tilt --depth -o -"),
+    C("export wax.hand.taps.json --format hlsl --compute -o -"),
+    C("export wax.hand.taps.json --format glsl --compute --coverage -o -"),
+    C("export wax.svd2.kernel.json --format glsl --compute --with-shader -o -"),
     C("export wax.hand.taps.json --format hlsl --depth --without-shader"),
     C("export wax.hand.taps.json --format c -o w.c"),
     C(

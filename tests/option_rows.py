@@ -1039,6 +1039,7 @@ EXPORT = {
     "--jitter": Row(_SOURCE, "--jitter", _exported, _taps_source(jitter=True)),
     "--tilt": Row(_SOURCE, "--tilt", _exported, _taps_source(tilt=True)),
     "--transmittance": Row(_SOURCE, "--transmittance", _exported, _taps_source(transmittance=True)),
+    "--compute": Row(_SOURCE, "--compute", _exported, _taps_source(compute=True)),
     "--keep-energy": Row(_SOURCE, "--keep-energy", _exported, _taps_source(keep_energy=True)),
     "--half": Row(_SOURCE, "--half", _exported, _taps_source(half=True)),
     "--without-shader": Row(

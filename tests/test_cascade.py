@@ -376,6 +376,8 @@ def test_passes_and_halvings_are_limits():
         full = cascade.structure_for(budget, None, None, 22.6, full_resolution=True)
         assert max(each.level for each in full) == 0
         assert cost_of_chain(full).fetches > 0.7 * budget
+    full = cascade.structure_for(36, None, None, 22.6, full_resolution=True)
+    assert structures.STRUCTURES["-".join(str(each.pairs) for each in full)][0] <= 1.9
 
 
 @pytest.mark.slow

@@ -136,6 +136,7 @@ def source_text(
     jitter: bool = False,
     tilt: bool = False,
     transmittance: bool = False,
+    compute: bool = False,
     keep_energy: bool = False,
     half: bool = False,
     without_shader: bool = False,
@@ -161,6 +162,8 @@ def source_text(
         Whether passes take the mm of a pixel along either side apart, for tilted surfaces.
     transmittance : bool
         Whether there is a function for the light that comes through a thickness.
+    compute : bool
+        Whether compute shaders, one a level of a cascade, take the place of the passes.
     keep_energy : bool
         Whether the blend keeps the energy; otherwise it is a constant of its own.
     half : bool
@@ -185,7 +188,7 @@ def source_text(
         "JITTER": jitter,
         "TRANSMITTANCE": transmittance,
     }
-    switches = {**asked, "TILT": tilt}
+    switches = {**asked, "TILT": tilt, "COMPUTE": compute}
     if any(switches.values()) and (without_shader or not (tables or with_shader or dense)):
         given = ", ".join(name.lower() for name, each in switches.items() if each)
         raise KernelError(f"{given}: a switch of passes; have these written, too.")
@@ -202,6 +205,7 @@ def source_text(
         half=half,
         features=tuple(name for name, given in asked.items() if given),
         tilted=tilt,
+        compute=compute,
     )
     if half:
         for each in tables:

@@ -20,7 +20,7 @@ class Dialect:
     ----------
     name : str
     types : mapping
-        Names of float, float2, float3, float4 and uint.
+        Names of float, float2, float3, float4 and uint; for passes also of int, int2, int4, uint2.
     constant : str
         With kind, name, dims and value.
     array : tuple of str
@@ -29,14 +29,19 @@ class Dialect:
         A value for each channel, with kind and values.
     number : str
         With value.
-    function, argument, variable : str
-        A function's first line with kind, name and arguments; the others with kind and name.
+    function, procedure, argument, variable : str
+        A function's first line with kind, name and arguments, and that of one that returns nothing;
+        the others with kind and name.
     picture, sampler : str
         Types of arguments; without a sampler a picture has its own.
     fetch, load : str
         With picture and place: a bilinear fetch at texture coordinates; a texel at its middle.
     struct, variable_of : str
         A structure of an array ``term``, with kind, name and count; a variable of it.
+    shared : str
+        An array of floats of a group of threads, with name and count.
+    barrier : str
+        Waits for all threads of a group.
     has_defines : bool
         Whether there is a preprocessor.
     """
@@ -48,6 +53,7 @@ class Dialect:
     vector: str
     number: str = "{value}"
     function: str = "{kind} {name}({arguments})"
+    procedure: str = "void {name}({arguments})"
     argument: str = "{kind} {name}"
     variable: str = "{kind} {name}"
     picture: str = ""
@@ -56,6 +62,8 @@ class Dialect:
     load: str = ""
     struct: str = "struct {name} {{ {kind} term[{count}]; }};"
     variable_of: str = "{kind} {name}"
+    shared: str = ""
+    barrier: str = ""
     has_defines: bool = True
 
     @property
@@ -76,7 +84,8 @@ class Dialect:
         return self.variable.format(kind=self.types[kind], name=name)
 
 
-_HLSL_TYPES = {each: each for each in (*KINDS, "uint")}
+_WHOLE = ("uint", "uint2", "int", "int2", "int4")
+_HLSL_TYPES = {each: each for each in (*KINDS, *_WHOLE)}
 HLSL = Dialect(
     "hlsl",
     _HLSL_TYPES,
@@ -87,25 +96,42 @@ HLSL = Dialect(
     sampler="SamplerState",
     fetch="{picture}.SampleLevel(bilinear, {place}, 0.0)",
     load="{picture}.Load(int3(int2({place}), 0))",
+    shared="groupshared float {name}[{count}];",
+    barrier="GroupMemoryBarrierWithGroupSync()",
 )
 GLSL = replace(
     HLSL,
     name="glsl",
-    types={"float": "float", "float2": "vec2", "float3": "vec3", "float4": "vec4", "uint": "uint"},
+    types=dict(
+        zip(
+            (*KINDS, *_WHOLE),
+            ("float", "vec2", "vec3", "vec4", "uint", "uvec2", "int", "ivec2", "ivec4"),
+            strict=True,
+        )
+    ),
     constant="const {kind} {name} = {value};",
     array=("const {kind} {name}[{count}] = {kind}[{count}](", ");"),
     picture="sampler2D",
     sampler="",
     fetch="textureLod({picture}, {place}, 0.0)",
     load="texelFetch({picture}, ivec2({place}), 0)",
+    shared="shared float {name}[{count}];",
+    barrier="barrier()",
 )
 WGSL = Dialect(
     "wgsl",
-    {"float": "f32", "float2": "vec2f", "float3": "vec3f", "float4": "vec4f", "uint": "u32"},
+    dict(
+        zip(
+            (*KINDS, *_WHOLE),
+            ("f32", "vec2f", "vec3f", "vec4f", "u32", "vec2u", "i32", "vec2i", "vec4i"),
+            strict=True,
+        )
+    ),
     constant="const {name}: {kind} = {value};",
     array=("const {name} = array<{kind}, {count}>(", ");"),
     vector="{kind}({values})",
     function="fn {name}({arguments}) -> {kind}",
+    procedure="fn {name}({arguments})",
     argument="{name}: {kind}",
     variable="var {name}",
     picture="texture_2d<f32>",
@@ -114,6 +140,8 @@ WGSL = Dialect(
     load="textureLoad({picture}, vec2i({place}), 0)",
     struct="struct {name} {{ term: array<{kind}, {count}> }}",
     variable_of="var {name}: {kind}",
+    shared="var<workgroup> {name}: array<f32, {count}>;",
+    barrier="workgroupBarrier()",
     has_defines=False,
 )
 C = Dialect(

@@ -123,7 +123,8 @@ class Functions:
         apart = ",\n    " if sum(map(len, words)) > _LONGEST else ", "
         middle = (len(words) + 1) // 2
         halves = [", ".join(each) for each in (words[:middle], words[middle:]) if each]
-        return own.function.format(kind=kind, name=full, arguments=apart.join(halves))
+        template = own.procedure if kind == "void" else own.function
+        return template.format(kind=kind, name=full, arguments=apart.join(halves))
 
     def _call(self, name: str, *arguments: str) -> str:
         """Call one of the functions above; a dialect without samplers passes none."""

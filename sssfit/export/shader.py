@@ -9,6 +9,7 @@ import numpy as np
 from sssfit.arrays import FloatArray
 from sssfit.errors import KernelError
 from sssfit.export.certificate import certificate, how_to_run, pass_table
+from sssfit.export.compute import ComputeFunctions, compute_table, levels_of
 from sssfit.export.constants import Writer, check_prefix
 from sssfit.export.depth import DepthFunctions, check_depth, depth_rates
 from sssfit.export.dialects import Dialect, commented, mark, switch
@@ -46,6 +47,8 @@ class Style:
         Of `FEATURES`: which are on where nothing else is said.
     tilted : bool
         Whether passes take the mm of a pixel along either side apart.
+    compute : bool
+        Whether compute shaders, one a level, take the place of the passes.
     """
 
     prefix: str = "SSS"
@@ -54,6 +57,7 @@ class Style:
     half: bool = False
     features: tuple[str, ...] = ()
     tilted: bool = False
+    compute: bool = False
 
     def has(self, feature: str) -> bool:
         """Return whether a feature is on; depth is followed within coverage alone."""
@@ -74,37 +78,15 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
         written for them.
     """
     _check(tables, style)
-    depth = style.has("DEPTH")
     passes = dialect.has_passes and style.with_passes
     words = [line for each in tables for line in certificate(each)]
-    words += (
-        pass_table(
-            tables[0],
-            style.prefix,
-            normalized=style.normalized,
-            depth=depth,
-            jitter=style.has("JITTER"),
-            tilted=style.tilted,
-        )
-        if passes
-        else how_to_run(tables[0])
-    )
+    words += _table(tables, style) if passes else how_to_run(tables[0])
     words += list(_notes(tables, style, passes=passes))
     lines = [mark(dialect), *(commented(each) for each in words)]
     lines += _defines(dialect, style) if passes else []
     lines += _constants(tables, dialect, style, passes=passes)
     if passes:
-        listed = pass_list(tables[0], normalized=style.normalized, depth=depth)
-        kind = DepthFunctions if depth else Functions
-        functions = kind(
-            tables[0],
-            listed,
-            dialect,
-            style.prefix,
-            is_indexed=len(tables) > 1,
-            is_jittered=style.has("JITTER"),
-            is_tilted=style.tilted,
-        )
+        functions = _functions(tables, dialect, style)
         if style.has("TRANSMITTANCE"):
             lines += [
                 "",
@@ -113,6 +95,39 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
         lines += ["", *functions.lines()]
     text = lines if dialect.has_defines else _resolved(lines, style)
     return "\n".join(text).rstrip("\n") + "\n"
+
+
+def _table(tables: Sequence[Taps], style: Style) -> Iterator[str]:
+    """Return the passes or dispatches in words."""
+    if style.compute:
+        return compute_table(tables[0], levels_of(tables), style.prefix)
+    return pass_table(
+        tables[0],
+        style.prefix,
+        normalized=style.normalized,
+        depth=style.has("DEPTH"),
+        jitter=style.has("JITTER"),
+        tilted=style.tilted,
+    )
+
+
+def _functions(tables: Sequence[Taps], dialect: Dialect, style: Style) -> Functions:
+    """Return the functions of the passes or dispatches."""
+    first, is_indexed = tables[0], len(tables) > 1
+    if style.compute:
+        levels = levels_of(tables)
+        return ComputeFunctions(first, levels, dialect, style.prefix, is_indexed=is_indexed)
+    depth = style.has("DEPTH")
+    kind = DepthFunctions if depth else Functions
+    return kind(
+        first,
+        pass_list(first, normalized=style.normalized, depth=depth),
+        dialect,
+        style.prefix,
+        is_indexed=is_indexed,
+        is_jittered=style.has("JITTER"),
+        is_tilted=style.tilted,
+    )
 
 
 def _notes(tables: Sequence[Taps], style: Style, *, passes: bool) -> Iterator[str]:
@@ -131,6 +146,12 @@ def _notes(tables: Sequence[Taps], style: Style, *, passes: bool) -> Iterator[st
 def _check(tables: Sequence[Taps], style: Style) -> None:
     check_prefix(style.prefix)
     first = tables[0]
+    beside = [each.lower() for each in style.features if each != "TRANSMITTANCE"]
+    beside += ["tilt"] if style.tilted else []
+    if style.compute and beside:
+        raise KernelError(
+            f"compute shaders keep no {' and no '.join(beside)}; export the passes, which do."
+        )
     if style.has("DEPTH") and style.tilted:
         raise KernelError(
             "passes that follow depth are narrower on a slope already; export with depth or with "
@@ -160,7 +181,8 @@ def _defines(dialect: Dialect, style: Style) -> Iterator[str]:
     if not dialect.has_defines:
         return
     p = style.prefix
-    for each in dict.fromkeys((*_WITHOUT_BEING_ASKED, *style.features)):
+    always = () if style.compute else _WITHOUT_BEING_ASKED
+    for each in dict.fromkeys((*always, *style.features)):
         name = f"{p}_{each}"
         yield from (f"#ifndef {name}", f"#define {name} {int(each in style.features)}", "#endif")
     if style.has("DEPTH"):
@@ -218,7 +240,8 @@ def _constants(
     yield from write.rows("WEIGHT", np.concatenate(weights).tolist())
     if passes and style.has("DEPTH"):
         yield from write.rows("RATE", [row for each in tables for row in depth_rates(each)])
-    if passes and not pass_list(first, normalized=style.normalized)[-1].is_blended:
+    listed = pass_list(first, normalized=style.normalized)
+    if passes and not style.compute and not listed[-1].is_blended:
         return
     blends = [_blend(each, style) for each in tables]
     yield from write.rows("BLEND", np.concatenate(blends).tolist())

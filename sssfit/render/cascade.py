@@ -18,8 +18,7 @@ from sssfit.render.borders import source_indices
 
 FloatArray = npt.NDArray[np.floating[Any]]
 
-_ROWS = 128  # of a block, even; a block computes twice its stages' reach of rows more
-_CHUNK = 1536  # numbers of a row that the sums take at a time: 6 kB of each row of weights
+_ROWS = 256  # of a block, even; a block computes twice its stages' reach of rows more
 
 
 def is_quick(taps: Taps) -> bool:
@@ -50,30 +49,38 @@ def apply_cascade(
     from sssfit._jit.cascade import add_doubled, run_level  # numba: 0.4 s
 
     channels = pixels.shape[2]
-    current = np.ascontiguousarray(pixels).reshape(len(pixels), -1)
-    sums: list[FloatArray] = []
+    picture = np.ascontiguousarray(pixels).reshape(len(pixels), -1)
+    smaller = _smaller(pixels.shape, taps.stages[-1].level, picture.dtype)
+    pictures, sums = [picture, *smaller[::2]], [np.empty_like(picture), *smaller[1::2]]
     with thread_pool(thread_count(threads), "sssfit-cascade") as pool:
-        for level in range(taps.stages[-1].level + 1):
-            total = np.empty_like(current)
-            half = _half_of(current, channels, wanted=level < taps.stages[-1].level)
-            given = _numbers(taps, level, mm_per_pixel, current, channels)
-            _run_blocks(pool, len(current), run_level, current, total, half, *given, channels)
-            sums.append(total)
-            current = half
+        for level, (read, total) in enumerate(zip(pictures, sums, strict=True)):
+            half = pictures[level + 1] if level + 1 < len(sums) else total[:0, :0]
+            given = _numbers(taps, level, mm_per_pixel, read, channels)
+            _run_blocks(pool, len(read), run_level, read, total, half, *given, level == 0)
         for fine in range(len(sums) - 2, -1, -1):
-            height, width = sums[fine + 1].shape
-            places = (source_indices(n, 1, "mirror") for n in (height, width // channels))
-            whole = len(sums[fine])
-            _run_blocks(pool, whole, add_doubled, sums[fine], sums[fine + 1], *places, channels)
+            total, coarse = sums[fine : fine + 2]
+            height, width = coarse.shape[0], coarse.shape[1] // channels
+            places = (source_indices(n, 1, "mirror") for n in (height, width))
+            both = total, coarse, *places
+            _run_blocks(pool, len(total), add_doubled, *both, channels, fine == 0)
     return sums[0].reshape(pixels.shape)
 
 
-def _half_of(picture: FloatArray, channels: int, *, wanted: bool) -> FloatArray:
-    """Return room for a picture of half the size, or none."""
-    if not wanted:
-        return np.empty((0, 0), picture.dtype)
-    height, width = picture.shape[0], picture.shape[1] // channels
-    return np.empty((-(-height // 2), -(-width // 2) * channels), picture.dtype)
+def _smaller(shape: tuple[int, ...], levels: int, precision: np.dtype[Any]) -> list[FloatArray]:
+    """Return room for picture and sum of each halved level, in turn, in planes (h, C w).
+
+    They share one array: C libraries keep one of up to 32 MB for the next call, where several are
+    fetched from the system page by page, up to 6 of 51 ms.
+    """
+    height, width, channels = shape
+    sizes = []
+    for _ in range(levels):
+        height, width = -(-height // 2), -(-width // 2)
+        sizes += [(height, width * channels)] * 2
+    ends = np.cumsum([0, *(h * w for h, w in sizes)])
+    room = np.empty(ends[-1], precision)
+    parts = zip(itertools.pairwise(ends), sizes, strict=True)
+    return [room[begin:end].reshape(size) for (begin, end), size in parts]
 
 
 def _numbers(
@@ -85,19 +92,18 @@ def _numbers(
     lines = [_line(each, mm_per_pixel * 2.0**level) for each in stages]
     reach = np.array([at.max() for at, _ in lines])
     many = np.array([len(at) for at, _ in lines])
-    chunk = max(_CHUNK // channels, 1)
     at = np.zeros((len(stages), many.max()), np.intp)
-    weights = np.zeros((len(stages), many.max() + 1, chunk * channels), picture.dtype)
+    weights = np.zeros((len(stages), many.max() + 1, channels), picture.dtype)
     for s, (own, each) in enumerate(lines):
         at[s, : len(own)] = own
-        weights[s, : len(each)] = np.tile(each, chunk)
+        weights[s, : len(each)] = each
     shares = taps.blend[before : before + len(stages) + 1].copy()
     if level > 0:  # what it is halved from is part of the finer sum
         shares[0] = 0.0
     height, width = picture.shape[0], picture.shape[1] // channels
     rows = source_indices(height, 2 * int(reach.sum()) + 1, "mirror")
     columns = source_indices(width, int(reach.max()) + 1, "mirror")
-    return rows, columns, reach, many, at, weights, np.tile(shares, chunk).astype(picture.dtype)
+    return rows, columns, reach, many, at, weights, shares.astype(picture.dtype)
 
 
 def _line(stage: Stage, mm_per_texel: float) -> tuple[npt.NDArray[np.intp], FloatArray]:

@@ -6,7 +6,8 @@
 
 A close shot writes every pixel, a mid shot the middle 1/16 of them, and with no skin in view the
 draws are made and write nothing: the fixed cost. The shots are cut by the scissor, as an engine
-cuts by its stencil. All cases take turns, and the least time of each counts. Needs `moderngl`.
+cuts by its stencil; of compute shaders as many groups run as the shot has. All cases take turns,
+and the least time of each counts. Needs `moderngl`.
 """
 
 import argparse
@@ -21,10 +22,12 @@ ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "bench")]
 
 from bench_walk import markdown, processor, write_page  # noqa: E402
+from compute_runs import prepared_compute  # noqa: E402
 from shader_runs import device_of, prepared  # noqa: E402
 
 from sssfit.errors import SssfitWarning  # noqa: E402
 from sssfit.export import kernel_text  # noqa: E402
+from sssfit.export.compute import bytes_moved, levels_of  # noqa: E402
 from sssfit.fit import fit_result  # noqa: E402
 from sssfit.fit.on_taps import on_taps  # noqa: E402
 from sssfit.material import load_material  # noqa: E402
@@ -56,17 +59,34 @@ def shot_rows(size, runs):
     cases, best = {}, {}
     for label, taps in tables():
         text, _ = kernel_text(taps, "glsl")
-        cases[label] = taps, prepared(text, "glsl", taps, light, taps.mm_per_pixel, normalized=True)
-        timed(cases[label][1], 1.0)  # the driver compiles at the first draw
+        draw = prepared(text, "glsl", taps, light, taps.mm_per_pixel, normalized=True)
+        moved = f"{taps.bytes_per_pixel():.0f}"
+        cases[label] = (f"{taps.fetches:.4g}", str(taps.passes), moved, "0"), draw
+        if taps.chained:
+            cases[f"{label}, compute"] = compute_case(taps, light)
+    for _, draw in cases.values():
+        timed(draw, 1.0)  # the driver compiles at the first draw
     for _ in range(runs):
         for label, (_, draw) in cases.items():
             for shot, part in SHOTS.items():
                 took = timed(draw, part)
                 best[label, shot] = min(best.get((label, shot), np.inf), took)
-    for label, (taps, _) in cases.items():
+    for label, (cost, _) in cases.items():
         shots = [f"{1e3 * best[label, shot]:.2f}" for shot in SHOTS]
-        cost = f"{taps.fetches:.4g}", str(taps.passes), f"{taps.bytes_per_pixel():.0f}"
+        shots[2] = "-" if label.endswith("compute") else shots[2]  # no group runs
         yield (label.replace("|", "\\|"), *cost, *shots)
+
+
+def compute_case(taps, light):
+    """Cost and dispatches of a cascade's compute shaders: loads a pixel, and bytes with halos."""
+    text, _ = kernel_text(taps, "glsl", compute=True)
+    _, run = prepared_compute(text, "glsl", [taps], light, taps.mm_per_pixel, half=True)
+    levels = levels_of([taps])
+    once, whole = (bytes_moved(levels, with_halos=halos) for halos in (False, True))
+    loads = sum((each.side / each.tile) ** 2 / 4.0**each.number for each in levels)
+    loads += sum(2.0 / 4.0**each.number for each in levels[:-1])
+    moved = f"{once:.0f}", f"{whole - once:.0f}"
+    return (f"{loads:.4g}", str(2 * len(levels) - 1), *moved), run
 
 
 def timed(draw, part):
@@ -81,7 +101,7 @@ def timed(draw, part):
 
 def ratio_rows(rows):
     """Six Gaussians over the single pair of 17 taps, here and on the report's cards."""
-    close = {label: float(cells[3]) for label, *cells in rows}
+    close = {label: float(cells[4]) for label, *cells in rows}
     ours = close["six Gaussians, 17 taps"] / close["pre-integrated, 17 taps"]
     yield "here", f"{ours:.2f}"
     for card, (two, six) in PUBLISHED.items():
@@ -92,15 +112,24 @@ def report(size, runs):
     """The page."""
     rows = list(shot_rows(size, runs))
     driver = device_of("glsl").context.info
-    heads = ("table", "fetches", "passes", "bytes a pixel", *(f"{each}, ms" for each in SHOTS))
+    heads = (
+        "table",
+        "fetches",
+        "passes",
+        "bytes a pixel",
+        "of halos",
+        *(f"{each}, ms" for each in SHOTS),
+    )
     return "\n\n".join(
         [
             "# Exported passes on a driver",
             f"{size[0]} x {size[1]} pixels, half floats between the passes, GLSL by "
             f"{driver['GL_RENDERER']}, {driver['GL_VERSION']}, {processor()}; least of {runs}. "
-            "Bytes are those that each pass reads and writes, a picture once. A software driver "
+            "Bytes are those that each pass reads and writes, a picture once; tiles of compute "
+            "shaders, whose passes are dispatches, also load halos. A software driver "
             "ranks only roughly: it pays for arithmetic and fetches alike, has no texture cache, "
-            "and its draws cost little.",
+            "and its draws cost little. Nor has it any groupshared memory of its own: compute "
+            "shaders save it no traffic, and it pays for every texel of their halos.",
             markdown(heads, rows),
             "Six Gaussians in screen space over one pair of passes, close shot:",
             markdown(("where", "ratio"), list(ratio_rows(rows))),
