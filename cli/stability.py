@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import click
@@ -54,12 +53,12 @@ def stability(material: str, common: Common, **given: Any) -> None:
             is_whole=given["is_whole"],
             seed=common.seed,
             threads=common.threads,
-            step=step,
+            progress=step,
         )
         if given["chart"]:
             write_chart(found, target(given["chart"]))
         if given["table"]:
             write(found.table().encode(), target(given["table"]))
     wrote = [each for each in (given["chart"], given["table"]) if each]
-    words = [found.text(), *(f"Wrote {Path(each)}" for each in wrote if each != "-")]
+    words = [found.text(), *(f"Wrote {each}" for each in wrote)]
     finish(common, {"output": wrote, **found.to_dict()}, "\n".join(words))

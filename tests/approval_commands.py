@@ -87,7 +87,10 @@ def _gone(*names: str) -> Callable[[], object]:
 HELP = [
     C("", note="no verb"),
     *(C(f"{verb} -h".strip()) for verb in ("", "materials", "simulate", "fit", "render")),
-    *(C(f"{verb} --help") for verb in ("compare", "choose", "import", "export", "chart", "show")),
+    *(
+        C(f"{verb} --help")
+        for verb in ("compare", "choose", "stability", "import", "export", "chart", "show")
+    ),
     C("--version"),
     C("--version -v", hidden=(r" \d[\w.]*$",)),
     C("simulat wax.toml"),

@@ -30,7 +30,7 @@ def stability(
     seed: int = 1,
     threads: int | None = None,
     is_whole: bool = False,
-    step: _Step | None = None,
+    progress: _Step | None = None,
 ) -> Stability:
     """Stress the fits of a material until they break.
 
@@ -48,7 +48,7 @@ def stability(
         By default all cores; results do not depend on them.
     is_whole : bool
         Whether seeds and sizes are those of docs/stability.md; otherwise cascades have fewer.
-    step : callable, optional
+    progress : callable, optional
         Told (done, of how many, the next one's name).
 
     Returns
@@ -72,8 +72,8 @@ def stability(
     panels: list[Panel] = []
     notes: list[str] = []
     for k, each in enumerate(names):
-        if step is not None:
-            step(k, len(names), each)
+        if progress is not None:
+            progress(k, len(names), each)
         try:
             panels += STRESSES[each].load()(subject)
         except FitError as error:

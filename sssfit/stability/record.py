@@ -186,6 +186,7 @@ class Panel:
                 "x": self.axis.label,
                 "y": self.y_label,
                 "limit": self.limit,
+                "fails": self.fails,
                 "curves": [
                     {"label": c.label, "x": c.x, "y": c.y, "low": c.low, "high": c.high}
                     for c in self.curves
