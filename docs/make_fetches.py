@@ -5,6 +5,7 @@ python docs/make_fetches.py
 
 import functools
 import itertools
+import math
 import warnings
 
 import numpy as np
@@ -29,6 +30,7 @@ BUDGETS = (14, 17, 20, 24, 28, 36, 50, 75, 100)
 CASCADES = (7, 10, 11, 12, 14, 17, 20, 24, 28, 36)
 TAPS = (3, 5, 7, 9, 11, 13, 17, 21, 25, 33, 41, 49)
 MOST = 100  # fetches a pixel
+MARK_POINTS = 11.0  # between the middles of two marks of engines' samplers
 # Name, colour and marker in the chart; the method; the settings of its kernels, and their terms.
 PUBLISHED = {
     "pre-integrated": (COLOURS[1], "^", "preintegrated", [({}, 1)]),
@@ -133,7 +135,10 @@ def chart(rows, cascades, ours, shipped, relatives):
     )
     letters = dict(zip("abcdefghijklmnopqrstuvwxyz", (each[0] for each in shipped), strict=False))
     key = ", ".join(f"{letter} {label}" for letter, label in letters.items())
-    engines_note = f"Letters: samplers of engines as they ship, one frame: {key}."
+    engines_note = (
+        f"Letters: samplers of engines as they ship, one frame: {key}. A letter that would cover "
+        "another is moved up."
+    )
     title = "skin1: what a budget of fetches shows"
     with new_page(5.6, title, "Exact profile, 0.3 mm a pixel", [note, engines_note]) as (
         figure,
@@ -157,10 +162,7 @@ def chart(rows, cascades, ours, shipped, relatives):
         own = envelope([(f, e) for f, _, e, _ in cascades])
         axes.plot(*zip(*own, strict=True), **styles["cascade"])
         axes.plot([own[-1][0], 110], [own[-1][1]] * 2, color="black", lw=0.8, ls=(0, (1, 2)))
-        for letter, (_, fetches, _, error) in zip(letters, shipped, strict=True):
-            axes.text(fetches, error, letter, size=7.5, weight="bold", ha="center", va="center",
-                      color="#222222", zorder=6, bbox={"boxstyle": "circle,pad=0.15", "fc": "white",
-                                                       "ec": "#666666", "lw": 0.6})  # fmt: skip
+        marks = [mark(axes, *each) for each in zip(letters, shipped, strict=True)]
         axes.axhline(1.0, color="#666666", lw=0.8, ls=(0, (4, 2)), zorder=1)
         axes.annotate("just noticeable side by side", (105, 1.0), (0, 3), ha="right",
                       textcoords="offset points", size=7.5, color="#444444")  # fmt: skip
@@ -173,7 +175,30 @@ def chart(rows, cascades, ours, shipped, relatives):
         axes.xaxis.set_minor_locator(NullLocator())
         axes.yaxis.set_minor_formatter(NullFormatter())
         name_axes(axes, "", "texture fetches a pixel", "99th percentile of ΔE 2000, mean")
+    set_apart(marks)
     save_figure(figure, "docs/skin1-fetches.png")
+
+
+def mark(axes, letter, sampler):
+    """Draw the letter of an engine's sampler, tied to its place by a line."""
+    _, fetches, _, error = sampler
+    circle = {"boxstyle": "circle,pad=0.15", "fc": "white", "ec": "#666666", "lw": 0.6}
+    line = {"arrowstyle": "-", "color": "#666666", "lw": 0.6, "shrinkA": 0.0, "shrinkB": 0.0}
+    return axes.annotate(letter, (fetches, error), (0, 0), textcoords="offset points", size=7.5,
+                         weight="bold", ha="center", va="center", color="#222222", zorder=6,
+                         bbox=circle, arrowprops=line)  # fmt: skip
+
+
+def set_apart(marks):
+    """Move marks that would cover others upwards, in the order of their errors."""
+    placed = []
+    for each in sorted(marks, key=lambda each: each.xy[1]):
+        x, y = each.axes.transData.transform(each.xy) * 72.0 / each.figure.dpi  # points
+        up = 0.0
+        while any(math.hypot(x - other[0], y + up - other[1]) < MARK_POINTS for other in placed):
+            up += 0.5
+        each.set_position((0.0, up))
+        placed.append((x, y + up))
 
 
 def row(cells):

@@ -1,10 +1,14 @@
 """What docs/cascades.md says of disks and of engines' samplers, recomputed."""
 
+import itertools
 import re
 import runpy
 from pathlib import Path
 
+import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
 
 from sssfit.compare.engines import engines
 
@@ -59,3 +63,23 @@ def test_all_rows(script, skin1, pictures):
         rows = [check_in_page(each) for each in script["disk_rows"](skin1, pictures, taps)]
         assert len(rows) == 3
         assert min(each[-2] for each in rows) > 5.0 * cascade
+
+
+def test_no_mark_of_a_sampler_covers_another(monkeypatch):
+    """Five samplers of about 40 fetches and about the same error, as HDRP's and Babylon's are."""
+    monkeypatch.syspath_prepend(str(DOCS))
+    fetches = runpy.run_path(str(DOCS / "make_fetches.py"))
+    figure = Figure(figsize=(8.0, 5.6), dpi=200)
+    axes = figure.subplots()
+    axes.set(xscale="log", yscale="log", xlim=(5.4, 240.0), ylim=(0.05, 50.0))
+    samplers = [("", n, 1, error) for n, error in
+                ((40, 22.1), (40, 20.6), (41, 21.0), (42, 16.0), (80, 16.0))]  # fmt: skip
+    marks = [fetches["mark"](axes, *each) for each in zip("abcde", samplers, strict=True)]
+    fetches["set_apart"](marks)
+    FigureCanvasAgg(figure).draw()
+    circles = [each.get_bbox_patch().get_window_extent() for each in marks]
+    middles = np.array([0.5 * (each.p0 + each.p1) for each in circles])
+    for i, j in itertools.combinations(range(len(marks)), 2):
+        between = np.hypot(*(middles[i] - middles[j]))
+        assert between >= 0.5 * (circles[i].width + circles[j].width)
+    assert marks[4].get_position() == (0.0, 0.0)  # whoever stands alone stays

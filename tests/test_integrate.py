@@ -17,19 +17,27 @@ from sssfit.export import DIALECTS, Style, source
 from sssfit.export.passes import pass_list
 
 PAGE = "integrate.md"
+FILES = (
+    Path(__file__).parents[1] / "docs" / "integrate"
+)  # the scripts of which the page shows parts
 MASKED = Style(features=("COVERAGE",))
-ENTRY = re.compile(r"^(?:float4|void) (\w+)\([^)]*\)[^{;]*\{", re.MULTILINE)
-ENTRIES = ["Light", "Blur", "Halve", "Sum3", "Sum2", "Sum1", "Sum0", "Add"]
+ENTRY = re.compile(r"^float4 (\w+)\(float4 at : SV_Position\)", re.MULTILINE)
+ENTRIES = ["Blur", "Halve", "Sum3", "Sum2", "Sum1", "Sum0", "Light", "Add"]
 # What the includes of HDRP's custom passes stand for, without stereo.
 UNITY = """
 #define TEXTURE2D_X(name) Texture2DArray<float4> name
 #define LOAD_TEXTURE2D_X(name, place) name.Load(int4(int2(place), 0, 0))
-SamplerState s_linear_clamp_sampler;
-struct Varyings { float4 positionCS : SV_POSITION; };
 """
-HLSL = dict(zip(("own", "unity", "unreal"), code_blocks("hlsl", PAGE), strict=True))
+PASSES, OWN, COMPUTE, *OTHERS = code_blocks("hlsl", PAGE)
+HLSL = dict(zip(("own", "unity", "unreal"), (OWN, *OTHERS), strict=True))
 GODOT, *ES = code_blocks("glsl", PAGE)
-WEBGL, *ENGINES = code_blocks("js", PAGE)
+LANGUAGES = {"ScatterPass.cs": "csharp", "scatter.gd": "gdscript", "scatter.glsl": "glsl"}
+LANGUAGES |= dict.fromkeys(("passes.js", "three-scattering.js", "babylon-scattering.js"), "js")
+
+
+def script(name):
+    """A file beside the page."""
+    return (FILES / name).read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="module")
@@ -58,17 +66,25 @@ def accepted(text, stage, folder, *flags):
 @pytest.mark.parametrize("entry", ENTRIES)
 def test_hlsl_compiles_around_an_export(taps, engine, entry, tmp_path):
     needs("hlsl")
-    code = HLSL[engine]
-    assert ENTRY.findall(code.replace("float Mm(float4 at) {", "")) == ENTRIES
+    code = PASSES + HLSL[engine]
+    assert ENTRY.findall(code) == ENTRIES
     export = source([taps], DIALECTS["hlsl"], MASKED)
     before = UNITY if engine == "unity" else ""
     # The compiler is asked for an entry point of this name.
     spirv_of(f"#define {entry} main\n{export}\n{before}\n{code}", tmp_path)
 
 
+@pytest.mark.parametrize("entry", ["Level0", "Add"])
+def test_levels_compile_around_an_export(taps, entry, tmp_path):
+    text = source([taps], DIALECTS["hlsl"], Style(compute=True))
+    assert re.search(r"^// SSS_Level0 .* 16 +\d+$", text, re.MULTILINE)  # the page has this tile
+    code = f"#define {entry} main\n{text}\n{COMPUTE}"
+    accepted(code, "comp", tmp_path, "-D", "-V", "-e", "main", "--auto-map-bindings")
+
+
 def test_compute_shaders_compile_around_an_export(taps, glsl, tmp_path):
-    script = "".join(code_blocks("gdscript", PAGE))
-    calls = {"light": (script_text(script, "LIGHT"), 1), "add": (script_text(script, "ADD"), 1)}
+    own = script("scatter.gd")
+    calls = {"light": (script_text(own, "LIGHT"), 1), "add": (script_text(own, "ADD"), 1)}
     for each in listed(taps):
         axis = {"x": "vec2(1.0, 0.0)", "y": "vec2(0.0, 1.0)"}.get(each["axis"])
         words = [f"{each['stage']}u", axis] if axis else []
@@ -83,9 +99,9 @@ def test_compute_shaders_compile_around_an_export(taps, glsl, tmp_path):
         accepted(text, "comp", tmp_path, "-V")
 
 
-def script_text(script, name):
+def script_text(own, name):
     """A constant text of the GDScript."""
-    return re.search(rf'^const {name} := "(.*)"$', script, re.MULTILINE)[1]
+    return re.search(rf'^const {name} := "(.*)"$', own, re.MULTILINE)[1]
 
 
 @pytest.mark.parametrize("text", ES)
@@ -108,10 +124,9 @@ def listed(taps):
     ]
 
 
-@pytest.mark.parametrize(("language", "quote"), [("csharp", '@"'), ("gdscript", 'r"(?m)')])
-def test_regular_expressions_find_every_pass(taps, glsl, language, quote):
-    code = "".join(code_blocks(language, PAGE))
-    (pattern,) = re.findall(re.escape(quote) + r'(\^//[^"]+)"', code)
+@pytest.mark.parametrize(("name", "quote"), [("ScatterPass.cs", '@"'), ("scatter.gd", 'r"(?m)')])
+def test_regular_expressions_find_every_pass(taps, glsl, name, quote):
+    (pattern,) = re.findall(re.escape(quote) + r'(\^//[^"]+)"', script(name))
     keys = ("name", "stage", "axis", "reads", "writes", "size")
     found = [
         dict(zip(keys, each.groups(), strict=True))
@@ -131,7 +146,7 @@ def node():
 
 def made_by_javascript(text, folder):
     """The passes of exported GLSL, and their fragment shaders, as the page's script makes them."""
-    (folder / "passes.mjs").write_text(WEBGL, encoding="utf-8")
+    (folder / "passes.mjs").write_text(script("passes.js"), encoding="utf-8")
     (folder / "export.glsl").write_text(text, encoding="utf-8")
     (folder / "run.mjs").write_text(
         "import { readFileSync } from 'node:fs';\n"
@@ -192,17 +207,32 @@ def draw(context, fragment, reads, target):
     context.simple_vertex_array(program, corners, "at").render(vertices=3)
 
 
-@pytest.mark.parametrize("number", range(len(ENGINES)))
-def test_javascript_of_the_engines_is_well_formed(number, tmp_path):
-    (tmp_path / "engine.mjs").write_text(ENGINES[number], encoding="utf-8")
+@pytest.mark.parametrize("name", ["three-scattering.js", "babylon-scattering.js"])
+def test_javascript_of_the_engines_is_well_formed(name, tmp_path):
+    (tmp_path / "engine.mjs").write_text(script(name), encoding="utf-8")
     subprocess.run([node(), "--check", "engine.mjs"], cwd=tmp_path, check=True)
 
 
 def test_a_section_fits_a_screen_and_names_what_was_read():
-    text = (Path(__file__).parents[1] / "docs" / PAGE).read_text(encoding="utf-8")
+    text = (FILES.parent / PAGE).read_text(encoding="utf-8")
     read = text.split("## Where the names were read", 1)[1]
     for engine in ("Unity", "Unreal", "Godot", "three.js", "Babylon.js"):
         assert f"- {engine}: " in read
-    languages = ("hlsl", "csharp", "cpp", "gdscript", "glsl", "js")
-    blocks = [block for each in languages for block in code_blocks(each, PAGE)]
-    assert max(len(each.splitlines()) for each in blocks) <= 60
+    for section in re.split(r"^##+ ", text, flags=re.MULTILINE)[1:]:
+        assert len(section.splitlines()) <= 55, section.splitlines()[0]
+
+
+@pytest.mark.parametrize(("name", "language"), LANGUAGES.items())
+def test_the_page_shows_parts_of_the_files_that_it_links(name, language):
+    text = (FILES.parent / PAGE).read_text(encoding="utf-8")
+    assert f"](integrate/{name})" in text
+    shown = [each for each in code_blocks(language, PAGE) if each in script(name)]
+    assert shown, name
+    if language in ("csharp", "gdscript"):
+        assert len(shown) == len(code_blocks(language, PAGE))
+
+
+def test_every_part_of_javascript_is_in_a_file():
+    whole = "".join(script(name) for name, language in LANGUAGES.items() if language == "js")
+    for each in code_blocks("js", PAGE):
+        assert each in whole

@@ -163,7 +163,7 @@ def source_text(
     transmittance : bool
         Whether there is a function for the light that comes through a thickness.
     compute : bool
-        Whether compute shaders, one a level of a cascade, take the place of the passes.
+        Whether compute shaders, one a level of a cascade, replace the passes.
     keep_energy : bool
         Whether the blend keeps the energy; otherwise it is a constant of its own.
     half : bool

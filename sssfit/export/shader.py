@@ -48,7 +48,7 @@ class Style:
     tilted : bool
         Whether passes take the mm of a pixel along either side apart.
     compute : bool
-        Whether compute shaders, one a level, take the place of the passes.
+        Whether compute shaders, one a level, replace the passes.
     """
 
     prefix: str = "SSS"
