@@ -1,7 +1,7 @@
 """Bad but plausible profiles: gaps, coarse rings, a saturated middle and a camera's noise.
 
 Each defect is put into the subject's own profile, as measurements and other programs have it, and
-the kernel's picture is held against that of the whole profile's kernel.
+the kernel's picture is compared with that of the whole profile's kernel.
 """
 
 import dataclasses

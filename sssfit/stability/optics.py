@@ -103,7 +103,12 @@ def _beyond(subject: Subject, eta: float) -> Curve:
     profiles = _profiles(eta, subject.threads)
     shares = [float((each.beyond_grid / each.diffuse_reflectance)[0]) for each in profiles]
     floor = np.maximum(_ascending(shares), 1e-9)
-    return Curve(f"index {eta:g}", _lost(ALBEDOS), floor, advice="--radius auto, or a larger one")
+    return Curve(
+        f"index {eta:g}",
+        _lost(ALBEDOS),
+        floor,
+        advice='a larger radius, or `radius_mm = "auto"` of a walk',
+    )
 
 
 def _model(subject: Subject, name: str) -> Curve:

@@ -261,8 +261,8 @@ def _few_taps(facts: Facts, limit: float) -> str:
     if fetches >= limit:
         return ""
     return (
-        f"{fetches} taps a pass take points of light apart, whatever is fitted: over {limit:.0f} "
-        "taps are needed, or a cascade of as many fetches"
+        f"{fetches} taps a pass take points of light apart for every method; take {limit:.0f} or "
+        "more, or a cascade of as many fetches"
     )
 
 
