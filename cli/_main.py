@@ -31,6 +31,7 @@ from .materials import materials
 from .render import render
 from .show import show
 from .simulate import simulate
+from .stability import stability
 
 _LIBRARIES = (
     *("numpy", "scipy", "threadpoolctl", "nlopt", "numba", "llvmlite", "matplotlib"),
@@ -76,7 +77,9 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
         ctx.exit(2)
 
 
-for _verb in (*(materials, simulate, fit, render, compare, choose, import_, export, chart, show),):
+for _verb in (
+    *(materials, simulate, fit, render, compare, choose, stability, import_, export, chart, show),
+):
     cli.add_command(_verb)
 
 

@@ -3,7 +3,7 @@
 Those of methods and of made pictures are made from their entries, in ``_methods``.
 """
 
-from sssfit.methods import EXPORTS, FITS, SEPARABLE
+from sssfit.methods import EXPORTS, FITS, SEPARABLE, STRESSES
 from sssfit.scene.made import COMPARED, EDGE_DEGREES, MADE
 
 from ._options import (
@@ -153,6 +153,15 @@ FIT_PIXELS = (
 )
 FIT_OUTPUT = output("PROFILE.METHOD.taps.json, .kernel.json without taps", "is not our kernel")
 
+STABILITY = (
+    option("--only", Names(STRESSES), "NAME,...", "Stresses, as below.  [default: all]"),
+    option("--mm-per-pixel", Length(), "MM", "Size of a pixel, where it is not what is made "
+           "harder.", 0.3),
+    flag("--whole is_whole", "As many seeds and sizes for cascades as for the others; slow."),
+    option("--chart", None, "FILE", "Figure: PNG, SVG or PDF by its ending; - for PNG on stdout."),
+    option("--table", None, "FILE", "Table in Markdown, - for stdout."),
+    flag("--force", "Replace files that are not our chart or table."),
+)
 EXPORT = (option("--format form", list(EXPORTS), None, "Output format, as below.", required=True),)
 EXPORT_OUTPUT = output("NAME.FORMAT", "sssfit did not write")
 # fmt: on

@@ -495,6 +495,27 @@ EXPORTS: Mapping[str, Method] = {
     ),
 }
 
+STRESSES: Mapping[str, Method] = {
+    "noise": Method("sssfit.stability.noise:stress", "walks of 1e3 to 1e7 photons"),
+    "pixel-size": Method(
+        "sssfit.stability.pixel_size:stress", "pixels of .001 to 10 mean free paths"
+    ),
+    "optics": Method(
+        "sssfit.stability.optics:stress", "albedos of .01 to .99999, indices of 1 to 2"
+    ),
+    "gaussians": Method("sssfit.stability.gaussians:stress", "1 to 10 Gaussians, random starts"),
+    "guided": Method("sssfit.stability.guided:stress", "k, b and pixels of the guided fit"),
+    "hard-light": Method(
+        "sssfit.stability.hard_light:stress", "decompositions beside a highlight of 1000"
+    ),
+    "taps": Method("sssfit.stability.taps:stress", "few fetches, short numbers, a firefly"),
+    "motion": Method("sssfit.stability.motion:stress", "a point that moves over the pixels"),
+    "grid": Method("sssfit.stability.grid:stress", "wide annuli, a short radius"),
+    "imports": Method(
+        "sssfit.stability.imports:stress", "gaps, coarse annuli, saturation, a camera's noise"
+    ),
+}
+
 
 def settings_of(methods: Mapping[str, Method]) -> dict[str, tuple[Setting, tuple[str, ...]]]:
     """Return every setting once by its name, with the names of the methods that have it.

@@ -87,7 +87,10 @@ def _gone(*names: str) -> Callable[[], object]:
 HELP = [
     C("", note="no verb"),
     *(C(f"{verb} -h".strip()) for verb in ("", "materials", "simulate", "fit", "render")),
-    *(C(f"{verb} --help") for verb in ("compare", "choose", "import", "export", "chart", "show")),
+    *(
+        C(f"{verb} --help")
+        for verb in ("compare", "choose", "stability", "import", "export", "chart", "show")
+    ),
     C("--version"),
     C("--version -v", hidden=(r" \d[\w.]*$",)),
     C("simulat wax.toml"),
@@ -1266,8 +1269,28 @@ SHOW = [
     C(f"show {'abcdefghij' * 120}"),
 ]
 
+STABILITY = [
+    C("stability wax.profile.npz --only hard-light --mm-per-pixel .5 --table t.md"),
+    C("stability wax.profile.npz --only hard-light --mm-per-pixel .5 --chart s.png -q"),
+    C("stability mono.profile.npz --only hard-light --mm-per-pixel .5 --json --seed 2"),
+    C("stability - --only hard-light --mm-per-pixel .5 --table -", stdin="mono.profile.npz"),
+    C("stability mono.profile.npz --only hard-light --mm-per-pixel .5 --whole --threads 1"),
+    C("stability mono.profile.npz --only hard-light --table foreign.md"),
+    C("stability mono.profile.npz --only hard-light --mm-per-pixel .5 --table foreign.md --force"),
+    C("stability mono.profile.npz --only hard-light --chart s.exr"),
+    C("stability wax.profile.npz --only nois"),
+    C("stability wax.profile.npz --only hard-light --mm-per-pixel 0"),
+    C("stability wax.profile.npz --only hard-light --mm-per-pixel nan"),
+    C("stability deon-skin --only noise"),
+    C("stability deon-skin --only pixel-size -v"),
+    C("stability missing.toml"),
+    C("stability density.csv"),
+    C("stability"),
+]
+
 COMMANDS = {
     "help": HELP,
+    "stability": STABILITY,
     "materials": MATERIALS,
     "simulate": SIMULATE,
     "fit": FIT,

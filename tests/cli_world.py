@@ -45,6 +45,8 @@ from sssfit.scene.made import make_scene
 from sssfit.scene.record import Scene
 from sssfit.simulate import Checkpoint, inversion, simulate_montecarlo
 from sssfit.simulate._finished import DEFAULT_PHOTONS
+from sssfit.stability import Curve, Panel, Stability
+from sssfit.stability.record import Axis
 
 WAX = (
     'name = "wax"\nsource = "a test"\neta = 1.3\ng = 0\n'
@@ -513,6 +515,16 @@ def small_convergence() -> Any:
     return walk_convergence.Convergence(exact_profile(), walks, exact, line)
 
 
+def stresses() -> Stability:
+    """Made up: real ones take seconds."""
+    photons = np.array([1e3, 1e4, 1e5])
+    falling = Curve("svd 3", photons, np.array([5.2, 1.9, 0.6]), advice="more photons")
+    refused = Curve("gaussians 4", photons, np.array([np.inf, 2.0, 1.5]), advice="fewer Gaussians")
+    axis = Axis("photons", mild=1e5, form=".2g")
+    panel = Panel("noise", "noise", axis, "Delta E", 1.0, (falling, refused), "colours change")
+    return Stability("wax", 0.5, (panel,), ("Left out grid: no material.",), seed=3)
+
+
 def blank(*_) -> Figure:
     """A chart with nothing on it: what charts look like is tested where they are made."""
     return Figure(figsize=(0.1, 0.1))
@@ -520,6 +532,7 @@ def blank(*_) -> Figure:
 
 _CHARTS = (
     *("profile", "kernel", "material", "pareto", "budget", "sheet", "models", "guide", "spectrum"),
+    "stability",
 )
 STAND_INS = {
     "sssfit.simulate.simulate_montecarlo_many": few_photons,
@@ -535,6 +548,7 @@ STAND_INS = {
     "sssfit.compare.budget.error_budgets": lambda _, given: budgets(rank_of(given)),
     "sssfit.compare.compare_models": lambda *_: models(),
     "sssfit.compare.sheet.compute_sheet": lambda *_: small_sheet(),
+    "sssfit.stability.stability": lambda *_: stresses(),
     **{f"sssfit.chart.{kind}.{kind}_figure": blank for kind in _CHARTS},
 }
 

@@ -105,6 +105,7 @@ def is_written(*endings: str) -> Callable[[Ran], Any]:
     begins = {
         "png": b"\x89PNG",
         "svg": b"<?xml",
+        "md": b"<!-- sssfit.stability/1 -->",
         "csv": b"# sssfit.table/1\nmaterial,",
         "npz": b"PK",
     }
@@ -1173,6 +1174,39 @@ CHART = {
     "--force": Row("chart -o foreign.png", "--force", is_written("png"), lambda: ["foreign.png"]),
 }
 
+# stability
+
+_STABILITY = "stability wax.toml"
+
+
+def _stressed(**settings: Any) -> Any:
+    usual = {"only": None, "mm_per_pixel": 0.3, "is_whole": False, "seed": 1}
+    return called("sssfit.stability.stability", wax(), **usual | settings)
+
+
+STABILITY = {
+    "--only": Row(
+        _STABILITY,
+        "--only noise,taps",
+        calls,
+        lambda: _stressed(only=["noise", "taps"]),
+        words="all",
+    ),
+    "--mm-per-pixel": Row(
+        _STABILITY,
+        "--mm-per-pixel .2",
+        calls,
+        lambda: _stressed(mm_per_pixel=0.2),
+        default="0.3",
+    ),
+    "--whole": Row(_STABILITY, "--whole", calls, lambda: _stressed(is_whole=True)),
+    "--chart": Row(_STABILITY, "--chart s.png", is_written("png"), lambda: ["s.png"]),
+    "--table": Row(_STABILITY, "--table s.md", is_written("md"), lambda: ["s.md"]),
+    "--force": Row(
+        f"{_STABILITY} --table foreign.md", "--force", is_written("md"), lambda: ["foreign.md"]
+    ),
+}
+
 ROWS: dict[str, dict[str, Row]] = {
     "materials": MATERIALS,
     "simulate": SIMULATE,
@@ -1183,6 +1217,7 @@ ROWS: dict[str, dict[str, Row]] = {
     "import": IMPORT,
     "export": EXPORT,
     "chart": CHART,
+    "stability": STABILITY,
     "show": {},
 }
 
@@ -1197,6 +1232,7 @@ COMMANDS = {
     "import": "import table.csv",
     "export": "export --format csv",
     "chart": "chart",
+    "stability": _STABILITY,
     "show": "show",
 }
 
@@ -1241,6 +1277,7 @@ SEEDS = {
         calls,
         lambda: _compared([make_scene("noise", height=16, width=24, mm_per_pixel=0.3, seed=5)]),
     ),
+    "stability": Row(_STABILITY, "--seed 5", calls, lambda: _stressed(seed=5)),
     "choose": Row(_CHOOSE, "--seed 5", _asked, lambda: _rounded(_chosen(seed=5))),
     "chart": Row(
         "chart wax.toml --models",
@@ -1254,6 +1291,7 @@ SEEDS = {
 THREADS = {
     "simulate": Row(_WALK, "--threads 1", calls, lambda: _walk(threads=1)),
     "compare": Row(_BUDGET, "--threads 1", calls, lambda: _budgeted(threads=1)),
+    "stability": Row(_STABILITY, "--threads 1", calls, lambda: _stressed(threads=1)),
     "choose": Row(_CHOOSE, "--threads 1", _asked, lambda: _rounded(_chosen(threads=1))),
     "chart": Row(
         "chart wax.toml --models",
@@ -1316,6 +1354,8 @@ STREAMS = (
     f"{_MAKE} --name lard -o x.toml",
     f"{_KERNELS} --chart x.png",
     f"{_BUDGET} --budget-chart x.png",
+    f"{_STABILITY} --chart x.png",
+    f"{_STABILITY} --table x.md",
     "compare wax.profile.npz --what sheet --chart x.png",
     "compare wax.profile.npz --what front --size 24x16 --chart x.png",
 )

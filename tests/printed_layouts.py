@@ -954,6 +954,26 @@ def _empty(f: Figures) -> list[Words]:
 
 _MAKE = "materials --from-reflectance .4,.2,.1 --mean-free-path 1.3,.9,.7 --eta 1.3 -o lard.toml"
 
+
+def stability(f: Figures) -> list[Any]:
+    parts: list[Any] = []
+    for panel in f["panels"]:
+        head = Words(
+            "{}: {} ({}); limit {}; beyond it {}",
+            *(panel["stress"], panel["title"], panel["x"], panel["limit"], panel["fails"]),
+        )
+        rows = [[each["method"], _safe(each)] for each in panel["findings"]]
+        parts += [head, Table(["method", "safe"], rows)]
+    return [*parts, *map(Words, f["notes"])]
+
+
+def _safe(finding: Figures) -> Any:
+    if finding["safe"] == "never":
+        return "nowhere that was tried"
+    edge = finding["below"]
+    return Words("from {} ({} to {})", edge["at"], edge["low"], edge["high"])
+
+
 # A command that prints each of them, on the files of ``cli_world``.
 PRINTED: dict[str, Layout] = {
     "materials": materials_list,
@@ -991,6 +1011,7 @@ PRINTED: dict[str, Layout] = {
     "compare wax.profile.npz --what sheet --chart s.png": sheet,
     "compare wax.profile.npz --what front --size 24x16": fronts,
     "compare wax.profile.npz --what front --size 24x16 --chart f.png --table f.md": fronts,
+    "stability wax.toml": stability,
     "choose wax.toml": choice,
     "choose wax.toml --tolerance 6": choice,
     "choose wax.toml --tolerance 7": choice,

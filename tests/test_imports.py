@@ -28,7 +28,18 @@ ROOMS = [
         "shapes",
     ),
     *("material", "grid", "profile", "kernel", "formats", "scene"),
-    *("simulate", "fit", "render", "measure", "compare", "choose", "export", "chart", "cli"),
+    *(
+        "simulate",
+        "fit",
+        "render",
+        "measure",
+        "compare",
+        "choose",
+        "stability",
+        "export",
+        "chart",
+        "cli",
+    ),
 ]
 # What verbs ask of the chart's room before there is anything to draw; quick to import.
 LIGHT_CHART_FILES = {"data", "files"}

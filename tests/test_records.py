@@ -72,6 +72,7 @@ RECORDS = {
         lambda: world.choice().to_dict(),
         {"distance_mm", "fov_degrees", "resolution"},
     ),
+    "stability wax.toml": (lambda: world.stresses().to_dict(), set()),
     SMALL: (lambda: world.comparison().to_dict(), {"error", "cost", "verdict", "budget"}),
     "chart wax.profile.npz --spectrum": (lambda: spectrum().to_dict(), {"profile"}),
     "chart wax.profile.npz --guide": (lambda: guide().to_dict(), {"profile"}),

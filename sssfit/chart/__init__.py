@@ -26,6 +26,7 @@ FIGURES: Mapping[str, str] = {
     "ModelComparison": "sssfit.chart.models:models_figure",
     "Profile": "sssfit.chart.profile:profile_figure",
     "Sheet": "sssfit.chart.sheet:sheet_figure",
+    "Stability": "sssfit.chart.stability:stability_figure",
     "Spectrum": "sssfit.chart.spectrum:spectrum_figure",
     "TapsView": "sssfit.chart.taps:taps_figure",
 }

@@ -221,7 +221,7 @@ def evaluate(
         score,
         cost_of(kernel, seconds),
         asymmetry_of(kernel),
-        _true_asymmetry(kernel, profile),
+        true_asymmetry(kernel, profile),
         through,
     )
 
@@ -277,7 +277,7 @@ def _half_pixels(kernel: Kernel) -> int:
     return reach_pixels(kernel) if isinstance(kernel, Taps) else kernel.half_pixels
 
 
-def _true_asymmetry(kernel: Kernel, profile: Profile | None) -> FloatArray:
+def true_asymmetry(kernel: Kernel, profile: Profile | None) -> FloatArray:
     """Return the same of the profile's own kernel on the kernel's pixels."""
     if profile is None:
         return np.full(len(kernel.channels), np.nan)
@@ -334,5 +334,5 @@ def evaluate_in_screen_space(
 
     picture, seconds = timed(rendered, scene)
     cost, asymmetry = cost_of(kernel, seconds), asymmetry_of(kernel)
-    unknown = _true_asymmetry(kernel, None)
+    unknown = true_asymmetry(kernel, None)
     return Evaluation(scene, kernel, picture, None, None, cost, asymmetry, unknown, through)

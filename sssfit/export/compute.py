@@ -32,17 +32,24 @@ class Level:
     number : int
         How often its picture is halved.
     stages : range
-    halo, tile : int
-        Texels; ``tile`` a side of what is written, even and at most `GROUP`.
+    reaches : tuple of int
+        Texels around one that each stage's fetches touch.
+    tile : int
+        Texels a side of what is written, even and at most `GROUP`.
     is_last : bool
         Whether nothing is halved any more.
     """
 
     number: int
     stages: range
-    halo: int
+    reaches: tuple[int, ...]
     tile: int
     is_last: bool
+
+    @property
+    def halo(self) -> int:
+        """Texels around the tile that are loaded, too."""
+        return sum(self.reaches)
 
     @property
     def side(self) -> int:
@@ -80,7 +87,8 @@ def levels_of(tables: Sequence[Taps]) -> list[Level]:
     found = []
     for level in range(count):
         stages = [k for k, each in enumerate(first.stages) if each.level == level]
-        halo = sum(max(_reach(each, k, first.mm_per_pixel) for each in tables) for k in stages)
+        reaches = [max(_reach(each, k, first.mm_per_pixel) for each in tables) for k in stages]
+        halo = sum(reaches)
         tile = min(GROUP, (most - 2 * halo) // 2 * 2)
         if tile < 2:
             raise KernelError(
@@ -88,7 +96,8 @@ def levels_of(tables: Sequence[Taps]) -> list[Level]:
                 f"bytes of groupshared memory hold {most} x {most}; expected at most "
                 f"{(most - 2) // 2} texels. Export the passes."
             )
-        found.append(Level(level, range(stages[0], stages[-1] + 1), halo, tile, level == count - 1))
+        own = range(stages[0], stages[-1] + 1)
+        found.append(Level(level, own, tuple(reaches), tile, level == count - 1))
     return found
 
 
@@ -258,8 +267,9 @@ class ComputeFunctions(Functions):
 }}"""
 
     def _of_a_stage(self) -> list[tuple[str, str]]:
-        given = [("uint", "stage"), ("int", "side"), ("int", "thread"), ("int4", "ends")]
-        return [*given, ("float", "mm_per_pixel"), *self.profile]
+        given = [("uint", "stage"), ("int", "side"), ("int", "before"), ("int", "after")]
+        given += [("int", "thread"), ("int4", "ends"), ("float", "mm_per_pixel")]
+        return [*given, *self.profile]
 
     def _begun(self) -> str:
         """Return the line that finds the size of a texel, for which the halo suffices."""
@@ -267,11 +277,11 @@ class ComputeFunctions(Functions):
         return f"{self.dialect.new('float', 'mm_per_texel')} = {size};"
 
     def _loop(self, made: str, slot: str, indent: str) -> str:
-        """Return the lines in which threads make all texels, and wait for each other."""
-        new = self.dialect.new
+        """Return the lines in which threads make texels from ``low`` on, and then wait."""
+        new, at = self.dialect.new, self._whole_numbers("i % many.x", "i / many.x")
         lines = [
-            f"for ({new('int', 'i')} = thread; i < side * side; i += {GROUP**2}) {{",
-            f"    {new('int2', 'at')} = {self._whole_numbers('i % side', 'i / side')};",
+            f"for ({new('int', 'i')} = thread; i < many.x * many.y; i += {GROUP**2}) {{",
+            f"    {new('int2', 'at')} = low + {at};",
             f"    {self._call('Keep', made, 'at', slot)};",
             "}",
             f"{self.dialect.barrier};",
@@ -281,11 +291,15 @@ class ComputeFunctions(Functions):
     def _pair(self) -> str:
         given = ("stage", self._whole_numbers("1 - y", "y"), "at", "y", "ends", "mm_per_texel")
         made = self._call("Along", *given, *self.own_profile)
+        new, low = self.dialect.new, self._whole_numbers("after", "before + y * (after - before)")
         return f"""
-// A stage on all texels, along x to the other slot of the memory and along y back.
+// A stage, along x to the other slot of the memory and along y back, on texels that later ones
+// need: those at least "after" from the ends of the tile, from such at least "before".
 {self._head("void", "Blur", self._of_a_stage())} {{
     {self._begun()}
-    for ({self.dialect.new("int", "y")} = 0; y < 2; y++) {{
+    for ({new("int", "y")} = 0; y < 2; y++) {{
+        {new("int2", "low")} = {low};
+        {new("int2", "many")} = side - 2 * low;
 {self._loop(made, "1 - y", " " * 8)}
     }}
 }}"""
@@ -323,10 +337,13 @@ class ComputeFunctions(Functions):
 
     def _star(self) -> str:
         made = self._call("Around", "stage", "at", "ends", "mm_per_texel", *self.own_profile)
+        new, low = self.dialect.new, self._whole_numbers("after", "after")
         return f"""
-// A stage on all texels in one pass, and back to the first slot of the memory.
+// A stage in one pass, and back to the first slot of the memory.
 {self._head("void", "Star", self._of_a_stage())} {{
     {self._begun()}
+    {new("int2", "low")} = {low};
+    {new("int2", "many")} = side - 2 * low;
 {self._loop(made, "1", " " * 4)}
 {self._loop(self._call("Kept", "at", "1"), "0", " " * 4)}
 }}"""
@@ -376,7 +393,10 @@ class ComputeFunctions(Functions):
     def _stage(self, k: int, level: Level) -> Iterator[str]:
         """Yield the lines that run a stage and add its picture."""
         name = "Blur" if self.taps.stages[k].kind == "pair" else "Star"
-        given = [f"{k}u", str(level.side), "own", "ends", "mm_per_pixel", *self.own_profile]
+        before = sum(level.reaches[: k - level.stages[0]])
+        margins = str(before), str(before + level.reaches[k - level.stages[0]])
+        given = [f"{k}u", str(level.side), *margins, "own", "ends", "mm_per_pixel"]
+        given += self.own_profile
         yield f"    {self._call(name, *given)};"
         share = self._at("BLEND", f"{k + 1}u", "PICTURES")
         yield f"    light += {share} * {self._texel('at')};"

@@ -275,6 +275,13 @@ def search(annuli: Objective, terms: int, least_mm2: float, most_mm2: float) -> 
     )
 
 
+def local_minimum(
+    annuli: Objective, log_variances: FloatArray, bounds: tuple[float, float]
+) -> Point:
+    """Descend from given log variances alone, within bounds, as one start of the search does."""
+    return _descend(annuli, annuli.at(log_variances), bounds, _FINE)[0]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Step:
     """The best sum after adding one Gaussian; ``evaluations`` are those of all steps so far.

@@ -1,0 +1,142 @@
+"""Where methods are safe, as a figure of small panels: `stability_figure`.
+
+``sssfit.stability`` computes the record.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from sssfit.arrays import FloatArray
+from sssfit.chart.page import (
+    COLOURS,
+    LINE_STYLES,
+    Style,
+    add_legend,
+    name_axes,
+    new_page,
+    tick,
+    tick_decades,
+)
+
+if TYPE_CHECKING:
+    from sssfit.stability import Curve, Panel, Stability
+
+_COLUMNS, _PANEL_INCHES, _HEAD_INCHES = 2, 2.15, 1.35
+# Okabe and Ito's vermillion, green and blue, then their orange, sky blue, purple and black.
+_COLOURS = (*COLOURS, "#e69f00", "#56b4e9", "#cc79a7", "#000000", "#999999")
+_MARKERS = "os^Dv<>P"
+_SAFE = "#e8f3ec"
+_HEADROOM = 0.25  # of the axis above the limit, at least
+
+
+def stability_figure(stability: Stability) -> Figure:
+    """Draw every panel of a record: a line for each method, and what is safe shaded.
+
+    Parameters
+    ----------
+    stability : Stability
+        With one panel or more.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        8 inches wide. Bars are quartiles over seeds; a line leaves its panel at the top where a fit
+        is refused.
+    """
+    panels = stability.panels
+    shared = _shared(stability)
+    rows = math.ceil(len(panels) / _COLUMNS)
+    where = f"pixels of {stability.mm_per_pixel:g} mm, seed {stability.seed}"
+    notes = ["Shaded: within the limit. Bars: quartiles over seeds.", *stability.notes]
+    height = _HEAD_INCHES + rows * _PANEL_INCHES
+    title = f"{stability.material}: where fits are safe"
+    with new_page(height, title, where, notes) as (figure, below):
+        if shared:
+            handles = [Line2D([], [], **_style(k)) for k in range(len(shared))]
+            below = add_legend(below, handles, shared)
+        grid = below.subplots(rows, _COLUMNS, squeeze=False).ravel()
+        for axes, panel in zip(grid, panels, strict=False):
+            _draw(axes, panel, shared)
+        for axes in grid[len(panels) :]:
+            axes.remove()
+    return figure
+
+
+def _shared(stability: Stability) -> list[str]:
+    """Return the labels that panels of several stresses have, in their order."""
+    seen = {(panel.stress, each.label) for panel in stability.panels for each in panel.curves}
+    stresses = Counter(label for _, label in seen)
+    labels = dict.fromkeys(each.label for panel in stability.panels for each in panel.curves)
+    return [label for label in labels if stresses[label] > 1]
+
+
+def _style(k: int) -> Style:
+    return {
+        "color": _COLOURS[k % len(_COLOURS)],
+        "linestyle": LINE_STYLES[k // 2 % len(LINE_STYLES)],
+        "marker": _MARKERS[k % len(_MARKERS)],
+        "markersize": 3.2,
+        "lw": 1.0,
+    }
+
+
+def _draw(axes: Axes, panel: Panel, shared: list[str]) -> None:
+    own = [each.label for each in panel.curves if each.label not in shared]
+    for each in panel.curves:
+        k = shared.index(each.label) if each.label in shared else own.index(each.label)
+        _line(axes, each, _style(k))
+    name_axes(axes, panel.title, panel.axis.label, panel.y_label)
+    if panel.axis.is_log:
+        axes.set_xscale("log")
+    else:
+        tick(axes.xaxis)
+    low, high = _range(panel)
+    if panel.is_log:
+        axes.set_yscale("log")
+        axes.set_ylim(low, high)
+        tick_decades(axes.yaxis, 6)
+    else:
+        axes.set_ylim(low, high)
+        tick(axes.yaxis)
+    axes.axhspan(low, panel.limit, color=_SAFE, zorder=0)
+    axes.axhline(panel.limit, color="#666666", lw=0.6, zorder=1)
+    if own:
+        axes.legend(loc="best", fontsize=7)
+
+
+def _line(axes: Axes, curve: Curve, style: Style) -> None:
+    known = np.isfinite(curve.y)
+    axes.plot(curve.x[known], curve.y[known], label=curve.label, **style)
+    if curve.low is None or curve.high is None:
+        return
+    bars = _bars(curve.y, curve.low, curve.high)[:, known]
+    axes.errorbar(
+        curve.x[known], curve.y[known], yerr=bars, fmt="none", ecolor=style["color"], elinewidth=0.7
+    )
+
+
+def _bars(y: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
+    """Return lengths of bars down and up (2, N); 0 where a quartile is infinite."""
+    with np.errstate(invalid="ignore"):
+        bars = np.stack((y - low, high - y))
+    found: FloatArray = np.where(np.isfinite(bars), np.maximum(bars, 0.0), 0.0)
+    return found
+
+
+def _range(panel: Panel) -> tuple[float, float]:
+    """Return the limits of the measure's axis, with room above the limit."""
+    values = np.concatenate([each.y for each in panel.curves])
+    values = np.append(values[np.isfinite(values)], panel.limit)
+    if not panel.is_log:
+        return 0.0, float(values.max()) * (1.0 + _HEADROOM)
+    positive = values[values > 0.0]
+    low, high = float(positive.min()), float(positive.max())
+    return 0.7 * low, max(high, panel.limit * 3.0) * 1.5

@@ -1,0 +1,98 @@
+"""Stresses every method until it breaks, and says where it is safe.
+
+`stability` runs the stresses of ``sssfit.methods.STRESSES`` on a material; a new one is one file
+with a function from a `Subject` to panels, and one entry there.
+"""
+
+from collections.abc import Callable, Collection
+from pathlib import Path
+
+from sssfit.errors import ArgumentError, FitError
+from sssfit.files import has_mark
+from sssfit.material import Material
+from sssfit.messages import did_you_mean, shown
+from sssfit.methods import STRESSES
+from sssfit.profile import Profile
+from sssfit.simulate import simulate_exact
+from sssfit.stability.record import MARK, Curve, Edge, Finding, Panel, Stability
+from sssfit.stability.subject import Subject
+
+__all__ = ["Curve", "Edge", "Finding", "Panel", "Stability", "Subject", "stability"]
+
+_Step = Callable[[int, int, str], None]
+
+
+def stability(
+    source: Material | Profile,
+    *,
+    only: Collection[str] | None = None,
+    mm_per_pixel: float = 0.3,
+    seed: int = 1,
+    threads: int | None = None,
+    is_whole: bool = False,
+    progress: _Step | None = None,
+) -> Stability:
+    """Stress the fits of a material until they break.
+
+    Parameters
+    ----------
+    source : Material or Profile
+        A profile is taken as the truth; stresses that walk need to know its material.
+    only : collection of str, optional
+        Names of stresses, by default all that the source allows.
+    mm_per_pixel : float [mm]
+        Where pixels are not what is made harder.
+    seed : int
+        Of walks and searches.
+    threads : int, optional
+        By default all cores; results do not depend on them.
+    is_whole : bool
+        Whether seeds and sizes are those of docs/stability.md; otherwise cascades have fewer.
+    progress : callable, optional
+        Told (done, of how many, the next one's name).
+
+    Returns
+    -------
+    Stability
+
+    Raises
+    ------
+    ArgumentError
+        A stress is unknown.
+    FitError
+        A stress that was named needs a material, and the profile does not say its own; or no kernel
+        can be made.
+    """
+    names = _named(only)
+    profile = source if isinstance(source, Profile) else simulate_exact(source)
+    if not mm_per_pixel > 0.0:
+        raise ArgumentError(f"`mm_per_pixel = {mm_per_pixel}`; expected a length above 0.")
+    name = profile.material_name or "unknown"
+    subject = Subject(name, profile, mm_per_pixel, seed, threads, is_whole)
+    panels: list[Panel] = []
+    notes: list[str] = []
+    for k, each in enumerate(names):
+        if progress is not None:
+            progress(k, len(names), each)
+        try:
+            panels += STRESSES[each].load()(subject)
+        except FitError as error:
+            if only is not None:
+                raise
+            notes.append(f"Left out {each}: {error}")
+    return Stability(name, mm_per_pixel, tuple(panels), tuple(notes), seed)
+
+
+def _named(only: Collection[str] | None) -> list[str]:
+    """Return the stresses in the order of their table; refuse unknown ones."""
+    for each in only or ():
+        if each not in STRESSES:
+            near = did_you_mean(each, list(STRESSES))
+            known = ", ".join(STRESSES)
+            raise ArgumentError(f"stress {shown(each)}: {near}expected some of {known}.")
+    return [each for each in STRESSES if not only or each in only]
+
+
+def is_stability_table(path: Path) -> bool:
+    """Return whether a file is a table that we wrote."""
+    return has_mark(path, {MARK.encode(): b""})

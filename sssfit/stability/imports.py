@@ -1,0 +1,118 @@
+"""Bad but plausible profiles: gaps, coarse rings, a saturated middle and a camera's noise.
+
+Each defect is put into the subject's own profile, as measurements and other programs have it, and
+the kernel's picture is compared with that of the whole profile's kernel.
+"""
+
+import dataclasses
+from collections.abc import Callable
+
+import numpy as np
+
+from sssfit.arrays import FloatArray
+from sssfit.methods import TAPS
+from sssfit.profile import Profile
+from sssfit.profile.pixels import annulus_areas
+from sssfit.stability.record import Axis, Curve, Panel
+from sssfit.stability.subject import WAYS, Subject, Way, attempted
+
+LIMIT = 1.0  # Delta E
+_NONE = 1e-3  # of a share, for logarithmic axes
+_SHARES = (_NONE, 0.01, 0.03, 0.1, 0.3, 0.6)
+_DEVIATIONS = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
+_MERGED = (1, 4, 16, 64, 256)
+
+Defect = Callable[[Profile, float], Profile]
+
+
+def stress(subject: Subject) -> list[Panel]:
+    """Put four defects into the profile, from slight to gross."""
+    defects: dict[str, tuple[Defect, tuple[float, ...], str, str]] = {
+        "annuli lost in gaps": (_with_gaps, _SHARES, "share of the annuli", "fill the gaps"),
+        "annuli read as one": (_merged, _MERGED, "annuli in one", "finer radii near the beam"),
+        "a saturated middle": (
+            _saturated,
+            _SHARES,
+            "share of the energy cut off",
+            "expose shorter",
+        ),
+        "a camera's noise, clipped at 0": (
+            _noisy,
+            _DEVIATIONS,
+            "deviation / peak",
+            "average pictures",
+        ),
+    }
+    ways = [each for each in WAYS if each.method not in TAPS or subject.is_whole]
+    return [
+        Panel(
+            stress="imports",
+            title=title,
+            axis=Axis(label, mild=steps[0]),
+            y_label="p99 of Delta E 2000",
+            limit=LIMIT,
+            curves=[_curve(subject, each, defect, steps, advice) for each in ways],
+            fails="the import shows in the picture, or is refused",
+        )
+        for title, (defect, steps, label, advice) in defects.items()
+    ]
+
+
+def _curve(
+    subject: Subject, way: Way, defect: Defect, steps: tuple[float, ...], advice: str
+) -> Curve:
+    wanted = subject.shows(subject.true_kernel(way))
+
+    def change(step: float) -> float:
+        profile = defect(subject.profile, step)
+        return attempted(lambda: subject.error(way.fit(profile, subject.mm_per_pixel), wanted))
+
+    errors = np.maximum(subject.each(change, steps), 1e-3)
+    return Curve(way.label, np.array(steps), errors, advice=advice)
+
+
+def _with_energy(profile: Profile, energy: FloatArray) -> Profile:
+    unknown = np.full(energy.shape, np.nan)
+    return dataclasses.replace(profile, annulus_energy=energy, annulus_energy_stderr=unknown)
+
+
+def _with_gaps(profile: Profile, share: float) -> Profile:
+    """Lose every k-th run of ten annuli; nothing was written there, which reads as no light."""
+    run, annuli = 10, profile.n_annuli
+    every = max(round(run / share), run)
+    lost = np.arange(annuli) % every >= every - run
+    return _with_energy(profile, np.where(lost[:, None], 0.0, profile.annulus_energy))
+
+
+def _merged(profile: Profile, count: float) -> Profile:
+    """Read so many annuli as one."""
+    edges = np.arange(0, profile.n_annuli, int(count))
+    energy = np.add.reduceat(profile.annulus_energy, edges, axis=0)
+    r_edges_mm = np.append(profile.r_edges_mm[edges], profile.r_edges_mm[-1])
+    unknown = np.full(energy.shape, np.nan)
+    return dataclasses.replace(
+        profile, r_edges_mm=r_edges_mm, annulus_energy=energy, annulus_energy_stderr=unknown
+    )
+
+
+def _saturated(profile: Profile, share: float) -> Profile:
+    """Clip R_d so that each channel loses a share of its energy in the middle."""
+    density = profile.reflectance_per_mm2
+    areas = annulus_areas(profile.r_edges_mm)[:, None]
+    energy = np.empty_like(density)
+    for c in range(density.shape[1]):
+        levels = np.geomspace(density[:, c].max(), max(density[:, c].max() * 1e-9, 1e-300), 400)
+        kept = np.array([(np.minimum(density[:, c], each) * areas[:, 0]).sum() for each in levels])
+        k = int(np.searchsorted(-kept, -(1.0 - share) * kept[0]))
+        level = levels[min(k, len(levels) - 1)]
+        energy[:, c] = np.minimum(density[:, c], level) * areas[:, 0]
+    return _with_energy(profile, energy)
+
+
+def _noisy(profile: Profile, share: float) -> Profile:
+    """Add noise of one deviation to R_d, as a camera's floor; below 0 fits refuse it, so clip."""
+    rng = np.random.default_rng(1)
+    density = profile.reflectance_per_mm2
+    areas = annulus_areas(profile.r_edges_mm)[:, None]
+    noise = share * density.max(axis=0) * rng.standard_normal(density.shape)
+    return _with_energy(profile, np.maximum(density + noise, 0.0) * areas)

@@ -1,0 +1,139 @@
+"""Taps and stages: few fetches, short numbers between the passes and in the table, one firefly."""
+
+import functools
+
+import numpy as np
+
+from sssfit.arrays import FloatArray
+from sssfit.compare._budget_causes import stored
+from sssfit.kernel import Kernel, Taps
+from sssfit.render.taps import render_taps
+from sssfit.scene.record import Scene
+from sssfit.stability.record import Axis, Curve, Panel
+from sssfit.stability.subject import CASCADE, SIDE, Subject, Way, attempted, error_of, shown
+
+LIMIT = 1.0  # Delta E
+_TAPS = (5, 9, 17, 33, 65)  # a pass
+_FETCHES = (7, 12, 17, 24)  # a pixel
+_FETCHES_OF_PAPERS = (7, 10, 12, 14, 17, 20, 24, 36, 60)
+_FORMATS = {"float32": 23, "half": 10, "r11g11b10": 6}  # bits of the fraction; blue has one less
+_STORAGES = {"float64": 52, "float32": 23, "half": 10, "8-bit": 8}
+_BRIGHTNESS = tuple(10.0**k for k in range(7))
+_THINNED = (
+    Way("pre-integrated on taps", "preintegrated", {}),
+    Way("svd 3 on taps", "svd", {"rank": 3}),
+    Way("gaussians 4 on taps", "gaussians", {"terms": 4}),
+)
+_PASS = Way("pre-integrated, 25 taps", "preintegrated", {}, taps=25)
+
+
+def stress(subject: Subject) -> list[Panel]:
+    """Give kernels fewer fetches, fewer bits and brighter points."""
+    tables = {each.label: subject.true_kernel(each) for each in (CASCADE, _PASS)}
+    return [
+        _few_fetches(subject),
+        Panel(
+            stress="taps",
+            title="what rounding between passes adds",
+            axis=Axis("bits of the fraction", mild=23.0, is_log=False),
+            y_label="p99 of Delta E 2000",
+            limit=LIMIT,
+            curves=[_rounded_pictures(subject, *each) for each in tables.items()],
+            fails="steps of colour in smooth light",
+        ),
+        Panel(
+            stress="taps",
+            title="what rounding of the table adds",
+            axis=Axis("bits of the fraction", mild=52.0, is_log=False),
+            y_label="p99 of Delta E 2000",
+            limit=LIMIT,
+            curves=[_rounded_table(subject, *each) for each in tables.items()],
+            fails="the kernel changes its energy or its width",
+        ),
+        Panel(
+            stress="taps",
+            title="one pixel brighter, half floats between passes",
+            axis=Axis("brightness of one pixel", mild=1.0),
+            y_label="p99 of Delta E 2000",
+            limit=LIMIT,
+            curves=[_firefly(subject, *each) for each in tables.items()],
+            fails="the pixel's light exceeds 65504 or drowns its neighbours",
+        ),
+    ]
+
+
+def _few_fetches(subject: Subject) -> Panel:
+    """Return the error over the fetches of a pixel."""
+    truths = subject.truths()
+    budgets = _FETCHES_OF_PAPERS if subject.is_whole else _FETCHES
+    cascades = [
+        CASCADE if n == CASCADE.settings["fetches"] else Way("", "cascade", {"fetches": n})
+        for n in budgets
+    ]
+
+    def error(way: Way) -> float:
+        return attempted(lambda: subject.error(subject.true_kernel(way), truths))
+
+    curves = [Curve("cascade", np.array(budgets), np.array(subject.each(error, cascades)))]
+    for way in _THINNED:
+        thinned = [Way(way.label, way.method, way.settings, taps=n) for n in _TAPS]
+        kernels = [subject.true_kernel(each) for each in thinned]
+        fetches = [each.fetches for each in kernels if isinstance(each, Taps)]
+        errors = subject.each(lambda kernel: subject.error(kernel, truths), kernels)
+        curves.append(Curve(way.label, np.array(fetches), np.array(errors), advice="a cascade"))
+    return Panel(
+        stress="taps",
+        title="error of few fetches",
+        axis=Axis("fetches a pixel", mild=1000.0),
+        y_label="p99 of Delta E 2000",
+        limit=LIMIT,
+        curves=curves,
+        fails="points of light fall apart",
+    )
+
+
+def _rounded_pictures(subject: Subject, label: str, taps: Kernel) -> Curve:
+    assert isinstance(taps, Taps)
+    scenes = subject.scenes()
+    plain = subject.shows(taps)
+
+    def error(form: str) -> float:
+        pictures = [_through(each, taps, form) for each in scenes]
+        return float(np.mean([error_of(a, b) for a, b in zip(pictures, plain, strict=True)]))
+
+    forms = sorted(_FORMATS, key=lambda each: _FORMATS[each])
+    errors = np.maximum([attempted(functools.partial(error, each)) for each in forms], 1e-6)
+    bits = np.array([_FORMATS[each] for each in forms])
+    return Curve(label, bits, errors, advice="half floats")
+
+
+def _rounded_table(subject: Subject, label: str, taps: Kernel) -> Curve:
+    plain = subject.shows(taps)
+    forms = sorted(_STORAGES, key=lambda each: _STORAGES[each])
+    errors = [subject.error(stored(taps, each), plain) for each in forms]
+    bits = np.array([_STORAGES[each] for each in forms])
+    return Curve(label, bits, np.maximum(errors, 1e-6), advice="half floats or more")
+
+
+def _firefly(subject: Subject, label: str, taps: Kernel) -> Curve:
+    """Return what half floats do to light of 1 with one brighter pixel."""
+    assert isinstance(taps, Taps)
+
+    def error(brightness: float) -> float:
+        scene = _with_firefly(subject.mm_per_pixel, brightness)
+        return error_of(_through(scene, taps, "half"), shown(taps, scene))
+
+    errors = [attempted(functools.partial(error, each)) for each in _BRIGHTNESS]
+    advice = "clamp the light before the first pass"
+    return Curve(label, np.array(_BRIGHTNESS), np.maximum(errors, 1e-6), advice=advice)
+
+
+def _through(scene: Scene, taps: Taps, form: str) -> FloatArray:
+    """Return a picture whose passes hand it on in a format."""
+    return np.asarray(render_taps(scene, taps, intermediate=form, threads=1), dtype=np.float64)
+
+
+def _with_firefly(mm_per_pixel: float, brightness: float) -> Scene:
+    light: FloatArray = np.full((SIDE, SIDE, 1), 0.5)
+    light[SIDE // 2, SIDE // 2] = brightness
+    return Scene("firefly", light, mm_per_pixel)

@@ -1,0 +1,207 @@
+"""Stresses: edges of safe regions, planted failures, and boundaries that theory knows."""
+
+import dataclasses
+import json
+import re
+
+import numpy as np
+import pytest
+from test_lut import ENERGY, VARIANCES
+from test_profile import make_profile
+
+from sssfit.errors import ArgumentError, FitError
+from sssfit.material import load_material
+from sssfit.methods import STRESSES
+from sssfit.shapes import gaussian_cdf
+from sssfit.stability import Curve, Panel, Subject, gaussians, hard_light, noise, optics, stability
+from sssfit.stability.record import BETWEEN, FROM, NEVER, SAFE, UP_TO, Axis
+from sssfit.stability.subject import Way
+
+
+@pytest.fixture(scope="module")
+def profile():
+    """A Gaussian of the plane for each channel."""
+    edges_mm = np.linspace(0.0, 8.0, 801)
+    within = ENERGY * gaussian_cdf(edges_mm[:, None], VARIANCES)
+    return make_profile(edges_mm, np.diff(within, axis=0), beyond_grid=ENERGY - within[-1])
+
+
+def panel_of(*curves, mild=1.0, limit=1.0, is_log=True, **axis):
+    return Panel("noise", "title", Axis("x", mild, **axis), "y", limit, curves, "breaks", is_log)
+
+
+def finding_of(y, mild, x=(1.0, 10.0, 100.0, 1000.0), **more):
+    panel = panel_of(Curve("a", np.array(x), np.array(y), **more), mild=mild)
+    return next(panel.findings())
+
+
+def test_a_crossing_is_interpolated_between_its_points_and_they_are_its_uncertainty():
+    found = finding_of([0.01, 0.1, 10.0, 100.0], mild=1.0)  # log y crosses half-way
+    assert found.kind == UP_TO
+    assert found.below is None
+    assert found.above.at == pytest.approx(10.0**1.5)
+    assert (found.above.low, found.above.high) == (10.0, 100.0)
+    assert found.words == "up to 31.6 (10 to 100)"
+
+
+def test_the_quartiles_over_seeds_are_the_uncertainty_where_there_are_seeds():
+    y = np.array([100.0, 10.0, 0.1, 0.01])
+    found = finding_of(y, mild=1000.0, low=y / 3.0, high=y * 3.0)
+    assert found.kind == FROM
+    assert found.below.at == pytest.approx(10.0**1.5)
+    # log10 y falls by 2 a decade, so a factor of 3 moves the crossing by half its logarithm.
+    assert found.below.low == pytest.approx(10.0 ** (1.5 - 0.5 * np.log10(3.0)))
+    assert found.below.high == pytest.approx(10.0 ** (1.5 + 0.5 * np.log10(3.0)))
+
+
+@pytest.mark.parametrize(
+    ("y", "mild", "kind", "words"),
+    [
+        ([0.1, 0.2, 0.3, 0.4], 1.0, SAFE, "everywhere that was tried"),
+        ([2.0, 2.0, 3.0, 0.1], 1.0, NEVER, "nowhere that was tried"),
+        ([10.0, 0.1, 0.1, np.inf], 10.0, BETWEEN, "3.16 (1 to 10) to 316 (100 to 1e+03)"),
+        ([0.1, 0.1, np.inf, 0.1], 1.0, UP_TO, "up to 31.6 (10 to 100)"),
+        ([0.1, 10.0, 0.1, 0.1], 1000.0, FROM, "from 31.6 (10 to 100)"),
+    ],
+)
+def test_safe_is_what_hangs_together_with_the_mild_place(y, mild, kind, words):
+    found = finding_of(y, mild)
+    assert found.kind == kind
+    assert found.words == words
+
+
+def test_a_linear_axis_is_interpolated_linearly():
+    curve = Curve("a", np.array([1.0, 2.0, 3.0]), np.array([0.0, 0.5, 1.5]))
+    panel = panel_of(curve, is_log=False)
+    panel = dataclasses.replace(panel, axis=Axis("x", 1.0, is_log=False))
+    assert panel.edges(curve)[1].at == pytest.approx(2.5)
+
+
+def test_the_table_has_a_row_for_each_method_and_stress(profile):
+    found = stability(profile, only=["hard-light"], mm_per_pixel=0.25)
+    rows = [line for line in found.table().splitlines() if line.startswith("| hard-light")]
+    assert len(rows) == sum(len(panel.curves) for panel in found.panels) == 6
+    assert json.loads(json.dumps(found.to_dict()))["panels"][0]["stress"] == "hard-light"
+    assert "hard-light: asymmetry" in found.text()
+
+
+def test_a_gaussian_profile_is_healthy_and_a_cross_is_found(profile):
+    """One term is exact for Gaussians; a kernel with a cross on its axes is not round."""
+    found = stability(profile, only=["hard-light"], mm_per_pixel=0.25)
+    assert {each.kind for panel in found.panels for each in panel.findings()} == {SAFE}
+    kernel = Way("svd", "svd", {"rank": 1}).fit(profile, 0.25)
+    weights = kernel.weights.copy()
+    weights[:, weights.shape[1] // 2] *= 4.0
+    crossed = dataclasses.replace(kernel, weights=weights)
+    subject = Subject("crossed", profile, 0.25)
+    assert hard_light.unround(subject, crossed) > hard_light.ASYMMETRY_LIMIT
+    scene = hard_light.highlight(0.25)
+    below = dataclasses.replace(kernel, signs=-kernel.signs)
+    assert hard_light._negative(hard_light.shown(below, scene)) == 1.0
+
+
+def test_a_condition_number_is_that_of_the_integrals():
+    variances = np.array([0.1, 1.0, 1.5])
+    r = np.linspace(0.0, 30.0, 300_001)[:, None]
+    values = np.exp(-0.5 * r**2 / variances)
+    matrix = np.trapezoid(values[:, :, None] * values[:, None] * r[:, None], r[:, 0], axis=0)
+    norms = np.sqrt(np.diag(matrix))
+    wanted = np.linalg.cond(matrix / norms[:, None] / norms)
+    assert optics.condition_number(variances) == pytest.approx(wanted, rel=1e-6)
+
+
+def test_energy_beyond_the_grid_is_that_of_the_exact_solver():
+    """It falls as the albedo does, by the exponential of the radius over the diffusion length."""
+    curve = optics._beyond(Subject("s", None, 0.3), 1.4)
+    lost = np.array([0.001, 0.003])
+    shares = np.interp(np.log(lost), np.log(curve.x), np.log(curve.y))
+    # K_1 decays as exp(-r sigma_tr), sigma_tr = sqrt(3 (1 - albedo)) near 1, at 32 mean free paths.
+    sigma_tr = np.sqrt(3.0 * lost)
+    assert shares[0] - shares[1] == pytest.approx(32.0 * np.diff(sigma_tr)[0], rel=0.25)
+    assert (np.diff(curve.y) <= 0.0).all()
+
+
+def test_models_are_worse_where_light_is_lost():
+    curve = optics._model(Subject("s", None, 0.3), "dipole")
+    assert (np.diff(curve.y) > 0.0).all()
+    assert curve.y[0] < optics.MODEL_LIMIT < curve.y[-1]
+
+
+def test_a_single_gaussian_needs_one_and_every_start_finds_it():
+    """The second of two equal Gaussians is left out, so nothing coalesces."""
+    edges_mm = np.linspace(0.0, 8.0, 801)
+    within = 0.5 * gaussian_cdf(edges_mm[:, None], np.array([1.0]))
+    subject = Subject("one", make_profile(edges_mm, np.diff(within, axis=0)), 0.25)
+    assert gaussians._error(gaussians._fit(subject, False, 1)) < 1e-6
+    assert gaussians._missed(subject, False, 1) == 0.0
+    assert gaussians._nearest(gaussians._fit(subject, False, 1)) == 0.0
+
+
+@pytest.fixture(scope="module")
+def walked():
+    """Noise of the quick methods, of few photons and seeds."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(noise, "_LAST", 5)
+        patch.setattr(noise, "_SEEDS", 8)
+        patch.setattr(
+            noise, "WAYS", [Way("svd 3", "svd", {"rank": 3}), Way("pre", "preintegrated", {})]
+        )
+        return stability(load_material("skin1"), only=["noise"]).panels
+
+
+def test_noise_falls_as_the_root_of_the_photons(walked):
+    error, spread, _ = walked
+    for curve in (*error.curves, *spread.curves):
+        slope = np.polyfit(np.log(curve.x), np.log(curve.y), 1)[0]
+        # Medians of 8 seeds are known to 1.25 / sqrt(8) * 0.6 of themselves: a slope over two
+        # decades to 0.08.
+        assert slope == pytest.approx(-0.5, abs=0.16), curve.label
+
+
+def test_a_fit_that_chases_noise_is_found(walked, monkeypatch):
+    """The same fit with noise added to its weights on purpose has a boundary at more photons."""
+    real = Way.fit
+    rng = np.random.default_rng(5)
+
+    def broken(way, profile, pitch, **given):
+        kernel = real(way, profile, pitch, **given)
+        if profile.photons is None:
+            return kernel
+        shake = 1.0 + 30.0 / np.sqrt(profile.photons) * rng.standard_normal(3)
+        return dataclasses.replace(kernel, weights=kernel.weights * shake)
+
+    monkeypatch.setattr(Way, "fit", broken)
+    monkeypatch.setattr(noise, "_LAST", 5)
+    monkeypatch.setattr(noise, "_SEEDS", 8)
+    monkeypatch.setattr(noise, "WAYS", [Way("svd 3", "svd", {"rank": 3})])
+    found = next(stability(load_material("skin1"), only=["noise"]).panels[0].findings())
+    healthy = next(walked[0].findings())
+    assert healthy.kind == FROM
+    assert found.kind == NEVER or found.below.at > 2.0 * healthy.below.high
+
+
+def test_stresses_that_walk_need_a_material(profile):
+    with pytest.raises(FitError, match="noise: the profile does not say its material"):
+        stability(profile, only=["noise"])
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"only": ["nois"]}, "stress 'nois': did you mean noise? expected some of noise, "),
+        ({"only": ["hard-light"], "mm_per_pixel": 0.0}, "`mm_per_pixel = 0.0`; expected"),
+        ({"only": ["hard-light"], "mm_per_pixel": float("nan")}, "`mm_per_pixel = nan`"),
+    ],
+)
+def test_bad_settings_get_one_line(profile, given, words):
+    with pytest.raises(ArgumentError) as caught:
+        stability(profile, **given)
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_every_stress_is_a_file_of_its_own():
+    for name, method in STRESSES.items():
+        assert method.function == f"sssfit.stability.{name.replace('-', '_')}:stress"
+        assert callable(method.load())
+        assert re.fullmatch(r"[^.].*[^.]", method.summary)
