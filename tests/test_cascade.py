@@ -87,6 +87,17 @@ def test_the_spectrum_is_that_of_points_at_all_places(skin1, structure):
     np.testing.assert_allclose(chain.spectrum(x), mean, rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("structure", ["1|1-2", "*|1"])
+def test_stages_that_a_fit_shrinks_to_nothing_are_still_a_table(skin1, structure):
+    """Offsets far below a texel, or the same in double precision; a choice's fits ended there."""
+    chain = chain_of(skin1, structure)
+    x = chain.start(np.random.default_rng(2))
+    x[chain.step_parameters] = -40.0
+    written = x.copy()
+    written[chain.step_parameters] = np.log(taps_of(chain, x).stages[0].offsets_mm[0] / 0.3)
+    np.testing.assert_allclose(chain.spectrum(written), chain.spectrum(x), rtol=0, atol=1e-8)
+
+
 def test_the_wanted_spectrum_is_the_kernels(skin1):
     target = make_target(skin1, 0.3, 9.0)
     found = spectral_target(target, [0, 1, 2], "white")
