@@ -41,12 +41,15 @@ def export(context: click.Context, /, files: Any, form: str, common: Common, **g
     """
     from sssfit.export import exported, is_ours, read_exportable
     from sssfit.kernel import read_kernel
+    from sssfit.stability.rules import warn_of_doubts
 
     settings = own_settings(context, EXPORTS, form, given, "--format")
     read = read_exportable if EXPORTS[form].of_profiles else read_kernel
     names = files or [profile_name(None) if EXPORTS[form].of_profiles else kernel_name(None)]
     records = [load(read, each) for each in names]
     made = exported(records, form, ending=Path(given["output"] or "").suffix.lower(), **settings)
+    for each in records:
+        warn_of_doubts(each, strict=given["strict"])
     files_of = {made.of: names[0]} if len(names) == 1 else {"kernels": names}
     path = target(given["output"], stem_of(names[0]) + made.tag + made.ending)
     kind, ours = (made.what, made.ending), partial(is_ours, form=form)
