@@ -7,6 +7,7 @@ kind.
 """
 
 import contextlib
+import dataclasses
 import functools
 import importlib
 import io
@@ -28,13 +29,16 @@ from unittest import mock
 import approval_world as world
 import matplotlib.figure
 import rich.progress
+import shared_work
 from approval_figures import figure_lines
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 import sssfit
 from sssfit.cli import main
 from sssfit.compare.candidates import Candidate, candidates, every_candidate
+from sssfit.fit import TapsFit
 from sssfit.process import available_cores
+from sssfit.profile import Profile
 
 _TRIED = (
     "pre-integrated",
@@ -99,11 +103,11 @@ class Clock:
     """Seconds that depend on nothing but how often they were asked for."""
 
     def __init__(self) -> None:
-        self._now, self._asked = 0.0, 0
+        self._now, self.asked = 0.0, 0
 
     def __call__(self) -> float:
-        self._now += STEPS_SECONDS[self._asked % len(STEPS_SECONDS)]
-        self._asked += 1
+        self._now += STEPS_SECONDS[self.asked % len(STEPS_SECONDS)]
+        self.asked += 1
         return self._now
 
 
@@ -171,9 +175,8 @@ def stand_ins(
 ) -> Iterator[None]:
     """All that stands in for what depends on the machine; ``charts`` receives descriptions."""
     from sssfit import material, simulate
-    from sssfit.choose import truth
+    from sssfit.choose import options, truth
     from sssfit.compare import pictures, sheet
-    from sssfit.fit import cascade
     from sssfit.measure import cost
 
     clock = Clock()
@@ -199,9 +202,8 @@ def stand_ins(
                 sheet.compute_sheet, functools.partial(sheet.compute_sheet, pixels=24, most_terms=2)
             ),
             mock.patch.object(pictures, "PIXELS", 13),
-            # A shorter search for cascades: choices fit dozens of them.
-            mock.patch.object(cascade, "_STARTS", 1),
-            mock.patch.object(cascade, "_HOPS", ()),
+            *(mock.patch.object(*each) for each in shared_work.SHORT),  # searches of cascades
+            mock.patch.object(options, "fit_result", _fitted_once(options.fit_result, clock)),
             mock.patch.object(truth, "WALK_PHOTONS", 3000),
             mock.patch.object(truth, "COUNTS", (1000, 2000, 4000)),
             mock.patch.object(cost.seconds_per_megapixel, "__defaults__", (5, clock)),
@@ -212,6 +214,26 @@ def stand_ins(
         for each in patches:
             stack.enter_context(each)
         yield
+
+
+def _fitted_once(real: Callable[..., TapsFit], clock: Clock) -> Callable[..., TapsFit]:
+    """Fit an option of a choice to the same profile once; the clock goes on by every fit."""
+
+    def fit(profile: Profile, method: str, **settings: Any) -> TapsFit:
+        key = shared_work.contents(profile), method, tuple(sorted(settings.items()))
+        begun = clock.asked
+        if key in _FITS:
+            found, asked = _FITS[key]
+            times = [clock() for _ in range(asked)]
+            return dataclasses.replace(found, seconds=sum(times[1::2]) - sum(times[::2]))
+        found = real(profile, method, **settings)
+        _FITS[key] = found, clock.asked - begun
+        return found
+
+    return fit
+
+
+_FITS: dict[Any, tuple[TapsFit, int]] = {}
 
 
 def _few_names(*, paper: bool = False) -> tuple[str, ...]:

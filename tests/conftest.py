@@ -1,7 +1,7 @@
 """What holds for all tests: Ctrl-C arrives, no child process is left, and none runs for ever.
 
 Half of the tests start from the exact profile of some material and a quarter from the lit head, so
-each of these is computed once a worker (``shared_work``), as are fits of the same profile.
+each of these is computed once a run (``shared_work``), as are fits of the same profile.
 
 Linear algebra has one thread in the tests' own process: a worker a core leaves no core for BLAS's
 threads, and waiting for each other they took a tenth of the processor time. Children of the tests
@@ -14,6 +14,7 @@ tests made is not looked through for garbage again and again: that took a third 
 
 import ctypes
 import gc
+import os
 import signal
 import sys
 
@@ -75,6 +76,15 @@ def pytest_collection():
 def pytest_sessionfinish():
     """Let everything be collected at the end: OpenImageIO complains of what is left over."""
     gc.unfreeze()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _shared_between_workers(tmp_path_factory):
+    """What one worker has solved, lit or fitted is read by the other; see ``shared_work``."""
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "shared-work"
+    folder.mkdir(exist_ok=True)
+    shared_work.keep_in(folder)
 
 
 @pytest.fixture(autouse=True)

@@ -1,21 +1,28 @@
 """Work that tests share: solutions of the exact solver, lit heads, and fits of candidates.
 
-All depend on their arguments alone and cannot be changed. The tests of the solver and of the head
-compute them themselves, as do those that count threads or interrupt a run, and whatever runs within
-``alone``.
+All depend on their arguments alone and cannot be changed. What one worker made, the others read
+from a folder of this run, which no other run reads: nothing of older sources can pass a test.
+
+The tests of the solver and of the head compute them themselves, as do those that count threads or
+interrupt a run, and whatever runs within ``alone``.
 """
 
 import contextlib
 import dataclasses
 import functools
+import hashlib
 import json
+import os
+import pickle
 from collections.abc import Mapping
+from pathlib import Path
 from types import NoneType
 
 import numpy as np
 
 import sssfit.choose.options
 import sssfit.compare.candidates
+import sssfit.fit._spectrum
 import sssfit.fit.cascade
 import sssfit.scene.head
 import sssfit.simulate.exact
@@ -25,22 +32,43 @@ OWN = {
     *("test_memory_order", "test_processes", "test_runner"),
 }
 _OWN_FITS = {"test_approved"}  # its clock counts how often it is asked, fits included
-# What these ask is how good a cascade is; the others fit dozens, and one start will do for them.
+# What these ask is how good a cascade is. The others, approvals among them, fit dozens, and one
+# start, few frequencies and short descents will do for them: a fifth of the time.
 LONG_SEARCHES = {
     *("test_cascade", "test_disks_page", "test_docs", "test_docs_tables", "test_engines"),
     *("test_frames", "test_motion", "test_readme_figures", "test_shading"),
 }
-_SEARCH = sssfit.fit.cascade._STARTS, sssfit.fit.cascade._HOPS
+_WHOLE_DESCENTS = {"test_distance"}  # asks which of two cascades is nearer: one start decides that
 _PLAIN = str | int | float | NoneType  # a setting that is a function, or a scene, is not shared
-_state = {"allowed": True, "fits": True}
+_state = {"allowed": True, "fits": True, "short": 0, "folder": None}
+
+
+def _short_descent(chain, x, most, gain=3e-3, real=sssfit.fit.cascade._descend):
+    return real(chain, x, min(most, 20), max(gain, 0.02))
+
+
+SHORT = (
+    (sssfit.fit.cascade, "_STARTS", 1),
+    (sssfit.fit.cascade, "_HOPS", ()),
+    (sssfit.fit.cascade, "_descend", _short_descent),
+    (sssfit.fit._spectrum, "_FREQUENCIES", 28),
+)
+_LONG = tuple((module, name, getattr(module, name)) for module, name, _ in SHORT)
 
 
 def allow(file):
     """Share from now on, unless this file of tests computes everything itself."""
     _state["allowed"] = file not in OWN
     _state["fits"] = _state["allowed"] and file not in _OWN_FITS
-    cascade = sssfit.fit.cascade
-    cascade._STARTS, cascade._HOPS = _SEARCH if file in LONG_SEARCHES else (1, ())
+    short = 0 if file in LONG_SEARCHES else 2 if file in _WHOLE_DESCENTS else len(SHORT)
+    _state["short"] = short
+    for module, name, value in (*SHORT[:short], *_LONG[short:]):
+        setattr(module, name, value)
+
+
+def keep_in(folder):
+    """Share with the other workers of this run, which have the same folder."""
+    _state["folder"] = folder
 
 
 @contextlib.contextmanager
@@ -64,6 +92,38 @@ def begin():
     sssfit.choose.options.fit_result = _fitted_once(sssfit.choose.options.fit_result)
 
 
+def _once(known, key, make):
+    """What was made for a key, here or by another worker of this run; made, if it was not."""
+    if key not in known:
+        known[key] = _read(key) or make()
+        _keep(key, known[key])
+    return known[key]
+
+
+def _path(key):
+    return Path(_state["folder"]) / hashlib.sha256(repr(key).encode()).hexdigest()
+
+
+def _read(key):
+    if _state["folder"] is None or not _path(key).exists():
+        return None
+    main, *buffers = pickle.loads(_path(key).read_bytes())
+    # Arrays on bytes can only be read, as they could before.
+    return pickle.loads(main, buffers=[bytes(each) if fixed else bytearray(each)
+                                       for fixed, each in buffers])  # fmt: skip
+
+
+def _keep(key, made):
+    if _state["folder"] is None or _path(key).exists():
+        return
+    buffers = []
+    main = pickle.dumps(made, protocol=5, buffer_callback=buffers.append)
+    views = [each.raw() for each in buffers]
+    aside = _path(key).with_suffix(f".{os.getpid()}")
+    aside.write_bytes(pickle.dumps([main, *((each.readonly, bytes(each)) for each in views)]))
+    aside.replace(_path(key))
+
+
 def _solved_once(real):
     known = {}
 
@@ -71,10 +131,9 @@ def _solved_once(real):
     def solve(eta, channels, level, workers):
         if not _state["allowed"] or workers.stop is not None:
             return real(eta, channels, level, workers)
-        key = eta, level, tuple((each.albedo, each.radii_mfp.tobytes()) for each in channels)
-        if key not in known:
-            known[key] = real(eta, channels, level, workers)
-        return list(known[key])
+        own = [(float(each.albedo), each.radii_mfp.tobytes()) for each in channels]
+        key = "exact", float(eta), level, tuple(own)
+        return list(_once(known, key, lambda: real(eta, channels, level, workers)))
 
     return solve
 
@@ -87,9 +146,7 @@ def _lit_once(real):
         key = tuple(sorted((name, value) for name, value in given.items() if name != "threads"))
         if not _state["allowed"] or not all(isinstance(each, int | float) for _, each in key):
             return real(**given)
-        if key not in known:
-            known[key] = real(**given)
-        return known[key]
+        return _once(known, ("head", *key), lambda: real(**given))
 
     return head_scene
 
@@ -103,16 +160,13 @@ def _fitted_once(real):
         values = settings.values()
         if not _state["fits"] or not all(isinstance(each, _PLAIN) for each in values):
             return real(profile, method, **settings)
-        searches = sssfit.fit.cascade._STARTS, sssfit.fit.cascade._HOPS
-        key = _contents(profile), method, searches, *sorted(settings.items())
-        if key not in known:
-            known[key] = real(profile, method, **settings)
-        return known[key]
+        key = contents(profile), method, _state["short"], *sorted(settings.items())
+        return _once(known, (real.__name__, *key), lambda: real(profile, method, **settings))
 
     return fit
 
 
-def _contents(profile):
+def contents(profile):
     """Everything in a profile, provenance included: a kernel takes over some of it."""
     fields = [getattr(profile, each.name) for each in dataclasses.fields(profile)]
     return tuple(

@@ -36,8 +36,8 @@ TABLES = [
         [
             "`sssfit simulate skin1 --photons 1000`, first use, compiling",
             "`sssfit simulate skin1 --photons 1000`",
-            "`sssfit simulate skin1 --photons 20000`",
-            "`sssfit simulate --paper --photons 20000`",
+            "`sssfit simulate skin1 --photons 2000`",
+            "`sssfit simulate --paper --photons 2000`",
             "`sssfit chart skin1.profile.npz`",
             "`sssfit materials`",
         ],

@@ -67,6 +67,18 @@ def sssfit(folder, *arguments, megabytes=None, timeout=120, **environment):
     )
 
 
+@pytest.fixture
+def run(folder, capfd):
+    """Run it here; give exit status, stdout and stderr."""
+
+    def call(*arguments):
+        with pytest.raises(SystemExit) as ended:
+            main(arguments)
+        return ended.value.code, *capfd.readouterr()
+
+    return call
+
+
 # Memory
 
 VERBS = {
@@ -197,19 +209,24 @@ def test_warnings_of_others_are_one_line(folder):
 
 @pytest.mark.parametrize("columns", ["40", "0", "abc"])
 def test_narrow_terminals(folder, columns):
-    for arguments in ((), ("simulate",)):
-        ended = sssfit(folder, *arguments, "--help", COLUMNS=columns)
-        assert (ended.returncode, ended.stderr) == (0, "")
-        assert "Show this message" in " ".join(ended.stdout.split())
     ended = sssfit(folder, "simulate", "wax.toml", "--photons", "2e4", COLUMNS=columns)
     assert ended.returncode == 0
     assert ended.stdout.splitlines()[0].startswith("wax: 20,000 photons, ")  # whole, when piped
-    ended = sssfit(folder, "simulate", "no.toml", COLUMNS=columns)
-    assert (ended.returncode, ended.stderr.count("\n")) == (1, 1)
+
+
+@pytest.mark.parametrize("columns", ["40", "0", "abc"])
+def test_help_and_messages_on_narrow_terminals(run, monkeypatch, columns):
+    monkeypatch.setenv("COLUMNS", columns)
+    for arguments in ((), ("simulate",)):
+        status, out, err = run(*arguments, "--help")
+        assert (status, err) == (0, "")
+        assert "Show this message" in " ".join(out.split())
+    status, _, err = run("simulate", "no.toml")
+    assert (status, err.count("\n")) == (1, 1)
 
 
 @posix
-def test_paths_with_control_characters_are_escaped(folder):
+def test_paths_with_control_characters_are_escaped(run):
     name = "a\nb\x1b[31mc"
     shutil.copy("wax.profile.npz", f"{name}.profile.npz")
     shutil.copy("wax.toml", f"{name}.toml")
@@ -221,18 +238,18 @@ def test_paths_with_control_characters_are_escaped(folder):
         ("render", f"no{name}", "--irradiance", "disk"),
         ("chart", f"{name}.profile.npz", "-o", f"{name}.gif"),
     ):
-        ended = sssfit(folder, *arguments)
-        assert ended.returncode == 1
-        assert ended.stderr.count("\n") == 1
-        assert "\x1b" not in ended.stderr
-        assert r"a\nb" in ended.stderr
-    ended = sssfit(folder, "fit", f"{name}.profile.npz", "--method", "svd", "-o", f"{name}.json")
-    assert ended.returncode == 0
-    assert "\x1b" not in ended.stdout
-    assert ended.stdout.splitlines()[-1] == r"Wrote a\nb\x1b[31mc.json"
+        status, _, err = run(*arguments)
+        assert status == 1
+        assert err.count("\n") == 1
+        assert "\x1b" not in err
+        assert r"a\nb" in err
+    status, out, _ = run("fit", f"{name}.profile.npz", "--method", "svd", "-o", f"{name}.json")
+    assert status == 0
+    assert "\x1b" not in out
+    assert out.splitlines()[-1] == r"Wrote a\nb\x1b[31mc.json"
 
 
-def test_messages_are_shortened(folder):
+def test_messages_are_shortened(run):
     long = "x" * 5000
     for arguments in (
         ("simulate", long),
@@ -243,10 +260,10 @@ def test_messages_are_shortened(folder):
         (long,),
         (f"--{long}",),
     ):
-        ended = sssfit(folder, *arguments)
-        assert ended.returncode in (1, 2)
-        assert all(len(line) < 1100 for line in ended.stderr.splitlines())
-        assert ended.stderr.splitlines()[-1].startswith("Error: ")
+        status, _, err = run(*arguments)
+        assert status in (1, 2)
+        assert all(len(line) < 1100 for line in err.splitlines())
+        assert err.splitlines()[-1].startswith("Error: ")
 
 
 # Options at the end of their range

@@ -1,5 +1,6 @@
 """``sssfit show`` and ``sssfit chart`` as a user meets them: files, pipes, --json, refusals."""
 
+import contextlib
 import dataclasses
 import io
 import itertools
@@ -7,6 +8,7 @@ import json
 import re
 import subprocess
 import sys
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -48,13 +50,19 @@ def folder(tmp_path, profile):
 
 
 def sssfit(folder, *args, given=b""):
-    return subprocess.run(
-        [sys.executable, "-m", "sssfit.cli", *args],
-        cwd=folder,
-        input=given,
-        capture_output=True,
-        timeout=60,
+    """Run it in this process, in a folder and with bytes on stdin; what it printed are bytes."""
+    stdin, stdout, stderr = (
+        io.TextIOWrapper(io.BytesIO(each), encoding="utf-8", write_through=True)
+        for each in (given, b"", b"")
     )
+    with (
+        contextlib.chdir(folder),
+        mock.patch.multiple(sys, stdin=stdin, stdout=stdout, stderr=stderr),
+        pytest.raises(SystemExit) as ended,
+    ):
+        main(args)
+    out, err = (each.buffer.getvalue() for each in (stdout, stderr))
+    return subprocess.CompletedProcess(args, ended.value.code, out, err)
 
 
 def tables(text):

@@ -31,6 +31,7 @@ from sssfit.kernel.structure import Shape
 
 _BARRIER = 0.01  # a squared misfit; an offset 1 % beyond the kernel adds 1e-6
 _STAR = "star"
+_LEAST_TEXELS = 1e-9  # between fetches of a table: a stage that a fit has no need of shrinks to 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,8 +138,9 @@ class Chain(ABC):
         kinds = [each.kind for each in self.shapes]
         return Numbers(
             [
-                np.exp(steps) if kind == _STAR else np.cumsum(np.exp(steps))
+                texels if kind == _STAR else np.cumsum(texels)
                 for kind, (steps, _) in zip(kinds, parts, strict=True)
+                for texels in [np.maximum(np.exp(steps), _LEAST_TEXELS)]
             ],
             [normalised(logits, kind)[0].T for kind, (_, logits) in zip(kinds, parts, strict=True)],
             self._blend(x),

@@ -156,14 +156,15 @@ def cascade_rows(side, runs):
     return rows
 
 
-def compile_rows():
+def compile_rows(small):
     """First use with an empty folder for machine code, and the next one."""
     rows = []
     with tempfile.TemporaryDirectory() as folder:
+        cache = {} if small else {"NUMBA_CACHE_DIR": folder}  # compiling takes 10 s
         for what in ("first use, compiling", "next process"):
             ended = subprocess.run(
                 [sys.executable, "-c", FIRST_USE],
-                env=os.environ | {"NUMBA_CACHE_DIR": folder},
+                env=os.environ | cache,
                 capture_output=True,
                 text=True,
                 check=True,
@@ -216,7 +217,7 @@ def page(small):
         markdown(heads, pass_rows(427, side, 1 if small else 3)),
         "### Compiling",
         "Seconds until the first picture is blurred, without imports.",
-        markdown(("process", "float32", "float64 after it"), compile_rows()),
+        markdown(("process", "float32", "float64 after it"), compile_rows(small)),
         "## A cascade",
         f"1-1|2-2|2-2 on {side} x {side} RGB in float32 beside OpenCV's sepFilter2D with 37 "
         "weights a pass, mirrored borders. OpenCV 4.12 runs it on one thread, 5.0 on all.",

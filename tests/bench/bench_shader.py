@@ -21,6 +21,7 @@ import numpy as np
 ROOT = Path(__file__).parents[2]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "bench")]
 
+import shared_work  # noqa: E402
 from bench_walk import markdown, processor, write_page  # noqa: E402
 from compute_runs import prepared_compute  # noqa: E402
 from shader_runs import device_of, prepared  # noqa: E402
@@ -144,7 +145,10 @@ def main():
     parser.add_argument("--small", action="store_true")
     given = parser.parse_args()
     warnings.simplefilter("ignore", SssfitWarning)  # of fits, which are not what is measured
-    text = report((96, 54), 1) if given.small else report((1920, 1080), 5)
+    if given.small:  # short searches: long ones take half the time
+        shared_work.begin()
+        shared_work.allow("bench_shader")
+    text = report((64, 36), 1) if given.small else report((1920, 1080), 5)
     if given.write:
         write_page("benchmarks-shader.md", Path(__file__), text)
     else:

@@ -195,7 +195,7 @@ def processor():
 
 def page(small):
     """All tables."""
-    photons, whole = (4_000, 20_000) if small else (2_000_000, 10_000_000)
+    photons, whole = (4_000, 2_000) if small else (2_000_000, 10_000_000)
     sections = [
         "# Benchmarks",
         "Made by `python tests/bench/bench_walk.py --write`; times are medians and depend on the "
