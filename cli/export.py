@@ -48,11 +48,11 @@ def export(context: click.Context, /, files: Any, form: str, common: Common, **g
     names = files or [profile_name(None) if EXPORTS[form].of_profiles else kernel_name(None)]
     records = [load(read, each) for each in names]
     made = exported(records, form, ending=Path(given["output"] or "").suffix.lower(), **settings)
-    for each in records:
-        warn_of_doubts(each, strict=given["strict"])
     files_of = {made.of: names[0]} if len(names) == 1 else {"kernels": names}
     path = target(given["output"], stem_of(names[0]) + made.tag + made.ending)
     kind, ours = (made.what, made.ending), partial(is_ours, form=form)
     with held([path], ours, inputs=names, force=given["force"], named=kind):
+        for each in records:
+            warn_of_doubts(each, strict=given["strict"])
         write(made.content, path)
     finish_one(common, path, {"format": form} | files_of | made.figures, "", made.stdout)
