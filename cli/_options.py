@@ -163,6 +163,9 @@ SHIPPED = (
 )
 
 
+STRICT = flag("--strict", "End with an error in place of a warning of an unsafe kernel.")
+
+
 def refuse(given: Mapping[str, Any], whose: Mapping[str, str]) -> None:
     """Refuse options that would do nothing; ``whose`` says of each parameter what it is for."""
     named = {each.name: each.opts[-1] for each in click.get_current_context().command.params}

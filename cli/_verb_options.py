@@ -8,6 +8,7 @@ from sssfit.scene.made import COMPARED, EDGE_DEGREES, MADE
 
 from ._options import (
     SHIPPED,
+    STRICT,
     Count,
     Length,
     Lengths,
@@ -118,6 +119,7 @@ CHOOSE = (
     *_OF_FILES,
     option("-o --output", None, "FILE", "Table of taps, - for stdout; the profile goes beside it.  "
            "[default: MATERIAL.chosen.taps.json]"),
+    STRICT,
     flag("--force", "Replace an input, or files that are not our kernel or profile."),
 )
 
@@ -151,7 +153,8 @@ FIT_PIXELS = (
            "smallest that keeps 99.9 % of every channel, for cascade 99.99 %.", "auto"),
     flag("--normalize", "Scale every channel to unit energy, and store its energy as a factor."),
 )
-FIT_OUTPUT = output("PROFILE.METHOD.taps.json, .kernel.json without taps", "is not our kernel")
+FIT_OUTPUT = (STRICT, *output("PROFILE.METHOD.taps.json, .kernel.json without taps",
+                             "is not our kernel"))
 
 STABILITY = (
     option("--only", Names(STRESSES), "NAME,...", "Stresses, as below.  [default: all]"),
@@ -163,7 +166,7 @@ STABILITY = (
     flag("--force", "Replace files that are not our chart or table."),
 )
 EXPORT = (option("--format form", list(EXPORTS), None, "Output format, as below.", required=True),)
-EXPORT_OUTPUT = output("NAME.FORMAT", "sssfit did not write")
+EXPORT_OUTPUT = STRICT, *output("NAME.FORMAT", "sssfit did not write")
 # fmt: on
 
 _OF_CHARTS = {  # options of single charts: what of it they are for, and the charts

@@ -51,6 +51,7 @@ def choose(material: str, common: Common, **given: Any) -> None:
     from sssfit.kernel import is_taps_file
     from sssfit.material import Material
     from sssfit.profile import is_profile_file
+    from sssfit.stability.rules import warn_of_doubts
 
     views.check_distance(given["distance_mm"])
     on = {key: given[key] for key in ("layer", "mask")}
@@ -80,6 +81,8 @@ def choose(material: str, common: Common, **given: Any) -> None:
             threads=common.threads,
             progress=(lambda step: note(step_line(step))) if common.verbose else None,
         )
+        if choice.fit is not None:
+            warn_of_doubts(choice.fit.kernel, choice.profile, strict=given["strict"])
         written = _write(choice, path, profile_path)
     view["resolution"] = frame[::-1]
     figures = {"output": written, **view, **choice.to_dict()}

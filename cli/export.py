@@ -41,6 +41,7 @@ def export(context: click.Context, /, files: Any, form: str, common: Common, **g
     """
     from sssfit.export import exported, is_ours, read_exportable
     from sssfit.kernel import read_kernel
+    from sssfit.stability.rules import warn_of_doubts
 
     settings = own_settings(context, EXPORTS, form, given, "--format")
     read = read_exportable if EXPORTS[form].of_profiles else read_kernel
@@ -51,5 +52,7 @@ def export(context: click.Context, /, files: Any, form: str, common: Common, **g
     path = target(given["output"], stem_of(names[0]) + made.tag + made.ending)
     kind, ours = (made.what, made.ending), partial(is_ours, form=form)
     with held([path], ours, inputs=names, force=given["force"], named=kind):
+        for each in records:
+            warn_of_doubts(each, strict=given["strict"])
         write(made.content, path)
     finish_one(common, path, {"format": form} | files_of | made.figures, "", made.stdout)

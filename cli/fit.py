@@ -46,6 +46,7 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
     from sssfit.fit import fit_result
     from sssfit.kernel import is_kernel_file, is_taps_file
     from sssfit.profile import Profile
+    from sssfit.stability.rules import warn_of_doubts
 
     method, pitches = given["method"], given["pitches"]
     settings = own_settings(context, FITS, method, given)
@@ -69,6 +70,7 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
     with held(paths, is_ours, inputs=inputs, force=given["force"], named=KERNEL):
         for path, pitch in zip(paths, pitches or [given["mm_per_pixel"]], strict=True):
             result = fit_result(source, method, mm_per_pixel=pitch, **settings)
+            warn_of_doubts(result.kernel, source, strict=given["strict"])
             write(result.kernel.write, path)
             told.append({"profile": name, **result.to_dict()})
             text.append(f"{page(kind, told[-1])}\nWrote {path or 'the kernel to stdout'}")

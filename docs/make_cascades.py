@@ -1,13 +1,15 @@
 """Write the figures of docs/cascades.md: budgets, materials, pixel sizes; one point of light.
 
 python docs/make_cascades.py
+python docs/make_cascades.py full
 python docs/make_cascades.py structures '1|1-2|2-2' '*|*|*'
 
-The second prints lines for the table of ``sssfit/fit/structures.py``: of structures that are named,
-or of all that it knows.
+The second writes what cascades leave without halvings. The third prints lines for the table of
+``sssfit/fit/structures.py``: of structures that are named, or of all that it knows.
 """
 
 import sys
+from dataclasses import replace
 
 import numpy as np
 from sections import put_section
@@ -24,6 +26,7 @@ from sssfit.measure.score import measure
 from sssfit.render import render
 from sssfit.render.reference import render_reference
 from sssfit.scene.made import make_scene
+from sssfit.simulate import simulate_exact
 from sssfit.simulate.truth import exact_with_all_light
 
 PICTURES = (
@@ -66,6 +69,22 @@ percentiles):
 | Delta E | {other} |
 """
 
+FULL_FETCHES = 36
+FULL = """The same means with nothing halved (the structure is that of skin1):
+
+| fetches at most | structure | fetches | passes | {heads} |
+|---|---|---|---|{rules}|
+{budget}
+
+Each picture of marble, on the profile with all of its light, and on the one that is cut at
+{edge_mm:.1f} mm, where the paper's grid ends, and scaled to the same energy; each is fitted and is
+the truth of its own rows:
+
+| profile | structure | {names} | mean |
+|---|---|{name_rules}|---|
+{each}
+"""
+
 
 def whole_profile(name):
     """Return the exact profile on a grid that holds all but .01 % of the light.
@@ -75,6 +94,15 @@ def whole_profile(name):
     """
     material = load_material(name)
     return exact_with_all_light(material, paper_grid(material), 150.0)
+
+
+def cut_profile(name):
+    """Return the exact profile on the paper's grid, scaled to all of the light."""
+    exact = simulate_exact(load_material(name))
+    scale = exact.diffuse_reflectance / exact.total_on_grid
+    return replace(
+        exact, annulus_energy=scale * exact.annulus_energy, beyond_grid=0.0 * exact.beyond_grid
+    )
 
 
 def scenes(mm_per_pixel, rows=256):
@@ -101,10 +129,10 @@ def row(cells):
     return f"| {' | '.join(cells)} |"
 
 
-def budget_rows(profiles):
+def budget_rows(profiles, budgets, **settings):
     """Return a row for each budget."""
-    for budget in BUDGETS:
-        found = [fit_taps(each, fetches=budget).kernel for each in profiles.values()]
+    for budget in budgets:
+        found = [fit_taps(each, fetches=budget, **settings).kernel for each in profiles.values()]
         first = found[0]
         shown = [p99(*each) for each in zip(found, profiles.values(), strict=True)]
         structure = first.structure.replace("|", "\\|")
@@ -134,21 +162,54 @@ def print_structures(texts):
         print(f'    "{text}": ({", ".join(f"{each:.3g}" for each in shown)}),', flush=True)
 
 
+def picture_names():
+    """Return the names of the eight pictures."""
+    return [f"{name} {own.get('angle_degrees', '')}".strip() for name, own in PICTURES]
+
+
+def full_rows(profiles):
+    """Return a row for each profile and structure: what is left of each picture, and the mean."""
+    for name, profile in profiles.items():
+        for text in ("1-1-2-2", "1-2-1-2"):
+            found = scores(fit_taps(profile, stages=text).kernel, profile)
+            shown = [each.delta_e_2000_p99 for each in found]
+            yield row([name, text, *(f"{each:.2f}" for each in (*shown, np.mean(shown)))])
+
+
+def put_full_resolution():
+    """Write what cascades leave without halvings."""
+    profiles = {name: whole_profile(name) for name in MATERIALS}
+    cut = cut_profile("marble")
+    text = FULL.format(
+        heads=" | ".join(MATERIALS),
+        rules="---|" * (len(MATERIALS) - 1) + "---",
+        budget="\n".join(budget_rows(profiles, [FULL_FETCHES], full_resolution=True)),
+        edge_mm=cut.r_edges_mm[-1],
+        names=" | ".join(picture_names()),
+        name_rules="---|" * (len(PICTURES) - 1) + "---",
+        each="\n".join(full_rows({"all light": profiles["marble"], "cut": cut})),
+    )
+    put_section("cascades.md", "docs/make_cascades.py full", text)
+
+
 def main():
     """Write the page's figures and the picture."""
     if sys.argv[1:2] == ["structures"]:
         print_structures(sys.argv[2:])
+        return
+    if sys.argv[1:] == ["full"]:
+        put_full_resolution()
         return
     profiles = {name: whole_profile(name) for name in MATERIALS}
     skin1 = profiles["skin1"]
     taps: Taps = fit_taps(skin1, fetches=24).kernel
     each = scores(taps, skin1)
     figures = ("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99")
-    names = [f"{name} {own.get('angle_degrees', '')}".strip() for name, own in PICTURES]
+    names = picture_names()
     text = TEXT.format(
         heads=" | ".join(MATERIALS),
         rules="---|" * (len(MATERIALS) - 1) + "---",
-        budgets="\n".join(budget_rows(profiles)),
+        budgets="\n".join(budget_rows(profiles, BUDGETS)),
         pixels=fit_svd(skin1).kernel.pixels,
         dense="\n".join(dense_rows(skin1)),
         names=" | ".join(names),

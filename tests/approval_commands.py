@@ -245,6 +245,8 @@ SIMULATE = [
 ]
 
 FIT = [
+    C("fit wax.profile.npz --method svd --rank 1 --mm-per-pixel .5 --strict"),
+    C("fit wax.profile.npz --method preintegrated --mm-per-pixel .5 --strict"),
     C("fit --list"),
     C("fit --method svd"),
     C("fit wax.profile.npz --method svd --rank 2 --mm-per-pixel .5 --support 2.1 --energy keep"),
@@ -758,6 +760,10 @@ CHOOSE = [
     ),
     C("choose deon-skin --distance 60m --resolution 40x24"),
     C("choose"),
+    C(
+        "choose wax.profile.npz --distance 3m --resolution 40x24 --irradiance disk --fetches 12"
+        " --strict"
+    ),
     C("choose wax.toml --distance 1"),
     C("choose wax.toml --distance 1cm"),
     C("choose wax.toml --fov 180"),
@@ -1088,6 +1094,8 @@ EXPORT = [
     C("export wax.profile.npz --format csv --table line"),
     C("export wax.hand.taps.json --format csv"),
     C("export wax.profile.npz --format hlls"),
+    C("export wax.svd2.kernel.json --format hlsl --strict"),
+    C("export wax.profile.npz --format csv --strict -o strict.csv"),
     C("export missing.kernel.json --format hlsl"),
     C("export over.profile.npz --format csv", set_up=_over, note="more light than arrives"),
     C("export below.profile.npz --format csv", set_up=_below, note="negative energy"),

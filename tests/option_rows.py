@@ -308,6 +308,12 @@ def _by_hand(option: str, other: str, method: str, usual: dict[str, Any], **own:
 
 
 FIT = {
+    "--strict": Row(
+        "fit wax.profile.npz --method svd --rank 1 --mm-per-pixel .4",
+        "--strict",
+        status,
+        lambda: 1,
+    ),
     "--list": Row(
         "fit wax.profile.npz --method svd",
         "fit --list",
@@ -807,6 +813,7 @@ def _asked(ran: Ran) -> Any:
 _CHOOSE = "choose wax.toml"
 
 CHOOSE = {
+    "--strict": Row(_CHOOSE, "--strict", status, lambda: 1),
     "--distance": Row(
         _CHOOSE, "--distance 25cm", _asked, lambda: _rounded(_chosen(250.0)), default="0.6m"
     ),
@@ -1034,6 +1041,7 @@ def _taps_source(**settings: Any) -> Callable[[], str]:
 
 
 EXPORT = {
+    "--strict": Row(_DENSE, "--strict", status, lambda: 1),
     "--prefix": Row(_SOURCE, "--prefix WAX", _exported, _taps_source(prefix="WAX"), words="SSS"),
     "--coverage": Row(_SOURCE, "--coverage", _exported, _taps_source(coverage=True)),
     "--depth": Row(_SOURCE, "--depth", _exported, _taps_source(depth=True)),

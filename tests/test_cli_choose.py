@@ -21,6 +21,8 @@ from sssfit.simulate import simulate_exact
 SMALL = ("--resolution", "128x128", "--distance", "0.14m", "--tolerance", "3")
 EDGE = ("--resolution", "64x64", "--distance", "0.14m", "--tolerance", "3", "--irradiance", "edge")
 
+pytestmark = pytest.mark.filterwarnings("ignore:Light may crawl")  # of tables with few fetches
+
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):

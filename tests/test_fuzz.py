@@ -393,7 +393,7 @@ SMALL = {
     "compare": ("--size", "8x6", *FEW),
     "choose": ("--resolution", "8x6"),
 }
-SLOW = ("compare", "choose")
+SLOW = ("compare", "choose", "stability")
 # What each verb reads, and the options it cannot do without.
 USUAL = {
     "simulate": ("x.toml",),
@@ -401,6 +401,7 @@ USUAL = {
     "render": ("x.kernel.json", "--irradiance", "disk"),
     "compare": ("x.profile.npz",),
     "choose": ("skin1",),
+    "stability": ("x.profile.npz", "--only", "hard-light"),
     "import": ("x.csv",),
     "export": ("x.profile.npz", "--format", "csv"),
     "chart": ("x.profile.npz",),

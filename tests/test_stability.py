@@ -13,9 +13,9 @@ from sssfit.errors import ArgumentError, FitError
 from sssfit.material import load_material
 from sssfit.methods import STRESSES
 from sssfit.shapes import gaussian_cdf
-from sssfit.stability import Curve, Panel, Subject, gaussians, hard_light, noise, optics, stability
+from sssfit.stability import Curve, Panel, gaussians, hard_light, noise, optics, stability
 from sssfit.stability.record import BETWEEN, FROM, NEVER, SAFE, UP_TO, Axis
-from sssfit.stability.subject import Way
+from sssfit.stability.subject import Subject, Way
 
 
 @pytest.fixture(scope="module")

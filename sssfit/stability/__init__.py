@@ -13,11 +13,9 @@ from sssfit.material import Material
 from sssfit.messages import did_you_mean, shown
 from sssfit.methods import STRESSES
 from sssfit.profile import Profile
-from sssfit.simulate import simulate_exact
 from sssfit.stability.record import MARK, Curve, Edge, Finding, Panel, Stability
-from sssfit.stability.subject import Subject
 
-__all__ = ["Curve", "Edge", "Finding", "Panel", "Stability", "Subject", "stability"]
+__all__ = ["Curve", "Edge", "Finding", "Panel", "Stability", "is_stability_table", "stability"]
 
 _Step = Callable[[int, int, str], None]
 
@@ -63,6 +61,9 @@ def stability(
         A stress that was named needs a material, and the profile does not say its own; or no kernel
         can be made.
     """
+    from sssfit.simulate import simulate_exact  # numba, and half a second for all of these
+    from sssfit.stability.subject import Subject
+
     names = _named(only)
     profile = source if isinstance(source, Profile) else simulate_exact(source)
     if not mm_per_pixel > 0.0:

@@ -5,6 +5,7 @@ beyond its limit, in words, or nothing; what is unknown warns of nothing.
 """
 
 import math
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -12,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from sssfit.arrays import FloatArray
-from sssfit.fit._target import Target
-from sssfit.fit.svd import all_eigenvalues
+from sssfit.errors import FitError, SssfitWarning
 from sssfit.kernel import Kernel, Taps
 from sssfit.messages import counted
 from sssfit.profile import Profile
@@ -84,6 +84,30 @@ def doubts(kernel: Kernel, profile: Profile | None = None) -> list[str]:
     return [f"{words} (stress {rule.stress})." for rule, words in found if words]
 
 
+def warn_of_doubts(
+    kernel: Kernel | Profile, profile: Profile | None = None, *, strict: bool = False
+) -> None:
+    """Warn of every rule that a kernel breaks, or with ``strict`` raise an error that names them.
+
+    A profile alone breaks none.
+
+    Raises
+    ------
+    FitError
+        ``strict`` is set, and there is a doubt.
+
+    Warns
+    -----
+    SssfitWarning
+        One for each doubt.
+    """
+    found = [] if isinstance(kernel, Profile) else doubts(kernel, profile)
+    if strict and found:
+        raise FitError(f"{' '.join(found)} Without `strict` the kernel is written all the same.")
+    for each in found:
+        warnings.warn(f"{each[:1].upper()}{each[1:]}", SssfitWarning, stacklevel=2)
+
+
 def noise_ratio(profile: Profile, mm_per_pixel: float) -> FloatArray:
     """Return the noise of the 2D kernel over the kernel, by Frobenius norms (C,).
 
@@ -108,6 +132,9 @@ def rank_of_noise(profile: Profile, mm_per_pixel: float, half_pixels: int) -> in
 
     None where the profile has no standard errors, or no rank up to 16 comes that near.
     """
+    from sssfit.fit._target import Target  # scipy's linear algebra, which exports do not need
+    from sssfit.fit.svd import all_eigenvalues
+
     if profile.photons is None:
         return None
     noise, needed = noise_ratio(profile, mm_per_pixel), []
