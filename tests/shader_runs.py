@@ -52,7 +52,9 @@ def run(
     normalized=False,
     whole=False,
 ):
-    """The result (H, W, C), or all four numbers, of exported source on light (H, W, C), with clamped borders.
+    """The result (H, W, C) of exported source on light (H, W, C), with clamped borders.
+
+    The whole of it has alpha too.
 
     With depth (H, W) [mm] the source must follow it; with mm a pixel (right, down) take them apart.
     """
