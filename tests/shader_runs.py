@@ -50,8 +50,11 @@ def run(
     jitter=False,
     profile=None,
     normalized=False,
+    whole=False,
 ):
     """The result (H, W, C) of exported source on light (H, W, C), with clamped borders.
+
+    The whole of it has alpha too.
 
     With depth (H, W) [mm] the source must follow it; with mm a pixel (right, down) take them apart.
     """
@@ -64,7 +67,7 @@ def run(
     for targets, draw in draws:
         draw(1.0)
         last = targets[0]
-    return device_of(dialect).pixels(last)[..., : light.shape[2]]
+    return device_of(dialect).pixels(last)[..., : 4 if whole else light.shape[2]]
 
 
 def prepared(text, dialect, taps, light, mm_per_pixel, *, normalized):
