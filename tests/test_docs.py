@@ -1,17 +1,18 @@
 """The documents say what the program does, and no file names a private place."""
 
+import contextlib
+import io
 import re
 import runpy
 import shlex
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sssfit.cli import cli
+from sssfit.cli import cli, main
 from sssfit.formats.pictures import load_image
 from sssfit.kernel import Taps
 from sssfit.material import parse_material
@@ -68,14 +69,15 @@ def commands_of(page: str, start: str = "sssfit ") -> list[list[str]]:
 
 def printed_by(arguments: list[str], folder: Path) -> str:
     """What a command of ours that ends well prints on stdout."""
-    return subprocess.run(
-        [sys.executable, "-m", "sssfit.cli", *arguments],
-        cwd=folder,
-        stdout=subprocess.PIPE,
-        encoding="utf-8",
-        check=True,
-        timeout=300,
-    ).stdout
+    printed = io.StringIO()
+    with (
+        contextlib.chdir(folder),
+        contextlib.redirect_stdout(printed),
+        pytest.raises(SystemExit) as ended,
+    ):
+        main(arguments)
+    assert ended.value.code == 0
+    return printed.getvalue()
 
 
 def table_of(text: str) -> list[list[str]]:

@@ -17,7 +17,7 @@ from sssfit.material import load_material
 from sssfit.simulate import simulate_burley, simulate_dipole, simulate_exact
 
 pytestmark = pytest.mark.filterwarnings("ignore::sssfit.errors.SssfitWarning")
-few = settings(max_examples=8, deadline=None, derandomize=True)
+
 
 CASES = [
     ("svd", {}),
@@ -79,13 +79,8 @@ def test_every_method_is_held_to_this():
     assert {method for method, _ in CASES} == set(METHODS)
 
 
-@every_case
-@few
-@given(fit=fits())
-def test_energies(method, own, fit):
-    profile, pixels = fit
-    result = METHODS[method].fit(profile, **pixels, **own)
-    kernel, total = result.kernel, profile.diffuse_reflectance
+def check_energies(method, own, kernel, profile):
+    total = profile.diffuse_reflectance
     whole = np.array([kernel.full(c).sum() for c in range(2)])
     np.testing.assert_allclose(kernel.energy, whole, rtol=1e-11)
     np.testing.assert_allclose(kernel.energy_error, whole / total - 1.0, rtol=0, atol=1e-12)
@@ -99,12 +94,7 @@ def test_energies(method, own, fit):
         np.testing.assert_allclose(weights, total, rtol=1e-10)
 
 
-@every_case
-@few
-@given(fit=fits())
-def test_shapes_signs_and_ends(method, own, fit):
-    profile, pixels = fit
-    result = METHODS[method].fit(profile, **pixels, **own)
+def check_shapes_signs_and_ends(method, own, result):
     kernel = result.kernel
     assert kernel.signs.shape == (kernel.rank, 2)
     assert np.isin(kernel.signs, (-1.0, 1.0)).all()
@@ -122,12 +112,7 @@ def test_shapes_signs_and_ends(method, own, fit):
         assert " " in reason or reason == "converged"
 
 
-@every_case
-@few
-@given(fit=fits())
-def test_passes_are_the_2d_kernel(method, own, fit):
-    profile, pixels = fit
-    kernel = METHODS[method].fit(profile, **pixels, **own).kernel
+def check_passes_are_the_2d_kernel(kernel):
     image = np.random.default_rng(1).random((5, 7))
     for c in range(2):
         whole = np.zeros((kernel.pixels, kernel.pixels))
@@ -146,13 +131,7 @@ def test_passes_are_the_2d_kernel(method, own, fit):
         np.testing.assert_allclose(passed, in_the_plane, rtol=0, atol=1e-12 * size)
 
 
-@every_case
-@few
-@given(fit=fits())
-def test_normalising_moves_the_energy_apart(method, own, fit):
-    profile, pixels = fit
-    kernel = METHODS[method].fit(profile, **pixels, **own).kernel
-    unit = METHODS[method].fit(profile, **pixels, **own, normalize=True).kernel
+def check_normalising_moves_the_energy_apart(method, own, kernel, unit, profile):
     np.testing.assert_allclose(unit.energy, 1.0, rtol=1e-11)
     np.testing.assert_allclose(unit.scale, kernel.energy, rtol=1e-11)
     if promised(method, own):
@@ -167,12 +146,7 @@ def test_normalising_moves_the_energy_apart(method, own, fit):
         np.testing.assert_array_equal(getattr(unit, name), getattr(kernel, name))
 
 
-@every_case
-@few
-@given(fit=fits(), normalize=st.booleans())
-def test_files_bring_every_bit_back(method, own, fit, normalize):
-    profile, pixels = fit
-    kernel = METHODS[method].fit(profile, **pixels, **own, normalize=normalize).kernel
+def check_files_bring_every_bit_back(kernel):
     with tempfile.TemporaryDirectory() as folder:
         path, again = Path(folder) / "a.kernel.json", Path(folder) / "b.kernel.json"
         kernel.save(path)
@@ -183,3 +157,28 @@ def test_files_bring_every_bit_back(method, own, fit, normalize):
     assert loaded.mm_per_pixel == kernel.mm_per_pixel
     for name in ARRAYS:
         assert getattr(loaded, name).tobytes() == getattr(kernel, name).tobytes()
+
+
+def fitted(examples):
+    """Hold a case to all of it, on so many profiles."""
+
+    @every_case
+    @settings(max_examples=examples, deadline=None, derandomize=True)
+    @given(fit=fits())
+    def test(method, own, fit):
+        profile, pixels = fit
+        result = METHODS[method].fit(profile, **pixels, **own)
+        kernel = result.kernel
+        unit = METHODS[method].fit(profile, **pixels, **own, normalize=True).kernel
+        check_energies(method, own, kernel, profile)
+        check_shapes_signs_and_ends(method, own, result)
+        check_passes_are_the_2d_kernel(kernel)
+        check_normalising_moves_the_energy_apart(method, own, kernel, unit, profile)
+        for each in (kernel, unit):
+            check_files_bring_every_bit_back(each)
+
+    return test
+
+
+test_what_every_fit_promises = fitted(12)
+test_what_every_fit_promises_on_many_profiles = pytest.mark.slow(fitted(100))
