@@ -7,6 +7,7 @@ GLSL runs by moderngl (EGL, llvmpipe), HLSL too after glslang and spirv-cross, a
 import functools
 import importlib.util
 import os
+import re
 import shutil
 import struct
 import subprocess
@@ -50,8 +51,11 @@ def run(
     jitter=False,
     profile=None,
     normalized=False,
+    whole=False,
 ):
     """The result (H, W, C) of exported source on light (H, W, C), with clamped borders.
+
+    The whole of it has alpha too.
 
     With depth (H, W) [mm] the source must follow it; with mm a pixel (right, down) take them apart.
     """
@@ -64,7 +68,7 @@ def run(
     for targets, draw in draws:
         draw(1.0)
         last = targets[0]
-    return device_of(dialect).pixels(last)[..., : light.shape[2]]
+    return device_of(dialect).pixels(last)[..., : 4 if whole else light.shape[2]]
 
 
 def prepared(text, dialect, taps, light, mm_per_pixel, *, normalized):
@@ -206,9 +210,9 @@ class _OpenGL:
         vertices = self.context.simple_vertex_array(program, self.vertices, "at")
         members = {name: program[name] for name in program}
         samplers = {
-            each: int(name.removeprefix("SPIRV_Cross_Combined")[1])
+            each: int(found[1])
             for name, each in members.items()
-            if name.startswith(("t0", "t1", "t2", "t3", "t4", "t5", "SPIRV_Cross_Combinedt"))
+            if (found := re.match(r"(?:SPIRV_Cross_Combined)?t(\d+)", name))
         }
 
         def draw(part):

@@ -83,7 +83,7 @@ def test_the_halo_limits_the_blur_of_smaller_pixels(dialect):
     text = source([taps], DIALECTS[dialect], COMPUTE)
     near, far = (run_compute(text, dialect, [taps], light, mm) for mm in (0.5 * PITCH, PITCH))
     np.testing.assert_array_equal(near, far)
-    assert "Halos are those\n// for 0.3 mm; for less the blur stays as many texels wide." in text
+    assert "Halos\n// are those for 0.3 mm; for less the blur stays as many texels wide." in text
 
 
 @pytest.mark.parametrize("dialect", RUN)

@@ -5,6 +5,7 @@ import io
 import itertools
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import jsonschema
@@ -18,6 +19,7 @@ import sssfit
 from sssfit.errors import KernelError
 from sssfit.export import DIALECTS, Style, is_ours, kernel_text, source, taps_document
 from sssfit.export.certificate import SERVES
+from sssfit.export.passes import pass_list
 from sssfit.kernel import Stage, Taps
 from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
@@ -215,3 +217,59 @@ def test_that_range_is_the_one_that_was_measured():
     page = (Path(__file__).parents[1] / "docs" / "cascades.md").read_text("utf-8")
     words = r"single table serves pixels of ([\d.]+) to ([\d.]+) times its own"
     assert tuple(map(float, re.search(words, page).groups())) == SERVES
+
+
+def columns_of(text):
+    """The columns of the table of passes, split where there are two spaces or more."""
+    lines = text.splitlines()
+    begin = next(k for k, line in enumerate(lines) if line.startswith("// call "))
+    prefix = "// SKIN_OF_A_HEAD_"
+    rows = itertools.takewhile(lambda line: line.startswith(prefix), lines[begin + 1 :])
+    return [re.split(" {2,}", row.removeprefix(prefix)) for row in rows]
+
+
+@pytest.mark.parametrize(
+    ("taps", "more"),
+    [
+        (taps_of("1-1-1-1-1|2-2", channels=3), {}),
+        (taps_of("1-1|2-2", channels=3), {"depth": True}),
+        (taps_of("2-2-2", channels=3, chained=False), {}),
+        (taps_of("1-1|2-2", channels=3), {"compute": True}),
+    ],
+)
+def test_columns_of_the_table_of_passes_stay_apart(taps, more):
+    """Scripts of docs/integrate.md read them."""
+    if not taps.chained:
+        stages = [replace(each, offsets_mm=taps.stages[0].offsets_mm) for each in taps.stages]
+        taps = replace(taps, stages=tuple(stages))
+    text, _ = kernel_text(taps, "hlsl", prefix="SKIN_OF_A_HEAD", **more)
+    found = columns_of(text)
+    if more.get("compute"):
+        assert found[0][1:4] == ["E", "P0 H1", "1"]
+        assert found[-1] == ["Add", "M1 P0", "M0", "1"]
+        return
+    wanted = [
+        [
+            each.call,
+            " ".join(each.pictures),
+            " ".join(each.writes) + ("+" if each.is_added else ""),
+            f"1/{2**each.level}" if each.level else "1",
+            str(each.fetches),
+        ]
+        for each in pass_list(taps, normalized=True, depth="depth" in more)
+    ]
+    assert found == wanted
+
+
+def test_one_pass_is_one_pass():
+    assert "24 fetches a pixel in 1 pass; all stages" in kernel_text(disk_of(24), "hlsl")[0]
+
+
+@pytest.mark.parametrize("form", ["hlsl", "c"])
+def test_what_half_floats_cannot_hold_is_refused(form):
+    taps = taps_of("1", channels=3, mm_per_pixel=1e5)
+    stage = replace(taps.stages[0], offsets_mm=1e6 * taps.stages[0].offsets_mm)
+    taps = replace(taps, stages=(stage,))
+    with pytest.raises(KernelError, match=r"does not fit in a half float, of which 65504 is the"):
+        kernel_text(taps, form, half=True)
+    assert "inf" not in kernel_text(taps, form)[0].split("static")[1]

@@ -151,7 +151,7 @@ def test_beyond_grid_is_apart_and_nothing_is_folded_into_the_last_annulus():
 
 @pytest.mark.parametrize(
     ("photons", "seeds"),
-    [(1000, 400), (20_000, 100), pytest.param(20_000, 400, marks=pytest.mark.slow)],
+    [(1000, 400), (20_000, 200), pytest.param(20_000, 400, marks=pytest.mark.slow)],
 )
 def test_standard_errors_are_honest(photons, seeds):
     # spread over the seeds against the mean of the variances the runs claim, F at several radii

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 
 from sssfit.export.passes import Pass, fetches_of, pass_list
 from sssfit.kernel import Taps
+from sssfit.messages import counted
 
 _ROUNDING = 1e-12
 # Of its own pixels, those on which skin1's cascade stays within 1 (docs/cascades.md, Distance).
@@ -25,9 +26,11 @@ def certificate(taps: Taps) -> Iterator[str]:
     )
     yield f"Profile: {meta.get('profile_method') or 'unknown'}{sha}."
     read = "each stage reads the one before" if taps.chained else "all stages read the irradiance"
+    every = taps.cost.all_passes
+    more = f", {every} with those that change the picture's size" if every > taps.passes else ""
     yield (
-        f"{taps.structure}: {taps.fetches:.6g} fetches a pixel in {taps.passes} passes, "
-        f"{taps.cost.all_passes} with those that change the picture's size; {read}."
+        f"{taps.structure}: {taps.fetches:.6g} fetches a pixel in {counted(taps.passes, 'pass')}"
+        f"{more}; {read}."
     )
     yield (
         f"Made for pixels of {taps.mm_per_pixel:.9g} mm; channels {', '.join(taps.channels)}; "
@@ -67,13 +70,13 @@ def pass_table(
     passes = pass_list(taps, normalized=normalized, depth=depth)
     yield ""
     yield "Passes in their order. E is the irradiance, M0 the result; sizes are rounded up."
-    yield f"{'call':<16}{'reads':<16}{'writes':<8}{'size':<6}fetches"
+    rows = [("call", "reads", "writes", "size", "fetches")]
     for each in passes:
-        reads = " ".join(each.pictures)
         size = f"1/{2**each.level}" if each.level else "1"
         writes = " ".join(each.writes) + ("+" if each.is_added else "")
-        call = f"{prefix}_{each.call}"
-        yield f"{call:<16}{reads:<16}{writes:<8}{size:<6}{each.fetches}"
+        reads = " ".join(each.pictures)
+        rows.append((f"{prefix}_{each.call}", reads, writes, size, str(each.fetches)))
+    yield from columns(rows, (16, 16, 8, 6))
     if any(each.is_added for each in passes):
         yield "A + is added to what the target holds (blend ONE, ONE)."
     yield "position: middle of the pixel that is written (SV_Position, gl_FragCoord), in pixels."
@@ -81,7 +84,7 @@ def pass_table(
     if depth:
         yield from _of_depth(passes)
     else:
-        yield "2 d tan(fov / 2) / rows at depth d, divided by a pixel's own scale of the blur."
+        yield "2 d tan(vertical fov / 2) / rows at depth d, over a pixel's own scale of the blur."
     if tilted:
         yield "Right and down apart: each is that times sqrt(1 + s^2), s the change of depth in mm"
         yield "over as many mm along this side, from the neighbours' depth or ddx and ddy."
@@ -90,9 +93,21 @@ def pass_table(
     yield "Sampler: bilinear, clamped. Alpha is coverage, and light is multiplied by it."
 
 
+def columns(rows: Sequence[Sequence[str]], least: Sequence[int]) -> Iterator[str]:
+    """Yield rows of a table; columns have these widths, or those of their words and two spaces.
+
+    Scripts split rows where there are two spaces (docs/integrate.md).
+    """
+    longest = [max(len(row[k]) for row in rows if k < len(row)) + 2 for k in range(len(least))]
+    widths = [*map(max, longest, least), 0]
+    for row in rows:
+        words = (each.ljust(width) for each, width in zip(row, widths, strict=False))
+        yield "".join(words).rstrip()
+
+
 def _of_depth(passes: Sequence[Pass]) -> Iterator[str]:
     """Yield what passes that follow depth read besides light."""
-    yield "of a surface at depth 1 mm, 2 tan(fov / 2) / rows, divided by a pixel's own scale."
+    yield "of a surface at depth 1 mm, 2 tan(vertical fov / 2) / rows, over a pixel's own scale."
     yield "D0 holds coverage times depth in mm in its first channel, in 32 bits; where the coverage"
     yield f"is 0 nothing is read. {fetches_of(passes):.6g} fetches a pixel with those of depth."
 

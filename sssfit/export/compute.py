@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from sssfit.errors import KernelError
+from sssfit.export.certificate import columns
 from sssfit.export.dialects import Dialect
 from sssfit.export.functions import Functions
 from sssfit.kernel import Taps
@@ -129,14 +130,14 @@ def compute_table(taps: Taps, levels: Sequence[Level], prefix: str) -> Iterator[
     yield f"Dispatches in their order, groups of {GROUP} x {GROUP} threads. E is the irradiance, M0"
     yield "the result; sizes are rounded up. A group of Level writes a tile, and holds it with a"
     yield f"halo around it in {shared_bytes(taps, levels)} bytes of groupshared memory."
-    yield f"{'call':<16}{'reads':<8}{'writes':<8}{'size':<6}{'tile':<6}halo"
-    for each in levels:
+    sizes = [f"1/{2**each.number}" if each.number else "1" for each in levels]
+    rows: list[tuple[str, ...]] = [("call", "reads", "writes", "size", "tile", "halo")]
+    for each, size in zip(levels, sizes, strict=True):
         name, writes = f"{prefix}_Level{each.number}", " ".join(each.writes)
-        size = f"1/{2**each.number}" if each.number else "1"
-        yield f"{name:<16}{each.reads:<8}{writes:<8}{size:<6}{each.tile:<6}{each.halo}"
-    for each in reversed(levels[:-1]):
-        n, size = each.number, f"1/{2**each.number}" if each.number else "1"
-        yield f"{f'{prefix}_Add':<16}{f'M{n + 1} P{n}':<8}{f'M{n}':<8}{size}"
+        rows.append((name, each.reads, writes, size, str(each.tile), str(each.halo)))
+    inner = reversed(range(len(levels) - 1))
+    rows += ((f"{prefix}_Add", f"M{n + 1} P{n}", f"M{n}", sizes[n]) for n in inner)
+    yield from columns(rows, (16, 8, 8, 6, 6))
     once, whole = (bytes_moved(levels, with_halos=halos) for halos in (False, True))
     yield f"Bytes a pixel in half floats: {once:.4g}, and {whole - once:.3g} of halos, which caches"
     yield f"may hold; the passes one by one move {taps.bytes_per_pixel():.4g}."
@@ -144,8 +145,8 @@ def compute_table(taps: Taps, levels: Sequence[Level], prefix: str) -> Iterator[
     yield "Threads below the tile write term[0] to group * tile + thread of the first picture,"
     yield "those below half of it term[1] to group * tile / 2 + thread of the other, if inside."
     yield "Add: position is the middle of the texel that is written, texel 1 / size of M."
-    yield "mm_per_pixel: of the full picture, 2 d tan(fov / 2) / rows at depth d. Halos are those"
-    yield f"for {taps.mm_per_pixel:.6g} mm; for less the blur stays as many texels wide."
+    yield "mm_per_pixel: of the full picture, 2 d tan(vertical fov / 2) / rows at depth d. Halos"
+    yield f"are those for {taps.mm_per_pixel:.6g} mm; for less the blur stays as many texels wide."
     yield "Sampler: bilinear, clamped."
 
 

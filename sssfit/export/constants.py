@@ -9,6 +9,7 @@ from sssfit.export.dialects import KINDS, Dialect
 from sssfit.messages import shown
 
 _LONGEST = 96  # characters of a line of numbers
+_MOST_HALF = float(np.finfo(np.float16).max)
 _MANY = 8  # rows of an array from which on two share a line
 
 
@@ -23,7 +24,7 @@ def check_prefix(prefix: str) -> None:
         raise KernelError(
             f"prefix = {shown(prefix)}; expected letters, digits and _, such as SKIN."
         )
-    if prefix.lower().startswith("gl_") or "__" in f"{prefix}_":
+    if f"{prefix}_".lower().startswith("gl_") or "__" in f"{prefix}_":
         raise KernelError(
             f"prefix = {shown(prefix)}; names that begin with gl_ or have two _ in a row are "
             "reserved, so choose another, such as SKIN."
@@ -83,11 +84,28 @@ class Writer:
         yield from (before, *(f"    {each}," for each in lines[:-1]), f"    {lines[-1]}", after)
 
     def _literal(self, values: Sequence[float]) -> str:
-        rounded = np.array(values, np.float16).astype(float).tolist() if self.half else values
-        return self.dialect.literal(rounded)
+        return self.dialect.literal(_in_half(values) if self.half else values)
 
     def _ends(self, kind: str, name: str, count: int, dims: str) -> tuple[str, str]:
         """Return what stands before and after the rows of an array."""
         words = {"kind": self.dialect.types[kind], "name": f"{self.prefix}_{name}"}
         before, after = self.dialect.array
         return before.format(count=count, dims=dims, **words), after.format()
+
+
+def _in_half(values: Sequence[float]) -> list[float]:
+    """Return values as half floats hold them.
+
+    Raises
+    ------
+    KernelError
+        One is too large for them.
+    """
+    most = max(values, key=abs)
+    if abs(most) > _MOST_HALF:
+        raise KernelError(
+            f"{most:.6g} does not fit in a half float, of which {_MOST_HALF:.0f} is the largest; "
+            "export in single precision."
+        )
+    rounded: list[float] = np.array(values, np.float16).astype(float).tolist()
+    return rounded

@@ -236,14 +236,14 @@ class DepthFunctions(Functions):
     def _coarser(self, each: Pass) -> Iterator[str]:
         new, (smaller, own) = self.dialect.new, each.depths
         yield switch(self.prefix, "DEPTH")
-        yield f"{new('float', 'cover')} = {self._load(each.adds[0][0])}.a;"
-        yield "if (cover == 0.0) {"
+        yield f"{new('float4', 'own')} = {self._load(each.adds[0][0])};"
+        yield "if (own.a == 0.0) {"
         yield f"    return {self._nothing()};"
         yield "}"
-        yield f"{new('float', 'z')} = {self._load(own)}.x / cover;"
+        yield f"{new('float', 'z')} = {self._load(own)}.x / own.a;"
         given = (f"{each.stages[0]}u", "z", each.reads, smaller, "position", "texel")
         larger = self._call("Larger", *given, *(name for _, name in self.profile))
-        yield f"{new(self.light, 'light')} = cover * {larger};"
+        yield f"{new(self.light, 'light')} = own.a * {larger} + {self._own_share(each)};"
         yield "#else"
         yield from super()._coarser(each)
         yield "#endif"

@@ -193,7 +193,7 @@ class Functions:
         new = self.dialect.new
         return f"""\
     {new("float2", "place")} = position * texel;
-{self._per_mm(f"(mm_per_pixel * {size})", axis)}
+{self._per_mm(f"(mm_per_pixel * {size})" if size else "mm_per_pixel", axis)}
     {new("float4", "own")} = {self._fetch(picture, "place")};"""
 
     def _per_mm(self, mm: str, axis: str) -> str:
@@ -349,26 +349,32 @@ class Functions:
     def _sum(self, each: Pass) -> Iterator[str]:
         """Yield the lines that add up the pictures of a level: its last stage, or a coarser sum."""
         new = self.dialect.new
+        adds, cover = each.adds, "own.a"
         if each.kind == "sum":
             yield from self._coarser(each)
+            adds = adds[1:]
         else:
             share = self._at("BLEND", f"{each.stages[0] + 1}u", "PICTURES")
             yield f"{new('float4', 'blurred')} = {self._last(each)};"
-            yield f"{new('float', 'cover')} = blurred.a;"
             yield f"{new(self.light, 'light')} = {share} * blurred{self.rgb};"
-        for name, row in each.adds:
+            cover = "0.0" if each.is_added else "blurred.a"  # the target has it already
+        for name, row in adds:
             share = self._at("BLEND", f"{row}u", "PICTURES")
             yield f"light += {share} * {self._load(name)}{self.rgb};"
-        yield f"return {self._whole('light', 'cover')};"
+        yield f"return {self._whole('light', cover)};"
 
     def _coarser(self, each: Pass) -> Iterator[str]:
-        """Yield the lines that fetch a coarser sum, one for what it has around a pixel."""
+        """Yield the lines that add a coarser sum, over what it covers there, and a pixel's own."""
         new, place = self.dialect.new, "0.5 * position * texel"
         yield f"{new('float4', 'coarse')} = {self._fetch(each.reads, place)};"
-        yield f"{new('float', 'cover')} = {self._load(each.adds[0][0])}.a;"
+        yield f"{new('float4', 'own')} = {self._load(each.adds[0][0])};"
         part = f"coarse.{'a' * len(self.taps.channels)}"
-        coarse = self._call("Covered", f"coarse{self.rgb}", part, "cover")
-        yield f"{new(self.light, 'light')} = {coarse}{self.rgb};"
+        coarse = self._call("Covered", f"coarse{self.rgb}", part, "own.a")
+        yield f"{new(self.light, 'light')} = {coarse}{self.rgb} + {self._own_share(each)};"
+
+    def _own_share(self, each: Pass) -> str:
+        """Return what a sum adds of the picture that it takes its coverage from."""
+        return f"{self._at('BLEND', f'{each.adds[0][1]}u', 'PICTURES')} * own{self.rgb}"
 
     def _last(self, each: Pass) -> str:
         """Return a call of the last pass of a stage."""
@@ -384,7 +390,7 @@ class Functions:
         """Yield the lines of the first pass of several terms, which fetches once for all."""
         new, first = self.dialect.new, [self.first[k] for k in each.stages]
         yield from (
-            line.strip() for line in self._begin(each.reads, "1.0", self._axis(each)).split("\n")
+            line.strip() for line in self._begin(each.reads, "", self._axis(each)).split("\n")
         )
         for k, start in enumerate(first):
             middle = self._at("WEIGHT", f"{start}u")
@@ -392,12 +398,13 @@ class Functions:
             yield f"{new(self.light, f'part{k}')} = {middle} * own.a;"
         count = len(self.taps.stages[each.stages[0]].weights)
         yield f"for ({new('uint', 'i')} = 1u; i < {count}u; i++) {{"
-        away = self._away(f"{first[0]}u + i", f"{each.stages[0]}u")
+        rows = [f"{start}u + i" if start else "i" for start in first]
+        away = self._away(rows[0], f"{each.stages[0]}u")
         yield from (line.removeprefix("    ") for line in away.split("\n"))
         yield f"    {new('float4', 'both')} = {self._both(each.reads, 'away')};"
-        for k, start in enumerate(first):
-            yield f"    light{k} += {self._at('WEIGHT', f'{start}u + i')} * both{self.rgb};"
-            yield f"    part{k} += {self._at('WEIGHT', f'{start}u + i')} * both.a;"
+        for k, row in enumerate(rows):
+            yield f"    light{k} += {self._at('WEIGHT', row)} * both{self.rgb};"
+            yield f"    part{k} += {self._at('WEIGHT', row)} * both.a;"
         yield "}"
         yield f"{self.dialect.variable_of.format(kind=f'{self.prefix}_Terms', name='all')};"
         for k in range(len(first)):
@@ -406,7 +413,7 @@ class Functions:
 
     def _disk(self, each: Pass) -> Iterator[str]:
         """Yield the lines of single fetches on a spiral that each pixel turns by its own angle."""
-        new, begin = self.dialect.new, self._begin(each.reads, "1.0").split("\n")
+        new, begin = self.dialect.new, self._begin(each.reads, "").split("\n")
         yield from (line.strip() for line in begin)
         count, weight = len(self.taps.stages[0].weights), self._at("WEIGHT", "i")
         yield f"{new('float', 'turn')} = {self._call('Turn', 'position', 'frame')};"

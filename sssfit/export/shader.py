@@ -64,7 +64,12 @@ class Style:
         return feature in self.features or (feature == "COVERAGE" and "DEPTH" in self.features)
 
 
-FEATURES = ("COVERAGE", "DEPTH", "JITTER", "TRANSMITTANCE")
+FEATURES = {  # what each does
+    "COVERAGE": "light stays within the mask that alpha holds",
+    "DEPTH": "a fetch loses weight by its difference in depth",
+    "JITTER": "each pixel and frame moves the outer taps",
+    "TRANSMITTANCE": "a function tells the light through a thickness",
+}
 _WITHOUT_BEING_ASKED = ("COVERAGE",)  # has few lines, so each source has them behind its switch
 
 
@@ -184,7 +189,8 @@ def _defines(dialect: Dialect, style: Style) -> Iterator[str]:
     always = () if style.compute else _WITHOUT_BEING_ASKED
     for each in dict.fromkeys((*always, *style.features)):
         name = f"{p}_{each}"
-        yield from (f"#ifndef {name}", f"#define {name} {int(each in style.features)}", "#endif")
+        yield f"#ifndef {name} // 1: {FEATURES[each]}"
+        yield from (f"#define {name} {int(each in style.features)}", "#endif")
     if style.has("DEPTH"):
         yield switch(p, "DEPTH")
         yield "// Every pass then divides by what is near and covered."

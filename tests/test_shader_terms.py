@@ -1,0 +1,55 @@
+"""Exported passes of several separable terms, on a software driver against the renderer."""
+
+import numpy as np
+import pytest
+from shader_runs import run
+from test_shaders import PITCH, RUN, TABLES, apart, disk_mask, light_of, rendered
+
+from sssfit.export import DIALECTS, Style, kernel_text, source
+from sssfit.export.dense import taps_of_kernel
+from sssfit.export.passes import pass_list
+from sssfit.fit.on_taps import on_taps
+from sssfit.fit.svd import fit_svd
+from sssfit.material import load_material
+from sssfit.render.separable import render_separable
+from sssfit.scene.record import Scene
+from sssfit.simulate import simulate_dipole
+
+
+@pytest.fixture(scope="module")
+def skin1():
+    return simulate_dipole(load_material("skin1"))
+
+
+@pytest.mark.parametrize("dialect", RUN)
+@pytest.mark.parametrize("rank", [2, 3])
+@pytest.mark.parametrize("thinned", [False, True])
+def test_ranks_of_svd_show_what_the_renderer_shows(skin1, rank, thinned, dialect):
+    """Terms of a fit share their first pass; dense, 31 weights a pass, and on 9 taps."""
+    kernel = fit_svd(skin1, rank=rank, mm_per_pixel=PITCH, support_mm=4.5).kernel
+    light = light_of((37, 50), 3)
+    if thinned:
+        found = taps = on_taps(kernel, 9)
+        wanted = rendered(light, taps)
+    else:
+        found, taps = kernel, taps_of_kernel(kernel, 65)
+        wanted = render_separable(Scene("light", light, PITCH), kernel, border="clamp")
+    assert [len(each.stages) for each in pass_list(taps)] == [rank, *[1] * rank]
+    text, _ = kernel_text(found, dialect, keep_energy=True, with_shader=not thinned)
+    assert apart(run(text, dialect, taps, light, PITCH), wanted) < 1e-5
+
+
+@pytest.mark.parametrize("dialect", RUN)
+@pytest.mark.parametrize("feature", ["COVERAGE", "DEPTH"])
+@pytest.mark.parametrize("name", ["*|1-*|*", "three terms"])
+def test_alpha_of_the_result_is_the_coverage(name, feature, dialect):
+    """Terms are added to a target that holds the coverage since the first."""
+    taps = dict(TABLES)[name]
+    text = source([taps], DIALECTS[dialect], Style(features=(feature,), normalized=False))
+    cover, light, mm = disk_mask(), light_of((45, 50), 3), PITCH
+    view = {"cover": cover, "whole": True}
+    if feature == "DEPTH":
+        view["depth"], mm = np.full(cover.shape, 300.0), PITCH / 300.0
+    found = run(text, dialect, taps, light, mm, **view)
+    # The middle of a texel in texture coordinates rounds by up to 50 x 6e-8 of a texel.
+    np.testing.assert_allclose(found[..., 3], cover, atol=1e-5)
