@@ -7,6 +7,7 @@ GLSL runs by moderngl (EGL, llvmpipe), HLSL too after glslang and spirv-cross, a
 import functools
 import importlib.util
 import os
+import re
 import shutil
 import struct
 import subprocess
@@ -209,9 +210,9 @@ class _OpenGL:
         vertices = self.context.simple_vertex_array(program, self.vertices, "at")
         members = {name: program[name] for name in program}
         samplers = {
-            each: int(name.removeprefix("SPIRV_Cross_Combined")[1])
+            each: int(found[1])
             for name, each in members.items()
-            if name.startswith(("t0", "t1", "t2", "t3", "t4", "t5", "SPIRV_Cross_Combinedt"))
+            if (found := re.match(r"(?:SPIRV_Cross_Combined)?t(\d+)", name))
         }
 
         def draw(part):

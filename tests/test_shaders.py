@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from reference_taps import fetch, gathered, passes_of, turn_of
 from shader_runs import device_of, glsl_program, hlsl_source, needs, run, spirv_of
 from test_disk import disk_of
+from test_export import small_kernel
 from test_taps import signed_taps, taps_of
 from test_turned import turned
 
@@ -716,6 +717,25 @@ def test_preprocessors_read_the_switches_alike(first, on, tmp_path):
     left = left_by_babylon(iter([*split_by_babylon(text), "#endif"]), {})
     kept = (each.split("//")[0] for each in left if not each.startswith("#"))
     assert "".join("".join(kept).split()) == "".join(done.stdout.split())
+
+
+def test_what_is_refused_says_nothing_else(caplog):
+    caplog.set_level("INFO", "sssfit")
+    one, other = taps_of("1", channels=3), taps_of("2", channels=3)
+    with pytest.raises(KernelError, match="fit them with the same stages"):
+        kernel_text([one, other], "hlsl", half=True)
+    with pytest.raises(KernelError, match="prefix = '1a'"):
+        kernel_text(small_kernel(pixels=41), "hlsl", half=True, prefix="1a")
+    assert caplog.messages == []
+    kernel_text(one, "hlsl", half=True)
+    assert len(caplog.messages) == 1
+
+
+@pytest.mark.parametrize("more", ["with_shader", "dense"])
+def test_passes_are_asked_for_or_not(more):
+    for kernel in (taps_of("1", channels=3), small_kernel()):
+        with pytest.raises(KernelError, match="with its passes or without them; ask for one"):
+            kernel_text(kernel, "hlsl", without_shader=True, **{more: True})
 
 
 def test_what_cannot_share_a_file_is_one_line():

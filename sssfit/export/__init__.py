@@ -192,6 +192,8 @@ def source_text(
     if any(switches.values()) and (without_shader or not (tables or with_shader or dense)):
         given = ", ".join(name.lower() for name, each in switches.items() if each)
         raise KernelError(f"{given}: a switch of passes; have these written, too.")
+    if without_shader and (with_shader or dense):
+        raise KernelError("source is written with its passes or without them; ask for one.")
     if not tables and len(kernels) == 1 and isinstance(kernels[0], SeparableKernel):
         if not (with_shader or dense):
             return _dense_text(kernels[0], form, prefix, half=half)
@@ -207,14 +209,15 @@ def source_text(
         tilted=tilt,
         compute=compute,
     )
-    if half:
-        for each in tables:
-            _note_half(each, taps_in_half(each))
-    return source(tables, DIALECTS[form], style)
+    text = source(tables, DIALECTS[form], style)
+    for each in tables if half else ():
+        _note_half(each, taps_in_half(each))
+    return text
 
 
 def _dense_text(kernel: SeparableKernel, form: str, prefix: str, *, half: bool) -> str:
     """Return the arrays of a dense kernel, and say what its passes would cost."""
+    text = dense(kernel, DIALECTS[form], prefix, half=half)
     weights = 2 * kernel.rank * kernel.pixels
     if weights > MOST_WEIGHTS:
         note(
@@ -223,7 +226,7 @@ def _dense_text(kernel: SeparableKernel, form: str, prefix: str, *, half: bool) 
         )
     if half:
         _note_half(kernel, dense_in_half(kernel))
-    return dense(kernel, DIALECTS[form], prefix, half=half)
+    return text
 
 
 def _note_half(kernel: Kernel, rounded: FloatArray) -> None:
