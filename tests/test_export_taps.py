@@ -202,6 +202,13 @@ def test_profile_names_that_clash_are_refused_in_one_line():
         assert "\n" not in str(caught.value)
 
 
+def test_tables_that_are_to_be_mixed_have_the_same_stages():
+    text, _ = kernel_text(taps_of("1|1"), "hlsl")
+    assert "mix the numbers of two tables with these stages, an octave apart" in text
+    page = (Path(__file__).parents[1] / "docs" / "cascades.md").read_text("utf-8")
+    assert re.search(r"`sssfit fit --stages '\S+' --pitches \S+` makes one\s+table for each", page)
+
+
 def test_the_comment_says_on_which_pixels_a_table_serves():
     words = {
         "1-1|1": "Serves pixels of 0.228 to 0.387 mm (skin1 within 1 Delta E)",

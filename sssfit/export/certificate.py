@@ -53,7 +53,7 @@ def _distances(taps: Taps) -> str:
     least, most = (own * each for each in SERVES)
     return (
         f"Serves pixels of {least:.3g} to {most:.3g} mm (skin1 within 1 Delta E); for other "
-        "distances mix the numbers of two tables an octave apart."
+        "distances mix the numbers of two tables with these stages, an octave apart."
     )
 
 
