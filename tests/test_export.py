@@ -12,7 +12,8 @@ import pytest
 from reference_pixels import make_profile
 
 import sssfit
-from sssfit.export import DIALECTS, dense, json_document
+from sssfit.errors import KernelError
+from sssfit.export import DIALECTS, dense, json_document, kernel_text
 from sssfit.fit import fit_preintegrated
 from sssfit.kernel import SeparableKernel
 
@@ -241,3 +242,13 @@ def test_a_fitted_kernel_is_exported():
     profile = make_profile(np.linspace(0.0, 2.0, 21), np.full((20, 2), 0.01))
     text = hlsl_of(fit_preintegrated(profile, mm_per_pixel="profile").kernel)
     assert "float2 SSS_WEIGHT[" in text
+
+
+def test_only_dense_writes_passes_of_more_than_65_weights():
+    kernel = small_kernel(pixels=143)
+    with pytest.raises(
+        KernelError, match=r"has 143 weights, and 65 are the most .* `dense` is set"
+    ):
+        kernel_text(kernel, "hlsl", with_shader=True)
+    assert "SSS_Blur" in kernel_text(kernel, "hlsl", dense=True)[0]
+    assert "SSS_Blur" in kernel_text(small_kernel(pixels=65), "hlsl", with_shader=True)[0]

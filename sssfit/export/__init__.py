@@ -25,7 +25,7 @@ from sssfit.profile import Profile
 
 __all__ = ["DIALECTS", "Style", "dense", "json_document", "kernel_text", "source", "taps_document"]
 
-MOST_WEIGHTS, MOST_DENSE = 65, 129  # of a pass that is written as a loop of fetches
+MOST_WEIGHTS = 65  # of a pass that is written as a loop of fetches without being asked twice
 _FIGURES = ("channels", "rank", "pixels", "mm_per_pixel")
 _TAPS_FIGURES = ("channels", "structure", "fetches", "passes", "mm_per_pixel")
 
@@ -173,7 +173,7 @@ def source_text(
     with_shader : bool
         Whether a dense kernel gets passes too, up to 65 weights each.
     dense : bool
-        Whether it gets them up to 129.
+        Whether it gets them with any number of weights.
 
     Raises
     ------
@@ -197,7 +197,7 @@ def source_text(
     if not tables and len(kernels) == 1 and isinstance(kernels[0], SeparableKernel):
         if not (with_shader or dense):
             return _dense_text(kernels[0], form, prefix, half=half)
-        tables = [taps_of_kernel(kernels[0], MOST_DENSE if dense else MOST_WEIGHTS)]
+        tables = [taps_of_kernel(kernels[0], None if dense else MOST_WEIGHTS)]
     if len(tables) < len(kernels):
         raise KernelError("only tables of taps share one source; write dense kernels one by one.")
     style = Style(

@@ -407,12 +407,12 @@ class ComputeFunctions(Functions):
         if level.is_last:
             yield f"    return {self._whole('light', '1.0')};"
             return
-        made = self.dialect.variable_of.format(kind=f"{self.prefix}_Tiled", name="all")
+        made = self.dialect.variable_of.format(kind=f"{self.prefix}_Tiled", name="made")
         four = self._call("Four", f"at + {self.dialect.types['int2']}(thread)", "ends")
         yield f"    {made};"
-        yield f"    all.term[0] = {self._whole('light', '1.0')};"
-        yield f"    all.term[1] = {self._whole(four, '1.0')};"
-        yield "    return all;"
+        yield f"    made.term[0] = {self._whole('light', '1.0')};"
+        yield f"    made.term[1] = {self._whole(four, '1.0')};"
+        yield "    return made;"
 
     def _add(self) -> str:
         arguments = [("picture", "coarse"), ("picture", "sum"), ("sampler", "bilinear")]

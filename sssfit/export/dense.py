@@ -38,7 +38,7 @@ def dense(
     return "\n".join([*lines, ""])
 
 
-def taps_of_kernel(kernel: SeparableKernel, most: int) -> Taps:
+def taps_of_kernel(kernel: SeparableKernel, most: int | None) -> Taps:
     """Return a dense kernel as a table with a fetch for every pixel.
 
     Raises
@@ -46,10 +46,10 @@ def taps_of_kernel(kernel: SeparableKernel, most: int) -> Taps:
     KernelError
         A pass has more weights than ``most``.
     """
-    if kernel.pixels > most:
+    if most is not None and kernel.pixels > most:
         raise KernelError(
             f"a pass of this kernel has {kernel.pixels} weights, and {most} are the most that are "
-            "written as fetches; thin it to taps, or fit a cascade."
+            "written as fetches unless `dense` is set; thin it to taps, or fit a cascade."
         )
     middle = kernel.pixels // 2
     offsets_mm: FloatArray = kernel.mm_per_pixel * np.arange(1.0, middle + 1.0)

@@ -149,7 +149,7 @@ class DepthFunctions(Functions):
         struct = self.dialect.struct.format(
             name=f"{p}_Halved", kind=self.dialect.types["float4"], count=2
         )
-        made = self.dialect.variable_of.format(kind=f"{p}_Halved", name="all")
+        made = self.dialect.variable_of.format(kind=f"{p}_Halved", name="made")
         at = self._clamped("min", f"2.0 * floor(position) + {self._corner('i')}")
         arguments = [("uint", "stage"), ("picture", "picture"), *self.beside]
         arguments += [("sampler", "bilinear"), ("float2", "position"), ("float2", "texel")]
@@ -170,19 +170,19 @@ class DepthFunctions(Functions):
         {new("float", "z")} = {depth}.x;
         {new(self.light, "near")} = {far};
         {new("float", "taken")} = 0.25 * {self._widest()};
-        all.term[0] += taken * there;
-        all.term[1].x += taken * z;
+        made.term[0] += taken * there;
+        made.term[1].x += taken * z;
     }}"""
-        off = f"    all.term[0] = {self._fetch('picture', '2.0 * position * texel')};"
+        off = f"    made.term[0] = {self._fetch('picture', '2.0 * position * texel')};"
         return f"""
 // Half the size: of four texels those that are as near as the nearest. Depth is a second target.
 {struct}
 {self._head(f"{p}_Halved", "Halve", [*arguments, *self.profile])} {{
     {made};
-    all.term[0] = {self._nothing()};
-    all.term[1] = all.term[0];
+    made.term[0] = {self._nothing()};
+    made.term[1] = made.term[0];
 {self._switched(on, off)}
-    return all;
+    return made;
 }}"""
 
     def _widest(self) -> str:

@@ -406,10 +406,10 @@ class Functions:
             yield f"    light{k} += {self._at('WEIGHT', row)} * both{self.rgb};"
             yield f"    part{k} += {self._at('WEIGHT', row)} * both.a;"
         yield "}"
-        yield f"{self.dialect.variable_of.format(kind=f'{self.prefix}_Terms', name='all')};"
+        yield f"{self.dialect.variable_of.format(kind=f'{self.prefix}_Terms', name='made')};"
         for k in range(len(first)):
-            yield f"all.term[{k}] = {self._call('Covered', f'light{k}', f'part{k}', 'own.a')};"
-        yield "return all;"
+            yield f"made.term[{k}] = {self._call('Covered', f'light{k}', f'part{k}', 'own.a')};"
+        yield "return made;"
 
     def _disk(self, each: Pass) -> Iterator[str]:
         """Yield the lines of single fetches on a spiral that each pixel turns by its own angle."""
