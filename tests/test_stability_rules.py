@@ -141,6 +141,8 @@ def test_few_terms_are_not_round(exact):
     for rank, is_named in ((1, True), (2, True), (3, False), (5, False)):
         kernel = fit_svd(exact, rank=rank, mm_per_pixel=PITCH).kernel
         assert ("not-round" in fired(kernel)) is is_named
+    coarse = fit_svd(exact, rank=1, mm_per_pixel=PITCH, support_mm=3.0 * PITCH).kernel
+    assert "not-round" not in fired(coarse)
 
 
 def test_a_guide_far_from_50_is_named(exact):

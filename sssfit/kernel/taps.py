@@ -40,7 +40,6 @@ from sssfit.kernel.record import PROVENANCE, SeparableKernel
 from sssfit.kernel.structure import (
     MOST_LEVELS,
     MOST_ON_DISK,
-    MOST_PAIRS,
     MOST_STAGES,
     Cost,
     Shape,
@@ -65,7 +64,7 @@ _ERRORS = ("spectral", "energy")
 # Fetches with one weight: a pair of passes and a line have the middle and mirrored pairs, a star
 # the middle, four diagonal neighbours and four on the axes, a disk single fetches.
 _COPIES = {"pair": 2.0, "star": 4.0, "disk": 1.0, "line": 2.0}
-_MOST_OFFSETS = {"pair": MOST_PAIRS, "disk": MOST_ON_DISK, "line": MOST_PAIRS}
+_MOST_OFFSETS = dict.fromkeys(("pair", "disk", "line"), MOST_ON_DISK)  # of dense passes, too
 # Angles below which a stage is its own mirror image: the passes of a pair are perpendicular.
 _TURNS = {"pair": 90.0, "line": 180.0}
 _ROUNDING = 1e-9  # of sums that are computed in another order

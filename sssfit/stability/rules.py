@@ -19,6 +19,7 @@ from sssfit.messages import counted
 from sssfit.profile import Profile
 from sssfit.profile.pixels import annulus_areas
 
+_ROUND_PIXELS = 4  # from which circle on asymmetry is told from the squareness of pixels
 _TAIL = 1e-3  # of the energy: gaps beyond it are where a walk saw nothing
 
 
@@ -238,6 +239,8 @@ def _coarse_annuli(facts: Facts, limit: float) -> str:
 def _not_round(facts: Facts, limit: float) -> str:
     kernel = facts.kernel
     if isinstance(kernel, Taps) or kernel.method != "svd" or kernel.rank >= limit:
+        return ""
+    if kernel.half_pixels < _ROUND_PIXELS:  # a few pixels are square in any case
         return ""
     return (
         f"a point of light becomes a cross or a diamond by {counted(kernel.rank, 'term')}, with "
