@@ -151,12 +151,6 @@ def test_a_guide_far_from_50_is_named(exact):
         assert ("guide-b" in fired(kernel)) is is_named
 
 
-def test_many_signed_gaussians_are_named(exact):
-    for terms, signed, is_named in ((8, True, True), (6, True, False), (8, False, False)):
-        kernel = fit_gaussians(exact, terms=terms, signed=signed, mm_per_pixel=PITCH).kernel
-        assert ("signed-gaussians" in fired(kernel)) is is_named
-
-
 def test_a_halving_behind_one_stage_is_named():
     for structure, is_named in (("1|1", True), ("1-1|1", False), ("1-1", False), ("1", False)):
         assert ("crawling" in fired(taps_of(structure))) is is_named

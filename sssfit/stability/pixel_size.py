@@ -51,7 +51,7 @@ def stress(subject: Subject) -> list[Panel]:
 def _curve(subject: Subject, way: Way, path_mm: float) -> Curve:
     """Return what each pixel size adds to the error on the subject's pixels."""
     steps = _STEPS if way.method not in TAPS or subject.is_whole else _STEPS_OF_CASCADES
-    sizes = np.geomspace(_LEAST, _MOST, steps)
+    sizes = np.unique([*np.geomspace(_LEAST, _MOST, steps), subject.mm_per_pixel / path_mm])
     own = _error(subject, way, subject.mm_per_pixel)
     errors = subject.each(lambda size: _error(subject, way, size * path_mm), sizes.tolist())
     more = np.maximum(np.array(errors) - own, _FLOOR)
