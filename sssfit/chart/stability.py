@@ -136,7 +136,7 @@ def _range(panel: Panel) -> tuple[float, float]:
     values = np.concatenate([each.y for each in panel.curves])
     values = np.append(values[np.isfinite(values)], panel.limit)
     if not panel.is_log:
-        return 0.0, float(values.max()) * (1.0 + _HEADROOM)
+        return 0.0, float(values.max()) * (1.0 + _HEADROOM) or 1.0
     positive = values[values > 0.0]
     low, high = float(positive.min()), float(positive.max())
     return 0.7 * low, max(high, panel.limit * 3.0) * 1.5
