@@ -3,19 +3,23 @@
 import dataclasses
 import json
 import re
+import warnings
 
 import numpy as np
 import pytest
 from test_lut import ENERGY, VARIANCES
 from test_profile import make_profile
 
-from sssfit.errors import ArgumentError, FitError
+from sssfit.errors import ArgumentError, FitError, SssfitWarning
 from sssfit.material import load_material
 from sssfit.methods import STRESSES
 from sssfit.shapes import gaussian_cdf
 from sssfit.stability import Curve, Panel, gaussians, hard_light, noise, optics, stability
 from sssfit.stability.record import BETWEEN, FROM, NEVER, SAFE, UP_TO, Axis
 from sssfit.stability.subject import Subject, Way
+
+# `stability` itself hears no warning of a fit; these call the fits beside it.
+pytestmark = pytest.mark.filterwarnings("ignore::sssfit.errors.SssfitWarning")
 
 
 @pytest.fixture(scope="module")
@@ -205,3 +209,19 @@ def test_every_stress_is_a_file_of_its_own():
         assert method.function == f"sssfit.stability.{name.replace('-', '_')}:stress"
         assert callable(method.load())
         assert re.fullmatch(r"[^.].*[^.]", method.summary)
+
+
+def test_what_fits_warn_of_is_not_heard_and_filters_are_put_back(profile, monkeypatch):
+    real = Way.fit
+
+    def warning(way, *given, **more):
+        warnings.warn("a doubt", SssfitWarning, stacklevel=1)
+        return real(way, *given, **more)
+
+    monkeypatch.setattr(Way, "fit", warning)
+    with warnings.catch_warnings(record=True) as heard:
+        warnings.simplefilter("always")
+        inside = list(warnings.filters)
+        stability(profile, only=["hard-light"], mm_per_pixel=0.25)
+        assert list(warnings.filters) == inside
+    assert heard == []

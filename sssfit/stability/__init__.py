@@ -4,10 +4,12 @@
 with a function from a `Subject` to panels, and one entry there.
 """
 
+import math
+import warnings
 from collections.abc import Callable, Collection
 from pathlib import Path
 
-from sssfit.errors import ArgumentError, FitError
+from sssfit.errors import ArgumentError, FitError, SssfitWarning
 from sssfit.files import has_mark
 from sssfit.material import Material
 from sssfit.messages import did_you_mean, shown
@@ -45,7 +47,7 @@ def stability(
     threads : int, optional
         By default all cores; results do not depend on them.
     is_whole : bool
-        Whether seeds and sizes are those of docs/stability.md; otherwise cascades have fewer.
+        Whether cascades have as many seeds and sizes as the others.
     progress : callable, optional
         Told (done, of how many, the next one's name).
 
@@ -65,22 +67,26 @@ def stability(
     from sssfit.stability.subject import Subject
 
     names = _named(only)
-    profile = source if isinstance(source, Profile) else simulate_exact(source)
-    if not mm_per_pixel > 0.0:
+    if not (math.isfinite(mm_per_pixel) and mm_per_pixel > 0.0):
         raise ArgumentError(f"`mm_per_pixel = {mm_per_pixel}`; expected a length above 0.")
+    profile = source if isinstance(source, Profile) else simulate_exact(source)
     name = profile.material_name or "unknown"
     subject = Subject(name, profile, mm_per_pixel, seed, threads, is_whole)
     panels: list[Panel] = []
     notes: list[str] = []
-    for k, each in enumerate(names):
-        if progress is not None:
-            progress(k, len(names), each)
-        try:
-            panels += STRESSES[each].load()(subject)
-        except FitError as error:
-            if only is not None:
-                raise
-            notes.append(f"Left out {each}: {error}")
+    # Here and not around each fit: threads would put back each other's filters. What fits warn of
+    # is what a stress finds out.
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SssfitWarning)
+        for k, each in enumerate(names):
+            if progress is not None:
+                progress(k, len(names), each)
+            try:
+                panels += STRESSES[each].load()(subject)
+            except FitError as error:
+                if only is not None:
+                    raise
+                notes.append(f"Left out {each}: {error}")
     return Stability(name, mm_per_pixel, tuple(panels), tuple(notes), seed)
 
 

@@ -2,13 +2,11 @@
 
 import functools
 import math
-import warnings
 from collections.abc import Sequence
 
 import numpy as np
 
 from sssfit.arrays import FloatArray
-from sssfit.errors import SssfitWarning
 from sssfit.fit import FitResult, fit_gaussians
 from sssfit.fit._gaussians_search import fitted_annuli, local_minimum, make_annuli
 from sssfit.fit._target import make_target
@@ -90,9 +88,7 @@ def _missing(subject: Subject, label: str, signed: bool) -> Curve:
 
 def _fit(subject: Subject, signed: bool, terms: int) -> FitResult:
     pitch = subject.mm_per_pixel
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SssfitWarning)
-        return fit_gaussians(subject.profile, terms=terms, signed=signed, mm_per_pixel=pitch)
+    return fit_gaussians(subject.profile, terms=terms, signed=signed, mm_per_pixel=pitch)
 
 
 def _first(found: FitResult) -> dict[str, object]:
@@ -117,9 +113,7 @@ def _nearest(found: FitResult) -> float:
 
 def _missed(subject: Subject, signed: bool, terms: int) -> float:
     """Return the share of random starts that end over 1 % above the best one's error."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SssfitWarning)
-        target = make_target(subject.profile, subject.mm_per_pixel)
+    target = make_target(subject.profile, subject.mm_per_pixel)
     edges_mm, energy = fitted_annuli(target, 0)
     annuli = make_annuli(edges_mm, energy, float(target.total[0] / energy.sum()), signed=signed)
     rng = np.random.default_rng((subject.seed, terms))

@@ -11,7 +11,7 @@ from sssfit.methods import TAPS
 from sssfit.profile import Profile
 from sssfit.simulate import simulate_exact
 from sssfit.stability.record import Axis, Curve, Panel
-from sssfit.stability.subject import WAYS, Subject, Way, attempted
+from sssfit.stability.subject import WAYS, Subject, Way
 
 LIMIT = 1.0  # Delta E
 _RINGS = (1.0, 4.0, 16.0, 64.0, 256.0)  # times the width of the subject's annuli
@@ -63,10 +63,5 @@ def _profile(subject: Subject, dr_mm: float, radius_mm: float) -> Profile:
 def _curve(
     subject: Subject, way: Way, factors: tuple[float, ...], profiles: list[Profile], advice: str
 ) -> Curve:
-    wanted = subject.shows(subject.true_kernel(way))
-
-    def change(profile: Profile) -> float:
-        return attempted(lambda: subject.error(way.fit(profile, subject.mm_per_pixel), wanted))
-
-    errors = np.maximum(subject.each(change, profiles), 1e-3)
+    errors = np.maximum(subject.changes(way, profiles), 1e-3)
     return Curve(way.label, np.array(factors), errors, advice=advice)

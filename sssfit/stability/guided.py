@@ -4,12 +4,10 @@ The paper draws k = 1.55, sees nothing beyond 4, and calls moderate changes of b
 """
 
 import functools
-import warnings
 
 import numpy as np
 
 from sssfit.arrays import FloatArray
-from sssfit.errors import SssfitWarning
 from sssfit.fit import FitResult, fit_guided
 from sssfit.fit._result import fit_channels
 from sssfit.fit.guided import extents_of, fit_one_pass, guided_target
@@ -77,9 +75,7 @@ def stress(subject: Subject) -> list[Panel]:
 
 def _fit(subject: Subject, k: float, b: float) -> FitResult:
     """Fit as `fit_guided` does, which refuses a k above the paper's 4."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SssfitWarning)
-        target = guided_target(subject.profile, subject.mm_per_pixel, None)
+    target = guided_target(subject.profile, subject.mm_per_pixel, None)
     extents_mm = extents_of(target)
     return fit_channels(
         target,
@@ -94,10 +90,8 @@ def _on_pixels(subject: Subject, pixels: int) -> FitResult:
     support_mm = pixels // 2 * subject.mm_per_pixel
     reach_mm = float(subject.profile.r_edges_mm[-1])
     pitch_mm = subject.mm_per_pixel * min(1.0, reach_mm / support_mm)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SssfitWarning)
-        support_mm = pixels // 2 * pitch_mm
-        return fit_guided(subject.profile, mm_per_pixel=pitch_mm, support_mm=support_mm)
+    support_mm = pixels // 2 * pitch_mm
+    return fit_guided(subject.profile, mm_per_pixel=pitch_mm, support_mm=support_mm)
 
 
 def _change(subject: Subject, own: list[FloatArray], found: FitResult) -> float:

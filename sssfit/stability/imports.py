@@ -14,7 +14,7 @@ from sssfit.methods import TAPS
 from sssfit.profile import Profile
 from sssfit.profile.pixels import annulus_areas
 from sssfit.stability.record import Axis, Curve, Panel
-from sssfit.stability.subject import WAYS, Subject, Way, attempted
+from sssfit.stability.subject import WAYS, Subject
 
 LIMIT = 1.0  # Delta E
 _NONE = 1e-3  # of a share, for logarithmic axes
@@ -43,32 +43,25 @@ def stress(subject: Subject) -> list[Panel]:
             "average pictures",
         ),
     }
+    return [_panel(subject, title, *each) for title, each in defects.items()]
+
+
+def _panel(
+    subject: Subject, title: str, defect: Defect, steps: tuple[float, ...], label: str, advice: str
+) -> Panel:
+    """Return what one defect changes, step by step."""
+    profiles = [defect(subject.profile, each) for each in steps]
     ways = [each for each in WAYS if each.method not in TAPS or subject.is_whole]
-    return [
-        Panel(
-            stress="imports",
-            title=title,
-            axis=Axis(label, mild=steps[0]),
-            y_label="p99 of Delta E 2000",
-            limit=LIMIT,
-            curves=[_curve(subject, each, defect, steps, advice) for each in ways],
-            fails="the import shows in the picture, or is refused",
-        )
-        for title, (defect, steps, label, advice) in defects.items()
-    ]
-
-
-def _curve(
-    subject: Subject, way: Way, defect: Defect, steps: tuple[float, ...], advice: str
-) -> Curve:
-    wanted = subject.shows(subject.true_kernel(way))
-
-    def change(step: float) -> float:
-        profile = defect(subject.profile, step)
-        return attempted(lambda: subject.error(way.fit(profile, subject.mm_per_pixel), wanted))
-
-    errors = np.maximum(subject.each(change, steps), 1e-3)
-    return Curve(way.label, np.array(steps), errors, advice=advice)
+    changes = {each.label: np.maximum(subject.changes(each, profiles), 1e-3) for each in ways}
+    return Panel(
+        stress="imports",
+        title=title,
+        axis=Axis(label, mild=steps[0]),
+        y_label="p99 of Delta E 2000",
+        limit=LIMIT,
+        curves=[Curve(name, np.array(steps), y, advice=advice) for name, y in changes.items()],
+        fails="the import shows in the picture, or is refused",
+    )
 
 
 def _with_energy(profile: Profile, energy: FloatArray) -> Profile:

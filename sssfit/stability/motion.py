@@ -12,7 +12,7 @@ from sssfit.compare.motion import motion
 from sssfit.render.reference import render_reference
 from sssfit.scene.record import Scene
 from sssfit.stability.record import Axis, Curve, Panel
-from sssfit.stability.subject import CASCADE, SIDE, Subject, Way, error_of, shown
+from sssfit.stability.subject import CASCADE, SIDE, Subject, Way, cascade, error_of, shown
 
 LIMIT = 0.85  # docs/cascades.md asks it of two stages before the first halving
 _FETCHES = (14, 17, 24)
@@ -20,7 +20,7 @@ _SHIFTS = np.arange(0.0, 4.01, 0.5)
 _WAYS = (
     Way("pre-integrated", "preintegrated", {}),
     Way("svd 3", "svd", {"rank": 3}),
-    Way("cascade 14", "cascade", {"fetches": 14}),
+    cascade(14),
     CASCADE,
     Way("cascade 24, still", "cascade", {"fetches": 24, "still": True}),
 )
@@ -56,8 +56,7 @@ def stress(subject: Subject) -> list[Panel]:
 
 def _moved(subject: Subject) -> Curve:
     """Return what whole pixels change, by fetches: where stages before the first halving grow."""
-    ways = [Way("", "cascade", {"fetches": n}) for n in _FETCHES[:-1]] + [CASCADE]
-    kernels = [subject.true_kernel(each) for each in ways]
+    kernels = [subject.true_kernel(cascade(each)) for each in _FETCHES]
     changes = [motion(each, subject.profile, positions=1).moved for each in kernels]
     advice = "24 fetches, or `still`"
     return Curve("cascade", np.array(_FETCHES), np.array(changes), advice=advice)

@@ -5,13 +5,11 @@ spreads without bounds; where it nears 0 only 1/r is left, which no sum of Gauss
 """
 
 import functools
-import warnings
 from collections.abc import Sequence
 
 import numpy as np
 
 from sssfit.arrays import FloatArray
-from sssfit.errors import SssfitWarning
 from sssfit.fit import FitResult, fit_gaussians
 from sssfit.material import Layer, Material
 from sssfit.profile import Profile
@@ -142,9 +140,7 @@ def _terms_needed(profile: Profile) -> float:
 
 
 def _gaussians(profile: Profile, terms: int) -> FitResult:
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SssfitWarning)
-        return fit_gaussians(profile, terms=terms, mm_per_pixel=_PITCH_MM)
+    return fit_gaussians(profile, terms=terms, mm_per_pixel=_PITCH_MM)
 
 
 def _condition(subject: Subject) -> Curve:

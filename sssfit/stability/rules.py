@@ -134,16 +134,18 @@ def rank_of_noise(profile: Profile, mm_per_pixel: float, half_pixels: int) -> in
     None where the profile has no standard errors, or no rank up to 16 comes that near.
     """
     from sssfit.fit._target import Target  # scipy's linear algebra, which exports do not need
-    from sssfit.fit.svd import all_eigenvalues
+    from sssfit.fit.svd import eigenpairs
 
     if profile.photons is None:
         return None
     noise, needed = noise_ratio(profile, mm_per_pixel), []
     target = Target(profile, mm_per_pixel, half_pixels)
     for c in np.flatnonzero(profile.annulus_energy.any(axis=0)):
-        squares = np.sort(all_eigenvalues(target.quadrant(int(c))) ** 2)[::-1]
-        left = np.sqrt(np.maximum(1.0 - np.cumsum(squares) / squares.sum(), 0.0))
-        enough = np.flatnonzero(left[:_MOST_RANK] <= noise[c])
+        quadrant = target.quadrant(int(c))
+        values, _ = eigenpairs(quadrant, min(_MOST_RANK, len(quadrant)))
+        whole = target.copies @ quadrant**2 @ target.copies
+        left = np.sqrt(np.maximum(1.0 - np.cumsum(values**2) / whole, 0.0))
+        enough = np.flatnonzero(left <= noise[c])
         if enough.size == 0:
             return None
         needed.append(int(enough[0]) + 1)
@@ -155,7 +157,7 @@ _MOST_RANK = 16
 
 def _rank_in_noise(facts: Facts, limit: float) -> str:
     kernel, profile = facts.kernel, facts.profile
-    if profile is None or isinstance(kernel, Taps) or kernel.method != "svd":
+    if profile is None or isinstance(kernel, Taps) or kernel.method != "svd" or kernel.rank == 1:
         return ""
     enough = rank_of_noise(profile, kernel.mm_per_pixel, kernel.half_pixels)
     if enough is None or kernel.rank <= enough * limit:

@@ -5,7 +5,6 @@ pictures: a disk, and points of light, which show every fetch of a kernel.
 """
 
 import functools
-import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from sssfit.arrays import FloatArray
-from sssfit.errors import SssfitError, SssfitWarning
+from sssfit.errors import SssfitError
 from sssfit.fit import fit_separable, fit_taps
 from sssfit.fit.on_taps import on_taps
 from sssfit.kernel import Kernel
@@ -46,23 +45,27 @@ class Way:
     taps: int | None = None
 
     def fit(self, profile: Profile, mm_per_pixel: float, **given: Any) -> Kernel:
-        """Fit a profile; what the fit warns of is what a stress is to find out.
+        """Fit a profile.
 
         Raises
         ------
         SssfitError
             The fit is refused.
         """
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SssfitWarning)
-            settings = {"mm_per_pixel": mm_per_pixel, **self.settings, **given}
-            if self.method in TAPS:
-                return fit_taps(profile, self.method, **settings).kernel
-            kernel = fit_separable(profile, self.method, **settings).kernel
-            return kernel if self.taps is None else on_taps(kernel, self.taps)
+        settings = {"mm_per_pixel": mm_per_pixel, **self.settings, **given}
+        if self.method in TAPS:
+            return fit_taps(profile, self.method, **settings).kernel
+        kernel = fit_separable(profile, self.method, **settings).kernel
+        return kernel if self.taps is None else on_taps(kernel, self.taps)
 
 
-CASCADE = Way("cascade 24", "cascade", {"fetches": 24})
+@functools.cache  # the same object, so that stresses share the kernel that `Subject` keeps of it
+def cascade(fetches: int) -> Way:
+    """Return the cascade of a budget."""
+    return Way(f"cascade {fetches}", "cascade", {"fetches": fetches})
+
+
+CASCADE = cascade(24)
 # The cascade and the published methods, side by side in every stress that has room for them.
 WAYS = (
     Way("pre-integrated", "preintegrated", {}),
@@ -89,7 +92,7 @@ class Subject:
     seed : int
     threads : int, optional
     is_whole : bool
-        Whether all sizes are those of the published page, not the quick ones.
+        Whether cascades have as many seeds and sizes as the others.
     """
 
     name: str
@@ -123,6 +126,18 @@ class Subject:
         scenes = self.scenes(kernel.mm_per_pixel)
         pairs = zip(scenes, truths, strict=True)
         return float(np.mean([error_of(shown(kernel, scene), true) for scene, true in pairs]))
+
+    def changes(self, way: Way, profiles: Iterable[Profile]) -> FloatArray:
+        """Return what kernels of other profiles show beside that of the subject's own (N,).
+
+        Infinite where a fit is refused.
+        """
+        wanted = self.shows(self.true_kernel(way))
+
+        def change(profile: Profile) -> float:
+            return attempted(lambda: self.error(way.fit(profile, self.mm_per_pixel), wanted))
+
+        return np.array(self.each(change, profiles))
 
     def truths(self, mm_per_pixel: float | None = None) -> list[FloatArray]:
         """Return the pictures of the profile's own 2D kernel."""

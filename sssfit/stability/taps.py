@@ -10,7 +10,16 @@ from sssfit.kernel import Kernel, Taps
 from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
 from sssfit.stability.record import Axis, Curve, Panel
-from sssfit.stability.subject import CASCADE, SIDE, Subject, Way, attempted, error_of, shown
+from sssfit.stability.subject import (
+    CASCADE,
+    SIDE,
+    Subject,
+    Way,
+    attempted,
+    cascade,
+    error_of,
+    shown,
+)
 
 LIMIT = 1.0  # Delta E
 _TAPS = (5, 9, 17, 33, 65)  # a pass
@@ -66,10 +75,7 @@ def _few_fetches(subject: Subject) -> Panel:
     """Return the error over the fetches of a pixel."""
     truths = subject.truths()
     budgets = _FETCHES_OF_PAPERS if subject.is_whole else _FETCHES
-    cascades = [
-        CASCADE if n == CASCADE.settings["fetches"] else Way("", "cascade", {"fetches": n})
-        for n in budgets
-    ]
+    cascades = [cascade(each) for each in budgets]
 
     def error(way: Way) -> float:
         return attempted(lambda: subject.error(subject.true_kernel(way), truths))
