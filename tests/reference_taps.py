@@ -125,6 +125,12 @@ def _codes(mantissa):
     return values
 
 
+def below(value):
+    """The half float before the nearest one."""
+    bits = struct.unpack("H", struct.pack("e", value))[0]
+    return struct.unpack("e", struct.pack("H", max(bits - 1, 0)))[0]
+
+
 def as_code(light):
     """The sRGB code of light (IEC 61966-2-1)."""
     return 12.92 * light if light <= 0.0031308 else 1.055 * light ** (1 / 2.4) - 0.055
@@ -142,6 +148,9 @@ def stored_as(name, channel):
         "float32": lambda value: struct.unpack("f", struct.pack("f", value))[0],
         "half": as_half,
         "r11g11b10": lambda value: as_small_float(value, (6, 6, 5)[channel]),
+        "half-truncated": lambda value: max(
+            n for n in (as_half(value), below(value)) if n <= value
+        ),
         "rgba8": lambda value: round(255 * value) / 255,
         "srgb8": lambda value: as_light(round(255 * as_code(value)) / 255),
     }[name]

@@ -257,7 +257,9 @@ def test_its_words():
         "<Taps of wax by test, 1-2|1|1, 22.69 fetches of 0.3 mm pixels: error c0 1 %, c1 1 %>"
     )
     assert taps.figures()["fetches"] == 22.6875
-    with pytest.raises(KernelError, match="texel = 'byte'; expected float32, half, r11g11b10"):
+    with pytest.raises(
+        KernelError, match="texel = 'byte'; expected float32, half, half-truncated, r11g11b10"
+    ):
         taps.bytes_per_pixel("byte")
     assert taps.bytes_per_pixel("float32") == 2 * taps.bytes_per_pixel("half")
 
@@ -394,10 +396,17 @@ def test_r11g11b10_is_the_nearest_of_all_its_numbers(channel, mantissa, dtype):
 
 
 # About a step of each format near 1, with room for sums in another order.
-STEPS = {"float32": 1e-7, "half": 1e-3, "r11g11b10": 3e-2, "rgba8": 3e-2, "srgb8": 6e-2}
+STEPS = {
+    "float32": 1e-7,
+    "half": 1e-3,
+    "half-truncated": 2e-3,
+    "r11g11b10": 3e-2,
+    "rgba8": 3e-2,
+    "srgb8": 6e-2,
+}
 
 
-@pytest.mark.parametrize("name", ["float32", "half", "r11g11b10"])
+@pytest.mark.parametrize("name", ["float32", "half", "half-truncated", "r11g11b10"])
 def test_numbers_that_a_format_holds_stay_as_they_are(name):
     held = np.array([0.0, 2.0**-14, 0.375, 1.0, 1.5, 63.0, 2.0**15])[:, None] * np.ones(3)
     store = store_of(name, taps_of(channels=3))
@@ -419,7 +428,9 @@ def test_codes_of_8_bits_stay_as_they_are_and_others_go_to_the_nearest(name):
     np.testing.assert_allclose(ours, slow, rtol=0.0, atol=1e-15)
 
 
-@pytest.mark.parametrize("name", ["float32", "half", "r11g11b10", "rgba8", "srgb8"])
+@pytest.mark.parametrize(
+    "name", ["float32", "half", "half-truncated", "r11g11b10", "rgba8", "srgb8"]
+)
 @pytest.mark.parametrize("covered", [False, True])
 @pytest.mark.parametrize(
     ("structure", "chained"), [("1-2", True), ("1-2", False), ("1|1|2", True), ("*|1-*", True)]
@@ -452,7 +463,7 @@ def test_light_beyond_a_formats_range_is_one_line():
 
 def test_formats_that_do_not_fit_a_table_are_one_line():
     scene = Scene("grey", np.ones((4, 5, 1)), PITCH)
-    with pytest.raises(RenderError, match="intermediate = 'byte'; expected float32, half, r11"):
+    with pytest.raises(RenderError, match="intermediate = 'byte'; expected float32, half, half-tr"):
         render_taps(scene, taps_of(), intermediate="byte")
     with pytest.raises(RenderError, match="r11g11b10 holds 1 or 3 channels, and the table has 2"):
         render_taps(scene, taps_of(), intermediate="r11g11b10")

@@ -69,7 +69,14 @@ _MOST_OFFSETS = dict.fromkeys(("pair", "disk", "line"), MOST_ON_DISK)  # of dens
 _TURNS = {"pair": 90.0, "line": 180.0}
 _ROUNDING = 1e-9  # of sums that are computed in another order
 # Of a texel of three channels, as stored.
-BYTES = {"float32": 16, "half": 8, "r11g11b10": 4, "rgba8": 4, "srgb8": 4}
+BYTES = {
+    "float32": 16,
+    "half": 8,
+    "half-truncated": 8,
+    "r11g11b10": 4,
+    "rgba8": 4,
+    "srgb8": 4,
+}
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -299,8 +306,8 @@ class Taps:
 
         Parameters
         ----------
-        texel : {"float32", "half", "r11g11b10", "rgba8", "srgb8"}
-            Format of the pictures between the passes.
+        texel : str
+            Format of the pictures between the passes, one of ``BYTES``.
 
         Raises
         ------

@@ -3,7 +3,9 @@
 "float32" and "half" are IEEE 754's; numpy rounds to them to the nearest, ties to even. "r11g11b10"
 has unsigned floats of 5 bits of exponent (bias 15, with denormals) and 6, 6 and 5 bits of mantissa:
 the largest are (2 - 2^-6) 2^15 = 65 024 and, for blue, 64 512. It has no sign and three channels.
-"rgba8" and "srgb8" are 255 steps from 0 to 1, even in light or in its sRGB code.
+"half-truncated" is "half" rounded towards 0, as Direct3D prescribes for render targets ("Data
+conversion rules": round-to-zero between float formats) and Mesa's drivers do it; every pass darkens
+by up to 2^-11. "rgba8" and "srgb8" are 255 steps from 0 to 1, even in light or in its sRGB code.
 """
 
 from collections.abc import Callable
@@ -25,6 +27,7 @@ _LEAST_EXPONENT = -14  # of normal numbers; below it the steps stay the same
 _LARGEST = {
     "float32": float(np.finfo(np.float32).max),
     "half": 65504.0,
+    "half-truncated": 65504.0,
     "r11g11b10": 65024.0,
     "rgba8": 1.0,
     "srgb8": 1.0,
@@ -38,7 +41,8 @@ def store_of(intermediate: str | None, taps: Taps) -> Store | None:
 
     Parameters
     ----------
-    intermediate : {"float32", "half", "r11g11b10", "rgba8", "srgb8"}, optional
+    intermediate : str, optional
+        "float32", "half", "half-truncated", "r11g11b10", "rgba8" or "srgb8".
     taps : Taps
         What the passes apply.
 
@@ -88,6 +92,13 @@ def _half(pixels: FloatArray) -> FloatArray:
     return pixels.astype(np.float16).astype(pixels.dtype)
 
 
+def _half_truncated(pixels: FloatArray) -> FloatArray:
+    nearest = pixels.astype(np.float16)
+    beyond = np.abs(nearest.astype(np.float64)) > np.abs(pixels)
+    held = np.where(beyond & np.isfinite(nearest), np.nextafter(nearest, np.float16(0.0)), nearest)
+    return held.astype(pixels.dtype)
+
+
 def _r11g11b10(pixels: FloatArray) -> FloatArray:
     """Round to the nearest, ties to even; the steps of a number follow from its exponent."""
     bits = np.array(_MANTISSA_BITS[: pixels.shape[-1]])
@@ -111,6 +122,7 @@ def _srgb8(pixels: FloatArray) -> FloatArray:
 _ROUND: dict[str, Store] = {
     "float32": _float32,
     "half": _half,
+    "half-truncated": _half_truncated,
     "r11g11b10": _r11g11b10,
     "rgba8": _rgba8,
     "srgb8": _srgb8,
