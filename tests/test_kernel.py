@@ -129,7 +129,7 @@ KNOWN_KEYWORDS = {
 def keywords_of(rules):
     """Every keyword of a schema and of those within."""
     inner = [*rules.get("properties", {}).values()]
-    inner += [rules[name] for name in ("items", "additionalProperties") if name in rules]
+    inner += [rules[name] for name in ("items", "additionalProperties") if rules.get(name)]
     return set(rules).union(*map(keywords_of, inner))
 
 
@@ -142,7 +142,8 @@ def test_the_schema_is_one_and_refuses_what_is_no_kernel():
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate({name: good[name] for name in good if name != key}, SCHEMA)
     assert keywords_of(SCHEMA) <= KNOWN_KEYWORDS
-    for changes in ({"mm_per_pixel": 0}, {"terms": []}, {"rank": 0}, {"format": "sssfit.kernel/2"}):
+    wrong = ({"mm_per_pixel": 0}, {"terms": []}, {"rank": 0}, {"format": "sssfit.kernel/2"})
+    for changes in (*wrong, {"ranks": 1}):
         with pytest.raises(jsonschema.ValidationError):
             jsonschema.validate(good | changes, SCHEMA)
 

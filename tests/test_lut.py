@@ -81,7 +81,8 @@ def test_the_default_radius_holds_999_thousandths_of_every_channel(profile):
 
 def test_a_dds_holds_the_floats_of_the_exr(profile, tmp_path):
     for table in ("radial", "line", "kernel"):
-        own = {"table": table, "texels": 64, "mm_per_pixel": 0.25}
+        own = {"table": table}
+        own |= {"texels": 64} if table == "radial" else {"mm_per_pixel": 0.25}
         exr, _ = read_exr(lut_bytes([profile], **own)[0], tmp_path / "a.exr")
         dds = read_dds(lut_bytes([profile], ending=".dds", **own)[0])
         np.testing.assert_array_equal(dds[..., :3], exr)
@@ -156,6 +157,8 @@ def test_more_channels_than_a_format_has_are_refused():
         ({"radius_mm": float("nan")}, "`radius = nan`"),
         ({"table": "line", "mm_per_pixel": 0.0}, "`mm_per_pixel = 0`"),
         ({"table": "kernel", "mm_per_pixel": 1e-9}, "would have 32,769 texels"),
+        ({"table": "line", "texels": 9}, "`texels` is for a profile's radial table, and this is a"),
+        ({"mm_per_pixel": 0.3}, "is for a profile's line or kernel table, and this is a profile's"),
     ],
 )
 def test_a_texture_that_cannot_be_is_refused_in_one_line(profile, given, words):
@@ -169,6 +172,9 @@ def test_what_has_no_such_table_is_refused(profile):
     kernel = fit_svd(profile, rank=1, mm_per_pixel=0.3).kernel
     with pytest.raises(KernelError, match="no radial table"):
         lut_bytes([kernel])
+    for own in ({"texels": 9}, {"radius_mm": 1.0}, {"mm_per_pixel": 0.3}):
+        with pytest.raises(KernelError, match="this is a table of a kernel's own pixels; leave it"):
+            lut_bytes([kernel], table="line", **own)
     with pytest.raises(KernelError, match="a texture holds one profile or kernel"):
         lut_bytes([profile, profile])
     with pytest.raises(KernelError, match="halved pictures"):

@@ -159,6 +159,9 @@ EDITS = {
     "mm_per_pixel": (0, "mm_per_pixel = 0; expected 1e-12 to 1e+12"),
     "blend": ([[0.1, 0.2]], "blend has 1 entry; expected 2 to 25"),
     "method": ("a\nb", "expected a text that prints on one line"),
+    "chain": (True, "chain is unknown; did you mean chained? expected format, comment, method"),
+    "a\nb": (True, r"'a\nb' is unknown; expected format, comment"),
+    "errors": ({"spectral": [0, 0], "energy": [0, 0], "rms": [0, 0]}, "errors.rms is unknown"),
 }
 
 
@@ -179,6 +182,7 @@ STAGE_EDITS = {
     "kind": ("round", "stages[1].kind = 'round'; expected pair or star or disk"),
     "offsets_mm": ([0.5, 0.4], "stages[1].offsets_mm = [0.5, 0.4]; expected rising ones"),
     "weights": ([[1, 1], [0.1, 0], [0, 0]], "stages[1].weights add up to [1.2, 1.0]"),
+    "angles_degrees": (45.0, "stages[1].angles_degrees is unknown; did you mean angle_degrees? expected level,"),
 }
 
 
@@ -240,6 +244,26 @@ def test_a_name_of_two_lines_stays_on_one():
         assert "\n" not in str(caught.value)
     with pytest.raises(KernelError, match=r"^two\\nlines: not a kernel"):
         read_kernel(io.BytesIO(b"x"), "two\nlines")
+
+
+@pytest.mark.parametrize("separators", [(",", ":"), (", ", ": ")])
+def test_another_programs_json_is_read_alike(tmp_path, separators):
+    """The format may come last, and without a space before it."""
+    taps = taps_of("1|2")
+    whole = json.loads(bytes_of(taps))
+    whole["format"] = whole.pop("format")
+    text = json.dumps(whole, separators=separators)
+    (tmp_path / "a.taps.json").write_text(text, "utf-8")
+    for source in (tmp_path / "a.taps.json", io.BytesIO(text.encode())):
+        assert bytes_of(read_kernel(source)) == bytes_of(taps)
+    assert is_taps_file(tmp_path / "a.taps.json")
+
+
+def test_what_is_neither_kind_of_kernel_names_both(tmp_path):
+    for text, said in (("hi", ""), ('{"format": "x"}', r": it has format 'x'"), ("[]", "")):
+        (tmp_path / "a.json").write_text(text, "utf-8")
+        with pytest.raises(KernelError, match=f"not a kernel{said}; name a .kernel.json or .taps"):
+            read_kernel(tmp_path / "a.json")
 
 
 def test_a_stream_that_cannot_be_read_is_one_line():

@@ -69,7 +69,10 @@ def pass_table(
     """Yield the passes as a table, and what their functions take."""
     passes = pass_list(taps, normalized=normalized, depth=depth)
     yield ""
-    yield "Passes in their order. E is the irradiance, M0 the result; sizes are rounded up."
+    yield (
+        "Passes in their order, each called by an entry point of yours. E is the irradiance, M0 the "
+        "result; sizes are rounded up."
+    )
     rows = [("call", "reads", "writes", "size", "fetches")]
     for each in passes:
         size = f"1/{2**each.level}" if each.level else "1"
@@ -79,7 +82,7 @@ def pass_table(
     yield from columns(rows, (16, 16, 8, 6))
     if any(each.is_added for each in passes):
         yield "A + is added to what the target holds (blend ONE, ONE)."
-    yield "position: middle of the pixel that is written (SV_Position, gl_FragCoord), in pixels."
+    yield "position: middle of the pixel that is written (SV_Position, gl_FragCoord), rows as in E."
     yield "texel: 1 / size of the first picture that is read; mm_per_pixel: of the full picture,"
     if depth:
         yield from _of_depth(passes)

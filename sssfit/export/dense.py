@@ -7,6 +7,7 @@ from sssfit.errors import KernelError
 from sssfit.export.constants import Writer, check_prefix
 from sssfit.export.dialects import Dialect, commented, mark
 from sssfit.export.document import description
+from sssfit.export.remarks import remarked
 from sssfit.kernel import SeparableKernel, Stage, Taps
 
 
@@ -35,7 +36,7 @@ def dense(
         *write.rows("SIGN", kernel.signs.tolist()),
         *write.rows("WEIGHT", kernel.weights.reshape(-1, channels).tolist()),
     ]
-    return "\n".join([*lines, ""])
+    return "\n".join([*remarked(lines, dialect), ""])
 
 
 def taps_of_kernel(kernel: SeparableKernel, most: int | None) -> Taps:

@@ -9,6 +9,17 @@ from dataclasses import dataclass, replace
 from sssfit.export.numbers import literal
 from sssfit.messages import printable
 
+# What a line is that differs in another engine or language (sssfit.export.remarks). No semicolon,
+# which ends a line for Babylon.js.
+_FETCH = "texture call, bilinear at level 0"
+_LOAD = "texture call, one texel"
+_TYPES = "texture and sampler types"
+_ARRAY = "array syntax"
+_SHARED = "group memory"
+_BARRIER = "group barrier"
+_MADE = "array syntax, an output each"
+_OUTPUT = "output: light and coverage"
+
 KINDS = ("float", "float2", "float3", "float4")  # of one to four channels
 
 
@@ -44,6 +55,10 @@ class Dialect:
         Waits for all threads of a group.
     has_defines : bool
         Whether there is a preprocessor.
+    remarks : tuple of (str, str)
+        Patterns of lines that differ in another language or engine, and what these lines are.
+    versions, compute_versions : str
+        The first versions that compile passes and compute shaders, where a file must name them.
     """
 
     name: str
@@ -65,6 +80,9 @@ class Dialect:
     shared: str = ""
     barrier: str = ""
     has_defines: bool = True
+    remarks: tuple[tuple[str, str], ...] = ()
+    versions: str = ""
+    compute_versions: str = ""
 
     @property
     def has_passes(self) -> bool:
@@ -98,6 +116,16 @@ HLSL = Dialect(
     load="{picture}.Load(int3(int2({place}), 0))",
     shared="groupshared float {name}[{count}];",
     barrier="GroupMemoryBarrierWithGroupSync()",
+    remarks=(
+        (r"\.SampleLevel\(", _FETCH),
+        (r"\.Load\(", _LOAD),
+        (r"Texture2D<|SamplerState ", _TYPES),
+        (r"^static const \w+ \w+\[", _ARRAY),
+        (r"^groupshared ", _SHARED),
+        (r"GroupMemoryBarrier", _BARRIER),
+        (r"^struct ", _MADE),
+        (r"^ +return float4\(", _OUTPUT),
+    ),
 )
 GLSL = replace(
     HLSL,
@@ -117,6 +145,18 @@ GLSL = replace(
     load="texelFetch({picture}, ivec2({place}), 0)",
     shared="shared float {name}[{count}];",
     barrier="barrier()",
+    remarks=(
+        (r"textureLod\(", _FETCH),
+        (r"texelFetch\(", _LOAD),
+        (r"sampler2D ", "texture types, each with its sampler"),
+        (r"^const \w+ \w+\[", _ARRAY),
+        (r"^shared ", _SHARED),
+        (r"barrier\(\)", _BARRIER),
+        (r"^struct ", _MADE),
+        (r"^ +return vec4\(", _OUTPUT),
+    ),
+    versions="130 or 300 es",
+    compute_versions="430 or 310 es",
 )
 WGSL = Dialect(
     "wgsl",
@@ -143,6 +183,16 @@ WGSL = Dialect(
     shared="var<workgroup> {name}: array<f32, {count}>;",
     barrier="workgroupBarrier()",
     has_defines=False,
+    remarks=(
+        (r"textureSampleLevel\(", _FETCH),
+        (r"textureLoad\(", _LOAD),
+        (r"texture_2d<|: sampler\b", _TYPES),
+        (r"^const \w+ = array<", _ARRAY),
+        (r"^var<workgroup> ", _SHARED),
+        (r"workgroupBarrier\(\)", _BARRIER),
+        (r"^struct ", _MADE),
+        (r"^ +return vec4f\(", _OUTPUT),
+    ),
 )
 C = Dialect(
     "c",

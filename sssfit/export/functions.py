@@ -139,9 +139,13 @@ class Functions:
     def _fetch(self, picture: str, place: str) -> str:
         return self.dialect.fetch.format(picture=picture, place=place)
 
-    def _both(self, picture: str, away: str) -> str:
-        """Return the sum of two mirrored fetches."""
-        return " + ".join(self._fetch(picture, f"place {sign} {away}") for sign in "-+")
+    def _both(self, name: str, picture: str, aways: Sequence[str], indent: str) -> str:
+        """Return the lines that make the sum of pairs of mirrored fetches, a fetch each."""
+        places = [f"place {sign} {each}" for each in aways for sign in "-+"]
+        first, *rest = [self._fetch(picture, each) for each in places]
+        lines = [f"{self.dialect.new('float4', name)} = {first};"]
+        lines += [f"{name} += {each};" for each in rest]
+        return "\n".join(indent + each for each in lines)
 
     def _load(self, picture: str) -> str:
         return self.dialect.load.format(picture=picture, place="position")
@@ -221,7 +225,7 @@ class Functions:
     def _two(self, weight: str) -> str:
         """Return the lines that add two mirrored fetches."""
         return f"""\
-        {self.dialect.new("float4", "both")} = {self._both("picture", "away")};
+{self._both("both", "picture", ["away"], " " * 8)}
         light += {weight} * both{self.rgb};
         part += {weight} * both.a;"""
 
@@ -267,11 +271,9 @@ class Functions:
         return f"""\
     {new("float2", "away")} = {o1} * per_mm;
     {new("float2", "turned")} = {turned};
-    {new("float4", "corners")} = {self._both("picture", "away")};
-    corners += {self._both("picture", "turned")};
+{self._both("corners", "picture", ["away", "turned"], " " * 4)}
     away = {o2} * per_mm;
-    {new("float4", "beside")} = {self._both("picture", x)};
-    beside += {self._both("picture", y)};
+{self._both("beside", "picture", [x, y], " " * 4)}
     {new(self.light, "light")} = {w0} * own{rgb} + {w1} * corners{rgb} + {w2} * beside{rgb};
     {new(self.light, "part")} = {w0} * own.a + {w1} * corners.a + {w2} * beside.a;"""
 
@@ -401,7 +403,7 @@ class Functions:
         rows = [f"{start}u + i" if start else "i" for start in first]
         away = self._away(rows[0], f"{each.stages[0]}u")
         yield from (line.removeprefix("    ") for line in away.split("\n"))
-        yield f"    {new('float4', 'both')} = {self._both(each.reads, 'away')};"
+        yield from self._both("both", each.reads, ["away"], " " * 4).split("\n")
         for k, row in enumerate(rows):
             yield f"    light{k} += {self._at('WEIGHT', row)} * both{self.rgb};"
             yield f"    part{k} += {self._at('WEIGHT', row)} * both.a;"

@@ -33,6 +33,12 @@ from sssfit.profile.pixels import full_kernel
 TABLES = ("radial", "line", "kernel")
 ENDINGS = (".exr", ".dds", ".png")
 _MOST_TEXELS = 16384  # on a side, the largest texture of current graphics cards
+_TEXELS, _PITCH_MM = 256, 0.3
+_SETTINGS = {  # of a profile's tables
+    "radial": ("texels", "radius"),
+    "line": ("radius", "mm_per_pixel"),
+    "kernel": ("radius", "mm_per_pixel"),
+}
 _SHARE = 0.999  # of each channel's light on the grid, within the radius unless one is given
 _PREVIEW_ROWS = 64  # of a PNG of one row, which nobody would see
 _MARK = b"sssfit.lut/1"  # in a DDS, among the words that its header leaves free
@@ -44,9 +50,9 @@ def lut_bytes(
     *,
     ending: str = ".exr",
     table: str = "radial",
-    texels: int = 256,
+    texels: int | None = None,
     radius_mm: float | None = None,
-    mm_per_pixel: float = 0.3,
+    mm_per_pixel: float | None = None,
 ) -> tuple[bytes, dict[str, Any]]:
     """Return the file of a texture, and its figures.
 
@@ -58,12 +64,12 @@ def lut_bytes(
         EXR has float32 and the pitch in its header; DDS float32, with three channels as four, the
         last one 1; PNG 16-bit sRGB of the values over the largest, to look at.
     table : "radial", "line" or "kernel"
-    texels : int
-        Of the radial table.
+    texels : int, optional
+        Of the radial table, by default 256.
     radius_mm : float, optional [mm]
         How far a profile's table reaches, by default as far as 99.9 % of every channel's light.
-    mm_per_pixel : float [mm]
-        Pitch of a profile's line or kernel.
+    mm_per_pixel : float, optional [mm]
+        Pitch of a profile's line or kernel, by default 0.3.
 
     Returns
     -------
@@ -72,16 +78,21 @@ def lut_bytes(
     Raises
     ------
     KernelError
-        There are several, the ending or the table is unknown, the texture would be too large, or a
-        kernel has no such table.
+        There are several, the ending or the table is unknown, the texture would be too large, a
+        kernel has no such table, or the table has no such setting.
     """
     if len(sources) != 1:
         raise KernelError("a texture holds one profile or kernel; write the others one by one.")
     if ending not in ENDINGS:
         raise KernelError(f"{ending or 'no ending'}: textures are written as {', '.join(ENDINGS)}.")
     source = sources[0]
+    _check_table(table)
+    given = {"texels": texels, "radius": radius_mm, "mm_per_pixel": mm_per_pixel}
+    _check_given(source, table, [key for key, value in given.items() if value is not None])
     if isinstance(source, Profile):
-        values, pitch_mm = _of_profile(source, table, texels, radius_mm, mm_per_pixel)
+        texels = _TEXELS if texels is None else texels
+        pitch_mm = _PITCH_MM if mm_per_pixel is None else mm_per_pixel
+        values, pitch_mm = _of_profile(source, table, texels, radius_mm, pitch_mm)
     else:
         values, pitch_mm = _of_kernel(source, table), source.mm_per_pixel
     figures = {
@@ -121,13 +132,11 @@ def _of_profile(
     _check_size(2 * half + 1)
     if table == "line":
         return profile.line_kernel(pitch_mm, half)[None], pitch_mm
-    _check_table(table)
     return full_kernel(profile.quadrant_kernel(pitch_mm, half)), pitch_mm
 
 
 def _of_kernel(kernel: Kernel, table: str) -> FloatArray:
     """Return the texels (H, W, C) of a kernel, its ``scale`` included."""
-    _check_table(table)
     if table == "radial":
         raise KernelError(
             f"{of_material(kernel.meta.get('material'))}: a kernel's pixels have no radial table; "
@@ -149,6 +158,18 @@ def _scaled(kernel: SeparableKernel, values: FloatArray) -> FloatArray:
 def _check_table(table: str) -> None:
     if table not in TABLES:
         raise KernelError(f"`table = {shown(table)}`; expected one of {', '.join(TABLES)}.")
+
+
+def _check_given(source: Profile | Kernel, table: str, given: Sequence[str]) -> None:
+    """Refuse settings that another table has."""
+    known = _SETTINGS[table] if isinstance(source, Profile) else ()
+    for each in given:
+        if each not in known:
+            owners = " or ".join(name for name, own in _SETTINGS.items() if each in own)
+            what = f"a profile's {table} table" if known else "a table of a kernel's own pixels"
+            raise KernelError(
+                f"`{each}` is for a profile's {owners} table, and this is {what}; leave it out."
+            )
 
 
 def _check_size(texels: int) -> None:

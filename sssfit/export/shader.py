@@ -17,6 +17,7 @@ from sssfit.export.functions import Functions
 from sssfit.export.jitter import check_jitter, jitter_lines
 from sssfit.export.passes import pass_list
 from sssfit.export.profiles import profile_constants
+from sssfit.export.remarks import remarked
 from sssfit.export.through import ROWS, through_table
 from sssfit.kernel import Taps
 
@@ -87,6 +88,7 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
     words = [line for each in tables for line in certificate(each)]
     words += _table(tables, style) if passes else how_to_run(tables[0])
     words += list(_notes(tables, style, passes=passes))
+    words += list(_versions(dialect, style)) if passes else []
     lines = [mark(dialect), *(commented(each) for each in words)]
     lines += _defines(dialect, style) if passes else []
     lines += _constants(tables, dialect, style, passes=passes)
@@ -99,7 +101,7 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
             ]
         lines += ["", *functions.lines()]
     text = lines if dialect.has_defines else _resolved(lines, style)
-    return "\n".join(text).rstrip("\n") + "\n"
+    return "\n".join(remarked(text, dialect)).rstrip("\n") + "\n"
 
 
 def _table(tables: Sequence[Taps], style: Style) -> Iterator[str]:
@@ -146,6 +148,13 @@ def _notes(tables: Sequence[Taps], style: Style, *, passes: bool) -> Iterator[st
             yield "Within a mask their sums may vanish, so keep coverage for other tables."
     if passes and tables[0].chained:
         yield "Half floats between the passes cost nothing that is seen. Linear light throughout."
+
+
+def _versions(dialect: Dialect, style: Style) -> Iterator[str]:
+    """Yield which version of the language a program must name, if it must."""
+    first = dialect.compute_versions if style.compute else dialect.versions
+    if first:
+        yield f"Needs GLSL version {first} or later; the directive is left to the program."
 
 
 def _check(tables: Sequence[Taps], style: Style) -> None:

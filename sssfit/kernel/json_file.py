@@ -19,7 +19,7 @@ import numpy as np
 
 from sssfit.errors import KernelError
 from sssfit.files import has_mark, read_at_most, reason
-from sssfit.messages import counted, shown
+from sssfit.messages import counted, did_you_mean, shown
 
 Schema = Mapping[str, Any]
 
@@ -54,7 +54,8 @@ class JsonFormat:
 
     def is_file(self, path: Path) -> bool:
         """Return whether a file is one of any version, by the format it names."""
-        return has_mark(path, {b"{": b'"format": ' + self.mark})
+        keys = b'"format": ', b'"format":'  # as we write it, and as programs do that save bytes
+        return any(has_mark(path, {b"{": each + self.mark}) for each in keys)
 
     @property
     def schema(self) -> Schema:
@@ -134,9 +135,13 @@ def _check_object(value: dict[str, Any], rules: Schema, path: str) -> None:
     for name in rules.get("required", ()):
         if name not in value:
             raise KernelError(f"{path or 'the kernel'} has no {name}.")
-    named = rules.get("properties", {})
+    named, other = rules.get("properties", {}), rules.get("additionalProperties", {})
     for name, each in value.items():
-        check(each, named.get(name, rules.get("additionalProperties", {})), _joined(path, name))
+        if name not in named and other is False:
+            key = name if re.fullmatch(r"\w{1,60}", name, re.ASCII) else shown(name)
+            said = f"{_joined(path, key)} is unknown; {did_you_mean(name, list(named))}"
+            raise KernelError(f"{said}expected {', '.join(named)}.")
+        check(each, named.get(name, other), _joined(path, name))
 
 
 def _joined(path: str, name: str) -> str:
