@@ -10,8 +10,8 @@ from reference_pixels import make_profile, one_over_r_profile
 
 from sssfit._jit.pixels import quadrant_energy
 from sssfit.errors import ArgumentError, RenderError
+from sssfit.methods import LIGHTS
 from sssfit.motion.adaptive import AdaptiveRenderer, averaged_around
-from sssfit.motion.lights import LIGHTS
 from sssfit.motion.local_light import brightest_channel, half_width, local_irradiance
 from sssfit.render.adaptive import alias_table, make_sampler, render_samples, samples_for
 from sssfit.render.reference import (
@@ -165,10 +165,9 @@ def test_frames_that_adapt_are_unbiased_too(skin1, light, looks_ahead):
     scene = make_scene("edge", height=SIDE, width=SIDE, mm_per_pixel=0.05, angle_degrees=30.0)
     settings = {"looks_ahead": looks_ahead, "target_variance": 1e-3, "seed": 2}
     renderer = AdaptiveRenderer(skin1, 0.05, **settings)
-    pictures, counts, factors = [], [], []
-    for k in range(120):
-        factors.append(LIGHTS[light].intensity(k))
-        pictures.append(renderer.render(lit(scene, factors[-1])))
+    pictures, counts, factors = [], [], intensities(light, 120)
+    for each in factors:
+        pictures.append(renderer.render(lit(scene, each)))
         counts.append(renderer.counts)
     assert np.unique(counts).size > 30
     sampler = make_sampler(skin1, 0.05)
@@ -228,7 +227,7 @@ def test_every_seed_and_frame_has_its_own_numbers(small):
     scene, sampler = random_scene(), make_sampler(small, PITCH)
     seen = [
         render_samples(scene, sampler, 2, frame=frame, seed=seed)
-        for frame, seed in ((0, 0), (1, 0), (0, 1), (1, 1), (2**62 - 1, 2**62 - 1))
+        for frame, seed in ((0, 0), (1, 0), (0, 1), (1, 1), (2**63 - 1, 2**63 - 1))
     ]
     for i in range(len(seen)):
         for k in range(i):
@@ -352,7 +351,7 @@ def edge():
 
 
 def intensities(light, count):
-    return [LIGHTS[light].intensity(k) for k in range(count)]
+    return [LIGHTS[light].load()(k) for k in range(count)]
 
 
 def test_samples_go_where_the_variance_is(skin1, edge):

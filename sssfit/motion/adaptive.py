@@ -31,9 +31,9 @@ _UNCERTAIN = 4  # frames of a history that cannot be trusted: a variance of two 
 # 4e14, which an edge that came near turned into 64 samples.
 _STILL = 1e-3
 # Variances are averaged over 5 x 5 pixels. In dim light few samples meet a lit pixel: alone, a
-# pixel found no variance for many frames, then too much. An edge in still light took 20.8 samples
-# a pixel for the error of 13.9 fixed ones; with 3 x 3 pixels, 23.1 for that of 23.6; with 5 x 5,
-# 23.1 for that of 24.8; 9 x 9 gave 25.4.
+# pixel found no variance for many frames, then too much. An edge in still light took 23.3 samples
+# a pixel for the error of 13.8 fixed ones; with 3 x 3 pixels 23.1 for that of 23.6, with 5 x 5
+# 23.1 for that of 24.8, and with 9 x 9 23.0 for that of 25.4.
 _AROUND = 5
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from sssfit.arrays import FloatArray, plain
 from sssfit.errors import ArgumentError
 from sssfit.messages import shown, table
+from sssfit.methods import RENDERERS
 from sssfit.motion.run import FRAMES, moving_light
-from sssfit.motion.ways import WAYS
 from sssfit.profile import Profile
 from sssfit.scene.record import Scene
 
@@ -82,7 +82,7 @@ class SampleCurves:
         """Return a row a target: samples and error of every sampler."""
         heads = ["target variance"]
         for name in self.samples:
-            heads += [f"{WAYS[name].label}: samples", "rmse"]
+            heads += [f"{RENDERERS[name].summary}: samples", "rmse"]
         rows = [
             [
                 f"{target:g}",

@@ -7,9 +7,14 @@ from typing import Any
 import numpy as np
 
 from sssfit.arrays import FloatArray, plain
-from sssfit.messages import counted, table
+from sssfit.messages import counted, number, table
 
-COLD = 10  # frames at the start that means leave out: histories begin
+_COLD = 25  # as the supplement's averages
+
+
+def cold_frames(frames: int) -> int:
+    """Return how many frames means leave out while histories begin: 25, at most half of all."""
+    return min(_COLD, frames // 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,13 +45,13 @@ class Track:
 
     @property
     def mean_fetches(self) -> float:
-        """Mean over the frames, without the first ten."""
-        return float(np.mean(self.fetches[COLD:]))
+        """Mean over the frames after the first ones, `cold_frames`."""
+        return float(np.mean(self.fetches[cold_frames(len(self.fetches)) :]))
 
     @property
     def rmse(self) -> float:
-        """Root of the mean square error over the frames, without the first ten."""
-        return float(np.sqrt(np.mean(self.mse[COLD:])))
+        """Root of the mean square error over the frames after the first ones."""
+        return float(np.sqrt(np.mean(self.mse[cold_frames(len(self.mse)) :])))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures for JSON."""
@@ -76,7 +81,7 @@ class MovingLight:
     target_variance : float
     seed : int
     level : float
-        Root of the mean square of the true frames, without the first ten.
+        Root of the mean square of the true frames after the first ones.
     tracks : sequence of Track
     """
 
@@ -93,6 +98,11 @@ class MovingLight:
     level: float
     tracks: Sequence[Track]
 
+    @property
+    def cold(self) -> int:
+        """Frames at the start that means leave out."""
+        return cold_frames(len(self.intensity))
+
     def track(self, name: str) -> Track:
         """Return a renderer's track; KeyError where it did not run."""
         return {each.name: each for each in self.tracks}[name]
@@ -104,6 +114,10 @@ class MovingLight:
             return None
         return 1.0 - self.track(name).mean_fetches / self.track("without").mean_fetches
 
+    def relative(self, track: Track) -> float | None:
+        """Return a renderer's error as a share of the light; None where all frames are black."""
+        return track.rmse / self.level if self.level > 0.0 else None
+
     def to_dict(self) -> dict[str, Any]:
         """Return the figures of ``sssfit motion --json``."""
         return plain(
@@ -112,10 +126,12 @@ class MovingLight:
                 "irradiance": self.scene,
                 "light": self.light,
                 "frames": len(self.intensity),
+                "cold_frames": self.cold,
                 "height": self.height,
                 "width": self.width,
                 "mm_per_pixel": self.mm_per_pixel,
-                "shift": self.shift,
+                "shift_down": self.shift[0],
+                "shift_right": self.shift[1],
                 "target_variance": self.target_variance,
                 "seed": self.seed,
                 "level": self.level,
@@ -131,8 +147,8 @@ class MovingLight:
             [
                 each.label,
                 f"{each.mean_fetches:.2f}",
-                f"{each.rmse:.4f}",
-                f"{100.0 * each.rmse / self.level:.1f} %" if self.level > 0.0 else "-",
+                f"{each.rmse:.3g}",
+                number(self.relative(each), ".3g%"),
             ]
             for each in self.tracks
         ]

@@ -1,23 +1,23 @@
-"""Runs a sequence: a scene under a light that changes, by every renderer of ``ways.WAYS``."""
+"""Runs a sequence: a scene under a light that changes, by every renderer of the registry."""
 
 from collections.abc import Callable, Collection
-from typing import Any
 
 import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import ArgumentError
 from sssfit.messages import did_you_mean, shown
-from sssfit.motion.adaptive import TARGET_VARIANCE, AdaptiveRenderer
+from sssfit.methods import LIGHTS, RENDERERS
+from sssfit.motion.adaptive import TARGET_VARIANCE
 from sssfit.motion.frames import Frames
-from sssfit.motion.lights import LIGHTS
-from sssfit.motion.record import COLD, MovingLight, Track
+from sssfit.motion.record import MovingLight, Track, cold_frames
 from sssfit.motion.reproject import Shift
-from sssfit.motion.ways import MOST_FRAMES, WAYS, Picture, of_renderer
+from sssfit.motion.ways import MOST_FRAMES, Task, Way
 from sssfit.profile import Profile
 from sssfit.scene.record import Scene
 
 FRAMES = 100
+_FEWEST_FRAMES = 2
 _FIRST = "variates"  # its fetches are those of the others
 
 Watch = Callable[[str, int, FloatArray], object]
@@ -46,22 +46,22 @@ def moving_light(
     scene : Scene
         Only its irradiance and pixel size are used; borders are mirrored.
     light : str
-        A name of ``sssfit.motion.lights.LIGHTS``.
+        A name of ``sssfit.methods.LIGHTS``.
     length : int
-        Number of frames, 11 to 100 000; means leave out the first ten.
+        Number of frames, 2 to 100 000; means leave out the first ones (`cold_frames`).
     target_variance : float
         Of `AdaptiveRenderer`.
     shift : (int, int) [pixels]
         By how much the picture moves down and right in every frame.
     ways : collection of str, optional
-        Names of ``WAYS``, by default all; "variates" always runs.
+        Names of ``sssfit.methods.RENDERERS``, by default all; "variates" always runs.
     seed : int
     threads : int, optional
         By default all cores; results do not depend on them.
     watch : callable, optional
         Given every picture: (name, number of the frame, array (H, W, C)).
     progress : callable, optional
-        Told (done, of how many, the next one's name).
+        Told (frames done, of how many, the renderer's name).
 
     Returns
     -------
@@ -72,23 +72,22 @@ def moving_light(
     ArgumentError, RenderError, FitError
         A setting is out of range, or the scene and the profile do not fit.
     """
-    intensity, asked = _intensity(light, length), _asked(ways)
-    frames = Frames(scene, profile, intensity, _checked_shift(shift), threads)
+    asked = _asked(ways)
+    frames = make_frames(profile, scene, light=light, length=length, shift=shift, threads=threads)
     truths = frames.truths()
     tracks: dict[str, Track] = {}
-    for done, name in enumerate(asked):
-        if progress is not None:
-            progress(done, len(asked), WAYS[name].label)
-        way, renderer = WAYS[name], None
-        if way.at_equal_fetches is not None:
-            picture = way.at_equal_fetches(frames, tracks[_FIRST].mean_fetches, seed)
-        else:
-            how: dict[str, Any] = {"target_variance": target_variance, **way.settings}
-            how |= {"seed": seed, "threads": threads}
-            renderer = AdaptiveRenderer(profile, scene.mm_per_pixel, **how)
-            picture = of_renderer(renderer, frames)
-        tracks[name] = _tracked(name, picture, renderer, frames, truths, watch)
-    squares = [np.square(truths(k)).mean() for k in list(frames)[COLD:]]
+    for k, name in enumerate(asked):
+        fetches = tracks[_FIRST].mean_fetches if _FIRST in tracks else 0.0
+        way = RENDERERS[name].load()(Task(frames, target_variance, fetches, seed))
+
+        def told(frame: int, picture: FloatArray, name: str = name, k: int = k) -> None:
+            if watch is not None:
+                watch(name, frame, picture)
+            if progress is not None:
+                progress(k * length + frame + 1, len(asked) * length, RENDERERS[name].summary)
+
+        tracks[name] = _tracked(name, way, frames, truths, told)
+    squares = [np.square(truths(k)).mean() for k in list(frames)[cold_frames(length) :]]
     return MovingLight(
         material=profile.label,
         scene=scene.name,
@@ -97,7 +96,7 @@ def moving_light(
         height=scene.height,
         width=scene.width,
         shift=frames.shift,
-        intensity=intensity,
+        intensity=frames.intensity,
         target_variance=target_variance,
         seed=seed,
         level=float(np.sqrt(np.mean(squares))),
@@ -107,48 +106,54 @@ def moving_light(
 
 def _tracked(
     name: str,
-    picture: Picture,
-    renderer: AdaptiveRenderer | None,
+    way: Way,
     frames: Frames,
     truths: Callable[[int], FloatArray],
-    watch: Watch | None,
+    told: Callable[[int, FloatArray], None],
 ) -> Track:
     """Render all frames by one renderer."""
     fetches, mse = [], []
     for k in frames:
-        seen, price = picture(k)
+        seen, price = way.picture(k)
         fetches.append(price)
         mse.append(float(np.square(seen - truths(k)).mean()))
-        if watch is not None:
-            watch(name, k, seen)
-    maps: dict[str, Any] = {}
-    if renderer is not None:
-        maps = {"variance": renderer.variance, "counts": renderer.counts}
-    return Track(name, WAYS[name].label, np.array(fetches), np.array(mse), **maps)
+        told(k, seen)
+    label = RENDERERS[name].summary
+    return Track(name, label, np.array(fetches), np.array(mse), **way.maps())
 
 
-def _intensity(light: str, length: int) -> FloatArray:
-    """Return the light of every frame."""
+def make_frames(
+    profile: Profile,
+    scene: Scene,
+    *,
+    light: str = "strobe",
+    length: int = FRAMES,
+    shift: Shift = (0, 0),
+    threads: int | None = None,
+) -> Frames:
+    """Return the frames of a sequence; parameters and errors are those of `moving_light`."""
     if light not in LIGHTS:
         near = did_you_mean(str(light), list(LIGHTS))
         raise ArgumentError(f"light {shown(light)}: {near}expected one of {', '.join(LIGHTS)}.")
     is_whole = isinstance(length, int) and not isinstance(length, bool)
-    if not (is_whole and COLD < length <= MOST_FRAMES):
+    if not (is_whole and _FEWEST_FRAMES <= length <= MOST_FRAMES):
         raise ArgumentError(
-            f"`length = {shown(length)}`; expected {COLD + 1} to {MOST_FRAMES} frames."
+            f"`length = {shown(length)}`; expected {_FEWEST_FRAMES} to {MOST_FRAMES} frames."
         )
-    return np.array([LIGHTS[light].intensity(k) for k in range(length)])
+    of_frame = LIGHTS[light].load()
+    intensity = np.array([of_frame(k) for k in range(length)])
+    return Frames(scene, profile, intensity, _checked_shift(shift), threads)
 
 
 def _asked(ways: Collection[str] | None) -> list[str]:
     """Return the renderers in the order of their registry; refuse unknown ones."""
     for each in ways or ():
-        if each not in WAYS:
-            near = did_you_mean(str(each), list(WAYS))
+        if each not in RENDERERS:
+            near = did_you_mean(str(each), list(RENDERERS))
             raise ArgumentError(
-                f"renderer {shown(each)}: {near}expected some of {', '.join(WAYS)}."
+                f"renderer {shown(each)}: {near}expected some of {', '.join(RENDERERS)}."
             )
-    return [each for each in WAYS if not ways or each in ways or each == _FIRST]
+    return [each for each in RENDERERS if not ways or each in ways or each == _FIRST]
 
 
 def _checked_shift(shift: Shift) -> Shift:

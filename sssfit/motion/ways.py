@@ -1,12 +1,12 @@
 """The renderers of a sequence: adaptive samplers, fixed sampling, and kernels without noise.
 
-Those after the samplers have as many fetches a pixel as the sampler with control variates took, or
-the fewest that they can have.
+Each is a function of a task, ``sssfit.methods.RENDERERS`` lists them. Those that do not adapt have
+as many fetches a pixel as the sampler with control variates took, or the fewest that they can have.
 """
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,79 +23,109 @@ from sssfit.render.adaptive import make_sampler, render_samples
 MOST_FRAMES = 100_000
 _FEWEST_TAPS, _FEWEST_FETCHES = 3, 7  # of a separable kernel's pass, of a cascade
 
-Picture = Callable[[int], tuple[FloatArray, float]]  # of a frame's number: picture, fetches a pixel
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """What a renderer is asked for.
+
+    Parameters
+    ----------
+    frames : Frames
+    target_variance : float
+        Of adaptive samplers.
+    fetches : float
+        Of a pixel, for the others.
+    seed : int
+    """
+
+    frames: Frames
+    target_variance: float
+    fetches: float
+    seed: int
 
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """A renderer.
+    """What renders a task's frames in their order.
 
     Parameters
     ----------
-    label : str
-        For charts and tables.
-    settings : mapping
-        Keywords of `AdaptiveRenderer`, for a sampler that adapts.
-    at_equal_fetches : callable, optional
-        For another: of frames, fetches a pixel and seed; returns what renders a frame.
+    picture : callable
+        Of a frame's number; returns the picture (H, W, C), and fetches a pixel.
+    maps : callable
+        After a frame: moving variance and samples (H, W) of an adaptive sampler.
     """
 
-    label: str
-    settings: Mapping[str, Any] = field(default_factory=dict)
-    at_equal_fetches: Callable[[Frames, float, int], Picture] | None = None
+    picture: Callable[[int], tuple[FloatArray, float]]
+    maps: Callable[[], Mapping[str, Any]] = dict
 
 
-def of_renderer(renderer: AdaptiveRenderer, frames: Frames) -> Picture:
-    """Return what renders the frames of a sequence in their order."""
+def without(task: Task) -> Way:
+    """Sample adaptively, without control variates."""
+    return _adaptive(task, has_variates=False)
+
+
+def variates(task: Task) -> Way:
+    """Sample adaptively, with control variates as in the supplement."""
+    return _adaptive(task)
+
+
+def ahead(task: Task) -> Way:
+    """Sample adaptively, with control variates and the variance at the coming frame's light."""
+    return _adaptive(task, looks_ahead=True)
+
+
+def _adaptive(task: Task, **settings: Any) -> Way:
+    frames = task.frames
+    renderer = AdaptiveRenderer(
+        frames.profile,
+        frames.scene.mm_per_pixel,
+        target_variance=task.target_variance,
+        seed=task.seed,
+        threads=frames.threads,
+        **settings,
+    )
 
     def picture(frame: int) -> tuple[FloatArray, float]:
-        shift = frames.shift if frame else (0, 0)
-        seen = renderer.render(frames.at(frame), shift=shift)
+        seen = renderer.render(frames.at(frame), shift=frames.shift if frame else (0, 0))
         return seen, float(renderer.counts.mean())
 
-    return picture
+    return Way(picture, lambda: {"variance": renderer.variance, "counts": renderer.counts})
 
 
-def _fixed(frames: Frames, fetches: float, seed: int) -> Picture:
-    """Return a sampler with the same samples everywhere, of other random numbers."""
+def fixed(task: Task) -> Way:
+    """Take the same samples everywhere, of other random numbers than the adaptive samplers."""
+    frames = task.frames
     sampler = make_sampler(frames.profile, frames.scene.mm_per_pixel)
-    count = max(round(fetches), 1)
+    count = max(round(task.fetches), 1)
+    how: dict[str, Any] = {"seed": task.seed, "threads": frames.threads}
 
     def picture(frame: int) -> tuple[FloatArray, float]:
         # Adaptive samplers draw the frames from 0 up; these begin where no sequence gets to.
-        apart = frame + MOST_FRAMES
-        how: dict[str, Any] = {"frame": apart, "seed": seed, "threads": frames.threads}
-        return render_samples(frames.at(frame), sampler, count, **how), float(count)
+        seen = render_samples(frames.at(frame), sampler, count, frame=frame + MOST_FRAMES, **how)
+        return seen, float(count)
 
-    return picture
+    return Way(picture)
 
 
-def _separable(frames: Frames, fetches: float, _seed: int) -> Picture:
-    """Return a pre-integrated kernel on an odd number of taps in each of its two passes."""
+def separable(task: Task) -> Way:
+    """Apply a pre-integrated kernel on an odd number of taps in each of its two passes."""
+    frames = task.frames
     pitch = frames.scene.mm_per_pixel
     kernel = fit_separable(frames.profile, "preintegrated", mm_per_pixel=pitch).kernel
-    pairs = (math.floor(fetches / 2.0) - 1) // 2
+    pairs = (math.floor(task.fetches / 2.0) - 1) // 2
     return _of_taps(frames, on_taps(kernel, max(2 * pairs + 1, _FEWEST_TAPS)))
 
 
-def _cascade(frames: Frames, fetches: float, seed: int) -> Picture:
-    pitch, most = frames.scene.mm_per_pixel, max(fetches, _FEWEST_FETCHES)
-    given: dict[str, Any] = {"mm_per_pixel": pitch, "fetches": most, "seed": seed}
-    return _of_taps(frames, fit_taps(frames.profile, "cascade", **given).kernel)
+def cascade(task: Task) -> Way:
+    """Apply a cascade."""
+    frames, most = task.frames, max(task.fetches, _FEWEST_FETCHES)
+    given: dict[str, Any] = {"mm_per_pixel": frames.scene.mm_per_pixel, "fetches": most}
+    return _of_taps(frames, fit_taps(frames.profile, "cascade", seed=task.seed, **given).kernel)
 
 
-def _of_taps(frames: Frames, taps: Taps) -> Picture:
+def _of_taps(frames: Frames, taps: Taps) -> Way:
     pictures = frames.linear(
         lambda scene: np.asarray(render(scene, taps, threads=frames.threads), dtype=np.float64)
     )
-    return lambda frame: (pictures(frame), float(taps.fetches))
-
-
-WAYS: Mapping[str, Way] = {
-    "without": Way("adaptive, no control variates", {"has_variates": False}),
-    "variates": Way("adaptive, control variates"),
-    "ahead": Way("adaptive, next frame's light", {"looks_ahead": True}),
-    "fixed": Way("fixed sampling", at_equal_fetches=_fixed),
-    "separable": Way("separable", at_equal_fetches=_separable),
-    "cascade": Way("cascade", at_equal_fetches=_cascade),
-}
+    return Way(lambda frame: (pictures(frame), float(taps.fetches)))

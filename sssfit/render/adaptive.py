@@ -30,7 +30,7 @@ CountArray = npt.NDArray[np.int32]
 
 LEAST_SAMPLES, MOST_SAMPLES = 1, 64
 _ROWS = 8  # of a block: numbers of samples differ, so that small blocks keep threads busy
-_LARGEST_FRAME = 2**62
+_LARGEST = 2**63 - 1  # of a seed or a frame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,7 +157,7 @@ def render_samples(
     shape = scene.height, scene.width
     many = _checked_counts(counts, shape)
     for name, value in (("frame", frame), ("seed", seed)):
-        if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value < _LARGEST_FRAME:
+        if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= _LARGEST:
             raise RenderError(f"{name} = {shown(value)}; expected a whole number from 0.")
     half = reference_half_pixels(profile, scene.mm_per_pixel, *shape)
     check_memory(16.0 * half, f"a kernel of {half} pixels each way", "use larger pixels")
