@@ -1,4 +1,4 @@
-"""Write docs/stability.md: where every method is safe, by ten stresses.
+"""Write docs/stability.md: where every method is safe, by eleven stresses.
 
 python docs/make_stability.py            skin1, some minutes
 python docs/make_stability.py --paper    the supplement's eleven materials, an hour

@@ -508,8 +508,11 @@ STRESSES: Mapping[str, Method] = {
     "hard-light": Method(
         "sssfit.stability.hard_light:stress", "decompositions beside a highlight of 1000"
     ),
-    "taps": Method("sssfit.stability.taps:stress", "few fetches, short numbers, a firefly"),
-    "motion": Method("sssfit.stability.motion:stress", "a point that moves over the pixels"),
+    "taps": Method("sssfit.stability.taps:stress", "few fetches, jitter, short numbers, a firefly"),
+    "distance": Method(
+        "sssfit.stability.distance:stress", "near by and far away, slopes, pixels that grow"
+    ),
+    "motion": Method("sssfit.stability.motion:stress", "a point that moves, a camera that nears"),
     "grid": Method("sssfit.stability.grid:stress", "wide annuli, a short radius"),
     "imports": Method(
         "sssfit.stability.imports:stress", "gaps, coarse annuli, saturation, a camera's noise"

@@ -11,6 +11,7 @@ import time
 import warnings
 from pathlib import Path
 
+import processor  # isort: skip  # noqa: F401 (before numpy)
 import approval_calls as calls
 from approval_calls import CALLS, Call
 from approval_commands import COMMANDS

@@ -12,6 +12,8 @@ page by page, took two fifths of the processor time of a cascade's fit. And what
 tests made is not looked through for garbage again and again: that took a third of the collection.
 Looking through the rest after every 700 new objects, as Python does, took a thirtieth of the tests.
 
+Figures that are approved or documented are those of one kind of processor (``processor``).
+
 Commands that tests start keep their bytecode, whatever the caller's environment says: to compile
 our sources again took a tenth of each command.
 """
@@ -22,6 +24,7 @@ import os
 import signal
 import sys
 
+import processor  # isort: skip  # noqa: F401 (before numpy)
 import pytest
 import scipy.linalg  # noqa: F401 (its BLAS has to be there to be limited)
 import shared_work

@@ -125,6 +125,16 @@ def _codes(mantissa):
     return values
 
 
+def as_code(light):
+    """The sRGB code of light (IEC 61966-2-1)."""
+    return 12.92 * light if light <= 0.0031308 else 1.055 * light ** (1 / 2.4) - 0.055
+
+
+def as_light(code):
+    """The light of an sRGB code."""
+    return code / 12.92 if code <= 0.04045 else ((code + 0.055) / 1.055) ** 2.4
+
+
 def stored_as(name, channel):
     """What a texel of a channel becomes in a format, for whole pictures."""
     store = {
@@ -132,6 +142,8 @@ def stored_as(name, channel):
         "float32": lambda value: struct.unpack("f", struct.pack("f", value))[0],
         "half": as_half,
         "r11g11b10": lambda value: as_small_float(value, (6, 6, 5)[channel]),
+        "rgba8": lambda value: round(255 * value) / 255,
+        "srgb8": lambda value: as_light(round(255 * as_code(value)) / 255),
     }[name]
     return np.vectorize(store, otypes=[float])
 

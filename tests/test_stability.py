@@ -14,7 +14,18 @@ from sssfit.errors import ArgumentError, FitError, SssfitWarning
 from sssfit.material import load_material
 from sssfit.methods import STRESSES
 from sssfit.shapes import gaussian_cdf
-from sssfit.stability import Curve, Panel, gaussians, hard_light, noise, optics, stability
+from sssfit.stability import (
+    Curve,
+    Panel,
+    distance,
+    gaussians,
+    hard_light,
+    motion,
+    noise,
+    optics,
+    stability,
+    taps,
+)
 from sssfit.stability.record import BETWEEN, FROM, NEVER, SAFE, UP_TO, Axis
 from sssfit.stability.subject import Subject, Way
 
@@ -225,3 +236,49 @@ def test_what_fits_warn_of_is_not_heard_and_filters_are_put_back(profile, monkey
         stability(profile, only=["hard-light"], mm_per_pixel=0.25)
         assert list(warnings.filters) == inside
     assert heard == []
+
+
+def test_a_table_on_other_pixels(profile):
+    """On the table's own pixels it is the subject's error; far away it is another picture."""
+    subject = Subject("gaussian", profile, 0.25)
+    kernel = Way("pre", "preintegrated", {}, taps=9).fit(profile, 0.25)
+    (own,) = distance._at_distances(subject, {"pair": kernel})
+    middle = int(np.flatnonzero(own.x == 1.0)[0])
+    assert own.y[middle] < min(own.y[0], own.y[-1])
+    assert own.y[middle] == pytest.approx(subject.error(kernel, subject.truths()))
+
+
+def test_a_plane_that_faces_the_eye_and_equal_pixels_are_the_flat_picture(profile):
+    subject = Subject("gaussian", profile, 0.25)
+    kernel = Way("pre", "preintegrated", {}, taps=9).fit(profile, 0.25)
+    flat = subject.error(kernel, subject.truths())
+    assert distance._tilted(subject, "pair", kernel).y[0] == pytest.approx(flat, rel=1e-6)
+    (own,) = distance._growing(subject, {"pair": kernel})
+    assert own.y[0] == pytest.approx(flat, rel=1e-6)
+
+
+def test_flicker_is_the_change_of_the_error_and_not_of_the_light():
+    """An error that stays is no flicker, one that jumps by a frame is found."""
+    rng = np.random.default_rng(2)
+    truths = [rng.uniform(0.2, 1.0, (8, 8, 3)) for _ in range(4)]
+    steady = [each + 0.1 for each in truths]
+    assert motion._flicker(steady, truths) < 1e-6
+    planted = [*steady[:3], steady[3] + 0.05]
+    assert motion._flicker(planted, truths) > 0.5
+
+
+def test_spots_stay_in_place_on_smaller_pixels():
+    near, far = motion._spots(0.3, 0.5), motion._spots(0.3, 1.0)
+    assert near.mm_per_pixel == 0.15
+    rows = slice(24, 72)
+    quarter = near.irradiance.reshape(48, 2, 48, 2, 1).mean(axis=(1, 3))
+    np.testing.assert_allclose(quarter, far.irradiance[rows, rows], atol=0.12)
+
+
+def test_light_of_8_bits_loses_more_the_dimmer_it_is(profile):
+    subject = Subject("gaussian", profile, 0.25)
+    kernel = Way("pre", "preintegrated", {}, taps=9).fit(profile, 0.25)
+    found = taps._eight_bits(subject, "pair", kernel, "rgba8")
+    assert found.y[-1] > 4.0 * found.y[0]
+    still = taps._jittered(subject, "pair", kernel, 1)
+    assert still.y[0] == 1e-3 < still.y[-1]

@@ -9,7 +9,7 @@ from pathlib import Path
 import jsonschema
 import numpy as np
 import pytest
-from reference_taps import as_half, as_small_float, rendered
+from reference_taps import as_half, as_light, as_small_float, rendered, stored_as
 
 import sssfit
 from sssfit.errors import KernelError, RenderError
@@ -393,6 +393,10 @@ def test_r11g11b10_is_the_nearest_of_all_its_numbers(channel, mantissa, dtype):
     assert (ours[:, [c for c in range(3) if c != channel]] == 0.0).all()
 
 
+# About a step of each format near 1, with room for sums in another order.
+STEPS = {"float32": 1e-7, "half": 1e-3, "r11g11b10": 3e-2, "rgba8": 3e-2, "srgb8": 6e-2}
+
+
 @pytest.mark.parametrize("name", ["float32", "half", "r11g11b10"])
 def test_numbers_that_a_format_holds_stay_as_they_are(name):
     held = np.array([0.0, 2.0**-14, 0.375, 1.0, 1.5, 63.0, 2.0**15])[:, None] * np.ones(3)
@@ -402,7 +406,20 @@ def test_numbers_that_a_format_holds_stay_as_they_are(name):
     np.testing.assert_array_equal(store(noise), noise)
 
 
-@pytest.mark.parametrize("name", ["float32", "half", "r11g11b10"])
+@pytest.mark.parametrize("name", ["rgba8", "srgb8"])
+def test_codes_of_8_bits_stay_as_they_are_and_others_go_to_the_nearest(name):
+    codes = np.arange(256) / 255.0
+    held = np.array([as_light(each) if name == "srgb8" else each for each in codes])
+    store = store_of(name, taps_of(channels=3))
+    pixels = held[:, None] * np.ones(3)
+    np.testing.assert_allclose(store(pixels), pixels, rtol=0.0, atol=1e-15)
+    noise = np.random.default_rng(9).uniform(0.0, 1.0, 500)
+    slow = stored_as(name, 0)(noise)
+    ours = store(noise[:, None] * np.ones(3))[:, 1]
+    np.testing.assert_allclose(ours, slow, rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", ["float32", "half", "r11g11b10", "rgba8", "srgb8"])
 @pytest.mark.parametrize("covered", [False, True])
 @pytest.mark.parametrize(
     ("structure", "chained"), [("1-2", True), ("1-2", False), ("1|1|2", True), ("*|1-*", True)]
@@ -421,13 +438,13 @@ def test_every_picture_between_passes_is_in_the_format(structure, chained, cover
         # Sums in another order may round to the neighbour: a step, of few texels.
         apart = np.abs(ours[..., channel] - slow)
         assert np.median(apart) < 1e-14
-        assert apart.max() < 0.2 * {"float32": 1e-7, "half": 1e-3, "r11g11b10": 3e-2}[name]
+        assert apart.max() < 0.2 * STEPS[name]
 
 
 def test_light_beyond_a_formats_range_is_one_line():
     taps = taps_of("1|1", channels=3)
     bright = Scene("sun", np.full((4, 4, 1), 7e4), PITCH)
-    for name, most in (("half", "65504"), ("r11g11b10", "65024")):
+    for name, most in (("half", "65504"), ("r11g11b10", "65024"), ("srgb8", "1;")):
         with pytest.raises(RenderError, match=f"reaches 7e.04, and {name} holds up to {most}"):
             render_taps(bright, taps, intermediate=name)
     assert np.isfinite(render_taps(bright, taps, intermediate="float32")).all()

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections import Counter
 from typing import TYPE_CHECKING
@@ -89,10 +90,11 @@ def _style(k: int) -> Style:
 
 
 def _draw(axes: Axes, panel: Panel, shared: list[str]) -> None:
-    own = [each.label for each in panel.curves if each.label not in shared]
+    styles = _styles([each.label for each in panel.curves], shared)
+    own = []
     for each in panel.curves:
-        k = shared.index(each.label) if each.label in shared else own.index(each.label)
-        _line(axes, each, _style(k))
+        line = _line(axes, each, _style(styles[each.label]))
+        own += [line] if each.label not in shared else []
     name_axes(axes, panel.title, panel.axis.label, panel.y_label)
     if panel.axis.is_log:
         axes.set_xscale("log")
@@ -109,18 +111,28 @@ def _draw(axes: Axes, panel: Panel, shared: list[str]) -> None:
     axes.axhspan(low, panel.limit, color=_SAFE, zorder=0)
     axes.axhline(panel.limit, color="#666666", lw=0.6, zorder=1)
     if own:
-        axes.legend(loc="best", fontsize=7)
+        legend = axes.legend(handles=own, loc="best", fontsize=7, frameon=True, framealpha=0.85)
+        legend.get_frame().set_edgecolor("none")
 
 
-def _line(axes: Axes, curve: Curve, style: Style) -> None:
+def _styles(labels: list[str], shared: list[str]) -> dict[str, int]:
+    """Return the number of each curve's style: that of the figure's legend, or one left over."""
+    of_legend = {each: shared.index(each) for each in labels if each in shared}
+    free = (k for k in itertools.count() if k not in of_legend.values())
+    return of_legend | {each: next(free) for each in labels if each not in shared}
+
+
+def _line(axes: Axes, curve: Curve, style: Style) -> Line2D:
+    """Draw a curve with its quartiles, and return its line."""
     known = np.isfinite(curve.y)
-    axes.plot(curve.x[known], curve.y[known], label=curve.label, **style)
+    (line,) = axes.plot(curve.x[known], curve.y[known], label=curve.label, **style)
     if curve.low is None or curve.high is None:
-        return
+        return line
     bars = _bars(curve.y, curve.low, curve.high)[:, known]
     axes.errorbar(
         curve.x[known], curve.y[known], yerr=bars, fmt="none", ecolor=style["color"], elinewidth=0.7
     )
+    return line
 
 
 def _bars(y: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:

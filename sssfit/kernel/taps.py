@@ -68,7 +68,8 @@ _MOST_OFFSETS = dict.fromkeys(("pair", "disk", "line"), MOST_ON_DISK)  # of dens
 # Angles below which a stage is its own mirror image: the passes of a pair are perpendicular.
 _TURNS = {"pair": 90.0, "line": 180.0}
 _ROUNDING = 1e-9  # of sums that are computed in another order
-BYTES = {"float32": 16, "half": 8, "r11g11b10": 4}  # of a texel of three channels, as stored
+# Of a texel of three channels, as stored.
+BYTES = {"float32": 16, "half": 8, "r11g11b10": 4, "rgba8": 4, "srgb8": 4}
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -298,7 +299,7 @@ class Taps:
 
         Parameters
         ----------
-        texel : {"float32", "half", "r11g11b10"}
+        texel : {"float32", "half", "r11g11b10", "rgba8", "srgb8"}
             Format of the pictures between the passes.
 
         Raises

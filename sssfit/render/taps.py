@@ -62,7 +62,7 @@ def render_taps(
         One of ``sssfit.render.borders.BORDERS``.
     coverage : array (H, W), optional
         Part of each pixel that the object covers, 0 to 1; other pixels neither give nor show light.
-    intermediate : {"float32", "half", "r11g11b10"}, optional
+    intermediate : {"float32", "half", "r11g11b10", "rgba8", "srgb8"}, optional
         Format of the pictures between the passes, as `sssfit.render.texels` has them; by default
         they keep the precision of ``dtype``. Irradiance, coverage and result keep it always, and so
         does a picture that is added up by the pass that made it.

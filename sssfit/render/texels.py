@@ -3,6 +3,7 @@
 "float32" and "half" are IEEE 754's; numpy rounds to them to the nearest, ties to even. "r11g11b10"
 has unsigned floats of 5 bits of exponent (bias 15, with denormals) and 6, 6 and 5 bits of mantissa:
 the largest are (2 - 2^-6) 2^15 = 65 024 and, for blue, 64 512. It has no sign and three channels.
+"rgba8" and "srgb8" are 255 steps from 0 to 1, even in light or in its sRGB code.
 """
 
 from collections.abc import Callable
@@ -12,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit.errors import RenderError
+from sssfit.formats.colours import srgb_decode, srgb_encode
 from sssfit.kernel.taps import BYTES, Taps
 from sssfit.messages import shown
 
@@ -24,7 +26,11 @@ _LARGEST = {
     "float32": float(np.finfo(np.float32).max),
     "half": 65504.0,
     "r11g11b10": 65024.0,
+    "rgba8": 1.0,
+    "srgb8": 1.0,
 }
+_UNSIGNED = {"r11g11b10", "rgba8", "srgb8"}
+_CODES = 255.0
 
 
 def store_of(intermediate: str | None, taps: Taps) -> Store | None:
@@ -32,22 +38,22 @@ def store_of(intermediate: str | None, taps: Taps) -> Store | None:
 
     Parameters
     ----------
-    intermediate : {"float32", "half", "r11g11b10"}, optional
+    intermediate : {"float32", "half", "r11g11b10", "rgba8", "srgb8"}, optional
     taps : Taps
         What the passes apply.
 
     Raises
     ------
     RenderError
-        The format is unknown, or it is "r11g11b10" and the table has weights below 0 or other than
-        1 or 3 channels. What is returned raises it for light beyond the format's range.
+        The format is unknown, or it has no sign and the table has weights below 0 or other than 1
+        or 3 channels. What is returned raises it for light beyond the format's range.
     """
     if intermediate is None:
         return None
     if intermediate not in BYTES:
         raise RenderError(f"intermediate = {shown(intermediate)}; expected {', '.join(BYTES)}.")
-    if intermediate == "r11g11b10":
-        _check_unsigned(taps)
+    if intermediate in _UNSIGNED:
+        _check_unsigned(intermediate, taps)
 
     def store(pixels: FloatArray) -> FloatArray:
         with np.errstate(over="ignore"):  # checked below
@@ -63,14 +69,14 @@ def store_of(intermediate: str | None, taps: Taps) -> Store | None:
     return store
 
 
-def _check_unsigned(taps: Taps) -> None:
+def _check_unsigned(name: str, taps: Taps) -> None:
     if len(taps.channels) not in (1, 3):
         raise RenderError(
-            f"r11g11b10 holds 1 or 3 channels, and the table has {len(taps.channels)}; choose half."
+            f"{name} holds 1 or 3 channels, and the table has {len(taps.channels)}; choose half."
         )
     if (taps.blend < 0.0).any() or taps.has_negative_weights:
         raise RenderError(
-            "r11g11b10 has no sign, and the table has weights below 0; choose half or float32."
+            f"{name} has no sign, and the table has weights below 0; choose half or float32."
         )
 
 
@@ -92,4 +98,20 @@ def _r11g11b10(pixels: FloatArray) -> FloatArray:
     return np.where(rounded > largest, np.inf, rounded).astype(pixels.dtype)
 
 
-_ROUND: dict[str, Store] = {"float32": _float32, "half": _half, "r11g11b10": _r11g11b10}
+def _rgba8(pixels: FloatArray) -> FloatArray:
+    codes = np.rint(_CODES * pixels)
+    return np.where(codes > _CODES, np.inf, codes / _CODES).astype(pixels.dtype)
+
+
+def _srgb8(pixels: FloatArray) -> FloatArray:
+    codes = np.rint(_CODES * srgb_encode(pixels))
+    return np.where(codes > _CODES, np.inf, srgb_decode(codes / _CODES)).astype(pixels.dtype)
+
+
+_ROUND: dict[str, Store] = {
+    "float32": _float32,
+    "half": _half,
+    "r11g11b10": _r11g11b10,
+    "rgba8": _rgba8,
+    "srgb8": _srgb8,
+}

@@ -3,13 +3,20 @@
 Halved pictures see a point by its place among their texels, so light crawls. The measure is the
 change of the 99th percentile of Delta E, cascade beside exact kernel, from that of the point at
 rest (`sssfit.compare.motion` has its largest over all places).
+
+A camera that nears changes the size of every pixel. From a frame to the next the picture may change
+as the truth does and no more: the measure is the 99th percentile of Delta E between a frame, and
+the true frame with the error that the frame before had.
 """
 
 import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.compare.motion import motion
+from sssfit.kernel import Kernel, Taps
+from sssfit.render.jitter import Jitter
 from sssfit.render.reference import render_reference
+from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
 from sssfit.stability.record import Axis, Curve, Panel
 from sssfit.stability.subject import CASCADE, SIDE, Subject, Way, cascade, error_of, shown
@@ -17,12 +24,20 @@ from sssfit.stability.subject import CASCADE, SIDE, Subject, Way, cascade, error
 LIMIT = 0.85  # docs/cascades.md asks it of two stages before the first halving
 _FETCHES = (14, 17, 24)
 _SHIFTS = np.arange(0.0, 4.01, 0.5)
-_WAYS = (
-    Way("pre-integrated", "preintegrated", {}),
-    Way("svd 3", "svd", {"rank": 3}),
+_SPEEDS = (0.001, 0.003, 0.01, 0.03, 0.1)  # of a pixel's size, a frame
+_FRAMES = 5
+# Middles of four spots of light (right, down) in pixels of the first frame, their deviation one.
+_SPOTS = ((0.0, 0.0), (21.3, 7.1), (-16.4, 23.7), (9.6, -27.2))
+_PAIR = Way("pre-integrated, 25 taps", "preintegrated", {}, taps=25)
+_CASCADES = (
     cascade(14),
     CASCADE,
     Way("cascade 24, still", "cascade", {"fetches": 24, "still": True}),
+)
+_WAYS = (
+    Way("pre-integrated", "preintegrated", {}),
+    Way("svd 3", "svd", {"rank": 3}),
+    *_CASCADES,
 )
 
 
@@ -44,14 +59,67 @@ def stress(subject: Subject) -> list[Panel]:
         Panel(
             stress="motion",
             title="a point moved by a pixel, and back",
-            axis=Axis("fetches of a cascade", mild=float(_FETCHES[-1])),
+            axis=Axis("fetches of a cascade", mild=float(_FETCHES[-1]), is_log=False),
             y_label="p99 of Delta E 2000",
             limit=LIMIT,
             curves=[_moved(subject)],
             fails="one stage before the first halving: light crawls",
             is_log=False,
         ),
+        Panel(
+            stress="motion",
+            title="a camera that nears: flicker a frame",
+            axis=Axis("nearer by a frame (% of a pixel's size)", mild=100.0 * _SPEEDS[0]),
+            y_label="p99 of Delta E 2000",
+            limit=LIMIT,
+            curves=_nearing(subject),
+            fails="blurs jump as texels change places",
+        ),
     ]
+
+
+def _nearing(subject: Subject) -> list[Curve]:
+    """Return by how much errors change from frame to frame, the largest of some frames."""
+    tables = {each.label: subject.true_kernel(each) for each in (*_CASCADES, _PAIR)}
+    moving = {f"{each.label}, jitter": tables[each.label] for each in (CASCADE, _PAIR)}
+    flickers: dict[str, list[float]] = {label: [] for label in (*tables, *moving)}
+    for speed in _SPEEDS:
+        scenes = [_spots(subject.mm_per_pixel, (1.0 - speed) ** k) for k in range(_FRAMES)]
+        truths = [render_reference(each, subject.profile, threads=1) for each in scenes]
+        for label, kernel in tables.items():
+            frames = [shown(kernel, each) for each in scenes]
+            flickers[label].append(_flicker(frames, truths))
+        for label, kernel in moving.items():
+            frames = [_jittered(kernel, each, k) for k, each in enumerate(scenes)]
+            flickers[label].append(_flicker(frames, truths))
+    percent = 100.0 * np.array(_SPEEDS)
+    advice = "two stages before the first halving; no jitter"
+    return [
+        Curve(label, percent, np.maximum(y, 1e-4), advice=advice) for label, y in flickers.items()
+    ]
+
+
+def _flicker(frames: list[FloatArray], truths: list[FloatArray]) -> float:
+    """Return the largest change of the error from a frame to the next."""
+    return max(
+        error_of(frames[k], np.maximum(truths[k] + frames[k - 1] - truths[k - 1], 0.0))
+        for k in range(1, len(frames))
+    )
+
+
+def _jittered(kernel: Kernel, scene: Scene, frame: int) -> FloatArray:
+    assert isinstance(kernel, Taps)
+    picture = render_taps(scene, kernel, jitter=Jitter(), frame=frame, threads=1)
+    return np.asarray(picture, dtype=np.float64)
+
+
+def _spots(mm_per_pixel: float, times: float) -> Scene:
+    """Return spots of light that stay in place in mm, on pixels of so many times a size."""
+    at = times * (np.arange(SIDE) + 0.5 - 0.5 * SIDE)
+    light = sum(
+        np.exp(-0.5 * ((at[:, None] - down) ** 2 + (at - right) ** 2)) for right, down in _SPOTS
+    )
+    return Scene("spots", np.asarray(light)[..., None], times * mm_per_pixel)
 
 
 def _moved(subject: Subject) -> Curve:

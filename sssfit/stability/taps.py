@@ -1,4 +1,4 @@
-"""Taps and stages: few fetches, short numbers between the passes and in the table, one firefly."""
+"""Taps and stages: few fetches, jitter, short numbers between passes and in tables, a firefly."""
 
 import functools
 
@@ -7,6 +7,7 @@ import numpy as np
 from sssfit.arrays import FloatArray
 from sssfit.compare._budget_causes import stored
 from sssfit.kernel import Kernel, Taps
+from sssfit.render.jitter import Jitter
 from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
 from sssfit.stability.record import Axis, Curve, Panel
@@ -27,6 +28,10 @@ _FETCHES = (7, 12, 17, 24)  # a pixel
 _FETCHES_OF_PAPERS = (7, 10, 12, 14, 17, 20, 24, 36, 60)
 _FORMATS = {"float32": 23, "half": 10, "r11g11b10": 6}  # bits of the fraction; blue has one less
 _STORAGES = {"float64": 52, "float32": 23, "half": 10, "8-bit": 8}
+_EIGHT_BITS = ("srgb8", "rgba8")
+_STOPS = (0.0, 1.0, 2.0, 4.0, 6.0)  # by which the brightest light lies below 1
+_STRENGTHS = (0.0, 0.5, 1.0)  # of the jitter that `Jitter` has by default
+_FRAMES = 8
 _BRIGHTNESS = tuple(10.0**k for k in range(7))
 _THINNED = (
     Way("pre-integrated on taps", "preintegrated", {}),
@@ -49,6 +54,30 @@ def stress(subject: Subject) -> list[Panel]:
             limit=LIMIT,
             curves=[_rounded_pictures(subject, *each) for each in tables.items()],
             fails="steps of colour in smooth light",
+        ),
+        Panel(
+            stress="taps",
+            title="what 8 bits between passes add",
+            axis=Axis("brightest light (stops below 1)", mild=0.0, is_log=False),
+            y_label="p99 of Delta E 2000",
+            limit=LIMIT,
+            curves=[
+                _eight_bits(subject, *each, form) for each in tables.items() for form in _EIGHT_BITS
+            ],
+            fails="steps of colour where light is dim",
+        ),
+        Panel(
+            stress="taps",
+            title="what jitter adds",
+            axis=Axis("jitter (of the default's)", mild=0.0, is_log=False),
+            y_label="p99 of Delta E 2000",
+            limit=LIMIT,
+            curves=[
+                _jittered(subject, *each, frames)
+                for each in tables.items()
+                for frames in (1, _FRAMES)
+            ],
+            fails="grain",
         ),
         Panel(
             stress="taps",
@@ -111,6 +140,46 @@ def _rounded_pictures(subject: Subject, label: str, taps: Kernel) -> Curve:
     errors = np.maximum([attempted(functools.partial(error, each)) for each in forms], 1e-6)
     bits = np.array([_FORMATS[each] for each in forms])
     return Curve(label, bits, errors, advice="half floats")
+
+
+def _eight_bits(subject: Subject, label: str, taps: Kernel, form: str) -> Curve:
+    """Return what 255 steps add to light that uses fewer and fewer of them."""
+    assert isinstance(taps, Taps)
+    plain = subject.shows(taps)
+
+    def error(stops: float) -> float:
+        found = []
+        for scene, wanted in zip(subject.scenes(), plain, strict=True):
+            dim = 0.5**stops / float(scene.irradiance.max())
+            light = Scene(scene.name, dim * scene.irradiance, scene.mm_per_pixel)
+            found.append(error_of(_through(light, taps, form) / dim, wanted))
+        return float(np.mean(found))
+
+    errors = [attempted(functools.partial(error, each)) for each in _STOPS]
+    advice = "half floats; or sRGB codes, and light near 1"
+    return Curve(f"{label}, {form}", np.array(_STOPS), np.maximum(errors, 1e-6), advice=advice)
+
+
+def _jittered(subject: Subject, label: str, taps: Kernel, frames: int) -> Curve:
+    """Return what moved taps add to a frame, or to the mean of several."""
+    assert isinstance(taps, Taps)
+    plain = subject.shows(taps)
+    usual = Jitter()
+
+    def error(strength: float) -> float:
+        jitter = Jitter(usual.share, strength * usual.scale, strength * usual.degrees)
+        pictures = [_with_jitter(scene, taps, jitter, frames) for scene in subject.scenes()]
+        return float(np.mean([error_of(a, b) for a, b in zip(pictures, plain, strict=True)]))
+
+    errors = [1e-3, *(max(error(each), 1e-3) for each in _STRENGTHS[1:])]
+    advice = "no jitter for cascades; for pairs more frames in the mean"
+    name = label if frames == 1 else f"{label}, mean of {frames} frames"
+    return Curve(name, np.array(_STRENGTHS), np.array(errors), advice=advice)
+
+
+def _with_jitter(scene: Scene, taps: Taps, jitter: Jitter, frames: int) -> FloatArray:
+    shots = [render_taps(scene, taps, jitter=jitter, frame=k, threads=1) for k in range(frames)]
+    return np.asarray(np.mean(shots, axis=0), dtype=np.float64)
 
 
 def _rounded_table(subject: Subject, label: str, taps: Kernel) -> Curve:
