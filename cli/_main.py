@@ -28,7 +28,6 @@ from .export import export
 from .fit import fit
 from .import_ import import_
 from .materials import materials
-from .motion import motion
 from .render import render
 from .show import show
 from .simulate import simulate
@@ -79,8 +78,7 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
 
 
 for _verb in (
-    *(materials, simulate, fit, render, compare, choose, stability, motion),
-    *(import_, export, chart, show),
+    *(materials, simulate, fit, render, compare, choose, stability, import_, export, chart, show),
 ):
     cli.add_command(_verb)
 

@@ -119,7 +119,7 @@ class MovingLight:
         return track.rmse / self.level if self.level > 0.0 else None
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the figures of ``sssfit motion --json``."""
+        """Return the figures for JSON."""
         return plain(
             {
                 "material": self.material,
