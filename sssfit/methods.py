@@ -520,6 +520,24 @@ STRESSES: Mapping[str, Method] = {
 }
 
 
+LIGHTS: Mapping[str, Method] = {
+    "still": Method("sssfit.motion.lights:still", "does not change"),
+    "sinusoidal": Method("sssfit.motion.lights:sinusoidal", "swells and fades, from 0.1 to 1.9"),
+    "strobe": Method("sssfit.motion.lights:strobe", "four frames lit, four nearly dark"),
+    "gunshot": Method("sssfit.motion.lights:gunshot", "bursts of three flashes that fade quickly"),
+}
+
+# What renders frames under a light that changes, in the order of its running.
+RENDERERS: Mapping[str, Method] = {
+    "without": Method("sssfit.motion.ways:without", "adaptive, no control variates"),
+    "variates": Method("sssfit.motion.ways:variates", "adaptive, control variates"),
+    "ahead": Method("sssfit.motion.ways:ahead", "adaptive, next frame's light"),
+    "fixed": Method("sssfit.motion.ways:fixed", "fixed sampling"),
+    "separable": Method("sssfit.motion.ways:separable", "separable"),
+    "cascade": Method("sssfit.motion.ways:cascade", "cascade"),
+}
+
+
 def settings_of(methods: Mapping[str, Method]) -> dict[str, tuple[Setting, tuple[str, ...]]]:
     """Return every setting once by its name, with the names of the methods that have it.
 

@@ -36,6 +36,7 @@ ROOMS = [
         "compare",
         "choose",
         "stability",
+        "motion",
         "export",
         "chart",
         "cli",

@@ -24,11 +24,13 @@ FIGURES: Mapping[str, str] = {
     "KernelView": "sssfit.chart.kernel:kernel_figure",
     "Material": "sssfit.chart.material:material_figure",
     "ModelComparison": "sssfit.chart.models:models_figure",
+    "MovingLight": "sssfit.chart.moving_light:moving_light_figure",
     "Profile": "sssfit.chart.profile:profile_figure",
     "Sheet": "sssfit.chart.sheet:sheet_figure",
     "Stability": "sssfit.chart.stability:stability_figure",
     "Spectrum": "sssfit.chart.spectrum:spectrum_figure",
     "TapsView": "sssfit.chart.taps:taps_figure",
+    "VariateTable": "sssfit.chart.variates:variates_figure",
 }
 
 

@@ -60,12 +60,12 @@ def render_reference(
     _plan(scene.height, scene.width, half, profile.n_channels, border)
     quadrant, left_out = reference_quadrant(profile, scene.mm_per_pixel, scene.height, scene.width)
     picture = convolve(scene.irradiance, quadrant, border=border, threads=threads)
-    picture += left_out * _far_irradiance(scene.irradiance, border)
+    picture += left_out * far_irradiance(scene.irradiance, border)
     # Rounding of the transforms, 1e-16 of the largest pixel, would give negative light.
     return np.maximum(picture, 0.0, out=picture) if quadrant.min() >= 0.0 else picture
 
 
-def _far_irradiance(irradiance: FloatArray, border: str) -> FloatArray:
+def far_irradiance(irradiance: FloatArray, border: str) -> FloatArray:
     """Return the mean irradiance (1 or C,) of a picture's continuation, far from the picture."""
     if border == "zero":
         return np.zeros(1)

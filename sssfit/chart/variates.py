@@ -1,0 +1,105 @@
+"""The supplement's control variates over time, as a figure: `variates_figure`.
+
+``sssfit.motion.table`` computes the record; the panels are those of figures 1 and 2 of Xie and
+Olano 2021, "Supplementary: Real-time Subsurface Control Variates".
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from sssfit.arrays import FloatArray
+from sssfit.chart.page import COLOURS, LINE_STYLES, Style, add_table, name_axes, new_page, tick
+from sssfit.messages import counted
+
+if TYPE_CHECKING:
+    from sssfit.motion.table import VariateTable
+
+_HEIGHT_INCHES = 8.2
+_LABELS = (
+    "Res_f: no control variate",
+    "Res_SF: coefficient of a frame",
+    "Res_SF_EMA: its moving mean",
+    "Res_EMCM: moving covariance",
+    "Res_hat_EMCM: the same, G constant in a frame",
+    "Res_GT: true coefficient",
+)
+_COLOURS = (*COLOURS, "#e69f00", "#000000", "#cc79a7")
+_ORDER = (0, 5, 1, 2, 3, 4)  # what is drawn first lies behind
+_HEADS = ("", "still", "published", "moving", "published")
+_NOTE = (
+    "Lines: one run, the first seed. Table: medians over the seeds of the root of the residual's "
+    "moving variance, frames 25 to 100, beside the published values. Still: h = 1; moving: "
+    "h = 1 + 3 sin(t / 10). The coefficient of the fifth is that of the fourth."
+)
+
+
+def variates_figure(table: VariateTable) -> Figure:
+    """Draw coefficient, residual and error over the frames, under still and under moving light.
+
+    Parameters
+    ----------
+    table : VariateTable
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        8 x 8.2 inches, with the table at the top.
+    """
+    title = "Control variates under light that changes"
+    where = f"f = h(t) / (1 + y), g = h(t) (1 - y), 16 samples a frame, {_seeds(table)}"
+    with new_page(_HEIGHT_INCHES, title, where, [_NOTE]) as (figure, below):
+        handles = [Line2D([], [], **_style(k)) for k in range(len(_LABELS))]
+        below = add_table(below, _HEADS, _rows(table), handles)
+        grid = below.subplots(3, 2, sharex=True)
+        for column, (light, trace) in enumerate(table.traces.items()):
+            parts = (trace.coefficient, trace.residual, trace.error)
+            for axes, values in zip(grid[:, column], parts, strict=True):
+                _draw(axes, values)
+            name_axes(grid[0, column], f"{light} light", "", "coefficient" * (column == 0))
+            name_axes(grid[1, column], "", "", "residual" * (column == 0))
+            name_axes(grid[2, column], "", "frame", "root of moving variance" * (column == 0))
+            coefficients = trace.coefficient[:, 9:]
+            low, high = float(coefficients.min()), float(coefficients.max())
+            room = 0.1 * (high - low)
+            grid[0, column].set_ylim(low - room, high + room)
+        below.align_ylabels(grid[:, 0])
+    return figure
+
+
+def _seeds(table: VariateTable) -> str:
+    return f"{counted(table.seeds, 'seed')} from {table.seed}"
+
+
+def _rows(table: VariateTable) -> list[tuple[str, list[str]]]:
+    """Return name and figures of each residual."""
+    told = table.to_dict()
+    return [
+        (
+            label,
+            [
+                f"{told[of][light][label.partition(':')[0]]:.4f}"
+                for light in ("still", "moving")
+                for of in ("table", "published")
+            ],
+        )
+        for label in _LABELS
+    ]
+
+
+def _style(k: int) -> Style:
+    return {"color": _COLOURS[k], "linestyle": LINE_STYLES[k % len(LINE_STYLES)], "lw": 1.0}
+
+
+def _draw(axes: Axes, values: FloatArray) -> None:
+    frames = np.arange(1, values.shape[1] + 1)
+    for k in _ORDER:
+        axes.plot(frames, values[k], **_style(k))
+    axes.set_xlim(1, frames[-1])
+    tick(axes.xaxis)
+    tick(axes.yaxis)
