@@ -182,7 +182,10 @@ STAGE_EDITS = {
     "kind": ("round", "stages[1].kind = 'round'; expected pair or star or disk"),
     "offsets_mm": ([0.5, 0.4], "stages[1].offsets_mm = [0.5, 0.4]; expected rising ones"),
     "weights": ([[1, 1], [0.1, 0], [0, 0]], "stages[1].weights add up to [1.2, 1.0]"),
-    "angles_degrees": (45.0, "stages[1].angles_degrees is unknown; did you mean angle_degrees? expected level,"),
+    "angles_degrees": (
+        45.0,
+        "stages[1].angles_degrees is unknown; did you mean angle_degrees? expected level,",
+    ),
 }
 
 

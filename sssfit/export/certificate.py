@@ -70,8 +70,8 @@ def pass_table(
     passes = pass_list(taps, normalized=normalized, depth=depth)
     yield ""
     yield (
-        "Passes in their order, each called by an entry point of yours. E is the irradiance, M0 the "
-        "result; sizes are rounded up."
+        "Passes in their order, each called by an entry point of yours. E is the irradiance, M0 "
+        "the result; sizes are rounded up."
     )
     rows = [("call", "reads", "writes", "size", "fetches")]
     for each in passes:
