@@ -3,7 +3,6 @@
 Those of methods and of made pictures are made from their entries, in ``_methods``.
 """
 
-from sssfit.kernel.taps import BYTES
 from sssfit.methods import EXPORTS, FITS, SEPARABLE, STRESSES
 from sssfit.scene.made import COMPARED, EDGE_DEGREES, MADE
 
@@ -53,8 +52,9 @@ RENDER = (
     flag("--screen", "Render like a shader: in perspective, by depth, within the mask; head only."),
     option("--follow", ["gaussian", "lerp", "none"], None, "With --screen: how a depth difference "
            "weights a sample.  [default: gaussian]"),
-    option("--intermediate", list(BYTES), None, "Table of taps: format of the "
-           "pictures between its passes.  [default: they are not rounded]"),
+    option("--intermediate", ["float32", "half", "half-truncated", "r11g11b10", "rgba8", "srgb8"],
+           None, "Table of taps: format of the pictures between its passes.  [default: they are not "
+           "rounded]"),
     option("--profile", None, "FILE", "Reference profile.  [default: the profile in this folder "
            "that the kernel was fitted to]"),
     option("--exposure", _FACTOR, "FACTOR", "Exposure for Delta E and PNG files.  [default: from "
