@@ -53,8 +53,8 @@ RENDER = (
     option("--follow", ["gaussian", "lerp", "none"], None, "With --screen: how a depth difference "
            "weights a sample.  [default: gaussian]"),
     option("--intermediate", ["float32", "half", "half-truncated", "r11g11b10", "rgba8", "srgb8"],
-           None, "Table of taps: format of the pictures between its passes.  [default: they are not "
-           "rounded]"),
+           None, "Table of taps: format of the pictures between its passes.  [default: they are "
+           "not rounded]"),
     option("--profile", None, "FILE", "Reference profile.  [default: the profile in this folder "
            "that the kernel was fitted to]"),
     option("--exposure", _FACTOR, "FACTOR", "Exposure for Delta E and PNG files.  [default: from "
