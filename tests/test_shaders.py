@@ -570,6 +570,7 @@ def assert_compiles(text, dialect, taps):
 
 def declared(text):
     """Name, length and number of values of each array."""
+    text = re.sub(" //.*", "", text)
     pattern = r"(\w+)\[(\d+)\](?:\[\d+\])? = (?:\w+\[\d+\]\()?\{?(.*?)\}?\)?;\n"
     for name, length, body in re.findall(pattern, text, re.DOTALL):
         vectors = len(re.findall(r"(?:float\d|vec\d)\(|\{", body))

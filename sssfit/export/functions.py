@@ -140,9 +140,11 @@ class Functions:
         return self.dialect.fetch.format(picture=picture, place=place)
 
     def _both(self, name: str, picture: str, aways: Sequence[str], indent: str) -> str:
-        """Return the lines that make the sum of pairs of mirrored fetches, a fetch each."""
-        places = [f"place {sign} {each}" for each in aways for sign in "-+"]
-        first, *rest = [self._fetch(picture, each) for each in places]
+        """Return the lines that make the sum of mirrored fetches, a pair each."""
+        first, *rest = [
+            " + ".join(self._fetch(picture, f"place {sign} {each}") for sign in "-+")
+            for each in aways
+        ]
         lines = [f"{self.dialect.new('float4', name)} = {first};"]
         lines += [f"{name} += {each};" for each in rest]
         return "\n".join(indent + each for each in lines)
