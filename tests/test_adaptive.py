@@ -161,7 +161,11 @@ def test_a_head_is_unbiased_at_every_pixel(skin1):
 @pytest.mark.parametrize("light", ["strobe", "sinusoidal"])
 @pytest.mark.parametrize("looks_ahead", [False, True])
 def test_frames_that_adapt_are_unbiased_too(skin1, light, looks_ahead):
-    """The samples of a frame depend on frames before it only. 3.2 mm: all see some light."""
+    """The samples of a frame depend on frames before it only. 3.2 mm: all see some light.
+
+    Of 24 runs with other seeds, lights and pixels of .05 and .1 mm the largest of 12 288 deviations
+    is 3.6 to 4.5 standard errors, as of as many normal ones (4.1 by median).
+    """
     scene = make_scene("edge", height=SIDE, width=SIDE, mm_per_pixel=0.05, angle_degrees=30.0)
     settings = {"looks_ahead": looks_ahead, "target_variance": 1e-3, "seed": 2}
     renderer = AdaptiveRenderer(skin1, 0.05, **settings)
@@ -298,7 +302,7 @@ def test_a_bad_target_gets_one_line(small, target):
         lambda: samples_for([1.0], target, 8),
         lambda: AdaptiveRenderer(small, PITCH, target_variance=target),
     ):
-        with pytest.raises(RenderError, match=r"`target_variance = .*`; expected a number above 0"):
+        with pytest.raises(RenderError, match=r"target_variance = .*; expected a number above 0"):
             make()
 
 
@@ -427,7 +431,7 @@ def test_rates_of_zero_and_one_are_defined(skin1, edge, blends):
 @pytest.mark.parametrize("blend", [-0.1, 2.0, float("nan")])
 def test_bad_rates_get_one_line(small, blend):
     for name in ("blend_covariance", "blend_residual"):
-        with pytest.raises(ArgumentError, match=r"^`blend = .*`; expected a rate from 0 to 1\.$"):
+        with pytest.raises(ArgumentError, match=r"^blend = .*; expected a rate from 0 to 1\.$"):
             AdaptiveRenderer(small, PITCH, **{name: blend})
 
 

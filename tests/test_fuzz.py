@@ -283,7 +283,7 @@ def check_written(path):
 
 def check_hlsl(text):
     """Comments, constants and finite numbers, nothing else."""
-    constants = re.sub(r"^// .*$", "", text, flags=re.MULTILINE)
+    constants = re.sub(r"^// .*$| // [a-z ,]+$", "", text, flags=re.MULTILINE)
     numbers = re.findall(r"-?\d+\.?\d*(?:e[-+]?\d+)?", re.sub(r"float\d|SSS_\w+", "", constants))
     assert np.isfinite(np.array(numbers, dtype=np.float64).astype(np.float32)).all()
     skeleton = re.sub(r"-?\d+\.?\d*(?:e[-+]?\d+)?(?<=\d)u?", "0", constants)

@@ -302,7 +302,7 @@ def test_reprojection_is_a_slice(shift):
 def test_a_bad_rate_is_refused_in_one_line(kind, blend):
     with pytest.raises(ArgumentError) as caught:
         kind(blend)
-    assert str(caught.value).startswith("`blend = ")
+    assert str(caught.value).startswith("blend = ")
     assert str(caught.value).endswith("expected a rate from 0 to 1.")
     assert "\n" not in str(caught.value)
 

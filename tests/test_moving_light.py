@@ -239,12 +239,12 @@ def test_progress_counts_the_frames_of_all_renderers(skin1, scenes):
     ("given", "words"),
     [
         ({"light": "strob"}, "light 'strob': did you mean strobe? expected one of still, "),
-        ({"length": 1}, "`length = 1`; expected 2 to 100000 frames."),
-        ({"length": 2.5}, "`length = 2.5`; expected"),
-        ({"length": True}, "`length = True`; expected"),
+        ({"length": 1}, "length = 1; expected 2 to 100000 frames."),
+        ({"length": 2.5}, "length = 2.5; expected"),
+        ({"length": True}, "length = True; expected"),
         ({"ways": ["cascad"]}, "renderer 'cascad': did you mean cascade? expected some of "),
-        ({"shift": (1, 0.5)}, "`shift = (1, 0.5)`; expected two whole numbers of pixels."),
-        ({"shift": 3}, "`shift = 3`; expected two whole numbers of pixels."),
+        ({"shift": (1, 0.5)}, "shift = (1, 0.5); expected two whole numbers of pixels."),
+        ({"shift": 3}, "shift = 3; expected two whole numbers of pixels."),
     ],
 )
 def test_bad_settings_get_one_line(skin1, scenes, given, words):
@@ -255,7 +255,7 @@ def test_bad_settings_get_one_line(skin1, scenes, given, words):
 
 
 def test_bad_targets_get_one_line(skin1, scenes):
-    with pytest.raises(RenderError, match=r"`target_variance = 0`; expected a number above 0"):
+    with pytest.raises(RenderError, match=r"target_variance = 0; expected a number above 0"):
         moving_light(skin1, scenes["edge"], target_variance=0)
     with pytest.raises(ArgumentError, match="expected two different ones"):
         sample_curves(skin1, scenes["edge"], targets=[1e-3, 1e-3])

@@ -226,5 +226,5 @@ def test_the_text_has_every_figure(measured):
 def test_a_bad_number_of_seeds_is_refused_in_one_line(seeds):
     with pytest.raises(ArgumentError) as caught:
         measure_table(seeds=seeds)
-    assert str(caught.value).startswith("`seeds = ")
+    assert str(caught.value).startswith("seeds = ")
     assert "\n" not in str(caught.value)

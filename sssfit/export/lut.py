@@ -39,6 +39,7 @@ _SETTINGS = {  # of a profile's tables
     "line": ("radius", "mm_per_pixel"),
     "kernel": ("radius", "mm_per_pixel"),
 }
+_MARKED = {"texels": "`texels`", "radius": "`radius_mm`", "mm_per_pixel": "`mm_per_pixel`"}
 _SHARE = 0.999  # of each channel's light on the grid, within the radius unless one is given
 _PREVIEW_ROWS = 64  # of a PNG of one row, which nobody would see
 _MARK = b"sssfit.lut/1"  # in a DDS, among the words that its header leaves free
@@ -168,7 +169,8 @@ def _check_given(source: Profile | Kernel, table: str, given: Sequence[str]) -> 
             owners = " or ".join(name for name, own in _SETTINGS.items() if each in own)
             what = f"a profile's {table} table" if known else "a table of a kernel's own pixels"
             raise KernelError(
-                f"`{each}` is for a profile's {owners} table, and this is {what}; leave it out."
+                f"{_MARKED[each]} is for a profile's {owners} table, and this is {what}; leave it "
+                "out."
             )
 
 

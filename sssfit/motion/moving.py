@@ -26,7 +26,7 @@ def checked_blend(blend: float) -> float:
     """Return a rate from 0 to 1, or raise ArgumentError."""
     is_number = isinstance(blend, int | float | np.number) and not isinstance(blend, bool)
     if not (is_number and 0.0 <= blend <= 1.0):
-        raise ArgumentError(f"`blend = {shown(blend)}`; expected a rate from 0 to 1.")
+        raise ArgumentError(f"blend = {shown(blend)}; expected a rate from 0 to 1.")
     return float(blend)
 
 

@@ -138,7 +138,7 @@ def make_frames(
     is_whole = isinstance(length, int) and not isinstance(length, bool)
     if not (is_whole and _FEWEST_FRAMES <= length <= MOST_FRAMES):
         raise ArgumentError(
-            f"`length = {shown(length)}`; expected {_FEWEST_FRAMES} to {MOST_FRAMES} frames."
+            f"length = {shown(length)}; expected {_FEWEST_FRAMES} to {MOST_FRAMES} frames."
         )
     of_frame = LIGHTS[light].load()
     intensity = np.array([of_frame(k) for k in range(length)])
@@ -159,5 +159,5 @@ def _asked(ways: Collection[str] | None) -> list[str]:
 def _checked_shift(shift: Shift) -> Shift:
     is_pair = isinstance(shift, tuple | list) and len(shift) == 2
     if not is_pair or any(isinstance(k, bool) or not isinstance(k, int) for k in shift):
-        raise ArgumentError(f"`shift = {shown(shift)}`; expected two whole numbers of pixels.")
+        raise ArgumentError(f"shift = {shown(shift)}; expected two whole numbers of pixels.")
     return int(shift[0]), int(shift[1])

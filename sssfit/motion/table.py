@@ -146,7 +146,7 @@ def measure_table(*, seeds: int = 200, seed: int = 1) -> VariateTable:
     """
     if isinstance(seeds, bool) or not isinstance(seeds, int) or not 1 <= seeds <= _MOST_SEEDS:
         raise ArgumentError(
-            f"`seeds = {shown(seeds)}`; expected a whole number from 1 to {_MOST_SEEDS}."
+            f"seeds = {shown(seeds)}; expected a whole number from 1 to {_MOST_SEEDS}."
         )
     errors, coefficients, traces = {}, {}, {}
     for k, light in enumerate(_INTENSITY):

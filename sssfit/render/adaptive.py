@@ -203,9 +203,7 @@ def samples_for(
         The target is not above 0.
     """
     if not (np.isfinite(target_variance) and target_variance > 0.0):
-        raise RenderError(
-            f"`target_variance = {shown(target_variance)}`; expected a number above 0."
-        )
+        raise RenderError(f"target_variance = {shown(target_variance)}; expected a number above 0.")
     wanted = np.asarray(variance, dtype=np.float64) / target_variance
     known = np.where(np.isnan(wanted), start, np.minimum(wanted, MOST_SAMPLES))
     return np.clip(np.ceil(known), LEAST_SAMPLES, MOST_SAMPLES).astype(np.int32)

@@ -29,7 +29,6 @@ from sssfit.stability.subject import (
     attempted,
     cascade,
     error_of,
-    shown,
 )
 
 LIMIT = 1.0  # Delta E
@@ -88,16 +87,10 @@ def _at_distances(subject: Subject, tables: dict[str, Kernel]) -> list[Curve]:
         pitch_mm = times * subject.mm_per_pixel
         truths = subject.truths(pitch_mm)
         for label, kernel in tables.items():
-            work = functools.partial(_error_at, subject, kernel, pitch_mm, truths)
+            work = functools.partial(subject.error, kernel, truths, pitch_mm)
             seen = attempted(work)
             errors[label].append(max(seen, 1e-4))
     return [Curve(label, _TIMES, np.array(y), advice=_NEAREST) for label, y in errors.items()]
-
-
-def _error_at(subject: Subject, kernel: Kernel, pitch_mm: float, truths: list[FloatArray]) -> float:
-    """Return what a table of another pixel size shows on pixels of one."""
-    pairs = zip(subject.scenes(pitch_mm), truths, strict=True)
-    return float(np.mean([error_of(shown(kernel, scene), true) for scene, true in pairs]))
 
 
 def _tilted(subject: Subject, label: str, kernel: Kernel) -> Curve:

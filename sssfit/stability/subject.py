@@ -121,9 +121,14 @@ class Subject:
         pitch = self.mm_per_pixel if mm_per_pixel is None else mm_per_pixel
         return _scenes(pitch)
 
-    def error(self, kernel: Kernel, truths: Sequence[FloatArray]) -> float:
-        """Return what a kernel's pictures show beside others of the same scenes."""
-        scenes = self.scenes(kernel.mm_per_pixel)
+    def error(
+        self, kernel: Kernel, truths: Sequence[FloatArray], mm_per_pixel: float | None = None
+    ) -> float:
+        """Return what a kernel's pictures show beside others of the same scenes.
+
+        On the kernel's own pixels, or on those of a size.
+        """
+        scenes = self.scenes(kernel.mm_per_pixel if mm_per_pixel is None else mm_per_pixel)
         pairs = zip(scenes, truths, strict=True)
         return float(np.mean([error_of(shown(kernel, scene), true) for scene, true in pairs]))
 
