@@ -401,8 +401,9 @@ SMALL = {
     "render": ("--size", "8x6"),
     "compare": ("--size", "8x6", *FEW),
     "choose": ("--resolution", "8x6"),
+    "motion": ("--size", "8x6", "--length", "3", "--only", "variates"),
 }
-SLOW = ("compare", "choose", "stability")
+SLOW = ("compare", "choose", "stability", "motion")
 # What each verb reads, and the options it cannot do without.
 USUAL = {
     "simulate": ("x.toml",),
@@ -411,6 +412,7 @@ USUAL = {
     "compare": ("x.profile.npz",),
     "choose": ("skin1",),
     "stability": ("x.profile.npz", "--only", "hard-light"),
+    "motion": ("x.profile.npz",),
     "import": ("x.csv",),
     "export": ("x.profile.npz", "--format", "csv"),
     "chart": ("x.profile.npz",),
@@ -425,6 +427,7 @@ LIKELY = {
     "size": ("8x6", "3x3"),
     "count": ("2", "1000", "1e3"),
     "share": ("10%", "0.5"),
+    "shift": ("1,0", "-2,3"),
     "whole number": ("1", "2", "3"),
     "number": ("0.5", "1", "1.4", "30"),
     "text": (
