@@ -28,6 +28,7 @@ from .export import export
 from .fit import fit
 from .import_ import import_
 from .materials import materials
+from .motion import motion
 from .render import render
 from .show import show
 from .simulate import simulate
@@ -78,7 +79,8 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
 
 
 for _verb in (
-    *(materials, simulate, fit, render, compare, choose, stability, import_, export, chart, show),
+    *(materials, simulate, fit, render, compare, choose, stability, motion),
+    *(import_, export, chart, show),
 ):
     cli.add_command(_verb)
 

@@ -212,6 +212,7 @@ Lengths = functools.partial(Value, "list of lengths", text.lengths_mm)
 Count = functools.partial(Value, "count", text.whole_number)
 Size = functools.partial(Value, "size", text.size)
 Names = functools.partial(Value, "list of names", text.names)
+Shift = functools.partial(Value, "shift", text.shift)
 Share = functools.partial(Value, "share", text.share)
 BaseColour = functools.partial(Value, "list of reflectances", text.base_colour)
 

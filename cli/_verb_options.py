@@ -3,7 +3,7 @@
 Those of methods and of made pictures are made from their entries, in ``_methods``.
 """
 
-from sssfit.methods import EXPORTS, FITS, SEPARABLE, STRESSES
+from sssfit.methods import EXPORTS, FITS, LIGHTS, RENDERERS, SEPARABLE, STRESSES
 from sssfit.scene.made import COMPARED, EDGE_DEGREES, MADE
 
 from ._options import (
@@ -16,6 +16,7 @@ from ._options import (
     Number,
     NumberRange,
     Numbers,
+    Shift,
     Size,
     WholeRange,
     flag,
@@ -165,6 +166,28 @@ STABILITY = (
     option("--chart", None, "FILE", "Figure: PNG, SVG or PDF by its ending; - for PNG on stdout."),
     option("--table", None, "FILE", "Table in Markdown, - for stdout."),
     flag("--force", "Replace files that are not our chart or table."),
+)
+MOTION = (
+    option("--light", list(LIGHTS), None, "Light, as below.", "strobe"),
+    option("--irradiance", None, "NAME|FILE", f"Irradiance picture: {_FILE} file. The edge is at "
+           f"{EDGE_DEGREES:g} degrees.", "head"),
+    option("--mm-per-pixel", Length(), "MM", "Pixel size.  [default: from your file, else 0.3]"),
+    option("--size", Size(), "WxH", "Made pictures: columns and rows.  [default: 512x512]"),
+    _OF_FILES[0],
+    option("--length", WholeRange(2, 100_000), "N", "Number of frames.", 100),
+    option("--target-variance", _FACTOR, "V", "Variance that a frame's pixels should have, in "
+           "squared units of radiant exitance.", 2e-3),
+    option("--shift", Shift(), "X,Y", "Whole pixels by which the picture moves to the right and "
+           "down in every frame.", "0,0"),
+    option("--only", Names(RENDERERS), "NAME,...", "Renderers, as below; variates always runs.  "
+           "[default: all]"),
+    option("--frames", None, "DIR", "Write every frame there, as frame-0000 and so on."),
+    option("--format form", ["png", "exr"], None, "With --frames: format.  [default: png]"),
+    option("--of", list(RENDERERS), None, "With --frames: renderer.  [default: variates]"),
+    option("--chart", None, "FILE", "Figure: PNG, SVG or PDF by its ending; - for PNG on stdout."),
+    flag("--table", "Measure Table 1 of the supplement in place of a sequence; no MATERIAL."),
+    option("--seeds", WholeRange(1, 10_000), "N", "With --table: seeds.  [default: 200]"),
+    flag("--force", "Replace files that are not our chart or pictures."),
 )
 EXPORT = (option("--format form", list(EXPORTS), None, "Output format, as below.", required=True),)
 EXPORT_OUTPUT = STRICT, *output("NAME.FORMAT", "sssfit did not write")

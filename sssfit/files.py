@@ -15,7 +15,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 from sssfit.errors import ArgumentError, FileError
 
@@ -237,9 +237,15 @@ def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
 
 
 @contextlib.contextmanager
-def temporary_folder() -> Iterator[Path]:
-    """Make a folder outside the user's own, removed again also where the process ends at once."""
-    with tempfile.TemporaryDirectory() as name:
+def temporary_folder(beside: Path | None = None) -> Iterator[Path]:
+    """Make a folder that is removed again, also where the process ends at once.
+
+    It lies outside the user's own, or on the disk of an output and beside it.
+    """
+    where: dict[str, Any] = {}
+    if beside is not None:
+        where = {"dir": beside.parent, "prefix": f".{beside.name}.", "suffix": ".tmp"}
+    with tempfile.TemporaryDirectory(**where) as name:
         _unfinished.add(Path(name))
         try:
             yield Path(name)
@@ -265,14 +271,14 @@ atexit.register(remove_unfinished)
 
 
 def remove_leftovers(path: Path) -> None:
-    """Delete the temporary files of killed writes of ``path``.
+    """Delete the temporary files and folders of killed writes of ``path``.
 
     Call it while holding the output's lock, so that no other process is writing.
     """
     pattern = f".{glob.escape(path.name)}.{8 * '?'}.tmp"  # mkstemp puts eight letters in
     with contextlib.suppress(OSError):
         for leftover in path.parent.glob(pattern):
-            leftover.unlink(missing_ok=True)
+            shutil.rmtree(leftover) if leftover.is_dir() else leftover.unlink(missing_ok=True)
 
 
 @contextlib.contextmanager

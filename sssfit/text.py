@@ -147,6 +147,7 @@ def decimal_shifted(word: str, power: int) -> float:
 _MM_PER_UNIT = {"": 1.0, "um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0}
 _LENGTH = re.compile(r"\s*([-+.\deE]+?)\s*(um|mm|cm|m|)\s*")
 _PIXELS = re.compile("0*[1-9][0-9]{0,8}")  # a picture of more columns than that has no memory
+_WHOLE = re.compile("[+-]?[0-9]{1,9}", re.ASCII)
 _HEX = re.compile("#(?:[0-9a-fA-F]{3}|[0-9a-fA-F]{6})")
 
 
@@ -216,6 +217,14 @@ def size(text: str) -> tuple[int, int]:
     if not all(_PIXELS.fullmatch(each) for each in (width, height)):
         raise ArgumentError(f"{text!r} is not a size in pixels, such as 1920x1080.")
     return int(height), int(width)
+
+
+def shift(text: str) -> tuple[int, int]:
+    """Read whole pixels to the right and down, as 2,-1; return (down, right)."""
+    parts = [each.strip() for each in text.split(",")]
+    if len(parts) != 2 or not all(_WHOLE.fullmatch(each) for each in parts):
+        raise ArgumentError(f"{text!r} is not a shift of whole pixels X,Y, such as 2,-1.")
+    return int(parts[1]), int(parts[0])
 
 
 def share(text: str) -> float:

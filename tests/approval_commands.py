@@ -89,7 +89,16 @@ HELP = [
     *(C(f"{verb} -h".strip()) for verb in ("", "materials", "simulate", "fit", "render")),
     *(
         C(f"{verb} --help")
-        for verb in ("compare", "choose", "stability", "import", "export", "chart", "show")
+        for verb in (
+            "compare",
+            "choose",
+            "stability",
+            "motion",
+            "import",
+            "export",
+            "chart",
+            "show",
+        )
     ),
     C("--version"),
     C("--version -v", hidden=(r" \d[\w.]*$",)),
@@ -1296,9 +1305,69 @@ STABILITY = [
     C("stability"),
 ]
 
+_MOVING = "--mm-per-pixel .5 --length 8"
+_TINY = f"{_MOVING} --size 10x6 --irradiance edge"
+_BRIEF = "--mm-per-pixel .5 --length 3 --size 10x6"
+
+MOTION = [
+    C(f"motion wax.profile.npz {_TINY} --only without,ahead --chart m.png"),
+    C(f"motion wax.profile.npz {_MOVING} --size 10x6 --light sinusoidal --only fixed --json"),
+    C(f"motion - {_TINY} --light gunshot --only variates --seed 3", stdin="mono.profile.npz"),
+    C(f"motion wax.profile.npz {_TINY} --target-variance .05 --only separable"),
+    C(f"motion mono.profile.npz {_TINY} --light still --target-variance .05 --only cascade"),
+    C(f"motion mono.profile.npz {_TINY} --shift 1,-2 --only without --chart m.svg --threads 1"),
+    C(f"motion wax.profile.npz {_MOVING} --irradiance plain.png --only variates"),
+    C(
+        "motion wax.profile.npz --length 4 --irradiance layers.exr --layer near --mm-per-pixel .25 --only fixed"
+    ),
+    C(f"motion mono.profile.npz {_TINY} --only without --chart -"),
+    C(f"motion mono.profile.npz {_BRIEF} --only without --frames out"),
+    C(f"motion leaf.profile.npz {_BRIEF} --frames shots --format exr --of fixed --only without -q"),
+    C(f"motion leaf.profile.npz {_BRIEF} --frames shots"),
+    C(f"motion mono.profile.npz {_TINY} --only fixed", terminal=True),
+    C(
+        f"motion mono.profile.npz {_BRIEF} --only variates --frames out",
+        set_up=_copied("foreign.png", "out/frame-0002.png"),
+        note="a foreign file in the way",
+    ),
+    C(
+        f"motion mono.profile.npz {_BRIEF} --only variates --frames out --force",
+        set_up=_copied("foreign.png", "out/frame-0002.png"),
+        note="a foreign file in the way",
+    ),
+    C(f"motion mono.profile.npz {_BRIEF} --frames foreign.md"),
+    C(f"motion mono.profile.npz {_BRIEF} --frames no/such/folder"),
+    C(f"motion mono.profile.npz {_BRIEF} --chart foreign.png --frames shots"),
+    C(f"motion mono.profile.npz {_TINY} --chart m.exr"),
+    C("motion --table --seeds 3 --chart t.png"),
+    C("motion --table --seeds 4 --seed 2 --json"),
+    C("motion --table -v"),
+    C("motion"),
+    C("motion wax.profile.npz --table"),
+    C("motion --table --length 5"),
+    C("motion --table --seeds 0"),
+    C("motion wax.profile.npz --seeds 5"),
+    C("motion wax.profile.npz --of fixed"),
+    C("motion wax.profile.npz --format exr"),
+    C("motion wax.profile.npz --light strob"),
+    C("motion wax.profile.npz --only adaptive"),
+    C("motion wax.profile.npz --shift 1.5,0"),
+    C("motion wax.profile.npz --shift 1"),
+    C("motion wax.profile.npz --length 1"),
+    C("motion wax.profile.npz --target-variance 0"),
+    C("motion wax.profile.npz --size 0x5"),
+    C("motion wax.profile.npz --layer far"),
+    C("motion wax.profile.npz --irradiance plain.png --size 5x5"),
+    C("motion wax.profile.npz --irradiance missing.exr"),
+    C("motion four.profile.npz --irradiance plain.png --mm-per-pixel .5"),
+    C("motion four.profile.npz --irradiance plain.png"),
+    C("motion missing.toml"),
+]
+
 COMMANDS = {
     "help": HELP,
     "stability": STABILITY,
+    "motion": MOTION,
     "materials": MATERIALS,
     "simulate": SIMULATE,
     "fit": FIT,

@@ -46,7 +46,7 @@ from sssfit.scene.record import Scene
 from sssfit.simulate import Checkpoint, inversion, simulate_montecarlo
 from sssfit.simulate._finished import DEFAULT_PHOTONS
 from sssfit.stability import Curve, Panel, Stability
-from sssfit.stability.record import Axis
+from sssfit.stability.curve import Axis
 
 WAX = (
     'name = "wax"\nsource = "a test"\neta = 1.3\ng = 0\n'
@@ -525,6 +525,16 @@ def stresses() -> Stability:
     return Stability("wax", 0.5, (panel,), ("Left out grid: no material.",), seed=3)
 
 
+def small_sequence(real, given):
+    """Eight frames of twelve by eight pixels, by what needs no fit, whatever is asked for."""
+    small = {"size": (8, 12), "length": 8, "only": ["without", "ahead", "fixed"], "layer": None}
+    return real(**given | small | {"source": profile(), "irradiance": "edge"})
+
+
+def few_seeds(real, given):
+    return real(seeds=2, seed=given["seed"])
+
+
 def blank(*_) -> Figure:
     """A chart with nothing on it: what charts look like is tested where they are made."""
     return Figure(figsize=(0.1, 0.1))
@@ -532,7 +542,7 @@ def blank(*_) -> Figure:
 
 _CHARTS = (
     *("profile", "kernel", "material", "pareto", "budget", "sheet", "models", "guide", "spectrum"),
-    "stability",
+    *("stability", "moving_light", "variates"),
 )
 STAND_INS = {
     "sssfit.simulate.simulate_montecarlo_many": few_photons,
@@ -549,6 +559,8 @@ STAND_INS = {
     "sssfit.compare.compare_models": lambda *_: models(),
     "sssfit.compare.sheet.compute_sheet": lambda *_: small_sheet(),
     "sssfit.stability.stability": lambda *_: stresses(),
+    "sssfit.motion.runner.run_sequence": small_sequence,
+    "sssfit.motion.table.measure_table": few_seeds,
     **{f"sssfit.chart.{kind}.{kind}_figure": blank for kind in _CHARTS},
 }
 

@@ -7,6 +7,7 @@ click's own objects and fails where one has no row. Options that all verbs share
 
 import contextlib
 import functools
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -1215,6 +1216,85 @@ STABILITY = {
     ),
 }
 
+# motion
+
+_MOTION = "motion wax.toml"
+
+
+def _moved(irradiance: str = "head", **settings: Any) -> Any:
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        return called("sssfit.motion.runner.run_sequence", wax(), irradiance, **settings)
+
+
+def _tabled(**settings: Any) -> Any:
+    return called("sssfit.motion.table.measure_table", **settings)
+
+
+def _frame_names(ending: str) -> list[str]:
+    return [f"shots/frame-000{k}.{ending}" for k in range(8)]
+
+
+MOTION = {
+    "--light": Row(
+        _MOTION, "--light gunshot", calls, lambda: _moved(light="gunshot"), default="strobe"
+    ),
+    "--irradiance": Row(
+        _MOTION, "--irradiance edge", calls, lambda: _moved("edge"), default="head"
+    ),
+    "--mm-per-pixel": Row(
+        _MOTION,
+        "--mm-per-pixel .2",
+        calls,
+        lambda: _moved(mm_per_pixel=0.2),
+        words="from your file, else 0.3",
+    ),
+    "--size": Row(_MOTION, "--size 24x16", calls, lambda: _moved(size=(16, 24)), words="512x512"),
+    "--layer": Row(
+        f"{_MOTION} --irradiance layers.exr --layer near",
+        "--layer far",
+        calls,
+        lambda: _moved("layers.exr", layer="far"),
+        words=_LAYER,
+    ),
+    "--length": Row(_MOTION, "--length 7", calls, lambda: _moved(length=7), default="100"),
+    "--target-variance": Row(
+        _MOTION,
+        "--target-variance .01",
+        calls,
+        lambda: _moved(target_variance=0.01),
+        default="0.002",
+    ),
+    "--shift": Row(_MOTION, "--shift 2,-1", calls, lambda: _moved(shift=(-1, 2)), default="0,0"),
+    "--only": Row(
+        _MOTION,
+        "--only fixed,cascade",
+        calls,
+        lambda: _moved(only=["fixed", "cascade"]),
+        words="all",
+    ),
+    "--frames": Row(_MOTION, "--frames shots", names, lambda: _frame_names("png")),
+    "--format": Row(
+        f"{_MOTION} --frames shots",
+        "--format exr",
+        names,
+        lambda: _frame_names("exr"),
+        default="png",
+    ),
+    "--of": Row(
+        f"{_MOTION} --frames shots",
+        "--of fixed",
+        calls,
+        lambda: _moved(frames="shots", of="fixed"),
+        default="variates",
+    ),
+    "--chart": Row(_MOTION, "--chart m.png", is_written("png"), lambda: ["m.png"]),
+    "--table": Row(_MOTION, "motion --table", calls, _tabled),
+    "--seeds": Row("motion --table", "--seeds 3", calls, lambda: _tabled(seeds=3), default="200"),
+    "--force": Row(
+        f"{_MOTION} --chart foreign.png", "--force", is_written("png"), lambda: ["foreign.png"]
+    ),
+}
+
 ROWS: dict[str, dict[str, Row]] = {
     "materials": MATERIALS,
     "simulate": SIMULATE,
@@ -1226,6 +1306,7 @@ ROWS: dict[str, dict[str, Row]] = {
     "export": EXPORT,
     "chart": CHART,
     "stability": STABILITY,
+    "motion": MOTION,
     "show": {},
 }
 
@@ -1241,6 +1322,7 @@ COMMANDS = {
     "export": "export --format csv",
     "chart": "chart",
     "stability": _STABILITY,
+    "motion": _MOTION,
     "show": "show",
 }
 
@@ -1286,6 +1368,8 @@ SEEDS = {
         lambda: _compared([make_scene("noise", height=16, width=24, mm_per_pixel=0.3, seed=5)]),
     ),
     "stability": Row(_STABILITY, "--seed 5", calls, lambda: _stressed(seed=5)),
+    "motion": Row(_MOTION, "--seed 5", calls, lambda: _moved(seed=5)),
+    "motion --table": Row("motion --table", "--seed 5", calls, lambda: _tabled(seed=5)),
     "choose": Row(_CHOOSE, "--seed 5", _asked, lambda: _rounded(_chosen(seed=5))),
     "chart": Row(
         "chart wax.toml --models",
@@ -1300,6 +1384,7 @@ THREADS = {
     "simulate": Row(_WALK, "--threads 1", calls, lambda: _walk(threads=1)),
     "compare": Row(_BUDGET, "--threads 1", calls, lambda: _budgeted(threads=1)),
     "stability": Row(_STABILITY, "--threads 1", calls, lambda: _stressed(threads=1)),
+    "motion": Row(_MOTION, "--threads 1", calls, lambda: _moved(threads=1)),
     "choose": Row(_CHOOSE, "--threads 1", _asked, lambda: _rounded(_chosen(threads=1))),
     "chart": Row(
         "chart wax.toml --models",
@@ -1364,6 +1449,8 @@ STREAMS = (
     f"{_BUDGET} --budget-chart x.png",
     f"{_STABILITY} --chart x.png",
     f"{_STABILITY} --table x.md",
+    f"{_MOTION} --chart x.png",
+    "motion --table --chart x.png",
     "compare wax.profile.npz --what sheet --chart x.png",
     "compare wax.profile.npz --what front --size 24x16 --chart x.png",
 )

@@ -974,6 +974,60 @@ def _safe(finding: Figures) -> Any:
     return Words("from {} ({} to {})", edge["at"], edge["low"], edge["high"])
 
 
+def motion(f: Figures) -> list[Any]:
+    head = Words(
+        "{}, {} under {} light: {} frames of {} x {} pixels, target variance {}",
+        *(f["material"], f["irradiance"], f["light"], f["frames"], f["width"], f["height"]),
+        f["target_variance"],
+    )
+    rows = [
+        [each["label"], each["mean_fetches"], each["rmse"], Percent(each["rmse"] / f["level"])]
+        for each in f["tracks"]
+    ]
+    labels = {each["name"]: each["label"] for each in f["tracks"]}
+    saved = [
+        Words(
+            "{}: {} {} samples than without control variates",
+            labels[name],
+            Percent(abs(share)),
+            "more" if share < 0.0 else "fewer",
+        )
+        for name, share in f["saving"].items()
+    ]
+    table = Table(["renderer", "fetches a pixel", "rmse", "of the light"], rows)
+    frames = [each for each in f["output"] if "/" in each]
+    lines = [Words("Wrote {} frames to {}", len(frames), "shots")] if frames else []
+    return [
+        head,
+        table,
+        *saved,
+        *lines,
+        *(Words("Wrote {}", each) for each in f["output"][len(frames) :]),
+    ]
+
+
+def variates(f: Figures) -> list[Any]:
+    rows = []
+    for light, medians in f["table"].items():
+        quartiles = [Words("{}-{}", *each) for each in f["quartiles"][light].values()]
+        rows += [[light, *medians.values()], ["quartiles", *quartiles]]
+        rows.append(["published", *f["published"][light].values()])
+    lines = [
+        Words(
+            "coefficient, {}: {} ({} to {}), published {}",
+            *(name.replace("_", "-"), f["coefficients"][name]),
+            *(*f["coefficient_quartiles"][name], f["published_coefficients"][name]),
+        )
+        for name in f["coefficients"]
+    ]
+    return [
+        Words("Medians over {} seeds of the root of the residual's moving variance", f["seeds"]),
+        Table(["light", *f["table"]["still"]], rows),
+        Words("largest deviation from a published value {}", Percent(f["largest_deviation"])),
+        *lines,
+    ]
+
+
 # A command that prints each of them, on the files of ``cli_world``.
 PRINTED: dict[str, Layout] = {
     "materials": materials_list,
@@ -1012,6 +1066,9 @@ PRINTED: dict[str, Layout] = {
     "compare wax.profile.npz --what front --size 24x16": fronts,
     "compare wax.profile.npz --what front --size 24x16 --chart f.png --table f.md": fronts,
     "stability wax.toml": stability,
+    "motion wax.toml": motion,
+    "motion wax.toml --frames shots --chart m.png": motion,
+    "motion --table": variates,
     "choose wax.toml": choice,
     "choose wax.toml --tolerance 6": choice,
     "choose wax.toml --tolerance 7": choice,

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import time
 
 import numpy as np
 import pytest
@@ -218,6 +219,33 @@ def test_annuli_of_less_than_no_energy_are_unbiased_too():
     assert np.abs(z).max() < SIGMAS
 
 
+def widened(profile, factor):
+    return dataclasses.replace(profile, r_edges_mm=factor * profile.r_edges_mm)
+
+
+def test_a_scale_widens_the_profile(small):
+    """Twice the radii are the same bits as a profile twice as wide."""
+    scene = random_scene()
+    seen = render_samples(scene, make_sampler(small, PITCH), 9, scale=2.0)
+    wide = render_samples(scene, make_sampler(widened(small, 2.0), PITCH), 9)
+    np.testing.assert_array_equal(seen, wide)
+
+
+def test_every_pixel_of_a_map_has_its_own_profile(small):
+    """Each is unbiased against the true picture of the profile as wide as the map says."""
+    scene, sampler = random_scene(), make_sampler(small, PITCH)
+    scale = np.array([0.5, 1.0, 1.7])[np.random.default_rng(9).integers(0, 3, (12, 15))]
+    frames = [render_samples(scene, sampler, 64, scale=scale, frame=k) for k in range(60)]
+    for factor in np.unique(scale):
+        own, here = make_sampler(widened(small, factor), PITCH), scale == factor
+        truth = render_reference(scene, own.profile)[here]
+        stderr = np.sqrt(one_sample_variance(scene, own)[here] / (60 * 64))
+        z = (np.mean(frames, axis=0)[here] - truth) / stderr
+        assert np.abs(z).max() < SIGMAS
+        spread = np.square(z).mean(axis=0)
+        np.testing.assert_allclose(spread, 1.0, atol=SIGMAS * math.sqrt(2.0 / here.sum()))
+
+
 @pytest.mark.parametrize("threads", [1, 2, 3])
 def test_the_bits_do_not_depend_on_threads(small, threads):
     scene, sampler = random_scene(37, 41), make_sampler(small, PITCH)
@@ -260,6 +288,9 @@ def test_noise_of_neighbours_and_frames_is_independent(small):
         ({"counts": np.ones((3, 3), dtype=int)}, "of the type int64 and shape (3, 3); expected"),
         ({"counts": 2.0}, "of the type float64 and shape (); expected whole numbers"),
         ({"counts": float("nan")}, "expected whole numbers"),
+        ({"scale": np.ones((3, 3))}, "a scale of shape (3, 3); expected (12, 15), or one number"),
+        ({"scale": 0.0}, "the scale has values that are not numbers above 0"),
+        ({"scale": np.full((12, 15), np.nan)}, "the scale has values that are not numbers above 0"),
         ({"frame": -1}, "frame = -1; expected a whole number from 0"),
         ({"frame": 1.5}, "frame = 1.5; expected"),
         ({"seed": True}, "seed = True; expected"),
@@ -477,3 +508,50 @@ def test_frames_of_another_size_get_one_line(small):
 def test_light_that_is_no_number_is_refused_in_one_line():
     with pytest.raises(RenderError, match="NaN or infinite value"):
         scene_of([[1.0, float("nan")]])
+
+
+# Full size
+
+
+@pytest.mark.slow
+def test_a_head_of_512_pixels_is_unbiased(skin1):
+    """Blocks of 8 x 8 pixels of all channels within 4.5 standard errors; frames adapt.
+
+    In the shade, below a hundredth of the mean light, a block meets light in few of its 2560
+    samples, so that errors there are not normal; they count in the mean of the whole picture.
+    """
+    scene = make_scene("head", height=512, width=512, mm_per_pixel=PITCH)
+    sampler, factors = make_sampler(skin1, PITCH), intensities("strobe", 40)
+    truth, variance = render_reference(scene, skin1), one_sample_variance(scene, sampler)
+    renderer = AdaptiveRenderer(skin1, PITCH)
+    difference, expected = np.zeros(truth.shape), np.zeros(truth.shape)
+    for h in factors:
+        difference += renderer.render(lit(scene, h)) - h * truth
+        expected += h**2 * variance / renderer.counts[..., None]
+    off, allowed, light = (
+        each.reshape(64, 8, 64, 8, 3).sum(axis=(1, 3)) for each in (difference, expected, truth)
+    )
+    z = (off / np.sqrt(allowed))[light > 0.01 * light.mean()]
+    assert z.size > 9000
+    assert np.abs(z).max() < SIGMAS
+    # The channels share their samples: as many squares as one channel has, at least.
+    assert abs(np.square(z).mean() - 1.0) < SIGMAS * math.sqrt(6.0 / z.size)
+    whole = difference.sum(axis=(0, 1)) / np.sqrt(expected.sum(axis=(0, 1)))
+    assert np.abs(whole).max() < SIGMAS
+
+
+@pytest.mark.slow
+def test_twenty_million_samples_a_second_and_time_in_proportion(skin1):
+    """On two threads, three channels; the least of seven times, all done in turn."""
+    scene = make_scene("head", height=512, width=512, mm_per_pixel=PITCH)
+    sampler, counts = make_sampler(skin1, PITCH), (8, 16, 32, 64)
+    least = dict.fromkeys(counts, math.inf)
+    for _ in range(7):
+        for n in counts:
+            begun = time.perf_counter()
+            render_samples(scene, sampler, n, threads=2)
+            least[n] = min(least[n], time.perf_counter() - begun)
+    assert 64 * 512 * 512 / least[64] > 20e6
+    slope, fixed = np.polyfit(counts, list(least.values()), 1)
+    for n, seconds in least.items():
+        assert seconds == pytest.approx(fixed + slope * n, rel=0.1)

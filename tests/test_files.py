@@ -221,3 +221,15 @@ def test_a_lock_file_unlinked_under_us_is_made_again(tmp_path, monkeypatch):
     with files.locked(tmp_path / "a.npz"):
         assert (tmp_path / ".a.npz.lock").exists()
     assert len(calls) == 2
+
+
+def test_the_temporary_folder_of_a_killed_write_is_removed(tmp_path):
+    killed, other = tmp_path / ".a.npz.abcdefgh.tmp", tmp_path / ".b.npz.abcdefgh.tmp"
+    for each in (killed, other):
+        each.mkdir()
+        (each / "part").write_bytes(b"half")
+    with files.locked(tmp_path / "a.npz"), files.temporary_folder(tmp_path / "a.npz") as aside:
+        assert aside.parent == tmp_path
+        assert aside.match(".a.npz.????????.tmp")
+        (aside / "part").write_bytes(b"half")
+    assert names(tmp_path) == [other.name]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sssfit.errors import ArgumentError, FileError, RenderError
-from sssfit.formats.pictures import load_image
+from sssfit.formats.pictures import load_image, save_image
 from sssfit.methods import LIGHTS, RENDERERS
 from sssfit.motion.curve import SampleCurves, sample_curves
 from sssfit.motion.files import FrameFiles
@@ -275,7 +275,8 @@ def test_frames_are_numbered_and_share_an_exposure(skin1, scenes, tmp_path):
             if name == "variates":
                 pictures.append(picture)
 
-        moving_light(skin1, scenes["edge"], length=6, ways=["without"], watch=watch)
+        with files.held():
+            moving_light(skin1, scenes["edge"], length=6, ways=["without"], watch=watch)
         assert [each.name for each in files.paths] == [f"frame-{k:04}.{form}" for k in range(6)]
         assert sorted((tmp_path / form).iterdir()) == files.paths
         read = [load_image(each).pixels for each in files.paths]
@@ -291,13 +292,56 @@ def test_frames_are_numbered_and_share_an_exposure(skin1, scenes, tmp_path):
 def test_frames_do_not_replace_foreign_files(skin1, scenes, tmp_path):
     frames = make_frames(skin1, scenes["edge"], length=3)
     (tmp_path / "frame-0002.png").write_bytes(b"mine")
+
+    def write(folder, **how):
+        files = FrameFiles(folder, "variates", frames, **how)
+        with files.held():
+            for k in frames:
+                files.write("variates", k, np.full((4, 4, 3), 0.5))
+
     with pytest.raises(FileError, match=r"frame-0002\.png exists and was not written by sssfit"):
-        FrameFiles(tmp_path, "variates", frames)
-    FrameFiles(tmp_path, "variates", frames, force=True)
+        write(tmp_path)
+    assert (tmp_path / "frame-0002.png").read_bytes() == b"mine"
+    write(tmp_path, force=True)
+    assert load_image(tmp_path / "frame-0002.png").pixels.shape == (4, 4, 3)
     with pytest.raises(FileError, match="the folder cannot be made"):
-        FrameFiles(tmp_path / "no" / "folder", "variates", frames)
+        write(tmp_path / "no" / "folder")
     with pytest.raises(FileError, match="the folder cannot be made"):
-        FrameFiles(tmp_path / "frame-0002.png", "variates", frames)
+        write(tmp_path / "frame-0002.png")
+
+
+@pytest.mark.parametrize("stops", [KeyboardInterrupt, FileError])
+def test_frames_come_all_or_none(skin1, scenes, tmp_path, stops):
+    frames = make_frames(skin1, scenes["edge"], length=3)
+    old, new = tmp_path / "old", tmp_path / "new"
+    old.mkdir()
+    save_image(old / "frame-0001.png", np.full((4, 4, 3), 0.5))
+    before = (old / "frame-0001.png").read_bytes()
+
+    def stopped(folder):
+        files = FrameFiles(folder, "variates", frames)
+        with files.held():
+            for k in range(2):
+                files.write("variates", k, np.zeros((4, 4, 3)))
+            raise stops
+
+    for folder in (old, new):
+        with pytest.raises(stops):
+            stopped(folder)
+    assert [each.name for each in old.iterdir()] == ["frame-0001.png"]
+    assert (old / "frame-0001.png").read_bytes() == before
+    assert not new.exists()
+
+
+def test_two_runs_do_not_write_the_same_frames(skin1, scenes, tmp_path):
+    frames = make_frames(skin1, scenes["edge"], length=3)
+    one, two = (FrameFiles(tmp_path, "variates", frames, form="exr") for _ in range(2))
+    with (
+        pytest.raises(FileError, match=r"frame-0000\.exr is being written by another run"),
+        one.held(),
+        two.held(),
+    ):
+        pass
 
 
 def test_a_png_holds_one_or_three_channels(tmp_path):
@@ -319,7 +363,9 @@ def test_a_png_holds_one_or_three_channels(tmp_path):
     with pytest.raises(RenderError, match=r"and the material has 2 channels; write EXR"):
         FrameFiles(tmp_path / "png", "variates", frames)
     files = FrameFiles(tmp_path / "exr", "variates", frames, form="exr")
-    files.write("variates", 1, np.ones((4, 4, 2)))
+    with files.held():
+        for k in frames:
+            files.write("variates", k, np.ones((4, 4, 2)))
     assert load_image(files.paths[1]).channels == ("far", "near")
 
 

@@ -57,6 +57,18 @@ def burley():
     return run_figures(simulate_burley(world.wax(), dr_mm=0.3, radius_mm=8.0), 0.25)
 
 
+def moved():
+    from sssfit.motion import runner
+
+    return runner.run_sequence(world.wax(), "head")[0].to_dict()
+
+
+def tabled():
+    from sssfit.motion import table
+
+    return table.measure_table().to_dict()
+
+
 SMALL = "compare wax.profile.npz --what kernels --size 24x16"
 # Commands, the dict of the record, and what the verb adds: facts of the run, not of the record.
 RECORDS = {
@@ -73,6 +85,8 @@ RECORDS = {
         {"distance_mm", "fov_degrees", "resolution"},
     ),
     "stability wax.toml": (lambda: world.stresses().to_dict(), set()),
+    "motion wax.toml": (moved, set()),
+    "motion --table": (tabled, set()),
     SMALL: (lambda: world.comparison().to_dict(), {"error", "cost", "verdict", "budget"}),
     "chart wax.profile.npz --spectrum": (lambda: spectrum().to_dict(), {"profile"}),
     "chart wax.profile.npz --guide": (lambda: guide().to_dict(), {"profile"}),

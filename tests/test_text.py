@@ -3,7 +3,16 @@
 import pytest
 
 from sssfit.errors import ArgumentError
-from sssfit.text import base_colour, length_mm, lengths_mm, number, numbers, share, whole_number
+from sssfit.text import (
+    base_colour,
+    length_mm,
+    lengths_mm,
+    number,
+    numbers,
+    share,
+    shift,
+    whole_number,
+)
 
 GOOD = [
     (length_mm, (" 250um ",), 0.25),
@@ -18,6 +27,7 @@ GOOD = [
     (whole_number, ("10_000", 2, 10**12), 10_000),
     (share, ("0.5%",), 0.005),
     (share, (" .25 ",), 0.25),
+    (shift, ("2, -1",), (-1, 2)),
     (base_colour, ("44%,0.2",), [0.44, 0.2]),
     (base_colour, (" #c58c6b ",), "#c58c6b"),
 ]
@@ -32,6 +42,7 @@ BAD = [
     *((number, (each,)) for each in ("", "nan", "inf", "1,2", "many")),
     *((numbers, (each,)) for each in ("1,,2", "1,nan")),
     *((share, (each,)) for each in ("0", "1", "100%", "half", "nan")),
+    *((shift, (each,)) for each in ("", "1", "1,2,3", "1,.5", "1,", "1e3,0", "a,b")),
     *((base_colour, (each,)) for each in ("#c58c6", "#xyzxyz", "red", "1,,2")),
 ]
 

@@ -44,6 +44,7 @@ def sample_rows(
     squares: FloatArray,
     weights: FloatArray,
     counts: CountArray,
+    scale: FloatArray,
     key: np.uint64,
     out: DoubleArray,
     first: int,
@@ -67,6 +68,8 @@ def sample_rows(
         Energy of an annulus over its probability.
     counts : array (H, W)
         Samples of each pixel, 1 to 64.
+    scale : array (H, W)
+        Factor of each pixel's radii.
     key : uint64
         From `frame_key`.
     """
@@ -87,7 +90,7 @@ def sample_rows(
                     a = other[a]
                 inside = (_F32(np.int32((word >> _U64(32)) & _SHORT)) + _HALF) * _STEP
                 turn = (_F32(np.int32(word >> _U64(48))) + _HALF) * _STEP
-                radius = np.sqrt(squares[a, 0] + inside * squares[a, 1])
+                radius = scale[y, x] * np.sqrt(squares[a, 0] + inside * squares[a, 1])
                 cosine, sine = cos_sin_turn(turn)
                 down = np.intp(np.floor(radius * sine + _HALF))
                 right = np.intp(np.floor(radius * cosine + _HALF))

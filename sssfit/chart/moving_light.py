@@ -33,13 +33,14 @@ _HEIGHT_INCHES, _LINES_INCHES, _MAPS_INCHES = 9.9, 4.0, 4.7
 # Okabe and Ito's vermillion, green and blue for what adapts, then their orange, purple and black.
 _COLOURS = (*COLOURS, "#e69f00", "#cc79a7", "#000000")
 _STYLES = (*LINE_STYLES[:3], *LINE_STYLES[:3])
-_DECADES = 4.0  # most of an error and of a variance that are drawn
+_ERROR_DECADES, _DECADES = 6.0, 4.0  # most of an error and of a variance that are drawn
 _SAMPLE_TICKS = (1, 2, 4, 8, 16, 32, 64)
 _LEAST, _MOST = _SAMPLE_TICKS[0], _SAMPLE_TICKS[-1]
 _NOTE = (
     "Without noise are the separable kernel and the cascade; all others are one frame's samples, "
     "before any filter over time. Error: root mean square over pixels and channels, against the "
-    "true 2D kernel. Variance: moving, of one sample. Means leave out the first {} frames."
+    "true 2D kernel. Shaded behind the lines: the intensity of the light, from 0 up. Variance: "
+    "moving, of one sample. Means in the legend leave out the first {} frames."
 )
 
 
@@ -85,7 +86,7 @@ def _label(moving: MovingLight, track: Track) -> str:
     """Return a renderer with its means: fetches and error."""
     share = moving.relative(track)
     error = "" if share is None else f", error {100.0 * share:.3g} %"
-    return f"{track.label}: {track.mean_fetches:.3g}{error}"
+    return f"{track.label}: {track.mean_fetches:.3g} fetches{error}"
 
 
 def _style(k: int) -> Style:
@@ -111,7 +112,7 @@ def _draw_lines(place: SubFigure, moving: MovingLight, styles: dict[str, Style])
     largest = max((float(each.max()) for each in errors.values()), default=1.0) or 1.0
     seen = np.concatenate([each[each > 0.0] for each in errors.values()])
     least = float(seen.min()) if seen.size else largest / 10.0
-    _log(under, max(0.7 * least, largest / 10.0**_DECADES), 1.5 * largest)
+    _log(under, max(0.7 * least, largest / 10.0**_ERROR_DECADES), 1.5 * largest)
     above.set_xlim(0, max(len(frames) - 1, 1))
     tick(under.xaxis)
     for axes in (above, under):

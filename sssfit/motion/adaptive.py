@@ -10,6 +10,7 @@ The next frame's samples depend on frames before it only, and on G, so every fra
 """
 
 import numpy as np
+import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
@@ -116,7 +117,9 @@ class AdaptiveRenderer:
         """Moving variance of one sample's residual (H, W); NaN without history."""
         return self._residual.variance
 
-    def render(self, scene: Scene, *, shift: Shift = (0, 0)) -> FloatArray:
+    def render(
+        self, scene: Scene, *, shift: Shift = (0, 0), scale: npt.ArrayLike = 1.0
+    ) -> FloatArray:
         """Render the next frame.
 
         Parameters
@@ -126,6 +129,8 @@ class AdaptiveRenderer:
         shift : (int, int) [pixels]
             By how much the picture has moved down and right since the frame before; pixels that
             came into it begin again.
+        scale : float or array (H, W)
+            Factor of each pixel's radii, as `render_samples`; G stays that of the profile itself.
 
         Returns
         -------
@@ -139,6 +144,7 @@ class AdaptiveRenderer:
             scene,
             self._sampler,
             self.counts,
+            scale=scale,
             frame=self.frame,
             seed=self._seed,
             border=self._border,

@@ -1,12 +1,17 @@
-"""A sequence of pictures in a folder, numbered: frame-0000.png, frame-0001.png and so on."""
+"""A sequence of pictures in a folder, numbered: frame-0000.png, frame-0001.png and so on.
 
+All of them come into the folder at the end, together, or none does.
+"""
+
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import FileError, RenderError
-from sssfit.files import check_output, reason
+from sssfit.files import check_output, locked, reason, temporary_folder
 from sssfit.formats.pictures import is_image_file, save_image
 from sssfit.measure.score import auto_exposure
 from sssfit.messages import counted
@@ -14,7 +19,7 @@ from sssfit.motion.frames import Frames
 
 
 class FrameFiles:
-    """Writes one renderer's pictures as they come.
+    """Writes one renderer's pictures as they come, while `held`.
 
     Parameters
     ----------
@@ -35,8 +40,6 @@ class FrameFiles:
 
     Raises
     ------
-    FileError
-        The folder cannot be made, or a file not written or replaced.
     RenderError
         A PNG cannot hold the channels.
     """
@@ -53,25 +56,59 @@ class FrameFiles:
         digits = max(len(str(len(frames.intensity) - 1)), 4)
         self.paths = [folder / f"frame-{k:0{digits}}.{form}" for k in frames]
         self._name, self._channels = name, list(channels) if form == "exr" else None
-        self._mm_per_pixel = frames.scene.mm_per_pixel
-        try:
-            folder.mkdir(exist_ok=True)
-        except OSError as error:
-            raise FileError(f"{folder}: the folder cannot be made: {reason(error)}.") from None
-        for each in self.paths:
-            check_output(each, is_image_file, force=force)
+        self._frames, self._force = frames, force
         self._exposure = 1.0  # an EXR keeps the light as it is
-        brightest = frames.truths()(int(np.argmax(frames.intensity)))
-        if form == "png" and brightest.any():
-            self._exposure = auto_exposure(brightest)
+        self._aside = folder
+
+    @contextlib.contextmanager
+    def held(self) -> Iterator[None]:
+        """Lock the sequence, and put it into the folder at the end; after an error there is none.
+
+        Raises
+        ------
+        FileError
+            The folder cannot be made, a file not written or replaced, or another run writes them.
+        """
+        with _folder(self.paths[0].parent):
+            for each in self.paths:
+                check_output(each, is_image_file, force=self._force)
+            with locked(self.paths[0]), temporary_folder(self.paths[0]) as self._aside:
+                if self._channels is None:
+                    self._exposure = _exposure(self._frames)
+                yield
+                for each in self.paths:
+                    (self._aside / each.name).replace(each)
 
     def write(self, name: str, frame: int, picture: FloatArray) -> None:
         """Write a frame, if it is of the renderer that was asked for."""
         if name == self._name:
             save_image(
-                self.paths[frame],
+                self._aside / self.paths[frame].name,
                 picture,
                 channels=self._channels,
                 exposure=self._exposure,
-                mm_per_pixel=self._mm_per_pixel,
+                mm_per_pixel=self._frames.scene.mm_per_pixel,
             )
+
+
+@contextlib.contextmanager
+def _folder(path: Path) -> Iterator[None]:
+    """Make a folder, unless it is there; after an error it is gone again."""
+    is_new = not path.exists()
+    try:
+        path.mkdir(exist_ok=True)
+    except OSError as error:
+        raise FileError(f"{path}: the folder cannot be made: {reason(error)}.") from None
+    try:
+        yield
+    except BaseException:
+        if is_new:
+            with contextlib.suppress(OSError):  # somebody else has put something there
+                path.rmdir()
+        raise
+
+
+def _exposure(frames: Frames) -> float:
+    """Return the exposure of the brightest true frame."""
+    brightest = frames.truths()(int(np.argmax(frames.intensity)))
+    return auto_exposure(brightest) if brightest.any() else 1.0

@@ -119,7 +119,7 @@ class MovingLight:
         return track.rmse / self.level if self.level > 0.0 else None
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the figures for JSON."""
+        """Return the figures of ``sssfit motion --json``."""
         return plain(
             {
                 "material": self.material,
@@ -159,8 +159,8 @@ class MovingLight:
             f"target variance {self.target_variance:g}"
         )
         saved = [
-            f"{self.track(name).label}: {100.0 * share:.1f} % fewer samples than without control "
-            "variates"
+            f"{self.track(name).label}: {100.0 * abs(share):.1f} % "
+            f"{'more' if share < 0.0 else 'fewer'} samples than without control variates"
             for name in ("variates", "ahead")
             if (share := self.saving(name)) is not None
         ]

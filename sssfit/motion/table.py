@@ -90,7 +90,7 @@ class VariateTable:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """Return medians, quartiles and published values for JSON."""
+        """Return medians, quartiles and published values as ``sssfit motion --table --json``."""
         return plain(
             {
                 "seeds": self.seeds,

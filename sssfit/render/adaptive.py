@@ -114,6 +114,7 @@ def render_samples(
     sampler: KernelSampler,
     counts: npt.ArrayLike,
     *,
+    scale: npt.ArrayLike = 1.0,
     frame: int = 0,
     seed: int = 1,
     border: str = "mirror",
@@ -129,6 +130,8 @@ def render_samples(
         Of the scene's pixel size.
     counts : int or array (H, W) of int
         Samples of each pixel, 1 to 64; the mean of n samples has 1/n of the variance of one.
+    scale : float or array (H, W)
+        Factor of the radii that a pixel gathers light from, above 0: a map of mean free paths.
     frame : int
         From 0; every frame has its own random numbers.
     seed : int
@@ -141,12 +144,13 @@ def render_samples(
     Returns
     -------
     array (H, W, C)
-        Radiant exitance, in the irradiance's unit; its expected value is `render_reference`'s.
+        Radiant exitance, in the irradiance's unit; its expected value is `render_reference`'s, with
+        the profile of the pixel's scale.
 
     Raises
     ------
     RenderError
-        Numbers of samples, frame or seed are out of range, or scene and sampler do not fit.
+        Numbers of samples, scale, frame or seed are out of range, or scene and sampler do not fit.
     """
     from sssfit._jit import thread_pool
     from sssfit._jit.adaptive import frame_key, sample_rows  # numba: 0.4 s
@@ -155,11 +159,12 @@ def render_samples(
     check_channels(scene.channels, profile.n_channels)
     _check_pitch(scene, sampler)
     shape = scene.height, scene.width
-    many = _checked_counts(counts, shape)
+    many, factor = _checked_counts(counts, shape), _checked_scale(scale, shape)
     for name, value in (("frame", frame), ("seed", seed)):
         if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= _LARGEST:
             raise RenderError(f"{name} = {shown(value)}; expected a whole number from 0.")
-    half = reference_half_pixels(profile, scene.mm_per_pixel, *shape)
+    pitch = scene.mm_per_pixel / float(factor.max())  # of the widest profile's own pixels
+    half = reference_half_pixels(profile, pitch, *shape)
     check_memory(16.0 * half, f"a kernel of {half} pixels each way", "use larger pixels")
     light = np.pad(scene.irradiance, ((0, 1), (0, 1), (0, 0))).astype(np.float32)
     far = far_irradiance(scene.irradiance, border)
@@ -168,7 +173,7 @@ def render_samples(
     everywhere = np.broadcast_to(far, scene.channels).astype(np.float32)
     out = np.empty((*shape, profile.n_channels))
     key = np.uint64(frame_key(seed, frame))
-    given = light, everywhere, *places, half, *tables, many, key, out
+    given = light, everywhere, *places, half, *tables, many, factor, key, out
     _run_blocks(thread_pool(thread_count(threads), "sssfit-samples"), sample_rows, given)
     out += profile.beyond_grid * far
     return out
@@ -222,6 +227,15 @@ def _checked_counts(counts: npt.ArrayLike, shape: tuple[int, int]) -> CountArray
             f"{MOST_SAMPLES}."
         )
     return np.ascontiguousarray(np.broadcast_to(given, shape), dtype=np.int32)
+
+
+def _checked_scale(scale: npt.ArrayLike, shape: tuple[int, int]) -> npt.NDArray[np.float32]:
+    given = np.asarray(scale, dtype=np.float32)
+    if given.shape not in ((), shape):
+        raise RenderError(f"a scale of shape {given.shape}; expected {shape}, or one number.")
+    if not (np.isfinite(given).all() and (given > 0.0).all()):
+        raise RenderError("the scale has values that are not numbers above 0.")
+    return np.ascontiguousarray(np.broadcast_to(given, shape))
 
 
 def _check_pitch(scene: Scene, sampler: KernelSampler) -> None:
