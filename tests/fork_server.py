@@ -18,7 +18,13 @@ from pathlib import Path
 
 # What verbs import when they are run.
 _LOADED = (
-    *("sssfit.chart.profile", "sssfit.compare", "sssfit.export", "sssfit.fit"),
+    *(
+        "sssfit.chart.profile",
+        "sssfit.compare",
+        "sssfit.export",
+        "sssfit.fit",
+        "sssfit.motion.runner",
+    ),
     *(
         "sssfit.formats.mci",
         "sssfit.formats.mco",
