@@ -46,7 +46,7 @@ from sssfit.scene.record import Scene
 from sssfit.simulate import Checkpoint, inversion, simulate_montecarlo
 from sssfit.simulate._finished import DEFAULT_PHOTONS
 from sssfit.stability import Curve, Panel, Stability
-from sssfit.stability.record import Axis
+from sssfit.stability.curve import Axis
 
 WAX = (
     'name = "wax"\nsource = "a test"\neta = 1.3\ng = 0\n'

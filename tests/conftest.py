@@ -25,6 +25,7 @@ import signal
 import sys
 
 import processor  # isort: skip  # noqa: F401 (before numpy)
+import fork_server
 import pytest
 import scipy.linalg  # noqa: F401 (its BLAS has to be there to be limited)
 import shared_work
@@ -86,6 +87,7 @@ def pytest_collection():
 
 def pytest_sessionfinish():
     """Let everything be collected at the end: OpenImageIO complains of what is left over."""
+    fork_server.close()
     gc.unfreeze()
 
 

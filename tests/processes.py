@@ -20,6 +20,11 @@ def start(command, **options):
         process = subprocess.Popen(command, **options)
     finally:
         signal.signal(signal.SIGINT, before)
+    return ended_with_the_test(process)
+
+
+def ended_with_the_test(process):
+    """Let `end_all` end a process, too."""
     _started.append(process)
     return process
 

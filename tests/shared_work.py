@@ -41,7 +41,7 @@ LONG_SEARCHES = {
 # These ask which of two cascades is nearer, or draw lines: far ones, where a descent stops early.
 _WHOLE_DESCENTS = {"test_distance", "test_rotated"}
 _PLAIN = str | int | float | NoneType  # a setting that is a function, or a scene, is not shared
-_state = {"allowed": True, "fits": True, "short": 0, "folder": None}
+_state = {"allowed": True, "fits": True, "short": 0, "folder": None, "begun": False}
 
 
 def _short_descent(chain, x, most, gain=3e-3, real=sssfit.fit.cascade._descend):
@@ -84,7 +84,10 @@ def alone():
 
 
 def begin():
-    """Put all three in front of the real functions."""
+    """Put all three in front of the real functions, unless they are."""
+    if _state["begun"]:
+        return
+    _state["begun"] = True
     exact, head, fits = sssfit.simulate.exact, sssfit.scene.head, sssfit.compare.candidates
     exact._solve = _solved_once(exact._solve)
     head.head_scene = _lit_once(head.head_scene)

@@ -2,10 +2,12 @@
 
 import math
 import re
+import runpy
 import subprocess
 import sys
 from pathlib import Path
 
+import fork_server
 import pytest
 from shader_runs import needs
 
@@ -61,19 +63,36 @@ def tables(text):
     return found
 
 
+def forked(command, *, check=False, capture_output=False, **options):
+    """As `subprocess.run`, by a child that has everything loaded."""
+    streams = {} if capture_output else {"stdout": None, "stderr": None}
+    ended = fork_server.run(command, **streams, **options)
+    if check:
+        ended.check_returncode()
+    return ended
+
+
+@pytest.fixture
+def small(monkeypatch, capfd):
+    """Run a script at its small size, as a program in this process; give its tables."""
+    monkeypatch.setattr(subprocess, "run", forked)
+    monkeypatch.setattr(sys, "path", [*sys.path])
+
+    def call(script):
+        monkeypatch.setattr(sys, "argv", [script, "--small"])
+        runpy.run_path(str(BENCH / script), run_name="__main__")
+        out, err = capfd.readouterr()
+        assert err == ""
+        return tables(out.replace("\\|", "/"))
+
+    return call
+
+
 @pytest.mark.parametrize(
     ("script", "expected"), [("bench_walk.py", TABLES), ("bench_exact.py", EXACT)]
 )
-def test_small_benchmarks_run_and_fill_every_table(script, expected):
-    ended = subprocess.run(
-        [sys.executable, str(BENCH / script), "--small"],
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    assert ended.returncode == 0, ended.stderr
-    assert ended.stderr == ""
-    found = tables(ended.stdout)
+def test_small_benchmarks_run_and_fill_every_table(small, script, expected):
+    found = small(script)
     assert [(heads, [row[0] for row in rows]) for heads, rows in found] == expected
     for heads, rows in found:
         for row in rows:
@@ -86,15 +105,8 @@ def test_small_benchmarks_run_and_fill_every_table(script, expected):
                 assert number >= 0.0
 
 
-def test_small_benchmarks_of_fits_run_and_fill_every_table():
-    ended = subprocess.run(
-        [sys.executable, str(BENCH / "bench_fit.py"), "--small"],
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    assert (ended.returncode, ended.stderr) == (0, "")
-    solver, whole, limits, methods = tables(ended.stdout)
+def test_small_benchmarks_of_fits_run_and_fill_every_table(small):
+    solver, whole, limits, methods = small("bench_fit.py")
     assert [row[0].split()[0] for row in solver[1]] == ["the", "rank", "numpy.linalg.svd"]
     assert float(solver[1][1][3]) < 1e-10  # ours against numpy's, in the same run
     assert [row[0] for row in whole[1]] == ["skin1", "ketchup"]
@@ -104,15 +116,8 @@ def test_small_benchmarks_of_fits_run_and_fill_every_table():
         assert all(math.isfinite(float(value)) for value in row[1:])
 
 
-def test_small_benchmarks_of_renderers_run_and_fill_every_table():
-    ended = subprocess.run(
-        [sys.executable, str(BENCH / "bench_render.py"), "--small"],
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    assert (ended.returncode, ended.stderr) == (0, "")
-    few, many, compiling, cascade, reference = tables(ended.stdout)
+def test_small_benchmarks_of_renderers_run_and_fill_every_table(small):
+    few, many, compiling, cascade, reference = small("bench_render.py")
     for _, rows in (few, many):
         names = [row[0].split(",")[0] for row in rows]
         scipys = ["scipy.ndimage.convolve1d"] * 2
@@ -130,16 +135,9 @@ def test_small_benchmarks_of_renderers_run_and_fill_every_table():
         assert all(float(value) >= 0.0 for value in row)
 
 
-def test_small_benchmarks_of_shaders_run_and_fill_every_table():
+def test_small_benchmarks_of_shaders_run_and_fill_every_table(small):
     needs("glsl")
-    ended = subprocess.run(
-        [sys.executable, str(BENCH / "bench_shader.py"), "--small"],
-        capture_output=True,
-        text=True,
-        timeout=300,
-    )
-    assert (ended.returncode, ended.stderr) == (0, "")
-    cases, ratios = tables(ended.stdout.replace("\\|", "/"))
+    cases, ratios = small("bench_shader.py")
     assert [row[0].split()[0] for row in cases[1]] == [
         *["cascade"] * 6,  # each with its compute shaders
         *("pre-integrated,", "pre-integrated,", "pre-integrated,", "six", "disk,"),

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import fork_server
 import numpy as np
 import pytest
 from reference_pixels import make_profile
@@ -49,7 +50,7 @@ def folder(made, tmp_path, monkeypatch):
 
 
 def sssfit(folder, *arguments, megabytes=None, timeout=120, **environment):
-    """Run it in another process, under a limit of its address space if one is given."""
+    """Run it in a new process, under a limit of its address space if one is given."""
 
     def limit():
         import resource
@@ -209,7 +210,8 @@ def test_warnings_of_others_are_one_line(folder):
 
 @pytest.mark.parametrize("columns", ["40", "0", "abc"])
 def test_narrow_terminals(folder, columns):
-    ended = sssfit(folder, "simulate", "wax.toml", "--photons", "2e4", COLUMNS=columns)
+    command = [sys.executable, "-m", "sssfit.cli", "simulate", "wax.toml", "--photons", "2e4"]
+    ended = fork_server.run(command, cwd=folder, env=os.environ | {"COLUMNS": columns})
     assert ended.returncode == 0
     assert ended.stdout.splitlines()[0].startswith("wax: 20,000 photons, ")  # whole, when piped
 

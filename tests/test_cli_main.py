@@ -13,6 +13,7 @@ import warnings
 from pathlib import Path
 
 import click
+import fork_server
 import processes
 import pytest
 
@@ -61,8 +62,8 @@ def raising(error: BaseException):
     return body
 
 
-def start(body: str, **options) -> subprocess.Popen:
-    """Run the program in another process with a verb ``trial`` of the given source."""
+def trial(body: str) -> list[str]:
+    """The program with a verb ``trial`` of the given source, for another process."""
     program = f"""
 import time
 import click
@@ -74,7 +75,7 @@ def trial():
 
 main(["trial"])
 """
-    return processes.start([sys.executable, "-c", program], **options)
+    return [sys.executable, "-c", program]
 
 
 # Options
@@ -187,7 +188,7 @@ def test_status_of_a_verb_is_the_status_of_the_program(run, verb):
 
 @posix_only
 def test_sigterm_is_130():
-    with start("click.echo('ready')\ntime.sleep(60)") as process:
+    with fork_server.start(trial("click.echo('ready')\ntime.sleep(60)")) as process:
         assert process.stdout.readline() == "ready\n"
         process.send_signal(signal.SIGTERM)
         _, err = process.communicate(timeout=20)
@@ -205,7 +206,7 @@ def test_warning_is_one_line_on_stderr(run, verb):
 
 @posix_only
 def test_reader_that_goes_away_is_no_error():
-    with start("while True:\n    click.echo('x' * 4096)") as process:
+    with fork_server.start(trial("while True:\n    click.echo('x' * 4096)")) as process:
         process.stdout.readline()
         process.stdout.close()
         err = process.stderr.read()
@@ -219,7 +220,7 @@ def test_no_color_is_honoured_on_a_terminal(tmp_path):
     import pty
 
     ours, theirs = pty.openpty()
-    with processes.start(
+    with fork_server.start(
         [sys.executable, "-m", "sssfit.cli", "simulate", "skin1", "--photons", "1e5"],
         cwd=tmp_path,
         env=os.environ | {"NO_COLOR": "1", "TERM": "xterm-256color"},
@@ -274,6 +275,6 @@ def test_matplotlib_says_nothing_and_draws_without_a_display(tmp_path, changed, 
     import matplotlib
     print(matplotlib.get_backend().lower())
     """
-    with start(body, env=environment) as program:
+    with processes.start(trial(body), env=environment) as program:
         out, err = program.communicate()
     assert (program.returncode, out.strip(), err) == (0, "agg", "")

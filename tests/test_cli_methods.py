@@ -4,14 +4,13 @@ import io
 import json
 import os
 import signal
-import subprocess
 import sys
 import time
 from pathlib import Path
 
+import fork_server
 import numpy as np
 import pytest
-from processes import start
 
 from sssfit import simulate
 from sssfit.cli import cli, main
@@ -125,9 +124,8 @@ def test_multipole_reports_what_a_slab_transmits(run, tmp_path):
 
 
 def test_profile_to_stdout(tmp_path):
-    ended = subprocess.run(
-        [*COMMAND, "skin1", "--method", "dipole", "-o", "-"], cwd=tmp_path, capture_output=True
-    )
+    command = [*COMMAND, "skin1", "--method", "dipole", "-o", "-"]
+    ended = fork_server.run(command, cwd=tmp_path, text=False)
     assert ended.returncode == 0
     profile = Profile.read(io.BytesIO(ended.stdout), "stdout")
     assert profile.meta["method"] == "dipole"
@@ -286,7 +284,7 @@ def test_what_was_done_before_a_signal_stays(run, tmp_path, monkeypatch, number)
 @posix
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_an_interrupted_solver_leaves_nothing_behind(tmp_path, number):
-    process = start([*COMMAND, "--paper", "--method", "exact"], cwd=tmp_path)
+    process = fork_server.start([*COMMAND, "--paper", "--method", "exact"], cwd=tmp_path)
     end = time.monotonic() + 60.0
     while not (tmp_path / ".wholemilk.exact.profile.npz.lock").exists():  # the last of them
         assert process.poll() is None

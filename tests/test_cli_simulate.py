@@ -4,12 +4,11 @@ import io
 import json
 import os
 import signal
-import subprocess
 import sys
 import time
 
+import fork_server
 import numpy as np
-import processes
 import pytest
 
 from sssfit.cli import main
@@ -43,7 +42,7 @@ def run(tmp_path, monkeypatch, capfd):
 
 
 def start(folder, *arguments):
-    return processes.start([*COMMAND, *arguments], cwd=folder)
+    return fork_server.start([*COMMAND, *arguments], cwd=folder)
 
 
 def wait_for(condition, seconds=60.0):
@@ -139,9 +138,8 @@ def test_file_has_the_same_bytes_on_one_and_two_threads(run, tmp_path):
 
 
 def test_profile_to_stdout(tmp_path):
-    ended = subprocess.run(
-        [*COMMAND, "skin1", "--photons", "2000", "-o", "-"], cwd=tmp_path, capture_output=True
-    )
+    command = [*COMMAND, "skin1", "--photons", "2000", "-o", "-"]
+    ended = fork_server.run(command, cwd=tmp_path, text=False)
     assert ended.returncode == 0
     assert Profile.read(io.BytesIO(ended.stdout), "stdout").photons == 2000
     assert b"Wrote the profile to stdout" in ended.stderr
@@ -288,14 +286,12 @@ def test_a_second_signal_meets_the_former_handler(first, second):
 def test_two_at_once_and_killed(tmp_path):
     first = start(tmp_path, "skin1", "--photons", "1e11")
     wait_for(lambda: (tmp_path / ".skin1.profile.npz.lock").exists())
-    second = subprocess.run(
-        [*COMMAND, "skin1", "--photons", "1e4"], cwd=tmp_path, capture_output=True, text=True
-    )
+    second = fork_server.run([*COMMAND, "skin1", "--photons", "1e4"], cwd=tmp_path)
     assert second.returncode == 1
     assert "being written by another run" in second.stderr
     first.kill()
     first.communicate()
     assert not (tmp_path / "skin1.profile.npz").exists()
-    third = subprocess.run([*COMMAND, "skin1", "--photons", "1e4", "-q"], cwd=tmp_path)
+    third = fork_server.run([*COMMAND, "skin1", "--photons", "1e4", "-q"], cwd=tmp_path)
     assert third.returncode == 0
     assert names(tmp_path) == ["skin1.profile.npz"]

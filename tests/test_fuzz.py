@@ -16,17 +16,18 @@ import random
 import re
 import shutil
 import signal
+import subprocess
 import sys
 import time
 import types
 from pathlib import Path
 
 import click
+import fork_server
 import jsonschema
 import mutations
 import numpy as np
 import pytest
-from fork_server import Forks
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from reference_pixels import make_profile
@@ -65,6 +66,12 @@ CUT_SECONDS = 2.0  # a run of odd options may be a long one; it is then interrup
 MOST_SECONDS = 60.0  # for a case; the slowest take a second on an idle machine
 MOST_BYTES = 1_500_000_000  # what a case may add to the memory that was ever used
 FEW = ("--photons", "3")
+STRICT = """
+import sys, warnings
+from sssfit.cli import main
+warnings.simplefilter("error")
+main(sys.argv[1:])
+"""
 
 posix = pytest.mark.skipif(os.name != "posix", reason="forks are POSIX")
 pytestmark = pytest.mark.filterwarnings("error")
@@ -100,14 +107,6 @@ def originals(tmp_path_factory):
         "skin1.profile.npz.checkpoint": (folder / "c").read_bytes(),
         "light.exr": (folder / "light.exr").read_bytes(),
     }
-
-
-@pytest.fixture(scope="module")
-def forks():
-    """What runs a command line in a process of its own."""
-    client = Forks()
-    yield client
-    client.close()
 
 
 @pytest.fixture
@@ -222,12 +221,22 @@ def ended(arguments, stdin):
     return ending.value.code or 0
 
 
-def run_apart(forks, folder, arguments, stdin):
+def run_apart(folder, arguments, stdin):
     """As `run`, in a process of its own: odd options may ask for hours, and are interrupted."""
-    before = snapshot(folder)
-    status, out, err, is_cut = forks.run(
-        folder, arguments, stdin, cut=CUT_SECONDS, most=MOST_SECONDS
-    )
+    before, given = snapshot(folder), folder.parent / "stdin"
+    given.write_bytes(stdin)
+    is_cut = False
+    with given.open() as stream:
+        process = fork_server.start(
+            [sys.executable, "-c", STRICT, *arguments], cwd=folder, stdin=stream
+        )
+    try:
+        out, err = process.communicate(timeout=CUT_SECONDS)
+    except subprocess.TimeoutExpired:
+        is_cut = True
+        process.send_signal(signal.SIGINT)
+        out, err = process.communicate(timeout=MOST_SECONDS - CUT_SECONDS)
+    status = process.returncode
     assert "Traceback" not in out
     if is_cut and status == 130:
         assert err.endswith("Interrupted.\n"), err
@@ -462,7 +471,7 @@ def likely_or_odd(rng, option):
     return rng.choice(likely if rng.random() < 0.5 else ODD)
 
 
-def try_options(forks, folder, originals, examples):
+def try_options(folder, originals, examples):
     """Give verbs so many lists of options."""
 
     @fuzz(examples)
@@ -473,21 +482,21 @@ def try_options(forks, folder, originals, examples):
         (folder / "deep").mkdir()
         for name, content in originals.items():
             (folder / name).write_bytes(content)
-        run_apart(forks, folder, [*option_list(rng), "-q"], originals[rng.choice(FILES[:6])])
+        run_apart(folder, [*option_list(rng), "-q"], originals[rng.choice(FILES[:6])])
 
     trial()
 
 
 @posix
-def test_odd_options(work, originals, forks):
-    try_options(forks, work, originals, 25)
+def test_odd_options(work, originals):
+    try_options(work, originals, 25)
 
 
 @posix
 @pytest.mark.slow
 @pytest.mark.timeout(7200)
-def test_twelve_hundred_option_lists(work, originals, forks):
-    try_options(forks, work, originals, 1200)
+def test_twelve_hundred_option_lists(work, originals):
+    try_options(work, originals, 1200)
 
 
 def test_the_rules_are_held_to(bench, monkeypatch):

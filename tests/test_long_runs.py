@@ -14,6 +14,7 @@ import sys
 import time
 import warnings
 
+import fork_server
 import numpy as np
 import processes
 import pytest
@@ -576,7 +577,8 @@ def test_a_full_disk_at_the_end_is_one_line_and_resumed(run, tmp_path, monkeypat
 
 
 def start(folder, *arguments, **environment):
-    return processes.start([*COMMAND, *arguments], cwd=folder, env=os.environ | environment)
+    begin = processes.start if environment else fork_server.start  # a cache of its own: compiling
+    return begin([*COMMAND, *arguments], cwd=folder, env=os.environ | environment)
 
 
 def wait_for(condition, seconds=60.0):
@@ -678,6 +680,7 @@ class Killer:
 
 KILLED = ("skin1", "--photons", "4e6", "--checkpoint-every", "0.05", "-q")
 BRIEF = ("skin1", "--photons", "1e6", "--checkpoint-every", "0.02", "-q")
+LONGER = ("skin1", "--photons", "2e6", "--checkpoint-every", "0.02")  # than a disk takes to fill
 
 
 def run_alone(folder, arguments):
@@ -746,7 +749,7 @@ def test_all_materials_killed_and_resumed(tmp_path):
     folders = [tmp_path / each for each in ("whole", "killed")]
     for folder in folders:
         folder.mkdir()
-    subprocess.run([*COMMAND, *arguments], cwd=folders[0], check=True)
+    fork_server.run([*COMMAND, *arguments], cwd=folders[0]).check_returncode()
     killer = Killer(arguments, 3.0, random.Random(3))
     for _ in range(2):
         killer.kill_one(folders[1], "by the clock")
@@ -799,10 +802,9 @@ def fill(folder, seconds=0.3):
 
 
 @posix
-def test_a_disk_that_fills_up_during_a_run(small_disk, undisturbed):
-    whole, _ = undisturbed
-    loud = [each for each in KILLED if each != "-q"]
-    process = start(small_disk, *loud)
+def test_a_disk_that_fills_up_during_a_run(small_disk, tmp_path):
+    whole, _ = run_alone(tmp_path, [*LONGER, "-q"])
+    process = start(small_disk, *LONGER)
     wait_for((small_disk / CHECKPOINT).exists)
     fill(small_disk)
     _, err = process.communicate(timeout=120)
@@ -814,7 +816,7 @@ def test_a_disk_that_fills_up_during_a_run(small_disk, undisturbed):
     )
     assert names(small_disk) == ["filler", CHECKPOINT]
     (small_disk / "filler").unlink()
-    process = start(small_disk, *KILLED, "--resume")
+    process = start(small_disk, *LONGER, "-q", "--resume")
     assert process.communicate(timeout=120)[1] == ""
     assert (small_disk / PROFILE).read_bytes() == whole
     assert names(small_disk) == [PROFILE]

@@ -4,7 +4,7 @@ import os
 import subprocess
 import sys
 
-import processes
+import fork_server
 import pytest
 
 from sssfit.cli import main
@@ -43,7 +43,7 @@ def test_a_full_bar_is_taken_from_the_terminal(tmp_path, arguments):
 
     ours, theirs = pty.openpty()
     try:
-        ran = processes.start(
+        ran = fork_server.start(
             command(arguments),
             cwd=tmp_path,
             stdout=subprocess.DEVNULL,

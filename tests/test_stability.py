@@ -26,8 +26,10 @@ from sssfit.stability import (
     stability,
     taps,
 )
-from sssfit.stability.record import BETWEEN, FROM, NEVER, SAFE, UP_TO, Axis
-from sssfit.stability.subject import Subject, Way
+from sssfit.stability.curve import Axis
+from sssfit.stability.panel import BETWEEN, FROM, NEVER, SAFE, UP_TO
+from sssfit.stability.subject import Subject
+from sssfit.stability.ways import Way
 
 # `stability` itself hears no warning of a fit; these call the fits beside it.
 pytestmark = pytest.mark.filterwarnings("ignore::sssfit.errors.SssfitWarning")
@@ -93,7 +95,7 @@ def test_a_linear_axis_is_interpolated_linearly():
 
 
 def test_the_table_has_a_row_for_each_method_and_stress(profile):
-    found = stability(profile, only=["hard-light"], mm_per_pixel=0.25)
+    found = stability(profile, only=["hard-light"], mm_per_pixel=0.25, threads=1)
     rows = [line for line in found.table().splitlines() if line.startswith("| hard-light")]
     assert len(rows) == sum(len(panel.curves) for panel in found.panels) == 6
     assert json.loads(json.dumps(found.to_dict()))["panels"][0]["stress"] == "hard-light"
@@ -102,7 +104,7 @@ def test_the_table_has_a_row_for_each_method_and_stress(profile):
 
 def test_a_gaussian_profile_is_healthy_and_a_cross_is_found(profile):
     """One term is exact for Gaussians; a kernel with a cross on its axes is not round."""
-    found = stability(profile, only=["hard-light"], mm_per_pixel=0.25)
+    found = stability(profile, only=["hard-light"], mm_per_pixel=0.25, threads=1)
     assert {each.kind for panel in found.panels for each in panel.findings()} == {SAFE}
     kernel = Way("svd", "svd", {"rank": 1}).fit(profile, 0.25)
     weights = kernel.weights.copy()
@@ -147,9 +149,9 @@ def test_a_single_gaussian_needs_one_and_every_start_finds_it():
     edges_mm = np.linspace(0.0, 8.0, 801)
     within = 0.5 * gaussian_cdf(edges_mm[:, None], np.array([1.0]))
     subject = Subject("one", make_profile(edges_mm, np.diff(within, axis=0)), 0.25)
-    assert gaussians._error(gaussians._fit(subject, False, 1)) < 1e-6
-    assert gaussians._missed(subject, False, 1) == 0.0
-    assert gaussians._nearest(gaussians._fit(subject, False, 1)) == 0.0
+    assert gaussians.sums(subject, False)[0].error < 1e-6
+    assert gaussians._missed(subject, (False, 1)) == 0.0
+    assert gaussians.nearest(gaussians.sums(subject, False)[0]) == 0.0
 
 
 @pytest.fixture(scope="module")
@@ -161,7 +163,7 @@ def walked():
         patch.setattr(
             noise, "WAYS", [Way("svd 3", "svd", {"rank": 3}), Way("pre", "preintegrated", {})]
         )
-        return stability(load_material("skin1"), only=["noise"]).panels
+        return stability(load_material("skin1"), only=["noise"], threads=1).panels
 
 
 def test_noise_falls_as_the_root_of_the_photons(walked):
@@ -189,7 +191,7 @@ def test_a_fit_that_chases_noise_is_found(walked, monkeypatch):
     monkeypatch.setattr(noise, "_LAST", 5)
     monkeypatch.setattr(noise, "_SEEDS", 8)
     monkeypatch.setattr(noise, "WAYS", [Way("svd 3", "svd", {"rank": 3})])
-    found = next(stability(load_material("skin1"), only=["noise"]).panels[0].findings())
+    found = next(stability(load_material("skin1"), only=["noise"], threads=1).panels[0].findings())
     healthy = next(walked[0].findings())
     assert healthy.kind == FROM
     assert found.kind == NEVER or found.below.at > 2.0 * healthy.below.high
@@ -197,7 +199,7 @@ def test_a_fit_that_chases_noise_is_found(walked, monkeypatch):
 
 def test_stresses_that_walk_need_a_material(profile):
     with pytest.raises(FitError, match="noise: the profile does not say its material"):
-        stability(profile, only=["noise"])
+        stability(profile, only=["noise"], threads=1)
 
 
 @pytest.mark.parametrize(
@@ -233,7 +235,7 @@ def test_what_fits_warn_of_is_not_heard_and_filters_are_put_back(profile, monkey
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always")
         inside = list(warnings.filters)
-        stability(profile, only=["hard-light"], mm_per_pixel=0.25)
+        stability(profile, only=["hard-light"], mm_per_pixel=0.25, threads=1)
         assert list(warnings.filters) == inside
     assert heard == []
 

@@ -16,6 +16,8 @@ from sssfit.methods import STRESSES
 from sssfit.shapes import gaussian_cdf
 from sssfit.simulate import simulate_exact, simulate_montecarlo
 from sssfit.stability import rules
+from sssfit.stability.facts import Facts
+from sssfit.stability.noise_floor import noise_ratio, rank_of_noise
 
 PITCH = 0.3
 # What the fits themselves warn of is not asked here.
@@ -34,7 +36,7 @@ def walks():
 
 
 def fired(kernel, profile=None):
-    facts = rules.Facts(kernel, profile)
+    facts = Facts(kernel, profile)
     return {each.name for each in rules.RULES if each.look(facts, each.limit)}
 
 
@@ -56,7 +58,7 @@ def test_every_rule_names_its_stress_and_says_one_sentence(walks):
 def test_a_rank_in_the_noise_is_named_and_one_above_it_is_not(walks, exact):
     low = fit_svd(walks[2000], rank=5, mm_per_pixel=PITCH).kernel
     assert "rank-in-noise" in fired(low, walks[2000])
-    enough = rules.rank_of_noise(walks[2000], PITCH, low.half_pixels)
+    enough = rank_of_noise(walks[2000], PITCH, low.half_pixels)
     good = fit_svd(walks[2000], rank=enough, mm_per_pixel=PITCH).kernel
     assert "rank-in-noise" not in fired(good, walks[2000])
     many = fit_svd(walks[1_000_000], rank=3, mm_per_pixel=PITCH).kernel
@@ -79,7 +81,7 @@ def test_the_noise_ratio_is_that_of_walks_around_the_exact_kernel(exact):
         )
         apart = _full(Target(walk, PITCH, half), 0) - _full(wanted, 0)
         errors.append(np.linalg.norm(apart) / norm)
-        predicted.append(rules.noise_ratio(walk, PITCH)[0])
+        predicted.append(noise_ratio(walk, PITCH)[0])
     # The prediction takes a ring's pixels as alike, which the middle ones are not: 20 %. The mean
     # of squares of 12 walks is known to about 2 sqrt(2 / 12) / 2 of itself over few rings.
     assert np.mean(np.square(errors)) == pytest.approx(np.mean(np.square(predicted)), rel=0.5)
@@ -93,8 +95,8 @@ def _full(target, channel):
 
 def test_the_rank_of_noise_is_where_the_residual_meets_it(walks):
     walk, half = walks[2000], 40
-    noise = rules.noise_ratio(walk, PITCH)
-    rank = rules.rank_of_noise(walk, PITCH, half)
+    noise = noise_ratio(walk, PITCH)
+    rank = rank_of_noise(walk, PITCH, half)
     left = []
     for c in range(3):
         squares = np.sort(all_eigenvalues(Target(walk, PITCH, half).quadrant(c)) ** 2)[::-1]

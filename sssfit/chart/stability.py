@@ -49,14 +49,14 @@ def stability_figure(stability: Stability) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        8 inches wide. Bars are quartiles over seeds; a line leaves its panel at the top where a fit
-        is refused.
+        8 inches wide. Bars are where other seeds lie; a line leaves its panel at the top where a
+        fit is refused.
     """
     panels = stability.panels
     shared = _shared(stability)
     rows = math.ceil(len(panels) / _COLUMNS)
     where = f"pixels of {stability.mm_per_pixel:g} mm, seed {stability.seed}"
-    notes = ["Shaded: within the limit. Bars: quartiles over seeds.", *stability.notes]
+    notes = ["Shaded: within the limit. Bars: where other seeds lie.", *stability.notes]
     height = _HEAD_INCHES + rows * _PANEL_INCHES
     title = f"{stability.material}: where fits are safe"
     with new_page(height, title, where, notes) as (figure, below):
@@ -123,7 +123,7 @@ def _styles(labels: list[str], shared: list[str]) -> dict[str, int]:
 
 
 def _line(axes: Axes, curve: Curve, style: Style) -> Line2D:
-    """Draw a curve with its quartiles, and return its line."""
+    """Draw a curve with its bars, and return its line."""
     known = np.isfinite(curve.y)
     (line,) = axes.plot(curve.x[known], curve.y[known], label=curve.label, **style)
     if curve.low is None or curve.high is None:
@@ -136,7 +136,7 @@ def _line(axes: Axes, curve: Curve, style: Style) -> Line2D:
 
 
 def _bars(y: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
-    """Return lengths of bars down and up (2, N); 0 where a quartile is infinite."""
+    """Return lengths of bars down and up (2, N); 0 where an end is infinite."""
     with np.errstate(invalid="ignore"):
         bars = np.stack((y - low, high - y))
     found: FloatArray = np.where(np.isfinite(bars), np.maximum(bars, 0.0), 0.0)

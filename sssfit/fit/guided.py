@@ -13,6 +13,7 @@ that the other pixels leave over and becomes a spike, which is reported and can 
 
 import math
 import warnings
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -207,11 +208,18 @@ def _sum_constraint(wanted: float, weights: FloatArray) -> Function:
 
 
 def fit_one_pass(
-    target: Target, channel: int, extent_mm: float, k: float, b: float, most: float
+    target: Target,
+    channel: int,
+    extent_mm: float,
+    k: float,
+    b: float,
+    most: float,
+    begin: Callable[[FloatArray], FloatArray] | None = None,
 ) -> ChannelFit:
     """Fit a channel level by level, with energies as shares of its total, so that sum(a) = 1.
 
-    ``extent_mm`` is where x = 1 in Gamma, ``most`` the largest share of the middle pixel.
+    ``extent_mm`` is where x = 1 in Gamma, ``most`` the largest share of the middle pixel. ``begin``
+    makes the start of the coarsest level from the pre-integrated pass (h+1,), which it is without.
     """
     total = float(target.total[channel])
     extent = float(extent_mm / (target.mm_per_pixel * (target.half_pixels + 0.5)))
@@ -221,7 +229,10 @@ def fit_one_pass(
         pitch = target.mm_per_pixel * (target.half_pixels + 0.5) / (half + 0.5)
         level = Target(target.profile, pitch, half)
         line = level.half_line()[:, channel]
-        start = line if found is None else _resampled(found.x, half)
+        if found is not None:
+            start = _resampled(found.x, half)
+        else:
+            start = line if begin is None else begin(line)
         found = rank_one(
             level.quadrant(channel) / total,
             gamma(half, k, b, extent),

@@ -25,6 +25,7 @@ K_r and the contribution of the critical angle to E fall like (k s tan(theta_c))
 neglected beyond ``Resolution.phase`` radians.
 """
 
+import functools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -122,7 +123,7 @@ def respond(k: float, eta: float, albedos: FloatArray, resolution: Resolution) -
     Response
         For a beam of energy 1 along the normal.
     """
-    equation = _Equation.of(k, eta, resolution)
+    equation = _Equation.of(k, eta, resolution) if k > 0.0 else _of_all_light(eta, resolution)
     return equation.solve(
         normal_transmittance(eta) * np.exp(-equation.panels.nodes.ravel()), albedos
     )
@@ -135,7 +136,7 @@ def respond_to_diffuse_light(eta: float, albedos: FloatArray, resolution: Resolu
     Inside, within the cone, it is eta^2 (1 - R_F)/pi, so its first collisions have the density 4
     eta^2 E(z) (docs/theory.md).
     """
-    equation = _Equation.of(0.0, eta, resolution)
+    equation = _of_all_light(eta, resolution)
     return equation.solve(4.0 * eta**2 * equation.escape, albedos)
 
 
@@ -186,6 +187,13 @@ class _Equation:
             multiple[i] = albedo * np.sum(weights * (density - first) * self.escape)
             absorbed[i] = (1.0 - albedo) * np.sum(weights * density) + deep
         return Response(multiple, absorbed)
+
+
+# An inversion asks for the total of ten sets of albedos: set up once, it takes a fifth of the time.
+@functools.lru_cache(maxsize=4)  # of .7 MB each
+def _of_all_light(eta: float, resolution: Resolution) -> _Equation:
+    """Return the equation for wavenumber 0, which gives totals."""
+    return _Equation.of(0.0, eta, resolution)
 
 
 def _panels(kappa: float, resolution: Resolution) -> _Panels:

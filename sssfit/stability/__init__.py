@@ -4,6 +4,8 @@
 with a function from a `Subject` to panels, and one entry there.
 """
 
+import contextlib
+import dataclasses
 import math
 import warnings
 from collections.abc import Callable, Collection
@@ -14,8 +16,11 @@ from sssfit.files import has_mark
 from sssfit.material import Material
 from sssfit.messages import did_you_mean, shown
 from sssfit.methods import STRESSES
+from sssfit.process import one_blas_thread, thread_count
 from sssfit.profile import Profile
-from sssfit.stability.record import MARK, Curve, Edge, Finding, Panel, Stability
+from sssfit.stability.curve import Curve, Edge
+from sssfit.stability.panel import Finding, Panel
+from sssfit.stability.record import MARK, Stability
 
 __all__ = ["Curve", "Edge", "Finding", "Panel", "Stability", "is_stability_table", "stability"]
 
@@ -45,7 +50,9 @@ def stability(
     seed : int
         Of walks and searches.
     threads : int, optional
-        By default all cores; results do not depend on them.
+        Processes that share the work, by default as many as there are cores; a script that calls
+        this needs its ``if __name__ == "__main__":`` then. With 1 there is none but the caller's.
+        Results do not depend on them.
     is_whole : bool
         Whether cascades have as many seeds and sizes as the others.
     progress : callable, optional
@@ -59,12 +66,15 @@ def stability(
     ------
     ArgumentError
         A stress is unknown.
+    SssfitError
+        A process was killed.
     FitError
         A stress that was named needs a material, and the profile does not say its own; or no kernel
         can be made.
     """
     from sssfit.simulate import simulate_exact  # numba, and half a second for all of these
     from sssfit.stability.subject import Subject
+    from sssfit.stability.workers import Workers
 
     names = _named(only)
     if not (math.isfinite(mm_per_pixel) and mm_per_pixel > 0.0):
@@ -74,10 +84,11 @@ def stability(
     subject = Subject(name, profile, mm_per_pixel, seed, threads, is_whole)
     panels: list[Panel] = []
     notes: list[str] = []
-    # Here and not around each fit: threads would put back each other's filters. What fits warn of
-    # is what a stress finds out.
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SssfitWarning)
+    with warnings.catch_warnings(), one_blas_thread(), contextlib.ExitStack() as ends:
+        warnings.simplefilter("ignore", SssfitWarning)  # what fits warn of is what a stress finds
+        if (count := thread_count(threads)) > 1:
+            workers = ends.enter_context(Workers(count, subject))
+            subject = dataclasses.replace(subject, workers=workers)
         for k, each in enumerate(names):
             if progress is not None:
                 progress(k, len(names), each)

@@ -19,17 +19,10 @@ from sssfit.render.screen import render_screen
 from sssfit.render.screen_taps import render_screen_taps
 from sssfit.scene.made import make_scene
 from sssfit.scene.record import Scene
-from sssfit.stability.record import Axis, Curve, Panel
-from sssfit.stability.subject import (
-    CASCADE,
-    PICTURES,
-    SIDE,
-    Subject,
-    Way,
-    attempted,
-    cascade,
-    error_of,
-)
+from sssfit.stability.curve import Axis, Curve
+from sssfit.stability.panel import Panel
+from sssfit.stability.subject import PICTURES, SIDE, Subject, attempted, error_of
+from sssfit.stability.ways import CASCADE, Way, cascade
 
 LIMIT = 1.0  # Delta E
 # Of skin1's kernel for .3 mm, 161 pixels wide, 1 288 at the first and about one at the last.
@@ -47,8 +40,8 @@ _NEAREST = "a table for each octave of pixel sizes"
 
 def stress(subject: Subject) -> list[Panel]:
     """Show the subject's tables near by, far away, on slopes and where pixels grow."""
-    flat = {each.label: subject.true_kernel(each) for each in (*_CASCADES, _PAIR, _DISK)}
-    screen = {each.label: subject.true_kernel(each) for each in (*_CASCADES, _PAIR, _DENSE)}
+    flat = subject.true_kernels((*_CASCADES, _PAIR, _DISK))
+    screen = subject.true_kernels((*_CASCADES, _PAIR, _DENSE))
     return [
         Panel(
             stress="distance",

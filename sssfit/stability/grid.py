@@ -10,8 +10,10 @@ from sssfit.errors import FitError
 from sssfit.methods import TAPS
 from sssfit.profile import Profile
 from sssfit.simulate import simulate_exact
-from sssfit.stability.record import Axis, Curve, Panel
-from sssfit.stability.subject import WAYS, Subject, Way
+from sssfit.stability.curve import Axis, Curve
+from sssfit.stability.panel import Panel
+from sssfit.stability.subject import Subject
+from sssfit.stability.ways import WAYS, Way
 
 LIMIT = 1.0  # Delta E
 _RINGS = (1.0, 4.0, 16.0, 64.0, 256.0)  # times the width of the subject's annuli
@@ -39,7 +41,7 @@ def stress(subject: Subject) -> list[Panel]:
             axis=Axis("annulus (times the default)", mild=1.0),
             y_label="p99 of Delta E 2000",
             limit=LIMIT,
-            curves=[_curve(subject, each, _RINGS, wide, "finer annuli") for each in ways],
+            curves=_curves(subject, ways, _RINGS, wide, "finer annuli"),
             fails="the middle of the kernel is unresolved",
         ),
         Panel(
@@ -48,7 +50,7 @@ def stress(subject: Subject) -> list[Panel]:
             axis=Axis("radius (share of the default)", mild=1.0),
             y_label="p99 of Delta E 2000",
             limit=LIMIT,
-            curves=[_curve(subject, each, _RADII, short, "a larger radius") for each in ways],
+            curves=_curves(subject, ways, _RADII, short, "a larger radius"),
             fails="light beyond the grid is lost or gathered",
         ),
     ]
@@ -60,8 +62,14 @@ def _profile(subject: Subject, dr_mm: float, radius_mm: float) -> Profile:
     return simulate_exact(subject.material, dr_mm=dr_mm, radius_mm=radius_mm, threads=threads)
 
 
-def _curve(
-    subject: Subject, way: Way, factors: tuple[float, ...], profiles: list[Profile], advice: str
-) -> Curve:
-    errors = np.maximum(subject.changes(way, profiles), 1e-3)
-    return Curve(way.label, np.array(factors), errors, advice=advice)
+def _curves(
+    subject: Subject,
+    ways: list[Way],
+    factors: tuple[float, ...],
+    profiles: list[Profile],
+    advice: str,
+) -> list[Curve]:
+    return [
+        Curve(way.label, np.array(factors), np.maximum(errors, 1e-3), advice=advice)
+        for way, errors in zip(ways, subject.changes(ways, profiles), strict=True)
+    ]

@@ -4,6 +4,7 @@ The paper draws k = 1.55, sees nothing beyond 4, and calls moderate changes of b
 """
 
 import functools
+from collections.abc import Callable
 
 import numpy as np
 
@@ -11,8 +12,9 @@ from sssfit.arrays import FloatArray
 from sssfit.fit import FitResult, fit_guided
 from sssfit.fit._result import fit_channels
 from sssfit.fit.guided import extents_of, fit_one_pass, guided_target
-from sssfit.stability.record import Axis, Curve, Panel
-from sssfit.stability.subject import Subject
+from sssfit.stability.curve import Axis, Curve
+from sssfit.stability.panel import Panel
+from sssfit.stability.subject import PICTURES, Subject, attempted
 
 LIMIT = 1.0  # Delta E
 DRAWN_K, DRAWN_B = 1.55, 50.0
@@ -20,16 +22,21 @@ STOPPED_LIMIT = 0.0  # channels that stop before they converge
 _KS = (0.0, 0.5, 1.0, 1.55, 2.0, 3.0, 4.0, 5.0, 6.0)
 _BS = (5.0, 12.5, 25.0, 50.0, 100.0, 200.0, 500.0)
 _PIXELS = (9, 17, 33, 65, 129, 257, 513)
+_SPREADS, _STARTS = (0.1, 1.0, 10.0), 8
+_FLOOR = 1e-3  # Delta E, for logarithmic axes
 _ADVICE_K, _ADVICE_B = "k between 1 and 4", "b near 50"
 
 
 def stress(subject: Subject) -> list[Panel]:
-    """Change k from 0 to 6, b from 5 to 500, and fit 9 to 513 pixels."""
+    """Change k from 0 to 6, b from 5 to 500, the start, and fit 9 to 513 pixels."""
     own = subject.shows(_fit(subject, DRAWN_K, DRAWN_B).kernel)
-    nearest = functools.partial(_change, subject, own)
-    by_k = subject.each(lambda k: nearest(_fit(subject, k, DRAWN_B)), _KS)
-    by_b = subject.each(lambda b: nearest(_fit(subject, DRAWN_K, b)), _BS)
-    by_pixels = subject.each(functools.partial(_on_pixels, subject), _PIXELS)
+    by_k, by_b = (
+        np.array(subject.each(functools.partial(_change, own), given))
+        for given in ([(k, DRAWN_B) for k in _KS], [(DRAWN_K, b) for b in _BS])
+    )
+    starts = [(each, number) for each in _SPREADS for number in range(_STARTS)]
+    by_start = np.array(subject.each(functools.partial(_from_start, own), starts))
+    by_pixels = subject.each(_on_pixels, reversed(_PIXELS))[::-1]
     misses = [abs(float(each.energy_error[0])) for each in by_pixels]
     early = [_stopped_early(each) for each in by_pixels]
     return [
@@ -39,7 +46,7 @@ def stress(subject: Subject) -> list[Panel]:
             axis=Axis("k", mild=DRAWN_K, is_log=False),
             y_label="p99 of Delta E 2000",
             limit=LIMIT,
-            curves=[Curve("guided", np.array(_KS), np.maximum(by_k, 1e-3), advice=_ADVICE_K)],
+            curves=_by_picture(_KS, by_k, _ADVICE_K),
             fails="near and far light trade places",
         ),
         Panel(
@@ -48,8 +55,17 @@ def stress(subject: Subject) -> list[Panel]:
             axis=Axis("b", mild=DRAWN_B),
             y_label="p99 of Delta E 2000",
             limit=LIMIT,
-            curves=[Curve("guided", np.array(_BS), np.maximum(by_b, 1e-3), advice=_ADVICE_B)],
+            curves=_by_picture(_BS, by_b, _ADVICE_B),
             fails="the guide's cross widens or vanishes",
+        ),
+        Panel(
+            stress="guided",
+            title=f"what {_STARTS} other starts change",
+            axis=Axis("standard deviation of the start's logarithms", mild=_SPREADS[0]),
+            y_label="p99 of Delta E 2000",
+            limit=LIMIT,
+            curves=[_by_start(by_start.reshape(len(_SPREADS), _STARTS))],
+            fails="the search ends elsewhere",
         ),
         Panel(
             stress="guided",
@@ -73,16 +89,55 @@ def stress(subject: Subject) -> list[Panel]:
     ]
 
 
-def _fit(subject: Subject, k: float, b: float) -> FitResult:
+def _fit(
+    subject: Subject,
+    k: float,
+    b: float,
+    begin: Callable[[FloatArray], FloatArray] | None = None,
+) -> FitResult:
     """Fit as `fit_guided` does, which refuses a k above the paper's 4."""
     target = guided_target(subject.profile, subject.mm_per_pixel, None)
     extents_mm = extents_of(target)
     return fit_channels(
         target,
         "guided",
-        lambda channel: fit_one_pass(target, channel, extents_mm[channel], k, b, 1.0),
+        lambda channel: fit_one_pass(target, channel, extents_mm[channel], k, b, 1.0, begin),
         settings={"k": k, "b": b},
     )
+
+
+def _change(own: list[FloatArray], subject: Subject, given: tuple[float, float]) -> list[float]:
+    """Return what k and b change of each picture."""
+    return subject.errors(_fit(subject, *given).kernel, own)
+
+
+def _from_start(own: list[FloatArray], subject: Subject, given: tuple[float, int]) -> float:
+    """Return what a start changes whose pixels are each off by a random factor."""
+    spread, number = given
+    rng = np.random.default_rng((subject.seed, number))
+
+    def begin(line: FloatArray) -> FloatArray:
+        started: FloatArray = line * np.exp(spread * rng.standard_normal(line.size))
+        return started
+
+    return attempted(lambda: subject.error(_fit(subject, DRAWN_K, DRAWN_B, begin).kernel, own))
+
+
+def _by_picture(x: tuple[float, ...], changes: FloatArray, advice: str) -> list[Curve]:
+    """Return the mean over the pictures, and each of them, of changes (N, pictures)."""
+    labels = ("guided", *(f"guided, {each}" for each in PICTURES))
+    values = np.column_stack((changes.mean(axis=1), changes))
+    return [
+        Curve(label, np.array(x), np.maximum(y, _FLOOR), advice=advice)
+        for label, y in zip(labels, values.T, strict=True)
+    ]
+
+
+def _by_start(changes: FloatArray) -> Curve:
+    """Return the median over starts, and the range, of changes (N, starts)."""
+    changes = np.maximum(changes, _FLOOR)
+    ends = changes.min(axis=1), changes.max(axis=1)
+    return Curve("guided", np.array(_SPREADS), np.median(changes, axis=1), *ends)
 
 
 def _on_pixels(subject: Subject, pixels: int) -> FitResult:
@@ -92,10 +147,6 @@ def _on_pixels(subject: Subject, pixels: int) -> FitResult:
     pitch_mm = subject.mm_per_pixel * min(1.0, reach_mm / support_mm)
     support_mm = pixels // 2 * pitch_mm
     return fit_guided(subject.profile, mm_per_pixel=pitch_mm, support_mm=support_mm)
-
-
-def _change(subject: Subject, own: list[FloatArray], found: FitResult) -> float:
-    return subject.error(found.kernel, own)
 
 
 def _stopped_early(found: FitResult) -> float:

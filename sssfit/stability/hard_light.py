@@ -13,8 +13,10 @@ from sssfit.compare.evaluate import asymmetry_of, true_asymmetry
 from sssfit.kernel import Kernel
 from sssfit.render.reference import render_reference
 from sssfit.scene.record import Scene
-from sssfit.stability.record import Axis, Curve, Panel
-from sssfit.stability.subject import SIDE, Subject, Way, error_of, shown
+from sssfit.stability.curve import Axis, Curve
+from sssfit.stability.panel import Panel
+from sssfit.stability.subject import SIDE, Subject, error_of, shown
+from sssfit.stability.ways import Way
 
 NEGATIVE_LIMIT = 1e-3  # of the pixels: what a display would show as black holes
 ASYMMETRY_LIMIT = 0.1  # a tenth of the light at a radius
@@ -75,12 +77,8 @@ def stress(subject: Subject) -> list[Panel]:
 
 def _fits(subject: Subject, settings: dict[str, Any]) -> list[Kernel]:
     """Return the kernel of each rank."""
-
-    def fit(rank: int) -> Kernel:
-        way = Way("svd", "svd", settings | {"rank": rank})
-        return way.fit(subject.profile, subject.mm_per_pixel)
-
-    return subject.each(fit, RANKS)
+    ways = [Way("svd", "svd", settings | {"rank": rank}) for rank in RANKS]
+    return [subject.fit(each, subject.profile) for each in ways]
 
 
 def highlight(mm_per_pixel: float) -> Scene:

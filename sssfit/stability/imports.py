@@ -13,23 +13,30 @@ from sssfit.arrays import FloatArray
 from sssfit.methods import TAPS
 from sssfit.profile import Profile
 from sssfit.profile.pixels import annulus_areas
-from sssfit.stability.record import Axis, Curve, Panel
-from sssfit.stability.subject import WAYS, Subject
+from sssfit.stability.curve import Axis, Curve
+from sssfit.stability.panel import Panel
+from sssfit.stability.subject import Subject
+from sssfit.stability.ways import WAYS
 
 LIMIT = 1.0  # Delta E
 _NONE = 1e-3  # of a share, for logarithmic axes
 _SHARES = (_NONE, 0.01, 0.03, 0.1, 0.3, 0.6)
 _DEVIATIONS = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
-_MERGED = (1, 4, 16, 64, 256)
+_RATIOS = (1.0, 1.1, 1.3, 1.6, 2.0, 4.0)
 
-Defect = Callable[[Profile, float], Profile]
+Defect = Callable[[Subject, float], Profile]
 
 
 def stress(subject: Subject) -> list[Panel]:
     """Put four defects into the profile, from slight to gross."""
     defects: dict[str, tuple[Defect, tuple[float, ...], str, str]] = {
         "annuli lost in gaps": (_with_gaps, _SHARES, "share of the annuli", "fill the gaps"),
-        "annuli read as one": (_merged, _MERGED, "annuli in one", "finer radii near the beam"),
+        "unequal radii": (
+            _unequal,
+            _RATIOS,
+            "a radius over the one before",
+            "finer radii near the beam",
+        ),
         "a saturated middle": (
             _saturated,
             _SHARES,
@@ -50,16 +57,19 @@ def _panel(
     subject: Subject, title: str, defect: Defect, steps: tuple[float, ...], label: str, advice: str
 ) -> Panel:
     """Return what one defect changes, step by step."""
-    profiles = [defect(subject.profile, each) for each in steps]
+    profiles = [defect(subject, each) for each in steps]
     ways = [each for each in WAYS if each.method not in TAPS or subject.is_whole]
-    changes = {each.label: np.maximum(subject.changes(each, profiles), 1e-3) for each in ways}
+    changes = [np.maximum(each, 1e-3) for each in subject.changes(ways, profiles)]
     return Panel(
         stress="imports",
         title=title,
         axis=Axis(label, mild=steps[0]),
         y_label="p99 of Delta E 2000",
         limit=LIMIT,
-        curves=[Curve(name, np.array(steps), y, advice=advice) for name, y in changes.items()],
+        curves=[
+            Curve(way.label, np.array(steps), y, advice=advice)
+            for way, y in zip(ways, changes, strict=True)
+        ],
         fails="the import shows in the picture, or is refused",
     )
 
@@ -69,17 +79,22 @@ def _with_energy(profile: Profile, energy: FloatArray) -> Profile:
     return dataclasses.replace(profile, annulus_energy=energy, annulus_energy_stderr=unknown)
 
 
-def _with_gaps(profile: Profile, share: float) -> Profile:
+def _with_gaps(subject: Subject, share: float) -> Profile:
     """Lose every k-th run of ten annuli; nothing was written there, which reads as no light."""
+    profile = subject.profile
     run, annuli = 10, profile.n_annuli
     every = max(round(run / share), run)
     lost = np.arange(annuli) % every >= every - run
     return _with_energy(profile, np.where(lost[:, None], 0.0, profile.annulus_energy))
 
 
-def _merged(profile: Profile, count: float) -> Profile:
-    """Read so many annuli as one."""
-    edges = np.arange(0, profile.n_annuli, int(count))
+def _unequal(subject: Subject, ratio: float) -> Profile:
+    """Read annuli as one so that each radius is this many times the one before, or the next."""
+    profile = subject.profile
+    edges = [0, 1]
+    while edges[-1] < profile.n_annuli:
+        edges.append(max(edges[-1] + 1, round(ratio * edges[-1])))
+    edges = edges[:-1]
     energy = np.add.reduceat(profile.annulus_energy, edges, axis=0)
     r_edges_mm = np.append(profile.r_edges_mm[edges], profile.r_edges_mm[-1])
     unknown = np.full(energy.shape, np.nan)
@@ -88,8 +103,9 @@ def _merged(profile: Profile, count: float) -> Profile:
     )
 
 
-def _saturated(profile: Profile, share: float) -> Profile:
+def _saturated(subject: Subject, share: float) -> Profile:
     """Clip R_d so that each channel loses a share of its energy in the middle."""
+    profile = subject.profile
     density = profile.reflectance_per_mm2
     areas = annulus_areas(profile.r_edges_mm)[:, None]
     energy = np.empty_like(density)
@@ -102,9 +118,10 @@ def _saturated(profile: Profile, share: float) -> Profile:
     return _with_energy(profile, energy)
 
 
-def _noisy(profile: Profile, share: float) -> Profile:
+def _noisy(subject: Subject, share: float) -> Profile:
     """Add noise of one deviation to R_d, as a camera's floor; below 0 fits refuse it, so clip."""
-    rng = np.random.default_rng(1)
+    profile = subject.profile
+    rng = np.random.default_rng(subject.seed)
     density = profile.reflectance_per_mm2
     areas = annulus_areas(profile.r_edges_mm)[:, None]
     noise = share * density.max(axis=0) * rng.standard_normal(density.shape)

@@ -18,8 +18,10 @@ from sssfit.render.jitter import Jitter
 from sssfit.render.reference import render_reference
 from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
-from sssfit.stability.record import Axis, Curve, Panel
-from sssfit.stability.subject import CASCADE, SIDE, Subject, Way, cascade, error_of, shown
+from sssfit.stability.curve import Axis, Curve
+from sssfit.stability.panel import Panel
+from sssfit.stability.subject import SIDE, Subject, error_of, shown
+from sssfit.stability.ways import CASCADE, Way, cascade
 
 LIMIT = 0.85  # docs/cascades.md asks it of two stages before the first halving
 _FETCHES = (14, 17, 24)
@@ -45,6 +47,7 @@ def stress(subject: Subject) -> list[Panel]:
     """Move a point by half pixels, over a whole texel of the coarsest picture but one."""
     scenes = [_point(subject.mm_per_pixel, each) for each in _SHIFTS.tolist()]
     truths = [render_reference(each, subject.profile, threads=1) for each in scenes]
+    kernels = subject.true_kernels(reversed(_WAYS))
     return [
         Panel(
             stress="motion",
@@ -52,7 +55,7 @@ def stress(subject: Subject) -> list[Panel]:
             axis=Axis("moved (pixels)", mild=0.0, is_log=False),
             y_label="change of p99 of Delta E 2000",
             limit=LIMIT,
-            curves=[_curve(subject, each, scenes, truths) for each in _WAYS],
+            curves=[_curve(each.label, kernels[each.label], scenes, truths) for each in _WAYS],
             fails="light crawls as the camera moves",
             is_log=False,
         ),
@@ -80,7 +83,7 @@ def stress(subject: Subject) -> list[Panel]:
 
 def _nearing(subject: Subject) -> list[Curve]:
     """Return by how much errors change from frame to frame, the largest of some frames."""
-    tables = {each.label: subject.true_kernel(each) for each in (*_CASCADES, _PAIR)}
+    tables = subject.true_kernels((*_CASCADES, _PAIR))
     moving = {f"{each.label}, jitter": tables[each.label] for each in (CASCADE, _PAIR)}
     flickers: dict[str, list[float]] = {label: [] for label in (*tables, *moving)}
     for speed in _SPEEDS:
@@ -124,18 +127,17 @@ def _spots(mm_per_pixel: float, times: float) -> Scene:
 
 def _moved(subject: Subject) -> Curve:
     """Return what whole pixels change, by fetches: where stages before the first halving grow."""
-    kernels = [subject.true_kernel(cascade(each)) for each in _FETCHES]
-    changes = [motion(each, subject.profile, positions=1).moved for each in kernels]
+    kernels = subject.true_kernels(cascade(each) for each in _FETCHES)
+    changes = [motion(each, subject.profile, positions=1).moved for each in kernels.values()]
     advice = "24 fetches, or `still`"
     return Curve("cascade", np.array(_FETCHES), np.array(changes), advice=advice)
 
 
-def _curve(subject: Subject, way: Way, scenes: list[Scene], truths: list[FloatArray]) -> Curve:
-    kernel = subject.true_kernel(way)
-    pairs = list(zip(scenes, truths, strict=True))
-    errors = np.array(subject.each(lambda pair: error_of(shown(kernel, pair[0]), pair[1]), pairs))
+def _curve(label: str, kernel: Kernel, scenes: list[Scene], truths: list[FloatArray]) -> Curve:
+    pairs = zip(scenes, truths, strict=True)
+    errors = np.array([error_of(shown(kernel, scene), truth) for scene, truth in pairs])
     advice = "two stages before the first halving, or `still`"
-    return Curve(way.label, _SHIFTS, np.abs(errors - errors[0]), advice=advice)
+    return Curve(label, _SHIFTS, np.abs(errors - errors[0]), advice=advice)
 
 
 def _point(mm_per_pixel: float, moved: float) -> Scene:

@@ -5,8 +5,9 @@ by the same method. A walk of few photons is the beginning of no longer one, so 
 independent; channels share their walks, as they do for users.
 """
 
+import functools
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,13 +18,19 @@ from sssfit.kernel import Kernel, Taps
 from sssfit.profile import Profile
 from sssfit.render.screen import second_moments
 from sssfit.simulate import simulate_montecarlo
-from sssfit.stability.record import Axis, Curve, Panel
-from sssfit.stability.subject import WAYS, Subject, Way
+from sssfit.stability.curve import Axis, Curve
+from sssfit.stability.panel import Panel
+from sssfit.stability.seeds import bias_range, median_range, spread_range
+from sssfit.stability.subject import Subject
+from sssfit.stability.ways import WAYS, Way
 
 LIMIT = 1.0  # Delta E: about what is just seen
 WIDTH_LIMIT = 0.05  # of the width: a blur 5 % wider moves an edge's L* by 1
-_SEEDS, _SEEDS_OF_CASCADES = 16, 4
 _FIRST, _LAST = 3, 7  # decades of photons
+_SEEDS = 16
+# Unless all is whole. A walk of 1e7 photons takes as long as all its fits, a cascade as all others.
+_SEEDS_OF_MANY, _MANY = 4, 10**7
+_SEEDS_OF_CASCADES, _PHOTONS_OF_CASCADES = 6, (10**3, 10**5)
 _ADVICE = {
     "svd": "fewer terms or more photons; the exact method has no noise",
     "gaussians": "fewer Gaussians or more photons",
@@ -34,7 +41,8 @@ _ADVICE = {
 def stress(subject: Subject) -> list[Panel]:
     """Fit walks of 1e3 to 1e7 photons with every method, 16 seeds each.
 
-    Cascades are fitted for every other number of photons and for 4 seeds, unless all is whole.
+    Unless all is whole, 1e7 photons have 4 seeds, and cascades are fitted to 1e3 and 1e5 photons
+    with 6.
 
     Raises
     ------
@@ -44,16 +52,15 @@ def stress(subject: Subject) -> list[Panel]:
     if subject.material is None:
         raise FitError("noise: the profile does not say its material; give the material.")
     photons = [10**each for each in range(_FIRST, _LAST + 1)]
-    wanted = {each.label: _Wanted(subject, each) for each in WAYS}
-
-    def measured(given: tuple[int, int]) -> dict[str, _Seen]:
-        """Fit one walk by all methods; sums of Gaussians begin with those of fewer."""
-        profile = _walk(subject, *given)
-        ways = [each for each in WAYS if _is_due(subject, each, *given)]
-        return {each.label: wanted[each.label].seen(subject, each, profile) for each in ways}
-
-    work = [(count, seed) for count in photons for seed in range(_SEEDS)]
-    found = dict(zip(work, subject.each(measured, work), strict=True))
+    subject.prepare(reversed(WAYS))
+    wanted = [(each, _wanted(subject, each)) for each in WAYS]
+    work = [
+        (count, number)
+        for count in reversed(photons)
+        for number in range(_seeds_of(subject, count))
+    ]
+    seen = subject.each(functools.partial(_measured, wanted), work)
+    found = dict(zip(work, seen, strict=True))
     figures = [_figures(each, found) for each in WAYS]
     axis = Axis("photons", mild=float(photons[-1]), form=".2g")
     return [
@@ -87,13 +94,6 @@ def stress(subject: Subject) -> list[Panel]:
     ]
 
 
-def _is_due(subject: Subject, way: Way, photons: int, seed: int) -> bool:
-    """Return whether a method is fitted to a walk; a cascade takes a hundred times as long."""
-    if way.method != "cascade" or subject.is_whole:
-        return True
-    return seed < _SEEDS_OF_CASCADES and round(math.log10(photons) - _FIRST) % 2 == 0
-
-
 class _Seen(NamedTuple):
     """Of one kernel: the error of its pictures, and its width over the exact one's."""
 
@@ -101,20 +101,46 @@ class _Seen(NamedTuple):
     width: float
 
 
-class _Wanted:
+class _Wanted(NamedTuple):
     """What one method makes of the exact profile."""
 
-    def __init__(self, subject: Subject, way: Way) -> None:
-        kernel = subject.true_kernel(way)
-        self._pictures, self._width_mm = subject.shows(kernel), width_mm(kernel)
+    pictures: list[FloatArray]
+    width_mm: float
 
-    def seen(self, subject: Subject, way: Way, profile: Profile) -> _Seen:
-        """Compare the kernel of a walk; infinite where too few annuli have light for a fit."""
-        try:
-            kernel = way.fit(profile, subject.mm_per_pixel)
-        except SssfitError:
-            return _Seen(np.inf, np.inf)
-        return _Seen(subject.error(kernel, self._pictures), width_mm(kernel) / self._width_mm)
+
+def _wanted(subject: Subject, way: Way) -> _Wanted:
+    kernel = subject.true_kernel(way)
+    return _Wanted(subject.shows(kernel), width_mm(kernel))
+
+
+def _seeds_of(subject: Subject, photons: int) -> int:
+    return _SEEDS if subject.is_whole or photons < _MANY else min(_SEEDS, _SEEDS_OF_MANY)
+
+
+def _measured(
+    wanted: Sequence[tuple[Way, _Wanted]], subject: Subject, given: tuple[int, int]
+) -> dict[str, _Seen]:
+    """Fit one walk by all methods; sums of Gaussians begin with those of fewer."""
+    photons, number = given
+    profile = _walk(subject, photons, number)
+    due = [each for each in wanted if _is_due(subject, each[0], photons, number)]
+    return {way.label: _seen(subject, way, own, profile) for way, own in due}
+
+
+def _seen(subject: Subject, way: Way, wanted: _Wanted, profile: Profile) -> _Seen:
+    """Compare the kernel of a walk; infinite where too few annuli have light for a fit."""
+    try:
+        kernel = subject.fit(way, profile)
+    except SssfitError:
+        return _Seen(np.inf, np.inf)
+    return _Seen(subject.error(kernel, wanted.pictures), width_mm(kernel) / wanted.width_mm)
+
+
+def _is_due(subject: Subject, way: Way, photons: int, number: int) -> bool:
+    """Return whether a method is fitted to a walk; a cascade takes a hundred times as long."""
+    if way.method != "cascade" or subject.is_whole:
+        return True
+    return number < _SEEDS_OF_CASCADES and photons in _PHOTONS_OF_CASCADES
 
 
 class _Figures(NamedTuple):
@@ -124,30 +150,16 @@ class _Figures(NamedTuple):
 
 
 def _figures(way: Way, found: Mapping[tuple[int, int], Mapping[str, _Seen]]) -> _Figures:
-    """Return quartiles of the error, and spread and bias of the width, by numbers of photons."""
+    """Return the median of the error, and spread and bias of the width, by numbers of photons."""
     seen: dict[int, list[_Seen]] = {}
-    for (photons, _), by_label in found.items():
+    for (photons, _), by_label in sorted(found.items()):
         if way.label in by_label:
             seen.setdefault(photons, []).append(by_label[way.label])
-    errors = np.array([[each.error for each in own] for own in seen.values()])
-    widths = np.array([[each.width for each in own] for own in seen.values()]) - 1.0
-    low, middle, high = np.quantile(errors, (0.25, 0.5, 0.75), axis=1, method="nearest")
-    with np.errstate(invalid="ignore"):  # infinite where a fit was refused
-        spread, mean = np.std(widths, axis=1, ddof=1), np.mean(widths, axis=1)
-    spread, bias = (np.where(np.isfinite(each), np.abs(each), np.inf) for each in (spread, mean))
-    # A standard deviation of n seeds is known to 1 / sqrt(2 n - 2), a mean to spread / sqrt(n).
-    seeds = errors.shape[1]
-    share, of_mean = 1.0 / np.sqrt(2.0 * seeds - 2.0), spread / np.sqrt(seeds)
-
-    def curve(y: FloatArray, low: FloatArray, high: FloatArray) -> Curve:
-        advice = _ADVICE.get(way.method, "more photons")
-        return Curve(way.label, np.array(list(seen)), y, low, high, advice)
-
-    return _Figures(
-        curve(middle, low, high),
-        curve(spread, (1.0 - share) * spread, (1.0 + share) * spread),
-        curve(bias, np.maximum(bias - of_mean, 0.0), bias + of_mean),
-    )
+    errors = [np.array([each.error for each in own]) for own in seen.values()]
+    widths = [np.array([each.width for each in own]) - 1.0 for own in seen.values()]
+    advice = _ADVICE.get(way.method, "more photons")
+    ranges = median_range(errors), spread_range(widths), bias_range(widths)
+    return _Figures(*(Curve(way.label, np.array(list(seen)), *each, advice) for each in ranges))
 
 
 def width_mm(kernel: Kernel) -> float:

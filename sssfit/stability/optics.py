@@ -15,7 +15,8 @@ from sssfit.material import Layer, Material
 from sssfit.profile import Profile
 from sssfit.simulate import simulate_burley, simulate_dipole, simulate_dipole_grosjean
 from sssfit.simulate.exact import simulate_exact_many
-from sssfit.stability.record import Axis, Curve, Panel
+from sssfit.stability.curve import Axis, Curve
+from sssfit.stability.panel import Panel
 from sssfit.stability.subject import Subject
 
 BEYOND_LIMIT, MODEL_LIMIT, TERMS_LIMIT = 1e-3, 0.1, 6
@@ -34,6 +35,9 @@ _WIDE = "an exact or walked profile with a larger radius"
 def stress(subject: Subject) -> list[Panel]:
     """Solve for albedos of .01 to .99999 and indices of 1 to 2."""
     axis = Axis("1 - albedo", mild=0.1)
+    profiles = _profiles(_OWN_INDEX, subject.threads)
+    sums = subject.each(_sums, profiles)
+    terms, condition = (_ascending(each) for each in zip(*sums, strict=True))
     bright = Axis("1 - albedo", mild=1.0 - ALBEDOS[-1])
     return [
         Panel(
@@ -60,7 +64,7 @@ def stress(subject: Subject) -> list[Panel]:
             title="Gaussians for an error of 1 %",
             y_label="terms",
             limit=TERMS_LIMIT,
-            curves=[_terms(subject)],
+            curves=[Curve("gaussians", _lost(ALBEDOS), terms, advice="another method")],
             fails="six Gaussians are not enough",
             is_log=False,
         ),
@@ -70,7 +74,7 @@ def stress(subject: Subject) -> list[Panel]:
             title="condition of six Gaussians' normal matrix",
             y_label="condition number",
             limit=CONDITION_LIMIT,
-            curves=[_condition(subject)],
+            curves=[Curve("gaussians 6", _lost(ALBEDOS), condition, advice="fewer Gaussians")],
             fails="weights are lost in rounding",
         ),
     ]
@@ -121,17 +125,16 @@ def _model(subject: Subject, name: str) -> Curve:
     return Curve(name, _lost(ALBEDOS), _ascending(errors), advice=_WIDE)
 
 
-def _terms(subject: Subject) -> Curve:
-    """Return the terms that are needed, 11 where ten do not do."""
-    profiles = _profiles(_OWN_INDEX, subject.threads)
-    counts = subject.each(lambda profile: _terms_needed(profile), profiles)
-    return Curve("gaussians", _lost(ALBEDOS), _ascending(counts), advice="another method")
-
-
 _MOST_TERMS, _ENOUGH, _PITCH_MM = 10, 0.01, 0.5
 
 
+def _sums(_: Subject, profile: Profile) -> tuple[float, float]:
+    """Return the Gaussians that are needed, and the condition number of six."""
+    return _terms_needed(profile), _condition_of(profile)
+
+
 def _terms_needed(profile: Profile) -> float:
+    """Return the Gaussians that are needed, 11 where ten do not do."""
     for terms in range(1, _MOST_TERMS + 1):
         own = _gaussians(profile, terms).kernel.parameters["Y"]
         if own["relative_error"] <= _ENOUGH:
@@ -141,12 +144,6 @@ def _terms_needed(profile: Profile) -> float:
 
 def _gaussians(profile: Profile, terms: int) -> FitResult:
     return fit_gaussians(profile, terms=terms, mm_per_pixel=_PITCH_MM)
-
-
-def _condition(subject: Subject) -> Curve:
-    profiles = _profiles(_OWN_INDEX, subject.threads)
-    found = subject.each(lambda profile: _condition_of(profile), profiles)
-    return Curve("gaussians 6", _lost(ALBEDOS), _ascending(found), advice="fewer Gaussians")
 
 
 def _condition_of(profile: Profile) -> float:

@@ -5,27 +5,24 @@ pictures: a disk, and points of light, which show every fetch of a kernel.
 """
 
 import functools
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import SssfitError
-from sssfit.fit import fit_separable, fit_taps
-from sssfit.fit.on_taps import on_taps
 from sssfit.kernel import Kernel
 from sssfit.material import Material
 from sssfit.measure.delta_e import delta_e_2000, exposure_of
-from sssfit.methods import TAPS
-from sssfit.process import thread_count
 from sssfit.profile import Profile
 from sssfit.render import render
 from sssfit.render.reference import render_reference
 from sssfit.scene.made import make_scene
 from sssfit.scene.record import Scene
+from sssfit.stability.ways import Way
+from sssfit.stability.workers import Workers
 
 PICTURES = ("disk", "points")
 SIDE = 96  # pixels of a picture
@@ -33,50 +30,6 @@ _PERCENT = 99.0
 
 _Given = TypeVar("_Given")
 _Found = TypeVar("_Found")
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Way:
-    """A method with its settings, as charts name it."""
-
-    label: str
-    method: str
-    settings: Mapping[str, Any]
-    taps: int | None = None
-
-    def fit(self, profile: Profile, mm_per_pixel: float, **given: Any) -> Kernel:
-        """Fit a profile.
-
-        Raises
-        ------
-        SssfitError
-            The fit is refused.
-        """
-        settings = {"mm_per_pixel": mm_per_pixel, **self.settings, **given}
-        if self.method in TAPS:
-            return fit_taps(profile, self.method, **settings).kernel
-        kernel = fit_separable(profile, self.method, **settings).kernel
-        return kernel if self.taps is None else on_taps(kernel, self.taps)
-
-
-@functools.cache  # the same object, so that stresses share the kernel that `Subject` keeps of it
-def cascade(fetches: int) -> Way:
-    """Return the cascade of a budget."""
-    return Way(f"cascade {fetches}", "cascade", {"fetches": fetches})
-
-
-CASCADE = cascade(24)
-# The cascade and the published methods, side by side in every stress that has room for them.
-WAYS = (
-    Way("pre-integrated", "preintegrated", {}),
-    Way("artist", "artist", {}),
-    Way("guided", "guided", {"k": 2.0}),
-    Way("svd 1", "svd", {"rank": 1}),
-    Way("svd 3", "svd", {"rank": 3}),
-    Way("gaussians 4", "gaussians", {"terms": 4}),
-    Way("gaussians 6", "gaussians", {"terms": 6}),
-    CASCADE,
-)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,8 +44,11 @@ class Subject:
     mm_per_pixel : float [mm]
     seed : int
     threads : int, optional
+        Of the exact solver.
     is_whole : bool
         Whether cascades have as many seeds and sizes as the others.
+    workers : Workers, optional
+        What shares the work; without them it is done here.
     """
 
     name: str
@@ -101,20 +57,68 @@ class Subject:
     seed: int = 1
     threads: int | None = None
     is_whole: bool = False
+    workers: Workers | None = None
+    _kernels: dict[tuple[object, ...], Kernel | SssfitError] = field(default_factory=dict)
 
     @property
     def material(self) -> Material | None:
         """What the profile is of, if it says."""
         return self.profile.material
 
-    def each(self, work: Callable[[_Given], _Found], given: Iterable[_Given]) -> list[_Found]:
-        """Run work on all threads; the result does not depend on them."""
-        with ThreadPoolExecutor(thread_count(self.threads)) as pool:
-            return list(pool.map(work, given))
+    def each(
+        self, work: Callable[["Subject", _Given], _Found], given: Iterable[_Given]
+    ) -> list[_Found]:
+        """Return work(subject, each), by all workers; the result does not depend on them.
+
+        Parameters
+        ----------
+        work : callable
+            A function of a module, or a partial of one. Workers have a subject of their own, so
+            kernels that all of them need are given along.
+        given : iterable
+            What takes longest comes first.
+        """
+        if self.workers is None:
+            return [work(self, each) for each in given]
+        return self.workers.each(work, given)
+
+    def fit(
+        self, way: Way, profile: Profile, mm_per_pixel: float | None = None, **given: Any
+    ) -> Kernel:
+        """Fit a profile, on the subject's pixels and from its seed.
+
+        Raises
+        ------
+        SssfitError
+            The fit is refused.
+        """
+        pitch = self.mm_per_pixel if mm_per_pixel is None else mm_per_pixel
+        return way.fit(profile, pitch, **({"seed": self.seed} if way.is_seeded else {}), **given)
+
+    def prepare(self, ways: Iterable[Way]) -> None:
+        """Fit the profile itself by several methods at once, and keep their kernels or refusals."""
+        missing = {each.key: each for each in ways if each.key not in self._kernels}
+        self._kernels.update(zip(missing, self.each(_fitted, missing.values()), strict=True))
 
     def true_kernel(self, way: Way) -> Kernel:
-        """Return a method's kernel of the profile itself, on the subject's pixels."""
-        return _fitted(self, way)
+        """Return a method's kernel of the profile itself, on the subject's pixels.
+
+        Raises
+        ------
+        SssfitError
+            The fit is refused.
+        """
+        self.prepare([way])
+        found = self._kernels[way.key]
+        if isinstance(found, SssfitError):
+            raise found
+        return found
+
+    def true_kernels(self, ways: Iterable[Way]) -> dict[str, Kernel]:
+        """Return them by the methods' labels, what takes longest given first."""
+        ways = tuple(ways)
+        self.prepare(ways)
+        return {each.label: self.true_kernel(each) for each in ways}
 
     def scenes(self, mm_per_pixel: float | None = None) -> Sequence[Scene]:
         """Return the pictures on pixels of a size."""
@@ -128,35 +132,57 @@ class Subject:
 
         On the kernel's own pixels, or on those of a size.
         """
-        scenes = self.scenes(kernel.mm_per_pixel if mm_per_pixel is None else mm_per_pixel)
-        pairs = zip(scenes, truths, strict=True)
-        return float(np.mean([error_of(shown(kernel, scene), true) for scene, true in pairs]))
+        return float(np.mean(self.errors(kernel, truths, mm_per_pixel)))
 
-    def changes(self, way: Way, profiles: Iterable[Profile]) -> FloatArray:
-        """Return what kernels of other profiles show beside that of the subject's own (N,).
+    def errors(
+        self, kernel: Kernel, truths: Sequence[FloatArray], mm_per_pixel: float | None = None
+    ) -> list[float]:
+        """Return it for each of `PICTURES`."""
+        scenes = self.scenes(kernel.mm_per_pixel if mm_per_pixel is None else mm_per_pixel)
+        return [
+            error_of(shown(kernel, scene), true) for scene, true in zip(scenes, truths, strict=True)
+        ]
+
+    def changes(self, ways: Sequence[Way], profiles: Sequence[Profile]) -> list[FloatArray]:
+        """Return what kernels of other profiles show beside those of the subject's own, by way.
 
         Infinite where a fit is refused.
         """
-        wanted = self.shows(self.true_kernel(way))
-
-        def change(profile: Profile) -> float:
-            return attempted(lambda: self.error(way.fit(profile, self.mm_per_pixel), wanted))
-
-        return np.array(self.each(change, profiles))
+        kernels = self.true_kernels(ways)
+        wanted = [(each, self.shows(kernels[each.label])) for each in ways]
+        return list(np.array(self.each(functools.partial(_changes, wanted), profiles)).T)
 
     def truths(self, mm_per_pixel: float | None = None) -> list[FloatArray]:
         """Return the pictures of the profile's own 2D kernel."""
-        scenes = self.scenes(mm_per_pixel)
-        return [render_reference(each, self.profile, threads=1) for each in scenes]
+        return _truths(self, self.mm_per_pixel if mm_per_pixel is None else mm_per_pixel)
 
     def shows(self, kernel: Kernel) -> list[FloatArray]:
         """Return the pictures of a kernel."""
         return [shown(kernel, each) for each in self.scenes(kernel.mm_per_pixel)]
 
 
-@functools.lru_cache(maxsize=64)
-def _fitted(subject: Subject, way: Way) -> Kernel:
-    return way.fit(subject.profile, subject.mm_per_pixel)
+def _fitted(subject: Subject, way: Way) -> Kernel | SssfitError:
+    try:
+        return subject.fit(way, subject.profile)
+    except SssfitError as error:
+        return error
+
+
+def _changes(
+    wanted: Sequence[tuple[Way, list[FloatArray]]], subject: Subject, profile: Profile
+) -> list[float]:
+    """Return what all kernels of one profile show: sums of Gaussians begin with those of fewer."""
+    return [attempted(functools.partial(_change, subject, profile, *each)) for each in wanted]
+
+
+def _change(subject: Subject, profile: Profile, way: Way, wanted: list[FloatArray]) -> float:
+    return subject.error(subject.fit(way, profile), wanted)
+
+
+@functools.lru_cache(maxsize=32)
+def _truths(subject: Subject, mm_per_pixel: float) -> list[FloatArray]:
+    scenes = subject.scenes(mm_per_pixel)
+    return [render_reference(each, subject.profile, threads=1) for each in scenes]
 
 
 @functools.lru_cache(maxsize=64)

@@ -10,17 +10,10 @@ from sssfit.kernel import Kernel, Taps
 from sssfit.render.jitter import Jitter
 from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
-from sssfit.stability.record import Axis, Curve, Panel
-from sssfit.stability.subject import (
-    CASCADE,
-    SIDE,
-    Subject,
-    Way,
-    attempted,
-    cascade,
-    error_of,
-    shown,
-)
+from sssfit.stability.curve import Axis, Curve
+from sssfit.stability.panel import Panel
+from sssfit.stability.subject import SIDE, Subject, attempted, error_of, shown
+from sssfit.stability.ways import CASCADE, Way, cascade
 
 LIMIT = 1.0  # Delta E
 _TAPS = (5, 9, 17, 33, 65)  # a pass
@@ -43,7 +36,7 @@ _PASS = Way("pre-integrated, 25 taps", "preintegrated", {}, taps=25)
 
 def stress(subject: Subject) -> list[Panel]:
     """Give kernels fewer fetches, fewer bits and brighter points."""
-    tables = {each.label: subject.true_kernel(each) for each in (CASCADE, _PASS)}
+    tables = subject.true_kernels((CASCADE, _PASS))
     return [
         _few_fetches(subject),
         Panel(
@@ -105,16 +98,17 @@ def _few_fetches(subject: Subject) -> Panel:
     truths = subject.truths()
     budgets = _FETCHES_OF_PAPERS if subject.is_whole else _FETCHES
     cascades = [cascade(each) for each in budgets]
+    subject.prepare(reversed(cascades))
 
     def error(way: Way) -> float:
         return attempted(lambda: subject.error(subject.true_kernel(way), truths))
 
-    curves = [Curve("cascade", np.array(budgets), np.array(subject.each(error, cascades)))]
+    curves = [Curve("cascade", np.array(budgets), np.array([error(each) for each in cascades]))]
     for way in _THINNED:
         thinned = [Way(way.label, way.method, way.settings, taps=n) for n in _TAPS]
-        kernels = [subject.true_kernel(each) for each in thinned]
+        kernels = [subject.fit(each, subject.profile) for each in thinned]
         fetches = [each.fetches for each in kernels if isinstance(each, Taps)]
-        errors = subject.each(lambda kernel: subject.error(kernel, truths), kernels)
+        errors = [subject.error(kernel, truths) for kernel in kernels]
         curves.append(Curve(way.label, np.array(fetches), np.array(errors), advice="a cascade"))
     return Panel(
         stress="taps",

@@ -1,0 +1,106 @@
+"""Worker processes: fits are Python code for most of their time, so threads gain 5 % on two cores.
+
+Processes are spawned: forked ones would take along locks that numba's and BLAS's threads may hold
+at that moment. A worker ends as soon as the caller's end of a pipe is closed, by the caller or by
+its death, so none is left behind; Ctrl-C reaches the caller alone.
+"""
+
+import multiprocessing
+import os
+import signal
+import threading
+import warnings
+from collections.abc import Callable, Iterable
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing.connection import Connection
+from types import TracebackType
+from typing import Any, TypeVar
+
+from sssfit.errors import SssfitError
+from sssfit.process import one_blas_thread
+
+_Given = TypeVar("_Given")
+_Found = TypeVar("_Found")
+
+_MOST = 16  # workers; each takes 0.3 GB
+_LOST = (
+    "a worker process ended before its work was done: it was killed, memory ran out, or the "
+    "script lacks `if __name__ == '__main__':`; `threads = 1` takes no worker."
+)
+
+_shared: Any = None
+
+
+class Workers:
+    """Processes that share an object and take calls on it; a context, at whose end they end.
+
+    Parameters
+    ----------
+    count : int
+        Of processes, which start at the first call.
+    shared : object
+        The first argument of every call. Each process has a copy, so what is cached on it stays.
+    """
+
+    def __init__(self, count: int, shared: object) -> None:
+        context = multiprocessing.get_context("spawn")
+        self._theirs, self._ours = context.Pipe(duplex=False)
+        self._pool = ProcessPoolExecutor(min(count, _MOST), context, _begin, (self._theirs, shared))
+
+    def __enter__(self) -> "Workers":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if error is not None:
+            self._ours.close()  # which ends them in the midst of their work
+        self._pool.shutdown(cancel_futures=True)
+        self._ours.close()
+        self._theirs.close()
+
+    def each(self, work: Callable[[Any, _Given], _Found], given: Iterable[_Given]) -> list[_Found]:
+        """Return work(shared, each) for all that is given, in its order.
+
+        Parameters
+        ----------
+        work : callable
+            A function of a module, or a partial of one: it is pickled.
+        given : iterable
+
+        Raises
+        ------
+        SssfitError
+            A process ended. What the work itself raises is raised here.
+        """
+        try:
+            return list(self._pool.map(_call, ((work, each) for each in given)))
+        except BrokenProcessPool:
+            raise SssfitError(_LOST) from None
+
+
+def _begin(theirs: Connection, shared: object) -> None:
+    """Make this process a worker."""
+    global _shared  # the pool hands nothing else from the initializer to the calls
+    _shared = shared
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_caller, args=(theirs,), daemon=True).start()
+    warnings.simplefilter("ignore")  # as in the caller: what fits warn of is what a stress finds
+    one_blas_thread().__enter__()
+
+
+def _end_with_caller(theirs: Connection) -> None:
+    """Wait until the other end of the pipe is closed; nothing is ever sent."""
+    try:
+        theirs.poll(None)
+    finally:
+        os._exit(1)
+
+
+def _call(given: tuple[Callable[[Any, _Given], _Found], _Given]) -> _Found:
+    work, each = given
+    return work(_shared, each)

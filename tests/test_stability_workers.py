@@ -1,0 +1,126 @@
+"""Workers: the same bits on any number of them, and none is left behind."""
+
+import functools
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+from test_profile import make_profile
+from worker_calls import killed, refused, scaled
+
+from sssfit.errors import FitError, SssfitError
+from sssfit.shapes import gaussian_cdf
+from sssfit.stability import imports
+from sssfit.stability.subject import Subject
+from sssfit.stability.ways import Way
+from sssfit.stability.workers import Workers
+
+
+def is_alive(pid):
+    """Return whether a process runs; one that has ended and is not waited for does not."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+def waited_for(condition):
+    end = time.monotonic() + 60.0
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.05)
+    return condition()
+
+
+def test_results_come_in_order_from_processes_of_their_own_that_end():
+    before = multiprocessing.active_children()
+    with Workers(2, "shared") as workers:
+        found = workers.each(functools.partial(scaled, 3), range(20))
+        assert [each[:2] for each in found] == [("shared", 3 * k) for k in range(20)]
+        assert os.getpid() not in {each[2] for each in found}
+    assert multiprocessing.active_children() == before
+
+
+def test_an_error_of_the_work_is_raised_here():
+    with pytest.raises(FitError, match="7 is refused"), Workers(1, None) as workers:
+        workers.each(refused, [7])
+
+
+def test_a_killed_worker_gets_one_line():
+    lost = pytest.raises(SssfitError, match="worker process ended before")
+    with lost as caught, Workers(1, None) as workers:
+        workers.each(killed, [0])
+    assert "\n" not in str(caught.value)
+
+
+_CALLER = """
+import sys
+from pathlib import Path
+sys.path[:0] = {paths!r}
+from sssfit.stability.ways import Way
+from sssfit.stability.workers import Workers
+from worker_calls import asleep
+
+if __name__ == "__main__":
+    with Workers(2, Path({folder!r})) as workers:
+        workers.each(asleep, range(2))
+"""
+
+
+@pytest.mark.skipif(not Path("/proc/self").is_dir(), reason="looks for processes in /proc")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGKILL])
+def test_no_worker_outlives_its_caller(tmp_path, number):
+    """Ctrl-C or a killed caller ends workers in the midst of their work."""
+    started = tmp_path / "started"
+    started.mkdir()
+    script = tmp_path / "caller.py"
+    paths = [str(Path(__file__).parent)]
+    script.write_text(_CALLER.format(paths=paths, folder=str(started)))
+    with subprocess.Popen([sys.executable, str(script)], stderr=subprocess.PIPE) as caller:
+        try:
+            assert waited_for(lambda: len(list(started.iterdir())) == 2)
+            assert waited_for(lambda: all(each.read_text() for each in started.iterdir()))
+            pids = [int(each.read_text()) for each in started.iterdir()]
+            caller.send_signal(number)
+            caller.wait(timeout=60.0)
+            assert waited_for(lambda: not any(map(is_alive, pids)))
+        finally:
+            caller.kill()
+
+
+def test_a_script_without_its_guard_gets_one_line(tmp_path):
+    script = tmp_path / "unguarded.py"
+    script.write_text(
+        "from sssfit.stability.workers import Workers\n"
+        "with Workers(1, None) as workers:\n"
+        "    workers.each(print, [0])\n"
+    )
+    run = subprocess.run(
+        [sys.executable, str(script)], capture_output=True, text=True, timeout=120.0, check=False
+    )
+    assert run.returncode == 1
+    last = run.stderr.strip().splitlines()[-1]
+    assert "the script lacks `if __name__ == '__main__':`" in last
+
+
+@pytest.fixture(scope="module")
+def profile():
+    edges_mm = np.linspace(0.0, 8.0, 401)
+    energy = np.diff(0.5 * gaussian_cdf(edges_mm[:, None], np.array([1.0])), axis=0)
+    return make_profile(edges_mm, energy)
+
+
+def test_a_stress_gives_the_same_bits_with_workers(profile):
+    subject = Subject("gaussian", profile, 0.25)
+    ways = [Way("pre", "preintegrated", {}), Way("svd 2", "svd", {"rank": 2})]
+    profiles = [imports._saturated(subject, each) for each in (0.01, 0.1)]
+    alone = subject.changes(ways, profiles)
+    with Workers(2, Subject("gaussian", profile, 0.25)) as workers:
+        shared = Subject("gaussian", profile, 0.25, workers=workers).changes(ways, profiles)
+    np.testing.assert_array_equal(alone, shared)
+    assert (np.diff(np.array(alone), axis=1) > 0.0).all()
