@@ -542,16 +542,19 @@ def test_a_head_of_512_pixels_is_unbiased(skin1):
 
 @pytest.mark.slow
 def test_twenty_million_samples_a_second_and_time_in_proportion(skin1):
-    """On two threads, three channels; the least of seven times, all done in turn."""
+    """Of processor time, to which other work does not add; the least of nine, all done in turn.
+
+    On the clock two threads took 27 to 40 million a second where other work asked for four times
+    the machine (docs/make_motion_cost.py), and 1 to 64 samples were within 2.1 % of a line.
+    """
     scene = make_scene("head", height=512, width=512, mm_per_pixel=PITCH)
-    sampler, counts = make_sampler(skin1, PITCH), (8, 16, 32, 64)
-    least = dict.fromkeys(counts, math.inf)
-    for _ in range(7):
-        for n in counts:
-            begun = time.perf_counter()
+    sampler, counts = make_sampler(skin1, PITCH), np.array([8, 16, 32, 64])
+    seconds = np.full(counts.size, math.inf)
+    for _ in range(9):
+        for k, n in enumerate(counts):
+            begun = time.process_time()
             render_samples(scene, sampler, n, threads=2)
-            least[n] = min(least[n], time.perf_counter() - begun)
-    assert 64 * 512 * 512 / least[64] > 20e6
-    slope, fixed = np.polyfit(counts, list(least.values()), 1)
-    for n, seconds in least.items():
-        assert seconds == pytest.approx(fixed + slope * n, rel=0.1)
+            seconds[k] = min(seconds[k], time.process_time() - begun)
+    assert 2.0 * counts[-1] * 512**2 / seconds[-1] > 20e6  # both threads' seconds
+    slope, fixed = np.polyfit(counts, seconds, 1, w=1.0 / seconds)
+    np.testing.assert_allclose(seconds, fixed + slope * counts, rtol=0.1)
