@@ -50,7 +50,7 @@ Samples follow the map for one multiplication a sample. A cascade that was fitte
 {wrong:.1f} % off in every frame, and no number of frames mends it. In a single frame that is
 still the error of {like_once:.0f} fixed samples a pixel; over time, where noise falls as the root
 of the number of frames, {frames_once} frames of the sampler with variates pass it. A cascade for
-each step of the map has the error of {like_steps:.1e} samples, for {fetches:.0f} fetches. With
+each step of the map has the error of {like_steps} samples, for {fetches:.0f} fetches. With
 variates the sampler takes {saved:.0f} % fewer samples than without.
 
 ![The head with a map of mean free paths, by a cascade and by samples](skin1-radii.png)
@@ -213,7 +213,8 @@ def main():
         cells = [f"{each.fetches:.1f}", f"{100.0 * single:.2g} %", f"{100.0 * mean:.2g} %"]
         rows.append(row([each.label, *cells]))
     plain, adaptive = found["adaptive, no control variates"], found["adaptive"]
-    once = found["cascade, fitted once"]
+    once, steps = found["cascade, fitted once"], found["a cascade a step"]
+    like_steps = found["fixed sampling"].samples_for(steps.errors[0])
     text = TEXT.format(
         steps=len(np.unique(scale)),
         period=PERIOD,
@@ -224,9 +225,9 @@ def main():
         rows="\n".join(rows),
         wrong=100.0 * once.errors[0],
         like_once=found["fixed sampling"].samples_for(once.errors[0]),
-        like_steps=found["fixed sampling"].samples_for(found["a cascade a step"].errors[0]),
+        like_steps=f"{float(f'{like_steps:.2g}'):,.0f}",
         frames_once=int(np.ceil((adaptive.errors[0] / once.errors[0]) ** 2)),
-        fetches=found["a cascade a step"].fetches,
+        fetches=steps.fetches,
         saved=100.0 * (1.0 - adaptive.fetches / plain.fetches),
     )
     put_section("motion.md", "docs/make_radii.py", text)

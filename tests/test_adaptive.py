@@ -498,6 +498,17 @@ def test_histories_follow_a_picture_that_moves(small, edge):
     assert left.counts[inside].mean() > 1.3 * asked
 
 
+def test_a_frame_that_adapts_takes_a_map_of_radii(small):
+    scene, scale = random_scene(), np.linspace(0.5, 2.0, 180).reshape(12, 15)
+    renderer = AdaptiveRenderer(small, PITCH, seed=3)
+    seen = [renderer.render(scene, scale=scale) for _ in range(7)][-1]
+    sampler, how = make_sampler(small, PITCH), {"scale": scale, "frame": 6, "seed": 3}
+    assert np.unique(renderer.counts).size > 5
+    np.testing.assert_array_equal(seen, render_samples(scene, sampler, renderer.counts, **how))
+    with pytest.raises(RenderError, match=r"a scale of shape \(2, 2\); expected \(12, 15\)"):
+        renderer.render(scene, scale=np.ones((2, 2)))
+
+
 def test_frames_of_another_size_get_one_line(small):
     renderer = AdaptiveRenderer(small, PITCH)
     renderer.render(random_scene())
