@@ -17,7 +17,8 @@ import approval_world as world
 import numpy as np
 from approval_figures import figure_lines
 from approval_files import array_text, file_lines, masked, text_lines
-from approval_run import copied_files, stand_ins
+from approval_folder import copied_files
+from approval_run import stand_ins
 from matplotlib.figure import Figure
 
 from sssfit import compare, export, measure

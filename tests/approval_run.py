@@ -6,6 +6,7 @@ chart is described in place of being laid out and drawn, and a comparison tries 
 kind.
 """
 
+import collections
 import contextlib
 import dataclasses
 import functools
@@ -14,9 +15,7 @@ import io
 import os
 import pkgutil
 import shlex
-import shutil
 import sys
-import tempfile
 import time
 import types
 import warnings
@@ -26,11 +25,11 @@ from pathlib import Path
 from typing import Any
 from unittest import mock
 
-import approval_world as world
 import matplotlib.figure
 import rich.progress
 import shared_work
 from approval_figures import figure_lines
+from approval_folder import contents, copied_files
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 import sssfit
@@ -152,10 +151,18 @@ def _walk(name: str, path: Any) -> Iterator[pkgutil.ModuleInfo]:
 
 def _in_place_of(real: Any, stand_in: Any) -> Iterator[contextlib.AbstractContextManager[Any]]:
     """Put a stand-in wherever one of our modules holds the real thing."""
+    for module, name in _holders(tuple(len(vars(each)) for each in modules()))[id(real)]:
+        yield mock.patch.object(module, name, stand_in)
+
+
+@functools.lru_cache(maxsize=1)
+def _holders(_names: tuple[int, ...]) -> dict[int, list[tuple[types.ModuleType, str]]]:
+    """Where our modules hold what, by its identity; looked for again when they have more names."""
+    found: dict[int, list[tuple[types.ModuleType, str]]] = collections.defaultdict(list)
     for module in modules():
-        for name, value in list(vars(module).items()):
-            if value is real:
-                yield mock.patch.object(module, name, stand_in)
+        for name, value in vars(module).items():
+            found[id(value)].append((module, name))
+    return found
 
 
 class _Time(types.ModuleType):
@@ -247,26 +254,6 @@ def _some_of(
     return tuple(each for each in real(pixels, *given, **settings) if each.label in _TRIED)
 
 
-@contextlib.contextmanager
-def copied_files() -> Iterator[Path]:
-    """Be in a fresh folder of the files: links, because copies would take most of the time.
-
-    What is written replaces a link and leaves the file behind it alone; that is checked.
-    """
-    whole = _signatures(world.files())
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name).resolve()
-        shutil.copytree(world.files(), folder, dirs_exist_ok=True, copy_function=os.link)
-        with contextlib.chdir(folder):
-            yield folder
-    assert _signatures(world.files()) == whole, "a file was written in place"
-
-
-def _signatures(folder: Path) -> dict[str, tuple[int, int]]:
-    found = {each.path: each.stat() for each in os.scandir(folder)}
-    return {path: (stat.st_size, stat.st_mtime_ns) for path, stat in found.items()}
-
-
 def run(command: Command) -> Ran:
     """Run in a fresh copy of the folder of files."""
     charts: dict[bytes, list[str]] = {}
@@ -281,24 +268,6 @@ def run(command: Command) -> Ran:
         written = {path: data for path, data in after.items() if before.get(path) != data}
         gone = tuple(sorted(before.keys() - after.keys()))
     return Ran(status, stdout, stderr, written, gone, charts, str(folder))
-
-
-def contents(folder: Path) -> dict[str, bytes]:
-    paths = [path for path in sorted(folder.rglob("*")) if path.is_file()]
-    return {path.relative_to(folder).as_posix(): _bytes(path) for path in paths}
-
-
-def _bytes(path: Path) -> bytes:
-    """Read a file; those of the common folder once."""
-    found = path.stat()
-    if found.st_nlink == 1:
-        return path.read_bytes()
-    if found.st_ino not in _COMMON:
-        _COMMON[found.st_ino] = path.read_bytes()
-    return _COMMON[found.st_ino]
-
-
-_COMMON: dict[int, bytes] = {}
 
 
 def _environment(command: Command) -> contextlib.AbstractContextManager[Any]:

@@ -33,7 +33,8 @@ import processes
 _LOADED = (
     *("sssfit.chart", "sssfit.chart.profile", "sssfit.choose", "sssfit.cli._main"),
     *("sssfit.compare", "sssfit.export", "sssfit.fit", "sssfit.fit.cascade", "sssfit.formats.csv"),
-    *("sssfit.formats.mci", "sssfit.formats.mco", "sssfit.render.screen", "sssfit.simulate"),
+    *("sssfit.formats.mci", "sssfit.formats.mco", "sssfit.motion.runner", "sssfit.render.screen"),
+    "sssfit.simulate",
     *("colour", "matplotlib.pyplot", "scipy.optimize", "scipy.sparse.linalg", "scipy.special"),
 )
 _NUMBER = struct.Struct("=q")  # a length, a process, or the status that it ended with

@@ -498,6 +498,17 @@ def test_histories_follow_a_picture_that_moves(small, edge):
     assert left.counts[inside].mean() > 1.3 * asked
 
 
+def test_a_frame_that_adapts_takes_a_map_of_radii(small):
+    scene, scale = random_scene(), np.linspace(0.5, 2.0, 180).reshape(12, 15)
+    renderer = AdaptiveRenderer(small, PITCH, seed=3)
+    seen = [renderer.render(scene, scale=scale) for _ in range(7)][-1]
+    sampler, how = make_sampler(small, PITCH), {"scale": scale, "frame": 6, "seed": 3}
+    assert np.unique(renderer.counts).size > 5
+    np.testing.assert_array_equal(seen, render_samples(scene, sampler, renderer.counts, **how))
+    with pytest.raises(RenderError, match=r"a scale of shape \(2, 2\); expected \(12, 15\)"):
+        renderer.render(scene, scale=np.ones((2, 2)))
+
+
 def test_frames_of_another_size_get_one_line(small):
     renderer = AdaptiveRenderer(small, PITCH)
     renderer.render(random_scene())
@@ -542,16 +553,19 @@ def test_a_head_of_512_pixels_is_unbiased(skin1):
 
 @pytest.mark.slow
 def test_twenty_million_samples_a_second_and_time_in_proportion(skin1):
-    """On two threads, three channels; the least of seven times, all done in turn."""
+    """Of processor time, to which other work does not add; the least of nine, all done in turn.
+
+    On the clock two threads took 27 to 40 million a second where other work asked for four times
+    the machine (docs/make_motion_cost.py), and 1 to 64 samples were within 2.1 % of a line.
+    """
     scene = make_scene("head", height=512, width=512, mm_per_pixel=PITCH)
-    sampler, counts = make_sampler(skin1, PITCH), (8, 16, 32, 64)
-    least = dict.fromkeys(counts, math.inf)
-    for _ in range(7):
-        for n in counts:
-            begun = time.perf_counter()
+    sampler, counts = make_sampler(skin1, PITCH), np.array([8, 16, 32, 64])
+    seconds = np.full(counts.size, math.inf)
+    for _ in range(9):
+        for k, n in enumerate(counts):
+            begun = time.process_time()
             render_samples(scene, sampler, n, threads=2)
-            least[n] = min(least[n], time.perf_counter() - begun)
-    assert 64 * 512 * 512 / least[64] > 20e6
-    slope, fixed = np.polyfit(counts, list(least.values()), 1)
-    for n, seconds in least.items():
-        assert seconds == pytest.approx(fixed + slope * n, rel=0.1)
+            seconds[k] = min(seconds[k], time.process_time() - begun)
+    assert 2.0 * counts[-1] * 512**2 / seconds[-1] > 20e6  # both threads' seconds
+    slope, fixed = np.polyfit(counts, seconds, 1, w=1.0 / seconds)
+    np.testing.assert_allclose(seconds, fixed + slope * counts, rtol=0.1)
