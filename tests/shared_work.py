@@ -33,7 +33,7 @@ OWN = {
 }
 _OWN_FITS = {"test_approved"}  # its clock counts how often it is asked, fits included
 # What these ask is how good a cascade is. The others, approvals among them, fit dozens, and one
-# start, few frequencies and short descents will do for them: a fifth of the time.
+# descent, few frequencies and short descents will do for them: a fifth of the time.
 LONG_SEARCHES = {
     *("test_cascade", "test_disks_page", "test_docs", "test_docs_tables", "test_engines"),
     *("test_frames", "test_motion", "test_on_taps", "test_readme_figures", "test_shading"),
@@ -49,7 +49,8 @@ def _short_descent(chain, x, most, gain=3e-3, real=sssfit.fit.cascade._descend):
 
 
 SHORT = (
-    (sssfit.fit.cascade, "_STARTS", 1),
+    (sssfit.fit.cascade, "_STARTS", 2),
+    (sssfit.fit.cascade, "_KEPT_STARTS", 1),
     (sssfit.fit.cascade, "_HOPS", ()),
     (sssfit.fit.cascade, "_descend", _short_descent),
     (sssfit.fit._spectrum, "_FREQUENCIES", 28),
@@ -61,7 +62,7 @@ def allow(file):
     """Share from now on, unless this file of tests computes everything itself."""
     _state["allowed"] = file not in OWN
     _state["fits"] = _state["allowed"] and file not in _OWN_FITS
-    short = 0 if file in LONG_SEARCHES else 2 if file in _WHOLE_DESCENTS else len(SHORT)
+    short = 0 if file in LONG_SEARCHES else 3 if file in _WHOLE_DESCENTS else len(SHORT)
     _state["short"] = short
     for module, name, value in (*SHORT[:short], *_LONG[short:]):
         setattr(module, name, value)

@@ -12,8 +12,7 @@ from sssfit import fit
 from sssfit.compare.motion import motion
 from sssfit.errors import FitError
 from sssfit.fit import cascade, fit_taps, make_target, structures
-from sssfit.fit._chain_pairs import PairChain
-from sssfit.fit._chain_pairs import _sum as chain_sum
+from sssfit.fit._chain_pairs import PairChain, _sum
 from sssfit.fit._chain_stars import StarChain
 from sssfit.fit._spectrum import graded_frequencies, spectral_target
 from sssfit.grid import paper_grid
@@ -35,11 +34,11 @@ def skin1():
     return simulate_exact(load_material("skin1"))
 
 
-def chain_of(profile, structure, spectrum="natural", support_mm=9.0):
+def chain_of(profile, structure, aliasing=0.0, spectrum="natural", support_mm=9.0):
     target = make_target(profile, 0.3, support_mm)
     lit = list(range(profile.n_channels))
     kind = StarChain if "*" in structure or "x" in structure else PairChain
-    return kind(spectral_target(target, lit, spectrum), parse(structure))
+    return kind(spectral_target(target, lit, spectrum), parse(structure), aliasing)
 
 
 def taps_of(chain, x, pitch=0.3):
@@ -143,9 +142,8 @@ def test_derivatives_are_those_of_differences(skin1, structure):
 
 @pytest.mark.parametrize("structure", ["1|1-2|1", "*|1-*|*"])
 def test_derivatives_of_aliasing_are_those_of_differences(skin1, structure):
-    chain = chain_of(skin1, structure)
-    x, plain = chain.start(np.random.default_rng(3)), chain_of(skin1, structure)
-    chain.aliasing = 0.7
+    chain, plain = chain_of(skin1, structure, 0.7), chain_of(skin1, structure)
+    x = chain.start(np.random.default_rng(3))
     value, gradient = chain.value_and_gradient(x)
     assert value > plain.value_and_gradient(x)[0] + 1e-5
     for k in range(chain.size):
@@ -156,15 +154,16 @@ def test_derivatives_of_aliasing_are_those_of_differences(skin1, structure):
 
 
 def test_the_matrix_of_aliasing_is_that_of_its_residuals_slopes(skin1):
-    chain = chain_of(skin1, "1|1-2")
-    chain.aliasing = 0.7
+    chain = chain_of(skin1, "1|1-2", 0.7)
     x = chain.start(np.random.default_rng(4))
 
     def residuals(x):
         passed = chain._chain([chain._blur(x, k) for k in range(len(chain.shapes))])
         parts = [
-            np.sqrt(view.weight * chain.target.power) * chain_sum(passed, view, chain._blend(x))
-            for view in chain._views()
+            np.sqrt(view.weight * chain.target.power)
+            * _sum(part * view.x, part * view.y, chain._blend(x)[view.stages])
+            for view in chain.views
+            for part in [passed[:, :, view.stages]]
         ]
         return np.concatenate([each.ravel() for each in parts])
 
@@ -185,11 +184,11 @@ def test_aliasing_is_what_halved_pictures_show_of_a_wave(skin1, structure, level
     shown = render_taps(scene, taps)[0]
     spectrum = np.abs(np.fft.rfft(np.concatenate((shown, shown[::-1])), axis=0)) / size
     image = np.pi * 2.0 / 2.0**level - w
-    exact = PairChain(replace(chain.target, frequencies=np.array([w])), chain.shapes)
-    exact.aliasing = 1.0
+    exact = PairChain(replace(chain.target, frequencies=np.array([w])), chain.shapes, 1.0)
     x = chain.start(np.random.default_rng(8))
     passed = exact._chain([exact._blur(x, j) for j in range(len(exact.shapes))])[:, 0]
-    seen = (passed * exact._views()[level].x[:, 0] * exact._blend(x).T).sum(axis=1)
+    view = exact.views[level]
+    seen = (passed[:, view.stages] * view.x[0] * exact._blend(x).T[:, view.stages]).sum(axis=1)
     place = round(abs(image) * size / np.pi)
     np.testing.assert_allclose(spectrum[place], np.abs(seen), rtol=1e-9)
     assert np.abs(seen).min() > 1e-4
@@ -211,9 +210,8 @@ def test_the_matrix_is_that_of_the_residuals_slopes(skin1, structure):
 
 @pytest.mark.parametrize("aliasing", [0.0, 0.7])
 def test_pairs_are_the_same_in_one_dimension_and_in_two(skin1, aliasing):
-    one = chain_of(skin1, "1|1-2|1")
-    two = StarChain(one.target, one.shapes)
-    one.aliasing = two.aliasing = aliasing
+    one = chain_of(skin1, "1|1-2|1", aliasing)
+    two = StarChain(one.target, one.shapes, aliasing)
     x = one.start(np.random.default_rng(6))
     for ours, theirs in zip(
         (*one.misfit(x), one.matrix(x), one.spectrum(x)),
@@ -430,7 +428,7 @@ def test_unknown_methods_are_named(skin1):
 def test_aliasing_weighed_in_makes_light_stiller(skin1, monkeypatch):
     still = fit_taps(skin1, stages="1-1|2-2|2-2", still=True).kernel
     usual = fit_taps(skin1, stages="1-1|2-2|2-2").kernel
-    monkeypatch.setattr(cascade, "_ALIASING", 0.0)
+    monkeypatch.setattr(cascade, "ALIASING", 0.0)
     blind = fit_taps(skin1, stages="1-1|2-2|2-2").kernel
     moved = [motion(each, skin1, positions=1).moved for each in (still, usual, blind)]
     assert moved[0] < moved[1] < moved[2]
@@ -537,14 +535,24 @@ def test_the_optimum_at_full_resolution_is_that_of_another_program():
 
 
 @pytest.mark.slow
-def test_no_start_of_64_is_much_better(skin1, monkeypatch):
-    monkeypatch.setattr(cascade, "_ALIASING", 0.0)  # the search is for the misfit alone
+@pytest.mark.parametrize("stages", ["1-1|2-2|2-2", "1|1|1-1|1-1|1-1"])
+def test_no_start_of_64_is_much_better(skin1, stages):
     target = make_target(skin1, 0.3, cascade._reach_mm(skin1, 0.3))
-    chain = PairChain(spectral_target(target, [0, 1, 2], "natural"), parse("1-1|2-2|2-2"))
-    ours = (fit(skin1, "cascade", stages="1-1|2-2|2-2").errors["spectral"] ** 2).sum()
+    wanted = spectral_target(target, [0, 1, 2], "natural")
+    chain = PairChain(wanted, parse(stages), cascade.ALIASING)
+    ours = chain.value_and_gradient(cascade.searched(chain, 1)[0])[0]
     best = np.inf
     for seed in range(64):
         rough = chain.start(np.random.default_rng([77, seed]))
         ended = cascade._descend(chain, cascade._rough(chain, rough).x, 300, gain=1e-6)
         best = min(best, ended.fun)
-    assert ours <= 1.03 * best
+    assert ours <= 1.06 * best
+
+
+# With aliasing left to the last descent, seeds 1, 2, 3, 4 and 6 left .67, .61, .61, .35 and .89.
+@pytest.mark.parametrize(
+    "seed", [2, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (3, 4, 5, 6))]
+)
+def test_another_seed_leaves_about_as_much(skin1, seed):
+    first, other = (mean_p99(fit(skin1, fetches=14, seed=each), skin1) for each in (1, seed))
+    assert max(first, other) <= 1.4 * min(first, other)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from processes import start
 from test_profile import make_profile
 from worker_calls import killed, refused, scaled
 
@@ -81,16 +82,13 @@ def test_no_worker_outlives_its_caller(tmp_path, number):
     script = tmp_path / "caller.py"
     paths = [str(Path(__file__).parent)]
     script.write_text(_CALLER.format(paths=paths, folder=str(started)))
-    with subprocess.Popen([sys.executable, str(script)], stderr=subprocess.PIPE) as caller:
-        try:
-            assert waited_for(lambda: len(list(started.iterdir())) == 2)
-            assert waited_for(lambda: all(each.read_text() for each in started.iterdir()))
-            pids = [int(each.read_text()) for each in started.iterdir()]
-            caller.send_signal(number)
-            caller.wait(timeout=60.0)
-            assert waited_for(lambda: not any(map(is_alive, pids)))
-        finally:
-            caller.kill()
+    caller = start([sys.executable, str(script)])
+    assert waited_for(lambda: len(list(started.iterdir())) == 2)
+    assert waited_for(lambda: all(each.read_text() for each in started.iterdir()))
+    pids = [int(each.read_text()) for each in started.iterdir()]
+    caller.send_signal(number)
+    caller.wait(timeout=60.0)
+    assert waited_for(lambda: not any(map(is_alive, pids)))
 
 
 def test_a_script_without_its_guard_gets_one_line(tmp_path):
@@ -105,7 +103,7 @@ def test_a_script_without_its_guard_gets_one_line(tmp_path):
     )
     assert run.returncode == 1
     last = run.stderr.strip().splitlines()[-1]
-    assert "the script lacks `if __name__ == '__main__':`" in last
+    assert "the script lacks the main guard" in last
 
 
 @pytest.fixture(scope="module")

@@ -66,12 +66,19 @@ class Chain(ABC):
     The parameters are the blend's logits (L+1, C), then for each stage the logarithms of its offset
     steps (k,), shared by the channels, and of its weights (C, k+1). The two offsets of a star stand
     in place of steps.
+
+    Parameters
+    ----------
+    target : SpectralTarget
+    shapes : sequence of Shape
+    aliasing : float
+        Weight in the misfit of the squared images that halved pictures show; see ``_chain_pairs``.
     """
 
-    aliasing = 0.0  # weight in the misfit of the squared images that halved pictures show
-
-    def __init__(self, target: SpectralTarget, shapes: Sequence[Shape]) -> None:
-        self.target, self.shapes = target, tuple(shapes)
+    def __init__(
+        self, target: SpectralTarget, shapes: Sequence[Shape], aliasing: float = 0.0
+    ) -> None:
+        self.target, self.shapes, self.aliasing = target, tuple(shapes), aliasing
         self.channels = len(target.energy)
         self._down, self._up = resampling(target.frequencies, [each.level for each in shapes])
         self.counts = [2 if each.kind == _STAR else each.pairs for each in shapes]
@@ -152,21 +159,19 @@ class Chain(ABC):
         count = self.counts[k]
         return at[:count], at[count:].reshape(self.channels, count + 1)
 
-    def _images(self) -> Iterator[FloatArray]:
-        """Yield for each level by what images along an axis multiply the chain, (L+1, n).
+    def _images(self) -> Iterator[tuple[int, FloatArray]]:
+        """Yield for each level by what images along an axis multiply the chain, (l, n).
 
-        There is none where aliasing is not weighed in; see ``_chain_pairs``.
+        They have nothing of what comes before the level's first stage, whose number is given. There
+        is none where aliasing is not weighed in; see ``_chain_pairs``.
         """
         levels = np.array([0, *(each.level for each in self.shapes)])
         for level in range(1, levels[-1] + 1 if self.aliasing > 0.0 else 1):
-            image = np.zeros((levels.size, self.target.frequencies.size))
-            _, image[1:] = resampling(
-                self.target.frequencies - 2.0 * np.pi / 2.0**level, levels[1:].tolist()
-            )
+            first = int(np.searchsorted(levels, level))
+            w = self.target.frequencies - 2.0 * np.pi / 2.0**level
+            _, image = resampling(w, levels[first:].tolist())
             # Texels of coarser levels lie between those, where the image has the other sign.
-            image *= np.sign(level + 0.5 - levels)[:, None]
-            image[levels < level] = 0.0
-            yield image
+            yield first, image * np.sign(level + 0.5 - levels[first:])[:, None]
 
     def _steps(self, k: int) -> slice:
         """Return where a stage's offset steps are among the parameters."""

@@ -39,7 +39,8 @@ class _Blur:
 class _View:
     """One fitted sum over stages: what the chain up to each stage is multiplied by."""
 
-    factors: FloatArray  # (L+1, M)
+    first: int  # of the sum; the irradiance is 0, the first stage 1
+    factors: FloatArray  # (L+1 - first, M)
     wanted: FloatArray | float
     power: FloatArray  # (C, M), of its squares
 
@@ -47,8 +48,10 @@ class _View:
 class StarChain(Chain):
     """See `Chain`; M is the number of frequencies (wx, wy) of the triangle."""
 
-    def __init__(self, target: SpectralTarget, shapes: Sequence[Shape]) -> None:
-        super().__init__(target, shapes)
+    def __init__(
+        self, target: SpectralTarget, shapes: Sequence[Shape], aliasing: float = 0.0
+    ) -> None:
+        super().__init__(target, shapes, aliasing)
         count = target.frequencies.size
         self._x, self._y = np.tril_indices(count)
         self._twice = np.where(self._x == self._y, 1.0, 2.0)
@@ -58,12 +61,14 @@ class StarChain(Chain):
         self._power = target.power[:, self._x, self._y]
         self._wanted = target.wanted[:, self._x, self._y]
         self._halvings = self._both(self._down)
+        self._views = self._all_views()
+        self._kept = np.empty((self.channels, self._parameters_of(0).size, self._x.size))
 
     def spectrum(self, x: FloatArray) -> FloatArray:
         """Return the chain's spectrum (C, n, n)."""
         count = self.target.frequencies.size
         found = np.empty((self.channels, count, count))
-        rows = self._blend(x)[:, :, None] * self._views()[0].factors[:, None]
+        rows = self._blend(x)[:, :, None] * self._views[0].factors[:, None]
         flat = np.einsum("lcm,lcm->cm", rows, self._chain(self._blurs(x)))
         found[:, self._y, self._x] = flat  # the other half, where there is a triangle
         found[:, self._x, self._y] = flat
@@ -74,14 +79,15 @@ class StarChain(Chain):
         blurs, m = self._blurs(x), self._blend(x)
         chain = self._chain(blurs)  # (L+1, C, M)
         value, by_blend, by_chain = 0.0, np.zeros_like(m), np.zeros_like(chain)
-        for view in self._views():
-            rows = m[:, :, None] * view.factors[:, None]
-            apart = np.einsum("lcm,lcm->cm", rows, chain) - view.wanted
+        for view in self._views:
+            part, own = chain[view.first :], m[view.first :]
+            rows = own[:, :, None] * view.factors[:, None]
+            apart = np.einsum("lcm,lcm->cm", rows, part) - view.wanted
             weighted = view.power * apart
             value += float(np.vdot(weighted, apart))
-            by_rows = 2.0 * rows * weighted
-            by_chain += by_rows
-            by_blend += np.einsum("lcm,lcm->lc", by_rows, chain)
+            rows *= 2.0 * weighted
+            by_chain[view.first :] += rows
+            by_blend[view.first :] += np.einsum("lcm,lcm->lc", rows, part)
         share = m / self.target.energy
         gradient = np.empty(self.size)
         gradient[: m.size] = (by_blend - share * by_blend.sum(axis=0)).ravel()
@@ -93,26 +99,45 @@ class StarChain(Chain):
         blurs, m = self._blurs(x), self._blend(x)
         chain = self._chain(blurs)
         found = np.zeros((self.size, self.size))
-        for view in self._views():
-            shown = chain * view.factors[:, None]
-            whole = np.einsum("lc,lcm->cm", m, shown) / self.target.energy[:, None]
-            by_blend = (m[:, :, None] * (shown - whole)).transpose(1, 0, 2)
-            by_stage = self._slopes(blurs, m[:, :, None] * view.factors[:, None])
-            rows = np.concatenate((by_blend, by_stage), axis=1)
+        for view in self._views:
+            rows = self._rows(view, blurs, chain, m)
             rows *= np.sqrt(view.power)[:, None]
             for c in range(self.channels):
                 own = self._parameters_of(c)
                 found[np.ix_(own, own)] += 2.0 * rows[c] @ rows[c].T
         return found
 
-    def _views(self) -> list[_View]:
+    def _rows(
+        self, view: _View, blurs: Sequence[_Blur], chain: FloatArray, m: FloatArray
+    ) -> FloatArray:
+        """Return a view's derivatives by a channel's blend and stages, (C, L+1 + parameters, M).
+
+        They stand in ``_kept``: the system clears the pages of new arrays.
+        """
+        by_blend, by_stage = np.split(self._kept, [len(m)], axis=1)
+        shown = np.zeros_like(chain)
+        np.multiply(chain[view.first :], view.factors[:, None], out=shown[view.first :])
+        shown -= np.einsum("lc,lcm->cm", m, shown) / self.target.energy[:, None]
+        np.multiply(m.T[:, :, None], shown.transpose(1, 0, 2), out=by_blend)
+        after, end = np.zeros(chain.shape[1:]), by_stage.shape[1]
+        for k in range(len(blurs) - 1, -1, -1):
+            if k + 1 >= view.first:
+                after += m[k + 1][:, None] * view.factors[k + 1 - view.first]
+            after *= self._halvings[k]
+            begin = end - blurs[k].slopes.shape[1]
+            moved = (chain[k] * after)[:, None]
+            np.multiply(moved, blurs[k].slopes, out=by_stage[:, begin:end])
+            after, end = after * blurs[k].spectrum, begin
+        return self._kept
+
+    def _all_views(self) -> list[_View]:
         """Return the kernel, and what aliasing adds to each level, where it counts."""
         up = np.concatenate((np.ones((1, self.target.frequencies.size)), self._up))
-        views = [_View(self._both(up), self._wanted, self._power * self._twice)]
+        views = [_View(0, self._both(up), self._wanted, self._power * self._twice)]
         power = 0.5 * self.aliasing * self._power * self._twice
-        for image in self._images():
+        for first, image in self._images():
             for x, y in ((self._x, self._y), (self._y, self._x)):
-                views.append(_View(image[:, x] * up[:, y], 0.0, power))
+                views.append(_View(first, image[:, x] * up[first:, y], 0.0, power))
         return views
 
     def _both(self, line: FloatArray) -> FloatArray:
@@ -196,22 +221,6 @@ class StarChain(Chain):
             by_blur = by_chain * before[k] * self._halvings[k]
             self._put_stage(gradient, k, np.einsum("cm,cpm->cp", by_blur, blurs[k].slopes))
             by_chain = by_chain * (self._halvings[k] * blurs[k].spectrum)
-
-    def _slopes(self, blurs: Sequence[_Blur], rows: FloatArray) -> FloatArray:
-        """Return derivatives of the sum of rows (L+1, C, M) times the chain, (C, p, M).
-
-        They are by a channel's p parameters of stages.
-        """
-        counts = [each.slopes.shape[1] for each in blurs]
-        moving = np.zeros((self.channels, sum(counts), self._x.size))
-        found, chain, done = np.zeros(moving.shape), np.ones(moving[:, 0].shape), 0
-        for k, blur in enumerate(blurs):
-            factor = self._halvings[k] * blur.spectrum
-            moving[:, :done] *= factor[:, None]
-            moving[:, done : done + counts[k]] = (chain * self._halvings[k])[:, None] * blur.slopes
-            chain, done = chain * factor, done + counts[k]
-            found[:, :done] += rows[k + 1][:, None] * moving[:, :done]
-        return found
 
 
 def _waves(offsets: FloatArray, w: FloatArray) -> tuple[ComplexArray, ComplexArray]:

@@ -30,7 +30,7 @@ from sssfit.fit._result import TapsFit
 from sssfit.fit._spectrum import spectral_target
 from sssfit.fit._target import Pitch, Target
 from sssfit.fit._tied_chain import equal_pairs, gaussian_weights, one_shape
-from sssfit.fit.cascade import searched, table_of, whole_target
+from sssfit.fit.cascade import ALIASING, searched, table_of, whole_target
 from sssfit.kernel.structure import Shape
 from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
@@ -86,12 +86,12 @@ def fit_gaussian_chain(
         variances_mm2, weights, evaluations = shared_gaussians(target, lit, len(shapes))
         shapes = shapes[: len(variances_mm2)]
     with one_blas_thread():
-        chain = PairChain(spectral_target(target, lit, "natural"), shapes)
+        chain = PairChain(spectral_target(target, lit, "natural"), shapes, ALIASING)
         tied = one_shape(chain, is_fitted=blur == "shape")
         if blur == "published":
             p = _parameters(variances_mm2 / target.mm_per_pixel**2, weights, shapes[0].pairs)
         else:
-            p, evaluations = searched(tied, chain, seed)
+            p, evaluations = searched(tied, seed)
     taps = table_of("gaussian-chain", target, chain, tied.full(p), settings)
     return TapsFit(taps, evaluations, time.perf_counter() - begun)
 

@@ -23,7 +23,7 @@ from sssfit.fit._result import TapsFit
 from sssfit.fit._spectrum import spectral_target
 from sssfit.fit._target import Pitch
 from sssfit.fit._tied_chain import TiedChain, equal_pairs
-from sssfit.fit.cascade import searched, table_of, whole_target
+from sssfit.fit.cascade import ALIASING, searched, table_of, whole_target
 from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
 
@@ -68,9 +68,9 @@ def fit_pyramid(
     shapes = equal_pairs(stages)
     target, lit = whole_target(profile, mm_per_pixel, support_mm)
     with one_blas_thread():
-        chain = PairChain(spectral_target(target, lit, spectrum), shapes)
+        chain = PairChain(spectral_target(target, lit, spectrum), shapes, ALIASING)
         tied = one_filter(chain)
-        p, evaluations = searched(tied, chain, seed)
+        p, evaluations = searched(tied, seed)
     settings = {"stages": stages, "spectrum": spectrum, "fit_seed": seed}
     taps = table_of("pyramid", target, chain, tied.full(p), settings)
     return TapsFit(taps, evaluations, time.perf_counter() - begun)

@@ -78,7 +78,7 @@ def fit_rotated(
     with one_blas_thread():
         chain = StarChain(spectral_target(target, lit, "natural"), shapes)
         tied = last_shown(chain, _SHARED[len(shapes)])
-        p, evaluations = searched(tied, chain, seed)
+        p, evaluations = searched(tied, seed)
     settings = {"directions": directions, "taps": taps, "fit_seed": seed}
     table = table_of("rotated", target, chain, tied.full(p), settings)
     return TapsFit(table, evaluations, time.perf_counter() - begun)

@@ -26,7 +26,7 @@ _Found = TypeVar("_Found")
 _MOST = 16  # workers; each takes 0.3 GB
 _LOST = (
     "a worker process ended before its work was done: it was killed, memory ran out, or the "
-    "script lacks `if __name__ == '__main__':`; `threads = 1` takes no worker."
+    "script lacks the main guard that multiprocessing needs; `threads = 1` takes no worker."
 )
 
 _shared: Any = None
