@@ -163,16 +163,27 @@ def walked():
         patch.setattr(
             noise, "WAYS", [Way("svd 3", "svd", {"rank": 3}), Way("pre", "preintegrated", {})]
         )
+        patch.setattr(noise, "_SMOOTHED", ("svd 3",))
         return stability(load_material("skin1"), only=["noise"], threads=1).panels
 
 
 def test_noise_falls_as_the_root_of_the_photons(walked):
     error, spread, _ = walked
     for curve in (*error.curves, *spread.curves):
+        if "smoothed" in curve.label:  # the fewer photons, the more of their noise is taken
+            continue
         slope = np.polyfit(np.log(curve.x), np.log(curve.y), 1)[0]
         # Medians of 8 seeds are known to 1.25 / sqrt(8) * 0.6 of themselves: a slope over two
         # decades to 0.08.
         assert slope == pytest.approx(-0.5, abs=0.16), curve.label
+
+
+def test_smoothing_moves_the_boundary_of_noise(walked):
+    """By twice as many photons at the least, and by more than the boundaries' ranges allow."""
+    edges = {each.label: walked[0].edges(each)[0] for each in walked[0].curves}
+    plain, smooth = edges["svd 3"], edges["svd 3, smoothed"]
+    assert smooth.at < 0.5 * plain.at
+    assert smooth.at < plain.low
 
 
 def test_a_fit_that_chases_noise_is_found(walked, monkeypatch):

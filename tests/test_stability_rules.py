@@ -87,6 +87,37 @@ def test_the_noise_ratio_is_that_of_walks_around_the_exact_kernel(exact):
     assert np.mean(np.square(errors)) == pytest.approx(np.mean(np.square(predicted)), rel=0.5)
 
 
+def test_the_noise_floor_is_that_of_simulated_noise_of_rings(walks):
+    """Eigenvalues of matrices whose pixels share the noise of the annuli that they cover.
+
+    The matrices are summed up from parts of pixels, each in the annulus of its radius.
+    """
+    walk, half, parts, draws = walks[2000], 40, 10, 64
+    side = 2 * half + 1
+    at_mm = PITCH * ((np.arange(side * parts) + 0.5) / parts - half - 0.5)
+    annulus = np.searchsorted(walk.r_edges_mm, np.hypot(at_mm[:, None], at_mm), side="right") - 1
+    areas = np.pi * np.diff(walk.r_edges_mm**2)
+
+    def matrix(energy):
+        density = np.append(energy / areas, 0.0)[np.minimum(annulus, walk.n_annuli)]
+        return PITCH**2 * density.reshape(side, parts, side, parts).mean(axis=(1, 3))
+
+    rng = np.random.default_rng(1)
+    stated = noise_ratio(walk, PITCH)
+    for c in range(3):
+        stderr = walk.annulus_energy_stderr[:, c]
+        noise = [matrix(stderr * rng.standard_normal(len(stderr))) for _ in range(draws)]
+        eigenvalues = np.abs(np.linalg.eigvalsh(noise))
+        squares = (eigenvalues**2).sum(axis=1) / np.linalg.norm(
+            matrix(walk.annulus_energy[:, c])
+        ) ** 2
+        assert abs(squares.mean() - stated[c] ** 2) < 3.0 * squares.std(ddof=1) / np.sqrt(draws)
+        # Rings make noise of few terms; were pixels independent, the largest of 81 eigenvalues
+        # would be 2 / sqrt(81) of the norm.
+        largest = eigenvalues.max(axis=1) / np.linalg.norm(eigenvalues, axis=1)
+        assert np.median(largest) > 2.0 * 2.0 / np.sqrt(side)
+
+
 def _full(target, channel):
     quadrant = target.quadrant(channel)
     line = np.concatenate((quadrant[:0:-1], quadrant))

@@ -2,7 +2,9 @@
 
 The measure is what noise adds to a picture: the kernel of a walk beside that of the exact profile,
 by the same method. A walk of few photons is the beginning of no longer one, so points are
-independent; channels share their walks, as they do for users.
+independent; channels share their walks, as they do for users. Some methods are also fitted to the
+walk's profile smoothed by its standard errors (`sssfit.profile.smooth`), and held to the same
+kernels of the exact profile.
 """
 
 import functools
@@ -16,6 +18,7 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import FitError, SssfitError
 from sssfit.kernel import Kernel, Taps
 from sssfit.profile import Profile
+from sssfit.profile.smooth import smoothed
 from sssfit.render.screen import second_moments
 from sssfit.simulate import simulate_montecarlo
 from sssfit.stability.curve import Axis, Curve
@@ -31,9 +34,10 @@ _SEEDS = 16
 # Unless all is whole. A walk of 1e7 photons takes as long as all its fits, a cascade as all others.
 _SEEDS_OF_MANY, _MANY = 4, 10**7
 _SEEDS_OF_CASCADES, _PHOTONS_OF_CASCADES = 6, (10**3, 10**5)
+_SMOOTHED = ("pre-integrated", "svd 3", "gaussians 4")
 _ADVICE = {
-    "svd": "fewer terms or more photons; the exact method has no noise",
-    "gaussians": "fewer Gaussians or more photons",
+    "svd": "fewer terms, smooth the profile, more photons or the exact method",
+    "gaussians": "fewer Gaussians, smooth the profile, or more photons",
     "cascade": "more photons, or the exact method",
 }
 
@@ -53,15 +57,20 @@ def stress(subject: Subject) -> list[Panel]:
         raise FitError("noise: the profile does not say its material; give the material.")
     photons = [10**each for each in range(_FIRST, _LAST + 1)]
     subject.prepare(reversed(WAYS))
-    wanted = [(each, _wanted(subject, each)) for each in WAYS]
+    cases = [_Case(each.label, each, _wanted(subject, each)) for each in WAYS]
+    cases += [
+        each._replace(label=f"{each.label}, smoothed", is_smoothed=True)
+        for each in cases
+        if each.label in _SMOOTHED
+    ]
     work = [
         (count, number)
         for count in reversed(photons)
         for number in range(_seeds_of(subject, count))
     ]
-    seen = subject.each(functools.partial(_measured, wanted), work)
+    seen = subject.each(functools.partial(_measured, cases), work)
     found = dict(zip(work, seen, strict=True))
-    figures = [_figures(each, found) for each in WAYS]
+    figures = [_figures(each, found) for each in cases]
     axis = Axis("photons", mild=float(photons[-1]), form=".2g")
     return [
         Panel(
@@ -108,6 +117,15 @@ class _Wanted(NamedTuple):
     width_mm: float
 
 
+class _Case(NamedTuple):
+    """A method, as charts name it, and whether it is given smoothed profiles."""
+
+    label: str
+    way: Way
+    wanted: _Wanted
+    is_smoothed: bool = False
+
+
 def _wanted(subject: Subject, way: Way) -> _Wanted:
     kernel = subject.true_kernel(way)
     return _Wanted(subject.shows(kernel), width_mm(kernel))
@@ -117,23 +135,26 @@ def _seeds_of(subject: Subject, photons: int) -> int:
     return _SEEDS if subject.is_whole or photons < _MANY else min(_SEEDS, _SEEDS_OF_MANY)
 
 
-def _measured(
-    wanted: Sequence[tuple[Way, _Wanted]], subject: Subject, given: tuple[int, int]
-) -> dict[str, _Seen]:
+def _measured(cases: Sequence[_Case], subject: Subject, given: tuple[int, int]) -> dict[str, _Seen]:
     """Fit one walk by all methods; sums of Gaussians begin with those of fewer."""
     photons, number = given
     profile = _walk(subject, photons, number)
-    due = [each for each in wanted if _is_due(subject, each[0], photons, number)]
-    return {way.label: _seen(subject, way, own, profile) for way, own in due}
+    smooth = smoothed(profile)
+    return {
+        each.label: _seen(subject, each, smooth if each.is_smoothed else profile)
+        for each in cases
+        if _is_due(subject, each.way, photons, number)
+    }
 
 
-def _seen(subject: Subject, way: Way, wanted: _Wanted, profile: Profile) -> _Seen:
+def _seen(subject: Subject, case: _Case, profile: Profile) -> _Seen:
     """Compare the kernel of a walk; infinite where too few annuli have light for a fit."""
     try:
-        kernel = subject.fit(way, profile)
+        kernel = subject.fit(case.way, profile)
     except SssfitError:
         return _Seen(np.inf, np.inf)
-    return _Seen(subject.error(kernel, wanted.pictures), width_mm(kernel) / wanted.width_mm)
+    width = width_mm(kernel) / case.wanted.width_mm
+    return _Seen(subject.error(kernel, case.wanted.pictures), width)
 
 
 def _is_due(subject: Subject, way: Way, photons: int, number: int) -> bool:
@@ -149,17 +170,18 @@ class _Figures(NamedTuple):
     bias: Curve
 
 
-def _figures(way: Way, found: Mapping[tuple[int, int], Mapping[str, _Seen]]) -> _Figures:
+def _figures(case: _Case, found: Mapping[tuple[int, int], Mapping[str, _Seen]]) -> _Figures:
     """Return the median of the error, and spread and bias of the width, by numbers of photons."""
     seen: dict[int, list[_Seen]] = {}
     for (photons, _), by_label in sorted(found.items()):
-        if way.label in by_label:
-            seen.setdefault(photons, []).append(by_label[way.label])
+        if case.label in by_label:
+            seen.setdefault(photons, []).append(by_label[case.label])
     errors = [np.array([each.error for each in own]) for own in seen.values()]
     widths = [np.array([each.width for each in own]) - 1.0 for own in seen.values()]
-    advice = _ADVICE.get(way.method, "more photons")
+    own = "more photons" if case.is_smoothed else _ADVICE.get(case.way.method)
+    advice = own or "smooth the profile, or more photons"
     ranges = median_range(errors), spread_range(widths), bias_range(widths)
-    return _Figures(*(Curve(way.label, np.array(list(seen)), *each, advice) for each in ranges))
+    return _Figures(*(Curve(case.label, np.array(list(seen)), *each, advice) for each in ranges))
 
 
 def width_mm(kernel: Kernel) -> float:

@@ -57,7 +57,12 @@ def spread_range(samples: Sequence[FloatArray]) -> Range:
 
 
 def bias_range(samples: Sequence[FloatArray]) -> Range:
-    """Return absolute means; those of two sets of n seeds differ by sqrt(2 / n) of the spread."""
+    """Return absolute means; those of two sets of n seeds differ by sqrt(2 / n) of the spread.
+
+    The spread is that of the seeds themselves, so the difference has a t distribution.
+    """
+    from scipy.stats import t
+
     whole = [bool(np.isfinite(each).all()) for each in samples]
     bias = np.array(
         [
@@ -65,7 +70,9 @@ def bias_range(samples: Sequence[FloatArray]) -> Range:
             for each, is_whole in zip(samples, whole, strict=True)
         ]
     )
-    apart = np.array([3.0 * np.sqrt(2.0 / len(each)) * _deviation(each) for each in samples])
+    counts = np.array([len(each) for each in samples])
+    spread = np.array([_deviation(each) for each in samples])
+    apart = t.ppf(_NEARLY_ALL, counts - 1) * np.sqrt(2.0 / counts) * spread
     low = np.where(
         whole, np.maximum(np.where(whole, bias, 0.0) - np.where(whole, apart, 0.0), 0.0), np.inf
     )
