@@ -35,11 +35,18 @@ _OWN_FITS = {"test_approved"}  # its clock counts how often it is asked, fits in
 # What these ask is how good a cascade is. The others, approvals among them, fit dozens, and one
 # descent, few frequencies and short descents will do for them: a fifth of the time.
 LONG_SEARCHES = {
-    *("test_cascade", "test_disks_page", "test_docs", "test_docs_tables", "test_engines"),
-    *("test_frames", "test_motion", "test_on_taps", "test_readme_figures", "test_shading"),
+    *("test_cascade", "test_disks_page", "test_distance", "test_docs", "test_docs_tables"),
+    *(
+        "test_engines",
+        "test_frames",
+        "test_motion",
+        "test_on_taps",
+        "test_readme_figures",
+        "test_shading",
+    ),
 }
 # These ask which of two cascades is nearer, or draw lines: far ones, where a descent stops early.
-_WHOLE_DESCENTS = {"test_distance", "test_rotated"}
+_WHOLE_DESCENTS = {"test_rotated"}
 _PLAIN = str | int | float | NoneType  # a setting that is a function, or a scene, is not shared
 _state = {"allowed": True, "fits": True, "short": 0, "folder": None, "begun": False}
 

@@ -110,6 +110,7 @@ def test_a_foreign_file_in_the_profiles_place_is_not_replaced(folder, capsys):
     assert sorted(each.name for each in folder.iterdir()) == ["skin1.chosen.profile.npz"]
 
 
+@pytest.mark.filterwarnings("ignore:5 taps a pass")
 def test_which_figure_the_tolerance_is_of():
     loose, tight = (
         json.loads(ended("skin1", *EDGE, "--tolerance-of", of, "--json").stdout)
