@@ -4,6 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from scipy import sparse
 from test_profile import make_profile
 from test_taps import taps_of
 
@@ -87,35 +88,55 @@ def test_the_noise_ratio_is_that_of_walks_around_the_exact_kernel(exact):
     assert np.mean(np.square(errors)) == pytest.approx(np.mean(np.square(predicted)), rel=0.5)
 
 
+@pytest.mark.parametrize("pitch_mm", [0.15, 0.3, 0.6])
+def test_the_noise_ratio_is_that_of_parts_of_pixels(walks, pitch_mm):
+    """Independent errors of annuli, each shared by the pixels that a fine grid of points finds."""
+    walk, half, parts = walks[2000], 12, 40
+    noise, whole = _squares(_shares(walk, pitch_mm, half, parts), walk)
+    assert noise_ratio(walk, pitch_mm) == pytest.approx(np.sqrt(noise / whole), rel=0.04)
+
+
 def test_the_noise_floor_is_that_of_simulated_noise_of_rings(walks):
-    """Eigenvalues of matrices whose pixels share the noise of the annuli that they cover.
-
-    The matrices are summed up from parts of pixels, each in the annulus of its radius.
-    """
-    walk, half, parts, draws = walks[2000], 40, 10, 64
-    side = 2 * half + 1
-    at_mm = PITCH * ((np.arange(side * parts) + 0.5) / parts - half - 0.5)
-    annulus = np.searchsorted(walk.r_edges_mm, np.hypot(at_mm[:, None], at_mm), side="right") - 1
-    areas = np.pi * np.diff(walk.r_edges_mm**2)
-
-    def matrix(energy):
-        density = np.append(energy / areas, 0.0)[np.minimum(annulus, walk.n_annuli)]
-        return PITCH**2 * density.reshape(side, parts, side, parts).mean(axis=(1, 3))
-
+    """Eigenvalues of matrices whose pixels share the noise of the annuli that they cover."""
+    walk, half, draws = walks[2000], 24, 64
+    shares, side = _shares(walk, PITCH, half, 20), 2 * half + 1
+    noise, _ = _squares(shares, walk)
     rng = np.random.default_rng(1)
-    stated = noise_ratio(walk, PITCH)
     for c in range(3):
-        stderr = walk.annulus_energy_stderr[:, c]
-        noise = [matrix(stderr * rng.standard_normal(len(stderr))) for _ in range(draws)]
-        eigenvalues = np.abs(np.linalg.eigvalsh(noise))
-        squares = (eigenvalues**2).sum(axis=1) / np.linalg.norm(
-            matrix(walk.annulus_energy[:, c])
-        ) ** 2
-        assert abs(squares.mean() - stated[c] ** 2) < 3.0 * squares.std(ddof=1) / np.sqrt(draws)
-        # Rings make noise of few terms; were pixels independent, the largest of 81 eigenvalues
-        # would be 2 / sqrt(81) of the norm.
-        largest = eigenvalues.max(axis=1) / np.linalg.norm(eigenvalues, axis=1)
-        assert np.median(largest) > 2.0 * 2.0 / np.sqrt(side)
+        errors = walk.annulus_energy_stderr[:, c] * rng.standard_normal((draws, walk.n_annuli))
+        eigenvalues = np.abs(np.linalg.eigvalsh((errors @ shares).reshape(draws, side, side)))
+        squares = (eigenvalues**2).sum(axis=1)
+        assert abs(squares.mean() - noise[c]) < 3.0 * squares.std(ddof=1) / np.sqrt(draws)
+        # Rings make noise of few terms; were pixels independent, the largest of 49 eigenvalues
+        # would be 2 / sqrt(49) of the norm.
+        largest = eigenvalues.max(axis=1) / np.sqrt(squares)
+        assert np.median(largest) > 1.5 * 2.0 / np.sqrt(side)
+
+
+def _shares(profile, pitch_mm, half, parts):
+    """The shares (annuli, pixels) of each annulus that fall on pixels, from points on a grid."""
+    side = 2 * half + 1
+    at_mm = pitch_mm * ((np.arange(side * parts) + 0.5) / parts - half - 0.5)
+    radius_mm = np.hypot(at_mm[:, None], at_mm).ravel()
+    annulus = np.searchsorted(profile.r_edges_mm, radius_mm, side="right") - 1
+    line = np.arange(side * parts) // parts
+    pixel = (line[:, None] * side + line).ravel()
+    inside = annulus < profile.n_annuli
+    found = sparse.coo_array(
+        (np.ones(inside.sum()), (annulus[inside], pixel[inside])), (profile.n_annuli, side**2)
+    ).tocsr()
+    # Whole annuli have as many points as their area says, but for those of few points.
+    points = np.pi * np.diff(profile.r_edges_mm**2) * (parts / pitch_mm) ** 2
+    is_whole = profile.r_edges_mm[1:] <= pitch_mm * (half + 0.5)
+    count = np.where(is_whole, np.maximum(found.sum(axis=1), 1.0), points)
+    return sparse.diags_array(1.0 / count) @ found
+
+
+def _squares(shares, profile):
+    """The expected squares of the norms of noise and kernel (C,), by shares of pixels."""
+    own = (shares * shares).sum(axis=1)
+    noise = (profile.annulus_energy_stderr**2 * own[:, None]).sum(axis=0)
+    return noise, ((shares.T @ profile.annulus_energy) ** 2).sum(axis=0)
 
 
 def _full(target, channel):

@@ -7,22 +7,27 @@ from sssfit.profile import Profile
 from sssfit.profile.pixels import annulus_areas
 
 _MOST_RANK = 16
+_DISK = 1.0 / np.sqrt(np.pi)  # radius of a disk of one pixel's area, in pixels
 
 
 def noise_ratio(profile: Profile, mm_per_pixel: float) -> FloatArray:
     """Return the noise of the 2D kernel over the kernel, by Frobenius norms (C,).
 
-    Annuli are gathered into rings of a pixel's width, whose errors add up in squares. A ring of
-    energy E on the area A puts E p^2 / A into each of its A / p^2 pixels, all with one error, so
-    the square of the norm is p^2 sum E^2 / A, of the noise as of the kernel.
+    Annuli are gathered into a disk of one pixel's area and rings of a pixel's width around it,
+    whose errors add up in squares. A ring of energy E on the area A puts E p^2 / A into each of its
+    A / p^2 pixels, all with one error, so the square of the norm is p^2 sum E^2 / A, of the noise
+    as of the kernel. With the true parts of pixels both ratios differ by at most 4 % (skin1, .15 to
+    1.2 mm); with rings from 0, p, 2 p on they differed by 20 %.
     """
     edges_mm = profile.r_edges_mm
-    rings = np.floor(edges_mm[:-1] / mm_per_pixel * (1.0 + 1e-12)).astype(np.intp)
+    middle_pixels = 0.5 * (edges_mm[1:] + edges_mm[:-1]) / mm_per_pixel
+    rings = np.floor(middle_pixels + 1.0 - _DISK).astype(np.intp)
     shape = rings[-1] + 1, len(profile.channels)
     variance, energy = np.zeros(shape), np.zeros(shape)
     np.add.at(variance, rings, np.nan_to_num(profile.annulus_energy_stderr) ** 2)
     np.add.at(energy, rings, profile.annulus_energy)
-    areas = annulus_areas(mm_per_pixel * np.arange(rings[-1] + 2))[:, None]
+    outer = np.arange(rings[-1] + 1) + _DISK
+    areas = annulus_areas(mm_per_pixel * np.concatenate(([0.0], outer)))[:, None]
     noise, whole = (variance / areas).sum(axis=0), (energy**2 / areas).sum(axis=0)
     ratio: FloatArray = np.sqrt(noise / np.where(whole > 0.0, whole, 1.0))
     return ratio
