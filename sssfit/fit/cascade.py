@@ -238,9 +238,9 @@ def searched(
     """Return the best parameters of a search, and evaluations.
 
     The misfit is smooth between texels only, so it has local optima. A search makes many cheap
-    descents, continues the best of them, and hops from the best of those. Aliasing is weighed in
-    from the first step: without it three of six seeds left .6 and more of skin1 with
-    1|1|1-1|1-1|1-1; with it all six leave .30 to .38.
+    descents, continues the best of them, and hops from the best of those. All of them weigh
+    aliasing in: without it three of four seeds left .6 and more of skin1 with 1|1|1-1|1-1|1-1,
+    with it six of six leave .30 to .38.
 
     Parameters
     ----------
