@@ -40,12 +40,12 @@ from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
 from sssfit.scene.record import Scene
 
-FETCHES = 24  # skin1 at .3 mm: 99 % of a picture's pixels within a Delta E of .12
+FETCHES = 24  # skin1 at .3 mm: 99 % of a picture's pixels within a Delta E of .10
 FEWEST = 7
 _KEPT, _MOST_PIXELS = 0.9999, 320
 _STARTS, _KEPT_STARTS, _SHAPES = 16, 4, 2
 # Weights of aliasing. skin1, 24 fetches: mean over eight pictures of the 99th percentile of Delta
-# E .127 with 0, .113 with .3, .121 with 1; of a point moved by a pixel .99, .71 and .67.
+# E .261 with 0, .101 with .3, .107 with 1; of a point moved by a pixel 3.1, .74 and .69.
 ALIASING, _TIMES = 0.3, 10.0 / 3.0
 # Of one picture the squared error itself: its images along x and along y. On points at .3 mm 14
 # fetches fitted with .3 had 1.08 times the error of those for natural pictures, with 2 they have
@@ -226,8 +226,8 @@ def _aliasing(pictures: Pictures, *, still: bool) -> float:
 def _effort(shapes: Sequence[Shape]) -> int:
     """Return how many times as many starts a search takes; without halvings each takes a third.
 
-    Of six seeds for skin1 with 1-1-1-2-2-2 one reached a Delta E of .35 with 16 starts, the others
-    .60; five of five reached .38 or less with 32.
+    Of three seeds for skin1 with 1-1-1-2-2-2 one reached a Delta E of .35 with 16 starts, the
+    others .60; five of five reached .38 or less with 32.
     """
     return 1 if shapes[-1].level else 2
 
