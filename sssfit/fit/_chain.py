@@ -89,6 +89,7 @@ class Chain(ABC):
         self.size = int(self._at[-1])
         steps = [np.arange(self._steps(k).start, self._steps(k).stop) for k in range(len(shapes))]
         self.step_parameters = np.concatenate(steps)  # which parameters are offset steps
+        self.parameters = [self._parameters_of(c) for c in range(self.channels)]
 
     @abstractmethod
     def spectrum(self, x: FloatArray) -> FloatArray:

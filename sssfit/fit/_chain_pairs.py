@@ -81,7 +81,7 @@ class PairChain(Chain):
         self._weights_at = np.zeros((self.channels, len(shapes), most + 1), np.intp)
         for k, own in enumerate(self.counts):
             self._steps_at[k, :own], self._weights_at[:, k, : own + 1] = self.places(k)
-        n, size = target.frequencies.size, self._parameters_of(0).size
+        n, size = target.frequencies.size, self.parameters[0].size
         self._spare = np.empty((size, n, n))  # new, the system clears its pages: twice the time
 
     def spectrum(self, x: FloatArray) -> FloatArray:
@@ -115,7 +115,7 @@ class PairChain(Chain):
         slopes = self._slopes(blurs)  # (C, parameters, L+1, n)
         found = np.zeros((self.size, self.size))
         for c in range(self.channels):
-            own = self._parameters_of(c)
+            own = self.parameters[c]
             for view in self.views:
                 products = self._products(view, blurs.chain[c], slopes[c], m[:, c], c)
                 found[np.ix_(own, own)] += 2.0 * products
