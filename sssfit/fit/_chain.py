@@ -89,6 +89,7 @@ class Chain(ABC):
         self.size = int(self._at[-1])
         steps = [np.arange(self._steps(k).start, self._steps(k).stop) for k in range(len(shapes))]
         self.step_parameters = np.concatenate(steps)  # which parameters are offset steps
+        self.parameters = [self._parameters_of(c) for c in range(self.channels)]
 
     @abstractmethod
     def spectrum(self, x: FloatArray) -> FloatArray:
@@ -224,11 +225,15 @@ def normalised(logits: FloatArray, kind: str = "pair") -> tuple[FloatArray, Floa
 
 
 def fetches(offsets: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the spectra (k, n) of mirrored bilinear fetches, and their slopes by offset."""
-    whole = np.floor(offsets)
-    near, far = np.cos(whole[:, None] * w), np.cos((whole[:, None] + 1.0) * w)
+    """Return the spectra (..., k, n) of mirrored bilinear fetches (..., k), and slopes by offset.
+
+    The frequencies are (..., n).
+    """
+    whole = np.floor(offsets)[..., None]
+    w = w[..., None, :]
+    near, far = np.cos(whole * w), np.cos((whole + 1.0) * w)
     slope = 2.0 * (far - near)
-    return 2.0 * near + (offsets - whole)[:, None] * slope, slope
+    return 2.0 * near + (offsets[..., None] - whole) * slope, slope
 
 
 def resampling(w: FloatArray, levels: Sequence[int]) -> tuple[FloatArray, FloatArray]:
