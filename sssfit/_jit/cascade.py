@@ -1,19 +1,18 @@
 """The stages of one level of a cascade, run through together so that their pictures stay in cache.
 
-Two rows at a time each stage blurs along y, out of a ring of rows into one line, and that line along
-x into the next ring, as far behind the stage before as its own reach; a row is added up when the
-last stage has blurred it. Only the picture is read, and the sum and the half-sized picture are
-written: 2048 x 2048 RGB of two stages move 113 MB in place of 600. Reading and writing take 10 of
-the 24 ms of the first two stages of 1-1|2-2|2-2 (AVX2, one thread), the passes 10, the rest sum and
-means: memory is no longer what holds it up. Strips of 512 or 1024 columns, four pairs at a time and
-sums of three lines at a time gained nothing.
+Two rows at a time each stage blurs along y, out of a ring of rows into one line, and that line
+along x into the next ring, as far behind the stage before as its own reach; a row is added up when
+the last stage has blurred it. Only the picture is read, and the sum and the half-sized picture are
+written: 2048 x 2048 RGB of two stages move 113 MB in place of 600. Of the 24 ms that the first two
+stages of 1-1|2-2|2-2 take (AVX2, one thread), 10 are the passes, 10 reading and writing, the rest
+sums and means. Strips of 512 or 1024 columns and sums of three lines at a time gained nothing.
 
 The picture and its sum lie as the caller's do, the channels of a pixel side by side; all else lies
 in planes, a row's channels one after another. So a pass has one weight for all numbers of a line,
 and means and doublings step by 2. Pixels throughout took half as long again: a pass read rows of
-weights, and the compiler gathered single numbers. A line
-is aligned, so that a pass along y reads no vector across two cache lines. What chooses among the
-loops over a line is inlined: a call counts references to each array that it is given.
+weights, and the compiler gathered single numbers. Lines are aligned, so that along y no vector
+lies across two cache lines. What chooses among the loops over a line is inlined: a call counts
+references to each array that it is given.
 
 The picture is mirrored at its borders. A mirrored picture blurred by an even pass is mirrored, bit
 for bit, so rows past a border or a block are computed like any others and blocks do not matter.
