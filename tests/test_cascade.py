@@ -2,6 +2,7 @@
 
 import functools
 import itertools
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -151,6 +152,18 @@ def test_derivatives_of_aliasing_are_those_of_differences(skin1, structure):
         step[k] = 1e-5
         after, before = (chain.value_and_gradient(x + s * step)[0] for s in (1, -1))
         assert gradient[k] == pytest.approx((after - before) / 2e-5, abs=1e-8, rel=1e-6)
+
+
+@pytest.mark.parametrize("structure", ["1|1-2", "*|1-*", "1-1x"])
+@pytest.mark.parametrize("logarithm", [-1e4, 1e4])
+def test_steps_that_a_line_search_throws_far_out_are_finite(skin1, structure, logarithm):
+    chain = chain_of(skin1, structure, 0.7)
+    x = chain.start(np.random.default_rng(4))
+    x[chain.step_parameters] = logarithm
+    value, gradient = chain.value_and_gradient(x)
+    assert math.isfinite(value)
+    assert np.isfinite(gradient).all()
+    assert np.isfinite(chain.hessian(x)).all()
 
 
 def test_the_matrix_of_aliasing_is_that_of_its_residuals_slopes(skin1):

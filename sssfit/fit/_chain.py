@@ -31,6 +31,7 @@ from sssfit.kernel.structure import Shape
 
 _BARRIER = 0.01  # a squared misfit; an offset 1 % beyond the kernel adds 1e-6
 _STAR = "star"
+_FAR = 20.0  # a logarithm; a line search may try 1e4, whose exponential is not finite
 _LEAST_TEXELS = 1e-9  # between fetches of a table: a stage that a fit has no need of shrinks to 0
 
 
@@ -148,7 +149,7 @@ class Chain(ABC):
             [
                 texels if kind == _STAR else np.cumsum(texels)
                 for kind, (steps, _) in zip(kinds, parts, strict=True)
-                for texels in [np.maximum(np.exp(steps), _LEAST_TEXELS)]
+                for texels in [np.maximum(texels_of(steps), _LEAST_TEXELS)]
             ],
             [normalised(logits, kind)[0].T for kind, (_, logits) in zip(kinds, parts, strict=True)],
             self._blend(x),
@@ -183,7 +184,7 @@ class Chain(ABC):
 
         The graded frequencies cannot tell such an offset from one inside.
         """
-        steps = np.exp(x[self._steps(k)])
+        steps = texels_of(x[self._steps(k)])
         if self.shapes[k].kind == _STAR:
             steps = np.where(np.arange(2) == np.argmax(steps), steps, 0.0)
         last = float(steps.sum())
@@ -214,6 +215,11 @@ class Chain(ABC):
         count = self.counts[k]
         gradient[self._at[k] : self._at[k] + count] = own[:, :count].sum(axis=0)
         gradient[self._at[k] + count : self._at[k + 1]] = own[:, count:].ravel()
+
+
+def texels_of(steps: FloatArray) -> FloatArray:
+    """Return offset steps, or a star's offsets, in texels from their logarithms."""
+    return np.exp(np.clip(steps, -_FAR, _FAR))
 
 
 def normalised(logits: FloatArray, kind: str = "pair") -> tuple[FloatArray, FloatArray]:

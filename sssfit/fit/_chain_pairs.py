@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sssfit.arrays import FloatArray
-from sssfit.fit._chain import Chain, fetches
+from sssfit.fit._chain import Chain, fetches, texels_of
 from sssfit.fit._spectrum import SpectralTarget
 from sssfit.kernel.structure import Shape
 
@@ -149,7 +149,7 @@ class PairChain(Chain):
         return found
 
     def _blurs(self, x: FloatArray) -> _Blurs:
-        step = np.exp(x[self._steps_at]) * self._has_step
+        step = texels_of(x[self._steps_at]) * self._has_step
         logits = np.where(self._has_weight, x[self._weights_at], -np.inf)
         weights = np.exp(logits - logits.max(axis=2, keepdims=True))
         weights /= (weights @ self._copies)[:, :, None]

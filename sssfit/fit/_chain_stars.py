@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
-from sssfit.fit._chain import Chain, fetches, normalised
+from sssfit.fit._chain import Chain, fetches, normalised, texels_of
 from sssfit.fit._spectrum import SpectralTarget
 from sssfit.kernel.structure import Shape, directions
 
@@ -202,7 +202,7 @@ class StarChain(Chain):
         return 2.0 ** self.shapes[k].level * self.target.frequencies
 
     def _pair(self, steps: FloatArray, logits: FloatArray, k: int) -> _Blur:
-        step = np.exp(steps)
+        step = texels_of(steps)
         weights, copies = normalised(logits)
         pairs, by_offset = fetches(np.cumsum(step), self._frequencies(k))
         fetched = np.concatenate((np.ones((1, pairs.shape[1])), pairs))
@@ -216,7 +216,7 @@ class StarChain(Chain):
 
     def _turned(self, steps: FloatArray, logits: FloatArray, k: int) -> _Blur:
         """Return the blur of a line, or of a pair that is turned."""
-        step = np.exp(steps)
+        step = texels_of(steps)
         weights, copies = normalised(logits)
         shape = self.channels, steps.size + weights.shape[1], self._x.size
         blur = _Blur(np.ones((shape[0], shape[2])), np.zeros(shape))
@@ -241,7 +241,7 @@ class StarChain(Chain):
         return 2.0 * (y * x).real, 2.0 * (down * by_y * x + right * y * by_x).real
 
     def _star(self, steps: FloatArray, logits: FloatArray, k: int) -> _Star:
-        offsets = np.exp(steps)
+        offsets = texels_of(steps)
         weights, copies = normalised(logits, "star")
         (diagonal, axis), (by_diagonal, by_axis) = fetches(offsets, self._frequencies(k))
         corners, beside = self._both(diagonal), axis[self._x] + axis[self._y]
