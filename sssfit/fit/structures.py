@@ -114,7 +114,7 @@ def best_structure(
 ) -> str | None:
     """Return the known structure that leaves the least within a budget; None if there is none.
 
-    Of those that leave hardly more, the one of the fewest passes.
+    Of those that leave hardly more, the one of the fewest passes, and of these the best.
 
     Parameters
     ----------
@@ -134,6 +134,6 @@ def best_structure(
         is_within = cost.fetches <= fetches and (passes is None or cost.passes <= passes)
         if is_within and not (full_resolution and shapes[-1].level):
             errors[text] = between(known, width)
-            costs[text] = cost.passes, cost.fetches, errors[text]
+            costs[text] = cost.passes, errors[text]
     as_good = (text for text in errors if errors[text] <= _AS_GOOD * min(errors.values()))
     return min(as_good, key=costs.__getitem__, default=None)
