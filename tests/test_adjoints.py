@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 from reference_pixels import one_over_r_profile
 
+from sssfit._jit.gaussians import coordinates
 from sssfit.fit import _by_hand, _fitted_taps, artist, burley, falloff, guided, weighted
 from sssfit.fit._chain_pairs import PairChain
 from sssfit.fit._chain_stars import StarChain
-from sssfit.fit._gaussians_search import make_annuli
+from sssfit.fit._gaussians_search import Coordinates, make_annuli
 from sssfit.fit._spectrum import spectral_target
 from sssfit.fit._target import Target
 from sssfit.fit._tied_chain import one_shape
@@ -201,6 +202,25 @@ def sum_of_gaussians(total: float | None, *, signed: bool) -> Callable:
     return made
 
 
+def coordinates_of_gaussians(_) -> Pair:
+    """Gaussians in few coordinates: each depends on its own variance only."""
+    annuli = make_annuli(np.linspace(0.0, 9.0, 40), np.ones(39), None, signed=False)
+    few = Coordinates.of(annuli, (-4.0, 5.0)).objective
+
+    def of(x):
+        columns = np.empty((2, len(few.wanted), x.size))
+        coordinates(few, x, columns)
+        return columns
+
+    def adjoint(x, y):
+        slopes = of(x)[1]
+        return np.sum(slopes * y.reshape(slopes.shape), axis=0)
+
+    return Pair(
+        "_gaussians_basis.py", lambda x: of(x)[0].ravel(), adjoint, np.log([0.05, 0.6, 4.0])
+    )
+
+
 def columns_of_gaussians(_) -> Pair:
     """Energies in annuli: column i depends on its own variance only."""
     annuli = make_annuli(np.linspace(0.0, 9.0, 40), np.ones(39), None, signed=False)
@@ -294,6 +314,7 @@ PAIRS = {
     "guided": guided_objective,
     "guided, sum": guided_sum,
     "columns of Gaussians": columns_of_gaussians,
+    "coordinates of Gaussians": coordinates_of_gaussians,
     "sum of Gaussians": sum_of_gaussians(None, signed=False),
     "sum of Gaussians, signed": sum_of_gaussians(None, signed=True),
     "sum of Gaussians, total": sum_of_gaussians(1.02, signed=False),

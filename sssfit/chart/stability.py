@@ -19,6 +19,7 @@ from sssfit.arrays import FloatArray
 from sssfit.chart.page import (
     COLOURS,
     LINE_STYLES,
+    WIDTH_INCHES,
     Style,
     add_legend,
     name_axes,
@@ -31,10 +32,12 @@ if TYPE_CHECKING:
     from sssfit.stability import Curve, Panel, Stability
 
 _COLUMNS, _PANEL_INCHES, _HEAD_INCHES = 2, 2.15, 1.35
+# Of all stresses, 38 panels: five a row on a page of a large screen, where two made one of 42 in.
+_MANY, _WIDE_COLUMNS, _WIDE_PANEL_INCHES, _WIDE_INCHES = 12, 5, 1.8, 16.0
 # Okabe and Ito's vermillion, green and blue, then their orange, sky blue, purple and black.
 _COLOURS = (*COLOURS, "#e69f00", "#56b4e9", "#cc79a7", "#000000", "#999999")
 _MARKERS = "os^Dv<>P"
-_SAFE = "#e8f3ec"
+_SAFE, _SMALL = "#e8f3ec", 6.5
 _HEADROOM = 0.25  # of the axis above the limit, at least
 
 
@@ -49,21 +52,24 @@ def stability_figure(stability: Stability) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        8 inches wide. Bars are where other seeds lie; a line leaves its panel at the top where a
-        fit is refused.
+        8 inches wide, with more than 12 panels 16. Bars are where other seeds lie; a line leaves
+        its panel at the top where a fit is refused.
     """
     panels = stability.panels
     shared = _shared(stability)
-    rows = math.ceil(len(panels) / _COLUMNS)
+    is_wide = len(panels) > _MANY
+    columns = _WIDE_COLUMNS if is_wide else _COLUMNS
+    rows = math.ceil(len(panels) / columns)
     where = f"pixels of {stability.mm_per_pixel:g} mm, seed {stability.seed}"
     notes = ["Shaded: within the limit. Bars: where other seeds lie.", *stability.notes]
-    height = _HEAD_INCHES + rows * _PANEL_INCHES
+    height = _HEAD_INCHES + rows * (_WIDE_PANEL_INCHES if is_wide else _PANEL_INCHES)
+    width = _WIDE_INCHES if is_wide else WIDTH_INCHES
     title = f"{stability.material}: where fits are safe"
-    with new_page(height, title, where, notes) as (figure, below):
+    with new_page(height, title, where, notes, width_inches=width) as (figure, below):
         if shared:
             handles = [Line2D([], [], **_style(k)) for k in range(len(shared))]
             below = add_legend(below, handles, shared)
-        grid = below.subplots(rows, _COLUMNS, squeeze=False).ravel()
+        grid = below.subplots(rows, columns, squeeze=False).ravel()
         for axes, panel in zip(grid, panels, strict=False):
             _draw(axes, panel, shared)
         for axes in grid[len(panels) :]:
@@ -96,6 +102,7 @@ def _draw(axes: Axes, panel: Panel, shared: list[str]) -> None:
         line = _line(axes, each, _style(styles[each.label]))
         own += [line] if each.label not in shared else []
     name_axes(axes, panel.title, panel.axis.label, panel.y_label)
+    axes.yaxis.label.set_size(_SMALL)  # "change of p99 of Delta E 2000" is as long as a panel
     if panel.axis.is_log:
         axes.set_xscale("log")
     else:
@@ -111,7 +118,7 @@ def _draw(axes: Axes, panel: Panel, shared: list[str]) -> None:
     axes.axhspan(low, panel.limit, color=_SAFE, zorder=0)
     axes.axhline(panel.limit, color="#666666", lw=0.6, zorder=1)
     if own:
-        legend = axes.legend(handles=own, loc="best", fontsize=7, frameon=True, framealpha=0.85)
+        legend = axes.legend(handles=own, loc="best", fontsize=_SMALL, frameon=True, framealpha=0.85)
         legend.get_frame().set_edgecolor("none")
 
 

@@ -172,7 +172,9 @@ class PairChain(Chain):
 
 def _across(rows: FloatArray, other: FloatArray, power: FloatArray) -> FloatArray:
     """Return sums over stages (p, n, l), with the other axis's functions (n, l) summed over."""
-    pairs = np.einsum("ij,jk,jl->ikl", power, other, other, optimize=True)
+    n, stages = other.shape
+    products = (other[:, :, None] * other[:, None, :]).reshape(n, -1)
+    pairs = (products.T @ power.T).T.reshape(n, stages, stages)
     found: FloatArray = np.matmul(rows.transpose(1, 0, 2), pairs).transpose(1, 0, 2)
     return found
 

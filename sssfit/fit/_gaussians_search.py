@@ -20,15 +20,19 @@ import functools
 import math
 import threading
 from dataclasses import dataclass, replace
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
+from sssfit.fit._gaussians_basis import basis_of
 from sssfit.fit._target import Target
 from sssfit.messages import counted
 from sssfit.profile.pixels import PARTS_PER_ANNULUS, SUBDIVIDED_ANNULI, annulus_areas
+
+if TYPE_CHECKING:
+    from sssfit._jit.gaussians import Sum
 
 # Signed weights may cancel: two of +-1e8 with nearly equal variances were seen to fit photon noise.
 # Their absolute sum may be at most this many times the energy.
@@ -172,7 +176,43 @@ class SharedAnnuli:
         return np.stack([each.at(log_variances).weights for each in self.parts], axis=1)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Coordinates:
+    """The same objective as `Annuli` in few coordinates and compiled, within bounds."""
+
+    objective: "Sum"
+
+    @classmethod
+    def of(cls, annuli: Annuli, bounds: tuple[float, float]) -> "Coordinates":
+        """Return the objective of annuli, for log variances within bounds."""
+        from sssfit._jit.gaussians import Sum  # numba: 0.4 s that ``fit --list`` does not need
+
+        basis = basis_of(annuli.inner, annuli.width, bounds)
+        scale = float(annuli.scale[0, 0]) / math.sqrt(2.0 * math.pi * float(annuli.width[0, 0]))
+        total = math.nan if annuli.total is None else float(annuli.total)
+        wanted = basis.split(annuli.wanted)
+        return cls(Sum(basis.series, *bounds, scale, wanted, total, annuli.signed))
+
+    def at(self, log_variances: FloatArray) -> Point:
+        """Return the best weights for given variances; infinite error if there is no solution."""
+        from sssfit._jit.gaussians import best_weights
+
+        shape = len(self.objective.wanted), len(log_variances)
+        weights, residual, jacobian = np.zeros(shape[1]), np.empty(shape[0]), np.zeros(shape)
+        if not best_weights(self.objective, log_variances, weights, residual, jacobian):
+            residual = np.full(shape[0], np.inf)
+        return Point(log_variances, weights, residual, jacobian)
+
+    def descend(self, log_variances: FloatArray, tolerance: float) -> tuple[Point, bool, int]:
+        """Return the point where a descent ends, if it converged, and evaluations."""
+        from sssfit._jit.gaussians import descend
+
+        end, settled, count = descend(self.objective, log_variances, tolerance, _MAX_EVALUATIONS)
+        return self.at(np.asarray(end, dtype=np.float64)), settled, count
+
+
 Objective: TypeAlias = Annuli | SharedAnnuli
+Searchable: TypeAlias = Coordinates | SharedAnnuli
 
 
 def _triangle(matrix: FloatArray) -> FloatArray:
@@ -275,11 +315,10 @@ def search(annuli: Objective, terms: int, least_mm2: float, most_mm2: float) -> 
     )
 
 
-def local_minimum(
-    annuli: Objective, log_variances: FloatArray, bounds: tuple[float, float]
-) -> Point:
+def local_minimum(annuli: Annuli, log_variances: FloatArray, bounds: tuple[float, float]) -> Point:
     """Descend from given log variances alone, within bounds, as one start of the search does."""
-    return _descend(annuli, annuli.at(log_variances), bounds, _FINE)[0]
+    own = Coordinates.of(annuli, bounds)
+    return _descend(own, own.at(log_variances), bounds, _FINE)[0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -316,7 +355,9 @@ class _Chain:
     """The best sums of 1, 2, 3 ... Gaussians of one channel, each searched from the one before."""
 
     def __init__(self, annuli: Objective, bounds: tuple[float, float]) -> None:
-        self._annuli, self._bounds = annuli, bounds
+        self._annuli: Searchable
+        self._annuli = Coordinates.of(annuli, bounds) if isinstance(annuli, Annuli) else annuli
+        self._bounds = bounds
         self._steps: list[_Step] = []
         self._lock = threading.Lock()
 
@@ -359,7 +400,7 @@ def _starts(log_variances: FloatArray | None, bounds: tuple[float, float]) -> li
 
 
 def _best_of(
-    annuli: Objective, starts: list[FloatArray], bounds: tuple[float, float]
+    annuli: Searchable, starts: list[FloatArray], bounds: tuple[float, float]
 ) -> tuple[Point, bool, int]:
     """Try all starts roughly, finish the best; return that point, if it converged, evaluations."""
     tried = [_descend(annuli, annuli.at(start), bounds, _ROUGH) for start in starts]
@@ -371,13 +412,15 @@ def _best_of(
 
 
 def _descend(
-    annuli: Objective, point: Point, bounds: tuple[float, float], tolerance: float
+    annuli: Searchable, point: Point, bounds: tuple[float, float], tolerance: float
 ) -> tuple[Point, bool, int]:
     """Run least squares from a point; return the last point, if it converged, evaluations."""
     from scipy.optimize import least_squares  # 0.8 s that ``fit --list`` does not need
 
     if not np.isfinite(point.cost):
         return point, True, 0
+    if isinstance(annuli, Coordinates):
+        return annuli.descend(point.log_variances, tolerance)
     seen = _LastPoint(annuli, point)
     found = least_squares(
         seen.residual,
@@ -396,7 +439,7 @@ def _descend(
 class _LastPoint:
     """Keeps the last point, whose weights serve the residual and the Jacobian."""
 
-    def __init__(self, annuli: Objective, point: Point) -> None:
+    def __init__(self, annuli: SharedAnnuli, point: Point) -> None:
         self._annuli, self._point = annuli, point
 
     def residual(self, log_variances: FloatArray) -> FloatArray:
