@@ -11,6 +11,7 @@ from test_lut import ENERGY, VARIANCES
 from test_profile import make_profile
 
 from sssfit.errors import ArgumentError, FitError, SssfitWarning
+from sssfit.fit import guided as fit_module
 from sssfit.fit._cascade_again import followed
 from sssfit.material import load_material
 from sssfit.methods import STRESSES
@@ -22,7 +23,9 @@ from sssfit.stability import (
     distance,
     gaussians,
     grid,
+    guided,
     hard_light,
+    imports,
     motion,
     noise,
     optics,
@@ -256,6 +259,42 @@ def test_a_followed_cascade_stays_where_it_is_and_goes_where_the_profile_goes(pr
         beyond_grid=0.5 * profile.beyond_grid,
     )
     np.testing.assert_allclose(followed(taps_of_it, dimmer).energy, 0.5 * same.energy, rtol=1e-6)
+
+
+def test_a_fit_that_takes_unequal_radii_for_equal_ones_is_found(profile, monkeypatch):
+    """Equal radii hide it; the healthy fit keeps within the limit as far as twice the radius."""
+    subject = Subject("gaussian", profile, 0.25)
+    ways = [Way("pre", "preintegrated", {})]
+    steps = [imports._unequal(subject, each) for each in imports._RATIOS]
+    (healthy,) = subject.changes(ways, [steps], imports.LIMIT)[0]
+    real = Way.fit
+
+    def equal(way, given, pitch, **more):
+        edges_mm = np.linspace(0.0, given.r_edges_mm[-1], given.n_annuli + 1)
+        return real(way, dataclasses.replace(given, r_edges_mm=edges_mm), pitch, **more)
+
+    monkeypatch.setattr(Way, "fit", equal)
+    (broken,) = subject.changes(ways, [steps], imports.LIMIT)[0]
+    assert healthy[0] == pytest.approx(broken[0], abs=1e-9)
+    assert (np.array(healthy[: imports._RATIOS.index(1.6) + 1]) < imports.LIMIT).all()
+    assert broken[1] > imports.LIMIT
+    assert len(broken) == 2
+
+
+def test_a_guided_search_that_stays_near_its_start_is_found(profile, monkeypatch):
+    """The same search, ended a tenth of the way from each level's start to its optimum."""
+    subject = Subject("gaussian", profile, 0.25)
+    own = subject.shows(guided._fit(subject, guided.DRAWN_K, guided.DRAWN_B).kernel)
+    assert guided._from_start(own, subject, (1.0, 0)) < 0.1 * guided.LIMIT
+    real = fit_module.rank_one
+
+    def lazy(wanted, weights, start, **more):
+        found = real(wanted, weights, start, **more)
+        return dataclasses.replace(found, x=0.9 * start + 0.1 * found.x)
+
+    monkeypatch.setattr(fit_module, "rank_one", lazy)
+    own = subject.shows(guided._fit(subject, guided.DRAWN_K, guided.DRAWN_B).kernel)
+    assert guided._from_start(own, subject, (1.0, 0)) > guided.LIMIT
 
 
 def test_stresses_that_walk_need_a_material(profile):

@@ -105,6 +105,7 @@ def _draw(axes: Axes, panel: Panel, shared: list[str]) -> None:
     axes.yaxis.label.set_size(_SMALL)  # "change of p99 of Delta E 2000" is as long as a panel
     if panel.axis.is_log:
         axes.set_xscale("log")
+        tick_decades(axes.xaxis, 8)
     else:
         tick(axes.xaxis)
     low, high = _range(panel)
@@ -118,7 +119,9 @@ def _draw(axes: Axes, panel: Panel, shared: list[str]) -> None:
     axes.axhspan(low, panel.limit, color=_SAFE, zorder=0)
     axes.axhline(panel.limit, color="#666666", lw=0.6, zorder=1)
     if own:
-        legend = axes.legend(handles=own, loc="best", fontsize=_SMALL, frameon=True, framealpha=0.85)
+        legend = axes.legend(
+            handles=own, loc="best", fontsize=_SMALL, frameon=True, framealpha=0.85
+        )
         legend.get_frame().set_edgecolor("none")
 
 
