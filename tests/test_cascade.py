@@ -2,6 +2,7 @@
 
 import functools
 import itertools
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -153,17 +154,29 @@ def test_derivatives_of_aliasing_are_those_of_differences(skin1, structure):
         assert gradient[k] == pytest.approx((after - before) / 2e-5, abs=1e-8, rel=1e-6)
 
 
+@pytest.mark.parametrize("structure", ["1|1-2", "*|1-*", "1-1x"])
+@pytest.mark.parametrize("logarithm", [-1e4, 1e4])
+def test_steps_that_a_line_search_throws_far_out_are_finite(skin1, structure, logarithm):
+    chain = chain_of(skin1, structure, 0.7)
+    x = chain.start(np.random.default_rng(4))
+    x[chain.step_parameters] = logarithm
+    value, gradient = chain.value_and_gradient(x)
+    assert math.isfinite(value)
+    assert np.isfinite(gradient).all()
+    assert np.isfinite(chain.hessian(x)).all()
+
+
 def test_the_matrix_of_aliasing_is_that_of_its_residuals_slopes(skin1):
     chain = chain_of(skin1, "1|1-2", 0.7)
     x = chain.start(np.random.default_rng(4))
 
     def residuals(x):
-        passed = chain._chain([chain._blur(x, k) for k in range(len(chain.shapes))])
+        passed = chain._blurs(x).chain
         parts = [
             np.sqrt(view.weight * chain.target.power)
             * _sum(part * view.x, part * view.y, chain._blend(x)[view.stages])
             for view in chain.views
-            for part in [passed[:, :, view.stages]]
+            for part in [passed[:, view.stages]]
         ]
         return np.concatenate([each.ravel() for each in parts])
 
@@ -186,9 +199,9 @@ def test_aliasing_is_what_halved_pictures_show_of_a_wave(skin1, structure, level
     image = np.pi * 2.0 / 2.0**level - w
     exact = PairChain(replace(chain.target, frequencies=np.array([w])), chain.shapes, 1.0)
     x = chain.start(np.random.default_rng(8))
-    passed = exact._chain([exact._blur(x, j) for j in range(len(exact.shapes))])[:, 0]
+    passed = exact._blurs(x).chain[:, :, 0]
     view = exact.views[level]
-    seen = (passed[:, view.stages] * view.x[0] * exact._blend(x).T[:, view.stages]).sum(axis=1)
+    seen = (passed[:, view.stages] * view.x[:, 0] * exact._blend(x).T[:, view.stages]).sum(axis=1)
     place = round(abs(image) * size / np.pi)
     np.testing.assert_allclose(spectrum[place], np.abs(seen), rtol=1e-9)
     assert np.abs(seen).min() > 1e-4

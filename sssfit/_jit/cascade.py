@@ -1,14 +1,18 @@
 """The stages of one level of a cascade, run through together so that their pictures stay in cache.
 
-Row by row each stage blurs along x into a ring of rows, and along y out of it into another, as far
-behind the stage before as its own reach; a row is added up when the last stage has blurred it. Only
-the picture is read, and the sum and the half-sized picture are written: 2048 x 2048 RGB of two
-stages move 113 MB in place of 600.
+Two rows at a time each stage blurs along y, out of a ring of rows into one line, and that line
+along x into the next ring, as far behind the stage before as its own reach; a row is added up when
+the last stage has blurred it. Only the picture is read, and the sum and the half-sized picture are
+written: 2048 x 2048 RGB of two stages move 113 MB in place of 600. Of the 24 ms that the first two
+stages of 1-1|2-2|2-2 take (AVX2, one thread), 10 are the passes, 10 reading and writing, the rest
+sums and means. Strips of 512 or 1024 columns and sums of three lines at a time gained nothing.
 
 The picture and its sum lie as the caller's do, the channels of a pixel side by side; all else lies
 in planes, a row's channels one after another. So a pass has one weight for all numbers of a line,
-and means and doublings step by 2: 1-1|2-2|2-2 on 2048 x 2048 RGB takes 44 ms on one thread. Pixels
-throughout took 65 ms: a pass read rows of weights, and the compiler gathered single numbers.
+and means and doublings step by 2. Pixels throughout took half as long again: a pass read rows of
+weights, and the compiler gathered single numbers. Lines are aligned, so that along y no vector
+lies across two cache lines. What chooses among the loops over a line is inlined: a call counts
+references to each array that it is given.
 
 The picture is mirrored at its borders. A mirrored picture blurred by an even pass is mirrored, bit
 for bit, so rows past a border or a block are computed like any others and blocks do not matter.
@@ -22,12 +26,14 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._jit import jit
+from sssfit._jit import jit, jit_inline
 
 FloatArray = npt.NDArray[np.floating[Any]]  # float32 or float64, one of them throughout a call
 IndexArray = npt.NDArray[np.intp]
 PlaceArray = npt.NDArray[np.uintp]
 Weight = Any  # a number of the picture's precision
+
+_ALIGNED = 16  # numbers
 
 
 @jit
@@ -93,7 +99,7 @@ def two_more(
         values[out + x] += near + w2 * (values[a2 + x] + values[b2 + x])
 
 
-@jit
+@jit_inline
 def blur(
     values: FloatArray,
     out: np.uintp,
@@ -102,45 +108,37 @@ def blur(
     after: PlaceArray,
     weights: FloatArray,
     s: int,
+    c: int,
     pairs: int,
-    plane: int,
     n: np.uintp,
 ) -> None:
-    """Blur a row of C lines of n numbers, ``plane`` apart, by the pass of stage ``s``.
+    """Blur n numbers by the pass of stage ``s`` and channel ``c``.
 
-    The first line's middle and its pairs are at ``middle``, ``before`` (K) and ``after`` (K).
+    The first number's middle and its pairs are at ``middle``, ``before`` (K) and ``after`` (K).
     """
-    for c in range(weights.shape[2]):
-        line = np.uintp(c * plane)
-        to, a1, b1 = out + line, before[0] + line, after[0] + line
-        w0, w1 = weights[s, 0, c], weights[s, 1, c]
-        if pairs == 1:
-            one_pair(values, to, middle + line, a1, b1, w0, w1, n)
+    a1, b1, w0, w1 = before[0], after[0], weights[s, c, 0], weights[s, c, 1]
+    if pairs == 1:
+        one_pair(values, out, middle, a1, b1, w0, w1, n)
+    else:
+        a2, b2, w2 = before[1], after[1], weights[s, c, 2]
+        two_pairs(values, out, middle, a1, b1, a2, b2, w0, w1, w2, n)
+    for k in range(2, pairs, 2):
+        a1, b1, w1 = before[k], after[k], weights[s, c, k + 1]
+        if k + 1 == pairs:
+            one_more(values, out, a1, b1, w1, n)
         else:
-            a2, b2, w2 = before[1] + line, after[1] + line, weights[s, 2, c]
-            two_pairs(values, to, middle + line, a1, b1, a2, b2, w0, w1, w2, n)
-        for k in range(2, pairs, 2):
-            a1, b1, w1 = before[k] + line, after[k] + line, weights[s, k + 1, c]
-            if k + 1 == pairs:
-                one_more(values, to, a1, b1, w1, n)
-            else:
-                a2, b2, w2 = before[k + 1] + line, after[k + 1] + line, weights[s, k + 2, c]
-                two_more(values, to, a1, b1, a2, b2, w1, w2, n)
+            a2, b2, w2 = before[k + 1], after[k + 1], weights[s, c, k + 2]
+            two_more(values, out, a1, b1, a2, b2, w1, w2, n)
 
 
 @jit
 def begin_sum(
-    values: FloatArray,
-    total: np.uintp,
-    line: np.uintp,
-    blurred: np.uintp,
-    share: Weight,
-    next_share: Weight,
-    n: np.uintp,
+    values: FloatArray, total: np.uintp, places: PlaceArray, shares: FloatArray, c: int, n: np.uintp
 ) -> None:
-    """Write the sum of a line and of the stage after it, each times its share."""
+    """Write the sum of two lines, each times its share."""
+    p, q, w0, w1 = places[0], places[1], shares[c, 0], shares[c, 1]
     for x in range(n):
-        values[total + x] = share * values[line + x] + next_share * values[blurred + x]
+        values[total + x] = w0 * values[p + x] + w1 * values[q + x]
 
 
 @jit
@@ -150,30 +148,14 @@ def gather(values: FloatArray, total: np.uintp, line: np.uintp, share: Weight, n
         values[total + x] += share * values[line + x]
 
 
-@jit
+@jit_inline
 def add_up(
-    values: FloatArray, out: int, places: IndexArray, shares: FloatArray, plane: int, n: np.uintp
+    values: FloatArray, total: np.uintp, places: PlaceArray, shares: FloatArray, c: int, n: np.uintp
 ) -> None:
-    """Write the sum of the rows at S + 1 places, each times its share (S + 1, C)."""
-    for c in range(shares.shape[1]):
-        shift = c * plane
-        total, first = np.uintp(out + shift), np.uintp(places[0] + shift)
-        begin_sum(values, total, first, np.uintp(places[1] + shift), shares[0, c], shares[1, c], n)
-        for s in range(2, places.size):
-            gather(values, total, np.uintp(places[s] + shift), shares[s, c], n)
-
-
-@jit
-def mirror_ends(
-    values: FloatArray, row: int, plane: int, columns: IndexArray, width: int, channels: int
-) -> None:
-    """Continue the C lines of a row on both sides from the source columns (B + W + B)."""
-    beyond = (columns.size - width) // 2
-    for c in range(channels):
-        line = row + c * plane
-        for k in range(beyond):
-            values[line - beyond + k] = values[line + columns[k]]
-            values[line + width + k] = values[line + columns[beyond + width + k]]
+    """Write the sum of n numbers at S + 1 places, each times its share (S + 1)."""
+    begin_sum(values, total, places, shares, c, n)
+    for s in range(2, places.size):
+        gather(values, total, places[s], shares[c, s], n)
 
 
 @jit
@@ -205,25 +187,36 @@ def read_line(
         place += step
 
 
-@jit
+@jit_inline
 def read_row(
     values: FloatArray,
     to: int,
     plane: int,
     picture: FloatArray,
     row: int,
+    columns: IndexArray,
+    margin: int,
     channels: int,
     is_packed: bool,
 ) -> None:
-    """Read row ``row`` of a picture (H, W C) into C lines; packed are channels side by side."""
+    """Read row ``row`` of a picture (H, W C) into C lines; packed are channels side by side.
+
+    A line begins ``margin`` before the picture and goes on past its borders by ``columns``.
+    """
     n = picture.shape[1] // channels
-    if is_packed and channels == 3:
-        read_three(values, np.uintp(to), np.uintp(plane), picture, row, np.uintp(n))
-    else:
-        for c in range(channels):
-            place, step = (c, channels) if is_packed else (c * n, 1)
-            line = np.uintp(to + c * plane)
-            read_line(values, line, picture, row, np.uintp(place), np.uintp(step), np.uintp(n))
+    step, apart = (channels, 1) if is_packed else (1, n)
+    is_rgb = is_packed and channels == 3
+    if is_rgb:
+        read_three(values, np.uintp(to + margin), np.uintp(plane), picture, row, np.uintp(n))
+    for c in range(channels):
+        line, first = to + c * plane, c * apart
+        if not is_rgb:
+            into = np.uintp(line + margin)
+            read_line(values, into, picture, row, np.uintp(first), np.uintp(step), np.uintp(n))
+        for k in range(margin):
+            values[line + k] = picture[row, first + columns[k] * step]
+        for k in range(margin + n, columns.size):
+            values[line + k] = picture[row, first + columns[k] * step]
 
 
 @jit
@@ -255,7 +248,7 @@ def write_line(
         place += step
 
 
-@jit
+@jit_inline
 def write_row(
     out: FloatArray,
     row: int,
@@ -270,22 +263,13 @@ def write_row(
     if is_packed and channels == 3:
         write_three(out, row, values, np.uintp(line), np.uintp(plane), np.uintp(n))
     else:
+        step, apart = (channels, 1) if is_packed else (1, n)
         for c in range(channels):
-            place, step = (c, channels) if is_packed else (c * n, 1)
-            first = np.uintp(line + c * plane)
-            write_line(out, row, np.uintp(place), np.uintp(step), values, first, np.uintp(n))
+            place, first = np.uintp(c * apart), np.uintp(line + c * plane)
+            write_line(out, row, place, np.uintp(step), values, first, np.uintp(n))
 
 
-@jit
-def mean_texels(out: FloatArray, upper: FloatArray, lower: FloatArray) -> None:
-    """Write the means of 2 x 2 texels of two lines."""
-    quarter = out.dtype.type(0.25)
-    for x in range(out.size):
-        p, q = 2 * x, 2 * x + 1
-        out[x] = quarter * ((upper[p] + upper[q]) + (lower[p] + lower[q]))
-
-
-@jit
+@jit_inline
 def halve_rows(
     half: FloatArray,
     row: int,
@@ -295,12 +279,14 @@ def halve_rows(
     plane: int,
     channels: int,
 ) -> None:
-    """Write row ``row`` of the half-sized picture; lines go on past an odd width."""
-    n = half.shape[1] // channels
+    """Write row ``row`` of the half-sized picture: means of 2 x 2 texels of two rows."""
+    n, quarter = half.shape[1] // channels, values.dtype.type(0.25)
     for c in range(channels):
-        a, b, place = upper + c * plane, lower + c * plane, c * n
-        texels = half[row][place : place + n]
-        mean_texels(texels, values[a : a + 2 * n], values[b : b + 2 * n])
+        place, a, b = np.uintp(c * n), np.uintp(upper + c * plane), np.uintp(lower + c * plane)
+        for x in range(np.uintp(n)):
+            p, q = np.uintp(2) * x, np.uintp(2) * x + np.uintp(1)
+            near = values[a + p] + values[a + q]
+            half[row, place + x] = quarter * (near + (values[b + p] + values[b + q]))
 
 
 @jit
@@ -328,56 +314,62 @@ def run_level(
     half : array (ceil(H / 2), C ceil(W / 2)) or (0, 0)
         The last stage's picture at half the size, in planes; empty at the last level.
     rows, columns : array
-        Source rows and columns, beyond each border as far as all stages reach, and one more.
+        Source rows and columns, beyond each border as far as all stages reach, and another where
+        the size is odd.
     reach, many : array (S)
         Of each stage: how far it reaches [texels], and its number of pairs of texels.
     at : array (S, K)
-    weights : array (S, 1 + K, C)
-    shares : array (S + 1, C)
+    weights : array (S, C, 1 + K)
+    shares : array (C, S + 1)
         Of the picture and each stage in the sum.
     is_packed : bool
         Whether picture and sum have the channels of a pixel side by side, or planes.
     """
-    stages, channels = reach.size, shares.shape[1]
-    width, far = picture.shape[1] // channels, reach.sum()
-    above, beyond = (rows.size - len(picture)) // 2, (columns.size - width) // 2
-    plane = width + 2 * beyond
-    size, n = channels * plane, np.uintp(width)
-    # Rings of rows: of the sum, one; of what each stage blurs, and of the last picture, until they
-    # are summed up; of what has been blurred along x. A row lies in its ring by its number.
-    behind = np.append(0, np.cumsum(reach))  # how far each picture's newest row is, from the first
-    kept, spread = np.maximum(far - behind + 1, 2), 2 * reach + 1
-    lines = beyond + size * (1 + np.cumsum(kept) - kept)
-    rings = lines[-1] + size * (2 + np.cumsum(spread) - spread)
-    values = np.empty(rings[-1] + size * spread[-1], picture.dtype)
+    stages, channels = reach.size, len(shares)
+    # How far past its borders the later stages need each picture; its lines begin there.
+    margin = reach.sum() - np.append(0, np.cumsum(reach))
+    width, end = columns.size - 2 * margin[0], last + (last - first) % 2
+    plane = -(-columns.size // _ALIGNED) * _ALIGNED
+    size = channels * plane
+    # First a row for what is blurred along y and for the sum, then a ring of rows for the picture
+    # and for what each stage makes of it, until the next has read them and they are summed up. A
+    # row lies in its ring by its number.
+    kept = 2 + np.maximum(margin, 2 * np.append(reach, 0))
+    rings = size * (1 + np.cumsum(kept) - kept)
+    values = np.empty(rings[-1] + size * kept[-1], picture.dtype)
     before, after = np.empty(at.shape[1], np.uintp), np.empty(at.shape[1], np.uintp)
-    end = last + (last - first) % 2 if half.size > 0 else last  # an odd last row has a partner
-    for t in range(first - 2 * far, end):
-        row = t + far
-        line = lines[0] + row % kept[0] * size
-        read_row(values, line, plane, picture, rows[above + row], channels, is_packed)
-        mirror_ends(values, line, plane, columns, width, channels)
+    places = np.empty(stages + 1, np.uintp)
+    for t in range(first - 2 * margin[0], end, 2):
+        for row in (t + margin[0], t + margin[0] + 1):
+            line, source = rings[0] + row % kept[0] * size, rows[margin[0] + row]
+            read_row(values, line, plane, picture, source, columns, margin[0], channels, is_packed)
         for s in range(stages):
-            for k in range(many[s]):
-                before[k], after[k] = line - at[s, k], line + at[s, k]
-            into = np.uintp(rings[s] + row % spread[s] * size)
-            blur(values, into, np.uintp(line), before, after, weights, s, many[s], plane, n)
-            row -= reach[s]
-            if t < first - 2 * (far - behind[s + 1]):
-                break  # the rows around it are not there yet
-            for k in range(many[s]):
-                before[k] = rings[s] + (row - at[s, k]) % spread[s] * size
-                after[k] = rings[s] + (row + at[s, k]) % spread[s] * size
-            middle = np.uintp(rings[s] + row % spread[s] * size)
-            line = lines[s + 1] + row % kept[s + 1] * size
-            blur(values, np.uintp(line), middle, before, after, weights, s, many[s], plane, n)
-            mirror_ends(values, line, plane, columns, width, channels)
-        if first <= t < last:
-            places = lines + t % kept * size
-            add_up(values, beyond, places, shares, plane, n)
-            write_row(total, t, values, beyond, plane, channels, is_packed)
-        if t >= first and half.size > 0 and t % 2 == 1:
-            halve_rows(half, t // 2, values, lines[-1], lines[-1] + size, plane, channels)
+            m = margin[s + 1]
+            n, less = np.uintp(width + 2 * margin[s]), np.uintp(width + 2 * m)
+            for c in range(channels):
+                blurred, ring, into = c * plane, rings[s] + c * plane, rings[s + 1] + c * plane
+                for row in range(max(first - m, t + m), t + m + 2):
+                    for k in range(many[s]):
+                        before[k] = ring + (row - at[s, k]) % kept[s] * size
+                        after[k] = ring + (row + at[s, k]) % kept[s] * size
+                    to, middle = np.uintp(blurred), np.uintp(ring + row % kept[s] * size)
+                    blur(values, to, middle, before, after, weights, s, c, many[s], n)
+                    line = blurred + reach[s]
+                    for k in range(many[s]):
+                        before[k], after[k] = line - at[s, k], line + at[s, k]
+                    to = np.uintp(into + row % kept[s + 1] * size)
+                    blur(values, to, np.uintp(line), before, after, weights, s, c, many[s], less)
+        if t < first:
+            continue
+        for row in range(t, min(t + 2, last)):
+            for c in range(channels):
+                for s in range(stages + 1):
+                    places[s] = rings[s] + row % kept[s] * size + c * plane + margin[s]
+                add_up(values, np.uintp(c * plane), places, shares, c, np.uintp(width))
+            write_row(total, row, values, 0, plane, channels, is_packed)
+        if half.size > 0:
+            upper = rings[-1]
+            halve_rows(half, t // 2, values, upper, upper + size, plane, channels)
 
 
 @jit
@@ -391,42 +383,11 @@ def enlarge(out: FloatArray, line: FloatArray) -> None:
 
 
 @jit
-def add_three(
-    total: FloatArray,
-    row: int,
-    wide: FloatArray,
-    u: np.uintp,
-    v: np.uintp,
-    plane: np.uintp,
-    n: np.uintp,
-) -> None:
-    """Add a row between two of lines, at u and the farther v, to one of three channels."""
-    near, far = wide.dtype.type(0.75), wide.dtype.type(0.25)
-    u1, v1, u2, v2 = u + plane, v + plane, u + plane + plane, v + plane + plane
-    for x in range(n):
-        p = np.uintp(3) * x
-        q, r = p + np.uintp(1), p + np.uintp(2)
-        total[row, p] += near * wide[u + x] + far * wide[v + x]
-        total[row, q] += near * wide[u1 + x] + far * wide[v1 + x]
-        total[row, r] += near * wide[u2 + x] + far * wide[v2 + x]
-
-
-@jit
-def add_line(
-    total: FloatArray,
-    row: int,
-    place: np.uintp,
-    step: np.uintp,
-    wide: FloatArray,
-    u: np.uintp,
-    v: np.uintp,
-    n: np.uintp,
-) -> None:
-    """Add a line between two to a channel of a row."""
-    near, far = wide.dtype.type(0.75), wide.dtype.type(0.25)
-    for x in range(n):
-        total[row, place] += near * wide[u + x] + far * wide[v + x]
-        place += step
+def add_between(total: FloatArray, near: FloatArray, far: FloatArray) -> None:
+    """Add a line between two others."""
+    most, rest = total.dtype.type(0.75), total.dtype.type(0.25)
+    for x in range(total.size):
+        total[x] += most * near[x] + rest * far[x]
 
 
 @jit
@@ -444,27 +405,17 @@ def add_doubled(
 
     ``rows`` and ``columns`` are its source rows and columns, with one beyond each border.
     """
-    width, narrow = total.shape[1] // channels, coarse.shape[1] // channels
-    n, plane, padded = np.uintp(width), 2 * narrow, narrow + 2
-    size = channels * plane
-    lines = np.empty(channels * padded, total.dtype)
-    wide = np.empty(3 * size, total.dtype)  # rows k - 1, k, k + 1 in turn
+    padded = columns.size
+    plane, doubled = 2 * (padded - 2), channels * padded
+    values = np.empty(doubled + channels * plane, total.dtype)
+    wide = np.empty((3, total.shape[1]), total.dtype)  # rows k - 1, k, k + 1 in turn
     for k in range(first // 2 - 1, (last - 1) // 2 + 2):
-        read_row(lines, 1, padded, coarse, rows[1 + k], channels, False)
-        mirror_ends(lines, 1, padded, columns, narrow, channels)
+        read_row(values, 0, padded, coarse, rows[1 + k], columns, 1, channels, False)
         for c in range(channels):
-            line, out = c * padded, k % 3 * size + c * plane
-            enlarge(wide[out : out + plane], lines[line : line + padded])
-        for y in (2 * k - 1, 2 * k):  # between rows k - 1 and k
-            if not first <= y < last:
-                continue
-            u, v = (k - 1) % 3 * size, k % 3 * size
-            if y == 2 * k:
-                u, v = v, u  # the nearer one
-            if is_packed and channels == 3:
-                add_three(total, y, wide, np.uintp(u), np.uintp(v), np.uintp(plane), n)
-                continue
-            for c in range(channels):
-                place, step = (c, channels) if is_packed else (c * width, 1)
-                uc, vc = np.uintp(u + c * plane), np.uintp(v + c * plane)
-                add_line(total, y, np.uintp(place), np.uintp(step), wide, uc, vc, n)
+            line, out = c * padded, doubled + c * plane
+            enlarge(values[out : out + plane], values[line : line + padded])
+        write_row(wide, k % 3, values, doubled, plane, channels, is_packed)
+        if first <= 2 * k - 1 < last:
+            add_between(total[2 * k - 1], wide[(k - 1) % 3], wide[k % 3])
+        if first <= 2 * k < last:
+            add_between(total[2 * k], wide[k % 3], wide[(k - 1) % 3])

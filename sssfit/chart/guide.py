@@ -23,6 +23,7 @@ from sssfit.chart.page import (
     Style,
     add_table,
     draw_plane,
+    draw_steps,
     name_axes,
     new_page,
     signed_norm,
@@ -153,18 +154,12 @@ def _draw_pass(axes: Axes, guide: Guide, guided: FloatArray | None) -> None:
     pitch = guide.mm_per_pixel
     edges = pitch * (np.arange(guide.preintegrated.size + 1) - 0.5)
     edges[0] = 0.2 * pitch
-    line: Style = {"baseline": None, "snap": False}
-    axes.stairs(
-        guide.preintegrated / pitch,
-        edges,
-        color=_GREY,
-        ls=(0, (4, 1.6)),
-        lw=LINE_WIDTH,
-        label="pre-integrated",
-        **line,
-    )
+    dashed: Style = {"color": _GREY, "ls": (0, (4, 1.6)), "lw": LINE_WIDTH}
+    values = guide.preintegrated / pitch
+    draw_steps(axes, values, edges, snap=False, label="pre-integrated", **dashed)
     if guided is not None:
-        axes.stairs(guided / pitch, edges, color=COLOURS[2], lw=1.4, label="guided", **line)
+        style: Style = {"color": COLOURS[2], "lw": 1.4, "label": "guided"}
+        draw_steps(axes, guided / pitch, edges, snap=False, **style)
     axes.set_xscale("log")
     axes.set_yscale("log", nonpositive="clip")
     axes.set_xlim(edges[0], edges[-1])

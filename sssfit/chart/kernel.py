@@ -34,6 +34,7 @@ from sssfit.chart.page import (
     add_legend,
     add_table,
     draw_plane,
+    draw_steps,
     name_axes,
     new_page,
     signed_norm,
@@ -156,9 +157,7 @@ def _draw_passes(upper: SubFigure, view: KernelView) -> None:
         _scale_distance(axes, edges)
         _scale_passes(axes, half)
         for t in range(kernel.rank):
-            axes.stairs(
-                half[t, :, k], edges, baseline=None, snap=False, **_term_style(t, kernel.rank)
-            )
+            draw_steps(axes, half[t, :, k], edges, snap=False, **_term_style(t, kernel.rank))
         title = f"passes, {shortened(kernel.channels[c])}"
         name_axes(axes, title, "distance from the middle (mm)", "" if k else "weight (1/mm)")
 
@@ -319,7 +318,7 @@ def _scale_slices(axes: Axes, view: KernelView) -> None:
 def _draw_steps(axes: Axes, values: FloatArray, edges: FloatArray, style: Style) -> None:
     """Draw values above 0 as steps from pixel to pixel."""
     positive = np.where(values > 0.0, values, np.nan)
-    axes.stairs(positive, edges, baseline=None, snap=False, **style)
+    draw_steps(axes, positive, edges, snap=False, **style)
 
 
 def _draw_bars(

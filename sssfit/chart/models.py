@@ -19,7 +19,7 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, StrMethodFormatter
 
 from sssfit.arrays import FloatArray
-from sssfit.chart.page import Handle, Style, add_table, name_axes, new_page
+from sssfit.chart.page import Handle, Style, add_table, draw_steps, name_axes, new_page
 from sssfit.chart.text import WEIGHTED, count, grid, method_name, shortened, spread
 from sssfit.messages import counted
 
@@ -137,16 +137,9 @@ def _draw_curve(
     if curve.method != "montecarlo":
         axes.plot(0.5 * (edges_mm[1:] + edges_mm[:-1]), mean, **style)
         return
-    axes.stairs(
-        mean + error,
-        edges_mm,
-        baseline=mean - error,
-        fill=True,
-        lw=0,
-        alpha=_BAND_ALPHA,
-        color=style["color"],
-    )
-    axes.stairs(mean, edges_mm, baseline=None, **style)
+    band: Style = {"lw": 0, "alpha": _BAND_ALPHA, "color": style["color"]}
+    draw_steps(axes, mean + error, edges_mm, baseline=mean - error, **band)
+    draw_steps(axes, mean, edges_mm, **style)
 
 
 def _limit(panels: npt.NDArray[Any], comparison: ModelComparison, shown: Sequence[int]) -> None:

@@ -12,6 +12,7 @@ from typing import Any, BinaryIO, cast
 
 import matplotlib as mpl
 import numpy as np
+import numpy.typing as npt
 from matplotlib import font_manager
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
@@ -26,6 +27,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
 from matplotlib.legend_handler import HandlerBase
 from matplotlib.lines import Line2D
+from matplotlib.patches import StepPatch
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
 from matplotlib.transforms import Bbox
 
@@ -240,6 +242,34 @@ def name_axes(axes: Axes, title: str, x_label: str, y_label: str) -> None:
     axes.set_title(drawable(title), loc="left")
     axes.set_xlabel(drawable(x_label))
     axes.set_ylabel(y_label)
+
+
+def draw_steps(
+    axes: Axes,
+    values: npt.NDArray[np.floating],
+    edges: npt.NDArray[np.floating],
+    *,
+    color: object,
+    baseline: npt.NDArray[np.floating] | None = None,
+    **style: Any,
+) -> None:
+    """Step from bin to bin, as ``Axes.stairs`` does, on axes that are given their limits.
+
+    To find limits matplotlib goes over the steps one by one, which took half of a chart's time.
+
+    Parameters
+    ----------
+    axes : matplotlib.axes.Axes
+    values, edges : array (n,), (n+1,)
+    color : matplotlib colour
+    baseline : array (n,), optional
+        Of a filled band; without one a line is drawn.
+    **style
+        Further properties of a patch.
+    """
+    side = "edgecolor" if baseline is None else "facecolor"
+    own: Style = {"baseline": baseline, "fill": baseline is not None, side: color}
+    axes.add_artist(StepPatch(values, edges, **own, **style))
 
 
 def lay_out(figure: Figure) -> None:

@@ -20,6 +20,7 @@ from sssfit.chart.page import (
     LINE_WIDTH,
     Style,
     add_legend,
+    draw_steps,
     lay_out,
     name_axes,
     new_page,
@@ -138,21 +139,13 @@ def _draw_curves(
         if axes.get_yscale() == "log":
             mean = np.where(mean > 0, mean, np.nan)  # a gap
         if channel not in named:
-            axes.stairs(
-                mean, edges[channel], baseline=None, lw=0.3, snap=False, color=style["color"]
-            )
+            draw_steps(axes, mean, edges[channel], lw=0.3, snap=False, color=style["color"])
             continue
-        axes.stairs(mean, edges[channel], baseline=None, lw=LINE_WIDTH, snap=False, **style)
+        draw_steps(axes, mean, edges[channel], lw=LINE_WIDTH, snap=False, **style)
         low, high = mean - error, mean + error
         if np.isfinite(low).any():
-            band: Style = {
-                "fill": True,
-                "lw": 0,
-                "alpha": 0.3,
-                "snap": False,
-                "color": style["color"],
-            }
-            axes.stairs(high, edges[channel], baseline=low, **band)
+            band: Style = {"lw": 0, "alpha": 0.3, "snap": False, "color": style["color"]}
+            draw_steps(axes, high, edges[channel], baseline=low, **band)
 
 
 def _limit_decades(axes: Axes, values: list[FloatArray]) -> float:

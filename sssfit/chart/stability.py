@@ -102,7 +102,7 @@ def _draw(axes: Axes, panel: Panel, shared: list[str]) -> None:
         line = _line(axes, each, _style(styles[each.label]))
         own += [line] if each.label not in shared else []
     name_axes(axes, panel.title, panel.axis.label, panel.y_label)
-    axes.yaxis.label.set_size(_SMALL)  # "change of p99 of Delta E 2000" is as long as a panel
+    axes.yaxis.label.set_fontsize(_SMALL)  # "change of p99 of Delta E 2000" is as long as a panel
     if panel.axis.is_log:
         axes.set_xscale("log")
         tick_decades(axes.xaxis, 8)

@@ -31,6 +31,7 @@ from sssfit.kernel.structure import Shape
 
 _BARRIER = 0.01  # a squared misfit; an offset 1 % beyond the kernel adds 1e-6
 _STAR = "star"
+_FAR = 20.0  # a logarithm; a line search may try 1e4, whose exponential is not finite
 _LEAST_TEXELS = 1e-9  # between fetches of a table: a stage that a fit has no need of shrinks to 0
 
 
@@ -89,6 +90,7 @@ class Chain(ABC):
         self.size = int(self._at[-1])
         steps = [np.arange(self._steps(k).start, self._steps(k).stop) for k in range(len(shapes))]
         self.step_parameters = np.concatenate(steps)  # which parameters are offset steps
+        self.parameters = [self._parameters_of(c) for c in range(self.channels)]
 
     @abstractmethod
     def spectrum(self, x: FloatArray) -> FloatArray:
@@ -147,7 +149,7 @@ class Chain(ABC):
             [
                 texels if kind == _STAR else np.cumsum(texels)
                 for kind, (steps, _) in zip(kinds, parts, strict=True)
-                for texels in [np.maximum(np.exp(steps), _LEAST_TEXELS)]
+                for texels in [np.maximum(texels_of(steps), _LEAST_TEXELS)]
             ],
             [normalised(logits, kind)[0].T for kind, (_, logits) in zip(kinds, parts, strict=True)],
             self._blend(x),
@@ -182,7 +184,7 @@ class Chain(ABC):
 
         The graded frequencies cannot tell such an offset from one inside.
         """
-        steps = np.exp(x[self._steps(k)])
+        steps = texels_of(x[self._steps(k)])
         if self.shapes[k].kind == _STAR:
             steps = np.where(np.arange(2) == np.argmax(steps), steps, 0.0)
         last = float(steps.sum())
@@ -215,6 +217,11 @@ class Chain(ABC):
         gradient[self._at[k] + count : self._at[k + 1]] = own[:, count:].ravel()
 
 
+def texels_of(steps: FloatArray) -> FloatArray:
+    """Return offset steps, or a star's offsets, in texels from their logarithms."""
+    return np.exp(np.clip(steps, -_FAR, _FAR))
+
+
 def normalised(logits: FloatArray, kind: str = "pair") -> tuple[FloatArray, FloatArray]:
     """Return weights (C, k+1) whose fetches add up to 1, and how many each stands for (k+1,)."""
     weights = np.exp(logits - logits.max(axis=1, keepdims=True))
@@ -224,11 +231,15 @@ def normalised(logits: FloatArray, kind: str = "pair") -> tuple[FloatArray, Floa
 
 
 def fetches(offsets: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the spectra (k, n) of mirrored bilinear fetches, and their slopes by offset."""
-    whole = np.floor(offsets)
-    near, far = np.cos(whole[:, None] * w), np.cos((whole[:, None] + 1.0) * w)
+    """Return the spectra (..., k, n) of mirrored bilinear fetches (..., k), and slopes by offset.
+
+    The frequencies are (..., n).
+    """
+    whole = np.floor(offsets)[..., None]
+    w = w[..., None, :]
+    near, far = np.cos(whole * w), np.cos((whole + 1.0) * w)
     slope = 2.0 * (far - near)
-    return 2.0 * near + (offsets - whole)[:, None] * slope, slope
+    return 2.0 * near + (offsets[..., None] - whole) * slope, slope
 
 
 def resampling(w: FloatArray, levels: Sequence[int]) -> tuple[FloatArray, FloatArray]:

@@ -20,7 +20,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
-from sssfit.fit._chain import Chain, fetches, normalised
+from sssfit.fit._chain import Chain, fetches, normalised, texels_of
 from sssfit.fit._spectrum import SpectralTarget
 from sssfit.kernel.structure import Shape, directions
 
@@ -33,6 +33,45 @@ class _Blur:
 
     spectrum: FloatArray
     slopes: FloatArray
+
+    def gradient(self, by_blur: FloatArray) -> FloatArray:
+        """Return derivatives by the stage's parameters (C, p) from those by its spectrum (C, M)."""
+        found: FloatArray = np.einsum("cm,cpm->cp", by_blur, self.slopes)
+        return found
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Star:
+    """A star at some parameters; its derivatives take three times as long as its spectrum.
+
+    Attributes
+    ----------
+    spectrum : array (C, M)
+    weights : array (C, 3)
+    copies : array (3,)
+        How many fetches have each weight.
+    fetched, moved : array (3, M), (2, M)
+        The fetches' spectra, and the derivatives of the last two by their offsets' logarithms.
+    """
+
+    spectrum: FloatArray
+    weights: FloatArray
+    copies: FloatArray
+    fetched: FloatArray
+    moved: FloatArray
+
+    @property
+    def slopes(self) -> FloatArray:
+        """Derivatives (C, 5, M)."""
+        weights, copies = self.weights[:, :, None], self.copies[:, None]
+        by_weight = weights * (self.fetched - copies * self.spectrum[:, None, :])
+        return np.concatenate((weights[:, 1:] * self.moved, by_weight), axis=1)
+
+    def gradient(self, by_blur: FloatArray) -> FloatArray:
+        """Return derivatives by the stage's parameters (C, 5) from those by its spectrum (C, M)."""
+        of_all = np.einsum("cm,cm->c", by_blur, self.spectrum)[:, None]
+        by_weight = self.weights * (by_blur @ self.fetched.T - self.copies * of_all)
+        return np.concatenate((self.weights[:, 1:] * (by_blur @ self.moved.T), by_weight), axis=1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,7 +101,7 @@ class StarChain(Chain):
         self._wanted = target.wanted[:, self._x, self._y]
         self._halvings = self._both(self._down)
         self._views = self._all_views()
-        self._kept = np.empty((self.channels, self._parameters_of(0).size, self._x.size))
+        self._kept = np.empty((self.channels, self.parameters[0].size, self._x.size))
 
     def spectrum(self, x: FloatArray) -> FloatArray:
         """Return the chain's spectrum (C, n, n)."""
@@ -97,18 +136,23 @@ class StarChain(Chain):
     def matrix(self, x: FloatArray) -> FloatArray:
         """Return the Gauss-Newton part of its second derivatives, (size, size)."""
         blurs, m = self._blurs(x), self._blend(x)
-        chain = self._chain(blurs)
+        chain, slopes = self._chain(blurs), [each.slopes for each in blurs]
         found = np.zeros((self.size, self.size))
         for view in self._views:
-            rows = self._rows(view, blurs, chain, m)
+            rows = self._rows(view, blurs, slopes, chain, m)
             rows *= np.sqrt(view.power)[:, None]
             for c in range(self.channels):
-                own = self._parameters_of(c)
+                own = self.parameters[c]
                 found[np.ix_(own, own)] += 2.0 * rows[c] @ rows[c].T
         return found
 
     def _rows(
-        self, view: _View, blurs: Sequence[_Blur], chain: FloatArray, m: FloatArray
+        self,
+        view: _View,
+        blurs: Sequence[_Blur | _Star],
+        slopes: Sequence[FloatArray],
+        chain: FloatArray,
+        m: FloatArray,
     ) -> FloatArray:
         """Return a view's derivatives by a channel's blend and stages, (C, L+1 + parameters, M).
 
@@ -124,9 +168,8 @@ class StarChain(Chain):
             if k + 1 >= view.first:
                 after += m[k + 1][:, None] * view.factors[k + 1 - view.first]
             after *= self._halvings[k]
-            begin = end - blurs[k].slopes.shape[1]
-            moved = (chain[k] * after)[:, None]
-            np.multiply(moved, blurs[k].slopes, out=by_stage[:, begin:end])
+            begin = end - slopes[k].shape[1]
+            np.multiply((chain[k] * after)[:, None], slopes[k], out=by_stage[:, begin:end])
             after, end = after * blurs[k].spectrum, begin
         return self._kept
 
@@ -145,16 +188,21 @@ class StarChain(Chain):
         product: FloatArray = line[..., self._x] * line[..., self._y]
         return product
 
-    def _blurs(self, x: FloatArray) -> list[_Blur]:
-        made = {"pair": self._pair, "star": self._star, "line": self._turned}
+    def _blurs(self, x: FloatArray) -> list[_Blur | _Star]:
         kinds = ["line" if each.angle_degrees else each.kind for each in self.shapes]
-        return [made[kind](*self._stage(x, k), k) for k, kind in enumerate(kinds)]
+        return [self._blur(*self._stage(x, k), k, kind) for k, kind in enumerate(kinds)]
+
+    def _blur(self, steps: FloatArray, logits: FloatArray, k: int, kind: str) -> _Blur | _Star:
+        if kind == "star":
+            return self._star(steps, logits, k)
+        made = self._pair if kind == "pair" else self._turned
+        return made(steps, logits, k)
 
     def _frequencies(self, k: int) -> FloatArray:
         return 2.0 ** self.shapes[k].level * self.target.frequencies
 
     def _pair(self, steps: FloatArray, logits: FloatArray, k: int) -> _Blur:
-        step = np.exp(steps)
+        step = texels_of(steps)
         weights, copies = normalised(logits)
         pairs, by_offset = fetches(np.cumsum(step), self._frequencies(k))
         fetched = np.concatenate((np.ones((1, pairs.shape[1])), pairs))
@@ -168,7 +216,7 @@ class StarChain(Chain):
 
     def _turned(self, steps: FloatArray, logits: FloatArray, k: int) -> _Blur:
         """Return the blur of a line, or of a pair that is turned."""
-        step = np.exp(steps)
+        step = texels_of(steps)
         weights, copies = normalised(logits)
         shape = self.channels, steps.size + weights.shape[1], self._x.size
         blur = _Blur(np.ones((shape[0], shape[2])), np.zeros(shape))
@@ -192,34 +240,33 @@ class StarChain(Chain):
         x, by_x = (each[:, self._x] for each in _waves(offsets * right, w))
         return 2.0 * (y * x).real, 2.0 * (down * by_y * x + right * y * by_x).real
 
-    def _star(self, steps: FloatArray, logits: FloatArray, k: int) -> _Blur:
-        offsets = np.exp(steps)
+    def _star(self, steps: FloatArray, logits: FloatArray, k: int) -> _Star:
+        offsets = texels_of(steps)
         weights, copies = normalised(logits, "star")
         (diagonal, axis), (by_diagonal, by_axis) = fetches(offsets, self._frequencies(k))
         corners, beside = self._both(diagonal), axis[self._x] + axis[self._y]
         fetched = np.stack((np.ones(corners.size), corners, beside))
-        spectrum = weights @ fetched
-        by_weight = weights[:, :, None] * (fetched - copies[:, None] * spectrum[:, None, :])
         turned = by_diagonal[self._x] * diagonal[self._y] + diagonal[self._x] * by_diagonal[self._y]
         moved = np.stack((turned, by_axis[self._x] + by_axis[self._y])) * offsets[:, None]
-        by_offset = weights[:, 1:, None] * moved
-        return _Blur(spectrum, np.concatenate((by_offset, by_weight), axis=1))
+        return _Star(weights @ fetched, weights, copies, fetched, moved)
 
-    def _chain(self, blurs: Sequence[_Blur]) -> FloatArray:
+    def _chain(self, blurs: Sequence[_Blur | _Star]) -> FloatArray:
         """Return the product of all stages and halvings up to each stage, (L+1, C, M)."""
         found = np.ones((len(blurs) + 1, self.channels, self._x.size))
         for k, blur in enumerate(blurs):
             found[k + 1] = found[k] * (self._halvings[k] * blur.spectrum)
         return found
 
-    def _backwards(self, blurs: Sequence[_Blur], by_rows: FloatArray, gradient: FloatArray) -> None:
+    def _backwards(
+        self, blurs: Sequence[_Blur | _Star], by_rows: FloatArray, gradient: FloatArray
+    ) -> None:
         """Fill in the gradient by the stages from that by their chain (L+1, C, M)."""
         before = self._chain(blurs)
         by_chain = np.zeros(before.shape[1:])
         for k in range(len(blurs) - 1, -1, -1):
             by_chain = by_chain + by_rows[k + 1]
             by_blur = by_chain * before[k] * self._halvings[k]
-            self._put_stage(gradient, k, np.einsum("cm,cpm->cp", by_blur, blurs[k].slopes))
+            self._put_stage(gradient, k, blurs[k].gradient(by_blur))
             by_chain = by_chain * (self._halvings[k] * blurs[k].spectrum)
 
 

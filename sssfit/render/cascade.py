@@ -93,17 +93,19 @@ def _numbers(
     reach = np.array([at.max() for at, _ in lines])
     many = np.array([len(at) for at, _ in lines])
     at = np.zeros((len(stages), many.max()), np.intp)
-    weights = np.zeros((len(stages), many.max() + 1, channels), picture.dtype)
+    weights = np.zeros((len(stages), channels, many.max() + 1), picture.dtype)
     for s, (own, each) in enumerate(lines):
         at[s, : len(own)] = own
-        weights[s, : len(each)] = each
-    shares = taps.blend[before : before + len(stages) + 1].copy()
+        weights[s, :, : len(each)] = each.T
+    shares = np.array(taps.blend[before : before + len(stages) + 1].T, picture.dtype)
     if level > 0:  # what it is halved from is part of the finer sum
-        shares[0] = 0.0
-    height, width = picture.shape[0], picture.shape[1] // channels
-    rows = source_indices(height, 2 * int(reach.sum()) + 1, "mirror")
-    columns = source_indices(width, int(reach.max()) + 1, "mirror")
-    return rows, columns, reach, many, at, weights, shares.astype(picture.dtype)
+        shares[:, 0] = 0.0
+    far, size = int(reach.sum()), (picture.shape[0], picture.shape[1] // channels)
+    # An odd row or column has a partner past the border, for halving.
+    rows, columns = (
+        source_indices(n, far + 1, "mirror")[1 : n + 2 * far + 1 + n % 2] for n in size
+    )
+    return rows, columns, reach, many, at, weights, shares
 
 
 def _line(stage: Stage, mm_per_texel: float) -> tuple[npt.NDArray[np.intp], FloatArray]:
