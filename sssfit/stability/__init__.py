@@ -60,7 +60,7 @@ def stability(
         this needs its ``if __name__ == "__main__":`` then. With 1 there is none but the caller's.
         Results do not depend on them.
     is_whole : bool
-        Whether 1e7 photons are walked, and cascades are searched anew for every walk and have as
+        Whether 1e7 photons are walked, and cascades are searched again for every walk and have as
         many sizes as the others.
     progress : callable, optional
         Told (done, of how many, the next one's name).

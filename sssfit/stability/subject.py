@@ -47,7 +47,7 @@ class Subject:
     threads : int, optional
         Of the exact solver.
     is_whole : bool
-        Whether cascades are searched anew for every walk and have as many sizes as the others.
+        Whether cascades are searched again for every walk and have as many sizes as the others.
     workers : Workers, optional
         What shares the work; without them it is done here.
     """
