@@ -12,7 +12,7 @@ import sys
 from dataclasses import replace
 
 import numpy as np
-from sections import put_section
+from sections import DOCS, put_section
 
 from sssfit.chart import figure_of
 from sssfit.chart.page import save_figure
@@ -220,7 +220,7 @@ def main():
         other=" | ".join(f"{p99(taps, skin1, pitch):.2f}" for pitch in PITCHES_MM),
     )
     put_section("cascades.md", "docs/make_cascades.py", text)
-    save_figure(figure_of(view_taps(taps, skin1)), "docs/skin1-cascade.png")
+    save_figure(figure_of(view_taps(taps, skin1)), DOCS / "skin1-cascade.png")
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ import numpy as np
 from make_cascades import PICTURES, whole_profile
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
-from sections import put_section
+from sections import DOCS, put_section
 
 from sssfit.chart.page import COLOURS, add_legend, name_axes, new_page, save_figure
 from sssfit.fit import fit_result, fit_taps
@@ -157,7 +157,7 @@ def chart(errors):
             "size of a pixel / size that the table is made for (0.3 mm)",
             "99th percentile of ΔE 2000, mean",
         )
-    save_figure(figure, "docs/skin1-distance.png")
+    save_figure(figure, DOCS / "skin1-distance.png")
 
 
 def main():

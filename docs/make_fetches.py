@@ -14,7 +14,7 @@ from make_relatives import RELATIVES
 from make_relatives import best as best_of_searches
 from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, NullFormatter, NullLocator
-from sections import put_section
+from sections import DOCS, put_section
 
 from sssfit.chart.page import COLOURS, add_legend, name_axes, new_page, save_figure
 from sssfit.compare.engines import engines
@@ -176,7 +176,7 @@ def chart(rows, cascades, ours, shipped, relatives):
         axes.yaxis.set_minor_formatter(NullFormatter())
         name_axes(axes, "", "texture fetches a pixel", "99th percentile of ΔE 2000, mean")
     set_apart(marks)
-    save_figure(figure, "docs/skin1-fetches.png")
+    save_figure(figure, DOCS / "skin1-fetches.png")
 
 
 def mark(axes, letter, sampler):

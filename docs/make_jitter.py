@@ -5,7 +5,7 @@ python docs/make_jitter.py
 
 from make_cascades import row, whole_profile
 from make_samples import CROP, LIGHT_DEGREES, MM, PIXELS, bands, codes, lightness
-from sections import put_section
+from sections import DOCS, put_section
 
 from sssfit.chart.page import new_mosaic, new_page, put_difference, put_picture, save_figure
 from sssfit.compare.frames import over_frames
@@ -84,7 +84,7 @@ def draw(drawn, exposure, truth):
             put_difference(axes, wide * k, 1.04, error[CROP], AMPLIFIED)
         names = ["true kernel", *(label for label, *_ in drawn)]
         axes.set_xticks([wide * k + 0.5 for k in range(len(names))], names)
-    save_figure(figure, "docs/skin1-jitter.png")
+    save_figure(figure, DOCS / "skin1-jitter.png")
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ python docs/make_samples.py
 import numpy as np
 from make_cascades import row, whole_profile
 from matplotlib.lines import Line2D
-from sections import put_section
+from sections import DOCS, put_section
 
 from sssfit.chart.page import (
     COLOURS,
@@ -134,7 +134,7 @@ def draw(found, exposure, truth):
         panel.set_ylim(None, 0.6)
         tick(panel.xaxis)
         name_axes(panel, "", "cycles a millimetre along x", "CIE L* of the error")
-    save_figure(figure, "docs/skin1-samples.png")
+    save_figure(figure, DOCS / "skin1-samples.png")
 
 
 def main():

@@ -59,7 +59,7 @@ FOR_TYPES = {
     "sssfit/kinds.py": {f"sssfit.{room}" for room in ("kernel", "material", "profile", "simulate")},
 }
 # The compiled layer stands beside the list: these rooms may use it, and it uses none of them.
-ROOMS_ON_JIT = {"profile", "scene", "simulate", "fit", "render"}
+ROOMS_ON_JIT = {"profile", "scene", "simulate", "render"}
 # Neighbours that hand records on and know nothing of each other.
 APART = {"simulate", "fit", "render"}
 JIT_MAY_IMPORT = {"numpy", "numba", "math", "sssfit"} | set(sys.stdlib_module_names)

@@ -255,7 +255,7 @@ def draw_steps(
 ) -> None:
     """Step from bin to bin, as ``Axes.stairs`` does, on axes that are given their limits.
 
-    To find limits matplotlib goes over the steps one by one, which took half of a chart's time.
+    To find limits matplotlib goes over the steps one by one: 2.5 of 4 s for the chart of skin1.
 
     Parameters
     ----------

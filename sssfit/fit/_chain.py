@@ -223,11 +223,11 @@ def texels_of(steps: FloatArray) -> FloatArray:
 
 
 def normalised(logits: FloatArray, kind: str = "pair") -> tuple[FloatArray, FloatArray]:
-    """Return weights (C, k+1) whose fetches add up to 1, and how many each stands for (k+1,)."""
-    weights = np.exp(logits - logits.max(axis=1, keepdims=True))
+    """Return weights (..., k+1) whose fetches add up to 1, and how many each stands for (k+1,)."""
+    weights = np.exp(logits - logits.max(axis=-1, keepdims=True))
     mirrored = 4.0 if kind == _STAR else 2.0
-    copies = np.where(np.arange(logits.shape[1]) == 0, 1.0, mirrored)
-    return weights / (weights @ copies)[:, None], copies
+    copies = np.where(np.arange(logits.shape[-1]) == 0, 1.0, mirrored)
+    return weights / (weights @ copies)[..., None], copies
 
 
 def fetches(offsets: FloatArray, w: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sssfit.arrays import FloatArray
-from sssfit.fit._chain import Chain, fetches, texels_of
+from sssfit.fit._chain import Chain, fetches, normalised, texels_of
 from sssfit.fit._spectrum import SpectralTarget
 from sssfit.kernel.structure import Shape
 
@@ -31,6 +31,8 @@ class _Blurs:
     ----------
     step : array (S, k)
     weights : array (C, S, k+1)
+    copies : array (k+1,)
+        How many fetches have each weight.
     fetched : array (S, k+1, n)
         The spectra of a stage's fetches.
     by_offset : array (S, k, n)
@@ -43,6 +45,7 @@ class _Blurs:
 
     step: FloatArray
     weights: FloatArray
+    copies: FloatArray
     fetched: FloatArray
     by_offset: FloatArray
     spectrum: FloatArray
@@ -76,7 +79,6 @@ class PairChain(Chain):
         count, most = np.array(self.counts)[:, None], max(self.counts)
         self._has_step = np.arange(most) < count
         self._has_weight = np.arange(most + 1) <= count
-        self._copies = np.where(np.arange(most + 1) == 0, 1.0, 2.0)
         self._steps_at = np.zeros((len(shapes), most), np.intp)
         self._weights_at = np.zeros((self.channels, len(shapes), most + 1), np.intp)
         for k, own in enumerate(self.counts):
@@ -151,15 +153,14 @@ class PairChain(Chain):
     def _blurs(self, x: FloatArray) -> _Blurs:
         step = texels_of(x[self._steps_at]) * self._has_step
         logits = np.where(self._has_weight, x[self._weights_at], -np.inf)
-        weights = np.exp(logits - logits.max(axis=2, keepdims=True))
-        weights /= (weights @ self._copies)[:, :, None]
+        weights, copies = normalised(logits)
         pairs, by_offset = fetches(np.cumsum(step, axis=1), self._w)
         fetched = np.concatenate((np.ones_like(self._w)[:, None], pairs), axis=1)
         spectrum = (weights[:, :, None] @ fetched)[:, :, 0]
         factors = self._down * spectrum
         chain = np.ones((self.channels, len(self.shapes) + 1, self._w.shape[1]))
         np.cumprod(factors, axis=1, out=chain[:, 1:])
-        return _Blurs(step, weights, fetched, by_offset, spectrum, factors, chain)
+        return _Blurs(step, weights, copies, fetched, by_offset, spectrum, factors, chain)
 
     def _backwards(self, blurs: _Blurs, by_u: FloatArray, gradient: FloatArray) -> None:
         """Fill in the gradient by the stages from that by their chain (C, L+1, n)."""
@@ -169,7 +170,7 @@ class PairChain(Chain):
         by_blur *= blurs.chain[:, :-1] * self._down
         of_fetches = (blurs.fetched @ by_blur[..., None])[..., 0]  # (C, S, k+1)
         of_all = np.einsum("csn,csn->cs", by_blur, blurs.spectrum)[:, :, None]
-        by_weight = blurs.weights * (of_fetches - self._copies * of_all)
+        by_weight = blurs.weights * (of_fetches - blurs.copies * of_all)
         by_offset = blurs.weights[:, :, 1:] * (blurs.by_offset @ by_blur[..., None])[..., 0]
         by_step = _of_farther(by_offset.sum(axis=0)) * blurs.step
         gradient[self._steps_at[self._has_step]] = by_step[self._has_step]
@@ -178,7 +179,7 @@ class PairChain(Chain):
     def _slopes(self, blurs: _Blurs) -> FloatArray:
         """Return derivatives of the chain by a channel's parameters, (C, p, L+1, n)."""
         weights, spectrum = blurs.weights[..., None], blurs.spectrum[:, :, None]
-        by_weight = weights * (blurs.fetched - self._copies[:, None] * spectrum)
+        by_weight = weights * (blurs.fetched - blurs.copies[:, None] * spectrum)
         moved = (weights[:, :, 1:] * blurs.by_offset).swapaxes(2, 3)
         by_step = (_of_farther(moved) * blurs.step[:, None]).swapaxes(2, 3)
         has = np.concatenate((self._has_step, self._has_weight), axis=1)

@@ -13,7 +13,7 @@ Lines come with their mirror images and are shown behind
 all of them, so that a quadrant stands for all.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -189,14 +189,13 @@ class StarChain(Chain):
         return product
 
     def _blurs(self, x: FloatArray) -> list[_Blur | _Star]:
+        made: dict[str, Callable[[FloatArray, FloatArray, int], _Blur | _Star]] = {
+            "pair": self._pair,
+            "star": self._star,
+            "line": self._turned,
+        }
         kinds = ["line" if each.angle_degrees else each.kind for each in self.shapes]
-        return [self._blur(*self._stage(x, k), k, kind) for k, kind in enumerate(kinds)]
-
-    def _blur(self, steps: FloatArray, logits: FloatArray, k: int, kind: str) -> _Blur | _Star:
-        if kind == "star":
-            return self._star(steps, logits, k)
-        made = self._pair if kind == "pair" else self._turned
-        return made(steps, logits, k)
+        return [made[kind](*self._stage(x, k), k) for k, kind in enumerate(kinds)]
 
     def _frequencies(self, k: int) -> FloatArray:
         return 2.0 ** self.shapes[k].level * self.target.frequencies

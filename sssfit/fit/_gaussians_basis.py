@@ -47,6 +47,20 @@ class Basis:
         inside = self.vectors.T @ wanted
         return np.append(inside, np.linalg.norm(wanted - self.vectors @ inside))
 
+    def columns(self, log_variances: FloatArray) -> FloatArray:
+        """Return coordinates of unit Gaussians and their log derivatives (2, K+1, N)."""
+        parts = self.series.shape[1]
+        low, high = self.bounds
+        inside_bounds = np.clip(log_variances, low, high)  # steps may end a rounding beyond
+        places = parts * (inside_bounds - low) / (high - low)
+        part = np.minimum(places.astype(int), parts - 1)
+        angles = np.arccos(np.clip(2.0 * (places - part) - 1.0, -1.0, 1.0))
+        waves = np.cos(angles[:, None] * np.arange(_NODES))
+        inside = np.einsum("cnkd,nd->ckn", self.series[:, part], waves)
+        out = np.zeros((2, inside.shape[1] + 1, part.size))
+        out[:, :-1] = inside * np.exp(-0.5 * inside_bounds)
+        return out
+
 
 def basis_of(inner: FloatArray, width: FloatArray, bounds: tuple[float, float]) -> Basis:
     """Return the basis of a grid.

@@ -272,7 +272,7 @@ def _of_one_shape(chain: Chain, seed: int) -> list[FloatArray]:
     """Return the optimum of stages of one shape, where all have as many taps and some are halved.
 
     Searches for its few parameters hardly miss it, and halved pictures do less to it: from it
-    1|1|1|1|1|1 leaves .37 of skin1 in place of .65, and .41 of ketchup in place of .56.
+    1|1|1|1|1|1 leaves .41 of skin1 and .33 of ketchup.
     """
     first, last = chain.shapes[0], chain.shapes[-1]
     if last.level == 0 or {(each.pairs, each.is_upright) for each in chain.shapes} != {
