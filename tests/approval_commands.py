@@ -1303,6 +1303,9 @@ STABILITY = [
     C("stability missing.toml"),
     C("stability density.csv"),
     C("stability"),
+    C("stability wax.profile.npz --paper"),
+    C("stability --paper --chart s.png"),
+    C("stability wax.profile.npz -o out"),
 ]
 
 _MOVING = "--mm-per-pixel .5 --length 8"

@@ -1193,6 +1193,10 @@ def _stressed(**settings: Any) -> Any:
     return called("sssfit.stability.stability", wax(), **usual | settings)
 
 
+def _page_names(folder: str = "") -> list[str]:
+    return [f"{folder}marble-stability.png", f"{folder}stability.md"]
+
+
 STABILITY = {
     "--only": Row(
         _STABILITY,
@@ -1211,6 +1215,14 @@ STABILITY = {
     "--whole": Row(_STABILITY, "--whole", calls, lambda: _stressed(is_whole=True)),
     "--chart": Row(_STABILITY, "--chart s.png", is_written("png"), lambda: ["s.png"]),
     "--table": Row(_STABILITY, "--table s.md", is_written("md"), lambda: ["s.md"]),
+    "--paper": Row(_STABILITY, "stability --paper", names, _page_names),
+    "--output": Row(
+        _STABILITY,
+        "stability --paper -o out",
+        names,
+        lambda: _page_names("out/"),
+        default="here",
+    ),
     "--force": Row(
         f"{_STABILITY} --table foreign.md", "--force", is_written("md"), lambda: ["foreign.md"]
     ),

@@ -51,8 +51,8 @@ _ADVICE = {
 def stress(subject: Subject) -> list[Panel]:
     """Fit walks of 1e3 to 1e7 photons with every method, 16 seeds each.
 
-    Unless all is whole, profiles of 1e7 photons have the noise of 1e6, and cascades are followed
-    from the exact profile's, to 1e3, 1e4 and 1e5 photons.
+    Unless all is whole, profiles of 1e7 photons have the noise of 1e6, and cascades start at that
+    of the exact profile, with 1e3, 1e4 and 1e5 photons.
 
     Raises
     ------
