@@ -226,7 +226,7 @@ SIMULATE = {
 
 def _fit(method: str, **settings: Any) -> Callable[[], Any]:
     return lambda: world.weights_of(
-        world.quietly(fit.METHODS[method].fit, profile(), **settings).kernel
+        world.quietly(fit.fit_result, profile(), method, **settings).kernel
     )
 
 
@@ -348,6 +348,7 @@ FIT = {
         ],
     ),
     "--support": _fitted("--support", "2.1", "svd", "auto", support_mm=2.1),
+    "--smooth": _fitted("--smooth", "", "preintegrated", smooth=True),
     "--normalize": _fitted("--normalize", "", "preintegrated", normalize=True),
     "--rank": _fitted("--rank", "2", "svd", "3", "3 for svd, 2 for weighted", rank=2),
     "--energy": _fitted("--energy", "keep", "svd", "rescale", energy="keep"),

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -33,12 +34,15 @@ if TYPE_CHECKING:
 
 _COLUMNS, _PANEL_INCHES, _HEAD_INCHES = 2, 2.15, 1.35
 # Of all stresses, 38 panels: five a row on a page of a large screen, where two made one of 42 in.
-_MANY, _WIDE_COLUMNS, _WIDE_PANEL_INCHES, _WIDE_INCHES = 12, 5, 1.8, 16.0
+_MANY, _WIDE_COLUMNS, _WIDE_PANEL_INCHES, _WIDE_INCHES = 12, 5, 2.0, 16.0
 # Okabe and Ito's vermillion, green and blue, then their orange, sky blue, purple and black.
 _COLOURS = (*COLOURS, "#e69f00", "#56b4e9", "#cc79a7", "#000000", "#999999")
 _MARKERS = "os^Dv<>P"
 _SAFE, _SMALL = "#e8f3ec", 6.5
 _HEADROOM = 0.25  # of the axis above the limit, at least
+_CROWDED = 3  # curves; more leave no room for a legend, which stands above them
+_SHORT_DECADES = 1.3  # as `tick_decades` has it
+_LEGEND_LINE = 0.135  # of the axis of a crowded panel
 
 
 def stability_figure(stability: Stability) -> Figure:
@@ -86,10 +90,13 @@ def _shared(stability: Stability) -> list[str]:
 
 
 def _style(k: int) -> Style:
+    """Return the k-th style; from the ninth on, colours return with other markers, hollow."""
+    turn, place = divmod(k, len(_COLOURS))
     return {
-        "color": _COLOURS[k % len(_COLOURS)],
+        "color": _COLOURS[place],
         "linestyle": LINE_STYLES[k // 2 % len(LINE_STYLES)],
-        "marker": _MARKERS[k % len(_MARKERS)],
+        "marker": _MARKERS[(place + turn) % len(_MARKERS)],
+        "markerfacecolor": "white" if turn % 2 else _COLOURS[place],
         "markersize": 3.2,
         "lw": 1.0,
     }
@@ -105,24 +112,33 @@ def _draw(axes: Axes, panel: Panel, shared: list[str]) -> None:
     axes.yaxis.label.set_fontsize(_SMALL)  # "change of p99 of Delta E 2000" is as long as a panel
     if panel.axis.is_log:
         axes.set_xscale("log")
-        tick_decades(axes.xaxis, 8)
+        _tick_decades(axes.xaxis, 8)
     else:
         tick(axes.xaxis)
     low, high = _range(panel)
+    is_crowded = panel.is_log and bool(own) and len(panel.curves) > _CROWDED
+    legend_share = _LEGEND_LINE * len(own) * is_crowded
     if panel.is_log:
         axes.set_yscale("log")
-        axes.set_ylim(low, high)
-        tick_decades(axes.yaxis, 6)
+        axes.set_ylim(low, high * (high / low) ** (legend_share / (1.0 - legend_share)))
+        _tick_decades(axes.yaxis, 6)
     else:
         axes.set_ylim(low, high)
         tick(axes.yaxis)
     axes.axhspan(low, panel.limit, color=_SAFE, zorder=0)
     axes.axhline(panel.limit, color="#666666", lw=0.6, zorder=1)
     if own:
-        legend = axes.legend(
-            handles=own, loc="best", fontsize=_SMALL, frameon=True, framealpha=0.85
-        )
+        place: Style = {"loc": "upper right" if is_crowded else "best"}
+        legend = axes.legend(handles=own, fontsize=_SMALL, frameon=True, framealpha=0.85, **place)
         legend.get_frame().set_edgecolor("none")
+
+
+def _tick_decades(axis: Axis, most: int) -> None:
+    """Tick powers of ten; on a short axis 1, 2 and 5 are labelled in one way."""
+    tick_decades(axis, most)
+    low, high = axis.get_view_interval()
+    if math.log10(high / low) < _SHORT_DECADES:
+        axis.set_major_formatter("{x:g}")
 
 
 def _styles(labels: list[str], shared: list[str]) -> dict[str, int]:
