@@ -153,6 +153,7 @@ FIT_PIXELS = (
     option("--pitches", Lengths(), "MM,...", "Pixel sizes to make a kernel for, a file each."),
     option("--support", Length("auto"), "MM|auto", "Half width of the kernel; auto is the "
            "smallest that keeps 99.9 % of every channel, for cascade 99.99 %.", "auto"),
+    flag("--smooth", "Take most of a walk's noise out of the profile before the fit."),
     flag("--normalize", "Scale every channel to unit energy, and store its energy as a factor."),
 )
 FIT_OUTPUT = (STRICT, *output("PROFILE.METHOD.taps.json, .kernel.json without taps",
@@ -165,6 +166,10 @@ STABILITY = (
     flag("--whole is_whole", "As many seeds and sizes for cascades as for the others; slow."),
     option("--chart", None, "FILE", "Figure: PNG, SVG or PDF by its ending; - for PNG on stdout."),
     option("--table", None, "FILE", "Table in Markdown, - for stdout."),
+    flag("--paper", "The eleven materials of the Separable Subsurface Scattering paper, which take "
+         "an hour; no MATERIAL."),
+    option("-o --output", None, "FOLDER", "Folder of stability.md and NAME-stability.png with "
+           "--paper.  [default: here]"),
     flag("--force", "Replace files that are not our chart or table."),
 )
 MOTION = (

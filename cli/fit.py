@@ -65,6 +65,7 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
         check_memory("picture fit", common.threads)
         settings["target"] = imported("sssfit.compare.pictures:picture_error")
     settings["support_mm"] = None if given["support"] == "auto" else given["support"]
+    settings |= {"smooth": True} if given["smooth"] else {}
     is_ours, inputs = is_taps_file if is_taps else is_kernel_file, [name, given["irradiance"]]
     kind, told, text = "fit-taps" if is_taps else "fit", list[dict[str, Any]](), list[str]()
     with held(paths, is_ours, inputs=inputs, force=given["force"], named=KERNEL):

@@ -268,6 +268,8 @@ FIT = [
     C("fit mono.profile.npz --method preintegrated --mm-per-pixel .05cm"),
     C("fit wax.profile.npz --method guided --k 3 --b 5 --mm-per-pixel .5"),
     C("fit wax.profile.npz --method guided --k 0 --mm-per-pixel .5 --normalize"),
+    C("fit wax.profile.npz --method svd --mm-per-pixel .5 --smooth"),
+    C("fit mono.profile.npz --method svd --mm-per-pixel .5 --smooth"),
     C("fit wax.profile.npz --method guided --centre-bound .2 --mm-per-pixel .5 --json"),
     C("fit wax.profile.npz --method artist --mm-per-pixel .5"),
     C("fit wax.profile.npz --method artist --target kernel --mm-per-pixel .5 -v"),
@@ -1303,6 +1305,9 @@ STABILITY = [
     C("stability missing.toml"),
     C("stability density.csv"),
     C("stability"),
+    C("stability wax.profile.npz --paper"),
+    C("stability --paper --chart s.png"),
+    C("stability wax.profile.npz -o out"),
 ]
 
 _MOVING = "--mm-per-pixel .5 --length 8"

@@ -515,14 +515,14 @@ def small_convergence() -> Any:
     return walk_convergence.Convergence(exact_profile(), walks, exact, line)
 
 
-def stresses() -> Stability:
+def stresses(name: str) -> Stability:
     """Made up: real ones take seconds."""
     photons = np.array([1e3, 1e4, 1e5])
     falling = Curve("svd 3", photons, np.array([5.2, 1.9, 0.6]), advice="more photons")
     refused = Curve("gaussians 4", photons, np.array([np.inf, 2.0, 1.5]), advice="fewer Gaussians")
     axis = Axis("photons", mild=1e5, form=".2g")
     panel = Panel("noise", "noise", axis, "Delta E", 1.0, (falling, refused), "colours change")
-    return Stability("wax", 0.5, (panel,), ("Left out grid: no material.",), seed=3)
+    return Stability(name, 0.5, (panel,), ("Left out grid: no material.",), seed=3)
 
 
 def small_sequence(real, given):
@@ -558,7 +558,7 @@ STAND_INS = {
     "sssfit.compare.budget.error_budgets": lambda _, given: budgets(rank_of(given)),
     "sssfit.compare.compare_models": lambda *_: models(),
     "sssfit.compare.sheet.compute_sheet": lambda *_: small_sheet(),
-    "sssfit.stability.stability": lambda *_: stresses(),
+    "sssfit.stability.stability": lambda _, given: stresses(given["source"].name),
     "sssfit.motion.runner.run_sequence": small_sequence,
     "sssfit.motion.table.measure_table": few_seeds,
     **{f"sssfit.chart.{kind}.{kind}_figure": blank for kind in _CHARTS},

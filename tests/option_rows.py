@@ -226,7 +226,7 @@ SIMULATE = {
 
 def _fit(method: str, **settings: Any) -> Callable[[], Any]:
     return lambda: world.weights_of(
-        world.quietly(fit.METHODS[method].fit, profile(), **settings).kernel
+        world.quietly(fit.fit_result, profile(), method, **settings).kernel
     )
 
 
@@ -348,6 +348,7 @@ FIT = {
         ],
     ),
     "--support": _fitted("--support", "2.1", "svd", "auto", support_mm=2.1),
+    "--smooth": _fitted("--smooth", "", "preintegrated", smooth=True),
     "--normalize": _fitted("--normalize", "", "preintegrated", normalize=True),
     "--rank": _fitted("--rank", "2", "svd", "3", "3 for svd, 2 for weighted", rank=2),
     "--energy": _fitted("--energy", "keep", "svd", "rescale", energy="keep"),
@@ -1193,6 +1194,10 @@ def _stressed(**settings: Any) -> Any:
     return called("sssfit.stability.stability", wax(), **usual | settings)
 
 
+def _page_names(folder: str = "") -> list[str]:
+    return [f"{folder}marble-stability.png", f"{folder}stability.md"]
+
+
 STABILITY = {
     "--only": Row(
         _STABILITY,
@@ -1211,6 +1216,14 @@ STABILITY = {
     "--whole": Row(_STABILITY, "--whole", calls, lambda: _stressed(is_whole=True)),
     "--chart": Row(_STABILITY, "--chart s.png", is_written("png"), lambda: ["s.png"]),
     "--table": Row(_STABILITY, "--table s.md", is_written("md"), lambda: ["s.md"]),
+    "--paper": Row(_STABILITY, "stability --paper", names, _page_names),
+    "--output": Row(
+        _STABILITY,
+        "stability --paper -o out",
+        names,
+        lambda: _page_names("out/"),
+        default="here",
+    ),
     "--force": Row(
         f"{_STABILITY} --table foreign.md", "--force", is_written("md"), lambda: ["foreign.md"]
     ),

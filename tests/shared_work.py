@@ -51,7 +51,7 @@ _PLAIN = str | int | float | NoneType  # a setting that is a function, or a scen
 _state = {"allowed": True, "fits": True, "short": 0, "folder": None, "begun": False}
 
 
-def _short_descent(chain, x, most, gain=3e-3, real=sssfit.fit.cascade._descend):
+def _short_descent(chain, x, most, gain=3e-3, real=sssfit.fit.cascade.descent):
     return real(chain, x, min(most, 20), max(gain, 0.02))
 
 
@@ -59,7 +59,7 @@ SHORT = (
     (sssfit.fit.cascade, "_STARTS", 2),
     (sssfit.fit.cascade, "_KEPT_STARTS", 1),
     (sssfit.fit.cascade, "_HOPS", ()),
-    (sssfit.fit.cascade, "_descend", _short_descent),
+    (sssfit.fit.cascade, "descent", _short_descent),
     (sssfit.fit._spectrum, "_FREQUENCIES", 28),
 )
 _LONG = tuple((module, name, getattr(module, name)) for module, name, _ in SHORT)

@@ -16,7 +16,8 @@ from reference_pixels import one_over_r_profile
 from sssfit.fit import _by_hand, _fitted_taps, artist, burley, falloff, guided, weighted
 from sssfit.fit._chain_pairs import PairChain
 from sssfit.fit._chain_stars import StarChain
-from sssfit.fit._gaussians_search import make_annuli
+from sssfit.fit._gaussians_basis import basis_of
+from sssfit.fit._gaussians_objective import make_annuli
 from sssfit.fit._spectrum import spectral_target
 from sssfit.fit._target import Target
 from sssfit.fit._tied_chain import one_shape
@@ -195,10 +196,30 @@ def sum_of_gaussians(total: float | None, *, signed: bool) -> Callable:
             return 2.0 * y * (point.jacobian.T @ point.residual)
 
         return Pair(
-            "_gaussians_search.py", lambda x: annuli.at(x).cost, adjoint, np.log([0.05, 0.6, 4.0])
+            "_gaussians_objective.py",
+            lambda x: annuli.at(x).cost,
+            adjoint,
+            np.log([0.05, 0.6, 4.0]),
         )
 
     return made
+
+
+def coordinates_of_gaussians(_) -> Pair:
+    """Gaussians in few coordinates: each depends on its own variance only."""
+    annuli = make_annuli(np.linspace(0.0, 9.0, 40), np.ones(39), None, signed=False)
+    basis = basis_of(annuli.inner, annuli.width, (-4.0, 5.0))
+
+    def adjoint(x, y):
+        slopes = basis.columns(x)[1]
+        return np.sum(slopes * y.reshape(slopes.shape), axis=0)
+
+    return Pair(
+        "_gaussians_basis.py",
+        lambda x: basis.columns(x)[0].ravel(),
+        adjoint,
+        np.log([0.05, 0.6, 4.0]),
+    )
 
 
 def columns_of_gaussians(_) -> Pair:
@@ -210,7 +231,7 @@ def columns_of_gaussians(_) -> Pair:
         return np.sum(slopes * y.reshape(slopes.shape), axis=0)
 
     return Pair(
-        "_gaussians_search.py",
+        "_gaussians_objective.py",
         lambda x: annuli._columns(x)[0].ravel(),
         adjoint,
         np.log([0.05, 0.6, 4.0]),
@@ -294,6 +315,7 @@ PAIRS = {
     "guided": guided_objective,
     "guided, sum": guided_sum,
     "columns of Gaussians": columns_of_gaussians,
+    "coordinates of Gaussians": coordinates_of_gaussians,
     "sum of Gaussians": sum_of_gaussians(None, signed=False),
     "sum of Gaussians, signed": sum_of_gaussians(None, signed=True),
     "sum of Gaussians, total": sum_of_gaussians(1.02, signed=False),
@@ -337,7 +359,10 @@ def test_a_wrong_adjoint_is_seen(monkeypatch):
 
 
 def test_every_file_that_writes_derivatives_has_a_pair(monkeypatch):
-    """``_nlopt`` and ``cascade`` hand on what they are given, ``_chain`` from its two kinds."""
+    """``_nlopt``, ``cascade`` and ``_gaussians_search`` hand on what they are given.
+
+    ``_chain`` hands it on from its two kinds.
+    """
     folder = Path(artist.__file__).parent
     words = ("gradient", "derivative", "jacobian", "slope")
     written = {
@@ -346,4 +371,5 @@ def test_every_file_that_writes_derivatives_has_a_pair(monkeypatch):
         if any(word in path.read_text(encoding="utf-8") for word in words)
     }
     tested = {make(monkeypatch).file for make in PAIRS.values()}
-    assert written - {"_nlopt.py", "cascade.py", "_chain.py"} == tested
+    handed_on = {"_nlopt.py", "cascade.py", "_chain.py", "_gaussians_search.py"}
+    assert written - handed_on == tested

@@ -557,7 +557,7 @@ def test_no_start_of_64_is_much_better(skin1, stages):
     best = np.inf
     for seed in range(64):
         rough = chain.start(np.random.default_rng([77, seed]))
-        ended = cascade._descend(chain, cascade._rough(chain, rough).x, 300, gain=1e-6)
+        ended = cascade.descent(chain, cascade._rough(chain, rough).x, 300, gain=1e-6)
         best = min(best, ended.fun)
     assert ours <= 1.06 * best
 

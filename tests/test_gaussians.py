@@ -19,10 +19,11 @@ from reference_gaussians import (
 from reference_pixels import make_profile, one_over_r_profile
 from scipy.integrate import quad
 
-import sssfit.fit._gaussians_search as annuli_module
+import sssfit.fit._gaussians_search as search_module
 from sssfit import shapes
 from sssfit.errors import FitError, SssfitWarning
 from sssfit.fit import METHODS, fit_gaussians, make_target
+from sssfit.fit._gaussians_objective import make_annuli
 from sssfit.fit._gaussians_search import fitted_annuli
 from sssfit.material import load_material, material_names
 from sssfit.simulate.dipole import simulate_dipole
@@ -225,7 +226,7 @@ def test_weights_are_the_best_for_the_variances():
     energy = profile.annulus_energy[:, 0]
     variances = np.log([0.01, 0.02, 0.3, 0.31, 2.0, 90.0])
     for total in (None, 1.1):
-        annuli = annuli_module.make_annuli(profile.r_edges_mm, energy, total, signed=False)
+        annuli = make_annuli(profile.r_edges_mm, energy, total, signed=False)
         point = annuli.at(variances)
         assert (point.weights >= 0.0).all()
         assert (point.weights == 0.0).any()
@@ -243,7 +244,7 @@ def test_weights_are_the_best_for_the_variances():
 def test_gradient_by_finite_differences(total, signed):
     profile = simulate_dipole(load_material("skin1"), dr_mm=0.05)
     energy = profile.annulus_energy[:, 1]
-    annuli = annuli_module.make_annuli(profile.r_edges_mm, energy, total, signed=signed)
+    annuli = make_annuli(profile.r_edges_mm, energy, total, signed=signed)
     here = np.log([0.03, 0.4, 2.5])
     point = annuli.at(here)
     gradient = 2.0 * point.jacobian.T @ point.residual
@@ -430,14 +431,14 @@ def test_fewer_annuli_than_unknowns():
 
 def test_sums_are_searched_once_whatever_the_support(monkeypatch, marble):
     searched = []
-    original = annuli_module._best_of
+    original = search_module._best_of
 
     def counted(annuli, starts, bounds):
         searched.append(len(starts[0]))
         return original(annuli, starts, bounds)
 
-    monkeypatch.setattr(annuli_module, "_best_of", counted)
-    annuli_module.forget_searches()
+    monkeypatch.setattr(search_module, "_best_of", counted)
+    search_module.forget_searches()
     first = fit_gaussians(marble, terms=3, mm_per_pixel=0.5, support_mm=6.0)
     assert searched == [1, 2, 3] * 3
     wider = fit_gaussians(marble, terms=2, mm_per_pixel=0.5, support_mm=9.0)
@@ -446,7 +447,7 @@ def test_sums_are_searched_once_whatever_the_support(monkeypatch, marble):
     assert searched[9:] == [4] * 3
     fit_gaussians(marble, terms=1, signed=True, mm_per_pixel=0.5)
     assert searched[12:] == [1] * 3  # another objective
-    annuli_module.forget_searches()
+    search_module.forget_searches()
     again = fit_gaussians(marble, terms=2, mm_per_pixel=0.5, support_mm=9.0)
     np.testing.assert_array_equal(again.kernel.weights, wider.kernel.weights)
     assert (again.evaluations, again.stop_reasons) == (wider.evaluations, wider.stop_reasons)

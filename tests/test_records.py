@@ -84,7 +84,7 @@ RECORDS = {
         lambda: world.choice().to_dict(),
         {"distance_mm", "fov_degrees", "resolution"},
     ),
-    "stability wax.toml": (lambda: world.stresses().to_dict(), set()),
+    "stability wax.toml": (lambda: world.stresses("wax").to_dict(), set()),
     "motion wax.toml": (moved, set()),
     "motion --table": (tabled, set()),
     SMALL: (lambda: world.comparison().to_dict(), {"error", "cost", "verdict", "budget"}),

@@ -7,7 +7,7 @@ import pytest
 from test_profile import make_profile
 
 from sssfit.errors import ProfileError
-from sssfit.fit import fit_svd
+from sssfit.fit import fit_result, fit_svd
 from sssfit.fit._target import Target
 from sssfit.material import load_material
 from sssfit.profile import smooth
@@ -59,6 +59,17 @@ def test_each_channel_keeps_its_energy_and_its_annuli(exact):
     assert (found.annulus_energy >= 0.0).all()
     assert np.isnan(found.annulus_energy_stderr).all()
     assert fit_svd(found, rank=3, mm_per_pixel=PITCH).kernel.rank == 3
+
+
+def test_a_kernel_of_a_smoothed_profile_is_the_walks(exact):
+    """So `sssfit render` finds the walk itself, and judges by that."""
+    own = walk(exact, 2_000, 1)
+    fitted = fit_result(own, "svd", rank=2, mm_per_pixel=PITCH, smooth=True).kernel
+    assert fitted.meta["profile_sha256"] == own.sha256
+    assert fitted.meta["settings"]["smooth"] is True
+    wanted = fit_svd(smoothed(own), rank=2, mm_per_pixel=PITCH).kernel
+    np.testing.assert_array_equal(fitted.weights, wanted.weights)
+    assert "smooth" not in fit_svd(own, mm_per_pixel=PITCH).kernel.meta["settings"]
 
 
 def test_a_power_law_is_not_penalised():

@@ -11,15 +11,21 @@ from test_lut import ENERGY, VARIANCES
 from test_profile import make_profile
 
 from sssfit.errors import ArgumentError, FitError, SssfitWarning
+from sssfit.fit import guided as fit_module
+from sssfit.fit._cascade_again import followed
 from sssfit.material import load_material
 from sssfit.methods import STRESSES
 from sssfit.shapes import gaussian_cdf
+from sssfit.simulate import simulate_exact
 from sssfit.stability import (
     Curve,
     Panel,
     distance,
     gaussians,
+    grid,
+    guided,
     hard_light,
+    imports,
     motion,
     noise,
     optics,
@@ -208,6 +214,89 @@ def test_a_fit_that_chases_noise_is_found(walked, monkeypatch):
     assert found.kind == NEVER or found.below.at > 2.0 * healthy.below.high
 
 
+def test_a_walks_noise_made_smaller_is_that_of_more_photons():
+    """Of 16 walks made four times as many photons, beside 16 that were walked: within 4 sigma."""
+    exact = simulate_exact(load_material("skin1"))
+    subject = Subject("skin1", exact, 0.3)
+    walks = [noise._walk(subject, 10_000, each) for each in range(16)]
+    made = [noise.with_noise_of(exact, each, 40_000) for each in walks]
+    walked = [noise._walk(subject, 40_000, 100 + each) for each in range(16)]
+    rings = np.add.reduceat, np.array([0, 3, 10, 30, 100, 300])
+    found, wanted, true = (
+        np.array([rings[0](each.annulus_energy, rings[1], axis=0) for each in some])
+        for some in (made, walked, [exact])
+    )
+    ratio = found.std(axis=0, ddof=1) / wanted.std(axis=0, ddof=1)
+    assert np.abs(np.log(ratio)).max() < 4.0 * np.sqrt(1.0 / 15.0)  # of two spreads of 16
+    error = wanted.std(axis=0, ddof=1) / np.sqrt(16.0)
+    assert (np.abs(found.mean(axis=0) - true[0]) < 5.0 * error).all()
+    assert made[0].photons == 40_000
+    np.testing.assert_allclose(made[0].annulus_energy_stderr, 0.5 * walks[0].annulus_energy_stderr)
+
+
+def test_gathered_annuli_are_those_that_the_solver_has():
+    material = load_material("skin1")
+    exact = simulate_exact(material)
+    found = grid.gathered(exact, 4, 400)
+    wanted = simulate_exact(
+        material, dr_mm=4.0 * exact.r_edges_mm[1], radius_mm=float(exact.r_edges_mm[400])
+    )
+    np.testing.assert_allclose(found.r_edges_mm, wanted.r_edges_mm, rtol=1e-12)
+    np.testing.assert_allclose(found.annulus_energy, wanted.annulus_energy, rtol=1e-5)
+    np.testing.assert_allclose(found.diffuse_reflectance, wanted.diffuse_reflectance, rtol=1e-6)
+
+
+def test_a_followed_cascade_stays_where_it_is_and_goes_where_the_profile_goes(profile):
+    """On its own profile it is the same; on one of twice the light it has twice the energy."""
+    way = Way("cascade 7", "cascade", {"fetches": 7})
+    taps_of_it = way.fit(profile, 0.25, seed=1)
+    subject = Subject("gaussian", profile, 0.25)
+    same = followed(taps_of_it, profile)
+    assert subject.error(same, subject.shows(taps_of_it)) < 0.02
+    dimmer = dataclasses.replace(
+        profile,
+        annulus_energy=0.5 * profile.annulus_energy,
+        beyond_grid=0.5 * profile.beyond_grid,
+    )
+    np.testing.assert_allclose(followed(taps_of_it, dimmer).energy, 0.5 * same.energy, rtol=1e-6)
+
+
+def test_a_fit_that_takes_unequal_radii_for_equal_ones_is_found(profile, monkeypatch):
+    """Equal radii hide it; the healthy fit keeps within the limit as far as twice the radius."""
+    subject = Subject("gaussian", profile, 0.25)
+    ways = [Way("pre", "preintegrated", {})]
+    steps = [imports._unequal(subject, each) for each in imports._RATIOS]
+    (healthy,) = subject.changes(ways, [steps], imports.LIMIT)[0]
+    real = Way.fit
+
+    def equal(way, given, pitch, **more):
+        edges_mm = np.linspace(0.0, given.r_edges_mm[-1], given.n_annuli + 1)
+        return real(way, dataclasses.replace(given, r_edges_mm=edges_mm), pitch, **more)
+
+    monkeypatch.setattr(Way, "fit", equal)
+    (broken,) = subject.changes(ways, [steps], imports.LIMIT)[0]
+    assert healthy[0] == pytest.approx(broken[0], abs=1e-9)
+    assert (np.array(healthy[: imports._RATIOS.index(1.6) + 1]) < imports.LIMIT).all()
+    assert broken[1] > imports.LIMIT
+    assert len(broken) == 2
+
+
+def test_a_guided_search_that_stays_near_its_start_is_found(profile, monkeypatch):
+    """The same search, ended a tenth of the way from each level's start to its optimum."""
+    subject = Subject("gaussian", profile, 0.25)
+    own = subject.shows(guided._fit(subject, guided.DRAWN_K, guided.DRAWN_B).kernel)
+    assert guided._from_start(own, subject, (1.0, 0)) < 0.1 * guided.LIMIT
+    real = fit_module.rank_one
+
+    def lazy(wanted, weights, start, **more):
+        found = real(wanted, weights, start, **more)
+        return dataclasses.replace(found, x=0.9 * start + 0.1 * found.x)
+
+    monkeypatch.setattr(fit_module, "rank_one", lazy)
+    own = subject.shows(guided._fit(subject, guided.DRAWN_K, guided.DRAWN_B).kernel)
+    assert guided._from_start(own, subject, (1.0, 0)) > guided.LIMIT
+
+
 def test_stresses_that_walk_need_a_material(profile):
     with pytest.raises(FitError, match="noise: the profile does not say its material"):
         stability(profile, only=["noise"], threads=1)
@@ -265,7 +354,7 @@ def test_a_plane_that_faces_the_eye_and_equal_pixels_are_the_flat_picture(profil
     subject = Subject("gaussian", profile, 0.25)
     kernel = Way("pre", "preintegrated", {}, taps=9).fit(profile, 0.25)
     flat = subject.error(kernel, subject.truths())
-    assert distance._tilted(subject, "pair", kernel).y[0] == pytest.approx(flat, rel=1e-6)
+    assert distance._tilted(subject, {"pair": kernel})[0].y[0] == pytest.approx(flat, rel=1e-6)
     (own,) = distance._growing(subject, {"pair": kernel})
     assert own.y[0] == pytest.approx(flat, rel=1e-6)
 
@@ -291,7 +380,7 @@ def test_spots_stay_in_place_on_smaller_pixels():
 def test_light_of_8_bits_loses_more_the_dimmer_it_is(profile):
     subject = Subject("gaussian", profile, 0.25)
     kernel = Way("pre", "preintegrated", {}, taps=9).fit(profile, 0.25)
-    found = taps._eight_bits(subject, "pair", kernel, "rgba8")
+    found = taps._eight_bits(subject, ("pair", kernel, "rgba8"))
     assert found.y[-1] > 4.0 * found.y[0]
-    still = taps._jittered(subject, "pair", kernel, 1)
+    still = taps._jittered(subject, ("pair", kernel, 1))
     assert still.y[0] == 1e-3 < still.y[-1]

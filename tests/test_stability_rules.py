@@ -8,7 +8,7 @@ from scipy import sparse
 from test_profile import make_profile
 from test_taps import taps_of
 
-from sssfit.fit import fit_gaussians, fit_guided, fit_svd
+from sssfit.fit import fit_gaussians, fit_guided, fit_result, fit_svd
 from sssfit.fit._target import Target
 from sssfit.fit.on_taps import on_taps
 from sssfit.fit.svd import all_eigenvalues
@@ -163,6 +163,21 @@ def test_few_photons_are_named_with_how_many_would_do(walks):
     assert "about 2e+05 photons" in words or "about 1e+05 photons" in words
     many = fit_gaussians(walks[1_000_000], terms=4, mm_per_pixel=PITCH).kernel
     assert "few-photons" not in fired(many, walks[1_000_000])
+
+
+def test_a_smoothed_walk_may_have_fewer_photons():
+    """Of svd by a factor of 4, as the stress of noise has it; not so few that nothing helps."""
+    told = {}
+    for photons in (1000, 20_000):
+        profile = simulate_montecarlo(load_material("skin1"), photons=photons)
+        for smooth in (False, True):
+            kernel = fit_result(profile, "svd", rank=1, mm_per_pixel=0.3, smooth=smooth).kernel
+            words = [each for each in rules.doubts(kernel, profile) if "photons leave" in each]
+            told[photons, smooth] = words
+    assert "a smoothed profile, about" in told[20_000, False][0]
+    assert told[20_000, True] == []
+    assert "smoothed" not in told[1000, False][0]
+    assert told[1000, True]
 
 
 def test_light_beyond_the_grid_is_named():

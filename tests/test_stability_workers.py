@@ -117,8 +117,10 @@ def test_a_stress_gives_the_same_bits_with_workers(profile):
     subject = Subject("gaussian", profile, 0.25)
     ways = [Way("pre", "preintegrated", {}), Way("svd 2", "svd", {"rank": 2})]
     profiles = [imports._saturated(subject, each) for each in (0.01, 0.1)]
-    alone = subject.changes(ways, profiles)
+    alone = subject.changes(ways, [profiles], np.inf)[0]
     with Workers(2, Subject("gaussian", profile, 0.25)) as workers:
-        shared = Subject("gaussian", profile, 0.25, workers=workers).changes(ways, profiles)
+        shared = Subject("gaussian", profile, 0.25, workers=workers).changes(
+            ways, [profiles], np.inf
+        )[0]
     np.testing.assert_array_equal(alone, shared)
     assert (np.diff(np.array(alone), axis=1) > 0.0).all()

@@ -94,16 +94,21 @@ class _Page(Figure):
 
 @contextlib.contextmanager
 def new_page(
-    height_inches: float, title: str, subtitle: str, notes: Sequence[str] = ()
+    height_inches: float,
+    title: str,
+    subtitle: str,
+    notes: Sequence[str] = (),
+    *,
+    width_inches: float = WIDTH_INCHES,
 ) -> Iterator[tuple[Figure, SubFigure]]:
-    """Make a page, 8 inches wide, with title and provenance at the top and notes at the bottom.
+    """Make a page with title and provenance at the top and notes at the bottom.
 
     Yields the figure, and the remaining subfigure for `add_legend`, `add_table` and panels. Each
     takes the top of a subfigure and returns the rest, because matplotlib lets nothing else share
     that area. After drawing, `lay_out` computes the layout.
     """
     with chart_style():
-        figure = _empty_page(height_inches)
+        figure = _empty_page(width_inches, height_inches)
         page = _rest(figure)
         left: Style = {"x": 0.0, "ha": "left", "wrap": True}
         page.suptitle(drawable(title), fontsize=12, fontweight="bold", **left)
@@ -115,12 +120,12 @@ def new_page(
         lay_out(figure)
 
 
-def _empty_page(height_inches: float) -> Figure:
-    margins = MARGIN_INCHES / WIDTH_INCHES, MARGIN_INCHES / height_inches
+def _empty_page(width_inches: float, height_inches: float) -> Figure:
+    margins = MARGIN_INCHES / width_inches, MARGIN_INCHES / height_inches
     layout = ConstrainedLayoutEngine(
         rect=(*margins, 1 - 2 * margins[0], 1 - 2 * margins[1]), w_pad=0.05, h_pad=0.06
     )
-    figure = _Page(figsize=(WIDTH_INCHES, height_inches), dpi=DPI, layout=layout)
+    figure = _Page(figsize=(width_inches, height_inches), dpi=DPI, layout=layout)
     FigureCanvasAgg(figure)
     return figure
 
@@ -134,7 +139,7 @@ def add_legend(
     below: SubFigure, handles: Sequence[Handle], labels: Sequence[str], *, title: str = ""
 ) -> SubFigure:
     """Draw a legend at the top of a subfigure, in as many columns as fit; return the rest."""
-    room = (WIDTH_INCHES - 2 * MARGIN_INCHES) * DPI
+    room = below.figure.bbox.width - 2 * MARGIN_INCHES * DPI
     for columns in range(min(5, len(handles)), 0, -1):
         legend = _draw_legend(below, handles, labels, columns, title=title or None)
         if columns == 1 or legend.get_window_extent().width <= room:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
@@ -19,6 +20,7 @@ from sssfit.arrays import FloatArray
 from sssfit.chart.page import (
     COLOURS,
     LINE_STYLES,
+    WIDTH_INCHES,
     Style,
     add_legend,
     name_axes,
@@ -31,11 +33,16 @@ if TYPE_CHECKING:
     from sssfit.stability import Curve, Panel, Stability
 
 _COLUMNS, _PANEL_INCHES, _HEAD_INCHES = 2, 2.15, 1.35
+# Of all stresses, 38 panels: five a row on a page of a large screen, where two made one of 42 in.
+_MANY, _WIDE_COLUMNS, _WIDE_PANEL_INCHES, _WIDE_INCHES = 12, 5, 2.0, 16.0
 # Okabe and Ito's vermillion, green and blue, then their orange, sky blue, purple and black.
 _COLOURS = (*COLOURS, "#e69f00", "#56b4e9", "#cc79a7", "#000000", "#999999")
 _MARKERS = "os^Dv<>P"
-_SAFE = "#e8f3ec"
+_SAFE, _SMALL = "#e8f3ec", 6.5
 _HEADROOM = 0.25  # of the axis above the limit, at least
+_CROWDED = 3  # curves; more leave no room for a legend, which stands above them
+_SHORT_DECADES = 1.3  # as `tick_decades` has it
+_LEGEND_LINE = 0.135  # of the axis of a crowded panel
 
 
 def stability_figure(stability: Stability) -> Figure:
@@ -49,21 +56,24 @@ def stability_figure(stability: Stability) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        8 inches wide. Bars are where other seeds lie; a line leaves its panel at the top where a
-        fit is refused.
+        8 inches wide, with more than 12 panels 16. Bars are where other seeds lie; a line leaves
+        its panel at the top where a fit is refused.
     """
     panels = stability.panels
     shared = _shared(stability)
-    rows = math.ceil(len(panels) / _COLUMNS)
+    is_wide = len(panels) > _MANY
+    columns = _WIDE_COLUMNS if is_wide else _COLUMNS
+    rows = math.ceil(len(panels) / columns)
     where = f"pixels of {stability.mm_per_pixel:g} mm, seed {stability.seed}"
     notes = ["Shaded: within the limit. Bars: where other seeds lie.", *stability.notes]
-    height = _HEAD_INCHES + rows * _PANEL_INCHES
+    height = _HEAD_INCHES + rows * (_WIDE_PANEL_INCHES if is_wide else _PANEL_INCHES)
+    width = _WIDE_INCHES if is_wide else WIDTH_INCHES
     title = f"{stability.material}: where fits are safe"
-    with new_page(height, title, where, notes) as (figure, below):
+    with new_page(height, title, where, notes, width_inches=width) as (figure, below):
         if shared:
             handles = [Line2D([], [], **_style(k)) for k in range(len(shared))]
             below = add_legend(below, handles, shared)
-        grid = below.subplots(rows, _COLUMNS, squeeze=False).ravel()
+        grid = below.subplots(rows, columns, squeeze=False).ravel()
         for axes, panel in zip(grid, panels, strict=False):
             _draw(axes, panel, shared)
         for axes in grid[len(panels) :]:
@@ -80,10 +90,13 @@ def _shared(stability: Stability) -> list[str]:
 
 
 def _style(k: int) -> Style:
+    """Return the k-th style; from the ninth on, colours return with other markers, hollow."""
+    turn, place = divmod(k, len(_COLOURS))
     return {
-        "color": _COLOURS[k % len(_COLOURS)],
+        "color": _COLOURS[place],
         "linestyle": LINE_STYLES[k // 2 % len(LINE_STYLES)],
-        "marker": _MARKERS[k % len(_MARKERS)],
+        "marker": _MARKERS[(place + turn) % len(_MARKERS)],
+        "markerfacecolor": "white" if turn % 2 else _COLOURS[place],
         "markersize": 3.2,
         "lw": 1.0,
     }
@@ -96,23 +109,36 @@ def _draw(axes: Axes, panel: Panel, shared: list[str]) -> None:
         line = _line(axes, each, _style(styles[each.label]))
         own += [line] if each.label not in shared else []
     name_axes(axes, panel.title, panel.axis.label, panel.y_label)
+    axes.yaxis.label.set_fontsize(_SMALL)  # "change of p99 of Delta E 2000" is as long as a panel
     if panel.axis.is_log:
         axes.set_xscale("log")
+        _tick_decades(axes.xaxis, 8)
     else:
         tick(axes.xaxis)
     low, high = _range(panel)
+    is_crowded = panel.is_log and bool(own) and len(panel.curves) > _CROWDED
+    legend_share = _LEGEND_LINE * len(own) * is_crowded
     if panel.is_log:
         axes.set_yscale("log")
-        axes.set_ylim(low, high)
-        tick_decades(axes.yaxis, 6)
+        axes.set_ylim(low, high * (high / low) ** (legend_share / (1.0 - legend_share)))
+        _tick_decades(axes.yaxis, 6)
     else:
         axes.set_ylim(low, high)
         tick(axes.yaxis)
     axes.axhspan(low, panel.limit, color=_SAFE, zorder=0)
     axes.axhline(panel.limit, color="#666666", lw=0.6, zorder=1)
     if own:
-        legend = axes.legend(handles=own, loc="best", fontsize=7, frameon=True, framealpha=0.85)
+        place: Style = {"loc": "upper right" if is_crowded else "best"}
+        legend = axes.legend(handles=own, fontsize=_SMALL, frameon=True, framealpha=0.85, **place)
         legend.get_frame().set_edgecolor("none")
+
+
+def _tick_decades(axis: Axis, most: int) -> None:
+    """Tick powers of ten; on a short axis 1, 2 and 5 are labelled in one way."""
+    tick_decades(axis, most)
+    low, high = axis.get_view_interval()
+    if math.log10(high / low) < _SHORT_DECADES:
+        axis.set_major_formatter("{x:g}")
 
 
 def _styles(labels: list[str], shared: list[str]) -> dict[str, int]:

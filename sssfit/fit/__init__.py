@@ -74,6 +74,7 @@ def fit_result(
     *,
     taps: int | None = None,
     place: str | None = None,
+    smooth: bool = False,
     **settings: Any,
 ) -> FitResult | TapsFit:
     """Fit a kernel of either kind to a profile, and return it with how it was found.
@@ -88,6 +89,8 @@ def fit_result(
         Thin a separable kernel to so many bilinear fetches a pass; see ``sssfit.fit.on_taps``.
     place : str, optional
         Where the taps lie, "cumulative", "quadratic" or "fitted".
+    smooth : bool
+        Take most of the noise out of a walk's profile first (`sssfit.profile.smooth`).
     **settings
         Keyword arguments of the method's ``fit_x``: ``rank``, ``mm_per_pixel``, ...
 
@@ -100,12 +103,16 @@ def fit_result(
     FitError
         The method is unknown, or cannot fit this profile with these settings.
     ProfileError
-        The file cannot be read as a profile.
+        The file cannot be read as a profile, or a profile to smooth has no standard errors.
     """
     if not isinstance(method, str) or method not in FITS:
         raise FitError(f"method = {shown(method)}; expected one of {', '.join(FITS)}.")
     if place is not None and taps is None:
         raise FitError(f"place = {shown(place)} is where taps lie; give their number as `taps`.")
+    if smooth:
+        from sssfit.profile.smooth import smoothed  # scipy's splines, which few fits need
+
+        profile = smoothed(_loaded(profile))
     if method in TAPS:
         if place is not None:
             raise FitError(f"place = {shown(place)} is of separable kernels; leave it out.")

@@ -1,17 +1,7 @@
-"""Objective of the Gaussian fit of one channel, and the search for the variances.
+"""Search for the variances of a sum of Gaussians.
 
-The objective int r (R - sum_i w_i G(v_i, r))^2 dr is evaluated from the energies of the annuli.
-With e the energy of an annulus, A its area and E_i the energy of a unit Gaussian in it, it is
-
-    sum over annuli of (e - sum_i w_i E_i)^2 / (2 pi A).
-
-This is the same integral for the means over the annuli; point samples would be wrong where R_d is
-curved within an annulus. For given variances the weights are a linear least squares problem; the
-remaining function depends on the variances alone and is minimised over their logarithms (variable
-projection: Golub and Pereyra 1973; the Jacobian is Kaufman's of 1975, which leaves out a term that
-vanishes with the residual).
-
-The search adds one Gaussian at a time. The best sum of N starts from the best of N - 1 with a new
+The objective (``_gaussians_objective.py``) is minimised over the logarithms of the variances. The
+search adds one Gaussian at a time. The best sum of N starts from the best of N - 1 with a new
 Gaussian in each gap between variances, below the smallest and above the largest. With weight 0 for
 the new one each start is as good as the previous optimum, so the error cannot rise with N.
 """
@@ -20,187 +10,14 @@ import functools
 import math
 import threading
 from dataclasses import dataclass, replace
-from typing import TypeAlias
 
 import numpy as np
-import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
+from sssfit.fit._gaussians_objective import Annuli, Objective, Point, Searched
 from sssfit.fit._target import Target
 from sssfit.messages import counted
 from sssfit.profile.pixels import PARTS_PER_ANNULUS, SUBDIVIDED_ANNULI, annulus_areas
-
-# Signed weights may cancel: two of +-1e8 with nearly equal variances were seen to fit photon noise.
-# Their absolute sum may be at most this many times the energy.
-_LARGEST_SUM = 10.0
-_RANK = 1e-12  # columns closer than this, such as Gaussians of equal variance, count as one
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Point:
-    """Log variances (N,), the best weights for them (N,), and their error.
-
-    ``residual`` (n,) is relative: its norm is the relative error of the literature. ``jacobian``
-    (n, N).
-    """
-
-    log_variances: FloatArray
-    weights: FloatArray
-    residual: FloatArray
-    jacobian: FloatArray
-
-    @property
-    def cost(self) -> float:
-        """Square of the relative error."""
-        return float(self.residual @ self.residual)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Annuli:
-    """The objective for one channel, as a function of the variances' logarithms.
-
-    Energies are shares of the energy on the grid, so that faint profiles do not underflow.
-
-    ``inner``, ``width`` (n, 1) [mm^2] are r0^2 / 2 and (r1^2 - r0^2) / 2 of each annulus; ``scale``
-    (n, 1) is sqrt(area) times the target's norm, ``wanted`` (n,) the target, of norm 1; ``total``
-    the required sum of the weights, or None if it is free.
-    """
-
-    inner: FloatArray
-    width: FloatArray
-    scale: FloatArray
-    wanted: FloatArray
-    total: float | None
-    signed: bool
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Annuli) and self._content == other._content
-
-    def __hash__(self) -> int:
-        return hash(self._content)
-
-    @property
-    def _content(self) -> tuple[object, ...]:
-        arrays = self.inner, self.width, self.wanted
-        return *(each.tobytes() for each in arrays), self.total, self.signed
-
-    def at(self, log_variances: FloatArray) -> Point:
-        """Return the best weights for given variances; infinite error if there is no solution."""
-        columns, slopes = self._columns(log_variances)
-        weights = np.zeros(len(log_variances))
-        try:
-            free = self._positive_weights(columns)
-        except RuntimeError:  # columns equal to rounding can make the solver cycle
-            return self._infeasible_point(log_variances)
-        basis, wanted = self._unconstrained(columns[:, free])
-        norms = np.linalg.norm(basis, axis=0)
-        norms[norms == 0.0] = 1.0  # two of equal variance, one eliminated by the total
-        q, r = np.linalg.qr(basis / norms)
-        found = np.linalg.lstsq(r, q.T @ wanted, rcond=_RANK)[0] / norms
-        if self.total is not None:
-            found = np.append(found, self.total - found.sum())
-        if np.abs(found).sum() > _LARGEST_SUM * max(1.0, self.total or 0.0):
-            return self._infeasible_point(log_variances)
-        weights[free] = found
-        jacobian = -slopes * weights
-        jacobian -= q @ (q.T @ jacobian)
-        return Point(log_variances, weights, self.wanted - columns @ weights, jacobian)
-
-    def _infeasible_point(self, log_variances: FloatArray) -> Point:
-        """Return a point of infinite error."""
-        nothing = np.zeros((len(self.wanted), len(log_variances)))
-        return Point(log_variances, nothing[0], np.full(self.wanted.shape, np.inf), nothing)
-
-    def _columns(self, log_variances: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return scaled energies of unit Gaussians in the annuli (n, N), and their log derivatives.
-
-        exp(-a) - exp(-b) is computed as exp(-a) (1 - exp(a - b)), which keeps its digits in thin
-        annuli.
-        """
-        inverse = np.exp(-log_variances)
-        a, step = self.inner * inverse, self.width * inverse
-        at_inner = np.exp(-a)
-        energy = -at_inner * np.expm1(-step)
-        slope = a * energy - step * (at_inner - energy)
-        return energy / self.scale, slope / self.scale
-
-    def _positive_weights(self, columns: FloatArray) -> npt.NDArray[np.intp]:
-        """Return the indices of the weights that are not 0 at the optimum."""
-        from scipy.optimize import nnls  # 0.8 s that ``fit --list`` does not need
-
-        terms = columns.shape[1]
-        if self.signed:
-            return np.arange(terms)
-        if self.total is None:
-            r = _triangle(np.column_stack((columns, self.wanted)))
-            return np.flatnonzero(nnls(r[:, :terms], r[:, terms])[0] > 0.0)
-        # Weights on a simplex: with sum w = T, columns w - wanted = sum_i w_i/T (T column_i -
-        # wanted). The non-negative u that minimises |sum_i u_i (...)|^2 + (1 - sum u)^2 is a
-        # multiple of the best w, because for a fixed direction of u the minimum grows with the
-        # first term.
-        r = _triangle(self.total * columns - self.wanted[:, None])
-        rows = np.vstack((r, np.ones(terms)))
-        aim = np.append(np.zeros(len(r)), 1.0)
-        return np.flatnonzero(nnls(rows, aim)[0] > 0.0)
-
-    def _unconstrained(self, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return columns and target of the problem with the last weight eliminated by the total."""
-        if self.total is None:
-            return columns, self.wanted
-        last = columns[:, -1]
-        return columns[:, :-1] - last[:, None], self.wanted - self.total * last
-
-
-@dataclass(frozen=True, slots=True)
-class SharedAnnuli:
-    """The objectives of several channels, added up, where all have the same variances."""
-
-    parts: tuple[Annuli, ...]
-
-    def at(self, log_variances: FloatArray) -> Point:
-        """Return the point of all residuals, with each Gaussian's largest weight."""
-        points = [each.at(log_variances) for each in self.parts]
-        return Point(
-            log_variances,
-            np.max([each.weights for each in points], axis=0),
-            np.concatenate([each.residual for each in points]),
-            np.concatenate([each.jacobian for each in points]),
-        )
-
-    def weights(self, log_variances: FloatArray) -> FloatArray:
-        """Return the best weights for given variances (N, C)."""
-        return np.stack([each.at(log_variances).weights for each in self.parts], axis=1)
-
-
-Objective: TypeAlias = Annuli | SharedAnnuli
-
-
-def _triangle(matrix: FloatArray) -> FloatArray:
-    """Return R of the QR decomposition: a small matrix with the same inner products."""
-    return np.asarray(np.linalg.qr(matrix, mode="r"), dtype=np.float64)
-
-
-def make_annuli(
-    r_edges_mm: FloatArray, energy: FloatArray, total: float | None, *, signed: bool
-) -> Annuli:
-    """Set up the objective for the energies (n,) of a channel, at least one of them above 0.
-
-    ``total`` is the required sum of the weights as a share of the energy on the grid, or None.
-    """
-    inner, outer = r_edges_mm[:-1], r_edges_mm[1:]
-    width = 0.5 * (outer - inner) * (outer + inner)
-    root = np.sqrt(2.0 * math.pi * width)
-    wanted = energy / energy.sum() / root
-    norm = float(np.linalg.norm(wanted))
-    return Annuli(
-        inner=0.5 * inner[:, None] ** 2,
-        width=width[:, None],
-        scale=root[:, None] * norm,
-        wanted=wanted / norm,
-        total=total,
-        signed=signed,
-    )
-
 
 # Merging the first two annuli lowers int r R^2 dr by this share or more: 16 to 33 % where R_d ~ 1/r
 # (the exact profiles of four materials), under 0.6 % for dipoles on grids five times too coarse.
@@ -275,11 +92,10 @@ def search(annuli: Objective, terms: int, least_mm2: float, most_mm2: float) -> 
     )
 
 
-def local_minimum(
-    annuli: Objective, log_variances: FloatArray, bounds: tuple[float, float]
-) -> Point:
+def local_minimum(annuli: Annuli, log_variances: FloatArray, bounds: tuple[float, float]) -> Point:
     """Descend from given log variances alone, within bounds, as one start of the search does."""
-    return _descend(annuli, annuli.at(log_variances), bounds, _FINE)[0]
+    few = annuli.within(bounds)
+    return _descend(few, few.at(log_variances), bounds, _FINE)[0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -316,7 +132,7 @@ class _Chain:
     """The best sums of 1, 2, 3 ... Gaussians of one channel, each searched from the one before."""
 
     def __init__(self, annuli: Objective, bounds: tuple[float, float]) -> None:
-        self._annuli, self._bounds = annuli, bounds
+        self._objective, self._bounds = annuli.within(bounds), bounds
         self._steps: list[_Step] = []
         self._lock = threading.Lock()
 
@@ -329,7 +145,7 @@ class _Chain:
 
     def _next(self, before: _Step | None) -> _Step:
         starts = _starts(None if before is None else before.log_variances, self._bounds)
-        found, settled, count = _best_of(self._annuli, starts, self._bounds)
+        found, settled, count = _best_of(self._objective, starts, self._bounds)
         if before is not None:
             count += before.evaluations
             if not found.cost < before.cost:
@@ -359,26 +175,26 @@ def _starts(log_variances: FloatArray | None, bounds: tuple[float, float]) -> li
 
 
 def _best_of(
-    annuli: Objective, starts: list[FloatArray], bounds: tuple[float, float]
+    objective: Searched, starts: list[FloatArray], bounds: tuple[float, float]
 ) -> tuple[Point, bool, int]:
     """Try all starts roughly, finish the best; return that point, if it converged, evaluations."""
-    tried = [_descend(annuli, annuli.at(start), bounds, _ROUGH) for start in starts]
+    tried = [_descend(objective, objective.at(start), bounds, _ROUGH) for start in starts]
     tried.sort(key=lambda each: each[0].cost)
-    finished = [_descend(annuli, each[0], bounds, _FINE) for each in tried[:_FINISHED]]
+    finished = [_descend(objective, each[0], bounds, _FINE) for each in tried[:_FINISHED]]
     count = len(starts) + sum(each[2] for each in [*tried, *finished])
     best = min(finished, key=lambda each: each[0].cost)
     return best[0], best[1], count
 
 
 def _descend(
-    annuli: Objective, point: Point, bounds: tuple[float, float], tolerance: float
+    objective: Searched, point: Point, bounds: tuple[float, float], tolerance: float
 ) -> tuple[Point, bool, int]:
     """Run least squares from a point; return the last point, if it converged, evaluations."""
     from scipy.optimize import least_squares  # 0.8 s that ``fit --list`` does not need
 
     if not np.isfinite(point.cost):
         return point, True, 0
-    seen = _LastPoint(annuli, point)
+    seen = _LastPoint(objective, point)
     found = least_squares(
         seen.residual,
         point.log_variances,
@@ -390,18 +206,18 @@ def _descend(
         gtol=None,
         max_nfev=_MAX_EVALUATIONS,
     )
-    return annuli.at(found.x), bool(found.status > 0), int(found.nfev)
+    return objective.at(found.x), bool(found.status > 0), int(found.nfev)
 
 
 class _LastPoint:
     """Keeps the last point, whose weights serve the residual and the Jacobian."""
 
-    def __init__(self, annuli: Objective, point: Point) -> None:
-        self._annuli, self._point = annuli, point
+    def __init__(self, objective: Searched, point: Point) -> None:
+        self._objective, self._point = objective, point
 
     def residual(self, log_variances: FloatArray) -> FloatArray:
         if not np.array_equal(log_variances, self._point.log_variances):
-            self._point = self._annuli.at(log_variances)
+            self._point = self._objective.at(log_variances)
         return self._point.residual
 
     def jacobian(self, log_variances: FloatArray) -> FloatArray:

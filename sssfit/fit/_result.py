@@ -324,15 +324,19 @@ def _parameters(fits: list[ChannelFit], channels: tuple[str, ...]) -> dict[str, 
 
 
 def provenance(target: Target, settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the provenance of a kernel: its profile, and the settings of its fit."""
+    """Return the provenance of a kernel: its profile, and the settings of its fit.
+
+    The profile of a kernel is the walk itself where it was smoothed for the fit.
+    """
     meta = target.profile.meta
+    walk = meta.get("smoothed_sha256")
     return {
         "material": target.name,
         "material_sha256": meta.get("material_sha256"),
-        "profile_sha256": target.profile.sha256,
+        "profile_sha256": walk or target.profile.sha256,
         "profile_method": meta.get("method", "unknown"),
         "photons": meta.get("photons"),
         "seed": meta.get("seed"),
         "version": __version__,
-        "settings": dict(settings),
+        "settings": {**settings, **({"smooth": True} if walk else {})},
     }

@@ -256,15 +256,15 @@ def searched(
     rng = np.random.default_rng([seed])
     rough = [_rough(chain, chain.start(rng)) for _ in range(effort * _STARTS)]
     kept = [each.x for each in sorted(rough, key=lambda each: each.fun)[: effort * _KEPT_STARTS]]
-    found = [_descend(chain, x, 25) for x in (*kept, *starts)]
+    found = [descent(chain, x, 25) for x in (*kept, *starts)]
     best = min(found, key=lambda each: each.fun)
-    best = _descend(chain, best.x, 60)
+    best = descent(chain, best.x, 60)
     for width in _HOPS:
         x = best.x.copy()
         x[chain.step_parameters] += rng.normal(0.0, width, chain.step_parameters.size)
-        found.append(_descend(chain, x, 40))
+        found.append(descent(chain, x, 40))
         best = min(best, found[-1], key=lambda each: each.fun)
-    best = _descend(chain, best.x, 200, gain=1e-5)
+    best = descent(chain, best.x, 200, gain=1e-5)
     return best.x, sum(each.nfev for each in (*rough, *found, best))
 
 
@@ -281,7 +281,7 @@ def _of_one_shape(chain: Chain, seed: int) -> list[FloatArray]:
         return []
     tied, rng = one_shape(chain, is_fitted=True), np.random.default_rng([seed])
     starts = [_rough(tied, tied.start(rng)).x for _ in range(_SHAPES)]
-    ends = [_descend(tied, each, 60) for each in starts]
+    ends = [descent(tied, each, 60) for each in starts]
     return [tied.full(min(ends, key=lambda each: each.fun).x)]
 
 
@@ -296,7 +296,7 @@ def _rough(chain: Searched, x: FloatArray) -> optimize.OptimizeResult:
     )
 
 
-def _descend(
+def descent(
     chain: Searched, x: FloatArray, most: int, gain: float = 3e-3
 ) -> optimize.OptimizeResult:
     """Minimise from a point by a trust region with the Gauss-Newton matrix.

@@ -25,7 +25,8 @@ from scipy import optimize
 from sssfit.arrays import FloatArray
 from sssfit.errors import FitError
 from sssfit.fit._chain_pairs import PairChain
-from sssfit.fit._gaussians_search import SharedAnnuli, fitted_annuli, make_annuli, search
+from sssfit.fit._gaussians_objective import SharedAnnuli, make_annuli
+from sssfit.fit._gaussians_search import fitted_annuli, search
 from sssfit.fit._result import TapsFit
 from sssfit.fit._spectrum import spectral_target
 from sssfit.fit._target import Pitch, Target

@@ -13,7 +13,8 @@ The fit uses the profile's annuli and not the pixels, so variances and weights d
 pixel size. The exception are profiles with R_d ~ 1/r near the beam, where the integral of r R^2
 diverges as annuli narrow; these are evaluated at the resolution of the pixels, with a warning.
 
-Next: ``_gaussians_search.py`` has the objective, the search and the resolution.
+Next: ``_gaussians_objective.py`` has the objective, ``_gaussians_search.py`` the search and the
+resolution.
 """
 
 import math
@@ -23,7 +24,8 @@ import warnings
 import numpy as np
 
 from sssfit.errors import FitError, SssfitWarning
-from sssfit.fit._gaussians_search import GaussianSum, fitted_annuli, is_steep, make_annuli, search
+from sssfit.fit._gaussians_objective import make_annuli
+from sssfit.fit._gaussians_search import GaussianSum, fitted_annuli, is_steep, search
 from sssfit.fit._result import ChannelFit, FitResult, energy_factor, fit_channels, rescales_energy
 from sssfit.fit._target import Pitch, Target, make_target
 from sssfit.messages import counted

@@ -1,5 +1,6 @@
 """CIE Delta E 2000, and the checks, exposure and displayed colours of all measures."""
 
+import functools
 from types import ModuleType
 
 import numpy as np
@@ -49,11 +50,17 @@ def delta_e_of_lab(colour: FloatArray, true: FloatArray) -> FloatArray:
 def lab(pixels: FloatArray) -> FloatArray:
     """Return CIE L, a, b of linear sRGB pixels (N, 3)."""
     colour = _load_colour()
-    srgb = colour.RGB_COLOURSPACES["sRGB"]
-    # From the primaries, not the standard's table, whose four digits give white b = 0.01.
-    to_xyz = colour.normalised_primary_matrix(srgb.primaries, srgb.whitepoint)
-    colours: FloatArray = np.asarray(colour.XYZ_to_Lab(pixels @ to_xyz.T, srgb.whitepoint))
+    whitepoint = colour.RGB_COLOURSPACES["sRGB"].whitepoint
+    colours: FloatArray = np.asarray(colour.XYZ_to_Lab(pixels @ _to_xyz().T, whitepoint))
     return colours
+
+
+@functools.cache
+def _to_xyz() -> FloatArray:
+    """Return the matrix from the primaries, and not the standard's, whose white has b = 0.01."""
+    colour = _load_colour()
+    srgb = colour.RGB_COLOURSPACES["sRGB"]
+    return np.asarray(colour.normalised_primary_matrix(srgb.primaries, srgb.whitepoint))
 
 
 def _load_colour() -> ModuleType:

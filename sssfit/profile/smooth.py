@@ -46,6 +46,7 @@ def smoothed(profile: Profile) -> Profile:
     -------
     Profile
         On the same annuli; its standard errors are unknown, because annuli share their noise now.
+        Its ``meta`` names the walk's fingerprint as ``smoothed_sha256``.
 
     Raises
     ------
@@ -66,7 +67,10 @@ def smoothed(profile: Profile) -> Profile:
         axis=1,
     )
     unknown = np.full(energy.shape, np.nan)
-    return dataclasses.replace(profile, annulus_energy=energy, annulus_energy_stderr=unknown)
+    meta = {**profile.meta, "smoothed_sha256": profile.sha256}
+    return dataclasses.replace(
+        profile, annulus_energy=energy, annulus_energy_stderr=unknown, meta=meta
+    )
 
 
 def _smooth(edges_mm: FloatArray, energy: FloatArray, variance: FloatArray) -> FloatArray:

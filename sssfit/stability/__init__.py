@@ -1,26 +1,32 @@
 """Stresses every method until it breaks, and says where it is safe.
 
 `stability` runs the stresses of ``sssfit.methods.STRESSES`` on a material; a new one is one file
-with a function from a `Subject` to panels, and one entry there.
+with a function from a `Subject` to panels, and one entry there. What its ``KERNELS`` names is
+fitted beforehand, with those of the other stresses, so that no worker waits for another's search.
 """
 
 import contextlib
 import dataclasses
+import importlib
 import math
 import warnings
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from sssfit.errors import ArgumentError, FitError, SssfitWarning
 from sssfit.files import has_mark
 from sssfit.material import Material
 from sssfit.messages import did_you_mean, shown
-from sssfit.methods import STRESSES
+from sssfit.methods import STRESSES, TAPS
 from sssfit.process import one_blas_thread, thread_count
 from sssfit.profile import Profile
 from sssfit.stability.curve import Curve, Edge
 from sssfit.stability.panel import Finding, Panel
 from sssfit.stability.record import MARK, Stability
+
+if TYPE_CHECKING:
+    from sssfit.stability.ways import Way
 
 __all__ = ["Curve", "Edge", "Finding", "Panel", "Stability", "is_stability_table", "stability"]
 
@@ -54,7 +60,8 @@ def stability(
         this needs its ``if __name__ == "__main__":`` then. With 1 there is none but the caller's.
         Results do not depend on them.
     is_whole : bool
-        Whether cascades have as many seeds and sizes as the others.
+        Whether 1e7 photons are walked, and cascades are searched again for every walk and have as
+        many sizes as the others.
     progress : callable, optional
         Told (done, of how many, the next one's name).
 
@@ -89,16 +96,26 @@ def stability(
         if (count := thread_count(threads)) > 1:
             workers = ends.enter_context(Workers(count, subject))
             subject = dataclasses.replace(subject, workers=workers)
-        for k, each in enumerate(names):
+        stresses = {each: STRESSES[each].load() for each in names}
+        for k, (each, stress) in enumerate(stresses.items()):
             if progress is not None:
                 progress(k, len(names), each)
+            if k == 0:
+                subject.prepare(_kernels(stresses.values()))
             try:
-                panels += STRESSES[each].load()(subject)
+                panels += stress(subject)
             except FitError as error:
                 if only is not None:
                     raise
                 notes.append(f"Left out {each}: {error}")
     return Stability(name, mm_per_pixel, tuple(panels), tuple(notes), seed)
+
+
+def _kernels(stresses: Iterable[Callable[..., object]]) -> "list[Way]":
+    """Return what stresses want of the profile itself, the searches first, which take longest."""
+    modules = [importlib.import_module(each.__module__) for each in stresses]
+    ways = [way for module in modules for way in getattr(module, "KERNELS", ())]
+    return sorted(ways, key=lambda each: each.method not in TAPS)
 
 
 def _named(only: Collection[str] | None) -> list[str]:

@@ -35,6 +35,7 @@ _DENSE = Way("pre-integrated", "preintegrated", {})
 _PAIR = Way("pre-integrated, 25 taps", "preintegrated", {}, taps=25)
 _DISK = Way("disk 24, one frame", "disk", {"taps": 24})
 _CASCADES = (CASCADE, cascade(14))
+KERNELS = (*_CASCADES, _PAIR, _DISK, _DENSE)
 _NEAREST = "a table for each octave of pixel sizes"
 
 
@@ -58,7 +59,7 @@ def stress(subject: Subject) -> list[Panel]:
             axis=Axis("angle (degrees)", mild=0.0, is_log=False),
             y_label="p99 of Delta E 2000",
             limit=LIMIT,
-            curves=[_tilted(subject, *each) for each in screen.items()],
+            curves=_tilted(subject, screen),
             fails="the slope's own pixels are too long for the table",
         ),
         Panel(
@@ -75,27 +76,51 @@ def stress(subject: Subject) -> list[Panel]:
 
 def _at_distances(subject: Subject, tables: dict[str, Kernel]) -> list[Curve]:
     """Return the error on pixels of other sizes, for each table."""
-    errors: dict[str, list[float]] = {label: [] for label in tables}
-    for times in _TIMES.tolist():
-        pitch_mm = times * subject.mm_per_pixel
-        truths = subject.truths(pitch_mm)
-        for label, kernel in tables.items():
-            work = functools.partial(subject.error, kernel, truths, pitch_mm)
-            seen = attempted(work)
-            errors[label].append(max(seen, 1e-4))
-    return [Curve(label, _TIMES, np.array(y), advice=_NEAREST) for label, y in errors.items()]
+    errors = subject.each(functools.partial(_at_distance, tables), _TIMES.tolist())
+    return _curves(tables, _TIMES, errors, _NEAREST)
 
 
-def _tilted(subject: Subject, label: str, kernel: Kernel) -> Curve:
+def _at_distance(tables: dict[str, Kernel], subject: Subject, times: float) -> list[float]:
+    pitch_mm = times * subject.mm_per_pixel
+    truths = subject.truths(pitch_mm)
+    works = [functools.partial(subject.error, each, truths, pitch_mm) for each in tables.values()]
+    return [max(attempted(each), 1e-4) for each in works]
+
+
+def _curves(
+    tables: dict[str, Kernel], x: FloatArray, errors: list[list[float]], advice: str
+) -> list[Curve]:
+    """Return a curve for each table of errors by place and table."""
+    by_table = zip(*errors, strict=True)
+    return [
+        Curve(label, x, np.array(y), advice=advice)
+        for label, y in zip(tables, by_table, strict=True)
+    ]
+
+
+def _tilted(subject: Subject, tables: dict[str, Kernel]) -> list[Curve]:
     """Return the error on a plane that turns away from the eye, depth followed."""
     angles = np.degrees(np.arccos(1.0 / np.array(_COLUMNS)))
-    errors = []
-    for columns in _COLUMNS:
-        own = [_on_slope(subject, name, columns) for name in PICTURES]
-        seen = [error_of(_on_screen(kernel, plane, "gaussian"), true) for plane, true in own]
-        errors.append(float(np.mean(seen)))
-    advice = "offsets by each axis' own pixel, as a shader with tilt has them"
-    return Curve(label, angles, np.array(errors), advice=advice)
+    errors = subject.each(functools.partial(_at_angle, tables), _COLUMNS)
+    return _curves(
+        tables, angles, errors, "offsets by each axis' own pixel, as a shader with tilt has them"
+    )
+
+
+def _at_angle(tables: dict[str, Kernel], subject: Subject, columns: int) -> list[float]:
+    return _mean_errors(
+        tables, [_on_slope(subject, each, columns) for each in PICTURES], "gaussian"
+    )
+
+
+def _mean_errors(
+    tables: dict[str, Kernel], own: list[tuple[Scene, FloatArray]], follow: str
+) -> list[float]:
+    """Return each table's error, the mean over pictures with their truths."""
+    return [
+        float(np.mean([error_of(_on_screen(each, plane, follow), true) for plane, true in own]))
+        for each in tables.values()
+    ]
 
 
 def _on_slope(subject: Subject, name: str, columns: int) -> tuple[Scene, FloatArray]:
@@ -113,14 +138,13 @@ def _on_slope(subject: Subject, name: str, columns: int) -> tuple[Scene, FloatAr
 
 def _growing(subject: Subject, tables: dict[str, Kernel]) -> list[Curve]:
     """Return the error where pixels grow by a factor from the left to the right."""
-    errors: dict[str, list[float]] = {label: [] for label in tables}
-    for ratio in _RATIOS:
-        own = [_with_growth(subject, scene, ratio) for scene in subject.scenes()]
-        for label, kernel in tables.items():
-            seen = [error_of(_on_screen(kernel, plane, "none"), true) for plane, true in own]
-            errors[label].append(float(np.mean(seen)))
-    ratios = np.array(_RATIOS)
-    return [Curve(label, ratios, np.array(y), advice=_NEAREST) for label, y in errors.items()]
+    errors = subject.each(functools.partial(_with_ratio, tables), _RATIOS)
+    return _curves(tables, np.array(_RATIOS), errors, _NEAREST)
+
+
+def _with_ratio(tables: dict[str, Kernel], subject: Subject, ratio: float) -> list[float]:
+    own = [_with_growth(subject, each, ratio) for each in subject.scenes()]
+    return _mean_errors(tables, own, "none")
 
 
 def _with_growth(subject: Subject, scene: Scene, ratio: float) -> tuple[Scene, FloatArray]:
@@ -128,11 +152,12 @@ def _with_growth(subject: Subject, scene: Scene, ratio: float) -> tuple[Scene, F
 
     The pixels' sizes have the subject's as their geometric middle, in bands of a few columns.
     """
-    bands = np.geomspace(ratio**-0.5, ratio**0.5, _BANDS)
-    times = np.repeat(bands, SIDE // _BANDS)
+    bands = np.geomspace(ratio**-0.5, ratio**0.5, _BANDS if ratio > 1.0 else 1)
+    columns = SIDE // len(bands)
+    times = np.repeat(bands, columns)
     true = np.empty((SIDE, SIDE, len(subject.profile.channels)))
     for k, each in enumerate(bands.tolist()):
-        own = slice(k * (SIDE // _BANDS), (k + 1) * (SIDE // _BANDS))
+        own = slice(k * columns, (k + 1) * columns)
         pixels = Scene(scene.name, scene.irradiance, each * scene.mm_per_pixel)
         true[:, own] = render_reference(pixels, subject.profile, threads=1)[:, own]
     depth_mm = np.broadcast_to(_FAR_MM * times, (SIDE, SIDE))

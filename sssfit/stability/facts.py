@@ -31,6 +31,11 @@ class Facts:
         return settings
 
     @property
+    def is_smoothed(self) -> bool:
+        """Whether the fit took most of the noise out of the profile."""
+        return bool(self.settings.get("smooth"))
+
+    @property
     def noise(self) -> FloatArray | None:
         """`noise_ratio` of the profile on the kernel's pixels (C,); None where nothing is noisy."""
         if self.profile is None or self.profile.photons is None:

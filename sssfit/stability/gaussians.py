@@ -5,14 +5,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from sssfit.fit._gaussians_search import (
-    Annuli,
-    GaussianSum,
-    fitted_annuli,
-    local_minimum,
-    make_annuli,
-    search,
-)
+from sssfit.fit._gaussians_objective import Annuli, make_annuli
+from sssfit.fit._gaussians_search import GaussianSum, fitted_annuli, local_minimum, search
 from sssfit.fit._target import make_target
 from sssfit.stability.curve import Axis, Curve
 from sssfit.stability.optics import CONDITION_LIMIT, condition_number

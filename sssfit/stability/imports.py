@@ -16,7 +16,7 @@ from sssfit.profile.pixels import annulus_areas
 from sssfit.stability.curve import Axis, Curve
 from sssfit.stability.panel import Panel
 from sssfit.stability.subject import Subject
-from sssfit.stability.ways import WAYS
+from sssfit.stability.ways import WAYS, Way
 
 LIMIT = 1.0  # Delta E
 _NONE = 1e-3  # of a share, for logarithmic axes
@@ -50,16 +50,24 @@ def stress(subject: Subject) -> list[Panel]:
             "average pictures",
         ),
     }
-    return [_panel(subject, title, *each) for title, each in defects.items()]
+    ways = [each for each in WAYS if each.method not in TAPS or subject.is_whole]
+    series = [[make(subject, each) for each in steps] for make, steps, *_ in defects.values()]
+    changes = subject.changes(ways, series, LIMIT)
+    return [
+        _panel(title, ways, own, *each[1:])
+        for (title, each), own in zip(defects.items(), changes, strict=True)
+    ]
 
 
 def _panel(
-    subject: Subject, title: str, defect: Defect, steps: tuple[float, ...], label: str, advice: str
+    title: str,
+    ways: list[Way],
+    changes: list[list[float]],
+    steps: tuple[float, ...],
+    label: str,
+    advice: str,
 ) -> Panel:
-    """Return what one defect changes, step by step."""
-    profiles = [defect(subject, each) for each in steps]
-    ways = [each for each in WAYS if each.method not in TAPS or subject.is_whole]
-    changes = [np.maximum(each, 1e-3) for each in subject.changes(ways, profiles)]
+    """Return what one defect changes, step by step, until the limit."""
     return Panel(
         stress="imports",
         title=title,
@@ -67,8 +75,8 @@ def _panel(
         y_label="p99 of Delta E 2000",
         limit=LIMIT,
         curves=[
-            Curve(way.label, np.array(steps), y, advice=advice)
-            for way, y in zip(ways, changes, strict=True)
+            Curve(way.label, np.array(steps[: len(own)]), np.maximum(own, 1e-3), advice=advice)
+            for way, own in zip(ways, changes, strict=True)
         ],
         fails="the import shows in the picture, or is refused",
     )

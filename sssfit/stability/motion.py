@@ -9,6 +9,8 @@ as the truth does and no more: the measure is the 99th percentile of Delta E bet
 the true frame with the error that the frame before had.
 """
 
+import functools
+
 import numpy as np
 
 from sssfit.arrays import FloatArray
@@ -41,13 +43,14 @@ _WAYS = (
     Way("svd 3", "svd", {"rank": 3}),
     *_CASCADES,
 )
+KERNELS = (*_WAYS, _PAIR, *(cascade(each) for each in _FETCHES))
 
 
 def stress(subject: Subject) -> list[Panel]:
     """Move a point by half pixels, over a whole texel of the coarsest picture but one."""
     scenes = [_point(subject.mm_per_pixel, each) for each in _SHIFTS.tolist()]
     truths = [render_reference(each, subject.profile, threads=1) for each in scenes]
-    kernels = subject.true_kernels(reversed(_WAYS))
+    kernels = subject.true_kernels(_WAYS)
     return [
         Panel(
             stress="motion",
@@ -85,21 +88,26 @@ def _nearing(subject: Subject) -> list[Curve]:
     """Return by how much errors change from frame to frame, the largest of some frames."""
     tables = subject.true_kernels((*_CASCADES, _PAIR))
     moving = {f"{each.label}, jitter": tables[each.label] for each in (CASCADE, _PAIR)}
-    flickers: dict[str, list[float]] = {label: [] for label in (*tables, *moving)}
-    for speed in _SPEEDS:
-        scenes = [_spots(subject.mm_per_pixel, (1.0 - speed) ** k) for k in range(_FRAMES)]
-        truths = [render_reference(each, subject.profile, threads=1) for each in scenes]
-        for label, kernel in tables.items():
-            frames = [shown(kernel, each) for each in scenes]
-            flickers[label].append(_flicker(frames, truths))
-        for label, kernel in moving.items():
-            frames = [_jittered(kernel, each, k) for k, each in enumerate(scenes)]
-            flickers[label].append(_flicker(frames, truths))
+    flickers = subject.each(functools.partial(_at_speed, tables, moving), _SPEEDS)
     percent = 100.0 * np.array(_SPEEDS)
     advice = "two stages before the first halving; no jitter"
     return [
-        Curve(label, percent, np.maximum(y, 1e-4), advice=advice) for label, y in flickers.items()
+        Curve(label, percent, np.maximum(y, 1e-4), advice=advice)
+        for label, y in zip((*tables, *moving), zip(*flickers, strict=True), strict=True)
     ]
+
+
+def _at_speed(
+    tables: dict[str, Kernel], moving: dict[str, Kernel], subject: Subject, speed: float
+) -> list[float]:
+    """Return the flicker of tables, and of those with jitter."""
+    scenes = [_spots(subject.mm_per_pixel, (1.0 - speed) ** k) for k in range(_FRAMES)]
+    truths = [render_reference(each, subject.profile, threads=1) for each in scenes]
+    frames = [[shown(kernel, each) for each in scenes] for kernel in tables.values()]
+    frames += [
+        [_jittered(kernel, each, k) for k, each in enumerate(scenes)] for kernel in moving.values()
+    ]
+    return [_flicker(each, truths) for each in frames]
 
 
 def _flicker(frames: list[FloatArray], truths: list[FloatArray]) -> float:
@@ -128,9 +136,13 @@ def _spots(mm_per_pixel: float, times: float) -> Scene:
 def _moved(subject: Subject) -> Curve:
     """Return what whole pixels change, by fetches: where stages before the first halving grow."""
     kernels = subject.true_kernels(cascade(each) for each in _FETCHES)
-    changes = [motion(each, subject.profile, positions=1).moved for each in kernels.values()]
+    changes = subject.each(_change, kernels.values())
     advice = "24 fetches, or `still`"
     return Curve("cascade", np.array(_FETCHES), np.array(changes), advice=advice)
+
+
+def _change(subject: Subject, kernel: Kernel) -> float:
+    return motion(kernel, subject.profile, positions=1).moved
 
 
 def _curve(label: str, kernel: Kernel, scenes: list[Scene], truths: list[FloatArray]) -> Curve:

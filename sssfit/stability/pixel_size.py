@@ -2,7 +2,8 @@
 
 The measure is by how much the error grows over that on the subject's own pixels. Kernels have at
 most 513 pixels, what the guided fit takes and no shader exceeds, so near-by pixels also cut them
-off; of cascades only the picture's part is seen.
+off; of cascades only the picture's part is seen. Sizes are tried from the subject's own outward,
+each method's as far as its first beyond the limit.
 """
 
 import functools
@@ -20,6 +21,7 @@ from sssfit.stability.subject import Subject, attempted
 from sssfit.stability.ways import WAYS, Way
 
 LIMIT = 1.0  # Delta E more than on the subject's pixels
+KERNELS = WAYS
 _LEAST, _MOST, _STEPS = 1e-3, 10.0, 9
 _STEPS_OF_CASCADES = 5
 _HALF_PIXELS = 256
@@ -41,21 +43,21 @@ def stress(subject: Subject) -> list[Panel]:
     path_mm = float(paths_mm.min())
     slow = [each for each in WAYS if each.method in TAPS]
     quick = [each for each in WAYS if each.method not in TAPS]
-    work = [([way], size) for way in slow for size in _sizes(subject, way, path_mm)]
-    work += [(quick, size) for size in _sizes(subject, quick[0], path_mm)]
-    subject.prepare(slow)
-    found = subject.each(functools.partial(_errors, path_mm), work)
-    errors = {
-        (way.label, size): error
-        for (ways, size), own in zip(work, found, strict=True)
-        for way, error in zip(ways, own, strict=True)
-    }
-    curves = [_curve(subject, way, path_mm, errors) for way in WAYS]
+    own = {each.label: _own_error(subject, each) for each in WAYS}
+    start = subject.mm_per_pixel / path_mm
+    groups = [([each], _sizes(subject, each, start)) for each in slow]
+    groups.append((quick, _sizes(subject, quick[0], start)))
+    work = [(ways, outward) for ways, sizes in groups for outward in _outward(sizes, start)]
+    errors: dict[str, dict[float, float]] = {each.label: {start: 0.0} for each in WAYS}
+    for found in subject.each(functools.partial(_more, path_mm, own), work):
+        for label, more in found.items():
+            errors[label].update(more)
+    curves = [_curve(label, more) for label, more in errors.items()]
     return [
         Panel(
             stress="pixel-size",
             title="what another pixel size adds to the error",
-            axis=Axis("pixel (mean free paths)", mild=subject.mm_per_pixel / path_mm),
+            axis=Axis("pixel (mean free paths)", mild=start),
             y_label="more p99 of Delta E 2000",
             limit=LIMIT,
             curves=curves,
@@ -64,33 +66,42 @@ def stress(subject: Subject) -> list[Panel]:
     ]
 
 
-def _sizes(subject: Subject, way: Way, path_mm: float) -> list[float]:
+def _sizes(subject: Subject, way: Way, start: float) -> list[float]:
     """Return pixel sizes in mean free paths, beside the subject's."""
     steps = _STEPS if way.method not in TAPS or subject.is_whole else _STEPS_OF_CASCADES
-    own = subject.mm_per_pixel / path_mm
-    return [each for each in np.geomspace(_LEAST, _MOST, steps).tolist() if each != own]
+    return [each for each in np.geomspace(_LEAST, _MOST, steps).tolist() if each != start]
 
 
-def _curve(
-    subject: Subject, way: Way, path_mm: float, errors: Mapping[tuple[str, float], float]
-) -> Curve:
-    """Return what each pixel size adds to the error on the subject's pixels."""
-    own = attempted(lambda: subject.error(subject.true_kernel(way), subject.truths()))
-    more = {size: errors[way.label, size] - own for size in _sizes(subject, way, path_mm)}
-    more[subject.mm_per_pixel / path_mm] = 0.0
+def _outward(sizes: Sequence[float], start: float) -> tuple[list[float], list[float]]:
+    """Return the sizes below the start and those above it, the nearest first."""
+    return [each for each in sizes if each < start][::-1], [each for each in sizes if each > start]
+
+
+def _curve(label: str, more: Mapping[float, float]) -> Curve:
     sizes = sorted(more)
-    return Curve(
-        way.label,
-        np.array(sizes),
-        np.maximum([more[each] for each in sizes], _FLOOR),
-        advice=_ADVICE,
-    )
+    y = np.maximum([more[each] for each in sizes], _FLOOR)
+    return Curve(label, np.array(sizes), y, advice=_ADVICE)
 
 
-def _errors(path_mm: float, subject: Subject, given: tuple[Sequence[Way], float]) -> list[float]:
-    """Return the errors of methods on pixels of a size; Gaussians begin with fewer of them."""
-    ways, paths = given
-    return [attempted(functools.partial(_error, subject, way, paths * path_mm)) for way in ways]
+def _own_error(subject: Subject, way: Way) -> float:
+    return attempted(lambda: subject.error(subject.true_kernel(way), subject.truths()))
+
+
+def _more(
+    path_mm: float,
+    own: Mapping[str, float],
+    subject: Subject,
+    given: tuple[Sequence[Way], Sequence[float]],
+) -> dict[str, dict[float, float]]:
+    """Return what sizes add to methods' errors, until the limit; Gaussians begin with fewer."""
+    ways, sizes = given
+    found: dict[str, dict[float, float]] = {each.label: {} for each in ways}
+    for size in sizes:
+        for way in ways:
+            error = attempted(functools.partial(_error, subject, way, size * path_mm))
+            found[way.label][size] = error - own[way.label]
+        ways = [each for each in ways if found[each.label][size] <= LIMIT]
+    return found
 
 
 def _error(subject: Subject, way: Way, pitch_mm: float) -> float:

@@ -15,6 +15,8 @@ def rank_in_noise(facts: Facts, limit: float) -> str:
     kernel, profile = facts.kernel, facts.profile
     if profile is None or isinstance(kernel, Taps) or kernel.method != "svd" or kernel.rank == 1:
         return ""
+    if facts.is_smoothed:  # what is left of the noise is not known
+        return ""
     enough = rank_of_noise(profile, kernel.mm_per_pixel, kernel.half_pixels)
     if enough is None or kernel.rank <= enough * limit:
         return ""
@@ -33,20 +35,28 @@ _NOISE_LIMITS = {
     "gaussians": 0.0125,
     "cascade": 0.0375,
 }
+# The same of smoothed walks, for the methods that smoothing helps.
+_SMOOTHED_LIMITS = {"preintegrated": 0.068, "svd": 0.05}
 
 
 def too_few_photons(facts: Facts, limit: float) -> str:
     """Name a walk whose noise adds a Delta E of 1."""
-    noise, most = facts.noise, _NOISE_LIMITS.get(facts.kernel.method)
-    if noise is None or most is None or not noise.max() > limit * most:
+    method, noise = facts.kernel.method, facts.noise
+    if noise is None or method not in _NOISE_LIMITS:
+        return ""
+    plain = _NOISE_LIMITS[method]
+    of_smoothed = _SMOOTHED_LIMITS.get(method, plain)
+    most = of_smoothed if facts.is_smoothed else plain
+    if not noise.max() > limit * most:
         return ""
     assert facts.profile is not None
     photons = facts.profile.photons or 0
     wanted = photons * float(noise.max() / most) ** 2
+    smooth = "a smoothed profile, " if most < noise.max() <= of_smoothed else ""
     return (
         f"{counted(photons, 'photon', ',')} leave noise of {100.0 * noise.max():.2g} % in the "
-        f"kernel, more than a Delta E of 1 by {facts.kernel.method}; about {wanted:.1g} photons or "
-        "the exact method would do"
+        f"kernel, more than a Delta E of 1 by {facts.kernel.method}; {smooth}about {wanted:.1g} "
+        "photons or the exact method would do"
     )
 
 

@@ -15,7 +15,8 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import SssfitError
 from sssfit.kernel import Kernel
 from sssfit.material import Material
-from sssfit.measure.delta_e import delta_e_2000, exposure_of
+from sssfit.measure.delta_e import delta_e_of_lab, exposure_of, lab
+from sssfit.measure.delta_e import shown as displayed
 from sssfit.profile import Profile
 from sssfit.render import render
 from sssfit.render.reference import render_reference
@@ -46,7 +47,7 @@ class Subject:
     threads : int, optional
         Of the exact solver.
     is_whole : bool
-        Whether cascades have as many seeds and sizes as the others.
+        Whether cascades are searched again for every walk and have as many sizes as the others.
     workers : Workers, optional
         What shares the work; without them it is done here.
     """
@@ -143,14 +144,17 @@ class Subject:
             error_of(shown(kernel, scene), true) for scene, true in zip(scenes, truths, strict=True)
         ]
 
-    def changes(self, ways: Sequence[Way], profiles: Sequence[Profile]) -> list[FloatArray]:
-        """Return what kernels of other profiles show beside those of the subject's own, by way.
+    def changes(
+        self, ways: Sequence[Way], series: Sequence[Sequence[Profile]], limit: float
+    ) -> list[list[list[float]]]:
+        """Return what kernels of other profiles show beside those of the subject's own.
 
-        Infinite where a fit is refused.
+        For each series of profiles, from good to bad, and each way: a list that ends behind the
+        first profile whose measure exceeds the limit; infinite where a fit is refused.
         """
         kernels = self.true_kernels(ways)
         wanted = [(each, self.shows(kernels[each.label])) for each in ways]
-        return list(np.array(self.each(functools.partial(_changes, wanted), profiles)).T)
+        return self.each(functools.partial(_changes, wanted, limit), series)
 
     def truths(self, mm_per_pixel: float | None = None) -> list[FloatArray]:
         """Return the pictures of the profile's own 2D kernel."""
@@ -169,10 +173,18 @@ def _fitted(subject: Subject, way: Way) -> Kernel | SssfitError:
 
 
 def _changes(
-    wanted: Sequence[tuple[Way, list[FloatArray]]], subject: Subject, profile: Profile
-) -> list[float]:
-    """Return what all kernels of one profile show: sums of Gaussians begin with those of fewer."""
-    return [attempted(functools.partial(_change, subject, profile, *each)) for each in wanted]
+    wanted: Sequence[tuple[Way, list[FloatArray]]],
+    limit: float,
+    subject: Subject,
+    profiles: Sequence[Profile],
+) -> list[list[float]]:
+    """Return what kernels of a series show, by way; sums of Gaussians begin with fewer."""
+    found: list[list[float]] = [[] for _ in wanted]
+    for profile in profiles:
+        for own, each in zip(found, wanted, strict=True):
+            if not own or own[-1] <= limit:
+                own.append(attempted(functools.partial(_change, subject, profile, *each)))
+    return found
 
 
 def _change(subject: Subject, profile: Profile, way: Way, wanted: list[FloatArray]) -> float:
@@ -199,8 +211,18 @@ def shown(kernel: Kernel, scene: Scene) -> FloatArray:
 
 def error_of(picture: FloatArray, truth: FloatArray) -> float:
     """Return the 99th percentile of Delta E 2000, at the truth's exposure."""
-    ours, true = as_colours(picture), as_colours(truth)
-    return float(np.percentile(delta_e_2000(ours, true, exposure_of(true)), _PERCENT))
+    true = as_colours(truth)
+    exposure, wanted = _as_seen(true.tobytes(), true.shape[1])
+    colours = lab(displayed(as_colours(picture), exposure))
+    return float(np.percentile(delta_e_of_lab(colours, wanted), _PERCENT))
+
+
+@functools.lru_cache(maxsize=64)  # a truth serves up to a hundred pictures
+def _as_seen(true: bytes, channels: int) -> tuple[float, FloatArray]:
+    """Return the exposure and the colours `lab` of pixels."""
+    pixels = np.frombuffer(true, dtype=np.float64).reshape(-1, channels)
+    exposure = exposure_of(pixels)
+    return exposure, lab(displayed(pixels, exposure))
 
 
 def as_colours(picture: FloatArray) -> FloatArray:

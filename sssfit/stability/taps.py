@@ -32,6 +32,7 @@ _THINNED = (
     Way("gaussians 4 on taps", "gaussians", {"terms": 4}),
 )
 _PASS = Way("pre-integrated, 25 taps", "preintegrated", {}, taps=25)
+KERNELS = (CASCADE, _PASS, *(cascade(each) for each in reversed(_FETCHES)))
 
 
 def stress(subject: Subject) -> list[Panel]:
@@ -45,7 +46,7 @@ def stress(subject: Subject) -> list[Panel]:
             axis=Axis("bits of the fraction", mild=23.0, is_log=False),
             y_label="p99 of Delta E 2000",
             limit=LIMIT,
-            curves=[_rounded_pictures(subject, *each) for each in tables.items()],
+            curves=subject.each(_rounded_pictures, tables.items()),
             fails="steps of colour in smooth light",
         ),
         Panel(
@@ -54,9 +55,9 @@ def stress(subject: Subject) -> list[Panel]:
             axis=Axis("brightest light (stops below 1)", mild=0.0, is_log=False),
             y_label="p99 of Delta E 2000",
             limit=LIMIT,
-            curves=[
-                _eight_bits(subject, *each, form) for each in tables.items() for form in _EIGHT_BITS
-            ],
+            curves=subject.each(
+                _eight_bits, [(*each, form) for each in tables.items() for form in _EIGHT_BITS]
+            ),
             fails="steps of colour where light is dim",
         ),
         Panel(
@@ -65,11 +66,9 @@ def stress(subject: Subject) -> list[Panel]:
             axis=Axis("jitter (of the default's)", mild=0.0, is_log=False),
             y_label="p99 of Delta E 2000",
             limit=LIMIT,
-            curves=[
-                _jittered(subject, *each, frames)
-                for each in tables.items()
-                for frames in (1, _FRAMES)
-            ],
+            curves=subject.each(
+                _jittered, [(*each, frames) for each in tables.items() for frames in (1, _FRAMES)]
+            ),
             fails="grain",
         ),
         Panel(
@@ -78,7 +77,7 @@ def stress(subject: Subject) -> list[Panel]:
             axis=Axis("bits of the fraction", mild=52.0, is_log=False),
             y_label="p99 of Delta E 2000",
             limit=LIMIT,
-            curves=[_rounded_table(subject, *each) for each in tables.items()],
+            curves=subject.each(_rounded_table, tables.items()),
             fails="the kernel changes its energy or its width",
         ),
         Panel(
@@ -87,7 +86,7 @@ def stress(subject: Subject) -> list[Panel]:
             axis=Axis("brightness of one pixel", mild=1.0),
             y_label="p99 of Delta E 2000",
             limit=LIMIT,
-            curves=[_firefly(subject, *each) for each in tables.items()],
+            curves=subject.each(_firefly, tables.items()),
             fails="the pixel's light exceeds 65504 or drowns its neighbours",
         ),
     ]
@@ -121,7 +120,8 @@ def _few_fetches(subject: Subject) -> Panel:
     )
 
 
-def _rounded_pictures(subject: Subject, label: str, taps: Kernel) -> Curve:
+def _rounded_pictures(subject: Subject, given: tuple[str, Kernel]) -> Curve:
+    label, taps = given
     assert isinstance(taps, Taps)
     scenes = subject.scenes()
     plain = subject.shows(taps)
@@ -136,8 +136,9 @@ def _rounded_pictures(subject: Subject, label: str, taps: Kernel) -> Curve:
     return Curve(label, bits, errors, advice="half floats")
 
 
-def _eight_bits(subject: Subject, label: str, taps: Kernel, form: str) -> Curve:
+def _eight_bits(subject: Subject, given: tuple[str, Kernel, str]) -> Curve:
     """Return what 255 steps add to light that uses fewer and fewer of them."""
+    label, taps, form = given
     assert isinstance(taps, Taps)
     plain = subject.shows(taps)
 
@@ -154,8 +155,9 @@ def _eight_bits(subject: Subject, label: str, taps: Kernel, form: str) -> Curve:
     return Curve(f"{label}, {form}", np.array(_STOPS), np.maximum(errors, 1e-6), advice=advice)
 
 
-def _jittered(subject: Subject, label: str, taps: Kernel, frames: int) -> Curve:
+def _jittered(subject: Subject, given: tuple[str, Kernel, int]) -> Curve:
     """Return what moved taps add to a frame, or to the mean of several."""
+    label, taps, frames = given
     assert isinstance(taps, Taps)
     plain = subject.shows(taps)
     usual = Jitter()
@@ -176,7 +178,8 @@ def _with_jitter(scene: Scene, taps: Taps, jitter: Jitter, frames: int) -> Float
     return np.asarray(np.mean(shots, axis=0), dtype=np.float64)
 
 
-def _rounded_table(subject: Subject, label: str, taps: Kernel) -> Curve:
+def _rounded_table(subject: Subject, given: tuple[str, Kernel]) -> Curve:
+    label, taps = given
     plain = subject.shows(taps)
     forms = sorted(_STORAGES, key=lambda each: _STORAGES[each])
     errors = [subject.error(stored(taps, each), plain) for each in forms]
@@ -184,8 +187,9 @@ def _rounded_table(subject: Subject, label: str, taps: Kernel) -> Curve:
     return Curve(label, bits, np.maximum(errors, 1e-6), advice="half floats or more")
 
 
-def _firefly(subject: Subject, label: str, taps: Kernel) -> Curve:
+def _firefly(subject: Subject, given: tuple[str, Kernel]) -> Curve:
     """Return what half floats do to light of 1 with one brighter pixel."""
+    label, taps = given
     assert isinstance(taps, Taps)
 
     def error(brightness: float) -> float:
