@@ -77,6 +77,16 @@ def test_the_quartiles_over_seeds_are_the_uncertainty_where_there_are_seeds():
     assert found.below.high == pytest.approx(10.0 ** (1.5 + 0.5 * np.log10(3.0)))
 
 
+def test_a_curve_that_other_seeds_may_take_over_the_limit_has_an_uncertain_end():
+    y = np.array([0.5, 0.2, 0.1, 0.05])
+    found = finding_of(y, mild=1000.0, low=y / 4.0, high=y * 4.0)
+    assert found.kind == FROM
+    assert (found.below.at, found.below.low) == (1.0, 1.0)
+    # high is 2 at 1 and 0.8 at 10; its logarithm crosses 0 at this share of the decade.
+    assert found.below.high == pytest.approx(10.0 ** (np.log(2.0) / np.log(2.5)))
+    assert finding_of(y, mild=1000.0, low=y, high=y * 1.5).kind == SAFE
+
+
 @pytest.mark.parametrize(
     ("y", "mild", "kind", "words"),
     [

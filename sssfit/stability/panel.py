@@ -44,8 +44,8 @@ class Panel:
     def edges(self, curve: Curve) -> tuple[Edge | None, Edge | None]:
         """Return where a curve stops being safe below and above the mild place.
 
-        None where it stays safe to the end. Where the mild place itself is not safe both edges are
-        there.
+        None where it stays safe to the end, with other seeds too; where only they might fail, the
+        edge is the end. Where the mild place itself is not safe both edges are there.
         """
         return self._edge(curve, -1), self._edge(curve, 1)
 
@@ -61,16 +61,15 @@ class Panel:
         return scaled
 
     def _edge(self, curve: Curve, step: int) -> Edge | None:
-        at = self._crossing(curve, curve.y, step)
-        if at is None:
+        found = self._crossing(curve, curve.y, step)
+        end = float(curve.x[-1] if step > 0 else curve.x[0])
+        if curve.low is None or curve.high is None:
+            return None if found is None else Edge(found[0], *sorted(found[1:]))
+        others = [self._crossing(curve, each, step) for each in (curve.low, curve.high)]
+        if found is None and others == [None, None]:
             return None
-        place, inner, outer = at
-        found = [inner, outer]
-        if curve.low is not None and curve.high is not None:
-            crossings = [self._crossing(curve, each, step) for each in (curve.low, curve.high)]
-            end = curve.x[-1] if step > 0 else curve.x[0]
-            found = [float(end) if each is None else each[0] for each in crossings]
-        return Edge(place, min(found), max(found))
+        place, *ends = (end if each is None else each[0] for each in (found, *others))
+        return Edge(place, min(ends), max(ends))
 
     def _crossing(
         self, curve: Curve, y: FloatArray, step: int
