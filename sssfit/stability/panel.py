@@ -66,7 +66,8 @@ class Panel:
         if curve.low is None or curve.high is None:
             return None if found is None else Edge(found[0], *sorted(found[1:]))
         others = [self._crossing(curve, each, step) for each in (curve.low, curve.high)]
-        if found is None and others == [None, None]:
+        is_end = curve.x[self._start(curve)] == end  # and nothing was tried beyond the mild place
+        if found is None and (is_end or others == [None, None]):
             return None
         place, *ends = (end if each is None else each[0] for each in (found, *others))
         return Edge(place, min(ends), max(ends))
