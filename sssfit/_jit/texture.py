@@ -4,14 +4,14 @@ Pictures are (N, C), N = H W texels row after row, of the texture or of one of h
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from sssfit._jit import jit
 
-FloatArray = npt.NDArray[np.float64]
+FloatArray = npt.NDArray[np.floating[Any]]
 
 
 class Texture(NamedTuple):
@@ -24,12 +24,19 @@ class Texture(NamedTuple):
 
 
 @jit
-def fetch(light: FloatArray, picture: FloatArray, texture: Texture, y: float, x: float) -> float:
+def fetch(
+    light: FloatArray,
+    picture: FloatArray,
+    cover: FloatArray,
+    width: int,
+    height: int,
+    y: float,
+    x: float,
+) -> float:
     """Fetch at a place in texels from the first one's middle; return coverage.
 
     ``light`` (C,) becomes coverage times light. Beyond the texture there is none.
     """
-    cover, width, height = texture.cover, texture.width, texture.height
     top, left = math.floor(y), math.floor(x)
     down, right = y - top, x - left
     share = 0.0
@@ -74,7 +81,9 @@ def gather(
     divide : bool
         By the sum of weights times coverage. Where that is 0 the texel stays as it was.
     """
-    cover, per_mm, width = texture.cover, texture.per_mm, texture.width
+    # Each read of an array from the tuple counts its references, so read them once.
+    cover, per_mm = texture.cover, texture.per_mm
+    width, height = texture.width, texture.height
     channels = weights.shape[1]
     light, total, mass = np.empty(channels), np.empty(channels), np.empty(channels)
     for p in range(first, last):
@@ -86,7 +95,7 @@ def gather(
             total[c] = mass[c] = 0.0
         for k in range(weights.shape[0]):
             y, x = row + places_mm[k, 0] * down, column + places_mm[k, 1] * right
-            share = fetch(light, picture, texture, y, x)
+            share = fetch(light, picture, cover, width, height, y, x)
             for c in range(channels):
                 total[c] += weights[k, c] * light[c]
                 mass[c] += weights[k, c] * share
@@ -104,8 +113,9 @@ def look_up(
     out: FloatArray, share: FloatArray, picture: FloatArray, texture: Texture, places: FloatArray
 ) -> None:
     """Write light (M, C) and coverage (M,) at places (M, 2) in texels down and right."""
-    light = np.empty(picture.shape[1])
+    light, cover = np.empty(picture.shape[1]), texture.cover
+    width, height = texture.width, texture.height
     for p in range(places.shape[0]):
-        share[p] = fetch(light, picture, texture, places[p, 0], places[p, 1])
+        share[p] = fetch(light, picture, cover, width, height, places[p, 0], places[p, 1])
         for c in range(light.size):
             out[p, c] = light[c] / share[p] if share[p] > 0.0 else 0.0

@@ -12,12 +12,12 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from sssfit._jit import texture as compiled
-from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
 from sssfit.kernel import Kernel
 from sssfit.messages import shown
@@ -33,6 +33,8 @@ from sssfit.render.lights import (
 from sssfit.render.texture_blur import Level, blur_texture
 from sssfit.scene.camera import Camera
 from sssfit.scene.mesh import Mesh
+
+FloatArray = npt.NDArray[np.floating[Any]]
 
 CULL_DEGREES = 105.0
 REFERENCE_UNITS, UNIT_MM = 4.5, 100.0  # d_ref, for a map of its full size

@@ -188,11 +188,13 @@ class _Chain:
         self, picture: FloatArray, places: FloatArray, weights: FloatArray, level: int
     ) -> FloatArray:
         out = np.zeros(picture.shape)
-        flat, texture = out.reshape(-1, out.shape[-1]), self.textures[level]
+        flat = out.reshape(-1, picture.shape[-1])
+        texture = self.textures[level]
         given = np.ascontiguousarray(picture).reshape(flat.shape), places, weights, texture
         blocks = itertools.pairwise(_edges(len(flat)))
         jobs = [
-            self.pool.submit(compiled.gather, flat, *given, self.divide, *each) for each in blocks
+            self.pool.submit(compiled.gather, flat, *given, self.divide, first, last)
+            for first, last in blocks
         ]
         for each in jobs:
             each.result()
@@ -203,7 +205,8 @@ class _Chain:
         four = four_texels(self.levels[level].cover, "zero")[..., None]
         light = (four * four_texels(picture, "zero")).sum(axis=0)
         whole = four.sum(axis=0)
-        return np.divide(light, whole, out=np.zeros_like(light), where=whole > 0.0)
+        mean: FloatArray = np.divide(light, whole, out=np.zeros_like(light), where=whole > 0.0)
+        return mean
 
     def _enlarged(self, picture: FloatArray, fine: int) -> FloatArray:
         """Return a picture of half the size by bilinear fetches."""

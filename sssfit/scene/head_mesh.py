@@ -59,8 +59,8 @@ class _Surface:
     def __init__(self) -> None:
         field = bust(_SPACING_MM, 0.0, thread_count(None))
         rows, columns = field.heights.shape
-        x = field.x0_mm + _SPACING_MM * np.arange(columns)
-        y = field.y0_mm + _SPACING_MM * np.arange(rows)
+        x = field.x0_mm + _SPACING_MM * np.arange(columns, dtype=np.float64)
+        y = field.y0_mm + _SPACING_MM * np.arange(rows, dtype=np.float64)
         self.front, self.back = field.heights, back(x[None, :], y[:, None])
         self.corner = np.array([field.x0_mm, field.y0_mm])
 
