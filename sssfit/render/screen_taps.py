@@ -242,7 +242,7 @@ class _Chain:
         self, picture: FloatArray, stage: Stage, rate: FloatArray, level: _Level
     ) -> FloatArray:
         """Return the passes of a stage, one after the other."""
-        texels, passes = level.texels, list(_fetches(stage))
+        texels, passes = level.texels, list(fetches(stage))
         for k, (places_mm, weights) in enumerate(passes):
             out = np.zeros(picture.shape)
             given = _flat(picture), places_mm, weights, rate, texels, self.divide
@@ -265,7 +265,7 @@ def _flat(picture: FloatArray) -> FloatArray:
     return picture.reshape(-1, picture.shape[-1])
 
 
-def _fetches(stage: Stage) -> Iterator[tuple[FloatArray, FloatArray]]:
+def fetches(stage: Stage) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Return places (F, 2) [mm], down and right, and weights (F, C) of each pass of a stage."""
     if stage.kind == "star":
         o, a = stage.offsets_mm
