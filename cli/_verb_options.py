@@ -166,10 +166,9 @@ STABILITY = (
     flag("--whole is_whole", "As many seeds and sizes for cascades as for the others; slow."),
     option("--chart", None, "FILE", "Figure: PNG, SVG or PDF by its ending; - for PNG on stdout."),
     option("--table", None, "FILE", "Table in Markdown, - for stdout."),
-    flag("--paper", "The eleven materials of the Separable Subsurface Scattering paper, which take "
-         "an hour; no MATERIAL."),
-    option("-o --output", None, "FOLDER", "Folder of stability.md and NAME-stability.png with "
-           "--paper.  [default: here]"),
+    flag("--paper", "The paper's eleven materials, which take hours; no MATERIAL."),
+    option("-o --output", None, "FOLDER", "--paper: folder of stability.md and charts.  "
+           "[default: here]"),
     flag("--force", "Replace files that are not our chart or table."),
 )
 MOTION = (

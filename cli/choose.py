@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -14,9 +13,6 @@ from ._input import load_source
 from ._options import Common, common_options, options
 from ._output import KERNEL, PROFILE, finish, held, stem_of, target, write
 from ._verb_options import CHOOSE
-
-if TYPE_CHECKING:
-    from sssfit.choose.choice import Choice
 
 
 @click.command()
@@ -81,22 +77,16 @@ def choose(material: str, common: Common, **given: Any) -> None:
             threads=common.threads,
             progress=(lambda step: note(step_line(step))) if common.verbose else None,
         )
+        written: list[str] = []
         if choice.fit is not None:
             warn_of_doubts(choice.fit.kernel, choice.profile, strict=given["strict"])
-        written = _write(choice, path, profile_path)
+            if profile_path is not None:
+                write(choice.profile.write, profile_path)
+            write(choice.fit.kernel.write, path)
+            written = [str(path or "-"), *([] if profile_path is None else [str(profile_path)])]
     view["resolution"] = frame[::-1]
     figures = {"output": written, **view, **choice.to_dict()}
     text = page("choose", {**figures, "sentences": "\n".join(sentences(choice))})
     finish(common, figures, text)
     if not written and path is not None and path.exists():
         note(f"{path} is from an earlier run; this view needs no kernel.")
-
-
-def _write(choice: Choice, path: Path | None, profile_path: Path | None) -> list[str]:
-    """Write the kernel, where one is needed, and the profile; return where they went."""
-    if choice.fit is None:
-        return []
-    if profile_path is not None:
-        write(choice.profile.write, profile_path)
-    write(choice.fit.kernel.write, path)
-    return [str(path or "-"), *([] if profile_path is None else [str(profile_path)])]

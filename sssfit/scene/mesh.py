@@ -20,8 +20,8 @@ _FLAT = 1e-12  # of the longest edge's square: a triangle with less area has no 
 class Mesh:
     """Triangles with texture coordinates; arrays are stored as read-only float64.
 
-    x points right, y up and z to the viewer. Corners of a triangle go round counterclockwise, seen
-    from outside. Texture coordinates are those of OBJ files: u to the right and v up, from 0 to 1.
+    x points right, y up and z to the viewer. Seen from outside, corners of a triangle go round
+    counterclockwise. Texture coordinates are those of OBJ files: u to the right and v up, 0 to 1.
 
     Parameters
     ----------
