@@ -1218,11 +1218,12 @@ STABILITY = {
     "--table": Row(_STABILITY, "--table s.md", is_written("md"), lambda: ["s.md"]),
     "--paper": Row(_STABILITY, "stability --paper", names, _page_names),
     "--output": Row(
-        _STABILITY,
-        "stability --paper -o out",
+        "stability --paper",
+        "-o out",
         names,
         lambda: _page_names("out/"),
-        default="here",
+        default=".",
+        words="here",
     ),
     "--force": Row(
         f"{_STABILITY} --table foreign.md", "--force", is_written("md"), lambda: ["foreign.md"]
