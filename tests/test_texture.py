@@ -12,7 +12,7 @@ from sssfit.fit import fit_gaussians, fit_result, fit_svd
 from sssfit.material import load_material
 from sssfit.render import render
 from sssfit.render.drawn import draw_texture, draw_view
-from sssfit.render.lights import PointLight, draw_shadows, irradiance_at
+from sssfit.render.lights import PointLight, draw_shadows, irradiance_at, specular_at
 from sssfit.render.texture import Savings, render_texture
 from sssfit.render.texture_blur import Level, blur_texture
 from sssfit.scene.camera import CLIP_PLANES, Camera
@@ -285,6 +285,31 @@ def test_a_shadow_falls_where_a_ray_is_stopped():
     far = np.abs(x) > edge + 1.0
     square = x[far] ** 2 + 150.0**2
     np.testing.assert_allclose(lit[far], 150.0**3 / square**1.5, rtol=1e-12)
+
+
+def test_specular_light_is_that_of_the_listing():
+    """GPU Gems 3, listing 14-2, a point at a time, with pi for a radiant exitance."""
+    rng = np.random.default_rng(7)
+    points = rng.uniform(-5.0, 5.0, (40, 3))
+    normals = rng.standard_normal((40, 3)) + np.array([0.0, 0.0, 2.0])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    eye = np.array([0.0, 0.0, 700.0])
+    light = PointLight((400.0, 100.0, 600.0), (1.0, 0.5), 800.0)
+    far = quad(1.0)
+    found = specular_at(points, normals, [draw_shadows(light, far, (0.0, 900.0, 0.0), 16)], eye)
+    for point, n, seen in zip(points, normals, found, strict=True):
+        away = np.array(light.place_mm) - point
+        to_light, to_eye = away / np.linalg.norm(away), eye - point
+        to_eye = to_eye / np.linalg.norm(to_eye)
+        h = to_light + to_eye
+        half = h / np.linalg.norm(h)
+        cosine = n @ half
+        tangent = np.tan(np.arccos(min(cosine, 1.0)))
+        beckmann = np.exp(-((tangent / 0.3) ** 2)) / (np.pi * 0.3**2 * cosine**4)
+        fresnel = 0.028 + 0.972 * (1.0 - half @ to_eye) ** 5
+        lit = 0.18 * max(n @ to_light, 0.0) * beckmann * fresnel / (h @ h)
+        arriving = 800.0**2 / (away @ away) * np.array([1.0, 0.5])
+        np.testing.assert_allclose(seen, np.pi * lit * arriving, rtol=1e-9, atol=1e-15)
 
 
 def test_seams_are_not_dark(kernels):

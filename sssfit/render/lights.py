@@ -15,8 +15,9 @@ from sssfit.scene.mesh import Mesh
 
 _BIAS_MM = 1.5  # by which a place is moved along its normal: half a triangle of the made head
 _NEAR_MM = 1.0
-# Skin at normal incidence (d'Eon and Luebke 2007, GPU Gems 3, chapter 14.3.3), and its roughness.
-F0, ROUGHNESS, SPECULAR = 0.028, 0.3, 0.2
+# Skin at normal incidence, its roughness and its strength (d'Eon and Luebke 2007, GPU Gems 3,
+# chapter 14.3).
+F0, ROUGHNESS, SPECULAR = 0.028, 0.3, 0.18
 
 
 @dataclass(frozen=True, slots=True)
