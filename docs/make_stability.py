@@ -1,7 +1,7 @@
-"""Write docs/stability.md's sections: where every method is safe, by eleven stresses.
+"""Write sections of docs/stability.md: where every method is safe, by eleven stresses.
 
-python docs/make_stability.py            skin1, some minutes
-python docs/make_stability.py --paper    the supplement's eleven materials, an hour
+python docs/make_stability.py skin1 apple    a section and a figure of each; 4 to 20 minutes
+python docs/make_stability.py --paper        the supplement's eleven materials, two hours
 """
 
 import argparse
@@ -15,26 +15,25 @@ from sssfit.material import load_material, material_names
 from sssfit.stability import stability
 from sssfit.stability.page import chart_name, section
 
-DOCS = Path(__file__).parent
+DOCS, SCRIPT = Path(__file__).parent, "docs/make_stability.py"
 
 
-def made(material):
-    """Draw the figure of one material, and return its section."""
+def make(material):
+    """Draw the figure of one material, and write its section."""
     found = stability(load_material(material))
     save_figure(figure_of(found), DOCS / chart_name(material))
-    return section(found, chart_name(material))
+    script = f"{SCRIPT} {material}"
+    put_section("stability.md", script, section(found, chart_name(material)), f"python {script}")
 
 
 def main():
-    """Write the sections, again after each material: the last of eleven ends after an hour."""
+    """Write the sections of the materials that are named."""
     parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("materials", nargs="*", default=["skin1"])
     parser.add_argument("--paper", action="store_true")
-    paper = parser.parse_args().paper
-    sections, script = [], "docs/make_stability.py"
-    for each in material_names(paper=True) if paper else ["skin1"]:
-        sections.append(made(each))
-        command = f"python {script}{' --paper' * paper}"
-        put_section("stability.md", script, "\n".join(sections), command)
+    given = parser.parse_args()
+    for each in material_names(paper=True) if given.paper else given.materials:
+        make(each)
 
 
 if __name__ == "__main__":
