@@ -1,0 +1,264 @@
+"""One picture of a row of heads: work, time and error with savings, beside those without."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from sssfit.arrays import BoolArray, FloatArray, plain
+from sssfit.crowd.row import Row
+from sssfit.kernel import Kernel, Taps
+from sssfit.measure.delta_e import delta_e_2000, exposure_of
+from sssfit.messages import table
+from sssfit.render.drawn import Drawn
+from sssfit.render.screen import render_screen
+from sssfit.render.screen_taps import render_screen_taps
+from sssfit.render.texture import Savings, TextureFrame, render_texture
+from sssfit.render.view import view_of
+
+MAP_SIZE = 1024
+_DEPTH_STEP = 0.05  # of the depth: two pixels further apart are on either side of an outline
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Work:
+    """What a picture took, and how far it is from the picture without savings.
+
+    Parameters
+    ----------
+    texels_lit, texels_convolved : int
+        Of maps, or pixels of a picture in screen space; of all passes.
+    seconds : mapping of str to float
+        By stage.
+    mean_delta_e, largest_delta_e : float
+        Over visible pixels, at the exposure of the picture without savings.
+    largest_inside : float
+        The largest one farther than the kernel reaches from outlines and from the picture's border.
+    """
+
+    texels_lit: int
+    texels_convolved: int
+    seconds: Mapping[str, float]
+    mean_delta_e: float = 0.0
+    largest_delta_e: float = 0.0
+    largest_inside: float = 0.0
+
+    @property
+    def total_seconds(self) -> float:
+        """Of all stages."""
+        return sum(self.seconds.values())
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures of ``sssfit scene --json``."""
+        return {
+            "texels_lit": self.texels_lit,
+            "texels_convolved": self.texels_convolved,
+            "seconds": dict(self.seconds),
+            "total_seconds": self.total_seconds,
+            "mean_delta_e": self.mean_delta_e,
+            "largest_delta_e": self.largest_delta_e,
+            "largest_inside": self.largest_inside,
+        }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CrowdFrame:
+    """A picture with savings, without them, and in screen space.
+
+    Parameters
+    ----------
+    row : Row
+    savings : Savings
+    map_size : int
+    map_sizes : tuple of int
+        Of each head, with savings.
+    picture : array (H, W, C)
+        With savings.
+    work : mapping of str to Work
+        "saved", "whole" and "screen".
+    """
+
+    row: Row
+    savings: Savings
+    map_size: int
+    map_sizes: tuple[int, ...]
+    picture: FloatArray
+    work: Mapping[str, Work]
+
+    @property
+    def speed_up(self) -> tuple[float, float]:
+        """How many times fewer texels are convolved, and how much less time is taken."""
+        whole, saved = self.work["whole"], self.work["saved"]
+        texels = whole.texels_convolved / max(saved.texels_convolved, 1)
+        return texels, whole.total_seconds / saved.total_seconds
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the figures of ``sssfit scene --json``."""
+        row, savings = self.row, self.savings
+        texels, seconds = self.speed_up
+        return plain(
+            {
+                "heads": row.heads,
+                "distance_units": row.distance_units,
+                "head_units": row.head_units,
+                "spacing_units": row.spacing_units,
+                "fov_degrees": row.fov_degrees,
+                "height": row.resolution[0],
+                "width": row.resolution[1],
+                "culled": savings.culled,
+                "by_depth": savings.by_depth,
+                "clipped": savings.clipped,
+                "margin": savings.margin,
+                "map_size": self.map_size,
+                "map_sizes": list(self.map_sizes),
+                "speed_up_texels": texels,
+                "speed_up_seconds": seconds,
+                "work": {name: each.to_dict() for name, each in self.work.items()},
+            }
+        )
+
+    def text(self) -> str:
+        """Return the same for a terminal."""
+        row = self.row
+        texels, seconds = self.speed_up
+        head = (
+            f"{row.heads} x a head of {row.head_units:g} units, {row.spacing_units:g} apart, from "
+            f"{row.distance_units:g} units (100 mm each); {row.fov_degrees:g} degrees, "
+            f"{row.resolution[1]} x {row.resolution[0]} pixels, maps of {self.map_size} texels"
+        )
+        rows = [
+            [
+                _NAMES[name],
+                f"{each.texels_lit:,}",
+                f"{each.texels_convolved:,}",
+                *(f"{1000.0 * each.seconds.get(stage, 0.0):,.0f}" for stage in _STAGES),
+                f"{1000.0 * each.total_seconds:,.0f}",
+                f"{each.mean_delta_e:.3f}",
+                f"{each.largest_inside:.3f}",
+            ]
+            for name, each in self.work.items()
+        ]
+        heads = ["", "texels lit", "convolved", *(f"{each} ms" for each in _STAGES), "all ms"]
+        heads += ["mean Delta E", "largest inside"]
+        ends = f"{texels:.2f} times fewer texels convolved, {seconds:.2f} times as fast"
+        return f"{head}\n{table(heads, rows)}\n{ends}"
+
+
+_NAMES = {"whole": "nothing left out", "saved": "with savings", "screen": "screen space"}
+_STAGES = ("shadows", "irradiance", "convolution", "picture")
+
+
+def measure_frame(
+    row: Row,
+    kernel: Kernel,
+    *,
+    savings: Savings,
+    map_size: int = MAP_SIZE,
+    whole: TextureFrame | None = None,
+    screen: bool = True,
+    threads: int | None = None,
+) -> CrowdFrame:
+    """Render a row with savings, without them, and in screen space.
+
+    Parameters
+    ----------
+    row : Row
+    kernel : SeparableKernel or Taps
+    savings : Savings
+    map_size : int
+        Side of a whole map in texels.
+    whole : TextureFrame, optional
+        The picture without savings, where it is known.
+    screen : bool
+        Also in screen space.
+    threads : int, optional
+    """
+    given = row.shape, row.offsets_mm, row.camera, row.lights, kernel
+    how: dict[str, Any] = {"map_size": map_size, "threads": threads}
+    if whole is None:
+        whole = render_texture(*given, **how)
+    saved = render_texture(*given, savings=savings, **how)
+    visible = whole.drawn.covered
+    inside = visible & _is_inside(whole.drawn, row, kernel)
+    work = {
+        "whole": _work_of(whole),
+        "saved": _work_of(saved, _errors(saved.picture, whole.picture, visible, inside)),
+    }
+    if screen:
+        work["screen"] = _in_screen_space(row, kernel, whole, visible, inside, threads)
+    return CrowdFrame(row, savings, map_size, saved.map_sizes, saved.picture, work)
+
+
+def _work_of(frame: TextureFrame, errors: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Work:
+    return Work(frame.texels_lit, frame.texels_convolved, frame.seconds, *errors)
+
+
+def _in_screen_space(
+    row: Row,
+    kernel: Kernel,
+    whole: TextureFrame,
+    visible: BoolArray,
+    inside: BoolArray,
+    threads: int | None,
+) -> Work:
+    """Return what the same picture takes in screen space, and how far it is from the other."""
+    seconds: dict[str, float] = {}
+    begun = time.perf_counter()
+    channels = len(kernel.channels)
+    scene, _ = view_of(row.shape, row.offsets_mm, row.camera, row.lights, channels=channels)
+    seconds["picture"] = time.perf_counter() - begun
+    begun = time.perf_counter()
+    if isinstance(kernel, Taps):
+        picture = render_screen_taps(scene, kernel, threads=threads)
+        passes = int(kernel.figures()["all_passes"])
+    else:
+        picture = render_screen(scene, kernel, threads=threads)
+        passes = 2 * len(kernel.signs)
+    seconds["convolution"] = time.perf_counter() - begun
+    pixels = int(visible.sum())
+    errors = _errors(picture, whole.picture, visible, inside)
+    return Work(pixels, passes * pixels, seconds, *errors)
+
+
+def _errors(
+    picture: FloatArray, truth: FloatArray, visible: BoolArray, inside: BoolArray
+) -> tuple[float, float, float]:
+    """Return mean and largest Delta E over visible pixels, and the largest inside."""
+    if not visible.any():
+        return 0.0, 0.0, 0.0
+    ours, true = picture[visible], truth[visible]
+    errors = delta_e_2000(ours, true, exposure_of(true))
+    within = errors[inside[visible]]
+    return float(errors.mean()), float(errors.max()), float(within.max(initial=0.0))
+
+
+def _is_inside(drawn: Drawn, row: Row, kernel: Kernel) -> BoolArray:
+    """Return whether a pixel is farther from outlines and borders than the kernel reaches."""
+    from scipy.ndimage import distance_transform_edt
+
+    mesh, camera = row.shape, row.camera
+    depth = np.full(drawn.copies.shape, 10.0 * camera.distance_mm)
+    here = drawn.covered
+    points = drawn.interpolated(mesh, mesh.positions_mm) + row.offsets_mm[drawn.copies[here]]
+    depth[here] = camera.distance_mm - points[:, 2]
+    edge = np.ones(depth.shape, dtype=bool)
+    edge[1:-1, 1:-1] = False
+    step = _DEPTH_STEP * np.minimum(depth, camera.distance_mm)
+    for axis in (0, 1):
+        for shift in (-1, 1):
+            edge |= np.abs(np.roll(depth, shift, axis) - depth) > step
+    reach_mm = _reach_mm(kernel)
+    nearest = depth[here].min(initial=camera.distance_mm)
+    pixels = reach_mm / camera.mm_per_pixel * camera.distance_mm / nearest
+    away: BoolArray = distance_transform_edt(~edge) > pixels + 1.0
+    return away
+
+
+def _reach_mm(kernel: Kernel) -> float:
+    """Return how far a kernel reaches along an axis."""
+    if isinstance(kernel, Taps):
+        farthest = [float(each.offsets_mm.max()) for each in kernel.stages]
+        return sum(farthest) if kernel.chained else max(farthest)
+    return float(kernel.half_pixels * kernel.mm_per_pixel)

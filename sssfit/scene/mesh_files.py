@@ -1,0 +1,61 @@
+"""Meshes with texture coordinates from OBJ, PLY and glTF files, by trimesh."""
+
+from pathlib import Path
+
+import numpy as np
+
+from sssfit.errors import FileError, RenderError
+from sssfit.files import reason
+from sssfit.messages import shown
+from sssfit.scene.mesh import Mesh
+
+FORMATS = (".obj", ".ply", ".gltf", ".glb")
+
+
+def load_mesh(path: str | Path, *, mm_per_unit: float = 1.0) -> Mesh:
+    """Read the triangles of a file as one mesh.
+
+    Parameters
+    ----------
+    path : str or Path
+        With one of the endings in `FORMATS`.
+    mm_per_unit : float [mm]
+        Length of the file's unit.
+
+    Raises
+    ------
+    FileError
+        The file cannot be read, or trimesh is not installed.
+    RenderError
+        It has no triangles or no texture coordinates, or they are invalid.
+    """
+    path = Path(path)
+    if path.suffix.lower() not in FORMATS:
+        raise FileError(f"{path}: expected a mesh of {', '.join(FORMATS)}.")
+    if not 0.0 < mm_per_unit < np.inf:
+        raise RenderError(f"mm_per_unit = {shown(mm_per_unit)}; expected a length above 0.")
+    try:
+        import trimesh
+    except ImportError:
+        raise FileError(
+            f'{path}: meshes from files need trimesh; install "sssfit[mesh]".'
+        ) from None
+    try:
+        # Without merging: a vertex on a seam is there once for each chart.
+        loaded = trimesh.load(path, force="mesh", process=False)
+    except OSError as error:
+        raise FileError(f"{path}: {reason(error)}.") from None
+    except Exception as error:  # of a dozen readers
+        raise FileError(f"{path}: not a mesh that can be read: {error}.") from None
+    if not isinstance(loaded, trimesh.Trimesh) or len(loaded.faces) == 0:
+        raise RenderError(f"{path}: there are no triangles in it.")
+    visual = getattr(loaded, "visual", None)
+    uv = getattr(visual, "uv", None)
+    normals = loaded.vertex_normals if "vertex_normals" in loaded._cache else None
+    return Mesh(
+        path.stem,
+        np.asarray(loaded.vertices, dtype=np.float64) * mm_per_unit,
+        uv,
+        np.asarray(loaded.faces, dtype=np.int64),
+        normals,
+    )
