@@ -20,7 +20,9 @@ SMALL = (60, 96)
 @pytest.fixture(scope="module")
 def kernel():
     profile = simulate_dipole(load_material("skin1"))
-    return fit_result(profile, "gaussian-chain", blur="published", stages="1-1", mm_per_pixel=1.0).kernel
+    return fit_result(
+        profile, "gaussian-chain", blur="published", stages="1-1", mm_per_pixel=1.0
+    ).kernel
 
 
 def row(heads=2, distance=8.0, **changes):

@@ -1,13 +1,15 @@
 """One picture of a row of heads: work, time and error with savings, beside those without."""
 
+import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
-from sssfit.arrays import BoolArray, FloatArray, plain
+from sssfit.arrays import BoolArray, plain
 from sssfit.crowd.row import Row
 from sssfit.kernel import Kernel, Taps
 from sssfit.measure.delta_e import delta_e_2000, exposure_of
@@ -17,6 +19,8 @@ from sssfit.render.screen import render_screen
 from sssfit.render.screen_taps import render_screen_taps
 from sssfit.render.texture import Savings, TextureFrame, render_texture
 from sssfit.render.view import view_of
+
+FloatArray = npt.NDArray[np.floating[Any]]
 
 MAP_SIZE = 1024
 _DEPTH_STEP = 0.05  # of the depth: two pixels further apart are on either side of an outline
@@ -181,7 +185,7 @@ def measure_frame(
         whole = render_texture(*given, **how)
     saved = render_texture(*given, savings=savings, **how)
     visible = whole.drawn.covered
-    inside = visible & _is_inside(whole.drawn, row, kernel)
+    inside = visible & _is_inside(whole.drawn, row, kernel, map_size)
     work = {
         "whole": _work_of(whole),
         "saved": _work_of(saved, _errors(saved.picture, whole.picture, visible, inside)),
@@ -234,7 +238,7 @@ def _errors(
     return float(errors.mean()), float(errors.max()), float(within.max(initial=0.0))
 
 
-def _is_inside(drawn: Drawn, row: Row, kernel: Kernel) -> BoolArray:
+def _is_inside(drawn: Drawn, row: Row, kernel: Kernel, map_size: int) -> BoolArray:
     """Return whether a pixel is farther from outlines and borders than the kernel reaches."""
     from scipy.ndimage import distance_transform_edt
 
@@ -249,16 +253,19 @@ def _is_inside(drawn: Drawn, row: Row, kernel: Kernel) -> BoolArray:
     for axis in (0, 1):
         for shift in (-1, 1):
             edge |= np.abs(np.roll(depth, shift, axis) - depth) > step
-    reach_mm = _reach_mm(kernel)
+    reach_mm = _reach_mm(kernel, float(np.percentile(mesh.stretch_mm(), 95.0)) / map_size)
     nearest = depth[here].min(initial=camera.distance_mm)
     pixels = reach_mm / camera.mm_per_pixel * camera.distance_mm / nearest
     away: BoolArray = distance_transform_edt(~edge) > pixels + 1.0
     return away
 
 
-def _reach_mm(kernel: Kernel) -> float:
-    """Return how far a kernel reaches along an axis."""
+def _reach_mm(kernel: Kernel, texel_mm: float) -> float:
+    """Return how far a kernel reaches; each of its bilinear passes a texel farther."""
     if isinstance(kernel, Taps):
         farthest = [float(each.offsets_mm.max()) for each in kernel.stages]
-        return sum(farthest) if kernel.chained else max(farthest)
-    return float(kernel.half_pixels * kernel.mm_per_pixel)
+        passes = sum(2**each.level for each in kernel.stages) if kernel.chained else 1
+        along = sum(farthest) if kernel.chained else max(farthest)
+    else:
+        passes, along = 1, float(kernel.half_pixels * kernel.mm_per_pixel)
+    return math.sqrt(2.0) * (along + passes * texel_mm)

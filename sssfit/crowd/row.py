@@ -17,7 +17,7 @@ from sssfit.scene.mesh import Mesh
 HEAD_UNITS, SPACING_UNITS = 2.5, 2.0  # of 100 mm; the paper gives neither
 RESOLUTION = (1200, 1920)  # the paper's, rows and columns
 MOST_HEADS = 64
-# Two lights far before the row, on both sides, so that all heads are lit alike: direction and power.
+# Two lights far before the row, on both sides, so that all heads are lit alike: direction, power.
 _LIGHTS = (((-0.5, 0.45, 0.75), 0.9), ((0.75, 0.1, 0.65), 0.45))
 _LIGHT_UNITS = 100.0
 
@@ -93,8 +93,7 @@ class Row:
         """Two lights, 100 units away."""
         far = _LIGHT_UNITS * UNIT_MM
         return tuple(
-            PointLight((far * x, far * y, far * z), (power,), far)
-            for (x, y, z), power in _LIGHTS
+            PointLight((far * x, far * y, far * z), (power,), far) for (x, y, z), power in _LIGHTS
         )
 
 

@@ -5,9 +5,9 @@ from typing import Any
 
 from sssfit.crowd.frame import MAP_SIZE, CrowdFrame, measure_frame
 from sssfit.crowd.row import HEAD_UNITS, RESOLUTION, SPACING_UNITS, Row
-from sssfit.crowd.table import SpeedUpTable, measure_table
 from sssfit.crowd.table import MAP_SIZE as TABLE_MAP_SIZE
 from sssfit.crowd.table import RESOLUTION as TABLE_RESOLUTION
+from sssfit.crowd.table import SpeedUpTable, measure_table
 from sssfit.errors import ArgumentError
 from sssfit.fit import fit_result
 from sssfit.kernel import Kernel
