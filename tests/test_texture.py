@@ -296,7 +296,8 @@ def test_specular_light_is_that_of_the_listing():
     eye = np.array([0.0, 0.0, 700.0])
     light = PointLight((400.0, 100.0, 600.0), (1.0, 0.5), 800.0)
     far = quad(1.0)
-    found = specular_at(points, normals, [draw_shadows(light, far, (0.0, 900.0, 0.0), 16)], eye)
+    shadow = draw_shadows(light, far, (0.0, 900.0, 0.0), 16)
+    found = specular_at(points, normals, [shadow], eye, 2)
     for point, n, seen in zip(points, normals, found, strict=True):
         away = np.array(light.place_mm) - point
         to_light, to_eye = away / np.linalg.norm(away), eye - point

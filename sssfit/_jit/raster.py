@@ -97,15 +97,6 @@ def lit_share(x: float, y: float, inverse_depth: float, nearest: FloatArray) -> 
 
 
 @jit
-def lit_shares(
-    out: FloatArray, x: FloatArray, y: FloatArray, inverse_depth: FloatArray, nearest: FloatArray
-) -> None:
-    """Write `lit_share` of places (N,)."""
-    for p in range(x.size):
-        out[p] = lit_share(x[p], y[p], inverse_depth[p], nearest)
-
-
-@jit
 def interpolate(
     out: FloatArray,
     faces: IndexArray,

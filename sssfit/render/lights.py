@@ -55,15 +55,21 @@ class ShadowMap:
     scale: float  # pixels of a tangent of 1
     nearest: FloatArray
 
-    def shares(self, points_mm: FloatArray, normals: FloatArray) -> FloatArray:
-        """Return the part of the light that reaches places (N, 3) with unit normals (N,)."""
-        view = (points_mm + _BIAS_MM * normals - np.array(self.light.place_mm)) @ self.axes.T
-        depth = np.maximum(view[:, 2], _NEAR_MM)
-        middle = 0.5 * len(self.nearest)
-        x, y = (np.ascontiguousarray(middle + self.scale * view[:, k] / depth) for k in range(2))
-        out = np.empty(len(depth))
-        compiled.lit_shares(out, x, y, 1.0 / depth, self.nearest)
-        return out
+    def add_irradiance(self, total: FloatArray, points_mm: FloatArray, normals: FloatArray) -> None:
+        """Add what arrives at places (N, 3) with unit normals (N, 3) to ``total`` (N, C)."""
+        light = self.light
+        power = np.asarray(light.power, dtype=np.float64) * light.reference_mm**2
+        compiled.add_light(
+            total,
+            points_mm,
+            normals,
+            np.array(light.place_mm, dtype=np.float64),
+            np.array(np.broadcast_to(power, total.shape[1:])),
+            self.axes,
+            self.scale,
+            self.nearest,
+            _BIAS_MM,
+        )
 
 
 def draw_shadows(light: PointLight, mesh: Mesh, offsets_mm: npt.ArrayLike, size: int) -> ShadowMap:
@@ -117,19 +123,7 @@ def irradiance_at(
     """Return the irradiance (N, C) of places (N, 3) [mm] with unit normals (N, 3)."""
     total = np.zeros((len(points_mm), channels)) + np.asarray(ambient, dtype=np.float64)
     for each in shadows:
-        light = each.light
-        power = np.broadcast_to(np.asarray(light.power, dtype=np.float64), (channels,))
-        compiled.add_light(
-            total,
-            points_mm,
-            normals,
-            np.array(light.place_mm, dtype=np.float64),
-            power * light.reference_mm**2,
-            each.axes,
-            each.scale,
-            each.nearest,
-            _BIAS_MM,
-        )
+        each.add_irradiance(total, points_mm, normals)
     return total
 
 
@@ -138,6 +132,7 @@ def specular_at(
     normals: FloatArray,
     shadows: Sequence[ShadowMap],
     eye_mm: FloatArray,
+    channels: int,
 ) -> FloatArray:
     """Return the light (N, C) that skin reflects at its surface to an eye.
 
@@ -147,9 +142,11 @@ def specular_at(
     pi.
     """
     to_eye = unit(eye_mm - points_mm)
-    total = np.zeros((len(points_mm), 1))
+    total = np.zeros((len(points_mm), channels))
     for each in shadows:
-        to_light, cosine, arriving = _arriving(each, points_mm, normals)
+        arriving = np.zeros_like(total)
+        each.add_irradiance(arriving, points_mm, normals)
+        to_light = unit(np.array(each.light.place_mm) - points_mm)
         half = to_light + to_eye
         middle = unit(half)
         at_normal = np.clip(np.einsum("nk,nk->n", middle, normals), 1e-4, 1.0)
@@ -157,23 +154,8 @@ def specular_at(
         beckmann = np.exp(-tangent2 / ROUGHNESS**2) / (np.pi * ROUGHNESS**2 * at_normal**4)
         schlick = F0 + (1.0 - F0) * (1.0 - np.einsum("nk,nk->n", middle, to_eye)) ** 5
         strength = beckmann * schlick / np.maximum(np.einsum("nk,nk->n", half, half), 1e-9)
-        lit = np.pi * SPECULAR * np.maximum(cosine, 0.0) * np.maximum(strength, 0.0)
-        total = total + lit[:, None] * arriving
+        total += (np.pi * SPECULAR * np.maximum(strength, 0.0))[:, None] * arriving
     return total
-
-
-def _arriving(
-    shadow: ShadowMap, points_mm: FloatArray, normals: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return unit vectors to a light, their cosines, and irradiance at normal incidence (N, C)."""
-    light = shadow.light
-    away = np.array(light.place_mm) - points_mm
-    square = np.einsum("nk,nk->n", away, away)
-    to_light = away / np.sqrt(square)[:, None]
-    cosine = np.einsum("nk,nk->n", to_light, normals)
-    share = np.where(cosine > 0.0, shadow.shares(points_mm, normals), 0.0)
-    falloff = share * light.reference_mm**2 / square
-    return to_light, cosine, falloff[:, None] * np.asarray(light.power)
 
 
 def unit(vectors: FloatArray) -> FloatArray:

@@ -247,7 +247,8 @@ def _add_specular(
     here = drawn.covered
     points = drawn.interpolated(mesh, mesh.positions_mm) + offsets[drawn.copies[here]]
     normals = unit(drawn.interpolated(mesh, np.asarray(mesh.normals)))
-    picture[here] += specular_at(points, normals, shadows, camera.eye_mm)
+    channels = picture.shape[2]
+    picture[here] += specular_at(points, normals, shadows, camera.eye_mm, channels)
 
 
 def _show(
