@@ -30,6 +30,7 @@ from .import_ import import_
 from .materials import materials
 from .motion import motion
 from .render import render
+from .scene import scene
 from .show import show
 from .simulate import simulate
 from .stability import stability
@@ -79,7 +80,7 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
 
 
 for _verb in (
-    *(materials, simulate, fit, render, compare, choose, stability, motion),
+    *(materials, simulate, fit, render, compare, choose, stability, motion, scene),
     *(import_, export, chart, show),
 ):
     cli.add_command(_verb)

@@ -3,7 +3,7 @@
 Those of methods and of made pictures are made from their entries, in ``_methods``.
 """
 
-from sssfit.methods import EXPORTS, FITS, LIGHTS, RENDERERS, SEPARABLE, STRESSES
+from sssfit.methods import EXPORTS, FITS, LIGHTS, RENDERERS, SAVINGS, SEPARABLE, STRESSES
 from sssfit.scene.made import COMPARED, EDGE_DEGREES, MADE
 
 from ._options import (
@@ -192,6 +192,31 @@ MOTION = (
     flag("--table", "Measure Table 1 of the supplement in place of a sequence; no MATERIAL."),
     option("--seeds", WholeRange(1, 10_000), "N", "With --table: seeds.  [default: 200]"),
     flag("--force", "Replace files that are not our chart or pictures."),
+)
+SCENE = (
+    option("--heads", WholeRange(1, 64), "N", "Number of heads.  [default: 1]"),
+    option("--distance distance_units", _FACTOR, "UNITS", "From the camera to the row's middle.  "
+           "[default: 10]"),
+    option("--head head_units", _FACTOR, "UNITS", "Height of a head.", 2.5),
+    option("--spacing spacing_units", _FACTOR, "UNITS", "From one head's middle to the next.", 2.0),
+    option("--fov fov_degrees", _ANGLE, "DEGREES", "Vertical field of view.", 30.0),
+    option("--resolution", Size(), "WxH", "Columns and rows of the frame.  [default: 1920x1200; "
+           "480x300 with --table]"),
+    option("--map-size", WholeRange(8, 16384), "N", "Side of a whole map in texels.  [default: "
+           "1024; 512 with --table]"),
+    option("--savings", Names(SAVINGS), "NAME,...", "What is left out, as above.  [default: all]"),
+    option("--culled-by", ["vertex", "face"], None, "Normals by which texels face away.", "vertex"),
+    option("--margin", _FACTOR, "D", "clipped: half widths of the picture that are kept.", 1.0),
+    option("--mesh", None, "FILE", "OBJ, PLY, glTF or GLB with texture coordinates in place of the "
+           'made head (needs "sssfit[mesh]").'),
+    option("--bloom", NumberRange(0.0, 1.0), "SHARE", "Light of -o that glare spreads over the "
+           "picture, such as 0.05.  [default: 0]"),
+    flag("--table", "Measure the paper's Table 1 in place of a frame."),
+    option("--chart", None, "FILE", "With --table: figure, PNG, SVG or PDF by its ending; - for "
+           "PNG on stdout."),
+    option("-o --output", None, "FILE", "Picture with the savings, .exr, .tif or .png; - for EXR "
+           "on stdout.  [default: none]"),
+    flag("--force", "Replace a file that is not our chart or picture."),
 )
 EXPORT = (option("--format form", list(EXPORTS), None, "Output format, as below.", required=True),)
 EXPORT_OUTPUT = STRICT, *output("NAME.FORMAT", "sssfit did not write")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import click
@@ -12,7 +13,8 @@ from ._output import finish, held, target, write, write_chart
 from ._progress import step_progress
 from ._verb_options import SCENE
 
-_OF_FRAMES = ("heads", "distance_units", "output")
+_OF_FRAMES = ("heads", "distance_units", "output", "bloom")
+_OF_FILES = ("bloom", "table", "chart", "output", "force")
 
 
 @click.command()
@@ -20,45 +22,47 @@ _OF_FRAMES = ("heads", "distance_units", "output")
 @options(*SCENE)
 @common_options
 def scene(kernel: str | None, common: Common, **given: Any) -> None:
-    """Render heads in a row with diffusion in texture space, and count its work.
+    """Render heads in a row with diffusion in texture space, and count the work.
 
     Each head has an irradiance map of its own, on which the kernel's passes run. Three savings
     leave out what is not seen: texels that face away (culled), maps too fine for their distance
-    (depth), and what lies outside of the picture (clipped). The picture is compared with that of
-    all texels, and with diffusion in screen space. One unit is 100 mm.
+    (depth), and what lies outside of the picture (clipped). The picture is compared with the one
+    in which nothing is left out, and with diffusion in screen space. One unit is 100 mm.
 
     KERNEL is a .kernel.json or .taps.json file, or - for stdin; by default the six Gaussians of
     skin1, each blurred from the one before.
 
     \b
       sssfit scene --heads 4 --distance 10 -o heads.exr
-      sssfit scene skin1.taps.json --heads 16 --distance 50 --savings depth,clipped
+      sssfit scene skin1.cascade24.taps.json --heads 16 --distance 50 --savings depth,clipped
       sssfit scene --table --chart table.png
     """
+    single = dict.fromkeys(_OF_FRAMES, "a single frame")
+    refuse(given, single if given["table"] else {"chart": "--table"})
+    if given["bloom"] and not given["output"]:
+        raise click.UsageError("--bloom is for the picture of -o; name its file.")
     from sssfit.chart.files import chart_format, is_chart_file
     from sssfit.crowd import runner
     from sssfit.formats.pictures import image_format, is_image_file
     from sssfit.kernel import read_kernel
 
-    refuse(given, {"output": "a frame"} if given["table"] else {"chart": "--table"})
     if given["chart"] not in (None, "-"):
         chart_format(given["chart"])
-    if given["output"]:
-        image_format(target(given["output"]))
-    loaded = load(read_kernel, kernel) if kernel else runner.six_gaussians()
+    form = image_format(given["output"]) if given["output"] not in (None, "-") else "exr"
     wrote = [each for each in (given["chart"], given["output"]) if each]
-    ours = lambda path: is_chart_file(path) or is_image_file(path)  # noqa: E731
-    outputs = [target(each) for each in wrote]
-    asked = {key: given[key] for key in runner.GEOMETRY} | {"threads": common.threads}
     hold = {"inputs": [kernel, given["mesh"]], "force": given["force"]}
-    with held(outputs, ours, **hold), step_progress("frames") as step:
+    ours = is_chart_file if given["table"] else is_image_file
+    own = {key: each for key, each in given.items() if key not in _OF_FILES and each is not None}
+    with held([target(each) for each in wrote], ours, **hold), step_progress("frames") as step:
+        loaded = load(read_kernel, kernel) if kernel else runner.six_gaussians()
         if given["table"]:
-            found: Any = runner.table_of(loaded, **asked, progress=step)
+            found: Any = runner.table_of(loaded, **own, threads=common.threads, progress=step)
         else:
-            found = runner.frame_of(loaded, **asked, **{key: given[key] for key in _OF_FRAMES[:2]})
+            found = runner.frame_of(loaded, **own, threads=common.threads)
         if given["chart"]:
             write_chart(found, target(given["chart"]))
         if given["output"]:
-            write(found.image_bytes(given["output"]), target(given["output"]))
+            save = partial(found.save, format=form, bloom=given["bloom"] or 0.0)
+            write(save, target(given["output"]))
     words = [found.text(), *(f"Wrote {each}" for each in wrote)]
     finish(common, {"output": wrote, "kernel": kernel, **found.to_dict()}, "\n".join(words))

@@ -537,6 +537,9 @@ RENDERERS: Mapping[str, Method] = {
     "cascade": Method("sssfit.motion.ways:cascade", "cascade"),
 }
 
+# What diffusion in texture space may leave out.
+SAVINGS = ("culled", "depth", "clipped")
+
 
 def settings_of(methods: Mapping[str, Method]) -> dict[str, tuple[Setting, tuple[str, ...]]]:
     """Return every setting once by its name, with the names of the methods that have it.

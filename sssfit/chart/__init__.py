@@ -28,6 +28,7 @@ FIGURES: Mapping[str, str] = {
     "Profile": "sssfit.chart.profile:profile_figure",
     "Sheet": "sssfit.chart.sheet:sheet_figure",
     "Stability": "sssfit.chart.stability:stability_figure",
+    "SpeedUpTable": "sssfit.chart.speed_up:speed_up_figure",
     "Spectrum": "sssfit.chart.spectrum:spectrum_figure",
     "TapsView": "sssfit.chart.taps:taps_figure",
     "VariateTable": "sssfit.chart.variates:variates_figure",

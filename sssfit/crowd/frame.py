@@ -4,23 +4,27 @@ import math
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
 
 from sssfit.arrays import BoolArray, plain
 from sssfit.crowd.row import Row
+from sssfit.errors import RenderError
+from sssfit.formats.pictures import image_format, save_image
 from sssfit.kernel import Kernel, Taps
 from sssfit.measure.delta_e import delta_e_2000, exposure_of
 from sssfit.messages import table
+from sssfit.render.bloom import bloomed
 from sssfit.render.drawn import Drawn
 from sssfit.render.screen import render_screen
 from sssfit.render.screen_taps import render_screen_taps
 from sssfit.render.texture import Savings, TextureFrame, render_texture
 from sssfit.render.view import view_of
 
-FloatArray = npt.NDArray[np.floating[Any]]
+Picture = npt.NDArray[np.floating[Any]]
 
 MAP_SIZE = 1024
 _DEPTH_STEP = 0.05  # of the depth: two pixels further apart are on either side of an outline
@@ -88,8 +92,26 @@ class CrowdFrame:
     savings: Savings
     map_size: int
     map_sizes: tuple[int, ...]
-    picture: FloatArray
+    picture: Picture
     work: Mapping[str, Work]
+
+    def save(
+        self, target: str | Path | BinaryIO, *, format: str | None = None, bloom: float = 0.0
+    ) -> None:
+        """Write the picture with savings, a share ``bloom`` of its light spread by glare.
+
+        ``format`` is "exr", "tiff" or "png", by default from the ending. A PNG has the exposure at
+        which errors are measured.
+        """
+        form = format or image_format(target)
+        lit = np.asarray(self.picture[self.picture.max(axis=-1) > 0.0], dtype=np.float64)
+        save_image(
+            target,
+            bloomed(self.picture, bloom),
+            format=form,
+            exposure=exposure_of(lit) if form == "png" and lit.size else 1.0,
+            mm_per_pixel=self.row.camera.mm_per_pixel,
+        )
 
     @property
     def speed_up(self) -> tuple[float, float]:
@@ -132,20 +154,22 @@ class CrowdFrame:
             f"{row.distance_units:g} units (100 mm each); {row.fov_degrees:g} degrees, "
             f"{row.resolution[1]} x {row.resolution[0]} pixels, maps of {self.map_size} texels"
         )
+        every = self.work.values()
         rows = [
-            [
-                _NAMES[name],
-                f"{each.texels_lit:,}",
-                f"{each.texels_convolved:,}",
-                *(f"{1000.0 * each.seconds.get(stage, 0.0):,.0f}" for stage in _STAGES),
-                f"{1000.0 * each.total_seconds:,.0f}",
-                f"{each.mean_delta_e:.3f}",
-                f"{each.largest_inside:.3f}",
-            ]
-            for name, each in self.work.items()
+            ["texels lit", *(f"{each.texels_lit:,}" for each in every)],
+            ["texels convolved", *(f"{each.texels_convolved:,}" for each in every)],
+            *(
+                [
+                    f"{name} (ms)",
+                    *(f"{1000.0 * each.seconds.get(name, 0.0):,.0f}" for each in every),
+                ]
+                for name in _STAGES
+            ),
+            ["all stages (ms)", *(f"{1e3 * each.total_seconds:,.0f}" for each in every)],
+            ["mean Delta E", *(f"{each.mean_delta_e:.3f}" for each in every)],
+            ["largest inside", *(f"{each.largest_inside:.3f}" for each in every)],
         ]
-        heads = ["", "texels lit", "convolved", *(f"{each} ms" for each in _STAGES), "all ms"]
-        heads += ["mean Delta E", "largest inside"]
+        heads = ["", *(_NAMES[name] for name in self.work)]
         ends = f"{texels:.2f} times fewer texels convolved, {seconds:.2f} times as fast"
         return f"{head}\n{table(heads, rows)}\n{ends}"
 
@@ -178,7 +202,17 @@ def measure_frame(
     screen : bool
         Also in screen space.
     threads : int, optional
+
+    Raises
+    ------
+    RenderError
+        The kernel has other channels than red, green and blue or a single one.
     """
+    if len(kernel.channels) not in (1, 3):
+        raise RenderError(
+            f"The kernel has {len(kernel.channels)} channels; a frame is judged as a picture of "
+            "1 or 3."
+        )
     given = row.shape, row.offsets_mm, row.camera, row.lights, kernel
     how: dict[str, Any] = {"map_size": map_size, "threads": threads}
     if whole is None:
@@ -227,12 +261,12 @@ def _in_screen_space(
 
 
 def _errors(
-    picture: FloatArray, truth: FloatArray, visible: BoolArray, inside: BoolArray
+    picture: Picture, truth: Picture, visible: BoolArray, inside: BoolArray
 ) -> tuple[float, float, float]:
     """Return mean and largest Delta E over visible pixels, and the largest inside."""
     if not visible.any():
         return 0.0, 0.0, 0.0
-    ours, true = picture[visible], truth[visible]
+    ours, true = (np.asarray(each[visible], np.float64) for each in (picture, truth))
     errors = delta_e_2000(ours, true, exposure_of(true))
     within = errors[inside[visible]]
     return float(errors.mean()), float(errors.max()), float(within.max(initial=0.0))

@@ -15,6 +15,7 @@ from sssfit.scene.head_mesh import head_mesh
 from sssfit.scene.mesh import Mesh
 
 HEAD_UNITS, SPACING_UNITS = 2.5, 2.0  # of 100 mm; the paper gives neither
+DISTANCE_UNITS = 10.0
 RESOLUTION = (1200, 1920)  # the paper's, rows and columns
 MOST_HEADS = 64
 # Two lights far before the row, on both sides, so that all heads are lit alike: direction, power.

@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection
 from typing import Any
 
 from sssfit.crowd.frame import MAP_SIZE, CrowdFrame, measure_frame
-from sssfit.crowd.row import HEAD_UNITS, RESOLUTION, SPACING_UNITS, Row
+from sssfit.crowd.row import DISTANCE_UNITS, HEAD_UNITS, RESOLUTION, SPACING_UNITS, Row
 from sssfit.crowd.table import MAP_SIZE as TABLE_MAP_SIZE
 from sssfit.crowd.table import RESOLUTION as TABLE_RESOLUTION
 from sssfit.crowd.table import SpeedUpTable, measure_table
@@ -13,17 +13,12 @@ from sssfit.fit import fit_result
 from sssfit.kernel import Kernel
 from sssfit.material import load_material
 from sssfit.messages import did_you_mean, shown
+from sssfit.methods import SAVINGS
 from sssfit.render.texture import Savings
 from sssfit.scene.camera import FOV_DEGREES
 from sssfit.scene.mesh import Mesh
 from sssfit.scene.mesh_files import load_mesh
 from sssfit.simulate import simulate_exact
-
-SAVINGS = ("culled", "depth", "clipped")
-GEOMETRY = (
-    *("head_units", "spacing_units", "fov_degrees", "resolution"),
-    *("map_size", "savings", "culled_by", "margin", "mesh"),
-)
 
 
 def six_gaussians() -> Kernel:
@@ -60,8 +55,8 @@ def savings_of(
 def frame_of(
     kernel: Kernel,
     *,
-    heads: int = 1,
-    distance_units: float = 10.0,
+    heads: int | None = None,
+    distance_units: float | None = None,
     head_units: float = HEAD_UNITS,
     spacing_units: float = SPACING_UNITS,
     fov_degrees: float = FOV_DEGREES,
@@ -75,8 +70,8 @@ def frame_of(
 ) -> CrowdFrame:
     """Render one frame; arguments are those of `Row`, `savings_of` and `measure_frame`."""
     row = Row(
-        heads,
-        distance_units,
+        heads or 1,
+        distance_units or DISTANCE_UNITS,
         head_units,
         spacing_units,
         fov_degrees,

@@ -37,7 +37,7 @@ def view_of(
     light, gloss = (np.zeros((*here.shape, channels)) for _ in range(2))
     light[here] = irradiance_at(points, normals, shadows, ambient, channels)
     if specular:
-        gloss[here] = specular_at(points, normals, shadows, camera.eye_mm)
+        gloss[here] = specular_at(points, normals, shadows, camera.eye_mm, channels)
     depth = np.full(here.shape, np.inf)
     depth[here] = camera.distance_mm - points[:, 2]
     scene = Scene(

@@ -1,10 +1,10 @@
 """The head as a closed mesh of about 25 000 triangles in three charts.
 
 Every point of the surface is where a ray from the middle of the head leaves it for the last time:
-front and back are the height fields of the made head. Rows of equal arc length run from the crown
-to the neck; behind the ears, where a ray passes twice, the outer side counts. The chart of the
-sides takes the upper three quarters of the texture, with its seam at the back; crown and neck are
-disks below it.
+front and back are the height fields of the made head. Rows run from the crown to the neck, closer
+at mouth, nose and eyes; columns around the head, closer in front and at the ears. Behind the ears,
+where a ray passes twice, the outer side counts. The chart of the sides takes the upper three
+quarters of the texture, with its seam at the back; crown and neck are disks below it.
 """
 
 import functools
@@ -20,14 +20,24 @@ from sssfit.scene.mesh import Mesh
 HEIGHT_MM = 250.0  # 2.5 units of 100 mm; the paper gives no size
 _MIDDLE_MM = (0.0, 15.0, -95.0)
 _LOWEST_MM = -140.0  # the neck ends here, where the shoulders begin
-_COLUMNS, _ROWS = 160, 65  # of the sides: 20 800 triangles
-_IN_FRONT = 0.3  # columns lie 1 / (1 - this) times as close in front as evenly, as artists do
-_RINGS = 8  # of each disk: 2 400 triangles
+_COLUMNS, _ROWS = 144, 76  # of the sides: 21 888 triangles
+_RINGS = 6  # of each disk: 1 584 triangles
+# How close columns and rows lie, by the angle from the front and by the elevation in degrees: lips
+# have folds of 2 mm, and an ear is 3 mm thick where columns cross it, at 72 to 86 degrees.
+_CLOSE_COLUMNS = (
+    (0.0, 26.0, 36.0, 66.0, 72.0, 86.0, 95.0, 180.0),
+    (3, 3, 1.2, 0.8, 3, 3, 0.6, 0.5),
+)
+_CLOSE_ROWS = (
+    (-75.0, -52.0, -44.0, -16.0, -10.0, 12.0, 20.0, 60.0),
+    (0.7, 0.9, 3, 3, 1.8, 1.8, 0.7, 0.5),
+)
+_EVEN = 0.5  # part of the texture's width and height that is shared out evenly
 _CROWN_DEGREES = 58.0
 _REACH_MM = 260.0
 _SPACING_MM = 1.0  # of the height fields; triangles are 2 to 5 mm wide
 _STEPS, _HALVINGS = 200, 24
-_FINE = 120  # elevations by which the rows' arc lengths are measured
+_FINE = 240  # elevations by which the rows' arc lengths are measured
 _GUTTER = 1.0 / 128.0  # of the texture: at 128 texels a chart still keeps one to itself
 _DISK = 0.115  # radius of the two disks in the texture
 
@@ -42,8 +52,7 @@ def head_mesh(height_mm: float = HEIGHT_MM) -> Mesh:
         From the end of the neck to the crown.
     """
     surface = _Surface()
-    even = np.pi * (2.0 * np.arange(_COLUMNS + 1) / _COLUMNS - 1.0)
-    angles = even - _IN_FRONT * np.sin(even)  # 0 looks along z
+    angles = _angles()
     lines = [surface.points(angles, each) for each in surface.elevations()]
     shares = np.linspace(1.0, 0.0, _RINGS + 1)
     crown = [surface.points(angles, 90.0 - each * (90.0 - _CROWN_DEGREES)) for each in shares]
@@ -67,13 +76,14 @@ class _Surface:
         self.corner = np.array([field.x0_mm, field.y0_mm])
 
     def elevations(self) -> FloatArray:
-        """Return the elevations of the rows of the sides, at equal arc lengths in front."""
+        """Return the elevations of the rows of the sides."""
         low = -np.degrees(np.arctan2(_MIDDLE_MM[1] - _LOWEST_MM, 45.0))
         fine = np.linspace(_CROWN_DEGREES, low, _FINE)
         angles = np.array([0.0, 0.5 * np.pi, np.pi])
         paths = np.array([self.points(angles, each) for each in fine])
         steps = np.linalg.norm(np.diff(paths, axis=0), axis=-1).sum(axis=1)
-        length = np.concatenate(([0.0], np.cumsum(steps)))
+        close = np.interp(0.5 * (fine[1:] + fine[:-1]), *_CLOSE_ROWS)
+        length = np.concatenate(([0.0], np.cumsum(close * steps)))
         return np.interp(np.linspace(0.0, length[-1], _ROWS + 1), length, fine)
 
     def points(self, angles: FloatArray, elevation_degrees: float) -> FloatArray:
@@ -115,16 +125,33 @@ class _Surface:
         return (points[..., 2] <= front) & (points[..., 2] >= back)
 
 
+def _angles() -> FloatArray:
+    """Return the angles of the columns from the z axis, -pi to pi."""
+    fine = np.linspace(-180.0, 180.0, 3601)
+    close = np.interp(np.abs(0.5 * (fine[1:] + fine[:-1])), *_CLOSE_COLUMNS)
+    passed = np.concatenate(([0.0], np.cumsum(close)))
+    return np.radians(np.interp(np.linspace(0.0, passed[-1], _COLUMNS + 1), passed, fine))
+
+
 _Part = tuple[FloatArray, FloatArray, "np.ndarray[tuple[int, ...], np.dtype[np.int64]]"]
 
 
 def _sides(lines: FloatArray) -> _Part:
     """Return points, texture coordinates and triangles of a grid of rows (R, N, 3)."""
     rows, columns = lines.shape[:2]
-    u = np.linspace(_GUTTER, 1.0 - _GUTTER, columns)
-    v = np.linspace(1.0 - _GUTTER, 0.25 + _GUTTER, rows)
+    around = np.linalg.norm(np.diff(lines, axis=1), axis=-1).mean(axis=0)
+    down = np.linalg.norm(np.diff(lines, axis=0), axis=-1).mean(axis=1)
+    u = _GUTTER + (1.0 - 2.0 * _GUTTER) * _shares(around)
+    v = 1.0 - _GUTTER - (0.75 - 2.0 * _GUTTER) * _shares(down)
     uv = np.stack(np.meshgrid(u, v), axis=-1)
     return lines.reshape(-1, 3), uv.reshape(-1, 2), _grid_faces(rows, columns)
+
+
+def _shares(steps: FloatArray) -> FloatArray:
+    """Return where rows or columns lie in a chart, 0 to 1: halfway from even to by their width."""
+    by_width = np.concatenate(([0.0], np.cumsum(steps))) / steps.sum()
+    found: FloatArray = _EVEN * np.linspace(0.0, 1.0, len(by_width)) + (1.0 - _EVEN) * by_width
+    return found
 
 
 def _grid_faces(rows: int, columns: int) -> "np.ndarray[tuple[int, ...], np.dtype[np.int64]]":

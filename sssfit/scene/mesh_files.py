@@ -1,6 +1,7 @@
 """Meshes with texture coordinates from OBJ, PLY and glTF files, by trimesh."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -50,7 +51,12 @@ def load_mesh(path: str | Path, *, mm_per_unit: float = 1.0) -> Mesh:
     if not isinstance(loaded, trimesh.Trimesh) or len(loaded.faces) == 0:
         raise RenderError(f"{path}: there are no triangles in it.")
     visual = getattr(loaded, "visual", None)
-    uv = getattr(visual, "uv", None)
+    uv: Any = getattr(visual, "uv", None)
+    if uv is None and path.suffix.lower() in (".gltf", ".glb"):
+        raise RenderError(
+            f"{path}: no texture coordinates were found; trimesh reads those of a glTF only where "
+            "the mesh has a material as well."
+        )
     normals = loaded.vertex_normals if "vertex_normals" in loaded._cache else None
     return Mesh(
         path.stem,
