@@ -27,7 +27,8 @@ def scene(kernel: str | None, common: Common, **given: Any) -> None:
     Each head has an irradiance map of its own, on which the kernel's passes run. Three savings
     leave out what is not seen: texels that face away (culled), maps too fine for their distance
     (depth), and what lies outside of the picture (clipped). The picture is compared with the one
-    in which nothing is left out, and with diffusion in screen space. One unit is 100 mm.
+    in which nothing is left out, and with diffusion in screen space; errors inside are those
+    farther from outlines and from the border than the kernel reaches. One unit is 100 mm.
 
     KERNEL is a .kernel.json or .taps.json file, or - for stdin; by default the six Gaussians of
     skin1, each blurred from the one before.
@@ -64,5 +65,5 @@ def scene(kernel: str | None, common: Common, **given: Any) -> None:
         if given["output"]:
             save = partial(found.save, format=form, bloom=given["bloom"] or 0.0)
             write(save, target(given["output"]))
-    words = [found.text(), *(f"Wrote {each}" for each in wrote)]
-    finish(common, {"output": wrote, "kernel": kernel, **found.to_dict()}, "\n".join(words))
+    text = [found.text(), *map("Wrote {}".format, wrote)]
+    finish(common, {"output": wrote, "kernel": kernel, **found.to_dict()}, "\n".join(text))

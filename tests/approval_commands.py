@@ -94,6 +94,7 @@ HELP = [
             "choose",
             "stability",
             "motion",
+            "scene",
             "import",
             "export",
             "chart",
@@ -1369,10 +1370,56 @@ MOTION = [
     C("motion missing.toml"),
 ]
 
+_BALLS = "--mesh ball.obj --resolution 40x30 --map-size 32"
+_ROW = f"scene wax.svd2.kernel.json {_BALLS}"
+_TABLED = "scene wax.svd2.kernel.json --mesh ball.obj --resolution 8x6 --map-size 16 --table"
+
+SCENE = [
+    C(_ROW),
+    C(f"{_ROW} --heads 3 --distance 7 --savings culled --culled-by face -o s.exr"),
+    C(f"{_ROW} --heads 2 --head 2 --spacing 1.5 --fov 40 --margin 1.2 --bloom .1 -o s.png -v"),
+    C(
+        f"scene wax.gaussians3.kernel.json {_BALLS} --savings depth,clipped --json --threads 1 --seed 2"
+    ),
+    C(f"scene - {_BALLS} -o -", stdin="wax.svd2.kernel.json"),
+    C(f"scene wax.hand.taps.json {_BALLS} --distance 5 -q"),
+    C("scene wax.svd2.kernel.json --resolution 8x6 --map-size 64", note="the made head"),
+    C(f"scene {_BALLS} --distance 5", note="the default kernel"),
+    C(f"{_ROW} -o foreign.png"),
+    C(f"{_ROW} -o foreign.png --force"),
+    C(f"{_ROW} -o no/such/folder.exr"),
+    C(f"{_ROW} -o s.jpg"),
+    C(f"{_TABLED} --chart t.png"),
+    C(f"{_TABLED} --json"),
+    C(f"{_ROW} --table --chart t.exr"),
+    C(f"{_ROW} --table --chart foreign.png"),
+    C(f"{_ROW} --table --heads 3"),
+    C(f"{_ROW} --table -o s.exr"),
+    C(f"{_ROW} --chart t.png"),
+    C(f"{_ROW} --bloom .1"),
+    C(f"{_ROW} --bloom 2 -o s.png"),
+    C(f"{_ROW} --savings cull"),
+    C(f"{_ROW} --heads 0"),
+    C(f"{_ROW} --heads 65"),
+    C(f"{_ROW} --distance 0"),
+    C(f"{_ROW} --distance 1"),
+    C(f"{_ROW} --fov 180"),
+    C(f"{_ROW} --head nan"),
+    C(f"{_ROW} --map-size 4"),
+    C(f"{_ROW} --resolution 40"),
+    C(f"{_ROW} --culled-by edge"),
+    C("scene wax.svd2.kernel.json --mesh bare.obj"),
+    C("scene wax.svd2.kernel.json --mesh missing.obj"),
+    C("scene wax.svd2.kernel.json --mesh plain.png"),
+    C("scene missing.kernel.json"),
+    C("scene wax.profile.npz"),
+]
+
 COMMANDS = {
     "help": HELP,
     "stability": STABILITY,
     "motion": MOTION,
+    "scene": SCENE,
     "materials": MATERIALS,
     "simulate": SIMULATE,
     "fit": FIT,

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import OpenImageIO
+from meshes import obj_text, sphere
 from PIL import Image
 
 from sssfit.formats.pictures import save_image
@@ -784,6 +785,8 @@ def _records(folder: Path) -> None:
     (folder / "damaged.profile.npz").write_bytes((folder / "wax.profile.npz").read_bytes()[:2000])
     text = (folder / "wax.svd2.kernel.json").read_text(encoding="utf-8")
     (folder / "damaged.kernel.json").write_text(text.replace('"rank": 2', '"rank": 3'))
+    (folder / "ball.obj").write_text(obj_text(sphere(rows=8, columns=16)))
+    (folder / "bare.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     for ending in ("npz", "json", "exr", "png", "md", "csv", "toml", "hlsl", "checkpoint"):
         (folder / f"foreign.{ending}").write_text("mine\n")
 

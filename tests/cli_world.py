@@ -26,6 +26,7 @@ import OpenImageIO
 import walk_convergence
 from click.testing import CliRunner
 from matplotlib.figure import Figure
+from meshes import sphere
 from test_mci import file_text, run_text
 from test_mco import BELOW, DR_CM, IN_LAYERS, N_R, REFLECTED, SPECULAR, block, mco_text
 
@@ -34,6 +35,10 @@ from sssfit.choose import choice as choose
 from sssfit.cli import cli
 from sssfit.compare import budget, pareto, runner, sheet
 from sssfit.compare.candidates import Candidate, candidates
+from sssfit.crowd.frame import CrowdFrame, measure_frame
+from sssfit.crowd.row import Row
+from sssfit.crowd.runner import savings_of
+from sssfit.crowd.table import ALL, SpeedUpTable
 from sssfit.errors import SssfitWarning
 from sssfit.fit import fit_gaussians, fit_svd
 from sssfit.formats.csv import csv_text
@@ -535,6 +540,49 @@ def few_seeds(real, given):
     return real(seeds=2, seed=given["seed"])
 
 
+def small_row(given) -> Row:
+    """Spheres in place of heads, on few pixels."""
+    kept = {key: given[key] for key in ("head_units", "spacing_units", "fov_degrees")}
+    heads, distance = given.get("heads") or 1, given.get("distance_units") or 10.0
+    return Row(heads, distance, resolution=(20, 32), mesh=sphere(rows=8, columns=16), **kept)
+
+
+def on_the_clock(frame: CrowdFrame) -> CrowdFrame:
+    """The frame with other times at each stage, but always the same."""
+    work = {
+        name: replace(each, seconds={stage: 0.25 + 0.125 * (j + 3 * k) for k, stage in named})
+        for j, (name, each) in enumerate(frame.work.items())
+        for named in [list(enumerate(each.seconds))]
+    }
+    return replace(frame, work=work)
+
+
+def small_frame(_, given) -> CrowdFrame:
+    savings = savings_of(*(given[key] for key in ("savings", "culled_by", "margin")))
+    return on_the_clock(
+        measure_frame(small_row(given), given["kernel"], savings=savings, map_size=32)
+    )
+
+
+def small_table(_, given) -> SpeedUpTable:
+    """Two by two cells, one of them published."""
+    frames = [
+        tuple(
+            on_the_clock(
+                measure_frame(
+                    small_row({**given["geometry"], "heads": heads, "distance_units": distance}),
+                    given["kernel"],
+                    savings=ALL,
+                    map_size=32,
+                )
+            )
+            for distance in (5.0, 7.0)
+        )
+        for heads in (1, 3)
+    ]
+    return SpeedUpTable(tuple(frames))
+
+
 def blank(*_) -> Figure:
     """A chart with nothing on it: what charts look like is tested where they are made."""
     return Figure(figsize=(0.1, 0.1))
@@ -542,7 +590,7 @@ def blank(*_) -> Figure:
 
 _CHARTS = (
     *("profile", "kernel", "material", "pareto", "budget", "sheet", "models", "guide", "spectrum"),
-    *("stability", "moving_light", "variates"),
+    *("stability", "moving_light", "variates", "speed_up"),
 )
 STAND_INS = {
     "sssfit.simulate.simulate_montecarlo_many": few_photons,
@@ -561,6 +609,9 @@ STAND_INS = {
     "sssfit.stability.stability": lambda _, given: stresses(given["source"].name),
     "sssfit.motion.runner.run_sequence": small_sequence,
     "sssfit.motion.table.measure_table": few_seeds,
+    "sssfit.crowd.runner.six_gaussians": lambda *_: gaussians(),
+    "sssfit.crowd.runner.frame_of": small_frame,
+    "sssfit.crowd.runner.table_of": small_table,
     **{f"sssfit.chart.{kind}.{kind}_figure": blank for kind in _CHARTS},
 }
 

@@ -36,6 +36,14 @@ def sphere(radius_mm=50.0, rows=24, columns=48):
     return Mesh("sphere", points.reshape(-1, 3), uv, faces)
 
 
+def obj_text(mesh):
+    """The mesh as a file."""
+    lines = [f"v {x:.6g} {y:.6g} {z:.6g}" for x, y, z in mesh.positions_mm]
+    lines += [f"vt {u:.6g} {v:.6g}" for u, v in mesh.uv]
+    lines += ["f " + " ".join(f"{k + 1}/{k + 1}" for k in face) for face in mesh.faces]
+    return "\n".join(lines) + "\n"
+
+
 def cube(side_mm=80.0):
     """Six faces, a chart of its own for each in a grid of 3 x 2 with gutters."""
     points, uv, faces = [], [], []

@@ -31,6 +31,7 @@ from sssfit.measure.difference import difference_map, magnified_difference
 from sssfit.measure.score import auto_exposure
 from sssfit.methods import FITS as METHODS
 from sssfit.methods import SEPARABLE
+from sssfit.render.bloom import bloomed
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
 from sssfit.render.transmittance import with_transmitted
@@ -1309,6 +1310,68 @@ MOTION = {
     ),
 }
 
+# scene
+
+_SCENE = "scene wax.svd2.kernel.json"
+
+
+def _framed(**settings: Any) -> Any:
+    usual = {"head_units": 2.5, "spacing_units": 2.0, "fov_degrees": 30.0, "margin": 1.0}
+    return called(
+        "sssfit.crowd.runner.frame_of", kernel(), **usual | {"culled_by": "vertex"} | settings
+    )
+
+
+def _row_table(**settings: Any) -> Any:
+    usual = {"head_units": 2.5, "spacing_units": 2.0, "fov_degrees": 30.0, "margin": 1.0}
+    return called(
+        "sssfit.crowd.runner.table_of", kernel(), **usual | {"culled_by": "vertex"} | settings
+    )
+
+
+def _shown(bloom: float) -> Any:
+    found = world.small_frame(
+        None,
+        {
+            "kernel": kernel(),
+            "head_units": 2.5,
+            "spacing_units": 2.0,
+            "fov_degrees": 30.0,
+            "savings": None,
+            "culled_by": "vertex",
+            "margin": 1.0,
+        },
+    )
+    return np.asarray(bloomed(found.picture, bloom), dtype=np.float32)
+
+
+def _scene_row(typed: str, default: str | None = None, words: str | None = None, **own: Any) -> Row:
+    return Row(_SCENE, typed, calls, lambda: _framed(**own), default=default, words=words)
+
+
+SCENE = {
+    "--heads": _scene_row("--heads 3", "1", heads=3),
+    "--distance": _scene_row("--distance 7", "10", distance_units=7.0),
+    "--head": _scene_row("--head 2", "2.5", head_units=2.0),
+    "--spacing": _scene_row("--spacing 3", "2", spacing_units=3.0),
+    "--fov": _scene_row("--fov 40", "30", fov_degrees=40.0),
+    "--resolution": _scene_row("--resolution 40x30", "1920x1200", resolution=(30, 40)),
+    "--map-size": _scene_row("--map-size 64", "1024", map_size=64),
+    "--savings": _scene_row("--savings depth,clipped", words="all", savings=["depth", "clipped"]),
+    "--culled-by": _scene_row("--culled-by face", "vertex", culled_by="face"),
+    "--margin": _scene_row("--margin 1.5", "1", margin=1.5),
+    "--mesh": _scene_row("--mesh square.obj", mesh="square.obj"),
+    "--bloom": Row(
+        f"{_SCENE} -o s.exr", "--bloom .2", made_picture, lambda: _shown(0.2), default="0"
+    ),
+    "--table": Row(_SCENE, f"{_SCENE} --table", calls, _row_table),
+    "--chart": Row(f"{_SCENE} --table", "--chart t.png", is_written("png"), lambda: ["t.png"]),
+    "--output": Row(_SCENE, "-o s.exr", made_picture, lambda: _shown(0.0)),
+    "--force": Row(
+        f"{_SCENE} -o foreign.png", "--force", is_written("png"), lambda: ["foreign.png"]
+    ),
+}
+
 ROWS: dict[str, dict[str, Row]] = {
     "materials": MATERIALS,
     "simulate": SIMULATE,
@@ -1321,6 +1384,7 @@ ROWS: dict[str, dict[str, Row]] = {
     "chart": CHART,
     "stability": STABILITY,
     "motion": MOTION,
+    "scene": SCENE,
     "show": {},
 }
 
@@ -1337,6 +1401,7 @@ COMMANDS = {
     "chart": "chart",
     "stability": _STABILITY,
     "motion": _MOTION,
+    "scene": _SCENE,
     "show": "show",
 }
 
@@ -1398,6 +1463,7 @@ THREADS = {
     "simulate": Row(_WALK, "--threads 1", calls, lambda: _walk(threads=1)),
     "compare": Row(_BUDGET, "--threads 1", calls, lambda: _budgeted(threads=1)),
     "stability": Row(_STABILITY, "--threads 1", calls, lambda: _stressed(threads=1)),
+    "scene": _scene_row("--threads 1", threads=1),
     "motion": Row(_MOTION, "--threads 1", calls, lambda: _moved(threads=1)),
     "choose": Row(_CHOOSE, "--threads 1", _asked, lambda: _rounded(_chosen(threads=1))),
     "chart": Row(

@@ -1028,6 +1028,51 @@ def variates(f: Figures) -> list[Any]:
     ]
 
 
+_OF_WORK = {"whole": "nothing left out", "saved": "with savings", "screen": "screen space"}
+_SCENE_STAGES = ("shadows", "irradiance", "convolution", "picture")
+
+
+def scene(f: Figures) -> list[Any]:
+    head = Words(
+        "{} of {} units, {} apart, from {} units (100 mm each); {} degrees, {} x {} "
+        "pixels, maps of {} texels",
+        *(
+            f"{f['heads']} {plural(f['heads'], 'head')}",
+            f["head_units"],
+            f["spacing_units"],
+            f["distance_units"],
+            f["fov_degrees"],
+        ),
+        *(f["width"], f["height"], f["map_size"]),
+    )
+    every = [f["work"][name] for name in _OF_WORK]
+    rows = [
+        ["texels lit", *(Exact(each["texels_lit"]) for each in every)],
+        ["texels convolved", *(Exact(each["texels_convolved"]) for each in every)],
+        *(
+            [f"{name} (ms)", *(Rough(each["milliseconds"].get(name, 0)) for each in every)]
+            for name in _SCENE_STAGES
+        ),
+        ["all stages (ms)", *(each["total_milliseconds"] for each in every)],
+        ["mean Delta E", *(Rough(each["mean_delta_e"]) for each in every)],
+        ["largest Delta E inside", *(Rough(each["largest_inside"]) for each in every)],
+    ]
+    ends = Words(
+        "{} times fewer texels convolved, {} times as fast",
+        *(f["speed_up_texels"], f["speed_up_seconds"]),
+    )
+    table = Table(["", *_OF_WORK.values()], rows)
+    return [head, table, ends, *(Words("Wrote {}", each) for each in f["output"])]
+
+
+def speed_ups(f: Figures) -> list[Any]:
+    rows = []
+    for k, heads in enumerate(f["heads"]):
+        for name, key in (("texels", "texels"), ("time", "seconds"), ("published", "published")):
+            rows.append([f"{heads}, {name}", *f[key][k]])
+    return [Table(["heads", *(f"{each:g}" for each in f["distances"])], rows)]
+
+
 # A command that prints each of them, on the files of ``cli_world``.
 PRINTED: dict[str, Layout] = {
     "materials": materials_list,
@@ -1069,6 +1114,9 @@ PRINTED: dict[str, Layout] = {
     "motion wax.toml": motion,
     "motion wax.toml --frames shots --chart m.png": motion,
     "motion --table": variates,
+    "scene wax.svd2.kernel.json": scene,
+    "scene wax.svd2.kernel.json --heads 3 --distance 8 -o s.png": scene,
+    "scene wax.svd2.kernel.json --table": speed_ups,
     "choose wax.toml": choice,
     "choose wax.toml --tolerance 6": choice,
     "choose wax.toml --tolerance 7": choice,

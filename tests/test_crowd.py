@@ -1,17 +1,24 @@
 """Heads in a row: where they stand, what savings leave out, and the paper's table."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from meshes import sphere
 
+from sssfit.chart import figure_of
 from sssfit.crowd.frame import measure_frame
 from sssfit.crowd.row import Row
 from sssfit.crowd.runner import savings_of
 from sssfit.crowd.table import ALL, PUBLISHED, measure_table
-from sssfit.errors import ArgumentError
+from sssfit.errors import ArgumentError, RenderError
 from sssfit.fit import fit_result
+from sssfit.formats.pictures import load_image
 from sssfit.material import load_material
+from sssfit.render.bloom import bloomed
 from sssfit.render.texture import Savings
+from sssfit.render.texture_blur import Level, halved
+from sssfit.render.texture_lookup import look_up
 from sssfit.simulate import simulate_dipole
 
 SMALL = (60, 96)
@@ -86,3 +93,99 @@ def test_savings_are_chosen_by_name():
     assert savings_of(["depth"]) == Savings(by_depth=True)
     with pytest.raises(ArgumentError, match="culled, depth, clipped"):
         savings_of(["cull"])
+
+
+def test_the_table_has_the_papers_cells_and_says_so_where_it_has_none(kernel):
+    found = measure_table(
+        *(kernel,), heads=(1, 3), distances=(5.0, 7.0), map_size=32, resolution=SMALL
+    )
+    assert (found.heads, found.distances) == ((1, 3), (5.0, 7.0))
+    assert found.published[0, 0] == 1.10
+    assert np.isnan(found.published[1]).all()
+    assert found.to_dict()["published"] == [[1.10, None], [None, None]]
+    ratio = [
+        each.work["saved"].texels_convolved / each.work["screen"].texels_convolved
+        for each in found.frames[1]
+    ]
+    np.testing.assert_allclose(found.over_screen[1], ratio)
+    figure = figure_of(found)
+    assert [axes.get_title(loc="left") for axes in figure.axes][2] == "texture over screen space"
+
+
+def test_screen_space_is_near_texture_space_where_the_surface_faces_the_eye(kernel):
+    """Both diffuse in mm of the surface; they part at outlines."""
+    found = measure_frame(row(1, 8.0), kernel, savings=Savings(), map_size=256)
+    assert found.work["screen"].mean_delta_e < 1.0
+    assert found.work["saved"].mean_delta_e == 0.0
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3, 1.0])
+def test_bloom_moves_light_and_keeps_it(share):
+    picture = np.zeros((64, 80, 3))
+    picture[30:34, 40:44] = 10.0
+    found = bloomed(picture, share)
+    np.testing.assert_allclose(found.sum(axis=(0, 1)), picture.sum(axis=(0, 1)))
+    core = found[30:34, 40:44].sum() / picture.sum()
+    assert core == pytest.approx(1.0) if share == 0.0 else 1.0 - share < core < 1.0
+    assert (found >= 0.0).all()
+
+
+def test_bloom_of_a_point_is_its_three_gaussians():
+    """Widths are parts of the picture's height."""
+    picture = np.zeros((251, 251, 1))
+    picture[125, 125] = 1.0
+    found = bloomed(picture, 1.0)[:, :, 0]
+    x = np.arange(251) - 125.0
+    wide = [np.exp(-0.5 * (x / (part * 251)) ** 2) for part in (0.004, 0.016, 0.064)]
+    wanted = sum(
+        share * np.outer(each, each) / each.sum() ** 2
+        for share, each in zip((0.5, 0.3, 0.2), wide, strict=True)
+    )
+    np.testing.assert_allclose(found, wanted, atol=2e-5)
+
+
+def test_what_is_no_share_or_no_picture_of_colours_is_refused(kernel):
+    with pytest.raises(RenderError, match="bloom = 2"):
+        bloomed(np.zeros((4, 4, 3)), 2.0)
+    stages = tuple(dataclasses.replace(each, weights=each.weights[:, :2]) for each in kernel.stages)
+    errors = {name: each[:2] for name, each in kernel.errors.items()}
+    two = dataclasses.replace(
+        *(kernel,), channels=("a", "b"), blend=kernel.blend[:, :2], stages=stages, errors=errors
+    )
+    with pytest.raises(RenderError, match="2 channels"):
+        measure_frame(row(), two, savings=Savings())
+
+
+def test_a_wide_pixel_takes_the_mean_of_its_texels():
+    """At widths that are powers of 2, in the middle of those texels: their mean by coverage."""
+    rng = np.random.default_rng(5)
+    light, cover = rng.uniform(size=(16, 16, 2)), rng.integers(0, 2, (16, 16)).astype(float)
+    level = Level(cover, np.ones((16, 16, 2)))
+    for n in (0, 1, 2):
+        wide = 2**n
+        places = np.array([[wide * 1.5 - 0.5, wide * 2.5 - 0.5]])
+        found = look_up(light, level, places, np.array([float(wide)]))
+        block = np.s_[wide : 2 * wide, 2 * wide : 3 * wide]
+        weights = cover[block][..., None]
+        wanted = (weights * light[block]).sum(axis=(0, 1)) / max(weights.sum(), 1.0)
+        np.testing.assert_allclose(found[0], wanted, atol=1e-12)
+    between = look_up(light, level, np.array([[2.5, 4.5]]), np.array([2.0**0.25]))
+    ends = [look_up(light, level, np.array([[2.5, 4.5]]), np.array([each])) for each in (1.0, 2.0)]
+    np.testing.assert_allclose(between, 0.75 * ends[0] + 0.25 * ends[1])
+
+
+def test_constant_light_stays_constant_from_any_distance():
+    cover = np.random.default_rng(6).integers(0, 2, (9, 13)).astype(float)
+    light = 0.3 * cover[..., None]
+    assert set(np.unique(halved(light, cover)).round(12)) <= {0.0, 0.3}
+    places = np.stack(np.meshgrid(np.arange(9.0), np.arange(13.0)), axis=-1).reshape(-1, 2)
+    found = look_up(light, Level(cover, np.ones((9, 13, 2))), places, np.full(len(places), 5.0))
+    assert set(np.unique(found).round(12)) <= {0.0, 0.3}
+
+
+def test_a_frame_is_written_with_its_scale(kernel, tmp_path):
+    found = measure_frame(row(), kernel, savings=Savings(), map_size=64, screen=False)
+    found.save(tmp_path / "frame.exr")
+    read = load_image(tmp_path / "frame.exr")
+    np.testing.assert_allclose(read.pixels, found.picture.astype(np.float32), atol=0.0)
+    assert read.mm_per_pixel == found.row.camera.mm_per_pixel

@@ -402,8 +402,9 @@ SMALL = {
     "compare": ("--size", "8x6", *FEW),
     "choose": ("--resolution", "8x6"),
     "motion": ("--size", "8x6", "--length", "3", "--only", "variates"),
+    "scene": ("--resolution", "8x6", "--map-size", "16"),
 }
-SLOW = ("compare", "choose", "stability", "motion")
+SLOW = ("compare", "choose", "stability", "motion", "scene")
 # What each verb reads, and the options it cannot do without.
 USUAL = {
     "simulate": ("x.toml",),
@@ -413,6 +414,7 @@ USUAL = {
     "choose": ("skin1",),
     "stability": ("x.profile.npz", "--only", "hard-light"),
     "motion": ("x.profile.npz",),
+    "scene": ("x.kernel.json",),
     "import": ("x.csv",),
     "export": ("x.profile.npz", "--format", "csv"),
     "chart": ("x.profile.npz",),

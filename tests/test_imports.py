@@ -37,6 +37,7 @@ ROOMS = [
         "choose",
         "stability",
         "motion",
+        "crowd",
         "export",
         "chart",
         "cli",

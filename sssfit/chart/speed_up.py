@@ -14,7 +14,6 @@ from matplotlib.lines import Line2D
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.page import COLOURS, Style, add_legend, name_axes, new_page, tick_decades
-from sssfit.crowd.table import DISTANCES, HEADS, PUBLISHED
 from sssfit.messages import counted
 
 if TYPE_CHECKING:
@@ -50,45 +49,36 @@ def speed_up_figure(table: SpeedUpTable) -> Figure:
     )
     title = "What texture space need not compute"
     with new_page(_HEIGHT_INCHES, title, where, [_NOTE]) as (figure, below):
-        handles = [Line2D([], [], **_style(k)) for k in range(len(HEADS))]
-        below = add_legend(below, handles, [counted(each, "head") for each in HEADS])
+        handles = [Line2D([], [], **_style(k)) for k in range(len(table.heads))]
+        below = add_legend(below, handles, [counted(each, "head") for each in table.heads])
         grid = below.subplots(2, 2).ravel()
-        _draw(grid[0], table.texels, "speed-up in convolved texels", "times fewer", PUBLISHED)
-        _draw(grid[1], table.seconds, "speed-up in time", "times as fast", PUBLISHED)
-        _draw(grid[2], _over_screen(table), "texture over screen space", "texels / pixels", None)
+        _draw(grid[0], table, table.texels, "speed-up in convolved texels", "times fewer")
+        _draw(grid[1], table, table.seconds, "speed-up in time", "times as fast")
+        for axes in grid[:2]:
+            _draw_published(axes, table)
+        _draw(grid[2], table, table.over_screen, "texture over screen space", "texels / pixels")
         grid[2].axhline(1.0, color="#666666", lw=0.6)
         errors = np.array([[f.work["saved"].mean_delta_e for f in row] for row in table.frames])
-        _draw(grid[3], np.maximum(errors, 1e-4), "error of the savings", "mean Delta E 2000", None)
+        _draw(grid[3], table, np.maximum(errors, 1e-4), "error of the savings", "mean Delta E 2000")
     return figure
-
-
-def _over_screen(table: SpeedUpTable) -> FloatArray:
-    """Return texels convolved with savings over pixels convolved in screen space."""
-    return np.array(
-        [
-            [
-                f.work["saved"].texels_convolved / max(f.work["screen"].texels_convolved, 1)
-                for f in row
-            ]
-            for row in table.frames
-        ]
-    )
 
 
 def _style(k: int) -> Style:
     return {"color": _COLOURS[k], "marker": _MARKERS[k], "markersize": 3.5, "lw": 1.0}
 
 
-def _draw(
-    axes: Axes, values: FloatArray, title: str, y_label: str, published: FloatArray | None
-) -> None:
+def _draw(axes: Axes, table: SpeedUpTable, values: FloatArray, title: str, y_label: str) -> None:
     """Draw a line for each number of heads over the distance."""
     for k, line in enumerate(values):
-        axes.plot(DISTANCES, line, **_style(k))
-        if published is not None:
-            axes.plot(DISTANCES, published[k], color=_COLOURS[k], lw=0.9, linestyle=":")
+        axes.plot(table.distances, line, **_style(k))
     name_axes(axes, title, "distance (units of 100 mm)", y_label)
     for axis in (axes.xaxis, axes.yaxis):
         scale = axes.set_xscale if axis is axes.xaxis else axes.set_yscale
         scale("log")
         tick_decades(axis, 6)
+
+
+def _draw_published(axes: Axes, table: SpeedUpTable) -> None:
+    """Draw the paper's speed-ups, dotted."""
+    for k, line in enumerate(table.published):
+        axes.plot(table.distances, line, color=_COLOURS[k], lw=0.9, linestyle=":")

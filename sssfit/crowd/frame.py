@@ -16,7 +16,7 @@ from sssfit.errors import RenderError
 from sssfit.formats.pictures import image_format, save_image
 from sssfit.kernel import Kernel, Taps
 from sssfit.measure.delta_e import delta_e_2000, exposure_of
-from sssfit.messages import table
+from sssfit.messages import counted, table
 from sssfit.render.bloom import bloomed
 from sssfit.render.drawn import Drawn
 from sssfit.render.screen import render_screen
@@ -25,9 +25,12 @@ from sssfit.render.texture import Savings, TextureFrame, render_texture
 from sssfit.render.view import view_of
 
 Picture = npt.NDArray[np.floating[Any]]
+_Errors = tuple[float, float, float, int]
 
 MAP_SIZE = 1024
-_DEPTH_STEP = 0.05  # of the depth: two pixels further apart are on either side of an outline
+# Of a pixel's width: neighbours further apart in depth are on either side of a contour, or on a
+# surface seen at less than 14 degrees.
+_DEPTH_STEP = 4.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +47,8 @@ class Work:
         Over visible pixels, at the exposure of the picture without savings.
     largest_inside : float
         The largest one farther than the kernel reaches from outlines and from the picture's border.
+    inside_pixels : int
+        How many lie there.
     """
 
     texels_lit: int
@@ -52,6 +57,7 @@ class Work:
     mean_delta_e: float = 0.0
     largest_delta_e: float = 0.0
     largest_inside: float = 0.0
+    inside_pixels: int = 0
 
     @property
     def total_seconds(self) -> float:
@@ -63,11 +69,12 @@ class Work:
         return {
             "texels_lit": self.texels_lit,
             "texels_convolved": self.texels_convolved,
-            "seconds": dict(self.seconds),
-            "total_seconds": self.total_seconds,
+            "milliseconds": {name: 1e3 * each for name, each in self.seconds.items()},
+            "total_milliseconds": 1e3 * self.total_seconds,
             "mean_delta_e": self.mean_delta_e,
             "largest_delta_e": self.largest_delta_e,
             "largest_inside": self.largest_inside,
+            "inside_pixels": self.inside_pixels,
         }
 
 
@@ -150,8 +157,8 @@ class CrowdFrame:
         row = self.row
         texels, seconds = self.speed_up
         head = (
-            f"{row.heads} x a head of {row.head_units:g} units, {row.spacing_units:g} apart, from "
-            f"{row.distance_units:g} units (100 mm each); {row.fov_degrees:g} degrees, "
+            f"{counted(row.heads, 'head')} of {row.head_units:g} units, {row.spacing_units:g} "
+            f"apart, from {row.distance_units:g} units (100 mm each); {row.fov_degrees:g} degrees, "
             f"{row.resolution[1]} x {row.resolution[0]} pixels, maps of {self.map_size} texels"
         )
         every = self.work.values()
@@ -167,7 +174,7 @@ class CrowdFrame:
             ),
             ["all stages (ms)", *(f"{1e3 * each.total_seconds:,.0f}" for each in every)],
             ["mean Delta E", *(f"{each.mean_delta_e:.3f}" for each in every)],
-            ["largest inside", *(f"{each.largest_inside:.3f}" for each in every)],
+            ["largest Delta E inside", *(f"{each.largest_inside:.3f}" for each in every)],
         ]
         heads = ["", *(_NAMES[name] for name in self.work)]
         ends = f"{texels:.2f} times fewer texels convolved, {seconds:.2f} times as fast"
@@ -229,7 +236,7 @@ def measure_frame(
     return CrowdFrame(row, savings, map_size, saved.map_sizes, saved.picture, work)
 
 
-def _work_of(frame: TextureFrame, errors: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Work:
+def _work_of(frame: TextureFrame, errors: _Errors = (0.0, 0.0, 0.0, 0)) -> Work:
     return Work(frame.texels_lit, frame.texels_convolved, frame.seconds, *errors)
 
 
@@ -260,16 +267,14 @@ def _in_screen_space(
     return Work(pixels, passes * pixels, seconds, *errors)
 
 
-def _errors(
-    picture: Picture, truth: Picture, visible: BoolArray, inside: BoolArray
-) -> tuple[float, float, float]:
-    """Return mean and largest Delta E over visible pixels, and the largest inside."""
+def _errors(picture: Picture, truth: Picture, visible: BoolArray, inside: BoolArray) -> _Errors:
+    """Return mean and largest Delta E over visible pixels, and the largest inside of how many."""
     if not visible.any():
-        return 0.0, 0.0, 0.0
+        return 0.0, 0.0, 0.0, 0
     ours, true = (np.asarray(each[visible], np.float64) for each in (picture, truth))
     errors = delta_e_2000(ours, true, exposure_of(true))
     within = errors[inside[visible]]
-    return float(errors.mean()), float(errors.max()), float(within.max(initial=0.0))
+    return float(errors.mean()), float(errors.max()), float(within.max(initial=0.0)), within.size
 
 
 def _is_inside(drawn: Drawn, row: Row, kernel: Kernel, map_size: int) -> BoolArray:
@@ -283,7 +288,7 @@ def _is_inside(drawn: Drawn, row: Row, kernel: Kernel, map_size: int) -> BoolArr
     depth[here] = camera.distance_mm - points[:, 2]
     edge = np.ones(depth.shape, dtype=bool)
     edge[1:-1, 1:-1] = False
-    step = _DEPTH_STEP * np.minimum(depth, camera.distance_mm)
+    step = _DEPTH_STEP * camera.mm_per_pixel * depth / camera.distance_mm
     for axis in (0, 1):
         for shift in (-1, 1):
             edge |= np.abs(np.roll(depth, shift, axis) - depth) > step

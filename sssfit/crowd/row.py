@@ -58,16 +58,16 @@ class Row:
 
     def __post_init__(self) -> None:
         if isinstance(self.heads, bool) or not isinstance(self.heads, int):
-            raise ArgumentError(f"heads = {shown(self.heads)}; expected a whole number.")
+            raise ArgumentError(f"`heads = {shown(self.heads)}`: expected a whole number.")
         if not 1 <= self.heads <= MOST_HEADS:
-            raise ArgumentError(f"heads = {self.heads}; expected 1 to {MOST_HEADS}.")
+            raise ArgumentError(f"`heads = {self.heads}`: expected 1 to {MOST_HEADS}.")
         for name in ("distance_units", "head_units", "spacing_units"):
             value = getattr(self, name)
             if not 0.0 < value < math.inf:
-                raise ArgumentError(f"{name} = {shown(value)}; expected a number above 0.")
+                raise ArgumentError(f"`{name} = {shown(value)}`: expected a number above 0.")
         if self.distance_units <= 0.5 * self.head_units:
             raise ArgumentError(
-                f"distance_units = {self.distance_units:g}; expected more than half a head's "
+                f"`distance_units = {self.distance_units:g}`: expected more than half a head's "
                 f"height of {self.head_units:g} units."
             )
 

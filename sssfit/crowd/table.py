@@ -46,24 +46,59 @@ class SpeedUpTable:
     frames: tuple[tuple[CrowdFrame, ...], ...]
 
     @property
+    def heads(self) -> tuple[int, ...]:
+        """Number of heads of each row of the table."""
+        return tuple(row[0].row.heads for row in self.frames)
+
+    @property
+    def distances(self) -> tuple[float, ...]:
+        """Distance of each column [100 mm]."""
+        return tuple(each.row.distance_units for each in self.frames[0])
+
+    @property
+    def published(self) -> FloatArray:
+        """The paper's speed-ups of these cells; NaN where it has none."""
+        known = {
+            (heads, distance): PUBLISHED[i, k]
+            for i, heads in enumerate(HEADS)
+            for k, distance in enumerate(DISTANCES)
+        }
+        return np.array([[known.get((i, k), np.nan) for k in self.distances] for i in self.heads])
+
+    @property
     def texels(self) -> FloatArray:
-        """Texels convolved without savings over those with all (5, 6)."""
+        """Texels convolved without savings over those with all three."""
         return np.array([[each.speed_up[0] for each in row] for row in self.frames])
 
     @property
     def seconds(self) -> FloatArray:
-        """The same of the time (5, 6)."""
+        """The same of the time."""
         return np.array([[each.speed_up[1] for each in row] for row in self.frames])
+
+    @property
+    def over_screen(self) -> FloatArray:
+        """Texels convolved with all three over pixels that screen space convolves."""
+        return np.array(
+            [
+                [
+                    each.work["saved"].texels_convolved
+                    / max(each.work["screen"].texels_convolved, 1)
+                    for each in row
+                ]
+                for row in self.frames
+            ]
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the figures of ``sssfit scene --table --json``."""
         return plain(
             {
-                "heads": HEADS,
-                "distances": DISTANCES,
-                "published": PUBLISHED,
+                "heads": self.heads,
+                "distances": self.distances,
+                "published": [[_known(each) for each in row] for row in self.published],
                 "texels": self.texels,
                 "seconds": self.seconds,
+                "over_screen": self.over_screen,
                 "frames": [[each.to_dict() for each in row] for row in self.frames],
             }
         )
@@ -71,11 +106,16 @@ class SpeedUpTable:
     def text(self) -> str:
         """Return the table for a terminal: texels, seconds and published."""
         rows = []
-        for heads, *values in zip(HEADS, self.texels, self.seconds, PUBLISHED, strict=True):
+        columns = self.texels, self.seconds, self.published
+        for heads, *values in zip(self.heads, *columns, strict=True):
             for name, line in zip(("texels", "time", "published"), values, strict=True):
                 label = f"{heads}, {name}"
                 rows.append([label, *(f"{each:.2f}" for each in line)])
-        return table(["heads", *(f"{each:g}" for each in DISTANCES)], rows)
+        return table(["heads", *(f"{each:g}" for each in self.distances)], rows)
+
+
+def _known(value: float) -> float | None:
+    return None if np.isnan(value) else float(value)
 
 
 def measure_table(

@@ -17,7 +17,6 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._jit import texture as compiled
 from sssfit.errors import RenderError
 from sssfit.kernel import Kernel
 from sssfit.messages import shown
@@ -31,6 +30,7 @@ from sssfit.render.lights import (
     unit,
 )
 from sssfit.render.texture_blur import Level, blur_texture
+from sssfit.render.texture_lookup import look_up
 from sssfit.scene.camera import Camera
 from sssfit.scene.mesh import Mesh
 
@@ -161,7 +161,7 @@ def render_texture(
         with _clock(seconds, "convolution"):
             blurred, count = blur_texture(light, level, kernel, threads=threads)
         with _clock(seconds, "picture"):
-            _show(picture, drawn, k, mesh, blurred, level)
+            _show(picture, drawn, k, mesh, offset, camera, blurred, level)
         lit, convolved, sizes = lit + level.texels, convolved + count, [*sizes, size]
     with _clock(seconds, "picture"):
         if specular:
@@ -252,7 +252,14 @@ def _add_specular(
 
 
 def _show(
-    picture: FloatArray, drawn: Drawn, copy: int, mesh: Mesh, blurred: FloatArray, level: Level
+    picture: FloatArray,
+    drawn: Drawn,
+    copy: int,
+    mesh: Mesh,
+    offset: FloatArray,
+    camera: Camera,
+    blurred: FloatArray,
+    level: Level,
 ) -> None:
     """Write the pixels that show a copy from its map."""
     here = drawn.copies == copy
@@ -262,10 +269,11 @@ def _show(
     height, width = level.cover.shape
     uv = own.interpolated(mesh, mesh.uv)
     places = np.stack((height * (1.0 - uv[:, 1]) - 0.5, width * uv[:, 0] - 0.5), axis=1)
-    out, share = np.zeros((len(places), blurred.shape[-1])), np.zeros(len(places))
-    flat = np.ascontiguousarray(blurred).reshape(-1, blurred.shape[-1])
-    compiled.look_up(out, share, flat, level.compiled, places)
-    picture[here] = out
+    depth = camera.distance_mm - (own.interpolated(mesh, mesh.positions_mm) + offset)[:, 2]
+    pixel_mm = camera.mm_per_pixel * depth / camera.distance_mm
+    # An anisotropic filter's: the texels of a pixel that looks straight at the surface.
+    across = np.sqrt(height * width / mesh.stretch_mm()[drawn.faces[here]].prod(axis=1))
+    picture[here] = look_up(blurred, level, places, across * pixel_mm)
 
 
 @contextmanager

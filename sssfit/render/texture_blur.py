@@ -171,7 +171,7 @@ class _Chain:
             if step.from_light:
                 level = 0
             while level < step.level:
-                source = self._halved(source, level)
+                source = halved(source, self.levels[level].cover)
                 level += 1
             while len(sums) <= level:
                 shape = (*self.levels[len(sums)].cover.shape, light.shape[-1])
@@ -200,14 +200,6 @@ class _Chain:
             each.result()
         return out
 
-    def _halved(self, picture: FloatArray, level: int) -> FloatArray:
-        """Return means of 2 x 2 texels by coverage."""
-        four = four_texels(self.levels[level].cover, "zero")[..., None]
-        light = (four * four_texels(picture, "zero")).sum(axis=0)
-        whole = four.sum(axis=0)
-        mean: FloatArray = np.divide(light, whole, out=np.zeros_like(light), where=whole > 0.0)
-        return mean
-
     def _enlarged(self, picture: FloatArray, fine: int) -> FloatArray:
         """Return a picture of half the size by bilinear fetches."""
         height, width = self.levels[fine].cover.shape
@@ -218,6 +210,15 @@ class _Chain:
         flat = np.ascontiguousarray(picture).reshape(-1, channels)
         compiled.look_up(out, share, flat, self.textures[fine + 1], places)
         return out.reshape(height, width, channels)
+
+
+def halved(light: FloatArray, cover: FloatArray) -> FloatArray:
+    """Return means of 2 x 2 texels by coverage; 0 where nothing is covered."""
+    four = four_texels(cover, "zero")[..., None]
+    whole = four.sum(axis=0)
+    sums = (four * four_texels(light, "zero")).sum(axis=0)
+    mean: FloatArray = np.divide(sums, whole, out=np.zeros_like(sums), where=whole > 0.0)
+    return mean
 
 
 def _edges(count: int) -> Iterator[int]:

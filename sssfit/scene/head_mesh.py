@@ -130,7 +130,8 @@ def _angles() -> FloatArray:
     fine = np.linspace(-180.0, 180.0, 3601)
     close = np.interp(np.abs(0.5 * (fine[1:] + fine[:-1])), *_CLOSE_COLUMNS)
     passed = np.concatenate(([0.0], np.cumsum(close)))
-    return np.radians(np.interp(np.linspace(0.0, passed[-1], _COLUMNS + 1), passed, fine))
+    angles = np.interp(np.linspace(0.0, passed[-1], _COLUMNS + 1), passed, fine)
+    return np.radians(np.asarray(angles, dtype=np.float64))
 
 
 _Part = tuple[FloatArray, FloatArray, "np.ndarray[tuple[int, ...], np.dtype[np.int64]]"]
