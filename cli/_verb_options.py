@@ -207,8 +207,8 @@ SCENE = (
     option("--savings", Names(SAVINGS), "NAME,...", "What is left out, as above.  [default: all]"),
     option("--culled-by", ["vertex", "face"], None, "Normals by which texels face away.", "vertex"),
     option("--margin", _FACTOR, "D", "clipped: half widths of the picture that are kept.", 1.0),
-    option("--mesh", None, "FILE", "OBJ, PLY, glTF or GLB with texture coordinates in place of the "
-           'made head (needs "sssfit[mesh]").'),
+    option("--mesh", None, "FILE", "OBJ, PLY, glTF or GLB with texture coordinates; needs the "
+           "extra mesh.  [default: the made head]"),
     option("--bloom", NumberRange(0.0, 1.0), "SHARE", "Light of -o that glare spreads over the "
            "picture, such as 0.05.  [default: 0]"),
     flag("--table", "Measure the paper's Table 1 in place of a frame."),

@@ -1350,23 +1350,25 @@ def _scene_row(typed: str, default: str | None = None, words: str | None = None,
 
 
 SCENE = {
-    "--heads": _scene_row("--heads 3", "1", heads=3),
-    "--distance": _scene_row("--distance 7", "10", distance_units=7.0),
+    "--heads": _scene_row("--heads 3", words="1", heads=3),
+    "--distance": _scene_row("--distance 7", words="10", distance_units=7.0),
     "--head": _scene_row("--head 2", "2.5", head_units=2.0),
-    "--spacing": _scene_row("--spacing 3", "2", spacing_units=3.0),
-    "--fov": _scene_row("--fov 40", "30", fov_degrees=40.0),
-    "--resolution": _scene_row("--resolution 40x30", "1920x1200", resolution=(30, 40)),
-    "--map-size": _scene_row("--map-size 64", "1024", map_size=64),
+    "--spacing": _scene_row("--spacing 3", "2.0", spacing_units=3.0),
+    "--fov": _scene_row("--fov 40", "30.0", fov_degrees=40.0),
+    "--resolution": _scene_row(
+        "--resolution 40x30", words="1920x1200; 480x300 with --table", resolution=(30, 40)
+    ),
+    "--map-size": _scene_row("--map-size 64", words="1024; 512 with --table", map_size=64),
     "--savings": _scene_row("--savings depth,clipped", words="all", savings=["depth", "clipped"]),
     "--culled-by": _scene_row("--culled-by face", "vertex", culled_by="face"),
-    "--margin": _scene_row("--margin 1.5", "1", margin=1.5),
-    "--mesh": _scene_row("--mesh square.obj", mesh="square.obj"),
+    "--margin": _scene_row("--margin 1.5", "1.0", margin=1.5),
+    "--mesh": _scene_row("--mesh square.obj", words="the made head", mesh="square.obj"),
     "--bloom": Row(
         f"{_SCENE} -o s.exr", "--bloom .2", made_picture, lambda: _shown(0.2), default="0"
     ),
     "--table": Row(_SCENE, f"{_SCENE} --table", calls, _row_table),
     "--chart": Row(f"{_SCENE} --table", "--chart t.png", is_written("png"), lambda: ["t.png"]),
-    "--output": Row(_SCENE, "-o s.exr", made_picture, lambda: _shown(0.0)),
+    "--output": Row(_SCENE, "-o s.exr", names, lambda: ["s.exr"], words="none"),
     "--force": Row(
         f"{_SCENE} -o foreign.png", "--force", is_written("png"), lambda: ["foreign.png"]
     ),

@@ -109,7 +109,8 @@ def test_citation_has_the_version():
 def test_declared_dependencies_are_the_imported_ones():
     project = PYPROJECT["project"]
     needed = import_names(project["dependencies"])
-    extra = import_names(project["optional-dependencies"]["metrics"])
+    extras = (project["optional-dependencies"][name] for name in ("metrics", "mesh"))
+    extra = set[str]().union(*map(import_names, extras))
     foreign = set(sys.stdlib_module_names) | {"sssfit"}
     assert needed | extra == imported(r"^\s*(?:from|import) (\w+)") - foreign
     at_heads = imported(r"^(?:from|import) (\w+)")

@@ -64,7 +64,7 @@ class Row:
         for name in ("distance_units", "head_units", "spacing_units"):
             value = getattr(self, name)
             if not 0.0 < value < math.inf:
-                raise ArgumentError(f"`{name} = {shown(value)}`: expected a number above 0.")
+                raise ArgumentError(f"{name} = {shown(value)}; expected a number above 0.")
         if self.distance_units <= 0.5 * self.head_units:
             raise ArgumentError(
                 f"`distance_units = {self.distance_units:g}`: expected more than half a head's "

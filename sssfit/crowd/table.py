@@ -110,7 +110,7 @@ class SpeedUpTable:
         for heads, *values in zip(self.heads, *columns, strict=True):
             for name, line in zip(("texels", "time", "published"), values, strict=True):
                 label = f"{heads}, {name}"
-                rows.append([label, *(f"{each:.2f}" for each in line)])
+                rows.append([label, *("-" if np.isnan(each) else f"{each:.2f}" for each in line)])
         return table(["heads", *(f"{each:g}" for each in self.distances)], rows)
 
 
