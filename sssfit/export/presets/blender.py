@@ -94,13 +94,19 @@ def widths_mm(method: str, colour: FloatArray, eta: float) -> FloatArray:
 
 
 def convert(source: Source, chosen: Values) -> Values:
-    """Return colour and radii whose look has the profile's widths."""
-    method = str(chosen["method"])
-    eta = min(max(source.eta, 1.01), 3.8)
+    """Return colour and radii whose look has the profile's widths.
+
+    A walk's own shape is first taken for equal paths, then corrected once with the look itself,
+    whose channels share a grid: what it draws then gives the same radii to 1e-8.
+    """
+    method, eta = str(chosen["method"]), min(max(source.eta, 1.01), 3.8)
     colour = np.minimum(source.reflectance / normal_transmittance(eta), 1.0)
     shapes = source.shapes_per_mm
-    wanted_mm = (_walk_shapes(colour) if "walk" in method else 1.0) / shapes
-    radius_mm = wanted_mm / widths_mm(method, colour, eta)
+    width_mm = (_walk_shapes(colour) if "walk" in method else 1.0) / shapes
+    if "walk" in method:
+        drawn = _walk_look(source.title, colour, width_mm, colour * normal_transmittance(eta))
+        width_mm = width_mm * source_of(drawn).shapes_per_mm / shapes
+    radius_mm = width_mm / widths_mm(method, colour, eta)
     unit_mm = _MM * float(chosen["meters_per_unit"])  # type: ignore[arg-type]
     return {
         **chosen,
@@ -127,15 +133,15 @@ def profile(parameters: Parameters) -> Profile:
     total = colour * normal_transmittance(eta)
     if "walk" not in method:
         return burley_profile(parameters.title, parameters.preset.name, total, width_mm)
-    walk = medium.half_space("walk", "blender", width_mm, cycles_albedo(colour), eta=1.0)
-    return _brought_to(total, simulate_exact(walk), parameters)
+    return _walk_look(parameters.title, colour, width_mm, total)
 
 
-def _brought_to(total: FloatArray, found: Profile, parameters: Parameters) -> Profile:
-    """Return a profile with other totals (3,), named as the parameters."""
+def _walk_look(title: str, colour: FloatArray, path_mm: FloatArray, total: FloatArray) -> Profile:
+    """Return the exact profile of Cycles' medium, brought to the totals (3,), by title."""
+    walk = medium.half_space("walk", "blender", path_mm, cycles_albedo(colour), eta=1.0)
+    found = simulate_exact(walk)
     share = total / found.diffuse_reflectance
-    meta = {**found.meta, "method": "blender", "material_sha256": None,
-            "material": {"name": parameters.title, "source": "preset blender"}}  # fmt: skip
+    named = {"name": title, "source": "preset blender"}
     return dataclasses.replace(
         found,
         annulus_energy=found.annulus_energy * share,
@@ -143,7 +149,7 @@ def _brought_to(total: FloatArray, found: Profile, parameters: Parameters) -> Pr
         beyond_grid=found.beyond_grid * share,
         beyond_grid_stderr=found.beyond_grid_stderr * share,
         absorbed=np.zeros((0, 3)),
-        meta=meta,
+        meta={**found.meta, "method": "blender", "material_sha256": None, "material": named},
     )
 
 

@@ -1,0 +1,179 @@
+"""Documents of presets, read by the programs and the schemas that they are for."""
+
+import json
+
+import jsonschema
+import numpy as np
+import pytest
+
+from sssfit.export.presets import preset_of, preset_text
+from sssfit.material import load_material
+from sssfit.optics import normal_reflectance
+from sssfit.simulate import simulate_exact
+
+# The properties of the Khronos extensions' schemas, in words of JSON Schema.
+_SHARE = {"type": "number", "minimum": 0.0, "maximum": 1.0}
+_COLOUR = {"type": "array", "items": _SHARE, "minItems": 3, "maxItems": 3}
+EXTENSIONS = {
+    "KHR_materials_ior": {"ior": {"type": "number", "minimum": 1.0}},
+    "KHR_materials_volume": {
+        "thicknessFactor": {"type": "number", "minimum": 0.0},
+        "attenuationDistance": {"type": "number", "exclusiveMinimum": 0.0},
+        "attenuationColor": _COLOUR,
+    },
+    "KHR_materials_diffuse_transmission": {
+        "diffuseTransmissionFactor": _SHARE,
+        "diffuseTransmissionColorFactor": _COLOUR,
+    },
+    "KHR_materials_volume_scatter": {
+        "multiscatterColor": _COLOUR,
+        "scatterAnisotropy": {"type": "number", "minimum": -1.0, "maximum": 1.0},
+    },
+}
+
+
+def of_object(properties, *required):
+    return {
+        "type": "object",
+        "properties": properties,
+        "required": list(required),
+        "additionalProperties": False,
+    }
+
+
+SCHEMA = of_object(
+    {
+        "asset": of_object(
+            {"version": {"const": "2.0"}, "generator": {"type": "string"}}, "version"
+        ),
+        "extensionsUsed": {
+            "type": "array",
+            "items": {"enum": list(EXTENSIONS)},
+            "uniqueItems": True,
+            "minItems": len(EXTENSIONS),
+        },
+        "materials": {
+            "type": "array",
+            "minItems": 1,
+            "items": of_object(
+                {
+                    "name": {"type": "string"},
+                    "pbrMetallicRoughness": of_object(
+                        {"metallicFactor": _SHARE, "roughnessFactor": _SHARE}
+                    ),
+                    "extensions": of_object(
+                        {name: of_object(each) for name, each in EXTENSIONS.items()}, *EXTENSIONS
+                    ),
+                }
+            ),
+        },
+    },
+    "asset",
+    "materials",
+)
+
+
+@pytest.fixture(scope="module")
+def skin1():
+    return simulate_exact(load_material("skin1"))
+
+
+@pytest.mark.parametrize("name", ["skin1", "ketchup", "wholemilk"])
+def test_gltf_fits_the_schemas_of_its_extensions(name):
+    document = json.loads(preset_text(preset_of("gltf", load_material(name))))
+    jsonschema.validate(document, SCHEMA)
+    (material,) = document["materials"]
+    assert material["name"] == name
+
+
+@pytest.mark.parametrize("name", ["openpbr", "materialx"])
+def test_materialx_reads_and_validates_the_document(skin1, name):
+    mx = pytest.importorskip("MaterialX")
+    found = preset_of(name, skin1)
+    document = mx.createDocument()
+    mx.readFromXmlString(document, preset_text(found))
+    library = mx.createDocument()
+    mx.loadLibraries(mx.getDefaultDataLibraryFolders(), mx.getDefaultDataSearchPath(), library)
+    document.setDataLibrary(library)
+    is_valid, said = document.validate()
+    assert is_valid, said
+    (shader,) = [each for each in document.getNodes() if each.getType() == "surfaceshader"]
+    definition = shader.getNodeDef()
+    assert definition is not None
+    for each in shader.getInputs():
+        known = definition.getActiveInput(each.getName())
+        assert known is not None, each.getName()
+        assert known.getType() == each.getType(), each.getName()
+        value = each.getValue()
+        if each.getName() == "subsurface_color":
+            written = [value[k] for k in range(3)]
+            np.testing.assert_allclose(written, found["subsurface_color"], rtol=1e-6)
+
+
+# The scene of `test_mitsuba_draws_our_edge`, in mm: a camera looks down at a block of the medium,
+# lit from all sides but where a black sheet, a hair above it, covers half of it.
+_BLOCK_MM, _DEEP_MM, _GAP_MM = 120.0, 60.0, 1e-3
+
+
+def scene_of(text, spp, columns, rows, field_mm):
+    """Mitsuba's scene as XML around the preset's text."""
+    medium, interface = "medium_skin1", "interface_skin1"
+    shapes = f"""
+  <integrator type="volpath"><integer name="max_depth" value="-1" />
+    <integer name="rr_depth" value="200" /></integrator>
+  <emitter type="constant"><rgb name="radiance" value="1" /></emitter>
+  <shape type="cube">
+    <transform name="to_world"><scale x="{_BLOCK_MM}" y="{_BLOCK_MM}" z="{_DEEP_MM}" />
+      <translate z="{-_DEEP_MM}" /></transform>
+    <ref id="{interface}" /><ref name="interior" id="{medium}" />
+  </shape>
+  <shape type="rectangle">
+    <transform name="to_world"><scale x="{_BLOCK_MM}" y="{2 * _BLOCK_MM}" />
+      <translate x="{-_BLOCK_MM}" z="{_GAP_MM}" /></transform>
+    <bsdf type="twosided"><bsdf type="diffuse">
+      <rgb name="reflectance" value="0" /></bsdf></bsdf>
+  </shape>
+  <sensor type="orthographic">
+    <transform name="to_world"><scale x="{0.5 * field_mm}" y="{0.5 * field_mm}" />
+      <lookat origin="{0.5 * field_mm},0,50" target="{0.5 * field_mm},0,0" up="0,1,0" />
+    </transform>
+    <sampler type="independent"><integer name="sample_count" value="{spp}" /></sampler>
+    <film type="hdrfilm"><integer name="width" value="{columns}" />
+      <integer name="height" value="{rows}" /><rfilter type="box" />
+      <string name="pixel_format" value="rgb" /><string name="component_format" value="float32" />
+    </film>
+  </sensor>
+</scene>
+"""
+    return text.replace("</scene>\n", shapes.lstrip("\n"))
+
+
+@pytest.mark.slow
+def test_mitsuba_draws_our_edge(skin1):
+    """The light that comes back beside an edge of light, by Mitsuba's walk and by the profile.
+
+    Seen along the normal under equal radiance from all directions, a surface shows the total of the
+    profile by reciprocity; beside the shadow of a sheet, its integral over the lit half plane, plus
+    the specular reflection.
+    """
+    mi = pytest.importorskip("mitsuba")
+    mi.set_variant("scalar_rgb")
+    columns, rows, field_mm = 24, 24, 12.0
+    text = scene_of(preset_text(preset_of("mitsuba", skin1)), 256, columns, rows, field_mm)
+    picture = np.array(mi.render(mi.load_string(text)), dtype=float)
+    columns_of = picture.mean(axis=0)
+    stderr = picture.std(axis=0, ddof=1) / np.sqrt(rows)
+    if columns_of[0].sum() > columns_of[-1].sum():  # the camera's x runs to the left
+        columns_of, stderr = columns_of[::-1], stderr[::-1]
+    pitch = field_mm / columns
+    fine = 20
+    line = skin1.line_kernel(pitch / fine)
+    half = len(line) // 2
+    step = np.cumsum(line, axis=0)  # light from the left end to each strip's right edge
+    wanted = np.stack(
+        [step[half + fine * k : half + fine * (k + 1)].mean(axis=0) for k in range(columns)]
+    )
+    wanted = wanted + normal_reflectance(1.3)
+    sigmas = (columns_of - wanted) / stderr
+    assert np.abs(sigmas).max() < 4.5, np.abs(sigmas).max()
+    assert (stderr / wanted).max() < 0.05
