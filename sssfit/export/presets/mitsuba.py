@@ -1,7 +1,8 @@
 """Mitsuba 3: a homogeneous medium inside a dielectric, as a scene's part in XML.
 
-The medium has sigma_t and an albedo, which ``scale`` brings to the scene's unit: sigma_t is given
-per mm.
+The medium has sigma_t times ``scale``, per unit of the scene, and an albedo. Its reader takes
+colours from 0 to 1 only, so that sigma_t is a share of the strongest channel's extinction, the
+scale.
 """
 
 from __future__ import annotations
@@ -16,12 +17,14 @@ from sssfit.export.presets.text import head, number, numbers
 from sssfit.material import Material
 
 FIELDS = (
-    Field("sigma_t", "1/mm", "extinction coefficient", "colour", is_above=True),
+    Field("sigma_t", "1", "share of the scale of each channel", "colour", most=1.0, is_above=True),
     Field("albedo", "1", "single-scattering albedo", "colour", most=1.0),
     Field("g", "1", "mean cosine of scattering, above 0 forward", least=-0.99, most=0.99,
           default=0.0),
     Field("int_ior", "1", "refractive index", least=1.0, most=4.0, default=1.5046),
-    Field("scale", "1", "mm in the scene's unit: 1000 for metres", is_above=True, default=1.0,
+    Field("scale", "1/unit", "extinction of the strongest channel, per unit of the scene",
+          is_above=True, default=1.0),
+    Field("mm_per_unit", "mm", "length of the scene's unit", is_above=True, default=1.0,
           is_chosen=True),
 )  # fmt: skip
 
@@ -29,9 +32,11 @@ FIELDS = (
 def convert(source: Source, chosen: Values) -> Values:
     """Return the coefficients; exact."""
     path_mm, albedo, g, eta = medium.medium_of(source)
+    unit_mm = float(chosen["mm_per_unit"])  # type: ignore[arg-type]
     return {
         **chosen,
-        "sigma_t": tuple((1.0 / path_mm).tolist()),
+        "scale": unit_mm / float(path_mm.min()),
+        "sigma_t": tuple((path_mm.min() / path_mm).tolist()),
         "albedo": tuple(albedo.tolist()),
         "g": g,
         "int_ior": eta,
@@ -40,10 +45,11 @@ def convert(source: Source, chosen: Values) -> Values:
 
 def material(parameters: Parameters) -> Material:
     """Return the medium."""
+    strongest_per_mm = parameters.number("scale") / parameters.number("mm_per_unit")
     return medium.half_space(
         parameters.title,
         parameters.preset.name,
-        1.0 / np.array(parameters.colour("sigma_t")),
+        1.0 / (strongest_per_mm * np.array(parameters.colour("sigma_t"))),
         parameters.colour("albedo"),
         g=parameters.number("g"),
         eta=parameters.number("int_ior"),
