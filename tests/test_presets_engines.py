@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from sssfit.compare.engines import listing
 from sssfit.export.presets import (
     engine_look,
     import_preset,
@@ -18,6 +17,7 @@ from sssfit.export.presets.gltf import multiscatter_colour
 from sssfit.export.presets.hdrp import filter_radius_mm
 from sssfit.export.presets.separable import FALLOFF, STRENGTH
 from sssfit.export.presets.unreal import distance_mm
+from sssfit.kernel.listing import listing
 from sssfit.material import load_material
 from sssfit.shapes import s_diffuse_mean_free_path, s_perpendicular
 from sssfit.simulate import simulate_dipole, simulate_exact

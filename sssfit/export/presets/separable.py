@@ -1,6 +1,6 @@
 """The kernel of separable-sss, which several engines take: width, strength and falloff.
 
-Jimenez' listing (``calculateKernel``; `sssfit.compare.engines.listing`) evaluates the red channel
+Jimenez' listing (``calculateKernel``; `sssfit.kernel.listing.listing`) evaluates the red channel
 of d'Eon's skin at a few offsets o, which grow as the square up to 3, or to 2 with 20 taps or fewer:
 
     w(o) ~ area(o) p(o / (0.001 + f)),    p(r) = sum_i w_i exp(-r^2 / 2 v_i) / (2 pi v_i),
@@ -23,12 +23,12 @@ import numpy as np
 from scipy.optimize import brentq
 
 from sssfit.arrays import FloatArray
-from sssfit.compare.engines import listing
 from sssfit.errors import KernelError
 from sssfit.export.presets.fields import Values
 from sssfit.export.presets.record import Parameters
 from sssfit.grid import grid_of_lengths
 from sssfit.kernel import Stage, Taps
+from sssfit.kernel.listing import LISTED, listing
 from sssfit.profile import Profile
 from sssfit.shapes import gaussian_beyond
 from sssfit.simulate.closed_form import closed_form_profile
@@ -38,9 +38,7 @@ KERNEL_RANGE = 3.0  # units of the offsets that an engine's width stands for
 CHANNELS = ("R", "G", "B")
 COUNTS = (11, 17, 25)
 _BIAS = 0.001  # of the falloff
-# The red channel of d'Eon's skin without its narrowest Gaussian, which the strength stands for.
-_WEIGHTS = np.array((0.100, 0.118, 0.113, 0.358, 0.078))
-_VARIANCES = np.array((0.0484, 0.187, 0.567, 1.99, 7.41))
+_WEIGHTS, _VARIANCES = (np.array(each) for each in zip(*LISTED, strict=True))
 # As a kernel on a line each Gaussian has the energy w / sqrt(v).
 _ON_LINE = _WEIGHTS / np.sqrt(_VARIANCES) / float((_WEIGHTS / np.sqrt(_VARIANCES)).sum())
 PIXEL_MM = 0.3  # frequencies up to those of such pixels count

@@ -11,9 +11,9 @@ from scipy import special
 from scipy.optimize import least_squares
 
 from sssfit.arrays import FloatArray
-from sssfit.compare.engines import listing
 from sssfit.export.presets.separable import LEAST_FALLOFF, PIXEL_MM, Separable
 from sssfit.export.presets.source import Source
+from sssfit.kernel.listing import listing
 from sssfit.profile import Profile
 
 # Along an axis: taps that reach over 13 mm oscillate between fewer (160 change the width by .04 %).
