@@ -19,7 +19,7 @@ from sssfit.export.presets.separable import FALLOFF, STRENGTH
 from sssfit.export.presets.unreal import distance_mm
 from sssfit.kernel.listing import listing
 from sssfit.material import load_material
-from sssfit.shapes import s_diffuse_mean_free_path, s_perpendicular
+from sssfit.shapes import diffusion_radius, s_diffuse_mean_free_path, s_perpendicular
 from sssfit.simulate import simulate_dipole, simulate_exact
 from sssfit.simulate.inversion import reflectance_of, van_de_hulst_albedo
 
@@ -198,6 +198,42 @@ def test_widths_are_lengths_on_the_surface(name, given, reach_mm):
     look = engine_look(parameters_from(name, {"albedo": "1,1,1", **given}))
     reach = 3.0 if look.stages[0].offsets_mm.size >= 10 else 2.0
     assert look.stages[0].offsets_mm[-1] * 3.0 / reach == pytest.approx(reach_mm)
+
+
+# The re-derived algorithm: red's weight at the centre and at the next tap, and its offset; the root
+# of the second moment along an axis before and after the strength is mixed in [mm].
+LISTED = {
+    25: (0.53060512, 0.02114117, 0.0208333, 0.724, 0.501),
+    17: (0.53634254, 0.03244625, 0.03125, 0.584, 0.405),
+    11: (0.56047879, 0.07718024, 0.08, 0.571, 0.396),
+}
+
+
+@pytest.mark.parametrize("taps", LISTED)
+def test_the_kernel_of_separable_sss_is_the_published_one(taps):
+    centre, near, offset, before_mm, after_mm = LISTED[taps]
+    given = {"albedo": "1,1,1", "sssWidth": 0.0015, "strength": STRENGTH, "falloff": FALLOFF}
+    (stage,) = engine_look(
+        parameters_from("iryoku", {**given, "SSSS_N_SAMPLES": taps})
+    ).stages  # sssWidth of 1.5 mm: one unit of an offset is 1 mm
+    red = stage.weights[:, 0]
+    assert red[0] == pytest.approx(centre, abs=5e-9)
+    assert red[1] == pytest.approx(near, abs=5e-9)
+    assert stage.offsets_mm[0] == pytest.approx(offset, abs=5e-8)
+    assert stage.offsets_mm[-1] == pytest.approx(3.0 if taps > 20 else 2.0)
+    # Quadratic spacing, and unit sums in every channel.
+    np.testing.assert_allclose(
+        np.sqrt(stage.offsets_mm / stage.offsets_mm[-1]), np.arange(1, len(red)) / (len(red) - 1)
+    )
+    np.testing.assert_allclose(stage.weights[0] + 2.0 * stage.weights[1:].sum(axis=0), 1.0)
+    second = 2.0 * float(red[1:] @ stage.offsets_mm**2)
+    assert math.sqrt(second) == pytest.approx(after_mm, abs=5e-4)
+    assert math.sqrt(second / STRENGTH[0]) == pytest.approx(before_mm, abs=5e-4)
+
+
+def test_normalised_diffusions_radii_are_the_published_ones():
+    found = diffusion_radius([0.5, 0.9, 0.997], 1.0)
+    np.testing.assert_allclose(found, [1.5521832635, 6.0622291433, 16.5643987534], atol=5e-11)
 
 
 def test_o3de_draws_twice_its_distance(skin1):

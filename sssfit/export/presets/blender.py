@@ -205,8 +205,8 @@ BLENDER = Preset(
         "github.com/blender/blender: intern/cycles/kernel/closure/bssrdf.h, bssrdf_setup_radius",
         "github.com/blender/blender: intern/cycles/kernel/integrator/subsurface_random_walk.h, "
         "subsurface_random_walk_remap",
-        "github.com/blender/blender: source/blender/draw/engines/eevee/shaders/"
-        "effect_subsurface_frag.glsl, burley_setup",
+        "github.com/blender/blender: source/blender/draw/engines/eevee_next/shaders/"
+        "eevee_subsurface_convolve_comp.glsl, burley_setup",
     ),
     doubts=doubts,
 )

@@ -7,7 +7,7 @@ of d'Eon's skin at a few offsets o, which grow as the square up to 3, or to 2 wi
 
 and mixes with the unblurred light by the strength t. Two passes of it blur a picture. p is a cross
 section of a profile in the plane, used as a kernel on a line. As a line's kernel its Gaussians have
-the weights w_i / sqrt(v_i), those of another, narrower profile: 0.87 mm instead of 1.35 mm of
+the weights w_i / sqrt(v_i), those of another, narrower profile: 0.87 mm instead of 1.34 mm of
 standard deviation along an axis, at falloff 1. `sssfit.export.presets.separable_fit` therefore
 fits what the taps do to a picture, not p.
 """

@@ -91,8 +91,8 @@ STRIDE = Preset(
     origin=(
         "github.com/stride3d/stride: sources/engine/Stride.Rendering/Rendering/Images/"
         "SubsurfaceScattering/SubsurfaceScatteringBlurShader.sdsl, SSSSBlurPS",
-        "github.com/stride3d/stride: MaterialSubsurfaceScatteringFeature.cs, "
-        "SubsurfaceScatteringKernelGenerator, CalculateScatteringKernel",
+        "github.com/stride3d/stride: sources/engine/Stride.Rendering/Rendering/Materials/"
+        "SubsurfaceScattering/SubsurfaceScatteringKernelGenerator.cs, CalculateScatteringKernel",
     ),
     of_taps=of_taps,
 )

@@ -218,6 +218,8 @@ UNREAL = Preset(
     lost="the shape of the profile beyond one distance a channel, and the refractive index.",
     origin=(
         "Christensen and Burley 2015, eqs. 3, 5 and 8",
+        "github.com/EpicGames/UnrealEngine: Engine/Shaders/Private/BurleyNormalizedSSSCommon.ush, "
+        "the conversion of mean free paths (open to licensees)",
         "github.com/community-shaders/skyrim-community-shaders: features/Subsurface Scattering/"
         "Shaders/SubsurfaceScattering/Burley.hlsli, GetScalingFactor",
         "github.com/iryoku/separable-sss: Demo/Code/SeparableSSS.cpp, calculateKernel",
