@@ -243,6 +243,13 @@ def test_bad_input_gives_one_clear_line(name, given, said):
     assert "\n" not in str(raised.value)
 
 
+def test_a_title_suits_a_file():
+    given = {"baseColor": "1,1,1", "scatteringDistance": "1,1,1"}
+    assert import_preset("hdrp", given, "my-skin").material_name == "my-skin"
+    with pytest.raises(SssfitError, match="my skin/2"):
+        import_preset("hdrp", given, "my skin/2")
+
+
 def test_a_choice_is_not_a_parameter_of_the_material(skin1):
     with pytest.raises(ArgumentError, match="takes no 'baseColor'"):
         preset_of("hdrp", skin1, baseColor="1,1,1")

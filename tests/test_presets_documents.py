@@ -1,6 +1,7 @@
 """Documents of presets, read by the programs and the schemas that they are for."""
 
 import json
+import re
 
 import jsonschema
 import numpy as np
@@ -108,6 +109,33 @@ def test_materialx_reads_and_validates_the_document(skin1, name):
         if each.getName() == "subsurface_color":
             written = [value[k] for k in range(3)]
             np.testing.assert_allclose(written, found["subsurface_color"], rtol=1e-6)
+
+
+PARAMETER = re.compile(r'"(string|rgb|float) (\w+)" \[ (?:"([^"]*)"|([-\d.e+ ]+)) \]')
+
+
+def test_pbrts_directives_are_those_of_its_file_format(skin1):
+    """MakeNamedMedium, MediumInterface and Material with typed lists, as it documents them."""
+    found = preset_of("pbrt", skin1, scale=1000.0)
+    code = [line.split("#")[0] for line in preset_text(found).splitlines()]
+    words = [line.strip() for line in code if line.strip()]
+    directives = [each.split()[0] for each in words if not each.startswith('"')]
+    assert directives == [
+        "MakeNamedMedium",
+        "AttributeBegin",
+        "MediumInterface",
+        "Material",
+        "AttributeEnd",
+    ]
+    values = {}
+    for kind, name, word, numbers in PARAMETER.findall("\n".join(words)):
+        values[name] = word if kind == "string" else [float(each) for each in numbers.split()]
+        assert len(values[name]) == (3 if kind == "rgb" else len(values[name]))
+    assert values["type"] == "homogeneous"
+    layer = skin1.material.layers[0]
+    np.testing.assert_allclose(values["sigma_a"], layer.sigma_a_per_mm, rtol=1e-8)
+    np.testing.assert_allclose(values["sigma_s"], layer.sigma_s_per_mm, rtol=1e-8)
+    assert (values["scale"], values["g"], values["eta"]) == ([1000.0], [0.0], [1.3])
 
 
 # The scene of `test_mitsuba_draws_our_edge`, in mm: a camera looks down at a block of the medium,

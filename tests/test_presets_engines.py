@@ -15,6 +15,7 @@ from sssfit.export.presets import (
 from sssfit.export.presets.blender import cycles_albedo, dipole_albedo, widths_mm
 from sssfit.export.presets.gltf import multiscatter_colour
 from sssfit.export.presets.hdrp import filter_radius_mm
+from sssfit.export.presets.medium import albedo_of_colour, entering_colour
 from sssfit.export.presets.separable import FALLOFF, STRENGTH
 from sssfit.export.presets.unreal import distance_mm
 from sssfit.kernel.listing import listing
@@ -79,6 +80,15 @@ def test_unreals_older_triple_is_the_kernel_of_separable_sss():
     np.testing.assert_allclose(share, 1.0 - np.array(STRENGTH), atol=0.01)
 
 
+def test_unreals_tint_leaves_the_rest_of_the_light_where_it_fell():
+    given = {**SKIN, "MeanFreePathDistance": 0.13}
+    whole = import_preset("unreal", given)
+    tinted = import_preset("unreal", {**given, "Tint": "0.25,0.5,1"})
+    np.testing.assert_allclose(tinted.diffuse_reflectance, whole.diffuse_reflectance, rtol=1e-12)
+    share = tinted.annulus_energy[5:] / whole.annulus_energy[5:]
+    np.testing.assert_allclose(share, np.broadcast_to((0.25, 0.5, 1.0), share.shape), rtol=1e-9)
+
+
 def test_hdrps_filter_holds_997_of_a_thousand():
     found = parameters_from(
         "hdrp",
@@ -120,6 +130,14 @@ def test_openpbrs_colour_is_the_reflectance_below_the_interface(skin1):
     )
     radius_mm = 10.0 * found["subsurface_radius"] * np.array(found["subsurface_radius_scale"])
     np.testing.assert_allclose(radius_mm, skin1.material.layers[0].mean_free_path_mm, rtol=1e-12)
+
+
+def test_the_albedo_of_a_colour_has_it_to_nine_digits():
+    colour = np.array([0.0, 1e-4, 7e-3, 0.44, 0.97, 1.0])
+    for eta, g in ((1.0, 0.0), (1.4, 0.9)):
+        albedo = albedo_of_colour(colour, g, eta)
+        assert ((albedo >= 0.0) & (albedo <= 1.0)).all()
+        np.testing.assert_allclose(entering_colour(albedo, g, eta), colour, rtol=2e-8, atol=1e-12)
 
 
 def test_gltf_reads_the_coefficients_back(skin1):

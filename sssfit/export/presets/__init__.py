@@ -18,6 +18,7 @@ from sssfit.export.presets.record import Parameters, Preset
 from sssfit.export.presets.source import source_of
 from sssfit.kernel import SeparableKernel, Taps
 from sssfit.material import Material
+from sssfit.material.checks import check_texts
 from sssfit.messages import did_you_mean, shown
 from sssfit.methods import PRESETS, imported
 from sssfit.profile import Profile
@@ -99,8 +100,11 @@ def parameters_from(name: str, given: Mapping[str, object], title: str = "") -> 
     ------
     ArgumentError
         The preset or a name is unknown, a value is invalid or missing.
+    MaterialError
+        The title does not suit a file's name.
     """
     wanted = preset(name)
+    check_texts(title or name, "")
     return _warned(wanted, title or name, wanted.read(given, title=title or name))
 
 

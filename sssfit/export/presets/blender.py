@@ -11,7 +11,8 @@ With l = radius times scale in the scene's metres,
 
 The walk begins with a cosine below the surface and meets no interface on its way out. Cycles turns
 the colour into its albedo by a fit to such walks (`cycles_albedo`). The look of both walks is the
-exact profile of that medium without an interface, brought to the colour's energy.
+exact profile of that medium without an interface, brought to the colour's energy; it is lit along
+the normal.
 """
 
 from __future__ import annotations

@@ -33,16 +33,19 @@ def burley_profile(
     preset: str,
     albedo: npt.ArrayLike,
     distance_mm: npt.ArrayLike,
+    blurred: npt.ArrayLike = 1.0,
 ) -> Profile:
     """Return the profile of an albedo (3,) and a distance d (3,) [mm], by name and preset.
 
-    The closed form to rounding; it has no material, and its ``meta["method"]`` is "burley".
+    The closed form to rounding; it has no material, and its ``meta["method"]`` is "burley". Of the
+    light the share ``blurred`` is; the rest lies in the first annulus.
     """
     total = np.asarray(albedo, dtype=np.float64)
     shapes = 1.0 / np.asarray(distance_mm, dtype=np.float64)
     radius_mm = 3.0 * math.log(0.75 / _BEYOND) / float(shapes.min())
     grid = grid_of_lengths(1.0 / float(shapes.max()) / _RINGS_PER_DISTANCE, radius_mm)
-    beyond = total * diffusion_beyond(grid.r_edges_mm[:, None], shapes)
+    beyond = total * np.asarray(blurred) * diffusion_beyond(grid.r_edges_mm[:, None], shapes)
+    beyond[0] = total
     return closed_form_profile(
         title,
         "burley",

@@ -18,8 +18,6 @@ from sssfit.export.presets.record import Parameters, Preset
 from sssfit.export.presets.source import Source
 from sssfit.export.presets.text import head
 from sssfit.material import Material
-from sssfit.optics import normal_transmittance
-from sssfit.simulate.inversion import invert_reflectance
 
 VERSION = "1.39"
 FIELDS = (
@@ -54,13 +52,12 @@ def convert(source: Source, chosen: Values) -> Values:
 def material(parameters: Parameters) -> Material:
     """Return the medium, its albedo by the exact inversion of the colour."""
     eta, g = parameters.number("specular_IOR"), parameters.number("subsurface_anisotropy")
-    total = normal_transmittance(eta) * np.array(parameters.colour("subsurface_color"))
     path_mm = parameters.number("mm_per_unit") * parameters.number("subsurface_scale")
     return medium.half_space(
         parameters.title,
         parameters.preset.name,
         path_mm * np.array(parameters.colour("subsurface_radius")),
-        medium.full_albedo(invert_reflectance(total, eta).albedo, g),
+        medium.albedo_of_colour(parameters.colour("subsurface_color"), g, eta),
         g=g,
         eta=eta,
     )

@@ -20,8 +20,10 @@ from sssfit.optics import normal_transmittance
 from sssfit.profile import Profile
 from sssfit.simulate import simulate_exact
 from sssfit.simulate.exact import diffuse_reflectance
+from sssfit.simulate.inversion import invert_reflectance
 
 CHANNELS = ("R", "G", "B")
+_STEP, _LEAST, _NEAR_ONE = 1e-4, 1e-300, 1e-4  # of albedos
 
 
 def medium_of(source: Source) -> tuple[FloatArray, FloatArray, float, float]:
@@ -62,6 +64,22 @@ def entering_colour(albedo: FloatArray, g: float, eta: float) -> FloatArray:
     """Return the share of the entering light that comes back, R_d / (1 - R_sp), normal light."""
     total = diffuse_reflectance(reduced_albedo(albedo, g), eta)
     return np.asarray(total / normal_transmittance(eta))
+
+
+def albedo_of_colour(colour: npt.ArrayLike, g: float, eta: float) -> FloatArray:
+    """Return the albedos (3,) whose `entering_colour` is a colour, 0 to 1.
+
+    The exact inversion, good to 1e-8 of the incident light, and a secant step, by which dark
+    colours come back to six digits too.
+    """
+    asked = np.asarray(colour, dtype=np.float64)
+    found = invert_reflectance(normal_transmittance(eta) * asked, eta).albedo
+    moved = found * (1.0 - _STEP)
+    first, second = (entering_colour(each, 0.0, eta) for each in (found, moved))
+    slope = np.where(found > 0.0, (first - second) / np.maximum(found - moved, _LEAST), 1.0)
+    # The slope is infinite at albedo 1, where the inversion has all digits.
+    step = np.where(found < 1.0 - _NEAR_ONE, (asked - first) / slope, 0.0)
+    return full_albedo(np.clip(found + step, 0.0, 1.0), g)
 
 
 def half_space(

@@ -21,8 +21,6 @@ from sssfit.export.presets.materialx import document, value
 from sssfit.export.presets.record import Parameters, Preset
 from sssfit.export.presets.source import Source
 from sssfit.material import Material
-from sssfit.optics import normal_transmittance
-from sssfit.simulate.inversion import invert_reflectance
 
 FIELDS = (
     Field("subsurface_color", "1", "R_d / (1 - R_sp) for light along the normal, linear", "colour",
@@ -56,15 +54,13 @@ def convert(source: Source, chosen: Values) -> Values:
 def material(parameters: Parameters) -> Material:
     """Return the medium, its albedo by the exact inversion of the colour."""
     eta, g = parameters.number("specular_ior"), parameters.number("subsurface_scatter_anisotropy")
-    total = normal_transmittance(eta) * np.array(parameters.colour("subsurface_color"))
-    reduced = invert_reflectance(total, eta).albedo
     path_mm = parameters.number("mm_per_unit") * parameters.number("subsurface_radius")
     scale = np.array(parameters.colour("subsurface_radius_scale"))
     return medium.half_space(
         parameters.title,
         parameters.preset.name,
         path_mm * scale,
-        medium.full_albedo(reduced, g),
+        medium.albedo_of_colour(parameters.colour("subsurface_color"), g, eta),
         g=g,
         eta=eta,
     )

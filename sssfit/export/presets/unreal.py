@@ -148,7 +148,8 @@ def profile(parameters: Parameters) -> Profile:
     if not parameters["EnableBurley"]:
         return WORDS.profile(parameters)
     albedo, name = parameters.colour("SurfaceAlbedo"), parameters.preset.name
-    return burley_profile(parameters.title, name, albedo, distance_mm(parameters))
+    blurred = parameters.colour("Tint")
+    return burley_profile(parameters.title, name, albedo, distance_mm(parameters), blurred)
 
 
 def look(parameters: Parameters) -> Profile | Taps:
