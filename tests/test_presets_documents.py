@@ -2,10 +2,13 @@
 
 import json
 import re
+import shutil
+import subprocess
 
 import jsonschema
 import numpy as np
 import pytest
+from shader_runs import needs
 
 from sssfit.export.presets import preset_of, preset_text
 from sssfit.material import load_material
@@ -136,6 +139,42 @@ def test_pbrts_directives_are_those_of_its_file_format(skin1):
     np.testing.assert_allclose(values["sigma_a"], layer.sigma_a_per_mm, rtol=1e-8)
     np.testing.assert_allclose(values["sigma_s"], layer.sigma_s_per_mm, rtol=1e-8)
     assert (values["scale"], values["g"], values["eta"]) == ([1000.0], [0.0], [1.3])
+
+
+# What makes a whole program of a preset's text, for a compiler: its front and its end.
+PROGRAMS = {
+    "godot": (
+        "#version 450\n#define USE_25_SAMPLES\n",
+        "layout(location = 0) out vec4 found;\n"
+        "void main() { found = skin_kernel[kernel_size - 1] + kernel[1].xyxy; }\n",
+        ["-S", "frag"],
+    ),
+    "iryoku": (
+        "",
+        "float4 main() : SV_Target { return kernel[SSSS_N_SAMPLES - 1] * sssWidth; }\n",
+        ["-D", "-e", "main", "-S", "frag", "-V"],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", PROGRAMS)
+def test_a_compiler_takes_the_tables(skin1, tmp_path, name):
+    needs("hlsl")
+    front, end, flags = PROGRAMS[name]
+    path = tmp_path / "table.frag"
+    path.write_text(front + preset_text(preset_of(name, skin1)) + end, encoding="utf-8")
+    command = ["glslangValidator", *flags, path.name]
+    run = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stdout
+
+
+def test_node_takes_the_script_for_babylon(skin1, tmp_path):
+    if shutil.which("node") is None:
+        pytest.skip("needs node")
+    path = tmp_path / "profile.js"
+    path.write_text(preset_text(preset_of("babylon", skin1)), encoding="utf-8")
+    run = subprocess.run(["node", "--check", path], capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stderr
 
 
 # The scene of `test_mitsuba_draws_our_edge`, in mm: a camera looks down at a block of the medium,
