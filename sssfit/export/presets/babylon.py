@@ -74,11 +74,10 @@ def write(parameters: Parameters) -> str:
     body = [
         "const subSurface = scene.enableSubSurfaceForPrePass();",
         f"subSurface.metersPerUnit = {number(parameters.number('metersPerUnit'))};",
-        "const profile = subSurface.addDiffusionProfile("
-        f"new BABYLON.Color3({numbers(parameters.colour('color'))}));",
         "material.subSurface.isScatteringEnabled = true;",
-        "material.subSurface.scatteringDiffusionProfile = subSurface.ssDiffusionProfileColors["
-        "profile];",
+        "// This adds the profile; there is room for four of one's own.",
+        "material.subSurface.scatteringDiffusionProfile = "
+        f"new BABYLON.Color3({numbers(parameters.colour('color'))});",
         f"material.albedoColor = new BABYLON.Color3({numbers(parameters.colour('albedo'))});",
     ]
     return lines(parameters, "//", body)

@@ -66,7 +66,6 @@ def write(parameters: Parameters) -> str:
         "description": f"{parameters.title}, {parameters.preset.model}",
         "materialType": "@gemroot:Atom_Feature_Common@/Assets/Materials/Types/"
         "EnhancedPBR.materialtype",
-        "materialTypeVersion": 5,
         "propertyValues": values,
     }
     return json.dumps(document, indent=4) + "\n"

@@ -218,7 +218,7 @@ UNREAL = Preset(
     profile=profile,
     lost="the shape of the profile beyond one distance a channel, and the refractive index.",
     origin=(
-        "Christensen and Burley 2015, eqs. 3, 5 and 8",
+        "P. H. Christensen, B. Burley 2015, technical memo 15-04, two of the three fits of s",
         "github.com/EpicGames/UnrealEngine: Engine/Shaders/Private/BurleyNormalizedSSSCommon.ush, "
         "the conversion of mean free paths (open to licensees)",
         "github.com/community-shaders/skyrim-community-shaders: features/Subsurface Scattering/"
