@@ -540,6 +540,27 @@ RENDERERS: Mapping[str, Method] = {
 # What diffusion in texture space may leave out.
 SAVINGS = ("culled", "depth", "clipped")
 
+# Engines that take a few parameters in place of a table: files of `sssfit.export.presets`.
+_IN = "sssfit.export.presets"
+PRESETS: Mapping[str, Method] = {
+    "iryoku": Method(f"{_IN}.iryoku:IRYOKU", "separable-sss: 11, 17 or 25 taps and a width"),
+    "unreal": Method(f"{_IN}.unreal:UNREAL", "Unreal Engine: subsurface profile"),
+    "hdrp": Method(f"{_IN}.hdrp:HDRP", "Unity HDRP: diffusion profile"),
+    "blender": Method(f"{_IN}.blender:BLENDER", "Blender: Principled BSDF, Cycles and EEVEE"),
+    "godot": Method(f"{_IN}.godot:GODOT", "Godot: constants of its shader"),
+    "babylon": Method(f"{_IN}.babylon:BABYLON", "Babylon.js: diffusion profile"),
+    "openpbr": Method(f"{_IN}.openpbr:OPENPBR", "OpenPBR Surface: a MaterialX document"),
+    "materialx": Method(f"{_IN}.materialx:MATERIALX", "MaterialX: its standard surface"),
+    "pbrt": Method(f"{_IN}.pbrt:PBRT", "pbrt-v4: homogeneous medium"),
+    "mitsuba": Method(f"{_IN}.mitsuba:MITSUBA", "Mitsuba: homogeneous medium"),
+    "gltf": Method(f"{_IN}.gltf:GLTF", "glTF: KHR_materials_volume_scatter"),
+    "stride": Method(f"{_IN}.stride:STRIDE", "Stride: subsurface scattering feature"),
+    "o3de": Method(f"{_IN}.o3de:O3DE", "Open 3D Engine: EnhancedPBR material"),
+    "community-shaders": Method(
+        f"{_IN}.community_shaders:COMMUNITY_SHADERS", "Community Shaders: both methods"
+    ),
+}
+
 
 def settings_of(methods: Mapping[str, Method]) -> dict[str, tuple[Setting, tuple[str, ...]]]:
     """Return every setting once by its name, with the names of the methods that have it.

@@ -7,10 +7,11 @@ import pytest
 from reference_taps import texel, turn_of
 
 import sssfit
-from sssfit.compare.engines import engines, listing
+from sssfit.compare.engines import engines
 from sssfit.errors import FitError, RenderError
 from sssfit.fit import fit_burley, fit_falloff
 from sssfit.fit.falloff import STRETCH
+from sssfit.kernel.listing import listing
 from sssfit.scene.record import Scene
 from sssfit.simulate import simulate_dipole
 

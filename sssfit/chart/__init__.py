@@ -21,6 +21,7 @@ FIGURES: Mapping[str, str] = {
     "Budget": "sssfit.chart.budget:budget_figure",
     "Comparison": "sssfit.chart.pareto:pareto_figure",
     "Guide": "sssfit.chart.guide:guide_figure",
+    "InversionCurves": "sssfit.chart.inversions:inversions_figure",
     "KernelView": "sssfit.chart.kernel:kernel_figure",
     "Material": "sssfit.chart.material:material_figure",
     "ModelComparison": "sssfit.chart.models:models_figure",

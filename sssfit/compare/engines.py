@@ -19,11 +19,10 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
-from sssfit.errors import FitError
 from sssfit.fit import fit_burley, fit_falloff
 from sssfit.fit.falloff import scale_of
 from sssfit.kernel import Stage, Taps
-from sssfit.messages import shown
+from sssfit.kernel.listing import listing
 from sssfit.profile import Profile
 from sssfit.render.borders import check_channels, source_indices
 from sssfit.render.disk import turns
@@ -60,8 +59,6 @@ _COMMUNITY = (
     "SubsurfaceScattering/SeparableSSS.hlsli, SSSSBlurCS"
 )
 
-# The red channel of d'Eon's skin as the listing has it: weights and variances [mm^2].
-_LISTED = ((0.1, 0.0484), (0.118, 0.187), (0.113, 0.567), (0.358, 1.99), (0.078, 7.41))
 _NARROWEST = 0.233  # the share that the listing leaves out: its strength has it
 
 
@@ -282,29 +279,6 @@ def _listing_of(profile: Profile, scene: Scene, taps: int) -> tuple[FloatArray, 
     offsets, weights = listing(taps, strength, numbers["falloff"])
     # A unit of the listing is the width of a channel whose falloff is .999.
     return offsets * scale_of(known["width"], 0.999), weights
-
-
-def listing(taps: int, strength: FloatArray, falloff: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return the kernel of Jimenez' listing: offsets (n,) and weights (n+1, C), middle first.
-
-    ``calculateKernel`` of separable-sss: offsets grow as the square up to 3, or 2 with 20 taps or
-    fewer; weights are the profile at a point, by radius, times half the distance between the
-    neighbours, and the strength (C,) is the share that is scattered. ``falloff`` (C,) scales the
-    profile. Raises FitError for an even number of taps, or one below 3.
-    """
-    if taps < 3 or taps % 2 == 0:
-        raise FitError(f"taps = {shown(taps)}; expected an odd number from 3.")
-    half = taps // 2
-    reach = 3.0 if taps > 20 else 2.0
-    offsets = reach * (np.arange(half + 1) / half) ** 2
-    after = np.append(offsets[1:], offsets[-1])
-    before = np.append(-offsets[1], offsets[:-1])
-    r = offsets[:, None] / (0.001 + np.asarray(falloff))
-    profile = sum(w * np.exp(-(r**2) / (2.0 * v)) / (2.0 * 3.14 * v) for w, v in _LISTED)
-    weights = 0.5 * (after - before)[:, None] * profile
-    weights = strength * weights / (weights[0] + 2.0 * weights[1:].sum(axis=0))
-    weights[0] += 1.0 - strength
-    return offsets[1:], weights
 
 
 @functools.lru_cache(maxsize=8)

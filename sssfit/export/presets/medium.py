@@ -1,0 +1,107 @@
+"""Engines that take a medium: extinction, albedo, anisotropy and index, in their own words.
+
+The look is the exact profile of the medium that the parameters describe, lit along the normal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.arrays import FloatArray
+from sssfit.errors import KernelError
+from sssfit.export.presets.record import Parameters
+from sssfit.export.presets.source import Source
+from sssfit.material import Layer, Material
+from sssfit.messages import by_channel
+from sssfit.optics import normal_transmittance
+from sssfit.profile import Profile
+from sssfit.simulate import simulate_exact
+from sssfit.simulate.exact import diffuse_reflectance
+from sssfit.simulate.inversion import invert_reflectance
+
+CHANNELS = ("R", "G", "B")
+_STEP, _LEAST, _NEAR_ONE = 1e-4, 1e-300, 1e-4  # of albedos
+
+
+def medium_of(source: Source) -> tuple[FloatArray, FloatArray, float, float]:
+    """Return mean free paths (3,) [mm], albedos (3,), g and the relative index of a material.
+
+    One g for all channels is kept. Where channels differ, and where a renderer has one number, the
+    reduced coefficients of g = 0 stand in for them (similarity relation).
+
+    Raises
+    ------
+    KernelError
+        There is no such medium, or a channel does not scatter or has no extinction.
+    """
+    layer = source.layer("the engine asks for coefficients")
+    g = float(layer.g[0])
+    is_reduced = bool((layer.g != g).any())
+    sigma_s = layer.reduced_sigma_s_per_mm if is_reduced else layer.sigma_s_per_mm
+    sigma_t = layer.sigma_a_per_mm + sigma_s
+    if not (sigma_s > 0.0).all():
+        said = by_channel(source.profile.channels, sigma_s.tolist(), ".3g")
+        raise KernelError(f"{source.title} does not scatter in every channel ({said} per mm).")
+    return 1.0 / sigma_t, sigma_s / sigma_t, 0.0 if is_reduced else g, source.eta
+
+
+def reduced_albedo(albedo: npt.ArrayLike, g: float) -> FloatArray:
+    """Return alpha' = alpha (1 - g) / (1 - alpha g), of the isotropic medium that looks alike."""
+    a = np.asarray(albedo, dtype=np.float64)
+    return np.asarray(a * (1.0 - g) / (1.0 - a * g))
+
+
+def full_albedo(reduced: npt.ArrayLike, g: float) -> FloatArray:
+    """Return alpha = alpha' / (1 - g + g alpha'), the inverse of `reduced_albedo`."""
+    a = np.asarray(reduced, dtype=np.float64)
+    return np.asarray(a / (1.0 - g + g * a))
+
+
+def entering_colour(albedo: FloatArray, g: float, eta: float) -> FloatArray:
+    """Return the share of the entering light that comes back, R_d / (1 - R_sp), normal light."""
+    total = diffuse_reflectance(reduced_albedo(albedo, g), eta)
+    return np.asarray(total / normal_transmittance(eta))
+
+
+def albedo_of_colour(colour: npt.ArrayLike, g: float, eta: float) -> FloatArray:
+    """Return the albedos (3,) whose `entering_colour` is a colour, 0 to 1.
+
+    The exact inversion, good to 1e-8 of the incident light, and a secant step, by which dark
+    colours come back to six digits too.
+    """
+    asked = np.asarray(colour, dtype=np.float64)
+    found = invert_reflectance(normal_transmittance(eta) * asked, eta).albedo
+    moved = found * (1.0 - _STEP)
+    first, second = (entering_colour(each, 0.0, eta) for each in (found, moved))
+    slope = np.where(found > 0.0, (first - second) / np.maximum(found - moved, _LEAST), 1.0)
+    # The slope is infinite at albedo 1, where the inversion has all digits.
+    step = np.where(found < 1.0 - _NEAR_ONE, (asked - first) / slope, 0.0)
+    return full_albedo(np.clip(found + step, 0.0, 1.0), g)
+
+
+def half_space(
+    title: str,
+    preset: str,
+    path_mm: npt.ArrayLike,
+    albedo: npt.ArrayLike,
+    *,
+    g: float = 0.0,
+    eta: float = 1.4,
+) -> Material:
+    """Return the material of mean free paths (3,) [mm] and albedos (3,)."""
+    sigma_t = 1.0 / np.asarray(path_mm, dtype=np.float64)
+    alpha = np.asarray(albedo, dtype=np.float64)
+    layer = Layer(eta, np.full(sigma_t.size, g), (1.0 - alpha) * sigma_t, alpha * sigma_t)
+    return Material(title, CHANNELS, (layer,), source=f"preset {preset}")
+
+
+def exact_look(material: Callable[[Parameters], Material]) -> Callable[[Parameters], Profile]:
+    """Return the look of a preset that describes a medium: its exact profile."""
+
+    def look(parameters: Parameters) -> Profile:
+        return simulate_exact(material(parameters))
+
+    return look
