@@ -39,8 +39,6 @@ _LIBRARIES = (
     *("numpy", "scipy", "threadpoolctl", "nlopt", "numba", "llvmlite", "matplotlib"),
     *("colour-science", "OpenImageIO", "click", "rich"),
 )
-
-
 _LONGEST_LINE = 1000  # a path may be 4096 characters, an option's value anything
 _OUT_OF_MEMORY = "out of memory: use a smaller grid or picture, fewer channels or --threads."
 

@@ -161,8 +161,6 @@ SHIPPED = (
     flag("--all every", "All materials that ship with sssfit."),
     flag("--paper", "The eleven materials of the Separable Subsurface Scattering paper."),
 )
-
-
 STRICT = flag("--strict", "End with an error in place of a warning of an unsafe kernel.")
 
 

@@ -3,7 +3,7 @@
 Those of methods and of made pictures are made from their entries, in ``_methods``.
 """
 
-from sssfit.methods import EXPORTS, FITS, LIGHTS, RENDERERS, SAVINGS, SEPARABLE, STRESSES
+from sssfit.methods import EXPORTS, FITS, LIGHTS, PRESETS, RENDERERS, SAVINGS, SEPARABLE, STRESSES
 from sssfit.scene.made import COMPARED, EDGE_DEGREES, MADE
 
 from ._options import (
@@ -30,6 +30,8 @@ _ANGLE = NumberRange(0.0, 180.0, min_open=True, max_open=True)
 _FILE = f"{', '.join(MADE)}, or your own EXR, HDR, TIFF, PNG, JPG or TGA"
 
 # fmt: off
+_FIGURE = option("--chart", None, "FILE", "Figure: PNG, SVG or PDF by its ending; - for PNG on "
+                 "stdout.")
 _OF_FILES = (
     option("--layer", None, "NAME", "Your own EXR: the layer to read, such as ViewLayer.Combined.  "
            "[default: R, G, B without a layer, or the only layer with them]"),
@@ -75,10 +77,10 @@ RENDER = (
 
 COMPARE = (
     *SHIPPED,
-    option("--what", ["front", "budget", "kernels", "sheet"], None, "budget: the causes of a "
-           "kernel's error; kernels: all kernels by error and cost; front: the kernels that no "
-           "other beats, one line per picture; sheet: pictures of all kernels, drawn into "
-           "--chart.  [default: budget and kernels]"),
+    option("--what", ["front", "budget", "kernels", "sheet", "presets"], None, "budget: the "
+           "causes of a kernel's error; kernels: all kernels by error and cost; front: the kernels "
+           "that no other beats, one line per picture; sheet: pictures of all kernels, drawn into "
+           "--chart; presets: what engines show.  [default: budget and kernels]"),
     option("--picture pictures", None, "NAME|FILE,...", f"Irradiance pictures: {_FILE} files. The "
            f"edge is at {EDGE_DEGREES:g} degrees.  [default: {','.join(COMPARED)}]", multiple=True),
     option("--mm-per-pixel", Length("profile"), "MM|profile", "Size of all pixels; profile is "
@@ -164,7 +166,7 @@ STABILITY = (
     option("--mm-per-pixel", Length(), "MM", "Size of a pixel, where it is not what is made "
            "harder.", 0.3),
     flag("--whole is_whole", "As many seeds and sizes for cascades as for the others; slow."),
-    option("--chart", None, "FILE", "Figure: PNG, SVG or PDF by its ending; - for PNG on stdout."),
+    _FIGURE,
     option("--table", None, "FILE", "Table in Markdown, - for stdout."),
     flag("--paper", "The paper's eleven materials, which take hours; no MATERIAL."),
     option("-o --output", None, "FOLDER", "--paper: folder of stability.md and charts.  "
@@ -188,7 +190,7 @@ MOTION = (
     option("--frames", None, "DIR", "Write every frame there, as frame-0000 and so on."),
     option("--format form", ["png", "exr"], None, "With --frames: format.  [default: png]"),
     option("--of", list(RENDERERS), None, "With --frames: renderer.  [default: variates]"),
-    option("--chart", None, "FILE", "Figure: PNG, SVG or PDF by its ending; - for PNG on stdout."),
+    _FIGURE,
     flag("--table", "Measure Table 1 of the supplement in place of a sequence; no MATERIAL."),
     option("--seeds", WholeRange(1, 10_000), "N", "With --table: seeds.  [default: 200]"),
     flag("--force", "Replace files that are not our chart or pictures."),
@@ -218,7 +220,11 @@ SCENE = (
            "on stdout.  [default: none]"),
     flag("--force", "Replace a file that is not our chart or picture."),
 )
-EXPORT = (option("--format form", list(EXPORTS), None, "Output format, as below.", required=True),)
+EXPORT = (
+    option("--format form", list(EXPORTS), None, "Output format, as below."),
+    option("--preset", list(PRESETS), None, "An engine's own parameters, as below."),
+    flag("--list listing", "List the presets."),
+)
 EXPORT_OUTPUT = STRICT, *output("NAME.FORMAT", "sssfit did not write")
 # fmt: on
 

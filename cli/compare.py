@@ -42,9 +42,9 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
       sssfit compare skin1 --what budget --method gaussians --budget-chart budget.png
       sssfit compare skin1 --what front --cost passes --only svd,cascade
       sssfit compare skin1 --picture head --size 1024x1024 --mm-per-pixel 0.15 --cost seconds
-      sssfit compare slab.profile.npz --picture mine.exr --error l2
       sssfit compare --all -o charts
       sssfit compare skin1 --what sheet --chart skin1-sheet.png
+      sssfit compare skin1 --what presets --chart skin1-engines.png
     """
     pictures = [name for each in given["pictures"] or COMPARED for name in each.split(",")]
     _check(material, given, pictures)
@@ -140,7 +140,7 @@ def _check(material: str | None, given: Mapping[str, Any], names: Sequence[str])
     if given["output"] is not None and not several:
         raise click.UsageError("-o is the folder of --all; name files by --chart and --table.")
     idle = list(_OF_BUDGETS) if several or what not in (None, "budget") else []
-    idle += ["chart", "table", "only"] if what == "budget" else []
+    idle += {"budget": ["chart", "table", "only"], "presets": ["table", "only"]}.get(what, [])
     idle += ["pictures", "size", "layer", "mask", "table", "only"] if what == "sheet" else []
     refuse(given, dict.fromkeys(idle, "another --what"))
     if what == "sheet" and not given["chart"]:

@@ -13,7 +13,7 @@ from ._output import finish, held, target, write, write_chart
 from ._progress import step_progress
 from ._verb_options import SCENE
 
-_OF_FRAMES = ("heads", "distance_units", "output", "bloom")
+_OF_FRAMES = dict.fromkeys(("heads", "distance_units", "output", "bloom"), "a single frame")
 _OF_FILES = ("bloom", "table", "chart", "output", "force")
 
 
@@ -38,8 +38,7 @@ def scene(kernel: str | None, common: Common, **given: Any) -> None:
       sssfit scene skin1.cascade24.taps.json --heads 16 --distance 50 --savings depth,clipped
       sssfit scene --table --chart table.png
     """
-    single = dict.fromkeys(_OF_FRAMES, "a single frame")
-    refuse(given, single if given["table"] else {"chart": "--table"})
+    refuse(given, _OF_FRAMES if given["table"] else {"chart": "--table"})
     if given["bloom"] and not given["output"]:
         raise click.UsageError("--bloom is for the picture of -o; name its file.")
     from sssfit.chart.files import chart_format, is_chart_file

@@ -45,12 +45,17 @@ def did_you_mean(word: str, known: Sequence[str]) -> str:
     return f"did you mean {near[0]}? " if near else ""
 
 
-def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Return columns under their heads: the first flush left, the others flush right; never cut."""
+def table(
+    header: Sequence[str], rows: Sequence[Sequence[str]], left: Collection[int] = (0,)
+) -> str:
+    """Return columns under their heads: those in ``left`` flush left, the others flush right.
+
+    None is cut.
+    """
     widths = [max(len(row[k]) for row in [header, *rows]) for k in range(len(header))]
     lines = (
         "  ".join(
-            cell.ljust(width) if k == 0 else cell.rjust(width)
+            cell.ljust(width) if k in left else cell.rjust(width)
             for k, (cell, width) in enumerate(zip(row, widths, strict=True))
         ).rstrip()
         for row in [header, *rows]

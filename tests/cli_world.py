@@ -604,7 +604,7 @@ STAND_INS = {
     "sssfit.choose.choice.choose": small_choice,
     "sssfit.compare.compare_kernels": small_comparison,
     "sssfit.compare.budget.error_budgets": lambda _, given: budgets(rank_of(given)),
-    "sssfit.compare.compare_models": lambda *_: models(),
+    "sssfit.compare.drawing.compare_models": lambda *_: models(),
     "sssfit.compare.sheet.compute_sheet": lambda *_: small_sheet(),
     "sssfit.stability.stability": lambda _, given: stresses(given["source"].name),
     "sssfit.motion.runner.run_sequence": small_sequence,

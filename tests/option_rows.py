@@ -1170,7 +1170,7 @@ CHART = {
         "chart wax.toml --models",
         "--photons 2e4",
         calls,
-        lambda: called("sssfit.compare.compare_models", wax(), photons=20_000),
+        lambda: called("sssfit.compare.drawing.compare_models", wax(), photons=20_000),
         default="1e7",
     ),
     "--output": Row(
@@ -1456,7 +1456,7 @@ SEEDS = {
         "chart wax.toml --models",
         "--seed 5",
         calls,
-        lambda: called("sssfit.compare.compare_models", wax(), seed=5),
+        lambda: called("sssfit.compare.drawing.compare_models", wax(), seed=5),
     ),
 }
 
@@ -1472,7 +1472,7 @@ THREADS = {
         "chart wax.toml --models",
         "--threads 1",
         calls,
-        lambda: called("sssfit.compare.compare_models", wax(), threads=1),
+        lambda: called("sssfit.compare.drawing.compare_models", wax(), threads=1),
     ),
 }
 

@@ -26,6 +26,7 @@ FIGURES: Mapping[str, str] = {
     "Material": "sssfit.chart.material:material_figure",
     "ModelComparison": "sssfit.chart.models:models_figure",
     "MovingLight": "sssfit.chart.moving_light:moving_light_figure",
+    "PresetComparison": "sssfit.chart.presets:presets_figure",
     "Profile": "sssfit.chart.profile:profile_figure",
     "Sheet": "sssfit.chart.sheet:sheet_figure",
     "Stability": "sssfit.chart.stability:stability_figure",

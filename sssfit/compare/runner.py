@@ -11,6 +11,7 @@ from typing import Any
 from sssfit.compare.budget import PHOTONS, Budget, error_budgets
 from sssfit.compare.comparison import Comparison, check_error
 from sssfit.compare.pareto import compare_kernels
+from sssfit.compare.presets import PresetComparison, compare_presets
 from sssfit.compare.sheet import Sheet, compute_sheet
 from sssfit.compare.table import (
     budget_text,
@@ -29,7 +30,7 @@ from sssfit.scene.load import load_scenes
 from sssfit.scene.record import Scene
 from sssfit.simulate.truth import true_profile
 
-Part = Comparison | list[Budget] | Sheet
+Part = Comparison | list[Budget] | Sheet | PresetComparison
 Watch = Callable[[str], AbstractContextManager[Any]]
 
 
@@ -80,8 +81,8 @@ def compare(
     scenes : sequence of Scene
         Not needed for a sheet.
     what : str, optional
-        "kernels", "front", "budget" or "sheet"; by default kernels, then a budget where there is
-        one.
+        "kernels", "front", "budget", "presets" or "sheet"; by default kernels, then a budget where
+        there is one.
     name : str
         The source's name in messages.
     profile : Profile, optional
@@ -106,6 +107,10 @@ def compare(
     SssfitError
         As `compare_kernels`, `error_budgets` and `compute_sheet`.
     """
+    if what == "presets":
+        with steps(name) as show:
+            yield compare_presets(source, scenes, threads=threads, progress=show)
+        return
     if what != "budget" and profile is None:
         profile = profile_of(source, threads=threads)
     if profile is not None and what == "sheet":
@@ -160,9 +165,10 @@ def told(
     """
     kernels = [each for each in parts if isinstance(each, Comparison)]
     figures: dict[str, Any] = {"output": list(wrote)}
-    if isinstance(parts[0], Sheet):
+    if isinstance(parts[0], Sheet | PresetComparison):
         figures |= parts[0].to_dict()
-        text, wrote = f"{sheet_text(figures)}\n", ["a PNG to stdout"] if "-" in wrote else wrote
+        text = f"{sheet_text(figures) if isinstance(parts[0], Sheet) else parts[0].text()}\n"
+        wrote = ["a PNG to stdout"] if "-" in wrote else wrote
     elif what == "front":
         figures |= _fronts(kernels, error, cost)
         text = f"{fronts_text(kernels, error, cost)}\n"

@@ -63,7 +63,7 @@ def write(parameters: Parameters) -> str:
         f"{group}.quality": parameters.number("quality"),
     }
     document = {
-        "description": f"{parameters.title}, {parameters.preset.model}",
+        "description": f"{parameters.title}, {parameters.preset.model}, by sssfit",
         "materialType": "@gemroot:Atom_Feature_Common@/Assets/Materials/Types/"
         "EnhancedPBR.materialtype",
         "propertyValues": values,

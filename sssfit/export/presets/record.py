@@ -98,7 +98,7 @@ class Preset:
         if missing:
             raise ArgumentError(
                 f"{printable(title)}: {', '.join(missing)} missing; {self.name} needs "
-                f"{'them' if len(missing) > 1 else 'it'}, such as {fields[missing[0]].expected}."
+                f"{'them' if len(missing) > 1 else 'it'}: {fields[missing[0]].expected}."
             )
         return MappingProxyType(
             {key: each.read(given.get(key, each.default)) for key, each in fields.items()}
