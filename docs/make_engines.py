@@ -14,6 +14,8 @@ from sections import DOCS, put_section
 from sssfit.chart import figure_of
 from sssfit.chart.page import save_figure
 from sssfit.compare.inversions import compute_inversions
+from sssfit.compare.presets import PICTURES, compare_presets
+from sssfit.compare.runner import scenes_for
 from sssfit.export.presets import preset, preset_of
 from sssfit.export.presets.source import source_of
 from sssfit.fit import fit_burley
@@ -194,8 +196,32 @@ def mean_free_paths():
     return table(("material", "match", "SurfaceAlbedo", "mean free path, cm"), rows)
 
 
+SHOWN = ("skin1", "marble")
+
+
+def shown():
+    """Tabulate what engines show of two materials, and draw it of the first."""
+    scenes = scenes_for(None, PICTURES, 0.3, size=(256, 256), layer=None, mask=None, seed=1)
+    found = [compare_presets(load_material(name), scenes) for name in SHOWN]
+    save_figure(figure_of(found[0]), DOCS / "engines-skin1.png")
+    heads = ("preset", *(f"{each.material} {name}" for each in found for name in each.pictures))
+    errors = [{row.parameters.preset.name: row for row in each.rows} for each in found]
+    rows = [
+        (
+            f"`{name}`",
+            *(
+                f"{mean:.2f} / {p95:.2f}"
+                for each in errors
+                for mean, p95 in zip(each[name].mean, each[name].p95, strict=True)
+            ),
+        )
+        for name in errors[0]
+    ]
+    return table(heads, rows)
+
+
 def main():
-    """Write the sections and the chart."""
+    """Write the sections and the charts."""
     for name, made in (
         ("presets", overview),
         ("walks", walks),
@@ -203,6 +229,7 @@ def main():
         ("listing", cross_section),
         ("unreal", mean_free_paths),
         ("colours", colours),
+        ("shown", shown),
     ):
         put_section("engines.md", f"{SCRIPT} {name}", made(), f"python {SCRIPT}")
     save_figure(figure_of(compute_inversions()), DOCS / "inversions.png")

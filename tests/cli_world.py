@@ -35,6 +35,7 @@ from sssfit.choose import choice as choose
 from sssfit.cli import cli
 from sssfit.compare import budget, pareto, runner, sheet
 from sssfit.compare.candidates import Candidate, candidates
+from sssfit.compare.presets import PresetComparison, compare_presets
 from sssfit.crowd.frame import CrowdFrame, measure_frame
 from sssfit.crowd.row import Row
 from sssfit.crowd.runner import savings_of
@@ -536,6 +537,14 @@ def small_sequence(real, given):
     return real(**given | small | {"source": profile(), "irradiance": "edge"})
 
 
+@functools.cache
+def all_presets() -> PresetComparison:
+    """What engines show of a profile without coefficients, on one small picture."""
+    compute = _unrecorded(compare_presets)
+    edge = make_scene("edge", height=16, width=24, mm_per_pixel=0.3)
+    return quietly(compute, profile(), [edge], threads=1)
+
+
 def few_seeds(real, given):
     return real(seeds=2, seed=given["seed"])
 
@@ -590,7 +599,7 @@ def blank(*_) -> Figure:
 
 _CHARTS = (
     *("profile", "kernel", "material", "pareto", "budget", "sheet", "models", "guide", "spectrum"),
-    *("stability", "moving_light", "variates", "speed_up"),
+    *("stability", "moving_light", "variates", "speed_up", "presets"),
 )
 STAND_INS = {
     "sssfit.simulate.simulate_montecarlo_many": few_photons,
@@ -605,6 +614,7 @@ STAND_INS = {
     "sssfit.compare.compare_kernels": small_comparison,
     "sssfit.compare.budget.error_budgets": lambda _, given: budgets(rank_of(given)),
     "sssfit.compare.drawing.compare_models": lambda *_: models(),
+    "sssfit.compare.presets.compare_presets": lambda *_: all_presets(),
     "sssfit.compare.sheet.compute_sheet": lambda *_: small_sheet(),
     "sssfit.stability.stability": lambda _, given: stresses(given["source"].name),
     "sssfit.motion.runner.run_sequence": small_sequence,

@@ -23,6 +23,7 @@ from sssfit.compare.evaluate import evaluate, evaluate_in_screen_space
 from sssfit.compare.pictures import picture_error
 from sssfit.export import json_document, kernel_text
 from sssfit.export.lut import lut_bytes
+from sssfit.export.presets import import_preset, preset_of, preset_text
 from sssfit.formats.csv import csv_text, load_csv
 from sssfit.formats.mci import load_mci
 from sssfit.formats.mco import join_channels, load_mco
@@ -30,7 +31,7 @@ from sssfit.formats.pictures import load_image
 from sssfit.measure.difference import difference_map, magnified_difference
 from sssfit.measure.score import auto_exposure
 from sssfit.methods import FITS as METHODS
-from sssfit.methods import SEPARABLE
+from sssfit.methods import PRESETS, SEPARABLE
 from sssfit.render.bloom import bloomed
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
@@ -971,7 +972,15 @@ def _table(name: str, **settings: Any) -> Any:
     return _content(world.quietly(load_csv, world.files() / name, **settings))
 
 
+_HDRP = {"baseColor": "0.4,0.2,0.1", "scatteringDistance": "1,0.5,0.25"}
+
 IMPORT = {
+    "--preset": Row(
+        "import table.csv",
+        "import --preset hdrp " + " ".join("=".join(each) for each in _HDRP.items()),
+        made_profile,
+        lambda: import_preset("hdrp", _HDRP, "hdrp"),
+    ),
     "--quantity": Row(
         "import bare.csv -o x.profile.npz",
         "--quantity density",
@@ -1007,7 +1016,7 @@ IMPORT = {
         names,
         lambda: ["x.profile.npz"],
         default="table.profile.npz",
-        words="NAME.profile.npz",
+        words="NAME.profile.npz; .toml where a preset gives a material",
     ),
     "--force": Row(
         "import table.csv -o foreign.npz", "--force", is_written("npz"), lambda: ["foreign.npz"]
@@ -1044,6 +1053,18 @@ def _taps_source(**settings: Any) -> Callable[[], str]:
 
 
 EXPORT = {
+    "--preset": Row(
+        _DENSE,
+        "export wax.profile.npz --preset hdrp worldScale=2",
+        _exported,
+        lambda: preset_text(preset_of("hdrp", profile(), worldScale=2)),
+    ),
+    "--list": Row(
+        _DENSE,
+        "export --list",
+        lambda ran: [line.split()[0] for line in ran.stdout.splitlines()[1:]],
+        lambda: list(PRESETS),
+    ),
     "--strict": Row(_DENSE, "--strict", status, lambda: 1),
     "--prefix": Row(_SOURCE, "--prefix WAX", _exported, _taps_source(prefix="WAX"), words="SSS"),
     "--coverage": Row(_SOURCE, "--coverage", _exported, _taps_source(coverage=True)),

@@ -1028,6 +1028,56 @@ def variates(f: Figures) -> list[Any]:
     ]
 
 
+def preset(f: Figures) -> list[Any]:
+    rows = [
+        [name, _parameter(each["value"]), each["unit"] or None, each["meaning"]]
+        for name, each in f["parameters"].items()
+    ]
+    head = Words("{} for {}: {}", f["material"], f["engine"], f["model"])
+    table = Table(["parameter", "value", "unit", "meaning"], rows, alike=("unit",))
+    return [head, table, Words("Lost: {}", f["lost"]), wrote(f)]
+
+
+def _parameter(value: Any) -> Any:
+    if isinstance(value, list):
+        return Words(" ".join(["{}"] * len(value)), *map(_parameter, value))
+    if isinstance(value, bool):
+        return str(value)
+    return Rough(value) if isinstance(value, float | int) else value
+
+
+def presets_listed(f: Figures) -> list[Any]:
+    rows = [
+        [each["preset"], each["engine"], each["inverse"], ", ".join(each["chosen"]) or None]
+        for each in f["presets"]
+    ]
+    return [Table(["preset", "engine", "back to a", "what you choose"], rows)]
+
+
+def presets_compared(f: Figures) -> list[Any]:
+    pictures = [f"{each}, mean / p95" for each in f["pictures"]]
+    rows = [
+        [
+            each["preset"],
+            *(
+                Words("{} / {}", Rough(mean), Rough(p95))
+                for mean, p95 in zip(each["mean"], each["p95"], strict=True)
+            ),
+        ]
+        for each in f["presets"]
+    ]
+    told: dict[str, list[str]] = {}
+    for each in f["presets"]:
+        for words in each["warnings"]:
+            told.setdefault(words, []).append(each["preset"])
+    return [
+        Words("{}: Delta E 2000 of every engine's own diffusion", f["material"]),
+        Table(["preset", *pictures], rows),
+        *(Words("{}: {}", ", ".join(names), words) for words, names in told.items()),
+        *(Words("{}: left out, {}", name, why) for name, why in f["left_out"].items()),
+    ]
+
+
 _OF_WORK = {"whole": "nothing left out", "saved": "with savings", "screen": "screen space"}
 _SCENE_STAGES = ("shadows", "irradiance", "convolution", "picture")
 
@@ -1117,6 +1167,10 @@ PRINTED: dict[str, Layout] = {
     "scene wax.svd2.kernel.json": scene,
     "scene wax.svd2.kernel.json --heads 3 --distance 8 -o s.png": scene,
     "scene wax.svd2.kernel.json --table": speed_ups,
+    "export wax.profile.npz --preset hdrp": preset,
+    "export wax.profile.npz --preset iryoku": preset,
+    "export --list": presets_listed,
+    "compare wax.profile.npz --what presets --size 24x16": presets_compared,
     "choose wax.toml": choice,
     "choose wax.toml --tolerance 6": choice,
     "choose wax.toml --tolerance 7": choice,
