@@ -979,7 +979,7 @@ IMPORT = {
         "import table.csv",
         "import --preset hdrp " + " ".join("=".join(each) for each in _HDRP.items()),
         made_profile,
-        lambda: import_preset("hdrp", _HDRP, "hdrp"),
+        lambda: _content(import_preset("hdrp", _HDRP, "hdrp")),
     ),
     "--quantity": Row(
         "import bare.csv -o x.profile.npz",

@@ -344,7 +344,7 @@ def test_a_table_of_somebody_else_is_not_replaced_without_force(run):
     ("arguments", "status", "said"),
     [
         (("--format", "csv"), 1, "there is no *.profile.npz in this folder"),
-        (("x.npz",), 2, "Missing option '--format'"),
+        (("x.npz",), 2, "give --format or --preset"),
         (("x.npz", "--format", "pdf"), 2, "pdf"),
         (("x.npz", "--format", "csv"), 1, "x.npz cannot be read: no such file"),
     ],

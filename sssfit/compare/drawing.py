@@ -17,6 +17,7 @@ from sssfit.messages import note
 from sssfit.profile import Profile
 
 VIEWS = ("models", "spectrum", "guide")
+_OF_PROFILES = {"spectrum": "`spectrum = True`", "guide": "`guide = True`"}
 COMPUTED = ("kernel", "taps", *VIEWS)
 
 
@@ -36,10 +37,9 @@ def drawn_of(found: Any, view: str, name: str) -> tuple[Any, str, str | None]:
     ProfileError
         The view is of profiles, and the record is none.
     """
-    if view in ("spectrum", "guide") and not isinstance(found, Profile):
-        raise ProfileError(
-            f"{name} is not a profile; `{view} = True` draws one, a .profile.npz file."
-        )
+    if view in _OF_PROFILES and not isinstance(found, Profile):
+        asked = _OF_PROFILES[view]
+        raise ProfileError(f"{name} is not a profile; {asked} draws one, a .profile.npz file.")
     if isinstance(found, Material):
         return found, view or "material", found.name
     if isinstance(found, Profile):

@@ -19,7 +19,7 @@ from sssfit.profile import Profile, is_profile_file
 
 _DIGITS = 7  # parameters are stored in single precision at best
 _MARK, _HEAD = b"sssfit", 512  # bytes; the text of every preset with comments begins with them
-_TOML_HEAD = "# Made by `sssfit import --preset`, which may replace this file."
+_TOML_HEAD = "# Made by sssfit from an engine's parameters; it may replace this file."
 
 
 def presets_list() -> list[dict[str, Any]]:
@@ -130,7 +130,7 @@ def kind_of(record: Material | Profile) -> tuple[str, Callable[[Path], bool]]:
 
 
 def preset_of_any(name: str, loaded: Any, chosen: Mapping[str, str]) -> Parameters:
-    """Return an engine's parameters for whatever a file of ours holds.
+    """Return an engine's parameters for what a file of ours holds.
 
     Raises
     ------
