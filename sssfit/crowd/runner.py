@@ -3,7 +3,8 @@
 from collections.abc import Callable, Collection
 from typing import Any
 
-from sssfit.crowd.frame import MAP_SIZE, CrowdFrame, measure_frame
+from sssfit.crowd.frame import MAP_SIZE, measure_frame
+from sssfit.crowd.record import CrowdFrame
 from sssfit.crowd.row import DISTANCE_UNITS, HEAD_UNITS, RESOLUTION, SPACING_UNITS, Row
 from sssfit.crowd.table import MAP_SIZE as TABLE_MAP_SIZE
 from sssfit.crowd.table import RESOLUTION as TABLE_RESOLUTION
