@@ -59,7 +59,7 @@ class Work:
             "total_milliseconds": 1e3 * self.total_seconds,
             "mean_delta_e": self.mean_delta_e,
             "largest_delta_e": self.largest_delta_e,
-            "largest_inside": self.largest_inside,
+            "largest_inside": self.largest_inside if self.inside_pixels else None,
             "inside_pixels": self.inside_pixels,
         }
 
@@ -160,7 +160,10 @@ class CrowdFrame:
             ),
             ["all stages (ms)", *(f"{1e3 * each.total_seconds:,.0f}" for each in every)],
             ["mean Delta E", *(f"{each.mean_delta_e:.3f}" for each in every)],
-            ["largest Delta E inside", *(f"{each.largest_inside:.3f}" for each in every)],
+            [
+                "largest Delta E inside",
+                *(f"{each.largest_inside:.3f}" if each.inside_pixels else "-" for each in every),
+            ],
         ]
         heads = ["", *(_NAMES[name] for name in self.work)]
         ends = f"{texels:.2f} times fewer texels convolved, {seconds:.2f} times as fast"

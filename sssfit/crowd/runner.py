@@ -31,14 +31,14 @@ def six_gaussians() -> Kernel:
 def savings_of(
     names: Collection[str] | None, culled_by: str = "vertex", margin: float = 1.0
 ) -> Savings:
-    """Return savings by name; None is all of them.
+    """Return savings by name; None is all of them, and "none" stands for no saving.
 
     Raises
     ------
     ArgumentError, RenderError
         A name is unknown, or a setting is invalid.
     """
-    wanted = SAVINGS if names is None else tuple(names)
+    wanted = SAVINGS if names is None else tuple(each for each in names if each != "none")
     for each in wanted:
         if each not in SAVINGS:
             raise ArgumentError(

@@ -9,6 +9,7 @@ one file here and one line in ``sssfit.methods.PRESETS``; ``record`` says what i
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Mapping
 
@@ -35,6 +36,9 @@ __all__ = [
     "preset_of",
     "preset_text",
 ]
+
+
+_INDICES = ("ior", "indexOfRefraction")  # what engines call it
 
 
 def preset(name: str) -> Preset:
@@ -117,7 +121,7 @@ def import_preset(name: str, given: Mapping[str, object], title: str = "") -> Ma
     found = parameters_from(name, given, title)
     if found.preset.material is not None:
         return found.preset.material(found)
-    return found.preset.profile(found)
+    return _with_index(found, found.preset.profile(found))
 
 
 def engine_look(parameters: Parameters) -> Profile | Taps:
@@ -133,6 +137,15 @@ def preset_text(parameters: Parameters) -> str:
 def preset_json(parameters: Parameters) -> str:
     """Return parameters, units and warnings as JSON."""
     return json.dumps(parameters.to_dict(), indent=2, ensure_ascii=False) + "\n"
+
+
+def _with_index(found: Parameters, profile: Profile) -> Profile:
+    """Keep the refractive index among a profile's settings, for the way back."""
+    index = [found.values[name] for name in _INDICES if name in found.values]
+    if not index:
+        return profile
+    settings = {**profile.meta.get("settings", {}), "eta": index[0]}
+    return dataclasses.replace(profile, meta={**profile.meta, "settings": settings})
 
 
 def _warned(wanted: Preset, title: str, values: Mapping[str, object]) -> Parameters:

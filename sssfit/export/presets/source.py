@@ -72,9 +72,12 @@ class Source:
 
     @property
     def eta(self) -> float:
-        """Refractive index of the material relative to what is above; 1.4 of an unknown one."""
+        """Refractive index of the material relative to what is above; 1.4 of an unknown one.
+
+        A profile that was imported from an engine has it among its settings.
+        """
         if self.material is None:
-            return 1.4
+            return float(self.profile.meta.get("settings", {}).get("eta", 1.4))
         return self.material.layers[0].eta / self.material.eta_above
 
     @property
