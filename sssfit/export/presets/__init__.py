@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from sssfit.errors import ArgumentError
 from sssfit.export.presets.fields import Field
 from sssfit.export.presets.record import Parameters, Preset
-from sssfit.export.presets.source import source_of
+from sssfit.export.presets.source import Source, source_of
 from sssfit.kernel import SeparableKernel, Taps
 from sssfit.material import Material
 from sssfit.material.checks import check_texts
@@ -59,7 +59,7 @@ def preset(name: str) -> Preset:
 
 
 def preset_of(
-    name: str, record: Material | Profile | SeparableKernel | Taps, **chosen: object
+    name: str, record: Material | Profile | SeparableKernel | Taps | Source, **chosen: object
 ) -> Parameters:
     """Return an engine's parameters for a material or a profile.
 
@@ -67,8 +67,9 @@ def preset_of(
     ----------
     name : str
     record : Material, Profile or Taps
-        Three channels. Of a material the exact profile is computed, which takes seconds. Taps are
-        those of an engine's own shader, whose parameters are found again.
+        Three channels. Of a material the exact profile is computed, which takes seconds; a `Source`
+        serves several presets. Taps are those of an engine's own shader, whose parameters are found
+        again.
     **chosen
         Parameters that a user chooses, by the engine's names: those with ``is_chosen`` in
         `Preset.fields`, such as the number of taps or the size of the scene's unit.

@@ -86,13 +86,13 @@ class Source:
         return self.reflectance / normal_transmittance(self.eta)
 
 
-def source_of(record: Material | Profile | SeparableKernel | Taps) -> Source:
+def source_of(record: Material | Profile | SeparableKernel | Taps | Source) -> Source:
     """Return the source of a preset.
 
     Parameters
     ----------
-    record : Material or Profile
-        Of a material the exact profile is computed, which takes seconds.
+    record : Material, Profile or Source
+        Of a material the exact profile is computed, which takes seconds; a source stays as it is.
 
     Raises
     ------
@@ -100,6 +100,8 @@ def source_of(record: Material | Profile | SeparableKernel | Taps) -> Source:
         It is a kernel, which a preset's parameters cannot carry; it has not three channels; a
         channel reflects nothing; or a material has layers and no profile of its own.
     """
+    if isinstance(record, Source):
+        return record
     if isinstance(record, SeparableKernel | Taps):
         raise KernelError(
             f"a kernel of {of_material(record.meta.get('material'))} is a table, which a preset's "
