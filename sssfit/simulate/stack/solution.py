@@ -19,7 +19,7 @@ from sssfit.simulate.stack.transform import Wavenumbers, refined
 
 Each = Callable[[Callable[[float], FloatArray], FloatArray], FloatArray]
 
-_HIGHEST = 20.0  # largest wavenumber, in the largest extinctions; 8 gives the same to 1e-5
+_HIGHEST = 10.0  # largest wavenumber, in the largest extinctions; 20 gives the same to 1e-6
 _MISS = 0.1  # of the tolerance, between two wavenumbers; F is then off by less
 _FEW_RADII, _PER_DECADE = 120, 40  # more radii than this are interpolated: 1e-7 of F
 _ROUNDING = 1e-4  # of T(0): T(k) below this is rounding of the directions, and counts as 0

@@ -137,18 +137,12 @@ def _near_tail(p: int) -> CubicSpline:
 
 def _panels(first: float, last: float, widest: float) -> tuple[FloatArray, FloatArray]:
     """Return nodes and weights over [0, last]: panels that grow by 15 %, then as wide as allowed."""
-    ends = [0.0, min(first, last)]
-    while ends[-1] < last and ends[-1] * (_GROWTH - 1.0) < widest:
-        ends.append(min(ends[-1] * _GROWTH, last))
-    if ends[-1] < last:
-        steps = math.ceil((last - ends[-1]) / widest)
-        ends.extend(np.linspace(ends[-1], last, steps + 1)[1:].tolist())
-    parts = [np.linspace(a, b, math.ceil((b - a) / widest) + 1)[:-1] for a, b in _pairs(ends)]
-    starts = np.append(np.concatenate(parts), last)
+    first = min(first, last)
+    near = np.linspace(0.0, first, math.ceil(first / widest) + 1)
+    to = min(max(widest / (_GROWTH - 1.0), first), last)
+    growing = np.geomspace(first, to, math.ceil(math.log(to / first) / math.log(_GROWTH)) + 1)
+    far = np.linspace(to, last, math.ceil((last - to) / widest) + 1)
+    ends = np.concatenate((near, growing[1:], far[1:]))
     t, weight = gauss_legendre(_NODES)
-    width = np.diff(starts)[:, None]
-    return (starts[:-1, None] + width * t).ravel(), (width * weight).ravel()
-
-
-def _pairs(ends: list[float]) -> list[tuple[float, float]]:
-    return [(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True) if b > a]
+    width = np.diff(ends)[:, None]
+    return (ends[:-1, None] + width * t).ravel(), (width * weight).ravel()
