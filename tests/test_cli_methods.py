@@ -204,7 +204,7 @@ def test_bad_input_is_one_clear_line(run, tmp_path, arguments, status, fragment)
     assert names(tmp_path) == []
 
 
-@pytest.mark.parametrize("method", ["exact", "dipole", "dipole-grosjean", "burley"])
+@pytest.mark.parametrize("method", ["dipole", "dipole-grosjean", "burley"])
 def test_slabs_are_refused_with_the_methods_that_would_do(run, tmp_path, method):
     (tmp_path / "slab.toml").write_text(SLAB + "thickness_mm = 3\n")
     status, _, err = run("slab.toml", "--method", method)
@@ -214,12 +214,28 @@ def test_slabs_are_refused_with_the_methods_that_would_do(run, tmp_path, method)
     assert names(tmp_path) == ["slab.toml"]
 
 
-def test_similarity_is_warned_of_in_one_line(run, tmp_path):
+def test_similarity_is_used_where_it_is_asked_for_and_said(run, tmp_path):
     (tmp_path / "skin.toml").write_text(SLAB.replace("g = 0", "g = 0.8"))
-    status, _, err = run("skin.toml", "--method", "exact", "--tolerance", "1%", *GRID)
-    assert status == 0
-    assert err.startswith("Warning: skin: g = 0.8")
-    assert err.count("\n") == 1
+    asked = ("skin.toml", "--method", "exact", "--tolerance", "1%", *GRID)
+    status, out, err = run(*asked)
+    assert (status, err) == (0, "")
+    assert "exact (layer solver, " in out
+    assert "isotropic" not in out
+    status, out, err = run(*asked, "--similarity")
+    assert (status, err) == (0, "")
+    assert "exact (half-space solver)" in out
+    assert "for isotropic scattering of (1 - g) sigma_s" in out
+
+
+def test_slabs_are_solved(run, tmp_path):
+    (tmp_path / "slab.toml").write_text(SLAB + "thickness_mm = 3\n")
+    status, out, err = run("slab.toml", "--method", "exact", "--tolerance", "1%", *GRID)
+    assert (status, err) == (0, "")
+    assert "transmittance" in out
+    (written,) = tmp_path.glob("*.npz")
+    profile = Profile.load(written)
+    assert profile.meta["settings"]["solver"] == "layer"
+    assert (profile.transmittance_stderr > 0.0).all()
 
 
 def test_a_foreign_file_is_not_replaced_without_force(run, tmp_path):
@@ -232,7 +248,7 @@ def test_a_foreign_file_is_not_replaced_without_force(run, tmp_path):
 
 
 def test_what_compiles_says_so_unless_quiet(run, monkeypatch):
-    monkeypatch.setattr(simulate.exact, "is_solver_compiled", lambda: False)
+    monkeypatch.setattr(simulate.half_space, "is_solver_compiled", lambda: False)
     asked = ("skin1", "--method", "exact", "--tolerance", "1%", *GRID)
     assert run(*asked)[2].startswith("Compiling the solver")
     assert run(*asked, "-q") == (0, "", "")

@@ -47,7 +47,8 @@ class Assembly:
             for each in set(stack.slabs)
         }
         media = tuple(made[each] for each in stack.slabs)
-        return cls(media, beam_of(stack, [each.sigma_t for each in media]), stack.eta_above, stack.eta_below, nodes)
+        beam = beam_of(stack, [each.sigma_t for each in media])
+        return cls(media, beam, stack.eta_above, stack.eta_below, nodes)
 
     @cached_property
     def mirrored(self) -> "Assembly":
@@ -144,7 +145,7 @@ def _entering(
 def _spans(
     assembly: Assembly, k: float, azimuth: Azimuth, modes: ModesOf, last: int | None
 ) -> tuple[list[Span], list[Floor]]:
-    """Return each layer on what lies below it, and the floors that the layers make, from the top."""
+    """Return each layer on what is below it, and the floors they make, from the top down."""
     media, beam = assembly.media, assembly.beam
     count = len(media) if last is None else last + 1
     spans: list[Span] = []
@@ -152,7 +153,7 @@ def _spans(
     for j in range(count - 1, -1, -1):
         medium, down, up = media[j], float(beam.down[j]), float(beam.up[j])
         if j == last or math.isinf(medium.thickness):
-            span = _endless(medium, down, up, k, azimuth, modes)
+            span = _endless(medium, down, up, azimuth, modes)
         else:
             floor = _floor_under(assembly, j, floors, azimuth.orders)
             if medium.slab.scatters:
@@ -165,9 +166,7 @@ def _spans(
     return spans, [Floor(np.zeros((0, 0)), np.zeros(0)), *floors]
 
 
-def _endless(
-    medium: Medium, down: float, up: float, k: float, azimuth: Azimuth, modes: ModesOf
-) -> Span:
+def _endless(medium: Medium, down: float, up: float, azimuth: Azimuth, modes: ModesOf) -> Span:
     """Return a layer without end, which absorbs all light if it does not scatter."""
     if medium.slab.scatters:
         return embedding.span_without_end(modes(medium), down, up * medium.attenuation)

@@ -33,8 +33,9 @@ class Beam:
 def beam_of(stack: SlabStack, sigma_t: Sequence[float]) -> Beam:
     """Solve for the beam under extinctions (layers,) [1/mm], with all reflections of interfaces.
 
-    b+_j = t_j b+_{j-1} e_{j-1} + r_j b-_j e_j and b-_j = r_{j+1} b+_j e_j + t_{j+1} b-_{j+1} e_{j+1}
-    with r = ((n1 - n2) / (n1 + n2))^2 and e = exp(-sigma_t* d).
+    b+_j = t_j b+_{j-1} e_{j-1} + r_j b-_j e_j and
+    b-_j = r_{j+1} b+_j e_j + t_{j+1} b-_{j+1} e_{j+1}, with e = exp(-sigma_t* d) and
+    r = ((n1 - n2) / (n1 + n2))^2.
     """
     slabs = stack.slabs
     etas = [stack.eta_above, *(each.eta for each in slabs), stack.eta_below]
@@ -51,7 +52,7 @@ def beam_of(stack: SlabStack, sigma_t: Sequence[float]) -> Beam:
             matrix[2 * j, 2 * j - 2] = -(1.0 - r[j]) * e[j - 1]
         if j < len(slabs) - 1:
             matrix[2 * j + 1, 2 * j + 3] = -(1.0 - r[j + 1]) * e[j + 1]
-    found = np.linalg.solve(matrix, entering)
+    found = np.linalg.solve(matrix, entering).astype(np.float64)
     down, up = found[0::2], found[1::2]
     returned = r[0] + (1.0 - r[0]) * up[0] * e[0]
     return Beam(down, up, returned, (1.0 - r[-1]) * down[-1] * e[-1])

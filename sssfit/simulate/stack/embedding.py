@@ -160,8 +160,7 @@ class Interface:
         driven = self.reflected_below * below.source
         driven[self.places_below] += self.transmitted * self.scale * from_above[self.places_above]
         system = np.eye(len(below.matrix)) - self.reflected_below[:, None] * below.matrix
-        found: FloatArray = np.linalg.solve(system, driven)
-        return found
+        return np.asarray(np.linalg.solve(system, driven), dtype=np.float64)
 
 
 def light_at_top(span: Span, reflected: FloatArray) -> ComplexArray:
@@ -188,6 +187,3 @@ def _passage(medium: Medium, k: float, azimuth: Azimuth) -> FloatArray:
     found = np.zeros((orders, n, orders, n))
     found[:, node, :, node] = fading[:, None, None] * blocks.real
     return found.reshape(orders * n, orders * n)
-
-
-

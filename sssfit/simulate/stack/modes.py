@@ -61,7 +61,7 @@ def modes_of(medium: Medium, k: float, azimuth: Azimuth) -> Modes:
 def _streaming_and_collision(
     medium: Medium, scattering: FloatArray, k: float, azimuth: Azimuth
 ) -> FloatArray:
-    """Return mu^-1 (sigma_t* + k sin(theta) cos(phi) - scattering), order by order and node by node."""
+    """Return mu^-1 (sigma_t* + k sin(theta) cos(phi) - scattering), by order and node."""
     orders, n, node = azimuth.orders, medium.n, np.arange(medium.n)
     matrix = np.zeros((orders, n, orders, n))
     for m in range(orders):

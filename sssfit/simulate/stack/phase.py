@@ -63,7 +63,6 @@ class Medium:
         """The beam's exp(-sigma_t* d); 0 without a bottom."""
         return attenuation(self.sigma_t, self.thickness)
 
-
     def ahead(self, cosine: FloatArray) -> FloatArray:
         """Return what a beam scatters into forward directions [1/(mm sr)]; see `_ahead`."""
         return _ahead(self.slab, self.sigma_s, self.moments, cosine, smooth=self.is_seen_through)

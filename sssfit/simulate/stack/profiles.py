@@ -8,34 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from sssfit.arrays import FloatArray
-from sssfit.errors import SimulationError, StoppedError
+from sssfit.errors import StoppedError
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
 from sssfit.profile import Profile
 from sssfit.simulate._deterministic import computed_profile, energies_from_cumulative
-from sssfit.simulate.stack.azimuth import MOST_ORDERS
 from sssfit.simulate.stack.beam import attenuation, beam_of
 from sssfit.simulate.stack.families import families_of
-from sssfit.simulate.stack.nodes import Nodes
+from sssfit.simulate.stack.limits import Channel, cannot_meet, check_memory, fits
 from sssfit.simulate.stack.sampling import Family
-from sssfit.simulate.stack.slabs import SlabStack, stacks_of
-from sssfit.simulate.stack.solution import Answer, Errors, Side, SideErrors, Step, steps
+from sssfit.simulate.stack.slabs import stacks_of
+from sssfit.simulate.stack.solution import Answer, Errors, Side, SideErrors, steps
 
 COUNTS = (8, 12, 16, 20, 24, 28, 32, 36)
 _QUICK = 2e-3  # a tolerance from which 8 and 12 directions may do
 _LEAST_GAIN = 2.0  # by which four more directions reduce an error, if it was not more before
-_MOST_BYTES = 2_000_000_000  # of matrices at once
-_MATRICES = 6  # complex ones for each layer of a stack, and the modes of each
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Channel:
-    """One channel of one material."""
-
-    name: str
-    stack: SlabStack
-    specular: float
-    radii: FloatArray
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,6 +40,8 @@ def solve_stacks(
     tolerance: float,
     pool: ThreadPoolExecutor,
     threads: int,
+    *,
+    reduced: Sequence[Material] | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> list[Profile]:
     """Solve for the profiles of layered materials, any g and indices.
@@ -66,6 +55,8 @@ def solve_stacks(
         light that leaves on both sides.
     pool : ThreadPoolExecutor
         Of ``threads`` threads; the result does not depend on them.
+    reduced : sequence of Material, optional
+        What is solved for in place of each material, by the similarity relation.
     stop : callable, optional
         StoppedError is raised when it returns true.
 
@@ -84,8 +75,8 @@ def solve_stacks(
         return np.stack(list(pool.map(one, k.tolist())))
 
     channels = [
-        _Channel(f"{material.name} {name}", stack, material.specular_reflectance, grid.r_edges_mm)
-        for material, grid in zip(materials, grids, strict=True)
+        Channel(f"{material.name} {name}", stack, material.specular_reflectance, grid.r_edges_mm)
+        for material, grid in zip(reduced or materials, grids, strict=True)
         for name, stack in zip(material.channels, stacks_of(material), strict=True)
     ]
     solved: dict[int, _Solved] = {
@@ -99,15 +90,16 @@ def solve_stacks(
         own = [channels[number] for number in numbers]
         solved |= zip(numbers, _solve_family(own, tolerance, threads, each), strict=True)
     found, first = [], 0
-    for material, grid in zip(materials, grids, strict=True):
-        last = first + material.n_channels
-        found.append(_profile(material, grid, [solved[k] for k in range(first, last)], tolerance))
-        first = last
+    for material, solved_for, grid in zip(materials, reduced or materials, grids, strict=True):
+        answers = [solved[k] for k in range(first, first + material.n_channels)]
+        is_similar = material != solved_for
+        found.append(_profile(material, grid, answers, tolerance, similarity=is_similar))
+        first += material.n_channels
     return found
 
 
 def _solve_family(
-    channels: Sequence[_Channel],
+    channels: Sequence[Channel],
     tolerance: float,
     threads: int,
     each: Callable[[Callable[[float], FloatArray], FloatArray], FloatArray],
@@ -115,7 +107,7 @@ def _solve_family(
     """Add directions until every channel meets the tolerance."""
     counts = COUNTS if tolerance >= _QUICK else COUNTS[1:]
     for count in counts[:2]:
-        _check_memory(channels, count, threads)
+        check_memory(channels, count, threads)
     family = Family(tuple(channel.stack for channel in channels))
     radii, specular = ([getattr(each, key) for each in channels] for key in ("radii", "specular"))
     radii = [each[1:] for each in radii]
@@ -127,55 +119,15 @@ def _solve_family(
             pairs = zip(step.answers, step.errors, strict=True)
             return [_Solved(*pair, step.count) for pair in pairs]
         left = counts[counts.index(step.count) + 1 :]
-        gain = max(before / worst, _LEAST_GAIN) if math.isfinite(before) else math.inf
-        if not left or worst > tolerance * gain ** len(left) or not _fits(channels, left[0], threads):
-            raise _cannot_meet(channels[shares.index(worst)], step, worst, tolerance)
+        gain = max(before / worst, _LEAST_GAIN)
+        is_hopeless = worst > tolerance * gain ** len(left)
+        if is_hopeless or not fits(channels, left[0], threads):
+            raise cannot_meet(channels[shares.index(worst)], step, worst, tolerance)
         before = worst
     raise AssertionError("steps end with the last number of directions")
 
 
-def _cannot_meet(
-    channel: _Channel, step: Step, worst: float, tolerance: float
-) -> SimulationError:
-    """Say which channel is too hard, why, and what to do."""
-    stack = channel.stack
-    steepest = max(each.g for each in stack.scattering)
-    is_thin = stack.is_seen_through and steepest > 0.5
-    why = f" (a thin slab of g = {steepest:g}, which the walk does well)" if is_thin else ""
-    digit = 10.0 ** math.floor(math.log10(worst))
-    return SimulationError(
-        f"{channel.name}{why}: the tolerance of {tolerance:g} cannot be met: {step.count} and "
-        f"{step.count - 4} directions differ by {worst:.2g} of the light; give "
-        f"{math.ceil(worst / digit) * digit:g} or more, or use the method montecarlo."
-    )
-
-
-def _bytes(channels: Sequence[_Channel], count: int, threads: int) -> float:
-    """Return the memory that matrices of all threads take at once."""
-    needs = []
-    for channel in channels:
-        size = MOST_ORDERS * Nodes.of(channel.stack.indices, count).invariant.size
-        needs.append(16.0 * size**2 * _MATRICES * (len(channel.stack.slabs) + 2))
-    return threads * max(needs)
-
-
-def _fits(channels: Sequence[_Channel], count: int, threads: int) -> bool:
-    return _bytes(channels, count, threads) <= _MOST_BYTES
-
-
-def _check_memory(channels: Sequence[_Channel], count: int, threads: int) -> None:
-    """Raise an error for stacks of too many layers."""
-    if not _fits(channels, count, threads):
-        most = max(channels, key=lambda each: len(each.stack.slabs))
-        needed = _bytes(channels, count, threads) / 1e9
-        raise SimulationError(
-            f"{most.name} has {len(most.stack.slabs)} layers, whose matrices would take "
-            f"{needed:.1f} GB on {threads} threads, over the limit of {_MOST_BYTES / 1e9:g} GB; "
-            "merge layers, use fewer threads, or use the method montecarlo."
-        )
-
-
-def _beam_only(channel: _Channel) -> _Solved:
+def _beam_only(channel: Channel) -> _Solved:
     """Return the answer where nothing scatters, which the beam alone gives without error."""
     stack, edges = channel.stack, channel.radii[1:]
     sigma_t = [each.sigma_a for each in stack.slabs]
@@ -192,7 +144,12 @@ def _beam_only(channel: _Channel) -> _Solved:
 
 
 def _profile(
-    material: Material, grid: RadialGrid, solved: Sequence[_Solved], tolerance: float
+    material: Material,
+    grid: RadialGrid,
+    solved: Sequence[_Solved],
+    tolerance: float,
+    *,
+    similarity: bool,
 ) -> Profile:
     """Assemble the answers of a material's channels."""
     sides = [each.answer.reflected for each in solved]
@@ -215,8 +172,8 @@ def _profile(
         relative_error=max(shares),
         settings={
             "tolerance": tolerance,
-            "similarity": False,
-            "solver": "layers",
+            "similarity": similarity,
+            "solver": "layer",
             "directions": max(each.count for each in solved),
         },
         energy_balance_stderr=np.abs(totals + absorbed.sum(axis=0) - 1.0).tolist(),
@@ -231,7 +188,7 @@ def _energies(sides: Sequence[Side], tolerance: float) -> FloatArray:
 
 
 def _stderr(errors: SideErrors) -> FloatArray:
-    """Return errors of the annuli and beyond the grid, (n + 1,), whose squares add up to those of F.
+    """Return errors of annuli and beyond the grid (n + 1,), whose squares add up to those of F.
 
     Each is at least the annulus's own, and the sum up to any edge at least F's error there.
     """

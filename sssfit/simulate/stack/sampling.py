@@ -83,7 +83,7 @@ class Sampler:
         return [transforms_at(each, self.zero, known.azimuth, known) for each in self.assemblies]
 
     def at(self, k: float) -> FloatArray:
-        """Return R(k) and T(k) of each stack less single scattering, (2 stacks,); T is 0 without."""
+        """Return R(k) and T(k) of each stack less single scattering, (2 stacks,)."""
         known = _KnownModes(k or self.zero, self.azimuth(k or self.zero))
         found = [_multiple(each, k, known) for each in self.assemblies]
         return np.array(found).ravel()

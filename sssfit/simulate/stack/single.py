@@ -7,6 +7,8 @@ phase function that delta-M leaves in the beam is missing from both.
 
 import math
 from collections.abc import Iterator
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -41,11 +43,13 @@ def single_transform(
         sine, cosine = medium.directions.sine[:, None], medium.directions.cosine[:, None]
         alpha = (medium.sigma_t + 1j * k * sine * azimuth.cosine) / cosine
         if medium.slab.scatters:
-            beams = float(assembly.beam.down[j]), float(assembly.beam.up[j]) * medium.attenuation
-            once = beams[0] * medium.backward[:, None] * _integral(alpha + medium.sigma_t, thickness)
-            if beams[1] > 0.0:
+            down, up = float(assembly.beam.down[j]), float(assembly.beam.up[j])
+            back = _integral(alpha + medium.sigma_t, thickness)
+            once = down * medium.backward[:, None] * back
+            up *= medium.attenuation
+            if up > 0.0:
                 coming = _integral(alpha - medium.sigma_t, thickness)
-                once = once + beams[1] * medium.forward[:, None] * coming
+                once = once + up * medium.forward[:, None] * coming
             leaving = (once * np.exp(-lost[:n])).real @ azimuth.weight
             total += 2.0 * math.pi * float((medium.directions.weight * passed[:n]) @ leaving)
         if math.isfinite(thickness):
@@ -74,7 +78,7 @@ def _layers_part(assembly: Assembly, j: int, medium: Medium, radii: FloatArray) 
     sine = p / medium.slab.eta
     cosine = np.sqrt((1.0 - sine) * (1.0 + sine))
     weight = 2.0 * math.pi * flux / (medium.slab.eta**2 * cosine)
-    for above, below in zip(path[:-1], path[1:], strict=True):
+    for above, below in pairwise(path):
         weight = weight * (1.0 - snell_reflectance(p, below, above))
     aside = np.zeros(p.size)
     for each in assembly.media[:j]:
@@ -93,20 +97,19 @@ def _emitted(
     sigma_t = medium.sigma_t
     down, up = float(assembly.beam.down[j]), float(assembly.beam.up[j]) * medium.attenuation
     back = medium.slab.sigma_s * henyey_greenstein(-cosine, medium.slab.g)
-    found = down * back * _integral(sigma_t / cosine + sigma_t, depth)
+    found: FloatArray = down * back * _integral(sigma_t / cosine + sigma_t, depth)
     if up > 0.0:
         found = found + up * medium.ahead(cosine) * _integral(sigma_t / cosine - sigma_t, depth)
     return found
 
 
-def _integral(rate: FloatArray, depth: FloatArray | float) -> FloatArray:
+def _integral(rate: Any, depth: FloatArray | float) -> Any:
     """Return int_0^d e^{-x z} dz = (1 - e^{-x d}) / x; real or complex."""
     if isinstance(depth, float) and math.isinf(depth):
         return 1.0 / rate
     is_small = np.abs(rate * depth) < _SMALL
     divisor = np.where(rate == 0.0, 1.0, rate)
-    found: FloatArray = np.where(is_small, depth, -np.expm1(-rate * depth) / divisor)
-    return found
+    return np.where(is_small, depth, -np.expm1(-rate * depth) / divisor)
 
 
 def _directions(eta: float) -> tuple[FloatArray, FloatArray]:
@@ -118,8 +121,8 @@ def _directions(eta: float) -> tuple[FloatArray, FloatArray]:
 
 
 def _panels(ends: FloatArray) -> Iterator[tuple[FloatArray, FloatArray]]:
-    for a, b in zip(ends[:-1], ends[1:], strict=True):
-        yield gauss_legendre(_NODES, float(a), float(b))
+    for a, b in pairwise(ends.tolist()):
+        yield gauss_legendre(_NODES, a, b)
 
 
 def _passed(assembly: Assembly, j: int) -> FloatArray:

@@ -107,7 +107,6 @@ def refined(
     return Wavenumbers(k, values, bend)
 
 
-
 def bessel_tail(p: int, x: FloatArray) -> FloatArray:
     """Return int_x^inf J1(t) t^-p dt."""
     near = _near_tail(p)(np.log(np.clip(x, 1e-7, _FAR)))
@@ -136,7 +135,7 @@ def _near_tail(p: int) -> CubicSpline:
 
 
 def _panels(first: float, last: float, widest: float) -> tuple[FloatArray, FloatArray]:
-    """Return nodes and weights over [0, last]: panels that grow by 15 %, then as wide as allowed."""
+    """Return nodes and weights over [0, last]: panels grow by 15 %, then are as wide as allowed."""
     first = min(first, last)
     near = np.linspace(0.0, first, math.ceil(first / widest) + 1)
     to = min(max(widest / (_GROWTH - 1.0), first), last)
