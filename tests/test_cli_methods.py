@@ -17,7 +17,7 @@ from sssfit.cli import cli, main
 from sssfit.material import load_material, material_names
 from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile
-from sssfit.simulate import burley, exact
+from sssfit.simulate import burley, half_space
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
 COMMAND = [sys.executable, "-m", "sssfit.cli", "simulate"]
@@ -30,7 +30,7 @@ SLAB = "eta = 1.3\ng = 0\nsigma_a_per_mm = [0.1, 0.1, 0.1]\nsigma_s_per_mm = [9,
 @pytest.fixture(scope="module", autouse=True)
 def compiled():
     """The solver is compiled before its words on stderr are looked at."""
-    exact.diffuse_reflectance([0.5], 1.3)
+    half_space.diffuse_reflectance([0.5], 1.3)
 
 
 def names(folder):
@@ -84,7 +84,7 @@ def test_exact_says_its_tolerance_its_error_and_that_energies_balance(run, tmp_p
     _, out, _ = run("skin1", "--method", "exact", "--tolerance", "1%", *GRID)
     profile = Profile.load(tmp_path / "skin1.exact.profile.npz")
     assert profile.meta["settings"]["tolerance"] == 0.01
-    assert f"exact to {100.0 * profile.meta['relative_error']:.1g} % of the total" in out
+    assert f"exact (half-space solver) to {100.0 * profile.meta['relative_error']:.1g} % of the total" in out
     assert "est. error" in out
     assert f"{profile.diffuse_reflectance_stderr[0]:.1e}" in out
     assert f"{profile.absorbed.sum(axis=0)[0]:.6f}" in out

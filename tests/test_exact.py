@@ -1,7 +1,6 @@
 """The exact solver against theory, against brute force, against the photon walk, and itself."""
 
 import threading
-import warnings
 from dataclasses import replace
 
 import checks
@@ -246,15 +245,15 @@ def test_energy_that_is_missing_counts_as_error(monkeypatch):
     assert profile.meta["relative_error"] == pytest.approx(0.003 / total, rel=1e-3)
     np.testing.assert_allclose(profile.meta["energy_balance_stderr"], 0.003, rtol=1e-3)
     assert (profile.diffuse_reflectance_stderr >= 0.00299).all()
-    monkeypatch.setattr(half_space, "_LEVELS", _LEVELS[:2])  # each of the others takes ten times longer
+    monkeypatch.setattr(
+        half_space, "_LEVELS", _LEVELS[:2]
+    )  # others take ten times longer
     with pytest.raises(SimulationError, match="cannot be met"):
         simulate_exact(material, tolerance=0.01)
 
 
 def test_similarity_is_on_record():
-    similar = simulate_exact(
-        checks.medium(0.1, 3.6, 1.3, g=0.75), tolerance=0.01, similarity=True
-    )
+    similar = simulate_exact(checks.medium(0.1, 3.6, 1.3, g=0.75), tolerance=0.01, similarity=True)
     assert similar.meta["settings"]["similarity"] is True
     isotropic = simulate_exact(checks.medium(0.1, 0.9, 1.3), tolerance=0.01)
     assert isotropic.meta["settings"]["similarity"] is False
