@@ -245,9 +245,7 @@ def test_energy_that_is_missing_counts_as_error(monkeypatch):
     assert profile.meta["relative_error"] == pytest.approx(0.003 / total, rel=1e-3)
     np.testing.assert_allclose(profile.meta["energy_balance_stderr"], 0.003, rtol=1e-3)
     assert (profile.diffuse_reflectance_stderr >= 0.00299).all()
-    monkeypatch.setattr(
-        half_space, "_LEVELS", _LEVELS[:2]
-    )  # others take ten times longer
+    monkeypatch.setattr(half_space, "_LEVELS", _LEVELS[:2])  # others take ten times longer
     with pytest.raises(SimulationError, match="cannot be met"):
         simulate_exact(material, tolerance=0.01)
 

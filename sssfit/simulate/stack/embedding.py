@@ -1,6 +1,6 @@
 """Light in a whole stack at one wavenumber: layers put on one another from the bottom up.
 
-Whatever lies below a depth acts as a floor: what comes up is L- = R L+ + s. A layer turns the floor
+All that lies below a depth acts as a floor: what comes up is L- = R L+ + s. A layer turns the floor
 under it into one above it, and so does an interface (invariant embedding; Chandrasekhar 1960,
 "Radiative Transfer", chapter 7). Decaying exponentials only, so that no thickness overflows.
 """
