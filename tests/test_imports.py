@@ -40,6 +40,7 @@ ROOMS = [
         "motion",
         "crowd",
         "chart",
+        "report",
         "cli",
     ),
 ]

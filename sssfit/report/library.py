@@ -1,0 +1,86 @@
+"""An index of materials: a swatch of each, its reflectance and how far its light goes."""
+
+import dataclasses
+from collections.abc import Callable, Iterable
+
+import numpy as np
+
+from sssfit.arrays import FloatArray
+from sssfit.material import Material
+from sssfit.measure.delta_e import auto_exposure
+from sssfit.profile import Profile
+from sssfit.render.reference import render_reference
+from sssfit.report.page import data_text, rendered, script_text
+from sssfit.report.pack import packed_picture
+from sssfit.report.pictures import mm_per_pixel_at
+from sssfit.scene.made import make_scene
+from sssfit.simulate.truth import true_profile
+
+_SIDE = 96  # pixels of a swatch: the whole face at 2.2 mm a pixel
+_SCRIPTS = ("half", "colour", "swatches")
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class Swatch:
+    """A material in the index.
+
+    Parameters
+    ----------
+    name, source : str
+    reflectance : array (C,)
+    radius_mm : array (C,) [mm]
+        That holds 90 % of a channel's light.
+    picture : array (H, W, 3)
+        The lit head, exposed.
+    """
+
+    name: str
+    source: str
+    reflectance: FloatArray
+    radius_mm: FloatArray
+    picture: FloatArray
+
+
+def swatch_of(material: Material, *, threads: int | None = None) -> Swatch:
+    """Return a material's swatch: the head by the exact profile."""
+    profile: Profile = true_profile(material, threads=threads)
+    pitch = 256.0 / _SIDE * mm_per_pixel_at(1800.0)
+    scene = make_scene("head", height=_SIDE, width=_SIDE, mm_per_pixel=pitch)
+    truth = render_reference(scene, profile, threads=threads)
+    shown = truth * auto_exposure(truth, scene.mask)
+    return Swatch(
+        material.name,
+        material.source,
+        profile.diffuse_reflectance,
+        profile.energy_radii_mm([0.9])[0],
+        np.broadcast_to(shown, (*shown.shape[:2], 3)),
+    )
+
+
+def library_page(
+    materials: Iterable[Material],
+    *,
+    threads: int | None = None,
+    progress: Callable[[int, int, str], None] | None = None,
+) -> str:
+    """Return an HTML page with a swatch of each material.
+
+    Raises
+    ------
+    SimulationError
+        A material is not one half space.
+    """
+    wanted = list(materials)
+    found = []
+    for done, each in enumerate(wanted):
+        if progress is not None:
+            progress(done, len(wanted), each.name)
+        found.append(swatch_of(each, threads=threads))
+    data = {"swatches": [packed_picture(each.picture) for each in found]}
+    return rendered(
+        "library.html",
+        script=script_text(_SCRIPTS),
+        title="materials",
+        data=data_text(data),
+        swatches=found,
+    )

@@ -1,0 +1,164 @@
+"""The pictures of a page: what is lit, the truth by the profile's whole 2D kernel, what counts."""
+
+import dataclasses
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from sssfit.arrays import FloatArray
+from sssfit.compare.references import Reference, references
+from sssfit.messages import note
+from sssfit.profile import Profile
+from sssfit.report.pack import packed_bytes, packed_picture
+from sssfit.scene.load import load_scene
+from sssfit.scene.made import EDGE_DEGREES, make_scene
+from sssfit.scene.record import Scene
+
+SIDE = 256  # pixels of a picture at most: nine heads of three channels then take 2 MB
+LIGHTS = (45.0, 0.0, 80.0)  # degrees of the key light to the left of the view axis
+# Of a frame of 1080 rows and 30 degrees: the camera's distance [mm], and mm a pixel.
+ROWS, FOV_DEGREES = 1080, 30.0
+DISTANCES_MM = (600.0, 1200.0, 1800.0)
+_SAID = 4096  # pixels of a side above which a reduction is noted even where it is expected
+
+
+@dataclasses.dataclass(frozen=True, slots=True, eq=False)
+class Shown:
+    """A picture of the page.
+
+    Parameters
+    ----------
+    key : str
+        Short and unique, for addresses: "head-45-600".
+    name : str
+        "head", "disk", "edge", or the name of a file.
+    light_degrees, distance_mm : float, optional
+        Of a head.
+    reference : Reference
+        The lit scene with its mask, the border, the truth and its exposure.
+    """
+
+    key: str
+    name: str
+    light_degrees: float | None
+    distance_mm: float | None
+    reference: Reference
+
+    @property
+    def scene(self) -> Scene:
+        """What is lit."""
+        return self.reference.scene
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what the page reads."""
+        scene = self.scene
+        counts = np.ones(scene.irradiance.shape[:2]) if scene.mask is None else scene.mask > 0
+        return {
+            "key": self.key,
+            "name": self.name,
+            "light": self.light_degrees,
+            "distance": self.distance_mm,
+            "mm_per_pixel": scene.mm_per_pixel,
+            "border": self.reference.border,
+            "exposure": self.reference.exposure,
+            "irradiance": packed_picture(scene.irradiance),
+            "truth": packed_picture(self.reference.truth),
+            "mask": packed_bytes(np.asarray(counts, dtype=np.uint8).tobytes()),
+        }
+
+
+def mm_per_pixel_at(distance_mm: float) -> float:
+    """Return the size of a pixel at a distance, in a frame of `ROWS` and `FOV_DEGREES`."""
+    return 2.0 * distance_mm * math.tan(math.radians(FOV_DEGREES) / 2.0) / ROWS
+
+
+def shown_pictures(
+    profile: Profile,
+    mm_per_pixel: float,
+    *,
+    irradiance: str | None = None,
+    side: int = SIDE,
+    threads: int | None = None,
+    progress: Callable[[str], None] = lambda name: None,  # noqa: ARG005
+) -> tuple[Shown, ...]:
+    """Render the pictures of a page: heads, a disk, an edge, and a user's own.
+
+    Parameters
+    ----------
+    profile : Profile
+        What the truths are made from.
+    mm_per_pixel : float [mm]
+        Of disk and edge, and of a file that does not say.
+    irradiance : str, optional
+        A picture's file; where it is larger than ``side`` it is reduced, which is noted.
+    side : int
+        Rows and columns.
+    threads : int, optional
+    progress : callable, optional
+        Called with the name of each picture before it is made.
+
+    Raises
+    ------
+    RenderError, FileError
+        As `load_scene` and `render_reference`.
+    """
+    found = []
+    for key, name, light, distance, scene in _scenes(mm_per_pixel, irradiance, side, threads):
+        progress(key)
+        (reference,) = references([scene], profile, threads=threads)
+        found.append(Shown(key, name, light, distance, reference))
+    return tuple(found)
+
+
+def _scenes(
+    mm_per_pixel: float, irradiance: str | None, side: int, threads: int | None
+) -> Iterator[tuple[str, str, float | None, float | None, Scene]]:
+    """Yield key, name, light, distance and scene of each picture."""
+    size = {"height": side, "width": side}
+    if irradiance is not None:
+        scene = _reduced(load_scene(irradiance, otherwise=mm_per_pixel), side)
+        yield "own", scene.name, None, None, scene
+    for distance in DISTANCES_MM:
+        for light in LIGHTS:
+            lit: dict[str, Any] = {"light_degrees": light, "distance_mm": distance}
+            pitch = mm_per_pixel_at(distance) * SIDE / side
+            head = make_scene("head", **size, mm_per_pixel=pitch, **lit, threads=threads)
+            yield f"head-{light:g}-{distance:g}", "head", light, distance, head
+    for name, own in (("disk", {}), ("edge", {"angle_degrees": EDGE_DEGREES})):
+        made = make_scene(name, **size, mm_per_pixel=mm_per_pixel, **own)
+        yield name, name, None, None, made
+
+
+def _reduced(scene: Scene, side: int) -> Scene:
+    """Return a picture whose sides are at most ``side``, by means of square blocks of pixels."""
+    factor = math.ceil(max(scene.height, scene.width) / side)
+    if factor == 1:
+        return scene
+    note(
+        f"{scene.name}: {scene.width} x {scene.height} pixels are scaled down by {factor} to "
+        f"fit the page's {side} x {side}."
+    )
+    mask = None if scene.mask is None else _means(scene.mask[..., None] > 0, factor)[..., 0] >= 0.5
+    return Scene(
+        scene.name,
+        _means(scene.irradiance, factor),
+        scene.mm_per_pixel * factor,
+        mask=None if mask is None else mask.astype(np.int32),
+    )
+
+
+def _means(picture: FloatArray, factor: int) -> FloatArray:
+    """Return the means of blocks of a picture (H, W, C); blocks at its ends may be smaller."""
+    rows, columns = (np.arange(0, n, factor) for n in picture.shape[:2])
+    sums = np.add.reduceat(np.add.reduceat(picture.astype(float), rows, axis=0), columns, axis=1)
+    heights = np.diff(np.append(rows, picture.shape[0]))
+    widths = np.diff(np.append(columns, picture.shape[1]))
+    means: FloatArray = sums / (heights[:, None] * widths)[..., None]
+    return means
+
+
+def first_of(pictures: Sequence[Shown]) -> Shown:
+    """Return the picture that a page opens with: a user's own, else the nearest head."""
+    return pictures[0]
