@@ -4,6 +4,7 @@ Only what a shader runs is compared here; a dense kernel has a weight for every 
 """
 
 import dataclasses
+import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
@@ -17,8 +18,9 @@ from sssfit.profile import Profile
 from sssfit.report.pack import packed_text
 
 FORMS = ("hlsl", "glsl", "wgsl", "json")
-# Of the methods with stages, those that are fitted in seconds: each cascade takes 3 to 5.
-CHAINS = ("cascade 12", "cascade 17", "cascade 24", "pyramid 12", "disk 24", "disk 40")
+# Of the methods with stages, those that are fitted in 7 s at most; a cascade of 17 takes 16.
+CHAINS = ("cascade 12", "cascade 24", "pyramid 12", "disk 24", "disk 40")
+MOST_FETCHES = 50  # of a thinned kernel; more cost twice a cascade, and are no better
 _MOVED = ("pair", "line")
 
 
@@ -129,7 +131,12 @@ def shown_candidates(pixels: int, only: Collection[str] | None = None) -> list[C
     every = [each for each in every_candidate(pixels, only) if is_shown(each)]
     if only is not None:
         return every
-    return [each for each in every if each.taps is not None or each.label in CHAINS]
+    return [each for each in every if _fetches(each) <= MOST_FETCHES or each.label in CHAINS]
+
+
+def _fetches(candidate: Candidate) -> float:
+    """Return the fetches of a thinned kernel, whose terms share their first pass."""
+    return math.inf if candidate.taps is None else candidate.taps * (candidate.terms + 1)
 
 
 def is_shown(candidate: Candidate) -> bool:

@@ -10,13 +10,13 @@ from sssfit.material import Material
 from sssfit.measure.delta_e import auto_exposure
 from sssfit.profile import Profile
 from sssfit.render.reference import render_reference
-from sssfit.report.page import data_text, rendered, script_text
+from sssfit.report.html import data_text, rendered, script_text
 from sssfit.report.pack import packed_picture
-from sssfit.report.pictures import mm_per_pixel_at
+from sssfit.report.pictures import distance_of
 from sssfit.scene.made import make_scene
 from sssfit.simulate.truth import true_profile
 
-_SIDE = 96  # pixels of a swatch: the whole face at 2.2 mm a pixel
+_SIDE, _MM_PER_PIXEL = 96, 2.3  # of a swatch: the whole face
 _SCRIPTS = ("half", "colour", "swatches")
 
 
@@ -44,8 +44,9 @@ class Swatch:
 def swatch_of(material: Material, *, threads: int | None = None) -> Swatch:
     """Return a material's swatch: the head by the exact profile."""
     profile: Profile = true_profile(material, threads=threads)
-    pitch = 256.0 / _SIDE * mm_per_pixel_at(1800.0)
-    scene = make_scene("head", height=_SIDE, width=_SIDE, mm_per_pixel=pitch)
+    pitch = _MM_PER_PIXEL
+    view = {"mm_per_pixel": pitch, "distance_mm": distance_of(pitch)}
+    scene = make_scene("head", height=_SIDE, width=_SIDE, **view)
     truth = render_reference(scene, profile, threads=threads)
     shown = truth * auto_exposure(truth, scene.mask)
     return Swatch(

@@ -2,13 +2,14 @@
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.compare.references import Reference, references
+from sssfit.fit import MM_PER_PIXEL
 from sssfit.messages import note
 from sssfit.profile import Profile
 from sssfit.report.pack import packed_bytes, packed_picture
@@ -18,10 +19,9 @@ from sssfit.scene.record import Scene
 
 SIDE = 256  # pixels of a picture at most: nine heads of three channels then take 2 MB
 LIGHTS = (45.0, 0.0, 80.0)  # degrees of the key light to the left of the view axis
-# Of a frame of 1080 rows and 30 degrees: the camera's distance [mm], and mm a pixel.
+# A frame in which distances are those of pixels; pixels of 0.3 mm are 0.6 m away.
 ROWS, FOV_DEGREES = 1080, 30.0
-DISTANCES_MM = (600.0, 1200.0, 1800.0)
-_SAID = 4096  # pixels of a side above which a reduction is noted even where it is expected
+FARTHER = (1, 2, 3)  # heads by how many times the pixels of the kernels theirs are
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -69,16 +69,27 @@ class Shown:
         }
 
 
-def mm_per_pixel_at(distance_mm: float) -> float:
-    """Return the size of a pixel at a distance, in a frame of `ROWS` and `FOV_DEGREES`."""
-    return 2.0 * distance_mm * math.tan(math.radians(FOV_DEGREES) / 2.0) / ROWS
+def distance_of(mm_per_pixel: float) -> float:
+    """Return the distance [mm] at which a frame of `ROWS` and `FOV_DEGREES` has such pixels."""
+    return 0.5 * ROWS * mm_per_pixel / math.tan(math.radians(FOV_DEGREES) / 2.0)
+
+
+def own_scene(irradiance: str, mm_per_pixel: float | None, side: int = SIDE) -> Scene:
+    """Return a user's picture, reduced to ``side`` pixels, which is noted.
+
+    Raises
+    ------
+    RenderError, FileError
+        As `load_scene`.
+    """
+    return _reduced(load_scene(irradiance, mm_per_pixel, otherwise=MM_PER_PIXEL), side)
 
 
 def shown_pictures(
     profile: Profile,
     mm_per_pixel: float,
     *,
-    irradiance: str | None = None,
+    own: Scene | None = None,
     side: int = SIDE,
     threads: int | None = None,
     progress: Callable[[str], None] = lambda name: None,  # noqa: ARG005
@@ -90,9 +101,9 @@ def shown_pictures(
     profile : Profile
         What the truths are made from.
     mm_per_pixel : float [mm]
-        Of disk and edge, and of a file that does not say.
-    irradiance : str, optional
-        A picture's file; where it is larger than ``side`` it is reduced, which is noted.
+        Of disk, edge and the nearest head.
+    own : Scene, optional
+        A user's picture, which comes first.
     side : int
         Rows and columns.
     threads : int, optional
@@ -101,11 +112,11 @@ def shown_pictures(
 
     Raises
     ------
-    RenderError, FileError
-        As `load_scene` and `render_reference`.
+    RenderError
+        As `render_reference`.
     """
     found = []
-    for key, name, light, distance, scene in _scenes(mm_per_pixel, irradiance, side, threads):
+    for key, name, light, distance, scene in _scenes(mm_per_pixel, own, side, threads):
         progress(key)
         (reference,) = references([scene], profile, threads=threads)
         found.append(Shown(key, name, light, distance, reference))
@@ -113,21 +124,21 @@ def shown_pictures(
 
 
 def _scenes(
-    mm_per_pixel: float, irradiance: str | None, side: int, threads: int | None
+    mm_per_pixel: float, own: Scene | None, side: int, threads: int | None
 ) -> Iterator[tuple[str, str, float | None, float | None, Scene]]:
     """Yield key, name, light, distance and scene of each picture."""
     size = {"height": side, "width": side}
-    if irradiance is not None:
-        scene = _reduced(load_scene(irradiance, otherwise=mm_per_pixel), side)
-        yield "own", scene.name, None, None, scene
-    for distance in DISTANCES_MM:
+    if own is not None:
+        yield "own", own.name, None, None, own
+    for farther in FARTHER:
+        pitch = farther * mm_per_pixel
+        distance = distance_of(pitch)
         for light in LIGHTS:
             lit: dict[str, Any] = {"light_degrees": light, "distance_mm": distance}
-            pitch = mm_per_pixel_at(distance) * SIDE / side
             head = make_scene("head", **size, mm_per_pixel=pitch, **lit, threads=threads)
-            yield f"head-{light:g}-{distance:g}", "head", light, distance, head
-    for name, own in (("disk", {}), ("edge", {"angle_degrees": EDGE_DEGREES})):
-        made = make_scene(name, **size, mm_per_pixel=mm_per_pixel, **own)
+            yield f"head-{light:g}-{farther}", "head", light, distance, head
+    for name, turned in (("disk", {}), ("edge", {"angle_degrees": EDGE_DEGREES})):
+        made = make_scene(name, **size, mm_per_pixel=mm_per_pixel, **turned)
         yield name, name, None, None, made
 
 
@@ -157,8 +168,3 @@ def _means(picture: FloatArray, factor: int) -> FloatArray:
     widths = np.diff(np.append(columns, picture.shape[1]))
     means: FloatArray = sums / (heights[:, None] * widths)[..., None]
     return means
-
-
-def first_of(pictures: Sequence[Shown]) -> Shown:
-    """Return the picture that a page opens with: a user's own, else the nearest head."""
-    return pictures[0]

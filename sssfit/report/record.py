@@ -19,12 +19,13 @@ from sssfit.profile import Profile
 from sssfit.render import render
 from sssfit.report.kernels import Fitted, ShownKernel, command_of, shown_candidates
 from sssfit.report.pack import packed_picture
-from sssfit.report.pictures import SIDE, Shown, shown_pictures
+from sssfit.report.pictures import SIDE, Shown, own_scene, shown_pictures
 from sssfit.simulate.truth import true_profile
 
 PHOTONS = 200_000  # of the walk in the models' chart and the budget: half a second
 ERROR, COST = "delta-e", "fetches"
 _COLOURS = 3  # channels of a picture that the page can show
+_TIMED_SECONDS = 2.0
 _MOST_DRAWN = 12  # kernels whose pictures a page without WebGL2 has
 
 Watch = Callable[[int, int, str], None]
@@ -138,7 +139,7 @@ def make_report(
     only : collection of str, optional
         Methods of the other kernels; by default those that are fitted in seconds.
     mm_per_pixel : float, optional [mm]
-        Of kernels, disk and edge; by default 0.3.
+        Of the kernels' pixels; by default those of the picture's file, else 0.3.
     side : int
         Rows and columns of the pictures.
     photons, seed : int
@@ -160,17 +161,20 @@ def make_report(
             f"{channels} channels have no colour; a report shows 3, or 1 as grey. Choose channels "
             "of the material, or compare its kernels by the error l2."
         )
-    pitch = mm_per_pixel or MM_PER_PIXEL
+    own = None if irradiance is None else own_scene(irradiance, mm_per_pixel, side)
+    pitch = own.mm_per_pixel if own else mm_per_pixel or MM_PER_PIXEL
     steps = _Steps(progress)
     steps("the exact profile")
     profile = source if isinstance(source, Profile) else true_profile(source, threads=threads)
     fits = _fits(profile, pitch, named, only, steps)
     pictures = shown_pictures(
-        profile, pitch, irradiance=irradiance, side=side, threads=threads, progress=steps
+        profile, pitch, own=own, side=side, threads=threads, progress=steps
     )
     steps("the comparison")
-    compared = [each for each in pictures if each.light_degrees is None]
-    comparison = _compared(profile, compared, pictures[0], pitch, fits, threads)
+    alone = [each for each in pictures[1:] if each.name in ("disk", "edge")]
+    scenes = [each.scene for each in (pictures[0], *alone)]
+    timed: dict[str, Any] = {"timed_seconds": _TIMED_SECONDS, "threads": threads}
+    comparison = compare_kernels(profile, scenes, candidates=fits, **timed)
     title = name or profile.material_name or "profile"
     start = f"sssfit simulate {title} --method exact"
     kernels = tuple(_shown(each, title, pitch) for each in fits)
@@ -233,23 +237,6 @@ def _fits(
     if not found:
         raise FitError(f"{profile.material_name or 'profile'}: no kernel could be fitted.")
     return found
-
-
-def _compared(
-    profile: Profile,
-    flat: Sequence[Shown],
-    first: Shown,
-    mm_per_pixel: float,
-    fits: Sequence[Fitted],
-    threads: int | None,
-) -> Comparison:
-    """Compare the kernels on the nearest head, or a user's picture, and on disk and edge.
-
-    All have the pixels of the kernels: a nearer head is 0.298 mm a pixel, and the others 0.3.
-    """
-    scenes = [first.scene, *(each.scene for each in flat if each is not first)]
-    same = [dataclasses.replace(each, mm_per_pixel=mm_per_pixel) for each in scenes]
-    return compare_kernels(profile, same, candidates=fits, threads=threads)
 
 
 def _shown(fit: Fitted, title: str, mm_per_pixel: float) -> ShownKernel:

@@ -30,8 +30,7 @@ def pareto_chart(report: Report) -> Chart:
         plot.add(_point(plot, row, is_front=row in front))
     legend = (("front-point", "on the Pareto front"), ("other-point", "another kernel is better"))
     words = f"On {name}. Choose a point to run its kernel above; the arrow keys go along the front."
-    svg = Markup(plot.svg()).replace(Markup('role="img"'), Markup('role="group"'))
-    return Chart("pareto", "Error and cost", words, legend, svg)
+    return Chart("pareto", "Error and cost", words, legend, plot.svg(role="group"))
 
 
 def _staircase(places: list[tuple[float, float]], end: float) -> list[tuple[float, float]]:

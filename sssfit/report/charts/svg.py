@@ -7,8 +7,10 @@ from collections.abc import Callable, Iterable, Sequence
 from markupsafe import Markup, escape
 
 WIDTH, HEIGHT = 560.0, 340.0
-_LEFT, _RIGHT, _TOP, _BOTTOM = 62.0, 14.0, 14.0, 46.0
+_LEFT, _RIGHT, _TOP, _BOTTOM = 76.0, 14.0, 14.0, 46.0
 _TICKS = 6
+_LEAST = 1e-30  # stands for 0 on a logarithmic axis
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -42,10 +44,10 @@ class Axis:
     is_log: bool = False
 
     def place(self, value: float) -> float:
-        """Return the place of a value, moved to the nearer end where it is outside."""
-        low, high, at = self.low, self.high, min(max(value, self.low), self.high)
+        """Return the place of a value, which may be beyond the ends."""
+        low, high, at = self.low, self.high, value
         if self.is_log:
-            low, high, at = math.log(low), math.log(high), math.log(at)
+            low, high, at = math.log(low), math.log(high), math.log(max(value, _LEAST))
         return self.begin + (self.end - self.begin) * (at - low) / (high - low)
 
     def ticks(self) -> list[float]:
@@ -93,11 +95,11 @@ class Plot:
         for value in self.x.ticks():
             at = self.x.place(value)
             self.line([(at, top), (at, low)], "grid")
-            self.text(at, low + 16, f"{value:.4g}", "tick middle")
+            self.text(at, low + 16, written(value), "tick middle")
         for value in self.y.ticks():
             at = self.y.place(value)
             self.line([(left, at), (right, at)], "grid")
-            self.text(left - 7, at + 4, f"{value:.3g}", "tick end")
+            self.text(left - 7, at + 4, written(value), "tick end")
         self.line([(left, top), (left, low), (right, low)], "axis")
         self.text(0.5 * (left + right), HEIGHT - 8, names[0], "name middle")
         middle = 0.5 * (top + low)
@@ -106,13 +108,20 @@ class Plot:
 
     def line(self, points: Iterable[tuple[float, float]], kind: str) -> None:
         """Add a line through places."""
-        path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-        self.parts.append(Markup('<polyline class="{}" points="{}"/>').format(kind, path))
+        self.add(line_of(points, kind))
+
+    def _inside(self, part: Markup) -> Markup:
+        """Return a part, cut off where it leaves the panel."""
+        width, height = self.x.end - self.x.begin, self.y.begin - self.y.end
+        box = Markup('<svg x="{0:.1f}" y="{1:.1f}" width="{2:.1f}" height="{3:.1f}" ')
+        box += Markup('viewBox="{0:.1f} {1:.1f} {2:.1f} {3:.1f}">')
+        return box.format(self.x.begin, self.y.end, width, height) + part + Markup("</svg>")
 
     def curve(self, x: Sequence[float], y: Sequence[float], kind: str) -> None:
         """Add a line through values; it ends where one is NaN, or not above 0 on a log axis."""
         for part in self._runs(x, y):
-            self.line([(self.x.place(a), self.y.place(b)) for a, b in part], f"curve {kind}")
+            places = [(self.x.place(a), self.y.place(b)) for a, b in part]
+            self.add(self._inside(line_of(places, f"curve {kind}")))
 
     def _runs(self, x: Sequence[float], y: Sequence[float]) -> list[list[tuple[float, float]]]:
         runs: list[list[tuple[float, float]]] = [[]]
@@ -131,7 +140,7 @@ class Plot:
         down = [(a, b) for a, b in zip(x, low, strict=True) if not math.isnan(b)]
         places = [(self.x.place(a), self.y.place(b)) for a, b in (*up, *reversed(down))]
         path = " ".join(f"{a:.1f},{b:.1f}" for a, b in places)
-        self.parts.append(Markup('<polygon class="band {}" points="{}"/>').format(kind, path))
+        self.add(self._inside(Markup('<polygon class="band {}" points="{}"/>').format(kind, path)))
 
     def text(
         self, x: float, y: float, words: str, kind: str, more: Markup | str = ""
@@ -144,15 +153,30 @@ class Plot:
         """Add what is drawn elsewhere."""
         self.parts.append(part)
 
-    def svg(self) -> Markup:
-        """Return the picture."""
-        return picture(self.parts, HEIGHT, self.describe)
+    def svg(self, role: str = "img") -> Markup:
+        """Return the picture; one with parts to be chosen is a group."""
+        return picture(self.parts, HEIGHT, self.describe, role)
 
 
-def picture(parts: Iterable[Markup], height: float, describe: str) -> Markup:
+def line_of(points: Iterable[tuple[float, float]], kind: str) -> Markup:
+    """Return a line through places."""
+    path = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
+    return Markup('<polyline class="{}" points="{}"/>').format(kind, path)
+
+
+def written(value: float) -> str:
+    """Return a value as an axis has it: powers of ten beyond three zeros raised."""
+    if value == 0.0 or 1e-3 <= abs(value) < 1e5:
+        return f"{value:.4g}"
+    mantissa, exponent = f"{value:.3e}".split("e")
+    power = f"10{str(int(exponent)).translate(_RAISED)}"
+    return power if float(mantissa) == 1.0 else f"{float(mantissa):g}·{power}"
+
+
+def picture(parts: Iterable[Markup], height: float, describe: str, role: str = "img") -> Markup:
     """Return parts as an SVG element with a description for those who do not see it."""
-    head = Markup('<svg viewBox="0 0 {:.0f} {:.0f}" role="img" aria-label="{}">')
-    return head.format(WIDTH, height, describe) + Markup("").join(parts) + Markup("</svg>")
+    head = Markup('<svg viewBox="0 0 {:.0f} {:.0f}" role="{}" aria-label="{}">')
+    return head.format(WIDTH, height, role, describe) + Markup("").join(parts) + Markup("</svg>")
 
 
 def limits(values: Iterable[float], *, is_log: bool, decades: float = 8.0) -> tuple[float, float]:

@@ -20,7 +20,7 @@ class Page {
     const handlers = {
       zoom: (factor, x, y) => this.zoom(factor, x, y),
       pan: (x, y) => this.change({ x, y }),
-      hover: (at) => this.shown && tellPixel(this.shown, this.drawn, at),
+      hover: (at) => this.look(at),
       click: (at) => this.pin(at),
       focus: (pane) => pane.canvas.focus({ preventScroll: true }),
     };
@@ -77,7 +77,13 @@ class Page {
     drawHistogram(this.shown.figures);
     drawWorst(this.shown, this.drawn, (x, y) => this.change({ zoom: 12, x: (x + 0.5) / width, y: (y + 0.5) / height }));
     this.mark(this.state.kernel);
+    this.look(this.seen ?? { x: width / 2, y: height / 2 });
     this.draw();
+  }
+
+  look(at) {
+    this.seen = at;
+    if (this.shown) tellPixel(this.shown, this.drawn, at);
   }
 
   layer(name, from) {
@@ -118,7 +124,7 @@ class Page {
   pin({ x, y }) {
     const { width, height } = this.shown.truth, at = { x: Math.floor(x), y: Math.floor(y) };
     if (at.x < 0 || at.y < 0 || at.x >= width || at.y >= height) return;
-    tellPixel(this.shown, this.drawn, at);
+    this.look(at);
     this.change({ pins: pinsText([...this.pins(), at].slice(-9)) });
   }
 

@@ -39,7 +39,7 @@ export function drawHistogram(figures) {
     svg.append(element('line', { class: 'quartile', x1: x, x2: x, y1: 2, y2: 64 }));
   }
   for (let value = 0; value <= SCALE_END; value++) {
-    const text = element('text', { class: 'tick middle', x: 4 + 240 * value / SCALE_END, y: 77 });
+    const text = element('text', { class: value === SCALE_END ? 'tick end' : 'tick middle', x: 4 + 240 * value / SCALE_END, y: 77 });
     text.textContent = value === SCALE_END ? `${value}+` : value;
     svg.append(text);
   }

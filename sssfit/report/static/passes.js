@@ -36,6 +36,7 @@ export class Passes {
     this.programs = new Map();
     this.targets = new Map();
     this.light = null;
+    this.attachments = gl.getParameter(gl.MAX_COLOR_ATTACHMENTS);
     gl.getExtension('OES_texture_float_linear');
     gl.getExtension('EXT_float_blend');
   }
@@ -104,7 +105,7 @@ export class Passes {
     const { gl } = this, program = this.program(source, pass);
     const targets = pass.writes.map((name) => this.target(name, pass.level, format));
     gl.bindFramebuffer(gl.FRAMEBUFFER, this.buffer ??= gl.createFramebuffer());
-    for (let k = 0; k < 8; k++) {
+    for (let k = 0; k < this.attachments; k++) {
       gl.framebufferTexture2D(gl.FRAMEBUFFER, gl.COLOR_ATTACHMENT0 + k, gl.TEXTURE_2D, targets[k]?.texture ?? null, 0);
     }
     gl.drawBuffers(targets.map((_, k) => gl.COLOR_ATTACHMENT0 + k));
