@@ -220,6 +220,20 @@ SCENE = (
            "on stdout.  [default: none]"),
     flag("--force", "Replace a file that is not our chart or picture."),
 )
+REPORT = (
+    SHIPPED[0],
+    option("--kernel kernels", None, "FILE", "Your own table of taps, beside the others; may be "
+           "given several times.", multiple=True),
+    option("--irradiance", None, "FILE", "Your own irradiance picture, with which the page opens; "
+           "it is scaled down to 256 x 256 pixels at most."),
+    option("--mm-per-pixel", Length(), "MM", "Pixel size of the kernels.  [default: from your own "
+           "file, else 0.3]"),
+    option("--only", Names(FITS), "METHOD,...", "Only kernels by these fit methods, beside your "
+           "own.  [default: those that are fitted in seconds]"),
+    option("--photons", Count(2, 10**12), "N", "Photons of the walk of models and budget.  "
+           "[default: 200000]"),
+    *output("MATERIAL.html, materials.html with --all", "is not our page"),
+)
 EXPORT = (
     option("--format form", list(EXPORTS), None, "Output format, as below."),
     option("--preset", list(PRESETS), None, "An engine's own parameters, as below."),

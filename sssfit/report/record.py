@@ -1,6 +1,7 @@
 """What a report holds: pictures, kernels with their exports, the comparison, charts' records."""
 
 import dataclasses
+import shlex
 from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
@@ -26,6 +27,7 @@ PHOTONS = 200_000  # of the walk in the models' chart and the budget: half a sec
 ERROR, COST = "delta-e", "fetches"
 _COLOURS = 3  # channels of a picture that the page can show
 _TIMED_SECONDS = 2.0
+_COMMANDS = ("sssfit simulate {} --method exact", "sssfit compare {}", "sssfit report {}")
 _MOST_DRAWN = 12  # kernels whose pictures a page without WebGL2 has
 
 Watch = Callable[[int, int, str], None]
@@ -90,6 +92,15 @@ class Report:
             for label in self.front[:_MOST_DRAWN]
         }
 
+    def figures(self) -> dict[str, Any]:
+        """Return the figures that ``sssfit report --json`` prints."""
+        return {
+            "name": self.name,
+            "kernels": [each.label for each in self.kernels],
+            "pictures": [each.key for each in self.pictures],
+            "front": self.front,
+        }
+
     def provenance(self) -> list[tuple[str, str]]:
         """Return names and values of what the figures depend on."""
         meta = self.profile.meta
@@ -131,7 +142,7 @@ def make_report(
     source : Material or Profile
         Of 1 or 3 channels, which a page can show as colours.
     name : str, optional
-        Of the page; by default the material's.
+        Of the page of a profile that does not name its material.
     named : sequence of (str, Taps)
         Tables of taps of a user's own, with their labels.
     irradiance : str, optional
@@ -175,8 +186,8 @@ def make_report(
     scenes = [each.scene for each in (pictures[0], *alone)]
     timed: dict[str, Any] = {"timed_seconds": _TIMED_SECONDS, "threads": threads}
     comparison = compare_kernels(profile, scenes, candidates=fits, **timed)
-    title = name or profile.material_name or "profile"
-    start = f"sssfit simulate {title} --method exact"
+    title = profile.material_name or name or "profile"
+    word = shlex.quote(title)
     kernels = tuple(_shown(each, title, pitch) for each in fits)
     steps("models and budget")
     walk = {"photons": photons, "seed": seed, "threads": threads}
@@ -190,7 +201,7 @@ def make_report(
         compute_spectrum(profile, mm_per_pixel=pitch),
         models,
         budgets,
-        (start, f"sssfit compare {title}", f"sssfit report {title} -o {title}.html"),
+        tuple(each.format(word) for each in _COMMANDS),
     )
 
 
@@ -244,7 +255,7 @@ def _shown(fit: Fitted, title: str, mm_per_pixel: float) -> ShownKernel:
     assert fit.found is not None
     assert isinstance(fit.found.kernel, Taps)
     made = fit.settings or fit.taps
-    command = command_of(fit, f"{title}.profile.npz", mm_per_pixel) if made else "given as a file"
+    command = command_of(fit, shlex.quote(f"{title}.profile.npz"), mm_per_pixel) if made else "given as a file"
     return ShownKernel(fit.label, fit.found.kernel, command)
 
 

@@ -1,0 +1,62 @@
+"""``sssfit report``: one HTML page about a material, or an index of all of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from ._input import load, load_source
+from ._options import Common, common_options, options, refuse
+from ._output import finish_one, held, stem_of, target, write
+from ._progress import step_progress
+from ._verb_options import REPORT
+
+_OF_ONE = ("kernels", "irradiance", "mm_per_pixel", "only", "photons")
+
+
+@click.command()
+@click.argument("material", required=False)
+@options(*REPORT)
+@common_options
+def report(material: str | None, common: Common, **given: Any) -> None:
+    """Write one HTML page about MATERIAL, with its kernels running in the page.
+
+    The page compares kernels with the true picture: it runs the exported GLSL itself by WebGL2, on
+    a head under three lights at three distances, a disk and an edge. It has the charts, the
+    tables and the exports, and needs no network and no server. With --all it is an index of the
+    materials that ship with sssfit.
+
+    MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or a .profile.npz
+    file, - for one on stdin.
+
+    \b
+      sssfit report skin1 -o skin1.html
+      sssfit report skin1 --kernel mine.taps.json --irradiance face.exr
+      sssfit report --all -o materials.html
+    """
+    if (material is None) != given["every"]:
+        raise click.UsageError("name one MATERIAL or profile, or give --all.")
+    refuse(given, dict.fromkeys(_OF_ONE, "one MATERIAL") if given["every"] else {})
+    from sssfit.kernel import Taps
+    from sssfit.material import load_material, material_names
+    from sssfit.report import is_report_file, library_page, make_report, page
+
+    name = "materials" if material is None else stem_of(material, "profile")
+    path = target(given["output"], f"{name}.html")
+    inputs = [material, given["irradiance"], *given["kernels"]]
+    hold = {"inputs": inputs, "force": given["force"], "named": ("a page", ".html")}
+    figures: dict[str, Any] = {"material": material}
+    with held([path], is_report_file, **hold), step_progress(name) as step:
+        if material is None:
+            every = [load_material(each) for each in material_names()]
+            text = library_page(every, threads=common.threads, progress=step)
+            figures["materials"] = [each.name for each in every]
+        else:
+            own = {key: given[key] for key in _OF_ONE[1:] if given[key] is not None}
+            named = [(stem_of(each), load(Taps.read, each)) for each in given["kernels"]]
+            run = {"seed": common.seed, "threads": common.threads, "progress": step}
+            made = make_report(load_source(material), name=name, named=named, **own, **run)
+            text, figures = page(made), figures | made.figures()
+        write(text.encode(), path)
+    finish_one(common, path, figures, "", "the page")

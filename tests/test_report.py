@@ -1,0 +1,144 @@
+"""A report's parts without a browser: packing, policy, scripts, charts and errors."""
+
+import base64
+import hashlib
+import html
+import json
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+import report_world as world
+from cli_world import WAX
+
+from sssfit.errors import RenderError
+from sssfit.material import parse_material
+from sssfit.measure.delta_e import delta_e_of_lab, lab
+from sssfit.report import is_report_file, make_report
+from sssfit.report.html import SCRIPTS, script_text
+from sssfit.report.pack import packed_picture, unpacked_picture
+from sssfit.report.pictures import _reduced
+from sssfit.scene.record import Scene
+
+STATIC = Path(__file__).parents[1] / "sssfit" / "report" / "static"
+
+
+@pytest.mark.parametrize("shape", [(5, 7, 3), (4, 1, 1), (1, 6, 2)])
+def test_a_packed_picture_comes_back_as_half_floats(shape):
+    picture = np.random.default_rng(2).normal(size=shape)
+    back = unpacked_picture(packed_picture(picture))
+    np.testing.assert_array_equal(back, picture.astype(np.float16).astype(float))
+
+
+def test_light_beyond_half_floats_is_refused():
+    with pytest.raises(RenderError, match="65504 of half floats"):
+        packed_picture(np.full((2, 2, 3), 1e6))
+
+
+def test_a_large_picture_is_reduced_by_means(caplog):
+    light = np.random.default_rng(3).random((9, 5, 3))
+    with caplog.at_level("INFO", logger="sssfit"):
+        small = _reduced(Scene("face", light, 0.1), 4)
+    assert small.irradiance.shape == (3, 2, 3)
+    assert small.mm_per_pixel == pytest.approx(0.3)
+    np.testing.assert_allclose(small.irradiance[0, 0], light[:3, :3].mean(axis=(0, 1)))
+    np.testing.assert_allclose(small.irradiance[2, 1], light[6:, 3:].mean(axis=(0, 1)))
+    assert "scaled down by 3" in caplog.text
+
+
+def test_the_policy_has_the_hashes_of_the_one_script_and_the_one_style():
+    text = world.text()
+    (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', text)
+    (script,) = re.findall(r'<script type="module">(.*?)</script>', text, re.DOTALL)
+    (style,) = re.findall(r"<style>(.*?)</style>", text, re.DOTALL)
+    for name, each in (("script", script), ("style", style)):
+        digest = base64.b64encode(hashlib.sha256(each.encode()).digest()).decode()
+        assert f"{name}-src 'sha256-{digest}'" in html.unescape(policy)
+    assert "default-src 'none'" in html.unescape(policy)
+    assert " style=" not in re.sub(r"<script.*?</script>", "", text, flags=re.DOTALL)
+
+
+def test_nothing_comes_from_elsewhere():
+    text = world.text()
+    found = re.findall(r'(?:src|href)="([^"#][^"]*)"', text)
+    assert [each for each in found if each != "data:,"] == []
+    assert len(text) < 5e6
+
+
+def test_a_name_cannot_leave_its_place():
+    text = world.text()
+    assert "<script>alert" not in text
+    assert "<img" not in text
+    (data,) = re.findall(r'id="data">(.*?)</script>', text, re.DOTALL)
+    assert json.loads(data)["name"] == world.NAME
+
+
+def test_modules_share_one_scope_and_have_no_name_twice():
+    names = re.findall(
+        r"^(?:const|let|class|function|async function) (\w+)", script_text(), re.MULTILINE
+    )
+    assert len(names) == len(set(names)) > 30
+    assert "import " not in script_text()
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_a_module_imports_from_those_before_it(name):
+    text = (STATIC / f"{name}.js").read_text(encoding="utf-8")
+    known = SCRIPTS[: SCRIPTS.index(name)]
+    for names, other in re.findall(r"^import \{([^}]*)\} from '\./(\w+)\.js';", text, re.MULTILINE):
+        assert other in known
+        source = (STATIC / f"{other}.js").read_text(encoding="utf-8")
+        for each in names.replace(" ", "").split(","):
+            exported = rf"^export (?:const|function|async function|class) {each}\b"
+            assert re.search(exported, source, re.MULTILINE), each
+    assert len(text.splitlines()) <= 250
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
+def test_the_pages_colours_are_the_librarys():
+    """Delta E of random and of grey pairs against colour-science's, and L, a, b."""
+    rng = np.random.default_rng(5)
+    pairs = rng.random((400, 2, 3))
+    pairs[:50] = pairs[:50, :, :1]  # greys have no hue
+    pairs[50:100, 1] = np.clip(pairs[50:100, 0] + rng.normal(size=(50, 3)) * 0.01, 0.0, 1.0)
+    code = (
+        f"import {{ labOf, deltaE }} from '{STATIC / 'colour.js'}';"
+        "const pairs = JSON.parse(process.argv[1]);"
+        "console.log(JSON.stringify(pairs.map((pair) => {"
+        "const labs = pair.map((each) => labOf(...each)); return [labs, deltaE(...labs)]; })));"
+    )
+    command = ["node", "--experimental-default-type=module", "--input-type=module", "-e", code]
+    ran = subprocess.run(
+        [*command, json.dumps(pairs.tolist())], capture_output=True, text=True, check=False
+    )
+    assert ran.returncode == 0, ran.stderr
+    labs, errors = zip(*json.loads(ran.stdout), strict=True)
+    ours = np.stack([lab(pairs[:, k]) for k in (0, 1)], axis=1)
+    np.testing.assert_allclose(labs, ours, atol=1e-9)
+    np.testing.assert_allclose(errors, delta_e_of_lab(ours[:, 0], ours[:, 1]), atol=1e-7)
+
+
+def test_the_front_of_the_page_is_that_of_the_comparison():
+    report = world.report()
+    first = report.comparison.pictures[0].name
+    front = [row.label for row in report.comparison.front(first, "delta-e", "fetches")]
+    assert report.front == front
+    assert {each.label for each in report.kernels} == {row.label for row in report.comparison.rows}
+
+
+def test_two_channels_have_no_colour():
+    text = WAX.replace("eta", 'channels = ["a", "b"]\neta', 1)
+    text = re.sub(r"\[([\d.]+), ([\d.]+), [\d.]+\]", r"[\1, \2]", text)
+    with pytest.raises(RenderError, match="2 channels have no colour"):
+        make_report(parse_material(text, "two.toml"))
+
+
+def test_a_page_knows_itself(tmp_path):
+    ours, other = tmp_path / "a.html", tmp_path / "b.html"
+    ours.write_text(world.text(), encoding="utf-8")
+    other.write_text("<!doctype html><title>mine</title>", encoding="utf-8")
+    assert is_report_file(ours)
+    assert not is_report_file(other)
