@@ -10,6 +10,7 @@ import pytest
 _ALWAYS = ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run")
 _SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 _WAIT = 20.0  # seconds
+_DRAWN = "document.body.dataset.drawn && document.body.dataset.busy !== 'true'"
 
 
 def needs_browser():
@@ -36,7 +37,8 @@ class Browser:
             options.add_argument(each)
         logs = {"browser": "ALL", "performance": "ALL"}
         options.set_capability("goog:loggingPrefs", logs)
-        self.driver = webdriver.Chrome(options=options, service=Service(shutil.which("chromedriver")))
+        service = Service(shutil.which("chromedriver"))
+        self.driver = webdriver.Chrome(options=options, service=service)
         self.downloads = downloads
         where = {"behavior": "allow", "downloadPath": str(downloads)}
         self.driver.execute_cdp_cmd("Browser.setDownloadBehavior", where)
@@ -61,7 +63,7 @@ class Browser:
         """What was logged since the last call."""
         return self.driver.get_log(kind)
 
-    def wait(self, condition="document.body.dataset.drawn && document.body.dataset.busy !== 'true'"):
+    def wait(self, condition=_DRAWN):
         """Wait until a condition holds."""
         end = time.monotonic() + _WAIT
         while not self.js(f"return Boolean({condition})"):

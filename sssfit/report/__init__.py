@@ -4,8 +4,8 @@
 The page needs no network and no server.
 """
 
-from sssfit.report.library import library_page
 from sssfit.report.html import is_report_file, page
+from sssfit.report.library import library_page
 from sssfit.report.record import Report, make_report
 
 __all__ = ["Report", "is_report_file", "library_page", "make_report", "page"]

@@ -178,9 +178,7 @@ def make_report(
     steps("the exact profile")
     profile = source if isinstance(source, Profile) else true_profile(source, threads=threads)
     fits = _fits(profile, pitch, named, only, steps)
-    pictures = shown_pictures(
-        profile, pitch, own=own, side=side, threads=threads, progress=steps
-    )
+    pictures = shown_pictures(profile, pitch, own=own, side=side, threads=threads, progress=steps)
     steps("the comparison")
     alone = [each for each in pictures[1:] if each.name in ("disk", "edge")]
     scenes = [each.scene for each in (pictures[0], *alone)]
@@ -255,7 +253,11 @@ def _shown(fit: Fitted, title: str, mm_per_pixel: float) -> ShownKernel:
     assert fit.found is not None
     assert isinstance(fit.found.kernel, Taps)
     made = fit.settings or fit.taps
-    command = command_of(fit, shlex.quote(f"{title}.profile.npz"), mm_per_pixel) if made else "given as a file"
+    command = (
+        command_of(fit, shlex.quote(f"{title}.profile.npz"), mm_per_pixel)
+        if made
+        else "given as a file"
+    )
     return ShownKernel(fit.label, fit.found.kernel, command)
 
 

@@ -142,9 +142,7 @@ class Plot:
         path = " ".join(f"{a:.1f},{b:.1f}" for a, b in places)
         self.add(self._inside(Markup('<polygon class="band {}" points="{}"/>').format(kind, path)))
 
-    def text(
-        self, x: float, y: float, words: str, kind: str, more: Markup | str = ""
-    ) -> None:
+    def text(self, x: float, y: float, words: str, kind: str, more: Markup | str = "") -> None:
         """Add words at a place."""
         head = Markup('<text class="{}" x="{:.1f}" y="{:.1f}"{}>').format(kind, x, y, more)
         self.parts.append(head + escape(words) + Markup("</text>"))
