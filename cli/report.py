@@ -22,10 +22,9 @@ _OF_ONE = ("kernels", "irradiance", "mm_per_pixel", "only", "photons")
 def report(material: str | None, common: Common, **given: Any) -> None:
     """Write one HTML page about MATERIAL, with its kernels running in the page.
 
-    The page compares kernels with the true picture: it runs the exported GLSL itself by WebGL2, on
-    a head under three lights at three distances, a disk and an edge. It has the charts, the
-    tables and the exports, and needs no network and no server. With --all it is an index of the
-    materials that ship with sssfit.
+    The page runs the exported GLSL by WebGL2 beside the true picture, on a head under three lights
+    at three distances, a disk and an edge. It has charts, tables and exports, and needs no network.
+    With --all it is an index of the materials that ship with sssfit.
 
     MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or a .profile.npz
     file, - for one on stdin.
@@ -44,19 +43,18 @@ def report(material: str | None, common: Common, **given: Any) -> None:
 
     name = "materials" if material is None else stem_of(material, "profile")
     path = target(given["output"], f"{name}.html")
-    inputs = [material, given["irradiance"], *given["kernels"]]
-    hold = {"inputs": inputs, "force": given["force"], "named": ("a page", ".html")}
-    figures: dict[str, Any] = {"material": material}
+    hold: dict[str, Any] = {"inputs": [material, given["irradiance"], *given["kernels"]]}
+    hold |= {"force": given["force"], "named": ("a page", ".html")}
     with held([path], is_report_file, **hold), step_progress(name) as step:
         if material is None:
             every = [load_material(each) for each in material_names()]
             text = library_page(every, threads=common.threads, progress=step)
-            figures["materials"] = [each.name for each in every]
+            figures: dict[str, Any] = {"materials": [each.name for each in every]}
         else:
-            own = {key: given[key] for key in _OF_ONE[1:] if given[key] is not None}
+            own: dict[str, Any] = {key: given[key] for key in _OF_ONE[1:] if given[key] is not None}
             named = [(stem_of(each), load(Taps.read, each)) for each in given["kernels"]]
-            run = {"seed": common.seed, "threads": common.threads, "progress": step}
-            made = make_report(load_source(material), name=name, named=named, **own, **run)
-            text, figures = page(made), figures | made.figures()
+            own |= {"seed": common.seed, "threads": common.threads, "progress": step}
+            made = make_report(load_source(material), name=name, named=named, **own)
+            text, figures = page(made), {"material": material, **made.figures()}
         write(text.encode(), path)
     finish_one(common, path, figures, "", "the page")

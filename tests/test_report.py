@@ -9,15 +9,16 @@ import shutil
 import subprocess
 from pathlib import Path
 
+import cli_world
 import numpy as np
 import pytest
 import report_world as world
-from cli_world import WAX
 
 from sssfit.errors import RenderError
+from sssfit.formats.pictures import save_image
 from sssfit.material import parse_material
 from sssfit.measure.delta_e import delta_e_of_lab, lab
-from sssfit.report import is_report_file, make_report
+from sssfit.report import is_report_file, library_page, make_report, page
 from sssfit.report.html import SCRIPTS, script_text
 from sssfit.report.pack import packed_picture, unpacked_picture
 from sssfit.report.pictures import _reduced
@@ -130,7 +131,7 @@ def test_the_front_of_the_page_is_that_of_the_comparison():
 
 
 def test_two_channels_have_no_colour():
-    text = WAX.replace("eta", 'channels = ["a", "b"]\neta', 1)
+    text = cli_world.WAX.replace("eta", 'channels = ["a", "b"]\neta', 1)
     text = re.sub(r"\[([\d.]+), ([\d.]+), [\d.]+\]", r"[\1, \2]", text)
     with pytest.raises(RenderError, match="2 channels have no colour"):
         make_report(parse_material(text, "two.toml"))
@@ -142,3 +143,26 @@ def test_a_page_knows_itself(tmp_path):
     other.write_text("<!doctype html><title>mine</title>", encoding="utf-8")
     assert is_report_file(ours)
     assert not is_report_file(other)
+
+
+def test_the_index_has_a_swatch_of_each_material():
+    text = library_page([cli_world.wax()], threads=2)
+    assert text.count('class="swatch"') == 1
+    assert "<h2>wax</h2>" in text
+    (data,) = re.findall(r'id="data">(.*?)</script>', text, re.DOTALL)
+    picture = unpacked_picture(json.loads(data)["swatches"][0])
+    assert picture.shape == (96, 96, 3)
+    assert np.percentile(picture[picture.max(axis=2) > 0.0].max(axis=1), 99.0) > 0.7
+
+
+def test_a_picture_of_ones_own_comes_first_with_its_pixels(tmp_path):
+    light = np.random.default_rng(4).random((40, 30, 3))
+    save_image(tmp_path / "face.exr", light, channels=("R", "G", "B"), mm_per_pixel=0.2)
+    profile, files = cli_world.profile(), {"irradiance": str(tmp_path / "face.exr")}
+    made = make_report(profile, only=["disk"], side=20, threads=2, **files)
+    first = made.pictures[0]
+    assert (first.key, first.scene.irradiance.shape) == ("own", (20, 15, 3))
+    assert made.comparison.mm_per_pixel == pytest.approx(0.4)
+    assert made.models is None
+    assert made.budgets == ()
+    assert "Error budget" not in page(made)

@@ -1,4 +1,4 @@
-"""A report in headless Chromium: what it shows is what the library computes; all of it is usable."""
+"""A report in headless Chromium: it shows what the library computes, and all of it can be used."""
 
 import json
 

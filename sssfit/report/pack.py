@@ -5,6 +5,7 @@ import zlib
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
@@ -12,7 +13,7 @@ from sssfit.errors import RenderError
 _LARGEST = float(np.finfo(np.float16).max)
 
 
-def packed_picture(picture: FloatArray) -> dict[str, Any]:
+def packed_picture(picture: npt.NDArray[np.floating[Any]]) -> dict[str, Any]:
     """Return a picture as half floats, deflated.
 
     A half float's 16 bits are taken as a whole number, and each as its difference from what its

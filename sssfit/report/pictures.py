@@ -21,6 +21,7 @@ SIDE = 256  # pixels of a picture at most: nine heads of three channels then tak
 LIGHTS = (45.0, 0.0, 80.0)  # degrees of the key light to the left of the view axis
 # A frame in which distances are those of pixels; pixels of 0.3 mm are 0.6 m away.
 ROWS, FOV_DEGREES = 1080, 30.0
+_HALF = 0.5  # of a block must be on the object for the reduced pixel to be
 FARTHER = (1, 2, 3)  # heads by how many times the pixels of the kernels theirs are
 
 
@@ -137,7 +138,8 @@ def _scenes(
             lit: dict[str, Any] = {"light_degrees": light, "distance_mm": distance}
             head = make_scene("head", **size, mm_per_pixel=pitch, **lit, threads=threads)
             yield f"head-{light:g}-{farther}", "head", light, distance, head
-    for name, turned in (("disk", {}), ("edge", {"angle_degrees": EDGE_DEGREES})):
+    flat: dict[str, dict[str, Any]] = {"disk": {}, "edge": {"angle_degrees": EDGE_DEGREES}}
+    for name, turned in flat.items():
         made = make_scene(name, **size, mm_per_pixel=mm_per_pixel, **turned)
         yield name, name, None, None, made
 
@@ -151,19 +153,18 @@ def _reduced(scene: Scene, side: int) -> Scene:
         f"{scene.name}: {scene.width} x {scene.height} pixels are scaled down by {factor} to "
         f"fit the page's {side} x {side}."
     )
-    mask = None if scene.mask is None else _means(scene.mask[..., None] > 0, factor)[..., 0] >= 0.5
-    return Scene(
-        scene.name,
-        _means(scene.irradiance, factor),
-        scene.mm_per_pixel * factor,
-        mask=None if mask is None else mask.astype(np.int32),
-    )
+    mask = None
+    if scene.mask is not None:
+        part = _means((scene.mask[..., None] > 0).astype(np.float64), factor)[..., 0]
+        mask = (part >= _HALF).astype(np.int32)
+    light = _means(scene.irradiance, factor)
+    return Scene(scene.name, light, scene.mm_per_pixel * factor, mask=mask)
 
 
 def _means(picture: FloatArray, factor: int) -> FloatArray:
     """Return the means of blocks of a picture (H, W, C); blocks at its ends may be smaller."""
     rows, columns = (np.arange(0, n, factor) for n in picture.shape[:2])
-    sums = np.add.reduceat(np.add.reduceat(picture.astype(float), rows, axis=0), columns, axis=1)
+    sums = np.add.reduceat(np.add.reduceat(picture, rows, axis=0), columns, axis=1)
     heights = np.diff(np.append(rows, picture.shape[0]))
     widths = np.diff(np.append(columns, picture.shape[1]))
     means: FloatArray = sums / (heights[:, None] * widths)[..., None]

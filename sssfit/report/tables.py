@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from sssfit.arrays import plain_value
-from sssfit.report.record import Report
+from sssfit.report.record import COST, ERROR, Report
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -52,14 +52,14 @@ def tables_of(report: Report) -> list[Table]:
 def _kernels(report: Report) -> Table:
     keys = ("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99", "relative_l2")
     costs = ("fetches", "passes", "bytes_per_pixel", "seconds_per_megapixel")
-    front = set(report.front)
-    rows = [
-        (row.label, row.picture, *_plain([getattr(row, key) for key in (*keys, *costs)]))
-        + ("yes" if row.label in front else "no",)
-        for row in report.comparison.rows
-    ]
-    heads = ("kernel", "picture", "mean ΔE", "95 % ΔE", "99 % ΔE", "relative L2", "fetches")
-    heads += ("passes", "bytes a pixel", "s a megapixel", "on the front")
+    rows = []
+    for row in report.comparison.rows:
+        figures = _plain([getattr(row, key) for key in (*keys, *costs)])
+        rows.append(
+            (row.label, row.picture, *figures, "yes" if (ERROR, COST) in row.fronts else "no")
+        )
+    heads: tuple[str, ...] = ("kernel", "picture", "mean ΔE", "95 % ΔE", "99 % ΔE")
+    heads += ("relative L2", "fetches", "passes", "bytes a pixel", "s a megapixel", "on the front")
     words = (
         "Errors against the picture by the profile's whole 2D kernel. Seconds are those of the "
         "library on this machine's processor; the page measures its own passes."
@@ -78,7 +78,13 @@ def _reflectance(report: Report) -> Table:
         profile.beyond_grid,
     )
     rows = tuple(zip(*map(_plain, columns), strict=True))
-    heads = ("channel", "diffuse reflectance", "its error", "50 % within mm", "90 % within mm")
+    heads: tuple[str, ...] = (
+        "channel",
+        "diffuse reflectance",
+        "its error",
+        "50 % within mm",
+        "90 % within mm",
+    )
     heads += ("99 % within mm", "beyond the grid")
     words = "How much light each channel returns, and the radii that it returns within."
     return Table("profile", "Profile", words, heads, rows)

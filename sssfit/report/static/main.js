@@ -105,7 +105,7 @@ class Page {
       this.single.show(names.map((name, k) => this.layer(name, k === 0 ? undefined : split)), this.state, pins);
     }
     const title = { truth: 'Truth', kernel: this.state.kernel, difference: 'Difference', unblurred: 'No blur' };
-    get('single-title').textContent = names.map((each) => title[each]).join(' | ');
+    get('single-title').textContent = names.map((each) => title[each]).join(' ◂ ▸ ');
     listPins(pins, this.shown, (k) => this.change({ pins: pinsText(pins.filter((_, own) => own !== k)) }));
     document.body.dataset.drawn = String((Number(document.body.dataset.drawn) || 0) + 1);
   }
