@@ -57,4 +57,4 @@ def report(material: str | None, common: Common, **given: Any) -> None:
             made = make_report(load_source(material), name=name, named=named, **own)
             text, figures = page(made), {"material": material, **made.figures()}
         write(text.encode(), path)
-    finish_one(common, path, figures, "", "the page")
+    finish_one(common, path, figures, made.text() if material else "", "the page")

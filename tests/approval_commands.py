@@ -95,6 +95,7 @@ HELP = [
             "stability",
             "motion",
             "scene",
+            "report",
             "import",
             "export",
             "chart",
@@ -1453,8 +1454,28 @@ SCENE = [
     C("scene wax.profile.npz"),
 ]
 
+# What is refused alone: a page has times in it, and is looked at in test_report_browser.
+REPORT = [
+    C("report"),
+    C("report wax.toml --all"),
+    C("report --all --only svd"),
+    C("report --all --kernel wax.hand.taps.json"),
+    C("report --all -o m.png"),
+    C("report wax.toml --kernel wax.svd2.kernel.json --photons 5000 -q"),
+    C("report wax.toml --kernel missing.taps.json --json"),
+    C("report wax.toml --irradiance missing.exr --mm-per-pixel .4 -v"),
+    C("report wax.toml -o a.png --force"),
+    C("report wax.toml -o no/such/folder.html"),
+    C("report wax.toml --only disc"),
+    C("report wax.toml --photons 1"),
+    C("report wax.toml --mm-per-pixel 0"),
+    C("report wax.toml --threads 0 --seed 2"),
+    C("report missing.toml"),
+]
+
 COMMANDS = {
     "help": HELP,
+    "report": REPORT,
     "stability": STABILITY,
     "motion": MOTION,
     "scene": SCENE,

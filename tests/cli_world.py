@@ -31,6 +31,7 @@ from test_mci import file_text, run_text
 from test_mco import BELOW, DR_CM, IN_LAYERS, N_R, REFLECTED, SPECULAR, block, mco_text
 
 from sssfit import compare, simulate
+from sssfit import report as report_room
 from sssfit.choose import choice as choose
 from sssfit.cli import cli
 from sssfit.compare import budget, pareto, runner, sheet
@@ -47,6 +48,7 @@ from sssfit.formats.pictures import load_image, save_image
 from sssfit.kernel import SeparableKernel, Stage, Taps
 from sssfit.material import Material, parse_material
 from sssfit.profile import Profile
+from sssfit.report import Report
 from sssfit.scene.made import make_scene
 from sssfit.scene.record import Scene
 from sssfit.simulate import Checkpoint, inversion, simulate_montecarlo
@@ -68,7 +70,7 @@ LAYERS = (
 PHOTONS, DR_MM, RADIUS_MM = 4000, 0.2, 6.0
 GRID = f"--dr {DR_MM} --radius {RADIUS_MM}"
 FOREIGN = "mine\n"  # what a file of somebody else's holds
-ENDINGS = ("npz", "json", "exr", "png", "md", "csv", "toml", "hlsl")
+ENDINGS = ("npz", "json", "exr", "png", "md", "csv", "toml", "hlsl", "html")
 
 
 @functools.cache
@@ -592,6 +594,18 @@ def small_table(_, given) -> SpeedUpTable:
     return SpeedUpTable(tuple(frames))
 
 
+@functools.cache
+def small_report() -> Report:
+    """One kernel on pictures of few pixels, whatever is asked for."""
+    make = _unrecorded(report_room.make_report)
+    return make(profile(), named=[("hand", taps())], only=["disk"], side=16, threads=1)
+
+
+def small_page(*_) -> str:
+    """The index of one material."""
+    return _unrecorded(report_room.library_page)([wax()], threads=1)
+
+
 def blank(*_) -> Figure:
     """A chart with nothing on it: what charts look like is tested where they are made."""
     return Figure(figsize=(0.1, 0.1))
@@ -622,6 +636,8 @@ STAND_INS = {
     "sssfit.crowd.runner.six_gaussians": lambda *_: gaussians(),
     "sssfit.crowd.runner.frame_of": small_frame,
     "sssfit.crowd.runner.table_of": small_table,
+    "sssfit.report.make_report": lambda *_: small_report(),
+    "sssfit.report.library_page": small_page,
     **{f"sssfit.chart.{kind}.{kind}_figure": blank for kind in _CHARTS},
 }
 

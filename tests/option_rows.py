@@ -28,6 +28,7 @@ from sssfit.formats.csv import csv_text, load_csv
 from sssfit.formats.mci import load_mci
 from sssfit.formats.mco import join_channels, load_mco
 from sssfit.formats.pictures import load_image
+from sssfit.material import load_material
 from sssfit.measure.difference import difference_map, magnified_difference
 from sssfit.measure.score import auto_exposure
 from sssfit.methods import FITS as METHODS
@@ -1395,6 +1396,53 @@ SCENE = {
     ),
 }
 
+# report
+
+_REPORT = "report wax.profile.npz"
+
+
+def _reported(**settings: Any) -> Any:
+    usual = {"name": "wax", "named": [], "seed": 1, "threads": None}
+    return called("sssfit.report.make_report", profile(), **usual | settings)
+
+
+def _report_row(typed: str, words: str, **own: Any) -> Row:
+    return Row(_REPORT, typed, calls, lambda: _reported(**own), words=words)
+
+
+def _indexed() -> Any:
+    every = [load_material(each) for each in ("skin1", "marble")]
+    return called("sssfit.report.library_page", every, threads=None)
+
+
+REPORT = {
+    "--all": Row(_REPORT, "report --all", calls, _indexed),
+    "--kernel": Row(
+        _REPORT,
+        "--kernel wax.taps.json",
+        calls,
+        lambda: _reported(named=[("wax", world.taps())]),
+    ),
+    "--irradiance": Row(
+        _REPORT, "--irradiance plain.png", calls, lambda: _reported(irradiance="plain.png")
+    ),
+    "--mm-per-pixel": _report_row(
+        "--mm-per-pixel .4", "from your own file, else 0.3", mm_per_pixel=0.4
+    ),
+    "--only": _report_row(
+        "--only disk,svd", "those that are fitted in seconds", only=["disk", "svd"]
+    ),
+    "--photons": _report_row("--photons 5000", "200000", photons=5000),
+    "--output": Row(
+        _REPORT,
+        "-o a.html",
+        names,
+        lambda: ["a.html"],
+        words="MATERIAL.html, materials.html with --all",
+    ),
+    "--force": Row(f"{_REPORT} -o foreign.html", "--force", names, lambda: ["foreign.html"]),
+}
+
 ROWS: dict[str, dict[str, Row]] = {
     "materials": MATERIALS,
     "simulate": SIMULATE,
@@ -1408,6 +1456,7 @@ ROWS: dict[str, dict[str, Row]] = {
     "stability": STABILITY,
     "motion": MOTION,
     "scene": SCENE,
+    "report": REPORT,
     "show": {},
 }
 
@@ -1425,6 +1474,7 @@ COMMANDS = {
     "stability": _STABILITY,
     "motion": _MOTION,
     "scene": _SCENE,
+    "report": _REPORT,
     "show": "show",
 }
 
@@ -1470,6 +1520,7 @@ SEEDS = {
         lambda: _compared([make_scene("noise", height=16, width=24, mm_per_pixel=0.3, seed=5)]),
     ),
     "stability": Row(_STABILITY, "--seed 5", calls, lambda: _stressed(seed=5)),
+    "report": Row(_REPORT, "--seed 5", calls, lambda: _reported(seed=5)),
     "motion": Row(_MOTION, "--seed 5", calls, lambda: _moved(seed=5)),
     "motion --table": Row("motion --table", "--seed 5", calls, lambda: _tabled(seed=5)),
     "choose": Row(_CHOOSE, "--seed 5", _asked, lambda: _rounded(_chosen(seed=5))),
@@ -1487,6 +1538,7 @@ THREADS = {
     "compare": Row(_BUDGET, "--threads 1", calls, lambda: _budgeted(threads=1)),
     "stability": Row(_STABILITY, "--threads 1", calls, lambda: _stressed(threads=1)),
     "scene": _scene_row("--threads 1", threads=1),
+    "report": Row(_REPORT, "--threads 1", calls, lambda: _reported(threads=1)),
     "motion": Row(_MOTION, "--threads 1", calls, lambda: _moved(threads=1)),
     "choose": Row(_CHOOSE, "--threads 1", _asked, lambda: _rounded(_chosen(threads=1))),
     "chart": Row(

@@ -1123,6 +1123,18 @@ def speed_ups(f: Figures) -> list[Any]:
     return [Table(["heads", *(f"{each:g}" for each in f["distances"])], rows)]
 
 
+def report(f: Figures) -> list[Any]:
+    kernels, pictures = len(f["kernels"]), len(f["pictures"])
+    return [
+        Words(
+            "{} {} on {} {}; on the Pareto front: {}",
+            *(kernels, plural(kernels, "kernel"), pictures, plural(pictures, "picture")),
+            ", ".join(f["front"]),
+        ),
+        *(Words("Wrote {}", each) for each in f["output"]),
+    ]
+
+
 # A command that prints each of them, on the files of ``cli_world``.
 PRINTED: dict[str, Layout] = {
     "materials": materials_list,
@@ -1158,6 +1170,7 @@ PRINTED: dict[str, Layout] = {
     "compare --all --size 24x16": fronts,
     "compare --all --size 24x16 --error l2 --cost passes": fronts,
     "compare wax.profile.npz --what sheet --chart s.png": sheet,
+    "report wax.profile.npz": report,
     "compare wax.profile.npz --what front --size 24x16": fronts,
     "compare wax.profile.npz --what front --size 24x16 --chart f.png --table f.md": fronts,
     "stability wax.toml": stability,

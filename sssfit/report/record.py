@@ -8,6 +8,7 @@ from sssfit.compare.budget import Budget
 from sssfit.compare.comparison import Comparison
 from sssfit.compare.models import ModelComparison
 from sssfit.compare.spectrum import Spectrum
+from sssfit.messages import counted
 from sssfit.profile import Profile
 from sssfit.render import render
 from sssfit.report.kernels import ShownKernel
@@ -76,6 +77,12 @@ class Report:
             label: packed_picture(render(first.scene, by_label[label], border=first.border))
             for label in self.front[:_MOST_DRAWN]
         }
+
+    def text(self) -> str:
+        """Return what ``sssfit report`` prints."""
+        kernels = counted(len(self.kernels), "kernel")
+        pictures = counted(len(self.pictures), "picture")
+        return f"{kernels} on {pictures}; on the Pareto front: {', '.join(self.front)}"
 
     def figures(self) -> dict[str, Any]:
         """Return the figures that ``sssfit report --json`` prints."""
