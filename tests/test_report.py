@@ -99,6 +99,14 @@ def test_a_module_imports_from_those_before_it(name):
 
 
 @pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
+@pytest.mark.parametrize("path", sorted(STATIC.glob("*.js")), ids=lambda path: path.stem)
+def test_modules_are_javascript(path):
+    command = ["node", "--check", "--input-type=module"]
+    ran = subprocess.run(command, input=path.read_bytes(), capture_output=True, check=False)
+    assert ran.returncode == 0, ran.stderr.decode()
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
 def test_the_pages_colours_are_the_librarys():
     """Delta E of random and of grey pairs against colour-science's, and L, a, b."""
     rng = np.random.default_rng(5)

@@ -129,6 +129,24 @@ def test_every_control_does_something(page, window):
     assert window.log("browser") == []
 
 
+def test_the_divider_is_dragged_and_elsewhere_the_picture(page, window):
+    from selenium.webdriver import ActionChains
+
+    window.open(page, "#zoom=4")
+    canvas = window.driver.find_element("id", "single")
+    width = canvas.size["width"]
+    mouse = ActionChains(window.driver)
+    mouse.move_to_element(canvas).click_and_hold().move_by_offset(width // 4, 0).release().perform()
+    assert float(window.js("return document.getElementById('split').value")) == pytest.approx(
+        0.75, abs=0.02
+    )
+    mouse.move_to_element(canvas).click_and_hold().move_by_offset(40, 0).release().perform()
+    seen = dict(each.split("=") for each in window.js("return location.hash")[1:].split("&"))
+    assert float(seen["split"]) == pytest.approx(0.75, abs=0.02)
+    assert float(seen["x"]) < 0.5
+    assert "pins" not in seen
+
+
 def test_stages_are_shown_one_by_one(page, window):
     window.open(page)
     window.set("kernel", world.LABEL)

@@ -7,6 +7,7 @@ from sssfit.report.charts.svg import Chart, Plot, limits
 from sssfit.report.record import COST, ERROR, Report
 
 _NOTICED = 1.0  # Delta E, just noticeable
+_LABEL = 0.3  # room of a label of 24 letters, in lengths of the axis
 
 
 def pareto_chart(report: Report) -> Chart:
@@ -15,22 +16,30 @@ def pareto_chart(report: Report) -> Chart:
     name = comparison.pictures[0].name
     rows, front = comparison.rows_of(name), comparison.front(name, ERROR, COST)
     plot = Plot(
-        limits([row.fetches for row in rows], is_log=True),
+        _fetches(rows),
         limits([*(row.delta_e_2000_mean for row in rows), _NOTICED], is_log=True),
         ("texture fetches a pixel", "mean ΔE 2000"),
         log=(True, True),
         describe=f"Error over fetches of {len(rows)} kernels on {name}; all are in the table",
     )
-    y = plot.y.place(_NOTICED)
-    plot.line([(plot.x.begin, y), (plot.x.end, y)], "noticed")
-    plot.text(plot.x.end - 4, y - 5, "ΔE 1, just noticeable", "small end")
+    noticed = plot.y.place(_NOTICED)
+    plot.line([(plot.x.begin, noticed), (plot.x.end, noticed)], "noticed")
+    plot.text(plot.x.end - 4, noticed - 5, "ΔE 1, just noticeable", "small end")
     places = [(plot.x.place(r.fetches), plot.y.place(r.delta_e_2000_mean)) for r in front]
     plot.line(_staircase(places, plot.x.end), "front")
     for row in sorted(rows, key=lambda each: each in front):
         plot.add(_point(plot, row, is_front=row in front))
+    for (x, y), row in zip(places, front, strict=True):
+        plot.text(x - 9.0, y + 14.0, row.label, "small end")  # below a front no point is
     legend = (("front-point", "on the Pareto front"), ("other-point", "another kernel is better"))
     words = f"On {name}. Choose a point to run its kernel above; the arrow keys go along the front."
     return Chart("pareto", "Error and cost", words, legend, plot.svg(role="group"))
+
+
+def _fetches(rows: list[KernelRow]) -> tuple[float, float]:
+    """Return the ends of the axis of fetches, with room for a label left of the cheapest."""
+    low, high = limits([row.fetches for row in rows], is_log=True)
+    return low * (low / high) ** _LABEL, high
 
 
 def _staircase(places: list[tuple[float, float]], end: float) -> list[tuple[float, float]]:

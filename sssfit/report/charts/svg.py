@@ -9,6 +9,7 @@ from markupsafe import Markup, escape
 WIDTH, HEIGHT = 560.0, 340.0
 _LEFT, _RIGHT, _TOP, _BOTTOM = 76.0, 14.0, 14.0, 46.0
 _TICKS = 6
+_ROOM = 0.05  # of an axis, beyond the values at either end
 _LEAST = 1e-30  # stands for 0 on a logarithmic axis
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -184,6 +185,7 @@ def limits(values: Iterable[float], *, is_log: bool, decades: float = 8.0) -> tu
     low, high = min(found), max(found)
     if is_log:
         low = max(low, high / 10.0**decades)
-        return low / 1.25, max(high * 1.25, low * 2.0)
-    room = 0.05 * (high - low or 1.0)
+        room = max(1.25, (high / low) ** _ROOM)
+        return low / room, high * room
+    room = _ROOM * (high - low or 1.0)
     return (min(low, 0.0) if low >= 0.0 else low - room), high + room

@@ -20,6 +20,7 @@ class Page {
     const handlers = {
       zoom: (factor, x, y) => this.zoom(factor, x, y),
       pan: (x, y) => this.change({ x, y }),
+      split: (split) => { this.change({ split }); get('split').value = this.state.split; },
       hover: (at) => this.look(at),
       click: (at) => this.pin(at),
       focus: (pane) => pane.canvas.focus({ preventScroll: true }),

@@ -3,6 +3,7 @@
 import { clipped, encoded, falseColour, SCALE_END } from './colour.js';
 
 const NUMBERS_FROM = 44; // CSS pixels a pixel of the picture must have for three figures in it
+const NEAR = 12; // CSS pixels around the divider in which it is taken hold of
 const LOUPE = 9; // pixels on a side of the loupe
 
 // A picture as a canvas of its own size, in sRGB codes.
@@ -53,15 +54,31 @@ export class Pane {
     return { x: ((clientX - box.left) * ratio - left) / scale, y: ((clientY - box.top) * ratio - top) / scale };
   }
 
+  // The share of the pane's width that a pointer is at.
+  across({ clientX }) {
+    const { left, width } = this.canvas.getBoundingClientRect();
+    return (clientX - left) / width;
+  }
+
+  isOnDivider(event) {
+    const split = this.layers[1]?.from;
+    return split !== undefined && Math.abs(this.across(event) - split) * this.canvas.clientWidth < NEAR;
+  }
+
   grab(event) {
     this.canvas.setPointerCapture(event.pointerId);
-    this.held = { x: event.clientX, y: event.clientY, view: { ...this.view }, moved: false };
+    const { clientX: x, clientY: y } = event;
+    this.held = { x, y, view: { ...this.view }, moved: false, divides: this.isOnDivider(event) };
     this.handlers.focus(this);
   }
 
   move(event) {
     if (!this.size) return;
-    if (!this.held) return void this.handlers.hover(this.at(event));
+    if (!this.held) {
+      this.canvas.style.cursor = this.isOnDivider(event) ? 'ew-resize' : '';
+      return void this.handlers.hover(this.at(event));
+    }
+    if (this.held.divides) return void this.handlers.split(this.across(event));
     const [dx, dy] = [event.clientX - this.held.x, event.clientY - this.held.y];
     this.held.moved ||= Math.hypot(dx, dy) > 4;
     if (!this.held.moved) return;
@@ -71,7 +88,7 @@ export class Pane {
   }
 
   drop(event) {
-    const wasClick = this.held && !this.held.moved;
+    const wasClick = this.held && !this.held.moved && !this.held.divides;
     this.held = null;
     if (wasClick) this.handlers.click(this.at(event));
   }
