@@ -7,6 +7,7 @@ from sssfit.report.charts.svg import Chart, Plot, limits
 from sssfit.report.record import COST, ERROR, Report
 
 _NOTICED = 1.0  # Delta E, just noticeable
+_LETTER, _LINE = 6.0, 12.0  # width and height of a label's letter
 _LABEL = 0.3  # room of a label of 24 letters, in lengths of the axis
 
 
@@ -29,11 +30,21 @@ def pareto_chart(report: Report) -> Chart:
     plot.line(_staircase(places, plot.x.end), "front")
     for row in sorted(rows, key=lambda each: each in front):
         plot.add(_point(plot, row, is_front=row in front))
-    for (x, y), row in zip(places, front, strict=True):
-        plot.text(x - 9.0, y + 14.0, row.label, "small end")  # below a front no point is
+    _name_front(plot, places, [row.label for row in front])
     legend = (("front-point", "on the Pareto front"), ("other-point", "another kernel is better"))
     words = f"On {name}. Choose a point to run its kernel above; the arrow keys go along the front."
     return Chart("pareto", "Error and cost", words, legend, plot.svg(role="group"))
+
+
+def _name_front(plot: Plot, places: list[tuple[float, float]], labels: list[str]) -> None:
+    """Write labels left of and below the front, where no point is; of two that meet, one."""
+    taken: list[tuple[float, float, float]] = []
+    for (x, y), label in zip(places, labels, strict=True):
+        begin, end, line = x - 9.0 - _LETTER * len(label), x - 9.0, y + 14.0
+        meets = any(begin < b and a < end and abs(line - other) < _LINE for a, b, other in taken)
+        if not meets and begin > plot.x.begin:
+            taken.append((begin, end, line))
+            plot.text(end, line, label, "small end")
 
 
 def _fetches(rows: list[KernelRow]) -> tuple[float, float]:
