@@ -206,7 +206,7 @@ SCENE = (
            "480x300 with --table]"),
     option("--map-size", WholeRange(8, 16384), "N", "Side of a whole map in texels.  [default: "
            "1024; 512 with --table]"),
-    option("--savings", Names(SAVINGS), "NAME,...", "What is left out, as above.  [default: all]"),
+    option("--savings", Names((*SAVINGS, "none")), "NAME,...", "What is left out.  [default: all]"),
     option("--culled-by", ["vertex", "face"], None, "Normals by which texels face away.", "vertex"),
     option("--margin", _FACTOR, "D", "clipped: half widths of the picture that are kept.", 1.0),
     option("--mesh", None, "FILE", "OBJ, PLY, glTF or GLB with texture coordinates; needs the "

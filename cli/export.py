@@ -87,7 +87,7 @@ def _preset(words: Any, given: Any, common: Common) -> None:
     files, chosen = reports.words_of(words, most=1)
     loaded = load(kinds.load, files[0] if files else profile_name(None))
     found = reports.preset_of_any(given["preset"], loaded, chosen)
-    path = target(given["output"], f"{found.title}.{given['preset']}{found.preset.ending}")
+    path = target(given["output"], reports.text_name(found))
     with held([path], reports.is_preset_file, inputs=files, force=given["force"]):
         reports.warn_of(found, strict=given["strict"])
         write(preset_text(found).encode(), path)

@@ -26,7 +26,7 @@ _OPTIONS = (
     option("--channels", None, "A,B,...", "Names for several .mco, in their order.  [default: "
            "R,G,B for three]"),
     option("--preset", list(PRESETS), None, "FILE... are an engine's own parameters, NAME=VALUE."),
-    *output("NAME.profile.npz; .toml where a preset gives a material", "is not our profile"),
+    *output("NAME.profile.npz; of a preset .toml or .taps.json", "is not our profile"),
 )
 # fmt: on
 
@@ -81,11 +81,11 @@ def import_(files: tuple[str, ...], common: Common, **given: Any) -> None:
 
 def _preset(name: str, words: Any, output: str | None, force: bool, common: Common) -> None:
     """Write the material or the profile that an engine's parameters describe."""
-    from sssfit.export.presets import import_preset, reports
+    from sssfit.export.presets import reports
     from sssfit.export.summary import figures_of, summary
 
     title = name if output in (None, "-") else Path(output or "").name.split(".")[0]
-    record = import_preset(name, reports.words_of(words, most=0)[1], title)
+    record = reports.imported_as(name, reports.words_of(words, most=0)[1], title, output or "")
     ending, ours = reports.kind_of(record)
     path = target(output, f"{title}{ending}")
     with held([path], ours, inputs=[], force=force):

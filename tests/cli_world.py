@@ -37,7 +37,8 @@ from sssfit.cli import cli
 from sssfit.compare import budget, pareto, runner, sheet
 from sssfit.compare.candidates import Candidate, candidates
 from sssfit.compare.presets import PresetComparison, compare_presets
-from sssfit.crowd.frame import CrowdFrame, measure_frame
+from sssfit.crowd.frame import measure_frame
+from sssfit.crowd.record import CrowdFrame
 from sssfit.crowd.row import Row
 from sssfit.crowd.runner import savings_of
 from sssfit.crowd.table import ALL, SpeedUpTable

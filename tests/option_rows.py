@@ -1017,7 +1017,7 @@ IMPORT = {
         names,
         lambda: ["x.profile.npz"],
         default="table.profile.npz",
-        words="NAME.profile.npz; .toml where a preset gives a material",
+        words="NAME.profile.npz; of a preset .toml or .taps.json",
     ),
     "--force": Row(
         "import table.csv -o foreign.npz", "--force", is_written("npz"), lambda: ["foreign.npz"]

@@ -1105,7 +1105,7 @@ def scene(f: Figures) -> list[Any]:
         ),
         ["all stages (ms)", *(each["total_milliseconds"] for each in every)],
         ["mean Delta E", *(Rough(each["mean_delta_e"]) for each in every)],
-        ["largest Delta E inside", *(Rough(each["largest_inside"]) for each in every)],
+        ["largest Delta E inside", *(_or_none(each["largest_inside"]) for each in every)],
     ]
     ends = Words(
         "{} times fewer texels convolved, {} times as fast",
@@ -1113,6 +1113,10 @@ def scene(f: Figures) -> list[Any]:
     )
     table = Table(["", *_OF_WORK.values()], rows)
     return [head, table, ends, *(Words("Wrote {}", each) for each in f["output"])]
+
+
+def _or_none(value: float | None) -> Any:
+    return None if value is None else Rough(value)
 
 
 def speed_ups(f: Figures) -> list[Any]:

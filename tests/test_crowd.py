@@ -90,6 +90,7 @@ def test_every_cell_leaves_out_as_much_as_the_papers(kernel):
 
 def test_savings_are_chosen_by_name():
     assert savings_of(None) == ALL
+    assert savings_of(["none"]) == Savings()
     assert savings_of(["depth"]) == Savings(by_depth=True)
     with pytest.raises(ArgumentError, match="culled, depth, clipped"):
         savings_of(["cull"])

@@ -16,9 +16,8 @@ from sssfit.material.checks import is_name
 from sssfit.messages import note
 from sssfit.profile import Profile
 
-VIEWS = ("models", "spectrum", "guide")
 _OF_PROFILES = {"spectrum": "`spectrum = True`", "guide": "`guide = True`"}
-COMPUTED = ("kernel", "taps", *VIEWS)
+COMPUTED = ("kernel", "taps", "models", "spectrum", "guide")
 
 
 def drawn_of(found: Any, view: str, name: str) -> tuple[Any, str, str | None]:
@@ -28,7 +27,7 @@ def drawn_of(found: Any, view: str, name: str) -> tuple[Any, str, str | None]:
     ----------
     found : Profile, SeparableKernel, Taps, Material or SoFar
     view : str
-        One of `VIEWS`, or "" for the record's own chart.
+        "models", "spectrum", "guide", or "" for the record's own chart.
     name : str
         The record's file in messages.
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from sssfit.arrays import plain
 from sssfit.errors import KernelError, RenderError
 from sssfit.export.presets import Parameters, engine_look, preset_of
+from sssfit.export.presets.source import source_of
 from sssfit.material import Material
 from sssfit.measure.score import measure
 from sssfit.messages import table
@@ -124,25 +125,26 @@ def compare_presets(
 
     Raises
     ------
+    KernelError
+        The source has other channels than three, or a channel reflects nothing.
     RenderError
-        There is no picture, or no preset carries the source.
+        There is no picture.
     """
     if not scenes:
         raise RenderError("no picture to compare presets on; expected at least one.")
     profile = source if isinstance(source, Profile) else true_profile(source, threads=threads)
     truths = [render_reference(each, profile, threads=threads) for each in scenes]
     rows, left_out = list[PresetErrors](), dict[str, str]()
+    one = source_of(profile)  # so that what presets share is computed once
     for k, name in enumerate(PRESETS):
         if progress is not None:
             progress(k, len(PRESETS), name)
         try:
-            found = preset_of(name, source if isinstance(source, Material) else profile)
+            found = preset_of(name, one)
         except KernelError as refusal:
             left_out[name] = str(refusal)
         else:
             rows.append(_errors(found, scenes, truths, threads))
-    if not rows:
-        raise RenderError(f"no preset carries this material. {next(iter(left_out.values()))}")
     title = rows[0].parameters.title
     ordered = tuple(sorted(rows, key=lambda each: max(each.p95)))
     pitch = scenes[0].mm_per_pixel

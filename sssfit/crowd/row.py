@@ -1,5 +1,6 @@
 """Heads side by side before a camera: what the paper leaves open, pinned."""
 
+import functools
 import math
 from dataclasses import dataclass, field
 
@@ -98,6 +99,7 @@ class Row:
         )
 
 
+@functools.lru_cache(maxsize=2)
 def _scaled(mesh: Mesh, height_mm: float) -> Mesh:
     """Return a mesh of a height, its middle at the origin."""
     low, high = mesh.positions_mm.min(axis=0), mesh.positions_mm.max(axis=0)

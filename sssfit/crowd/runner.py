@@ -3,7 +3,8 @@
 from collections.abc import Callable, Collection
 from typing import Any
 
-from sssfit.crowd.frame import MAP_SIZE, CrowdFrame, measure_frame
+from sssfit.crowd.frame import MAP_SIZE, measure_frame
+from sssfit.crowd.record import CrowdFrame
 from sssfit.crowd.row import DISTANCE_UNITS, HEAD_UNITS, RESOLUTION, SPACING_UNITS, Row
 from sssfit.crowd.table import MAP_SIZE as TABLE_MAP_SIZE
 from sssfit.crowd.table import RESOLUTION as TABLE_RESOLUTION
@@ -30,14 +31,14 @@ def six_gaussians() -> Kernel:
 def savings_of(
     names: Collection[str] | None, culled_by: str = "vertex", margin: float = 1.0
 ) -> Savings:
-    """Return savings by name; None is all of them.
+    """Return savings by name; None is all of them, and "none" stands for no saving.
 
     Raises
     ------
     ArgumentError, RenderError
         A name is unknown, or a setting is invalid.
     """
-    wanted = SAVINGS if names is None else tuple(names)
+    wanted = SAVINGS if names is None else tuple(each for each in names if each != "none")
     for each in wanted:
         if each not in SAVINGS:
             raise ArgumentError(

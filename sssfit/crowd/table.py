@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from sssfit.arrays import FloatArray, plain
-from sssfit.crowd.frame import CrowdFrame, measure_frame
+from sssfit.crowd.frame import measure_frame
+from sssfit.crowd.record import CrowdFrame
 from sssfit.crowd.row import Row
 from sssfit.kernel import Kernel
 from sssfit.messages import table

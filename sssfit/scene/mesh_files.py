@@ -35,6 +35,8 @@ def load_mesh(path: str | Path, *, mm_per_unit: float = 1.0) -> Mesh:
         raise FileError(f"{path}: expected a mesh of {', '.join(FORMATS)}.")
     if not 0.0 < mm_per_unit < np.inf:
         raise RenderError(f"mm_per_unit = {shown(mm_per_unit)}; expected a length above 0.")
+    if not path.is_file():
+        raise FileError(f"{path}: there is no such file.")
     try:
         import trimesh
     except ImportError:
@@ -47,7 +49,9 @@ def load_mesh(path: str | Path, *, mm_per_unit: float = 1.0) -> Mesh:
     except OSError as error:
         raise FileError(f"{path}: {reason(error)}.") from None
     except Exception as error:  # of a dozen readers
-        raise FileError(f"{path}: not a mesh that can be read: {error}.") from None
+        raise FileError(
+            f"{path}: not a mesh that can be read: {str(error).rstrip('.!')}."
+        ) from None
     if not isinstance(loaded, trimesh.Trimesh) or len(loaded.faces) == 0:
         raise RenderError(f"{path}: there are no triangles in it.")
     visual = getattr(loaded, "visual", None)

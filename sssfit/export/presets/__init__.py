@@ -9,13 +9,14 @@ one file here and one line in ``sssfit.methods.PRESETS``; ``record`` says what i
 
 from __future__ import annotations
 
+import dataclasses
 import json
 from collections.abc import Mapping
 
 from sssfit.errors import ArgumentError
 from sssfit.export.presets.fields import Field
 from sssfit.export.presets.record import Parameters, Preset
-from sssfit.export.presets.source import source_of
+from sssfit.export.presets.source import Source, source_of
 from sssfit.kernel import SeparableKernel, Taps
 from sssfit.material import Material
 from sssfit.material.checks import check_texts
@@ -37,6 +38,9 @@ __all__ = [
 ]
 
 
+_INDICES = ("ior", "indexOfRefraction")  # what engines call it
+
+
 def preset(name: str) -> Preset:
     """Return a preset by its name in ``sssfit.methods.PRESETS``.
 
@@ -55,7 +59,7 @@ def preset(name: str) -> Preset:
 
 
 def preset_of(
-    name: str, record: Material | Profile | SeparableKernel | Taps, **chosen: object
+    name: str, record: Material | Profile | SeparableKernel | Taps | Source, **chosen: object
 ) -> Parameters:
     """Return an engine's parameters for a material or a profile.
 
@@ -63,8 +67,9 @@ def preset_of(
     ----------
     name : str
     record : Material, Profile or Taps
-        Three channels. Of a material the exact profile is computed, which takes seconds. Taps are
-        those of an engine's own shader, whose parameters are found again.
+        Three channels. Of a material the exact profile is computed, which takes seconds; a `Source`
+        serves several presets. Taps are those of an engine's own shader, whose parameters are found
+        again.
     **chosen
         Parameters that a user chooses, by the engine's names: those with ``is_chosen`` in
         `Preset.fields`, such as the number of taps or the size of the scene's unit.
@@ -117,7 +122,7 @@ def import_preset(name: str, given: Mapping[str, object], title: str = "") -> Ma
     found = parameters_from(name, given, title)
     if found.preset.material is not None:
         return found.preset.material(found)
-    return found.preset.profile(found)
+    return _with_index(found, found.preset.profile(found))
 
 
 def engine_look(parameters: Parameters) -> Profile | Taps:
@@ -133,6 +138,15 @@ def preset_text(parameters: Parameters) -> str:
 def preset_json(parameters: Parameters) -> str:
     """Return parameters, units and warnings as JSON."""
     return json.dumps(parameters.to_dict(), indent=2, ensure_ascii=False) + "\n"
+
+
+def _with_index(found: Parameters, profile: Profile) -> Profile:
+    """Keep the refractive index among a profile's settings, for the way back."""
+    index = [found.values[name] for name in _INDICES if name in found.values]
+    if not index:
+        return profile
+    settings = {**profile.meta.get("settings", {}), "eta": index[0]}
+    return dataclasses.replace(profile, meta={**profile.meta, "settings": settings})
 
 
 def _warned(wanted: Preset, title: str, values: Mapping[str, object]) -> Parameters:

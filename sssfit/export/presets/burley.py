@@ -14,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
+from sssfit.export.presets.source import Source
 from sssfit.grid import grid_of_lengths
 from sssfit.messages import by_channel
 from sssfit.profile import Profile
@@ -54,6 +55,16 @@ def burley_profile(
         source=f"preset {preset}",
         settings={"preset": preset, "s_per_mm": shapes.tolist()},
     )
+
+
+def widest_and_shares(source: Source) -> tuple[float, tuple[float, ...]]:
+    """Return the distance d of the widest channel [mm], and each channel's share of it.
+
+    Of the shapes that fit the profile best.
+    """
+    distance_mm = 1.0 / source.shapes_per_mm
+    widest = float(distance_mm.max())
+    return widest, tuple((distance_mm / widest).tolist())
 
 
 def range_warnings(albedo: Sequence[float] | FloatArray) -> tuple[str, ...]:

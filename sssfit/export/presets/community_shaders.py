@@ -17,7 +17,7 @@ from sssfit.arrays import FloatArray
 from sssfit.export.presets.burley import burley_profile, range_warnings
 from sssfit.export.presets.fields import Field, Values
 from sssfit.export.presets.record import Parameters, Preset
-from sssfit.export.presets.separable import FALLOFF, KERNEL_RANGE, STRENGTH, Words
+from sssfit.export.presets.separable import FALLOFF, STRENGTH, Words, unit_of, width_of
 from sssfit.export.presets.separable_fit import fit_separable
 from sssfit.export.presets.source import Source
 from sssfit.kernel import Taps
@@ -28,7 +28,6 @@ TAPS = 21
 UNIT_MM = 14.28  # of a game unit
 # uv = 0.1 (UNIT_MM / 10) radius 0.5 / (z tan(fov / 2)), and uv 1 spans 2 z tan(fov / 2) units.
 DRAWN = 0.1 * (UNIT_MM / 10.0) * UNIT_MM
-_HALF_SCREEN = 2.0
 _BURLEY = 1
 FIELDS = (
     Field("albedo", "1", "diffuse reflectance R_d, the texture's colour, linear", "colour",
@@ -47,7 +46,7 @@ FIELDS = (
 
 def unit_mm(parameters: Parameters) -> float:
     """Return the length of one unit of the offsets [mm], to the sides."""
-    return _HALF_SCREEN * UNIT_MM * parameters.number("BlurRadius") / KERNEL_RANGE
+    return unit_of(UNIT_MM * parameters.number("BlurRadius"))
 
 
 WORDS = Words("albedo", "Strength", "Falloff", unit_mm, lambda _: TAPS)
@@ -62,7 +61,7 @@ def convert(source: Source, chosen: Values) -> Values:
         found = fit_separable(source, TAPS)
         kernel = {
             **WORDS.values(found, albedo),
-            "BlurRadius": found.unit_mm * KERNEL_RANGE / _HALF_SCREEN / UNIT_MM,
+            "BlurRadius": width_of(found.unit_mm) / UNIT_MM,
         }
     return {
         **chosen,

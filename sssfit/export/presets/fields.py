@@ -104,7 +104,8 @@ class Field:
             return f"one of {', '.join(str(each) for each in self.among)}"
         what = {"colour": "three numbers", "whole": "a whole number"}.get(self.kind, "a number")
         low = f"{'above' if self.is_above else 'from'} {self.least:g}"
-        high = "" if math.isinf(self.most) else f" to {self.most:g}"
+        to = ", at most" if self.is_above else " to"
+        high = "" if math.isinf(self.most) else f"{to} {self.most:g}"
         unit = "" if self.unit in ("", "1") else f", in {self.unit}"
         return f"{what} {low}{high}{unit}, such as {self._example}"
 

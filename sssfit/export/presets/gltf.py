@@ -18,12 +18,13 @@ import numpy as np
 
 from sssfit import __version__
 from sssfit.arrays import FloatArray
+from sssfit.errors import ArgumentError
 from sssfit.export.presets import medium
 from sssfit.export.presets.fields import Field, Values
 from sssfit.export.presets.record import Parameters, Preset
 from sssfit.export.presets.source import Source
 from sssfit.material import Material
-from sssfit.messages import by_channel
+from sssfit.messages import by_channel, shown
 from sssfit.simulate.inversion import van_de_hulst_albedo
 
 _MM = 1000.0
@@ -71,6 +72,11 @@ def convert(source: Source, chosen: Values) -> Values:
 def material(parameters: Parameters) -> Material:
     """Return the medium that a renderer makes of the extension."""
     colour = np.array(parameters.colour("attenuationColor"))
+    if (colour >= 1.0).any():
+        raise ArgumentError(
+            f"attenuationColor = {shown(parameters['attenuationColor'])}; expected three numbers "
+            "above 0 and below 1: a medium that takes no light has no length."
+        )
     path_mm = _MM * parameters.number("attenuationDistance") / -np.log(colour)
     return medium.half_space(
         parameters.title,

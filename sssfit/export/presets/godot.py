@@ -14,11 +14,14 @@ from sssfit.export.presets.fields import Field, Values
 from sssfit.export.presets.record import Parameters, Preset
 from sssfit.export.presets.separable import (
     COUNTS,
-    KERNEL_RANGE,
+    LOST,
+    MODEL,
     Separable,
     Words,
     kernel_rows,
     separable_of_taps,
+    unit_of,
+    width_of,
 )
 from sssfit.export.presets.separable_fit import fit_separable
 from sssfit.export.presets.source import Source
@@ -26,7 +29,6 @@ from sssfit.export.presets.text import lines, number, numbers
 from sssfit.kernel import Taps
 
 _MM = 1000.0
-_HALF_SCREEN = 2.0
 FIELDS = (
     Field("albedo", "1", "diffuse reflectance R_d, the material's albedo, linear", "colour",
           most=1.0),
@@ -44,7 +46,7 @@ FIELDS = (
 def unit_mm(parameters: Parameters) -> float:
     """Return the length of one unit of the offsets [mm], to the sides."""
     reach_mm = _MM * parameters.number("subsurface_scattering_depth_scale")
-    return _HALF_SCREEN * reach_mm * parameters.number("subsurf_scatter_strength") / KERNEL_RANGE
+    return unit_of(reach_mm * parameters.number("subsurf_scatter_strength"))
 
 
 WORDS = Words("albedo", "strength", "falloff", unit_mm, lambda each: int(each.number("taps")))
@@ -65,7 +67,7 @@ def of_taps(table: Taps, chosen: Values) -> Values:
 def _values(found: Separable, albedo: FloatArray) -> Values:
     return {
         **WORDS.values(found, albedo),
-        "subsurface_scattering_depth_scale": found.unit_mm * KERNEL_RANGE / _HALF_SCREEN / _MM,
+        "subsurface_scattering_depth_scale": width_of(found.unit_mm) / _MM,
         "subsurf_scatter_strength": 1.0,
     }
 
@@ -99,14 +101,14 @@ def _rows(kind: str, rows: list[tuple[float, ...]]) -> str:
 GODOT = Preset(
     name="godot",
     engine="Godot 4, subsurface scattering of the Forward+ renderer",
-    model="two passes of taps from one stretched Gaussian mixture (Jimenez et al. 2012)",
+    model=MODEL,
     ending=".glsl",
     fields=FIELDS,
     convert=convert,
     write=write,
     look=WORDS.look,
     profile=WORDS.profile,
-    lost="the 1/r peak of the profile, its round shape, and all but two numbers a channel.",
+    lost=LOST,
     origin=(
         "github.com/godotengine/godot: servers/rendering/renderer_rd/shaders/effects/"
         "subsurface_scattering.glsl, main",

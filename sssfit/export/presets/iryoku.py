@@ -12,11 +12,14 @@ from sssfit.export.presets.fields import Field, Values
 from sssfit.export.presets.record import Parameters, Preset
 from sssfit.export.presets.separable import (
     COUNTS,
-    KERNEL_RANGE,
+    LOST,
+    MODEL,
     Separable,
     Words,
     kernel_rows,
     separable_of_taps,
+    unit_of,
+    width_of,
 )
 from sssfit.export.presets.separable_fit import fit_separable
 from sssfit.export.presets.source import Source
@@ -24,7 +27,6 @@ from sssfit.export.presets.text import lines, number, numbers
 from sssfit.kernel import Taps
 
 _MM = 1000.0
-_HALF_SCREEN = 2.0  # texture coordinates span 2 of the units in which the shader moves
 
 FIELDS = (
     Field("albedo", "1", "diffuse reflectance R_d, the colour of the surface, linear", "colour",
@@ -42,7 +44,7 @@ FIELDS = (
 def unit_mm(parameters: Parameters) -> float:
     """Return the length of one unit of the offsets [mm], up and down."""
     width_mm = _MM * parameters.number("sssWidth") * parameters.number("meters_per_unit")
-    return _HALF_SCREEN * width_mm / KERNEL_RANGE
+    return unit_of(width_mm)
 
 
 WORDS = Words(
@@ -64,7 +66,7 @@ def of_taps(table: Taps, chosen: Values) -> Values:
 
 def _values(found: Separable, albedo: FloatArray, chosen: Values) -> Values:
     unit_m = float(chosen["meters_per_unit"])  # type: ignore[arg-type]
-    width = found.unit_mm * KERNEL_RANGE / _HALF_SCREEN / _MM / unit_m
+    width = width_of(found.unit_mm) / _MM / unit_m
     return {**WORDS.values(found, albedo), "sssWidth": width}
 
 
@@ -85,14 +87,14 @@ def write(parameters: Parameters) -> str:
 IRYOKU = Preset(
     name="iryoku",
     engine="separable-sss (iryoku)",
-    model="two passes of taps from one stretched Gaussian mixture (Jimenez et al. 2012)",
+    model=MODEL,
     ending=".hlsl",
     fields=FIELDS,
     convert=convert,
     write=write,
     look=WORDS.look,
     profile=WORDS.profile,
-    lost="the 1/r peak of the profile, its round shape, and all but two numbers a channel.",
+    lost=LOST,
     origin=(
         "github.com/iryoku/separable-sss: Demo/Code/SeparableSSS.cpp, calculateKernel; "
         "SeparableSSS.h, SSSSBlurPS",

@@ -8,7 +8,7 @@ its own text says "the color of the subsurface scattering effect" and no more.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from xml.sax.saxutils import escape, quoteattr
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from sssfit.export.presets import medium
 from sssfit.export.presets.fields import Field, Values
 from sssfit.export.presets.record import Parameters, Preset
 from sssfit.export.presets.source import Source
-from sssfit.export.presets.text import head
+from sssfit.export.presets.text import identifier, xml_comment
 from sssfit.material import Material
 
 VERSION = "1.39"
@@ -73,9 +73,8 @@ def document(parameters: Parameters, category: str, inputs: Mapping[str, tuple[s
 
     ``inputs`` are types and values by name.
     """
-    name = "".join(c if c.isalnum() else "_" for c in parameters.title)
+    name = identifier(parameters.title)
     name = name if name[0].isalpha() else f"m_{name}"
-    comment = "\n".join(f"  {line.strip()}" for line in head(parameters, "")).replace("--", "- -")
     rows = [
         f"    <input name={quoteattr(key)} type={quoteattr(kind)} value={quoteattr(text)} />"
         for key, (kind, text) in inputs.items()
@@ -84,7 +83,7 @@ def document(parameters: Parameters, category: str, inputs: Mapping[str, tuple[s
         [
             '<?xml version="1.0"?>',
             f'<materialx version="{VERSION}" colorspace="lin_rec709">',
-            f"  <!--\n{escape(comment)}\n  -->",
+            f"  <!--\n{xml_comment(parameters)}\n  -->",
             f'  <{category} name="SR_{name}" type="surfaceshader">',
             *rows,
             f"  </{category}>",

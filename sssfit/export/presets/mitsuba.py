@@ -13,7 +13,7 @@ from sssfit.export.presets import medium
 from sssfit.export.presets.fields import Field, Values
 from sssfit.export.presets.record import Parameters, Preset
 from sssfit.export.presets.source import Source
-from sssfit.export.presets.text import head, number, numbers
+from sssfit.export.presets.text import identifier, number, numbers, xml_comment
 from sssfit.material import Material
 
 FIELDS = (
@@ -58,12 +58,11 @@ def material(parameters: Parameters) -> Material:
 
 def write(parameters: Parameters) -> str:
     """Return a scene of the medium and its interface, for an object to refer to."""
-    title = "".join(c if c.isalnum() else "_" for c in parameters.title)
-    comment = "\n".join(f"  {line.strip()}" for line in head(parameters, "")).replace("--", "- -")
+    title = identifier(parameters.title)
     return "\n".join(
         [
             '<scene version="3.0.0">',
-            f"  <!--\n{comment}\n  -->",
+            f"  <!--\n{xml_comment(parameters)}\n  -->",
             f'  <medium type="homogeneous" id="medium_{title}">',
             f'    <rgb name="albedo" value="{numbers(parameters.colour("albedo"))}" />',
             f'    <rgb name="sigma_t" value="{numbers(parameters.colour("sigma_t"))}" />',

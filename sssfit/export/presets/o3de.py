@@ -11,7 +11,7 @@ import json
 
 import numpy as np
 
-from sssfit.export.presets.burley import burley_profile, range_warnings
+from sssfit.export.presets.burley import burley_profile, range_warnings, widest_and_shares
 from sssfit.export.presets.fields import Field, Values
 from sssfit.export.presets.record import Parameters, Preset
 from sssfit.export.presets.source import Source
@@ -30,12 +30,11 @@ FIELDS = (
 
 def convert(source: Source, chosen: Values) -> Values:
     """Return the distances of the shapes that fit best."""
-    distance_mm = 1.0 / source.shapes_per_mm
-    widest = float(distance_mm.max())
+    widest, shares = widest_and_shares(source)
     return {
         **chosen,
         "baseColor": tuple(source.reflectance.tolist()),
-        "scatterColor": tuple((distance_mm / widest).tolist()),
+        "scatterColor": shares,
         "scatterDistance": widest / _DRAWN,
     }
 

@@ -9,9 +9,17 @@ from pathlib import Path
 from typing import Any
 
 from sssfit.errors import ArgumentError, KernelError, SssfitWarning
-from sssfit.export.presets import Parameters, preset, preset_of
+from sssfit.export.presets import (
+    Parameters,
+    engine_look,
+    import_preset,
+    parameters_from,
+    preset,
+    preset_of,
+)
 from sssfit.export.presets.fields import Value
 from sssfit.kernel import SeparableKernel, Taps
+from sssfit.kernel.taps_json import is_taps_file, pack
 from sssfit.material import Material
 from sssfit.messages import printable, table
 from sssfit.methods import PRESETS
@@ -20,6 +28,8 @@ from sssfit.profile import Profile, is_profile_file
 _DIGITS = 7  # parameters are stored in single precision at best
 _MARK, _HEAD = b"sssfit", 512  # bytes; the text of every preset with comments begins with them
 _TOML_HEAD = "# Made by sssfit from an engine's parameters; it may replace this file."
+
+Imported = Material | Profile | Taps
 
 
 def presets_list() -> list[dict[str, Any]]:
@@ -113,19 +123,48 @@ def warn_of(found: Parameters, *, strict: bool = False) -> None:
         warnings.warn(f"{found.preset.name}: {words}", SssfitWarning, stacklevel=2)
 
 
-def stored(record: Material | Profile) -> bytes:
-    """Return an imported record's file: TOML of a material, npz of a profile."""
+def imported_as(name: str, given: Mapping[str, str], title: str, output: str) -> Imported:
+    """Return what an engine's parameters describe, for a file by its ending.
+
+    The taps of the engine's shader for .taps.json, which hold more than the radial profile that
+    is made of them; else a material or a profile.
+
+    Raises
+    ------
+    ArgumentError
+        As `import_preset`; the engine has no taps.
+    """
+    if not output.endswith(".taps.json"):
+        return import_preset(name, given, title)
+    look = engine_look(parameters_from(name, given, title))
+    if not isinstance(look, Taps):
+        raise ArgumentError(f"{name} blurs by a profile and has no taps; give .profile.npz.")
+    return look
+
+
+def text_name(found: Parameters) -> str:
+    """Return the name of a preset's file: material, engine, ending."""
+    tag = f".{found.preset.name}"
+    return found.title + (tag if tag != found.preset.ending else "") + found.preset.ending
+
+
+def stored(record: Imported) -> bytes:
+    """Return an imported record's file: TOML of a material, npz of a profile, JSON of taps."""
     if isinstance(record, Material):
         return f"{_TOML_HEAD}\n{record.to_toml()}".encode()
+    if isinstance(record, Taps):
+        return pack(record)
     stream = io.BytesIO()
     record.write(stream)
     return stream.getvalue()
 
 
-def kind_of(record: Material | Profile) -> tuple[str, Callable[[Path], bool]]:
+def kind_of(record: Imported) -> tuple[str, Callable[[Path], bool]]:
     """Return the ending of an imported record's file, and what tells whether a file is ours."""
     if isinstance(record, Profile):
         return ".profile.npz", is_profile_file
+    if isinstance(record, Taps):
+        return ".taps.json", is_taps_file
     return ".toml", is_preset_file
 
 

@@ -35,6 +35,9 @@ from sssfit.simulate.closed_form import closed_form_profile
 
 STRENGTH, FALLOFF = (0.48, 0.41, 0.28), (1.0, 0.37, 0.3)  # those of the published skin
 KERNEL_RANGE = 3.0  # units of the offsets that an engine's width stands for
+HALF_SCREEN = 2.0  # texture coordinates span 2 of the units in which the shaders move
+MODEL = "two passes of taps from one stretched Gaussian mixture (Jimenez et al. 2012)"
+LOST = "the 1/r peak of the profile, its round shape, and all but two numbers a channel."
 CHANNELS = ("R", "G", "B")
 COUNTS = (11, 17, 25)
 _BIAS = 0.001  # of the falloff
@@ -45,6 +48,16 @@ PIXEL_MM = 0.3  # frequencies up to those of such pixels count
 LEAST_FALLOFF = 0.02
 _SAME = 1e-6  # of taps that are to be those of a falloff
 _RINGS, _MOST_RINGS, _SIGMAS = 8.0, 4000.0, 6.0  # of the narrowest and the widest Gaussian
+
+
+def unit_of(width_mm: float) -> float:
+    """Return the length of one unit of the offsets [mm], for a width of these shaders [mm]."""
+    return HALF_SCREEN * width_mm / KERNEL_RANGE
+
+
+def width_of(unit_mm: float) -> float:
+    """Return the width [mm] that gives the unit, the inverse of `unit_of`."""
+    return unit_mm * KERNEL_RANGE / HALF_SCREEN
 
 
 class Separable(NamedTuple):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
@@ -27,6 +28,7 @@ _REFINED = 6
 _Model = Callable[[FloatArray], FloatArray]
 
 
+@functools.lru_cache(maxsize=8)  # three engines have the same 25 taps
 def fit_separable(source: Source, taps: int) -> Separable:
     """Fit the kernel of so many taps to what a picture shows of a profile.
 

@@ -72,9 +72,12 @@ class Source:
 
     @property
     def eta(self) -> float:
-        """Refractive index of the material relative to what is above; 1.4 of an unknown one."""
+        """Refractive index of the material relative to what is above; 1.4 of an unknown one.
+
+        A profile that was imported from an engine has it among its settings.
+        """
         if self.material is None:
-            return 1.4
+            return float(self.profile.meta.get("settings", {}).get("eta", 1.4))
         return self.material.layers[0].eta / self.material.eta_above
 
     @property
@@ -83,13 +86,13 @@ class Source:
         return self.reflectance / normal_transmittance(self.eta)
 
 
-def source_of(record: Material | Profile | SeparableKernel | Taps) -> Source:
+def source_of(record: Material | Profile | SeparableKernel | Taps | Source) -> Source:
     """Return the source of a preset.
 
     Parameters
     ----------
-    record : Material or Profile
-        Of a material the exact profile is computed, which takes seconds.
+    record : Material, Profile or Source
+        Of a material the exact profile is computed, which takes seconds; a source stays as it is.
 
     Raises
     ------
@@ -97,6 +100,8 @@ def source_of(record: Material | Profile | SeparableKernel | Taps) -> Source:
         It is a kernel, which a preset's parameters cannot carry; it has not three channels; a
         channel reflects nothing; or a material has layers and no profile of its own.
     """
+    if isinstance(record, Source):
+        return record
     if isinstance(record, SeparableKernel | Taps):
         raise KernelError(
             f"a kernel of {of_material(record.meta.get('material'))} is a table, which a preset's "

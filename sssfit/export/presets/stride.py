@@ -11,7 +11,15 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import KernelError
 from sssfit.export.presets.fields import Field, Values
 from sssfit.export.presets.record import Parameters, Preset
-from sssfit.export.presets.separable import KERNEL_RANGE, Separable, Words, separable_of_taps
+from sssfit.export.presets.separable import (
+    LOST,
+    MODEL,
+    Separable,
+    Words,
+    separable_of_taps,
+    unit_of,
+    width_of,
+)
 from sssfit.export.presets.separable_fit import fit_separable
 from sssfit.export.presets.source import Source
 from sssfit.export.presets.text import lines, number, numbers
@@ -19,7 +27,6 @@ from sssfit.kernel import Taps
 
 TAPS = 25
 _MM = 1000.0
-_HALF_SCREEN = 2.0
 FIELDS = (
     Field("albedo", "1", "diffuse reflectance R_d, the diffuse map, linear", "colour", most=1.0),
     Field("ScatteringWidth", "m", "scattering width", is_above=True),
@@ -32,7 +39,7 @@ FIELDS = (
 
 def unit_mm(parameters: Parameters) -> float:
     """Return the length of one unit of the offsets [mm]."""
-    return _HALF_SCREEN * _MM * parameters.number("ScatteringWidth") / KERNEL_RANGE
+    return unit_of(_MM * parameters.number("ScatteringWidth"))
 
 
 WORDS = Words("albedo", "Strength", "Falloff", unit_mm, lambda _: TAPS)
@@ -52,7 +59,7 @@ def of_taps(table: Taps, chosen: Values) -> Values:
 
 
 def _values(found: Separable, albedo: FloatArray) -> Values:
-    width = found.unit_mm * KERNEL_RANGE / _HALF_SCREEN / _MM
+    width = width_of(found.unit_mm) / _MM
     return {**WORDS.values(found, albedo), "ScatteringWidth": width}
 
 
@@ -80,14 +87,14 @@ def write(parameters: Parameters) -> str:
 STRIDE = Preset(
     name="stride",
     engine="Stride, subsurface scattering feature",
-    model="two passes of taps from one stretched Gaussian mixture (Jimenez et al. 2012)",
+    model=MODEL,
     ending=".cs",
     fields=FIELDS,
     convert=convert,
     write=write,
     look=WORDS.look,
     profile=WORDS.profile,
-    lost="the 1/r peak of the profile, its round shape, and all but two numbers a channel.",
+    lost=LOST,
     origin=(
         "github.com/stride3d/stride: sources/engine/Stride.Rendering/Rendering/Images/"
         "SubsurfaceScattering/SubsurfaceScatteringBlurShader.sdsl, SSSSBlurPS",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from xml.sax.saxutils import escape
 
 from sssfit import __version__
 from sssfit.export.presets.record import Parameters
@@ -25,6 +26,17 @@ def head(parameters: Parameters, mark: str) -> Iterator[str]:
 def lines(parameters: Parameters, mark: str, body: Iterable[str]) -> str:
     """Return a text of a head and its body."""
     return "\n".join([*head(parameters, mark), *body, ""])
+
+
+def xml_comment(parameters: Parameters) -> str:
+    """Return the head as the inside of an XML comment, in which -- may not stand."""
+    words = "\n".join(f"  {line.strip()}" for line in head(parameters, ""))
+    return escape(words.replace("--", "- -"))
+
+
+def identifier(title: str) -> str:
+    """Return a title in letters, digits and underscores."""
+    return "".join(c if c.isalnum() else "_" for c in title)
 
 
 def number(value: float) -> str:

@@ -24,7 +24,7 @@ from sssfit.export.presets.fields import Field, Values
 from sssfit.export.presets.record import Parameters, Preset
 from sssfit.export.presets.separable import FALLOFF, KERNEL_RANGE, STRENGTH, Words
 from sssfit.export.presets.source import Source
-from sssfit.export.presets.text import lines, number, numbers
+from sssfit.export.presets.text import identifier, lines, number, numbers
 from sssfit.kernel import Taps
 from sssfit.profile import Profile
 from sssfit.shapes import s_diffuse_mean_free_path, s_perpendicular
@@ -189,7 +189,7 @@ def write(parameters: Parameters) -> str:
             for each in ("EnableBurley", "EnableMeanFreePath")
         ),
         "asset = unreal.AssetToolsHelpers.get_asset_tools().create_asset(",
-        f'    "SP_{_identifier(parameters.title)}", "/Game", unreal.SubsurfaceProfile, '
+        f'    "SP_{identifier(parameters.title)}", "/Game", unreal.SubsurfaceProfile, '
         "unreal.SubsurfaceProfileFactory()",
         ")",
         'asset.set_editor_property("settings", settings)',
@@ -200,10 +200,6 @@ def write(parameters: Parameters) -> str:
 def _snake(name: str) -> str:
     """Return a property's name as the editor's Python spells it."""
     return "".join(f"_{c.lower()}" if c.isupper() else c for c in name).lstrip("_")
-
-
-def _identifier(name: str) -> str:
-    return "".join(c if c.isalnum() else "_" for c in name)
 
 
 UNREAL = Preset(
