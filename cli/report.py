@@ -39,7 +39,7 @@ def report(material: str | None, common: Common, **given: Any) -> None:
     refuse(given, dict.fromkeys(_OF_ONE, "one MATERIAL") if given["every"] else {})
     from sssfit.kernel import Taps
     from sssfit.material import load_material, material_names
-    from sssfit.report import is_report_file, library_page, make_report, page
+    from sssfit.report import finished_page, is_report_file, library_page
 
     name = "materials" if material is None else stem_of(material, "profile")
     path = target(given["output"], f"{name}.html")
@@ -48,13 +48,14 @@ def report(material: str | None, common: Common, **given: Any) -> None:
     with held([path], is_report_file, **hold), step_progress(name) as step:
         if material is None:
             every = [load_material(each) for each in material_names()]
-            text = library_page(every, threads=common.threads, progress=step)
+            own: dict[str, Any] = {"threads": common.threads, "progress": step}
+            text = library_page(every, beside=path and path.parent, **own)
             figures: dict[str, Any] = {"materials": [each.name for each in every]}
         else:
-            own: dict[str, Any] = {key: given[key] for key in _OF_ONE[1:] if given[key] is not None}
+            own = {key: given[key] for key in _OF_ONE[1:] if given[key] is not None}
             named = [(stem_of(each), load(Taps.read, each)) for each in given["kernels"]]
             own |= {"seed": common.seed, "threads": common.threads, "progress": step}
-            made = make_report(load_source(material), name=name, named=named, **own)
-            text, figures = page(made), {"material": material, **made.figures()}
+            made = finished_page(load_source(material), name=name, named=named, **own)
+            text, figures = made["page"], {"material": material, **made["figures"]}
         write(text.encode(), path)
-    finish_one(common, path, figures, made.text() if material else "", "the page")
+    finish_one(common, path, figures, made["words"] if material else "", "the page")

@@ -39,6 +39,8 @@ class Browser:
         options.set_capability("goog:loggingPrefs", logs)
         service = Service(shutil.which("chromedriver"))
         self.driver = webdriver.Chrome(options=options, service=service)
+        self.driver.set_page_load_timeout(_WAIT)
+        self.driver.set_script_timeout(_WAIT)
         self.downloads = downloads
         where = {"behavior": "allow", "downloadPath": str(downloads)}
         self.driver.execute_cdp_cmd("Browser.setDownloadBehavior", where)

@@ -1403,7 +1403,7 @@ _REPORT = "report wax.profile.npz"
 
 def _reported(**settings: Any) -> Any:
     usual = {"name": "wax", "named": [], "seed": 1, "threads": None}
-    return called("sssfit.report.make_report", profile(), **usual | settings)
+    return called("sssfit.report.finished_page", profile(), **usual | settings)
 
 
 def _report_row(typed: str, words: str, **own: Any) -> Row:
@@ -1412,7 +1412,7 @@ def _report_row(typed: str, words: str, **own: Any) -> Row:
 
 def _indexed() -> Any:
     every = [load_material(each) for each in ("skin1", "marble")]
-    return called("sssfit.report.library_page", every, threads=None)
+    return called("sssfit.report.library_page", every, beside=Path(), threads=None)
 
 
 REPORT = {

@@ -4,6 +4,7 @@ import base64
 import hashlib
 import html
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -18,11 +19,13 @@ from sssfit.errors import RenderError
 from sssfit.formats.pictures import save_image
 from sssfit.material import parse_material
 from sssfit.measure.delta_e import delta_e_of_lab, lab
-from sssfit.report import is_report_file, library_page, make_report, page
+from sssfit.report import finished_page, is_report_file, library_page, make_report, page
 from sssfit.report.html import SCRIPTS, script_text
+from sssfit.report.kept import kept, page_key
 from sssfit.report.pack import packed_picture, unpacked_picture
 from sssfit.report.pictures import _reduced
 from sssfit.scene.record import Scene
+from sssfit.simulate import simulate_exact
 
 STATIC = Path(__file__).parents[1] / "sssfit" / "report" / "static"
 
@@ -106,6 +109,39 @@ def test_modules_are_javascript(path):
     assert ran.returncode == 0, ran.stderr.decode()
 
 
+# Of TypeScript's checks: unknown names, missing exports, and wrong numbers of arguments. Types of
+# elements would need a cast in every second line.
+CHECKED = {"TS2304", "TS2305", "TS2306", "TS2307", "TS2552", "TS2554", "TS2555", "TS2588"}
+
+
+def test_names_imports_and_calls_are_right(tmp_path):
+    """By TypeScript, which CI installs; it must also find faults that are put in."""
+    if shutil.which("tsc") is None:
+        if os.environ.get("CI") == "true":
+            pytest.fail("tsc is missing, and CI installs it")
+        pytest.skip("needs tsc")
+    shutil.copytree(STATIC, tmp_path / "static")
+    # Known to browsers since 2020, and not yet to TypeScript 4.8.
+    members = "constructor(format: string); readable: any; writable: any;"
+    declared = f"declare class DecompressionStream {{ {members} }}"
+    (tmp_path / "known.d.ts").write_text(declared)
+    assert faults_of(tmp_path) == []
+    with (tmp_path / "static" / "main.js").open("a") as out:
+        out.write("import { nothing } from './half.js';\nexrOf(1, 2, 3, 4);\nmystery();\n")
+    assert sorted(faults_of(tmp_path)) == ["TS2304", "TS2305", "TS2554"]
+
+
+def faults_of(folder):
+    """The kinds of faults that TypeScript finds in modules of a folder, of those that we check."""
+    library = ["--target", "ES2022", "--lib", "ES2022,DOM,DOM.Iterable", "--module", "ES2022"]
+    paths = [folder / "known.d.ts", *sorted((folder / "static").glob("*.js"))]
+    command = ["tsc", "--noEmit", "--allowJs", "--checkJs", *library, *map(str, paths)]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    found = re.findall(r"error (TS\d+)", ran.stdout)
+    assert "TS2339" in found, ran.stdout + ran.stderr  # it did read them
+    return [each for each in found if each in CHECKED or each.startswith("TS1")]
+
+
 @pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
 def test_the_pages_colours_are_the_librarys():
     """Delta E of random and of grey pairs against colour-science's, and L, a, b."""
@@ -174,3 +210,81 @@ def test_a_picture_of_ones_own_comes_first_with_its_pixels(tmp_path):
     assert made.models is None
     assert made.budgets == ()
     assert "Error budget" not in page(made)
+
+
+def finished(**more):
+    """A small page of a profile, kept in a folder of its own."""
+    return finished_page(cli_world.profile(), only=["disk"], side=16, threads=1, **more)
+
+
+def edged(columns):
+    """A picture that is lit on one half."""
+    picture = np.zeros((40, columns, 3))
+    picture[:20] = 1.0
+    return picture
+
+
+def test_a_page_is_kept_with_what_was_said(tmp_path, monkeypatch, caplog):
+    caplog.set_level("INFO", logger="sssfit")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    save_image(tmp_path / "face.exr", edged(30), mm_per_pixel=0.2)
+    first = finished(irradiance=str(tmp_path / "face.exr"))
+    told = caplog.text
+    assert "scaled down by 3" in told
+    caplog.clear()
+    monkeypatch.setattr("sssfit.report.finished.make_report", None)
+    assert finished(irradiance=str(tmp_path / "face.exr")) == first
+    assert [line.split(": ")[-1] for line in caplog.text.splitlines()] == [
+        line.split(": ")[-1] for line in told.splitlines()
+    ]
+    save_image(tmp_path / "face.exr", edged(31), mm_per_pixel=0.2)
+    with pytest.raises(TypeError):  # another picture is another page
+        finished(irradiance=str(tmp_path / "face.exr"))
+
+
+def test_a_damaged_page_is_made_again(tmp_path, monkeypatch, caplog):
+    caplog.set_level("INFO", logger="sssfit")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr("sssfit.report.finished.page", lambda made: made.name)
+    first = finished()
+    (path,) = (tmp_path / "pages").glob("*.json")
+    raw = bytearray(path.read_bytes())
+    raw[40] ^= 1
+    path.write_bytes(raw)
+    assert finished() == first
+    assert path.read_bytes() != raw
+
+
+def test_ten_pages_are_kept(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr("sssfit.report.kept.logging.Logger.isEnabledFor", lambda *_: True)
+    for k in range(12):
+        assert kept(page_key({"number": k}), lambda k=k: {"made": k}) == {"made": k}
+    assert len(list((tmp_path / "pages").iterdir())) == 10
+
+
+def test_a_folder_that_cannot_be_written_keeps_nothing(tmp_path, monkeypatch):
+    (tmp_path / "pages").write_text("a file")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert kept(page_key({}), lambda: {"made": 1}) == {"made": 1}
+    assert (tmp_path / "pages").read_text() == "a file"
+
+
+def test_the_index_links_to_pages_beside_it(tmp_path):
+    (tmp_path / "wax.html").write_text(world.text(), encoding="utf-8")
+    assert '<a href="wax.html">wax</a>' in library_page(
+        [cli_world.wax()], beside=tmp_path, threads=2
+    )
+    (tmp_path / "wax.html").write_text("<!doctype html> of somebody else", encoding="utf-8")
+    text = library_page([cli_world.wax()], beside=tmp_path, threads=2)
+    assert "<a href" not in text
+    assert "sssfit report wax" in text
+
+
+def test_one_channel_is_grey():
+    text = cli_world.WAX.replace("eta", 'channels = ["grey"]\neta', 1)
+    text = re.sub(r"\[([\d.]+), [\d.]+, [\d.]+\]", r"[\1]", text)
+    grey = simulate_exact(parse_material(text, "grey.toml"), threads=1)
+    made = make_report(grey, only=["disk"], side=16, threads=1)
+    assert made.to_dict()["kernels"][0]["albedo"] == [pytest.approx(grey.diffuse_reflectance[0])]
+    assert "grey" in page(made)

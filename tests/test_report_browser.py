@@ -1,6 +1,8 @@
 """A report in headless Chromium: it shows what the library computes, and all of it can be used."""
 
+import dataclasses
 import json
+from urllib.parse import quote
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from sssfit.export import kernel_text
 from sssfit.formats.pictures import load_image
 from sssfit.measure.score import measure
 from sssfit.render import render
+from sssfit.render.reference import render_reference
 from sssfit.report.pack import unpacked_picture
 
 SHOWN = ("svd 2 on 7 taps", "svd 3 on 11 taps", "disk 24")
@@ -224,6 +227,51 @@ def test_the_copied_export_is_the_export(page, window, form):
     window.click(f"[data-export={form}]")
     window.wait("window.copied")
     assert window.js("return window.copied") == kernel_text(kernel_of(world.LABEL).taps, form)[0]
+
+
+@pytest.mark.parametrize(("key", "times"), [("disk", 2), ("edge", 0.5)])
+def test_the_page_computes_truths_for_other_pixels(page, window, key, times):
+    window.open(page, f"#picture={key}&kernel=" + quote(labels()[0]))
+    window.set("distance", times)
+    assert f"times={times:g}" in window.js("return location.hash")
+    reference = picture_of(key).reference
+    scene = reference.scene
+    lit = scene.irradiance.astype(np.float16).astype(float)
+    pitch = times * scene.mm_per_pixel
+    scene = dataclasses.replace(scene, irradiance=lit, mm_per_pixel=pitch)
+    border = "mirror" if reference.border == "mirror" else "clamp"
+    truth = render_reference(scene, world.report().profile, border=border)
+    seen = load_image(window.download("truth")).pixels
+    np.testing.assert_allclose(seen, truth, rtol=1e-6, atol=1e-7 * truth.max())
+    ours = render(scene, kernel_of(labels()[0]).taps, border=border)
+    assert np.abs(load_image(window.download("kernel")).pixels - ours).max() < 2e-3
+
+
+def test_fetches_go_along_the_front(page, window):
+    window.open(page)
+    front = world.report().front
+    for k, label in enumerate(front):
+        window.set("most", k)
+        assert window.js("return document.getElementById('kernel').value") == label
+        assert window.text("most-words").startswith(f"{kernel_of(label).taps.fetches:.3g}"[:2])
+
+
+def test_a_chart_shows_one_channel_at_a_time(page, window):
+    window.open(page)
+    read = (
+        "return [...document.querySelectorAll('#chart-models .panel')].map((each) => each.hidden)"
+    )
+    assert window.js(read) == [True, False, True]
+    window.click("#chart-models [data-panel='2']")
+    assert window.js(read) == [True, True, False]
+
+
+def test_the_difference_is_downloaded(page, window):
+    window.open(page)
+    errors = load_image(window.download("difference")).pixels
+    np.testing.assert_array_equal(errors[..., 0], errors[..., 2])
+    mask = picture_of("head-45-1").reference.scene.mask > 0
+    assert f"{errors[..., 0][mask].mean():.3g}" == f"{float(window.text('figure-mean')):.3g}"
 
 
 @pytest.mark.parametrize("width", [360, 1600])

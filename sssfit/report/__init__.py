@@ -5,9 +5,10 @@ materials.
 The page needs no network and no server.
 """
 
+from sssfit.report.finished import finished_page
 from sssfit.report.html import is_report_file, page
 from sssfit.report.library import library_page
 from sssfit.report.make import make_report
 from sssfit.report.record import Report
 
-__all__ = ["Report", "is_report_file", "library_page", "make_report", "page"]
+__all__ = ["Report", "finished_page", "is_report_file", "library_page", "make_report", "page"]

@@ -24,6 +24,7 @@ MARK = "sssfit.report/1"
 # In the order of their imports: each file imports only from files before it.
 SCRIPTS = (
     *("half", "colour", "figures", "exr", "passes", "state", "tables", "charts", "view"),
+    *("fourier", "kernel", "truth"),
     *("model", "panel", "controls", "main"),
 )
 _IMPORT = re.compile(r"^import [^;]*;\n", re.MULTILINE)

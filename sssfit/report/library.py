@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Iterable
+from pathlib import Path
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from sssfit.material import Material
 from sssfit.measure.delta_e import auto_exposure
 from sssfit.profile import Profile
 from sssfit.render.reference import render_reference
-from sssfit.report.html import data_text, rendered, script_text
+from sssfit.report.html import data_text, is_report_file, rendered, script_text
 from sssfit.report.pack import packed_picture
 from sssfit.report.pictures import distance_of
 from sssfit.scene.made import make_scene
@@ -61,10 +62,20 @@ def swatch_of(material: Material, *, threads: int | None = None) -> Swatch:
 def library_page(
     materials: Iterable[Material],
     *,
+    beside: Path | None = None,
     threads: int | None = None,
     progress: Callable[[int, int, str], None] | None = None,
 ) -> str:
     """Return an HTML page with a swatch of each material.
+
+    Parameters
+    ----------
+    materials : iterable of Material
+    beside : Path, optional
+        The folder of the page; names of materials link to pages of ours that are in it.
+    threads : int, optional
+    progress : callable, optional
+        Called with how many materials are done, of how many, and the name of the next.
 
     Raises
     ------
@@ -84,4 +95,12 @@ def library_page(
         title="materials",
         data=data_text(data),
         swatches=found,
+        linked=_linked(found, beside),
     )
+
+
+def _linked(swatches: list[Swatch], beside: Path | None) -> set[str]:
+    """Return the names of the materials that have a page of ours in a folder."""
+    if beside is None:
+        return set()
+    return {each.name for each in swatches if is_report_file(beside / f"{each.name}.html")}

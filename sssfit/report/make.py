@@ -5,6 +5,7 @@ from collections.abc import Collection, Sequence
 from typing import Any
 
 from sssfit.compare.budget import Budget, error_budgets
+from sssfit.compare.convergence import Convergence, compute_convergence
 from sssfit.compare.models import ModelComparison, compare_models
 from sssfit.compare.pareto import compare_kernels
 from sssfit.compare.spectrum import compute_spectrum
@@ -21,6 +22,9 @@ from sssfit.simulate.truth import true_profile
 
 PHOTONS = 200_000  # of the walk in the models' chart and the budget: half a second
 _COLOURS = 3  # channels of a picture that the page can show
+# Of the chart of convergence: numbers of photons, two a decade; walks of each; the exact solver's.
+_WALKS, _SEEDS, _TOLERANCES = 5, 3, (1e-4, 5e-6)
+_LEAST_CONVERGING = 100_000  # photons of the longest walk; the shortest then has 1000
 _TIMED_SECONDS = 2.0  # in which kernels are timed in turn
 _COMMANDS = ("sssfit simulate {} --method exact", "sssfit compare {}", "sssfit report {}")
 
@@ -58,7 +62,7 @@ def make_report(
     side : int
         Rows and columns of the pictures.
     photons, seed : int
-        Of the walk in the models' chart and in the error budget.
+        Of the walk in models and error budget; walks of up to so many show convergence.
     threads : int, optional
     progress : callable, optional
         Called with how many steps are done, of how many, and the name of the next.
@@ -93,7 +97,7 @@ def make_report(
     kernels = tuple(shown_kernel(each, title, pitch) for each in fits)
     steps("models and budget")
     walk = {"photons": photons, "seed": seed, "threads": threads}
-    models, budgets = _of_material(source, pictures, walk)
+    models, budgets, convergence = _of_material(source, pictures, walk)
     return Report(
         title,
         profile,
@@ -103,19 +107,32 @@ def make_report(
         compute_spectrum(profile, mm_per_pixel=pitch),
         models,
         budgets,
+        convergence,
         tuple(each.format(word) for each in _COMMANDS),
     )
 
 
 def _of_material(
     source: Material | Profile, pictures: Sequence[Shown], walk: dict[str, Any]
-) -> tuple[ModelComparison | None, tuple[Budget, ...]]:
+) -> tuple[ModelComparison | None, tuple[Budget, ...], Convergence | None]:
     """Return what needs coefficients; a material that the exact solver does not cover has none."""
     if isinstance(source, Profile):
-        return None, ()
+        return None, (), None
     flat = [each.scene for each in pictures if each.name in ("disk", "edge")]
     try:
-        return compare_models(source, **walk), tuple(error_budgets(source, flat, **walk))
+        models, budgets = compare_models(source, **walk), error_budgets(source, flat, **walk)
+        return models, tuple(budgets), _convergence(source, **walk)
     except SimulationError as refusal:
-        note(f"No models and no budget: {refusal}")
-        return None, ()
+        note(f"No models, budget and convergence: {refusal}")
+        return None, (), None
+
+
+def _convergence(
+    material: Material, *, photons: int, seed: int, threads: int | None
+) -> Convergence | None:
+    """Return walks of up to so many photons; so few that no slope would be seen have none."""
+    if photons < _LEAST_CONVERGING:
+        return None
+    numbers = [round(photons * 10 ** (-0.5 * k)) for k in reversed(range(_WALKS))]
+    settings: dict[str, Any] = {"seeds": _SEEDS, "first_seed": seed, "threads": threads}
+    return compute_convergence(material, photons=numbers, tolerances=_TOLERANCES, **settings)

@@ -6,17 +6,21 @@ from typing import Any
 from sssfit import __version__
 from sssfit.compare.budget import Budget
 from sssfit.compare.comparison import Comparison
+from sssfit.compare.convergence import Convergence
 from sssfit.compare.models import ModelComparison
 from sssfit.compare.spectrum import Spectrum
 from sssfit.messages import counted
 from sssfit.profile import Profile
+from sssfit.profile.pixels import flat_annuli
 from sssfit.render import render
 from sssfit.report.kernels import ShownKernel
-from sssfit.report.pack import packed_picture
+from sssfit.report.pack import packed_numbers, packed_picture
 from sssfit.report.pictures import Shown
 
 ERROR, COST = "delta-e", "fetches"
-_MOST_DRAWN = 12  # kernels whose pictures a page without WebGL2 has
+# Of the pictures that a page without WebGL2 has: so that a page with a noisy picture of a user's
+# own, .8 MB, stays below 5 MB.
+_DRAWN_CHARACTERS = 500_000
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -37,7 +41,8 @@ class Report:
     spectrum : Spectrum
     models : ModelComparison, optional
     budgets : tuple of Budget
-        None of either for a profile, or a material that the exact solver does not cover.
+    convergence : Convergence, optional
+        None of these for a profile, or a material that the exact solver does not cover.
     commands : tuple of str
         The command lines that make the figures again.
     """
@@ -50,6 +55,7 @@ class Report:
     spectrum: Spectrum
     models: ModelComparison | None
     budgets: tuple[Budget, ...]
+    convergence: Convergence | None
     commands: tuple[str, ...]
 
     @property
@@ -63,20 +69,35 @@ class Report:
         return {
             "name": self.name,
             "front": self.front,
+            "profile": self._annuli(),
             "pictures": [each.to_dict() for each in self.pictures],
             "kernels": [each.to_dict() for each in self.kernels],
             "drawn": self._drawn(),
             "rows": self.comparison.to_dict()["rows"],
         }
 
+    def _annuli(self) -> dict[str, Any]:
+        """Return the flat annuli of the profile, from which a page computes other truths."""
+        edges, densities = flat_annuli(self.profile.r_edges_mm, self.profile.annulus_energy)
+        return {
+            "radii": packed_numbers(edges[1:]),
+            "densities": packed_numbers(densities),
+            "reflectance": self.profile.diffuse_reflectance.tolist(),
+        }
+
     def _drawn(self) -> dict[str, Any]:
-        """Return the first picture by the kernels of the front, for a page without WebGL2."""
+        """Return the first picture by the best kernels, for a page without WebGL2."""
         by_label = {each.label: each.taps for each in self.kernels}
         first = self.pictures[0].reference
-        return {
-            label: packed_picture(render(first.scene, by_label[label], border=first.border))
-            for label in self.front[:_MOST_DRAWN]
-        }
+        found: dict[str, Any] = {}
+        left = _DRAWN_CHARACTERS
+        for label in reversed(self.front):
+            made = packed_picture(render(first.scene, by_label[label], border=first.border))
+            left -= len(made["data"])
+            if found and left < 0:
+                break
+            found[label] = made
+        return dict(reversed(found.items()))
 
     def text(self) -> str:
         """Return what ``sssfit report`` prints."""

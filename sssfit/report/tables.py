@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from sssfit.arrays import plain_value
+from sssfit.compare.convergence import Convergence
 from sssfit.report.record import COST, ERROR, Report
 
 
@@ -46,6 +47,8 @@ def tables_of(report: Report) -> list[Table]:
         found.append(_models(report))
     if report.budgets:
         found.append(_budget(report))
+    if report.convergence is not None:
+        found.append(_convergence(report.convergence))
     return found
 
 
@@ -114,6 +117,23 @@ def _budget(report: Report) -> Table:
         "of the interaction add up to 1."
     )
     return Table("budget", "Error budget", words, heads, tuple(rows))
+
+
+def _convergence(found: Convergence) -> Table:
+    rows: list[tuple[Any, ...]] = [
+        ("photon walk", each.photons, each.seed, *_plain([each.error, None, each.seconds]))
+        for each in found.walks
+    ]
+    rows += [
+        ("exact solution", None, None, *_plain([each.error, each.estimate, each.seconds]))
+        for each in found.resolutions
+    ]
+    heads = ("method", "photons", "seed", "largest error of F(r)", "its own estimate", "seconds")
+    words = (
+        "Error of the energy within a radius as a share of the total, of the worst channel. The "
+        "finest exact solution is what the others are compared with."
+    )
+    return Table("convergence", "Convergence", words, heads, tuple(rows))
 
 
 def _plain(values: Sequence[Any]) -> list[Any]:

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from sssfit.report.charts.budget import budget_chart
+from sssfit.report.charts.convergence import convergence_chart
 from sssfit.report.charts.models import models_chart
 from sssfit.report.charts.pareto import pareto_chart
 from sssfit.report.charts.profile import profile_chart
@@ -16,6 +17,7 @@ CHARTS: tuple[Callable[[Report], Chart | None], ...] = (
     models_chart,
     spectrum_chart,
     budget_chart,
+    convergence_chart,
 )
 
 

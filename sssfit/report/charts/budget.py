@@ -28,7 +28,7 @@ def budget_chart(report: Report) -> Chart | None:
     )
     describe = "Mean Delta E of each cause of the error"
     svg = picture(parts, _TOP + _ROW * len(names) + 8.0, describe)
-    return Chart("budget", "Error budget", words, legend, svg)
+    return Chart("budget", "Error budget", words, legend, (("", svg),))
 
 
 def _names(budget: Budget) -> list[str]:

@@ -1,7 +1,9 @@
-"""Diffusion models and the photon walk beside the exact solution."""
+"""Diffusion models and the photon walk beside the exact solution, a panel for each channel."""
 
 import numpy as np
+from markupsafe import Markup
 
+from sssfit.compare.models import ModelComparison
 from sssfit.report.charts.svg import Chart, Plot, limits
 from sssfit.report.record import Report
 
@@ -12,29 +14,34 @@ _NAMES = {
     "dipole-grosjean": "dipole, Grosjean's D",
     "burley": "normalised diffusion",
 }
-_SECOND = 1  # of three channels green is drawn, whose light goes neither far nor near
+_FIRST = 1  # of three channels green is shown first, whose light goes neither far nor near
 
 
 def models_chart(report: Report) -> Chart | None:
-    """Draw 2 pi r R_d of one channel by each method."""
+    """Draw 2 pi r R_d of each channel by each method."""
     if report.models is None:
         return None
-    channel = min(_SECOND, report.profile.n_channels - 1)
-    edges = report.models.edges_mm[channel]
+    names = report.profile.channels
+    panels = [(name, _panel(report.models, k, name)) for k, name in enumerate(names)]
+    every = enumerate(report.models.curves)
+    legend = tuple((f"m{k}", _NAMES.get(each.method, each.method)) for k, each in every)
+    note = "One channel at a time, as far as the walk has 100 hits in each annulus."
+    return Chart("models", "Models", note, legend, tuple(panels), min(_FIRST, len(names) - 1))
+
+
+def _panel(models: ModelComparison, channel: int, name: str) -> Markup:
+    """Return the curves of one channel."""
+    edges = models.edges_mm[channel]
     middles = (0.5 * (edges[1:] + edges[:-1])).tolist()
     width = np.diff(edges)
-    curves = [each.energy[channel] / width for each in report.models.curves]
+    curves = [each.energy[channel] / width for each in models.curves]
     plot = Plot(
         (0.0, float(edges[-1])),
         limits(curves[0].tolist(), is_log=True, decades=5.0),
         ("r (mm)", "2π r R_d (1/mm)"),
         log=(False, True),
-        describe="The profile of one channel by every model",
+        describe=f"The profile of channel {name} by every model",
     )
-    legend = []
-    for k, (model, curve) in enumerate(zip(report.models.curves, curves, strict=True)):
+    for k, curve in enumerate(curves):
         plot.curve(middles, curve.tolist(), f"m{k}")
-        legend.append((f"m{k}", _NAMES.get(model.method, model.method)))
-    name = report.profile.channels[channel]
-    note = f"Channel {name}, as far as the walk has 100 hits in each annulus."
-    return Chart("models", "Models", note, tuple(legend), plot.svg())
+    return plot.svg()

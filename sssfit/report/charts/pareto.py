@@ -8,6 +8,7 @@ from sssfit.report.record import COST, ERROR, Report
 
 _NOTICED = 1.0  # Delta E, just noticeable
 _LETTER, _LINE = 6.0, 12.0  # width and height of a label's letter
+_ROOM = 0.06  # of a label below a point, in lengths of the axis
 _LABEL = 0.3  # room of a label of 24 letters, in lengths of the axis
 
 
@@ -18,7 +19,7 @@ def pareto_chart(report: Report) -> Chart:
     rows, front = comparison.rows_of(name), comparison.front(name, ERROR, COST)
     plot = Plot(
         _fetches(rows),
-        limits([*(row.delta_e_2000_mean for row in rows), _NOTICED], is_log=True),
+        _errors(rows),
         ("texture fetches a pixel", "mean ΔE 2000"),
         log=(True, True),
         describe=f"Error over fetches of {len(rows)} kernels on {name}; all are in the table",
@@ -33,7 +34,7 @@ def pareto_chart(report: Report) -> Chart:
     _name_front(plot, places, [row.label for row in front])
     legend = (("front-point", "on the Pareto front"), ("other-point", "another kernel is better"))
     words = f"On {name}. Choose a point to run its kernel above; the arrow keys go along the front."
-    return Chart("pareto", "Error and cost", words, legend, plot.svg(role="group"))
+    return Chart("pareto", "Error and cost", words, legend, (("", plot.svg(role="group")),))
 
 
 def _name_front(plot: Plot, places: list[tuple[float, float]], labels: list[str]) -> None:
@@ -51,6 +52,12 @@ def _fetches(rows: list[KernelRow]) -> tuple[float, float]:
     """Return the ends of the axis of fetches, with room for a label left of the cheapest."""
     low, high = limits([row.fetches for row in rows], is_log=True)
     return low * (low / high) ** _LABEL, high
+
+
+def _errors(rows: list[KernelRow]) -> tuple[float, float]:
+    """Return the ends of the axis of errors, with room for the label below the best kernel."""
+    low, high = limits([*(row.delta_e_2000_mean for row in rows), _NOTICED], is_log=True)
+    return low * (low / high) ** _ROOM, high
 
 
 def _staircase(places: list[tuple[float, float]], end: float) -> list[tuple[float, float]]:

@@ -26,7 +26,7 @@ def profile_chart(report: Report) -> Chart:
         _draw(plot, each, kind)
     legend = tuple(zip(KINDS, profile.channels, strict=False))
     note = "Energy that leaves the surface at a radius; bands show one standard error."
-    return Chart("profile", "Profile", note, legend, plot.svg())
+    return Chart("profile", "Profile", note, legend, (("", plot.svg()),))
 
 
 def _draw(plot: Plot, bins: Bins, kind: str) -> None:

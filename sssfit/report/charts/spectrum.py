@@ -25,4 +25,4 @@ def spectrum_chart(report: Report) -> Chart:
         plot.curve(terms.tolist(), np.where(own > 0.0, own, np.nan).tolist(), kind)
     legend = tuple(zip(KINDS, report.profile.channels, strict=False))
     note = "The error of the best sum of so many separable terms: a singular value decomposition."
-    return Chart("spectrum", "Singular values", note, legend, plot.svg())
+    return Chart("spectrum", "Singular values", note, legend, (("", plot.svg()),))

@@ -16,13 +16,14 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 @dataclasses.dataclass(frozen=True, slots=True)
 class Chart:
-    """A finished chart: its title, a sentence under it, a legend, and the picture."""
+    """A finished chart: its title, a sentence under it, a legend, and its pictures."""
 
     key: str
     title: str
     note: str
     legend: tuple[tuple[str, str], ...]  # class and name
-    svg: Markup
+    panels: tuple[tuple[str, Markup], ...]  # names and pictures, of which one is shown
+    first: int = 0  # the panel that is shown first
 
 
 @dataclasses.dataclass(frozen=True, slots=True)
@@ -165,7 +166,7 @@ def line_of(points: Iterable[tuple[float, float]], kind: str) -> Markup:
 
 def written(value: float) -> str:
     """Return a value as an axis has it: powers of ten beyond three zeros raised."""
-    if value == 0.0 or 1e-3 <= abs(value) < 1e5:
+    if value == 0.0 or 1e-3 <= abs(value) < 1e4:
         return f"{value:.4g}"
     mantissa, exponent = f"{value:.3e}".split("e")
     power = f"10{str(int(exponent)).translate(_RAISED)}"

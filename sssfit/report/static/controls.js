@@ -28,6 +28,21 @@ function stageWords(name, kernel) {
   return `${name}, by ${label}`;
 }
 
+// A head is at some distances; pixels of a flat picture can have any size.
+function fillDistances(model, picture, same, state) {
+  const isFlat = model.isFlat(state);
+  const sizes = model.sizes.map((each) => [String(each), `${Number((each * picture.mm_per_pixel).toPrecision(3))} mm a pixel`]);
+  const distances = [...new Set(same.map(({ distance }) => distance))].map((each) => [String(each), metres(each)]);
+  fill(get('distance'), isFlat ? sizes : distances, String(isFlat ? state.times : picture.distance));
+}
+
+// The dearest kernel of the front that takes no more fetches than the one shown.
+function fillFetches({ front, kernels }, { fetches }) {
+  const within = front.filter((each) => kernels.get(each).fetches <= fetches);
+  Object.assign(get('most'), { max: front.length - 1, value: Math.max(within.length - 1, 0), disabled: front.length < 2 });
+  get('most-words').textContent = `${fetches.toPrecision(3)} a pixel`;
+}
+
 const metres = (mm) => `${(mm / 1000).toFixed(1)} m`;
 
 export function fillControls({ model, state }) {
@@ -37,7 +52,8 @@ export function fillControls({ model, state }) {
   const distinct = (list, key) => [...new Set(list.map((each) => each[key]))];
   fill(get('scene'), distinct(all, 'name').map((each) => [each, each]), picture.name);
   fill(get('light'), distinct(same, 'light').map((each) => [String(each), each === null ? '-' : `${each}°`]), String(picture.light));
-  fill(get('distance'), distinct(same, 'distance').map((each) => [String(each), each === null ? `${picture.mm_per_pixel} mm a pixel` : metres(each)]), String(picture.distance));
+  fillDistances(model, picture, same, state);
+  fillFetches(model, kernel);
   fill(get('format'), (model.passes?.formats ?? ['half']).map((each) => [each, each]), state.format);
   const shows = model.passes ? kernel.plan.flatMap(({ writes }) => writes) : ['M0'];
   fill(get('show'), [...new Set(['M0', ...shows])].map((each) => [each, stageWords(each, kernel)]), shows.includes(state.show) ? state.show : 'M0');
@@ -65,9 +81,11 @@ function pictureFor(model, wanted) {
 export function startControls(page) {
   const on = (id, change) => get(id).addEventListener('input', (event) => change(event.target));
   on('kernel', ({ value }) => page.change({ kernel: value, show: 'M0' }));
-  for (const id of ['scene', 'light', 'distance']) {
-    on(id, () => page.change({ picture: pictureFor(page.model, Object.fromEntries(['scene', 'light', 'distance'].map((key) => [key, get(key).value]))) }));
-  }
+  on('most', ({ value }) => page.change({ kernel: page.model.front[Number(value)], show: 'M0' }));
+  const chosen = () => ({ scene: get('scene').value, light: get('light').value, distance: get('distance').value });
+  for (const id of ['scene', 'light']) on(id, () => page.change({ picture: pictureFor(page.model, chosen()) }));
+  on('distance', ({ value }) => page.change(page.model.isFlat(page.state)
+    ? { times: Number(value) } : { picture: pictureFor(page.model, chosen()) }));
   for (const id of ['format', 'show']) on(id, ({ value }) => page.change({ [id]: value }));
   for (const id of NUMBERS) on(id, ({ value }) => page.change({ [id]: Number(value) }));
   on('jitter', ({ checked }) => page.change({ jitter: Number(checked) }));

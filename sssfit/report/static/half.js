@@ -17,6 +17,9 @@ export async function inflated(base64) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
+// Numbers of 64 bits.
+export const numbersOf = async (base64) => new Float64Array((await inflated(base64)).buffer);
+
 export const textOf = async (base64) => new TextDecoder().decode(await inflated(base64));
 
 // Sums up the steps from the left and upper neighbours, modulo 2^16; channels stand apart.

@@ -38,7 +38,7 @@ class Page {
     this.update();
   }
 
-  readHash() { this.state = stateOf(location.hash, this.model.names, this.model.keys); }
+  readHash() { this.state = stateOf(location.hash, this.model.names, this.model.keys, this.model.sizes); }
 
   change(given) {
     Object.assign(this.state, given);
@@ -138,8 +138,7 @@ class Page {
   // Keys 1 to 4 show one picture alone; 5 to 9 are kernels of the front, from the cheapest.
   flip(number) {
     if (number <= PANES.length) return this.change({ mode: 'single', pane: PANES[number - 1] });
-    const front = this.model.data.front.filter((each) => this.model.names.all.includes(each));
-    const kernel = front[number - PANES.length - 1];
+    const kernel = this.model.front[number - PANES.length - 1];
     return kernel ? this.change({ mode: 'single', pane: 'kernel', kernel }) : undefined;
   }
 
@@ -150,7 +149,11 @@ class Page {
   }
 
   download(name) {
-    const { truth, made, unblurred } = this.shown, { pixels, width, height } = { truth, kernel: made, unblurred }[name];
+    const { truth, made, unblurred, errors } = this.shown;
+    const difference = errors && { ...truth, pixels: Float32Array.from(truth.pixels, (_, k) => errors[Math.floor(k / 3)]) };
+    const chosen = { truth, kernel: made, unblurred, difference }[name];
+    if (!chosen) return void (get('status').textContent = 'A picture between the passes has no difference; show the result.');
+    const { pixels, width, height } = chosen;
     const link = document.createElement('a');
     link.href = URL.createObjectURL(exrOf(pixels, width, height));
     link.download = `${this.state.picture}-${name === 'kernel' ? this.state.kernel.replace(/[^\w.-]+/g, '-') : name}.exr`;

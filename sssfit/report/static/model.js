@@ -1,8 +1,11 @@
 // The data of the page, decoded once when it is needed, and a kernel's picture by its passes.
 
-import { pictureOf, inflated, textOf } from './half.js';
+import { pictureOf, inflated, numbersOf, textOf } from './half.js';
 import { differences } from './colour.js';
 import { figuresOf } from './figures.js';
+import { truthOf } from './truth.js';
+
+export const TIMES = [0.5, 1, 2, 3]; // how many times as large pixels of flat pictures may be
 
 export class Model {
   constructor(data, passes) {
@@ -22,6 +25,11 @@ export class Model {
 
   get keys() { return this.passes ? [...this.pictures.keys()] : [this.data.pictures[0].key]; }
 
+  get sizes() { return this.passes ? TIMES : [1]; }
+
+  // Kernels of the front that can be shown, cheapest first.
+  get front() { return this.data.front.filter((each) => this.names.all.includes(each)); }
+
   once(key, make) {
     if (!this.kept.has(key)) this.kept.set(key, make());
     return this.kept.get(key);
@@ -35,6 +43,31 @@ export class Model {
     });
   }
 
+  profile() {
+    return this.once('profile', async () => {
+      const { radii, densities, reflectance } = this.data.profile;
+      const [edges, values] = await Promise.all([numbersOf(radii), numbersOf(densities)]);
+      return { radii: edges, densities: values, reflectance, channels: reflectance.length };
+    });
+  }
+
+  isFlat({ picture }) { return this.pictures.get(picture).distance === null; }
+
+  // Pixels of flat pictures may be larger; those of a head have pictures of their own.
+  mmOf(state) {
+    const { mm_per_pixel: mm } = this.pictures.get(state.picture);
+    return this.isFlat(state) ? mm * state.times : mm;
+  }
+
+  // Light, mask and truth; the latter is computed here for pixels that the page has no truth for.
+  async seen(state) {
+    const own = await this.picture(state.picture), mm = this.mmOf(state);
+    const { mm_per_pixel: made, border } = this.pictures.get(state.picture);
+    if (mm === made) return own;
+    const truth = await this.once(`truth ${state.picture} ${mm}`, async () => truthOf(await this.profile(), own.light, mm, border));
+    return { ...own, truth };
+  }
+
   text(label, form) {
     const { texts, jittered } = this.kernels.get(label);
     return this.once(`${form} ${label}`, () => textOf(form === 'jittered' ? jittered : texts[form]));
@@ -46,7 +79,7 @@ export class Model {
     if (!this.passes) return { ...await this.once(`drawn ${state.kernel}`, () => pictureOf(this.data.drawn[state.kernel])) };
     const kernel = this.kernels.get(state.kernel), moves = Boolean(state.jitter && kernel.jittered);
     const source = await this.text(state.kernel, moves ? 'jittered' : 'glsl');
-    const { border, mm_per_pixel: mm } = this.pictures.get(state.picture);
+    const { border } = this.pictures.get(state.picture), mm = this.mmOf(state);
     if (this.lit !== state.picture) this.passes.setLight(light, border);
     this.lit = state.picture;
     const plan = moves ? kernel.jitter_plan : kernel.plan;
@@ -58,7 +91,7 @@ export class Model {
 
   // Everything that is shown at a state: pictures, errors and figures.
   async shown(state) {
-    const { light, truth, mask } = await this.picture(state.picture);
+    const { light, truth, mask } = await this.seen(state);
     const made = await this.rendered(state), exposure = this.exposure(state);
     const whole = made.width === truth.width;
     const errors = whole ? differences(made.pixels, truth.pixels, exposure) : null;
