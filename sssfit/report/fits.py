@@ -8,7 +8,8 @@ from sssfit.fit import FitResult, TapsFit, make_target
 from sssfit.kernel import Taps
 from sssfit.messages import note
 from sssfit.profile import Profile
-from sssfit.report.kernels import Fitted, ShownKernel, command_of, shown_candidates
+from sssfit.report.commands import command_of
+from sssfit.report.kernels import Fitted, ShownKernel, shown_candidates
 
 Watch = Callable[[int, int, str], None]
 

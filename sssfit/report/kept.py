@@ -20,6 +20,7 @@ from typing import Any
 from sssfit.errors import FileError, SssfitWarning
 from sssfit.files import write_atomically
 from sssfit.messages import note
+from sssfit.process import user_cache_folder
 
 _PACKAGES = ("numpy", "scipy", "numba", "colour-science", "jinja2")
 _MOST = 10  # pages of 5 MB
@@ -94,8 +95,6 @@ def _heard() -> Iterator[_Listener]:
 
 
 def _folder() -> Path:
-    from sssfit._jit import user_cache_folder  # numba: 0.3 s that help does not need
-
     return user_cache_folder() / "pages"
 
 

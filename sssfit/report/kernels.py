@@ -5,7 +5,7 @@ Only what a shader runs is compared here; a dense kernel has a weight for every 
 
 import dataclasses
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from typing import Any
 
 from sssfit.compare.candidates import Candidate, every_candidate
@@ -142,12 +142,3 @@ def _fetches(candidate: Candidate) -> float:
 def is_shown(candidate: Candidate) -> bool:
     """Return whether a shader runs what a candidate makes."""
     return candidate.taps is not None or candidate.method in TAPS
-
-
-def command_of(candidate: Candidate, profile_name: str, mm_per_pixel: float) -> str:
-    """Return the command line that fits a candidate."""
-    settings: Mapping[str, Any] = candidate.settings
-    words = [f"--{key.replace('_', '-')} {value}" for key, value in settings.items()]
-    words += [f"--taps {candidate.taps}"] if candidate.taps is not None else []
-    pixels = f"--mm-per-pixel {mm_per_pixel:g}"
-    return " ".join([f"sssfit fit {profile_name} --method {candidate.method}", *words, pixels])

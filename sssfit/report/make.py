@@ -1,6 +1,5 @@
 """Makes a report: profile, kernels, pictures, comparison, models and budget, in this order."""
 
-import shlex
 from collections.abc import Collection, Sequence
 from typing import Any
 
@@ -15,6 +14,7 @@ from sssfit.kernel import Taps
 from sssfit.material import Material
 from sssfit.messages import note
 from sssfit.profile import Profile
+from sssfit.report.commands import commands_of
 from sssfit.report.fits import Steps, Watch, fitted, shown_kernel
 from sssfit.report.pictures import SIDE, Shown, own_scene, shown_pictures
 from sssfit.report.record import Report
@@ -26,7 +26,6 @@ _COLOURS = 3  # channels of a picture that the page can show
 _WALKS, _SEEDS, _TOLERANCES = 5, 3, (1e-4, 5e-6)
 _LEAST_CONVERGING = 100_000  # photons of the longest walk; the shortest then has 1000
 _TIMED_SECONDS = 2.0  # in which kernels are timed in turn
-_COMMANDS = ("sssfit simulate {} --method exact", "sssfit compare {}", "sssfit report {}")
 
 
 def make_report(
@@ -93,7 +92,6 @@ def make_report(
     timed: dict[str, Any] = {"timed_seconds": _TIMED_SECONDS, "threads": threads}
     comparison = compare_kernels(profile, scenes, candidates=fits, **timed)
     title = profile.material_name or name or "profile"
-    word = shlex.quote(title)
     kernels = tuple(shown_kernel(each, title, pitch) for each in fits)
     steps("models and budget")
     walk = {"photons": photons, "seed": seed, "threads": threads}
@@ -108,7 +106,7 @@ def make_report(
         models,
         budgets,
         convergence,
-        tuple(each.format(word) for each in _COMMANDS),
+        commands_of(title),
     )
 
 
