@@ -131,6 +131,7 @@ CHART = (
     flag("--models", "Draw a material by every method, and the methods' errors."),
     flag("--spectrum", "Draw the energy of the kernel's singular values."),
     flag("--guide", "Draw the guide function beside the residual of the guided fit."),
+    flag("--frequency", "Draw the response to sinusoids of light, R(k)."),
     option("--mm-per-pixel", Length("profile"), "MM|profile", "Pixels of the kernel, with "
            "--spectrum or --guide; profile is the width of the profile's first annulus.  "
            "[default: 0.3]"),
@@ -143,7 +144,8 @@ CHART = (
     option("--photons", Count(2, 10**12), "N", "Photons of the walk, with --models.  "
            "[default: 1e7]"),
     *output("NAME.profile.png, NAME.kernel.png, NAME.material.png, NAME.checkpoint.png, "
-            "NAME.spectrum.png, NAME.guide.png, MATERIAL.models.png", "is not our chart",
+            "NAME.spectrum.png, NAME.guide.png, NAME.frequency.png, MATERIAL.models.png",
+            "is not our chart",
             "Output file, PNG, SVG or PDF by its ending; - for PNG on stdout"),
 )
 

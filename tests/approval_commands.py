@@ -180,6 +180,10 @@ SIMULATE = [
     C(f"simulate plate.toml {GRID} --photons 2e3 -o 'out/Platte λ.npz' -v"),
     C("simulate leaf.toml --dr 200um --radius .5cm --photons 2000 -o - ", note="to stdout"),
     C(f"simulate wax.toml {GRID} --photons 2000 -q"),
+    C(f"simulate wax.toml {GRID} --photons 2000 --beam gaussian:.5 -o beam.npz"),
+    C("simulate wax.toml --method burley --beam flat:1 --json -o beam.npz"),
+    C("simulate wax.toml --beam gausian:1"),
+    C("simulate wax.toml --beam flat:-1"),
     C(f"simulate wax.toml {GRID} --photons 1.5e5", terminal=True),
     C(f"simulate wax.toml {GRID} --photons 1000", compiled=False, note="not compiled"),
     C("simulate wax.toml --dr .2 --radius auto --photons 2000 -o auto.profile.npz"),
@@ -973,6 +977,8 @@ OWN = [
         for name in ("own.md", "own_table.csv", "own_table.json", "own.csv")
     ),
     C("export wax.svd2.kernel.json --format hlsl -o own.hlsl"),
+    C("export wax.profile.npz --format frequency"),
+    C("export wax.svd2.kernel.json --format frequency"),
     C("export wax.profile.npz --format csv -o own.csv"),
     C("export wax.profile.npz --format csv -o own_table.csv"),
     C("import density.csv -o mono.profile.npz"),
@@ -1171,6 +1177,9 @@ CHART = [
     C("chart skin1 -v -o skin.png"),
     C("chart --spectrum"),
     C("chart --spectrum 'Größe λ.profile.npz' --mm-per-pixel .4 --json"),
+    C("chart --frequency wax.profile.npz"),
+    C("chart --frequency four.profile.npz --json -o f.svg"),
+    C("chart wax.toml --frequency"),
     C("chart --guide wax.profile.npz --mm-per-pixel profile"),
     C(
         "chart --guide 'Größe λ.profile.npz' --k 0,2 --channel R --mm-per-pixel .04cm --json -o g.svg"

@@ -33,6 +33,7 @@ from sssfit.measure.difference import difference_map, magnified_difference
 from sssfit.measure.score import auto_exposure
 from sssfit.methods import FITS as METHODS
 from sssfit.methods import PRESETS, SEPARABLE
+from sssfit.profile.beam import parse_beam, under_beam
 from sssfit.render.bloom import bloomed
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
@@ -192,6 +193,12 @@ SIMULATE = {
         lambda: _content(simulate_burley(wax(), dr_mm=0.25)),
         default=f"{float(wax().layers[0].mean_free_path_mm.min()) / 20!r}",
         words="MFP_min / 20; deon-skin: 0.008",
+    ),
+    "--beam": Row(
+        "simulate wax.toml --method burley",
+        "--beam flat:0.8",
+        made_profile,
+        lambda: _content(under_beam(simulate_burley(wax()), parse_beam("flat:0.8"))),
     ),
     "--radius": Row(
         "simulate wax.toml --method burley",
@@ -1155,6 +1162,12 @@ CHART = {
         _charted("eigenvalues"),
         lambda: [True, ["wax.spectrum.png"]],
     ),
+    "--frequency": Row(
+        "chart wax.profile.npz --json",
+        "--frequency",
+        _charted("rows"),
+        lambda: [True, ["wax.frequency.png"]],
+    ),
     "--guide": Row(
         "chart wax.profile.npz --json",
         "--guide",
@@ -1202,7 +1215,7 @@ CHART = {
         lambda: ["x.svg"],
         default="wax.profile.png",
         words="NAME.profile.png, NAME.kernel.png, NAME.material.png, NAME.checkpoint.png, "
-        "NAME.spectrum.png, NAME.guide.png, MATERIAL.models.png",
+        "NAME.spectrum.png, NAME.guide.png, NAME.frequency.png, MATERIAL.models.png",
     ),
     "--force": Row("chart -o foreign.png", "--force", is_written("png"), lambda: ["foreign.png"]),
 }
@@ -1598,6 +1611,7 @@ STREAMS = (
     "chart wax.profile.npz -o x.png",
     "chart wax.profile.npz --spectrum -o x.png",
     "chart wax.profile.npz --guide -o x.png",
+    "chart wax.profile.npz --frequency -o x.png",
     "chart wax.profile.npz --models -o x.png",
     f"{_MAKE} --name lard -o x.toml",
     f"{_KERNELS} --chart x.png",

@@ -732,6 +732,28 @@ def written(f: Figures) -> list[Any]:
     return [wrote(f)]
 
 
+def frequency(f: Figures) -> list[Any]:
+    first = f["rows"][0]["response"]
+
+    def fallen(share: float, c: int) -> float | str:
+        below = [row["k_per_mm"] for row in f["rows"] if row["response"][c] < share * first[c]]
+        return below[0] if below else "not reached"
+
+    rows = [
+        [name, first[c], fallen(0.5, c), fallen(0.1, c)] for c, name in enumerate(f["channels"])
+    ]
+    return [
+        Words(
+            "R(k) at {} frequencies, from 0 to {} rad/mm", len(f["rows"]), f["rows"][-1]["k_per_mm"]
+        ),
+        Table(
+            ["channel", "R(0)", "half at k, rad/mm", "a tenth at k, rad/mm"],
+            *(rows, ("a tenth at k, rad/mm",)),
+        ),
+        wrote(f),
+    ]
+
+
 def spectrum(f: Figures) -> list[Any]:
     rows = [
         [
@@ -1199,6 +1221,7 @@ PRINTED: dict[str, Layout] = {
     "export --format hlsl": written,
     "chart": written,
     "chart wax.profile.npz --spectrum": spectrum,
+    "chart wax.profile.npz --frequency": frequency,
     "chart wax.profile.npz --guide": guide,
     "chart wax.toml --models": models,
     "chart wax.svd2.kernel.json": kernel_chart,
