@@ -977,8 +977,6 @@ OWN = [
         for name in ("own.md", "own_table.csv", "own_table.json", "own.csv")
     ),
     C("export wax.svd2.kernel.json --format hlsl -o own.hlsl"),
-    C("export wax.profile.npz --format frequency"),
-    C("export wax.svd2.kernel.json --format frequency"),
     C("export wax.profile.npz --format csv -o own.csv"),
     C("export wax.profile.npz --format csv -o own_table.csv"),
     C("import density.csv -o mono.profile.npz"),
@@ -1076,6 +1074,8 @@ EXPORT = [
     C("export missing.toml --preset hdrp"),
     C("export wax.profile.npz"),
     C("export --format csv"),
+    C("export wax.profile.npz --format frequency"),
+    C("export wax.svd2.kernel.json --format frequency"),
     C("export 'Größe λ.profile.npz' --format csv -o p.csv --json"),
     C("export leaf.profile.npz --format csv -o -"),
     C("export four.profile.npz --format csv -q"),
