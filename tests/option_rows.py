@@ -179,6 +179,12 @@ SIMULATE = {
         lambda: called("sssfit.simulate.simulate_exact_many", [wax()], tolerance=0.02, **_GRID),
         default="0.01%",
     ),
+    "--similarity": Row(
+        f"simulate wax.toml --method exact {GRID}",
+        "--similarity",
+        calls,
+        lambda: called("sssfit.simulate.simulate_exact_many", [wax()], similarity=True, **_GRID),
+    ),
     "--mapping": Row(
         _BURLEY,
         "--mapping diffuse",

@@ -173,7 +173,12 @@ def _how(row: Figures) -> Words:
     if row["photons"]:
         return Words("{} photons, seed {}", row["photons"], row["seed"])
     if row["method"] == "exact":
-        return Words("exact to {} % of the total", Rough(100.0 * row["relative_error"]))
+        error = Rough(100.0 * row["relative_error"])
+        if row["solver"] == "half-space":
+            return Words("exact (half-space solver) to {} % of the total", error)
+        return Words(
+            "exact (layer solver, {} directions) to {} % of the total", row["directions"], error
+        )
     if "mapping" in row:
         return Words("{} ({})", row["method"], row["mapping"])
     return Words("{}", row["method"])

@@ -210,7 +210,13 @@ def is_finished(
     )
 
 
-_OWN_SETTINGS = ("tolerance", "similarity", "mapping")  # for methods that have them
+_OWN_SETTINGS = (
+    "tolerance",
+    "similarity",
+    "solver",
+    "directions",
+    "mapping",
+)  # for methods that have them
 
 
 def run_figures(profile: Profile, seconds: float | None) -> dict[str, Any]:

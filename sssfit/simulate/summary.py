@@ -74,12 +74,20 @@ def _how(rows: Rows) -> str:
         counts = sorted({each["photons"] for each in rows})
         photons = " to ".join(f"{n:,}" for n in counts[:: len(counts) - 1 or 1])
         return f"{photons} photons, seed {row['seed']}"
-    words = str(row["method"])
+    words = str(row["method"]) + _solvers(rows)
     if row.get("tolerance") is not None:
         reached = max(each["relative_error"] or 0.0 for each in rows)
         words += f" to {100.0 * reached:.1g} % of the total"
     words += ", for isotropic scattering of (1 - g) sigma_s" if row.get("similarity") else ""
     return words + (f" ({row['mapping']})" if row.get("mapping") else "")
+
+
+def _solvers(rows: Rows) -> str:
+    """Return which of the exact solvers was chosen, and how many directions it took."""
+    names = sorted({each["solver"] for each in rows if each.get("solver")})
+    most = max(each.get("directions") or 0 for each in rows)
+    directions = f", {most} directions" if most else ""
+    return f" ({' and '.join(names)} solver{directions})" if names else ""
 
 
 def _table(rows: Rows) -> str:
