@@ -38,7 +38,7 @@ from .stability import stability
 
 _LIBRARIES = (
     *("numpy", "scipy", "threadpoolctl", "nlopt", "numba", "llvmlite", "matplotlib"),
-    *("colour-science", "OpenImageIO", "click", "rich"),
+    *("colour-science", "OpenImageIO", "click", "rich", "jinja2", "markupsafe"),
 )
 _LONGEST_LINE = 1000  # a path may be 4096 characters, an option's value anything
 _OUT_OF_MEMORY = "out of memory: use a smaller grid or picture, fewer channels or --threads."

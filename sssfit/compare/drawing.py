@@ -17,7 +17,11 @@ from sssfit.messages import note
 from sssfit.profile import Profile
 from sssfit.profile.frequency import frequency_response
 
-_OF_PROFILES = {each: f"`{each} = True`" for each in ("spectrum", "guide", "frequency")}
+_OF_PROFILES = {
+    "spectrum": "`spectrum = True`",
+    "guide": "`guide = True`",
+    "frequency": "`frequency = True`",
+}
 COMPUTED = ("kernel", "taps", "models", "spectrum", "guide", "frequency")
 
 

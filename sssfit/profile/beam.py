@@ -15,6 +15,7 @@ import numpy as np
 from sssfit.arrays import FloatArray
 from sssfit.errors import ProfileError
 from sssfit.messages import did_you_mean, shown
+from sssfit.optics import gauss_legendre
 from sssfit.profile.frequency import annulus_waves
 from sssfit.profile.pixels import flat_annuli
 from sssfit.profile.record import Profile
@@ -195,7 +196,7 @@ def _within_gaussian(radii: FloatArray, edges: FloatArray, radius_mm: float) -> 
     last = np.sqrt(-8.0 * np.log(_LEAST)) / radius_mm
     periods = last * float(radii[-1] + edges[-1]) / (2.0 * np.pi)
     intervals = max(1, int(np.ceil(periods / _PERIODS)))
-    x, weight = np.polynomial.legendre.leggauss(_NODES)
+    x, weight = gauss_legendre(_NODES, -1.0, 1.0)
     width = last / intervals
     found = np.zeros((len(radii), len(edges) - 1))
     step = max(1, int(_AT_ONCE / (_NODES * max(len(edges), len(radii)))))
@@ -212,10 +213,10 @@ def _within_disk(radii: FloatArray, edges: FloatArray, radius_mm: float) -> Floa
 
     Of an annulus s^2 is distributed evenly; four nodes of Gauss and Legendre in it stand for it.
     """
-    x, weight = np.polynomial.legendre.leggauss(_ACROSS)
+    nodes, weight = gauss_legendre(_ACROSS)
     square = edges**2
     found = np.zeros((len(radii), len(edges) - 1))
-    for node, share in zip(0.5 * (x + 1.0), 0.5 * weight, strict=True):
+    for node, share in zip(nodes, weight, strict=True):
         s = np.sqrt(square[:-1] + node * np.diff(square))
         found += share * lens_area(radii[:, None], radius_mm, s)
     return found / (np.pi * radius_mm**2)
