@@ -469,6 +469,11 @@ EXPORTS: Mapping[str, Method] = {
     "csv": Method(
         "sssfit.export.table:table_text", "a profile or a kernel as a table", of_profiles=True
     ),
+    "frequency": Method(
+        "sssfit.export.frequency:frequency_text",
+        "a profile's response to sinusoids of light, R(k), as a table: NAME.frequency.csv",
+        of_profiles=True,
+    ),
     "lut": Method(
         "sssfit.export.lut:lut_bytes",
         "a profile or a kernel as a texture: NAME.exr, .dds, or .png to look at",

@@ -51,15 +51,20 @@ def _heading(rows: Rows, *, several: bool) -> str:
     """Return lines with the material, the method, the speed and the grid."""
     row = rows[0]
     if several:
-        return f"{counted(len(rows), 'material')}: {_how(rows)}"
+        return f"{counted(len(rows), 'material')}: {_how(rows)}{_under(row)}"
     seconds, rate, annuli = row["seconds"], row["photons_per_second"], row["annuli"]
     speed = "" if seconds is None else f", {seconds:.1f} s"
     speed += f" ({rate:,.0f} a second)" if rate else ""
     return (
-        f"{row['material']}: {_how(rows)}{speed}; {counted(annuli, 'annulus')} of "
+        f"{row['material']}: {_how(rows)}{_under(row)}{speed}; {counted(annuli, 'annulus')} of "
         f"{row['dr_mm']:.4g} mm, "
         f"to {annuli * row['dr_mm']:.4g} mm"
     )
+
+
+def _under(row: dict[str, Any]) -> str:
+    """Return text on a beam, if it is not a pencil."""
+    return f", under the beam {row['beam']} mm" if "beam" in row else ""
 
 
 def _how(rows: Rows) -> str:
