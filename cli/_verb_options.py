@@ -228,8 +228,8 @@ REPORT = (
            "given several times.", multiple=True),
     option("--irradiance", None, "FILE", "Your own irradiance picture, with which the page opens; "
            "it is scaled down to 256 x 256 pixels at most."),
-    option("--mm-per-pixel", Length(), "MM", "Pixel size of the kernels.  [default: from your own "
-           "file, else 0.3]"),
+    option("--mm-per-pixel", Length(), "MM", "Pixel size of the kernels, and of your own picture "
+           "before it is scaled down.  [default: from your own file, else 0.3]"),
     option("--only", Names(FITS), "METHOD,...", "Only kernels by these fit methods, beside your "
            "own.  [default: those that are fitted in seconds]"),
     option("--photons", Count(2, 10**12), "N", "Photons of the walk of models and budget.  "

@@ -54,6 +54,7 @@ def report(material: str | None, common: Common, **given: Any) -> None:
         else:
             own = {key: given[key] for key in _OF_ONE[1:] if given[key] is not None}
             named = [(stem_of(each), load(Taps.read, each)) for each in given["kernels"]]
+            own |= {"origin": material, "kernels": list(given["kernels"])}
             own |= {"seed": common.seed, "threads": common.threads, "progress": step}
             made = finished_page(load_source(material), name=name, named=named, **own)
             text, figures = made["page"], {"material": material, **made["figures"]}

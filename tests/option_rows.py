@@ -1422,6 +1422,7 @@ _REPORT = "report wax.profile.npz"
 
 def _reported(**settings: Any) -> Any:
     usual = {"name": "wax", "named": [], "seed": 1, "threads": None}
+    usual |= {"origin": "wax.profile.npz", "kernels": []}
     return called("sssfit.report.finished_page", profile(), **usual | settings)
 
 
@@ -1440,7 +1441,7 @@ REPORT = {
         _REPORT,
         "--kernel wax.taps.json",
         calls,
-        lambda: _reported(named=[("wax", world.taps())]),
+        lambda: _reported(named=[("wax", world.taps())], kernels=["wax.taps.json"]),
     ),
     "--irradiance": Row(
         _REPORT, "--irradiance plain.png", calls, lambda: _reported(irradiance="plain.png")

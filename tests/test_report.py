@@ -15,11 +15,12 @@ import numpy as np
 import pytest
 import report_world as world
 
-from sssfit.errors import RenderError
+from sssfit.errors import KernelError, RenderError
 from sssfit.formats.pictures import save_image
 from sssfit.material import parse_material
 from sssfit.measure.delta_e import delta_e_of_lab, lab
 from sssfit.report import finished_page, is_report_file, library_page, make_report, page
+from sssfit.report.commands import commands_of
 from sssfit.report.html import SCRIPTS, script_text
 from sssfit.report.kept import kept, page_key
 from sssfit.report.pack import packed_picture, unpacked_picture
@@ -231,6 +232,7 @@ def test_a_page_is_kept_with_what_was_said(tmp_path, monkeypatch, caplog):
     first = finished(irradiance=str(tmp_path / "face.exr"))
     told = caplog.text
     assert "scaled down by 3" in told
+    assert "scaled down by 3" in first["page"]
     caplog.clear()
     monkeypatch.setattr("sssfit.report.finished.make_report", None)
     assert finished(irradiance=str(tmp_path / "face.exr")) == first
@@ -288,3 +290,27 @@ def test_one_channel_is_grey():
     made = make_report(grey, only=["disk"], side=16, threads=1)
     assert made.to_dict()["kernels"][0]["albedo"] == [pytest.approx(grey.diffuse_reflectance[0])]
     assert "grey" in page(made)
+
+
+def test_the_commands_of_a_page_are_those_it_was_made_with():
+    found = commands_of(
+        "my skin.toml",
+        is_material=True,
+        kernel=["a.taps.json", "b.taps.json"],
+        only=["disk", "svd"],
+        irradiance=None,
+        photons=5000,
+    )
+    assert found == (
+        "sssfit simulate 'my skin.toml' --method exact",
+        "sssfit report 'my skin.toml' --kernel a.taps.json --kernel b.taps.json --only disk,svd "
+        "--photons 5000",
+    )
+    assert commands_of("x.npz", is_material=False) == ("sssfit report x.npz",)
+
+
+@pytest.mark.parametrize("labels", [("mine", "mine"), ("disk 24",)])
+def test_kernels_of_one_name_are_refused(labels):
+    named = [(each, cli_world.taps()) for each in labels]
+    with pytest.raises(KernelError, match=f"two kernels are called {labels[0]}"):
+        make_report(cli_world.profile(), named=named, only=["disk"], side=16, threads=1)

@@ -229,6 +229,28 @@ def test_the_copied_export_is_the_export(page, window, form):
     assert window.js("return window.copied") == kernel_text(kernel_of(world.LABEL).taps, form)[0]
 
 
+@pytest.mark.parametrize(
+    ("key", "mode", "pane"),
+    [
+        *(("3", "single", "difference"), ("1", "single", "truth"), ("s", "swipe", "kernel")),
+        *(("f", "flicker", "kernel"), ("b", "side", "kernel")),
+    ],
+)
+def test_a_key_is_seen_in_the_controls(page, window, key, mode, pane):
+    window.open(page)
+    window.key(key)
+    for name, value in (("mode", mode), ("pane", pane)):
+        read = f"return document.querySelector('input[name={name}]:checked').value"
+        assert window.js(read) == value
+
+
+def test_the_scale_ends_where_the_gain_says(page, window):
+    window.open(page)
+    assert window.text("scale-end") == "5 and more"
+    window.set("gain", 8)
+    assert window.text("scale-end") == "0.625 and more"
+
+
 @pytest.mark.parametrize(("key", "times"), [("disk", 2), ("edge", 0.5)])
 def test_the_page_computes_truths_for_other_pixels(page, window, key, times):
     window.open(page, f"#picture={key}&kernel=" + quote(labels()[0]))

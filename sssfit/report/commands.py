@@ -6,13 +6,31 @@ from typing import Any
 
 from sssfit.compare.candidates import Candidate
 
-_COMMANDS = ("sssfit simulate {} --method exact", "sssfit compare {}", "sssfit report {}")
 
+def commands_of(origin: str, *, is_material: bool, **given: Any) -> tuple[str, ...]:
+    """Return the command lines that make a profile and a page again.
 
-def commands_of(material: str) -> tuple[str, ...]:
-    """Return the command lines that make profile, comparison and page."""
-    word = shlex.quote(material)
-    return tuple(each.format(word) for each in _COMMANDS)
+    Parameters
+    ----------
+    origin : str
+        The material or profile, as it was named.
+    is_material : bool
+        Whether the profile was computed, and not read.
+    **given
+        Options of the page with their values; None for those that were not given. Lists of files
+        are given one by one, and of names with commas.
+    """
+    word = shlex.quote(origin)
+    words = ["sssfit report", word]
+    for key, value in given.items():
+        if value is None:
+            continue
+        flag = f"--{key.replace('_', '-')}"
+        for each in value if key == "kernel" else [value]:
+            text = ",".join(each) if isinstance(each, tuple | list) else f"{each}"
+            words += [flag, shlex.quote(text)]
+    page = " ".join(words)
+    return (f"sssfit simulate {word} --method exact", page) if is_material else (page,)
 
 
 def command_of(candidate: Candidate, profile_name: str, mm_per_pixel: float) -> str:

@@ -1,5 +1,6 @@
 """A page as text with what is printed about it, made once and then kept."""
 
+import dataclasses
 import hashlib
 from collections.abc import Collection, Sequence
 from pathlib import Path
@@ -11,7 +12,7 @@ from sssfit.material import Material
 from sssfit.profile import Profile
 from sssfit.report.fits import Watch
 from sssfit.report.html import page
-from sssfit.report.kept import kept, page_key
+from sssfit.report.kept import heard, kept, page_key
 from sssfit.report.make import make_report
 
 
@@ -51,13 +52,15 @@ def finished_page(
     }
 
     def make() -> dict[str, Any]:
-        made = make_report(
-            source,
-            name=name,
-            named=named,
-            irradiance=irradiance,
-            **{"only": only, "progress": progress, **settings},
-        )
+        with heard() as told:
+            made = make_report(
+                source,
+                name=name,
+                named=named,
+                irradiance=irradiance,
+                **{"only": only, "progress": progress, **settings},
+            )
+        made = dataclasses.replace(made, notes=tuple(told.lines))
         return {"page": page(made), "words": made.text(), "figures": made.figures()}
 
     return kept(page_key(given), make)

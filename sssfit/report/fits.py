@@ -3,7 +3,7 @@
 import shlex
 from collections.abc import Callable, Collection, Sequence
 
-from sssfit.errors import FitError
+from sssfit.errors import FitError, KernelError
 from sssfit.fit import FitResult, TapsFit, make_target
 from sssfit.kernel import Taps
 from sssfit.messages import note
@@ -34,10 +34,19 @@ def fitted(
     only: Collection[str] | None,
     steps: Steps,
 ) -> list[Fitted]:
-    """Fit the candidates, each once; what cannot be fitted is noted and left out."""
+    """Fit the candidates, each once; what cannot be fitted is noted and left out.
+
+    Raises
+    ------
+    FitError
+        None could be fitted.
+    KernelError
+        Two have one label.
+    """
     pixels = 2 * make_target(profile, mm_per_pixel, None).half_pixels + 1
     wanted = shown_candidates(pixels, only)
     steps.total += len(wanted)
+    _check_labels([label for label, _ in named], [each.label for each in wanted])
     found = [
         Fitted(label, taps.method, 0, {}, None, TapsFit(taps, 0, 0.0)) for label, taps in named
     ]
@@ -56,6 +65,15 @@ def fitted(
     if not found:
         raise FitError(f"{profile.material_name or 'profile'}: no kernel could be fitted.")
     return found
+
+
+def _check_labels(own: Sequence[str], others: Sequence[str]) -> None:
+    """Refuse kernels that could not be told apart in the page."""
+    for k, label in enumerate(own):
+        if label in own[:k] or label in others:
+            raise KernelError(
+                f"two kernels are called {label}; rename a file, so that the page tells them apart."
+            )
 
 
 def shown_kernel(fit: Fitted, title: str, mm_per_pixel: float) -> ShownKernel:

@@ -57,7 +57,7 @@ def kept(key: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
     path = _folder() / f"{key}.json"
     found = _read(path)
     if found is None:
-        with _heard() as told, warnings.catch_warnings(record=True) as warned:
+        with heard() as told, warnings.catch_warnings(record=True) as warned:
             made = make()
         ours = [str(each.message) for each in warned if each.category is SssfitWarning]
         found = {"made": made, "notes": told.lines, "warnings": ours}
@@ -71,7 +71,7 @@ def kept(key: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
     return dict(found["made"])
 
 
-class _Listener(logging.Handler):
+class Listener(logging.Handler):
     """Remembers what the library says; it says it all the same."""
 
     def __init__(self) -> None:
@@ -84,9 +84,9 @@ class _Listener(logging.Handler):
 
 
 @contextlib.contextmanager
-def _heard() -> Iterator[_Listener]:
-    """Let a listener hear what is noted."""
-    listener = _Listener()
+def heard() -> Iterator[Listener]:
+    """Let a listener hear what is noted inside the block."""
+    listener = Listener()
     logging.getLogger(_LOG).addHandler(listener)
     try:
         yield listener

@@ -32,7 +32,9 @@ def make_report(
     source: Material | Profile,
     *,
     name: str | None = None,
+    origin: str | None = None,
     named: Sequence[tuple[str, Taps]] = (),
+    kernels: Sequence[str] = (),
     irradiance: str | None = None,
     only: Collection[str] | None = None,
     mm_per_pixel: float | None = None,
@@ -50,8 +52,12 @@ def make_report(
         Of 1 or 3 channels, which a page can show as colours.
     name : str, optional
         Of the page of a profile that does not name its material.
+    origin : str, optional
+        What the source was named as, in the command lines of the page; by default its title.
     named : sequence of (str, Taps)
         Tables of taps of a user's own, with their labels.
+    kernels : sequence of str
+        Their files, for the command lines.
     irradiance : str, optional
         A picture's file, which the page opens with.
     only : collection of str, optional
@@ -92,7 +98,7 @@ def make_report(
     timed: dict[str, Any] = {"timed_seconds": _TIMED_SECONDS, "threads": threads}
     comparison = compare_kernels(profile, scenes, candidates=fits, **timed)
     title = profile.material_name or name or "profile"
-    kernels = tuple(shown_kernel(each, title, pitch) for each in fits)
+    shown = tuple(shown_kernel(each, title, pitch) for each in fits)
     steps("models and budget")
     walk = {"photons": photons, "seed": seed, "threads": threads}
     models, budgets, convergence = _of_material(source, pictures, walk)
@@ -100,13 +106,22 @@ def make_report(
         title,
         profile,
         pictures,
-        kernels,
+        shown,
         comparison,
         compute_spectrum(profile, mm_per_pixel=pitch),
         models,
         budgets,
         convergence,
-        commands_of(title),
+        commands_of(
+            origin or title,
+            is_material=isinstance(source, Material),
+            kernel=kernels,
+            irradiance=irradiance,
+            only=None if only is None else sorted(only),
+            mm_per_pixel=mm_per_pixel,
+            photons=None if photons == PHOTONS else photons,
+            seed=None if seed == 1 else seed,
+        ),
     )
 
 

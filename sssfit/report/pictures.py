@@ -151,7 +151,8 @@ def _reduced(scene: Scene, side: int) -> Scene:
         return scene
     note(
         f"{scene.name}: {scene.width} x {scene.height} pixels are scaled down by {factor} to "
-        f"fit the page's {side} x {side}."
+        f"fit the page's {side} x {side}; its kernels are for pixels of "
+        f"{scene.mm_per_pixel * factor:.4g} mm."
     )
     mask = None
     if scene.mask is not None:

@@ -45,6 +45,8 @@ class Report:
         None of these for a profile, or a material that the exact solver does not cover.
     commands : tuple of str
         The command lines that make the figures again.
+    notes : tuple of str
+        What was told while it was made: what was left out, or scaled down.
     """
 
     name: str
@@ -57,6 +59,7 @@ class Report:
     budgets: tuple[Budget, ...]
     convergence: Convergence | None
     commands: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     @property
     def front(self) -> list[str]:
@@ -131,4 +134,4 @@ class Report:
             walk = self.models.walk.profile
             words = f"{walk.photons:,} photons, seed {walk.meta.get('seed')}"
             found.append(("walk of models and budget", words))
-        return found
+        return [*found, *(("note", each) for each in self.notes)]

@@ -1,5 +1,7 @@
 // The controls: each sets a part of the state, and shows it when the state changes by other ways.
 
+import { SCALE_END } from './colour.js';
+
 export const get = (id) => document.getElementById(id);
 const NUMBERS = ['stops', 'gain', 'frames', 'split'];
 
@@ -64,6 +66,7 @@ export function fillControls({ model, state }) {
   get('stops-words').textContent = `${state.stops > 0 ? '+' : ''}${state.stops} stops`;
   get('frames-words').textContent = String(state.frames);
   get('gain-words').textContent = `× ${state.gain}`;
+  get('scale-end').textContent = `${Number((SCALE_END / state.gain).toPrecision(3))} and more`;
   for (const each of document.querySelectorAll('input[name=mode]')) each.checked = each.value === state.mode;
   for (const each of document.querySelectorAll('input[name=pane]')) each.checked = each.value === state.pane;
   get('command').textContent = kernel.command;

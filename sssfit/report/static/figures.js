@@ -12,14 +12,16 @@ export function figuresOf(errors, mask) {
   return { mean, p95: percentile(counted, 95), p99: percentile(counted, 99), sorted: counted };
 }
 
-// Bins of Delta E, each as high as the error that its pixels have together; a few large errors then
-// show beside many small ones. Quartiles are of the same weight.
-export function histogramOf(sorted, end, count) {
+// Bins of Delta E, equal in its logarithm from `begin` to `end`, each as high as the error that its pixels
+// have together: a few large errors then show beside many small ones. Quartiles are of the same weight.
+export const placeOf = (error, begin, end) => Math.log(Math.min(Math.max(error, begin), end) / begin) / Math.log(end / begin);
+
+export function histogramOf(sorted, begin, end, count) {
   const bins = new Array(count).fill(0), total = sorted.reduce((sum, each) => sum + each, 0);
   const quartiles = [];
   let sum = 0;
   for (const each of sorted) {
-    bins[Math.min(Math.floor(each / end * count), count - 1)] += total > 0 ? each / total : 0;
+    bins[Math.min(Math.floor(placeOf(each, begin, end) * count), count - 1)] += total > 0 ? each / total : 0;
     sum += each;
     while (quartiles.length < 3 && total > 0 && sum >= total * (quartiles.length + 1) / 4) quartiles.push(each);
   }

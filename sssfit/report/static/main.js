@@ -45,7 +45,9 @@ class Page {
     for (const key of ['x', 'y', 'split']) this.state[key] = Math.min(Math.max(this.state[key], 0), 1);
     history.replaceState(null, '', hashOf(this.state));
     const views = ['x', 'y', 'zoom', 'split', 'mode', 'pane', 'pins'];
-    return Object.keys(given).every((key) => views.includes(key)) ? this.draw() : this.update();
+    if (!Object.keys(given).every((key) => views.includes(key))) return this.update();
+    fillControls(this);
+    return this.draw();
   }
 
   // Renders again; where the state changed meanwhile, only the newest is shown.

@@ -1,10 +1,10 @@
 // What stands beside the pictures: figures, scale, histogram, pins, loupe and the worst pixels.
 
-import { SCALE_END } from './colour.js';
-import { histogramOf, worstOf } from './figures.js';
+import { histogramOf, placeOf, worstOf } from './figures.js';
 import { drawLoupe } from './view.js';
 
-const BINS = 40, WORST = 3, APART = 12; // pixels between two of the worst places
+const BINS = 40, LOWEST = 0.001, HIGHEST = 100, // Delta E at the ends of the histogram
+  WORST = 3, APART = 12; // pixels between two of the worst places
 const byId = (id) => document.getElementById(id);
 const SVG = 'http://www.w3.org/2000/svg';
 
@@ -31,18 +31,24 @@ export function drawHistogram(figures) {
   const svg = byId('histogram');
   svg.replaceChildren();
   if (!figures) return;
-  const { bins, quartiles } = histogramOf(figures.sorted, SCALE_END, BINS), top = Math.max(...bins, 1e-9);
+  const { bins, quartiles } = histogramOf(figures.sorted, LOWEST, HIGHEST, BINS), top = Math.max(...bins, 1e-9);
   bins.forEach((share, k) => svg.append(element('rect', {
     class: 'bin', x: 4 + k * 6, width: 5, y: 64 - 60 * share / top, height: 60 * share / top })));
   for (const each of quartiles) {
-    const x = 4 + 240 * Math.min(each / SCALE_END, 1);
+    const x = 4 + 240 * placeOf(each, LOWEST, HIGHEST);
     svg.append(element('line', { class: 'quartile', x1: x, x2: x, y1: 2, y2: 64 }));
   }
-  for (let value = 0; value <= SCALE_END; value++) {
-    const text = element('text', { class: value === SCALE_END ? 'tick end' : 'tick middle', x: 4 + 240 * value / SCALE_END, y: 77 });
-    text.textContent = value === SCALE_END ? `${value}+` : value;
+  for (let value = LOWEST; value <= HIGHEST; value *= 10) {
+    const place = placeOf(value, LOWEST, HIGHEST), x = 4 + 240 * place;
+    svg.append(element('line', { class: 'axis', x1: x, x2: x, y1: 64, y2: 67 }));
+    const side = place < 0.01 ? 'start' : place > 0.99 ? 'end' : 'middle';
+    const text = element('text', { class: `tick ${side}`, x, y: 78 });
+    text.textContent = Number(value.toPrecision(1));
     svg.append(text);
   }
+  const name = element('text', { class: 'tick middle', x: 124, y: 91 });
+  name.textContent = 'ΔE of a pixel; height: share of the error';
+  svg.append(name);
   byId('quartiles').textContent = quartiles.length
     ? `Quartiles of the error: ${quartiles.map(short).join(', ')}` : 'There is no error.';
 }
