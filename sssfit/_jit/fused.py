@@ -43,7 +43,7 @@ def fma(a: np.float32, b: np.float32, c: np.float32) -> np.float32:
 
 
 @intrinsic  # type: ignore[untyped-decorator]
-def _fused(_context, a, b, c):  # type: ignore[no-untyped-def]  # noqa: ANN
+def _fused(_context, a, b, c):  # type: ignore[no-untyped-def]
     def generate(_context, builder, _signature, args):  # type: ignore[no-untyped-def]
         return builder.fma(*args)
 

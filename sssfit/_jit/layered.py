@@ -44,7 +44,6 @@ from sssfit._jit.layered_lanes import (
     WEIGHT,
     WORD_ROWS,
     Indices,
-    Lanes,
     X,
     Y,
     Z,
@@ -53,13 +52,12 @@ from sssfit._jit.layered_lanes import (
     list_flagged,
     remove_lanes,
     renormalise,
-    scatter,
+    rotate,
 )
 from sssfit._jit.layered_slots import (
     SLOT_ROWS,
     SLOT_WORD_ROWS,
     SUMS,
-    Slots,
     gather,
     meet,
     settle,
@@ -76,7 +74,7 @@ from sssfit._jit.layered_tally import (
     give_up,
     score_exits,
 )
-from sssfit._jit.sampling import LANES, LaneFloats
+from sssfit._jit.sampling import LANES, LaneFloats, LaneWords
 
 _F32 = np.float32
 _U32 = np.uint32
@@ -104,7 +102,9 @@ class Stack(NamedTuple):
 
 @jit_merged
 def launch(
-    lanes: Lanes,
+    floats: LaneFloats,
+    words: LaneWords,
+    shares: LaneFloats,
     ended: Indices,
     count: int,
     first_layer: np.uint64,
@@ -119,7 +119,6 @@ def launch(
     They enter along the normal or, ``diffuse``, with the cosine law of a uniformly lit surface.
     Those that fly through the layer are added to the ``waiting`` events; returns their number.
     """
-    floats, words = lanes.floats, lanes.words
     row = _U64(first_layer * COLUMNS)
     thickness, mean, capture = layers[row], layers[row + _U1], layers[row + _U2]
     back = layers[row + _U3]
@@ -150,8 +149,8 @@ def launch(
         floats[BACK + lane] = back
         words[LAYER + lane] = _U32(first_layer)
         words[BORN + lane] = sweep
-        for row_of in range(0, lanes.shares.size, STRIDE):
-            lanes.shares[_U64(row_of) + lane] = _ONE
+        for row_of in range(0, shares.size, STRIDE):
+            shares[_U64(row_of) + lane] = _ONE
         events[listed] = lane
         listed = _U64(listed + _U64(leaves))
     return np.int64(listed)
@@ -178,16 +177,19 @@ def trace_batch(
     floats = np.zeros(FLOAT_ROWS * STRIDE, np.float32)
     words = np.zeros(WORD_ROWS * STRIDE, np.uint32)
     shares = np.ones(channels * STRIDE, np.float32)
-    lanes = Lanes(floats, floats.view(np.uint32), words, np.zeros(STRIDE, np.uint8), shares)
-    slot_floats = np.ones(SLOT_ROWS * STRIDE, np.float32)
+    flags, gone = np.zeros(STRIDE, np.uint8), np.zeros(STRIDE, np.uint8)
+    slots = np.ones(SLOT_ROWS * STRIDE, np.float32)
     slot_words = np.zeros(SLOT_WORD_ROWS * STRIDE, np.uint32)
-    slots = Slots(slot_floats, slot_floats.view(np.uint32), slot_words)
     scratch = np.ones(SCRATCH_ROWS * STRIDE, np.float32)
-    absorbed = np.zeros((channels, SUMS, stack.layers.size // 4))
+    layer_count = stack.layers.size // 4
+    absorbed = np.zeros(channels * SUMS * layer_count)
     events, exits = np.empty(STRIDE, np.uint64), np.empty(STRIDE, np.uint64)
-    gone = np.zeros(LANES, np.bool_)
-    layer_words = stack.layers.view(np.uint32)
-    crossing_words = stack.crossings.view(np.uint32)
+    # floats as words, for copies, and flags as words of eight
+    bits, slot_bits = floats.view(np.uint32), slots.view(np.uint32)
+    layers, crossings = stack.layers.view(np.uint32), stack.crossings.view(np.uint32)
+    eights = flags.view(np.uint64)
+    coefficients, excess = stack.layers, stack.excess_per_mm
+    reflected, transmitted = ledger.reflected, ledger.transmitted
     seed_streams(words, seed, _U64(_U2 * _U64(batch)))
     seed_streams(slot_words, seed, _U64(_U2 * _U64(batch) + _U1))
 
@@ -203,49 +205,53 @@ def trace_batch(
                 taken = min(ended, waiting)
                 waiting -= taken
                 met = launch(
-                    lanes,
+                    floats,
+                    words,
+                    shares,
                     exits,
                     taken,
                     _U64(first_layer + 1),
                     diffuse,
-                    stack.layers,
+                    coefficients,
                     _U32(sweep),
                     events,
                     met,
                 )
                 for k in range(taken, ended):
-                    gone[exits[k]] = True
+                    gone[exits[k]] = 1
                 removed += ended - taken
                 ended = 0
                 continue
-            gather(lanes, events, met, slots, crossing_words)
-            meet(slots, (met + VECTOR - 1) & -VECTOR)
+            gather(bits, words, events, met, slot_bits, crossings)
+            meet(slots, slot_words, (met + VECTOR - 1) & -VECTOR)
             if is_alone:
-                book_alone(lanes, events, met, absorbed)
+                book_alone(floats, words, events, met, absorbed)
             else:
-                book_channels(lanes, events, met, slots, scratch, stack.excess_per_mm, absorbed)
-            met, ended = settle(lanes, slots, events, met, layer_words, exits)
-            score_exits(lanes, exits, ended, bins, ledger)
+                book_channels(floats, words, shares, events, met, slots, scratch, excess, absorbed)
+            met, ended = settle(bits, words, slot_bits, slot_words, events, met, layers, exits)
+            score_exits(floats, shares, exits, ended, bins, reflected, transmitted)
             rounds += 1
             if rounds > _MOST_ROUNDS:
-                give_up(lanes, events, met, bins, ledger)
+                give_up(floats, shares, events, met, bins, ledger)
                 exits[ended : ended + met] = events[:met]
                 ended += met
                 met = 0
         if removed > 0:
-            live = remove_lanes(lanes, gone, live)
+            live = remove_lanes(floats, words, shares, gone, live)
         padded = (live + VECTOR - 1) & -VECTOR
         if sweep - checked >= _SWEEPS_BETWEEN:
             checked = sweep
             renormalise(floats, padded)
-            flag_weak(lanes, padded, _U32(sweep))
-            weak = list_flagged(lanes.flags, live, events)
+            flag_weak(floats, words, flags, padded, _U32(sweep))
+            weak = list_flagged(flags, eights, live, events)
             ended = end_or_boost(
-                lanes,
+                floats,
+                words,
+                shares,
                 events,
                 weak,
                 _U32(sweep),
-                stack.excess_per_mm,
+                excess,
                 absorbed,
                 bins,
                 ledger,
@@ -254,10 +260,10 @@ def trace_batch(
             if ended > 0:
                 continue
         draw(floats, words, padded)
-        scatter(floats, padded)
-        fly(floats, lanes.flags, padded)
+        rotate(floats, padded)
+        fly(floats, flags, padded)
         sweep += 1
         flights += live
-        met = list_flagged(lanes.flags, live, events)
+        met = list_flagged(flags, eights, live, events)
     add_absorbed(absorbed, bins, ledger)
     return flights

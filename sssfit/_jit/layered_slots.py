@@ -5,15 +5,12 @@ a branch, and ``settle`` copies them back. A photon that goes on has a fresh fre
 good as the rest of the old one: free paths have no memory.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 
 from sssfit._jit import jit_merged
 from sssfit._jit.fused import STRIDE, fma, free_path, uniform, with_sign
 from sssfit._jit.layered_lanes import (
     BACK,
-    BOOKED,
     CAPTURE,
     COLUMNS,
     FREE_PATH,
@@ -23,9 +20,7 @@ from sssfit._jit.layered_lanes import (
     UX,
     UY,
     UZ,
-    WEIGHT,
     Indices,
-    Lanes,
     X,
     Y,
     Z,
@@ -58,27 +53,25 @@ _SIGN = _U64(31)
 _GRAZING = _F32(1e-6)  # least cosine after refraction: a photon along a clear layer would never end
 
 
-class Slots(NamedTuple):
-    """State of the photons at an interface: rows ``STRIDE`` apart."""
-
-    floats: LaneFloats
-    bits: LaneWords  # the same memory as words, for copies
-    words: LaneWords
-
-
 @jit_merged
-def gather(lanes: Lanes, events: Indices, count: int, slots: Slots, crossings: LaneWords) -> None:
+def gather(
+    source: LaneWords,
+    words: LaneWords,
+    events: Indices,
+    count: int,
+    target: LaneWords,
+    crossings: LaneWords,
+) -> None:
     """Copy the listed lanes into slots, with the interface ahead of each.
 
-    ``crossings`` holds floats as words: copies of words need no conversion of their own.
+    Lanes, slots and interfaces are floats that are copied as words, in ordinary registers.
     """
-    source, target = lanes.bits, slots.bits
     for k in range(count):
         slot = _U64(k)
         lane = events[slot]
         uz = source[UZ + lane]
         upward = _U64(_U64(uz) >> _SIGN)
-        row = _U64(_U64(_U64(lanes.words[LAYER + lane]) * _U2 + upward) * CROSSING_COLUMNS)
+        row = _U64(_U64(_U64(words[LAYER + lane]) * _U2 + upward) * CROSSING_COLUMNS)
         target[X + slot] = source[X + lane]
         target[Y + slot] = source[Y + lane]
         target[Z + slot] = source[Z + lane]
@@ -94,12 +87,11 @@ def gather(lanes: Lanes, events: Indices, count: int, slots: Slots, crossings: L
 
 
 @jit_merged
-def meet(slots: Slots, count: int) -> None:
+def meet(e: LaneFloats, words: LaneWords, count: int) -> None:
     """Fly to the interface, reflect or refract there by Fresnel and Snell, and fly on.
 
     A flight that would meet another interface ends at this one.
     """
-    e, words = slots.floats, slots.words
     for k in range(count):
         slot = _U64(k)
         ux, uy, uz = e[UX + slot], e[UY + slot], e[UZ + slot]
@@ -136,8 +128,10 @@ def meet(slots: Slots, count: int) -> None:
 
 @jit_merged
 def settle(
-    lanes: Lanes,
-    slots: Slots,
+    target: LaneWords,
+    words: LaneWords,
+    source: LaneWords,
+    slot_words: LaneWords,
     events: Indices,
     count: int,
     layers: LaneWords,
@@ -148,7 +142,6 @@ def settle(
     Lists those that meet another interface in ``events`` and those that have left in ``exits``;
     returns their numbers.
     """
-    target, source = lanes.bits, slots.bits
     below = _U64(_U64(layers.size) // COLUMNS - _U1)
     again, left = _U0, _U0
     for k in range(count):
@@ -157,8 +150,8 @@ def settle(
         uz = source[UZ + slot]
         upward = _U64(_U64(uz) >> _SIGN)
         # one layer down, or up: 1 - 2 of unsigned words wraps and comes back
-        step = _U64(slots.words[_CROSSES + slot])
-        layer = _U64(_U64(lanes.words[LAYER + lane]) + _U64(step * _U64(_U1 - _U64(_U2 * upward))))
+        step = _U64(slot_words[_CROSSES + slot])
+        layer = _U64(_U64(words[LAYER + lane]) + _U64(step * _U64(_U1 - _U64(_U2 * upward))))
         target[X + lane] = source[X + slot]
         target[Y + lane] = source[Y + slot]
         target[Z + lane] = source[Z + slot]
@@ -166,7 +159,7 @@ def settle(
         target[UY + lane] = source[UY + slot]
         target[UZ + lane] = uz
         target[PATH + lane] = source[_FRESH + slot]
-        lanes.words[LAYER + lane] = _U32(layer)
+        words[LAYER + lane] = _U32(layer)
         row = _U64(layer * COLUMNS)
         target[THICKNESS + lane] = layers[row]
         target[FREE_PATH + lane] = layers[row + _U1]
@@ -174,6 +167,6 @@ def settle(
         target[BACK + lane] = layers[row + _U3]
         events[again] = lane
         exits[left] = lane
-        again = _U64(again + _U64(slots.words[_MEETS_AGAIN + slot]))
+        again = _U64(again + _U64(slot_words[_MEETS_AGAIN + slot]))
         left = _U64(left + _U64((layer == _U0) | (layer == below)))
     return np.int64(again), np.int64(left)

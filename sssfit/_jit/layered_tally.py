@@ -17,16 +17,16 @@ from sssfit._jit.layered_lanes import (
     BORN,
     LAYER,
     PATH,
+    UZ,
     VECTOR,
     WEIGHT,
-    UZ,
+    Flags,
     Indices,
-    Lanes,
     X,
     Y,
 )
-from sssfit._jit.layered_slots import LENGTH, SUM_MASK, SUMS, Slots
-from sssfit._jit.sampling import LaneFloats
+from sssfit._jit.layered_slots import LENGTH, SUM_MASK, SUMS
+from sssfit._jit.sampling import LaneFloats, LaneWords
 from sssfit._jit.semi_infinite import COLLISION_CAP, ROULETTE_SPREAD
 
 _F32 = np.float32
@@ -66,25 +66,32 @@ class Ledger(NamedTuple):
 
 
 @jit_merged
-def book_alone(lanes: Lanes, events: Indices, count: int, absorbed: FloatArray) -> None:
+def book_alone(
+    floats: LaneFloats,
+    words: LaneWords,
+    events: Indices,
+    count: int,
+    absorbed: FloatArray,
+) -> None:
     """Tally the weight that a walk of one channel lost in its layer since the last tally."""
-    floats, layers = lanes.floats, _U64(absorbed.shape[2])
-    sums = absorbed.reshape(-1)
+    layers = _U64(_U64(absorbed.size) // _U64(SUMS))
     for k in range(count):
         slot = _U64(k)
         lane = events[slot]
         weight = floats[WEIGHT + lane]
-        row = _U64(_U64(slot & SUM_MASK) * layers + _U64(lanes.words[LAYER + lane]))
-        sums[row] += _F64(floats[BOOKED + lane]) - _F64(weight)
+        row = _U64(_U64(slot & SUM_MASK) * layers + _U64(words[LAYER + lane]))
+        absorbed[row] += _F64(floats[BOOKED + lane]) - _F64(weight)
         floats[BOOKED + lane] = weight
 
 
 @jit_merged
 def book_channels(
-    lanes: Lanes,
+    floats: LaneFloats,
+    words: LaneWords,
+    shares: LaneFloats,
     events: Indices,
     count: int,
-    slots: Slots,
+    slots: LaneFloats,
     scratch: LaneFloats,
     excess: LaneFloats,
     absorbed: FloatArray,
@@ -93,9 +100,9 @@ def book_channels(
 
     A channel that absorbs more than the walk's by ``excess`` keeps exp(-excess path) of its share.
     """
-    floats, shares, words = lanes.floats, lanes.shares, lanes.words
-    channels, layers = _U64(absorbed.shape[0]), _U64(absorbed.shape[2])
-    sums = absorbed.reshape(-1)
+    count_of_channels = shares.size // STRIDE
+    channels = _U64(count_of_channels)
+    layers = _U64(_U64(excess.size) // channels)
     padded = (count + VECTOR - 1) & -VECTOR
     for k in range(count):
         slot = _U64(k)
@@ -104,7 +111,7 @@ def book_channels(
         scratch[_WEIGHT_NOW + slot] = weight
         scratch[_WEIGHT_BOOKED + slot] = floats[BOOKED + lane]
         floats[BOOKED + lane] = weight
-    for c in range(absorbed.shape[0]):
+    for c in range(count_of_channels):
         channel = _U64(c)
         row = _U64(channel * _U64(STRIDE))
         first = _U64(channel * _U64(_U64(SUMS) * layers))
@@ -112,14 +119,12 @@ def book_channels(
             slot = _U64(k)
             lane = events[slot]
             scratch[_SHARE + slot] = shares[row + lane]
-            scratch[_EXCESS + slot] = excess[
-                _U64(_U64(words[LAYER + lane]) * channels) + channel
-            ]
+            scratch[_EXCESS + slot] = excess[_U64(_U64(words[LAYER + lane]) * channels) + channel]
         for k in range(padded):
             slot = _U64(k)
             share = scratch[_SHARE + slot]
             scratch[_BEFORE + slot] = scratch[_WEIGHT_BOOKED + slot] * share
-            share = share * decay(scratch[_EXCESS + slot] * slots.floats[LENGTH + slot])
+            share = share * decay(scratch[_EXCESS + slot] * slots[LENGTH + slot])
             scratch[_NOW + slot] = scratch[_WEIGHT_NOW + slot] * share
             scratch[_SHARE + slot] = share
         for k in range(count):
@@ -127,40 +132,52 @@ def book_channels(
             lane = events[slot]
             shares[row + lane] = scratch[_SHARE + slot]
             at = _U64(first + _U64(_U64(slot & SUM_MASK) * layers) + _U64(words[LAYER + lane]))
-            sums[at] += _F64(scratch[_BEFORE + slot]) - _F64(scratch[_NOW + slot])
+            absorbed[at] += _F64(scratch[_BEFORE + slot]) - _F64(scratch[_NOW + slot])
 
 
 @jit_merged
-def score_exits(lanes: Lanes, exits: Indices, count: int, bins: Bins, ledger: Ledger) -> None:
+def score_exits(
+    floats: LaneFloats,
+    shares: LaneFloats,
+    exits: Indices,
+    count: int,
+    bins: Bins,
+    reflected: FloatArray,
+    transmitted: FloatArray,
+) -> None:
     """Add the photons that have left the stack, in the bin of their radius at the surface."""
-    floats, shares = lanes.floats, lanes.shares
     for k in range(count):
         lane = exits[_U64(k)]
         x, y = _F64(floats[X + lane]), _F64(floats[Y + lane])
         radial_bin = _U64(np.int64(min(math.sqrt(x * x + y * y) * bins.per_mm, float(bins.last))))
-        cells = ledger.reflected if floats[UZ + lane] < _ZERO else ledger.transmitted
         weight = floats[WEIGHT + lane]
         for c in range(bins.channel.size):
             left = _F64(weight * shares[_U64(_U64(c) * _U64(STRIDE)) + lane])
             channel = _U64(bins.channel[_U64(c)])
-            cells[radial_bin, channel, _U0] += left
-            cells[radial_bin, channel, _U1] += left * left
+            if floats[UZ + lane] < _ZERO:
+                reflected[radial_bin, channel, _U0] += left
+                reflected[radial_bin, channel, _U1] += left * left
+            else:
+                transmitted[radial_bin, channel, _U0] += left
+                transmitted[radial_bin, channel, _U1] += left * left
 
 
 @jit_merged
-def flag_weak(lanes: Lanes, count: int, sweep: np.uint32) -> None:
+def flag_weak(
+    floats: LaneFloats, words: LaneWords, flags: Flags, count: int, sweep: np.uint32
+) -> None:
     """Flag the lanes below the roulette threshold or at the collision cap."""
     for k in range(count):
         lane = _U64(k)
-        collisions = _U32(sweep - lanes.words[BORN + lane])
-        lanes.flags[lane] = (lanes.floats[WEIGHT + lane] < _THRESHOLD) | (
-            collisions >= _U32(COLLISION_CAP)
-        )
+        collisions = _U32(sweep - words[BORN + lane])
+        flags[lane] = (floats[WEIGHT + lane] < _THRESHOLD) | (collisions >= _U32(COLLISION_CAP))
 
 
 @jit
 def end_or_boost(
-    lanes: Lanes,
+    floats: LaneFloats,
+    words: LaneWords,
+    shares: LaneFloats,
     events: Indices,
     count: int,
     sweep: np.uint32,
@@ -174,31 +191,31 @@ def end_or_boost(
 
     The weight that roulette adds or takes has mean zero, and its expected square is booked.
     """
-    ended = 0
+    ended, layers = 0, excess.size // bins.channel.size
     for k in range(count):
         lane = events[k]
-        stops = _U32(sweep - lanes.words[BORN + lane]) >= _U32(COLLISION_CAP)
-        lives = not stops and uniform(lanes.words, lane) < _SURVIVAL
-        weight, path = lanes.floats[WEIGHT + lane], lanes.floats[PATH + lane]
-        booked, layer = lanes.floats[BOOKED + lane], lanes.words[LAYER + lane]
+        stops = _U32(sweep - words[BORN + lane]) >= _U32(COLLISION_CAP)
+        lives = not stops and uniform(words, lane) < _SURVIVAL
+        weight, path = floats[WEIGHT + lane], floats[PATH + lane]
+        booked, layer = floats[BOOKED + lane], words[LAYER + lane]
         boosted = weight * _GAIN if lives else _ZERO
         for c in range(bins.channel.size):
             channel, at = bins.channel[c], _U64(c * STRIDE) + lane
-            share = lanes.shares[at]
+            share = shares[at]
             before = _F64(booked * share)
             share = share * decay(excess[layer * bins.channel.size + c] * path)
-            lanes.shares[at] = share
+            shares[at] = share
             now = _F64(weight * share)
-            absorbed[c, 0, layer] += before - now
+            absorbed[_U64(c * SUMS * layers) + _U64(layer)] += before - now
             if stops:
                 ledger.unfinished[channel, 0] += now
                 ledger.unfinished[channel, 1] += now * now
             else:
                 ledger.roulette[channel, 0] += _F64(boosted * share) - now
                 ledger.roulette[channel, 1] += ROULETTE_SPREAD * now * now
-        lanes.floats[PATH + lane] = _ZERO
-        lanes.floats[WEIGHT + lane] = boosted
-        lanes.floats[BOOKED + lane] = boosted
+        floats[PATH + lane] = _ZERO
+        floats[WEIGHT + lane] = boosted
+        floats[BOOKED + lane] = boosted
         if not lives:
             exits[ended] = lane
             ended += 1
@@ -206,20 +223,29 @@ def end_or_boost(
 
 
 @jit
-def give_up(lanes: Lanes, events: Indices, count: int, bins: Bins, ledger: Ledger) -> None:
+def give_up(
+    floats: LaneFloats,
+    shares: LaneFloats,
+    events: Indices,
+    count: int,
+    bins: Bins,
+    ledger: Ledger,
+) -> None:
     """Book the walks that meet interfaces without end as unfinished."""
     for k in range(count):
         for c in range(bins.channel.size):
-            weight = lanes.floats[WEIGHT + events[k]]
-            left = _F64(weight * lanes.shares[_U64(c * STRIDE) + events[k]])
+            weight = floats[WEIGHT + events[k]]
+            left = _F64(weight * shares[_U64(c * STRIDE) + events[k]])
             ledger.unfinished[bins.channel[c], 0] += left
             ledger.unfinished[bins.channel[c], 1] += left * left
 
 
 @jit
 def add_absorbed(absorbed: FloatArray, bins: Bins, ledger: Ledger) -> None:
-    """Add a batch's absorption, (K, SUMS, L + 2), to the ledger, (L, C)."""
+    """Add a batch's absorption, (K SUMS (L + 2),), to the ledger, (L, C)."""
+    inside = ledger.absorbed.shape[0]
     for c in range(bins.channel.size):
-        for layer in range(ledger.absorbed.shape[0]):
-            for k in range(SUMS):
-                ledger.absorbed[layer, bins.channel[c]] += absorbed[c, k, layer + 1]
+        for k in range(SUMS):
+            first = (c * SUMS + k) * (inside + 2) + 1
+            for layer in range(inside):
+                ledger.absorbed[layer, bins.channel[c]] += absorbed[first + layer]
