@@ -42,7 +42,7 @@ def fma(a: np.float32, b: np.float32, c: np.float32) -> np.float32:
     return _F32(float(a) * float(b) + float(c))
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def _fused(_context, a, b, c):  # type: ignore[no-untyped-def]
     def generate(_context, builder, _signature, args):  # type: ignore[no-untyped-def]
         return builder.fma(*args)
@@ -50,9 +50,9 @@ def _fused(_context, a, b, c):  # type: ignore[no-untyped-def]
     return types.float32(a, b, c), generate
 
 
-@overload(fma, inline="always")  # type: ignore[untyped-decorator]
+@overload(fma, inline="always")
 def _compiled_fma(a, b, c):  # type: ignore[no-untyped-def]  # noqa: ARG001
-    return lambda a, b, c: _fused(_F32(a), _F32(b), _F32(c))
+    return lambda a, b, c: _fused(a, b, c)  # type: ignore[call-arg]
 
 
 @jit

@@ -122,7 +122,7 @@ def launch(
     row = _U64(first_layer * COLUMNS)
     thickness, mean, capture = layers[row], layers[row + _U1], layers[row + _U2]
     back = layers[row + _U3]
-    listed = _U64(waiting)
+    listed = waiting
     for k in range(count):
         lane = ended[_U64(k)]
         ux, uy, uz = _ZERO, _ZERO, _ONE
@@ -151,9 +151,9 @@ def launch(
         words[BORN + lane] = sweep
         for row_of in range(0, shares.size, STRIDE):
             shares[_U64(row_of) + lane] = _ONE
-        events[listed] = lane
-        listed = _U64(listed + _U64(leaves))
-    return np.int64(listed)
+        events[_U64(listed)] = lane
+        listed += int(leaves)
+    return listed
 
 
 @jit

@@ -143,7 +143,7 @@ def list_flagged(flags: Flags, eights: Indices, count: int, lanes: Indices) -> i
     groups = (count + 63) >> 6
     for k in range(count, 64 * groups):
         flags[_U64(k)] = 0
-    found = _U64(0)
+    found = 0
     for group in range(groups):
         some = _U64(0)
         for k in range(8):
@@ -151,9 +151,9 @@ def list_flagged(flags: Flags, eights: Indices, count: int, lanes: Indices) -> i
         if some != _U64(0):
             for k in range(64):
                 lane = _U64(64 * group + k)
-                lanes[found] = lane
-                found = _U64(found + _U64(flags[lane]))
-    return np.int64(found)
+                lanes[_U64(found)] = lane
+                found += int(flags[lane])
+    return found
 
 
 @jit_merged

@@ -143,7 +143,7 @@ def settle(
     returns their numbers.
     """
     below = _U64(_U64(layers.size) // COLUMNS - _U1)
-    again, left = _U0, _U0
+    again, left = 0, 0
     for k in range(count):
         slot = _U64(k)
         lane = events[slot]
@@ -165,8 +165,8 @@ def settle(
         target[FREE_PATH + lane] = layers[row + _U1]
         target[CAPTURE + lane] = layers[row + _U2]
         target[BACK + lane] = layers[row + _U3]
-        events[again] = lane
-        exits[left] = lane
-        again = _U64(again + _U64(slot_words[_MEETS_AGAIN + slot]))
-        left = _U64(left + _U64((layer == _U0) | (layer == below)))
-    return np.int64(again), np.int64(left)
+        events[_U64(again)] = lane
+        exits[_U64(left)] = lane
+        again += int(slot_words[_MEETS_AGAIN + slot])
+        left += int((layer == _U0) | (layer == below))
+    return again, left

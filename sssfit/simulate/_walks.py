@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._jit import layered, semi_infinite
+from sssfit._jit import layered, layered_tally, semi_infinite
 from sssfit.arrays import FloatArray
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
@@ -115,12 +115,12 @@ class LayeredWalk:
     seed: int
     photons: int
     diffuse: bool = False
-    groups: tuple[tuple[layered.Stack, layered.Bins], ...] = field(init=False)
+    groups: tuple[tuple[layered.Stack, layered_tally.Bins], ...] = field(init=False)
 
     def __post_init__(self) -> None:
         material, grid = self.materials[0], self.grids[0]
         groups = tuple(
-            (_stack(material, members), layered.Bins(1.0 / grid.dr_mm, grid.annuli, members))
+            (_stack(material, members), layered_tally.Bins(1.0 / grid.dr_mm, grid.annuli, members))
             for members in channels_with_equal_scattering(material)
         )
         object.__setattr__(self, "groups", groups)
@@ -146,7 +146,7 @@ class LayeredWalk:
         """Return a tally with all sums zero."""
         material, cells = self.materials[0], self.grids[0].annuli + 1
         n = material.n_channels
-        ledger = layered.Ledger(
+        ledger = layered_tally.Ledger(
             reflected=np.zeros((cells, n, 2)),
             transmitted=np.zeros((cells, n, 2)),
             absorbed=np.zeros((len(material.layers), n)),
