@@ -30,6 +30,7 @@ from .import_ import import_
 from .materials import materials
 from .motion import motion
 from .render import render
+from .report import report
 from .scene import scene
 from .show import show
 from .simulate import simulate
@@ -37,7 +38,7 @@ from .stability import stability
 
 _LIBRARIES = (
     *("numpy", "scipy", "threadpoolctl", "nlopt", "numba", "llvmlite", "matplotlib"),
-    *("colour-science", "OpenImageIO", "click", "rich"),
+    *("colour-science", "OpenImageIO", "click", "rich", "jinja2", "markupsafe"),
 )
 _LONGEST_LINE = 1000  # a path may be 4096 characters, an option's value anything
 _OUT_OF_MEMORY = "out of memory: use a smaller grid or picture, fewer channels or --threads."
@@ -62,6 +63,7 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
       sssfit render --irradiance head       see it on a lit head, with its error
       sssfit export --format hlsl           write it as shader source
       sssfit compare skin1                  error and cost of every kernel, and the causes
+      sssfit report skin1                   one page with its kernels running in it
       sssfit choose skin1 --distance 0.6m   the cheapest kernel for a view
 
     Lengths are mm unless written with a unit (3cm, 0.6m). Every verb explains itself with --help.
@@ -79,7 +81,7 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
 
 for _verb in (
     *(materials, simulate, fit, render, compare, choose, stability, motion, scene),
-    *(import_, export, chart, show),
+    *(import_, export, chart, report, show),
 ):
     cli.add_command(_verb)
 

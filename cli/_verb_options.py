@@ -131,6 +131,7 @@ CHART = (
     flag("--models", "Draw a material by every method, and the methods' errors."),
     flag("--spectrum", "Draw the energy of the kernel's singular values."),
     flag("--guide", "Draw the guide function beside the residual of the guided fit."),
+    flag("--frequency", "Draw the response to sinusoids of light, R(k)."),
     option("--mm-per-pixel", Length("profile"), "MM|profile", "Pixels of the kernel, with "
            "--spectrum or --guide; profile is the width of the profile's first annulus.  "
            "[default: 0.3]"),
@@ -143,7 +144,8 @@ CHART = (
     option("--photons", Count(2, 10**12), "N", "Photons of the walk, with --models.  "
            "[default: 1e7]"),
     *output("NAME.profile.png, NAME.kernel.png, NAME.material.png, NAME.checkpoint.png, "
-            "NAME.spectrum.png, NAME.guide.png, MATERIAL.models.png", "is not our chart",
+            "NAME.spectrum.png, NAME.guide.png, NAME.frequency.png, MATERIAL.models.png",
+            "is not our chart",
             "Output file, PNG, SVG or PDF by its ending; - for PNG on stdout"),
 )
 
@@ -219,6 +221,20 @@ SCENE = (
     option("-o --output", None, "FILE", "Picture with the savings, .exr, .tif or .png; - for EXR "
            "on stdout.  [default: none]"),
     flag("--force", "Replace a file that is not our chart or picture."),
+)
+REPORT = (
+    SHIPPED[0],
+    option("--kernel kernels", None, "FILE", "Your own table of taps, beside the others; may be "
+           "given several times.", multiple=True),
+    option("--irradiance", None, "FILE", "Your own irradiance picture, with which the page opens; "
+           "it is scaled down to 256 x 256 pixels at most."),
+    option("--mm-per-pixel", Length(), "MM", "Pixel size of the kernels.  [default: from your own "
+           "file, else 0.3]"),
+    option("--only", Names(FITS), "METHOD,...", "Only kernels by these fit methods, beside your "
+           "own.  [default: those that are fitted in seconds]"),
+    option("--photons", Count(2, 10**12), "N", "Photons of the walk of models and budget.  "
+           "[default: 200000]"),
+    *output("MATERIAL.html, materials.html with --all", "is not our page"),
 )
 EXPORT = (
     option("--format form", list(EXPORTS), None, "Output format, as below."),

@@ -34,6 +34,8 @@ _OPTIONS = (
     option("--run number", WholeRange(1), "N", "Simulate only this run of an .mci file."),
     method_options(SIMULATIONS),
     option("--dr", Length(), "MM", "Annulus width.  [default: MFP_min / 20; deon-skin: 0.008]"),
+    option("--beam", None, "KIND:MM", "Beam in place of a pencil: gaussian:RADIUS, to 1/e^2, or "
+           "flat:RADIUS."),
     option("--radius", Length("auto"), "MM|auto", "Grid radius; auto (montecarlo) enlarges it "
            "until under 0.1 % of any channel lies beyond.  [default: 32 MFP_max; deon-skin: 17.2]"),
     *output("MATERIAL.profile.npz, MATERIAL.METHOD.profile.npz", "is not our profile",
@@ -62,19 +64,22 @@ def simulate(
     \b
       sssfit simulate skin1
       sssfit simulate skin1 --method exact
+      sssfit simulate skin1 --method exact --beam gaussian:0.5 -o beam.profile.npz
       sssfit simulate skin1 --photons 1e8 --radius auto -o fine.profile.npz
       sssfit simulate ./wax.toml --json
       sssfit simulate skin1 --target-error 0.1% --resume
       sssfit simulate tissue.mci --run 2
       sssfit simulate deon-skin
     """
-    every, paper, number, dr, radius, output, force = (
-        given.pop(key) for key in ("every", "paper", "number", "dr", "radius", "output", "force")
+    every, paper, number, dr, radius, output, force, beam = (
+        given.pop(key)
+        for key in ("every", "paper", "number", "dr", "radius", "output", "force", "beam")
     )
     if [material is not None, every, paper].count(True) != 1:
         raise click.UsageError("name one MATERIAL, or give --all or --paper.")
     from sssfit.formats.mci import is_mci
     from sssfit.process import asked_to_stop
+    from sssfit.profile.beam import parse_beam
     from sssfit.simulate import runner
 
     if number is not None and not is_mci(material):
@@ -84,6 +89,7 @@ def simulate(
     if radius == "auto" and method != _FIRST:
         raise click.UsageError("--radius auto is for --method montecarlo; give a length.")
     how = {key: own.pop(key) for key in own.keys() & {"checkpoint_every", "resume"}}
+    how |= {} if beam is None else {"beam": parse_beam(beam)}
     own |= {"threads": common.threads} if SIMULATIONS[method].shares else {}
     own |= {"seed": common.seed} if method == _FIRST else {}
     materials, settings = runner.runs_of(method, material, own, run=number, paper=paper)

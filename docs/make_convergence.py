@@ -9,10 +9,11 @@ import sys
 from pathlib import Path
 
 from sections import DOCS
-from walk_convergence import compute_convergence, convergence_figure, photon_numbers
+from walk_convergence import convergence_figure
 
 from sssfit.chart.files import chart_format
 from sssfit.chart.page import save_figure
+from sssfit.compare.convergence import compute_convergence, photon_numbers
 from sssfit.errors import SssfitError
 from sssfit.material import load_material
 from sssfit.messages import number, table

@@ -148,14 +148,20 @@ SIMULATIONS: Mapping[str, Method] = {
     ),
     "exact": Method(
         "sssfit.simulate:simulate_exact_many",
-        "solution of the transport equation, without noise; half spaces only",
+        "solution of the transport equation, without noise; also for layers and slabs",
         (
             Setting(
                 "tolerance",
                 "share",
-                "largest error of F(r), as a share of the total.",
+                "largest error of F(r), as a share of the light that leaves.",
                 "SHARE",
                 default="0.01%",
+            ),
+            Setting(
+                "similarity",
+                "flag",
+                "take forward scattering for isotropic with sigma_s' = (1 - g) sigma_s, which is "
+                "faster and an approximation.",
             ),
         ),
         shares=True,
@@ -462,6 +468,11 @@ EXPORTS: Mapping[str, Method] = {
     "json": Method("sssfit.export:document_text", "a kernel as a document"),
     "csv": Method(
         "sssfit.export.table:table_text", "a profile or a kernel as a table", of_profiles=True
+    ),
+    "frequency": Method(
+        "sssfit.export.frequency:frequency_text",
+        "a profile's response to sinusoids of light, R(k), as a table: NAME.frequency.csv",
+        of_profiles=True,
     ),
     "lut": Method(
         "sssfit.export.lut:lut_bytes",

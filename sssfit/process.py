@@ -1,4 +1,4 @@
-"""The process: its cores and threads, the memory it may use, Ctrl-C and SIGTERM.
+"""The process: its cores and threads, the memory it may use, its caches, Ctrl-C and SIGTERM.
 
 Memory: under a limit (``ulimit -v``, a batch system's) compiled libraries do not raise MemoryError.
 At 400 MB scipy's BLAS tried forever to get its buffers, at 520 MB the process ended in a
@@ -26,6 +26,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any, NoReturn
 
@@ -307,3 +308,16 @@ def _system_v() -> tuple[Callable[[int, int], int], int] | None:
     handler = install(signal.SIGTERM, signal.SIG_IGN)  # the same for all signals
     install(signal.SIGTERM, handler)
     return install, handler
+
+
+def user_cache_folder() -> Path:
+    """Return the cache folder: NUMBA_CACHE_DIR if set, else the platform's user cache folder."""
+    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(chosen)
+    if sys.platform == "win32":
+        base = os.environ.get("LOCALAPPDATA")
+        return (Path(base) if base else Path.home() / "AppData" / "Local") / "sssfit" / "cache"
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "sssfit"
+    base = os.environ.get("XDG_CACHE_HOME")
+    return (Path(base) if base else Path.home() / ".cache") / "sssfit"

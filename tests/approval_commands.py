@@ -95,6 +95,7 @@ HELP = [
             "stability",
             "motion",
             "scene",
+            "report",
             "import",
             "export",
             "chart",
@@ -179,6 +180,10 @@ SIMULATE = [
     C(f"simulate plate.toml {GRID} --photons 2e3 -o 'out/Platte λ.npz' -v"),
     C("simulate leaf.toml --dr 200um --radius .5cm --photons 2000 -o - ", note="to stdout"),
     C(f"simulate wax.toml {GRID} --photons 2000 -q"),
+    C(f"simulate wax.toml {GRID} --photons 2000 --beam gaussian:.5 -o beam.npz"),
+    C("simulate wax.toml --method burley --beam flat:1 --json -o beam.npz"),
+    C("simulate wax.toml --beam gausian:1"),
+    C("simulate wax.toml --beam flat:-1"),
     C(f"simulate wax.toml {GRID} --photons 1.5e5", terminal=True),
     C(f"simulate wax.toml {GRID} --photons 1000", compiled=False, note="not compiled"),
     C("simulate wax.toml --dr .2 --radius auto --photons 2000 -o auto.profile.npz"),
@@ -200,6 +205,7 @@ SIMULATE = [
     C("simulate two.mci --run 1 --method multipole"),
     C(f"simulate wax.toml {GRID} --method exact"),
     C(f"simulate wax.toml {GRID} --method exact --tolerance 2% --json"),
+    C(f"simulate wax.toml {GRID} --method exact --similarity"),
     C(f"simulate wax.toml {GRID} --method exact", compiled=False, note="not compiled"),
     C("simulate leaf.toml --dr .3 --radius 4 --method exact"),
     C(f"simulate wax.toml {GRID} --method dipole -o d.npz --json"),
@@ -227,7 +233,7 @@ SIMULATE = [
     C("simulate wax.toml --radius far"),
     C("simulate wax.toml --checkpoint-every -1"),
     C("simulate wax.toml --resume -o -"),
-    C("simulate plate.toml --method exact"),
+    C("simulate plate.toml --dr .3 --radius 3 --method exact --tolerance 3%"),
     C("simulate varnish.toml --method dipole"),
     C("simulate plate.toml --method gaussians"),
     C("simulate --all --method gaussians"),
@@ -1069,6 +1075,8 @@ EXPORT = [
     C("export missing.toml --preset hdrp"),
     C("export wax.profile.npz"),
     C("export --format csv"),
+    C("export wax.profile.npz --format frequency"),
+    C("export wax.svd2.kernel.json --format frequency"),
     C("export 'Größe λ.profile.npz' --format csv -o p.csv --json"),
     C("export leaf.profile.npz --format csv -o -"),
     C("export four.profile.npz --format csv -q"),
@@ -1170,6 +1178,9 @@ CHART = [
     C("chart skin1 -v -o skin.png"),
     C("chart --spectrum"),
     C("chart --spectrum 'Größe λ.profile.npz' --mm-per-pixel .4 --json"),
+    C("chart --frequency wax.profile.npz"),
+    C("chart --frequency four.profile.npz --json -o f.svg"),
+    C("chart wax.toml --frequency"),
     C("chart --guide wax.profile.npz --mm-per-pixel profile"),
     C(
         "chart --guide 'Größe λ.profile.npz' --k 0,2 --channel R --mm-per-pixel .04cm --json -o g.svg"
@@ -1453,8 +1464,28 @@ SCENE = [
     C("scene wax.profile.npz"),
 ]
 
+# What is refused alone: a page has times in it, and is looked at in test_report_browser.
+REPORT = [
+    C("report"),
+    C("report wax.toml --all"),
+    C("report --all --only svd"),
+    C("report --all --kernel wax.hand.taps.json"),
+    C("report --all -o m.png"),
+    C("report wax.toml --kernel wax.svd2.kernel.json --photons 5000 -q"),
+    C("report wax.toml --kernel missing.taps.json --json"),
+    C("report wax.toml --irradiance missing.exr --mm-per-pixel .4 -v"),
+    C("report wax.toml -o a.png --force"),
+    C("report wax.toml -o no/such/folder.html"),
+    C("report wax.toml --only disc"),
+    C("report wax.toml --photons 1"),
+    C("report wax.toml --mm-per-pixel 0"),
+    C("report wax.toml --threads 0 --seed 2"),
+    C("report missing.toml"),
+]
+
 COMMANDS = {
     "help": HELP,
+    "report": REPORT,
     "stability": STABILITY,
     "motion": MOTION,
     "scene": SCENE,

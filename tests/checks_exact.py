@@ -4,7 +4,6 @@ Figures as in checks.py: tests run them small, docs/make_verification.py at full
 """
 
 import functools
-import warnings
 
 import numpy as np
 from checks import (
@@ -18,7 +17,6 @@ from checks import (
     standard_error,
 )
 
-from sssfit.errors import SssfitWarning
 from sssfit.material import load_material, material_names
 from sssfit.simulate import shared_walks, simulate_montecarlo, simulate_montecarlo_many
 from sssfit.simulate.exact import simulate_exact, simulate_exact_many
@@ -106,9 +104,7 @@ def similarity_rows(photons):
         for albedo in (0.9, 0.99):
             scattering = albedo / (1.0 - g)
             material = medium(1.0 - albedo, scattering, 1.3, g=g, name="similar")
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", SssfitWarning)  # what it says is measured here
-                exact = simulate_exact(material)
+            exact = simulate_exact(material, similarity=True)
             walk = simulate_montecarlo(material, photons=photons)
             total = float(walk.diffuse_reflectance[0])
             near = int(np.searchsorted(exact.r_edges_mm, 1.0))  # one reduced mean free path

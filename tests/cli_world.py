@@ -23,7 +23,6 @@ from typing import Any
 import edited_skin
 import numpy as np
 import OpenImageIO
-import walk_convergence
 from click.testing import CliRunner
 from matplotlib.figure import Figure
 from meshes import sphere
@@ -31,9 +30,10 @@ from test_mci import file_text, run_text
 from test_mco import BELOW, DR_CM, IN_LAYERS, N_R, REFLECTED, SPECULAR, block, mco_text
 
 from sssfit import compare, simulate
+from sssfit import report as report_room
 from sssfit.choose import choice as choose
 from sssfit.cli import cli
-from sssfit.compare import budget, pareto, runner, sheet
+from sssfit.compare import budget, convergence, pareto, runner, sheet
 from sssfit.compare.candidates import Candidate, candidates
 from sssfit.compare.presets import PresetComparison, compare_presets
 from sssfit.crowd.frame import measure_frame
@@ -48,6 +48,7 @@ from sssfit.formats.pictures import load_image, save_image
 from sssfit.kernel import SeparableKernel, Stage, Taps
 from sssfit.material import Material, parse_material
 from sssfit.profile import Profile
+from sssfit.report import Report
 from sssfit.scene.made import make_scene
 from sssfit.scene.record import Scene
 from sssfit.simulate import Checkpoint, inversion, simulate_montecarlo
@@ -69,7 +70,7 @@ LAYERS = (
 PHOTONS, DR_MM, RADIUS_MM = 4000, 0.2, 6.0
 GRID = f"--dr {DR_MM} --radius {RADIUS_MM}"
 FOREIGN = "mine\n"  # what a file of somebody else's holds
-ENDINGS = ("npz", "json", "exr", "png", "md", "csv", "toml", "hlsl")
+ENDINGS = ("npz", "json", "exr", "png", "md", "csv", "toml", "hlsl", "html")
 
 
 @functools.cache
@@ -509,17 +510,15 @@ def small_editing() -> Any:
 def small_convergence() -> Any:
     """Made up: resolutions of the exact solver take seconds."""
     walks = tuple(
-        walk_convergence.WalkRun(photons, 1 + k, 0.125 * (k + 1), error)
+        convergence.WalkRun(photons, 1 + k, 0.125 * (k + 1), error)
         for k, (photons, error) in enumerate(((1000, 0.031), (2000, 0.027), (4000, 0.0142)))
     )
-    line = walk_convergence.fit_line(
-        [each.photons for each in walks], [each.error for each in walks]
-    )
+    line = convergence.fit_line([each.photons for each in walks], [each.error for each in walks])
     exact = (
-        walk_convergence.ExactRun(1e-2, 0.51, 3.1e-3, 2.2e-3),
-        walk_convergence.ExactRun(1e-4, 1.73, 4.3e-5, None),
+        convergence.ExactRun(1e-2, 0.51, 3.1e-3, 2.2e-3),
+        convergence.ExactRun(1e-4, 1.73, 4.3e-5, None),
     )
-    return walk_convergence.Convergence(exact_profile(), walks, exact, line)
+    return convergence.Convergence(exact_profile(), walks, exact, line)
 
 
 def stresses(name: str) -> Stability:
@@ -593,6 +592,25 @@ def small_table(_, given) -> SpeedUpTable:
     return SpeedUpTable(tuple(frames))
 
 
+@functools.cache
+def small_report() -> Report:
+    """One kernel on pictures of few pixels, whatever is asked for."""
+    make = _unrecorded(report_room.make_report)
+    return make(profile(), named=[("hand", taps())], only=["disk"], side=16, threads=1)
+
+
+@functools.cache
+def small_finished() -> dict[str, Any]:
+    """Its page, which no cache keeps."""
+    made = small_report()
+    return {"page": report_room.page(made), "words": made.text(), "figures": made.figures()}
+
+
+def small_page(*_) -> str:
+    """The index of one material."""
+    return _unrecorded(report_room.library_page)([wax()], threads=1)
+
+
 def blank(*_) -> Figure:
     """A chart with nothing on it: what charts look like is tested where they are made."""
     return Figure(figsize=(0.1, 0.1))
@@ -623,6 +641,8 @@ STAND_INS = {
     "sssfit.crowd.runner.six_gaussians": lambda *_: gaussians(),
     "sssfit.crowd.runner.frame_of": small_frame,
     "sssfit.crowd.runner.table_of": small_table,
+    "sssfit.report.finished_page": lambda *_: small_finished(),
+    "sssfit.report.library_page": small_page,
     **{f"sssfit.chart.{kind}.{kind}_figure": blank for kind in _CHARTS},
 }
 

@@ -28,10 +28,12 @@ from sssfit.formats.csv import csv_text, load_csv
 from sssfit.formats.mci import load_mci
 from sssfit.formats.mco import join_channels, load_mco
 from sssfit.formats.pictures import load_image
+from sssfit.material import load_material
 from sssfit.measure.difference import difference_map, magnified_difference
 from sssfit.measure.score import auto_exposure
 from sssfit.methods import FITS as METHODS
 from sssfit.methods import PRESETS, SEPARABLE
+from sssfit.profile.beam import parse_beam, under_beam
 from sssfit.render.bloom import bloomed
 from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
@@ -177,6 +179,12 @@ SIMULATE = {
         lambda: called("sssfit.simulate.simulate_exact_many", [wax()], tolerance=0.02, **_GRID),
         default="0.01%",
     ),
+    "--similarity": Row(
+        f"simulate wax.toml --method exact {GRID}",
+        "--similarity",
+        calls,
+        lambda: called("sssfit.simulate.simulate_exact_many", [wax()], similarity=True, **_GRID),
+    ),
     "--mapping": Row(
         _BURLEY,
         "--mapping diffuse",
@@ -191,6 +199,12 @@ SIMULATE = {
         lambda: _content(simulate_burley(wax(), dr_mm=0.25)),
         default=f"{float(wax().layers[0].mean_free_path_mm.min()) / 20!r}",
         words="MFP_min / 20; deon-skin: 0.008",
+    ),
+    "--beam": Row(
+        "simulate wax.toml --method burley",
+        "--beam flat:0.8",
+        made_profile,
+        lambda: _content(under_beam(simulate_burley(wax()), parse_beam("flat:0.8"))),
     ),
     "--radius": Row(
         "simulate wax.toml --method burley",
@@ -1154,6 +1168,12 @@ CHART = {
         _charted("eigenvalues"),
         lambda: [True, ["wax.spectrum.png"]],
     ),
+    "--frequency": Row(
+        "chart wax.profile.npz --json",
+        "--frequency",
+        _charted("rows"),
+        lambda: [True, ["wax.frequency.png"]],
+    ),
     "--guide": Row(
         "chart wax.profile.npz --json",
         "--guide",
@@ -1201,7 +1221,7 @@ CHART = {
         lambda: ["x.svg"],
         default="wax.profile.png",
         words="NAME.profile.png, NAME.kernel.png, NAME.material.png, NAME.checkpoint.png, "
-        "NAME.spectrum.png, NAME.guide.png, MATERIAL.models.png",
+        "NAME.spectrum.png, NAME.guide.png, NAME.frequency.png, MATERIAL.models.png",
     ),
     "--force": Row("chart -o foreign.png", "--force", is_written("png"), lambda: ["foreign.png"]),
 }
@@ -1395,6 +1415,53 @@ SCENE = {
     ),
 }
 
+# report
+
+_REPORT = "report wax.profile.npz"
+
+
+def _reported(**settings: Any) -> Any:
+    usual = {"name": "wax", "named": [], "seed": 1, "threads": None}
+    return called("sssfit.report.finished_page", profile(), **usual | settings)
+
+
+def _report_row(typed: str, words: str, **own: Any) -> Row:
+    return Row(_REPORT, typed, calls, lambda: _reported(**own), words=words)
+
+
+def _indexed() -> Any:
+    every = [load_material(each) for each in ("skin1", "marble")]
+    return called("sssfit.report.library_page", every, beside=Path(), threads=None)
+
+
+REPORT = {
+    "--all": Row(_REPORT, "report --all", calls, _indexed),
+    "--kernel": Row(
+        _REPORT,
+        "--kernel wax.taps.json",
+        calls,
+        lambda: _reported(named=[("wax", world.taps())]),
+    ),
+    "--irradiance": Row(
+        _REPORT, "--irradiance plain.png", calls, lambda: _reported(irradiance="plain.png")
+    ),
+    "--mm-per-pixel": _report_row(
+        "--mm-per-pixel .4", "from your own file, else 0.3", mm_per_pixel=0.4
+    ),
+    "--only": _report_row(
+        "--only disk,svd", "those that are fitted in seconds", only=["disk", "svd"]
+    ),
+    "--photons": _report_row("--photons 5000", "200000", photons=5000),
+    "--output": Row(
+        _REPORT,
+        "-o a.html",
+        names,
+        lambda: ["a.html"],
+        words="MATERIAL.html, materials.html with --all",
+    ),
+    "--force": Row(f"{_REPORT} -o foreign.html", "--force", names, lambda: ["foreign.html"]),
+}
+
 ROWS: dict[str, dict[str, Row]] = {
     "materials": MATERIALS,
     "simulate": SIMULATE,
@@ -1408,6 +1475,7 @@ ROWS: dict[str, dict[str, Row]] = {
     "stability": STABILITY,
     "motion": MOTION,
     "scene": SCENE,
+    "report": REPORT,
     "show": {},
 }
 
@@ -1425,6 +1493,7 @@ COMMANDS = {
     "stability": _STABILITY,
     "motion": _MOTION,
     "scene": _SCENE,
+    "report": _REPORT,
     "show": "show",
 }
 
@@ -1470,6 +1539,7 @@ SEEDS = {
         lambda: _compared([make_scene("noise", height=16, width=24, mm_per_pixel=0.3, seed=5)]),
     ),
     "stability": Row(_STABILITY, "--seed 5", calls, lambda: _stressed(seed=5)),
+    "report": Row(_REPORT, "--seed 5", calls, lambda: _reported(seed=5)),
     "motion": Row(_MOTION, "--seed 5", calls, lambda: _moved(seed=5)),
     "motion --table": Row("motion --table", "--seed 5", calls, lambda: _tabled(seed=5)),
     "choose": Row(_CHOOSE, "--seed 5", _asked, lambda: _rounded(_chosen(seed=5))),
@@ -1487,6 +1557,7 @@ THREADS = {
     "compare": Row(_BUDGET, "--threads 1", calls, lambda: _budgeted(threads=1)),
     "stability": Row(_STABILITY, "--threads 1", calls, lambda: _stressed(threads=1)),
     "scene": _scene_row("--threads 1", threads=1),
+    "report": Row(_REPORT, "--threads 1", calls, lambda: _reported(threads=1)),
     "motion": Row(_MOTION, "--threads 1", calls, lambda: _moved(threads=1)),
     "choose": Row(_CHOOSE, "--threads 1", _asked, lambda: _rounded(_chosen(threads=1))),
     "chart": Row(
@@ -1546,6 +1617,7 @@ STREAMS = (
     "chart wax.profile.npz -o x.png",
     "chart wax.profile.npz --spectrum -o x.png",
     "chart wax.profile.npz --guide -o x.png",
+    "chart wax.profile.npz --frequency -o x.png",
     "chart wax.profile.npz --models -o x.png",
     f"{_MAKE} --name lard -o x.toml",
     f"{_KERNELS} --chart x.png",

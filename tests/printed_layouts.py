@@ -173,7 +173,12 @@ def _how(row: Figures) -> Words:
     if row["photons"]:
         return Words("{} photons, seed {}", row["photons"], row["seed"])
     if row["method"] == "exact":
-        return Words("exact to {} % of the total", Rough(100.0 * row["relative_error"]))
+        error = Rough(100.0 * row["relative_error"])
+        if row["solver"] == "half-space":
+            return Words("exact (half-space solver) to {} % of the total", error)
+        return Words(
+            "exact (layer solver, {} directions) to {} % of the total", row["directions"], error
+        )
     if "mapping" in row:
         return Words("{} ({})", row["method"], row["mapping"])
     return Words("{}", row["method"])
@@ -732,6 +737,28 @@ def written(f: Figures) -> list[Any]:
     return [wrote(f)]
 
 
+def frequency(f: Figures) -> list[Any]:
+    first = f["rows"][0]["response"]
+
+    def fallen(share: float, c: int) -> float | str:
+        below = [row["k_per_mm"] for row in f["rows"] if row["response"][c] < share * first[c]]
+        return below[0] if below else "not reached"
+
+    rows = [
+        [name, first[c], fallen(0.5, c), fallen(0.1, c)] for c, name in enumerate(f["channels"])
+    ]
+    return [
+        Words(
+            "R(k) at {} frequencies, from 0 to {} rad/mm", len(f["rows"]), f["rows"][-1]["k_per_mm"]
+        ),
+        Table(
+            ["channel", "R(0)", "half at k, rad/mm", "a tenth at k, rad/mm"],
+            *(rows, ("a tenth at k, rad/mm",)),
+        ),
+        wrote(f),
+    ]
+
+
 def spectrum(f: Figures) -> list[Any]:
     rows = [
         [
@@ -1127,6 +1154,18 @@ def speed_ups(f: Figures) -> list[Any]:
     return [Table(["heads", *(f"{each:g}" for each in f["distances"])], rows)]
 
 
+def report(f: Figures) -> list[Any]:
+    kernels, pictures = len(f["kernels"]), len(f["pictures"])
+    return [
+        Words(
+            "{} {} on {} {}; on the Pareto front: {}",
+            *(kernels, plural(kernels, "kernel"), pictures, plural(pictures, "picture")),
+            ", ".join(f["front"]),
+        ),
+        *(Words("Wrote {}", each) for each in f["output"]),
+    ]
+
+
 # A command that prints each of them, on the files of ``cli_world``.
 PRINTED: dict[str, Layout] = {
     "materials": materials_list,
@@ -1162,6 +1201,7 @@ PRINTED: dict[str, Layout] = {
     "compare --all --size 24x16": fronts,
     "compare --all --size 24x16 --error l2 --cost passes": fronts,
     "compare wax.profile.npz --what sheet --chart s.png": sheet,
+    "report wax.profile.npz": report,
     "compare wax.profile.npz --what front --size 24x16": fronts,
     "compare wax.profile.npz --what front --size 24x16 --chart f.png --table f.md": fronts,
     "stability wax.toml": stability,
@@ -1186,6 +1226,7 @@ PRINTED: dict[str, Layout] = {
     "export --format hlsl": written,
     "chart": written,
     "chart wax.profile.npz --spectrum": spectrum,
+    "chart wax.profile.npz --frequency": frequency,
     "chart wax.profile.npz --guide": guide,
     "chart wax.toml --models": models,
     "chart wax.svd2.kernel.json": kernel_chart,

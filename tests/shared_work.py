@@ -25,7 +25,7 @@ import sssfit.compare.candidates
 import sssfit.fit._spectrum
 import sssfit.fit.cascade
 import sssfit.scene.head
-import sssfit.simulate.exact
+import sssfit.simulate.half_space
 
 OWN = {
     *("test_deterministic", "test_exact", "test_head", "test_head_through", "test_interrupts"),
@@ -96,8 +96,8 @@ def begin():
     if _state["begun"]:
         return
     _state["begun"] = True
-    exact, head, fits = sssfit.simulate.exact, sssfit.scene.head, sssfit.compare.candidates
-    exact._solve = _solved_once(exact._solve)
+    solver, head, fits = sssfit.simulate.half_space, sssfit.scene.head, sssfit.compare.candidates
+    solver._solve = _solved_once(solver._solve)
     head.head_scene = _lit_once(head.head_scene)
     fits.fit_separable = _fitted_once(fits.fit_separable)
     fits.fit_taps = _fitted_once(fits.fit_taps)

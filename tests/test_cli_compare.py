@@ -20,7 +20,7 @@ from sssfit.formats.pictures import save_image
 from sssfit.material import load_material
 from sssfit.scene.load import load_scenes
 from sssfit.scene.made import COMPARED, make_scene
-from sssfit.simulate import exact, simulate_dipole, simulate_exact
+from sssfit.simulate import half_space, simulate_dipole, simulate_exact
 
 SMALL = ("--picture", "disk", "--size", "32x32", "--mm-per-pixel", "2.5")
 SLAB = (
@@ -32,7 +32,7 @@ SLAB = (
 @pytest.fixture(scope="module", autouse=True)
 def compiled():
     """The solver is compiled before its words on stderr are looked at."""
-    exact.diffuse_reflectance([0.5], 1.3)
+    half_space.diffuse_reflectance([0.5], 1.3)
 
 
 @pytest.fixture(autouse=True)

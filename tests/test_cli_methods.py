@@ -17,7 +17,7 @@ from sssfit.cli import cli, main
 from sssfit.material import load_material, material_names
 from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile
-from sssfit.simulate import burley, exact
+from sssfit.simulate import burley, half_space
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
 COMMAND = [sys.executable, "-m", "sssfit.cli", "simulate"]
@@ -30,7 +30,7 @@ SLAB = "eta = 1.3\ng = 0\nsigma_a_per_mm = [0.1, 0.1, 0.1]\nsigma_s_per_mm = [9,
 @pytest.fixture(scope="module", autouse=True)
 def compiled():
     """The solver is compiled before its words on stderr are looked at."""
-    exact.diffuse_reflectance([0.5], 1.3)
+    half_space.diffuse_reflectance([0.5], 1.3)
 
 
 def names(folder):
@@ -84,7 +84,8 @@ def test_exact_says_its_tolerance_its_error_and_that_energies_balance(run, tmp_p
     _, out, _ = run("skin1", "--method", "exact", "--tolerance", "1%", *GRID)
     profile = Profile.load(tmp_path / "skin1.exact.profile.npz")
     assert profile.meta["settings"]["tolerance"] == 0.01
-    assert f"exact to {100.0 * profile.meta['relative_error']:.1g} % of the total" in out
+    assert f"to {100.0 * profile.meta['relative_error']:.1g} % of the total" in out
+    assert "exact (half-space solver) " in out
     assert "est. error" in out
     assert f"{profile.diffuse_reflectance_stderr[0]:.1e}" in out
     assert f"{profile.absorbed.sum(axis=0)[0]:.6f}" in out
@@ -204,7 +205,7 @@ def test_bad_input_is_one_clear_line(run, tmp_path, arguments, status, fragment)
     assert names(tmp_path) == []
 
 
-@pytest.mark.parametrize("method", ["exact", "dipole", "dipole-grosjean", "burley"])
+@pytest.mark.parametrize("method", ["dipole", "dipole-grosjean", "burley"])
 def test_slabs_are_refused_with_the_methods_that_would_do(run, tmp_path, method):
     (tmp_path / "slab.toml").write_text(SLAB + "thickness_mm = 3\n")
     status, _, err = run("slab.toml", "--method", method)
@@ -214,12 +215,28 @@ def test_slabs_are_refused_with_the_methods_that_would_do(run, tmp_path, method)
     assert names(tmp_path) == ["slab.toml"]
 
 
-def test_similarity_is_warned_of_in_one_line(run, tmp_path):
+def test_similarity_is_used_where_it_is_asked_for_and_said(run, tmp_path):
     (tmp_path / "skin.toml").write_text(SLAB.replace("g = 0", "g = 0.8"))
-    status, _, err = run("skin.toml", "--method", "exact", "--tolerance", "1%", *GRID)
-    assert status == 0
-    assert err.startswith("Warning: skin: g = 0.8")
-    assert err.count("\n") == 1
+    asked = ("skin.toml", "--method", "exact", "--tolerance", "1%", *GRID)
+    status, out, err = run(*asked)
+    assert (status, err) == (0, "")
+    assert "exact (layer solver, " in out
+    assert "isotropic" not in out
+    status, out, err = run(*asked, "--similarity")
+    assert (status, err) == (0, "")
+    assert "exact (half-space solver)" in out
+    assert "for isotropic scattering of (1 - g) sigma_s" in out
+
+
+def test_slabs_are_solved(run, tmp_path):
+    (tmp_path / "slab.toml").write_text(SLAB + "thickness_mm = 3\n")
+    status, out, err = run("slab.toml", "--method", "exact", "--tolerance", "1%", *GRID)
+    assert (status, err) == (0, "")
+    assert "transmittance" in out
+    (written,) = tmp_path.glob("*.npz")
+    profile = Profile.load(written)
+    assert profile.meta["settings"]["solver"] == "layer"
+    assert (profile.transmittance_stderr > 0.0).all()
 
 
 def test_a_foreign_file_is_not_replaced_without_force(run, tmp_path):
@@ -232,7 +249,7 @@ def test_a_foreign_file_is_not_replaced_without_force(run, tmp_path):
 
 
 def test_what_compiles_says_so_unless_quiet(run, monkeypatch):
-    monkeypatch.setattr(simulate.exact, "is_solver_compiled", lambda: False)
+    monkeypatch.setattr(simulate.half_space, "is_solver_compiled", lambda: False)
     asked = ("skin1", "--method", "exact", "--tolerance", "1%", *GRID)
     assert run(*asked)[2].startswith("Compiling the solver")
     assert run(*asked, "-q") == (0, "", "")

@@ -265,7 +265,7 @@ def test_of_several_computed_materials_the_worst_error_is_printed():
     for row, error in zip(rows, (2e-5, 7e-5, 4e-5), strict=True):
         row |= {"material": f"wax {error}", "relative_error": error}
     figures, text = reported(rows)
-    assert text.startswith("3 materials: exact to 0.007 % of the total")
+    assert text.startswith("3 materials: exact (half-space solver) to 0.007 % of the total")
     check(text, simulation(figures))
 
 

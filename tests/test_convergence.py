@@ -9,15 +9,15 @@ import pytest
 from figures import assert_legible, words_of
 from printed import check
 from printed_layouts import convergence
-from walk_convergence import (
+from walk_convergence import convergence_figure
+
+from sssfit.chart.page import save_figure
+from sssfit.compare.convergence import (
     compute_convergence,
-    convergence_figure,
     error_of,
     fit_line,
     photon_numbers,
 )
-
-from sssfit.chart.page import save_figure
 from sssfit.errors import SimulationError
 from sssfit.material import load_material
 from sssfit.simulate import simulate_exact, simulate_montecarlo

@@ -1,7 +1,6 @@
 """The exact solver against theory, against brute force, against the photon walk, and itself."""
 
 import threading
-import warnings
 from dataclasses import replace
 
 import checks
@@ -12,12 +11,12 @@ import reference
 import reference_exact
 from scipy import special
 
-from sssfit.errors import SimulationError, SssfitWarning, StoppedError
+from sssfit.errors import SimulationError, StoppedError
 from sssfit.grid import make_grid
 from sssfit.material import Layer, Material, load_material
 from sssfit.optics import normal_transmittance
 from sssfit.profile import Profile
-from sssfit.simulate import exact
+from sssfit.simulate import half_space
 from sssfit.simulate._depth import (
     _Equation,
     _integrate_over_w,
@@ -30,15 +29,14 @@ from sssfit.simulate._mixture import (
     single_scattering_beyond,
     single_scattering_of_diffuse_light,
 )
-from sssfit.simulate.exact import (
+from sssfit.simulate.exact import simulate_exact, simulate_exact_many
+from sssfit.simulate.half_space import (
     _LEVELS,
     _errors,
     _Solution,
     _stderr,
     diffuse_reflectance,
     entering_light,
-    simulate_exact,
-    simulate_exact_many,
 )
 
 FEW = ("skin1", "ketchup", "marble")
@@ -241,20 +239,19 @@ def test_energy_that_is_missing_counts_as_error(monkeypatch):
     total = simulate_exact(material).diffuse_reflectance[0]
     # Three thousandths of the light are said to have come in that neither leave nor are absorbed.
     monkeypatch.setattr(
-        exact, "normal_transmittance", lambda eta: normal_transmittance(eta) + 0.003
+        half_space, "normal_transmittance", lambda eta: normal_transmittance(eta) + 0.003
     )
     profile = simulate_exact(material, tolerance=0.1)
     assert profile.meta["relative_error"] == pytest.approx(0.003 / total, rel=1e-3)
     np.testing.assert_allclose(profile.meta["energy_balance_stderr"], 0.003, rtol=1e-3)
     assert (profile.diffuse_reflectance_stderr >= 0.00299).all()
-    monkeypatch.setattr(exact, "_LEVELS", _LEVELS[:2])  # each of the others takes ten times longer
+    monkeypatch.setattr(half_space, "_LEVELS", _LEVELS[:2])  # others take ten times longer
     with pytest.raises(SimulationError, match="cannot be met"):
         simulate_exact(material, tolerance=0.01)
 
 
 def test_similarity_is_on_record():
-    with pytest.warns(SssfitWarning):
-        similar = simulate_exact(checks.medium(0.1, 3.6, 1.3, g=0.75), tolerance=0.01)
+    similar = simulate_exact(checks.medium(0.1, 3.6, 1.3, g=0.75), tolerance=0.01, similarity=True)
     assert similar.meta["settings"]["similarity"] is True
     isotropic = simulate_exact(checks.medium(0.1, 0.9, 1.3), tolerance=0.01)
     assert isotropic.meta["settings"]["similarity"] is False
@@ -300,18 +297,11 @@ def test_unit_of_length_does_not_matter():
     np.testing.assert_allclose(near.annulus_energy, far.annulus_energy, rtol=1e-9)
 
 
-def test_similarity_is_used_and_said():
+def test_similarity_is_used_where_it_is_asked_for():
     material = checks.medium(0.1, 3.6, 1.3, g=0.75)
-    with pytest.warns(SssfitWarning, match="approximation"):
-        profile = simulate_exact(material)
+    profile = simulate_exact(material, similarity=True)
     isotropic = simulate_exact(checks.medium(0.1, 0.9, 1.3))
     np.testing.assert_allclose(profile.annulus_energy, isotropic.annulus_energy, rtol=1e-9)
-
-
-def test_isotropic_scattering_is_not_warned_of():
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        simulate_exact(checks.medium(0.3, 0.7, 1.3))
 
 
 def test_only_the_relative_index_counts():
@@ -372,15 +362,6 @@ def test_a_tolerance_that_cannot_be_met_says_what_can():
 def test_radii_that_are_none_are_refused(radius):
     with pytest.raises(SimulationError, match="radius_mm"):
         simulate_exact(checks.medium(0.3, 0.7, 1.3), radius_mm=radius)
-
-
-def test_layers_and_slabs_are_refused_with_what_would_do():
-    slab = Material("slab", ("c0",), (Layer(1.3, 0.0, [0.1], [0.9], 2.0),))
-    with pytest.raises(SimulationError, match="multipole or montecarlo"):
-        simulate_exact(slab)
-    under = Material("thin", ("c0",), (Layer(1.0, 0.0, [0.1], [0.9]),), eta_above=1.3)
-    with pytest.raises(SimulationError, match="use montecarlo"):
-        simulate_exact(under)
 
 
 def test_a_material_that_is_none_is_refused():

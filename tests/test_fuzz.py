@@ -403,8 +403,9 @@ SMALL = {
     "choose": ("--resolution", "8x6"),
     "motion": ("--size", "8x6", "--length", "3", "--only", "variates"),
     "scene": ("--resolution", "8x6", "--map-size", "16"),
+    "report": ("--only", "disk"),
 }
-SLOW = ("compare", "choose", "stability", "motion", "scene")
+SLOW = ("compare", "choose", "stability", "motion", "scene", "report")
 # What each verb reads, and the options it cannot do without.
 USUAL = {
     "simulate": ("x.toml",),
@@ -415,6 +416,7 @@ USUAL = {
     "stability": ("x.profile.npz", "--only", "hard-light"),
     "motion": ("x.profile.npz",),
     "scene": ("x.kernel.json",),
+    "report": ("x.profile.npz",),
     "import": ("x.csv",),
     "export": ("x.profile.npz", "--format", "csv"),
     "chart": ("x.profile.npz",),

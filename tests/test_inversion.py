@@ -16,7 +16,7 @@ from sssfit.cli._options import Lengths
 from sssfit.errors import MaterialError
 from sssfit.material import load_material, parse_material
 from sssfit.simulate import simulate_exact
-from sssfit.simulate.exact import LIGHTS, diffuse_reflectance, entering_light
+from sssfit.simulate.half_space import LIGHTS, diffuse_reflectance, entering_light
 from sssfit.simulate.inversion import (
     invert_reflectance,
     largest_reflectance,

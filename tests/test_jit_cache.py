@@ -13,7 +13,7 @@ import numba
 import numpy as np
 import pytest
 
-from sssfit import __version__, _jit
+from sssfit import __version__, _jit, process
 from sssfit.material import load_material
 from sssfit.simulate import simulate_montecarlo
 
@@ -69,14 +69,14 @@ def test_folder_is_the_users(tmp_path, monkeypatch):
         ("win32", "LOCALAPPDATA", Path("AppData", "Local", "sssfit", "cache")),
     ):
         with monkeypatch.context() as here:
-            here.setattr(_jit.sys, "platform", platform)
-            assert _jit.user_cache_folder() == tmp_path / "home" / without
+            here.setattr(process.sys, "platform", platform)
+            assert process.user_cache_folder() == tmp_path / "home" / without
             if variable:
                 here.setenv(variable, str(tmp_path / "base"))
-                found = _jit.user_cache_folder().relative_to(tmp_path / "base")
+                found = process.user_cache_folder().relative_to(tmp_path / "base")
                 assert without.parts[-len(found.parts) :] == found.parts
             here.setenv("NUMBA_CACHE_DIR", str(tmp_path / "chosen"))
-            assert _jit.user_cache_folder() == tmp_path / "chosen"
+            assert process.user_cache_folder() == tmp_path / "chosen"
 
 
 def test_folder_is_made_and_left_empty(tmp_path, monkeypatch):

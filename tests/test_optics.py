@@ -104,4 +104,4 @@ def test_there_is_no_other_fresnel_and_no_other_quadrature():
         for line in path.read_text(encoding="utf-8").splitlines()
         if written.search(line.partition("#")[0])
     }
-    assert found - {"simulate/exact.py"} == {"optics.py", "_jit/sampling.py"}
+    assert found - {"simulate/half_space.py"} == {"optics.py", "_jit/sampling.py"}

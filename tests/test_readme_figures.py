@@ -19,7 +19,7 @@ from sssfit.fit import fit_svd
 from sssfit.material import Layer, Material
 from sssfit.scene.made import make_scene
 from sssfit.simulate import simulate_burley, simulate_dipole, simulate_exact, simulate_montecarlo
-from sssfit.simulate.exact import diffuse_reflectance
+from sssfit.simulate.half_space import diffuse_reflectance
 
 SKIN1 = Layer(1.3, np.zeros(3), np.array([0.032, 0.17, 0.48]), np.array([0.74, 0.88, 1.01]))
 SPECULAR = (0.3 / 2.3) ** 2

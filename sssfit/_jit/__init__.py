@@ -17,7 +17,6 @@ import contextlib
 import hashlib
 import os
 import pickle
-import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -28,6 +27,7 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.registry import cpu_target
 
 from sssfit import __version__
+from sssfit.process import user_cache_folder
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
@@ -41,19 +41,6 @@ def source_key() -> str:
         digest.update(path.name.encode())
         digest.update(path.read_bytes())
     return f"{__version__}-{digest.hexdigest()[:16]}"
-
-
-def user_cache_folder() -> Path:
-    """Return the cache folder: NUMBA_CACHE_DIR if set, else the platform's user cache folder."""
-    if chosen := os.environ.get("NUMBA_CACHE_DIR"):
-        return Path(chosen)
-    if sys.platform == "win32":
-        base = os.environ.get("LOCALAPPDATA")
-        return (Path(base) if base else Path.home() / "AppData" / "Local") / "sssfit" / "cache"
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "sssfit"
-    base = os.environ.get("XDG_CACHE_HOME")
-    return (Path(base) if base else Path.home() / ".cache") / "sssfit"
 
 
 def _writable_cache_folder() -> str:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 FIGURES: Mapping[str, str] = {
     "Budget": "sssfit.chart.budget:budget_figure",
     "Comparison": "sssfit.chart.pareto:pareto_figure",
+    "FrequencyResponse": "sssfit.chart.frequency:frequency_figure",
     "Guide": "sssfit.chart.guide:guide_figure",
     "InversionCurves": "sssfit.chart.inversions:inversions_figure",
     "KernelView": "sssfit.chart.kernel:kernel_figure",

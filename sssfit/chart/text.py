@@ -50,6 +50,8 @@ def subtitle(profile: Profile) -> str:
     parts = [method_name(meta.get("method"))] if meta.get("method") else []
     if profile.photons is not None:
         parts.append(f"{count(profile.photons)} photons, seed {meta.get('seed', 'unknown')}")
+    if beam := meta.get("beam"):
+        parts.append(f"beam {shortened(str(beam))} mm")
     parts.append(grid(profile))
     if version := meta.get("version"):
         parts.append(f"sssfit {shortened(str(version))}")

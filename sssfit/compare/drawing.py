@@ -15,9 +15,14 @@ from sssfit.material import Material
 from sssfit.material.checks import is_name
 from sssfit.messages import note
 from sssfit.profile import Profile
+from sssfit.profile.frequency import frequency_response
 
-_OF_PROFILES = {"spectrum": "`spectrum = True`", "guide": "`guide = True`"}
-COMPUTED = ("kernel", "taps", "models", "spectrum", "guide")
+_OF_PROFILES = {
+    "spectrum": "`spectrum = True`",
+    "guide": "`guide = True`",
+    "frequency": "`frequency = True`",
+}
+COMPUTED = ("kernel", "taps", "models", "spectrum", "guide", "frequency")
 
 
 def drawn_of(found: Any, view: str, name: str) -> tuple[Any, str, str | None]:
@@ -27,7 +32,7 @@ def drawn_of(found: Any, view: str, name: str) -> tuple[Any, str, str | None]:
     ----------
     found : Profile, SeparableKernel, Taps, Material or SoFar
     view : str
-        "models", "spectrum", "guide", or "" for the record's own chart.
+        "models", "spectrum", "guide", "frequency", or "" for the record's own chart.
     name : str
         The record's file in messages.
 
@@ -91,6 +96,8 @@ def computed(
         return compute_guide(found, mm_per_pixel=mm_per_pixel, **asked)
     if kind == "spectrum":
         return compute_spectrum(found, mm_per_pixel=mm_per_pixel)
+    if kind == "frequency":
+        return frequency_response(found)
     if kind != "models":
         return found
     past = found if isinstance(found, Profile) else None

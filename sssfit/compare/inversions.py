@@ -15,7 +15,7 @@ import numpy as np
 
 from sssfit.arrays import FloatArray, plain
 from sssfit.optics import normal_transmittance
-from sssfit.simulate.exact import Light, diffuse_reflectance, entering_light
+from sssfit.simulate.half_space import Light, diffuse_reflectance, entering_light
 from sssfit.simulate.inversion import invert_reflectance, van_de_hulst_albedo
 
 ETAS = (1.0, 1.4, 1.5)

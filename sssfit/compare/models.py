@@ -192,8 +192,13 @@ def material_of_walk(profile: Profile) -> Material:
     Raises
     ------
     ProfileError
-        It is of another method, or does not say its material.
+        It is of another method, under a beam, or does not say its material.
     """
+    if "beam" in profile.meta:
+        raise ProfileError(
+            f"the profile of {profile.label} is under a beam, {profile.meta['beam']}; name the "
+            "material, or a walk of a pencil beam."
+        )
     material = profile.material
     is_walk = profile.meta.get("method") == "montecarlo" and profile.photons is not None
     if material is None or not is_walk or profile.channels != material.channels:

@@ -32,7 +32,7 @@ _Evaluated = tuple[Candidate, Fit, Sequence[Evaluation]]
 
 _COST_FIGURES = ("fetches", "passes", "all_passes", "bytes_per_pixel", "kernel_bytes")
 # Turns in which kernels are timed: two at least, then until so much time has gone.
-_LEAST_TURNS, _MOST_TURNS, _TIMED_SECONDS = 2, 12, 8.0
+_LEAST_TURNS, _MOST_TURNS, TIMED_SECONDS = 2, 12, 8.0
 
 
 def compare_kernels(
@@ -42,6 +42,7 @@ def compare_kernels(
     support_mm: float | None = None,
     candidates: Sequence[Candidate] | None = None,
     only: Collection[str] | None = None,
+    timed_seconds: float = TIMED_SECONDS,
     threads: int | None = None,
     progress: Report | None = None,
 ) -> Comparison:
@@ -61,6 +62,8 @@ def compare_kernels(
         before those that are thinned from them.
     only : collection of str, optional
         Methods of the default candidates.
+    timed_seconds : float [s]
+        How long kernels are timed in turn, after two turns at least.
     threads : int, optional
         By default all cores; only the seconds depend on it.
     progress : callable, optional
@@ -103,7 +106,7 @@ def compare_kernels(
         raise FitError(f"{target.name}: no kernel of {len(wanted)} could be fitted: {reason}")
     if progress is not None:
         progress(len(wanted), len(wanted), "timing")
-    seconds = _timed_in_turn([fit for _, fit, _ in evaluated], scenes, threads)
+    seconds = _timed_in_turn([fit for _, fit, _ in evaluated], scenes, timed_seconds, threads)
     rows = [
         row
         for each, price in zip(evaluated, seconds, strict=True)
@@ -160,7 +163,7 @@ def check_scenes(scenes: Sequence[Scene], channels: int) -> None:
 
 
 def _timed_in_turn(
-    fits: Sequence[Fit], scenes: Sequence[Scene], threads: int | None
+    fits: Sequence[Fit], scenes: Sequence[Scene], timed_seconds: float, threads: int | None
 ) -> npt.NDArray[np.float64]:
     """Return the least seconds per megapixel of each kernel, on the largest picture (n,).
 
@@ -171,7 +174,7 @@ def _timed_in_turn(
     least = np.full(len(fits), np.inf)
     begun = perf_counter()
     for done in range(_MOST_TURNS):
-        if done >= _LEAST_TURNS and perf_counter() - begun > _TIMED_SECONDS:
+        if done >= _LEAST_TURNS and perf_counter() - begun > timed_seconds:
             break
         for k, fit in enumerate(fits):
             start = perf_counter()

@@ -13,6 +13,7 @@ from sssfit.export.dense import dense, taps_of_kernel
 from sssfit.export.dense import energy_in_half as dense_in_half
 from sssfit.export.dialects import DIALECTS, mark
 from sssfit.export.document import json_document, taps_document
+from sssfit.export.frequency import is_our_frequencies
 from sssfit.export.lut import ENDINGS, is_our_texture
 from sssfit.export.shader import Style, source
 from sssfit.export.shader import energy_in_half as taps_in_half
@@ -76,6 +77,9 @@ def exported(
         ending = ending or ENDINGS[0]
         content, figures = write(sources, ending=ending, **settings)
         return Exported(content, of, "a texture", f".{figures['table']}", ending, figures)
+    if form == "frequency":
+        text, own = write(sources), {"channels": sources[0].channels}
+        return Exported(text.encode(), of, "a table", ".frequency", ".csv", own)
     text = write(sources, **({"form": form} if form in DIALECTS else {}), **settings)
     what = {"json": "a kernel", "csv": "a table"}.get(form, "source")
     return Exported(text.encode(), of, what, "", f".{form}", _figures(sources[0]))
@@ -241,6 +245,8 @@ def is_ours(path: Path, form: str) -> bool:
     """Return whether a file is one that `exported` wrote in this form."""
     if form == "csv":
         return is_our_table(path)
+    if form == "frequency":
+        return is_our_frequencies(path)
     if form == "lut":
         return is_our_texture(path)
     if form == "json":

@@ -28,6 +28,14 @@ _SPECTRUM: tuple[Part, ...] = (
         ("terms for an error of 1 %", "rank_for_1_percent", ""),
     )),
 )
+_FREQUENCY: tuple[Part, ...] = (
+    "R(k) at {frequencies:,} frequencies, from 0 to {last:.3g} rad/mm",
+    Columns("channel", "channels", (
+        ("R(0)", "total", ".6f"),
+        ("half at k, rad/mm", "half", ".3g|not reached"),
+        ("a tenth at k, rad/mm", "tenth", ".3g|not reached"),
+    )),
+)
 _GUIDE: tuple[Part, ...] = (
     "Channel {channel}; {pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm",
     Columns("k", "fits", (
@@ -175,6 +183,24 @@ def _spectrum_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     return {f"first_{key}": figures[f"{key}_share"][0] for key in ("squared", "absolute")}
 
 
+def _frequency_words(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the columns of a response: its total, and where it is a half and a tenth of it."""
+    rows = figures["rows"]
+    totals = rows[0]["response"]
+
+    def where(share: float) -> list[float | None]:
+        return [_fallen(rows, c, share * total) for c, total in enumerate(totals)]
+
+    found = {"total": totals, "half": where(0.5), "tenth": where(0.1)}
+    return {"frequencies": len(rows), "last": rows[-1]["k_per_mm"], **found}
+
+
+def _fallen(rows: list[dict[str, Any]], channel: int, least: float) -> float | None:
+    """Return the first frequency from which a channel's response is below a value."""
+    below = (row["k_per_mm"] for row in rows if row["response"][channel] < least)
+    return next(below, None)
+
+
 def _guide_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     """Return the columns of guided fits, the pre-integrated one last."""
     last = {
@@ -209,6 +235,7 @@ _PAGES: dict[str, tuple[tuple[Part, ...], Callable[[Mapping[str, Any]], dict[str
     "fit-taps": (_TAPS_FITTED, dict),
     "taps": (_TAPS, _taps_words),
     "spectrum": (_SPECTRUM, _spectrum_words),
+    "frequency": (_FREQUENCY, _frequency_words),
 }
 
 
@@ -218,8 +245,8 @@ def page(kind: str, figures: Mapping[str, Any]) -> str:
     Parameters
     ----------
     kind : str
-        "choose", "fit" or "render", the verbs; or "guide", "kernel", "models" or "spectrum",
-        which are drawn.
+        "choose", "fit" or "render", the verbs; or "frequency", "guide", "kernel", "models" or
+        "spectrum", which are drawn.
     figures : mapping
         The JSON object.
     """

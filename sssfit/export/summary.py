@@ -242,12 +242,11 @@ def profile_page(figures: Figures) -> str:
 
 
 def _walks(figures: Figures) -> str:
-    """Return the number of photons as text."""
-    return (
-        "no photons"
-        if figures["photons"] is None
-        else filled("{photons:,#photon}, seed {seed}", figures)
-    )
+    """Return the number of photons, and the beam if it is not a pencil, as text."""
+    beam = f", beam {figures['beam']} mm" if figures.get("beam") else ""
+    if figures["photons"] is None:
+        return f"no photons{beam}"
+    return filled("{photons:,#photon}, seed {seed}", figures) + beam
 
 
 def _coefficients(material: Figures) -> str:

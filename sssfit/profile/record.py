@@ -438,6 +438,7 @@ class Profile:
                     for share, each in zip(_SHARES, radii_mm, strict=True)
                 },
                 "empty_annuli": self._empty_annuli(),
+                **({"beam": meta["beam"]} if "beam" in meta else {}),
             }
         )
 

@@ -24,8 +24,9 @@ from sssfit.simulate._run import Progress
 from sssfit.simulate._so_far import SoFar, read_checkpoint
 from sssfit.simulate.burley import simulate_burley
 from sssfit.simulate.dipole import simulate_dipole, simulate_dipole_grosjean
-from sssfit.simulate.exact import is_solver_compiled, simulate_exact, simulate_exact_many
+from sssfit.simulate.exact import simulate_exact, simulate_exact_many
 from sssfit.simulate.gaussians import DEON_SKIN, simulate_deon_skin, simulate_gaussians
+from sssfit.simulate.half_space import is_solver_compiled
 from sssfit.simulate.montecarlo import (
     is_compiled,
     shared_walks,

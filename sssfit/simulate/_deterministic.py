@@ -107,6 +107,7 @@ def computed_profile(
     *,
     stderr: FloatArray | None = None,
     transmitted: FloatArray | None = None,
+    transmitted_stderr: FloatArray | None = None,
     absorbed: FloatArray | None = None,
     relative_error: float | None = None,
     settings: Mapping[str, Any] | None = None,
@@ -127,6 +128,8 @@ def computed_profile(
         The method's own estimate of their errors; NaN if there is none.
     transmitted : (n + 1, C), optional
         Energy that leaves through the bottom of a slab.
+    transmitted_stderr : (n + 1, C), optional
+        The method's own estimate of their errors.
     absorbed : (layers, C), optional
         Absorbed energy by layer; unknown by default, and then the energy balance is NaN.
     relative_error : float, optional
@@ -154,6 +157,10 @@ def computed_profile(
         unfinished=np.zeros(channels),
         annulus_transmittance=None if transmitted is None else transmitted[:n],
         beyond_grid_transmittance=None if transmitted is None else transmitted[n],
+        annulus_transmittance_stderr=None if transmitted_stderr is None else transmitted_stderr[:n],
+        beyond_grid_transmittance_stderr=(
+            None if transmitted_stderr is None else transmitted_stderr[n]
+        ),
         meta={
             "format": FORMAT,
             "method": method,

@@ -15,6 +15,7 @@ from sssfit.errors import SimulationError, SssfitWarning
 from sssfit.grid import make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
+from sssfit.profile.beam import Beam, wider_edges
 from sssfit.simulate._run import EndCondition
 from sssfit.simulate._walks import MAX_PHOTONS, Sums, Tally, Walk
 
@@ -183,8 +184,9 @@ def is_finished(
     dr_mm: float | None = None,
     radius_mm: float | str | None = None,
     target_error: float | None = None,
+    beam: Beam | None = None,
 ) -> bool:
-    """Whether ``simulate_montecarlo_many`` with these arguments would return this profile.
+    """Whether ``simulate_montecarlo_many`` with these arguments, and a beam, makes this profile.
 
     ``index`` is the index of the profile's material in ``materials``.
     """
@@ -193,6 +195,7 @@ def is_finished(
     grid = make_grid(
         material, dr_mm=dr_mm, radius_mm=None if isinstance(radius_mm, str) else radius_mm
     )
+    edges = grid.r_edges_mm if beam is None else wider_edges(grid.r_edges_mm, beam.reach_mm)
     expected = provenance(materials, grid.dr_mm, end_condition(photons, target_error), auto=auto)
     return (
         meta.get("method") == "montecarlo"
@@ -201,12 +204,19 @@ def is_finished(
         and profile.material_name == material.name
         and {"relative_error", "energy_balance_stderr"} <= meta.keys()
         and (meta.get("seed"), meta.get("version")) == (seed, __version__)
-        and (auto or profile.n_annuli == grid.annuli)
+        and (auto or profile.n_annuli == len(edges) - 1)
+        and meta.get("beam") == (None if beam is None else str(beam))
         and is_complete(profile)
     )
 
 
-_OWN_SETTINGS = ("tolerance", "similarity", "mapping")  # for methods that have them
+_OWN_SETTINGS = (
+    "tolerance",
+    "similarity",
+    "solver",
+    "directions",
+    "mapping",
+)  # for methods that have them
 
 
 def run_figures(profile: Profile, seconds: float | None) -> dict[str, Any]:
@@ -250,6 +260,7 @@ def run_figures(profile: Profile, seconds: float | None) -> dict[str, Any]:
             "target_error": settings.get("target_error"),
             "relative_error": meta["relative_error"],
             "finished_before": seconds is None,
+            **({"beam": meta["beam"]} if "beam" in meta else {}),
             **{key: settings[key] for key in _OWN_SETTINGS if key in settings},
         }
     )

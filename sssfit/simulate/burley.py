@@ -31,7 +31,7 @@ from sssfit.simulate._deterministic import (
     warn_of_similarity,
 )
 from sssfit.simulate._walks import relative_eta
-from sssfit.simulate.exact import diffuse_reflectance
+from sssfit.simulate.half_space import diffuse_reflectance
 
 MAPPINGS: Mapping[str, Callable[[npt.ArrayLike], FloatArray]] = MappingProxyType(
     {

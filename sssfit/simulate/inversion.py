@@ -6,7 +6,7 @@ pencil beam, or a base colour: the share of the entering diffuse light that come
 R_sp), as a renderer shows it in a white furnace. The exact solver gives R(a) to 1e-8, and a root
 finder inverts it. As a function of s = sqrt(1 - a), R is smooth and nearly linear down to s = 0,
 where its slope by a is infinite. For comparison, the module has the formulas that renderers use,
-which are right for diffuse light without a surface. Next: ``sssfit.simulate.exact``.
+which are right for diffuse light without a surface. Next: ``sssfit.simulate.half_space``.
 
 Not imported with the other methods: scipy.optimize takes 0.2 s to load.
 """
@@ -29,7 +29,7 @@ from sssfit.material.checks import check_texts, number
 from sssfit.messages import Columns, counted, report
 from sssfit.optics import normal_transmittance
 from sssfit.simulate._walks import note_compiling
-from sssfit.simulate.exact import (
+from sssfit.simulate.half_space import (
     LIGHTS,
     Light,
     diffuse_reflectance,

@@ -19,6 +19,7 @@ from sssfit.material import Material, load_material, material_names
 from sssfit.messages import note
 from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile, is_profile_file
+from sssfit.profile.beam import Beam, under_beam
 from sssfit.simulate._checkpoint import EVERY_SECONDS, Checkpoint, is_checkpoint_file
 from sssfit.simulate._finished import is_complete, is_finished, run_figures
 from sssfit.simulate._run import Progress
@@ -177,6 +178,7 @@ def simulate_to_files(
     checkpoint_every: float = EVERY_SECONDS,
     force: bool = False,
     inputs: Iterable[str | Path] = (),
+    beam: Beam | None = None,
     stop: Stop = lambda: False,
     watch: Watch = lambda label: nullcontext(),  # noqa: ARG005
 ) -> Results:
@@ -202,6 +204,8 @@ def simulate_to_files(
         Also replace files that are not ours, and inputs.
     inputs : iterable of str or Path
         Files that are read and must not be overwritten.
+    beam : Beam, optional
+        That the profiles are under, in place of a pencil beam.
     stop : callable
         When it returns true, a walk ends with the photons so far, and no other run begins.
     watch : callable
@@ -237,9 +241,9 @@ def simulate_to_files(
             given = every[group[0]]
             try:
                 if is_walk:
-                    made = _walk(*own, given, save, stop, watch)
+                    made = _walk(*own, given, beam, save, stop, watch)
                 else:
-                    made = _computed(*own, given, method, stop)
+                    made = _computed(*own, given, beam, method, stop)
             except StoppedError:
                 break
             found |= zip(group, made, strict=True)
@@ -256,6 +260,7 @@ def _computed(
     materials: Sequence[Any],
     paths: Sequence[Path | None],
     settings: Mapping[str, Any],
+    beam: Beam | None,
     method: str,
     stop: Stop,
 ) -> list[Outcome]:
@@ -268,6 +273,7 @@ def _computed(
         raise StoppedError("stopped between two materials.")
     else:
         profiles = [function(*([] if chosen.makes else [each]), **settings) for each in materials]
+    profiles = _under(profiles, beam)
     seconds = time.perf_counter() - begun
     _write(profiles, paths)
     return [Outcome(*each, seconds) for each in zip(profiles, paths, strict=True)]
@@ -277,6 +283,7 @@ def _walk(
     materials: Sequence[Any],
     paths: Sequence[Path | None],
     settings: Mapping[str, Any],
+    beam: Beam | None,
     save: Checkpoint | None,
     stop: Stop,
     watch: Watch,
@@ -284,7 +291,7 @@ def _walk(
     """Run one walk for all ``materials``, from its checkpoint if there is one to continue from."""
     resumes = save is not None and save.resume and save.path.exists()
     if save and save.resume and not resumes:
-        if before := _finished(materials, paths, settings):
+        if before := _finished(materials, paths, settings, beam):
             return [Outcome(*each, None) for each in zip(before, paths, strict=True)]
         note(f"No {save.path} to continue from: starting a new run.")
     last: list[Progress] = []
@@ -301,6 +308,7 @@ def _walk(
         profiles = SIMULATIONS[WALK].load()(
             materials, checkpoint=save, progress=report, stop=stop, **settings
         )
+    profiles = _under(profiles, beam)
     try:
         _write(profiles, paths)
     except FileError as error:
@@ -318,7 +326,10 @@ def _walk(
 
 
 def _finished(
-    materials: Sequence[Material], paths: Sequence[Path | None], settings: Mapping[str, Any]
+    materials: Sequence[Material],
+    paths: Sequence[Path | None],
+    settings: Mapping[str, Any],
+    beam: Beam | None,
 ) -> list[Profile]:
     """Return the profiles of this walk if all are complete; else none."""
     asked = {key: each for key, each in settings.items() if key != "threads"}
@@ -326,8 +337,13 @@ def _finished(
         profiles = [Profile.load(path) for path in paths if path and path.exists()]
     except ProfileError:
         return []
+    asked["beam"] = beam
     done = [is_finished(each, k, materials, **asked) for k, each in enumerate(profiles)]
     return profiles if len(done) == len(materials) and all(done) else []
+
+
+def _under(profiles: Sequence[Profile], beam: Beam | None) -> list[Profile]:
+    return list(profiles) if beam is None else [under_beam(each, beam) for each in profiles]
 
 
 def _write(profiles: Sequence[Profile], paths: Sequence[Path | None]) -> None:

@@ -51,15 +51,20 @@ def _heading(rows: Rows, *, several: bool) -> str:
     """Return lines with the material, the method, the speed and the grid."""
     row = rows[0]
     if several:
-        return f"{counted(len(rows), 'material')}: {_how(rows)}"
+        return f"{counted(len(rows), 'material')}: {_how(rows)}{_under(row)}"
     seconds, rate, annuli = row["seconds"], row["photons_per_second"], row["annuli"]
     speed = "" if seconds is None else f", {seconds:.1f} s"
     speed += f" ({rate:,.0f} a second)" if rate else ""
     return (
-        f"{row['material']}: {_how(rows)}{speed}; {counted(annuli, 'annulus')} of "
+        f"{row['material']}: {_how(rows)}{_under(row)}{speed}; {counted(annuli, 'annulus')} of "
         f"{row['dr_mm']:.4g} mm, "
         f"to {annuli * row['dr_mm']:.4g} mm"
     )
+
+
+def _under(row: dict[str, Any]) -> str:
+    """Return text on a beam, if it is not a pencil."""
+    return f", under the beam {row['beam']} mm" if "beam" in row else ""
 
 
 def _how(rows: Rows) -> str:
@@ -69,12 +74,20 @@ def _how(rows: Rows) -> str:
         counts = sorted({each["photons"] for each in rows})
         photons = " to ".join(f"{n:,}" for n in counts[:: len(counts) - 1 or 1])
         return f"{photons} photons, seed {row['seed']}"
-    words = str(row["method"])
+    words = str(row["method"]) + _solvers(rows)
     if row.get("tolerance") is not None:
         reached = max(each["relative_error"] or 0.0 for each in rows)
         words += f" to {100.0 * reached:.1g} % of the total"
     words += ", for isotropic scattering of (1 - g) sigma_s" if row.get("similarity") else ""
     return words + (f" ({row['mapping']})" if row.get("mapping") else "")
+
+
+def _solvers(rows: Rows) -> str:
+    """Return which of the exact solvers was chosen, and how many directions it took."""
+    names = sorted({each["solver"] for each in rows if each.get("solver")})
+    most = max(each.get("directions") or 0 for each in rows)
+    directions = f", {most} directions" if most else ""
+    return f" ({' and '.join(names)} solver{directions})" if names else ""
 
 
 def _table(rows: Rows) -> str:

@@ -5,7 +5,7 @@ import pytest
 import reference
 from published import Published, check, what
 
-from sssfit.simulate.exact import diffuse_reflectance
+from sssfit.simulate.half_space import diffuse_reflectance
 
 TITLE = "Chandrasekhar 1960"
 SOURCE = "S. Chandrasekhar, *Radiative Transfer*, Dover, 1960"

@@ -4,7 +4,7 @@ import pytest
 import reference
 from published import Published, check, what
 
-from sssfit.simulate.exact import entering_light
+from sssfit.simulate.half_space import entering_light
 
 TITLE = "Duntley 1942"
 SOURCE = (

@@ -19,7 +19,7 @@ from sssfit.messages import by_channel
 from sssfit.optics import normal_transmittance
 from sssfit.profile import Profile
 from sssfit.simulate import simulate_exact
-from sssfit.simulate.exact import diffuse_reflectance
+from sssfit.simulate.half_space import diffuse_reflectance
 from sssfit.simulate.inversion import invert_reflectance
 
 CHANNELS = ("R", "G", "B")

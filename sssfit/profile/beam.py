@@ -1,0 +1,249 @@
+"""Profiles under a beam of finite width, as the program conv makes them of those of MCML.
+
+Light that enters at a point returns around that point: under a beam the profile is the convolution
+of both. Wang, Jacques and Zheng 1997, "CONV - convolution for responses to a finite diameter photon
+beam incident on multi-layered tissues", has it in polar coordinates (equations 9 to 18).
+"""
+
+import itertools
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from sssfit.arrays import FloatArray
+from sssfit.errors import ProfileError
+from sssfit.messages import did_you_mean, shown
+from sssfit.optics import gauss_legendre
+from sssfit.profile.frequency import annulus_waves
+from sssfit.profile.pixels import flat_annuli
+from sssfit.profile.record import Profile
+
+_REACH = 2.5  # 1/e^2 radii of a Gaussian beam beyond which it has 4e-6 of its light
+_LEAST = 1e-13  # of the spectrum of a Gaussian beam where its integral ends
+_PERIODS, _NODES = 4, 20  # of the fastest wave, and of Gauss and Legendre, in an interval
+_AT_ONCE = 4e6  # numbers of an array
+_ACROSS = 4  # nodes across an annulus
+_COLUMNS = 512  # annuli whose shares are held at once
+
+
+@dataclass(frozen=True, slots=True)
+class Beam:
+    """Light that falls on the surface around the origin, of total 1.
+
+    Parameters
+    ----------
+    kind : str
+        "gaussian" or "flat".
+    radius_mm : float [mm]
+        Of a Gaussian where its irradiance has fallen to 1/e^2, as in conv; of a flat disk.
+    """
+
+    kind: str
+    radius_mm: float
+
+    def __str__(self) -> str:
+        return f"{self.kind}:{self.radius_mm:g}"
+
+    @property
+    def reach_mm(self) -> float:
+        """How far it spreads light that would return at its point of entry."""
+        return self.radius_mm * (_REACH if self.kind == "gaussian" else 1.0)
+
+
+def parse_beam(text: str) -> Beam:
+    """Return the beam of "gaussian:0.5" or "flat:1", a kind and its radius in mm.
+
+    Raises
+    ------
+    ProfileError
+        The kind is unknown, or the radius is not a positive number.
+    """
+    kind, _, words = text.partition(":")
+    if kind not in SPREADS:
+        hint = did_you_mean(kind, list(SPREADS))
+        raise ProfileError(
+            f"a beam {shown(text)}: {hint}expected gaussian:RADIUS or flat:RADIUS in mm."
+        )
+    try:
+        radius = float(words)
+    except ValueError:
+        radius = 0.0
+    if not 0.0 < radius < np.inf:
+        raise ProfileError(f"a beam {shown(text)}; its radius is a positive number of mm.")
+    return Beam(kind, radius)
+
+
+def under_beam(profile: Profile, beam: Beam) -> Profile:
+    """Return a profile under a beam, on its grid and as far beyond as the beam reaches.
+
+    Light beyond the profile's grid stays beyond. Errors are of the same walk; estimates of
+    other methods add up.
+
+    Parameters
+    ----------
+    profile : Profile
+        Of a pencil beam.
+    beam : Beam
+
+    Raises
+    ------
+    ProfileError
+        The profile is under a beam already.
+    """
+    if "beam" in profile.meta:
+        raise ProfileError(f"the profile is under a beam already: {profile.meta['beam']}.")
+    edges = wider_edges(profile.r_edges_mm, beam.reach_mm)
+    sides = profile.annulus_energy, profile.annulus_energy_stderr, profile.beyond_grid
+    energy, stderr, beyond = _spread(profile, edges, *sides, beam)
+    found: dict[str, Any] = {
+        "r_edges_mm": edges,
+        "annulus_energy": energy,
+        "annulus_energy_stderr": stderr,
+        "beyond_grid": beyond,
+        "meta": {**profile.meta, "beam": str(beam)},
+    }
+    if profile.annulus_transmittance is not None:
+        found |= _below(profile, edges, beam)
+    return replace(profile, **found)
+
+
+def _below(profile: Profile, edges: FloatArray, beam: Beam) -> dict[str, FloatArray | None]:
+    """Return the light that leaves through the bottom; what is unknown of it stays so."""
+    energy, stderr = profile.annulus_transmittance, profile.annulus_transmittance_stderr
+    beyond = profile.beyond_grid_transmittance
+    assert energy is not None
+    known = np.full(energy.shape, np.nan) if stderr is None else stderr
+    outside = np.zeros(energy.shape[1]) if beyond is None else beyond
+    found, error, left = _spread(profile, edges, energy, known, outside, beam)
+    return {
+        "annulus_transmittance": found,
+        "annulus_transmittance_stderr": None if stderr is None else error,
+        "beyond_grid_transmittance": None if beyond is None else left,
+    }
+
+
+def wider_edges(edges: FloatArray, reach_mm: float) -> FloatArray:
+    """Return edges, continued by annuli as wide as the last until they reach so much farther."""
+    width = float(edges[-1] - edges[-2])
+    count = int(np.ceil(reach_mm / width))
+    return np.concatenate((edges, edges[-1] + width * np.arange(1, count + 1)))
+
+
+def _spread(
+    profile: Profile,
+    wider: FloatArray,
+    energy: FloatArray,
+    stderr: FloatArray,
+    beyond: FloatArray,
+    beam: Beam,
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return energies (m, C) in wider annuli, their standard errors, and what is beyond (C,)."""
+    edges, photons = profile.r_edges_mm, profile.photons
+    square = _squares(energy, stderr, photons)
+    fine, densities = flat_annuli(edges, energy)
+    areas = np.pi * np.diff(fine**2)
+    annulus = np.searchsorted(edges[1:-1], fine[:-1], side="right")
+    part = areas / np.bincount(annulus, areas)[annulus]  # of its annulus
+    found = np.zeros((len(wider) - 1, energy.shape[1]))
+    error = np.zeros_like(found)
+    ends = np.searchsorted(annulus, np.arange(0, len(energy) + _COLUMNS, _COLUMNS))
+    for begin, end in itertools.pairwise(ends):
+        within = SPREADS[beam.kind](wider, fine[begin : end + 1], beam.radius_mm)
+        shares = np.diff(within, axis=0)
+        found += shares @ (densities[begin:end] * areas[begin:end, None])
+        firsts = np.flatnonzero(np.diff(annulus[begin:end], prepend=-1))
+        whole = np.add.reduceat(shares * part[begin:end], firsts, axis=1)
+        error += whole ** (1 if photons is None else 2) @ square[annulus[begin:end][firsts]]
+    if energy.min() >= 0.0:  # rounding, 1e-13 of the total, would give negative light
+        found = np.maximum(found, 0.0)
+    left = beyond + energy.sum(axis=0) - found.sum(axis=0)
+    if (beyond >= 0.0).all():
+        left = np.maximum(left, 0.0)
+    return found, _errors(error, found, stderr, photons), left
+
+
+def _squares(energy: FloatArray, stderr: FloatArray, photons: int | None) -> FloatArray:
+    """Return what a spread adds up: of a walk the mean squares of its photons, else the errors."""
+    return stderr if photons is None else (photons - 1) * stderr**2 + energy**2
+
+
+def _errors(
+    spread: FloatArray, energy: FloatArray, stderr: FloatArray, photons: int | None
+) -> FloatArray:
+    """Return the errors of a spread; estimates of a total keep theirs.
+
+    A photon lands in one annulus, so that annuli are anticorrelated; see
+    `Profile.cumulative_stderr`. Estimates of other methods are alike in neighbours, and add up.
+    """
+    if photons is not None:
+        return np.sqrt(np.maximum(spread - energy**2, 0.0) / (photons - 1))
+    before, after = (np.sqrt((each**2).sum(axis=0)) for each in (stderr, spread))
+    scale = np.divide(before, after, out=np.ones_like(after), where=after > 0.0)
+    found: FloatArray = np.maximum(spread, 0.0) * scale  # rounding, as of the energy
+    return found
+
+
+def _within_gaussian(radii: FloatArray, edges: FloatArray, radius_mm: float) -> FloatArray:
+    """Return the share (m, n) of flat annuli within radii: r int B(k) W(k) J1(k r) dk.
+
+    B = exp(-(k w)^2 / 8) is the spectrum of the beam, W that of an annulus. The integral ends where
+    B is 1e-13, and has 5 nodes in every period of its fastest wave.
+    """
+    from scipy import special
+
+    last = np.sqrt(-8.0 * np.log(_LEAST)) / radius_mm
+    periods = last * float(radii[-1] + edges[-1]) / (2.0 * np.pi)
+    intervals = max(1, int(np.ceil(periods / _PERIODS)))
+    x, weight = gauss_legendre(_NODES, -1.0, 1.0)
+    width = last / intervals
+    found = np.zeros((len(radii), len(edges) - 1))
+    step = max(1, int(_AT_ONCE / (_NODES * max(len(edges), len(radii)))))
+    for begin in range(0, intervals, step):
+        middle = width * (np.arange(begin, min(begin + step, intervals)) + 0.5)
+        k = (middle[:, None] + 0.5 * width * x).ravel()
+        share = np.tile(0.5 * width * weight, len(middle)) * np.exp(-((k * radius_mm) ** 2) / 8.0)
+        found += special.j1(radii[:, None] * k) @ (share[:, None] * annulus_waves(k, edges))
+    return found * radii[:, None]
+
+
+def _within_disk(radii: FloatArray, edges: FloatArray, radius_mm: float) -> FloatArray:
+    """Return the share (m, n) of flat annuli within radii: of light at s, a disk around it.
+
+    Of an annulus s^2 is distributed evenly; four nodes of Gauss and Legendre in it stand for it.
+    """
+    nodes, weight = gauss_legendre(_ACROSS)
+    square = edges**2
+    found = np.zeros((len(radii), len(edges) - 1))
+    for node, share in zip(nodes, weight, strict=True):
+        s = np.sqrt(square[:-1] + node * np.diff(square))
+        found += share * lens_area(radii[:, None], radius_mm, s)
+    return found / (np.pi * radius_mm**2)
+
+
+def lens_area(one: FloatArray, other: float, apart: FloatArray) -> FloatArray:
+    """Return the area that two disks share, whose centres are so far apart.
+
+    Weisstein, "Circle-Circle Intersection", equation 14.
+    """
+    smaller = np.pi * np.minimum(one, other) ** 2
+    with np.errstate(divide="ignore", invalid="ignore"):
+        to_one = (apart**2 + one**2 - other**2) / (2.0 * apart * one)
+        to_other = (apart**2 + other**2 - one**2) / (2.0 * apart * other)
+    kite = (other + one - apart) * (apart + one - other) * (apart - one + other)
+    kite = kite * (apart + one + other)
+    angles = one**2 * np.arccos(np.clip(to_one, -1.0, 1.0))
+    angles = angles + other**2 * np.arccos(np.clip(to_other, -1.0, 1.0))
+    area = angles - 0.5 * np.sqrt(np.maximum(kite, 0.0))
+    inside, outside = apart <= np.abs(one - other), apart >= one + other
+    found: FloatArray = np.where(inside, smaller, np.where(outside, 0.0, area))
+    return found
+
+
+# How much of light that enters at a point returns within radii; a new kind is one function and one
+# line, and its reach.
+SPREADS: dict[str, Callable[[FloatArray, FloatArray, float], FloatArray]] = {
+    "gaussian": _within_gaussian,
+    "flat": _within_disk,
+}

@@ -1,0 +1,65 @@
+"""What the solver for layers cannot do, and what it says then."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from sssfit.arrays import FloatArray
+from sssfit.errors import SimulationError
+from sssfit.simulate.stack.azimuth import MOST_ORDERS
+from sssfit.simulate.stack.nodes import Nodes
+from sssfit.simulate.stack.slabs import SlabStack
+from sssfit.simulate.stack.solution import Step
+
+_MOST_BYTES = 2_000_000_000  # of matrices at once
+_MATRICES = 6  # complex ones for each layer of a stack, and the modes of each
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Channel:
+    """One channel of one material."""
+
+    name: str
+    stack: SlabStack
+    specular: float
+    radii: FloatArray
+
+
+def cannot_meet(channel: Channel, step: Step, worst: float, tolerance: float) -> SimulationError:
+    """Say which channel is too hard, why, and what to do."""
+    stack = channel.stack
+    steepest = max(each.g for each in stack.scattering)
+    is_thin = stack.is_seen_through and steepest > 0.5
+    why = f" (a thin slab of g = {steepest:g}, which the walk does well)" if is_thin else ""
+    digit = 10.0 ** math.floor(math.log10(worst))
+    return SimulationError(
+        f"{channel.name}{why}: the tolerance of {tolerance:g} cannot be met: {step.count} and "
+        f"{step.count - 4} directions differ by {worst:.2g} of the light; give "
+        f"{math.ceil(worst / digit) * digit:g} or more, or use the method montecarlo."
+    )
+
+
+def _bytes(channels: Sequence[Channel], count: int, threads: int) -> float:
+    """Return the memory that matrices of all threads take at once."""
+    needs = []
+    for channel in channels:
+        size = MOST_ORDERS * Nodes.of(channel.stack.indices, count).invariant.size
+        needs.append(16.0 * size**2 * _MATRICES * (len(channel.stack.slabs) + 2))
+    return threads * max(needs)
+
+
+def fits(channels: Sequence[Channel], count: int, threads: int) -> bool:
+    """Return whether the matrices of so many directions fit into memory."""
+    return _bytes(channels, count, threads) <= _MOST_BYTES
+
+
+def check_memory(channels: Sequence[Channel], count: int, threads: int) -> None:
+    """Raise an error for stacks of too many layers."""
+    if not fits(channels, count, threads):
+        most = max(channels, key=lambda each: len(each.stack.slabs))
+        needed = _bytes(channels, count, threads) / 1e9
+        raise SimulationError(
+            f"{most.name} has {len(most.stack.slabs)} layers, whose matrices would take "
+            f"{needed:.1f} GB on {threads} threads, over the limit of {_MOST_BYTES / 1e9:g} GB; "
+            "merge layers, use fewer threads, or use the method montecarlo."
+        )

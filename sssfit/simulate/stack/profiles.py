@@ -1,0 +1,198 @@
+"""Profiles of layered materials by the solver for layers."""
+
+import math
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from sssfit.arrays import FloatArray
+from sssfit.errors import StoppedError
+from sssfit.grid import RadialGrid
+from sssfit.material import Material
+from sssfit.profile import Profile
+from sssfit.simulate._deterministic import computed_profile, energies_from_cumulative
+from sssfit.simulate.stack.beam import attenuation, beam_of
+from sssfit.simulate.stack.families import families_of
+from sssfit.simulate.stack.limits import Channel, cannot_meet, check_memory, fits
+from sssfit.simulate.stack.sampling import Family
+from sssfit.simulate.stack.slabs import stacks_of
+from sssfit.simulate.stack.solution import Answer, Errors, Side, SideErrors, steps
+
+COUNTS = (8, 12, 16, 20, 24, 28, 32, 36)
+_QUICK = 2e-3  # a tolerance from which 8 and 12 directions may do
+_LEAST_GAIN = 2.0  # by which four more directions reduce an error, if it was not more before
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Solved:
+    """The answer for a channel, its errors, and the number of directions that gave it."""
+
+    answer: Answer
+    errors: Errors
+    count: int
+
+
+def solve_stacks(
+    materials: Sequence[Material],
+    grids: Sequence[RadialGrid],
+    tolerance: float,
+    pool: ThreadPoolExecutor,
+    threads: int,
+    *,
+    reduced: Sequence[Material] | None = None,
+    stop: Callable[[], bool] | None = None,
+) -> list[Profile]:
+    """Solve for the profiles of layered materials, any g and indices.
+
+    Parameters
+    ----------
+    materials, grids : sequences
+        Those that share a layer share its modes.
+    tolerance : float
+        Largest error of F(r) at an edge, above and below, and of the totals, as a share of the
+        light that leaves on both sides.
+    pool : ThreadPoolExecutor
+        Of ``threads`` threads; the result does not depend on them.
+    reduced : sequence of Material, optional
+        What is solved for in place of each material, by the similarity relation.
+    stop : callable, optional
+        StoppedError is raised when it returns true.
+
+    Raises
+    ------
+    SimulationError
+        The tolerance cannot be met, or the matrices do not fit into memory.
+    """
+
+    def each(sample: Callable[[float], FloatArray], k: FloatArray) -> FloatArray:
+        def one(wavenumber: float) -> FloatArray:
+            if stop is not None and stop():
+                raise StoppedError("stopped before the equation was solved.")
+            return sample(wavenumber)
+
+        return np.stack(list(pool.map(one, k.tolist())))
+
+    channels = [
+        Channel(f"{material.name} {name}", stack, material.specular_reflectance, grid.r_edges_mm)
+        for material, grid in zip(reduced or materials, grids, strict=True)
+        for name, stack in zip(material.channels, stacks_of(material), strict=True)
+    ]
+    solved: dict[int, _Solved] = {
+        number: _beam_only(channel)
+        for number, channel in enumerate(channels)
+        if not channel.stack.scattering
+    }
+    others = [number for number in range(len(channels)) if number not in solved]
+    for members in families_of([channels[number].stack for number in others]):
+        numbers = [others[member] for member in members]
+        own = [channels[number] for number in numbers]
+        solved |= zip(numbers, _solve_family(own, tolerance, threads, each), strict=True)
+    found, first = [], 0
+    for material, solved_for, grid in zip(materials, reduced or materials, grids, strict=True):
+        answers = [solved[k] for k in range(first, first + material.n_channels)]
+        is_similar = material != solved_for
+        found.append(_profile(material, grid, answers, tolerance, similarity=is_similar))
+        first += material.n_channels
+    return found
+
+
+def _solve_family(
+    channels: Sequence[Channel],
+    tolerance: float,
+    threads: int,
+    each: Callable[[Callable[[float], FloatArray], FloatArray], FloatArray],
+) -> list[_Solved]:
+    """Add directions until every channel meets the tolerance."""
+    counts = COUNTS if tolerance >= _QUICK else COUNTS[1:]
+    for count in counts[:2]:
+        check_memory(channels, count, threads)
+    family = Family(tuple(channel.stack for channel in channels))
+    radii, specular = ([getattr(each, key) for each in channels] for key in ("radii", "specular"))
+    radii = [each[1:] for each in radii]
+    before = math.inf
+    for step in steps(family, radii, specular, counts, tolerance, each):
+        shares = [step.share(number) for number in range(len(channels))]
+        worst = max(shares)
+        if worst <= tolerance:
+            pairs = zip(step.answers, step.errors, strict=True)
+            return [_Solved(*pair, step.count) for pair in pairs]
+        left = counts[counts.index(step.count) + 1 :]
+        gain = max(before / worst, _LEAST_GAIN)
+        is_hopeless = worst > tolerance * gain ** len(left)
+        if is_hopeless or not fits(channels, left[0], threads):
+            raise cannot_meet(channels[shares.index(worst)], step, worst, tolerance)
+        before = worst
+    raise AssertionError("steps end with the last number of directions")
+
+
+def _beam_only(channel: Channel) -> _Solved:
+    """Return the answer where nothing scatters, which the beam alone gives without error."""
+    stack, edges = channel.stack, channel.radii[1:]
+    sigma_t = [each.sigma_a for each in stack.slabs]
+    beam = beam_of(stack, sigma_t)
+    fading = [attenuation(s, each.thickness) for s, each in zip(sigma_t, stack.slabs, strict=True)]
+
+    def spot(power: float) -> Side:
+        return Side(np.full(edges.size, power), power)
+
+    none = SideErrors(np.zeros(edges.size + 1), np.zeros(edges.size + 1), 0.0)
+    below = spot(beam.transmitted) if stack.has_bottom else None
+    answer = Answer(spot(beam.reflected - channel.specular), below, beam.absorbed(fading))
+    return _Solved(answer, Errors(none, none if stack.has_bottom else None), 0)
+
+
+def _profile(
+    material: Material,
+    grid: RadialGrid,
+    solved: Sequence[_Solved],
+    tolerance: float,
+    *,
+    similarity: bool,
+) -> Profile:
+    """Assemble the answers of a material's channels."""
+    sides = [each.answer.reflected for each in solved]
+    reflected = _energies(sides, tolerance)
+    stderr = np.stack([_stderr(each.errors.reflected) for each in solved], axis=1)
+    below = [each.answer.transmitted for each in solved if each.answer.transmitted is not None]
+    under = [each.errors.transmitted for each in solved if each.errors.transmitted is not None]
+    absorbed = np.maximum([each.answer.absorbed for each in solved], 0.0).T
+    shares = [each.errors.worst / max(each.answer.leaving, 1e-300) for each in solved]
+    totals = material.specular_reflectance + np.array([each.answer.leaving for each in solved])
+    return computed_profile(
+        material,
+        "exact",
+        grid,
+        reflected,
+        stderr=stderr,
+        transmitted=_energies(below, tolerance) if below else None,
+        transmitted_stderr=np.stack([_stderr(each) for each in under], axis=1) if under else None,
+        absorbed=absorbed,
+        relative_error=max(shares),
+        settings={
+            "tolerance": tolerance,
+            "similarity": similarity,
+            "solver": "layer",
+            "directions": max(each.count for each in solved),
+        },
+        energy_balance_stderr=np.abs(totals + absorbed.sum(axis=0) - 1.0).tolist(),
+    )
+
+
+def _energies(sides: Sequence[Side], tolerance: float) -> FloatArray:
+    """Return energies of the annuli and beyond the grid (n + 1, C)."""
+    cumulative = np.stack([np.append(0.0, each.cumulative) for each in sides], axis=1)
+    totals = np.array([each.total for each in sides])
+    return energies_from_cumulative(cumulative, totals, tolerance=tolerance)
+
+
+def _stderr(errors: SideErrors) -> FloatArray:
+    """Return errors of annuli and beyond the grid (n + 1,), whose squares add up to those of F.
+
+    Each is at least the annulus's own, and the sum up to any edge at least F's error there.
+    """
+    largest = np.maximum.accumulate(errors.edges)
+    steps_up = np.diff(np.append(0.0, largest**2))
+    stderr: FloatArray = np.sqrt(np.maximum(steps_up, errors.annuli**2))
+    return stderr

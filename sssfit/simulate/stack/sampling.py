@@ -1,0 +1,147 @@
+"""Transforms of several stacks at one wavenumber, with the modes of layers that they share."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sssfit.arrays import FloatArray
+from sssfit.simulate.stack.assembly import Assembly, Transforms, reflected_at, transforms_at
+from sssfit.simulate.stack.azimuth import Azimuth, azimuth_of
+from sssfit.simulate.stack.modes import Modes, modes_of
+from sssfit.simulate.stack.phase import Medium
+from sssfit.simulate.stack.single import single_transform
+from sssfit.simulate.stack.slabs import Slab, SlabStack
+
+_DEEP = 14.0  # k z from which a layer goes on without end: exp(-14) is 8e-7
+_SEEN = 1e-3  # share of the light in a beam that needs the forward peak's greater depth
+_STEEPEST = 1e-3  # least 1 - g^2, so that g near 1 asks for no infinite depth
+_NEXT_TO_ZERO = 1e-2  # of the least wavenumber, in place of 0 where 0 is singular
+
+
+@dataclass(frozen=True)
+class Family:
+    """Stacks with the same nodes, some of whose layers may be the same."""
+
+    stacks: tuple[SlabStack, ...]
+
+    @cached_property
+    def longest(self) -> float:
+        """The longest reduced mean free path [mm]."""
+        return max(1.0 / each.reduced_sigma_t for each in self._scattering)
+
+    @cached_property
+    def least_wavenumber(self) -> float:
+        """The first wavenumber above 0 [1/mm]: a 20th of the slowest decay, within limits."""
+        slowest = min(each.diffuse_rate for each in self._scattering)
+        thickest = max(sum(slab.thickness for slab in each.slabs) for each in self.stacks)
+        decay = max(slowest, 1.0 / thickest) / 20.0
+        return max(1e-4 / self.longest, min(0.03 / self.longest, decay))
+
+    @cached_property
+    def is_singular(self) -> bool:
+        """Whether k = 0 is singular: a layer that hardly absorbs, or a clear one."""
+        slowest = min(each.diffuse_rate for each in self._scattering)
+        slabs = [slab for each in self.stacks for slab in each.slabs]
+        return slowest < self.least_wavenumber or any(slab.is_clear for slab in slabs)
+
+    @property
+    def _scattering(self) -> list[Slab]:
+        return [slab for each in self.stacks for slab in each.scattering]
+
+
+@dataclass(frozen=True)
+class Sampler:
+    """A family in ``count`` discrete directions on either side."""
+
+    family: Family
+    count: int
+
+    @cached_property
+    def assemblies(self) -> tuple[Assembly, ...]:
+        """The stacks in discrete directions."""
+        return tuple(Assembly.of(each, self.count) for each in self.family.stacks)
+
+    @cached_property
+    def zero(self) -> float:
+        """The wavenumber that stands for 0."""
+        family = self.family
+        return _NEXT_TO_ZERO * family.least_wavenumber if family.is_singular else 0.0
+
+    @cached_property
+    def most_sigma_t(self) -> float:
+        """The largest extinction with delta-M scaling [1/mm]."""
+        return max(each.sigma_t for assembly in self.assemblies for each in assembly.media)
+
+    def azimuth(self, k: float) -> Azimuth:
+        """Return the rule in phi that all stacks share."""
+        return azimuth_of(k, min(each.least_sigma_t for each in self.assemblies))
+
+    def at_zero(self) -> list[Transforms]:
+        """Return the total of each stack, without the beam."""
+        known = _KnownModes(self.zero, self.azimuth(self.zero))
+        return [transforms_at(each, self.zero, known.azimuth, known) for each in self.assemblies]
+
+    def at(self, k: float) -> FloatArray:
+        """Return R(k) and T(k) of each stack less single scattering, (2 stacks,)."""
+        known = _KnownModes(k or self.zero, self.azimuth(k or self.zero))
+        found = [_multiple(each, k, known) for each in self.assemblies]
+        return np.array(found).ravel()
+
+
+class _KnownModes:
+    """Modes at one wavenumber, of layers that were met before."""
+
+    def __init__(self, k: float, azimuth: Azimuth) -> None:
+        self.k, self.azimuth = k, azimuth
+        self._found: dict[tuple[float, ...], Modes] = {}
+
+    def __call__(self, medium: Medium) -> Modes:
+        slab = medium.slab
+        key = slab.sigma_a, slab.sigma_s, slab.g, slab.eta
+        if key not in self._found:
+            self._found[key] = modes_of(medium, self.k, self.azimuth)
+        return self._found[key]
+
+
+def _multiple(assembly: Assembly, k: float, known: _KnownModes) -> tuple[float, float]:
+    """Return R(k) and T(k) less the light that is scattered once and leaves."""
+    azimuth = known.azimuth
+    once_k = known.k if k > 0.0 else 0.0
+    top = assembly.last_seen(k, _depth_above(assembly)) if k > 0.0 else None
+    if not assembly.has_bottom:
+        whole = reflected_at(assembly, known.k, azimuth, known, top)
+        return whole - single_transform(assembly, once_k, azimuth, top), 0.0
+    below = assembly.mirrored
+    lowest = below.last_seen(k, _forward_depth(assembly)) if k > 0.0 else None
+    if assembly.beam.transmitted > _SEEN:
+        lowest = None
+    if top is None or lowest is None:
+        both = transforms_at(assembly, known.k, azimuth, known)
+    up = both.reflected if top is None else reflected_at(assembly, known.k, azimuth, known, top)
+    down = (
+        both.transmitted if lowest is None else reflected_at(below, known.k, azimuth, known, lowest)
+    )
+    return (
+        up - single_transform(assembly, once_k, azimuth, top),
+        down - single_transform(below, once_k, azimuth, lowest),
+    )
+
+
+def _forward_depth(assembly: Assembly) -> float:
+    """Return k z that matters to a beam on its way out.
+
+    The pole of Henyey and Greenstein's function at cos = (1 + g^2) / 2 g slows exp(-k z) to
+    exp(-k z (1 - g^2) / (1 + g^2)).
+    """
+    g = max(0.0, max(each.slab.g for each in assembly.media if each.slab.scatters))
+    return _DEEP * (1.0 + g**2) / max(1.0 - g**2, _STEEPEST)
+
+
+def _depth_above(assembly: Assembly) -> float:
+    """Return k z that matters to the light that leaves above."""
+    returning = max(
+        float(up) * each.attenuation
+        for up, each in zip(assembly.beam.up, assembly.media, strict=True)
+    )
+    return _forward_depth(assembly) if returning > _SEEN else _DEEP

@@ -1,0 +1,239 @@
+"""F(r) of several stacks, with more and more directions until two numbers of them agree.
+
+The error estimate is the difference between N and N - 4 directions, both on every other wavenumber,
+plus what their spline is off by. It belongs to the coarser of the two, and the finer one is
+returned: an estimate, not a bound.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from sssfit.arrays import FloatArray
+from sssfit.simulate.stack.assembly import Assembly, Transforms
+from sssfit.simulate.stack.sampling import Family, Sampler
+from sssfit.simulate.stack.single import single_cumulative
+from sssfit.simulate.stack.transform import Wavenumbers, refined
+
+Each = Callable[[Callable[[float], FloatArray], FloatArray], FloatArray]
+
+_HIGHEST = 20.0  # largest wavenumber, in the largest extinctions; F is off by 9e-5 with 10
+_MISS = 0.1  # of the tolerance, between two wavenumbers; F is then off by less
+_FEW_RADII, _PER_DECADE = 120, 40  # more radii than this are interpolated: 1e-7 of F
+_ROUNDING = 1e-4  # of T(0): T(k) below this is rounding of the directions, and counts as 0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Side:
+    """Light that leaves on one side: F at the radii asked for (n,), and altogether."""
+
+    cumulative: FloatArray
+    total: float
+
+    @property
+    def edges(self) -> FloatArray:
+        """F at the radii and, last, altogether (n + 1,)."""
+        return np.append(self.cumulative, self.total)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Answer:
+    """What one stack does with light from above, as shares of it, without specular reflection."""
+
+    reflected: Side
+    transmitted: Side | None
+    absorbed: tuple[float, ...]
+
+    @property
+    def leaving(self) -> float:
+        """All light that leaves on the two sides."""
+        below = self.transmitted.total if self.transmitted is not None else 0.0
+        return self.reflected.total + below
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SideErrors:
+    """Errors of F at the radii and of the total (n + 1,), of the light in between (n + 1,).
+
+    ``spline`` is the largest that comes from the wavenumbers.
+    """
+
+    edges: FloatArray
+    annuli: FloatArray
+    spline: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Errors:
+    """Errors of an answer above and, for slabs, below."""
+
+    reflected: SideErrors
+    transmitted: SideErrors | None
+
+    @property
+    def worst(self) -> float:
+        """The largest error of F on either side."""
+        return float(max(np.max(each.edges) for each in self._sides))
+
+    @property
+    def spline(self) -> float:
+        """The largest that comes from the wavenumbers."""
+        return max(each.spline for each in self._sides)
+
+    @property
+    def _sides(self) -> list[SideErrors]:
+        return [each for each in (self.reflected, self.transmitted) if each is not None]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Step:
+    """Answers of all stacks with ``count`` directions, and their errors."""
+
+    count: int
+    answers: list[Answer]
+    errors: list[Errors]
+
+    def share(self, number: int) -> float:
+        """Return the largest error of a stack as a share of the light that leaves it."""
+        return self.errors[number].worst / self.answers[number].leaving
+
+    @property
+    def spline_share(self) -> float:
+        """The largest share that comes from the wavenumbers."""
+        pairs = zip(self.errors, self.answers, strict=True)
+        return max(errors.spline / answer.leaving for errors, answer in pairs)
+
+
+def steps(
+    family: Family,
+    radii: list[FloatArray],
+    specular: list[float],
+    counts: Sequence[int],
+    tolerance: float,
+    each: Each,
+) -> Iterator[Step]:
+    """Yield answers with more and more directions, from the second number on.
+
+    Parameters
+    ----------
+    family : Family
+    radii : list of (n,) [mm]
+        Of each stack, above 0 and ascending.
+    specular : list of float
+        Of each stack, the share of the beam that returns and is not part of F.
+    counts : sequence of int
+        Numbers of directions.
+    tolerance : float
+        The error asked for, a share of the light; it sets how close the wavenumbers lie.
+    each : callable
+        Maps a function over wavenumbers, with threads.
+    """
+    coarse: list[Answer] | None = None
+    waves: Wavenumbers | None = None
+    miss = tolerance * _MISS
+    for before, count in pairwise(counts):
+        sampler = _ready(family, count)
+        waves = _refined(sampler, miss, each) if waves is None else _same(sampler, waves, each)
+        few = waves.halved()
+        fine, halved = (_answers(sampler, of, radii, specular) for of in (waves, few))
+        if coarse is None:
+            first = _ready(family, before)
+            coarse = _answers(first, _same(first, few, each), radii, specular)
+        trios = zip(fine, halved, coarse, strict=True)
+        step = Step(count, fine, [_errors(*trio) for trio in trios])
+        yield step
+        if step.spline_share > 0.5 * tolerance:
+            waves, miss = None, 0.1 * miss
+        coarse = halved
+
+
+def _ready(family: Family, count: int) -> Sampler:
+    """Return a sampler whose stacks are made before several threads ask for them."""
+    sampler = Sampler(family, count)
+    sampler.assemblies  # noqa: B018
+    return sampler
+
+
+def _same(sampler: Sampler, waves: Wavenumbers, each: Each) -> Wavenumbers:
+    """Return the transforms on the wavenumbers of others."""
+    return Wavenumbers(waves.k, each(sampler.at, waves.k), waves.bend)
+
+
+def _refined(sampler: Sampler, miss: float, each: Each) -> Wavenumbers:
+    """Return the transforms on wavenumbers that are close enough."""
+    family = sampler.family
+    most, careful = _HIGHEST * sampler.most_sigma_t, 2.0 / family.longest
+    return refined(lambda k: each(sampler.at, k), family.least_wavenumber, most, miss, careful)
+
+
+def _answers(
+    sampler: Sampler, waves: Wavenumbers, radii: list[FloatArray], specular: list[float]
+) -> list[Answer]:
+    """Return each stack's answer from the transforms of all."""
+    totals = sampler.at_zero()
+    found = []
+    for number, (assembly, own, mirror) in enumerate(
+        zip(sampler.assemblies, radii, specular, strict=True)
+    ):
+        both = waves.values[:, 2 * number : 2 * number + 2]
+        above = Wavenumbers(waves.k, both[:, :1], waves.bend)
+        up = _side(assembly, above, own, assembly.beam.reflected - mirror)
+        down = None
+        if assembly.has_bottom:
+            below = Wavenumbers(waves.k, _without_rounding(both[:, 1:], totals[number]), waves.bend)
+            down = _side(assembly.mirrored, below, own, assembly.beam.transmitted)
+        found.append(Answer(up, down, totals[number].absorbed))
+    return found
+
+
+def _side(assembly: Assembly, waves: Wavenumbers, radii: FloatArray, beam: float) -> Side:
+    """Return F above an assembly: single scattering, the rest, and the beam at r = 0."""
+
+    def light(r: FloatArray) -> FloatArray:
+        return single_cumulative(assembly, r) + waves.cumulative(r)[:, 0] + beam
+
+    once = float(single_cumulative(assembly, np.array([np.inf]))[0])
+    return Side(_interpolated(light, radii), once + float(waves.values[0, 0]) + beam)
+
+
+def _interpolated(light: Callable[[FloatArray], FloatArray], radii: FloatArray) -> FloatArray:
+    """Return a smooth function at the radii; of many, by a spline in log r."""
+    if radii.size <= _FEW_RADII:
+        return light(radii)
+    decades = np.log10(radii[-1] / radii[0])
+    knots = np.geomspace(radii[0], radii[-1], int(np.ceil(_PER_DECADE * decades)) + 1)
+    found: FloatArray = CubicSpline(np.log(knots), light(knots))(np.log(radii))
+    return found
+
+
+def _without_rounding(values: FloatArray, total: Transforms) -> FloatArray:
+    """Return T(k) with zeros from the first on that is next to nothing."""
+    low = np.flatnonzero(np.abs(values[:, 0]) < _ROUNDING * total.transmitted)
+    kept = values.copy()
+    if low.size:
+        kept[low[0] :] = 0.0
+    return kept
+
+
+def _errors(fine: Answer, halved: Answer, coarse: Answer) -> Errors:
+    """Return the errors of both sides."""
+    up = _side_errors(fine.reflected, halved.reflected, coarse.reflected)
+    if fine.transmitted is None or halved.transmitted is None or coarse.transmitted is None:
+        return Errors(up, None)
+    return Errors(up, _side_errors(fine.transmitted, halved.transmitted, coarse.transmitted))
+
+
+def _side_errors(fine: Side, halved: Side, coarse: Side) -> SideErrors:
+    """Compare the light within each radius, and altogether: N with N - 4, and both splines."""
+    apart = [halved.edges - coarse.edges, fine.edges - halved.edges]
+    of_annuli = [np.diff(np.append(0.0, each)) for each in apart]
+    spline = float(np.max(np.abs(apart[1])))
+    return SideErrors(_summed(apart), _summed(of_annuli), spline)
+
+
+def _summed(apart: list[FloatArray]) -> FloatArray:
+    found: FloatArray = np.abs(apart[0]) + np.abs(apart[1])
+    return found

@@ -1,0 +1,28 @@
+"""A small report, made once: a material with a dangerous name, few kernels, small pictures."""
+
+import dataclasses
+import functools
+
+import cli_world
+
+from sssfit.report import Report, make_report, page
+
+NAME = "<script>alert(1)</script>"
+LABEL = "<img src=x onerror=alert(2)>"
+SIDE = 48
+
+
+@functools.cache
+def report() -> Report:
+    """With a chain of stages, a disk, shared first passes, models and a budget."""
+    named = [(LABEL, cli_world.taps())]
+    small = {"side": SIDE, "photons": 100_000, "mm_per_pixel": 0.3, "threads": 2}
+    made = make_report(cli_world.wax(), named=named, only=["disk", "svd"], **small)
+    # Files of materials refuse such names; profiles of other programs may have any.
+    return dataclasses.replace(made, name=NAME)
+
+
+@functools.cache
+def text() -> str:
+    """Its page."""
+    return page(report())

@@ -1,0 +1,172 @@
+"""Profiles under a beam of finite width: closed forms, slow integrals, walks, and bad input."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from sssfit.errors import ProfileError
+from sssfit.material import load_material
+from sssfit.profile import FORMAT, Profile
+from sssfit.profile.beam import Beam, lens_area, parse_beam, under_beam
+from sssfit.simulate import simulate_exact, simulate_montecarlo
+from sssfit.simulate.runner import simulate_to_files
+
+VARIANCES = np.array([0.05, 0.3, 2.0])
+WEIGHTS = np.array([0.2, 0.3, 0.1])
+
+
+def within(r, variances):
+    """The energy of Gaussians within a radius."""
+    return (WEIGHTS * -np.expm1(-(r[:, None] ** 2) / (2.0 * variances))).sum(axis=1)
+
+
+def gaussians():
+    """A profile of three Gaussians in annuli of a sixtieth of the narrowest one's deviation."""
+    width = np.sqrt(VARIANCES[0]) / 60.0
+    edges = width * np.arange(int(9.0 / width) + 1)
+    energy = np.diff(within(edges, VARIANCES))[:, None]
+    none = np.zeros(1)
+    meta = {"format": FORMAT, "channels": ["grey"], "method": "gaussians"}
+    return Profile(
+        edges, energy, 0.0 * energy, WEIGHTS.sum() - energy.sum(axis=0), none, 0.0,
+        np.zeros((0, 1)), none, None, meta,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("radius", [0.5, 1.3])
+def test_a_sum_of_gaussians_under_a_gaussian_has_its_closed_form(radius):
+    """A beam of 1/e^2 radius w has the variance w^2 / 4, and variances add: to 1e-6."""
+    found = under_beam(gaussians(), Beam("gaussian", radius))
+    theory = within(found.r_edges_mm, VARIANCES + radius**2 / 4.0)
+    assert np.abs(found.cumulative[:, 0] - theory).max() < 1e-6
+
+
+def test_a_flat_beam_is_the_mean_over_its_disk():
+    """F(r) against the mean of F over points of the disk: numbers of the golden spiral."""
+    radius, profile = 1.0, gaussians()
+    found = under_beam(profile, Beam("flat", radius))
+    count = 20_000
+    far = radius * np.sqrt((np.arange(count) + 0.5) / count)
+    r = np.array([0.3, 1.0, 2.0, 4.0])
+    # Light of a Gaussian around a point at a distance: a distribution of chi-square, not central.
+    from scipy.stats import ncx2
+
+    theory = sum(
+        w * ncx2.cdf(r[:, None] ** 2 / v, 2, far**2 / v).mean(axis=1)
+        for w, v in zip(WEIGHTS, VARIANCES, strict=True)
+    )
+    seen = np.interp(r, found.r_edges_mm, found.cumulative[:, 0])
+    np.testing.assert_allclose(seen, theory, atol=3e-5)
+
+
+@pytest.mark.parametrize("kind", ["gaussian", "flat"])
+def test_energy_stays(kind):
+    profile = simulate_exact(load_material("skin1"), dr_mm=0.2)
+    found = under_beam(profile, Beam(kind, 0.7))
+    np.testing.assert_allclose(found.diffuse_reflectance, profile.diffuse_reflectance, rtol=1e-12)
+    assert found.r_edges_mm[-1] > profile.r_edges_mm[-1] + 0.7
+    np.testing.assert_array_equal(found.r_edges_mm[: len(profile.r_edges_mm)], profile.r_edges_mm)
+    # Density in the middle is finite: of a Gaussian of deviation .35 it falls by a quarter from r =
+    # .1 to .3, and of a pencil as 1/r.
+    before, after = (
+        each.annulus_energy[:2] / np.diff(each.r_edges_mm[:3, None] ** 2, axis=0)
+        for each in (profile, found)
+    )
+    assert (before[0] > 2.5 * before[1]).all()
+    assert (after[0] < 1.4 * after[1]).all()
+
+
+@pytest.mark.parametrize("kind", ["gaussian", "flat"])
+def test_a_narrow_beam_changes_little_and_two_radii_are_apart(kind):
+    profile = simulate_exact(load_material("skin1"), dr_mm=0.5)
+    total = profile.diffuse_reflectance
+    apart = [
+        np.abs(
+            under_beam(profile, Beam(kind, radius)).annulus_energy[: profile.n_annuli]
+            - profile.annulus_energy
+        ).sum(axis=0)
+        / total
+        for radius in (0.05, 0.5)
+    ]
+    assert (apart[0] < 0.06).all()
+    assert (apart[1] > 5.0 * apart[0]).all()
+
+
+def test_errors_of_walks_are_those_of_other_seeds():
+    """The spread of 40 walks under a beam, against the standard error that each tells."""
+    material = load_material("skin1")
+    made = [
+        under_beam(
+            simulate_montecarlo(material, photons=4000, seed=seed, dr_mm=0.4, radius_mm=12.0),
+            Beam("gaussian", 1.0),
+        )
+        for seed in range(1, 41)
+    ]
+    energy = np.stack([each.annulus_energy[:20] for each in made])
+    told = np.sqrt(np.mean([each.annulus_energy_stderr[:20] ** 2 for each in made], axis=0))
+    ratio = energy.std(axis=0, ddof=1) / told
+    # The standard deviation of 40 values is known to 11 %; 60 of them, correlated, to less.
+    assert abs(ratio.mean() - 1.0) < 0.15
+
+
+def test_transmitted_light_is_spread_too():
+    slab = dataclasses.replace(
+        load_material("skin1"), layers=tuple(
+            dataclasses.replace(each, thickness_mm=1.0) for each in load_material("skin1").layers
+        )
+    )  # fmt: skip
+    profile = simulate_montecarlo(slab, photons=5000, dr_mm=0.3, radius_mm=9.0)
+    found = under_beam(profile, Beam("flat", 2.0))
+    np.testing.assert_allclose(found.transmittance, profile.transmittance, rtol=1e-12)
+    assert found.annulus_transmittance[0, 0] < profile.annulus_transmittance[0, 0]
+
+
+def test_disks_share_their_lens():
+    """Counted points against the formula; one inside the other, and apart."""
+    x, y = (np.random.default_rng(1).random((2, 400_000)) - 0.5) * 4.0
+    for other, apart in ((0.8, 0.9), (0.5, 0.2), (0.8, 3.0), (1.9, 1.5)):
+        both = (x**2 + y**2 < 1.0) & ((x - apart) ** 2 + y**2 < other**2)
+        area = float(lens_area(np.array([1.0]), other, np.array([apart]))[0])
+        assert 16.0 * both.mean() == pytest.approx(area, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("gausian:1", "did you mean gaussian"),
+        ("flat", "positive number of mm"),
+        ("flat:0", "positive number of mm"),
+        ("flat:-1", "positive number of mm"),
+        ("gaussian:nan", "positive number of mm"),
+        ("gaussian:inf", "positive number of mm"),
+        ("gaussian:1cm", "positive number of mm"),
+        ("", "expected gaussian:RADIUS or flat:RADIUS"),
+    ],
+)
+def test_bad_beams_are_refused(text, words):
+    with pytest.raises(ProfileError, match=words):
+        parse_beam(text)
+
+
+def test_a_beam_is_not_put_on_a_beam():
+    profile = under_beam(gaussians(), parse_beam("flat:1"))
+    assert profile.meta["beam"] == "flat:1"
+    with pytest.raises(ProfileError, match="under a beam already: flat:1"):
+        under_beam(profile, parse_beam("flat:1"))
+
+
+def test_files_are_under_the_beam_and_a_finished_one_of_another_is_not_taken(tmp_path, caplog):
+    caplog.set_level("INFO", logger="sssfit")
+    material, path = load_material("skin1"), tmp_path / "x.npz"
+    given = {"photons": 2000, "dr_mm": 0.5, "radius_mm": 10.0}
+    beam = parse_beam("gaussian:1")
+    run = lambda **more: simulate_to_files([material], [path], settings=given, **more).outcomes[0]  # noqa: E731
+    pencil = run()
+    wide = run(beam=beam)
+    np.testing.assert_array_equal(
+        wide.profile.annulus_energy, under_beam(pencil.profile, beam).annulus_energy
+    )
+    assert run(beam=beam, resume=True).seconds is None
+    assert run(resume=True).seconds is not None
+    assert "beam" not in Profile.load(path).meta

@@ -1,0 +1,290 @@
+"""A report's parts without a browser: packing, policy, scripts, charts and errors."""
+
+import base64
+import hashlib
+import html
+import json
+import os
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import cli_world
+import numpy as np
+import pytest
+import report_world as world
+
+from sssfit.errors import RenderError
+from sssfit.formats.pictures import save_image
+from sssfit.material import parse_material
+from sssfit.measure.delta_e import delta_e_of_lab, lab
+from sssfit.report import finished_page, is_report_file, library_page, make_report, page
+from sssfit.report.html import SCRIPTS, script_text
+from sssfit.report.kept import kept, page_key
+from sssfit.report.pack import packed_picture, unpacked_picture
+from sssfit.report.pictures import _reduced
+from sssfit.scene.record import Scene
+from sssfit.simulate import simulate_exact
+
+STATIC = Path(__file__).parents[1] / "sssfit" / "report" / "static"
+
+
+@pytest.mark.parametrize("shape", [(5, 7, 3), (4, 1, 1), (1, 6, 2)])
+def test_a_packed_picture_comes_back_as_half_floats(shape):
+    picture = np.random.default_rng(2).normal(size=shape)
+    back = unpacked_picture(packed_picture(picture))
+    np.testing.assert_array_equal(back, picture.astype(np.float16).astype(float))
+
+
+def test_light_beyond_half_floats_is_refused():
+    with pytest.raises(RenderError, match="65504 of half floats"):
+        packed_picture(np.full((2, 2, 3), 1e6))
+
+
+def test_a_large_picture_is_reduced_by_means(caplog):
+    light = np.random.default_rng(3).random((9, 5, 3))
+    with caplog.at_level("INFO", logger="sssfit"):
+        small = _reduced(Scene("face", light, 0.1), 4)
+    assert small.irradiance.shape == (3, 2, 3)
+    assert small.mm_per_pixel == pytest.approx(0.3)
+    np.testing.assert_allclose(small.irradiance[0, 0], light[:3, :3].mean(axis=(0, 1)))
+    np.testing.assert_allclose(small.irradiance[2, 1], light[6:, 3:].mean(axis=(0, 1)))
+    assert "scaled down by 3" in caplog.text
+
+
+def test_the_policy_has_the_hashes_of_the_one_script_and_the_one_style():
+    text = world.text()
+    (policy,) = re.findall(r'Content-Security-Policy" content="([^"]*)"', text)
+    (script,) = re.findall(r'<script type="module">(.*?)</script>', text, re.DOTALL)
+    (style,) = re.findall(r"<style>(.*?)</style>", text, re.DOTALL)
+    for name, each in (("script", script), ("style", style)):
+        digest = base64.b64encode(hashlib.sha256(each.encode()).digest()).decode()
+        assert f"{name}-src 'sha256-{digest}'" in html.unescape(policy)
+    assert "default-src 'none'" in html.unescape(policy)
+    assert " style=" not in re.sub(r"<script.*?</script>", "", text, flags=re.DOTALL)
+
+
+def test_nothing_comes_from_elsewhere():
+    text = world.text()
+    found = re.findall(r'(?:src|href)="([^"#][^"]*)"', text)
+    assert [each for each in found if each != "data:,"] == []
+    assert len(text) < 5e6
+
+
+def test_a_name_cannot_leave_its_place():
+    text = world.text()
+    assert "<script>alert" not in text
+    assert "<img" not in text
+    (data,) = re.findall(r'id="data">(.*?)</script>', text, re.DOTALL)
+    assert json.loads(data)["name"] == world.NAME
+
+
+def test_modules_share_one_scope_and_have_no_name_twice():
+    names = re.findall(
+        r"^(?:const|let|class|function|async function) (\w+)", script_text(), re.MULTILINE
+    )
+    assert len(names) == len(set(names)) > 30
+    assert "import " not in script_text()
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_a_module_imports_from_those_before_it(name):
+    text = (STATIC / f"{name}.js").read_text(encoding="utf-8")
+    known = SCRIPTS[: SCRIPTS.index(name)]
+    for names, other in re.findall(r"^import \{([^}]*)\} from '\./(\w+)\.js';", text, re.MULTILINE):
+        assert other in known
+        source = (STATIC / f"{other}.js").read_text(encoding="utf-8")
+        for each in names.replace(" ", "").split(","):
+            exported = rf"^export (?:const|function|async function|class) {each}\b"
+            assert re.search(exported, source, re.MULTILINE), each
+    assert len(text.splitlines()) <= 250
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
+@pytest.mark.parametrize("path", sorted(STATIC.glob("*.js")), ids=lambda path: path.stem)
+def test_modules_are_javascript(path):
+    command = ["node", "--check", "--input-type=module"]
+    ran = subprocess.run(command, input=path.read_bytes(), capture_output=True, check=False)
+    assert ran.returncode == 0, ran.stderr.decode()
+
+
+# Of TypeScript's checks: unknown names, missing exports, and wrong numbers of arguments. Types of
+# elements would need a cast in every second line.
+CHECKED = {"TS2304", "TS2305", "TS2306", "TS2307", "TS2552", "TS2554", "TS2555", "TS2588"}
+
+
+def test_names_imports_and_calls_are_right(tmp_path):
+    """By TypeScript, which CI installs; it must also find faults that are put in."""
+    if shutil.which("tsc") is None:
+        if os.environ.get("CI") == "true":
+            pytest.fail("tsc is missing, and CI installs it")
+        pytest.skip("needs tsc")
+    shutil.copytree(STATIC, tmp_path / "static")
+    # Known to browsers since 2020, and not yet to TypeScript 4.8.
+    members = "constructor(format: string); readable: any; writable: any;"
+    declared = f"declare class DecompressionStream {{ {members} }}"
+    (tmp_path / "known.d.ts").write_text(declared)
+    assert faults_of(tmp_path) == []
+    with (tmp_path / "static" / "main.js").open("a") as out:
+        out.write("import { nothing } from './half.js';\nexrOf(1, 2, 3, 4);\nmystery();\n")
+    assert sorted(faults_of(tmp_path)) == ["TS2304", "TS2305", "TS2554"]
+
+
+def faults_of(folder):
+    """The kinds of faults that TypeScript finds in modules of a folder, of those that we check."""
+    library = ["--target", "ES2022", "--lib", "ES2022,DOM,DOM.Iterable", "--module", "ES2022"]
+    paths = [folder / "known.d.ts", *sorted((folder / "static").glob("*.js"))]
+    command = ["tsc", "--noEmit", "--allowJs", "--checkJs", *library, *map(str, paths)]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    found = re.findall(r"error (TS\d+)", ran.stdout)
+    assert "TS2339" in found, ran.stdout + ran.stderr  # it did read them
+    return [each for each in found if each in CHECKED or each.startswith("TS1")]
+
+
+@pytest.mark.skipif(shutil.which("node") is None, reason="needs node")
+def test_the_pages_colours_are_the_librarys():
+    """Delta E of random and of grey pairs against colour-science's, and L, a, b."""
+    rng = np.random.default_rng(5)
+    pairs = rng.random((400, 2, 3))
+    pairs[:50] = pairs[:50, :, :1]  # greys have no hue
+    pairs[50:100, 1] = np.clip(pairs[50:100, 0] + rng.normal(size=(50, 3)) * 0.01, 0.0, 1.0)
+    code = (
+        f"import {{ labOf, deltaE }} from '{STATIC / 'colour.js'}';"
+        "const pairs = JSON.parse(process.argv[1]);"
+        "console.log(JSON.stringify(pairs.map((pair) => {"
+        "const labs = pair.map((each) => labOf(...each)); return [labs, deltaE(...labs)]; })));"
+    )
+    command = ["node", "--experimental-default-type=module", "--input-type=module", "-e", code]
+    ran = subprocess.run(
+        [*command, json.dumps(pairs.tolist())], capture_output=True, text=True, check=False
+    )
+    assert ran.returncode == 0, ran.stderr
+    labs, errors = zip(*json.loads(ran.stdout), strict=True)
+    ours = np.stack([lab(pairs[:, k]) for k in (0, 1)], axis=1)
+    np.testing.assert_allclose(labs, ours, atol=1e-9)
+    np.testing.assert_allclose(errors, delta_e_of_lab(ours[:, 0], ours[:, 1]), atol=1e-7)
+
+
+def test_the_front_of_the_page_is_that_of_the_comparison():
+    report = world.report()
+    first = report.comparison.pictures[0].name
+    front = [row.label for row in report.comparison.front(first, "delta-e", "fetches")]
+    assert report.front == front
+    assert {each.label for each in report.kernels} == {row.label for row in report.comparison.rows}
+
+
+def test_two_channels_have_no_colour():
+    text = cli_world.WAX.replace("eta", 'channels = ["a", "b"]\neta', 1)
+    text = re.sub(r"\[([\d.]+), ([\d.]+), [\d.]+\]", r"[\1, \2]", text)
+    with pytest.raises(RenderError, match="2 channels have no colour"):
+        make_report(parse_material(text, "two.toml"))
+
+
+def test_a_page_knows_itself(tmp_path):
+    ours, other = tmp_path / "a.html", tmp_path / "b.html"
+    ours.write_text(world.text(), encoding="utf-8")
+    other.write_text("<!doctype html><title>mine</title>", encoding="utf-8")
+    assert is_report_file(ours)
+    assert not is_report_file(other)
+
+
+def test_the_index_has_a_swatch_of_each_material():
+    text = library_page([cli_world.wax()], threads=2)
+    assert text.count('class="swatch"') == 1
+    assert "<h2>wax</h2>" in text
+    (data,) = re.findall(r'id="data">(.*?)</script>', text, re.DOTALL)
+    picture = unpacked_picture(json.loads(data)["swatches"][0])
+    assert picture.shape == (96, 96, 3)
+    assert np.percentile(picture[picture.max(axis=2) > 0.0].max(axis=1), 99.0) > 0.7
+
+
+def test_a_picture_of_ones_own_comes_first_with_its_pixels(tmp_path):
+    light = np.random.default_rng(4).random((40, 30, 3))
+    save_image(tmp_path / "face.exr", light, channels=("R", "G", "B"), mm_per_pixel=0.2)
+    profile, files = cli_world.profile(), {"irradiance": str(tmp_path / "face.exr")}
+    made = make_report(profile, only=["disk"], side=20, threads=2, **files)
+    first = made.pictures[0]
+    assert (first.key, first.scene.irradiance.shape) == ("own", (20, 15, 3))
+    assert made.comparison.mm_per_pixel == pytest.approx(0.4)
+    assert made.models is None
+    assert made.budgets == ()
+    assert "Error budget" not in page(made)
+
+
+def finished(**more):
+    """A small page of a profile, kept in a folder of its own."""
+    return finished_page(cli_world.profile(), only=["disk"], side=16, threads=1, **more)
+
+
+def edged(columns):
+    """A picture that is lit on one half."""
+    picture = np.zeros((40, columns, 3))
+    picture[:20] = 1.0
+    return picture
+
+
+def test_a_page_is_kept_with_what_was_said(tmp_path, monkeypatch, caplog):
+    caplog.set_level("INFO", logger="sssfit")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    save_image(tmp_path / "face.exr", edged(30), mm_per_pixel=0.2)
+    first = finished(irradiance=str(tmp_path / "face.exr"))
+    told = caplog.text
+    assert "scaled down by 3" in told
+    caplog.clear()
+    monkeypatch.setattr("sssfit.report.finished.make_report", None)
+    assert finished(irradiance=str(tmp_path / "face.exr")) == first
+    assert [line.split(": ")[-1] for line in caplog.text.splitlines()] == [
+        line.split(": ")[-1] for line in told.splitlines()
+    ]
+    save_image(tmp_path / "face.exr", edged(31), mm_per_pixel=0.2)
+    with pytest.raises(TypeError):  # another picture is another page
+        finished(irradiance=str(tmp_path / "face.exr"))
+
+
+def test_a_damaged_page_is_made_again(tmp_path, monkeypatch, caplog):
+    caplog.set_level("INFO", logger="sssfit")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr("sssfit.report.finished.page", lambda made: made.name)
+    first = finished()
+    (path,) = (tmp_path / "pages").glob("*.json")
+    raw = bytearray(path.read_bytes())
+    raw[40] ^= 1
+    path.write_bytes(raw)
+    assert finished() == first
+    assert path.read_bytes() != raw
+
+
+def test_ten_pages_are_kept(tmp_path, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    monkeypatch.setattr("sssfit.report.kept.logging.Logger.isEnabledFor", lambda *_: True)
+    for k in range(12):
+        assert kept(page_key({"number": k}), lambda k=k: {"made": k}) == {"made": k}
+    assert len(list((tmp_path / "pages").iterdir())) == 10
+
+
+def test_a_folder_that_cannot_be_written_keeps_nothing(tmp_path, monkeypatch):
+    (tmp_path / "pages").write_text("a file")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
+    assert kept(page_key({}), lambda: {"made": 1}) == {"made": 1}
+    assert (tmp_path / "pages").read_text() == "a file"
+
+
+def test_the_index_links_to_pages_beside_it(tmp_path):
+    (tmp_path / "wax.html").write_text(world.text(), encoding="utf-8")
+    assert '<a href="wax.html">wax</a>' in library_page(
+        [cli_world.wax()], beside=tmp_path, threads=2
+    )
+    (tmp_path / "wax.html").write_text("<!doctype html> of somebody else", encoding="utf-8")
+    text = library_page([cli_world.wax()], beside=tmp_path, threads=2)
+    assert "<a href" not in text
+    assert "sssfit report wax" in text
+
+
+def test_one_channel_is_grey():
+    text = cli_world.WAX.replace("eta", 'channels = ["grey"]\neta', 1)
+    text = re.sub(r"\[([\d.]+), [\d.]+, [\d.]+\]", r"[\1]", text)
+    grey = simulate_exact(parse_material(text, "grey.toml"), threads=1)
+    made = make_report(grey, only=["disk"], side=16, threads=1)
+    assert made.to_dict()["kernels"][0]["albedo"] == [pytest.approx(grey.diffuse_reflectance[0])]
+    assert "grey" in page(made)

@@ -1,0 +1,332 @@
+"""The solver for layers against published values, the other solver, reciprocity and energy."""
+
+import math
+
+import numpy as np
+import pytest
+import reference
+from checks import medium
+from checks_layers import layer, stack
+
+from sssfit.errors import SimulationError, StoppedError
+from sssfit.material import Material, load_material
+from sssfit.simulate import simulate_exact, simulate_exact_many
+from sssfit.simulate.half_space import diffuse_reflectance
+from sssfit.simulate.stack import limits
+from sssfit.simulate.stack.assembly import Assembly, _spans, reflected_at, transforms_at
+from sssfit.simulate.stack.azimuth import azimuth_of
+from sssfit.simulate.stack.families import families_of
+from sssfit.simulate.stack.modes import modes_of
+from sssfit.simulate.stack.nodes import Nodes, snell_reflectance
+from sssfit.simulate.stack.phase import henyey_greenstein, legendre_series, medium_of
+from sssfit.simulate.stack.single import single_cumulative, single_transform
+from sssfit.simulate.stack.slabs import Slab, SlabStack, stacks_of
+from sssfit.simulate.stack.transform import Wavenumbers, bessel_tail, refined
+
+WAVENUMBERS = (0.0, 0.05, 0.7, 4.0, 30.0)
+SKIN = (Slab(0.5, 20.0, 0.8, 1.45, 0.1), Slab(0.1, 10.0, 0.8, 1.38))
+SLABS = (
+    Slab(0.3, 8.0, 0.6, 1.4, 0.2),
+    Slab(0.0, 0.0, 0.0, 1.5, 0.1),
+    Slab(0.1, 4.0, 0.2, 1.33, 0.5),
+)
+
+
+def solved(slabs, k, count=16, **around):
+    """R(k), T(k) and absorption of a stack, without the beam."""
+    assembly = Assembly.of(SlabStack(tuple(slabs), **around), count)
+    azimuth = azimuth_of(k, assembly.least_sigma_t)
+    modes = lambda each: modes_of(each, k, azimuth)  # noqa: E731
+    return assembly, transforms_at(assembly, k, azimuth, modes), azimuth, modes
+
+
+def totals(slabs, count, **around):
+    """R and T with the beam, which the specular reflection is a part of."""
+    assembly, found, _, _ = solved(slabs, 0.0, count, **around)
+    beam = assembly.beam
+    return found.reflected + beam.reflected, found.transmitted + beam.transmitted
+
+
+def test_a_slab_is_van_de_hulsts():
+    # van de Hulst 1980, table 35: g = .75, albedo .9, optical depth 2
+    found = totals([Slab(10.0, 90.0, 0.75, 1.0, 0.02)], 24)
+    np.testing.assert_allclose(found, (0.09739, 0.66096), rtol=0, atol=6e-6)
+
+
+def test_a_half_space_is_giovanellis():
+    found = totals([Slab(10.0, 90.0, 0.0, 1.5)], 16)[0]
+    assert found == pytest.approx(0.2600, abs=1e-4)  # the last digit of his table
+    assert found == pytest.approx(diffuse_reflectance([0.9], 1.5)[0] + 0.04, abs=1e-6)
+
+
+@pytest.mark.parametrize("albedo", [0.5, 0.9, 0.99])
+def test_totals_are_chandrasekhars(albedo):
+    found = totals([Slab(1.0 - albedo, albedo, 0.0, 1.0)], 16)[0]
+    assert found == pytest.approx(reference.chandrasekhar_total(albedo), abs=1e-6)
+
+
+@pytest.mark.parametrize("k", WAVENUMBERS)
+def test_a_layer_cut_in_two_is_the_same(k):
+    whole = [Slab(0.2, 10.0, 0.8, 1.4, 0.3), SKIN[1]]
+    cut = [Slab(0.2, 10.0, 0.8, 1.4, 0.15)] * 2 + [SKIN[1]]
+    assert solved(cut, k)[1].reflected == pytest.approx(solved(whole, k)[1].reflected, abs=1e-10)
+
+
+@pytest.mark.parametrize("k", WAVENUMBERS)
+@pytest.mark.parametrize("slab", SLABS)
+def test_a_slab_cut_in_two_passes_on_the_same(k, slab):
+    rest = [Slab(0.1, 5.0, 0.5, 1.3, 0.4)]
+    k = k or 1e-3  # 0 is singular with a clear layer
+    halves = [Slab(slab.sigma_a, slab.sigma_s, slab.g, slab.eta, 0.5 * slab.thickness)] * 2
+    whole, cut = (solved([*each, *rest], k)[1] for each in ([slab], halves))
+    assert cut.reflected == pytest.approx(whole.reflected, abs=1e-10)
+    assert cut.transmitted == pytest.approx(whole.transmitted, abs=1e-10)
+
+
+@pytest.mark.parametrize("slabs", [SKIN, SLABS, SLABS[::-1]])
+@pytest.mark.parametrize("g", [-0.6, 0.0, 0.9])
+def test_energy_is_conserved(slabs, g):
+    slabs = [Slab(s.sigma_a, s.sigma_s, g * bool(s.sigma_s), s.eta, s.thickness) for s in slabs]
+    k = 1e-6 if any(each.is_clear for each in slabs) else 0.0  # 0 is singular with a clear layer
+    assembly, found, _, _ = solved(slabs, k)
+    beam = assembly.beam
+    left = found.reflected + found.transmitted + beam.reflected + beam.transmitted
+    assert left + sum(found.absorbed) == pytest.approx(1.0, abs=1e-12 if k == 0.0 else 1e-9)
+
+
+@pytest.mark.parametrize("k", WAVENUMBERS[:4])
+def test_paths_can_be_reversed(k):
+    # Helmholtz: L-(i) = sum rho(i, j) mu_j w_j L+(j) with rho symmetric, but for the sign of k.
+    assembly, _, azimuth, modes = solved(SKIN, k)
+    floor = _spans(assembly, k, azimuth, modes, None)[1][1].matrix
+    directions = assembly.media[1].directions
+    rho = floor / np.tile(directions.cosine, azimuth.orders)
+    sign = np.repeat((-1.0) ** np.arange(azimuth.orders), directions.cosine.size)
+    np.testing.assert_allclose(rho, sign[:, None] * rho.T * sign, rtol=0, atol=1e-9 * rho.max())
+
+
+@pytest.mark.parametrize("k", [0.3, 2.0, 11.0])
+def test_a_clear_layer_turns_and_fades_light_as_its_formula(k):
+    clear, scattering = Slab(0.4, 0.0, 0.0, 1.4, 0.3), Slab(0.3, 2.0, 0.0, 1.4)
+    # A layer that scatters next to nothing is solved by modes, one that does not by a formula.
+    nearly = Slab(0.4, 1e-7, 0.0, 1.4, 0.3)
+    azimuth = azimuth_of(k, 0.4)
+    modes = lambda each: modes_of(each, k, azimuth)  # noqa: E731
+    formula, by_modes = (
+        transforms_at(Assembly.of(SlabStack((each, scattering)), 16), k, azimuth, modes).reflected
+        for each in (clear, nearly)
+    )
+    assert formula == pytest.approx(by_modes, abs=1e-7)
+
+
+def test_what_is_left_out_deep_below_is_not_seen():
+    deep = [*SKIN[:1], Slab(0.1, 10.0, 0.8, 1.38, 2.0), Slab(3.0, 1.0, 0.3, 1.5, 1.0)]
+    k = 10.0  # k z = 20 at the end of the second layer
+    assembly, whole, azimuth, modes = solved(deep, k)
+    cut = reflected_at(assembly, k, azimuth, modes, 1)
+    assert cut == pytest.approx(whole.reflected, abs=1e-8)
+    assert assembly.last_seen(k, 14.0) == 1
+    assert assembly.last_seen(0.1, 14.0) is None
+
+
+@pytest.mark.parametrize("slabs", [SKIN, SLABS])
+def test_single_scattering_is_the_same_in_both_forms(slabs):
+    # F_1(r) = r int f(k) J1(k r) dk; both are of the light that leaves without a reflection.
+    assembly = Assembly.of(SlabStack(slabs), 48)
+    once = single_transform(assembly, 0.0, azimuth_of(0.0, 1.0))
+    total = float(single_cumulative(assembly, np.array([np.inf]))[0])
+    assert once == pytest.approx(total, abs=2e-7)
+
+
+def test_single_scattering_has_its_closed_form():
+    assembly = Assembly.of(SlabStack((Slab(0.3, 0.7, 0.0, 1.3),)), 16)
+    radii = np.array([1e-3, 0.05, 0.7, 3.0])
+    theory = [reference.single_scattering_cumulative(r, 0.7, 1.3) for r in radii]
+    np.testing.assert_allclose(single_cumulative(assembly, radii), theory, rtol=0, atol=1e-7)
+
+
+@pytest.mark.parametrize("g", [-0.5, 0.0, 0.7, 0.9])
+@pytest.mark.parametrize("is_seen_through", [False, True])
+def test_scattering_conserves_light(g, is_seen_through):
+    nodes = Nodes.of((1.0, 1.4), 12)
+    found = medium_of(Slab(0.2, 3.0, g, 1.4), nodes, 3, is_seen_through=is_seen_through)
+    weight = found.directions.weight
+    of_beam = 2.0 * math.pi * weight @ (found.forward + found.backward)
+    assert of_beam == pytest.approx(found.sigma_s, rel=1e-12)
+    uniform = np.sqrt(2.0 * weight)  # equal radiance from all directions
+    np.testing.assert_allclose(found.even[0] @ uniform, found.sigma_s * uniform, rtol=1e-12)
+
+
+def test_the_series_is_henyey_and_greensteins():
+    cosine = np.linspace(-1.0, 1.0, 9)
+    series = legendre_series(0.6 ** np.arange(60.0), cosine)
+    np.testing.assert_allclose(series, henyey_greenstein(cosine, 0.6), rtol=1e-9)
+
+
+def test_nodes_integrate_over_every_medium():
+    nodes = Nodes.of((1.0, 1.33, 1.5), 16)
+    for eta in (1.0, 1.33, 1.5):
+        each = nodes.directions(eta)
+        for power in (0, 1, 3):
+            found = each.weight @ each.cosine**power
+            assert found == pytest.approx(1.0 / (power + 1.0), abs=1e-5), (eta, power)
+
+
+def test_reflection_obeys_fresnel():
+    p = np.array([0.0, 0.3, 0.999, 1.2])
+    found = snell_reflectance(p, 1.4, 1.0)
+    assert found[0] == pytest.approx((0.4 / 2.4) ** 2)
+    np.testing.assert_allclose(found[:3], snell_reflectance(p[:3], 1.0, 1.4))
+    assert found[3] == 1.0
+
+
+@pytest.mark.parametrize("p", [2, 3])
+def test_the_tail_of_the_bessel_integral(p):
+    from scipy.integrate import quad
+    from scipy.special import j1
+
+    for x in (1e-3, 0.4, 7.0, 29.0):
+        near = quad(lambda t: j1(t) / t**p, x, 60.0, limit=400, epsabs=1e-13)[0]
+        rest = float(bessel_tail(p, np.array([60.0]))[0])
+        assert float(bessel_tail(p, np.array([x]))[0]) == pytest.approx(near + rest, rel=1e-7)
+
+
+def test_the_hankel_integral_of_a_known_transform():
+    # f = exp(-k h) comes from F(r) = 1 - h / sqrt(r^2 + h^2)
+    h, radii = 0.7, np.array([0.01, 0.2, 1.0, 5.0, 30.0])
+    waves = refined(lambda k: np.exp(-k * h)[:, None], 1e-3, 60.0, 1e-8, 1.0)
+    expected = 1.0 - h / np.hypot(radii, h)
+    np.testing.assert_allclose(waves.cumulative(radii)[:, 0], expected, rtol=0, atol=2e-7)
+    assert isinstance(waves.halved(), Wavenumbers)
+
+
+@pytest.mark.parametrize("name", ["skin1", "marble"])
+def test_half_spaces_are_those_of_the_other_solver(name, monkeypatch):
+    material = load_material(name)
+    other = simulate_exact(material, tolerance=2e-5)
+    monkeypatch.setattr("sssfit.simulate.half_space.covers", lambda *_, **__: False)
+    ours = simulate_exact(material)
+    assert ours.meta["settings"]["solver"] == "layer"
+    apart = np.abs(ours.cumulative - other.cumulative) / other.diffuse_reflectance
+    assert apart.max() < 6e-5
+    assert ours.meta["relative_error"] < 1e-4
+    np.testing.assert_allclose(ours.absorbed, other.absorbed, rtol=0, atol=1e-5)
+
+
+@pytest.mark.slow
+def test_eleven_half_spaces_are_those_of_the_other_solver(monkeypatch):
+    from sssfit.material import material_names
+
+    materials = [load_material(name) for name in material_names(paper=True)]
+    others = simulate_exact_many(materials, tolerance=1e-5)
+    monkeypatch.setattr("sssfit.simulate.half_space.covers", lambda *_, **__: False)
+    for ours, other in zip(simulate_exact_many(materials), others, strict=True):
+        apart = np.abs(ours.cumulative - other.cumulative) / other.diffuse_reflectance
+        assert apart.max() < 6e-5, other.label
+
+
+def test_materials_that_share_a_layer_share_its_modes(monkeypatch):
+    dermis = layer(0.1, 10.0, 0.8, 1.4)
+    skins = [stack(layer(a, 20.0, 0.8, 1.4, 0.1), dermis) for a in (0.3, 1.0)]
+    assert families_of([each for skin in skins for each in stacks_of(skin)]) == [[0, 1]]
+    apart = [stack(layer(0.3, 20.0, 0.8, 1.5, 0.1), dermis), skins[1]]
+    assert families_of([each for skin in apart for each in stacks_of(skin)]) == [[0], [1]]
+    solved_for = []
+    real = modes_of
+    monkeypatch.setattr(
+        "sssfit.simulate.stack.sampling.modes_of",
+        lambda medium, *rest: solved_for.append(medium.slab.sigma_a) or real(medium, *rest),
+    )
+    together = simulate_exact_many(skins, tolerance=0.01)
+    assert solved_for.count(0.1) <= solved_for.count(0.3) + solved_for.count(1.0)
+    for skin, shared in zip(skins, together, strict=True):
+        alone = simulate_exact(skin, tolerance=0.01)
+        error = np.hypot(shared.cumulative_stderr, alone.cumulative_stderr)
+        assert (np.abs(shared.cumulative - alone.cumulative) <= error).all()
+
+
+def test_threads_do_not_change_the_result():
+    skin = stack(layer(0.5, 20.0, 0.8, 1.45, 0.1), layer(0.1, 10.0, 0.8, 1.38))
+    one, two = (simulate_exact(skin, tolerance=0.01, threads=n) for n in (1, 2))
+    np.testing.assert_array_equal(one.annulus_energy, two.annulus_energy)
+
+
+def test_the_error_covers_a_finer_answer():
+    skin = stack(layer(0.5, 20.0, 0.8, 1.45, 0.1), layer(0.1, 10.0, 0.8, 1.38))
+    coarse, fine = (simulate_exact(skin, tolerance=each) for each in (2e-3, 5e-5))
+    apart = np.abs(coarse.cumulative - fine.cumulative)
+    assert (apart[1:] <= coarse.cumulative_stderr[1:] + fine.cumulative_stderr[1:]).all()
+    assert fine.meta["relative_error"] <= 5e-5
+    assert coarse.meta["settings"]["directions"] < fine.meta["settings"]["directions"]
+
+
+def test_light_that_nothing_scatters_goes_by_lambert_and_fresnel():
+    glass = stack(layer(0.5, 0.0, 0.0, 1.5, 2.0))
+    profile = simulate_exact(glass, dr_mm=0.1, radius_mm=1.0)
+    r, fades = 0.04, math.exp(-1.0)
+    through = (1.0 - r) ** 2 * fades / (1.0 - (r * fades) ** 2)
+    assert profile.transmittance[0] == pytest.approx(through, rel=1e-12)
+    returned = (1.0 - r) ** 2 * r * fades**2 / (1.0 - (r * fades) ** 2)
+    assert profile.diffuse_reflectance[0] == pytest.approx(returned, rel=1e-12)
+    assert profile.annulus_energy[0, 0] == profile.diffuse_reflectance[0]
+    assert profile.energy_balance[0] == pytest.approx(0.0, abs=1e-14)
+
+
+def test_a_channel_without_scattering_stands_beside_others():
+    slab = stack(layer([0.5, 0.1], [0.0, 3.0], 0.5, 1.4, 2.0))
+    profile = simulate_exact(slab, tolerance=0.01, dr_mm=0.1, radius_mm=3.0)
+    assert profile.annulus_energy[5, 0] == 0.0
+    assert profile.annulus_energy[5, 1] > 0.0
+
+
+def test_similarity_is_used_where_it_is_asked_for():
+    skin = stack(layer(0.5, 20.0, 0.8, 1.45, 0.1), layer(0.1, 10.0, 0.8, 1.38))
+    reduced = stack(layer(0.5, 4.0, 0.0, 1.45, 0.1), layer(0.1, 2.0, 0.0, 1.38))
+    similar = simulate_exact(skin, tolerance=0.01, similarity=True)
+    np.testing.assert_allclose(
+        similar.annulus_energy, simulate_exact(reduced, tolerance=0.01).annulus_energy, atol=1e-12
+    )
+    assert similar.meta["settings"]["similarity"] is True
+    assert similar.material == skin
+
+
+def test_thin_slabs_that_scatter_far_ahead_are_refused_by_name():
+    thin = Material("film", ("red",), (layer(0.1, 30.0, 0.97, 1.4, 0.03),))
+    with pytest.raises(SimulationError, match=r"film red.*thin slab of g = 0\.97.*montecarlo"):
+        simulate_exact(thin, dr_mm=0.01, radius_mm=0.3)
+
+
+def test_a_thousand_layers_are_refused_with_the_memory_they_take():
+    many = stack(*[layer(0.1, 3.0, 0.5, 1.4, 0.01)] * 1000)
+    with pytest.raises(SimulationError, match=r"1000 layers.*GB.*montecarlo"):
+        simulate_exact(many, threads=2)
+
+
+def test_directions_stop_where_memory_does(monkeypatch):
+    skin = stack(layer(0.5, 20.0, 0.8, 1.45, 0.1), layer(0.1, 10.0, 0.8, 1.38))
+    channels = [limits.Channel("skin", stacks_of(skin)[0], 0.0, np.array([0.0, 1.0]))]
+    limit = limits._bytes(channels, 16, 1)
+    monkeypatch.setattr(limits, "_MOST_BYTES", limit)
+    with pytest.raises(SimulationError, match="cannot be met: 16 and 12 directions"):
+        simulate_exact(skin, tolerance=1e-5, threads=1)
+
+
+def test_it_can_be_stopped():
+    calls = iter([False, False])
+    skin = stack(layer(0.5, 20.0, 0.8, 1.45, 0.1), layer(0.1, 10.0, 0.8, 1.38))
+    with pytest.raises(StoppedError):
+        simulate_exact(skin, threads=1, stop=lambda: next(calls, True))
+
+
+def test_a_medium_thinner_than_what_is_above_it():
+    thin = stack(layer(0.1, 1.0, 0.5, 1.0), above=1.5)
+    profile = simulate_exact(thin, tolerance=0.001, dr_mm=0.2, radius_mm=20.0)
+    assert profile.meta["settings"]["solver"] == "layer"
+    assert abs(profile.energy_balance[0]) < 1e-4
+
+
+def test_a_half_space_is_no_different_under_a_name():
+    # The smallest half space that each solver takes: nothing is chosen but by the material.
+    assert simulate_exact(medium(0.3, 0.7, 1.3)).meta["settings"]["solver"] == "half-space"
+    forward = simulate_exact(medium(0.3, 3.5, 1.3, g=0.8), tolerance=0.01)
+    assert forward.meta["settings"]["solver"] == "layer"
