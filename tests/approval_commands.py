@@ -658,7 +658,6 @@ COMPARE = [
     ),
     C(f"compare wax.toml --picture disk {TINY} --photons 2000 --chart - --table t.md"),
     C(f"compare leaf.toml --picture disk {TINY} --error l2"),
-    C(f"compare plate.toml --picture disk {TINY}"),
     C(f"compare deon-skin --picture disk {TINY} --what front"),
     C(f"compare deon-skin --what budget --picture disk {TINY}"),
     C(f"compare - --what budget --picture disk {TINY}", stdin="mono.profile.npz"),

@@ -304,7 +304,7 @@ def test_bad_input_is_one_line():
     slab = parse_material(skin1.to_toml() + "thickness_mm = 5.0\n", "slab.toml")
     both = parse_material(forward.to_toml() + "thickness_mm = 5.0\n", "both.toml")
     for each in (slab, both):  # no advice on g, which would not be enough
-        with pytest.raises(SimulationError, match=r"is not one half space.*profile of its photon"):
+        with pytest.raises(SimulationError, match=r"is not one half space.*its exact profile"):
             error_budget(each, noise_scene())
     with pytest.raises(FitError, match="rank"):
         error_budget(skin1, noise_scene(), photons=1000, settings={"rank": 1000})

@@ -5,7 +5,6 @@ import io
 import json
 import math
 import os
-import re
 from importlib import import_module
 
 import numpy as np
@@ -224,16 +223,11 @@ def test_size_without_made_pictures_is_wrong_usage(run, tmp_path):
     assert "--size is for made" in run("skin1", "--picture", "mine.exr", "--size", "9x9", status=2)
 
 
-def test_a_slab_needs_its_photons_walked(run, tmp_path):
+def test_a_slab_is_compared_with_its_exact_profile(run, tmp_path):
     (tmp_path / "slab.toml").write_text(SLAB)
-    line = one_line(run("slab.toml", *SMALL, status=1))
-    assert "slab is not one half space" in line
-    # What it advises is done, and works.
-    (advised,) = re.findall(r"compare (\S+\.profile\.npz)", line)
-    with pytest.raises(SystemExit) as ended:
-        main(["simulate", "slab.toml", "--photons", "1000", "-q"])
-    assert ended.value.code == 0
-    assert "Take " in run(advised, *SMALL)
+    told = run("slab.toml", *SMALL)
+    assert "slab, exact: " in told
+    assert "Take " in told
 
 
 def test_a_stack_is_told_what_the_next_command_takes(run, tmp_path):
@@ -348,14 +342,16 @@ def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch, whi
 
     verb = import_module("sssfit.cli.compare")
     real = verb.load_source
-    (tmp_path / "marble.toml").write_text(SLAB)
-    # In place of the shipped marble, a slab.
+    film = "eta = 1.4\ng = 0.97\nsigma_a_per_mm = [0.1, 0.1, 0.1]\n"
+    film += "sigma_s_per_mm = [30, 30, 30]\nthickness_mm = 0.03\n"
+    (tmp_path / "marble.toml").write_text(film)
+    # In place of the shipped marble, a film that has too few directions.
     paths = {"marble": "marble.toml"}
     monkeypatch.setattr(verb, "load_source", lambda name: real(paths.get(name, name)))
     monkeypatch.setattr(material, "material_names", lambda **_: ("marble", "skin1"))
     (tmp_path / "out").mkdir()
     err = run(which, "-o", "out", *SMALL, status=1)
-    assert "1 of 2 materials failed; marble: marble is not one half space" in err
+    assert "1 of 2 materials failed; marble: marble R (a thin slab of g = 0.97" in err
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         "skin1-pareto.md",
         "skin1-pareto.png",

@@ -175,22 +175,15 @@ def _signed(value: float, _: int) -> str:
 
 def _title(comparison: ModelComparison) -> str:
     """Return the title with the material and the reference of the models."""
-    truth = "isotropic scattering" if _is_similar(comparison) else "the exact solution"
-    return f"{shortened(comparison.material.name, 20)}: models against {truth}"
-
-
-def _is_similar(comparison: ModelComparison) -> bool:
-    """Return whether the exact solution is for the similar isotropic medium (g is not 0)."""
-    return bool(comparison.exact.profile.meta["settings"].get("similarity"))
+    return f"{shortened(comparison.material.name, 20)}: models against the exact solution"
 
 
 def _subtitle(comparison: ModelComparison) -> str:
     """Return text about the walk, the exact solution and their grid."""
     exact, walk = comparison.exact.profile, comparison.walk.profile
     reached = 100.0 * float(exact.meta["relative_error"] or 0.0)
-    what = "Isotropic" if _is_similar(comparison) else "Exact"
     return (
-        f"{what} to {reached:.1g} % of the total · {count(walk.photons or 0)} photons, seed "
+        f"Exact to {reached:.1g} % of the total · {count(walk.photons or 0)} photons, seed "
         f"{walk.meta.get('seed', 'unknown')} · {grid(walk)} · sssfit {exact.meta['version']}"
     )
 
@@ -232,10 +225,10 @@ def _notes(comparison: ModelComparison, shown: Sequence[int]) -> list[str]:
         "where it has too few. Band: ±1 standard error of the walk. Errors: linear within ±10 % "
         "(grey), logarithmic beyond, above +1000 % not drawn. MFP: mean free path.",
     ]
-    if _is_similar(comparison):
+    if comparison.material.layers[0].g.any():
         notes.append(
-            "g is not 0: the black curve solves for isotropic scattering of (1 - g) sigma_s, which "
-            "is an approximation. The walk follows g itself: where the two differ, trust the walk."
+            "g is not 0: the models are of isotropic scattering of (1 - g) sigma_s, which is an "
+            "approximation; the exact solution and the walk follow g itself."
         )
     left = comparison.material.n_channels - len(shown)
     if left:

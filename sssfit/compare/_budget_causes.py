@@ -127,18 +127,18 @@ def make_sources(
 
 
 def _check_solvable(material: Material) -> None:
-    """Refuse what has no exact solution; one with g is reduced, and the walk's is not."""
+    """Refuse what the models do not cover; one with g is reduced by them, and not by the truth."""
     if not material.is_semi_infinite:
         raise SimulationError(
-            f"{material.name} is not one half space, and an error budget needs the exact solution, "
-            "which others do not have: compare kernels on the profile of its photon walk instead."
+            f"{material.name} is not one half space, and an error budget has the diffusion models, "
+            "which cover nothing else: compare kernels on its exact profile instead."
         )
     g = material.layers[0].g
     if np.any(g != 0.0):
         raise SimulationError(
-            f"{material.name}: g = {g[np.argmax(np.abs(g))]:g}; an error budget needs a truth, and "
-            "the exact solver has one for g = 0: give sigma_s (1 - g) as sigma_s_per_mm and leave "
-            "g out."
+            f"{material.name}: g = {g[np.argmax(np.abs(g))]:g}; an error budget has the "
+            "diffusion models, which are of g = 0: give sigma_s (1 - g) as sigma_s_per_mm and "
+            "leave g out."
         )
 
 

@@ -177,7 +177,7 @@ def error_budgets(
     Parameters
     ----------
     material : Material
-        A homogeneous half space with g = 0: what the exact solver covers.
+        A homogeneous half space with g = 0: what the diffusion models cover.
     scenes : sequence of Scene
         Flat, all of the same pixel size; their profiles and kernels are shared. What counts of
         them says `evaluated_scene`.

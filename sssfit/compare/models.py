@@ -140,7 +140,7 @@ def compare_models(
     Parameters
     ----------
     material : Material
-        A homogeneous half space; with g other than 0 the exact solver warns that it is reduced.
+        A homogeneous half space; with g other than 0 the models warn that it is reduced.
     walk : Profile, optional
         The material's photon walk, if there is one already; its grid then serves all.
     photons, seed, threads, progress
@@ -166,6 +166,11 @@ def compare_models(
     """
     if walk is not None:
         dr_mm, radius_mm = _grid_of(walk)
+    # The dipoles come first: they refuse layers before the seconds that the solution takes.
+    dipoles = [
+        simulate(material, dr_mm=dr_mm, radius_mm=radius_mm)
+        for simulate in (simulate_dipole, simulate_dipole_grosjean)
+    ]
     exact = simulate_exact(material, dr_mm=dr_mm, radius_mm=radius_mm, threads=threads)
     if walk is None:
         walk = simulate_montecarlo(
@@ -177,7 +182,11 @@ def compare_models(
             radius_mm=radius_mm,
             progress=progress,
         )
-    profiles = [exact, walk, *_diffusion(material, exact, dr_mm, radius_mm)]
+    # Normalised diffusion is told the true total, as by an artist.
+    burley = simulate_burley(
+        material, reflectance=exact.diffuse_reflectance, dr_mm=dr_mm, radius_mm=radius_mm
+    )
+    profiles = [exact, walk, *dipoles, burley]
     cuts = [_cuts(walk, channel) for channel in range(material.n_channels)]
     return ModelComparison(
         material=material,
@@ -207,18 +216,6 @@ def material_of_walk(profile: Profile) -> Material:
             "material, or the profile of its walk."
         )
     return material
-
-
-def _diffusion(
-    material: Material, exact: Profile, dr_mm: float | None, radius_mm: float | None
-) -> list[Profile]:
-    """Return the models' profiles; normalised diffusion is told the true total, as by an artist."""
-    total = exact.diffuse_reflectance
-    return [
-        simulate_dipole(material, dr_mm=dr_mm, radius_mm=radius_mm),
-        simulate_dipole_grosjean(material, dr_mm=dr_mm, radius_mm=radius_mm),
-        simulate_burley(material, reflectance=total, dr_mm=dr_mm, radius_mm=radius_mm),
-    ]
 
 
 def _grid_of(walk: Profile) -> tuple[float, float]:

@@ -20,7 +20,7 @@ from sssfit.simulate.stack.sampling import Family
 from sssfit.simulate.stack.slabs import stacks_of
 from sssfit.simulate.stack.solution import Answer, Errors, Side, SideErrors, steps
 
-COUNTS = (8, 12, 16, 20, 24, 28, 32, 36)
+COUNTS = (8, 12, 16, 20, 24, 28, 32, 36, 40)
 _QUICK = 2e-3  # a tolerance from which 8 and 12 directions may do
 _LEAST_GAIN = 2.0  # by which four more directions reduce an error, if it was not more before
 
