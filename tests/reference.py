@@ -214,24 +214,30 @@ def single_scattering_cumulative(r, albedo, eta):
     return albedo / 2.0 * (1.0 - specular) * integral
 
 
-def xoshiro128pp(state, count):
-    """First ``count`` outputs of xoshiro128++ (Blackman and Vigna 2021) in Python integers."""
-    mask = 0xFFFFFFFF
+def rotated_left(word, bits):
+    """Rotate 32 bits, in Python integers."""
+    return ((word << bits) | (word >> (32 - bits))) & 0xFFFFFFFF
 
-    def rotl(x, k):
-        return ((x << k) | (x >> (32 - k))) & mask
 
+def xoshiro128_step(state):
+    """Next state of xoshiro128 (Blackman and Vigna 2021) in Python integers."""
     s = list(state)
-    outputs = []
+    t = (s[1] << 9) & 0xFFFFFFFF
+    s[2] ^= s[0]
+    s[3] ^= s[1]
+    s[1] ^= s[2]
+    s[0] ^= s[3]
+    s[2] ^= t
+    s[3] = rotated_left(s[3], 11)
+    return s
+
+
+def xoshiro128pp(state, count):
+    """First ``count`` outputs of xoshiro128++ in Python integers."""
+    mask, outputs = 0xFFFFFFFF, []
     for _ in range(count):
-        outputs.append((rotl((s[0] + s[3]) & mask, 7) + s[0]) & mask)
-        t = (s[1] << 9) & mask
-        s[2] ^= s[0]
-        s[3] ^= s[1]
-        s[1] ^= s[2]
-        s[0] ^= s[3]
-        s[2] ^= t
-        s[3] = rotl(s[3], 11)
+        outputs.append((rotated_left((state[0] + state[3]) & mask, 7) + state[0]) & mask)
+        state = xoshiro128_step(state)
     return outputs
 
 

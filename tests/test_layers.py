@@ -7,14 +7,10 @@ import checks
 import checks_layers
 import numpy as np
 import pytest
-import reference
 from checks_layers import STACKS, layer, stack
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy import stats
-from scipy.integrate import quad
 
-from sssfit._jit import layered, sampling
 from sssfit.errors import SssfitWarning
 from sssfit.formats.mci import load_mci
 from sssfit.grid import RadialGrid
@@ -24,8 +20,7 @@ from sssfit.simulate._walks import LayeredWalk, channels_with_equal_scattering
 
 DATA = Path(__file__).parent / "data"
 LIMIT = checks.LIMIT
-ALPHA = 2.0 * stats.norm.sf(LIMIT)
-ROUNDING = 1e-9  # weights are single precision; sums of them telescope to about 1e-11
+ROUNDING = 1e-12  # what is booked for a photon adds up to 1 exactly; sums are double
 
 sizes = pytest.mark.parametrize(
     "photons", [300_000, pytest.param(30_000_000, marks=pytest.mark.slow)], ids=["3e5", "3e7"]
@@ -62,91 +57,6 @@ def assert_agree(a, b, a_error, b_error):
 def assert_energy_conserved(profile):
     error = LIMIT * np.array(profile.meta["energy_balance_stderr"]) + ROUNDING
     assert np.all(np.abs(profile.energy_balance) <= error), profile.energy_balance
-
-
-# Henyey-Greenstein
-
-
-@pytest.mark.parametrize("g", [-0.99, -0.9, -0.5, -0.01, 0.0, 0.3, 0.8, 0.9, 0.99, 0.9999])
-def test_sampled_directions_follow_henyey_greenstein(g):
-    words = np.zeros(8 * sampling.LANES, np.uint32)
-    sampling.seed_lanes(words, np.uint64(1), np.int64(0))
-    n = 400_000
-    back = np.float32(1.0 - g)
-    draws = [
-        layered.sample_hg(back, sampling.next_unit(words, k % sampling.LANES)) for k in range(n)
-    ]
-    less = np.array(draws, float)  # 1 - cosine
-    # variance of the cosine: second moment (1 + 2 g^2)/3 less the mean's square
-    sigma = math.sqrt((1.0 + 2.0 * g * g) / 3.0 - g * g)
-    assert abs(less.mean() - (1.0 - g)) * math.sqrt(n) / sigma < LIMIT
-    # equal shares of probability, by the inverse of the cumulative density
-    u = np.linspace(0.0, 1.0, 101)
-    edges = 2.0 - 2.0 * u
-    if g != 0.0:
-        s = (1.0 - g * g) / (1.0 - g + 2.0 * g * u)
-        edges = (s * s - (1.0 - g) ** 2) / (2.0 * g)
-    edges[0], edges[-1] = 2.0, 0.0
-    assert stats.chisquare(np.histogram(less, edges[::-1])[0]).pvalue > ALPHA
-
-
-@pytest.mark.parametrize("g", [-0.7, 0.0, 0.9])
-def test_phase_function_is_normalised_and_has_mean_cosine_g(g):
-    whole, _ = quad(lambda x: layered.hg_pdf(x, g), -1.0, 1.0, epsabs=1e-13, epsrel=1e-13)
-    mean, _ = quad(lambda x: x * layered.hg_pdf(x, g), -1.0, 1.0, epsabs=1e-13, epsrel=1e-13)
-    assert whole == pytest.approx(1.0, abs=1e-12)
-    assert mean == pytest.approx(g, abs=1e-12)
-
-
-def test_deflections_in_the_walk_have_mean_cosine_g_and_keep_directions_unit():
-    rows, lanes = layered._FLOAT_ROWS, sampling.LANES
-    floats = np.zeros(rows * lanes, np.float32)
-    words = np.zeros(layered._WORD_ROWS * lanes, np.uint32)
-    sampling.seed_lanes(words, np.uint64(1), np.int64(0))
-    view = floats.reshape(rows, lanes)
-    row = {name: getattr(layered, name) // lanes for name in ("_UX", "_UY", "_UZ", "_BACK")}
-    view[row["_UZ"]] = 1.0
-    view[row["_BACK"]] = 0.1
-    view[layered._SIGMA_T // lanes] = 1.0
-    view[layered._BOTTOM // lanes], view[layered._TOP // lanes] = np.inf, -np.inf
-    cosines, azimuth = [], []
-    for _ in range(2000):
-        before = view[[row["_UX"], row["_UY"], row["_UZ"]]].astype(float)
-        layered.advance(floats, words, lanes)
-        after = view[[row["_UX"], row["_UY"], row["_UZ"]]].astype(float)
-        cosines.append(np.sum(before * after, axis=0))
-        azimuth.append(np.arctan2(after[1], after[0]))
-    assert np.abs(np.linalg.norm(after, axis=0) - 1.0).max() < 1e-6
-    cosines = np.concatenate(cosines)
-    sigma = math.sqrt((1.0 + 2.0 * 0.81) / 3.0 - 0.81)
-    assert abs(cosines.mean() - 0.9) * math.sqrt(cosines.size) / sigma < LIMIT
-    # after 2000 deflections of mean cosine .9 the azimuth has forgotten where it began
-    assert stats.chisquare(np.histogram(azimuth[-1], 8, (-np.pi, np.pi))[0]).pvalue > ALPHA
-
-
-@pytest.mark.parametrize("g", [0.99, 0.995, 0.9999])
-def test_directions_are_forgotten_as_g_to_the_number_of_collisions(g):
-    """Mean cosine between the first direction and the n-th is g^n; here n = 1/(1 - g)."""
-    rows, lanes, n = layered._FLOAT_ROWS, sampling.LANES, round(1.0 / (1.0 - g))
-    floats = np.zeros(rows * lanes, np.float32)
-    words = np.zeros(layered._WORD_ROWS * lanes, np.uint32)
-    view = floats.reshape(rows, lanes)
-    view[layered._BACK // lanes] = 1.0 - g
-    view[layered._SIGMA_T // lanes] = 1.0
-    view[layered._BOTTOM // lanes], view[layered._TOP // lanes] = np.inf, -np.inf
-    start = np.array([0.48, 0.6, 0.64])
-    cosines = []
-    for batch in range(40):
-        sampling.seed_lanes(words, np.uint64(1), np.int64(batch))
-        view[: layered._UZ // lanes + 1] = 0.0
-        for row, component in zip((layered._UX, layered._UY, layered._UZ), start, strict=True):
-            view[row // lanes] = component
-        for _ in range(n):
-            layered.advance(floats, words, lanes)
-        after = view[[layered._UX // lanes, layered._UY // lanes, layered._UZ // lanes]]
-        cosines.append(start @ after.astype(float))
-    cosines = np.concatenate(cosines)
-    assert abs(cosines.mean() - g**n) / (cosines.std() / math.sqrt(cosines.size)) < LIMIT
 
 
 # Published and closed forms
@@ -338,73 +248,6 @@ def test_plain_half_spaces_of_one_relative_index_share_a_walk_and_layers_walk_al
         *([name] for name in names[1:3]),
         *([name] for name in names[4:9]),
     ]
-
-
-# Events
-
-
-@pytest.mark.parametrize("below", [1.0, 1.4])
-def test_an_interface_lets_light_through_by_fresnels_formula(below):
-    # 300 x 256 photons out of index 1.5, up into 1 or down into what is below, decision by
-    # decision: a reflectance 1 % high would hold back some 18 more
-    material = stack(layer(0.1, 1.0, 0.5, 1.5, 1.0), below=below)
-    task = LayeredWalk((material,), (RadialGrid(1.0, 5),), 1, 1000)
-    (stack_, bins), lanes = task.groups[0], sampling.LANES
-    cosines = np.random.default_rng(1).uniform(-1.0, 1.0, (300, lanes)).astype(np.float32)
-    for batch, uz in enumerate(cosines):
-        floats, words, booked, *_, ledger = lane_at_an_event(task, 1)
-        sampling.seed_lanes(words, np.uint64(1), np.int64(batch))
-        drawn = words.copy()
-        floats[layered._UX : layered._UX + lanes] = np.sqrt(1.0 - uz.astype(float) ** 2)
-        floats[layered._UZ : layered._UZ + lanes] = uz
-        words[layered._AT_INTERFACE : layered._AT_INTERFACE + lanes] = 1
-        stays = [
-            layered.handle_event(floats, words, booked, lane, stack_, bins, ledger)
-            for lane in range(lanes)
-        ]
-        expected = [
-            float(sampling.next_unit(drawn, lane))
-            < reference.fresnel(abs(float(uz[lane])), 1.5 / (below if uz[lane] > 0.0 else 1.0))
-            for lane in range(lanes)
-        ]
-        assert stays == expected
-
-
-def lane_at_an_event(task, collisions):
-    """One lane inside, of weight ten, after so many collisions; the arguments of its event."""
-    (stack_, bins), lane = task.groups[0], 3
-    floats = np.zeros(layered._FLOAT_ROWS * sampling.LANES, np.float32)
-    words = np.zeros(layered._WORD_ROWS * sampling.LANES, np.uint32)
-    booked = np.ones((sampling.LANES, bins.channel.size, 2))
-    sampling.seed_lanes(words, np.uint64(1), np.int64(0))
-    floats[layered._WEIGHT : layered._WEIGHT + sampling.LANES] = 1.0
-    floats[layered._WEIGHT + lane] = 10.0
-    floats[layered._PATH + lane] = 0.5
-    words[layered._COLLISIONS + lane] = collisions
-    booked[lane, :, 1] = 10.0
-    return floats, words, booked, lane, stack_, bins, task.empty_tally().ledger
-
-
-def test_a_layered_walk_ends_unfinished_at_a_million_collisions_and_not_before():
-    material = stack(layer([0.0, 0.2], 1.0, 0.5, 1.3))
-    task = LayeredWalk((material,), (RadialGrid(1.0, 5),), 1, 1000)
-    events = np.zeros(sampling.LANES, np.int64)
-
-    before = lane_at_an_event(task, 999_999)
-    assert layered.find_events(*before[:2], sampling.LANES, events) == 0
-    layered.handle_event(*before)
-    assert not before[-1].unfinished.any()
-    assert before[-1].roulette.any()
-
-    at = lane_at_an_event(task, 1_000_000)
-    assert layered.find_events(*at[:2], sampling.LANES, events) == 1
-    assert events[0] == at[3]
-    assert not layered.handle_event(*at)
-    assert not at[-1].roulette.any()
-    # ten: what roulette gave the photon is part of it; .2 per mm over half a mm
-    left = 10.0 * np.exp([0.0, -0.1])
-    np.testing.assert_allclose(at[-1].unfinished, np.stack([left, left**2], 1), rtol=1e-12)
-    np.testing.assert_allclose(at[-1].absorbed[0], 10.0 - left, rtol=1e-12, atol=1e-12)
 
 
 # Energy and reproducibility

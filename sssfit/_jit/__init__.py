@@ -93,6 +93,14 @@ def jit_inline(function: Function) -> Function:
     return _compile(function, inline="always")
 
 
+def jit_merged(function: Function) -> Function:
+    """Like ``jit``, but LLVM inlines it into its callers, loops and all, as they are optimised.
+
+    For loops over a few elements, where the call itself would take as long as the loop.
+    """
+    return _compile(function, inline="never", forceinline=True)
+
+
 class _DamagedError(Exception):
     """A file of the cache has changed since it was written."""
 
@@ -169,13 +177,17 @@ class _ForgivingCache(FunctionCache):
             self.flush()  # type: ignore[no-untyped-call]
 
 
-def _compile(function: Function, *, inline: Literal["never", "always"]) -> Function:
+def _compile(
+    function: Function, *, inline: Literal["never", "always"], forceinline: bool = False
+) -> Function:
     """Decorate with a cache in our keyed folder.
 
     numba reads the folder from a global setting when a cache is created; it is set during the call
     and restored, so that the setting of a host program stays.
     """
-    compiled: Function = numba.njit(function, nogil=True, error_model="numpy", inline=inline)
+    compiled: Function = numba.njit(
+        function, nogil=True, error_model="numpy", inline=inline, forceinline=forceinline
+    )
     if _CACHE_FOLDER:
         before = numba.config.CACHE_DIR  # type: ignore[attr-defined]
         numba.config.CACHE_DIR = _CACHE_FOLDER  # type: ignore[attr-defined]

@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._jit import layered, semi_infinite
+from sssfit._jit import layered, layered_tally, semi_infinite
 from sssfit.arrays import FloatArray
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
@@ -115,12 +115,12 @@ class LayeredWalk:
     seed: int
     photons: int
     diffuse: bool = False
-    groups: tuple[tuple[layered.Stack, layered.Bins], ...] = field(init=False)
+    groups: tuple[tuple[layered.Stack, layered_tally.Bins], ...] = field(init=False)
 
     def __post_init__(self) -> None:
         material, grid = self.materials[0], self.grids[0]
         groups = tuple(
-            (_stack(material, members), layered.Bins(1.0 / grid.dr_mm, grid.annuli, members))
+            (_stack(material, members), layered_tally.Bins(1.0 / grid.dr_mm, grid.annuli, members))
             for members in channels_with_equal_scattering(material)
         )
         object.__setattr__(self, "groups", groups)
@@ -146,7 +146,7 @@ class LayeredWalk:
         """Return a tally with all sums zero."""
         material, cells = self.materials[0], self.grids[0].annuli + 1
         n = material.n_channels
-        ledger = layered.Ledger(
+        ledger = layered_tally.Ledger(
             reflected=np.zeros((cells, n, 2)),
             transmitted=np.zeros((cells, n, 2)),
             absorbed=np.zeros((len(material.layers), n)),
@@ -179,23 +179,32 @@ def channels_with_equal_scattering(material: Material) -> list[npt.NDArray[np.in
 
 
 def _stack(material: Material, members: npt.NDArray[np.int64]) -> layered.Stack:
-    """Lay out the layers for a group; its walk follows each layer's least absorbing channel."""
+    """Lay out the tables of a group; its walk follows each layer's least absorbing channel."""
     layers = material.layers
     sigma_a = np.array([layer.sigma_a_per_mm[members] for layer in layers])
     sigma_s = np.array([layer.sigma_s_per_mm[members[0]] for layer in layers])
     least = sigma_a.min(axis=1)
     sigma_t = least + sigma_s
-    edges_mm = np.concatenate([[0.0], np.cumsum([layer.thickness_mm for layer in layers])])
-    capture = np.divide(least, sigma_t, out=np.zeros_like(least), where=sigma_t > 0.0)
-    return layered.Stack(
-        top_mm=edges_mm[:-1].astype(np.float32),
-        bottom_mm=edges_mm[1:].astype(np.float32),
-        sigma_t_per_mm=sigma_t.astype(np.float32),
-        capture=capture.astype(np.float32),
-        back=np.array([1.0 - layer.g[members[0]] for layer in layers], np.float32),
-        eta=np.array([material.eta_above, *(each.eta for each in layers), material.eta_below]),
-        excess_per_mm=sigma_a - least[:, None],
-    )
+    scatters = sigma_t > 0.0
+    rows = np.zeros((len(layers) + 2, 4), np.float32)
+    rows[:, 0] = np.inf
+    rows[1:-1, 0] = [layer.thickness_mm for layer in layers]
+    rows[1:-1, 1] = np.divide(1.0, sigma_t, out=np.full_like(least, np.inf), where=scatters)
+    rows[1:-1, 2] = np.divide(least, sigma_t, out=np.zeros_like(least), where=scatters)
+    rows[1:-1, 3] = [1.0 - layer.g[members[0]] for layer in layers]
+    excess = np.zeros((len(layers) + 2, members.size), np.float32)
+    excess[1:-1] = sigma_a - least[:, None]
+    return layered.Stack(rows.ravel(), _crossings(material, rows).ravel(), excess.ravel())
+
+
+def _crossings(material: Material, rows: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
+    """Table of interfaces (L + 2, 2, 3): index over that beyond, thickness and mean free path."""
+    eta = np.array([material.eta_above, *(one.eta for one in material.layers), material.eta_below])
+    crossings = np.zeros((len(rows), 2, 3), np.float32)
+    for layer in range(1, len(rows) - 1):
+        for direction, beyond in enumerate((layer + 1, layer - 1)):
+            crossings[layer, direction] = eta[layer] / eta[beyond], *rows[beyond, :2]
+    return crossings
 
 
 # MCML's roulette threshold, applied to the largest weight of all channels.

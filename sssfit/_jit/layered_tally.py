@@ -1,0 +1,251 @@
+"""Sums of the layered walk: absorption by layer, exits by radius, roulette, unfinished walks.
+
+Weights are products of single-precision numbers, but sums and differences of weights are double:
+what is booked for a photon then adds up to exactly 1, and a run's balance holds to rounding.
+"""
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit._jit import jit, jit_merged
+from sssfit._jit.fused import STRIDE, decay, uniform
+from sssfit._jit.layered_lanes import (
+    BOOKED,
+    BORN,
+    LAYER,
+    PATH,
+    UZ,
+    VECTOR,
+    WEIGHT,
+    Flags,
+    Indices,
+    X,
+    Y,
+)
+from sssfit._jit.layered_slots import LENGTH, SUM_MASK, SUMS
+from sssfit._jit.sampling import LaneFloats, LaneWords
+from sssfit._jit.semi_infinite import COLLISION_CAP, ROULETTE_SPREAD
+
+_F32 = np.float32
+_F64 = np.float64
+_U32 = np.uint32
+_U64 = np.uint64
+_ZERO, _ONE = _F32(0.0), _F32(1.0)
+_U0, _U1, _U2 = _U64(0), _U64(1), _U64(2)
+# MCML's roulette threshold: below it, one in ten survives with ten times the weight.
+_THRESHOLD = _F32(1e-4)
+_SURVIVAL = _F32(0.1)
+_GAIN = _F32(10.0)
+
+# Rows of the scratch block of ``book_channels``
+_WEIGHT_NOW, _WEIGHT_BOOKED, _SHARE, _EXCESS, _BEFORE, _NOW = (_U64(k * STRIDE) for k in range(6))
+SCRATCH_ROWS = 6
+
+FloatArray = npt.NDArray[np.float64]
+
+
+class Bins(NamedTuple):
+    """Positions of the walk's K channels among all channels of the ledger."""
+
+    per_mm: float  # bins of the radial grid per mm
+    last: int  # the bin that stands for "beyond the grid"
+    channel: npt.NDArray[np.int64]  # (K,)
+
+
+class Ledger(NamedTuple):
+    """Sums over photons of weight and of weight squared; a photon enters with weight 1."""
+
+    reflected: FloatArray  # (n + 1, C, 2)
+    transmitted: FloatArray  # (n + 1, C, 2)
+    absorbed: FloatArray  # (L, C)
+    unfinished: FloatArray  # (C, 2)
+    roulette: FloatArray  # (C, 2): what roulette added, zero on average, and its variance
+
+
+@jit_merged
+def book_alone(
+    floats: LaneFloats,
+    words: LaneWords,
+    events: Indices,
+    count: int,
+    absorbed: FloatArray,
+) -> None:
+    """Tally the weight that a walk of one channel lost in its layer since the last tally."""
+    layers = _U64(_U64(absorbed.size) // _U64(SUMS))
+    for k in range(count):
+        slot = _U64(k)
+        lane = events[slot]
+        weight = floats[WEIGHT + lane]
+        row = _U64(_U64(slot & SUM_MASK) * layers + _U64(words[LAYER + lane]))
+        absorbed[row] += _F64(floats[BOOKED + lane]) - _F64(weight)
+        floats[BOOKED + lane] = weight
+
+
+@jit_merged
+def book_channels(
+    floats: LaneFloats,
+    words: LaneWords,
+    shares: LaneFloats,
+    events: Indices,
+    count: int,
+    slots: LaneFloats,
+    scratch: LaneFloats,
+    excess: LaneFloats,
+    absorbed: FloatArray,
+) -> None:
+    """Tally the weight that every channel lost in its layer since the last tally.
+
+    A channel that absorbs more than the walk's by ``excess`` keeps exp(-excess path) of its share.
+    """
+    count_of_channels = shares.size // STRIDE
+    channels = _U64(count_of_channels)
+    layers = _U64(_U64(excess.size) // channels)
+    padded = (count + VECTOR - 1) & -VECTOR
+    for k in range(count):
+        slot = _U64(k)
+        lane = events[slot]
+        weight = floats[WEIGHT + lane]
+        scratch[_WEIGHT_NOW + slot] = weight
+        scratch[_WEIGHT_BOOKED + slot] = floats[BOOKED + lane]
+        floats[BOOKED + lane] = weight
+    for c in range(count_of_channels):
+        channel = _U64(c)
+        row = _U64(channel * _U64(STRIDE))
+        first = _U64(channel * _U64(_U64(SUMS) * layers))
+        for k in range(count):
+            slot = _U64(k)
+            lane = events[slot]
+            scratch[_SHARE + slot] = shares[row + lane]
+            scratch[_EXCESS + slot] = excess[_U64(_U64(words[LAYER + lane]) * channels) + channel]
+        for k in range(padded):
+            slot = _U64(k)
+            share = scratch[_SHARE + slot]
+            scratch[_BEFORE + slot] = scratch[_WEIGHT_BOOKED + slot] * share
+            share = share * decay(scratch[_EXCESS + slot] * slots[LENGTH + slot])
+            scratch[_NOW + slot] = scratch[_WEIGHT_NOW + slot] * share
+            scratch[_SHARE + slot] = share
+        for k in range(count):
+            slot = _U64(k)
+            lane = events[slot]
+            shares[row + lane] = scratch[_SHARE + slot]
+            at = _U64(first + _U64(_U64(slot & SUM_MASK) * layers) + _U64(words[LAYER + lane]))
+            absorbed[at] += _F64(scratch[_BEFORE + slot]) - _F64(scratch[_NOW + slot])
+
+
+@jit_merged
+def score_exits(
+    floats: LaneFloats,
+    shares: LaneFloats,
+    exits: Indices,
+    count: int,
+    bins: Bins,
+    reflected: FloatArray,
+    transmitted: FloatArray,
+) -> None:
+    """Add the photons that have left the stack, in the bin of their radius at the surface."""
+    for k in range(count):
+        lane = exits[_U64(k)]
+        x, y = _F64(floats[X + lane]), _F64(floats[Y + lane])
+        radial_bin = _U64(np.int64(min(math.sqrt(x * x + y * y) * bins.per_mm, float(bins.last))))
+        weight = floats[WEIGHT + lane]
+        for c in range(bins.channel.size):
+            left = _F64(weight * shares[_U64(_U64(c) * _U64(STRIDE)) + lane])
+            channel = _U64(bins.channel[_U64(c)])
+            if floats[UZ + lane] < _ZERO:
+                reflected[radial_bin, channel, _U0] += left
+                reflected[radial_bin, channel, _U1] += left * left
+            else:
+                transmitted[radial_bin, channel, _U0] += left
+                transmitted[radial_bin, channel, _U1] += left * left
+
+
+@jit_merged
+def flag_weak(
+    floats: LaneFloats, words: LaneWords, flags: Flags, count: int, sweep: np.uint32
+) -> None:
+    """Flag the lanes below the roulette threshold or at the collision cap."""
+    for k in range(count):
+        lane = _U64(k)
+        collisions = _U32(sweep - words[BORN + lane])
+        flags[lane] = (floats[WEIGHT + lane] < _THRESHOLD) | (collisions >= _U32(COLLISION_CAP))
+
+
+@jit
+def end_or_boost(
+    floats: LaneFloats,
+    words: LaneWords,
+    shares: LaneFloats,
+    events: Indices,
+    count: int,
+    sweep: np.uint32,
+    excess: LaneFloats,
+    absorbed: FloatArray,
+    bins: Bins,
+    ledger: Ledger,
+    exits: Indices,
+) -> int:
+    """Stop walks at the cap and let the others play roulette; list those that end.
+
+    The weight that roulette adds or takes has mean zero, and its expected square is booked.
+    """
+    ended, layers = 0, excess.size // bins.channel.size
+    for k in range(count):
+        lane = events[k]
+        stops = _U32(sweep - words[BORN + lane]) >= _U32(COLLISION_CAP)
+        lives = not stops and uniform(words, lane) < _SURVIVAL
+        weight, path = floats[WEIGHT + lane], floats[PATH + lane]
+        booked, layer = floats[BOOKED + lane], words[LAYER + lane]
+        boosted = weight * _GAIN if lives else _ZERO
+        for c in range(bins.channel.size):
+            channel, at = bins.channel[c], _U64(c * STRIDE) + lane
+            share = shares[at]
+            before = _F64(booked * share)
+            share = share * decay(excess[layer * bins.channel.size + c] * path)
+            shares[at] = share
+            now = _F64(weight * share)
+            absorbed[_U64(c * SUMS * layers) + _U64(layer)] += before - now
+            if stops:
+                ledger.unfinished[channel, 0] += now
+                ledger.unfinished[channel, 1] += now * now
+            else:
+                ledger.roulette[channel, 0] += _F64(boosted * share) - now
+                ledger.roulette[channel, 1] += ROULETTE_SPREAD * now * now
+        floats[PATH + lane] = _ZERO
+        floats[WEIGHT + lane] = boosted
+        floats[BOOKED + lane] = boosted
+        if not lives:
+            exits[ended] = lane
+            ended += 1
+    return ended
+
+
+@jit
+def give_up(
+    floats: LaneFloats,
+    shares: LaneFloats,
+    events: Indices,
+    count: int,
+    bins: Bins,
+    ledger: Ledger,
+) -> None:
+    """Book the walks that meet interfaces without end as unfinished."""
+    for k in range(count):
+        for c in range(bins.channel.size):
+            weight = floats[WEIGHT + events[k]]
+            left = _F64(weight * shares[_U64(c * STRIDE) + events[k]])
+            ledger.unfinished[bins.channel[c], 0] += left
+            ledger.unfinished[bins.channel[c], 1] += left * left
+
+
+@jit
+def add_absorbed(absorbed: FloatArray, bins: Bins, ledger: Ledger) -> None:
+    """Add a batch's absorption, (K SUMS (L + 2),), to the ledger, (L, C)."""
+    inside = ledger.absorbed.shape[0]
+    for c in range(bins.channel.size):
+        for k in range(SUMS):
+            first = (c * SUMS + k) * (inside + 2) + 1
+            for layer in range(inside):
+                ledger.absorbed[layer, bins.channel[c]] += absorbed[first + layer]
