@@ -79,8 +79,8 @@ def draw(floats: LaneFloats, words: LaneWords, count: int) -> None:
 def deflection(back: np.float32, u: np.float32, uz: np.float32) -> tuple[np.float32, np.float32]:
     """Return 1 - cosine of a Henyey-Greenstein deflection, and 1 / (1 + |uz|) for ``rotate``.
 
-    With back = 1 - g and a uniform u, 1 - cosine is 2 back^2 (1 - u) (1 + g u) / (back + 2 g u)^2,
-    from the inverse of the cumulative density (1 + g^2 - ((1 - g^2)/(1 + g v))^2) / (2 g), v = 2u -
+    With back = 1 - g and a uniform u, 1 - cosine is 2 back^2 (1 - u) (1 + g u) / (back + 2 g u)^2:
+    the inverse of the cumulative density (1 + g^2 - ((1 - g^2)/(1 + g v))^2) / (2 g), v = 2u -
     1. Nothing cancels, and g = 0 needs no special case. A cosine, and 1 - g computed from g, would
     lose the forward peak in single precision: at g = .9999 half of all deflections are below 5e-9.
     One division serves both results.
