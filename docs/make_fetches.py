@@ -269,8 +269,8 @@ percentile of Delta E):
 - **Under 12 fetches nothing comes near:** the best of 11 fetches leaves {eleven:.0f}.
 - **Where two passes are all there is**, {two} on {two_fetches:.0f} fetches leaves {two_error:.1f};
   four passes of stars (`--passes 4`) leave {stars:.1f} for 16.
-- **Simulate exactly** where possible: half spaces with isotropic scattering. Elsewhere 1e6 photons
-  are enough."""
+- **Simulate exactly** where possible: all but thin slabs that scatter far ahead. Elsewhere 1e6
+  photons are enough."""
 
 TEXT = """![Error over fetches: cascades, and every published method on taps](skin1-fetches.png)
 

@@ -314,3 +314,59 @@ def test_kernels_of_one_name_are_refused(labels):
     named = [(each, cli_world.taps()) for each in labels]
     with pytest.raises(KernelError, match=f"two kernels are called {labels[0]}"):
         make_report(cli_world.profile(), named=named, only=["disk"], side=16, threads=1)
+
+
+def luminance(colour):
+    """WCAG 2.2's relative luminance of a colour such as #1b1c1e."""
+    codes = [int(colour[k : k + 2], 16) / 255.0 for k in (1, 3, 5)]
+    linear = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in codes]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def contrast(one, other):
+    """WCAG 2.2's contrast ratio."""
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def test_contrast_is_that_of_black_on_white():
+    assert contrast("#000000", "#ffffff") == pytest.approx(21.0)
+    assert contrast("#777777", "#ffffff") == pytest.approx(4.48, abs=0.01)
+
+
+@pytest.mark.parametrize("theme", [0, 1])
+def test_words_have_a_contrast_of_4_5_and_marks_of_3(theme):
+    """In both themes; WCAG 2.2, 1.4.3 and 1.4.11."""
+    style = (STATIC / "style.css").read_text(encoding="utf-8")
+    block = re.findall(r":root \{(.*?)\}", style, re.DOTALL)[theme]
+    colours = dict(re.findall(r"--([\w-]+): (#[0-9a-f]{6});", block))
+    for ground in ("paper", "card"):
+        for words in ("ink", "soft", "accent"):
+            assert contrast(colours[words], colours[ground]) >= 4.5, (words, ground)
+    assert contrast(colours["ink"], colours["notice"]) >= 4.5
+    for mark in ("edge", "c0", "c1", "c2", "m0", "m1", "m2", "m3", "m4", "b0", "b1"):
+        assert contrast(colours[mark], colours["card"]) >= 3.0, mark
+
+
+def test_a_layered_material_has_a_page_without_what_does_not_cover_it(caplog):
+    caplog.set_level("INFO", logger="sssfit")
+    layers = "".join(
+        f"[[layers]]\nsigma_a_per_mm = [{a}]\nsigma_s_per_mm = [2.0]\neta = 1.4\ng = 0.0\n{rest}\n"
+        for a, rest in ((0.5, "thickness_mm = 0.5"), (0.1, ""))
+    )
+    stack = parse_material(f'channels = ["grey"]\n{layers}', "stack.toml")
+    given = {"only": ["disk"], "side": 16, "threads": 2, "photons": 2000}
+    made = make_report(stack, **given)
+    assert made.models is None
+    assert made.budgets == ()
+    assert made.profile.meta["method"] == "exact"
+    for each in ("models", "error budget"):
+        assert f"The page has no {each}: " in caplog.text
+
+
+def test_passes_are_named_in_words():
+    (shown,) = (each for each in world.report().kernels if each.label == world.LABEL)
+    labels = [each["label"] for each in shown.to_dict()["plan"]]
+    assert labels[:2] == ["stage 1, across", "stage 1, down"]
+    assert any(each.startswith("halved, 1/2 of the size") for each in labels)
+    assert len(set(labels)) == len(labels)

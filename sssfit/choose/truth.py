@@ -32,8 +32,9 @@ def truth_of(
 
     A profile is its own truth.
 
-    Others are slabs, stacks, and scattering with g other than 0, which the exact solver takes for
-    isotropic: skin1's coefficients with g = 0.8 had a Delta E of 5.3 against the walk.
+    Others are slabs, stacks, and scattering with g other than 0: reduced to isotropic scattering,
+    skin1's coefficients with g = 0.8 had a Delta E of 5.3 against the walk. The exact solver for
+    layers has them too, but refuses thin slabs that scatter far ahead, and the walk none.
     The exact one has all of the light: marble's kernels, 2.2 % of whose red lies beyond the paper's
     grid, were .39 Delta E off on the head at best.
     """
@@ -51,7 +52,10 @@ def note_truth(source: Material | Profile) -> None:
     """Say, before a choice is made, what a profile cannot tell and what takes long."""
     if isinstance(source, Material):
         if not is_exact(source):
-            note(f"{source.name} has no exact solution: tracing 1e7 photons for its true profile.")
+            note(
+                f"{source.name} is not a half space with g = 0: tracing 1e7 photons for its true "
+                "profile."
+            )
         return
     missing = source.beyond_grid.sum() / max(source.diffuse_reflectance.sum(), 1e-300)
     if missing > _WORTH_A_NOTE:
@@ -62,7 +66,7 @@ def note_truth(source: Material | Profile) -> None:
 
 
 def is_exact(material: Material) -> bool:
-    """Whether the exact solver has the material's own profile: one half space with g = 0.
+    """Whether the truth is that of the solver for half spaces, with g = 0.
 
     Nor may it be thinner optically than what is above it, as vacuum under air is.
     """

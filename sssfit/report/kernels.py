@@ -109,13 +109,29 @@ def _planned(each: Pass, *, jitter: bool) -> dict[str, Any]:
     words += ["frame"] if each.takes_frame(jitter=jitter) else []
     return {
         "call": f"SSS_{each.name}({', '.join(words)})",
-        "label": each.call,
+        "label": _label(each),
         "reads": list(each.pictures),
         "writes": list(each.writes),
         "level": each.level,
         "fetches": each.fetches,
         "added": each.is_added,
     }
+
+
+_WORDS = {"halve": "halved", "sum": "sum of the stages", "disk": "disk", "star": "star"}
+_ALONG = {(1.0, 0.0): "across", (0.0, 1.0): "down"}
+
+
+def _label(each: Pass) -> str:
+    """Return what a pass writes, in words: its stage from 1, its direction, its size."""
+    stages = ", ".join(str(k + 1) for k in each.stages)
+    words = _WORDS.get(each.kind, "")
+    if each.axis is not None:
+        x, y = each.axis
+        words = _ALONG.get(each.axis, f"{words or 'blur'} along ({x:.2g}, {y:.2g})")
+    of_stage = "" if each.kind in ("halve", "sum") else f"stage {stages}, "
+    size = f", 1/{2**each.level} of the size" if each.level else ""
+    return f"{of_stage}{words}{size}"
 
 
 def shown_candidates(pixels: int, only: Collection[str] | None = None) -> list[Candidate]:

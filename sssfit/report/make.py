@@ -1,7 +1,7 @@
 """Makes a report: profile, kernels, pictures, comparison, models and budget, in this order."""
 
-from collections.abc import Collection, Sequence
-from typing import Any
+from collections.abc import Callable, Collection, Sequence
+from typing import Any, TypeVar
 
 from sssfit.compare.budget import Budget, error_budgets
 from sssfit.compare.convergence import Convergence, compute_convergence
@@ -26,6 +26,9 @@ _COLOURS = 3  # channels of a picture that the page can show
 _WALKS, _SEEDS, _TOLERANCES = 5, 3, (1e-4, 5e-6)
 _LEAST_CONVERGING = 100_000  # photons of the longest walk; the shortest then has 1000
 _TIMED_SECONDS = 2.0  # in which kernels are timed in turn
+
+
+Part = TypeVar("Part")
 
 
 def make_report(
@@ -128,16 +131,24 @@ def make_report(
 def _of_material(
     source: Material | Profile, pictures: Sequence[Shown], walk: dict[str, Any]
 ) -> tuple[ModelComparison | None, tuple[Budget, ...], Convergence | None]:
-    """Return what needs coefficients; a material that the exact solver does not cover has none."""
+    """Return what needs coefficients; a part that does not cover the material is noted."""
     if isinstance(source, Profile):
         return None, (), None
     flat = [each.scene for each in pictures if each.name in ("disk", "edge")]
+    return (
+        _covered("models", lambda: compare_models(source, **walk)),
+        tuple(_covered("error budget", lambda: error_budgets(source, flat, **walk)) or ()),
+        _covered("convergence", lambda: _convergence(source, **walk)),
+    )
+
+
+def _covered(what: str, make: Callable[[], Part]) -> Part | None:
+    """Return a part of the page, or None with a note if it does not cover the material."""
     try:
-        models, budgets = compare_models(source, **walk), error_budgets(source, flat, **walk)
-        return models, tuple(budgets), _convergence(source, **walk)
+        return make()
     except SimulationError as refusal:
-        note(f"No models, budget and convergence: {refusal}")
-        return None, (), None
+        note(f"The page has no {what}: {refusal}")
+        return None
 
 
 def _convergence(

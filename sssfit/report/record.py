@@ -42,7 +42,7 @@ class Report:
     models : ModelComparison, optional
     budgets : tuple of Budget
     convergence : Convergence, optional
-        None of these for a profile, or a material that the exact solver does not cover.
+        None of these for a profile, or for a material that they do not cover.
     commands : tuple of str
         The command lines that make the figures again.
     notes : tuple of str

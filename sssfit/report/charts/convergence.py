@@ -36,6 +36,6 @@ def convergence_chart(report: Report) -> Chart | None:
     )
     note = (
         f"Of the worst channel, against the exact solution. The slope of the walks is "
-        f"{found.line.slope:.2f} ± {found.line.slope_stderr:.2f}; theory has -0.5."
+        f"{found.line.slope:.2f} ± {found.line.slope_stderr:.2f}; in theory it is -0.5."
     )
     return Chart("convergence", "Convergence", note, legend, (("", plot.svg()),))

@@ -25,7 +25,7 @@ def models_chart(report: Report) -> Chart | None:
     panels = [(name, _panel(report.models, k, name)) for k, name in enumerate(names)]
     every = enumerate(report.models.curves)
     legend = tuple((f"m{k}", _NAMES.get(each.method, each.method)) for k, each in every)
-    note = "One channel at a time, as far as the walk has 100 hits in each annulus."
+    note = "One channel at a time; curves end where the walk has fewer than 100 hits in an annulus."
     return Chart("models", "Models", note, legend, tuple(panels), min(_FIRST, len(names) - 1))
 
 

@@ -33,7 +33,9 @@ def pareto_chart(report: Report) -> Chart:
         plot.add(_point(plot, row, is_front=row in front))
     _name_front(plot, places, [row.label for row in front])
     legend = (("front-point", "on the Pareto front"), ("other-point", "another kernel is better"))
-    words = f"On {name}. Choose a point to run its kernel above; the arrow keys go along the front."
+    words = (
+        f"On {name}. Choose a point to run its kernel above; the arrow keys move along the front."
+    )
     return Chart("pareto", "Error and cost", words, legend, (("", plot.svg(role="group")),))
 
 

@@ -25,7 +25,10 @@ def profile_chart(report: Report) -> Chart:
     for kind, each in zip(KINDS, bins, strict=False):
         _draw(plot, each, kind)
     legend = tuple(zip(KINDS, profile.channels, strict=False))
-    note = "Energy that leaves the surface at a radius; bands show one standard error."
+    note = (
+        "Energy that leaves the surface at a radius; bands show one standard error of a walk, or a "
+        "solver's estimate, which may be thinner than the line."
+    )
     return Chart("profile", "Profile", note, legend, (("", plot.svg()),))
 
 

@@ -27,7 +27,7 @@ function fillKernels(select, { data, names, kernels }, value) {
 function stageWords(name, kernel) {
   if (name === 'M0') return 'the result';
   const label = kernel.plan.find(({ writes }) => writes.includes(name)).label;
-  return `${name}, by ${label}`;
+  return `${name}: ${label}`;
 }
 
 // A head is at some distances; pixels of a flat picture can have any size.
