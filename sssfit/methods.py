@@ -136,6 +136,19 @@ SIMULATIONS: Mapping[str, Method] = {
                 "SHARE",
             ),
             Setting(
+                "angles",
+                "whole",
+                "bins of the exit angle, 0 to 90 degrees; the profile then has R_d(r, angle) too.",
+                "N",
+                (1, 180),
+            ),
+            Setting(
+                "numerical_aperture",
+                "number",
+                "of a detector, which sees light within asin(NA / n_above) of the normal only.",
+                "NA",
+            ),
+            Setting(
                 "checkpoint_every",
                 "seconds",
                 "time between saves of FILE.checkpoint, from which --resume continues.",

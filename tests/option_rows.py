@@ -172,6 +172,10 @@ SIMULATE = {
         f"simulate wax.toml {GRID}", "--photons 3000", calls, lambda: _walk(photons=3000), "1e7"
     ),
     "--target-error": Row(_WALK, "--target-error 20%", calls, lambda: _walk(target_error=0.2)),
+    "--angles": Row(_WALK, "--angles 6", calls, lambda: _walk(angles=6)),
+    "--numerical-aperture": Row(
+        _WALK, "--numerical-aperture .4", calls, lambda: _walk(numerical_aperture=0.4)
+    ),
     "--tolerance": Row(
         f"simulate wax.toml --method exact {GRID}",
         "--tolerance 2%",

@@ -8,6 +8,7 @@
 - ``xoshiro128pp``: the generator in Python integers.
 """
 
+import itertools
 import math
 
 import numba
@@ -122,6 +123,26 @@ def chandrasekhar_total(albedo, nodes=200):
     root = math.sqrt(1.0 - albedo)
     h_one = 1.0 / (root + albedo / 2.0 * np.sum(weights * mu * h / (1.0 + mu)))
     return 1.0 - h_one * root
+
+
+def chandrasekhar_by_angle(albedo, edges_rad, nodes=200):
+    """Shares of normal light that leave between exit angles: the law of diffuse reflection.
+
+    I(mu) = a/4 F mu0 / (mu + mu0) H(mu) H(mu0) for a flux pi F mu0 (Chandrasekhar 1960, section
+    33); over 2 pi mu dmu, by the trapezoidal rule with 100 steps a bin.
+    """
+    mu, weights, h = _chandrasekhar_h(albedo, nodes)
+
+    def at(x):
+        kernel = albedo / 2.0 * weights * mu / (x[:, None] + mu)
+        return 1.0 / (math.sqrt(1.0 - albedo) + kernel @ h)
+
+    shares = []
+    for low, high in itertools.pairwise(edges_rad):
+        x = np.linspace(math.cos(high), math.cos(low), 101)
+        y = albedo / 2.0 * x / (1.0 + x) * at(x) * at(np.ones(1))
+        shares.append(np.trapezoid(y, x))
+    return np.array(shares)
 
 
 def chandrasekhar_diffuse_total(albedo, nodes=200):
@@ -256,21 +277,34 @@ def splitmix64(start, count):
 
 @numba.njit(error_model="numpy", cache=True)
 def scalar_layered_walk(
-    seed, photons, sigma_a, sigma_s, g, eta, thickness, specular, first, dr, annuli, max_mm=1e30
+    seed,
+    photons,
+    sigma_a,
+    sigma_s,
+    g,
+    eta,
+    thickness,
+    specular,
+    first,
+    dr,
+    annuli,
+    max_mm=1e30,
+    angles=1,
 ):
     """MCML photon by photon, one channel: hop, drop, spin, roulette, as in the 1995 paper.
 
     sigma_a, sigma_s, g, thickness (L,); eta (L + 2,) from above to below; ``first`` is the first
-    layer that is not clear. Returns sums over photons: reflected and transmitted (annuli + 1, 3)
-    of weight, squared weight and hits; absorbed (L,); roulette's squared gains.
+    layer that is not clear. Returns sums over photons: reflected and transmitted ((annuli + 1)
+    angles, 3) of weight, squared weight and hits; absorbed (L,); roulette's squared gains. The bins
+    of the exit angle are those of MCML, acos(uz) / da.
     """
     np.random.seed(seed)
     layers = sigma_a.size
     top = np.zeros(layers + 1)
     for k in range(layers):
         top[k + 1] = top[k] + thickness[k]
-    reflected = np.zeros((annuli + 1, 3))
-    transmitted = np.zeros((annuli + 1, 3))
+    reflected = np.zeros(((annuli + 1) * angles, 3))
+    transmitted = np.zeros(((annuli + 1) * angles, 3))
     absorbed = np.zeros(layers)
     roulette = 0.0
     for _ in range(photons):
@@ -317,6 +351,8 @@ def scalar_layered_walk(
                     uz = -uz
                 elif (uz > 0.0 and layer == layers - 1) or (uz < 0.0 and layer == 0):
                     k = min(int(math.sqrt(x * x + y * y) / dr), annuli)
+                    exit_angle = math.acos(min(cos_t, 1.0))
+                    k = k * angles + min(int(exit_angle / (0.5 * math.pi) * angles), angles - 1)
                     out = transmitted if uz > 0.0 else reflected
                     out[k, 0] += w
                     out[k, 1] += w * w

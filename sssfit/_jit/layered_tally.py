@@ -26,7 +26,7 @@ from sssfit._jit.layered_lanes import (
     Y,
 )
 from sssfit._jit.layered_slots import LENGTH, SUM_MASK, SUMS
-from sssfit._jit.sampling import LaneFloats, LaneWords
+from sssfit._jit.sampling import LaneFloats, LaneWords, falling_bin
 from sssfit._jit.semi_infinite import COLLISION_CAP, ROULETTE_SPREAD
 
 _F32 = np.float32
@@ -53,13 +53,17 @@ class Bins(NamedTuple):
     per_mm: float  # bins of the radial grid per mm
     last: int  # the bin that stands for "beyond the grid"
     channel: npt.NDArray[np.int64]  # (K,)
+    # falling cosines outside the stack that separate the directions of each annulus: (B - 1,)
+    # above, (D - 1,) below
+    above: FloatArray
+    below: FloatArray
 
 
 class Ledger(NamedTuple):
     """Sums over photons of weight and of weight squared; a photon enters with weight 1."""
 
-    reflected: FloatArray  # (n + 1, C, 2)
-    transmitted: FloatArray  # (n + 1, C, 2)
+    reflected: FloatArray  # ((n + 1) B, C, 2): by radius and direction
+    transmitted: FloatArray  # ((n + 1) D, C, 2)
     absorbed: FloatArray  # (L, C)
     unfinished: FloatArray  # (C, 2)
     roulette: FloatArray  # (C, 2): what roulette added, zero on average, and its variance
@@ -145,21 +149,26 @@ def score_exits(
     reflected: FloatArray,
     transmitted: FloatArray,
 ) -> None:
-    """Add the photons that have left the stack, in the bin of their radius at the surface."""
+    """Add the photons that have left the stack, in the bin of their radius and direction."""
     for k in range(count):
         lane = exits[_U64(k)]
         x, y = _F64(floats[X + lane]), _F64(floats[Y + lane])
-        radial_bin = _U64(np.int64(min(math.sqrt(x * x + y * y) * bins.per_mm, float(bins.last))))
+        radial_bin = int(min(math.sqrt(x * x + y * y) * bins.per_mm, float(bins.last)))
+        uz = _F64(floats[UZ + lane])
+        if uz < 0.0:
+            row = _U64(radial_bin * (bins.above.size + 1) + falling_bin(-uz, bins.above))
+        else:
+            row = _U64(radial_bin * (bins.below.size + 1) + falling_bin(uz, bins.below))
         weight = floats[WEIGHT + lane]
         for c in range(bins.channel.size):
             left = _F64(weight * shares[_U64(_U64(c) * _U64(STRIDE)) + lane])
             channel = _U64(bins.channel[_U64(c)])
-            if floats[UZ + lane] < _ZERO:
-                reflected[radial_bin, channel, _U0] += left
-                reflected[radial_bin, channel, _U1] += left * left
+            if uz < 0.0:
+                reflected[row, channel, _U0] += left
+                reflected[row, channel, _U1] += left * left
             else:
-                transmitted[radial_bin, channel, _U0] += left
-                transmitted[radial_bin, channel, _U1] += left * left
+                transmitted[row, channel, _U0] += left
+                transmitted[row, channel, _U1] += left * left
 
 
 @jit_merged

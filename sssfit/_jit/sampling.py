@@ -14,7 +14,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._jit import jit
+from sssfit._jit import jit, jit_inline
 
 LANES = 256  # 128 to 1024 took the same time; fewer waste less at the end of a batch
 GENERATOR_ROWS = 4
@@ -140,3 +140,16 @@ def fresnel_reflectance(cos_inside: float, eta: float) -> float:
     r_s = (eta * cos_inside - cos_outside) / (eta * cos_inside + cos_outside)
     r_p = (cos_inside - eta * cos_outside) / (cos_inside + eta * cos_outside)
     return 0.5 * (r_s * r_s + r_p * r_p)
+
+
+@jit_inline
+def falling_bin(cosine: float, cosines: npt.NDArray[np.float64]) -> int:
+    """Return the bin of a cosine among falling ones that separate bins; 0 if there are none."""
+    low, high = 0, cosines.size
+    while low < high:
+        middle = (low + high) >> 1
+        if cosine <= cosines[middle]:
+            low = middle + 1
+        else:
+            high = middle
+    return low

@@ -27,6 +27,7 @@ from sssfit._jit.sampling import (
     LaneFloats,
     LaneWords,
     cos_sin_turn,
+    falling_bin,
     fresnel_reflectance,
     negative_log,
     next_unit,
@@ -70,6 +71,8 @@ class Channels(NamedTuple):
     bins_per_mean_free_path: FloatArray  # (C,)
     last_bin: npt.NDArray[np.int64]  # (C,): the bin that stands for "beyond the grid"
     first_cell: npt.NDArray[np.int64]  # (C,): start of the channel's bins in the tally
+    # (B - 1,): falling cosines inside the medium that separate the B directions of each annulus
+    cosines: FloatArray
 
 
 class Ledger(NamedTuple):
@@ -144,7 +147,7 @@ def power(channels: Channels, n: int, c: int) -> float:
 def score_exit(
     floats: LaneFloats, words: LaneWords, lane: int, channels: Channels, ledger: Ledger
 ) -> None:
-    """Add a photon that leaves: boost albedo^n in the bin of its radius at the surface.
+    """Add a photon that leaves: boost albedo^n in the bin of its radius and direction.
 
     The weight absorbed since the last tally is boost (albedo^settled - albedo^n).
     """
@@ -155,11 +158,13 @@ def score_exit(
     x = floats[_X + lane] - overshoot * floats[_DX + lane]
     y = floats[_Y + lane] - overshoot * floats[_DY + lane]
     rho = math.sqrt(float(x) * float(x) + float(y) * float(y))
+    directions = channels.cosines.size + 1
+    direction = falling_bin(-float(floats[_COS + lane]), channels.cosines)
     for c in range(channels.last_bin.size):
         weight = boost * power(channels, collisions, c)
         ledger.absorbed[c] += boost * power(channels, settled, c) - weight
         radial_bin = min(int(rho * channels.bins_per_mean_free_path[c]), channels.last_bin[c])
-        cell = channels.first_cell[c] + radial_bin
+        cell = channels.first_cell[c] + radial_bin * directions + direction
         ledger.bins[cell, 0] += weight
         ledger.bins[cell, 1] += weight * weight
 

@@ -12,7 +12,17 @@ from sssfit.errors import SimulationError
 from sssfit.grid import RadialGrid, paper_grid
 from sssfit.kernel import SeparableKernel, Taps
 from sssfit.material import Material, load_material, material_names
-from sssfit.messages import Columns, columns, filled, number, printable, report, table
+from sssfit.messages import (
+    Columns,
+    by_channel,
+    columns,
+    counted,
+    filled,
+    number,
+    printable,
+    report,
+    table,
+)
 from sssfit.methods import DEON_SKIN
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS
 
@@ -236,9 +246,22 @@ def profile_page(figures: Figures) -> str:
         filled("specular reflectance {specular_reflectance:.6f}, not part of diffuse R; ", figures)
         + "sum = specular + diffuse + absorbed + unfinished"
         + ("" if figures["transmitted"] is None else " + transmitted")
+        + (" + outside the aperture" if "outside_aperture" in figures else "")
     )
+    parts += [_directions(figures)] if {"exit_angles", "outside_aperture"} & figures.keys() else []
     parts += [_EMPTY] if any(figures["empty_annuli"] or ()) else []
     return "\n".join(parts)
+
+
+def _directions(figures: Figures) -> str:
+    """Return what is known of the directions of the light, as text."""
+    if "exit_angles" in figures:
+        bins = counted(len(figures["exit_angles"]), "bin")
+        return f"exit angles: {bins} from 0 to 90 degrees"
+    outside = by_channel(figures["channels"], figures["outside_aperture"], ".6f")
+    return (
+        filled("numerical aperture {numerical_aperture:g|unknown}; outside it ", figures) + outside
+    )
 
 
 def _walks(figures: Figures) -> str:

@@ -106,6 +106,8 @@ def under_beam(profile: Profile, beam: Beam) -> Profile:
     }
     if profile.annulus_transmittance is not None:
         found |= _below(profile, edges, beam)
+    for name in ("angle_reflected", "angle_transmitted"):
+        found |= _by_angle(profile, edges, name, beam)
     return replace(profile, **found)
 
 
@@ -124,6 +126,21 @@ def _below(profile: Profile, edges: FloatArray, beam: Beam) -> dict[str, FloatAr
     }
 
 
+def _by_angle(profile: Profile, edges: FloatArray, name: str, beam: Beam) -> dict[str, FloatArray]:
+    """Return energies by angle; within an annulus all angles are spread like their sum."""
+    energy, stderr = getattr(profile, name), getattr(profile, f"{name}_stderr")
+    if energy is None or len(energy) == 1:
+        return {}
+    bins, channels = energy.shape[1:]
+    flat = [each.reshape(len(energy), -1) for each in (energy, stderr)]
+    whole = profile.annulus_energy if name == "angle_reflected" else profile.annulus_transmittance
+    sides = flat[0][:-1], flat[1][:-1], flat[0][-1]
+    found, error, left = _spread(profile, edges, *sides, beam, whole=whole)
+    shape = (len(edges), bins, channels)
+    values = {name: (found, left), f"{name}_stderr": (error, flat[1][-1])}
+    return {key: np.vstack(each).reshape(shape) for key, each in values.items()}
+
+
 def wider_edges(edges: FloatArray, reach_mm: float) -> FloatArray:
     """Return edges, continued by annuli as wide as the last until they reach so much farther."""
     width = float(edges[-1] - edges[-2])
@@ -138,13 +155,23 @@ def _spread(
     stderr: FloatArray,
     beyond: FloatArray,
     beam: Beam,
+    *,
+    whole: FloatArray | None = None,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return energies (m, C) in wider annuli, their standard errors, and what is beyond (C,)."""
+    """Return energies (m, C) in wider annuli, their standard errors, and what is beyond (C,).
+
+    Of energies that are parts of a ``whole``, this says how they lie within an annulus.
+    """
     edges, photons = profile.r_edges_mm, profile.photons
     square = _squares(energy, stderr, photons)
-    fine, densities = flat_annuli(edges, energy)
+    fine, densities = flat_annuli(edges, energy if whole is None else whole)
     areas = np.pi * np.diff(fine**2)
     annulus = np.searchsorted(edges[1:-1], fine[:-1], side="right")
+    fine_energy = densities * areas[:, None]
+    if whole is not None:
+        of_annulus = np.where(whole > 0.0, whole, 1.0)[annulus]
+        times = energy.shape[1] // whole.shape[1]
+        fine_energy = energy[annulus] * np.tile(fine_energy / of_annulus, times)
     part = areas / np.bincount(annulus, areas)[annulus]  # of its annulus
     found = np.zeros((len(wider) - 1, energy.shape[1]))
     error = np.zeros_like(found)
@@ -152,7 +179,7 @@ def _spread(
     for begin, end in itertools.pairwise(ends):
         within = SPREADS[beam.kind](wider, fine[begin : end + 1], beam.radius_mm)
         shares = np.diff(within, axis=0)
-        found += shares @ (densities[begin:end] * areas[begin:end, None])
+        found += shares @ fine_energy[begin:end]
         firsts = np.flatnonzero(np.diff(annulus[begin:end], prepend=-1))
         whole = np.add.reduceat(shares * part[begin:end], firsts, axis=1)
         error += whole ** (1 if photons is None else 2) @ square[annulus[begin:end][firsts]]

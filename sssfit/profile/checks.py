@@ -9,7 +9,8 @@ from sssfit.arrays import FloatArray, check_names, check_provenance, json_object
 from sssfit.errors import MaterialError, ProfileError
 from sssfit.material import Material
 from sssfit.messages import counted, shown
-from sssfit.profile.npz import FORMAT, OPTIONAL
+from sssfit.profile.directions import check_directions, directed_shapes
+from sssfit.profile.npz import DIRECTED, FORMAT, FORMAT_OF_DIRECTIONS, OPTIONAL
 
 # Limits of shares of light and of mm, beyond any grid or table; squares stay far from overflow.
 _MAX = 1e12
@@ -23,7 +24,7 @@ def checked(given: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a `sssfit.profile.Profile` as stored, or raise ProfileError."""
     fields: dict[str, Any] = {
         name: None
-        if value is None and name in OPTIONAL
+        if value is None and name in (*OPTIONAL, *DIRECTED)
         else number_array(name, value, ProfileError)
         for name, value in given.items()
         if name != "meta"
@@ -39,6 +40,7 @@ def checked(given: Mapping[str, Any]) -> dict[str, Any]:
         for name in OPTIONAL:
             if fields[name] is not None:
                 raise ProfileError(f"{name} is given without annulus_transmittance.")
+    check_directions(fields)
     fields["specular_reflectance"] = float(fields["specular_reflectance"])
     if not 0.0 <= fields["specular_reflectance"] <= 1.0:
         raise ProfileError(
@@ -46,6 +48,12 @@ def checked(given: Mapping[str, Any]) -> dict[str, Any]:
         )
     fields["meta"] = json_object("meta", given["meta"], ProfileError)
     _check_meta(fields["meta"], energy.shape[1])
+    given_directions = [name for name in DIRECTED if fields[name] is not None]
+    if given_directions and fields["meta"]["format"] == FORMAT:
+        raise ProfileError(
+            f"{given_directions[0]} is given, which format {FORMAT!r} does not have; expected "
+            f"{FORMAT_OF_DIRECTIONS!r}."
+        )
     return fields
 
 
@@ -65,7 +73,8 @@ def _expected_shapes(fields: Mapping[str, FloatArray]) -> dict[str, tuple[int, .
         "unfinished": per_channel,
         "absorbed": layers + per_channel,
         "specular_reflectance": (),
-    }
+        "outside_aperture": per_channel,
+    } | directed_shapes(fields)
 
 
 def _check_values(name: str, value: FloatArray, shape: tuple[int, ...]) -> None:
@@ -106,7 +115,7 @@ def _check_edges(r_edges_mm: FloatArray, n_annuli: int) -> None:
 
 
 def _check_meta(meta: Mapping[str, Any], n_channels: int) -> None:
-    if meta.get("format") != FORMAT:
+    if meta.get("format") not in (FORMAT, FORMAT_OF_DIRECTIONS):
         raise ProfileError(f"meta has format {shown(meta.get('format'))}; expected {FORMAT!r}.")
     names = meta.get("channels")
     if not isinstance(names, list) or len(names) != n_channels:

@@ -25,6 +25,7 @@ from sssfit.kinds import KINDS
 from sssfit.messages import shown
 
 FORMAT = "sssfit.profile/1"
+FORMAT_OF_DIRECTIONS = "sssfit.profile/2"  # of a file with any of the arrays of ``DIRECTED``
 REQUIRED = (
     "r_edges_mm",
     "annulus_energy",
@@ -40,6 +41,14 @@ OPTIONAL = (
     "beyond_grid_transmittance",
     "annulus_transmittance_stderr",
     "beyond_grid_transmittance_stderr",
+)
+DIRECTED = (
+    "exit_angle_edges_rad",
+    "angle_reflected",
+    "angle_reflected_stderr",
+    "angle_transmitted",
+    "angle_transmitted_stderr",
+    "outside_aperture",
 )
 
 # The largest profile of the paper's materials is 0.3 MB, the largest possible one (64 channels of
@@ -134,12 +143,12 @@ def _unpack_stream(stream: BinaryIO) -> tuple[dict[str, FloatArray], dict[str, A
         if "meta" not in names:
             raise ProfileError(f"is not a profile: it holds {_listed(names)}")
         meta = _read_meta(archive)
-        if (found := _file_format(meta)) != FORMAT:
+        if (found := _file_format(meta)) not in (FORMAT, FORMAT_OF_DIRECTIONS):
             other = "has" if found.startswith("sssfit.profile/") else "is not a profile: it has"
             raise ProfileError(f"{other} format {shown(found)} where {FORMAT!r} was expected")
         if missing := [name for name in REQUIRED if name not in names]:
             raise ProfileError(f"lacks {', '.join(missing)}")
-        if len(set(names)) < len(names) or set(names) - {*REQUIRED, *OPTIONAL, "meta"}:
+        if len(set(names)) < len(names) or set(names) - {*REQUIRED, *OPTIONAL, *DIRECTED, "meta"}:
             raise ProfileError("holds arrays that a profile does not have")
         arrays = {name: _read_float(archive, name) for name in names if name != "meta"}
     return arrays, meta

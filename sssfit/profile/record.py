@@ -26,6 +26,7 @@ from sssfit.material.checks import is_name
 from sssfit.messages import by_channel, counted, html_table, number, of_material, printable
 from sssfit.profile import checks, npz
 from sssfit.profile import pixels as integrals
+from sssfit.profile.directions import directed_figures
 from sssfit.profile.npz import FORMAT, is_profile_file
 from sssfit.profile.pixels import full_kernel
 
@@ -63,7 +64,8 @@ class Profile:
     annulus_transmittance : array (n, C) [1] or None
         Energy that leaves through the bottom, by annulus; None for a semi-infinite material.
     meta : mapping
-        Provenance as JSON values: ``format`` ("sssfit.profile/1"), ``channels`` (C names),
+        Provenance as JSON values: ``format`` ("sssfit.profile/1", or
+        /2 if angles or an aperture are given), ``channels`` (C names),
         ``material``, ``method``, ``photons`` (number of walks, None if nothing is sampled),
         ``seed``, ``version``, settings.
     beyond_grid_transmittance : array (C,) [1] or None
@@ -72,6 +74,15 @@ class Profile:
     annulus_transmittance_stderr : array (n, C) [1] or None
     beyond_grid_transmittance_stderr : array (C,) [1] or None
         Their standard errors.
+    exit_angle_edges_rad : array (A+1,) [rad] or None
+        Edges of bins of the angle to the normal in which light leaves, outside; 0 to pi/2.
+    angle_reflected, angle_reflected_stderr : array (n+1, A, C) [1] or None
+        Diffusely reflected energy by annulus and angle, the last row beyond the grid, and its
+        standard error; (1, A, C) if the annuli are not told apart.
+    angle_transmitted, angle_transmitted_stderr : array (n+1, A, C) [1] or None
+        Likewise through the bottom.
+    outside_aperture : array (C,) [1] or None
+        Energy reflected outside the numerical aperture of a detector, and then in no annulus.
 
     Raises
     ------
@@ -92,6 +103,12 @@ class Profile:
     beyond_grid_transmittance: FloatArray | None = None
     annulus_transmittance_stderr: FloatArray | None = None
     beyond_grid_transmittance_stderr: FloatArray | None = None
+    exit_angle_edges_rad: FloatArray | None = None
+    angle_reflected: FloatArray | None = None
+    angle_reflected_stderr: FloatArray | None = None
+    angle_transmitted: FloatArray | None = None
+    angle_transmitted_stderr: FloatArray | None = None
+    outside_aperture: FloatArray | None = None
 
     def __post_init__(self) -> None:
         given = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
@@ -249,13 +266,15 @@ class Profile:
     def energy_balance(self) -> FloatArray:
         """Sum of all energies - 1 (C,): 0 except for roulette's noise and rounding.
 
-        Specular + diffuse + absorbed + unfinished (+ transmitted) - 1; NaN if the absorbed energy
-        is unknown.
+        Specular + diffuse + absorbed + unfinished (+ transmitted, + outside the aperture) - 1; NaN
+        if the absorbed energy is unknown.
         """
         if len(self.absorbed) == 0:
             return np.full(self.n_channels, np.nan)
         reflected = self.specular_reflectance + self.diffuse_reflectance
         balance: FloatArray = reflected + self.absorbed.sum(axis=0) + self.unfinished - 1.0
+        if self.outside_aperture is not None:
+            balance = balance + self.outside_aperture
         transmitted = self.transmittance
         return balance if transmitted is None else balance + transmitted
 
@@ -439,6 +458,7 @@ class Profile:
                 },
                 "empty_annuli": self._empty_annuli(),
                 **({"beam": meta["beam"]} if "beam" in meta else {}),
+                **directed_figures(self),
             }
         )
 

@@ -33,6 +33,7 @@ from sssfit.kinds import KINDS
 from sssfit.material import Material
 from sssfit.messages import printable, shown
 from sssfit.profile.npz import read_npy
+from sssfit.simulate._directions import Directions
 from sssfit.simulate._walks import BATCH_PHOTONS, MAX_PHOTONS, Tally
 
 FORMAT = "sssfit.checkpoint/1"
@@ -174,7 +175,10 @@ def is_checkpoint_file(path: Path) -> bool:
 
 
 def settings_of(
-    materials: Sequence[Material], grids: Sequence[RadialGrid], seed: int
+    materials: Sequence[Material],
+    grids: Sequence[RadialGrid],
+    seed: int,
+    directions: Directions,
 ) -> dict[str, str]:
     """Return everything that determines the bits of a walk's batches, as printable text."""
     return {
@@ -184,6 +188,7 @@ def settings_of(
         "annuli": ", ".join(str(grid.annuli) for grid in grids),
         "version": source_key(),
         "photons in a batch": str(BATCH_PHOTONS),
+        **{key: repr(value) for key, value in directions.given().items()},
     }
 
 

@@ -16,6 +16,7 @@ from sssfit.grid import make_grid
 from sssfit.material import Material
 from sssfit.profile import Profile
 from sssfit.profile.beam import Beam, wider_edges
+from sssfit.simulate._directions import Directions, by_angle, mean_and_error
 from sssfit.simulate._run import EndCondition
 from sssfit.simulate._walks import MAX_PHOTONS, Sums, Tally, Walk
 
@@ -43,15 +44,10 @@ def _trimmed(sums: Sums) -> Sums:
     def cut(bins: FloatArray) -> FloatArray:
         return np.concatenate([bins[:annuli], np.sum(bins[annuli:], axis=0, keepdims=True)])
 
-    transmitted = None if sums.transmitted is None else cut(sums.transmitted)
-    return replace(sums, reflected=cut(sums.reflected), transmitted=transmitted)
-
-
-def _mean_and_error(sums: FloatArray, photons: int) -> tuple[FloatArray, FloatArray]:
-    """Return the mean over photons and its standard error from sums of w and w^2, (..., 2)."""
-    mean, mean_square = sums[..., 0] / photons, sums[..., 1] / photons
-    # Rounding may leave a variance of -1e-17 if all photons have the same weight.
-    return mean, np.sqrt(np.maximum(mean_square - mean**2, 0.0) / (photons - 1))
+    names = ("reflected", "transmitted", "above_by_angle", "below_by_angle")
+    bins = {name: getattr(sums, name) for name in names}
+    kept: dict[str, Any] = {name: cut(each) for name, each in bins.items() if each is not None}
+    return replace(sums, **kept)
 
 
 def profile_of(
@@ -63,8 +59,11 @@ def profile_of(
     sums = task.sums(tally, index)
     if trim:
         sums = _trimmed(sums)
-    energy, stderr = (entering * each for each in _mean_and_error(sums.reflected, sums.photons))
-    _, balance_error = _mean_and_error(sums.roulette, sums.photons)
+    angles: dict[str, Any] = by_angle(sums, entering, task.directions)
+    energy, stderr = (entering * each for each in mean_and_error(sums.reflected, sums.photons))
+    if "angle_reflected" in angles:
+        energy = angles["angle_reflected"].sum(axis=1)  # equal to the last bit
+    _, balance_error = mean_and_error(sums.roulette, sums.photons)
     profile = Profile(
         r_edges_mm=grid.r_edges_mm[: len(energy)],
         annulus_energy=energy[:-1],
@@ -76,7 +75,7 @@ def profile_of(
         unfinished=entering * sums.unfinished[:, 0] / sums.photons,
         annulus_transmittance=None,
         meta={
-            "format": "sssfit.profile/1",
+            "format": task.directions.profile_format,
             "method": "montecarlo",
             "material": material.to_dict(),
             "material_sha256": material.sha256,
@@ -84,17 +83,22 @@ def profile_of(
             "photons": sums.photons,
             "seed": task.seed,
             "version": __version__,
-            "settings": provenance(task.materials, grid.dr_mm, ending, auto=trim),
+            "settings": provenance(task.materials, grid.dr_mm, ending, task.directions, auto=trim),
             "relative_error": error if math.isfinite(error) else None,
             "energy_balance_stderr": [entering * float(each) for each in balance_error],
         },
+        **{} if sums.transmitted is not None else angles,
+        outside_aperture=None if sums.unseen is None else entering * sums.unseen / sums.photons,
     )
     _warn_unfinished(material, profile)
     if sums.transmitted is None:
         return profile
-    energy, stderr = (entering * each for each in _mean_and_error(sums.transmitted, sums.photons))
+    energy, stderr = (entering * each for each in mean_and_error(sums.transmitted, sums.photons))
+    if "angle_transmitted" in angles:
+        energy = angles["angle_transmitted"].sum(axis=1)
     return replace(
         profile,
+        **angles,
         annulus_transmittance=energy[:-1],
         annulus_transmittance_stderr=stderr[:-1],
         beyond_grid_transmittance=energy[-1],
@@ -151,7 +155,12 @@ def whole_number(name: str, value: int) -> int:
 
 
 def provenance(
-    materials: Sequence[Material], dr_mm: float, ending: EndCondition, *, auto: bool
+    materials: Sequence[Material],
+    dr_mm: float,
+    ending: EndCondition,
+    directions: Directions,
+    *,
+    auto: bool,
 ) -> dict[str, Any]:
     """Return the settings of a run as stored in a profile's meta.
 
@@ -164,6 +173,7 @@ def provenance(
         "photons": ending.photons,
         "target_error": ending.target_error,
         "walk_materials_sha256": [each.sha256 for each in materials],
+        **directions.given(),
     }
 
 
@@ -184,6 +194,8 @@ def is_finished(
     dr_mm: float | None = None,
     radius_mm: float | str | None = None,
     target_error: float | None = None,
+    angles: int | None = None,
+    numerical_aperture: float | None = None,
     beam: Beam | None = None,
 ) -> bool:
     """Whether ``simulate_montecarlo_many`` with these arguments, and a beam, makes this profile.
@@ -196,7 +208,11 @@ def is_finished(
         material, dr_mm=dr_mm, radius_mm=None if isinstance(radius_mm, str) else radius_mm
     )
     edges = grid.r_edges_mm if beam is None else wider_edges(grid.r_edges_mm, beam.reach_mm)
-    expected = provenance(materials, grid.dr_mm, end_condition(photons, target_error), auto=auto)
+    ending, directions = (
+        end_condition(photons, target_error),
+        Directions(angles, numerical_aperture),
+    )
+    expected = provenance(materials, grid.dr_mm, ending, directions, auto=auto)
     return (
         meta.get("method") == "montecarlo"
         and meta.get("settings") == expected
@@ -216,6 +232,8 @@ _OWN_SETTINGS = (
     "solver",
     "directions",
     "mapping",
+    "angles",
+    "numerical_aperture",
 )  # for methods that have them
 
 
@@ -232,7 +250,7 @@ def run_figures(profile: Profile, seconds: float | None) -> dict[str, Any]:
         Duration of the run; None if it was already finished.
     """
     meta, settings = profile.meta, profile.meta["settings"]
-    is_known = len(profile.absorbed) > 0
+    is_known, unseen = len(profile.absorbed) > 0, profile.outside_aperture
     return plain(
         {
             "material": meta["material"]["name"],
@@ -262,5 +280,6 @@ def run_figures(profile: Profile, seconds: float | None) -> dict[str, Any]:
             "finished_before": seconds is None,
             **({"beam": meta["beam"]} if "beam" in meta else {}),
             **{key: settings[key] for key in _OWN_SETTINGS if key in settings},
+            **({} if unseen is None else {"outside_aperture": unseen}),
         }
     )

@@ -23,6 +23,7 @@ from sssfit.simulate._checkpoint import (
     read_state,
     settings_of,
 )
+from sssfit.simulate._directions import directions_of
 from sssfit.simulate._finished import profile_of
 from sssfit.simulate._run import EndCondition
 from sssfit.simulate._walks import MAX_PHOTONS, Walk, relative_errors
@@ -103,8 +104,9 @@ def _walk_of(meta: Mapping[str, Any]) -> Walk:
     try:
         materials = [Material.from_dict(each) for each in records]
         grids, seed = _grids(settings), int(settings["seed"])
+        directions = directions_of(settings)
         check_media(materials)
-        expected = settings_of(materials, grids, seed)
+        expected = settings_of(materials, grids, seed, directions)
     except (KeyError, TypeError, ValueError, MaterialError, SimulationError) as error:
         raise CheckpointError.of(
             f"its materials and grids ({shown(str(error))}) are not a walk's"
@@ -116,7 +118,7 @@ def _walk_of(meta: Mapping[str, Any]) -> Walk:
             )
     if not 0 <= seed < 2**64:
         raise CheckpointError.of(f"seed = {seed}, expected 0 to 2^64 - 1")
-    return make_walk(materials, grids, seed, MAX_PHOTONS)
+    return make_walk(materials, grids, seed, MAX_PHOTONS, directions)
 
 
 def _grids(settings: Mapping[str, str]) -> Sequence[RadialGrid]:

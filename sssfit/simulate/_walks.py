@@ -20,6 +20,7 @@ from sssfit.arrays import FloatArray
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
 from sssfit.messages import note
+from sssfit.simulate._directions import EVERYWHERE, Directions, check_cells
 
 # 16384 photons of skin1 take 4 ms, those of a medium of eta 1.3 without absorption half a second:
 # short enough for Ctrl-C, long enough to hide the cost of starting a batch (about 0.1 ms).
@@ -62,6 +63,9 @@ class Sums:
     absorbed: FloatArray  # (layers, C)
     unfinished: FloatArray  # (C, 2)
     roulette: FloatArray  # (C, 2)
+    above_by_angle: FloatArray | None = None  # (n + 1, A, C, 2), of what is reflected
+    below_by_angle: FloatArray | None = None
+    unseen: FloatArray | None = None  # (C,): weight outside a detector's aperture
 
 
 class Walk(Protocol):
@@ -75,6 +79,8 @@ class Walk(Protocol):
     def seed(self) -> int: ...
     @property
     def photons(self) -> int: ...
+    @property
+    def directions(self) -> Directions: ...
     def trace(self, batch: int) -> Tally: ...
     def empty_tally(self) -> Tally: ...
     def sums(self, tally: Tally, index: int) -> Sums: ...
@@ -115,12 +121,17 @@ class LayeredWalk:
     seed: int
     photons: int
     diffuse: bool = False
+    directions: Directions = EVERYWHERE
     groups: tuple[tuple[layered.Stack, layered_tally.Bins], ...] = field(init=False)
 
     def __post_init__(self) -> None:
         material, grid = self.materials[0], self.grids[0]
+        cosines = self.directions.above(material), self.directions.below()
         groups = tuple(
-            (_stack(material, members), layered_tally.Bins(1.0 / grid.dr_mm, grid.annuli, members))
+            (
+                _stack(material, members),
+                layered_tally.Bins(1.0 / grid.dr_mm, grid.annuli, members, *cosines),
+            )
             for members in channels_with_equal_scattering(material)
         )
         object.__setattr__(self, "groups", groups)
@@ -145,10 +156,11 @@ class LayeredWalk:
     def empty_tally(self) -> Tally:
         """Return a tally with all sums zero."""
         material, cells = self.materials[0], self.grids[0].annuli + 1
-        n = material.n_channels
+        n, bins = material.n_channels, self.groups[0][1]
+        check_cells(cells * (bins.above.size + 1) * n, self.directions)
         ledger = layered_tally.Ledger(
-            reflected=np.zeros((cells, n, 2)),
-            transmitted=np.zeros((cells, n, 2)),
+            reflected=np.zeros((cells * (bins.above.size + 1), n, 2)),
+            transmitted=np.zeros((cells * (bins.below.size + 1), n, 2)),
             absorbed=np.zeros((len(material.layers), n)),
             unfinished=np.zeros((n, 2)),
             roulette=np.zeros((n, 2)),
@@ -159,10 +171,11 @@ class LayeredWalk:
         """Return the sums of the only material (``index`` 0)."""
         ledger = tally.ledger
         finite = np.isfinite(self.materials[index].layers[-1].thickness_mm)
+        shape = (self.grids[0].annuli + 1, -1, self.materials[0].n_channels, 2)
+        below = ledger.transmitted.reshape(shape) if finite else None
         return Sums(
             photons=tally.photons,
-            reflected=ledger.reflected,
-            transmitted=ledger.transmitted if finite else None,
+            **self.directions.split(ledger.reflected.reshape(shape), below),
             absorbed=ledger.absorbed,
             unfinished=ledger.unfinished,
             roulette=ledger.roulette,
@@ -220,14 +233,16 @@ class SemiInfiniteWalk:
     grids: tuple[RadialGrid, ...]
     seed: int
     photons: int
+    directions: Directions = EVERYWHERE
     eta: float = field(init=False)
     channels: semi_infinite.Channels = field(init=False)
     roulette_at: npt.NDArray[np.uint32] = field(init=False)
 
     def __post_init__(self) -> None:
         largest = max(float(each.layers[0].albedo.max()) for each in self.materials)
+        cosines = self.directions.inside(self.materials[0])
         object.__setattr__(self, "eta", relative_eta(self.materials[0]))
-        object.__setattr__(self, "channels", _channels(self.materials, self.grids))
+        object.__setattr__(self, "channels", _channels(self.materials, self.grids, cosines))
         object.__setattr__(self, "roulette_at", roulette_schedule(largest))
 
     def trace(self, batch: int) -> Tally:
@@ -248,7 +263,8 @@ class SemiInfiniteWalk:
     def empty_tally(self) -> Tally:
         """Return a tally with all sums zero."""
         n_channels = self.channels.last_bin.size
-        cells = int(np.sum(self.channels.last_bin + 1))
+        cells = int(np.sum(self.channels.last_bin + 1)) * (self.channels.cosines.size + 1)
+        check_cells(cells, self.directions)
         ledger = semi_infinite.Ledger(
             bins=np.zeros((cells, 2)),
             absorbed=np.zeros(n_channels),
@@ -262,19 +278,20 @@ class SemiInfiniteWalk:
         first = sum(each.n_channels for each in self.materials[:index])
         own = range(first, first + self.materials[index].n_channels)
         ledger = tally.ledger
+        bins = np.stack([self._bins(ledger.bins, c) for c in own], axis=2)
         return Sums(
             photons=tally.photons,
-            reflected=np.stack([ledger.bins[self._cells(c)] for c in own], axis=1),
-            transmitted=None,
+            **self.directions.split(bins, None),
             absorbed=ledger.absorbed[None, own],
             unfinished=ledger.unfinished[own],
             roulette=ledger.roulette[own],
         )
 
-    def _cells(self, channel: int) -> slice:
-        """Positions of a channel's bins in the ledger, the one beyond the grid last."""
-        first = int(self.channels.first_cell[channel])
-        return slice(first, first + int(self.channels.last_bin[channel]) + 1)
+    def _bins(self, bins: FloatArray, channel: int) -> FloatArray:
+        """Return a channel's bins (n + 1, B, 2) of the ledger, those beyond the grid last."""
+        first, annuli = int(self.channels.first_cell[channel]), self.channels.last_bin[channel] + 1
+        directions = self.channels.cosines.size + 1
+        return bins[first : first + annuli * directions].reshape(annuli, directions, 2)
 
 
 def relative_eta(material: Material) -> float:
@@ -300,7 +317,7 @@ def roulette_schedule(albedo: float) -> npt.NDArray[np.uint32]:
 
 
 def _channels(
-    materials: tuple[Material, ...], grids: tuple[RadialGrid, ...]
+    materials: tuple[Material, ...], grids: tuple[RadialGrid, ...], cosines: FloatArray
 ) -> semi_infinite.Channels:
     """Lay the channels of all materials side by side."""
     albedo = np.concatenate([each.layers[0].albedo for each in materials])
@@ -312,13 +329,15 @@ def _channels(
     )
     counts = [each.n_channels for each in materials]
     last_bin = np.repeat([grid.annuli for grid in grids], counts).astype(np.int64)
-    first_cell = np.concatenate([[0], np.cumsum(last_bin[:-1] + 1)]).astype(np.int64)
+    directions = cosines.size + 1
+    first_cell = np.concatenate([[0], np.cumsum(last_bin[:-1] + 1)]).astype(np.int64) * directions
     return semi_infinite.Channels(
         power_low=_powers(albedo),
         power_high=_powers(_powers(albedo)[-1] * albedo),
         bins_per_mean_free_path=bins_per_mfp,
         last_bin=last_bin,
         first_cell=first_cell,
+        cosines=cosines,
     )
 
 

@@ -23,6 +23,7 @@ from sssfit.material import Material
 from sssfit.process import available_cores
 from sssfit.profile import Profile
 from sssfit.simulate._checkpoint import Checkpoint, settings_of
+from sssfit.simulate._directions import EVERYWHERE, Directions
 from sssfit.simulate._finished import (
     AUTO_BEYOND,
     end_condition,
@@ -57,6 +58,8 @@ def simulate_montecarlo(
     dr_mm: float | None = None,
     radius_mm: float | str | None = None,
     target_error: float | None = None,
+    angles: int | None = None,
+    numerical_aperture: float | None = None,
     checkpoint: Checkpoint | str | Path | None = None,
     progress: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
@@ -87,6 +90,12 @@ def simulate_montecarlo(
         under this share (0 to 1) of F at the last edge. Checked after fixed numbers of batches,
         1/64 to 1/32 apart, so the end depends only on the seed. Channels that do not scatter are
         ignored.
+    angles : int, optional
+        Bins of the exit angle, 1 to 180, from 0 to pi/2 to the normal: the profile then has
+        R_d(r, angle) too, and takes as many times the memory.
+    numerical_aperture : float, optional
+        Of a detector above the surface, which sees the light within asin(NA / n_above) of the
+        normal; the rest is ``outside_aperture``. In place of ``angles``.
     checkpoint : Checkpoint or Path, optional
         Where to save the sums at intervals, so that a killed run can continue and end in the same
         bits. A path means ``Checkpoint(path)``, which continues an existing checkpoint. The file
@@ -137,6 +146,8 @@ def simulate_montecarlo(
         dr_mm=dr_mm,
         radius_mm=radius_mm,
         target_error=target_error,
+        angles=angles,
+        numerical_aperture=numerical_aperture,
         checkpoint=checkpoint,
         progress=progress,
         stop=stop,
@@ -152,6 +163,8 @@ def simulate_montecarlo_many(
     dr_mm: float | None = None,
     radius_mm: float | str | None = None,
     target_error: float | None = None,
+    angles: int | None = None,
+    numerical_aperture: float | None = None,
     checkpoint: Checkpoint | str | Path | None = None,
     progress: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
@@ -169,6 +182,9 @@ def simulate_montecarlo_many(
     check_media(materials)
     ending = end_condition(photons, target_error)
     seed = whole_number("seed", seed)
+    directions = Directions(
+        None if angles is None else whole_number("angles", angles), numerical_aperture
+    )
     threads = available_cores() if threads is None else whole_number("threads", threads)
     _check_settings(ending.photons, seed, threads)
     note_compiling("photon walk", 10, is_compiled(materials[0]))
@@ -179,7 +195,7 @@ def simulate_montecarlo_many(
         grids = _auto_grids(materials, dr_mm, seed, threads, stop)
     else:
         grids = [make_grid(each, dr_mm=dr_mm, radius_mm=radius_mm) for each in materials]
-    task = make_walk(materials, grids, seed, ending.photons)
+    task = make_walk(materials, grids, seed, ending.photons, directions)
     tally = run(
         task,
         threads,
@@ -189,7 +205,7 @@ def simulate_montecarlo_many(
         checkpoint=Checkpoint(Path(checkpoint))
         if isinstance(checkpoint, str | Path)
         else checkpoint,
-        settings=settings_of(materials, grids, seed),
+        settings=settings_of(materials, grids, seed, directions),
     )
     if tally.photons < 2:
         raise StoppedError("stopped before a single batch of photons was done.")
@@ -251,11 +267,15 @@ def is_compiled(material: Material) -> bool:
 
 
 def make_walk(
-    materials: Sequence[Material], grids: Sequence[RadialGrid], seed: int, photons: int
+    materials: Sequence[Material],
+    grids: Sequence[RadialGrid],
+    seed: int,
+    photons: int,
+    directions: Directions = EVERYWHERE,
 ) -> Walk:
     """Choose the simplest walk for the material."""
     kind = SemiInfiniteWalk if has_fast_walk(materials[0]) else LayeredWalk
-    return kind(tuple(materials), tuple(grids), seed, photons)
+    return kind(tuple(materials), tuple(grids), seed, photons, directions=directions)
 
 
 def _check_settings(photons: int, seed: int, threads: int) -> None:

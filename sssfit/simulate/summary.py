@@ -63,8 +63,11 @@ def _heading(rows: Rows, *, several: bool) -> str:
 
 
 def _under(row: dict[str, Any]) -> str:
-    """Return text on a beam, if it is not a pencil."""
-    return f", under the beam {row['beam']} mm" if "beam" in row else ""
+    """Return text on a beam that is not a pencil, on an aperture, and on exit angles."""
+    beam = f", under the beam {row['beam']} mm" if "beam" in row else ""
+    aperture = row.get("numerical_aperture")
+    beam += f", within a numerical aperture of {aperture:g}" if aperture is not None else ""
+    return beam + (f", {counted(row['angles'], 'exit angle')}" if "angles" in row else "")
 
 
 def _how(rows: Rows) -> str:
@@ -130,6 +133,7 @@ def energy_lines(rows: Rows) -> list[str]:
     unfinished = max(float(each) for row in rows for each in row["unfinished"])
     parts = "specular + diffuse + absorbed"
     parts += " + transmitted" if any(row["transmittance"] is not None for row in rows) else ""
+    parts += " + outside the aperture" if "outside_aperture" in rows[0] else ""
     parts += " + unfinished" if unfinished > 0.0 else ""
     if not rows[0]["photons"]:
         return [*lines, f"energy: {parts} = 1 to {abs(balance):.0e} (worst channel, {name})"]
