@@ -272,7 +272,7 @@ RECORDS = [
     *(
         f"read_profile(packed('mono', {change}))"
         for change in (
-            *("meta=GONE", "meta='[]'", "meta='{'", "meta=meta('mono', format='sssfit.profile/2')"),
+            *("meta=GONE", "meta='[]'", "meta='{'", "meta=meta('mono', format='sssfit.profile/3')"),
             *("meta=meta('mono', format='other/3')", "meta=meta('mono', format=GONE)"),
             *("beyond_grid=GONE", "beyond_grid=GONE, absorbed=GONE", "extra=[1.0]"),
             *("unfinished=np.zeros(1, np.float32)", "meta=np.array([1.0, 2.0])"),

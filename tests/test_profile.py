@@ -437,7 +437,7 @@ def bomb():
         (archive(meta=np.array("[1]")), "not a JSON object"),
         (archive(meta=np.array(["{}"])), " is damaged; write it again, or"),
         (archive(meta=np.array("[" * 100000)), " is damaged; write it again, or"),
-        (archive(meta=np.array('{"format": "sssfit.profile/2"}')), "'sssfit.profile/2'"),
+        (archive(meta=np.array('{"format": "sssfit.profile/3"}')), "'sssfit.profile/3'"),
         (
             archive(meta=np.array('{"format": "sssfit.kernel/1"}')),
             "is not a profile: it has format 'sssfit.kernel/1'",
