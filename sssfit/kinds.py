@@ -102,7 +102,7 @@ def load(source: "str | Path | BinaryIO", origin: str | None = None) -> "Loaded"
         source.seek(0)
     else:
         origin = printable(origin or str(source))
-        names = imported("sssfit.material:material_names")()
+        names = imported("sssfit.material:shipped_names")()
         path = Path(source)
         if source in names and not path.exists():
             return imported("sssfit.material:load_material")(source)  # type: ignore[no-any-return]

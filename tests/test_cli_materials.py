@@ -40,7 +40,11 @@ def test_list_names_every_material_within_100_columns(run):
     lines = run().splitlines()
     assert lines[0].split()[:2] == ["name", "eta"]
     assert lines[0].count("mm") == 3
-    assert [line.split()[0] for line in lines[1:-2]] == list(material_names())
+    half_spaces, layered = lines[1 : lines.index("")], lines[lines.index("") + 2 : -2]
+    assert [line.split()[0] for line in half_spaces] == list(material_names())
+    assert [line.split()[0] for line in layered] == list(material_names(layered=True))
+    fat = next(line for line in layered if line.startswith("skin-melanin-12-fat"))
+    assert fat.split()[1:7] == ["1.4", "1.4", "1.44", "0.06", "1.5", "inf"]
     uses = "a profile without coefficients, for simulate, compare and choose"
     assert lines[-2:] == ["", f"deon-skin: {uses}"]
     assert max(map(len, lines)) <= 100
@@ -56,6 +60,10 @@ def test_list_as_json(run):
     assert result["profiles"] == ["deon-skin"]
     rows = {row["name"]: row for row in result["rows"]}
     assert tuple(rows) == material_names()
+    layered = {row["name"]: row for row in result["layered"]}
+    assert tuple(layered) == material_names(layered=True)
+    assert layered["wholemilk-on-glass"]["thickness_mm"] == [2.0, 3.0]
+    assert layered["skin-melanin-12"]["thickness_mm"] == [0.06, None]
     assert rows["skin1"]["annuli"] == 1236
     assert rows["skin1"]["dr_mm"] == pytest.approx(0.0335570469798, rel=1e-9)
     assert rows["skin1"]["channels"] == ["R", "G", "B"]

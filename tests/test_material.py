@@ -13,7 +13,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sssfit.errors import MaterialError
-from sssfit.material import Layer, Material, load_material, material_names, parse_material
+from sssfit.material import (
+    Layer,
+    Material,
+    load_material,
+    material_names,
+    parse_material,
+    shipped_names,
+)
 
 SKIN = """\
 eta = 1.3
@@ -60,6 +67,18 @@ def test_the_shipped_materials_are_listed_in_order():
     assert len(names) == 22
     assert list(names) == sorted(names)
     assert set(material_names(paper=True)) < set(names)
+    layered = material_names(layered=True)
+    assert len(layered) >= 20
+    assert list(layered) == sorted(layered)
+    assert shipped_names() == names + layered
+
+
+def test_layered_materials_are_no_half_spaces_and_say_where_they_come_from():
+    for name in material_names(layered=True):
+        material = load_material(name)
+        assert material.name == name
+        assert material.source
+        assert len(material.layers) > 1 or not material.is_semi_infinite
 
 
 def test_derived_coefficients_follow_their_definitions():
@@ -569,7 +588,7 @@ def test_round_trips_give_an_equal_material(material):
 
 
 def test_shipped_files_equal_their_own_toml():
-    for name in material_names():
+    for name in shipped_names():
         assert parse_material(load_material(name).to_toml(), "x.toml") == load_material(name)
 
 

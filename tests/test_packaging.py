@@ -19,7 +19,7 @@ PAPER = {
     *("apple", "chicken1", "chicken2", "cream", "ketchup", "marble"),
     *("potato", "skimmilk", "skin1", "skin2", "wholemilk"),
 }
-MATERIALS = {path.stem for path in (ROOT / "materials").glob("*.toml")}
+MATERIALS = {path.stem for path in (ROOT / "materials").rglob("*.toml")}
 # Distributions that are imported by another name.
 IMPORT_NAMES = {
     "colour-science": "colour",

@@ -82,9 +82,21 @@ def material_figures(material: Material) -> dict[str, Any]:
 
 
 def shipped_figures() -> dict[str, Any]:
-    """Return a row for each material that ships with sssfit."""
+    """Return a row for each material that ships with sssfit, half spaces apart from layers."""
     rows = [material_row(load_material(name)) for name in material_names()]
-    return {"rows": rows, "profiles": [DEON_SKIN]}
+    layered = [_layered_row(load_material(name)) for name in material_names(layered=True)]
+    return {"rows": rows, "layered": layered, "profiles": [DEON_SKIN]}
+
+
+def _layered_row(material: Material) -> dict[str, Any]:
+    """Return name and source, and index and thickness (None: without end) from the top down."""
+    return {
+        "name": material.name,
+        "source": material.source,
+        "channels": material.channels,
+        "eta": [layer.eta for layer in material.layers],
+        "thickness_mm": [layer.to_dict()["thickness_mm"] for layer in material.layers],
+    }
 
 
 def deon_skin_figures() -> dict[str, Any]:
@@ -167,8 +179,23 @@ def shipped_page(figures: Figures) -> str:
         ("radius, mm", values("radius_mm"), ".2f"),
     )
     return (
-        f"{text}\n\n{DEON_SKIN}: a profile without coefficients, for simulate, compare and choose"
+        f"{text}\n\n{_layered_table(figures['layered'])}\n\n"
+        f"{DEON_SKIN}: a profile without coefficients, for simulate, compare and choose"
     )
+
+
+def _layered_table(rows: list[Figures]) -> str:
+    """Return a line of text for each material of several layers, and for each slab."""
+    lines = [
+        [
+            row["name"],
+            " ".join(f"{eta:g}" for eta in row["eta"]),
+            " ".join(number(each, "g|inf") for each in row["thickness_mm"]),
+            row["source"],
+        ]
+        for row in rows
+    ]
+    return table(["layers", "eta", "thickness, mm", "source"], lines)
 
 
 def deon_skin_page(figures: Figures) -> str:

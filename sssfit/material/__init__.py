@@ -7,6 +7,7 @@ from sssfit.material.record import (
     material_names,
     parse_material,
     read_material,
+    shipped_names,
 )
 
 __all__ = [
@@ -16,4 +17,5 @@ __all__ = [
     "material_names",
     "parse_material",
     "read_material",
+    "shipped_names",
 ]

@@ -310,13 +310,14 @@ def load_material(name_or_path: str | Path) -> Material:
         if sys.stdin is None:
             raise MaterialError("stdin is closed; name a material or a file instead of -.")
         return read_material(sys.stdin.buffer, "stdin")
-    if not isinstance(name_or_path, Path) and wanted in material_names():
-        shipped = resources.files("sssfit.materials") / f"{wanted}.toml"
+    if not isinstance(name_or_path, Path) and wanted in shipped_names():
+        folder = "layered/" if wanted in material_names(layered=True) else ""
+        shipped = resources.files("sssfit.materials") / f"{folder}{wanted}.toml"
         return parse_material(shipped.read_text("utf-8"), f"{wanted}.toml")
     if isinstance(name_or_path, Path) or is_path(wanted):
         return read_material(Path(wanted), wanted)
     raise MaterialError(
-        f"there is no material {shown(wanted)}; {did_you_mean(wanted, material_names())}"
+        f"there is no material {shown(wanted)}; {did_you_mean(wanted, shipped_names())}"
         "`material_names()` lists them, and your own file ends in .toml."
     )
 
@@ -342,15 +343,22 @@ _PAPER = (
 
 
 @cache
-def material_names(*, paper: bool = False) -> tuple[str, ...]:
-    """Return the names of the materials that ship with sssfit, sorted.
+def material_names(*, paper: bool = False, layered: bool = False) -> tuple[str, ...]:
+    """Return the names of the half spaces that ship with sssfit, sorted.
 
-    ``paper`` selects those in the supplement of "Separable Subsurface Scattering".
+    ``paper`` selects those in the supplement of "Separable Subsurface Scattering", ``layered`` the
+    materials of several layers and the slabs in their place.
     """
     if paper:
         return _PAPER
-    files = resources.files("sssfit.materials").iterdir()
+    folder = resources.files("sssfit.materials")
+    files = (folder / "layered" if layered else folder).iterdir()
     return tuple(sorted(f.name[:-5] for f in files if f.name.endswith(".toml")))
+
+
+def shipped_names() -> tuple[str, ...]:
+    """Return the names of all materials that ship with sssfit: half spaces, then layered ones."""
+    return material_names() + material_names(layered=True)
 
 
 def parse_material(text: str, origin: str) -> Material:
