@@ -11,9 +11,8 @@ from reference_pixels import make_profile
 
 import sssfit.choose.choice as rooms
 import sssfit.choose.truth as truths
-import sssfit.simulate.truth as all_light
 from sssfit.choose import truth as photon_walks
-from sssfit.choose.choice import choose, is_exact, mm_per_pixel_at
+from sssfit.choose.choice import choose, mm_per_pixel_at
 from sssfit.choose.options import PREINTEGRATED, Option, options
 from sssfit.choose.report import sentences, step_line
 from sssfit.choose.truth import material_of, photons_needed
@@ -449,11 +448,32 @@ def test_a_picture_of_ones_own_and_its_mask(skin1):
     assert score.delta_e_2000_p95 <= 0.5
 
 
-def test_a_slab_is_held_against_a_walk(monkeypatch):
+def slab_of(thickness_mm=5.0):
+    layer = Layer(1.3, np.zeros(1), np.array([0.1]), np.array([1.0]), thickness_mm=thickness_mm)
+    return Material("slab", ("grey",), (layer,))
+
+
+def refused(*_, **__):
+    raise SimulationError("slab grey: 40 and 36 directions differ; give .002, or montecarlo.")
+
+
+def test_a_slab_is_held_against_its_exact_profile(monkeypatch):
+    quick(monkeypatch)
+    found = choose(slab_of(), mm_per_pixel=1.4, frame=(64, 64))
+    assert found.profile.meta["method"] == "exact"
+    assert found.profile.meta["settings"]["solver"] == "layer"
+    assert found.chosen.within
+
+
+def test_what_the_exact_solver_refuses_is_held_against_a_walk(monkeypatch, caplog):
     monkeypatch.setattr(truths, "WALK_PHOTONS", 20_000)
-    layer = Layer(1.3, np.zeros(1), np.array([0.1]), np.array([1.0]), thickness_mm=5.0)
-    slab, view = Material("slab", ("grey",), (layer,)), {"mm_per_pixel": 1.4, "frame": (64, 64)}
-    found = choose(slab, **view)
+    monkeypatch.setattr(truths, "exact_with_all_light", refused)
+    slab, view = slab_of(), {"mm_per_pixel": 1.4, "frame": (64, 64)}
+    with caplog.at_level("INFO", logger="sssfit"):
+        found = choose(slab, **view)
+    assert caplog.messages == [
+        "slab grey: 40 and 36 directions differ: tracing 1e7 photons for the true profile instead."
+    ]
     assert found.profile.photons == 20_000
     assert found.photons.truth_method == "montecarlo"
     assert found.photons.counts == (10_000,)
@@ -465,8 +485,8 @@ def test_a_slab_is_held_against_a_walk(monkeypatch):
 
 def test_the_seed_is_the_walks(monkeypatch):
     monkeypatch.setattr(truths, "WALK_PHOTONS", 1000)
-    layer = Layer(1.3, np.zeros(1), np.array([0.1]), np.array([1.0]), thickness_mm=5.0)
-    slab = Material("slab", ("grey",), (layer,))
+    monkeypatch.setattr(truths, "exact_with_all_light", refused)
+    slab = slab_of()
     first, second = (
         choose(slab, mm_per_pixel=8.0, frame=FRAME, seed=seed).profile for seed in (1, 2)
     )
@@ -564,22 +584,13 @@ def test_two_channels_have_no_colour():
         choose(Material("two", ("a", "b"), (layer,)), mm_per_pixel=0.6)
 
 
-def test_a_material_that_fails_to_converge(skin1, monkeypatch):
-    monkeypatch.setattr(
-        all_light, "simulate_exact", lambda m, **_: simulate_exact(m, tolerance=1e-15)
-    )
-    with pytest.raises(SimulationError, match="cannot be met"):
-        choose(skin1, mm_per_pixel=0.6, frame=FRAME)
-
-
-def test_forward_scattering_is_walked_and_not_taken_for_isotropic():
+def test_forward_scattering_is_solved_and_not_taken_for_isotropic():
     layer = Layer(1.3, np.array([0.8]), np.array([0.1]), np.array([5.0]))
     forward = Material("forward", ("grey",), (layer,))
-    assert not is_exact(forward)
-    even = Layer(1.3, np.zeros(1), np.array([0.1]), np.array([5.0]))
-    assert is_exact(Material("even", ("grey",), (even,)))
-    # Nor is a medium thinner optically than what is above it, which the exact solver refuses.
-    assert not is_exact(Material("under-water", ("grey",), (even,), eta_above=1.33))
+    found, _ = truths.truth_of(forward, seed=1, threads=1)
+    expected = simulate_exact(forward, threads=1)
+    assert found.diffuse_reflectance == pytest.approx(expected.diffuse_reflectance, rel=1e-12)
+    assert found.meta["settings"]["similarity"] is False
 
 
 def test_a_material_that_returns_nothing_is_refused():

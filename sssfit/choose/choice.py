@@ -25,7 +25,6 @@ from sssfit.choose.options import Option, check_caps, half_pixels, options
 from sssfit.choose.truth import (
     PhotonNeed,
     check_colours,
-    is_exact,
     material_of,
     name_of,
     note_truth,
@@ -52,7 +51,7 @@ from sssfit.profile import Profile
 from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
 
-__all__ = ["TOLERANCES", "Choice", "PhotonNeed", "Step", "choose", "is_exact", "mm_per_pixel_at"]
+__all__ = ["TOLERANCES", "Choice", "PhotonNeed", "Step", "choose", "mm_per_pixel_at"]
 
 TOLERANCE = 1.0  # of Delta E, unless there is a budget: about what an eye sees side by side
 # Truths of 8193 pixels: skin1 on pixels of .005 mm. On finer ones a picture of 512 pixels shows

@@ -7,12 +7,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from sssfit.arrays import plain
 from sssfit.choose.options import Option
 from sssfit.choose.views import Views
-from sssfit.errors import FitError, RenderError, SssfitError, SssfitWarning
+from sssfit.errors import (
+    FitError,
+    RenderError,
+    SimulationError,
+    SssfitError,
+    SssfitWarning,
+    StoppedError,
+)
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
 from sssfit.messages import note, number
@@ -28,34 +33,32 @@ _TRANSPORT = ("exact", "montecarlo")
 def truth_of(
     source: Material | Profile, *, seed: int, threads: int | None
 ) -> tuple[Profile, float]:
-    """Return a half space's exact profile, that of others by a walk; and the seconds.
+    """Return a material's exact profile, or a walk's where that is refused; and the seconds.
 
     A profile is its own truth.
 
-    Others are slabs, stacks, and scattering with g other than 0: reduced to isotropic scattering,
-    skin1's coefficients with g = 0.8 had a Delta E of 5.3 against the walk. The exact solver for
-    layers has them too, but refuses thin slabs that scatter far ahead, and the walk none.
     The exact one has all of the light: marble's kernels, 2.2 % of whose red lies beyond the paper's
-    grid, were .39 Delta E off on the head at best.
+    grid, were .39 Delta E off on the head at best. Refused are thin slabs that scatter far ahead
+    and stacks of hundreds of layers. None is reduced to isotropic scattering: skin1's coefficients
+    with g = 0.8 had then a Delta E of 5.3 against the walk.
     """
     if isinstance(source, Profile):
         return source, 0.0
     begun = time.perf_counter()
-    if is_exact(source):
+    try:
         profile = exact_with_all_light(source, make_grid(source), math.inf, threads=threads)
-    else:
+    except StoppedError:
+        raise
+    except SimulationError as refusal:
+        why = str(refusal).rstrip(".").partition(";")[0]
+        note(f"{why}: tracing 1e7 photons for the true profile instead.")
         profile = simulate_montecarlo(source, photons=WALK_PHOTONS, seed=seed, threads=threads)
     return profile, time.perf_counter() - begun
 
 
 def note_truth(source: Material | Profile) -> None:
-    """Say, before a choice is made, what a profile cannot tell and what takes long."""
+    """Say, before a choice is made, what a profile cannot tell."""
     if isinstance(source, Material):
-        if not is_exact(source):
-            note(
-                f"{source.name} is not a half space with g = 0: tracing 1e7 photons for its true "
-                "profile."
-            )
         return
     missing = source.beyond_grid.sum() / max(source.diffuse_reflectance.sum(), 1e-300)
     if missing > _WORTH_A_NOTE:
@@ -63,16 +66,6 @@ def note_truth(source: Material | Profile) -> None:
             f"{number(missing, '.2g%')} of the light lies beyond the profile's grid, where the "
             "true picture lacks it and a kernel does not: simulate with a larger radius."
         )
-
-
-def is_exact(material: Material) -> bool:
-    """Whether the truth is that of the solver for half spaces, with g = 0.
-
-    Nor may it be thinner optically than what is above it, as vacuum under air is.
-    """
-    layer = material.layers[0]
-    is_dense = layer.eta >= material.eta_above
-    return material.is_semi_infinite and is_dense and not np.any(layer.g)
 
 
 def material_of(source: Material | Profile) -> Material | None:

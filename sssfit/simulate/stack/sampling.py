@@ -8,6 +8,7 @@ import numpy as np
 from sssfit.arrays import FloatArray
 from sssfit.simulate.stack.assembly import Assembly, Transforms, reflected_at, transforms_at
 from sssfit.simulate.stack.azimuth import Azimuth, azimuth_of
+from sssfit.simulate.stack.gaps import Gap, resolved
 from sssfit.simulate.stack.modes import Modes, modes_of
 from sssfit.simulate.stack.phase import Medium
 from sssfit.simulate.stack.single import single_transform
@@ -84,9 +85,30 @@ class Sampler:
 
     def at(self, k: float) -> FloatArray:
         """Return R(k) and T(k) of each stack less single scattering, (2 stacks,)."""
-        known = _KnownModes(k or self.zero, self.azimuth(k or self.zero))
-        found = [_multiple(each, k, known) for each in self.assemblies]
+        known = self._modes(k)
+        found = [
+            _multiple(each, k, known, gap(k) if gap and k in gap else None)
+            for each, gap in zip(self.assemblies, self.gaps, strict=True)
+        ]
         return np.array(found).ravel()
+
+    @cached_property
+    def gaps(self) -> tuple[Gap | None, ...]:
+        """Where each stack's T(k) is interpolated, if anywhere."""
+        return tuple(self._gap(each) if each.has_bottom else None for each in self.assemblies)
+
+    def _gap(self, assembly: Assembly) -> Gap | None:
+        depths = [each.thickness for each in assembly.media]
+        first = resolved(self.count) / sum(depths)
+        last = 1.001 * _forward_depth(assembly) / depths[-1]  # just above it
+
+        def transmitted(k: float) -> float:
+            return _multiple(assembly, k, self._modes(k))[1]
+
+        return Gap(first, last, transmitted) if first < last else None
+
+    def _modes(self, k: float) -> "_KnownModes":
+        return _KnownModes(k or self.zero, self.azimuth(k or self.zero))
 
 
 class _KnownModes:
@@ -104,28 +126,32 @@ class _KnownModes:
         return self._found[key]
 
 
-def _multiple(assembly: Assembly, k: float, known: _KnownModes) -> tuple[float, float]:
-    """Return R(k) and T(k) less the light that is scattered once and leaves."""
+def _multiple(
+    assembly: Assembly, k: float, known: _KnownModes, through: float | None = None
+) -> tuple[float, float]:
+    """Return R(k) and T(k) less the light that is scattered once and leaves.
+
+    ``through`` is T(k) where it is known already.
+    """
     azimuth = known.azimuth
     once_k = known.k if k > 0.0 else 0.0
     top = assembly.last_seen(k, _depth_above(assembly)) if k > 0.0 else None
+    above: float | None = None
+    if top is not None or not assembly.has_bottom or through is not None:
+        above = reflected_at(assembly, known.k, azimuth, known, top)
     if not assembly.has_bottom:
-        whole = reflected_at(assembly, known.k, azimuth, known, top)
-        return whole - single_transform(assembly, once_k, azimuth, top), 0.0
-    below = assembly.mirrored
-    lowest = below.last_seen(k, _forward_depth(assembly)) if k > 0.0 else None
-    if assembly.beam.transmitted > _SEEN:
-        lowest = None
-    if top is None or lowest is None:
+        through = 0.0
+    elif through is None and k * assembly.media[-1].thickness > _forward_depth(assembly):
+        below = assembly.mirrored
+        through = reflected_at(below, known.k, azimuth, known, 0)
+        through -= single_transform(below, once_k, azimuth, 0)
+    if above is None or through is None:
         both = transforms_at(assembly, known.k, azimuth, known)
-    up = both.reflected if top is None else reflected_at(assembly, known.k, azimuth, known, top)
-    down = (
-        both.transmitted if lowest is None else reflected_at(below, known.k, azimuth, known, lowest)
-    )
-    return (
-        up - single_transform(assembly, once_k, azimuth, top),
-        down - single_transform(below, once_k, azimuth, lowest),
-    )
+        above = both.reflected if above is None else above
+        if through is None:
+            once = single_transform(assembly.mirrored, once_k, azimuth)
+            through = both.transmitted - once
+    return above - single_transform(assembly, once_k, azimuth, top), through
 
 
 def _forward_depth(assembly: Assembly) -> float:
