@@ -35,6 +35,7 @@ from .scene import scene
 from .show import show
 from .simulate import simulate
 from .stability import stability
+from .sweep import sweep
 
 _LIBRARIES = (
     *("numpy", "scipy", "threadpoolctl", "nlopt", "numba", "llvmlite", "matplotlib"),
@@ -80,7 +81,7 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
 
 
 for _verb in (
-    *(materials, simulate, fit, render, compare, choose, stability, motion, scene),
+    *(materials, simulate, sweep, fit, render, compare, choose, stability, motion, scene),
     *(import_, export, chart, report, show),
 ):
     cli.add_command(_verb)

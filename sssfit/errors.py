@@ -37,6 +37,14 @@ class RenderError(SssfitError):
     """A picture cannot be rendered or compared with these settings."""
 
 
+class PlanError(SssfitError):
+    """A sweep's plan or its values are invalid."""
+
+
+class SweepError(SssfitError):
+    """A sweep cannot run, or not to its end; what is finished is kept."""
+
+
 class FileError(SssfitError):
     """A file cannot be read, written or replaced."""
 

@@ -14,6 +14,7 @@ from approval_run import Command
 
 from sssfit.formats.profiles import import_profile
 from sssfit.kernel import Taps
+from sssfit.sweep import load_plan, sweep_to_store
 
 C = Command
 # What a search for a cascade ends with, and how long it took.
@@ -90,6 +91,7 @@ HELP = [
     *(
         C(f"{verb} --help")
         for verb in (
+            "sweep",
             "compare",
             "choose",
             "stability",
@@ -1490,8 +1492,65 @@ REPORT = [
     C("report missing.toml"),
 ]
 
+_POINTS = _write(
+    "points.toml",
+    'material = "wax.toml"\nmethod = "burley"\n[grid]\ndr_mm = 0.5\nradius_mm = 6\n'
+    '[[axes]]\nkey = "eta"\nvalues = [1.3, 1.5]\n'
+    '[[axes]]\nkey = "albedo"\nfrom = 0.5\nto = 0.9\ncount = 3\n',
+)
+
+
+def _swept() -> None:
+    _POINTS()
+    sweep_to_store(load_plan("points.toml"), "points.zarr", threads=1)
+
+
+def _plan(*lines: str) -> Callable[[], object]:
+    """Write a plan of the wax with other lines behind its head."""
+    return _write("p.toml", "\n".join(('material = "wax.toml"', *lines)))
+
+
+_ETA = '[[axes]]\nkey = "eta"\nvalues = [1.3, 1.5]'
+
+SWEEP = [
+    C("sweep points.toml --threads 1", set_up=_POINTS, brief=True),
+    C("sweep points.toml --threads 1 -o s.zarr --seed 3 --json -v", set_up=_POINTS, brief=True),
+    C("sweep points.toml --threads 1 -q", set_up=_POINTS, brief=True),
+    C("sweep points.toml --threads 1", set_up=_swept, note="a store is there"),
+    C("sweep points.toml --threads 1 --resume", set_up=_swept, brief=True),
+    C("sweep points.toml --threads 1 --force", set_up=_swept, brief=True),
+    C("sweep points.toml --threads 1 --resume --seed 5", set_up=_swept, brief=True),
+    C("sweep points.toml --dry-run --threads 1", set_up=_POINTS),
+    C("sweep points.toml --dry-run --threads 1 --json", set_up=_POINTS),
+    C("sweep points.toml --dry-run -o s.zarr", set_up=_POINTS),
+    C("sweep points.toml --resume --force", set_up=_POINTS),
+    C("sweep points.toml -o foreign.md", set_up=_POINTS),
+    C("sweep points.toml -o out --force", set_up=_POINTS),
+    C("sweep points.toml -o no/such/s.zarr", set_up=_POINTS),
+    C("sweep points.toml --scheduler 10.0.0.5:8786", set_up=_POINTS),
+    C("sweep points.toml --scheduler local:0", set_up=_POINTS),
+    C("sweep missing.toml"),
+    C("sweep wax.toml"),
+    C("sweep wax.profile.npz"),
+    C("sweep p.toml", set_up=_plan("mehtod = 'exact'", _ETA), note="a typo"),
+    C("sweep p.toml", set_up=_plan("method = 'exact'", _ETA, "[set]\ng = 'x'"), note="a name"),
+    C("sweep p.toml", set_up=_plan(_ETA.replace("1.5", "nan")), note="NaN"),
+    C("sweep p.toml", set_up=_plan(_ETA.replace("1.5", "15")), note="a point out of range"),
+    C(
+        "sweep p.toml",
+        set_up=_plan(
+            *(
+                f'[[axes]]\nkey = "{key}"\nfrom = 0.1\nto = 0.5\ncount = 1000'
+                for key in ("g", "albedo")
+            )
+        ),
+        note="a million points",
+    ),
+]
+
 COMMANDS = {
     "help": HELP,
+    "sweep": SWEEP,
     "report": REPORT,
     "stability": STABILITY,
     "motion": MOTION,

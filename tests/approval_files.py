@@ -6,6 +6,7 @@ import json
 import re
 import tempfile
 import zipfile
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -27,7 +28,11 @@ def lines_of(command: Command, ran: Ran) -> list[str]:
     lines = [f"exit {ran.status}"]
     lines += _section("stdout", _stdout(ran))
     lines += _section("stderr", _stderr(command, ran))
+    stores = Counter(name.partition("/")[0] for name in ran.written if ".zarr/" in name)
+    lines += [f"wrote {name}, {count} files" for name, count in stores.items()]
     for name, data in ran.written.items():
+        if ".zarr/" in name:
+            continue
         content = [] if command.brief else file_lines(name, data, ran.charts)
         lines += _section(f"wrote {name}", content) or [f"wrote {name}"]
     lines += [f"removed {name}" for name in ran.gone]

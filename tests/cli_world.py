@@ -55,6 +55,7 @@ from sssfit.simulate import Checkpoint, inversion, simulate_montecarlo
 from sssfit.simulate._finished import DEFAULT_PHOTONS
 from sssfit.stability import Curve, Panel, Stability
 from sssfit.stability.curve import Axis
+from sssfit.sweep import Estimate, Plan
 
 WAX = (
     'name = "wax"\nsource = "a test"\neta = 1.3\ng = 0\n'
@@ -66,6 +67,11 @@ LAYERS = (
     "sigma_s_per_mm = [4.0, 5.0, 6.0]\nthickness_mm = 0.5\n"
     "[[layers]]\neta = 1.3\ng = 0.1\nsigma_a_per_mm = [0.2, 0.4, 0.5]\n"
     "sigma_s_per_mm = [1.0, 1.5, 1.25]\nthickness_mm = 1.5\n"
+)
+POINTS = (
+    'material = "wax.toml"\nmethod = "burley"\n[grid]\ndr_mm = 0.5\nradius_mm = 6.0\n'
+    '[[axes]]\nkey = "eta"\nvalues = [1.3, 1.5]\n'
+    '[[axes]]\nkey = "albedo"\nfrom = 0.5\nto = 0.9\ncount = 3\n'
 )
 PHOTONS, DR_MM, RADIUS_MM = 4000, 0.2, 6.0
 GRID = f"--dr {DR_MM} --radius {RADIUS_MM}"
@@ -151,6 +157,7 @@ def files() -> Path:
     folder = Path(tempfile.mkdtemp(prefix="sssfit-world-"))
     (folder / "wax.toml").write_text(WAX)
     (folder / "plate.toml").write_text(LAYERS)
+    (folder / "points.toml").write_text(POINTS)
     plate_profile().save(folder / "plate.profile.npz")
     profile().save(folder / "wax.profile.npz")
     taps().save(folder / "wax.taps.json")
@@ -272,8 +279,13 @@ def run(command: str, *, both: bool = False) -> Ran:
 
 
 def contents(folder: Path) -> dict[str, bytes]:
-    paths = [path for path in folder.rglob("*") if path.is_file()]
-    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in paths}
+    """Every file by its name; a store of a sweep counts as one."""
+    found: dict[str, bytes] = {}
+    for path in sorted(path for path in folder.rglob("*") if path.is_file()):
+        before, store, _ = path.relative_to(folder).as_posix().partition(".zarr/")
+        name = before + store.removesuffix("/")
+        found[name] = found.get(name, b"") + path.read_bytes()
+    return found
 
 
 @contextlib.contextmanager
@@ -315,6 +327,8 @@ def told(value: Any) -> Any:
         return value.material_name, value.meta.get("method"), float(value.annulus_energy.sum())
     if isinstance(value, Material):
         return value.name
+    if isinstance(value, Plan):
+        return value.sha256
     if isinstance(value, Scene):
         light = value.irradiance
         mask = b"" if value.mask is None else value.mask.tobytes()
@@ -611,6 +625,15 @@ def small_page(*_) -> str:
     return _unrecorded(report_room.library_page)([wax()], threads=1)
 
 
+def on_this_thread(real, given):
+    """A sweep without further processes or a cluster, whatever is asked for."""
+    return real(**given | {"threads": 1, "scheduler": None})
+
+
+def made_up_estimate(_, given) -> Estimate:
+    return Estimate(given["plan"], 2, 1.5, 30.25, 0.75, 3, 12.5)
+
+
 def blank(*_) -> Figure:
     """A chart with nothing on it: what charts look like is tested where they are made."""
     return Figure(figsize=(0.1, 0.1))
@@ -641,6 +664,8 @@ STAND_INS = {
     "sssfit.crowd.runner.six_gaussians": lambda *_: gaussians(),
     "sssfit.crowd.runner.frame_of": small_frame,
     "sssfit.crowd.runner.table_of": small_table,
+    "sssfit.sweep.sweep_to_store": on_this_thread,
+    "sssfit.sweep.estimate": made_up_estimate,
     "sssfit.report.finished_page": lambda *_: small_finished(),
     "sssfit.report.library_page": small_page,
     **{f"sssfit.chart.{kind}.{kind}_figure": blank for kind in _CHARTS},

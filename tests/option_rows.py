@@ -41,6 +41,7 @@ from sssfit.render.transmittance import with_transmitted
 from sssfit.scene.made import make_scene
 from sssfit.scene.record import Scene
 from sssfit.simulate import Checkpoint, simulate_burley, simulate_dipole
+from sssfit.sweep import load_plan
 
 
 @dataclass(frozen=True)
@@ -1467,9 +1468,39 @@ REPORT = {
     "--force": Row(f"{_REPORT} -o foreign.html", "--force", names, lambda: ["foreign.html"]),
 }
 
+# sweep
+
+_SWEEP = "sweep points.toml"
+
+
+def _plan(seed: int | None = None) -> Any:
+    return load_plan(world.files() / "points.toml", seed=seed)
+
+
+def _swept(seed: int | None = None, **settings: Any) -> Any:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "x.zarr")
+        return called("sssfit.sweep.sweep_to_store", _plan(seed), path, **settings)
+
+
+SWEEP = {
+    "--dry-run": Row(_SWEEP, "--dry-run", calls, lambda: called("sssfit.sweep.estimate", _plan())),
+    "--scheduler": Row(
+        _SWEEP,
+        "--scheduler local:2",
+        calls,
+        lambda: _swept(scheduler="local:2"),
+        words="--threads processes of this machine",
+    ),
+    "--resume": Row(_SWEEP, "--resume", calls, lambda: _swept(resume=True)),
+    "--output": Row(_SWEEP, "-o x.zarr", names, lambda: ["x.zarr"], words="PLAN.zarr"),
+    "--force": Row(_SWEEP, "--force", calls, lambda: _swept(force=True)),
+}
+
 ROWS: dict[str, dict[str, Row]] = {
     "materials": MATERIALS,
     "simulate": SIMULATE,
+    "sweep": SWEEP,
     "fit": FIT,
     "render": RENDER,
     "compare": COMPARE,
@@ -1488,6 +1519,7 @@ ROWS: dict[str, dict[str, Row]] = {
 COMMANDS = {
     "materials": "materials wax.toml",
     "simulate": _WALK,
+    "sweep": _SWEEP,
     "fit": "fit --method preintegrated",
     "render": _DISK,
     "compare": _BOTH,
@@ -1511,6 +1543,7 @@ def _seeded_taps(seed: int, method: str, **own: Any) -> Any:
 # Where --seed has something to do; elsewhere nothing is random and results do not depend on it.
 SEEDS = {
     "simulate": Row(_WALK, "--seed 5", calls, lambda: _walk(seed=5)),
+    "sweep": Row(_SWEEP, "--seed 5", calls, lambda: _swept(seed=5)),
     "fit --method cascade": Row(
         "fit wax.profile.npz --method cascade --stages 1-1 --mm-per-pixel .6",
         "--seed 5",
@@ -1559,6 +1592,7 @@ SEEDS = {
 # What --threads reaches; elsewhere there is one thread.
 THREADS = {
     "simulate": Row(_WALK, "--threads 1", calls, lambda: _walk(threads=1)),
+    "sweep": Row(_SWEEP, "--threads 1", calls, lambda: _swept(threads=1)),
     "compare": Row(_BUDGET, "--threads 1", calls, lambda: _budgeted(threads=1)),
     "stability": Row(_STABILITY, "--threads 1", calls, lambda: _stressed(threads=1)),
     "scene": _scene_row("--threads 1", threads=1),

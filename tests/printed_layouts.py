@@ -1166,6 +1166,32 @@ def report(f: Figures) -> list[Any]:
     ]
 
 
+def _axes(f: Figures) -> str:
+    return " x ".join(f"{name} {count}" for name, count in f["axes"].items())
+
+
+def sweep(f: Figures) -> list[Any]:
+    counts = (f["points"], _axes(f), f["computed"], f["finished_before"])
+    head = Words(
+        "{} by {}: {} points ({}), {} computed, {} before", f["material"], f["method"], *counts
+    )
+    rest = Words("{} annuli of {} mm, {} s", f["annuli"], f["dr_mm"], f["seconds"])
+    return [head, rest, wrote(f)]
+
+
+def dry_run(f: Figures) -> list[Any]:
+    parts = ("seconds", "workers", "start_seconds", "work_seconds", "write_seconds")
+    return [
+        Words("{} by {}: {} points ({})", f["material"], f["method"], f["points"], _axes(f)),
+        Words("{} annuli of {} mm, {} MB", f["annuli"], f["dr_mm"], f["bytes"] / 1e6),
+        Words(
+            "about {} s on {} workers: {} s to start, {} s of work, {} s to write",
+            *(f[key] for key in parts),
+        ),
+        Words("{} tasks, the longest {} s", f["tasks"], f["longest_task_seconds"]),
+    ]
+
+
 # A command that prints each of them, on the files of ``cli_world``.
 PRINTED: dict[str, Layout] = {
     "materials": materials_list,
@@ -1185,6 +1211,8 @@ PRINTED: dict[str, Layout] = {
     "simulate wax.toml --method burley --mapping diffuse --dr .3 --radius 8": simulation,
     "simulate wax.toml --method dipole --dr .3 --radius 8": simulation,
     "simulate plate.toml --method multipole --dr .3 --radius 8": simulation,
+    "sweep points.toml": sweep,
+    "sweep points.toml --dry-run": dry_run,
     "fit wax.profile.npz --method svd --rank 2 --energy keep --mm-per-pixel .4": fit,
     "fit wax.profile.npz --method burley --mm-per-pixel .4": fit,
     "render --irradiance disk --size 24x16 --structure": rendering,

@@ -62,6 +62,22 @@ g = 0
 sigma_a_per_mm = [0.5, 0.6]
 sigma_s_per_mm = [1, 2]
 """
+POINTS = b"""material = "skin1"
+method = "burley"
+[grid]
+dr_mm = 0.4
+radius_mm = 8.0
+[[axes]]
+key = "eta"
+values = [1.3, 1.5]
+[[axes]]
+name = "n"
+from = 0.5
+to = 0.9
+count = 3
+[set]
+"sigma_a_per_mm.R" = "n * 0.1 + 1 / (2 - n)"
+"""
 CUT_SECONDS = 2.0  # a run of odd options may be a long one; it is then interrupted
 MOST_SECONDS = 60.0  # for a case; the slowest take a second on an idle machine
 MOST_BYTES = 1_500_000_000  # what a case may add to the memory that was ever used
@@ -99,6 +115,7 @@ def originals(tmp_path_factory):
     return {
         "x.toml": SKIN,
         "stack.toml": STACK,
+        "points.toml": POINTS,
         "x.mci": (DATA / "sample.mci").read_bytes(),
         "x.mco": mco_text().encode(),
         "x.csv": csv_text(wax).encode(),
@@ -133,6 +150,7 @@ TRIALS = {
         ("show", "{}"),
     ),
     "stack.toml": (("simulate", "{}", *FEW, "-o", "out.npz"), ("materials", "{}", "--json")),
+    "points.toml": (("sweep", "{}", "--dry-run", "--threads", "1"),),
     "x.mci": (("simulate", "{}", *FEW, "-o", "out.npz"),),
     "x.mco": (("import", "{}", "-o", "out.npz"), ("import", "-", "-o", "out.npz")),
     "x.csv": (
@@ -403,12 +421,14 @@ SMALL = {
     "choose": ("--resolution", "8x6"),
     "motion": ("--size", "8x6", "--length", "3", "--only", "variates"),
     "scene": ("--resolution", "8x6", "--map-size", "16"),
+    "sweep": ("--dry-run", "--threads", "1"),
     "report": ("--only", "disk"),
 }
 SLOW = ("compare", "choose", "stability", "motion", "scene", "report")
 # What each verb reads, and the options it cannot do without.
 USUAL = {
     "simulate": ("x.toml",),
+    "sweep": ("points.toml",),
     "fit": ("x.profile.npz", "--method", "svd", "--mm-per-pixel", "0.4"),
     "render": ("x.kernel.json", "--irradiance", "disk"),
     "compare": ("x.profile.npz",),

@@ -39,6 +39,7 @@ ROOMS = [
         "stability",
         "motion",
         "crowd",
+        "sweep",
         "chart",
         "report",
         "cli",

@@ -11,7 +11,7 @@ import signal
 import threading
 import warnings
 from collections.abc import Callable, Iterable
-from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.connection import Connection
 from types import TracebackType
@@ -62,6 +62,10 @@ class Workers:
         self._pool.shutdown(cancel_futures=True)
         self._ours.close()
         self._theirs.close()
+
+    def submit(self, work: Callable[[Any, _Given], _Found], given: _Given) -> "Future[_Found]":
+        """Return the future of work(shared, given); its exception is BrokenProcessPool if lost."""
+        return self._pool.submit(_call, (work, given))
 
     def each(self, work: Callable[[Any, _Given], _Found], given: Iterable[_Given]) -> list[_Found]:
         """Return work(shared, each) for all that is given, in its order.

@@ -1,0 +1,178 @@
+"""The axes of a plan: a list, a range, or a table of wavelengths, and what a point has on each."""
+
+import csv
+import io
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from sssfit.errors import PlanError
+from sssfit.messages import did_you_mean, shown
+from sssfit.sweep.keys import UNITS
+from sssfit.text import finite_number, read_text
+
+MOST_VALUES = 100_000
+_KEYS = ("name", "key", "units", "values", "from", "to", "count", "spacing", "table")
+_ENDINGS = {"_per_mm": "1/mm", "_mm": "mm", "_nm": "nm", "_per_cm": "1/cm"}
+
+
+@dataclass(frozen=True, slots=True)
+class Axis:
+    """One axis of a sweep.
+
+    Parameters
+    ----------
+    name : str
+        Of its dimension in the store, and in formulas.
+    values : tuple of float (n,)
+        Its coordinates.
+    units : str
+        Of the coordinates: "1/mm", "mm", "nm" or "1".
+    key : str
+        The coefficient that it sets; empty where only formulas use it.
+    columns : mapping
+        The further columns of a table by name, each (n,).
+    """
+
+    name: str
+    values: tuple[float, ...]
+    units: str = "1"
+    key: str = ""
+    columns: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+
+    def at(self, k: int) -> dict[str, float]:
+        """Return the value of each name at position ``k``."""
+        return {self.name: self.values[k]} | {name: each[k] for name, each in self.columns.items()}
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the axis as JSON values."""
+        columns = {name: list(each) for name, each in self.columns.items()}
+        return {
+            "name": self.name,
+            "key": self.key,
+            "units": self.units,
+            "values": list(self.values),
+            **({"columns": columns} if columns else {}),
+        }
+
+
+def read_axis(table: object, folder: Path, where: str) -> Axis:
+    """Read one ``[[axes]]`` table of a plan; CSV files lie in ``folder``.
+
+    Raises
+    ------
+    PlanError
+        A key is unknown or missing, or a value is invalid; the message begins with ``where``.
+    """
+    if not isinstance(table, dict):
+        raise PlanError(f"{where} = {shown(table)} is not a table; write it under [[axes]].")
+    for key in table:
+        if key not in _KEYS:
+            raise PlanError(
+                f"{where}.{key} is not a key of an axis; {did_you_mean(key, _KEYS)}expected "
+                f"{', '.join(_KEYS)}."
+            )
+    given = [key for key in ("values", "from", "table") if key in table]
+    if len(given) != 1:
+        raise PlanError(
+            f"{where} has {' and '.join(given) or 'no values'}; give one of values = [...], "
+            "from, to and count, or table = a CSV file."
+        )
+    texts = {key: table[key] for key in ("name", "key", "units", "table") if key in table}
+    for key, each in texts.items():
+        if not isinstance(each, str) or not each:
+            raise PlanError(f"{where}.{key} = {shown(each)}; expected a text in quotes.")
+    if "table" in table:
+        return _of_table(table, folder, where)
+    coefficient = table.get("key", "")
+    last = coefficient.split("].")[-1].split(".")[0]
+    name = table.get("name") or last
+    _check_name(name, where)
+    values = _listed(table, where) if "values" in table else _ranged(table, where)
+    units = table.get("units") or (UNITS.get(last, "1") if coefficient else _units(name))
+    return Axis(name, values, units, coefficient)
+
+
+def _check_name(name: str, where: str) -> None:
+    if not name.isidentifier():
+        raise PlanError(
+            f"{where}.name = {shown(name)}; an axis that sets no key has a name of letters, "
+            "digits and _, a letter first."
+        )
+
+
+def _units(name: str) -> str:
+    return next((unit for ending, unit in _ENDINGS.items() if name.endswith(ending)), "1")
+
+
+def _number(key: str, value: object, where: str) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value):
+        raise PlanError(f"{where}.{key} = {shown(value)}; expected a number.")
+    return float(value)
+
+
+def _listed(table: Mapping[str, Any], where: str) -> tuple[float, ...]:
+    """Return the values of a list."""
+    values = table["values"]
+    if not isinstance(values, list) or not 1 <= len(values) <= MOST_VALUES:
+        raise PlanError(f"{where}.values = {shown(values)}; expected a list of 1 number or more.")
+    return tuple(_number(f"values[{k}]", each, where) for k, each in enumerate(values))
+
+
+def _ranged(table: Mapping[str, Any], where: str) -> tuple[float, ...]:
+    """Return the values of a range, both ends included."""
+    missing = [key for key in ("from", "to", "count") if key not in table]
+    if missing:
+        raise PlanError(f"{where} has no {missing[0]}; a range has from, to and count.")
+    low, high = (_number(key, table[key], where) for key in ("from", "to"))
+    count, spacing = table["count"], table.get("spacing", "linear")
+    if type(count) is not int or not 1 <= count <= MOST_VALUES:
+        raise PlanError(
+            f"{where}.count = {shown(count)}; expected a whole number from 1 to {MOST_VALUES}."
+        )
+    if spacing not in ("linear", "log"):
+        raise PlanError(f"{where}.spacing = {shown(spacing)}; expected linear or log.")
+    if math.isinf(low) or math.isinf(high) or (spacing == "log" and not (low > 0 and high > 0)):
+        raise PlanError(
+            f"{where} goes from {low:g} to {high:g}; expected finite ends, above 0 for log."
+        )
+    # Python's power and not numpy's, whose last bit differs between processors.
+    parts = [k / (count - 1) for k in range(1, count - 1)]
+    if spacing == "log":
+        inner = [low * (high / low) ** part for part in parts]
+    else:
+        inner = [low + (high - low) * part for part in parts]
+    return (low, *inner, high) if count > 1 else (low,)
+
+
+def _of_table(table: Mapping[str, Any], folder: Path, where: str) -> Axis:
+    """Return the axis of a CSV file: its first column is the coordinate, the others are names."""
+    if "key" in table:
+        raise PlanError(f"{where} has table and key; a table's columns are used in [set].")
+    path = folder / table["table"]
+    text = read_text(path, str(path), expected="a CSV file with a head", error=PlanError).content
+    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
+    rows = [[cell.strip() for cell in row] for row in csv.reader(io.StringIO("\n".join(lines)))]
+    if len(rows) < 2 or len(rows) > MOST_VALUES + 1:
+        raise PlanError(f"{path} has no rows below its head; expected at least one.")
+    head, *body = rows
+    for name in head:
+        _check_name(name, str(path))
+    if len({*head}) < len(head):
+        raise PlanError(f"{path} names a column twice: {', '.join(head)}.")
+    columns: list[list[float]] = [[] for _ in head]
+    for number, row in enumerate(body, 2):
+        if len(row) != len(head):
+            raise PlanError(
+                f"{path}, row {number}, has {len(row)} cells and the head has {len(head)}."
+            )
+        for column, cell in zip(columns, row, strict=True):
+            if (value := finite_number(cell)) is None:
+                raise PlanError(f"{path}, row {number}: {shown(cell)} is not a number.")
+            column.append(value)
+    name = table.get("name") or head[0]
+    _check_name(name, where)
+    others = {key: tuple(each) for key, each in zip(head[1:], columns[1:], strict=True)}
+    return Axis(name, tuple(columns[0]), table.get("units") or _units(name), "", others)

@@ -1,0 +1,180 @@
+"""A Dask cluster as the place where tasks are done: one that runs, or workers of this machine.
+
+Tasks are the same as without a cluster, and results are added by this process in the same order.
+Dask gives the task of a lost worker to another one; a lost scheduler ends the sweep in order.
+"""
+
+import contextlib
+import logging
+from collections.abc import Iterator
+from concurrent.futures import Future
+from contextlib import ExitStack
+from types import TracebackType
+from typing import Any, Self
+
+from sssfit import __version__
+from sssfit.errors import ArgumentError, SweepError
+from sssfit.messages import printable, shown
+from sssfit.simulate.batches import code_version
+from sssfit.sweep.needed import needed
+from sssfit.sweep.plan import Plan
+from sssfit.sweep.tasks import Done, Task, perform
+
+_CONNECT_SECONDS = 10.0
+_WORKERS_SECONDS = 30.0
+_MOST_LOCAL = 256
+
+
+class Cluster:
+    """The workers of a Dask scheduler.
+
+    Parameters
+    ----------
+    plan : Plan
+    scheduler : str
+        Its address, tcp://HOST:PORT, or local:N, which starts a scheduler and N workers.
+
+    Raises
+    ------
+    ArgumentError
+        ``scheduler`` is neither.
+    """
+
+    def __init__(self, plan: Plan, scheduler: str) -> None:
+        self._plan, self._address = plan, scheduler
+        self._count = local_count(scheduler)
+        self._stack = ExitStack()
+        self.workers = 1
+
+    def __enter__(self) -> Self:
+        distributed = needed("distributed", "cluster")
+        with self._stack, _quiet():
+            address: Any = self._address
+            if self._count:
+                address = self._stack.enter_context(
+                    distributed.LocalCluster(
+                        n_workers=self._count,
+                        threads_per_worker=1,
+                        dashboard_address=None,
+                        host="127.0.0.1",
+                        silence_logs=logging.CRITICAL,
+                    )
+                )
+            self._client = self._connected(distributed, address)
+            self._stack.callback(self._close)
+            self.workers = self._check_workers()
+            self._stack = self._stack.pop_all()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        with _quiet():
+            self._stack.close()
+
+    def submit(self, task: Task) -> "Future[list[Done]]":
+        """Send a task to the scheduler."""
+        result: Future[list[Done]] = Future()
+        asked = self._client.submit(perform, self._plan, task, pure=False)
+        asked.add_done_callback(lambda ended: _hand_over(ended, result))
+        return result
+
+    def check(self) -> None:
+        """Raise SweepError if the connection to the scheduler is lost."""
+        if self._client.status != "running":
+            raise SweepError(f"the scheduler at {self._address} was lost.")
+
+    def _connected(self, distributed: Any, address: Any) -> Any:
+        try:
+            return distributed.Client(
+                address, timeout=_CONNECT_SECONDS, set_as_default=False, direct_to_workers=False
+            )
+        except (OSError, ValueError, TimeoutError) as error:
+            raise SweepError(
+                f"there is no Dask scheduler at {printable(self._address)} "
+                f"({type(error).__name__}); start one with the command dask scheduler, or check "
+                "the address."
+            ) from None
+
+    def _check_workers(self) -> int:
+        """Return the number of threads of all workers, whose code has to be ours."""
+        try:
+            self._client.wait_for_workers(1, timeout=_WORKERS_SECONDS)
+            found = self._client.run(code_version)
+        except TimeoutError:
+            raise SweepError(
+                f"the scheduler at {self._address} has no workers; start some with "
+                f"the command dask worker {self._address}."
+            ) from None
+        except Exception as error:  # another version raises anything when it is asked
+            raise SweepError(
+                f"a worker of {self._address} has no such sssfit ({type(error).__name__}); install "
+                f"sssfit {__version__} there."
+            ) from None
+        for worker, code in found.items():
+            if code != code_version():
+                raise SweepError(
+                    f"the worker {worker} has sssfit {shown(code)}, and this is "
+                    f"{code_version()!r}; install the same version on all machines."
+                )
+        return sum(self._client.nthreads().values())
+
+    def _close(self) -> None:
+        with contextlib.suppress(Exception):
+            self._client.close(timeout=2.0)
+
+
+def local_count(scheduler: str) -> int:
+    """Return N of local:N, and 0 for an address.
+
+    Raises
+    ------
+    ArgumentError
+        It is neither.
+    """
+    kind, _, rest = scheduler.partition(":")
+    if kind == "local" and rest.isdecimal() and 1 <= int(rest[:9]) <= _MOST_LOCAL:
+        return int(rest)
+    if kind in ("tcp", "tls", "ucx", "ws", "wss") and rest.startswith("//") and len(rest) > 2:
+        return 0
+    raise ArgumentError(
+        f"scheduler = {shown(scheduler)}; expected an address, tcp://HOST:PORT, or local:N for N "
+        f"workers of this machine, at most {_MOST_LOCAL}."
+    )
+
+
+def _hand_over(ended: Any, result: "Future[list[Done]]") -> None:
+    """Give a result of Dask's to a future of Python's own; called in a thread of the client."""
+    if not result.set_running_or_notify_cancel():
+        return
+    if ended.status == "finished":
+        try:
+            result.set_result(ended.result())
+        except Exception as error:
+            result.set_exception(SweepError(f"a result was lost ({type(error).__name__})"))
+    elif ended.status == "error":
+        failed = ended.exception()
+        is_ours = isinstance(failed, SweepError)
+        text = printable(str(failed))
+        result.set_exception(
+            failed if is_ours else SweepError(f"a task failed ({type(failed).__name__}: {text})")
+        )
+    else:
+        result.set_exception(SweepError("the scheduler gave up a task, or was lost"))
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep what Dask logs of lost connections out of stderr; what matters is raised."""
+    names = ("distributed", "tornado", "asyncio")
+    before = {name: logging.getLogger(name).level for name in names}
+    for name in names:
+        logging.getLogger(name).setLevel(logging.CRITICAL + 1)
+    try:
+        yield
+    finally:
+        for name, level in before.items():
+            logging.getLogger(name).setLevel(level)

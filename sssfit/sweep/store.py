@@ -1,0 +1,155 @@
+"""The store of a sweep: one Zarr folder of format 2, which xarray opens as it stands.
+
+A point's arrays are written first and its fingerprint, 64 bits of their SHA-256, after them; chunks
+are renamed into place. A sweep that is killed between leaves a point without a fingerprint, which
+is then computed again to the same bits. Resuming compares the fingerprints with the arrays, so that
+chunks that a crash of the machine lost are noticed too.
+
+One process writes, and holds the lock of the store's name.
+"""
+
+import hashlib
+import json
+import time
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sssfit.errors import FileError, SweepError
+from sssfit.files import reason
+from sssfit.messages import printable, shown
+from sssfit.simulate.batches import code_version
+from sssfit.sweep.layout import (
+    FINGERPRINT,
+    content_of,
+    values_of,
+    variables_of,
+)
+from sssfit.sweep.made import FORMAT, quiet
+from sssfit.sweep.needed import needed
+from sssfit.sweep.plan import Plan
+from sssfit.sweep.tasks import Done
+
+_WAITS_SECONDS, _WAITS_POINTS = 1.0, 64  # the most that a kill can make be computed again
+
+
+class Store:
+    """An open store, and the points that wait to be written to it.
+
+    Parameters
+    ----------
+    path : Path
+        An existing store of ``plan``.
+    plan : Plan
+    """
+
+    def __init__(self, path: Path, plan: Plan) -> None:
+        self.path, self.plan = path, plan
+        self._root = needed("zarr", "sweep").open_group(str(path), mode="r+", zarr_format=2)
+        self._variables = variables_of(plan)
+        self._waiting: list[tuple[int, dict[str, Any]]] = []
+        self._written_at = time.monotonic()
+
+    def finished(self) -> list[int]:
+        """Return the points whose arrays are as their fingerprints say."""
+        marks = self._root[FINGERPRINT.name][:].ravel()
+        return [int(k) for k in np.flatnonzero(marks) if self._mark_of(int(k)) == marks[k]]
+
+    def _mark_of(self, index: int) -> int:
+        at = self.plan.position(index)
+        try:
+            values = {each.name: self._root[each.name][at] for each in self._variables}
+        except (OSError, ValueError, RuntimeError):  # a chunk of another length than it should have
+            return 0
+        return _mark(
+            {key: str(each[()]) if key == "kernel" else each for key, each in values.items()}
+        )
+
+    def add(self, done: Done) -> None:
+        """Take a finished point; written at once or within a second, with its neighbours."""
+        values = values_of(self.plan, done, self._variables)
+        self._waiting.append((done.part.index, values))
+        is_late = time.monotonic() - self._written_at > _WAITS_SECONDS
+        if is_late or len(self._waiting) >= _WAITS_POINTS:
+            self.flush()
+
+    def flush(self) -> None:
+        """Write what waits.
+
+        Raises
+        ------
+        FileError
+            The disk is full, or the folder cannot be written; what was finished before is kept.
+        """
+        try:
+            with quiet():
+                self._flush()
+        except OSError as error:
+            raise FileError(
+                f"{self.path} cannot be written: {reason(error)}; the points that were finished "
+                "before are kept, and `resume = True` continues from there."
+            ) from error
+        self._waiting.clear()
+        self._written_at = time.monotonic()
+
+    def _flush(self) -> None:
+        waiting = sorted(self._waiting, key=lambda each: each[0])
+        rows = groupby(waiting, key=lambda each: self.plan.position(each[0])[:-1])
+        for row, points in ((row, list(each)) for row, each in rows):
+            last = [self.plan.position(index)[-1] for index, _ in points]
+            for each in self._variables:
+                array = self._root[each.name]
+                if each.is_of_rings:
+                    for k, (_, values) in zip(last, points, strict=True):
+                        array[(*row, k)] = values[each.name]
+                else:
+                    array.oindex[(*row, last)] = np.array([own[each.name] for _, own in points])
+            marks = np.array([_mark(values) for _, values in points])
+            self._root[FINGERPRINT.name].oindex[(*row, last)] = marks
+
+
+def _mark(values: dict[str, Any]) -> int:
+    digest = hashlib.sha256(content_of(values)).digest()
+    return (int.from_bytes(digest[:8], "big") >> 1) | 1
+
+
+def is_store(path: Path) -> bool:
+    """Return whether a folder is a sweep's store, of any version."""
+    return str(_read_head(path).get("format", "")).startswith("sssfit.sweep/")
+
+
+def _read_head(path: Path) -> dict[str, Any]:
+    try:
+        found = json.loads((path / ".zattrs").read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError):
+        return {}
+    return found if isinstance(found, dict) else {}
+
+
+def check_same(path: Path, plan: Plan) -> None:
+    """Raise SweepError for a store of another plan or version, and name what differs."""
+    head = _read_head(path)
+    if head.get("format") != FORMAT:
+        raise SweepError(f"{path} has format {shown(head.get('format'))}; expected {FORMAT!r}.")
+    there, here = head.get("plan", {}), json.loads(json.dumps(plan.to_dict()))
+    differ = [key for key in here if there.get(key) != here[key]]
+    if differ:
+        named = "; ".join(
+            f"{key} = {_short(there.get(key))} (now {_short(here[key])})" for key in differ
+        )
+        raise SweepError(
+            f"{path} was made with another plan: {named}. Give that plan, another output, or "
+            "`force = True` to begin again."
+        )
+    if head.get("code") != code_version():
+        raise SweepError(
+            f"{path} was begun with sssfit {shown(head.get('code'))}, and this is "
+            f"{code_version()!r}, which would make other bits; use that version, or `force = True` "
+            "to begin again."
+        )
+
+
+def _short(value: object) -> str:
+    return printable(json.dumps(value))[:80]
