@@ -127,7 +127,9 @@ def quadrant_energy(
             if first == radii.size:
                 break
             add_pixel(quadrant[i, k], radii, densities, first, i, k, pitch)
-            quadrant[k, i] = quadrant[i, k]
+            # Channel by channel: the assignment of a row takes 3 s to compile.
+            for c in range(quadrant.shape[2]):
+                quadrant[k, i, c] = quadrant[i, k, c]
     return quadrant
 
 

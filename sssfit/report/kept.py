@@ -26,7 +26,7 @@ _PACKAGES = ("numpy", "scipy", "numba", "colour-science", "jinja2")
 _MOST = 10  # pages of 5 MB
 _SUM_BYTES = 32  # of SHA-256
 _SOURCES = {".py", ".js", ".css", ".html"}
-_LOG = "sssfit"
+LOG = "sssfit"
 
 
 def page_key(given: Mapping[str, Any]) -> str:
@@ -61,7 +61,7 @@ def kept(key: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
             made = make()
         ours = [str(each.message) for each in warned if each.category is SssfitWarning]
         found = {"made": made, "notes": told.lines, "warnings": ours}
-        if logging.getLogger(_LOG).isEnabledFor(logging.INFO):
+        if logging.getLogger(LOG).isEnabledFor(logging.INFO):
             _write(path, found)
     else:
         for line in found["notes"]:
@@ -87,11 +87,11 @@ class Listener(logging.Handler):
 def heard() -> Iterator[Listener]:
     """Let a listener hear what is noted inside the block."""
     listener = Listener()
-    logging.getLogger(_LOG).addHandler(listener)
+    logging.getLogger(LOG).addHandler(listener)
     try:
         yield listener
     finally:
-        logging.getLogger(_LOG).removeHandler(listener)
+        logging.getLogger(LOG).removeHandler(listener)
 
 
 def _folder() -> Path:
@@ -120,4 +120,4 @@ def _write(path: Path, content: dict[str, Any]) -> None:
         for old in every[_MOST:]:
             old.unlink(missing_ok=True)
     except (OSError, FileError) as error:
-        logging.getLogger(_LOG).debug("The page was not kept: %s", error)
+        logging.getLogger(LOG).debug("The page was not kept: %s", error)

@@ -1,34 +1,35 @@
-"""Makes a report: profile, kernels, pictures, comparison, models and budget, in this order."""
+"""Makes a report: profile, pictures, kernels, comparison; beside them models and budget."""
 
-from collections.abc import Callable, Collection, Sequence
-from typing import Any, TypeVar
+from collections.abc import Collection, Sequence
+from functools import partial
+from typing import Any
 
-from sssfit.compare.budget import Budget, error_budgets
-from sssfit.compare.convergence import Convergence, compute_convergence
-from sssfit.compare.models import ModelComparison, compare_models
 from sssfit.compare.pareto import compare_kernels
+from sssfit.compare.references import evaluated_scene
 from sssfit.compare.spectrum import compute_spectrum
-from sssfit.errors import RenderError, SimulationError
+from sssfit.errors import FitError, RenderError
 from sssfit.fit import MM_PER_PIXEL
 from sssfit.kernel import Taps
 from sssfit.material import Material
-from sssfit.messages import note
 from sssfit.profile import Profile
+from sssfit.report.aside import Aside
 from sssfit.report.commands import commands_of
-from sssfit.report.fits import Steps, Watch, fitted, shown_kernel
-from sssfit.report.pictures import SIDE, Shown, own_scene, shown_pictures
+from sssfit.report.fits import (
+    Steps,
+    Watch,
+    begun_fits,
+    finished_fits,
+    given_kernels,
+    shown_kernel,
+)
+from sssfit.report.parts import parts_of
+from sssfit.report.pictures import SIDE, flat_scenes, own_scene, shown_pictures
 from sssfit.report.record import Report
 from sssfit.simulate.truth import true_profile
 
 PHOTONS = 200_000  # of the walk in the models' chart and the budget: half a second
 _COLOURS = 3  # channels of a picture that the page can show
-# Of the chart of convergence: numbers of photons, two a decade; walks of each; the exact solver's.
-_WALKS, _SEEDS, _TOLERANCES = 5, 3, (1e-4, 5e-6)
-_LEAST_CONVERGING = 100_000  # photons of the longest walk; the shortest then has 1000
 _TIMED_SECONDS = 2.0  # in which kernels are timed in turn
-
-
-Part = TypeVar("Part")
 
 
 def make_report(
@@ -92,19 +93,28 @@ def make_report(
     pitch = own.mm_per_pixel if own else mm_per_pixel or MM_PER_PIXEL
     steps = Steps(progress)
     steps("the exact profile")
-    profile = source if isinstance(source, Profile) else true_profile(source, threads=threads)
-    fits = fitted(profile, pitch, named, only, steps)
-    pictures = shown_pictures(profile, pitch, own=own, side=side, threads=threads, progress=steps)
-    steps("the comparison")
-    alone = [each for each in pictures[1:] if each.name in ("disk", "edge")]
-    scenes = [each.scene for each in (pictures[0], *alone)]
-    timed: dict[str, Any] = {"timed_seconds": _TIMED_SECONDS, "threads": threads}
-    comparison = compare_kernels(profile, scenes, candidates=fits, **timed)
+    walk: dict[str, Any] = {"photons": photons, "seed": seed, "threads": threads}
+    with Aside(threads) as aside:
+        profile = source if isinstance(source, Profile) else true_profile(source, threads=threads)
+        begun = begun_fits(profile, pitch, [label for label, _ in named], only, aside)
+        steps.total += len(begun)
+        flat = [evaluated_scene(each, profile) for each in flat_scenes(pitch, side)]
+        parts = aside.begin(partial(parts_of, source, flat, walk))
+        pictures = shown_pictures(
+            profile, pitch, own=own, side=side, threads=threads, progress=steps
+        )
+        fits = [*given_kernels(named), *finished_fits(begun, steps)]
+        if not fits:
+            raise FitError(f"{profile.material_name or 'profile'}: no kernel could be fitted.")
+        steps("the comparison")
+        alone = [each for each in pictures[1:] if each.name in ("disk", "edge")]
+        scenes = [each.scene for each in (pictures[0], *alone)]
+        timed: dict[str, Any] = {"timed_seconds": _TIMED_SECONDS, "threads": threads}
+        timed["progress"] = partial(_before_timing, steps, aside)
+        comparison = compare_kernels(profile, scenes, candidates=fits, **timed)
+        models, budgets, convergence = parts()
     title = profile.material_name or name or "profile"
     shown = tuple(shown_kernel(each, title, pitch) for each in fits)
-    steps("models and budget")
-    walk = {"photons": photons, "seed": seed, "threads": threads}
-    models, budgets, convergence = _of_material(source, pictures, walk)
     return Report(
         title,
         profile,
@@ -128,35 +138,8 @@ def make_report(
     )
 
 
-def _of_material(
-    source: Material | Profile, pictures: Sequence[Shown], walk: dict[str, Any]
-) -> tuple[ModelComparison | None, tuple[Budget, ...], Convergence | None]:
-    """Return what needs coefficients; a part that does not cover the material is noted."""
-    if isinstance(source, Profile):
-        return None, (), None
-    flat = [each.scene for each in pictures if each.name in ("disk", "edge")]
-    return (
-        _covered("models", lambda: compare_models(source, **walk)),
-        tuple(_covered("error budget", lambda: error_budgets(source, flat, **walk)) or ()),
-        _covered("convergence", lambda: _convergence(source, **walk)),
-    )
-
-
-def _covered(what: str, make: Callable[[], Part]) -> Part | None:
-    """Return a part of the page, or None with a note if it does not cover the material."""
-    try:
-        return make()
-    except SimulationError as refusal:
-        note(f"The page has no {what}: {refusal}")
-        return None
-
-
-def _convergence(
-    material: Material, *, photons: int, seed: int, threads: int | None
-) -> Convergence | None:
-    """Return walks of up to so many photons; so few that no slope would be seen have none."""
-    if photons < _LEAST_CONVERGING:
-        return None
-    numbers = [round(photons * 10 ** (-0.5 * k)) for k in reversed(range(_WALKS))]
-    settings: dict[str, Any] = {"seeds": _SEEDS, "first_seed": seed, "threads": threads}
-    return compute_convergence(material, photons=numbers, tolerances=_TOLERANCES, **settings)
+def _before_timing(steps: Steps, aside: Aside, _done: int, _of: int, name: str) -> None:
+    """Let nothing else run while kernels are timed, the last step of a comparison."""
+    if name == "timing":
+        steps(name)
+        aside.wait()

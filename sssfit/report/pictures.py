@@ -138,10 +138,15 @@ def _scenes(
             lit: dict[str, Any] = {"light_degrees": light, "distance_mm": distance}
             head = make_scene("head", **size, mm_per_pixel=pitch, **lit, threads=threads)
             yield f"head-{light:g}-{farther}", "head", light, distance, head
+    for made in flat_scenes(mm_per_pixel, side):
+        yield made.name, made.name, None, None, made
+
+
+def flat_scenes(mm_per_pixel: float, side: int) -> list[Scene]:
+    """Return the disk and the edge, without what counts of them."""
     flat: dict[str, dict[str, Any]] = {"disk": {}, "edge": {"angle_degrees": EDGE_DEGREES}}
-    for name, turned in flat.items():
-        made = make_scene(name, **size, mm_per_pixel=mm_per_pixel, **turned)
-        yield name, name, None, None, made
+    size: dict[str, Any] = {"height": side, "width": side, "mm_per_pixel": mm_per_pixel}
+    return [make_scene(name, **size, **turned) for name, turned in flat.items()]
 
 
 def _reduced(scene: Scene, side: int) -> Scene:

@@ -86,6 +86,24 @@ class Workers:
         except BrokenProcessPool:
             raise SssfitError(_LOST) from None
 
+    def begin(self, work: Callable[[Any, _Given], _Found], given: _Given) -> Callable[[], _Found]:
+        """Begin work(shared, given); return a function that waits for what it returns.
+
+        Raises
+        ------
+        SssfitError
+            By the function that is returned, as `each`.
+        """
+        future = self._pool.submit(_call, (work, given))
+
+        def result() -> Any:
+            try:
+                return future.result()
+            except BrokenProcessPool:
+                raise SssfitError(_LOST) from None
+
+        return result
+
 
 def _begin(theirs: Connection, shared: object) -> None:
     """Make this process a worker."""
