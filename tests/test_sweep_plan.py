@@ -155,6 +155,7 @@ BAD = {
     HEAD + AXIS + '[fit]\nmethod = "svd"\nrang = 3': "fit.rang is unknown; did you mean rank?",
     HEAD + '[[axes]]\ntable = "none.csv"': "none.csv cannot be read",
     "material = [": "not valid TOML",
+    HEAD + AXIS.replace("1.4", "1" + 400 * "0"): "expected a number",
     'material = "skin1"\n[settings]\nphotons = 1.5\n' + AXIS: "expected a whole number",
     'material = "skin1"\n[settings]\nphotons = 0\n' + AXIS: "photons = 0",
     'material = "skin1"\n' + AXIS + '[set]\ng = "0.99999"': "the photon walk covers",

@@ -108,9 +108,19 @@ def _units(name: str) -> str:
 
 
 def _number(key: str, value: object, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or math.isnan(value):
+    if (found := as_float(value)) is None or math.isnan(found):
         raise PlanError(f"{where}.{key} = {shown(value)}; expected a number.")
-    return float(value)
+    return found
+
+
+def as_float(value: object) -> float | None:
+    """Return a number of TOML as a float; None for anything else, and beyond what floats hold."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    try:
+        return float(value)
+    except OverflowError:
+        return None
 
 
 def _listed(table: Mapping[str, Any], where: str) -> tuple[float, ...]:

@@ -5,13 +5,13 @@ import math
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from sssfit.errors import PlanError, SssfitError
 from sssfit.material import Material, load_material
 from sssfit.messages import did_you_mean, printable, shown
 from sssfit.methods import FITS, SIMULATIONS, Method, Setting
-from sssfit.sweep.axes import read_axis
+from sssfit.sweep.axes import as_float, read_axis
 from sssfit.sweep.plan import WALK, Plan
 from sssfit.text import read_text
 
@@ -118,8 +118,8 @@ def _check_kind(key: str, value: object, setting: Setting) -> None:
         fits = isinstance(value, bool) if setting.kind == "flag" else value in setting.among
         expected = "true or false" if setting.kind == "flag" else " or ".join(setting.among)
     else:
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        fits, expected = is_number and math.isfinite(cast("float", value)), "a finite number"
+        found = as_float(value)
+        fits, expected = found is not None and math.isfinite(found), "a finite number"
     if not fits:
         raise PlanError(f"settings.{key} = {shown(value)}; expected {expected}.")
 
@@ -145,8 +145,8 @@ def _settings_of_fit(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _formula(key: str, value: object) -> str:
-    if isinstance(value, int | float) and not isinstance(value, bool):
-        return repr(float(value))
+    if (found := as_float(value)) is not None:
+        return repr(found)
     if not isinstance(value, str):
         raise PlanError(f"set.{key} = {shown(value)}; expected a formula in quotes.")
     return value
