@@ -132,6 +132,7 @@ CHART = (
     flag("--spectrum", "Draw the energy of the kernel's singular values."),
     flag("--guide", "Draw the guide function beside the residual of the guided fit."),
     flag("--frequency", "Draw the response to sinusoids of light, R(k)."),
+    flag("--angles", "Draw R_d by exit angle, beside a Lambertian medium's."),
     option("--mm-per-pixel", Length("profile"), "MM|profile", "Pixels of the kernel, with "
            "--spectrum or --guide; profile is the width of the profile's first annulus.  "
            "[default: 0.3]"),
@@ -144,7 +145,8 @@ CHART = (
     option("--photons", Count(2, 10**12), "N", "Photons of the walk, with --models.  "
            "[default: 1e7]"),
     *output("NAME.profile.png, NAME.kernel.png, NAME.material.png, NAME.checkpoint.png, "
-            "NAME.spectrum.png, NAME.guide.png, NAME.frequency.png, MATERIAL.models.png",
+            "NAME.spectrum.png, NAME.guide.png, NAME.frequency.png, NAME.angles.png, "
+            "MATERIAL.models.png",
             "is not our chart",
             "Output file, PNG, SVG or PDF by its ending; - for PNG on stdout"),
 )

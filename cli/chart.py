@@ -15,7 +15,7 @@ from ._output import finish_one, held, stem_of, target, write_chart
 from ._progress import walk_progress
 from ._verb_options import CHART, of_other_charts
 
-_VIEWS = ("models", "spectrum", "guide", "frequency")
+_VIEWS = ("models", "spectrum", "guide", "frequency", "angles")
 _FILES = {"profile", "kernel", "taps", "material", "checkpoint"}
 _MEMORY = {"kernel": "kernel chart", "taps": "kernel chart", **dict.fromkeys(_VIEWS, "figures")}
 
@@ -45,7 +45,8 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
     pass, under the guide function for which it is optimal.
 
     With --frequency: R(k), what returns of light that varies as cos(k x), with error bands; its
-    table is `sssfit export --format frequency`.
+    table is `sssfit export --format frequency`. With --angles: R_d by exit angle, of a profile made
+    with `sssfit simulate --angles N`, beside cos times Fresnel's transmittance.
 
     With --models, FILE is a material, or a profile of the photon walk, which is then not simulated
     again. The figure shows the exact solution, the walk and the diffusion models, with the error of
@@ -76,7 +77,7 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
     if kind == "models" and isinstance(found, Profile):
         refuse(given, {"photons": "a new walk, and FILE is already one"})
     check_memory(_MEMORY.get(kind, "chart"), common.threads)
-    profile, source = None, name if kind in ("profile", "spectrum", "guide", "frequency") else None
+    profile, source = None, name if kind in ("profile", *_VIEWS[1:]) else None
     if kind in ("kernel", "taps"):
         profile, source = profile_of_kernel(found, name, given["profile"])
     stem = made_of if kind == "models" else stem_of(name, made_of)

@@ -113,6 +113,14 @@ class Method:
         return found | ({"seed": seed} if self.is_seeded else {})
 
 
+_ANGLES = Setting(
+    "angles",
+    "whole",
+    "bins of the exit angle, 0 to 90 degrees; the profile then has R_d(angle), and of a walk "
+    "R_d(r, angle), too.",
+    "N",
+    (1, 180),
+)
 DEON_SKIN = "deon-skin"  # a profile that is made without a material
 
 SIMULATIONS: Mapping[str, Method] = {
@@ -135,13 +143,7 @@ SIMULATIONS: Mapping[str, Method] = {
                 "last edge, such as 0.5%.",
                 "SHARE",
             ),
-            Setting(
-                "angles",
-                "whole",
-                "bins of the exit angle, 0 to 90 degrees; the profile then has R_d(r, angle) too.",
-                "N",
-                (1, 180),
-            ),
+            _ANGLES,
             Setting(
                 "numerical_aperture",
                 "number",
@@ -176,6 +178,7 @@ SIMULATIONS: Mapping[str, Method] = {
                 "take forward scattering for isotropic with sigma_s' = (1 - g) sigma_s, which is "
                 "faster and an approximation.",
             ),
+            _ANGLES,
         ),
         shares=True,
     ),
@@ -481,6 +484,11 @@ EXPORTS: Mapping[str, Method] = {
     "json": Method("sssfit.export:document_text", "a kernel as a document"),
     "csv": Method(
         "sssfit.export.table:table_text", "a profile or a kernel as a table", of_profiles=True
+    ),
+    "angles": Method(
+        "sssfit.export.angles:angles_text",
+        "a profile's R_d by exit angle beside Lambert's law, as a table: NAME.angles.csv",
+        of_profiles=True,
     ),
     "frequency": Method(
         "sssfit.export.frequency:frequency_text",

@@ -188,6 +188,7 @@ SIMULATE = [
     C(f"simulate wax.toml {GRID} --photons 2000 --angles 6 -o angles.npz"),
     C(f"simulate wax.toml {GRID} --photons 2000 --numerical-aperture .4 --json -o seen.npz"),
     C(f"simulate wax.toml {GRID} --photons 2000 --numerical-aperture .4 -o seen.npz"),
+    C(f"simulate wax.toml {GRID} --method exact --angles 6 -o exact.npz"),
     C("simulate wax.toml --angles 0"),
     C("simulate wax.toml --numerical-aperture 0"),
     C("simulate wax.toml --numerical-aperture .3 --angles 4"),
@@ -1086,6 +1087,9 @@ EXPORT = [
     C("export --format csv"),
     C("export wax.profile.npz --format frequency"),
     C("export wax.svd2.kernel.json --format frequency"),
+    C("export angles.profile.npz --format angles"),
+    C("export wax.profile.npz --format angles"),
+    C("export wax.svd2.kernel.json --format angles"),
     C("export 'Größe λ.profile.npz' --format csv -o p.csv --json"),
     C("export leaf.profile.npz --format csv -o -"),
     C("export four.profile.npz --format csv -q"),
@@ -1190,6 +1194,9 @@ CHART = [
     C("chart --frequency wax.profile.npz"),
     C("chart --frequency four.profile.npz --json -o f.svg"),
     C("chart wax.toml --frequency"),
+    C("chart --angles angles.profile.npz"),
+    C("chart --angles angles.profile.npz --json -o a.svg"),
+    C("chart --angles wax.profile.npz"),
     C("chart --guide wax.profile.npz --mm-per-pixel profile"),
     C(
         "chart --guide 'Größe λ.profile.npz' --k 0,2 --channel R --mm-per-pixel .04cm --json -o g.svg"

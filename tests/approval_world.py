@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import OpenImageIO
+from angled import angled
 from meshes import obj_text, sphere
 from PIL import Image
 
@@ -781,6 +782,7 @@ def _records(folder: Path) -> None:
     for name, profile in (("four", four()), ("mono", mono()), ("leaf", leaf())):
         profile.save(folder / f"{name}.profile.npz")
     plate().save(folder / "Größe λ.profile.npz")
+    angled(wax()).save(folder / "angles.profile.npz")
     wax().save(folder / "wax.profile.npz")
     (folder / "damaged.profile.npz").write_bytes((folder / "wax.profile.npz").read_bytes()[:2000])
     text = (folder / "wax.svd2.kernel.json").read_text(encoding="utf-8")

@@ -23,6 +23,7 @@ from typing import Any
 import edited_skin
 import numpy as np
 import OpenImageIO
+from angled import angled
 from click.testing import CliRunner
 from matplotlib.figure import Figure
 from meshes import sphere
@@ -159,6 +160,7 @@ def files() -> Path:
     (folder / "plate.toml").write_text(LAYERS)
     (folder / "points.toml").write_text(POINTS)
     plate_profile().save(folder / "plate.profile.npz")
+    angled(profile()).save(folder / "angles.profile.npz")
     profile().save(folder / "wax.profile.npz")
     taps().save(folder / "wax.taps.json")
     gaussians().save(folder / "wax.gaussians2.kernel.json")

@@ -1179,6 +1179,12 @@ CHART = {
         _charted("rows"),
         lambda: [True, ["wax.frequency.png"]],
     ),
+    "--angles": Row(
+        "chart angles.profile.npz --json",
+        "--angles",
+        _charted("rows"),
+        lambda: [True, ["angles.angles.png"]],
+    ),
     "--guide": Row(
         "chart wax.profile.npz --json",
         "--guide",
@@ -1226,7 +1232,8 @@ CHART = {
         lambda: ["x.svg"],
         default="wax.profile.png",
         words="NAME.profile.png, NAME.kernel.png, NAME.material.png, NAME.checkpoint.png, "
-        "NAME.spectrum.png, NAME.guide.png, NAME.frequency.png, MATERIAL.models.png",
+        "NAME.spectrum.png, NAME.guide.png, NAME.frequency.png, NAME.angles.png, "
+        "MATERIAL.models.png",
     ),
     "--force": Row("chart -o foreign.png", "--force", is_written("png"), lambda: ["foreign.png"]),
 }
@@ -1657,6 +1664,7 @@ STREAMS = (
     "chart wax.profile.npz --spectrum -o x.png",
     "chart wax.profile.npz --guide -o x.png",
     "chart wax.profile.npz --frequency -o x.png",
+    "chart angles.profile.npz --angles -o x.png",
     "chart wax.profile.npz --models -o x.png",
     f"{_MAKE} --name lard -o x.toml",
     f"{_KERNELS} --chart x.png",

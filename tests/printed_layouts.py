@@ -737,6 +737,21 @@ def written(f: Figures) -> list[Any]:
     return [wrote(f)]
 
 
+def angles(f: Figures) -> list[Any]:
+    rows = [
+        [name, f["rows"][0]["per_sr"][c], 100 * f["misplaced"][c], 100 * f["misplaced_stderr"][c]]
+        for c, name in enumerate(f["channels"])
+    ]
+    return [
+        Words(
+            "R_d in {} bins of the exit angle; misplaced: by angle, against cos times Fresnel",
+            len(f["rows"]),
+        ),
+        Table(["channel", "first bin, 1/sr", "misplaced", "by noise alone"], rows),
+        wrote(f),
+    ]
+
+
 def frequency(f: Figures) -> list[Any]:
     first = f["rows"][0]["response"]
 
@@ -1255,6 +1270,7 @@ PRINTED: dict[str, Layout] = {
     "chart": written,
     "chart wax.profile.npz --spectrum": spectrum,
     "chart wax.profile.npz --frequency": frequency,
+    "chart angles.profile.npz --angles": angles,
     "chart wax.profile.npz --guide": guide,
     "chart wax.toml --models": models,
     "chart wax.svd2.kernel.json": kernel_chart,

@@ -1,5 +1,6 @@
 """Exit angles and apertures of both walks, against theory, the scalar MCML and one another."""
 
+import csv
 import dataclasses
 import math
 
@@ -8,8 +9,11 @@ import pytest
 import reference
 from checks import LIMIT, chi_square_sigmas, medium, standard_error
 from checks_layers import STACKS, layer, stack, sums_of
+from figures import assert_legible
 
-from sssfit.errors import ProfileError, SimulationError
+from sssfit.chart.angles import angles_figure
+from sssfit.errors import KernelError, ProfileError, SimulationError
+from sssfit.export import exported
 from sssfit.grid import RadialGrid
 from sssfit.material import load_material
 from sssfit.optics import entering_of_diffuse
@@ -21,9 +25,15 @@ from sssfit.profile.directions import (
     radiance,
     solid_angles,
 )
-from sssfit.simulate import Checkpoint, read_checkpoint, simulate_montecarlo
+from sssfit.simulate import (
+    Checkpoint,
+    read_checkpoint,
+    simulate_exact,
+    simulate_montecarlo,
+)
 from sssfit.simulate._directions import Directions
 from sssfit.simulate._walks import LayeredWalk
+from sssfit.simulate.stack.angles import energies_by_angle
 
 PHOTONS, BINS = 100_000, 15
 SLAB = STACKS["clear gap inside, backward g"]
@@ -277,3 +287,107 @@ def test_a_checkpoint_so_far_has_angles(tmp_path):
     )
     (found,) = read_checkpoint(path).profiles
     np.testing.assert_array_equal(found.angle_reflected.sum(axis=1), energies(found))
+
+
+# Table and chart
+
+
+def test_the_table_has_every_digit(skin):
+    found = exported([skin], "angles")
+    rows = list(csv.reader(found.content.decode().splitlines()[3:]))
+    values = np.array(rows[1:], float)
+    curve = angular_reflectance(skin)
+    np.testing.assert_array_equal(values[:, 2:5], curve.per_sr)
+    np.testing.assert_array_equal(values[:, 5:8], curve.per_sr_stderr)
+    np.testing.assert_array_equal(values[:, 8:], curve.lambertian)
+
+
+def test_only_profiles_have_a_table_of_angles(skin):
+    with pytest.raises(KernelError, match="of one profile"):
+        exported([skin, skin], "angles")
+
+
+def test_the_chart_is_legible_and_its_curves_are_the_record(skin):
+    curve = angular_reflectance(skin)
+    figure = assert_legible(lambda: angles_figure(curve))
+    left, right = figure.axes[-2:]
+    drawn = [line.get_ydata() for line in left.lines]
+    assert any(np.array_equal(each, curve.per_sr[:, 0]) for each in drawn)
+    assert any(np.array_equal(each, curve.lambertian[:, 2]) for each in drawn)
+    assert any(np.array_equal(each.get_ydata(), curve.ratio[:, 1]) for each in right.lines)
+
+
+def test_noise_alone_is_what_lambertian_light_misplaces():
+    """Multinomial counts of a Lambertian medium: the mean of 200 draws is the claimed one."""
+    edges = np.linspace(0.0, 0.5 * np.pi, 16)
+    shares, rng, n = lambertian_shares(edges, 1.0), np.random.default_rng(4), 10_000
+    found = []
+    for _ in range(200):
+        energy = (rng.multinomial(n, shares) / n)[None, :, None]
+        stderr = np.sqrt(energy * (1.0 - energy) / (n - 1))
+        curve = angular_reflectance(lit_from_all_sides(edges, energy, stderr, n))
+        found.append((float(curve.misplaced[0]), float(curve.misplaced_stderr[0])))
+    misplaced, claimed = np.array(found).T
+    error = misplaced.std() / math.sqrt(200.0)
+    assert abs(misplaced.mean() - claimed.mean()) < LIMIT * error
+
+
+def lit_from_all_sides(edges, energy, stderr, photons):
+    """A profile whose light is in one annulus, with its angles."""
+    one, none = np.ones((1, 1)), np.zeros(1)
+    meta = {"format": "sssfit.profile/2", "channels": ["grey"], "photons": photons}
+    return Profile(
+        np.array([0.0, 1.0]), one, 0.0 * one, none, none, 0.0, np.zeros((0, 1)), none, None, meta,
+        exit_angle_edges_rad=edges, angle_reflected=energy, angle_reflected_stderr=stderr,
+    )  # fmt: skip
+
+
+# The exact solver, at k = 0
+
+
+@pytest.mark.parametrize("albedo", [0.5, 0.99])
+def test_the_solver_has_chandrasekhars_law_to_eight_digits(albedo):
+    edges = np.linspace(0.0, 0.5 * np.pi, 16)
+    found = energies_by_angle(medium(1.0 - albedo, albedo, 1.0), edges)
+    expected = reference.chandrasekhar_by_angle(albedo, edges, nodes=100)
+    # the reference's trapezia are good to 2e-8
+    np.testing.assert_allclose(found["angle_reflected"][0, :, 0], expected, atol=3e-8)
+    assert found["angle_reflected_stderr"].max() < 1e-8
+
+
+def test_the_walk_has_the_angles_of_the_solver(slab, skin):
+    exact = energies_by_angle(load_material("skin1"), skin.exit_angle_edges_rad)
+    pairs = [(skin, "angle_reflected", exact)]
+    exact = energies_by_angle(SLAB, slab.exit_angle_edges_rad)
+    pairs += [(slab, name, exact) for name in ("angle_reflected", "angle_transmitted")]
+    for walk, name, truth in pairs:
+        mean, error = getattr(walk, name), getattr(walk, f"{name}_stderr")
+        square = ((PHOTONS - 1) * error**2 + mean**2).sum(axis=0)
+        mean = mean.sum(axis=0)
+        variance = (square - mean**2) / (PHOTONS - 1)
+        for c in range(mean.shape[1]):
+            apart = mean[:, c] - truth[name][0, :, c]
+            sigmas, _ = chi_square_sigmas(apart, variance[:, c])
+            assert abs(sigmas) < LIMIT
+
+
+def test_an_exact_profile_has_angles_that_add_up_to_its_total(tmp_path):
+    found = simulate_exact(load_material("skin1"), dr_mm=0.5, radius_mm=10.0, angles=6)
+    assert found.angle_reflected.shape == (1, 6, 3)
+    total = found.angle_reflected.sum(axis=(0, 1))
+    np.testing.assert_allclose(total, found.diffuse_reflectance, atol=1e-6)
+    assert found.meta["settings"]["angles"] == 6
+    found.save(tmp_path / "e.npz")
+    assert Profile.load(tmp_path / "e.npz").angle_reflected.shape == (1, 6, 3)
+    with pytest.raises(ProfileError, match="for all annuli together only"):
+        radiance(found)
+
+
+def test_the_beam_is_in_the_first_bin():
+    """Straight through a slab of index 1.5, once: (1 - R)^2 exp(-1.3)."""
+    material = stack(layer(0.3, 1.0, 0.5, 1.5, 1.0))
+    found = energies_by_angle(material, np.linspace(0.0, 0.5 * np.pi, 91))
+    through = (1.0 - (0.5 / 2.5) ** 2) ** 2 * math.exp(-1.3)
+    first, second = found["angle_transmitted"][0, :2, 0]
+    assert through < first < 1.01 * through
+    assert second < 0.01 * through

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 # Where a record is drawn, by the record's class; a new chart is one file and one line.
 FIGURES: Mapping[str, str] = {
+    "AngularReflectance": "sssfit.chart.angles:angles_figure",
     "Budget": "sssfit.chart.budget:budget_figure",
     "Comparison": "sssfit.chart.pareto:pareto_figure",
     "FrequencyResponse": "sssfit.chart.frequency:frequency_figure",

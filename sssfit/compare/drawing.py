@@ -15,14 +15,16 @@ from sssfit.material import Material
 from sssfit.material.checks import is_name
 from sssfit.messages import note
 from sssfit.profile import Profile
+from sssfit.profile.directions import angular_reflectance
 from sssfit.profile.frequency import frequency_response
 
 _OF_PROFILES = {
     "spectrum": "`spectrum = True`",
     "guide": "`guide = True`",
     "frequency": "`frequency = True`",
+    "angles": "`angles = True`",
 }
-COMPUTED = ("kernel", "taps", "models", "spectrum", "guide", "frequency")
+COMPUTED = ("kernel", "taps", "models", "spectrum", "guide", "frequency", "angles")
 
 
 def drawn_of(found: Any, view: str, name: str) -> tuple[Any, str, str | None]:
@@ -32,7 +34,7 @@ def drawn_of(found: Any, view: str, name: str) -> tuple[Any, str, str | None]:
     ----------
     found : Profile, SeparableKernel, Taps, Material or SoFar
     view : str
-        "models", "spectrum", "guide", "frequency", or "" for the record's own chart.
+        "models", "spectrum", "guide", "frequency", "angles", or "" for the record's own chart.
     name : str
         The record's file in messages.
 
@@ -98,6 +100,8 @@ def computed(
         return compute_spectrum(found, mm_per_pixel=mm_per_pixel)
     if kind == "frequency":
         return frequency_response(found)
+    if kind == "angles":
+        return angular_reflectance(found)
     if kind != "models":
         return found
     past = found if isinstance(found, Profile) else None

@@ -9,6 +9,7 @@ import numpy as np
 from sssfit import kinds
 from sssfit.arrays import FloatArray
 from sssfit.errors import FileError, KernelError
+from sssfit.export.angles import is_our_angles
 from sssfit.export.dense import dense, taps_of_kernel
 from sssfit.export.dense import energy_in_half as dense_in_half
 from sssfit.export.dialects import DIALECTS, mark
@@ -27,6 +28,7 @@ from sssfit.profile import Profile
 __all__ = ["DIALECTS", "Style", "dense", "json_document", "kernel_text", "source", "taps_document"]
 
 MOST_WEIGHTS = 65  # of a pass that is written as a loop of fetches without being asked twice
+_TABLES = {"angles": is_our_angles, "frequency": is_our_frequencies}  # of one profile
 _FIGURES = ("channels", "rank", "pixels", "mm_per_pixel")
 _TAPS_FIGURES = ("channels", "structure", "fetches", "passes", "mm_per_pixel")
 
@@ -77,9 +79,9 @@ def exported(
         ending = ending or ENDINGS[0]
         content, figures = write(sources, ending=ending, **settings)
         return Exported(content, of, "a texture", f".{figures['table']}", ending, figures)
-    if form == "frequency":
+    if form in _TABLES:
         text, own = write(sources), {"channels": sources[0].channels}
-        return Exported(text.encode(), of, "a table", ".frequency", ".csv", own)
+        return Exported(text.encode(), of, "a table", f".{form}", ".csv", own)
     text = write(sources, **({"form": form} if form in DIALECTS else {}), **settings)
     what = {"json": "a kernel", "csv": "a table"}.get(form, "source")
     return Exported(text.encode(), of, what, "", f".{form}", _figures(sources[0]))
@@ -245,8 +247,8 @@ def is_ours(path: Path, form: str) -> bool:
     """Return whether a file is one that `exported` wrote in this form."""
     if form == "csv":
         return is_our_table(path)
-    if form == "frequency":
-        return is_our_frequencies(path)
+    if form in _TABLES:
+        return _TABLES[form](path)
     if form == "lut":
         return is_our_texture(path)
     if form == "json":

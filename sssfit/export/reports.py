@@ -36,6 +36,14 @@ _FREQUENCY: tuple[Part, ...] = (
         ("a tenth at k, rad/mm", "tenth", ".3g|not reached"),
     )),
 )
+_ANGLES: tuple[Part, ...] = (
+    "R_d in {bins} bins of the exit angle; misplaced: by angle, against cos times Fresnel",
+    Columns("channel", "channels", (
+        ("first bin, 1/sr", "first", ".5f"),
+        ("misplaced", "misplaced", ".2g%|unknown"),
+        ("by noise alone", "misplaced_stderr", ".2g%|unknown"),
+    )),
+)
 _GUIDE: tuple[Part, ...] = (
     "Channel {channel}; {pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm",
     Columns("k", "fits", (
@@ -195,6 +203,11 @@ def _frequency_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     return {"frequencies": len(rows), "last": rows[-1]["k_per_mm"], **found}
 
 
+def _angles_words(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the number of bins, and the light of the first, next to the normal."""
+    return {"bins": len(figures["rows"]), "first": figures["rows"][0]["per_sr"]}
+
+
 def _fallen(rows: list[dict[str, Any]], channel: int, least: float) -> float | None:
     """Return the first frequency from which a channel's response is below a value."""
     below = (row["k_per_mm"] for row in rows if row["response"][channel] < least)
@@ -236,6 +249,7 @@ _PAGES: dict[str, tuple[tuple[Part, ...], Callable[[Mapping[str, Any]], dict[str
     "taps": (_TAPS, _taps_words),
     "spectrum": (_SPECTRUM, _spectrum_words),
     "frequency": (_FREQUENCY, _frequency_words),
+    "angles": (_ANGLES, _angles_words),
 }
 
 
@@ -245,8 +259,8 @@ def page(kind: str, figures: Mapping[str, Any]) -> str:
     Parameters
     ----------
     kind : str
-        "choose", "fit" or "render", the verbs; or "frequency", "guide", "kernel", "models" or
-        "spectrum", which are drawn.
+        "choose", "fit" or "render", the verbs; or "angles", "frequency", "guide", "kernel",
+        "models" or "spectrum", which are drawn.
     figures : mapping
         The JSON object.
     """

@@ -10,6 +10,7 @@ directions. Both add to their resolution until two of them agree within the tole
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import compress
+from typing import Any
 
 from sssfit._jit import thread_pool
 from sssfit.errors import SimulationError
@@ -19,6 +20,7 @@ from sssfit.process import available_cores, one_blas_thread
 from sssfit.profile import Profile
 from sssfit.simulate import half_space
 from sssfit.simulate._deterministic import check_is_material
+from sssfit.simulate._directions import Directions
 
 DEFAULT_TOLERANCE = 1e-4
 
@@ -30,6 +32,7 @@ def simulate_exact(
     radius_mm: float | None = None,
     tolerance: float = DEFAULT_TOLERANCE,
     similarity: bool = False,
+    angles: int | None = None,
     threads: int | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> Profile:
@@ -47,6 +50,8 @@ def simulate_exact(
     similarity : bool
         Whether scattering with g other than 0 is replaced by isotropic scattering of (1 - g)
         sigma_s, an approximation that is faster.
+    angles : int, optional
+        Bins of the exit angle, 1 to 180: R_d(angle), of all annuli together.
     threads : int, optional
         Threads to use; all cores by default. The result does not depend on them.
     stop : callable, optional
@@ -76,6 +81,7 @@ def simulate_exact(
         radius_mm=radius_mm,
         tolerance=tolerance,
         similarity=similarity,
+        angles=angles,
         threads=threads,
         stop=stop,
     )[0]
@@ -88,6 +94,7 @@ def simulate_exact_many(
     radius_mm: float | None = None,
     tolerance: float = DEFAULT_TOLERANCE,
     similarity: bool = False,
+    angles: int | None = None,
     threads: int | None = None,
     stop: Callable[[], bool] | None = None,
 ) -> list[Profile]:
@@ -100,6 +107,7 @@ def simulate_exact_many(
     """
     threads = available_cores() if threads is None else threads
     _check_settings(materials, tolerance, threads)
+    directions = Directions(angles)
     grids = [make_grid(each, dr_mm=dr_mm, radius_mm=radius_mm) for each in materials]
     is_plain = [half_space.covers(each, similarity=similarity) for each in materials]
     # One BLAS thread for each of ours: matrices of 100 to 400 rows do not profit from more, and
@@ -122,8 +130,23 @@ def simulate_exact_many(
             reduced=[_isotropic(each) if similarity else each for each in others],
             stop=stop,
         )
-    answers = {True: iter(plain), False: iter(layered)}
-    return [next(answers[each]) for each in is_plain]
+        answers = {True: iter(plain), False: iter(layered)}
+        found = [next(answers[each]) for each in is_plain]
+        if angles is None:
+            return found
+        solved_for = [_isotropic(each) if similarity else each for each in materials]
+        pairs = zip(found, solved_for, strict=True)
+        return [_with_angles(each, material, directions) for each, material in pairs]
+
+
+def _with_angles(profile: Profile, material: Material, directions: Directions) -> Profile:
+    """Add R_d(angle), which the solver for layers has at k = 0, whichever made the profile."""
+    from sssfit.simulate.stack.angles import energies_by_angle
+
+    settings = {**profile.meta["settings"], **directions.given()}
+    meta = {**profile.meta, "format": directions.profile_format, "settings": settings}
+    fields: dict[str, Any] = dict(energies_by_angle(material, directions.edges_rad))
+    return replace(profile, meta=meta, **fields)
 
 
 def _chosen(

@@ -16,7 +16,7 @@ from sssfit.arrays import FloatArray
 from sssfit.simulate.stack import embedding
 from sssfit.simulate.stack.azimuth import MOST_ORDERS, Azimuth
 from sssfit.simulate.stack.beam import Beam, beam_of
-from sssfit.simulate.stack.embedding import Floor, Interface, Span, flux_of
+from sssfit.simulate.stack.embedding import Floor, Interface, Span, flux_of, fluxes_of
 from sssfit.simulate.stack.modes import Modes
 from sssfit.simulate.stack.nodes import Nodes, snell_reflectance
 from sssfit.simulate.stack.phase import Medium, medium_of
@@ -101,11 +101,18 @@ def reflected_at(
     assembly: Assembly, k: float, azimuth: Azimuth, modes: ModesOf, last: int | None = None
 ) -> float:
     """Return R(k); layer ``last`` goes on without end, and those below it are left out."""
+    return float(leaving_by_node(assembly, k, azimuth, modes, last).sum())
+
+
+def leaving_by_node(
+    assembly: Assembly, k: float, azimuth: Azimuth, modes: ModesOf, last: int | None = None
+) -> FloatArray:
+    """Return the parts of R(k) that leave in the directions of the first layer's nodes (n,)."""
     first = _spans(assembly, k, azimuth, modes, last)[0][0]
     reflected = np.tile(assembly.reflected_at_top, azimuth.orders)
     a = embedding.light_at_top(first, reflected)
     rising = (first.up @ a + first.up_source).real
-    return flux_of(assembly.media[0], rising, 1.0 - assembly.reflected_at_top)
+    return fluxes_of(assembly.media[0], rising, 1.0 - assembly.reflected_at_top)
 
 
 def transforms_at(assembly: Assembly, k: float, azimuth: Azimuth, modes: ModesOf) -> Transforms:

@@ -80,7 +80,7 @@ class Sampler:
 
     def at_zero(self) -> list[Transforms]:
         """Return the total of each stack, without the beam."""
-        known = _KnownModes(self.zero, self.azimuth(self.zero))
+        known = KnownModes(self.zero, self.azimuth(self.zero))
         return [transforms_at(each, self.zero, known.azimuth, known) for each in self.assemblies]
 
     def at(self, k: float) -> FloatArray:
@@ -107,11 +107,11 @@ class Sampler:
 
         return Gap(first, last, transmitted) if first < last else None
 
-    def _modes(self, k: float) -> "_KnownModes":
-        return _KnownModes(k or self.zero, self.azimuth(k or self.zero))
+    def _modes(self, k: float) -> "KnownModes":
+        return KnownModes(k or self.zero, self.azimuth(k or self.zero))
 
 
-class _KnownModes:
+class KnownModes:
     """Modes at one wavenumber, of layers that were met before."""
 
     def __init__(self, k: float, azimuth: Azimuth) -> None:
@@ -119,6 +119,7 @@ class _KnownModes:
         self._found: dict[tuple[float, ...], Modes] = {}
 
     def __call__(self, medium: Medium) -> Modes:
+        """Return the modes of a layer."""
         slab = medium.slab
         key = slab.sigma_a, slab.sigma_s, slab.g, slab.eta
         if key not in self._found:
@@ -127,7 +128,7 @@ class _KnownModes:
 
 
 def _multiple(
-    assembly: Assembly, k: float, known: _KnownModes, through: float | None = None
+    assembly: Assembly, k: float, known: KnownModes, through: float | None = None
 ) -> tuple[float, float]:
     """Return R(k) and T(k) less the light that is scattered once and leaves.
 

@@ -1,0 +1,103 @@
+"""R_d by exit angle, beside Lambert's law under Fresnel's, as a figure: `angles_figure`.
+
+``sssfit.profile.directions`` computes the record.
+"""
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from sssfit.arrays import FloatArray
+from sssfit.chart.page import (
+    COLOURS,
+    LINE_STYLES,
+    LINE_WIDTH,
+    Style,
+    add_legend,
+    name_axes,
+    new_page,
+    tick,
+)
+from sssfit.chart.text import channel_label, in_legend, legend_title, subtitle, titled
+from sssfit.messages import by_channel
+from sssfit.profile.directions import AngularReflectance
+
+HEIGHT_INCHES = 4.4
+_LAMBERT: Style = {"color": "0.45", "lw": 1.2, "linestyle": (0, (1, 1.2))}
+_LEAST, _MOST = 0.5, 2.0  # ends of the ratio's ordinate: noise of nearly grazing bins is cut
+
+
+def angles_figure(found: AngularReflectance) -> Figure:
+    """Draw R_d(alpha) of each channel, and its ratio to cos alpha times Fresnel's transmittance.
+
+    Parameters
+    ----------
+    found : AngularReflectance
+        Of more than eight channels the first eight are drawn.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        8 x 4.4 inches; bands of one standard error.
+    """
+    profile = found.profile
+    shown = in_legend(min(profile.n_channels, len(COLOURS)))
+    title = titled(profile, "light by exit angle")
+    with new_page(HEIGHT_INCHES, title, subtitle(profile), [_note(found)]) as (figure, below):
+        handles = [Line2D([], [], **_style(c)) for c in shown] + [Line2D([], [], **_LAMBERT)]
+        labels = [channel_label(profile, c, is_drawn=True) for c in shown] + ["Lambert, Fresnel"]
+        rest = add_legend(below, handles, labels, title=legend_title(profile))
+        left, right = rest.subplots(1, 2)
+        for c in shown:
+            left.plot(found.angles_deg, found.lambertian[:, c], **_LAMBERT)
+            _draw(left, found, c, found.per_sr[:, c], found.per_sr_stderr[:, c])
+            scale = np.where(found.lambertian[:, c] > 0.0, found.lambertian[:, c], np.inf)
+            _draw(right, found, c, found.ratio[:, c], found.per_sr_stderr[:, c] / scale)
+        right.axhline(1.0, **_LAMBERT)
+        _limit(left, right, found, shown)
+        name_axes(left, "(a) R_d by exit angle", "exit angle (degrees)", "R_d (1/sr)")
+        name_axes(right, "(b) over Lambert and Fresnel", "exit angle (degrees)", "ratio")
+    return figure
+
+
+def _note(found: AngularReflectance) -> str:
+    names = found.profile.channels
+    shares = by_channel(names, (100.0 * found.misplaced).tolist(), ".2g")
+    noise = by_channel(names, (100.0 * found.misplaced_stderr).tolist(), ".2g")
+    return (
+        "Dotted: the same energy by the cosine times Fresnel's transmittance, as shaders assume. "
+        f"Of the light, at other angles than there, in %: {shares}; by noise alone {noise}."
+    )
+
+
+def _style(channel: int) -> Style:
+    return {
+        "color": COLOURS[channel],
+        "linestyle": LINE_STYLES[channel % len(LINE_STYLES)],
+        "lw": LINE_WIDTH,
+    }
+
+
+def _draw(
+    axes: Axes, found: AngularReflectance, channel: int, mean: FloatArray, error: FloatArray
+) -> None:
+    """Draw a channel's curve, and a band where it has errors."""
+    axes.plot(found.angles_deg, mean, **_style(channel))
+    if np.isfinite(error).all():
+        band: Style = {"lw": 0, "alpha": 0.3, "color": COLOURS[channel]}
+        axes.fill_between(found.angles_deg, mean - error, mean + error, **band)
+
+
+def _limit(left: Axes, right: Axes, found: AngularReflectance, shown: list[int]) -> None:
+    top = float(np.maximum(found.per_sr, found.lambertian)[:, shown].max()) or 1.0
+    left.set_ylim(0.0, 1.05 * top)
+    ratio = found.ratio[:, shown]
+    known = ratio[np.isfinite(ratio)]
+    if known.size:
+        low, high = np.clip([known.min(), known.max()], _LEAST, _MOST)
+        right.set_ylim(min(low - 0.05, 0.9), max(high + 0.05, 1.1))
+    for axes in (left, right):
+        axes.set_xlim(0.0, 90.0)
+        axes.set_xticks(range(0, 91, 15))
+        tick(axes.yaxis)
