@@ -739,7 +739,12 @@ def written(f: Figures) -> list[Any]:
 
 def angles(f: Figures) -> list[Any]:
     rows = [
-        [name, f["rows"][0]["per_sr"][c], 100 * f["misplaced"][c], 100 * f["misplaced_stderr"][c]]
+        [
+            name,
+            f["rows"][0]["per_sr"][c],
+            Percent(f["misplaced"][c], 2),
+            Percent(f["misplaced_stderr"][c], 2),
+        ]
         for c, name in enumerate(f["channels"])
     ]
     return [

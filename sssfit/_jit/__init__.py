@@ -25,6 +25,7 @@ from typing import Literal, TypeVar
 import numba
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 from numba.core.registry import cpu_target
+from numba.core.runtime.nrt import rtsys
 
 from sssfit import __version__
 from sssfit.process import user_cache_folder
@@ -65,12 +66,18 @@ def compiled_before(file: str, function: str = "trace_batch") -> bool:
     return bool(_CACHE_FOLDER) and any(Path(_CACHE_FOLDER).rglob(pattern))
 
 
-def thread_pool(threads: int, name: str = "sssfit") -> ThreadPoolExecutor:
+def thread_pool(
+    threads: int, name: str = "sssfit", first: Callable[[], object] | None = None
+) -> ThreadPoolExecutor:
     """Return threads for compiled functions, after numba's lazy imports.
 
     Otherwise the first call would do 0.3 s of imports on several threads at once, where an
     interrupt or a MemoryError in one of them can leave the others waiting for its locks forever.
+    A ``first`` call, of a function of `jit_entry` that is in the cache, does without them.
     """
+    if first is not None:
+        first()
+        return ThreadPoolExecutor(threads, thread_name_prefix=name)
     from numba.core import boxing  # noqa: F401
     from numba.core.runtime import context as runtime  # noqa: F401
 
@@ -82,6 +89,16 @@ def thread_pool(threads: int, name: str = "sssfit") -> ThreadPoolExecutor:
 def jit(function: Function) -> Function:
     """Compile ``function`` on first call with the common policy; ``.py_func`` is its slow twin."""
     return _compile(function, inline="never")
+
+
+def jit_entry(function: Function) -> Function:
+    """Like ``jit``, for what a run calls from Python, if it compiles to arithmetic alone.
+
+    The cache gives its machine code without numba's tables of all that it could compile, which take
+    0.4 s of the processor (and import scipy), so it may need no symbols but those of numba's
+    reference counts and of the mathematics library.
+    """
+    return _compile(function, inline="never", is_entry=True)
 
 
 def jit_inline(function: Function) -> Function:
@@ -151,7 +168,8 @@ class _ForgivingCache(FunctionCache):
     Otherwise a full disk or quota, or a truncated or damaged file, would stop every later run.
     """
 
-    def __init__(self, function: object) -> None:
+    def __init__(self, function: object, *, is_entry: bool) -> None:
+        self.is_entry = is_entry
         super().__init__(function)  # type: ignore[no-untyped-call]
         self._cache_file = _CheckedFiles(  # type: ignore[no-untyped-call]
             cache_path=self._cache_path,
@@ -161,6 +179,9 @@ class _ForgivingCache(FunctionCache):
 
     def load_overload(self, sig: object, target_context: object) -> object:
         try:
+            if self.is_entry:
+                rtsys.initialize(target_context)
+                return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
             return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:  # _DamagedError, OSError, or the errors of other versions of numba
             self._forget()
@@ -178,7 +199,11 @@ class _ForgivingCache(FunctionCache):
 
 
 def _compile(
-    function: Function, *, inline: Literal["never", "always"], forceinline: bool = False
+    function: Function,
+    *,
+    inline: Literal["never", "always"],
+    forceinline: bool = False,
+    is_entry: bool = False,
 ) -> Function:
     """Decorate with a cache in our keyed folder.
 
@@ -192,7 +217,7 @@ def _compile(
         before = numba.config.CACHE_DIR  # type: ignore[attr-defined]
         numba.config.CACHE_DIR = _CACHE_FOLDER  # type: ignore[attr-defined]
         try:
-            compiled._cache = _ForgivingCache(function)  # type: ignore[attr-defined]
+            compiled._cache = _ForgivingCache(function, is_entry=is_entry)  # type: ignore[attr-defined]
         finally:
             numba.config.CACHE_DIR = before  # type: ignore[attr-defined]
     return compiled

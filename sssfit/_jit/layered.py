@@ -24,7 +24,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sssfit._jit import jit, jit_merged
+from sssfit._jit import jit_entry, jit_merged
 from sssfit._jit.fused import STRIDE, free_path, seed_streams, turn, uniform
 from sssfit._jit.layered_lanes import (
     BACK,
@@ -156,7 +156,7 @@ def launch(
     return listed
 
 
-@jit
+@jit_entry
 def trace_batch(
     seed: np.uint64,
     batch: np.int64,

@@ -20,7 +20,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._jit import jit, jit_inline
+from sssfit._jit import jit, jit_entry, jit_inline
 from sssfit._jit.sampling import (
     GENERATOR_ROWS,
     LANES,
@@ -256,7 +256,7 @@ def handle_event(
     return True
 
 
-@jit
+@jit_entry
 def trace_batch(
     seed: np.uint64,
     batch: np.int64,

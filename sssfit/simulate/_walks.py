@@ -9,13 +9,15 @@ number of photons. Tallies of batches are added in order.
 """
 
 import math
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._jit import layered, layered_tally, semi_infinite
+from sssfit._jit import compiled_before, layered, layered_tally, semi_infinite
 from sssfit.arrays import FloatArray
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
@@ -82,6 +84,7 @@ class Walk(Protocol):
     @property
     def directions(self) -> Directions: ...
     def trace(self, batch: int) -> Tally: ...
+    def first_call(self) -> Callable[[], object] | None: ...
     def empty_tally(self) -> Tally: ...
     def sums(self, tally: Tally, index: int) -> Sums: ...
 
@@ -152,6 +155,10 @@ class LayeredWalk:
                 tally.ledger,
             )
         return tally
+
+    def first_call(self) -> Callable[[], object] | None:
+        """Return a walk of no photons, if its code need only be loaded."""
+        return partial(replace(self, photons=0).trace, 0) if compiled_before("layered") else None
 
     def empty_tally(self) -> Tally:
         """Return a tally with all sums zero."""
@@ -259,6 +266,11 @@ class SemiInfiniteWalk:
             tally.ledger,
         )
         return tally
+
+    def first_call(self) -> Callable[[], object] | None:
+        """Return a walk of no photons, if its code need only be loaded."""
+        known = compiled_before("semi_infinite")
+        return partial(replace(self, photons=0).trace, 0) if known else None
 
     def empty_tally(self) -> Tally:
         """Return a tally with all sums zero."""

@@ -101,18 +101,25 @@ def reflected_at(
     assembly: Assembly, k: float, azimuth: Azimuth, modes: ModesOf, last: int | None = None
 ) -> float:
     """Return R(k); layer ``last`` goes on without end, and those below it are left out."""
-    return float(leaving_by_node(assembly, k, azimuth, modes, last).sum())
+    rising = _rising(assembly, k, azimuth, modes, last)
+    return flux_of(assembly.media[0], rising, 1.0 - assembly.reflected_at_top)
 
 
-def leaving_by_node(
-    assembly: Assembly, k: float, azimuth: Azimuth, modes: ModesOf, last: int | None = None
-) -> FloatArray:
+def leaving_by_node(assembly: Assembly, k: float, azimuth: Azimuth, modes: ModesOf) -> FloatArray:
     """Return the parts of R(k) that leave in the directions of the first layer's nodes (n,)."""
+    rising = _rising(assembly, k, azimuth, modes, None)
+    return fluxes_of(assembly.media[0], rising, 1.0 - assembly.reflected_at_top)
+
+
+def _rising(
+    assembly: Assembly, k: float, azimuth: Azimuth, modes: ModesOf, last: int | None
+) -> FloatArray:
+    """Return L- under the upper surface."""
     first = _spans(assembly, k, azimuth, modes, last)[0][0]
     reflected = np.tile(assembly.reflected_at_top, azimuth.orders)
     a = embedding.light_at_top(first, reflected)
-    rising = (first.up @ a + first.up_source).real
-    return fluxes_of(assembly.media[0], rising, 1.0 - assembly.reflected_at_top)
+    rising: FloatArray = (first.up @ a + first.up_source).real
+    return rising
 
 
 def transforms_at(assembly: Assembly, k: float, azimuth: Azimuth, modes: ModesOf) -> Transforms:

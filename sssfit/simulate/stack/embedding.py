@@ -172,14 +172,17 @@ def light_at_top(span: Span, reflected: FloatArray) -> ComplexArray:
 
 def flux_of(medium: Medium, radiance: FloatArray, share: FloatArray | float = 1.0) -> float:
     """Return 2 pi sum w mu share L of the azimuthal order 0, from variables sqrt(2 w) L."""
-    return float(fluxes_of(medium, radiance, share).sum())
+    return 2.0 * math.pi * float(_weights(medium, share) @ radiance[: medium.n])
 
 
-def fluxes_of(medium: Medium, radiance: FloatArray, share: FloatArray | float) -> FloatArray:
+def fluxes_of(medium: Medium, radiance: FloatArray, share: FloatArray) -> FloatArray:
     """Return the terms of `flux_of`, node by node."""
-    weight = np.sqrt(0.5 * medium.directions.weight) * medium.directions.cosine * share
-    found: FloatArray = 2.0 * math.pi * weight * radiance[: medium.n]
+    found: FloatArray = 2.0 * math.pi * _weights(medium, share) * radiance[: medium.n]
     return found
+
+
+def _weights(medium: Medium, share: FloatArray | float) -> FloatArray:
+    return np.sqrt(0.5 * medium.directions.weight) * medium.directions.cosine * share
 
 
 def _passage(medium: Medium, k: float, azimuth: Azimuth) -> FloatArray:
