@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 from typing import Any
 
@@ -38,6 +39,8 @@ _OPTIONS = (
            "flat:RADIUS."),
     option("--radius", Length("auto"), "MM|auto", "Grid radius; auto (montecarlo) enlarges it "
            "until under 0.1 % of any channel lies beyond.  [default: 32 MFP_max; deon-skin: 17.2]"),
+    option("--scheduler", None, "ADDRESS", "montecarlo: Dask cluster that traces the photons: "
+           "tcp://HOST:PORT, or local:N for N new workers.  [default: --threads of this process]"),
     *output("MATERIAL.profile.npz, MATERIAL.METHOD.profile.npz", "is not our profile",
             "Output file, - for stdout; a folder with --all"),
 )
@@ -70,7 +73,9 @@ def simulate(
       sssfit simulate skin1 --target-error 0.1% --resume
       sssfit simulate tissue.mci --run 2
       sssfit simulate deon-skin
+      sssfit simulate skin1 --photons 1e9 --scheduler tcp://10.0.0.5:8786
     """
+    scheduler = given.pop("scheduler")
     every, paper, number, dr, radius, output, force, beam = (
         given.pop(key)
         for key in ("every", "paper", "number", "dr", "radius", "output", "force", "beam")
@@ -85,6 +90,8 @@ def simulate(
     if number is not None and not is_mci(material):
         raise click.UsageError("--run chooses a run of an MCML input file, .mci.")
     method = method_for(context, method, material)
+    if scheduler is not None and method != _FIRST:
+        raise click.UsageError("--scheduler is for --method montecarlo; leave it out.")
     own = own_settings(context, SIMULATIONS, method, given) | {"dr_mm": dr, "radius_mm": radius}
     if radius == "auto" and method != _FIRST:
         raise click.UsageError("--radius auto is for --method montecarlo; give a length.")
@@ -102,8 +109,13 @@ def simulate(
         binary_stdout()
     paths = runner.paths_of(materials, method, output, several=several)
     how["inputs"] = [material] if material and SIMULATIONS[method].makes is None else []
-    asked = (materials, paths, method, settings)
-    with asked_to_stop() as stop:  # what was done by then stays
+    # What was done when it is stopped stays.
+    with asked_to_stop() as stop, contextlib.ExitStack() as stack:
+        if scheduler is not None:
+            from sssfit.sweep.cluster import Batches
+
+            settings = runner.traced_by(stack.enter_context(Batches(scheduler)), settings)
+        asked = (materials, paths, method, settings)
         found = runner.simulate_to_files(*asked, force=force, stop=stop, watch=walk_progress, **how)
         if not found.outcomes:
             raise KeyboardInterrupt

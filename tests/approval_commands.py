@@ -177,6 +177,8 @@ MATERIALS = [
 ]
 
 SIMULATE = [
+    C("simulate wax.toml --method burley --scheduler local:2"),
+    C("simulate wax.toml --photons 3000 --scheduler 10.0.0.5"),
     C(f"simulate wax.toml {GRID} --photons 3000"),
     C(f"simulate wax.toml {GRID} --photons 3000 --seed 5 --threads 1 --json"),
     C(f"simulate plate.toml {GRID} --photons 2e3 -o 'out/Platte λ.npz' -v"),

@@ -144,6 +144,13 @@ def _content(made: Any) -> Any:
 _GRID = {"dr_mm": DR_MM, "radius_mm": RADIUS_MM}
 
 SIMULATE = {
+    "--scheduler": Row(
+        _WALK,
+        "--scheduler local:2",
+        calls,
+        lambda: _walk(elsewhere=world.Batches("local:2")),
+        words="--threads of this process",
+    ),
     "--all": Row(
         _BURLEY,
         f"simulate --all --method burley {GRID}",

@@ -1,5 +1,6 @@
 """A scheduler and two workers as processes of their own: the same bits, whatever is killed."""
 
+import contextlib
 import os
 import signal
 import socket
@@ -11,8 +12,10 @@ from processes import end_all, start
 from test_sweep import WALK, content, plan_of
 
 from sssfit.errors import ArgumentError, SweepError
+from sssfit.material import load_material
+from sssfit.simulate import simulate_to_files
 from sssfit.sweep import cluster, sweep_to_store, tasks
-from sssfit.sweep.cluster import local_count
+from sssfit.sweep.cluster import Batches, local_count
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="kill -9")
 # Long enough to be killed in its midst: 6 points of 20 batches.
@@ -147,6 +150,48 @@ def test_twenty_kills_of_each(machines, plan, undisturbed, tmp_path, seed):
         sweep_to_store(plan, path, scheduler=machines.address, progress=watch)
     sweep_to_store(plan, path, threads=1, resume=True)
     assert content(path) == undisturbed
+
+
+def test_one_large_walk_is_the_same_bits_on_a_cluster(machines, tmp_path):
+    """A worker is killed in the midst of one; the scheduler of another one, which is resumed."""
+    material, settings = load_material("skin1"), {"photons": 3_000_000, "threads": 2}
+    how = {"checkpoint_every": 0.0}
+    walk = [[material], [tmp_path / "local.npz"], "montecarlo", settings]
+    simulate_to_files(*walk)
+    local = (tmp_path / "local.npz").read_bytes()
+
+    seen = []
+
+    def killing(process):
+        @contextlib.contextmanager
+        def watch(label):
+            def report(now):
+                seen.append(now.photons_done)
+                if now.photons_done > 300_000 and process.poll() is None:
+                    process.kill()
+
+            yield report
+
+        return watch
+
+    walk[1] = [tmp_path / "far.npz"]
+    with Batches(machines.address) as elsewhere:
+        walk[3] = settings | {"elsewhere": elsewhere}
+        simulate_to_files(*walk, watch=killing(machines.workers[0]), **how)
+    assert (tmp_path / "far.npz").read_bytes() == local
+    assert len({*seen}) > 3  # progress is live
+
+    walk[1] = [tmp_path / "lost.npz"]
+    with Batches(machines.address) as elsewhere:
+        walk[3] = settings | {"elsewhere": elsewhere}
+        with pytest.raises(
+            SweepError, match=r"lost; .*checkpoint keeps [\d,]+ photons, and `resume"
+        ):
+            simulate_to_files(*walk, watch=killing(machines.scheduler), **how)
+    assert (tmp_path / "lost.npz.checkpoint").exists()
+    walk[3] = settings
+    simulate_to_files(*walk, resume=True)
+    assert (tmp_path / "lost.npz").read_bytes() == local
 
 
 OTHER = "import sssfit.simulate.batches as b\nb.source_key = lambda: '0.0.1-0123'\n"

@@ -6,17 +6,18 @@ after whole batches, at fixed numbers of batches.
 
 import math
 from collections import deque
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping
 from concurrent.futures import Future
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from datetime import timedelta
 from time import perf_counter
 
 from sssfit._jit import thread_pool
 from sssfit.arrays import FloatArray
-from sssfit.errors import SimulationError
+from sssfit.errors import SimulationError, SweepError
 from sssfit.simulate._checkpoint import Checkpoint, State
+from sssfit.simulate._elsewhere import Elsewhere, from_elsewhere
 from sssfit.simulate._walks import BATCH_PHOTONS, Tally, Walk, relative_errors
 
 REPORT_SECONDS = 0.1
@@ -133,11 +134,13 @@ def run(
     target_error: float | None = None,
     checkpoint: Checkpoint | None = None,
     settings: Mapping[str, str] | None = None,
+    elsewhere: Elsewhere | None = None,
 ) -> Tally:
     """Walk batches on ``threads`` threads until the photons are done or the target is met.
 
     Ends early, after a whole batch, when ``stop`` returns true. ``settings`` must agree with those
-    of a checkpoint.
+    of a checkpoint. ``elsewhere`` traces the batches in place of the threads; the order in which
+    they are added, and so every bit, is the same.
     """
     ending = EndCondition(task.photons, target_error)
     state = State(task.empty_tally())
@@ -149,7 +152,11 @@ def run(
         monitor.check_error()
         monitor.report(now=True)
     begun = perf_counter() - state.seconds
-    with closing(_in_order(task, threads, stop, state.tally.photons)) as tallies:
+    if elsewhere is None:
+        source = _in_order(task, threads, stop, state.tally.photons)
+    else:
+        source = from_elsewhere(task, elsewhere, stop, state.tally.photons)
+    with _saving(checkpoint, state), closing(source) as tallies:
         for tally in tallies:
             state.tally.add(tally)
             state.seconds = perf_counter() - begun
@@ -188,6 +195,21 @@ def _in_order(
                 yield pending.popleft().result()
         finally:
             pool.shutdown(wait=True, cancel_futures=True)
+
+
+@contextmanager
+def _saving(checkpoint: Checkpoint | None, state: State) -> Iterator[None]:
+    """Save what was done where the machines that go on with it are lost."""
+    try:
+        yield
+    except SweepError as error:
+        if checkpoint is None or not state.tally.photons:
+            raise
+        checkpoint.save_at_stop(state)
+        raise SweepError(
+            f"{str(error).rstrip('.')}; {checkpoint.path} keeps {state.tally.photons:,} photons, "
+            "and `resume = True` continues from there."
+        ) from None
 
 
 def _check_not_finished(checkpoint: Checkpoint, state: State, ending: EndCondition) -> None:

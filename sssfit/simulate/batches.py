@@ -25,6 +25,7 @@ __all__ = [
     "make_walk",
     "profile_of_tally",
     "steps_per_photon",
+    "trace_each",
     "trace_range",
     "walk_of",
 ]

@@ -24,6 +24,7 @@ from sssfit.process import available_cores
 from sssfit.profile import Profile
 from sssfit.simulate._checkpoint import Checkpoint, settings_of
 from sssfit.simulate._directions import EVERYWHERE, Directions
+from sssfit.simulate._elsewhere import Elsewhere
 from sssfit.simulate._finished import (
     AUTO_BEYOND,
     end_condition,
@@ -168,11 +169,13 @@ def simulate_montecarlo_many(
     checkpoint: Checkpoint | str | Path | None = None,
     progress: Callable[[Progress], None] | None = None,
     stop: Callable[[], bool] | None = None,
+    elsewhere: Elsewhere | None = None,
 ) -> list[Profile]:
     """Trace several materials of one relative refractive index with a single walk.
 
     Parameters and errors are those of ``simulate_montecarlo``; a profile may differ from that of
     a single run in its last bits, since roulette follows the largest albedo of all channels.
+    ``elsewhere`` traces the batches in place of threads: `sssfit.sweep.cluster.Batches`.
 
     Returns
     -------
@@ -206,6 +209,7 @@ def simulate_montecarlo_many(
         if isinstance(checkpoint, str | Path)
         else checkpoint,
         settings=settings_of(materials, grids, seed, directions),
+        elsewhere=elsewhere,
     )
     if tally.photons < 2:
         raise StoppedError("stopped before a single batch of photons was done.")

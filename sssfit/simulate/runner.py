@@ -21,6 +21,7 @@ from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile, is_profile_file
 from sssfit.profile.beam import Beam, under_beam
 from sssfit.simulate._checkpoint import EVERY_SECONDS, Checkpoint, is_checkpoint_file
+from sssfit.simulate._elsewhere import Elsewhere
 from sssfit.simulate._finished import is_complete, is_finished, run_figures
 from sssfit.simulate._run import Progress
 from sssfit.simulate.gaussians import DEON_SKIN
@@ -151,6 +152,15 @@ def runs_of(
     return [each.material for each in runs], [
         each.settings(given, photons=photons) for each in runs
     ]
+
+
+def traced_by(
+    elsewhere: Elsewhere, settings: dict[str, Any] | list[dict[str, Any]]
+) -> dict[str, Any] | list[dict[str, Any]]:
+    """Return the settings of walks whose batches other machines trace."""
+    if isinstance(settings, list):
+        return [each | {"elsewhere": elsewhere} for each in settings]
+    return settings | {"elsewhere": elsewhere}
 
 
 def paths_of(
@@ -332,7 +342,7 @@ def _finished(
     beam: Beam | None,
 ) -> list[Profile]:
     """Return the profiles of this walk if all are complete; else none."""
-    asked = {key: each for key, each in settings.items() if key != "threads"}
+    asked = {key: each for key, each in settings.items() if key not in ("threads", "elsewhere")}
     try:
         profiles = [Profile.load(path) for path in paths if path and path.exists()]
     except ProfileError:

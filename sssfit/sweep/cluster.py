@@ -6,31 +6,41 @@ Dask gives the task of a lost worker to another one; a lost scheduler ends the s
 
 import contextlib
 import logging
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future
 from contextlib import ExitStack
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 from sssfit import __version__
 from sssfit.errors import ArgumentError, SweepError
 from sssfit.messages import printable, shown
-from sssfit.simulate.batches import code_version
+from sssfit.simulate.batches import (
+    BATCH_PHOTONS,
+    Tally,
+    Walk,
+    code_version,
+    steps_per_photon,
+    trace_each,
+)
 from sssfit.sweep.needed import needed
 from sssfit.sweep.plan import Plan
-from sssfit.sweep.tasks import Done, Task, perform
+from sssfit.sweep.tasks import Done, Task, check_code, perform
+
+_Found = TypeVar("_Found")
 
 _CONNECT_SECONDS = 10.0
 _WORKERS_SECONDS = 30.0
 _MOST_LOCAL = 256
+_AHEAD = 3  # ranges of a walk for each worker
+_RANGE_STEPS, _MESSAGE_BYTES = 2.5e7, 8_000_000
 
 
-class Cluster:
-    """The workers of a Dask scheduler.
+class Connection:
+    """The workers of a Dask scheduler, and a context at whose end those of local:N have ended.
 
     Parameters
     ----------
-    plan : Plan
     scheduler : str
         Its address, tcp://HOST:PORT, or local:N, which starts a scheduler and N workers.
 
@@ -40,8 +50,8 @@ class Cluster:
         ``scheduler`` is neither.
     """
 
-    def __init__(self, plan: Plan, scheduler: str) -> None:
-        self._plan, self._address = plan, scheduler
+    def __init__(self, scheduler: str) -> None:
+        self._address = scheduler
         self._count = local_count(scheduler)
         self._stack = ExitStack()
         self.workers = 1
@@ -75,10 +85,10 @@ class Cluster:
         with _quiet():
             self._stack.close()
 
-    def submit(self, task: Task) -> "Future[list[Done]]":
-        """Send a task to the scheduler."""
-        result: Future[list[Done]] = Future()
-        asked = self._client.submit(perform, self._plan, task, pure=False)
+    def call(self, work: Callable[..., _Found], *given: Any) -> "Future[_Found]":
+        """Send a call to the scheduler."""
+        result: Future[_Found] = Future()
+        asked = self._client.submit(work, *given, pure=False)
         asked.add_done_callback(lambda ended: _hand_over(ended, result))
         return result
 
@@ -127,6 +137,46 @@ class Cluster:
             self._client.close(timeout=2.0)
 
 
+class Cluster(Connection):
+    """A cluster as the pool of a sweep."""
+
+    def __init__(self, plan: Plan, scheduler: str) -> None:
+        super().__init__(scheduler)
+        self._plan = plan
+
+    def submit(self, task: Task) -> "Future[list[Done]]":
+        """Send a task to the scheduler."""
+        return self.call(perform, self._plan, task)
+
+
+class Batches(Connection):
+    """A cluster that traces the batches of one walk: ``elsewhere`` of `simulate_montecarlo_many`.
+
+    The tallies of all batches come back one by one, since the walk without a cluster adds them so.
+    """
+
+    @property
+    def ahead(self) -> int:
+        """Number of ranges to ask for before the first is there."""
+        return _AHEAD * self.workers
+
+    def size(self, task: Walk) -> int:
+        """Return the batches of a range: a second of work, or as many as a message may carry."""
+        steps = BATCH_PHOTONS * sum(map(steps_per_photon, task.materials))
+        held: int = sum(each.nbytes for each in task.empty_tally().ledger)
+        return max(1, min(int(_RANGE_STEPS / steps), _MESSAGE_BYTES // held))
+
+    def submit(self, task: Walk, first: int, last: int) -> "Future[Sequence[Tally]]":
+        """Ask for the tallies of the batches from ``first`` to before ``last``."""
+        return self.call(_traced, code_version(), task, first, last)
+
+
+def _traced(code: str, walk: Walk, first: int, last: int) -> Sequence[Tally]:
+    """Trace batches on a worker, whose code has to be that of who asks."""
+    check_code(code)
+    return trace_each(walk, first, last)
+
+
 def local_count(scheduler: str) -> int:
     """Return N of local:N, and 0 for an address.
 
@@ -146,7 +196,7 @@ def local_count(scheduler: str) -> int:
     )
 
 
-def _hand_over(ended: Any, result: "Future[list[Done]]") -> None:
+def _hand_over(ended: Any, result: "Future[Any]") -> None:
     """Give a result of Dask's to a future of Python's own; called in a thread of the client."""
     if not result.set_running_or_notify_cancel():
         return

@@ -126,14 +126,19 @@ def perform(plan: Plan, task: Task) -> list[Done]:
     SweepError
         This process has other code than the one that asks, and would make other bits.
     """
-    if task.code != code_version():
-        raise SweepError(
-            f"a worker has other code of sssfit ({code_version()}) than this process "
-            f"({task.code}); install the same version on all machines."
-        )
+    check_code(task.code)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # what they warn of is in the figures: `unfinished`
         return [_done(plan, part, task.profile) for part in task.parts]
+
+
+def check_code(code: str) -> None:
+    """Raise SweepError where a process has other code than ``code``, and would make other bits."""
+    if code != code_version():
+        raise SweepError(
+            f"a worker has other code of sssfit ({code_version()}) than the process that asks "
+            f"({code}); install the same version on all machines."
+        )
 
 
 def _done(plan: Plan, part: Part, profile: Profile | None) -> Done:
