@@ -158,7 +158,7 @@ def output(default: str, what: str, text: str = "Output file, - for stdout") -> 
 
 
 SHIPPED = (
-    flag("--all every", "All materials that ship with sssfit."),
+    flag("--all every", "All materials without layers that ship with sssfit."),
     flag("--paper", "The eleven materials of the Separable Subsurface Scattering paper."),
 )
 STRICT = flag("--strict", "End with an error in place of a warning of an unsafe kernel.")
