@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from sssfit.arrays import plain_value
+from sssfit.compare.comparison import Comparison, KernelRow
 from sssfit.compare.convergence import Convergence
 from sssfit.report.record import COST, ERROR, Report
 
@@ -56,18 +57,32 @@ def _kernels(report: Report) -> Table:
     keys = ("delta_e_2000_mean", "delta_e_2000_p95", "delta_e_2000_p99", "relative_l2")
     costs = ("fetches", "passes", "bytes_per_pixel", "seconds_per_megapixel")
     rows = []
-    for row in report.comparison.rows:
+    for row in _ordered(report.comparison):
         figures = _plain([getattr(row, key) for key in (*keys, *costs)])
-        rows.append(
-            (row.label, row.picture, *figures, "yes" if (ERROR, COST) in row.fronts else "no")
-        )
-    heads: tuple[str, ...] = ("kernel", "picture", "mean ΔE", "95 % ΔE", "99 % ΔE")
-    heads += ("relative L2", "fetches", "passes", "bytes a pixel", "s a megapixel", "on the front")
+        rows.append((row.label, row.picture, "yes" if _is_on_front(row) else "no", *figures))
+    heads: tuple[str, ...] = ("kernel", "picture", "on the front", "mean ΔE", "95 % ΔE", "99 % ΔE")
+    heads += ("relative L2", "fetches", "passes", "bytes a pixel", "s a megapixel")
     words = (
-        "Errors against the picture by the profile's whole 2D kernel. Seconds are those of the "
-        "library on this machine's processor; the page measures its own passes."
+        "Picture by picture: first the kernels of its Pareto front, cheapest first, then the "
+        "others by mean ΔE. A click on a head sorts. Errors are against the picture by the "
+        "profile's whole 2D kernel. Seconds are the library's, the least of some turns on the "
+        "processor that made this page; the page measures its own passes."
     )
     return Table("kernels", "Kernels", words, heads, tuple(rows))
+
+
+def _ordered(comparison: Comparison) -> list[KernelRow]:
+    """Return rows by picture, those of its front first by cost, then the others by error."""
+    found: list[KernelRow] = []
+    for picture in comparison.pictures:
+        front = comparison.front(picture.name, ERROR, COST)
+        others = [row for row in comparison.rows_of(picture.name) if not _is_on_front(row)]
+        found += [*front, *sorted(others, key=lambda row: row.delta_e_2000_mean)]
+    return found
+
+
+def _is_on_front(row: KernelRow) -> bool:
+    return (ERROR, COST) in row.fronts
 
 
 def _reflectance(report: Report) -> Table:
@@ -131,7 +146,8 @@ def _convergence(found: Convergence) -> Table:
     heads = ("method", "photons", "seed", "largest error of F(r)", "its own estimate", "seconds")
     words = (
         "Error of the energy within a radius as a share of the total, of the worst channel. The "
-        "finest exact solution is what the others are compared with."
+        "finest exact solution is what the others are compared with. Seconds were measured while "
+        "other parts of this page were computed."
     )
     return Table("convergence", "Convergence", words, heads, tuple(rows))
 

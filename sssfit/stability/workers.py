@@ -2,18 +2,21 @@
 
 Processes are spawned: forked ones would take along locks that numba's and BLAS's threads may hold
 at that moment. A worker ends as soon as the caller's end of a pipe is closed, by the caller or by
-its death, so none is left behind; Ctrl-C reaches the caller alone.
+its death, so none is left behind; Ctrl-C reaches the caller alone, also while a worker imports.
 """
 
+import contextlib
 import multiprocessing
 import os
 import signal
+import sys
 import threading
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.connection import Connection
+from multiprocessing.resource_tracker import ensure_running
 from types import TracebackType
 from typing import Any, TypeVar
 
@@ -45,6 +48,7 @@ class Workers:
 
     def __init__(self, count: int, shared: object) -> None:
         context = multiprocessing.get_context("spawn")
+        _start_tracker()
         self._theirs, self._ours = context.Pipe(duplex=False)
         self._pool = ProcessPoolExecutor(min(count, _MOST), context, _begin, (self._theirs, shared))
 
@@ -82,7 +86,9 @@ class Workers:
             A process ended. What the work itself raises is raised here.
         """
         try:
-            return list(self._pool.map(_call, ((work, each) for each in given)))
+            with _deaf():
+                found = self._pool.map(_call, ((work, each) for each in given))
+            return list(found)
         except BrokenProcessPool:
             raise SssfitError(_LOST) from None
 
@@ -94,7 +100,8 @@ class Workers:
         SssfitError
             By the function that is returned, as `each`.
         """
-        future = self._pool.submit(_call, (work, given))
+        with _deaf():
+            future = self._pool.submit(_call, (work, given))
 
         def result() -> Any:
             try:
@@ -105,11 +112,39 @@ class Workers:
         return result
 
 
+def _start_tracker() -> None:
+    """Start Python's process that removes what others leave, without a word about it.
+
+    A caller that is killed, or that ends at once while it imports, leaves semaphores.
+    """
+    if sys.platform != "win32":
+        sys.warnoptions.append("ignore:resource_tracker:UserWarning")
+        try:
+            ensure_running()
+        finally:
+            sys.warnoptions.pop()
+
+
+@contextlib.contextmanager
+def _deaf() -> Iterator[None]:
+    """Start processes that do not hear Ctrl-C, which would end their imports with a traceback."""
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _begin(theirs: Connection, shared: object) -> None:
     """Make this process a worker."""
     global _shared  # the pool hands nothing else from the initializer to the calls
     _shared = shared
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if sys.platform != "win32":
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
     threading.Thread(target=_end_with_caller, args=(theirs,), daemon=True).start()
     warnings.simplefilter("ignore")  # as in the caller: what fits warn of is what a stress finds
     one_blas_thread().__enter__()

@@ -6,7 +6,7 @@ from sssfit.compare.budget import Budget
 from sssfit.report.charts.svg import WIDTH, Axis, Chart, limits, picture
 from sssfit.report.record import Report
 
-_ROW, _TOP, _LEFT = 30.0, 12.0, 150.0
+_ROW, _TOP, _LEFT = 34.0, 12.0, 188.0
 _LEAST = 1e-4  # Delta E that stands for 0 on a logarithmic axis
 
 

@@ -17,7 +17,7 @@ def convergence_chart(report: Report) -> Chart | None:
     plot = Plot(
         limits(photons, is_log=True),
         limits([*errors, own], is_log=True),
-        ("photons", "largest error of F(r), share of the total"),
+        ("photons", "largest error of F(r)"),
         log=(True, True),
         describe="Error of photon walks over their number of photons",
     )
@@ -35,7 +35,8 @@ def convergence_chart(report: Report) -> Chart | None:
         ("m1", "the exact solution's estimate of its own error"),
     )
     note = (
-        f"Of the worst channel, against the exact solution. The slope of the walks is "
+        "As a share of the total, of the worst channel, against the exact solution. The slope of "
+        "the walks is "
         f"{found.line.slope:.2f} ± {found.line.slope_stderr:.2f}; in theory it is -0.5."
     )
     return Chart("convergence", "Convergence", note, legend, (("", plot.svg()),))

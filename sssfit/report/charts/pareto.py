@@ -7,9 +7,9 @@ from sssfit.report.charts.svg import Chart, Plot, limits
 from sssfit.report.record import COST, ERROR, Report
 
 _NOTICED = 1.0  # Delta E, just noticeable
-_LETTER, _LINE = 6.0, 12.0  # width and height of a label's letter
-_ROOM = 0.06  # of a label below a point, in lengths of the axis
-_LABEL = 0.3  # room of a label of 24 letters, in lengths of the axis
+_LETTER, _LINE = 7.0, 14.0  # width and height of a label's letter on a phone, its largest
+_ROOM = 0.12  # of a label below a point, in lengths of the axis
+_LABEL = 0.45  # room of a label of 15 letters, in lengths of the axis
 
 
 def pareto_chart(report: Report) -> Chart:
@@ -26,11 +26,11 @@ def pareto_chart(report: Report) -> Chart:
     )
     noticed = plot.y.place(_NOTICED)
     plot.line([(plot.x.begin, noticed), (plot.x.end, noticed)], "noticed")
-    plot.text(plot.x.end - 4, noticed - 5, "ΔE 1, just noticeable", "small end")
     places = [(plot.x.place(r.fetches), plot.y.place(r.delta_e_2000_mean)) for r in front]
     plot.line(_staircase(places, plot.x.end), "front")
     for row in sorted(rows, key=lambda each: each in front):
         plot.add(_point(plot, row, is_front=row in front))
+    plot.text(plot.x.end - 4, noticed - 5, "ΔE 1, just noticeable", "small end")
     _name_front(plot, places, [row.label for row in front])
     legend = (("front-point", "on the Pareto front"), ("other-point", "another kernel is better"))
     words = (
@@ -41,13 +41,17 @@ def pareto_chart(report: Report) -> Chart:
 
 def _name_front(plot: Plot, places: list[tuple[float, float]], labels: list[str]) -> None:
     """Write labels left of and below the front, where no point is; of two that meet, one."""
-    taken: list[tuple[float, float, float]] = []
+    taken: list[tuple[float, float, float, float]] = []
     for (x, y), label in zip(places, labels, strict=True):
-        begin, end, line = x - 9.0 - _LETTER * len(label), x - 9.0, y + 14.0
-        meets = any(begin < b and a < end and abs(line - other) < _LINE for a, b, other in taken)
-        if not meets and begin > plot.x.begin:
-            taken.append((begin, end, line))
-            plot.text(end, line, label, "small end")
+        words = label.replace(" on ", "\non ").split("\n")
+        end, top, low = x - 9.0, y, y + _LINE * len(words)
+        begin = end - _LETTER * max(map(len, words))
+        meets = any(begin < b and a < end and top < d and c < low for a, b, c, d in taken)
+        if meets or begin < plot.x.begin or low > plot.y.begin:
+            continue
+        taken.append((begin, end, top, low))
+        for k, line in enumerate(words):
+            plot.text(end, top + _LINE * (k + 1), line, "small end")
 
 
 def _fetches(rows: list[KernelRow]) -> tuple[float, float]:

@@ -6,8 +6,9 @@ from collections.abc import Callable, Iterable, Sequence
 
 from markupsafe import Markup, escape
 
-WIDTH, HEIGHT = 560.0, 340.0
-_LEFT, _RIGHT, _TOP, _BOTTOM = 76.0, 14.0, 14.0, 46.0
+# Small, so that its words can be read where a phone shows it 290 pixels wide.
+WIDTH, HEIGHT = 440.0, 300.0
+_LEFT, _RIGHT, _TOP, _BOTTOM = 74.0, 14.0, 14.0, 48.0
 _TICKS = 6
 _ROOM = 0.05  # of an axis, beyond the values at either end
 _LEAST = 1e-30  # stands for 0 on a logarithmic axis

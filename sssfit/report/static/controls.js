@@ -45,6 +45,8 @@ function fillFetches({ front, kernels }, { fetches }) {
   get('most-words').textContent = `${fetches.toPrecision(3)} a pixel`;
 }
 
+const lightWords = (degrees) => (degrees === null ? '-' : degrees === 0 ? 'from the front' : `${degrees}° to the left`);
+
 const metres = (mm) => `${(mm / 1000).toFixed(1)} m`;
 
 export function fillControls({ model, state }) {
@@ -53,7 +55,7 @@ export function fillControls({ model, state }) {
   fillKernels(get('kernel'), model, state.kernel);
   const distinct = (list, key) => [...new Set(list.map((each) => each[key]))];
   fill(get('scene'), distinct(all, 'name').map((each) => [each, each]), picture.name);
-  fill(get('light'), distinct(same, 'light').map((each) => [String(each), each === null ? '-' : `${each}°`]), String(picture.light));
+  fill(get('light'), distinct(same, 'light').map((each) => [String(each), lightWords(each)]), String(picture.light));
   fillDistances(model, picture, same, state);
   fillFetches(model, kernel);
   fill(get('format'), (model.passes?.formats ?? ['half']).map((each) => [each, each]), state.format);

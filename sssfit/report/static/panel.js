@@ -42,11 +42,11 @@ export function drawHistogram(figures) {
     const place = placeOf(value, LOWEST, HIGHEST), x = 4 + 240 * place;
     svg.append(element('line', { class: 'axis', x1: x, x2: x, y1: 64, y2: 67 }));
     const side = place < 0.01 ? 'start' : place > 0.99 ? 'end' : 'middle';
-    const text = element('text', { class: `tick ${side}`, x, y: 78 });
+    const text = element('text', { class: `tick ${side}`, x, y: 75 });
     text.textContent = Number(value.toPrecision(1));
     svg.append(text);
   }
-  const name = element('text', { class: 'tick middle', x: 124, y: 91 });
+  const name = element('text', { class: 'tick middle', x: 124, y: 86 });
   name.textContent = 'ΔE of a pixel; height: share of the error';
   svg.append(name);
   byId('quartiles').textContent = quartiles.length
