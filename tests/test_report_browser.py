@@ -216,7 +216,7 @@ def test_tables_sort_and_copy(page, window):
     window.wait("window.copied")
     lines = window.js("return window.copied").splitlines()
     assert len(lines) == len(world.report().comparison.rows) + 1
-    assert lines[0].split(",")[:3] == ["kernel", "picture", "mean ΔE"]
+    assert lines[0].split(",")[:4] == ["kernel", "picture", "on the front", "mean ΔE"]
 
 
 @pytest.mark.parametrize("form", ["hlsl", "glsl", "wgsl", "json"])
