@@ -49,8 +49,11 @@ class Browser:
         """Open a page at a width of the window, and wait until it is drawn."""
         size = {"width": width, "height": 1000, "deviceScaleFactor": 1, "mobile": False}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-        theme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
-        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [theme]})
+        # A page that still scrolls is clicked in the wrong place.
+        given = {"prefers-color-scheme": "dark" if dark else "light"}
+        given |= {"prefers-reduced-motion": "reduce"}
+        features = [{"name": name, "value": value} for name, value in given.items()]
+        self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
         self.driver.get("about:blank")
         self.log("browser"), self.log("performance")
         self.driver.get(f"file://{path}{hash_}")
@@ -73,32 +76,57 @@ class Browser:
             time.sleep(0.02)
 
     def set(self, id_, value):
-        """Give a control a value, as a user does, and wait for the page."""
-        self.js(
-            "const at = document.getElementById(arguments[0]); at.value = arguments[1];"
-            "at.dispatchEvent(new Event('input', { bubbles: true }));",
-            id_,
-            value,
-        )
+        """Give a control a value by the keyboard, from its first option or its least value on."""
+        from selenium.webdriver import Keys
+
+        control = self.driver.find_element("id", id_)
+        if control.tag_name == "select":
+            options = self.js("return [...arguments[0].options].map((at) => at.value)", control)
+            arrow, steps = Keys.ARROW_DOWN, options.index(str(value))
+        else:
+            low, step = (float(control.get_attribute(each)) for each in ("min", "step"))
+            arrow, steps = Keys.ARROW_RIGHT, round((value - low) / step)
+        if control.is_enabled():
+            control.send_keys(Keys.HOME, *[arrow] * steps)
         self.wait()
 
     def click(self, selector):
-        """Click on an element, wherever the page is scrolled to."""
-        self.js(
-            "const at = document.querySelector(arguments[0]);"
-            "at.dispatchEvent(new MouseEvent('click', { bubbles: true }));",
-            selector,
-        )
+        """Click on an element, scrolled to the middle, where the status line does not lie."""
+        self._seen(selector).click()
         self.wait()
 
-    def key(self, key):
-        """Press a key."""
-        self.js(
-            "document.body.dispatchEvent(new KeyboardEvent('keydown', { key: arguments[0], "
-            "bubbles: true }))",
-            key,
-        )
+    def _seen(self, selector):
+        element = self.driver.find_element("css selector", selector)
+        self.js("arguments[0].scrollIntoView({ block: 'center', behavior: 'instant' })", element)
+        return element
+
+    def point(self, selector, *, click=False):
+        """Move the pointer onto an element, and click there."""
+        from selenium.webdriver import ActionChains
+
+        mouse = ActionChains(self.driver).move_to_element(self._seen(selector))
+        (mouse.click() if click else mouse).perform()
         self.wait()
+
+    def key(self, *keys):
+        """Press keys while no control has the focus."""
+        from selenium.webdriver import ActionChains
+
+        self.js("document.activeElement.blur()")
+        ActionChains(self.driver).send_keys(*keys).perform()
+        self.wait()
+
+    def pasted(self):
+        """What the clipboard holds, by pasting it into a field."""
+        from selenium.webdriver import ActionChains, Keys
+
+        self.js(
+            "window.field = document.createElement('textarea');"
+            "document.body.append(window.field); window.field.focus();"
+        )
+        keys = ActionChains(self.driver).key_down(Keys.CONTROL).send_keys("v").key_up(Keys.CONTROL)
+        keys.perform()
+        return self.js("window.field.remove(); return window.field.value")
 
     def text(self, id_):
         """The text of an element."""

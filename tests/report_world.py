@@ -16,7 +16,7 @@ SIDE = 48
 def report() -> Report:
     """With a chain of stages, a disk, shared first passes, models and a budget."""
     named = [(LABEL, cli_world.taps())]
-    small = {"side": SIDE, "photons": 100_000, "mm_per_pixel": 0.3, "threads": 2}
+    small = {"side": SIDE, "photons": 100_000, "mm_per_pixel": 0.3, "threads": 1}
     made = make_report(cli_world.wax(), named=named, only=["disk", "svd"], **small)
     # Files of materials refuse such names; profiles of other programs may have any.
     return dataclasses.replace(made, name=NAME)

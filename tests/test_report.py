@@ -20,11 +20,13 @@ from sssfit.formats.pictures import save_image
 from sssfit.material import parse_material
 from sssfit.measure.delta_e import delta_e_of_lab, lab
 from sssfit.report import finished_page, is_report_file, library_page, make_report, page
+from sssfit.report.charts import charts_of
 from sssfit.report.commands import commands_of
 from sssfit.report.html import SCRIPTS, script_text
 from sssfit.report.kept import kept, page_key
 from sssfit.report.pack import packed_picture, unpacked_picture
 from sssfit.report.pictures import _reduced
+from sssfit.report.tables import tables_of
 from sssfit.scene.record import Scene
 from sssfit.simulate import simulate_exact
 
@@ -204,7 +206,7 @@ def test_a_picture_of_ones_own_comes_first_with_its_pixels(tmp_path):
     light = np.random.default_rng(4).random((40, 30, 3))
     save_image(tmp_path / "face.exr", light, channels=("R", "G", "B"), mm_per_pixel=0.2)
     profile, files = cli_world.profile(), {"irradiance": str(tmp_path / "face.exr")}
-    made = make_report(profile, only=["disk"], side=20, threads=2, **files)
+    made = make_report(profile, only=["disk"], side=20, threads=1, **files)
     first = made.pictures[0]
     assert (first.key, first.scene.irradiance.shape) == ("own", (20, 15, 3))
     assert made.comparison.mm_per_pixel == pytest.approx(0.4)
@@ -257,12 +259,17 @@ def test_a_damaged_page_is_made_again(tmp_path, monkeypatch, caplog):
     assert path.read_bytes() != raw
 
 
-def test_ten_pages_are_kept(tmp_path, monkeypatch):
+def test_the_last_ten_pages_are_kept(tmp_path, monkeypatch):
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path))
     monkeypatch.setattr("sssfit.report.kept.logging.Logger.isEnabledFor", lambda *_: True)
-    for k in range(12):
-        assert kept(page_key({"number": k}), lambda k=k: {"made": k}) == {"made": k}
-    assert len(list((tmp_path / "pages").iterdir())) == 10
+    keys = [page_key({"number": k}) for k in range(12)]
+    for k, key in enumerate(keys):
+        assert kept(key, lambda k=k: {"made": k}) == {"made": k}
+        # Clocks of files tick every few milliseconds: two of these would be of one age.
+        os.utime(tmp_path / "pages" / f"{key}.json", (k, k))
+    assert {each.stem for each in (tmp_path / "pages").iterdir()} == set(keys[2:])
+    for k, key in enumerate(keys[2:], 2):
+        assert kept(key, None) == {"made": k}
 
 
 def test_a_folder_that_cannot_be_written_keeps_nothing(tmp_path, monkeypatch):
@@ -281,6 +288,46 @@ def test_the_index_links_to_pages_beside_it(tmp_path):
     text = library_page([cli_world.wax()], beside=tmp_path, threads=2)
     assert "<a href" not in text
     assert "sssfit report wax" in text
+
+
+def layered():
+    """Two layers of one channel."""
+    layers = "".join(
+        f"[[layers]]\nsigma_a_per_mm = [{a}]\nsigma_s_per_mm = [2.0]\neta = 1.4\ng = 0.0\n{rest}\n"
+        for a, rest in ((0.5, "thickness_mm = 0.5"), (0.1, ""))
+    )
+    return parse_material(f'channels = ["grey"]\n{layers}', "stack.toml")
+
+
+def test_a_second_process_changes_nothing_but_seconds(caplog):
+    caplog.set_level("INFO", logger="sssfit")
+    given = {"only": ["disk"], "side": 16, "photons": 2000}
+    found, told = [], []
+    for threads in (1, 2):
+        caplog.clear()
+        made = make_report(layered(), threads=threads, **given)
+        rows = [
+            {key: value for key, value in row.items() if "seconds" not in key}
+            for row in made.to_dict()["rows"]
+        ]
+        found.append({**made.to_dict(), "rows": rows, "charts": str(charts_of(made))})
+        told.append([each.getMessage() for each in caplog.records])
+    assert found[0] == found[1]
+    assert told[0] == told[1]
+
+
+def test_the_table_begins_with_the_front_of_the_first_picture():
+    report = world.report()
+    table = tables_of(report)[0]
+    rows = [dict(zip(table.heads, row, strict=True)) for row in table.rows]
+    assert [row["kernel"] for row in rows[: len(report.front)]] == report.front
+    assert [row["picture"] for row in rows] == [
+        each.name for each in report.comparison.pictures for _ in report.kernels
+    ]
+    others = [row for row in rows if row["on the front"] == "no"]
+    for picture in report.comparison.pictures:
+        errors = [row["mean ΔE"] for row in others if row["picture"] == picture.name]
+        assert errors == sorted(errors)
 
 
 def test_one_channel_is_grey():
@@ -350,13 +397,8 @@ def test_words_have_a_contrast_of_4_5_and_marks_of_3(theme):
 
 def test_a_layered_material_has_a_page_without_what_does_not_cover_it(caplog):
     caplog.set_level("INFO", logger="sssfit")
-    layers = "".join(
-        f"[[layers]]\nsigma_a_per_mm = [{a}]\nsigma_s_per_mm = [2.0]\neta = 1.4\ng = 0.0\n{rest}\n"
-        for a, rest in ((0.5, "thickness_mm = 0.5"), (0.1, ""))
-    )
-    stack = parse_material(f'channels = ["grey"]\n{layers}', "stack.toml")
-    given = {"only": ["disk"], "side": 16, "threads": 2, "photons": 2000}
-    made = make_report(stack, **given)
+    given = {"only": ["disk"], "side": 16, "threads": 1, "photons": 2000}
+    made = make_report(layered(), **given)
     assert made.models is None
     assert made.budgets == ()
     assert made.profile.meta["method"] == "exact"

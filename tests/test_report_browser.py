@@ -116,12 +116,12 @@ def test_every_control_does_something(page, window):
         assert f"{id_}={value:g}" in window.js("return location.hash")
     window.set("kernel", world.LABEL)
     window.click("#jitter")
-    window.js("document.getElementById('jitter').dispatchEvent(new Event('input'))")
+    assert "jitter=1" in window.js("return location.hash")
     for name in ("mode", "pane"):
-        count = window.js(f"return document.querySelectorAll('input[name={name}]').length")
-        for k in range(count):
-            window.js(f"document.querySelectorAll('input[name={name}]')[{k}].click()")
+        for each in window.driver.find_elements("name", name):
+            each.click()
             window.wait()
+            assert each.is_selected()
     for each in ("zoom-in", "zoom-out", "fit", "pin"):
         window.click(f"#{each}")
     for each in ("truth", "unblurred"):
@@ -190,16 +190,15 @@ def test_a_point_of_the_front_tells_and_runs_its_kernel(page, window):
     window.open(page)
     label = world.report().front[0]
     point = f'.point[data-kernel="{label}"]'
-    window.js(f"document.querySelector({point!r}).dispatchEvent(new PointerEvent('pointerenter'))")
+    window.point(point)
     assert window.text("pareto-words").startswith(f"{label}: mean ΔE ")
-    window.click(point)
+    window.point(point, click=True)
     assert window.js("return document.getElementById('kernel').value") == label
     assert window.js(f"return document.querySelector({point!r}).ariaPressed") == "true"
 
 
 def test_tables_sort_and_copy(page, window):
     window.open(page)
-    window.js("navigator.clipboard.writeText = async (text) => { window.copied = text; }")
     heads = window.js(
         "return [...document.querySelectorAll('#table-kernels th')].map((at) => at.dataset.value)"
     )
@@ -213,8 +212,8 @@ def test_tables_sort_and_copy(page, window):
         values = window.js(read)
         assert values == sorted(values, reverse=turn)
     window.click('[data-csv="table-kernels"]')
-    window.wait("window.copied")
-    lines = window.js("return window.copied").splitlines()
+    window.wait("document.getElementById('status').textContent.startsWith('Copied')")
+    lines = window.pasted().splitlines()
     assert len(lines) == len(world.report().comparison.rows) + 1
     assert lines[0].split(",")[:4] == ["kernel", "picture", "on the front", "mean ΔE"]
 
@@ -222,11 +221,10 @@ def test_tables_sort_and_copy(page, window):
 @pytest.mark.parametrize("form", ["hlsl", "glsl", "wgsl", "json"])
 def test_the_copied_export_is_the_export(page, window, form):
     window.open(page)
-    window.js("navigator.clipboard.writeText = async (text) => { window.copied = text; }")
     window.set("kernel", world.LABEL)
     window.click(f"[data-export={form}]")
-    window.wait("window.copied")
-    assert window.js("return window.copied") == kernel_text(kernel_of(world.LABEL).taps, form)[0]
+    window.wait("document.getElementById('status').textContent.startsWith('Copied')")
+    assert window.pasted() == kernel_text(kernel_of(world.LABEL).taps, form)[0]
 
 
 @pytest.mark.parametrize(

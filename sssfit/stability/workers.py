@@ -69,7 +69,8 @@ class Workers:
 
     def submit(self, work: Callable[[Any, _Given], _Found], given: _Given) -> "Future[_Found]":
         """Return the future of work(shared, given); its exception is BrokenProcessPool if lost."""
-        return self._pool.submit(_call, (work, given))
+        with _deaf():
+            return self._pool.submit(_call, (work, given))
 
     def each(self, work: Callable[[Any, _Given], _Found], given: Iterable[_Given]) -> list[_Found]:
         """Return work(shared, each) for all that is given, in its order.
@@ -100,8 +101,7 @@ class Workers:
         SssfitError
             By the function that is returned, as `each`.
         """
-        with _deaf():
-            future = self._pool.submit(_call, (work, given))
+        future = self.submit(work, given)
 
         def result() -> Any:
             try:
