@@ -27,6 +27,7 @@ _MOST = 10  # pages of 5 MB
 _SUM_BYTES = 32  # of SHA-256
 _SOURCES = {".py", ".js", ".css", ".html"}
 LOG = "sssfit"
+_OF_ONE_RUN = "Compiling the "  # of `note_compiling`: a page says the same, compiled before or not
 
 
 def page_key(given: Mapping[str, Any]) -> str:
@@ -79,8 +80,9 @@ class Listener(logging.Handler):
         self.lines: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Remember a line."""
-        self.lines.append(record.getMessage())
+        """Remember a line, unless it holds for one run only."""
+        if not (line := record.getMessage()).startswith(_OF_ONE_RUN):
+            self.lines.append(line)
 
 
 @contextlib.contextmanager
