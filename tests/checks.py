@@ -184,15 +184,15 @@ def against_scalar_loop(name, photons):
     return figures
 
 
-def against_mcml(name, photons):
-    """The lane walk against the original MCML program's profile, per channel.
+def against_mcml(name, photons, profile=None, what="lanes"):
+    """The lane walk, or ``what`` made a profile, against the original MCML program's, per channel.
 
     MCML's own errors come from 10 batches: of a single annulus they scatter by a quarter, which a
     chi-square does not forgive. Near the axis its photons carry the same weights as ours, so our
     variance per photon is the better one; in the tail its roulette, one a channel, leaves fewer
     and heavier photons, and there its errors, merged over many annuli, say so. The larger counts.
     """
-    profile = lane_profile(name, photons)
+    profile = profile or lane_profile(name, photons)
     ours, our_squares = moments(profile)
     figures = []
     with np.load(MCML) as data:
@@ -215,7 +215,7 @@ def against_mcml(name, photons):
             sigmas, chi2 = chi_square_sigmas(a - b, variance)
             figures.append(
                 Figure(
-                    f"{name} {channel}: lanes against MCML 1.2.2, {len(groups)} annuli",
+                    f"{name} {channel}: {what} against MCML 1.2.2, {len(groups)} annuli",
                     f"{a.sum():.6f}, chi² {chi2:.0f}",
                     f"{b.sum():.6f}",
                     sigmas,
@@ -225,7 +225,7 @@ def against_mcml(name, photons):
             theirs_total, theirs_stderr = float(data[key + "total"]), float(data[key + "total_se"])
             figures.append(
                 Figure(
-                    f"{name} {channel}: total, lanes against MCML 1.2.2",
+                    f"{name} {channel}: total, {what} against MCML 1.2.2",
                     f"{total:.6f} ± {stderr:.6f}",
                     f"{theirs_total:.6f} ± {theirs_stderr:.6f}",
                     (total - theirs_total) / np.hypot(stderr, theirs_stderr),

@@ -2,6 +2,7 @@
 
 import math
 
+import checks
 import numpy as np
 import reference
 from checks import (
@@ -16,7 +17,8 @@ from checks import (
 from sssfit.grid import RadialGrid, paper_grid
 from sssfit.material import Layer, Material, load_material
 from sssfit.simulate import simulate_montecarlo
-from sssfit.simulate._run import run
+from sssfit.simulate._finished import profile_of
+from sssfit.simulate._run import EndCondition, run
 from sssfit.simulate._walks import LayeredWalk, SemiInfiniteWalk
 
 
@@ -137,6 +139,14 @@ def one_layer(name, photons):
         )
         for c, channel in enumerate(material.channels)
     ]
+
+
+def against_mcml(name, photons):
+    """A shipped material by the layered walk against the original MCML program's profile."""
+    material = load_material(name)
+    task = LayeredWalk((material,), (paper_grid(material),), 1, photons)
+    profile = profile_of(task, run(task, 2), 0, EndCondition(photons), 0.0, trim=False)
+    return checks.against_mcml(name, photons, profile, "layered walk")
 
 
 def scalar_sums(material, photons, grid):

@@ -15,7 +15,14 @@ from checks_layers import STACKS, layer, stack
 from scipy import stats
 from scipy.integrate import quad
 
-from sssfit._jit import fused, layered, layered_lanes, layered_slots, layered_tally
+from sssfit._jit import (
+    fused,
+    layered,
+    layered_end,
+    layered_lanes,
+    layered_slots,
+    layered_tally,
+)
 from sssfit._jit.fused import STRIDE
 from sssfit._jit.sampling import LANES
 from sssfit.grid import RadialGrid
@@ -351,10 +358,10 @@ def event_of(task, collisions):
     floats, words, shares, lane, sweep, ledger = lane_inside(task, collisions)
     stack_, bins = task.groups[0]
     flags, exits = np.zeros(STRIDE, np.uint8), np.zeros(STRIDE, np.uint64)
-    layered_tally.flag_weak(floats, words, flags, LANES, sweep)
+    layered_end.flag_weak(floats, words, flags, LANES, sweep)
     layers = stack_.layers.size // 4
     absorbed = np.zeros(bins.channel.size * layered_slots.SUMS * layers)
-    ended = layered_tally.end_or_boost(
+    ended = layered_end.end_or_boost(
         floats,
         words,
         shares,

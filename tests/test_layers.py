@@ -85,6 +85,12 @@ def test_a_slab_without_absorption_loses_nothing():
     np.testing.assert_allclose(whole, 1.0, atol=ROUNDING)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["skin1", "chicken1", "ketchup"])
+def test_a_half_space_by_the_original_mcml(name):
+    assert_within(checks_layers.against_mcml(name, 10_000_000))
+
+
 # Inputs of MCML that others run: g to 1, n below 1 (tests/data/README.md has the right values)
 
 

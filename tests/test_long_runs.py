@@ -18,6 +18,7 @@ import fork_server
 import numpy as np
 import processes
 import pytest
+from checks_layers import layer, stack
 
 from sssfit import files
 from sssfit.cli import main
@@ -365,6 +366,17 @@ def test_a_checkpoint_of_another_version_says_so(tmp_path, monkeypatch):
     monkeypatch.setattr("sssfit.simulate._checkpoint.source_key", lambda: "0.0-abc")
     leave_checkpoint(path)
     assert read_checkpoint(path).profiles[0].meta["version"] is None
+
+
+def test_a_checkpoint_of_an_older_layered_walk_is_refused_by_name(tmp_path, monkeypatch):
+    path, slab = tmp_path / "c", stack(layer(0.1, 5.0, 0.8, 1.4, 1.0))
+    with monkeypatch.context() as older:
+        older.setattr("sssfit.simulate._checkpoint.source_key", lambda: "0.1.0-the-old-walk")
+        simulate_montecarlo(slab, photons=20_000, checkpoint=Checkpoint(path, 0.0))
+    before = path.read_bytes()
+    with pytest.raises(SimulationError, match=r"settings: version = 0\.1\.0-the-old-walk \(now"):
+        simulate_montecarlo(slab, photons=40_000, checkpoint=Checkpoint(path))
+    assert path.read_bytes() == before
 
 
 def test_a_checkpoint_that_does_not_say_its_version_is_of_another(tmp_path, left):

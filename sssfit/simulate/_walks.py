@@ -17,7 +17,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._jit import compiled_before, layered, layered_tally, semi_infinite
+from sssfit._jit import compiled_before, layered, layered_entry, layered_tally, semi_infinite
 from sssfit.arrays import FloatArray
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
@@ -125,7 +125,7 @@ class LayeredWalk:
     photons: int
     diffuse: bool = False
     directions: Directions = EVERYWHERE
-    groups: tuple[tuple[layered.Stack, layered_tally.Bins], ...] = field(init=False)
+    groups: tuple[tuple[layered_entry.Stack, layered_tally.Bins], ...] = field(init=False)
 
     def __post_init__(self) -> None:
         material, grid = self.materials[0], self.grids[0]
@@ -198,7 +198,7 @@ def channels_with_equal_scattering(material: Material) -> list[npt.NDArray[np.in
     return [np.array(members, np.int64) for members in groups.values()]
 
 
-def _stack(material: Material, members: npt.NDArray[np.int64]) -> layered.Stack:
+def _stack(material: Material, members: npt.NDArray[np.int64]) -> layered_entry.Stack:
     """Lay out the tables of a group; its walk follows each layer's least absorbing channel."""
     layers = material.layers
     sigma_a = np.array([layer.sigma_a_per_mm[members] for layer in layers])
@@ -214,7 +214,7 @@ def _stack(material: Material, members: npt.NDArray[np.int64]) -> layered.Stack:
     rows[1:-1, 3] = [1.0 - layer.g[members[0]] for layer in layers]
     excess = np.zeros((len(layers) + 2, members.size), np.float32)
     excess[1:-1] = sigma_a - least[:, None]
-    return layered.Stack(rows.ravel(), _crossings(material, rows).ravel(), excess.ravel())
+    return layered_entry.Stack(rows.ravel(), _crossings(material, rows).ravel(), excess.ravel())
 
 
 def _crossings(material: Material, rows: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
