@@ -101,8 +101,8 @@ COMPARE = (
     option("--rank", WholeRange(1, 1000), "N", "svd: rank of the budget's kernel.  [default: 3]"),
     option("--terms", WholeRange(1, 10), "N", "gaussians: number of Gaussians of the budget's "
            "kernel.  [default: 4]"),
-    option("--model", ["dipole", "dipole-grosjean", "burley"], None, "Profile model of the "
-           "budget's kernel.  [default: the photon walk]"),
+    option("--model", ["dipole", "dipole-grosjean", "burley", "multipole"], None, "Profile model "
+           "of the budget's kernel; multipole for layers.  [default: the photon walk]"),
     option("-o --output", None, "FOLDER", "Folder of NAME-pareto.png and NAME-pareto.md with "
            "--all or --paper.  [default: here]"),
     flag("--force", "Replace an input, or files that are not our charts or tables."),

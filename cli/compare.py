@@ -34,7 +34,7 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
     front: no other kernel is better in both. Seconds are measured on this machine.
 
     MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or a .profile.npz
-    file, - for one on stdin; a budget needs a half space with g = 0.
+    file, - for one on stdin; a budget needs a material.
 
     \b
       sssfit compare skin1

@@ -230,15 +230,6 @@ def test_a_slab_is_compared_with_its_exact_profile(run, tmp_path):
     assert "Take " in told
 
 
-def test_a_stack_is_told_what_the_next_command_takes(run, tmp_path):
-    toml = SLAB.replace("g = 0", "g = 0.8")
-    (tmp_path / "forward.toml").write_text(toml)
-    line = one_line(run("forward.toml", "-q", "--what", "budget", status=1))
-    assert "forward is not one half space" in line
-    for other in ("leave g out", "multipole"):
-        assert other not in line
-
-
 def test_it_ends_with_a_verdict_of_two_lines(run, few):
     given = (*SMALL, "--picture", "edge,points")
     figures = json.loads(run("skin1", *given, "--json"))

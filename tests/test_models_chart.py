@@ -119,12 +119,21 @@ def test_a_walk_that_is_there_is_not_walked_again():
     assert found.exact.profile.n_annuli == 100
 
 
+@pytest.mark.parametrize(("thickness_mm", "methods"), [(3.0, ["multipole"]), (0.5, [])])
+def test_a_slab_is_compared_with_its_multipole_if_it_has_one(thickness_mm, methods):
+    slab = Material("slab", ("c",), (Layer(1.3, np.zeros(1), [0.1], [1.0], thickness_mm),))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SssfitWarning)  # of diffusion in a slab this thin
+        found = compare_models(slab, photons=20_000, dr_mm=0.2, radius_mm=8.0)
+    assert [each.method for each in found.curves] == ["exact", "montecarlo", *methods]
+    assert "dipoles and normalised diffusion" in found.left_out[0]
+    assert len(found.left_out) == 2 - len(methods)
+    assert_legible(lambda: models_figure(found))
+
+
 def test_what_cannot_be_compared_is_refused():
     material = load_material("skin1")
-    slab = Material("slab", ("c",), (Layer(1.3, np.zeros(1), [0.1], [1.0], 3.0),))
     exact = simulate_exact(material, dr_mm=1.0, radius_mm=3.0)
-    with pytest.raises(SimulationError, match="finite thickness"):
-        compare_models(slab)
     with pytest.raises(SimulationError, match="photon walk's grid"):
         compare_models(material, walk=exact)
 
@@ -288,15 +297,15 @@ def test_the_verb_takes_a_profile_of_a_walk_and_its_grid(run, tmp_path):
         (("--models", "there.profile.npz"), 1, "there.profile.npz"),
         (("--models", "exact.profile.npz"), 1, "is not a photon walk of a known material"),
         (("--models", "walk.profile.npz", "--photons", "5"), 2, "is for a new walk"),
-        (("--models", "slab.toml"), 1, "finite thickness"),
+        (("--models", "film.toml"), 1, "thin slab of g = 0.97"),
     ],
 )
 def test_bad_input_is_one_clear_line(run, tmp_path, skin1, arguments, status, fragment):
     skin1.exact.profile.save(tmp_path / "exact.profile.npz")
     skin1.walk.profile.save(tmp_path / "walk.profile.npz")
-    (tmp_path / "slab.toml").write_text(
-        'channels = ["a"]\neta = 1.3\ng = 0\nsigma_a_per_mm = [1]\nsigma_s_per_mm = [9]\n'
-        "thickness_mm = 2\n"
+    (tmp_path / "film.toml").write_text(
+        'channels = ["a"]\neta = 1.4\ng = 0.97\nsigma_a_per_mm = [0.1]\nsigma_s_per_mm = [30]\n'
+        "thickness_mm = 0.03\n"
     )
     code, out, err = run(*arguments)
     assert code == status

@@ -41,6 +41,7 @@ _STYLES: dict[str, Style] = {
     "dipole": {"color": "#d55e00", "linestyle": (0, (5, 1.5)), "lw": 1.2},
     "dipole-grosjean": {"color": "#0072b2", "linestyle": (0, (6, 1.4, 1.2, 1.4)), "lw": 1.2},
     "burley": {"color": "#009e73", "linestyle": (0, (1.3, 1.2)), "lw": 1.5},
+    "multipole": {"color": "#d55e00", "linestyle": (0, (5, 1.5)), "lw": 1.2},
 }
 _BAND_ALPHA = 0.45
 
@@ -199,6 +200,8 @@ def _panel_title(comparison: ModelComparison, channel: int) -> str:
     apart = " · " if len(name) <= 4 else "\n"  # a longer one leaves too little room for the rest
     if comparison.edges_mm[channel].size < 2:
         return f"{name}{apart}too few photons to draw"
+    if len(comparison.material.layers) > 1:
+        return f"{name}{apart}{len(comparison.material.layers)} layers"
     albedo, path_mm = layer.albedo[channel], layer.mean_free_path_mm[channel]
     return f"{name}{apart}albedo {albedo:.4g} · MFP {path_mm:#.3g} mm"
 
@@ -225,7 +228,8 @@ def _notes(comparison: ModelComparison, shown: Sequence[int]) -> list[str]:
         "where it has too few. Band: ±1 standard error of the walk. Errors: linear within ±10 % "
         "(grey), logarithmic beyond, above +1000 % not drawn. MFP: mean free path.",
     ]
-    if comparison.material.layers[0].g.any():
+    notes += comparison.left_out
+    if any(each.g.any() for each in comparison.material.layers) and len(comparison.curves) > 2:
         notes.append(
             "g is not 0: the models are of isotropic scattering of (1 - g) sigma_s, which is an "
             "approximation; the exact solution and the walk follow g itself."

@@ -9,12 +9,14 @@ import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.compare.candidates import Candidate
-from sssfit.errors import KernelError, RenderError, SimulationError
+from sssfit.compare.covered import model_profiles
+from sssfit.errors import KernelError, RenderError
 from sssfit.fit.on_taps import LEAST_TAPS, on_taps
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.kernel import Kernel, SeparableKernel, Stage, Taps
 from sssfit.material import Material
 from sssfit.measure.score import ImageScore, measure
+from sssfit.messages import note
 from sssfit.profile import Profile
 from sssfit.render import render
 from sssfit.render.full_resolution import render_full_resolution
@@ -26,7 +28,15 @@ from sssfit.scene.record import Scene
 from sssfit.simulate import Progress, simulate
 from sssfit.simulate.truth import exact_with_all_light, radius_of
 
-MODELS = ("dipole", "dipole-grosjean", "burley")
+# What leaves a slab below is no part of a picture.
+_NOTHING_BELOW: dict[str, Any] = dict.fromkeys(
+    (
+        "annulus_transmittance",
+        "beyond_grid_transmittance",
+        "annulus_transmittance_stderr",
+        "beyond_grid_transmittance_stderr",
+    )
+)
 STORAGES = {"float64": "float64", "float32": "float32", "half": "half float", "8-bit": "8 bit"}
 
 
@@ -39,7 +49,7 @@ class Sources:
     exact, walk : Profile
         The truth, and the photon walk.
     models : mapping of str to Profile
-        By the names in `MODELS`.
+        Those that are of such a material, by name.
     annuli : int
         Annuli of the grid that a user's simulation has; the others hold what lies beyond it.
     """
@@ -60,6 +70,7 @@ class Sources:
             annulus_energy_stderr=profile.annulus_energy_stderr[kept],
             beyond_grid=profile.annulus_energy[far].sum(axis=0) + profile.beyond_grid,
             beyond_grid_stderr=np.sqrt((stderr**2).sum(axis=0)),
+            **_NOTHING_BELOW,
         )
 
     def cut(self, profile: Profile) -> Profile:
@@ -81,7 +92,7 @@ def make_sources(
     threads: int | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> Sources:
-    """Simulate a half space by the exact solver, the photon walk and the models.
+    """Simulate a material by the exact solver, the photon walk and its models.
 
     The truth's grid is doubled until at most 0.01 % of any channel's light lies beyond it, or the
     picture ends: light beyond the user's grid then falls where it belongs.
@@ -99,9 +110,8 @@ def make_sources(
     Raises
     ------
     SimulationError
-        A material that the exact solver does not cover, or settings out of range.
+        The exact solver refuses the material, or settings are out of range.
     """
-    _check_solvable(material)
     grid = make_grid(material, radius_mm=radius_mm)
     exact = exact_with_all_light(material, grid, reach_mm, threads=threads)
     wide_mm = radius_of(RadialGrid(grid.dr_mm, exact.n_annuli))
@@ -114,32 +124,11 @@ def make_sources(
         threads=threads,
         progress=progress,
     )
-    models = {
-        name: simulate(
-            material,
-            name,
-            radius_mm=wide_mm,
-            **({"reflectance": exact.diffuse_reflectance} if name == "burley" else {}),
-        )
-        for name in MODELS
-    }
+    total = exact.diffuse_reflectance
+    models, left_out = model_profiles(material, total, dr_mm=grid.dr_mm, radius_mm=wide_mm)
+    for line in left_out:
+        note(line)
     return Sources(exact, walk, models, grid.annuli)
-
-
-def _check_solvable(material: Material) -> None:
-    """Refuse what the models do not cover; one with g is reduced by them, and not by the truth."""
-    if not material.is_semi_infinite:
-        raise SimulationError(
-            f"{material.name} is not one half space, and an error budget has the diffusion models, "
-            "which cover nothing else: compare kernels on its exact profile instead."
-        )
-    g = material.layers[0].g
-    if np.any(g != 0.0):
-        raise SimulationError(
-            f"{material.name}: g = {g[np.argmax(np.abs(g))]:g}; an error budget has the "
-            "diffusion models, which are of g = 0: give sigma_s (1 - g) as sigma_s_per_mm and "
-            "leave g out."
-        )
 
 
 def _reach_mm(scene: Scene, grid_mm: float) -> float:

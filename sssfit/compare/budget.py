@@ -18,7 +18,6 @@ import numpy as np
 
 from sssfit.arrays import FloatArray, plain
 from sssfit.compare._budget_causes import (
-    MODELS,
     STORAGES,
     Cause,
     Switches,
@@ -26,6 +25,7 @@ from sssfit.compare._budget_causes import (
     everything,
 )
 from sssfit.compare.candidates import Candidate
+from sssfit.compare.covered import MODELS, models_of
 from sssfit.compare.references import check_one_pitch, evaluated_scene
 from sssfit.errors import FitError, RenderError, SimulationError
 from sssfit.kernel import Kernel, SeparableKernel, Taps
@@ -177,7 +177,8 @@ def error_budgets(
     Parameters
     ----------
     material : Material
-        A homogeneous half space with g = 0: what the diffusion models cover.
+        Any that the exact solver takes. The models are those of `models_of`; what is left out of
+        them is noted.
     scenes : sequence of Scene
         Flat, all of the same pixel size; their profiles and kernels are shared. What counts of
         them says `evaluated_scene`.
@@ -189,7 +190,8 @@ def error_budgets(
         The fit, one of ``sssfit.fit.METHODS`` or "cascade", and its keywords; by default svd of
         rank 3.
     model : str, optional
-        One of `MODELS`: the kernel is fitted to it in place of the walk, and there is no noise.
+        One of `models_of` the material: the kernel is fitted to it in place of the walk, and there
+        is no noise.
     storage : str
         One of `STORAGES`: how the kernel's weights are kept.
     threads : int, optional
@@ -203,13 +205,13 @@ def error_budgets(
     Raises
     ------
     SimulationError
-        A material that the exact solver does not cover, no such model, or settings of the walk.
+        A material that the exact solver refuses, no such model, or settings of the walk.
     RenderError
         No scene, pixels of several sizes, a picture of one colour, or what it takes to render.
     FitError, KernelError
         No such fit or storage, or a disk, which shows another picture in each frame.
     """
-    _check(scenes, model)
+    _check(material, scenes, model)
     if method == "disk":
         raise FitError("a disk shows another picture in each frame; take a budget of other fits.")
     default = {"rank": 3} if method == "svd" else {}
@@ -262,10 +264,13 @@ def size_of(score: ImageScore) -> float:
     return score.relative_l2 if math.isnan(seen) else seen
 
 
-def _check(scenes: Sequence[Scene], model: str | None) -> None:
+def _check(material: Material, scenes: Sequence[Scene], model: str | None) -> None:
     """Refuse what has no budget, before anything is simulated."""
-    if model is not None and model not in MODELS:
-        raise SimulationError(f"model = {model!r}; expected one of {', '.join(MODELS)}, or none.")
+    own = models_of(material)
+    if model is not None and model not in own:
+        raise SimulationError(
+            f"model = {model!r}; of {material.name} there is {', '.join(own)}, or none."
+        )
     if not scenes:
         raise RenderError("no picture: an error budget is of at least one.")
     check_one_pitch(scenes)

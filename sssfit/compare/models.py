@@ -14,15 +14,14 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit.arrays import FloatArray, plain
+from sssfit.compare.covered import model_profiles
 from sssfit.errors import ProfileError, SimulationError
 from sssfit.material import Material
+from sssfit.messages import note
 from sssfit.profile import Profile
 from sssfit.profile.bins import merged
 from sssfit.simulate import (
     Progress,
-    simulate_burley,
-    simulate_dipole,
-    simulate_dipole_grosjean,
     simulate_exact,
     simulate_montecarlo,
 )
@@ -88,11 +87,14 @@ class ModelComparison:
     edges_mm : tuple of C arrays (m_c + 1,) [mm]
         Edges of each channel's bins; they end where the walk has too few photons.
     curves : tuple of ModelCurve
+    left_out : tuple of str
+        Lines about models that do not cover the material.
     """
 
     material: Material
     edges_mm: tuple[FloatArray, ...]
     curves: tuple[ModelCurve, ...]
+    left_out: tuple[str, ...] = ()
 
     @property
     def exact(self) -> ModelCurve:
@@ -132,7 +134,7 @@ def compare_models(
     radius_mm: float | None = None,
     progress: Callable[[Progress], None] | None = None,
 ) -> ModelComparison:
-    """Compute a half space by the exact solver, the photon walk and the diffusion models.
+    """Compute a material by the exact solver, the photon walk and its diffusion models.
 
     Normalised diffusion has the total as a parameter, the reflectance that an artist wants; it is
     given the exact one, so that what is left is the error of its shape.
@@ -140,7 +142,8 @@ def compare_models(
     Parameters
     ----------
     material : Material
-        A homogeneous half space; with g other than 0 the models warn that it is reduced.
+        Of layers there is the multipole, if it covers them; of half spaces with g other than 0
+        the models warn that it is reduced.
     walk : Profile, optional
         The material's photon walk, if there is one already; its grid then serves all.
     photons, seed, threads, progress
@@ -155,7 +158,8 @@ def compare_models(
     Raises
     ------
     SimulationError
-        Layers or a bottom; settings out of range; or a ``walk`` on a grid that is not uniform.
+        The exact solver refuses the material; settings are out of range; or a ``walk`` on a grid
+        that is not uniform.
 
     Examples
     --------
@@ -166,11 +170,6 @@ def compare_models(
     """
     if walk is not None:
         dr_mm, radius_mm = _grid_of(walk)
-    # The dipoles come first: they refuse layers before the seconds that the solution takes.
-    dipoles = [
-        simulate(material, dr_mm=dr_mm, radius_mm=radius_mm)
-        for simulate in (simulate_dipole, simulate_dipole_grosjean)
-    ]
     exact = simulate_exact(material, dr_mm=dr_mm, radius_mm=radius_mm, threads=threads)
     if walk is None:
         walk = simulate_montecarlo(
@@ -182,16 +181,17 @@ def compare_models(
             radius_mm=radius_mm,
             progress=progress,
         )
-    # Normalised diffusion is told the true total, as by an artist.
-    burley = simulate_burley(
-        material, reflectance=exact.diffuse_reflectance, dr_mm=dr_mm, radius_mm=radius_mm
-    )
-    profiles = [exact, walk, *dipoles, burley]
+    total, grid = exact.diffuse_reflectance, {"dr_mm": dr_mm, "radius_mm": radius_mm}
+    models, left_out = model_profiles(material, total, **grid)
+    for line in left_out:
+        note(line)
+    profiles = [exact, walk, *models.values()]
     cuts = [_cuts(walk, channel) for channel in range(material.n_channels)]
     return ModelComparison(
         material=material,
         edges_mm=tuple(walk.r_edges_mm[each] for each in cuts),
         curves=tuple(_curve(each, exact, cuts) for each in profiles),
+        left_out=left_out,
     )
 
 
