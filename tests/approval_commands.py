@@ -1210,7 +1210,7 @@ CHART = [
     C("chart --models deon-skin"),
     C("chart --models leaf.profile.npz"),
     C("chart --models wax.profile.npz --photons 100"),
-    C("chart --models plate.toml"),
+    C("chart --models plate.toml --photons 2e3"),
     C("chart wax.profile.npz --photons 100"),
     C("chart wax.profile.npz --k 1"),
     C("chart wax.profile.npz --spectrum --channel R"),
@@ -1249,7 +1249,7 @@ CHART = [
     C("chart --spectrum --guide"),
     C("chart --guide wax.profile.npz --k 5"),
     C("chart --guide wax.profile.npz --mm-per-pixel 9"),
-    C("chart --models varnish.toml"),
+    C("chart --models varnish.toml --photons 2e3"),
 ]
 
 

@@ -83,7 +83,7 @@ class GaussianSum:
         middle = 0.5 * (edges_mm[1:] + edges_mm[:-1])
         scale = np.sqrt(np.append(1.0 / middle, 1.0 / edges_mm[-1]))
         energies = np.append(energy, beyond)
-        weights, _ = nnls(rows * scale[:, None], energies * scale)
+        weights, _ = nnls(rows * scale[:, None], energies * scale, maxiter=100 * count)
         weights *= energies.sum() / max(float(weights.sum()), 1e-300)
         return cls.of(weights[weights > 0.0], variances[weights > 0.0])
 
