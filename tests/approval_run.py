@@ -243,7 +243,9 @@ def _fitted_once(real: Callable[..., TapsFit], clock: Clock) -> Callable[..., Ta
 _FITS: dict[Any, tuple[TapsFit, int]] = {}
 
 
-def _few_names(*, paper: bool = False) -> tuple[str, ...]:
+def _few_names(*, paper: bool = False, layered: bool = False) -> tuple[str, ...]:
+    if layered:
+        return ()
     return ("espresso", "gone") if paper else ("espresso", "mintmocha")
 
 
