@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 import report_world as world
 
-from sssfit.errors import KernelError, RenderError
+from sssfit.errors import KernelError, RenderError, SimulationError
 from sssfit.formats.pictures import save_image
 from sssfit.material import parse_material
 from sssfit.measure.delta_e import delta_e_of_lab, lab
-from sssfit.report import finished_page, is_report_file, library_page, make_report, page
+from sssfit.report import finished_page, is_report_file, library_page, make_report, page, parts
 from sssfit.report.charts import charts_of
 from sssfit.report.commands import commands_of
 from sssfit.report.html import SCRIPTS, script_text
@@ -298,7 +298,7 @@ def layered():
     """Two layers of one channel."""
     layers = "".join(
         f"[[layers]]\nsigma_a_per_mm = [{a}]\nsigma_s_per_mm = [2.0]\neta = 1.4\ng = 0.0\n{rest}\n"
-        for a, rest in ((0.5, "thickness_mm = 0.5"), (0.1, ""))
+        for a, rest in ((0.5, "thickness_mm = 1.0"), (0.1, ""))
     )
     return parse_material(f'channels = ["grey"]\n{layers}', "stack.toml")
 
@@ -400,15 +400,30 @@ def test_words_have_a_contrast_of_4_5_and_marks_of_3(theme):
         assert contrast(colours[mark], colours["card"]) >= 3.0, mark
 
 
-def test_a_layered_material_has_a_page_without_what_does_not_cover_it(caplog):
+def test_a_page_of_layers_has_the_models_and_budgets_of_layers(caplog):
     caplog.set_level("INFO", logger="sssfit")
     given = {"only": ["disk"], "side": 16, "threads": 1, "photons": 2000}
     made = make_report(layered(), **given)
-    assert made.models is None
-    assert made.budgets == ()
+    assert made.models is not None
+    assert [each.profile.meta["method"] for each in made.models.curves] == [
+        *("exact", "montecarlo", "multipole"),
+    ]
+    assert {each.scene.name for each in made.budgets} == {"disk", "edge"}
     assert made.profile.meta["method"] == "exact"
-    for each in ("models", "error budget"):
-        assert f"The page has no {each}: " in caplog.text
+    assert "stack is not one half space: dipoles and normalised diffusion" in caplog.text
+
+
+def test_what_does_not_cover_a_material_is_left_out_with_a_note(caplog, monkeypatch):
+    def refused(*_, **__):
+        raise SimulationError("stack is refused.")
+
+    caplog.set_level("INFO", logger="sssfit")
+    for each in ("compare_models", "error_budgets", "compute_convergence"):
+        monkeypatch.setattr(parts, each, refused)
+    found = parts.parts_of(layered(), [], {"photons": 1_000_000, "seed": 1, "threads": 1})
+    assert found == (None, (), None)
+    for each in ("models", "error budget", "convergence"):
+        assert f"The page has no {each}: stack is refused." in caplog.text
 
 
 def test_passes_are_named_in_words():
