@@ -604,7 +604,7 @@ RENDER = [
     C("render wax.svd2.kernel.json --irradiance parts.exr --layer second --mm-per-pixel .25"),
     C(
         f"render wax.svd2.kernel.json --irradiance disk {SMALL}",
-        set_up=_gone("wax.profile.npz"),
+        set_up=_gone("wax.profile.npz", "angles.profile.npz"),
         note="the profile gone",
     ),
 ]

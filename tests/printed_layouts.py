@@ -48,8 +48,18 @@ def materials_list(f: Figures) -> list[Any]:
         ]
         for row in f["rows"]
     ]
+    layered = [
+        [
+            row["name"],
+            " ".join(f"{eta:g}" for eta in row["eta"]),
+            " ".join("inf" if each is None else f"{each:g}" for each in row["thickness_mm"]),
+            row["source"],
+        ]
+        for row in f["layered"]
+    ]
     return [
         Table([*heads, "radius, mm"], rows),
+        Table(["layers", "eta", "thickness, mm", "source"], layered),
         Words(
             "{}: a profile without coefficients, for simulate, compare and choose", *f["profiles"]
         ),
@@ -1195,7 +1205,7 @@ def sweep(f: Figures) -> list[Any]:
     head = Words(
         "{} by {}: {} points ({}), {} computed, {} before", f["material"], f["method"], *counts
     )
-    rest = Words("{} annuli of {} mm, {} s", f["annuli"], f["dr_mm"], f["seconds"])
+    rest = Words("{} annuli of {} mm, {} s", f["annuli"], f["dr_mm"], Rough(f["seconds"]))
     return [head, rest, wrote(f)]
 
 

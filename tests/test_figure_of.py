@@ -41,5 +41,7 @@ def test_a_record_is_drawn_by_what_it_is():
     for each in (load_material("skin1"), profile, spectrum):
         assert isinstance(figure_of(each), Figure)
     assert isinstance(profile.plot(), Figure)
-    with pytest.raises(TypeError, match="no chart of str; expected one of Budget, "):
+    with pytest.raises(
+        TypeError, match="no chart of str; expected one of AngularReflectance, Budget, "
+    ):
         figure_of("skin1")

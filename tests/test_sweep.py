@@ -3,14 +3,15 @@
 import os
 import shutil
 import signal
-import subprocess
 import sys
 import time
 from concurrent.futures import Future
 from dataclasses import replace
 from pathlib import Path
+from subprocess import DEVNULL
 
 import numpy as np
+import processes
 import pytest
 import xarray
 
@@ -348,7 +349,7 @@ def killed_at(folder, seconds, threads=1):
     """Run the sweep of a folder, and kill -9 it after a time."""
     (folder / "run.py").write_text(RUN)
     command = [sys.executable, "run.py", "plan.toml", "x.zarr", str(threads)]
-    process = subprocess.Popen(command, cwd=folder, stderr=subprocess.DEVNULL)
+    process = processes.start(command, cwd=folder, stdout=DEVNULL, stderr=DEVNULL)
     end = time.monotonic() + 60.0
     while not (folder / "x.zarr").exists() and time.monotonic() < end:
         time.sleep(0.01)

@@ -36,7 +36,8 @@ def test_two_batches_are_in_flight_at_once(monkeypatch, kind, material, threads)
     real, meeting = kind.trace, threading.Barrier(2)
 
     def trace(task, batch):
-        meeting.wait(timeout=30.0)
+        if task.photons:  # a walk of none only loads the code
+            meeting.wait(timeout=30.0)
         return real(task, batch)
 
     monkeypatch.setattr(kind, "trace", trace)
@@ -49,6 +50,8 @@ def test_one_thread_walks_one_batch_at_a_time(monkeypatch):
     real, walking, most = SemiInfiniteWalk.trace, set(), []
 
     def trace(task, batch):
+        if not task.photons:  # which only loads the code
+            return real(task, batch)
         walking.add(batch)
         most.append(len(walking))
         tally = real(task, batch)

@@ -20,7 +20,7 @@ from sssfit.compare.table import (
     left_out_lines,
     sheet_text,
 )
-from sssfit.errors import ProfileError, RenderError, SimulationError
+from sssfit.errors import FitError, ProfileError, RenderError, SimulationError
 from sssfit.fit import MM_PER_PIXEL, Pitch, pitch_of
 from sssfit.material import Material
 from sssfit.messages import note
@@ -123,11 +123,13 @@ def compare(
     if what in (None, "budget") and isinstance(source, Profile):
         note(f"No budget: {name} is a profile, and a budget simulates a material.")
     elif what in (None, "budget") and isinstance(source, Material):
+        # A default that the fit refuses, such as rank 3 on 3 pixels, costs the budget and no more.
+        refusals = (SimulationError,) if fit.get("settings") else (SimulationError, FitError)
         fit |= {"photons": photons or PHOTONS, "threads": threads}
         try:
             with walk(source.name) as show:
                 budgets = error_budgets(source, scenes, progress=show, **fit)
-        except SimulationError as refusal:
+        except refusals as refusal:
             if what == "budget":
                 raise
             note(f"No budget: {refusal}")
