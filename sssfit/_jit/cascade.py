@@ -297,6 +297,8 @@ def run_level(
     rows: IndexArray,
     columns: IndexArray,
     reach: IndexArray,
+    margin: IndexArray,
+    kept: IndexArray,
     many: IndexArray,
     at: IndexArray,
     weights: FloatArray,
@@ -318,6 +320,9 @@ def run_level(
         the size is odd.
     reach, many : array (S)
         Of each stage: how far it reaches [texels], and its number of pairs of texels.
+    margin, kept : array (S + 1)
+        Of the picture and what each stage makes of it: how far past its borders the later stages
+        need it (its lines begin there), and the rows that are kept of it.
     at : array (S, K)
     weights : array (S, C, 1 + K)
     shares : array (C, S + 1)
@@ -326,16 +331,16 @@ def run_level(
         Whether picture and sum have the channels of a pixel side by side, or planes.
     """
     stages, channels = reach.size, len(shares)
-    # How far past its borders the later stages need each picture; its lines begin there.
-    margin = reach.sum() - np.append(0, np.cumsum(reach))
     width, end = columns.size - 2 * margin[0], last + (last - first) % 2
     plane = -(-columns.size // _ALIGNED) * _ALIGNED
     size = channels * plane
     # First a row for what is blurred along y and for the sum, then a ring of rows for the picture
     # and for what each stage makes of it, until the next has read them and they are summed up. A
     # row lies in its ring by its number.
-    kept = 2 + np.maximum(margin, 2 * np.append(reach, 0))
-    rings = size * (1 + np.cumsum(kept) - kept)
+    rings = np.empty(stages + 1, np.intp)
+    rings[0] = size
+    for s in range(stages):
+        rings[s + 1] = rings[s] + size * kept[s]
     values = np.empty(rings[-1] + size * kept[-1], picture.dtype)
     before, after = np.empty(at.shape[1], np.uintp), np.empty(at.shape[1], np.uintp)
     places = np.empty(stages + 1, np.uintp)

@@ -92,6 +92,9 @@ def _numbers(
     lines = [_line(each, mm_per_pixel * 2.0**level) for each in stages]
     reach = np.array([at.max() for at, _ in lines])
     many = np.array([len(at) for at, _ in lines])
+    margin = reach.sum() - np.cumsum([0, *reach])
+    # numba would take 2 s to compile these lines.
+    kept = 2 + np.maximum(margin, 2 * np.array([*reach, 0]))
     at = np.zeros((len(stages), many.max()), np.intp)
     weights = np.zeros((len(stages), channels, many.max() + 1), picture.dtype)
     for s, (own, each) in enumerate(lines):
@@ -105,7 +108,7 @@ def _numbers(
     rows, columns = (
         source_indices(n, far + 1, "mirror")[1 : n + 2 * far + 1 + n % 2] for n in size
     )
-    return rows, columns, reach, many, at, weights, shares
+    return rows, columns, reach, margin, kept, many, at, weights, shares
 
 
 def _line(stage: Stage, mm_per_texel: float) -> tuple[npt.NDArray[np.intp], FloatArray]:
