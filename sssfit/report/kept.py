@@ -96,6 +96,24 @@ def heard() -> Iterator[Listener]:
         logging.getLogger(LOG).removeHandler(listener)
 
 
+@contextlib.contextmanager
+def told_once() -> Iterator[None]:
+    """Let a line that is noted again inside the block pass only the first time."""
+    told: set[str] = set()
+
+    def is_new(record: logging.LogRecord) -> bool:
+        seen = (line := record.getMessage()) in told
+        told.add(line)
+        return not seen
+
+    logger = logging.getLogger(LOG)
+    logger.addFilter(is_new)
+    try:
+        yield
+    finally:
+        logger.removeFilter(is_new)
+
+
 def _folder() -> Path:
     return user_cache_folder() / "pages"
 

@@ -10,6 +10,7 @@ from sssfit.errors import SimulationError
 from sssfit.material import Material
 from sssfit.messages import note
 from sssfit.profile import Profile
+from sssfit.report.kept import told_once
 from sssfit.scene.record import Scene
 
 # Of the chart of convergence: numbers of photons, two a decade; walks of each; the exact solver's.
@@ -34,11 +35,12 @@ def parts_of(source: Material | Profile, flat: Sequence[Scene], walk: dict[str, 
     """
     if isinstance(source, Profile):
         return None, (), None
-    return (
-        _covered("models", lambda: compare_models(source, **walk)),
-        tuple(_covered("error budget", lambda: error_budgets(source, flat, **walk)) or ()),
-        _covered("convergence", lambda: _convergence(source, **walk)),
-    )
+    with told_once():  # models and budget leave the same ones out
+        return (
+            _covered("models", lambda: compare_models(source, **walk)),
+            tuple(_covered("error budget", lambda: error_budgets(source, flat, **walk)) or ()),
+            _covered("convergence", lambda: _convergence(source, **walk)),
+        )
 
 
 def _covered(what: str, make: Callable[[], Part]) -> Part | None:
