@@ -18,7 +18,7 @@ from ._options import Common, in_options
 
 # What is written, and the ending of its name.
 PROFILE, KERNEL = ("a profile", ".npz"), ("a kernel", ".json")
-_ENDINGS = (".checkpoint", ".npz", ".json", ".toml", ".kernel", ".taps", ".profile")
+_ENDINGS = (".checkpoint", ".zarr", ".npz", ".json", ".toml", ".kernel", ".taps", ".profile")
 
 
 def finish(common: Common, figures: Mapping[str, Any], text: str) -> None:

@@ -146,7 +146,7 @@ CHART = (
            "[default: 1e7]"),
     *output("NAME.profile.png, NAME.kernel.png, NAME.material.png, NAME.checkpoint.png, "
             "NAME.spectrum.png, NAME.guide.png, NAME.frequency.png, NAME.angles.png, "
-            "MATERIAL.models.png",
+            "NAME.swatches.png, MATERIAL.models.png",
             "is not our chart",
             "Output file, PNG, SVG or PDF by its ending; - for PNG on stdout"),
 )

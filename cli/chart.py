@@ -1,12 +1,14 @@
-"""``sssfit chart``: files of ours, two views of a profile's kernel, a material by every method."""
+"""``sssfit chart``: files of ours, views of a profile's kernel, a material by every method."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import click
 
+from sssfit.methods import imported
 from sssfit.process import check_memory
 
 from ._input import load, load_source, profile_name, profile_of_kernel
@@ -35,7 +37,8 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
 
     A kernel: its passes, the 2D kernel beside the profile's, their difference, and slices along the
     axis and the diagonal. A table of taps: one point of light, stage by stage. A material:
-    coefficients, mean free paths and albedos.
+    coefficients, mean free paths and albedos. A sweep over wavelengths, a Zarr folder: the colour
+    of its diffuse reflectance in daylight, a swatch for each combination of the other axes.
 
     With --spectrum: the share of each separable term in the 2D kernel, of the sum of squares and of
     the sum of absolute values, and the number of terms for an error of 1 %.
@@ -60,6 +63,7 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
       sssfit chart --spectrum skin1.profile.npz --mm-per-pixel 0.1
       sssfit chart --guide skin1.profile.npz --mm-per-pixel 0.1
       sssfit chart --models skin1
+      sssfit chart skin-spectral.zarr
     """
     from sssfit import kinds
     from sssfit.chart.files import chart_format, is_chart_file
@@ -71,7 +75,8 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
         chart_format(given["output"])  # before anything is read or drawn
     view = _view(file, given)
     name = file if view == "models" and file else profile_name(file)
-    loaded = load_source(name) if view == "models" else load(kinds.load, name)
+    read = imported("sssfit.sweep.swatches:read_swatches") if Path(name).is_dir() else kinds.load
+    loaded = load_source(name) if view == "models" else load(read, name)
     found, kind, made_of = drawn_of(loaded, view, name)
     refuse(given, of_other_charts({kind}))
     if kind == "models" and isinstance(found, Profile):

@@ -1509,9 +1509,28 @@ _POINTS = _write(
 )
 
 
+_MONO = (
+    'name = "mono"\nchannels = ["mono"]\neta = 1.4\ng = 0.0\nsigma_a_per_mm = [0.1]\n'
+    "sigma_s_per_mm = [2.0]\n"
+)
+
+
 def _swept() -> None:
     _POINTS()
     sweep_to_store(load_plan("points.toml"), "points.zarr", threads=1)
+
+
+def _coloured() -> None:
+    """Store a sweep over wavelengths: a wax that is red, at two depths of its dye."""
+    _write("mono.toml", _MONO)()
+    _write("bands.csv", "wavelength_nm,dye\n400,0.9\n500,0.5\n600,0.1\n700,0.02\n")()
+    _write(
+        "red.toml",
+        'material = "mono.toml"\nmethod = "burley"\n[grid]\ndr_mm = 0.5\nradius_mm = 6\n'
+        '[[axes]]\nname = "depth"\nvalues = [0.5, 1]\n[[axes]]\ntable = "bands.csv"\n'
+        '[set]\nsigma_a_per_mm = "depth * dye"\n',
+    )()
+    sweep_to_store(load_plan("red.toml"), "red.zarr", threads=1)
 
 
 def _plan(*lines: str) -> Callable[[], object]:
@@ -1538,6 +1557,10 @@ SWEEP = [
     C("sweep points.toml -o no/such/s.zarr", set_up=_POINTS),
     C("sweep points.toml --scheduler 10.0.0.5:8786", set_up=_POINTS),
     C("sweep points.toml --scheduler local:0", set_up=_POINTS),
+    C("chart red.zarr", set_up=_coloured),
+    C("chart red.zarr --json -o red.svg", set_up=_coloured),
+    C("chart red.zarr --spectrum", set_up=_coloured),
+    C("chart points.zarr", set_up=_swept, note="no wavelengths"),
     C("sweep missing.toml"),
     C("sweep wax.toml"),
     C("sweep wax.profile.npz"),

@@ -1240,7 +1240,7 @@ CHART = {
         default="wax.profile.png",
         words="NAME.profile.png, NAME.kernel.png, NAME.material.png, NAME.checkpoint.png, "
         "NAME.spectrum.png, NAME.guide.png, NAME.frequency.png, NAME.angles.png, "
-        "MATERIAL.models.png",
+        "NAME.swatches.png, MATERIAL.models.png",
     ),
     "--force": Row("chart -o foreign.png", "--force", is_written("png"), lambda: ["foreign.png"]),
 }

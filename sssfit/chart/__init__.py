@@ -34,6 +34,7 @@ FIGURES: Mapping[str, str] = {
     "Stability": "sssfit.chart.stability:stability_figure",
     "SpeedUpTable": "sssfit.chart.speed_up:speed_up_figure",
     "Spectrum": "sssfit.chart.spectrum:spectrum_figure",
+    "Swatches": "sssfit.chart.swatches:swatches_figure",
     "TapsView": "sssfit.chart.taps:taps_figure",
     "VariateTable": "sssfit.chart.variates:variates_figure",
 }

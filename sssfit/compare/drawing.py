@@ -8,6 +8,7 @@ from sssfit.compare.guide import compute_guide
 from sssfit.compare.kernel_view import view_kernel
 from sssfit.compare.models import compare_models, material_of_walk
 from sssfit.compare.spectrum import compute_spectrum
+from sssfit.compare.swatches import Swatches
 from sssfit.compare.taps_view import view_taps
 from sssfit.errors import ProfileError
 from sssfit.kernel import SeparableKernel, Taps
@@ -24,7 +25,7 @@ _OF_PROFILES = {
     "frequency": "`frequency = True`",
     "angles": "`angles = True`",
 }
-COMPUTED = ("kernel", "taps", "models", "spectrum", "guide", "frequency", "angles")
+COMPUTED = ("kernel", "taps", "models", "spectrum", "guide", "frequency", "angles", "swatches")
 
 
 def drawn_of(found: Any, view: str, name: str) -> tuple[Any, str, str | None]:
@@ -32,7 +33,7 @@ def drawn_of(found: Any, view: str, name: str) -> tuple[Any, str, str | None]:
 
     Parameters
     ----------
-    found : Profile, SeparableKernel, Taps, Material or SoFar
+    found : Profile, SeparableKernel, Taps, Material, SoFar or Swatches
     view : str
         "models", "spectrum", "guide", "frequency", "angles", or "" for the record's own chart.
     name : str
@@ -46,6 +47,8 @@ def drawn_of(found: Any, view: str, name: str) -> tuple[Any, str, str | None]:
     if view in _OF_PROFILES and not isinstance(found, Profile):
         asked = _OF_PROFILES[view]
         raise ProfileError(f"{name} is not a profile; {asked} draws one, a .profile.npz file.")
+    if isinstance(found, Swatches):
+        return found, "swatches", found.name
     if isinstance(found, Material):
         return found, view or "material", found.name
     if isinstance(found, Profile):
@@ -76,7 +79,7 @@ def computed(
 
     Parameters
     ----------
-    found : Profile, SeparableKernel, Taps or Material
+    found : Profile, SeparableKernel, Taps, Material or Swatches
     kind : str
         Of `drawn_of`; what is not in `COMPUTED` is drawn as it is.
     profile : Profile, optional

@@ -44,6 +44,11 @@ _ANGLES: tuple[Part, ...] = (
         ("by noise alone", "misplaced_stderr", ".2g%|unknown"),
     )),
 )
+_SWATCHES: tuple[Part, ...] = (
+    "{material}: {swatches:#swatch} from {wavelengths:#wavelength}, CIE 1931 observer (2°), D65",
+    ("outside_srgb", "{outside_srgb:,} outside sRGB"),
+    ("missing", "{missing:,} not finished"),
+)
 _GUIDE: tuple[Part, ...] = (
     "Channel {channel}; {pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm",
     Columns("k", "fits", (
@@ -203,6 +208,15 @@ def _frequency_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     return {"frequencies": len(rows), "last": rows[-1]["k_per_mm"], **found}
 
 
+def _swatches_words(figures: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the number of swatches, and what else there is to say of them, None for nothing."""
+    swatches = 1
+    for values in figures["axes"].values():
+        swatches *= len(values)
+    told = {key: figures[key] or None for key in ("outside_srgb", "missing")}
+    return {"swatches": swatches, "wavelengths": len(figures["wavelengths_nm"]), **told}
+
+
 def _angles_words(figures: Mapping[str, Any]) -> dict[str, Any]:
     """Return the number of bins, and the light of the first, next to the normal."""
     return {"bins": len(figures["rows"]), "first": figures["rows"][0]["per_sr"]}
@@ -250,6 +264,7 @@ _PAGES: dict[str, tuple[tuple[Part, ...], Callable[[Mapping[str, Any]], dict[str
     "spectrum": (_SPECTRUM, _spectrum_words),
     "frequency": (_FREQUENCY, _frequency_words),
     "angles": (_ANGLES, _angles_words),
+    "swatches": (_SWATCHES, _swatches_words),
 }
 
 

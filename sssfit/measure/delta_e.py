@@ -43,13 +43,13 @@ def delta_e_2000(image: FloatArray, truth: FloatArray, exposure: float = 1.0) ->
 
 def delta_e_of_lab(colour: FloatArray, true: FloatArray) -> FloatArray:
     """Return CIE Delta E 2000 (N,) of colours `lab` (N, 3)."""
-    found: FloatArray = np.asarray(_load_colour().difference.delta_E_CIE2000(colour, true))
+    found: FloatArray = np.asarray(load_colour().difference.delta_E_CIE2000(colour, true))
     return found
 
 
 def lab(pixels: FloatArray) -> FloatArray:
     """Return CIE L, a, b of linear sRGB pixels (N, 3)."""
-    colour = _load_colour()
+    colour = load_colour()
     whitepoint = colour.RGB_COLOURSPACES["sRGB"].whitepoint
     colours: FloatArray = np.asarray(colour.XYZ_to_Lab(pixels @ _to_xyz().T, whitepoint))
     return colours
@@ -58,12 +58,12 @@ def lab(pixels: FloatArray) -> FloatArray:
 @functools.cache
 def _to_xyz() -> FloatArray:
     """Return the matrix from the primaries, and not the standard's, whose white has b = 0.01."""
-    colour = _load_colour()
+    colour = load_colour()
     srgb = colour.RGB_COLOURSPACES["sRGB"]
     return np.asarray(colour.normalised_primary_matrix(srgb.primaries, srgb.whitepoint))
 
 
-def _load_colour() -> ModuleType:
+def load_colour() -> ModuleType:
     """Import colour-science: 0.8 s for any of its parts, so only when colours are compared."""
     with np.printoptions():  # on import it sets numpy's print options to those of 1.13
         import colour

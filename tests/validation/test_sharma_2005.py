@@ -7,7 +7,7 @@ import pytest
 import reference_delta_e as reference
 from published import Published, check, what
 
-from sssfit.measure.delta_e import _load_colour
+from sssfit.measure.delta_e import load_colour
 
 TITLE = "Sharma, Wu and Dalal 2005"
 SOURCE = (
@@ -22,7 +22,7 @@ PAIRS = np.loadtxt(
 
 def delta_e(k):
     """Return the Delta E of pair k by the function that the measures use."""
-    return _load_colour().difference.delta_E_CIE2000(PAIRS[k, :3], PAIRS[k, 3:6])
+    return load_colour().difference.delta_E_CIE2000(PAIRS[k, :3], PAIRS[k, 3:6])
 
 
 FIGURES = [
