@@ -150,7 +150,7 @@ def _samples(steps: dict[int, float]) -> list[int]:
 
 def _timed(plan: Plan, index: int, pool: Pool) -> tuple[float, Done]:
     """Return the seconds of a point while all workers are busy, and its result or first batch."""
-    part, share = Part(index), 1.0
+    part, share = Part(index, last=0 if plan.photons is None else 1), 1.0
     if plan.photons is not None and plan.photons > BATCH_PHOTONS:
         part, share = Part(index, 0, 2, 0, 1), BATCH_PHOTONS / plan.photons
     task = Task((part,), 0.0, code_version())
