@@ -1,6 +1,7 @@
 """The plans of docs/examples: they are read, estimated, and some of their points computed."""
 
 import errno
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -66,3 +67,22 @@ def test_both_are_estimated_without_being_run(skin, table):
     found = estimate(skin, threads=1).to_dict()
     assert found["photons"] == 248 * 4000
     assert estimate(table, threads=1).to_dict()["points"] == 2000
+
+
+@pytest.mark.slow
+def test_the_whole_table_interrupted_and_resumed(table, tmp_path):
+    """2000 exact points on two workers, stopped after 300 and then done."""
+    seen = []
+    begun = time.monotonic()
+    stopped = sweep_to_store(
+        table,
+        tmp_path / "x.zarr",
+        threads=2,
+        stop=lambda: len(seen) >= 300,
+        progress=lambda *now: seen.append(now),
+    )
+    assert 300 <= stopped.done < 2000
+    found = sweep_to_store(table, tmp_path / "x.zarr", threads=2, resume=True)
+    assert found.is_complete
+    assert (found.before, found.done) == (stopped.done, 2000 - stopped.done)
+    print(f"2000 points in {time.monotonic() - begun:.0f} s")
