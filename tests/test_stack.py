@@ -14,7 +14,7 @@ from sssfit.simulate import simulate_exact, simulate_exact_many
 from sssfit.simulate.half_space import diffuse_reflectance
 from sssfit.simulate.stack import limits
 from sssfit.simulate.stack.assembly import Assembly, _spans, reflected_at, transforms_at
-from sssfit.simulate.stack.azimuth import azimuth_of
+from sssfit.simulate.stack.azimuth import FEWEST, azimuth_of
 from sssfit.simulate.stack.families import families_of
 from sssfit.simulate.stack.gaps import Gap
 from sssfit.simulate.stack.modes import modes_of
@@ -328,10 +328,17 @@ def test_a_thousand_layers_are_refused_with_the_memory_they_take():
 def test_directions_stop_where_memory_does(monkeypatch):
     skin = stack(layer(0.5, 20.0, 0.8, 1.45, 0.1), layer(0.1, 10.0, 0.8, 1.38))
     channels = [limits.Channel("skin", stacks_of(skin)[0], 0.0, np.array([0.0, 1.0]))]
-    limit = limits._bytes(channels, 16, 1)
+    limit = limits._bytes(channels, 16, FEWEST, 1)
     monkeypatch.setattr(limits, "_MOST_BYTES", limit)
     with pytest.raises(SimulationError, match="cannot be met: 16 and 12 directions"):
         simulate_exact(skin, tolerance=1e-5, threads=1)
+
+
+def test_tolerances_below_what_directions_reach_are_refused_at_once():
+    skin = stack(layer(0.5, 20.0, 0.8, 1.45, 0.1), layer(0.1, 10.0, 0.8, 1.38))
+    never = lambda: pytest.fail("it began to solve")  # noqa: E731
+    with pytest.raises(SimulationError, match=r"1e-09 cannot be met.*1e-06 or more.*montecarlo"):
+        simulate_exact(skin, tolerance=1e-9, threads=1, stop=never)
 
 
 def test_it_can_be_stopped():

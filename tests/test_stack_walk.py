@@ -2,8 +2,14 @@
 
 import checks
 import checks_stack
+import numpy as np
 import pytest
 from scipy import stats
+
+from sssfit.grid import make_grid
+from sssfit.simulate.stack.quarter import quarter_of
+from sssfit.simulate.stack.sampling import Family
+from sssfit.simulate.stack.slabs import stacks_of
 
 FEW = (2, 4, 8)  # a half space on two layers, a slab, a half space that scatters far ahead
 
@@ -23,11 +29,6 @@ def test_a_stack_is_that_of_the_walk(seed):
         assert abs(figure.sigmas) < checks.LIMIT, figure
 
 
-# A slab of .4 optical depths: light that its bottom returns crosses it twice, with a phase that the
-# five directions in azimuth do not resolve: chi-square is 856 on 163 annuli.
-THINNEST = 34
-
-
 def worst_of(figures):
     return max(figures, key=lambda each: abs(each.sigmas))
 
@@ -39,16 +40,22 @@ def limit_of(figures):
 
 @pytest.mark.slow
 def test_forty_stacks_are_those_of_the_walk():
-    seeds = [seed for seed in range(40) if seed != THINNEST]
-    figures = [each for seed in seeds for each in figures_of(seed, 4_000_000)]
+    figures = [each for seed in range(40) for each in figures_of(seed, 4_000_000)]
     assert abs(worst_of(figures).sigmas) < limit_of(figures), worst_of(figures)
 
 
-@pytest.mark.slow
-@pytest.mark.xfail(strict=True, reason="R(k) of thin slabs needs more directions in azimuth")
-def test_the_thinnest_of_them_too():
-    figures = figures_of(THINNEST, 4_000_000)
-    assert abs(worst_of(figures).sigmas) < limit_of(figures), worst_of(figures)
+def test_a_slab_of_few_optical_depths_gets_more_directions_in_azimuth():
+    # Stack 34 has .4: light that its bottom returns crosses it twice, which five directions do not
+    # resolve. F is off by 6e-4, and chi-square against 4e6 photons was 856 on 163 annuli.
+    material = checks_stack.random_stack(34)
+    family = Family(tuple(stacks_of(material)))
+    radii = [make_grid(material).r_edges_mm[1:]]
+    each = lambda sample, k: np.stack([sample(float(one)) for one in k])  # noqa: E731
+    few, more = (quarter_of(family, radii, tolerance, each) for tolerance in (5e-3, 1e-3))
+    assert few.count == 5
+    assert 3e-4 < few.share < 9e-4
+    assert more.count > 5
+    assert more.share < 3e-4
 
 
 def test_absorption_by_layer_is_that_of_the_walk():

@@ -14,7 +14,7 @@ import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.simulate.stack import embedding
-from sssfit.simulate.stack.azimuth import MOST_ORDERS, Azimuth
+from sssfit.simulate.stack.azimuth import FEWEST, Azimuth
 from sssfit.simulate.stack.beam import Beam, beam_of
 from sssfit.simulate.stack.embedding import Floor, Interface, Span, flux_of, fluxes_of
 from sssfit.simulate.stack.modes import Modes
@@ -39,11 +39,11 @@ class Assembly:
     nodes: Nodes
 
     @classmethod
-    def of(cls, stack: SlabStack, count: int) -> "Assembly":
-        """Discretise a stack with about ``count`` nodes on either side."""
+    def of(cls, stack: SlabStack, count: int, azimuths: int = FEWEST) -> "Assembly":
+        """Discretise a stack with about ``count`` nodes on either side, and those in azimuth."""
         nodes = Nodes.of(stack.indices, count)
         made = {
-            each: medium_of(each, nodes, MOST_ORDERS, is_seen_through=stack.is_seen_through)
+            each: medium_of(each, nodes, 2 * azimuths, is_seen_through=stack.is_seen_through)
             for each in set(stack.slabs)
         }
         media = tuple(made[each] for each in stack.slabs)

@@ -13,9 +13,10 @@ from sssfit.arrays import FloatArray
 from sssfit.optics import gauss_legendre
 
 _SMOOTH = 1.2  # wavenumber in attenuation lengths from which light near phi = pi/2 lasts longest
-# Largest order for wavenumbers, in attenuation lengths, below each limit.
-_ORDERS = ((0.08, 3), (0.25, 5), (0.6, 7), (math.inf, 9))
-MOST_ORDERS = 10
+# Directions a quarter for wavenumbers, in attenuation lengths, below each limit, where the most
+# are FEWEST; more are added at all wavenumbers alike.
+_COUNTS = ((0.08, 2), (0.25, 3), (0.6, 4), (math.inf, 5))
+FEWEST = 5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,12 +36,15 @@ class Azimuth:
         return len(self.streaming)
 
 
-def azimuth_of(k: float, sigma_t: float) -> Azimuth:
-    """Return the rule for a wavenumber and the least extinction of the layers that scatter."""
+def azimuth_of(k: float, sigma_t: float, most: int = FEWEST) -> Azimuth:
+    """Return the rule for a wavenumber and the least extinction of the layers that scatter.
+
+    ``most`` is the number of directions a quarter that large wavenumbers get.
+    """
     if k == 0.0:
         return Azimuth(np.ones(1), np.zeros(1), np.zeros((1, 1)))
     x = k / sigma_t
-    count = next(order for limit, order in _ORDERS if x < limit) // 2 + 1
+    count = next(few for limit, few in _COUNTS if x < limit) + most - FEWEST
     if x < _SMOOTH:
         angle = (np.arange(count) + 0.5) * 0.5 * math.pi / count
         weight = np.full(count, 1.0 / count)

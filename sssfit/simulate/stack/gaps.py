@@ -17,13 +17,15 @@ import numpy as np
 from sssfit.arrays import FloatArray
 
 _RESOLVED = 0.8  # k d / N up to which polar directions resolve the phase: T is off by 1e-5 there
-_MOST = 11.0  # k d up to which the directions in azimuth do, of which there are five a quarter
+_AZIMUTHS = (
+    2.2  # k d up to which a direction in azimuth does, of which there are 5 or more a quarter
+)
 _BESIDE = 1.25  # ratio of the wavenumbers on either side, two each, that the curve goes through
 
 
-def resolved(count: int) -> float:
+def resolved(count: int, azimuths: int) -> float:
     """Return k d up to which so many directions are enough for light that crosses a slab."""
-    return min(_RESOLVED * count, _MOST)
+    return min(_RESOLVED * count, _AZIMUTHS * azimuths)
 
 
 @dataclass(frozen=True)

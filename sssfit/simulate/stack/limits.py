@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError
-from sssfit.simulate.stack.azimuth import MOST_ORDERS
 from sssfit.simulate.stack.nodes import Nodes
+from sssfit.simulate.stack.quarter import AZIMUTHS, Quarter
 from sssfit.simulate.stack.slabs import SlabStack
 from sssfit.simulate.stack.solution import Step
 
+_LEAST_TOLERANCE = 1e-6  # 40 directions reach 5e-8 of a half space and 1e-6 of most stacks
 _MOST_BYTES = 2_000_000_000  # of matrices at once
 _MATRICES = 6  # complex ones for each layer of a stack, and the modes of each
 
@@ -25,39 +26,65 @@ class Channel:
     radii: FloatArray
 
 
+def azimuths_cannot(
+    channel: Channel, quarter: Quarter, part: float, tolerance: float
+) -> SimulationError:
+    """Say which channel is too thin for the directions in azimuth, and what to do."""
+    return SimulationError(
+        f"{channel.name}, which light crosses without being scattered: the tolerance of "
+        f"{tolerance:g} cannot be met: {AZIMUTHS[-1]} and {quarter.count} directions in azimuth "
+        f"differ by {quarter.share:.2g} of the light; give {_rounded_up(quarter.share / part):g} "
+        "or more, or use the method montecarlo."
+    )
+
+
+def _rounded_up(value: float) -> float:
+    """Return the next number of one digit."""
+    digit = 10.0 ** math.floor(math.log10(value))
+    return math.ceil(value / digit) * digit
+
+
 def cannot_meet(channel: Channel, step: Step, worst: float, tolerance: float) -> SimulationError:
     """Say which channel is too hard, why, and what to do."""
     stack = channel.stack
     steepest = max(each.g for each in stack.scattering)
     is_thin = stack.is_seen_through and steepest > 0.5
     why = f" (a thin slab of g = {steepest:g}, which the walk does well)" if is_thin else ""
-    digit = 10.0 ** math.floor(math.log10(worst))
     return SimulationError(
         f"{channel.name}{why}: the tolerance of {tolerance:g} cannot be met: {step.count} and "
         f"{step.count - 4} directions differ by {worst:.2g} of the light; give "
-        f"{math.ceil(worst / digit) * digit:g} or more, or use the method montecarlo."
+        f"{_rounded_up(worst):g} or more, or use the method montecarlo."
     )
 
 
-def _bytes(channels: Sequence[Channel], count: int, threads: int) -> float:
+def _bytes(channels: Sequence[Channel], count: int, azimuths: int, threads: int) -> float:
     """Return the memory that matrices of all threads take at once."""
     needs = []
     for channel in channels:
-        size = MOST_ORDERS * Nodes.of(channel.stack.indices, count).invariant.size
+        size = 2 * azimuths * Nodes.of(channel.stack.indices, count).invariant.size
         needs.append(16.0 * size**2 * _MATRICES * (len(channel.stack.slabs) + 2))
     return threads * max(needs)
 
 
-def fits(channels: Sequence[Channel], count: int, threads: int) -> bool:
+def fits(channels: Sequence[Channel], count: int, azimuths: int, threads: int) -> bool:
     """Return whether the matrices of so many directions fit into memory."""
-    return _bytes(channels, count, threads) <= _MOST_BYTES
+    return _bytes(channels, count, azimuths, threads) <= _MOST_BYTES
 
 
-def check_memory(channels: Sequence[Channel], count: int, threads: int) -> None:
+def check_tolerance(channels: Sequence[Channel], tolerance: float) -> None:
+    """Raise an error for a tolerance that no stack meets, before any time is spent on it."""
+    if tolerance < _LEAST_TOLERANCE:
+        raise SimulationError(
+            f"{channels[0].name}: the tolerance of {tolerance:g} cannot be met by the solver for "
+            f"layers; give {_LEAST_TOLERANCE:g} or more, or use the method montecarlo."
+        )
+
+
+def check_memory(channels: Sequence[Channel], count: int, azimuths: int, threads: int) -> None:
     """Raise an error for stacks of too many layers."""
-    if not fits(channels, count, threads):
+    if not fits(channels, count, azimuths, threads):
         most = max(channels, key=lambda each: len(each.stack.slabs))
-        needed = _bytes(channels, count, threads) / 1e9
+        needed = _bytes(channels, count, azimuths, threads) / 1e9
         raise SimulationError(
             f"{most.name} has {len(most.stack.slabs)} layers, whose matrices would take "
             f"{needed:.1f} GB on {threads} threads, over the limit of {_MOST_BYTES / 1e9:g} GB; "

@@ -1,9 +1,9 @@
 """Profiles of layered materials by the solver for layers."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,15 +13,27 @@ from sssfit.grid import RadialGrid
 from sssfit.material import Material
 from sssfit.profile import Profile
 from sssfit.simulate._deterministic import computed_profile, energies_from_cumulative
+from sssfit.simulate.stack.azimuth import FEWEST
 from sssfit.simulate.stack.beam import attenuation, beam_of
 from sssfit.simulate.stack.families import families_of
-from sssfit.simulate.stack.limits import Channel, cannot_meet, check_memory, fits
+from sssfit.simulate.stack.limits import (
+    Channel,
+    azimuths_cannot,
+    cannot_meet,
+    check_memory,
+    check_tolerance,
+    fits,
+)
+from sssfit.simulate.stack.quarter import Quarter, quarter_of
 from sssfit.simulate.stack.sampling import Family
 from sssfit.simulate.stack.slabs import stacks_of
-from sssfit.simulate.stack.solution import Answer, Errors, Side, SideErrors, steps
+from sssfit.simulate.stack.solution import Answer, Errors, Side, SideErrors, Step, steps
 
 COUNTS = (8, 12, 16, 20, 24, 28, 32, 36, 40)
 _QUICK = 2e-3  # a tolerance from which 8 and 12 directions may do
+_MOST_AZIMUTH = 0.5  # of a tolerance that directions in azimuth may take
+_MANY = 9  # directions in azimuth
+_PATIENCE = 10.0  # with few directions in azimuth: their errors differ between polar ones
 _LEAST_GAIN = 2.0  # by which four more directions reduce an error, if it was not more before
 
 
@@ -105,23 +117,56 @@ def _solve_family(
     each: Callable[[Callable[[float], FloatArray], FloatArray], FloatArray],
 ) -> list[_Solved]:
     """Add directions until every channel meets the tolerance."""
-    counts = COUNTS if tolerance >= _QUICK else COUNTS[1:]
+    counts: tuple[int, ...] = COUNTS if tolerance >= _QUICK else COUNTS[1:]
+    check_tolerance(channels, tolerance)
     for count in counts[:2]:
-        check_memory(channels, count, threads)
+        check_memory(channels, count, FEWEST, threads)
     family = Family(tuple(channel.stack for channel in channels))
     radii, specular = ([getattr(each, key) for each in channels] for key in ("radii", "specular"))
     radii = [each[1:] for each in radii]
+    quarter = quarter_of(family, radii, tolerance, each)
+
+    def solution(counts: Sequence[int], quarter: Quarter, patience: float) -> Step:
+        under_way = steps(family, radii, specular, counts, quarter, tolerance, each)
+        return _last(channels, under_way, counts, quarter, threads, tolerance, patience)
+
+    if quarter.count > _MANY:  # in a tenth of the time, few show how many polar ones are needed
+        needed = solution(counts, replace(quarter, count=FEWEST), _PATIENCE).count
+        counts = counts[counts.index(needed) - 1 :]
+        if quarter.share > _MOST_AZIMUTH * tolerance:
+            raise azimuths_cannot(channels[quarter.worst], quarter, _MOST_AZIMUTH, tolerance)
+        check_memory(channels, counts[1], quarter.count, threads)
+    step = solution(counts, quarter, 1.0)
+    pairs = zip(step.answers, step.errors, strict=True)
+    return [_Solved(*pair, step.count) for pair in pairs]
+
+
+def _last(
+    channels: Sequence[Channel],
+    under_way: Iterator[Step],
+    counts: Sequence[int],
+    quarter: Quarter,
+    threads: int,
+    tolerance: float,
+    patience: float,
+) -> Step:
+    """Return the first step that meets the tolerance.
+
+    One that no more directions would help is refused, or returned if it is within ``patience``
+    times the tolerance.
+    """
     before = math.inf
-    for step in steps(family, radii, specular, counts, tolerance, each):
+    for step in under_way:
         shares = [step.share(number) for number in range(len(channels))]
         worst = max(shares)
         if worst <= tolerance:
-            pairs = zip(step.answers, step.errors, strict=True)
-            return [_Solved(*pair, step.count) for pair in pairs]
+            return step
         left = counts[counts.index(step.count) + 1 :]
         gain = max(before / worst, _LEAST_GAIN)
         is_hopeless = worst > tolerance * gain ** len(left)
-        if is_hopeless or not fits(channels, left[0], threads):
+        if is_hopeless or not fits(channels, left[0], quarter.count, threads):
+            if worst <= patience * tolerance:
+                return step
             raise cannot_meet(channels[shares.index(worst)], step, worst, tolerance)
         before = worst
     raise AssertionError("steps end with the last number of directions")

@@ -1,5 +1,6 @@
 """Transforms of several stacks at one wavenumber, with the modes of layers that they share."""
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -7,7 +8,7 @@ import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.simulate.stack.assembly import Assembly, Transforms, reflected_at, transforms_at
-from sssfit.simulate.stack.azimuth import Azimuth, azimuth_of
+from sssfit.simulate.stack.azimuth import FEWEST, Azimuth, azimuth_of
 from sssfit.simulate.stack.gaps import Gap, resolved
 from sssfit.simulate.stack.modes import Modes, modes_of
 from sssfit.simulate.stack.phase import Medium
@@ -39,12 +40,21 @@ class Family:
         decay = max(slowest, 1.0 / thickest) / 20.0
         return max(1e-4 / self.longest, min(0.03 / self.longest, decay))
 
+    @property
+    def has_layers(self) -> bool:
+        """Whether any layer ends, so that light comes back through it."""
+        return any(math.isfinite(slab.thickness) for each in self.stacks for slab in each.slabs)
+
     @cached_property
     def is_singular(self) -> bool:
         """Whether k = 0 is singular: a layer that hardly absorbs, or a clear one."""
         slowest = min(each.diffuse_rate for each in self._scattering)
-        slabs = [slab for each in self.stacks for slab in each.slabs]
-        return slowest < self.least_wavenumber or any(slab.is_clear for slab in slabs)
+        return slowest < self.least_wavenumber or self.has_clear_layers
+
+    @property
+    def has_clear_layers(self) -> bool:
+        """Whether light passes any layer without loss."""
+        return any(slab.is_clear for each in self.stacks for slab in each.slabs)
 
     @property
     def _scattering(self) -> list[Slab]:
@@ -53,15 +63,16 @@ class Family:
 
 @dataclass(frozen=True)
 class Sampler:
-    """A family in ``count`` discrete directions on either side."""
+    """A family in ``count`` discrete directions on either side, ``azimuths`` of them a quarter."""
 
     family: Family
     count: int
+    azimuths: int = FEWEST
 
     @cached_property
     def assemblies(self) -> tuple[Assembly, ...]:
         """The stacks in discrete directions."""
-        return tuple(Assembly.of(each, self.count) for each in self.family.stacks)
+        return tuple(Assembly.of(each, self.count, self.azimuths) for each in self.family.stacks)
 
     @cached_property
     def zero(self) -> float:
@@ -76,7 +87,7 @@ class Sampler:
 
     def azimuth(self, k: float) -> Azimuth:
         """Return the rule in phi that all stacks share."""
-        return azimuth_of(k, min(each.least_sigma_t for each in self.assemblies))
+        return azimuth_of(k, min(each.least_sigma_t for each in self.assemblies), self.azimuths)
 
     def at_zero(self) -> list[Transforms]:
         """Return the total of each stack, without the beam."""
@@ -99,7 +110,7 @@ class Sampler:
 
     def _gap(self, assembly: Assembly) -> Gap | None:
         depths = [each.thickness for each in assembly.media]
-        first = resolved(self.count) / sum(depths)
+        first = resolved(self.count, self.azimuths) / sum(depths)
         last = 1.001 * _forward_depth(assembly) / depths[-1]  # just above it
 
         def transmitted(k: float) -> float:

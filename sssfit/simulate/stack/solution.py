@@ -1,8 +1,8 @@
 """F(r) of several stacks, with more and more directions until two numbers of them agree.
 
 The error estimate is the difference between N and N - 4 directions, both on every other wavenumber,
-plus what their spline is off by. It belongs to the coarser of the two, and the finer one is
-returned: an estimate, not a bound.
+plus what their spline and the directions in azimuth are off by (`quarter`). It belongs to the
+coarser of the two, and the finer one is returned: an estimate, not a bound.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -13,17 +13,15 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from sssfit.arrays import FloatArray
-from sssfit.simulate.stack.assembly import Assembly, Transforms
+from sssfit.simulate.stack.assembly import Assembly
+from sssfit.simulate.stack.quarter import Each, Quarter, without_rounding
 from sssfit.simulate.stack.sampling import Family, Sampler
 from sssfit.simulate.stack.single import single_cumulative
 from sssfit.simulate.stack.transform import Wavenumbers, refined
 
-Each = Callable[[Callable[[float], FloatArray], FloatArray], FloatArray]
-
 _HIGHEST = 20.0  # largest wavenumber, in the largest extinctions; F is off by 9e-5 with 10
 _MISS = 0.1  # of the tolerance, between two wavenumbers; F is then off by less
 _FEW_RADII, _PER_DECADE = 120, 40  # more radii than this are interpolated: 1e-7 of F
-_ROUNDING = 1e-4  # of T(0): T(k) below this is rounding of the directions, and counts as 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,6 +110,7 @@ def steps(
     radii: list[FloatArray],
     specular: list[float],
     counts: Sequence[int],
+    quarter: Quarter,
     tolerance: float,
     each: Each,
 ) -> Iterator[Step]:
@@ -126,6 +125,8 @@ def steps(
         Of each stack, the share of the beam that returns and is not part of F.
     counts : sequence of int
         Numbers of directions.
+    quarter : Quarter
+        The directions in azimuth, and their errors.
     tolerance : float
         The error asked for, a share of the light; it sets how close the wavenumbers lie.
     each : callable
@@ -135,24 +136,24 @@ def steps(
     waves: Wavenumbers | None = None
     miss = tolerance * _MISS
     for before, count in pairwise(counts):
-        sampler = _ready(family, count)
+        sampler = _ready(family, count, quarter.count)
         waves = _refined(sampler, miss, each) if waves is None else _same(sampler, waves, each)
         few = waves.halved()
         fine, halved = (_answers(sampler, of, radii, specular) for of in (waves, few))
         if coarse is None:
-            first = _ready(family, before)
+            first = _ready(family, before, quarter.count)
             coarse = _answers(first, _same(first, few, each), radii, specular)
-        trios = zip(fine, halved, coarse, strict=True)
-        step = Step(count, fine, [_errors(*trio) for trio in trios])
+        own = zip(fine, halved, coarse, quarter.errors, strict=True)
+        step = Step(count, fine, [_errors(*each_own) for each_own in own])
         yield step
         if step.spline_share > 0.5 * tolerance:
             waves, miss = None, 0.1 * miss
         coarse = halved
 
 
-def _ready(family: Family, count: int) -> Sampler:
+def _ready(family: Family, count: int, azimuths: int) -> Sampler:
     """Return a sampler whose stacks are made before several threads ask for them."""
-    sampler = Sampler(family, count)
+    sampler = Sampler(family, count, azimuths)
     sampler.assemblies  # noqa: B018
     return sampler
 
@@ -183,7 +184,8 @@ def _answers(
         up = _side(assembly, above, own, assembly.beam.reflected - mirror)
         down = None
         if assembly.has_bottom:
-            below = Wavenumbers(waves.k, _without_rounding(both[:, 1:], totals[number]), waves.bend)
+            kept = without_rounding(both[:, 1:], totals[number].transmitted)
+            below = Wavenumbers(waves.k, kept, waves.bend)
             down = _side(assembly.mirrored, below, own, assembly.beam.transmitted)
         found.append(Answer(up, down, totals[number].absorbed))
     return found
@@ -209,31 +211,24 @@ def _interpolated(light: Callable[[FloatArray], FloatArray], radii: FloatArray) 
     return found
 
 
-def _without_rounding(values: FloatArray, total: Transforms) -> FloatArray:
-    """Return T(k) with zeros from the first on that is next to nothing."""
-    low = np.flatnonzero(np.abs(values[:, 0]) < _ROUNDING * total.transmitted)
-    kept = values.copy()
-    if low.size:
-        kept[low[0] :] = 0.0
-    return kept
-
-
-def _errors(fine: Answer, halved: Answer, coarse: Answer) -> Errors:
-    """Return the errors of both sides."""
-    up = _side_errors(fine.reflected, halved.reflected, coarse.reflected)
+def _errors(fine: Answer, halved: Answer, coarse: Answer, azimuth: FloatArray) -> Errors:
+    """Return the errors of both sides; ``azimuth`` is that of light above."""
+    up = _side_errors(fine.reflected, halved.reflected, coarse.reflected, azimuth)
     if fine.transmitted is None or halved.transmitted is None or coarse.transmitted is None:
         return Errors(up, None)
-    return Errors(up, _side_errors(fine.transmitted, halved.transmitted, coarse.transmitted))
+    none = np.zeros(azimuth.size)
+    down = _side_errors(fine.transmitted, halved.transmitted, coarse.transmitted, none)
+    return Errors(up, down)
 
 
-def _side_errors(fine: Side, halved: Side, coarse: Side) -> SideErrors:
+def _side_errors(fine: Side, halved: Side, coarse: Side, azimuth: FloatArray) -> SideErrors:
     """Compare the light within each radius, and altogether: N with N - 4, and both splines."""
-    apart = [halved.edges - coarse.edges, fine.edges - halved.edges]
+    apart = [halved.edges - coarse.edges, fine.edges - halved.edges, azimuth]
     of_annuli = [np.diff(np.append(0.0, each)) for each in apart]
     spline = float(np.max(np.abs(apart[1])))
     return SideErrors(_summed(apart), _summed(of_annuli), spline)
 
 
 def _summed(apart: list[FloatArray]) -> FloatArray:
-    found: FloatArray = np.abs(apart[0]) + np.abs(apart[1])
+    found: FloatArray = np.sum(np.abs(apart), axis=0)
     return found
