@@ -33,7 +33,7 @@ _CONNECT_SECONDS = 10.0
 _WORKERS_SECONDS = 30.0
 _MOST_LOCAL = 256
 _AHEAD = 3  # ranges of a walk for each worker
-_RANGE_STEPS, _MESSAGE_BYTES = 2.5e7, 8_000_000
+_RANGE_STEPS, _MESSAGE_BYTES = 2e8, 8_000_000
 
 
 class Connection:

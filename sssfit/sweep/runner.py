@@ -52,7 +52,7 @@ def sweep_to_store(
     force : bool
         Replace an existing store of a sweep.
     stop : callable
-        When it returns true, tasks that run are waited for, and no other begins.
+        When it returns true, tasks that run on this machine are waited for, and no other begins.
     progress : callable, optional
         Called with points done, points in all and the last one's coordinates.
 
@@ -151,6 +151,8 @@ class Run:
             while True:
                 for task in self._next(tasks, len(pending)):
                     pending.add(self.pool.submit(task))
+                if self.stop():  # what waits for a worker need not be done
+                    pending = {each for each in pending if not each.cancel()}
                 if not pending:
                     break
                 ready, pending = wait(pending, _LOOKS_SECONDS, FIRST_COMPLETED)
