@@ -75,7 +75,7 @@ def measured(plan, folder, **where):
 
 def costs(folder, photons, bands, pairs):
     """One sweep on processes and on a cluster in turn, on one worker and two; the table."""
-    plan, rows, client = skin_plan(photons, bands), [], 0.0
+    plan, rows = skin_plan(photons, bands), []
     for workers in (1, 2):
         places = {"processes": {"threads": workers}, "cluster": {"scheduler": f"local:{workers}"}}
         runs = {name: [] for name in places}
@@ -94,7 +94,14 @@ def costs(folder, photons, bands, pairs):
                 )
             )
     heads = ("where", "workers", "s", "points/s", "more", "ms of the client a point", "MB a worker")
-    return plan, client, markdown(heads, rows)
+    return plan, markdown(heads, rows)
+
+
+def client_seconds(folder, bands):
+    """Seconds of the client's processor for each further point, on a cluster."""
+    plans = [skin_plan(10_000, each) for each in (bands, 5 * bands)]
+    own = [measured(plan, folder, scheduler="local:2")[1] for plan in plans]
+    return (own[1] - own[0]) / (plans[1].count - plans[0].count)
 
 
 def by_photons(folder, numbers, bands):
@@ -176,8 +183,9 @@ def section(small):
     photons, bands, pairs = (20_000, 1, 1) if small else (300_000, 25, 3)
     numbers = (1e4, 3e4) if small else (1e4, 1e5, 1e6)
     with tempfile.TemporaryDirectory() as made:
-        plan, client, table = costs(Path(made), photons, bands, pairs)
+        plan, table = costs(Path(made), photons, bands, pairs)
         curve = by_photons(Path(made), [int(each) for each in numbers], 1 if small else 6)
+        client = client_seconds(Path(made), 1 if small else 5)
     begun = time.process_time()
     for index in range(plan.count):
         perform(plan, whole(plan, index))
@@ -199,8 +207,8 @@ def section(small):
             f"in {asked / 1e3:.1f} kB, and a point comes back in {found / 1e3:.1f} kB. A point of "
             f"{photons:,} photons takes {work:.2f} s of a core.",
             f"**Extrapolated**, not measured: {LIBRARY:,} such points, on cores like these, with "
-            f"one client, which takes {1e3 * client:.1f} ms a point, and {TASK_SECONDS:.0f} s "
-            "for the last task to end.",
+            f"one client, which takes {1e3 * client:.1f} ms for each further point, and "
+            f"{TASK_SECONDS:.0f} s for the last task to end.",
             extrapolated(client, found, work, photons),
         ]
     )
