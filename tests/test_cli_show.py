@@ -495,8 +495,9 @@ def test_files_of_ours_are_called_damaged_by_their_kind(run, tmp_path, profile, 
     ],
 )
 def test_what_is_not_a_file_is_one_line(run, name, said):
-    for verb in ("show", "chart"):
-        assert run(verb, name) == (1, "", f"Error: {said}\n")
+    assert run("show", name) == (1, "", f"Error: {said}\n")
+    drawn = said.replace("in it.", "in it, or the store of a sweep.")  # which is a folder
+    assert run("chart", name) == (1, "", f"Error: {drawn}\n")
 
 
 def test_chart_draws_materials_and_checkpoints(run, tmp_path):
