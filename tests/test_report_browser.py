@@ -11,6 +11,7 @@ from browser import Browser
 
 from sssfit.export import kernel_text
 from sssfit.formats.pictures import load_image
+from sssfit.measure.delta_e import delta_e_2000
 from sssfit.measure.score import measure
 from sssfit.render import render
 from sssfit.render.reference import render_reference
@@ -100,6 +101,48 @@ def test_figures_are_the_librarys(page, window):
             value = getattr(score, f"delta_e_2000_{name}")
             assert window.text(f"figure-{key}") == f"{float(f'{value:.3g}'):#.3g}"
         assert float(window.text("figure-milliseconds")) > 0.0
+
+
+def differences_of(window):
+    """Truth, kernel and Delta E (H, W) of the picture that is shown, by the library."""
+    reference = picture_of("head-45-1").reference
+    seen = load_image(window.download("kernel")).pixels.astype(np.float64)
+    truth = reference.truth.astype(np.float16).astype(np.float64)
+    colours = (each.reshape(-1, 3) for each in (seen, truth))
+    found = delta_e_2000(*colours, reference.exposure).reshape(truth.shape[:2])
+    return truth, seen, found
+
+
+def test_quartiles_are_those_of_the_error_as_its_own_weight(page, window):
+    window.open(page)
+    mask = picture_of("head-45-1").reference.scene.mask
+    differences = differences_of(window)[2]
+    counted = np.sort(differences.ravel() if mask is None else differences[mask > 0])
+    share = np.cumsum(counted) / counted.sum()
+    expected = [counted[np.searchsorted(share, k / 4)] for k in (1, 2, 3)]
+    said = [float(each) for each in window.text("quartiles").partition(": ")[2].split(", ")]
+    assert said == pytest.approx(expected, rel=0.01)  # three digits are shown
+    assert len(window.driver.find_elements("css selector", "#histogram .quartile")) == 3
+
+
+def test_the_loupe_tells_the_pixel_under_the_mouse(page, window):
+    from selenium.webdriver import ActionChains
+
+    window.open(page)
+    canvas = window.driver.find_element("id", "single")
+    ActionChains(window.driver).move_to_element(canvas).perform()
+    column, row = (int(each) for each in window.text("pixel-place").split(", "))
+    pictures = differences_of(window)
+    height, width = pictures[2].shape
+    assert (abs(column - width / 2), abs(row - height / 2)) <= (2, 2)
+    for name, values in zip(("truth", "kernel", "error"), pictures, strict=True):
+        said = [float(each) for each in window.text(f"pixel-{name}").split(" ")]
+        assert said == pytest.approx(np.atleast_1d(values[row, column]), rel=0.01, abs=1e-3), name
+    drawn = window.js(
+        "return ['truth', 'kernel'].map((name) => document.getElementById(`loupe-${name}`)"
+        ".getContext('2d').getImageData(20, 20, 50, 50).data.some((n) => n > 0 && n < 255))"
+    )
+    assert drawn == [True, True]
 
 
 def test_every_control_does_something(page, window):

@@ -52,7 +52,7 @@ class Swatches:
     def luminance_stderr(self) -> FloatArray:
         """Standard error of Y (...)."""
         weights = xyz_weights(self.wavelengths_nm)[:, 1]
-        return np.asarray(np.sqrt((self.stderr * weights) ** 2 @ np.ones_like(weights)))
+        return np.asarray(np.sqrt(((self.stderr * weights) ** 2).sum(axis=-1)))
 
     @cached_property
     def codes(self) -> FloatArray:

@@ -92,8 +92,7 @@ def _numbers(
     lines = [_line(each, mm_per_pixel * 2.0**level) for each in stages]
     reach = np.array([at.max() for at, _ in lines])
     many = np.array([len(at) for at, _ in lines])
-    margin = reach.sum() - np.cumsum([0, *reach])
-    # numba would take 2 s to compile these lines.
+    margin = reach.sum() - np.cumsum([0, *reach])  # here: numba takes 2 s to compile these two
     kept = 2 + np.maximum(margin, 2 * np.array([*reach, 0]))
     at = np.zeros((len(stages), many.max()), np.intp)
     weights = np.zeros((len(stages), channels, many.max() + 1), picture.dtype)

@@ -28,8 +28,8 @@ from sssfit.simulate.batches import (
 from sssfit.simulate.half_space import covers
 from sssfit.sweep.plan import Plan
 
-# At 4 to 6 ns a step a task takes two seconds, of which the 10 to 20 ms of a scheduler are a
-# hundredth, and at the end of a sweep no worker waits longer than that for another.
+# At 4 to 6 ns a step a task takes two seconds, of which the 5 ms of client and scheduler are a
+# four-hundredth, and at the end of a sweep no worker waits longer than that for another.
 TASK_STEPS = 4e8
 # What other methods take for a point, in such steps: .2 s and 1 s of the exact solvers, 5 ms.
 _HALF_SPACE_STEPS, _STACK_STEPS, _DIFFUSION_STEPS = 4e7, 2e8, 1e6

@@ -84,13 +84,15 @@ def costs(folder, photons, bands, pairs):
                 runs[name].append(measured(plan, folder, **where))
         middle = {name: statistics.median(each[0] for each in of) for name, of in runs.items()}
         for name, of in runs.items():
-            client = statistics.median(each[1] for each in of) / plan.count
+            client = 1e3 * statistics.median(each[1] for each in of) / plan.count
             more = 100.0 * (middle[name] / middle["processes"] - 1.0)
+            largest = max(each[2] for each in of) / 1e6
+            is_apart = largest > 0.0  # one process does the work itself
             rows.append(
                 (
                     *(name, str(workers), f"{middle[name]:.1f}"),
-                    *(f"{plan.count / middle[name]:.1f}", f"{more:+.1f} %", f"{1e3 * client:.1f}"),
-                    f"{max(each[2] for each in of) / 1e6:.0f}",
+                    *(f"{plan.count / middle[name]:.1f}", f"{more:+.1f} %"),
+                    *((f"{client:.1f}", f"{largest:.0f}") if is_apart else ("-", "-")),
                 )
             )
     heads = ("where", "workers", "s", "points/s", "more", "ms of the client a point", "MB a worker")

@@ -17,9 +17,7 @@ import numpy as np
 from sssfit.arrays import FloatArray
 
 _RESOLVED = 0.8  # k d / N up to which polar directions resolve the phase: T is off by 1e-5 there
-_AZIMUTHS = (
-    2.2  # k d up to which a direction in azimuth does, of which there are 5 or more a quarter
-)
+_AZIMUTHS = 2.2  # k d up to which directions in azimuth do, for each of a quarter, 5 or more
 _BESIDE = 1.25  # ratio of the wavenumbers on either side, two each, that the curve goes through
 
 

@@ -30,9 +30,7 @@ _RADII = 60  # at which the error of F is found, and taken as linear in log r in
 _ROUNDING = 1e-4  # of T(0): T(k) below this is rounding of the directions, and counts as 0
 _PART = 0.3  # of the tolerance, which polar directions and wavenumbers share
 _PART_BELOW = 1.0  # of it in light from below, where polar directions differ too: N - 4 sees those
-_MOST_BELOW = (
-    7  # directions that T asks for: with more, so few polar ones leave the same difference
-)
+_MOST_BELOW = 7  # directions that T asks for: with more, 8 polar ones leave the same difference
 
 
 @dataclass(frozen=True, slots=True, eq=False)

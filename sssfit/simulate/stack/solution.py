@@ -143,8 +143,8 @@ def steps(
         if coarse is None:
             first = _ready(family, before, quarter.count)
             coarse = _answers(first, _same(first, few, each), radii, specular)
-        own = zip(fine, halved, coarse, quarter.errors, strict=True)
-        step = Step(count, fine, [_errors(*each_own) for each_own in own])
+        fours = zip(fine, halved, coarse, quarter.errors, strict=True)
+        step = Step(count, fine, [_errors(*four) for four in fours])
         yield step
         if step.spline_share > 0.5 * tolerance:
             waves, miss = None, 0.1 * miss
