@@ -14,6 +14,7 @@ import numpy as np
 import processes
 import pytest
 import xarray
+import zarr
 
 from sssfit.errors import FileError, SweepError
 from sssfit.fit import fit_svd
@@ -21,8 +22,9 @@ from sssfit.kernel import read_kernel
 from sssfit.simulate import simulate_exact, simulate_montecarlo
 from sssfit.sweep import Plan, Store, load_plan, sweep_to_store, tasks
 from sssfit.sweep import runner as runner_module
+from sssfit.sweep.chunks import Chunks
 from sssfit.sweep.dry_run import estimate
-from sssfit.sweep.layout import bytes_of
+from sssfit.sweep.layout import FINGERPRINT, bytes_of, variables_of
 from sssfit.sweep.runner import Run
 
 GRID = "[grid]\ndr_mm = 0.25\nradius_mm = 5.0\n"
@@ -179,9 +181,9 @@ def test_resuming_computes_only_what_is_missing(walked, tmp_path):
 
 def lose(path, plan, indices):
     """Take the fingerprints of points, as a kill before they were written would."""
-    store = Store(path, plan)
+    marks = zarr.open_array(str(path / "fingerprint"), mode="r+", zarr_format=2)
     for index in indices:
-        store._root["fingerprint"][plan.position(index)] = 0
+        marks[plan.position(index)] = 0
 
 
 def test_a_damaged_chunk_is_noticed_and_computed_again(walked, tmp_path):
@@ -193,6 +195,31 @@ def test_a_damaged_chunk_is_noticed_and_computed_again(walked, tmp_path):
     found = sweep_to_store(plan, tmp_path / "x.zarr", threads=1, resume=True)
     assert found.done == 2
     assert content(tmp_path / "x.zarr") == content(path)
+
+
+@pytest.mark.parametrize("points", [2, 300])
+def test_chunks_are_the_files_that_zarr_would_write(tmp_path, points):
+    """Some points of rows of one chunk and of two; values, fill values and a row without any."""
+    values = np.linspace(0.1, 0.9, points).tolist()
+    axes = (
+        f'[[axes]]\nkey = "albedo"\nvalues = [0.5, 0.9]\n[[axes]]\nkey = "g"\nvalues = {values}\n'
+    )
+    plan = plan_of(tmp_path, EXACT.replace(AXES, axes))
+    random = np.random.default_rng(3)
+    for name in ("ours", "zarrs"):
+        runner_module.make_store(tmp_path / name, plan)
+    for each in (*variables_of(plan), FINGERPRINT):
+        chunks = Chunks(tmp_path / "ours", plan, each)
+        array = zarr.open_array(str(tmp_path / "zarrs" / each.name), mode="r+", zarr_format=2)
+        for some in ([0], [*range(1, points, 7)]):  # the second time into chunks that are there
+            new = {k: random.random(array.shape[2:]) * 1e3 // 1 for k in some}
+            new |= {0: np.full(array.shape[2:], np.nan)} if each is not FINGERPRINT else {}
+            chunks.put((1,), new)
+            for k, value in new.items():
+                array[1, k] = value
+        for k in (0, 1, points - 1):
+            np.testing.assert_array_equal(chunks.get((1,), k), array[1, k])
+    assert content(tmp_path / "ours") == content(tmp_path / "zarrs")
 
 
 def test_a_sweep_that_is_stopped_keeps_its_points(walked, tmp_path):

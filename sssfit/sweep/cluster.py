@@ -23,6 +23,7 @@ from sssfit.simulate.batches import (
     steps_per_photon,
     trace_each,
 )
+from sssfit.sweep.local_workers import local_workers
 from sssfit.sweep.needed import needed
 from sssfit.sweep.plan import Plan
 from sssfit.sweep.tasks import Done, Task, check_code, perform
@@ -61,15 +62,7 @@ class Connection:
         with self._stack, _quiet():
             address: Any = self._address
             if self._count:
-                address = self._stack.enter_context(
-                    distributed.LocalCluster(
-                        n_workers=self._count,
-                        threads_per_worker=1,
-                        dashboard_address=None,
-                        host="127.0.0.1",
-                        silence_logs=logging.CRITICAL,
-                    )
-                )
+                address = self._stack.enter_context(local_workers(self._count))
             self._client = self._connected(distributed, address)
             self._stack.callback(self._close)
             self.workers = self._check_workers()

@@ -16,6 +16,9 @@ from sssfit.sweep.tasks import Done
 _OF_RINGS = ("r_mm", "channel")
 
 
+_MOST_IN_CHUNK = 256  # points of the last axis
+
+
 @dataclass(frozen=True, slots=True)
 class Variable:
     """An array of the store: its name, the dimensions after those of the axes, and a description.
@@ -83,6 +86,11 @@ def sizes_of(plan: Plan) -> dict[str, int]:
         "channel": plan.base.n_channels,
         "layer": len(plan.base.layers),
     }
+
+
+def chunk_points(plan: Plan, variable: Variable) -> int:
+    """Return the points of the last axis that share a chunk."""
+    return 1 if variable.is_of_rings else min(plan.shape[-1], _MOST_IN_CHUNK)
 
 
 def bytes_of(plan: Plan) -> int:

@@ -14,12 +14,19 @@ from sssfit import __version__
 from sssfit.errors import FileError
 from sssfit.files import reason, temporary_folder
 from sssfit.simulate.batches import code_version
-from sssfit.sweep.layout import FINGERPRINT, SEED, Variable, bytes_of, sizes_of, variables_of
+from sssfit.sweep.layout import (
+    FINGERPRINT,
+    SEED,
+    Variable,
+    bytes_of,
+    chunk_points,
+    sizes_of,
+    variables_of,
+)
 from sssfit.sweep.needed import needed
 from sssfit.sweep.plan import Plan
 
 FORMAT = "sssfit.sweep/1"
-_MOST_IN_CHUNK = 256  # points of the last axis
 _SPARE_BYTES = 1e7
 
 
@@ -122,7 +129,6 @@ def _coordinate(
 
 def _array(root: Any, plan: Plan, each: Variable) -> Any:
     sizes = [sizes_of(plan)[name] for name in each.dimensions]
-    inner = 1 if each.is_of_rings else min(plan.shape[-1], _MOST_IN_CHUNK)
     described = {
         "_ARRAY_DIMENSIONS": [*(axis.name for axis in plan.axes), *each.dimensions],
         "long_name": each.long_name,
@@ -138,7 +144,7 @@ def _array(root: Any, plan: Plan, each: Variable) -> Any:
     return root.create_array(
         each.name,
         shape=(*plan.shape, *sizes),
-        chunks=(*(1 for _ in plan.shape[:-1]), inner, *sizes),
+        chunks=(*(1 for _ in plan.shape[:-1]), chunk_points(plan, each), *sizes),
         attributes=described,
         **own,
     )

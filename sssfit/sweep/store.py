@@ -21,6 +21,7 @@ from sssfit.errors import FileError, SweepError
 from sssfit.files import reason
 from sssfit.messages import printable, shown
 from sssfit.simulate.batches import code_version
+from sssfit.sweep.chunks import Chunks
 from sssfit.sweep.layout import (
     FINGERPRINT,
     content_of,
@@ -32,7 +33,7 @@ from sssfit.sweep.needed import needed
 from sssfit.sweep.plan import Plan
 from sssfit.sweep.tasks import Done
 
-_WAITS_SECONDS, _WAITS_POINTS = 1.0, 64  # the most that a kill can make be computed again
+_WAITS_SECONDS, _WAITS_POINTS = 1.0, 512  # the most that a kill can make be computed again
 
 
 class Store:
@@ -47,25 +48,34 @@ class Store:
 
     def __init__(self, path: Path, plan: Plan) -> None:
         self.path, self.plan = path, plan
-        self._root = needed("zarr", "sweep").open_group(str(path), mode="r+", zarr_format=2)
         self._variables = variables_of(plan)
+        numbers = [each for each in (*self._variables, FINGERPRINT) if each.kind != "str"]
+        self._chunks = {each.name: Chunks(path, plan, each) for each in numbers}
+        self._kernels: Any = self._array("kernel") if plan.fit is not None else None
         self._waiting: list[tuple[int, dict[str, Any]]] = []
         self._written_at = time.monotonic()
 
     def finished(self) -> list[int]:
         """Return the points whose arrays are as their fingerprints say."""
-        marks = self._root[FINGERPRINT.name][:].ravel()
+        marks = self._array(FINGERPRINT.name)[:].ravel()
         return [int(k) for k in np.flatnonzero(marks) if self._mark_of(int(k)) == marks[k]]
 
+    def _array(self, name: str) -> Any:
+        zarr = needed("zarr", "sweep")
+        return zarr.open_array(str(self.path / name), mode="r+", zarr_format=2)
+
     def _mark_of(self, index: int) -> int:
-        at = self.plan.position(index)
+        *row, last = at = self.plan.position(index)
+        values: dict[str, Any] = {}
         try:
-            values = {each.name: self._root[each.name][at] for each in self._variables}
-        except (OSError, ValueError, RuntimeError):  # a chunk of another length than it should have
+            for each in self._variables:
+                if each.kind == "str":
+                    values[each.name] = str(self._kernels[at][()])
+                else:
+                    values[each.name] = self._chunks[each.name].get((*row,), last)
+        except (OSError, ValueError, RuntimeError):  # a text's chunk that cannot be decompressed
             return 0
-        return _mark(
-            {key: str(each[()]) if key == "kernel" else each for key, each in values.items()}
-        )
+        return _mark(values)
 
     def add(self, done: Done) -> None:
         """Take a finished point; written at once or within a second, with its neighbours."""
@@ -97,17 +107,17 @@ class Store:
     def _flush(self) -> None:
         waiting = sorted(self._waiting, key=lambda each: each[0])
         rows = groupby(waiting, key=lambda each: self.plan.position(each[0])[:-1])
-        for row, points in ((row, list(each)) for row, each in rows):
-            last = [self.plan.position(index)[-1] for index, _ in points]
+        for row, points in rows:
+            found = {self.plan.position(index)[-1]: values for index, values in points}
             for each in self._variables:
-                array = self._root[each.name]
-                if each.is_of_rings:
-                    for k, (_, values) in zip(last, points, strict=True):
-                        array[(*row, k)] = values[each.name]
-                else:
-                    array.oindex[(*row, last)] = np.array([own[each.name] for _, own in points])
-            marks = np.array([_mark(values) for _, values in points])
-            self._root[FINGERPRINT.name].oindex[(*row, last)] = marks
+                own = {last: values[each.name] for last, values in found.items()}
+                if each.kind != "str":
+                    self._chunks[each.name].put(row, own)
+                    continue
+                for last, text in own.items():
+                    self._kernels[(*row, last)] = text
+            marks = {last: _mark(values) for last, values in found.items()}
+            self._chunks[FINGERPRINT.name].put(row, marks)
 
 
 def _mark(values: dict[str, Any]) -> int:
