@@ -150,3 +150,30 @@ def test_small_benchmarks_of_shaders_run_and_fill_every_table(small):
     for passes, dispatches in zip(cases[1][0:6:2], cases[1][1:6:2], strict=True):
         assert float(dispatches[3]) < 0.75 * float(passes[3])
     assert [row[1] for row in ratios[1][1:]] == ["2.92", "2.26", "2.93"]
+
+
+def test_small_benchmarks_of_sweeps_run_and_fill_every_table(small, monkeypatch):
+    """In this process: workers and clusters have tests of their own, and take seconds to start."""
+    for extra in ("zarr", "distributed"):
+        pytest.importorskip(extra)
+    from sssfit import sweep
+    from sssfit.sweep import cluster, pools
+
+    def here(plan, path, *, progress, force, **_):
+        return whole(plan, path, progress=progress, force=force, threads=1)
+
+    whole = sweep.sweep_to_store
+    monkeypatch.setattr(sweep, "sweep_to_store", here)
+    monkeypatch.setattr(cluster, "Cluster", lambda plan, _: pools.ThisProcess(plan))
+    costs, memory, photons, albedos, cores = small("bench_sweep.py")
+    assert [row[:2] for row in costs[1]] == [
+        [name, workers] for workers in "12" for name in ("processes", "cluster")
+    ]
+    assert [row[0] for row in memory[1]] == ["5", "10"]
+    assert [row[0] for row in photons[1]] == ["1e+04"] * 2 + ["3e+04"] * 2
+    assert [row[0] for row in albedos[1]] == ["0.5", "0.9", "0.99", "0.999", "0.9999"]
+    assert [row[1] for row in cores[1]] == ["2", "10", "100", "1000"] * 2
+    for row in [*(row[2:5] for row in costs[1]), *(row[2:] for row in photons[1]), *albedos[1]]:
+        assert all(math.isfinite(float(value.rstrip(" %"))) for value in row)
+    for row in cores[1]:
+        assert all(math.isfinite(float(value.rstrip(" %"))) for value in row[2:5])

@@ -46,6 +46,7 @@ def local_workers(count: int) -> Any:
             n_workers=count,
             threads_per_worker=1,
             dashboard_address=None,
+            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # else 8787, or a warning
             host="127.0.0.1",
             silence_logs=logging.CRITICAL,
         )

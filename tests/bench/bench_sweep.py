@@ -5,7 +5,7 @@
     python tests/bench/bench_sweep.py --small    seconds, to see that it runs
 
 Times include the start and the end of the workers. Memory is the largest resident size of any
-worker, seen every two seconds when a point is finished.
+worker, seen when a point is finished, every two seconds at most.
 """
 
 import argparse
@@ -17,6 +17,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import psutil
 
 ROOT = Path(__file__).parents[2]
@@ -37,6 +38,7 @@ CORES = (2, 10, 100, 1000)
 LIBRARY = 1_000_000  # points of the extrapolation
 TASK_SECONDS = 2.0  # of a full task
 LOOK_SECONDS = 2.0  # between two looks at the workers' memory
+PLACES = {"processes": {"threads": 2}, "cluster": {"scheduler": "local:2"}}
 EMPTY = Task((), 0.0, code_version())
 
 
@@ -57,13 +59,13 @@ def albedo_plan(photons, albedos):
     return replace(plan, axes=axes, method="montecarlo", settings={"photons": photons})
 
 
-def measured(plan, folder, **where):
+def measured(plan, folder, every=LOOK_SECONDS, **where):
     """Seconds, this process's own of them on processors, and the largest worker's bytes."""
     largest, looked = 0, 0.0
 
     def look(*_):
         nonlocal largest, looked
-        if time.monotonic() < looked + LOOK_SECONDS:  # a look takes 10 ms of the client
+        if time.monotonic() < looked + every:  # a look takes 10 ms of the client
             return
         looked = time.monotonic()
         for each in psutil.Process().children(recursive=True):
@@ -103,6 +105,16 @@ def costs(folder, photons, bands, pairs):
     return plan, markdown(heads, rows)
 
 
+def memory(folder, photons, sizes):
+    """The largest resident size of any of two workers by the points of a sweep; the table."""
+    rows = []
+    for points in sizes:
+        plan = albedo_plan(photons, tuple(np.linspace(0.5, 0.99, points).tolist()))
+        cells = [measured(plan, folder, 0.1, **where)[2] / 1e6 for where in PLACES.values()]
+        rows.append((f"{points}", *(f"{each:.0f}" for each in cells)))
+    return markdown(("points", *(f"MB a worker, {name}" for name in PLACES)), rows)
+
+
 def client_seconds(folder, bands):
     """Seconds of the client's processor for each further point, on a cluster."""
     plans = [skin_plan(10_000, each) for each in (bands, 5 * bands)]
@@ -115,10 +127,7 @@ def by_photons(folder, numbers, bands):
     rows = []
     for photons in numbers:
         plan = skin_plan(photons, bands)
-        for name, where in {
-            "processes": {"threads": 2},
-            "cluster": {"scheduler": "local:2"},
-        }.items():
+        for name, where in PLACES.items():
             seconds = measured(plan, folder, **where)[0]
             rate = plan.count / seconds
             rows.append((f"{photons:.0e}", name, f"{rate:.1f}", f"{rate * photons / 1e6:.3f}"))
@@ -191,6 +200,7 @@ def section(small):
     with tempfile.TemporaryDirectory() as made:
         plan, table = costs(Path(made), photons, bands, pairs)
         curve = by_photons(Path(made), [int(each) for each in numbers], 1 if small else 6)
+        sizes = memory(Path(made), 2000, (5, 10) if small else (50, 500))
         client = client_seconds(Path(made), 1 if small else 5)
     begun = time.process_time()
     for index in range(plan.count):
@@ -205,6 +215,8 @@ def section(small):
             f"two workers: medians of {pairs} in turn. The client's time is that of its processor, "
             "the scheduler of local:N included.",
             table,
+            "Memory by the points of a sweep, 2,000 photons each, on two workers:",
+            sizes,
             "Points of more and fewer photons, on two workers:",
             curve,
             f"One core by the albedo, {photons:,} photons:",
