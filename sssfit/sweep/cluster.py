@@ -190,10 +190,14 @@ def local_count(scheduler: str) -> int:
 
 
 def _hand_over(ended: Any, result: "Future[Any]") -> None:
-    """Give a result of Dask's to a future of Python's own; called in a thread of the client."""
+    """Give a result of Dask's to a future of Python's own; called in a thread of the client.
+
+    A result is lost again if its worker is killed before it is fetched. Dask then has it computed
+    anew, for which ``result`` waits.
+    """
     if not result.set_running_or_notify_cancel():
         return
-    if ended.status == "finished":
+    if ended.status in ("finished", "lost", "pending"):
         try:
             result.set_result(ended.result())
         except Exception as error:
