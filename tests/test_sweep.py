@@ -348,6 +348,23 @@ def test_a_disk_that_fills_keeps_what_is_finished(walked, tmp_path, monkeypatch)
     assert content(tmp_path / "x.zarr") == content(path)
 
 
+def test_a_chunk_that_cannot_be_written_leaves_nothing_behind(walked, tmp_path, monkeypatch):
+    plan, path = walked
+    shutil.copytree(path, tmp_path / "x.zarr")
+
+    def filling(path, content):
+        with path.open("wb") as stream:
+            stream.write(content[:8])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", filling)
+    (first, *_) = variables_of(plan)
+    with pytest.raises(OSError, match="No space"):
+        Chunks(tmp_path / "x.zarr", plan, first).put((0,), {0: 1.0})
+    monkeypatch.undo()
+    assert content(tmp_path / "x.zarr") == content(path)
+
+
 def test_the_estimate_of_bytes_is_what_a_store_takes(walked):
     plan, path = walked
     chunks = {name: len(each) for name, each in content(path).items() if ".z" not in name}

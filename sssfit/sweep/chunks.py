@@ -5,6 +5,7 @@ place, "3.0.1"; without the file, all of it is the fill value. Zarr itself took 
 each chunk, 10 ms for a point, by its event loop and checks of indices; this takes a 20th of that.
 """
 
+import contextlib
 from collections.abc import Mapping
 from itertools import groupby
 from pathlib import Path
@@ -33,7 +34,7 @@ class Chunks:
     def __init__(self, store: Path, plan: Plan, variable: Variable) -> None:
         sizes = [sizes_of(plan)[name] for name in variable.dimensions]
         self._folder = store / variable.name
-        self._unfinished = store / ".unfinished"  # never left behind: what follows is written to it
+        self._unfinished = store / ".unfinished"  # after a kill it is what the next run writes to
         self._inner = chunk_points(plan, variable)
         self._fill = np.nan if variable.kind == "float64" else 0
         self._type = "<f8" if variable.kind == "float64" else "<i8"
@@ -93,5 +94,10 @@ class Chunks:
         if np.isnan(chunk).all():  # as Zarr has it
             place.unlink(missing_ok=True)
             return
-        self._unfinished.write_bytes(chunk.tobytes())
-        self._unfinished.replace(place)
+        try:
+            self._unfinished.write_bytes(chunk.tobytes())
+            self._unfinished.replace(place)
+        except OSError:
+            with contextlib.suppress(OSError):
+                self._unfinished.unlink()
+            raise

@@ -192,8 +192,8 @@ def local_count(scheduler: str) -> int:
 def _hand_over(ended: Any, result: "Future[Any]") -> None:
     """Give a result of Dask's to a future of Python's own; called in a thread of the client.
 
-    A result is lost again if its worker is killed before it is fetched. Dask then has it computed
-    anew, for which ``result`` waits.
+    A result is lost again if its worker is killed before it is fetched. Dask has it computed
+    again, for which ``result`` waits.
     """
     if not result.set_running_or_notify_cancel():
         return
