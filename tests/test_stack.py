@@ -15,9 +15,10 @@ from sssfit.simulate.half_space import diffuse_reflectance
 from sssfit.simulate.stack import limits
 from sssfit.simulate.stack.assembly import Assembly, _spans, reflected_at, transforms_at
 from sssfit.simulate.stack.azimuth import FEWEST, azimuth_of
+from sssfit.simulate.stack.changes import Changes, ready
 from sssfit.simulate.stack.families import families_of
 from sssfit.simulate.stack.gaps import Gap
-from sssfit.simulate.stack.modes import modes_of
+from sssfit.simulate.stack.modes import modes_of, times
 from sssfit.simulate.stack.nodes import Nodes, snell_reflectance
 from sssfit.simulate.stack.phase import henyey_greenstein, legendre_series, medium_of
 from sssfit.simulate.stack.sampling import Family, Sampler
@@ -360,3 +361,36 @@ def test_a_half_space_is_no_different_under_a_name():
     assert simulate_exact(medium(0.3, 0.7, 1.3)).meta["settings"]["solver"] == "half-space"
     forward = simulate_exact(medium(0.3, 3.5, 1.3, g=0.8), tolerance=0.01)
     assert forward.meta["settings"]["solver"] == "layer"
+
+
+def test_few_directions_and_their_change_are_all_directions():
+    # Half of the wavenumbers get 12 directions; all of them would give the same F within a third of
+    # the miss that is allowed between wavenumbers.
+    family = Family((SlabStack(SKIN),))
+    each = lambda sample, k: np.stack([sample(float(one)) for one in k])  # noqa: E731
+    many, radii = ready(family, 12, FEWEST), np.array([0.01, 0.1, 1.0])
+    changes = Changes(family, 8, many, 1e-4, each)
+    waves = changes.whole(many)[0]
+    direct = Wavenumbers(waves.k, each(many.at, waves.k), waves.bend)
+    np.testing.assert_allclose(waves.cumulative(radii), direct.cumulative(radii), atol=3e-5)
+    alone = changes.halved(ready(family, 8, FEWEST))
+    assert alone.k.size < waves.k.size
+
+
+def test_a_clear_layer_leaves_no_wavenumber_few_directions():
+    family = Family((SlabStack(SLABS),))
+    each = lambda sample, k: np.stack([sample(float(one)) for one in k])  # noqa: E731
+    many = ready(family, 8, FEWEST)
+    waves, half = Changes(family, 6, many, 1e-2, each).whole(many)
+    np.testing.assert_allclose(waves.values, each(many.at, waves.k), rtol=0, atol=1e-14)
+    assert half.k.size == waves.k.size // 2 + 1
+
+
+def test_a_pair_of_modes_is_two_real_columns():
+    rng = np.random.default_rng(5)
+    matrix = rng.normal(size=(9, 9))
+    factor, columns = np.linalg.eig(matrix)
+    assert np.iscomplexobj(factor)
+    real = np.where(factor.imag < 0.0, -columns.imag, columns.real)
+    powers = np.linalg.matrix_power(matrix, 3)
+    np.testing.assert_allclose(times(real, factor**3), powers @ real, atol=1e-12)

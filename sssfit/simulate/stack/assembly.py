@@ -118,7 +118,7 @@ def _rising(
     first = _spans(assembly, k, azimuth, modes, last)[0][0]
     reflected = np.tile(assembly.reflected_at_top, azimuth.orders)
     a = embedding.light_at_top(first, reflected)
-    rising: FloatArray = (first.up @ a + first.up_source).real
+    rising: FloatArray = first.up @ a + first.up_source
     return rising
 
 
@@ -131,11 +131,11 @@ def transforms_at(assembly: Assembly, k: float, azimuth: Azimuth, modes: ModesOf
         if falling is not None:
             entering = _entering(assembly, j, falling, floors[j], azimuth.orders)
             a = span.amplitudes(entering)
-        rising = (span.up @ a + span.up_source).real
+        rising = span.up @ a + span.up_source
         if j == 0:
             top = flux_of(medium, rising, 1.0 - assembly.reflected_at_top)
         net.append(
-            flux_of(medium, (span.down @ a + span.down_source).real - rising)
+            flux_of(medium, span.down @ a + span.down_source - rising)
             + float(assembly.beam.down[j] - assembly.beam.up[j] * medium.attenuation)
         )
         falling = span.bottom(a) if span.bottom is not None else None

@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
 from sssfit.simulate.stack.azimuth import Azimuth
-from sssfit.simulate.stack.modes import ComplexArray, Modes
+from sssfit.simulate.stack.modes import Modes, times
 from sssfit.simulate.stack.nodes import snell_reflectance
 from sssfit.simulate.stack.phase import Medium
 
@@ -34,21 +34,20 @@ class Span:
     ``bottom`` gives L+ at its bottom from a; None without one.
     """
 
-    down: ComplexArray
-    down_source: ComplexArray
-    up: ComplexArray
-    up_source: ComplexArray
-    bottom: Callable[[ComplexArray], FloatArray] | None
+    down: FloatArray
+    down_source: FloatArray
+    up: FloatArray
+    up_source: FloatArray
+    bottom: Callable[[FloatArray], FloatArray] | None
 
     def floor(self) -> Floor:
         """Return the layer with all below it as a floor."""
-        matrix = np.linalg.solve(self.down.T, self.up.T).T
-        return Floor(matrix.real, (self.up_source - matrix @ self.down_source).real)
+        matrix: FloatArray = np.asarray(np.linalg.solve(self.down.T, self.up.T), np.float64).T
+        return Floor(matrix, self.up_source - matrix @ self.down_source)
 
-    def amplitudes(self, entering: FloatArray) -> ComplexArray:
+    def amplitudes(self, entering: FloatArray) -> FloatArray:
         """Return a from L+ at the top."""
-        found: ComplexArray = np.linalg.solve(self.down, entering - self.down_source)
-        return found
+        return np.asarray(np.linalg.solve(self.down, entering - self.down_source), np.float64)
 
 
 def span_without_end(modes: Modes, down: float, up: float) -> Span:
@@ -65,6 +64,7 @@ def span_of(medium: Medium, modes: Modes, down: float, up: float, floor: Floor) 
     """
     u, v, beam = modes.along, modes.against, medium.attenuation
     e = np.exp(-modes.rate * medium.thickness)
+    ue, ve = times(u, e), times(v, e)
     top = (
         down * modes.beam_along + up * beam * modes.beam_against,
         down * modes.beam_against + up * beam * modes.beam_along,
@@ -73,14 +73,13 @@ def span_of(medium: Medium, modes: Modes, down: float, up: float, floor: Floor) 
         down * beam * modes.beam_along + up * modes.beam_against,
         down * beam * modes.beam_against + up * modes.beam_along,
     )
-    driven = (floor.matrix @ u - v) * e
+    driven = floor.matrix @ ue - ve
     source = floor.matrix @ bottom[0] - bottom[1] + floor.source
     solved = np.linalg.solve(u - floor.matrix @ v, np.column_stack((driven, source)))
     g, h = solved[:, :-1], solved[:, -1]
-    ue, ve = u * e, v * e
 
-    def leaves(a: ComplexArray) -> FloatArray:
-        found: FloatArray = (ue @ a + v @ (g @ a + h) + bottom[0]).real
+    def leaves(a: FloatArray) -> FloatArray:
+        found: FloatArray = ue @ a + v @ (g @ a + h) + bottom[0]
         return found
 
     return Span(u + ve @ g, ve @ h + top[0], v + ue @ g, ue @ h + top[1], leaves)
@@ -91,8 +90,8 @@ def span_of_clear(medium: Medium, k: float, azimuth: Azimuth, floor: Floor) -> S
     e = _passage(medium, k, azimuth)
     size = len(e)
 
-    def leaves(a: ComplexArray) -> FloatArray:
-        found: FloatArray = (e @ a).real
+    def leaves(a: FloatArray) -> FloatArray:
+        found: FloatArray = e @ a
         return found
 
     up = e @ floor.matrix @ e
@@ -163,11 +162,11 @@ class Interface:
         return np.asarray(np.linalg.solve(system, driven), dtype=np.float64)
 
 
-def light_at_top(span: Span, reflected: FloatArray) -> ComplexArray:
+def light_at_top(span: Span, reflected: FloatArray) -> FloatArray:
     """Return the amplitudes of the first layer, L+ = r L- at its top."""
     system = span.down - reflected[:, None] * span.up
-    found: ComplexArray = np.linalg.solve(system, reflected * span.up_source - span.down_source)
-    return found
+    driven = reflected * span.up_source - span.down_source
+    return np.asarray(np.linalg.solve(system, driven), np.float64)
 
 
 def flux_of(medium: Medium, radiance: FloatArray, share: FloatArray | float = 1.0) -> float:

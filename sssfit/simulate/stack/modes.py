@@ -1,4 +1,8 @@
-"""The eigenmodes of a layer at one wavenumber, and the light that a beam scatters into it."""
+"""The eigenmodes of a layer at one wavenumber, and the light that a beam scatters into it.
+
+Complex modes come in conjugate pairs, x and conj x, whose two columns hold Re x and Im x: all that
+is done with modes then is real, at a quarter of the operations.
+"""
 
 from dataclasses import dataclass
 from typing import Any
@@ -11,6 +15,7 @@ from sssfit.simulate.stack.azimuth import Azimuth
 from sssfit.simulate.stack.phase import Medium
 
 ComplexArray = npt.NDArray[Any]  # real where all modes of a layer are
+_NEVER_NEGATIVE = 1e-14  # of the largest square of a rate: a real one below is rounding
 _RESONANCE = 1e-7  # of sigma_t*^2: a beam this near to a mode's rate is moved by ten times that
 
 
@@ -21,7 +26,7 @@ class Modes:
     Parameters
     ----------
     rate : (n,) [1/mm]
-        Their real parts are positive.
+        Their real parts are positive; of a pair, the one with the positive imaginary part is first.
     along, against : (n, n)
         Columns: the radiance of a mode on the side to which it decays, and on the other one.
     beam_along, beam_against : (n,)
@@ -29,8 +34,8 @@ class Modes:
     """
 
     rate: ComplexArray
-    along: ComplexArray
-    against: ComplexArray
+    along: FloatArray
+    against: FloatArray
     beam_along: FloatArray
     beam_against: FloatArray
 
@@ -45,9 +50,10 @@ def modes_of(medium: Medium, k: float, azimuth: Azimuth) -> Modes:
     a_v = _streaming_and_collision(medium, medium.odd, k, azimuth)
     product = a_v @ a_u
     squares, x = np.linalg.eig(product)
-    is_real = not np.iscomplexobj(squares) and float(squares.min()) > 0.0
-    rate = np.sqrt(squares if is_real else squares.astype(complex))
-    y = (a_u @ x) / rate
+    rate = np.sqrt(_positive(squares))
+    if np.iscomplexobj(x):
+        x = np.where(squares.imag < 0.0, -x.imag, x.real)
+    y = times(a_u @ x, 1.0 / rate)
     sigma = medium.sigma_t
     if float(np.abs(squares - sigma**2).min()) < _RESONANCE * sigma**2:
         sigma *= 1.0 + 10.0 * _RESONANCE
@@ -56,6 +62,23 @@ def modes_of(medium: Medium, k: float, azimuth: Azimuth) -> Modes:
     u = np.linalg.solve(shifted, a_v @ both + sigma * difference)
     v = (a_u @ u - both) / sigma
     return Modes(rate, 0.5 * (x + y), 0.5 * (x - y), 0.5 * (u + v), 0.5 * (u - v))
+
+
+def times(columns: FloatArray, factor: ComplexArray) -> FloatArray:
+    """Return modes, as columns (m, n), times a factor each (n,), conjugate ones for a pair."""
+    if not np.iscomplexobj(factor):
+        return np.asarray(columns * factor, np.float64)
+    partner = np.arange(factor.size)
+    partner[factor.imag != 0.0] = partner[factor.imag != 0.0].reshape(-1, 2)[:, ::-1].ravel()
+    found: FloatArray = columns * factor.real - columns[:, partner] * factor.imag
+    return found
+
+
+def _positive(squares: ComplexArray) -> ComplexArray:
+    """Return squares of rates, the real ones of which are positive."""
+    least = _NEVER_NEGATIVE * np.abs(squares).max()
+    found: ComplexArray = np.where((squares.imag == 0.0) & (squares.real < least), least, squares)
+    return found
 
 
 def _streaming_and_collision(

@@ -14,12 +14,12 @@ from scipy.interpolate import CubicSpline
 
 from sssfit.arrays import FloatArray
 from sssfit.simulate.stack.assembly import Assembly
+from sssfit.simulate.stack.changes import Changes, ready
 from sssfit.simulate.stack.quarter import Each, Quarter, without_rounding
 from sssfit.simulate.stack.sampling import Family, Sampler
 from sssfit.simulate.stack.single import single_cumulative
-from sssfit.simulate.stack.transform import Wavenumbers, refined
+from sssfit.simulate.stack.transform import Wavenumbers
 
-_HIGHEST = 20.0  # largest wavenumber, in the largest extinctions; F is off by 9e-5 with 10
 _MISS = 0.1  # of the tolerance, between two wavenumbers; F is then off by less
 _FEW_RADII, _PER_DECADE = 120, 40  # more radii than this are interpolated: 1e-7 of F
 
@@ -133,41 +133,21 @@ def steps(
         Maps a function over wavenumbers, with threads.
     """
     coarse: list[Answer] | None = None
-    waves: Wavenumbers | None = None
+    changes: Changes | None = None
     miss = tolerance * _MISS
     for before, count in pairwise(counts):
-        sampler = _ready(family, count, quarter.count)
-        waves = _refined(sampler, miss, each) if waves is None else _same(sampler, waves, each)
-        few = waves.halved()
-        fine, halved = (_answers(sampler, of, radii, specular) for of in (waves, few))
+        sampler = ready(family, count, quarter.count)
+        changes = changes or Changes(family, counts[0], sampler, miss, each)
+        fine, halved = (_answers(sampler, of, radii, specular) for of in changes.whole(sampler))
         if coarse is None:
-            first = _ready(family, before, quarter.count)
-            coarse = _answers(first, _same(first, few, each), radii, specular)
+            first = ready(family, before, quarter.count)
+            coarse = _answers(first, changes.halved(first), radii, specular)
         fours = zip(fine, halved, coarse, quarter.errors, strict=True)
         step = Step(count, fine, [_errors(*four) for four in fours])
         yield step
         if step.spline_share > 0.5 * tolerance:
-            waves, miss = None, 0.1 * miss
+            changes, miss = None, 0.1 * miss
         coarse = halved
-
-
-def _ready(family: Family, count: int, azimuths: int) -> Sampler:
-    """Return a sampler whose stacks are made before several threads ask for them."""
-    sampler = Sampler(family, count, azimuths)
-    sampler.assemblies  # noqa: B018
-    return sampler
-
-
-def _same(sampler: Sampler, waves: Wavenumbers, each: Each) -> Wavenumbers:
-    """Return the transforms on the wavenumbers of others."""
-    return Wavenumbers(waves.k, each(sampler.at, waves.k), waves.bend)
-
-
-def _refined(sampler: Sampler, miss: float, each: Each) -> Wavenumbers:
-    """Return the transforms on wavenumbers that are close enough."""
-    family = sampler.family
-    most, careful = _HIGHEST * sampler.most_sigma_t, 2.0 / family.longest
-    return refined(lambda k: each(sampler.at, k), family.least_wavenumber, most, miss, careful)
 
 
 def _answers(

@@ -18,6 +18,7 @@ _GROWTH = 1.15  # of panels in k near 0
 _PANEL = 6.0  # largest width of a panel, in 1 / r: 8 nodes give J1 to 1e-9 on it
 _NODES = 8
 _LEAST_RATIO = 1.04  # of two wavenumbers with another in between
+_SAME = 1e-6  # share by which two wavenumbers may differ and count as one
 _FAR = 30.0  # from here on, the asymptotic series of the tail's integral is used
 
 
@@ -40,6 +41,12 @@ class Wavenumbers:
         """Return the same from every other wavenumber, and the two ends, to judge the spline."""
         kept = np.unique(np.append(np.arange(0, self.k.size, 2), self.k.size - 1))
         return Wavenumbers(self.k[kept], self.values[kept], self.bend)
+
+    def plus(self, others: "Wavenumbers") -> "Wavenumbers":
+        """Return the sum of two, on the wavenumbers of both; their ends are the same."""
+        k = np.union1d(self.k, others.k)
+        k = k[np.append(True, np.diff(k) > _SAME * k[1:])]
+        return Wavenumbers(k, self(k) + others(k), self.bend)
 
     def cumulative(self, radii: FloatArray) -> FloatArray:
         """Return F at radii above 0, (n, C)."""
