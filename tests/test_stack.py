@@ -326,6 +326,15 @@ def test_a_thousand_layers_are_refused_with_the_memory_they_take():
         simulate_exact(many, threads=2)
 
 
+def test_hundreds_of_layers_to_a_millionth_are_refused_at_once():
+    many = stack(*[layer(0.1, 3.0, 0.5, 1.4, 0.01)] * 400)
+    never = lambda: pytest.fail("it began to solve")  # noqa: E731
+    with pytest.raises(SimulationError, match=r"400 layers.*1e-06.*minutes.*montecarlo"):
+        simulate_exact(many, tolerance=1e-6, threads=1, stop=never)
+    channels = [limits.Channel("skin", each, 0.0, np.array([0.0, 1.0])) for each in stacks_of(many)]
+    limits.check_time(channels, 16, 1e-4)
+
+
 def test_directions_stop_where_memory_does(monkeypatch):
     skin = stack(layer(0.5, 20.0, 0.8, 1.45, 0.1), layer(0.1, 10.0, 0.8, 1.38))
     channels = [limits.Channel("skin", stacks_of(skin)[0], 0.0, np.array([0.0, 1.0]))]

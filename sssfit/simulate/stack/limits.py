@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError
+from sssfit.simulate.stack.azimuth import FEWEST
 from sssfit.simulate.stack.nodes import Nodes
 from sssfit.simulate.stack.quarter import AZIMUTHS, Quarter
 from sssfit.simulate.stack.slabs import SlabStack
@@ -13,6 +14,9 @@ from sssfit.simulate.stack.solution import Step
 
 _LEAST_TOLERANCE = 1e-6  # 40 directions reach 5e-8 of a half space and 1e-6 of most stacks
 _MOST_BYTES = 2_000_000_000  # of matrices at once
+_MOST_SECONDS = 600.0  # of one processor, for the first number of directions
+_SECONDS = 2.1e-9  # of a layer at one wavenumber, for each cube of an unknown; measured
+_WAVENUMBERS = 70.0  # at a tolerance of 1e-4; a spline's error goes with the fourth power
 _MATRICES = 6  # complex ones for each layer of a stack, and the modes of each
 
 
@@ -77,6 +81,24 @@ def check_tolerance(channels: Sequence[Channel], tolerance: float) -> None:
         raise SimulationError(
             f"{channels[0].name}: the tolerance of {tolerance:g} cannot be met by the solver for "
             f"layers; give {_LEAST_TOLERANCE:g} or more, or use the method montecarlo."
+        )
+
+
+def check_time(channels: Sequence[Channel], count: int, tolerance: float) -> None:
+    """Raise an error for stacks of many layers to a small tolerance, before an hour is spent."""
+    unknowns = [
+        2 * FEWEST * Nodes.of(each.stack.indices, count).invariant.size for each in channels
+    ]
+    layers = [len(each.stack.slabs) for each in channels]
+    cubes = sum(n * size**3 for n, size in zip(layers, unknowns, strict=True))
+    seconds = _SECONDS * cubes * _WAVENUMBERS * (1e-4 / tolerance) ** 0.25
+    if seconds > _MOST_SECONDS:
+        most = max(layers)
+        raise SimulationError(
+            f"{channels[layers.index(most)].name} has {most} layers, which to a tolerance of "
+            f"{tolerance:g} would take over {seconds / 60.0:.0f} minutes of a processor, more than "
+            f"{_MOST_SECONDS / 60.0:g}; merge layers, give a larger tolerance, or use the method "
+            "montecarlo."
         )
 
 

@@ -21,6 +21,7 @@ from sssfit.simulate.stack.limits import (
     azimuths_cannot,
     cannot_meet,
     check_memory,
+    check_time,
     check_tolerance,
     fits,
 )
@@ -121,6 +122,7 @@ def _solve_family(
     check_tolerance(channels, tolerance)
     for count in counts[:2]:
         check_memory(channels, count, FEWEST, threads)
+    check_time(channels, counts[1], tolerance)
     family = Family(tuple(channel.stack for channel in channels))
     radii, specular = ([getattr(each, key) for each in channels] for key in ("radii", "specular"))
     radii = [each[1:] for each in radii]
