@@ -1,4 +1,4 @@
-"""Work that tests share: solutions of the exact solver, lit heads, and fits of candidates.
+"""Work that tests share: solutions of the exact solvers, lit heads, and fits of candidates.
 
 All depend on their arguments alone and cannot be changed. What one worker made, the others read
 from a folder of this run, which no other run reads: nothing of older sources can pass a test.
@@ -26,10 +26,12 @@ import sssfit.fit._spectrum
 import sssfit.fit.cascade
 import sssfit.scene.head
 import sssfit.simulate.half_space
+import sssfit.simulate.stack
 
 OWN = {
     *("test_deterministic", "test_exact", "test_head", "test_head_through", "test_interrupts"),
-    *("test_memory_order", "test_processes", "test_runner"),
+    *("test_layered_materials", "test_memory_order", "test_processes", "test_runner"),
+    *("test_slabs", "test_stack", "test_stack_walk", "test_sweep", "test_sweep_cluster"),
 }
 _OWN_FITS = {"test_approved"}  # its clock counts how often it is asked, fits included
 # What these ask is how good a cascade is. The others, approvals among them, fit dozens, and one
@@ -92,12 +94,14 @@ def alone():
 
 
 def begin():
-    """Put all three in front of the real functions, unless they are."""
+    """Put what is shared in front of the real functions, unless it is."""
     if _state["begun"]:
         return
     _state["begun"] = True
     solver, head, fits = sssfit.simulate.half_space, sssfit.scene.head, sssfit.compare.candidates
     solver._solve = _solved_once(solver._solve)
+    stack = sssfit.simulate.stack
+    stack.solve_stacks = _layers_once(stack.solve_stacks)
     head.head_scene = _lit_once(head.head_scene)
     fits.fit_separable = _fitted_once(fits.fit_separable)
     fits.fit_taps = _fitted_once(fits.fit_taps)
@@ -148,6 +152,23 @@ def _solved_once(real):
         return list(_once(known, key, lambda: real(eta, channels, level, workers)))
 
     return solve
+
+
+def _layers_once(real):
+    """A plate takes 13 s, and charts, choices, budgets and comparisons of it all need it."""
+    known = {}
+
+    @functools.wraps(real)
+    def solve_stacks(materials, grids, tolerance, pool, threads, *, reduced=None, stop=None):
+        def solve():
+            return real(materials, grids, tolerance, pool, threads, reduced=reduced, stop=stop)
+
+        if not materials or not _state["allowed"] or (stop is not None and stop()):
+            return solve()
+        given = pickle.dumps((list(materials), list(grids), list(reduced or ())))
+        return list(_once(known, ("layers", tolerance, given), solve))
+
+    return solve_stacks
 
 
 def _lit_once(real):

@@ -361,7 +361,10 @@ def costs(name, distances_mm, tolerance, rows):
         yield found.chosen.fetches if found.chosen else 0
 
 
-@pytest.mark.parametrize("name", ["skin1", "marble", "ketchup"])
+@pytest.mark.parametrize(
+    "name",
+    ["skin1", *(pytest.param(each, marks=pytest.mark.slow) for each in ("marble", "ketchup"))],
+)
 def test_cost_never_rises_with_distance(name, monkeypatch):
     quick(monkeypatch)
     distances = np.geomspace(100.0, 50_000.0, 5)

@@ -10,6 +10,7 @@ from test_disk import disk_of
 from test_shaders import PITCH, PLAIN, RUN, apart, light_of, rendered
 from test_taps import taps_of
 from test_turned import turned
+from turns import in_turn
 
 from sssfit.errors import KernelError
 from sssfit.export import DIALECTS, kernel_text, source
@@ -43,16 +44,14 @@ def test_they_show_what_the_renderer_shows(structure, dialect):
     assert apart(run_compute(text, dialect, [taps], light, PITCH), rendered(light, taps)) < 1e-5
 
 
-@pytest.mark.parametrize("dialect", RUN)
-@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize(("size", "dialect"), in_turn([(each,) for each in SIZES], RUN))
 def test_pictures_of_any_size_are_halved_alike(size, dialect):
     taps, light = taps_of("1-2|3|2", channels=3), light_of(size, 3)
     text = source([taps], DIALECTS[dialect], COMPUTE)
     assert apart(run_compute(text, dialect, [taps], light, PITCH), rendered(light, taps)) < 1e-5
 
 
-@pytest.mark.parametrize("dialect", RUN)
-@pytest.mark.parametrize("name", ["disk", "edge", "head"])
+@pytest.mark.parametrize(("name", "dialect"), in_turn(["disk", "edge", "head"], RUN))
 def test_scenes(name, dialect):
     scene = make_scene(name, height=95, width=97, mm_per_pixel=PITCH)
     taps = taps_of("1-1|2-2|2-2", channels=3)

@@ -372,16 +372,23 @@ def test_figures_of_the_edits():
     assert made["editing_rows"](compute_editing()) in page, "run: python docs/make_sheets.py"
 
 
-def test_a_choice_from_far_and_one_from_near():
+@pytest.mark.parametrize(
+    ("name", "metres", "column"),
+    [
+        ("skin1", 20.0, 1),
+        pytest.param("ketchup", 20.0, 2, marks=pytest.mark.slow),
+        pytest.param("skin1", 5.0, 3, marks=pytest.mark.slow),
+    ],
+)
+def test_choices_by_distance(name, metres, column):
     made = runpy.run_path(str(ROOT / "docs" / "make_choices.py"))
     rows = {row[0]: row[1:] for row in table_with("how-to-choose.md", "", "mm per pixel")}
     expected = {f"{name}, {each:g} m" for name in made["MATERIALS"] for each in made["DISTANCES_M"]}
     assert set(rows) == expected
     asked = list(made["ASKED"].values())
-    for name, metres, column in (("skin1", 20.0, 1), ("ketchup", 20.0, 2), ("skin1", 5.0, 3)):
-        pitch = mm_per_pixel_at(1000.0 * metres, 30.0, 1080)
-        view = {"mm_per_pixel": pitch, "distance_mm": 1000.0 * metres}
-        found = made["words"](load_material(name), view, asked[column - 1])
-        assert rows[f"{name}, {metres:g} m"][column] == found.replace("\\|", "|"), (
-            "run: python docs/make_choices.py"
-        )
+    pitch = mm_per_pixel_at(1000.0 * metres, 30.0, 1080)
+    view = {"mm_per_pixel": pitch, "distance_mm": 1000.0 * metres}
+    found = made["words"](load_material(name), view, asked[column - 1])
+    assert rows[f"{name}, {metres:g} m"][column] == found.replace("\\|", "|"), (
+        "run: python docs/make_choices.py"
+    )

@@ -132,7 +132,7 @@ def test_decay_is_the_exponential_and_never_above_one():
 @pytest.mark.parametrize("g", [-0.99, -0.9, -0.5, -0.01, 0.0, 0.3, 0.8, 0.9, 0.99, 0.9999])
 def test_sampled_directions_follow_henyey_greenstein(g):
     back, uz = np.float32(1.0 - g), np.float32(0.3)
-    drawn = uniforms(400_000)
+    drawn = uniforms(100_000)
     pairs = np.array([layered_lanes.deflection(back, np.float32(u), uz) for u in drawn], float)
     less = pairs[:, 0]  # 1 - cosine
     np.testing.assert_allclose(pairs[:, 1], 1.0 / 1.3, rtol=3e-7)

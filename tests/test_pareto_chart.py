@@ -7,6 +7,7 @@ import io
 import numpy as np
 import pytest
 from figures import assert_legible, drawn_texts, words_of
+from turns import in_turn
 
 from sssfit.chart.page import lay_out, new_page, save_figure
 from sssfit.chart.pareto import pareto_figure, place_labels
@@ -49,8 +50,7 @@ def with_rows(comparison, change):
     return dataclasses.replace(comparison, rows=tuple(map(change, comparison.rows)))
 
 
-@pytest.mark.parametrize("error", ERRORS)
-@pytest.mark.parametrize("cost", COSTS)
+@pytest.mark.parametrize(("cost", "error"), in_turn(COSTS, ERRORS))
 def test_every_chart_is_legible(drawn, error, cost):
     assert_legible(lambda: drawn(error=error, cost=cost))
 

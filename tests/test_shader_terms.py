@@ -1,9 +1,12 @@
 """Exported passes of several separable terms, on a software driver against the renderer."""
 
+import itertools
+
 import numpy as np
 import pytest
 from shader_runs import run
 from test_shaders import PITCH, RUN, TABLES, apart, disk_mask, light_of, rendered
+from turns import in_turn
 
 from sssfit.export import DIALECTS, Style, kernel_text, source
 from sssfit.export.dense import taps_of_kernel
@@ -21,9 +24,9 @@ def skin1():
     return simulate_dipole(load_material("skin1"))
 
 
-@pytest.mark.parametrize("dialect", RUN)
-@pytest.mark.parametrize("rank", [2, 3])
-@pytest.mark.parametrize("thinned", [False, True])
+@pytest.mark.parametrize(
+    ("rank", "thinned", "dialect"), in_turn(itertools.product([2, 3], [False, True]), RUN)
+)
 def test_ranks_of_svd_show_what_the_renderer_shows(skin1, rank, thinned, dialect):
     """Terms of a fit share their first pass; dense, 31 weights a pass, and on 9 taps."""
     kernel = fit_svd(skin1, rank=rank, mm_per_pixel=PITCH, support_mm=4.5).kernel
@@ -39,9 +42,10 @@ def test_ranks_of_svd_show_what_the_renderer_shows(skin1, rank, thinned, dialect
     assert apart(run(text, dialect, taps, light, PITCH), wanted) < 1e-5
 
 
-@pytest.mark.parametrize("dialect", RUN)
-@pytest.mark.parametrize("feature", ["COVERAGE", "DEPTH"])
-@pytest.mark.parametrize("name", ["*|1-*|*", "three terms"])
+@pytest.mark.parametrize(
+    ("name", "feature", "dialect"),
+    in_turn(itertools.product(["*|1-*|*", "three terms"], ["COVERAGE", "DEPTH"]), RUN),
+)
 def test_alpha_of_the_result_is_the_coverage(name, feature, dialect):
     """Terms are added to a target that holds the coverage since the first."""
     taps = dict(TABLES)[name]

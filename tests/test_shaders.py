@@ -16,6 +16,7 @@ from test_disk import disk_of
 from test_export import small_kernel
 from test_taps import signed_taps, taps_of
 from test_turned import turned
+from turns import in_turn
 
 from sssfit.errors import KernelError
 from sssfit.export import DIALECTS, Style, kernel_text, source
@@ -77,24 +78,21 @@ def test_the_passes_have_the_fetches_of_the_table(name, taps):
     assert passes[-1].writes == ("M0",)
 
 
-@pytest.mark.parametrize("dialect", RUN)
-@pytest.mark.parametrize(("name", "taps"), TABLES)
+@pytest.mark.parametrize(("name", "taps", "dialect"), in_turn(TABLES, RUN))
 def test_they_show_what_the_renderer_shows(name, taps, dialect):
     light = light_of((37, 50), len(taps.channels))
     found = run(source([taps], DIALECTS[dialect], PLAIN), dialect, taps, light, PITCH)
     assert apart(found, rendered(light, taps)) < 1e-5, name
 
 
-@pytest.mark.parametrize("dialect", RUN)
-@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize(("size", "dialect"), in_turn([(each,) for each in SIZES], RUN))
 def test_pictures_of_any_size_are_halved_alike(size, dialect):
     taps, light = taps_of("1-2|3|2", channels=3), light_of(size, 3)
     found = run(source([taps], DIALECTS[dialect], PLAIN), dialect, taps, light, PITCH)
     assert apart(found, rendered(light, taps)) < 1e-5
 
 
-@pytest.mark.parametrize("dialect", RUN)
-@pytest.mark.parametrize("name", ["disk", "edge", "head"])
+@pytest.mark.parametrize(("name", "dialect"), in_turn(["disk", "edge", "head"], RUN))
 def test_scenes(name, dialect):
     scene = make_scene(name, height=96, width=96, mm_per_pixel=PITCH)
     taps = taps_of("1-1|2-2|2-2", channels=3)
@@ -117,14 +115,16 @@ def terms_of_one_pass():
     return replace(taps, stages=(one, replace(other, offsets_mm=one.offsets_mm)))
 
 
-@pytest.mark.parametrize("dialect", RUN)
 @pytest.mark.parametrize(
-    "taps",
-    [
-        *(taps_of(each, channels=3) for each in ("1", "1-2|3|2", "*|1-*|*")),
-        taps_of("2-1", channels=3, chained=False),
-        terms_of_one_pass(),
-    ],
+    ("taps", "dialect"),
+    in_turn(
+        [
+            *(taps_of(each, channels=3) for each in ("1", "1-2|3|2", "*|1-*|*")),
+            taps_of("2-1", channels=3, chained=False),
+            terms_of_one_pass(),
+        ],
+        RUN,
+    ),
 )
 def test_light_stays_within_a_mask(taps, dialect):
     light = light_of((45, 50), 3)
@@ -183,8 +183,7 @@ def step_of():
     return Scene("step", rng.random((45, 50, 1)), PITCH, **more)
 
 
-@pytest.mark.parametrize("dialect", RUN)
-@pytest.mark.parametrize(("name", "taps"), FOLLOWED)
+@pytest.mark.parametrize(("name", "taps", "dialect"), in_turn(FOLLOWED, RUN))
 def test_depth_is_followed_as_in_the_renderer(name, taps, dialect):
     assert apart(*on_screen(step_of(), taps, dialect)) < 1e-5, name
     head = make_scene("head", height=96, width=96, mm_per_pixel=PITCH)
@@ -197,8 +196,7 @@ def widened(taps, by):
     return replace(taps, mm_per_pixel=by * taps.mm_per_pixel, stages=tuple(stages))
 
 
-@pytest.mark.parametrize("dialect", RUN)
-@pytest.mark.parametrize(("name", "taps"), FOLLOWED)
+@pytest.mark.parametrize(("name", "taps", "dialect"), in_turn(FOLLOWED, RUN))
 def test_depth_of_a_whole_head(name, taps, dialect):
     """At 96 x 96 pixels a silhouette falls by 10 mm a pixel, many deviations of a stage.
 
@@ -306,8 +304,7 @@ MOVED = [  # one of each kind of pass, with stars beside them
 ]
 
 
-@pytest.mark.parametrize("dialect", RUN)
-@pytest.mark.parametrize(("name", "taps"), MOVED)
+@pytest.mark.parametrize(("name", "taps", "dialect"), in_turn(MOVED, RUN))
 def test_jittered_taps_lie_where_the_renderer_puts_them(name, taps, dialect):
     light, text = light_of((37, 50), 3), source([taps], DIALECTS[dialect], JITTERED)
     seen = []
@@ -401,14 +398,16 @@ def along_axes(taps, right_mm, down_mm):
     return replace(taps, stages=tuple(stages), blend=np.array(blend))
 
 
-@pytest.mark.parametrize("dialect", RUN)
 @pytest.mark.parametrize("mm", [(STEEP, PITCH), (PITCH, STEEP)])
 @pytest.mark.parametrize(
-    "taps",
-    [
-        *(taps_of(each, channels=3) for each in ("3", "1-1|1-2|2-2")),
-        turned("1-1|1-2", ["@45", "@135", "x30", ""], channels=3),
-    ],
+    ("taps", "dialect"),
+    in_turn(
+        [
+            *(taps_of(each, channels=3) for each in ("3", "1-1|1-2|2-2")),
+            turned("1-1|1-2", ["@45", "@135", "x30", ""], channels=3),
+        ],
+        RUN,
+    ),
 )
 def test_a_plane_tilted_by_60_degrees(taps, mm, dialect):
     """Offsets along either axis in mm of the surface, as passes of their own in the renderer."""

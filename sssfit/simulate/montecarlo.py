@@ -10,6 +10,7 @@ Standard errors come from squared weights: a photon leaves through one annulus a
 weights w the energy of an annulus is sum(w)/N and its variance (sum(w^2)/N - energy^2)/(N - 1).
 """
 
+import contextlib
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -36,6 +37,7 @@ from sssfit.simulate._run import EndCondition, Progress, run
 from sssfit.simulate._walks import (
     LayeredWalk,
     SemiInfiniteWalk,
+    Sums,
     Walk,
     note_compiling,
     relative_errors,
@@ -45,6 +47,7 @@ from sssfit.simulate._walks import (
 # With fewer, a channel may have a handful of hits, and its error estimate is unreliable.
 HONEST_PHOTONS = 1000
 PILOT_PHOTONS = 200_000
+PILOT_DOUBLINGS = 3  # of the radius, which one pilot walk sees
 # Beyond these, single precision does not resolve the peak (see ``sample_hg``, which is made for a
 # forward one).
 MIN_G, MAX_G = -0.99, 0.9999
@@ -307,24 +310,43 @@ def _auto_grids(
     """Double each material's radius until a pilot walk loses half the allowed share or less.
 
     Half, so that the run itself, whose first photons are those of the pilot, stays under the share.
-    The excess of the doubling is trimmed off the result.
+    The excess of the doubling is trimmed off the result. One pilot sees three doublings at once:
+    for cream, which needs four, each walk of 3 s was made anew.
     """
     grids = [make_grid(each, dr_mm=dr_mm) for each in materials]
     while True:
-        task = make_walk(materials, grids, seed, PILOT_PHOTONS)
+        tried = [_doubled(*each) for each in zip(materials, grids, strict=True)]
+        task = make_walk(materials, [each[-1] for each in tried], seed, PILOT_PHOTONS)
         tally = run(task, threads, stop=stop)
         if tally.photons < 2:
             raise StoppedError("stopped before a single batch of photons was done.")
-        wide = [
-            np.max(share_beyond(task.sums(tally, k))[-1]) < AUTO_BEYOND / 2
-            for k in range(len(materials))
-        ]
-        if all(wide):
-            return grids
+        found = [_wide_enough(task.sums(tally, k), each) for k, each in enumerate(tried)]
+        wide = [grid for grid in found if grid is not None]
+        if len(wide) == len(found):
+            return wide
         grids = [
-            grid if done else make_grid(each, dr_mm=grid.dr_mm, radius_mm=2.0 * grid.radius_mm)
-            for each, grid, done in zip(materials, grids, wide, strict=True)
+            grid or _twice_as_wide(material, each[-1])
+            for material, each, grid in zip(materials, tried, found, strict=True)
         ]
+
+
+def _doubled(material: Material, grid: RadialGrid) -> list[RadialGrid]:
+    """Return the grid and its doublings, as many as a grid can have annuli for."""
+    grids = [grid]
+    with contextlib.suppress(SimulationError):
+        while len(grids) <= PILOT_DOUBLINGS:
+            grids.append(_twice_as_wide(material, grids[-1]))
+    return grids
+
+
+def _twice_as_wide(material: Material, grid: RadialGrid) -> RadialGrid:
+    return make_grid(material, dr_mm=grid.dr_mm, radius_mm=2.0 * grid.radius_mm)
+
+
+def _wide_enough(sums: Sums, grids: Sequence[RadialGrid]) -> RadialGrid | None:
+    """Return the first grid beyond which little of the light of a walk on the last one lies."""
+    lost = np.max(share_beyond(sums), axis=1)
+    return next((each for each in grids if lost[each.annuli - 1] < AUTO_BEYOND / 2), None)
 
 
 def _warn_target(ending: EndCondition, photons: int, error: float) -> None:
