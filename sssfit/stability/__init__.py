@@ -3,6 +3,7 @@
 `stability` runs the stresses of ``sssfit.methods.STRESSES`` on a material; a new one is one file
 with a function from a `Subject` to panels, and one entry there. What its ``KERNELS`` names is
 fitted beforehand, with those of the other stresses, so that no worker waits for another's search.
+What its ``check`` refuses is refused before a worker starts or a kernel is fitted.
 """
 
 import contextlib
@@ -12,7 +13,7 @@ import math
 import warnings
 from collections.abc import Callable, Collection, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from sssfit.errors import ArgumentError, FitError, SssfitWarning
 from sssfit.files import has_mark
@@ -26,11 +27,13 @@ from sssfit.stability.panel import Finding, Panel
 from sssfit.stability.record import MARK, Stability
 
 if TYPE_CHECKING:
+    from sssfit.stability.subject import Subject
     from sssfit.stability.ways import Way
 
 __all__ = ["Curve", "Edge", "Finding", "Panel", "Stability", "is_stability_table", "stability"]
 
 _Step = Callable[[int, int, str], None]
+_Stress = Callable[[Any], list[Panel]]
 
 
 def stability(
@@ -89,17 +92,17 @@ def stability(
     profile = source if isinstance(source, Profile) else simulate_exact(source)
     name = profile.material_name or "unknown"
     subject = Subject(name, profile, mm_per_pixel, seed, threads, is_whole)
+    loaded = {each: STRESSES[each].load() for each in names}
+    stresses, notes = _possible(loaded, subject, is_named=only is not None)
     panels: list[Panel] = []
-    notes: list[str] = []
     with warnings.catch_warnings(), one_blas_thread(), contextlib.ExitStack() as ends:
         warnings.simplefilter("ignore", SssfitWarning)  # what fits warn of is what a stress finds
         if (count := thread_count(threads)) > 1:
             workers = ends.enter_context(Workers(count, subject))
             subject = dataclasses.replace(subject, workers=workers)
-        stresses = {each: STRESSES[each].load() for each in names}
         for k, (each, stress) in enumerate(stresses.items()):
             if progress is not None:
-                progress(k, len(names), each)
+                progress(k, len(stresses), each)
             if k == 0:
                 subject.prepare(_kernels(stresses.values()))
             try:
@@ -109,6 +112,28 @@ def stability(
                     raise
                 notes.append(f"Left out {each}: {error}")
     return Stability(name, mm_per_pixel, tuple(panels), tuple(notes), seed)
+
+
+def _possible(
+    stresses: "dict[str, _Stress]", subject: "Subject", *, is_named: bool
+) -> "tuple[dict[str, _Stress], list[str]]":
+    """Return the stresses that the subject allows, and a note on each of the others.
+
+    Raises FitError where stresses were named and one of them is not possible.
+    """
+    possible, notes = {}, []
+    for name, stress in stresses.items():
+        check = getattr(importlib.import_module(stress.__module__), "check", None)
+        try:
+            if check is not None:
+                check(subject)
+        except FitError as error:
+            if is_named:
+                raise
+            notes.append(f"Left out {name}: {error}")
+        else:
+            possible[name] = stress
+    return possible, notes
 
 
 def _kernels(stresses: Iterable[Callable[..., object]]) -> "list[Way]":

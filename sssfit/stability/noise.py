@@ -48,19 +48,19 @@ _ADVICE = {
 }
 
 
+def check(subject: Subject) -> None:
+    """Raise FitError if the profile's material is unknown, so that nothing can be walked."""
+    if subject.material is None:
+        raise FitError("noise: the profile does not say its material; give the material.")
+
+
 def stress(subject: Subject) -> list[Panel]:
     """Fit walks of 1e3 to 1e7 photons with every method, 16 seeds each.
 
     Unless all is whole, profiles of 1e7 photons have the noise of 1e6, and cascades start at that
     of the exact profile, with 1e3, 1e4 and 1e5 photons.
 
-    Raises
-    ------
-    FitError
-        The profile's material is unknown, and nothing can be walked.
     """
-    if subject.material is None:
-        raise FitError("noise: the profile does not say its material; give the material.")
     photons = [10**each for each in range(_FIRST, _LAST + 1)]
     cases = [_Case(each.label, each, _wanted(subject, each)) for each in WAYS]
     cases += [

@@ -29,18 +29,14 @@ _FLOOR = 0.01  # Delta E, which no eye and no display shows
 _ADVICE = "larger pixels near by, or a profile with finer annuli; nothing to blur far away"
 
 
-def stress(subject: Subject) -> list[Panel]:
-    """Fit and show the profile on pixels of .001 to 10 mean free paths.
+def check(subject: Subject) -> None:
+    """Raise FitError if the profile's mean free path is unknown."""
+    _least_path_mm(subject)
 
-    Raises
-    ------
-    FitError
-        The profile's mean free path is unknown.
-    """
-    paths_mm = mean_free_paths_mm(subject.profile)
-    if paths_mm is None:
-        raise FitError("pixel-size: the profile does not say its mean free path.")
-    path_mm = float(paths_mm.min())
+
+def stress(subject: Subject) -> list[Panel]:
+    """Fit and show the profile on pixels of .001 to 10 mean free paths."""
+    path_mm = _least_path_mm(subject)
     slow = [each for each in WAYS if each.method in TAPS]
     quick = [each for each in WAYS if each.method not in TAPS]
     own = {each.label: _own_error(subject, each) for each in WAYS}
@@ -64,6 +60,13 @@ def stress(subject: Subject) -> list[Panel]:
             fails="points of light spread or sharpen",
         )
     ]
+
+
+def _least_path_mm(subject: Subject) -> float:
+    paths_mm = mean_free_paths_mm(subject.profile)
+    if paths_mm is None:
+        raise FitError("pixel-size: the profile does not say its mean free path.")
+    return float(paths_mm.min())
 
 
 def _sizes(subject: Subject, way: Way, start: float) -> list[float]:
