@@ -76,18 +76,22 @@ class Browser:
             time.sleep(0.02)
 
     def set(self, id_, value):
-        """Give a control a value by the keyboard, from its first option or its least value on."""
+        """Give a control a value by the keyboard, by as few keys as there are steps to it."""
         from selenium.webdriver import Keys
 
         control = self.driver.find_element("id", id_)
         if control.tag_name == "select":
             options = self.js("return [...arguments[0].options].map((at) => at.value)", control)
-            arrow, steps = Keys.ARROW_DOWN, options.index(str(value))
+            steps = options.index(str(value)) - self.js(
+                "return arguments[0].selectedIndex", control
+            )
+            on, back = Keys.ARROW_DOWN, Keys.ARROW_UP
         else:
-            low, step = (float(control.get_attribute(each)) for each in ("min", "step"))
-            arrow, steps = Keys.ARROW_RIGHT, round((value - low) / step)
-        if control.is_enabled():
-            control.send_keys(Keys.HOME, *[arrow] * steps)
+            now, step = (float(control.get_attribute(each)) for each in ("value", "step"))
+            steps = round((value - now) / step)
+            on, back = Keys.ARROW_RIGHT, Keys.ARROW_LEFT
+        if control.is_enabled() and steps:
+            control.send_keys(*[on if steps > 0 else back] * abs(steps))
         self.wait()
 
     def click(self, selector):
