@@ -333,8 +333,8 @@ def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch, whi
 
     verb = import_module("sssfit.cli.compare")
     real = verb.load_source
-    film = "eta = 1.4\ng = 0.97\nsigma_a_per_mm = [0.1, 0.1, 0.1]\n"
-    film += "sigma_s_per_mm = [30, 30, 30]\nthickness_mm = 0.03\n"
+    film = 'channels = ["R"]\neta = 1.4\ng = 0.97\nsigma_a_per_mm = [0.1]\n'
+    film += "sigma_s_per_mm = [30]\nthickness_mm = 0.03\n"
     (tmp_path / "marble.toml").write_text(film)
     # In place of the shipped marble, a film that has too few directions.
     paths = {"marble": "marble.toml"}

@@ -311,7 +311,7 @@ def _auto_grids(
 
     Half, so that the run itself, whose first photons are those of the pilot, stays under the share.
     The excess of the doubling is trimmed off the result. One pilot sees three doublings at once:
-    for cream, which needs four, each walk of 3 s was made anew.
+    cream needs four, and each of them took a pilot of 3 s.
     """
     grids = [make_grid(each, dr_mm=dr_mm) for each in materials]
     while True:
