@@ -1,9 +1,10 @@
 """Profiles of layered materials by the solver for layers."""
 
 import math
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from sssfit.errors import StoppedError
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
 from sssfit.profile import Profile
-from sssfit.simulate._deterministic import computed_profile, energies_from_cumulative
 from sssfit.simulate.stack.azimuth import FEWEST
 from sssfit.simulate.stack.beam import attenuation, beam_of
 from sssfit.simulate.stack.families import families_of
@@ -29,6 +29,7 @@ from sssfit.simulate.stack.quarter import Quarter, quarter_of
 from sssfit.simulate.stack.sampling import Family
 from sssfit.simulate.stack.slabs import stacks_of
 from sssfit.simulate.stack.solution import Answer, Errors, Side, SideErrors, Step, steps
+from sssfit.simulate.stack.solved import Solved, profile_of
 
 COUNTS = (8, 12, 16, 20, 24, 28, 32, 36, 40)
 _QUICK = 2e-3  # a tolerance from which 8 and 12 directions may do
@@ -36,15 +37,6 @@ _MOST_AZIMUTH = 0.5  # of a tolerance that directions in azimuth may take
 _MANY = 9  # directions in azimuth
 _PATIENCE = 10.0  # with few directions in azimuth: their errors differ between polar ones
 _LEAST_GAIN = 2.0  # by which four more directions reduce an error, if it was not more before
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Solved:
-    """The answer for a channel, its errors, and the number of directions that gave it."""
-
-    answer: Answer
-    errors: Errors
-    count: int
 
 
 def solve_stacks(
@@ -78,10 +70,11 @@ def solve_stacks(
     SimulationError
         The tolerance cannot be met, or the matrices do not fit into memory.
     """
+    given_up = threading.Event()
 
     def each(sample: Callable[[float], FloatArray], k: FloatArray) -> FloatArray:
         def one(wavenumber: float) -> FloatArray:
-            if stop is not None and stop():
+            if given_up.is_set() or (stop is not None and stop()):
                 raise StoppedError("stopped before the equation was solved.")
             return sample(wavenumber)
 
@@ -92,21 +85,32 @@ def solve_stacks(
         for material, grid in zip(reduced or materials, grids, strict=True)
         for name, stack in zip(material.channels, stacks_of(material), strict=True)
     ]
-    solved: dict[int, _Solved] = {
+    solved: dict[int, Solved] = {
         number: _beam_only(channel)
         for number, channel in enumerate(channels)
         if not channel.stack.scattering
     }
     others = [number for number in range(len(channels)) if number not in solved]
-    for members in families_of([channels[number].stack for number in others]):
+
+    def of_family(members: list[int]) -> list[tuple[int, Solved]]:
         numbers = [others[member] for member in members]
         own = [channels[number] for number in numbers]
-        solved |= zip(numbers, _solve_family(own, tolerance, threads, each), strict=True)
+        return list(zip(numbers, _solve_family(own, tolerance, threads, each), strict=True))
+
+    # What a family does between its wavenumbers goes on beside those of another: skin, 5.4 s to 4.
+    with ThreadPoolExecutor(threads) as solvers:
+        try:
+            for pairs in solvers.map(of_family, families_of([channels[k].stack for k in others])):
+                solved |= pairs
+        except BaseException:  # an interrupt too: the other families end at their next wavenumber
+            given_up.set()
+            solvers.shutdown(cancel_futures=True)
+            raise
     found, first = [], 0
     for material, solved_for, grid in zip(materials, reduced or materials, grids, strict=True):
         answers = [solved[k] for k in range(first, first + material.n_channels)]
         is_similar = material != solved_for
-        found.append(_profile(material, grid, answers, tolerance, similarity=is_similar))
+        found.append(profile_of(material, grid, answers, tolerance, similarity=is_similar))
         first += material.n_channels
     return found
 
@@ -116,7 +120,7 @@ def _solve_family(
     tolerance: float,
     threads: int,
     each: Callable[[Callable[[float], FloatArray], FloatArray], FloatArray],
-) -> list[_Solved]:
+) -> list[Solved]:
     """Add directions until every channel meets the tolerance."""
     counts: tuple[int, ...] = COUNTS if tolerance >= _QUICK else COUNTS[1:]
     check_tolerance(channels, tolerance)
@@ -140,7 +144,7 @@ def _solve_family(
         check_memory(channels, counts[1], quarter.count, threads)
     step = solution(counts, quarter, 1.0)
     pairs = zip(step.answers, step.errors, strict=True)
-    return [_Solved(*pair, step.count) for pair in pairs]
+    return [Solved(*pair, step.count) for pair in pairs]
 
 
 def _last(
@@ -174,7 +178,7 @@ def _last(
     raise AssertionError("steps end with the last number of directions")
 
 
-def _beam_only(channel: Channel) -> _Solved:
+def _beam_only(channel: Channel) -> Solved:
     """Return the answer where nothing scatters, which the beam alone gives without error."""
     stack, edges = channel.stack, channel.radii[1:]
     sigma_t = [each.sigma_a for each in stack.slabs]
@@ -187,59 +191,4 @@ def _beam_only(channel: Channel) -> _Solved:
     none = SideErrors(np.zeros(edges.size + 1), np.zeros(edges.size + 1), 0.0)
     below = spot(beam.transmitted) if stack.has_bottom else None
     answer = Answer(spot(beam.reflected - channel.specular), below, beam.absorbed(fading))
-    return _Solved(answer, Errors(none, none if stack.has_bottom else None), 0)
-
-
-def _profile(
-    material: Material,
-    grid: RadialGrid,
-    solved: Sequence[_Solved],
-    tolerance: float,
-    *,
-    similarity: bool,
-) -> Profile:
-    """Assemble the answers of a material's channels."""
-    sides = [each.answer.reflected for each in solved]
-    reflected = _energies(sides, tolerance)
-    stderr = np.stack([_stderr(each.errors.reflected) for each in solved], axis=1)
-    below = [each.answer.transmitted for each in solved if each.answer.transmitted is not None]
-    under = [each.errors.transmitted for each in solved if each.errors.transmitted is not None]
-    absorbed = np.maximum([each.answer.absorbed for each in solved], 0.0).T
-    shares = [each.errors.worst / max(each.answer.leaving, 1e-300) for each in solved]
-    totals = material.specular_reflectance + np.array([each.answer.leaving for each in solved])
-    return computed_profile(
-        material,
-        "exact",
-        grid,
-        reflected,
-        stderr=stderr,
-        transmitted=_energies(below, tolerance) if below else None,
-        transmitted_stderr=np.stack([_stderr(each) for each in under], axis=1) if under else None,
-        absorbed=absorbed,
-        relative_error=max(shares),
-        settings={
-            "tolerance": tolerance,
-            "similarity": similarity,
-            "solver": "layer",
-            "directions": max(each.count for each in solved),
-        },
-        energy_balance_stderr=np.abs(totals + absorbed.sum(axis=0) - 1.0).tolist(),
-    )
-
-
-def _energies(sides: Sequence[Side], tolerance: float) -> FloatArray:
-    """Return energies of the annuli and beyond the grid (n + 1, C)."""
-    cumulative = np.stack([np.append(0.0, each.cumulative) for each in sides], axis=1)
-    totals = np.array([each.total for each in sides])
-    return energies_from_cumulative(cumulative, totals, tolerance=tolerance)
-
-
-def _stderr(errors: SideErrors) -> FloatArray:
-    """Return errors of annuli and beyond the grid (n + 1,), whose squares add up to those of F.
-
-    Each is at least the annulus's own, and the sum up to any edge at least F's error there.
-    """
-    largest = np.maximum.accumulate(errors.edges)
-    steps_up = np.diff(np.append(0.0, largest**2))
-    stderr: FloatArray = np.sqrt(np.maximum(steps_up, errors.annuli**2))
-    return stderr
+    return Solved(answer, Errors(none, none if stack.has_bottom else None), 0)
