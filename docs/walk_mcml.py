@@ -2,6 +2,8 @@
 
 Its generator is Knuth's subtractive one with lags 55 and 24, `ran3` of Press et al. 1992,
 "Numerical Recipes in C": each number is the difference of two earlier ones, in single precision.
+
+The scalar walk of tests/reference.py draws in another order, which such a generator's numbers feel.
 """
 
 import math

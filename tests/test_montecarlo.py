@@ -9,6 +9,7 @@ import math
 import subprocess
 import sys
 import warnings
+from unittest import mock
 
 import checks
 import numpy as np
@@ -17,7 +18,7 @@ import reference
 
 from sssfit.errors import SimulationError, SssfitWarning
 from sssfit.material import load_material, material_names
-from sssfit.simulate import simulate_montecarlo, simulate_montecarlo_many
+from sssfit.simulate import montecarlo, simulate_montecarlo, simulate_montecarlo_many
 from sssfit.simulate._finished import AUTO_BEYOND
 from sssfit.simulate._run import run
 from sssfit.simulate._walks import BATCH_PHOTONS, SemiInfiniteWalk, roulette_schedule
@@ -282,6 +283,20 @@ def test_auto_radius_is_the_smallest_that_keeps_the_share(name):
     one_less = profile.beyond_grid + profile.annulus_energy[-1]
     assert np.any(one_less >= AUTO_BEYOND * total)
     assert_energy_conserved(profile)
+
+
+def test_one_pilot_for_several_doublings_finds_the_grids_of_one_for_each(monkeypatch):
+    materials = [load_material(name) for name in ("cream", "wholemilk", "skin1")]
+    monkeypatch.setattr(montecarlo, "PILOT_PHOTONS", 5000)
+    walked = mock.Mock(side_effect=run)
+    monkeypatch.setattr(montecarlo, "run", walked)
+    found, walks = [], []
+    for doublings in (3, 0):
+        monkeypatch.setattr(montecarlo, "PILOT_DOUBLINGS", doublings)
+        found.append(montecarlo._auto_grids(materials, None, 1, 1, None))
+        walks.append(walked.call_count)
+    assert found[0] == found[1]
+    assert 2 * walks[0] < walks[1]
 
 
 def test_auto_radius_does_not_change_the_energies():

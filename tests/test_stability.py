@@ -31,6 +31,7 @@ from sssfit.stability import (
     optics,
     stability,
     taps,
+    workers,
 )
 from sssfit.stability.curve import Axis
 from sssfit.stability.panel import BETWEEN, FROM, NEVER, SAFE, UP_TO
@@ -307,9 +308,17 @@ def test_a_guided_search_that_stays_near_its_start_is_found(profile, monkeypatch
     assert guided._from_start(own, subject, (1.0, 0)) > guided.LIMIT
 
 
-def test_stresses_that_walk_need_a_material(profile):
-    with pytest.raises(FitError, match="noise: the profile does not say its material"):
-        stability(profile, only=["noise"], threads=1)
+@pytest.mark.parametrize(
+    ("stress", "words"), [("noise", "its material"), ("pixel-size", "its mean free path")]
+)
+def test_what_a_profile_lacks_is_said_before_any_work(profile, monkeypatch, stress, words):
+    def begun(*_):
+        pytest.fail("a kernel was fitted, or a worker started")
+
+    monkeypatch.setattr(Subject, "prepare", begun)
+    monkeypatch.setattr(workers, "Workers", begun)
+    with pytest.raises(FitError, match=f"{stress}: the profile does not say {words}"):
+        stability(profile, only=["hard-light", stress], threads=2)
 
 
 @pytest.mark.parametrize(

@@ -14,8 +14,6 @@ from sssfit.sweep.tasks import Done
 # Arrays with a value for each ring are a chunk a point; the others are a chunk for all points of
 # the last axis: 14 chunks a point took 24 ms to write.
 _OF_RINGS = ("r_mm", "channel")
-
-
 _MOST_IN_CHUNK = 256  # points of the last axis
 
 
