@@ -19,7 +19,8 @@ from sssfit.material import Layer, Material, load_material
 from sssfit.simulate import simulate_montecarlo
 from sssfit.simulate._finished import profile_of
 from sssfit.simulate._run import EndCondition, run
-from sssfit.simulate._walks import LayeredWalk, SemiInfiniteWalk
+from sssfit.simulate.walk_half_space import SemiInfiniteWalk
+from sssfit.simulate.walk_layered import LayeredWalk
 
 
 def layer(sigma_a, sigma_s, g=0.0, eta=1.0, thickness=math.inf):

@@ -32,8 +32,8 @@ from sssfit.simulate import (
     simulate_montecarlo,
 )
 from sssfit.simulate._directions import Directions
-from sssfit.simulate._walks import LayeredWalk
 from sssfit.simulate.stack.angles import energies_by_angle
+from sssfit.simulate.walk_layered import LayeredWalk
 
 PHOTONS, BINS = 100_000, 15
 SLAB = STACKS["clear gap inside, backward g"]

@@ -16,8 +16,9 @@ from sssfit.material import load_material
 from sssfit.process import asked_to_stop
 from sssfit.profile import Profile
 from sssfit.simulate import run_figures, simulate_montecarlo
-from sssfit.simulate._walks import BATCH_PHOTONS, SemiInfiniteWalk
+from sssfit.simulate._walks import BATCH_PHOTONS
 from sssfit.simulate.summary import energy_lines
+from sssfit.simulate.walk_half_space import SemiInfiniteWalk
 
 posix = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
 COMMAND = [sys.executable, "-m", "sssfit.cli", "simulate"]

@@ -26,7 +26,7 @@ from sssfit._jit import (
 from sssfit._jit.fused import STRIDE
 from sssfit._jit.sampling import LANES
 from sssfit.grid import RadialGrid
-from sssfit.simulate._walks import LayeredWalk
+from sssfit.simulate.walk_layered import LayeredWalk
 
 LIMIT = checks.LIMIT
 ALPHA = 2.0 * stats.norm.sf(LIMIT)
@@ -420,7 +420,7 @@ import hashlib, sys
 sys.path.insert(0, sys.argv[1])
 from checks_layers import STACKS, layer, stack
 from sssfit.grid import RadialGrid
-from sssfit.simulate._walks import LayeredWalk
+from sssfit.simulate.walk_layered import LayeredWalk
 channels = stack(layer([.02, .3, 1.], 5., .6, 1.4, .4), layer([.5, .1, .3], 3., 0., 1.3))
 digest = hashlib.sha256()
 for material in (*STACKS.values(), channels, stack(layer(.1, 5., .9999, 1.3, 1.))):

@@ -16,7 +16,8 @@ from sssfit.formats.mci import load_mci
 from sssfit.grid import RadialGrid
 from sssfit.simulate import shared_walks, simulate_montecarlo
 from sssfit.simulate._run import run
-from sssfit.simulate._walks import LayeredWalk, channels_with_equal_scattering
+from sssfit.simulate._walks import channels_with_equal_scattering
+from sssfit.simulate.walk_layered import LayeredWalk
 
 DATA = Path(__file__).parent / "data"
 LIMIT = checks.LIMIT

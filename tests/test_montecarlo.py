@@ -21,7 +21,8 @@ from sssfit.material import load_material, material_names
 from sssfit.simulate import montecarlo, simulate_montecarlo, simulate_montecarlo_many
 from sssfit.simulate._finished import AUTO_BEYOND
 from sssfit.simulate._run import run
-from sssfit.simulate._walks import BATCH_PHOTONS, SemiInfiniteWalk, roulette_schedule
+from sssfit.simulate._walks import BATCH_PHOTONS
+from sssfit.simulate.walk_half_space import SemiInfiniteWalk, roulette_schedule
 
 LIMIT = checks.LIMIT
 # What double precision leaves of sums over a few thousand bins and a million collisions.

@@ -1,6 +1,8 @@
 """The solver for layers against published values, the other solver, reciprocity and energy."""
 
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -24,6 +26,7 @@ from sssfit.simulate.stack.phase import henyey_greenstein, legendre_series, medi
 from sssfit.simulate.stack.sampling import Family, Sampler
 from sssfit.simulate.stack.single import single_cumulative, single_transform
 from sssfit.simulate.stack.slabs import Slab, SlabStack, stacks_of
+from sssfit.simulate.stack.spline import Spline
 from sssfit.simulate.stack.transform import Wavenumbers, bessel_tail, refined
 
 WAVENUMBERS = (0.0, 0.05, 0.7, 4.0, 30.0)
@@ -202,6 +205,32 @@ def test_reflection_obeys_fresnel():
     assert found[0] == pytest.approx((0.4 / 2.4) ** 2)
     np.testing.assert_allclose(found[:3], snell_reflectance(p[:3], 1.0, 1.4))
     assert found[3] == 1.0
+
+
+def test_a_spline_is_that_of_scipy():
+    from scipy.interpolate import CubicSpline
+
+    rng = np.random.default_rng(1)
+    x, values = np.sort(rng.random(40)), rng.random((40, 3))
+    asked = np.linspace(-0.05, 1.05, 60).reshape(6, 10)
+    expected = CubicSpline(x, values)(asked)
+    np.testing.assert_allclose(Spline.through(x, values)(asked), expected, rtol=1e-8, atol=1e-10)
+    np.testing.assert_allclose(
+        Spline.through(x[:4], values[:4])(asked), CubicSpline(x[:4], values[:4])(asked), rtol=1e-8
+    )
+
+
+IMPORTS = """
+import sys
+from sssfit.simulate import simulate
+simulate("skin-melanin-12", "exact", tolerance=0.05)
+print(*(each for each in ("numba", "scipy.interpolate", "scipy.optimize") if each in sys.modules))
+"""
+
+
+def test_layers_wait_for_no_library_that_they_do_not_need():
+    found = subprocess.run([sys.executable, "-c", IMPORTS], capture_output=True, text=True)
+    assert (found.returncode, found.stdout.split()) == (0, []), found.stderr
 
 
 @pytest.mark.parametrize("p", [2, 3])

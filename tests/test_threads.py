@@ -16,7 +16,9 @@ from sssfit.grid import RadialGrid
 from sssfit.material import Layer, Material
 from sssfit.process import one_blas_thread
 from sssfit.simulate import montecarlo, simulate_montecarlo
-from sssfit.simulate._walks import BATCH_PHOTONS, LayeredWalk, SemiInfiniteWalk
+from sssfit.simulate._walks import BATCH_PHOTONS
+from sssfit.simulate.walk_half_space import SemiInfiniteWalk
+from sssfit.simulate.walk_layered import LayeredWalk
 
 HALF_SPACE = checks.medium(0.1, 0.9, 1.3)
 SLAB = Material("slab", ("c",), (Layer(1.3, [0.8], [0.01], [20.0], 5.0),))

@@ -12,7 +12,7 @@ from sssfit._jit import sampling
 from sssfit._jit import semi_infinite as walk
 from sssfit.grid import RadialGrid
 from sssfit.simulate import simulate_montecarlo
-from sssfit.simulate._walks import SemiInfiniteWalk
+from sssfit.simulate.walk_half_space import SemiInfiniteWalk
 
 ALPHA = 2.0 * stats.norm.sf(4.5)  # two-sided probability beyond 4.5 standard errors
 

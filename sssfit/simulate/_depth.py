@@ -29,16 +29,20 @@ import functools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from sssfit._jit.transport import NEGLIGIBLE, Tables, kernel_matrix
 from sssfit.arrays import FloatArray
 from sssfit.optics import Cone, gauss_legendre, is_matched, normal_transmittance
+
+if TYPE_CHECKING:
+    from sssfit._jit.transport import Tables
 
 # Depth of the last panel: components that do not fall like exp(-nu z) are exp(-26) = 5e-12 there.
 _DEPTH = 26.0
 _WIDEST = 2.5  # panel: C0 = exp(-z) needs it
+_NOTHING = 360.0  # kappa d: exp(-360) is 0 beside all else, and larger ones might overflow
 _BEYOND = 40.0  # exp(-40) = 4e-18: tables end here
 _MAX_ENTRIES = 8000  # largest size of the table of X; only indices under 1.005 need more
 _AT_ONCE = 128  # distances times some 100 nodes: arrays that stay in the cache
@@ -155,6 +159,8 @@ class _Equation:
     @classmethod
     def of(cls, k: float, eta: float, resolution: Resolution) -> "_Equation":
         """Set up the equation."""
+        from sssfit._jit.transport import kernel_matrix  # numba: 0.35 s
+
         panels = _panels(math.sqrt(1.0 + k * k), resolution)
         escape, tables = _tables(k, eta, panels, resolution)
         matrix = kernel_matrix(
@@ -219,7 +225,7 @@ def _panels(kappa: float, resolution: Resolution) -> _Panels:
 
 def _tables(
     k: float, eta: float, panels: _Panels, resolution: Resolution
-) -> tuple[FloatArray, Tables]:
+) -> "tuple[FloatArray, Tables]":
     """Return E at the nodes and the tables of K_d and X."""
     kappa = math.hypot(1.0, k)
     shortest = 1e-9 * panels.nodes[0, 0]  # nearer sources contribute 1e-9 log(1e-9) of a panel
@@ -277,7 +283,7 @@ def _integrate_over_w(distances: FloatArray, k: float, function: _OfTau) -> Floa
     tau = (e^w + k^2 e^-w)/2 and p = (e^w - k^2 e^-w)/2.
     """
     kappa = math.hypot(1.0, k)
-    d = np.minimum(distances, 10.0 * NEGLIGIBLE / kappa)  # exp(-360): 0 beyond, and no overflow
+    d = np.minimum(distances, _NOTHING / kappa)
     x, w = gauss_legendre(_PER_STRETCH)
     places = (x + np.arange(_STRETCHES)[:, None]).ravel() / _STRETCHES
     weights = np.tile(w, _STRETCHES) / _STRETCHES

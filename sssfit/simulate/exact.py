@@ -111,7 +111,7 @@ def simulate_exact_many(
     directions = Directions(angles)
     grids = [make_grid(each, dr_mm=dr_mm, radius_mm=radius_mm) for each in materials]
     is_plain = [half_space.covers(each, similarity=similarity) for each in materials]
-    from sssfit.simulate import stack  # which takes 0.2 s for scipy's splines
+    from sssfit.simulate import stack
 
     # One BLAS thread for each of ours: matrices of 100 to 400 rows do not profit from more, and
     # with another process on one core BLAS's waiting threads made skin1 take 14 s instead of 1.8.
@@ -143,6 +143,8 @@ def _workers(threads: int, *, is_compiled: bool) -> ThreadPoolExecutor:
     if not is_compiled:
         return ThreadPoolExecutor(threads, thread_name_prefix="sssfit")
     from scipy import optimize, special  # noqa: F401 (before the threads, which need them)
+
+    from sssfit._jit import transport  # noqa: F401
 
     return thread_pool(threads)
 

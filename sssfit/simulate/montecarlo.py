@@ -35,8 +35,6 @@ from sssfit.simulate._finished import (
 )
 from sssfit.simulate._run import EndCondition, Progress, run
 from sssfit.simulate._walks import (
-    LayeredWalk,
-    SemiInfiniteWalk,
     Sums,
     Walk,
     note_compiling,
@@ -281,8 +279,14 @@ def make_walk(
     directions: Directions = EVERYWHERE,
 ) -> Walk:
     """Choose the simplest walk for the material."""
-    kind = SemiInfiniteWalk if has_fast_walk(materials[0]) else LayeredWalk
-    return kind(tuple(materials), tuple(grids), seed, photons, directions=directions)
+    given = tuple(materials), tuple(grids), seed, photons
+    if has_fast_walk(materials[0]):
+        from sssfit.simulate.walk_half_space import SemiInfiniteWalk  # numba: 0.35 s
+
+        return SemiInfiniteWalk(*given, directions=directions)
+    from sssfit.simulate.walk_layered import LayeredWalk
+
+    return LayeredWalk(*given, directions=directions)
 
 
 def _check_settings(photons: int, seed: int, threads: int) -> None:

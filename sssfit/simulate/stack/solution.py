@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from sssfit.arrays import FloatArray
 from sssfit.simulate.stack.assembly import Assembly
@@ -18,6 +17,7 @@ from sssfit.simulate.stack.changes import Changes, ready
 from sssfit.simulate.stack.quarter import Each, Quarter, without_rounding
 from sssfit.simulate.stack.sampling import Family, Sampler
 from sssfit.simulate.stack.single import single_cumulative
+from sssfit.simulate.stack.spline import Spline
 from sssfit.simulate.stack.transform import Wavenumbers
 
 _MISS = 0.1  # of the tolerance, between two wavenumbers; F is then off by less
@@ -187,8 +187,7 @@ def _interpolated(light: Callable[[FloatArray], FloatArray], radii: FloatArray) 
         return light(radii)
     decades = np.log10(radii[-1] / radii[0])
     knots = np.geomspace(radii[0], radii[-1], int(np.ceil(_PER_DECADE * decades)) + 1)
-    found: FloatArray = CubicSpline(np.log(knots), light(knots))(np.log(radii))
-    return found
+    return Spline.through(np.log(knots), light(knots)[:, None])(np.log(radii))[:, 0]
 
 
 def _errors(fine: Answer, halved: Answer, coarse: Answer, azimuth: FloatArray) -> Errors:

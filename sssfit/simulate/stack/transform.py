@@ -8,11 +8,11 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.special import j0, j1
 
 from sssfit.arrays import FloatArray
 from sssfit.optics import gauss_legendre
+from sssfit.simulate.stack.spline import Spline
 
 _GROWTH = 1.15  # of panels in k near 0
 _PANEL = 6.0  # largest width of a panel, in 1 / r: 8 nodes give J1 to 1e-9 on it
@@ -20,6 +20,8 @@ _NODES = 8
 _LEAST_RATIO = 1.04  # of two wavenumbers with another in between
 _SAME = 1e-6  # share by which two wavenumbers may differ and count as one
 _FAR = 30.0  # from here on, the asymptotic series of the tail's integral is used
+_ENDS = np.geomspace(1e-7, _FAR, 200)  # panels of its integral below, which grow by a tenth
+_OF_A_PANEL = 12  # nodes
 
 
 class Wavenumbers:
@@ -30,7 +32,7 @@ class Wavenumbers:
 
     def __init__(self, k: FloatArray, values: FloatArray, bend: float) -> None:
         self.k, self.values, self.bend = k, values, bend
-        self._spline = CubicSpline(np.arcsinh(k / bend), values)
+        self._spline = Spline.through(np.arcsinh(k / bend), values)
 
     def __call__(self, k: FloatArray) -> FloatArray:
         """Return the transforms at any wavenumbers up to K, (..., C)."""
@@ -116,8 +118,27 @@ def refined(
 
 def bessel_tail(p: int, x: FloatArray) -> FloatArray:
     """Return int_x^inf J1(t) t^-p dt."""
-    near = _near_tail(p)(np.log(np.clip(x, 1e-7, _FAR)))
+    inside = np.clip(x, _ENDS[0], _FAR)
+    place = np.clip(np.searchsorted(_ENDS, inside), 1, _ENDS.size - 1)
+    near = _tails(p)[place] + _between(p, inside, _ENDS[place])
     return np.where(x < _FAR, near, _far_tail(p, np.maximum(x, _FAR)))
+
+
+@functools.cache
+def _tails(p: int) -> FloatArray:
+    """Return the integral from each end of a panel to infinity."""
+    parts = np.append(_between(p, _ENDS[:-1], _ENDS[1:]), _far_tail(p, _ENDS[-1:]))
+    found: FloatArray = np.cumsum(parts[::-1])[::-1]
+    return found
+
+
+def _between(p: int, a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the integral from a to b (n,), which lie on one panel, to rounding."""
+    t, weight = gauss_legendre(_OF_A_PANEL)
+    width = (b - a)[:, None]
+    nodes = a[:, None] + width * t
+    found: FloatArray = np.sum(width * weight * j1(nodes) / nodes**p, axis=1)
+    return found
 
 
 def _far_tail(p: int, x: FloatArray, terms: int = 6) -> FloatArray:
@@ -127,18 +148,6 @@ def _far_tail(p: int, x: FloatArray, terms: int = 6) -> FloatArray:
     rest = _far_tail(p + 2, x, terms - 1)
     found: FloatArray = x**-p * j0(x) + p * x ** (-p - 1.0) * j1(x) - p * (p + 2) * rest
     return found
-
-
-@functools.cache
-def _near_tail(p: int) -> CubicSpline:
-    """Return the integral from e^y to infinity, for e^y up to 30, summed on fine panels."""
-    ends = np.concatenate([np.geomspace(1e-7, 0.5, 2000), np.linspace(0.5, _FAR, 1200)[1:]])
-    t, weight = gauss_legendre(6)
-    width = np.diff(ends)[:, None]
-    nodes = ends[:-1, None] + width * t
-    parts = np.sum(width * weight * j1(nodes) / nodes**p, axis=1)
-    sums = np.append(np.cumsum(parts[::-1])[::-1], 0.0)
-    return CubicSpline(np.log(ends), sums + float(_far_tail(p, np.array(_FAR))))
 
 
 def _panels(first: float, last: float, widest: float) -> tuple[FloatArray, FloatArray]:
