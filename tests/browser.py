@@ -10,6 +10,9 @@ import pytest
 _ALWAYS = ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run")
 _SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
 _WAIT = 20.0  # seconds
+_AT = "return arguments[0].selectedIndex"
+_PUT = """const [control, at] = arguments;
+control[control.tagName === 'SELECT' ? 'selectedIndex' : 'value'] = at;"""
 _DRAWN = "document.body.dataset.drawn && document.body.dataset.busy !== 'true'"
 
 
@@ -76,22 +79,24 @@ class Browser:
             time.sleep(0.02)
 
     def set(self, id_, value):
-        """Give a control a value by the keyboard, by as few keys as there are steps to it."""
+        """Give a control a value by one press of a key, from the step beside it.
+
+        It is put there without an event: the page would draw all steps between.
+        """
         from selenium.webdriver import Keys
 
         control = self.driver.find_element("id", id_)
         if control.tag_name == "select":
             options = self.js("return [...arguments[0].options].map((at) => at.value)", control)
-            steps = options.index(str(value)) - self.js(
-                "return arguments[0].selectedIndex", control
-            )
+            now, goal, step = (self.js(_AT, control), options.index(str(value)), 1)
             on, back = Keys.ARROW_DOWN, Keys.ARROW_UP
         else:
             now, step = (float(control.get_attribute(each)) for each in ("value", "step"))
-            steps = round((value - now) / step)
-            on, back = Keys.ARROW_RIGHT, Keys.ARROW_LEFT
-        if control.is_enabled() and steps:
-            control.send_keys(*[on if steps > 0 else back] * abs(steps))
+            goal, on, back = float(value), Keys.ARROW_RIGHT, Keys.ARROW_LEFT
+        if control.is_enabled() and round((goal - now) / step):
+            is_up = goal > now
+            self.js(_PUT, control, goal - step if is_up else goal + step)
+            control.send_keys(on if is_up else back)
         self.wait()
 
     def click(self, selector):
