@@ -10,6 +10,7 @@ from figures import assert_legible, drawn_texts, legends_of, words_of
 from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.patches import StepPatch
+from turns import mostly_slow
 
 from sssfit import chart
 from sssfit.chart.data import picture
@@ -250,7 +251,14 @@ def odd_profiles():
     }
 
 
-@pytest.mark.parametrize("name", odd_profiles())
+@pytest.mark.parametrize(
+    "name",
+    mostly_slow(
+        odd_profiles(),
+        *("few photons", "5 long names", "64 channels", "nothing", "1 annulus", "below zero"),
+        "unknown meta",
+    ),
+)
 def test_no_text_is_cut_off_or_runs_into_another(name):
     assert_legible(lambda: profile_figure(odd_profiles()[name]()))
 
@@ -391,7 +399,9 @@ def odd_materials():
     }
 
 
-@pytest.mark.parametrize("name", odd_materials())
+@pytest.mark.parametrize(
+    "name", mostly_slow(odd_materials(), "64 channels", "12 layers", "no scattering")
+)
 def test_charts_of_materials_are_legible_and_the_same_each_time(name):
     material = odd_materials()[name]()
     assert_legible(lambda: material_figure(material))

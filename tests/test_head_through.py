@@ -92,12 +92,12 @@ def test_a_ball_has_its_chords_and_its_cosines():
     radius = 40.0
     dome = lambda x, y: np.sqrt(np.maximum(radius**2 - x * x - y * y, 0.0))  # noqa: E731
     solid, front = solid_of(dome, lambda x, y: -dome(x, y), spacing=0.25, reach=45.0)
-    view = {"shape": (40, 40), "mm_per_pixel": 1.5, "distance_mm": DISTANCE, "floor_mm": 1.0}
+    view = {"shape": (20, 20), "mm_per_pixel": 3.0, "distance_mm": DISTANCE, "floor_mm": 1.0}
     light = np.array(_direction(115.0, 10.0))
     thickness, cosines = light_through(front, solid, tuple(light), **view)
     seen = light_field(front, Lighting((0.0, 0.0, 1.0)), smooth=False, **view)
-    x = 1.5 * (np.arange(40)[None, :] - 19.5)
-    y = 1.5 * (19.5 - np.arange(40)[:, None])
+    x = 3.0 * (np.arange(20)[None, :] - 9.5)
+    y = 3.0 * (9.5 - np.arange(20)[:, None])
     share = np.where(seen.labels > 0, seen.depth_mm, 0.0) / DISTANCE
     normal = np.stack(np.broadcast_arrays(x * share, y * share, DISTANCE * (1 - share)), axis=-1)
     facing = normal @ light / radius
@@ -105,8 +105,8 @@ def test_a_ball_has_its_chords_and_its_cosines():
     # Nodes are too far apart for the ball's equator, where both fields are upright.
     entry = normal[..., 2] - 2 * radius * facing * light[2]
     away, toward = inside & (facing < -0.05) & (np.abs(entry) > 10.0), inside & (facing > 0.05)
-    assert away.sum() > 300
-    assert toward.sum() > 30
+    assert away.sum() > 75
+    assert toward.sum() > 7
     np.testing.assert_allclose(thickness[away], -2 * radius * facing[away], atol=0.05)
     np.testing.assert_allclose(cosines[away], -facing[away], atol=0.01)
     assert not thickness[toward].any()

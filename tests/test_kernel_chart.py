@@ -10,6 +10,7 @@ from figures import assert_legible, drawn_texts, legends_of, words_of
 from matplotlib.patches import StepPatch
 from reference_pixels import make_profile, one_over_r_centre_pixel, one_over_r_profile
 from scipy.integrate import dblquad
+from turns import mostly_slow
 
 from sssfit.chart.kernel import kernel_figure
 from sssfit.chart.page import save_figure
@@ -298,13 +299,16 @@ def odd_views():
 
 
 @pytest.mark.filterwarnings("ignore::sssfit.errors.SssfitWarning")
-@pytest.mark.parametrize("name", odd_views())
+@pytest.mark.parametrize(
+    "name",
+    mostly_slow(odd_views(), "no profile", "ten terms", "six Gaussians", "long names", "one pixel"),
+)
 def test_no_text_is_cut_off_or_runs_into_another(name):
     view = odd_views()[name]()
     assert_legible(lambda: kernel_figure(view))
 
 
-@pytest.mark.parametrize("format", ["png", "svg", "pdf"])
+@pytest.mark.parametrize("format", mostly_slow(["png", "svg", "pdf"], "png"))
 def test_same_kernel_same_bytes(figure, figure_again, format):
     written = []
     for each in (figure, figure_again):

@@ -12,6 +12,7 @@ import pytest
 from figures import assert_legible, words_of
 from matplotlib.colors import to_hex
 from matplotlib.patches import StepPatch
+from turns import mostly_slow
 
 from sssfit.chart.models import models_figure
 from sssfit.chart.page import save_figure
@@ -223,7 +224,17 @@ def odd_comparisons():
     }
 
 
-@pytest.mark.parametrize("name", odd_comparisons())
+@pytest.mark.parametrize(
+    "name",
+    mostly_slow(
+        odd_comparisons(),
+        "2 photons",
+        "12 channels",
+        "1 channel, long names",
+        "nothing scatters",
+        "g",
+    ),
+)
 def test_no_text_is_cut_off_or_runs_into_another(name):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SssfitWarning)  # few photons, unfinished walks, similarity

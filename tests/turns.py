@@ -1,4 +1,4 @@
-"""Pairs of settings for tests of both: each setting in every run, each pair under ``slow``."""
+"""Settings of a test of which every run takes some, and those marked ``slow`` all."""
 
 import pytest
 
@@ -16,4 +16,13 @@ def in_turn(first, second):
         )
         for k, one in enumerate(first)
         for j, other in enumerate(second)
+    ]
+
+
+def mostly_slow(every, *in_every_run):
+    """All of them, of which only the named ones are not slow."""
+    assert set(in_every_run) <= set(every)
+    return [
+        each if each in in_every_run else pytest.param(each, marks=pytest.mark.slow)
+        for each in every
     ]
