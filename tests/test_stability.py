@@ -177,9 +177,9 @@ def walked():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(noise, "_LAST", 5)
         patch.setattr(noise, "_SEEDS", 8)
-        patch.setattr(
-            noise, "WAYS", [Way("svd 3", "svd", {"rank": 3}), Way("pre", "preintegrated", {})]
-        )
+        ways = [Way("svd 3", "svd", {"rank": 3}), Way("pre", "preintegrated", {})]
+        patch.setattr(noise, "WAYS", ways)
+        patch.setattr(noise, "KERNELS", ways)
         patch.setattr(noise, "_SMOOTHED", ("svd 3",))
         return stability(load_material("skin1"), only=["noise"], threads=1).panels
 
@@ -218,7 +218,10 @@ def test_a_fit_that_chases_noise_is_found(walked, monkeypatch):
     monkeypatch.setattr(Way, "fit", broken)
     monkeypatch.setattr(noise, "_LAST", 5)
     monkeypatch.setattr(noise, "_SEEDS", 8)
-    monkeypatch.setattr(noise, "WAYS", [Way("svd 3", "svd", {"rank": 3})])
+    ways = [Way("svd 3", "svd", {"rank": 3})]
+    monkeypatch.setattr(noise, "WAYS", ways)
+    monkeypatch.setattr(noise, "KERNELS", ways)
+    monkeypatch.setattr(noise, "_SMOOTHED", ())
     found = next(stability(load_material("skin1"), only=["noise"], threads=1).panels[0].findings())
     healthy = next(walked[0].findings())
     assert healthy.kind == FROM

@@ -18,15 +18,17 @@ MISSED = 0.0027  # of three standard deviations
 def test_a_range_holds_the_statistic_of_other_seeds(statistic, seeds):
     """Of lognormal errors or normal widths, as often as three deviations say."""
     rng = np.random.default_rng(seeds)
+    # Samples share a median's deviation, and a chart has three to five of them; others have theirs.
+    together = 4 if statistic is median_range else PAIRS
     missed = 0
-    for _ in range(PAIRS):
-        first, second = 0.4 * rng.standard_normal((2, 3, seeds))
+    for _ in range(PAIRS // together):
+        first, second = 0.4 * rng.standard_normal((2, together, seeds))
         if statistic is median_range:
             first, second = np.exp(first), np.exp(second)
         if statistic is bias_range:  # a mean far from 0, so that its sign is none
             first, second = first + 5.0, second + 5.0
         found, other = statistic(list(first)), statistic(list(second))
-        missed += int(not found.low[0] <= other.at[0] <= found.high[0])
+        missed += int(np.sum((other.at < found.low) | (other.at > found.high)))
     assert missed <= MISSED * PAIRS + 5.0 * np.sqrt(MISSED * PAIRS)
     if statistic is not median_range:  # whose factor is that of many seeds, and wide for four
         assert missed >= MISSED * PAIRS - 3.0 * np.sqrt(MISSED * PAIRS)
@@ -67,8 +69,10 @@ def small(monkeypatch):
     monkeypatch.setattr(noise, "_SEEDS", 8)
     ways = [Way("svd 3", "svd", {"rank": 3}), Way("pre-integrated", "preintegrated", {})]
     monkeypatch.setattr(noise, "WAYS", ways)
-    monkeypatch.setattr(gaussians, "_COUNTS", (1, 2, 3, 4))
-    monkeypatch.setattr(gaussians, "_STARTED", (1, 2, 4))
+    monkeypatch.setattr(noise, "KERNELS", ways)
+    monkeypatch.setattr(noise, "_SMOOTHED", ())  # a third of the time; test_stability smooths
+    monkeypatch.setattr(gaussians, "_COUNTS", (1, 2, 3))
+    monkeypatch.setattr(gaussians, "_STARTED", (1, 2, 3))
 
 
 def run(seed, only):
@@ -83,14 +87,14 @@ def test_another_seed_moves_no_boundary_by_more_than_its_range(small):
 
 
 def test_a_boundary_that_moved_is_found(small, monkeypatch):
-    """Pictures four times as wrong need sixteen times the photons."""
-    monkeypatch.setattr(noise, "_LAST", 6)
+    """Pictures a quarter as wrong need a sixteenth of the photons."""
+    monkeypatch.setattr(noise, "WAYS", noise.WAYS[:1])
     first = run(1, ["noise"])
     real = noise._seen
     monkeypatch.setattr(
         noise,
         "_seen",
-        lambda *given: (seen := real(*given))._replace(error=4.0 * seen.error),
+        lambda *given: (seen := real(*given))._replace(error=0.25 * seen.error),
     )
     found = moved_beyond(first, run(2, ["noise"]))
     assert any("svd 3:" in each for each in found)

@@ -4,9 +4,9 @@ Every channel rides on the same paths.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import lru_cache, partial
 
 import numpy as np
 import numpy.typing as npt
@@ -127,9 +127,10 @@ def _channels(
     last_bin = np.repeat([grid.annuli for grid in grids], counts).astype(np.int64)
     directions = cosines.size + 1
     first_cell = np.concatenate([[0], np.cumsum(last_bin[:-1] + 1)]).astype(np.int64) * directions
+    power_low, power_high = _power_tables(tuple(albedo.tolist()))
     return semi_infinite.Channels(
-        power_low=_powers(albedo),
-        power_high=_powers(_powers(albedo)[-1] * albedo),
+        power_low=power_low,
+        power_high=power_high,
         bins_per_mean_free_path=bins_per_mfp,
         last_bin=last_bin,
         first_cell=first_cell,
@@ -137,10 +138,18 @@ def _channels(
     )
 
 
-def _powers(base: FloatArray) -> FloatArray:
+# Many short walks of one material, as a stress makes them, spent two thirds of their time here.
+@lru_cache(maxsize=8)
+def _power_tables(albedo: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
+    """Return albedo^k for k below ``POWER_BLOCK``, and for its multiples, both (POWER_BLOCK, C)."""
+    low = _powers(albedo)
+    return low, _powers((low[-1] * albedo).tolist())
+
+
+def _powers(base: Sequence[float]) -> FloatArray:
     """Return base^k for k below ``POWER_BLOCK``, (POWER_BLOCK, C).
 
     Uses Python's power, because numpy's differs in the last bit between processors.
     """
-    rows = [[float(each) ** k for each in base] for k in range(semi_infinite.POWER_BLOCK)]
+    rows = [[each**k for each in base] for k in range(semi_infinite.POWER_BLOCK)]
     return np.array(rows)

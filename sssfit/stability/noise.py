@@ -151,11 +151,11 @@ def _measured(
     profiles = [walk, *(with_noise_of(subject.profile, walk, each) for each in scaled)]
     found = []
     for photons, profile in zip((walked, *scaled), profiles, strict=True):
-        smooth = smoothed(profile)
+        due = [each for each in cases if _is_due(subject, each.way, photons)]
+        # Smoothing takes longer than most fits.
+        smooth = smoothed(profile) if any(each.is_smoothed for each in due) else profile
         found += [
-            _seen(subject, each, smooth if each.is_smoothed else profile, photons)
-            for each in cases
-            if _is_due(subject, each.way, photons)
+            _seen(subject, each, smooth if each.is_smoothed else profile, photons) for each in due
         ]
     return found
 
