@@ -38,10 +38,22 @@ def limit_of(figures):
     return stats.norm.isf(0.5e-3 / len(figures))
 
 
+# Layers of .2 optical depths under which one of a high index reflects totally: 13 directions in
+# azimuth are refused at 2e-4, and three minutes give 3e-4.
+REFUSED = {20}
+
+
 @pytest.mark.slow
 def test_forty_stacks_are_those_of_the_walk():
-    figures = [each for seed in range(40) for each in figures_of(seed, 4_000_000)]
+    figures, refused = [], set()
+    for seed in range(40):
+        exact, walk = checks_stack.solved_and_walked(checks_stack.random_stack(seed), 4_000_000)
+        figures += checks_stack.against_walk(f"stack {seed}", exact, walk)
+        print(f"stack {seed}: {max(abs(each.sigmas) for each in figures):.2f} so far", flush=True)
+        if exact.meta["settings"]["tolerance"] > checks_stack.TOLERANCE:
+            refused.add(seed)
     assert abs(worst_of(figures).sigmas) < limit_of(figures), worst_of(figures)
+    assert refused == REFUSED
 
 
 def test_a_slab_of_few_optical_depths_gets_more_directions_in_azimuth():
