@@ -1,5 +1,7 @@
 """The solver for layers against the layered walk, on stacks drawn at random with fixed seeds."""
 
+import functools
+
 import checks
 import checks_stack
 import numpy as np
@@ -11,9 +13,11 @@ from sssfit.simulate.stack.quarter import quarter_of
 from sssfit.simulate.stack.sampling import Family
 from sssfit.simulate.stack.slabs import stacks_of
 
+PHOTONS = 100_000
 FEW = (2, 4, 8)  # a half space on two layers, a slab, a half space that scatters far ahead
 
 
+@functools.cache
 def figures_of(seed, photons):
     material = checks_stack.random_stack(seed)
     return list(
@@ -25,7 +29,7 @@ def figures_of(seed, photons):
 
 @pytest.mark.parametrize("seed", FEW)
 def test_a_stack_is_that_of_the_walk(seed):
-    for figure in figures_of(seed, 100_000):
+    for figure in figures_of(seed, PHOTONS):
         assert abs(figure.sigmas) < checks.LIMIT, figure
 
 
@@ -71,6 +75,6 @@ def test_a_slab_of_few_optical_depths_gets_more_directions_in_azimuth():
 
 
 def test_absorption_by_layer_is_that_of_the_walk():
-    figures = [each for each in figures_of(FEW[0], 50_000) if "absorbed" in each.what]
+    figures = [each for each in figures_of(FEW[0], PHOTONS) if "absorbed" in each.what]
     assert len(figures) == len(checks_stack.random_stack(FEW[0]).layers)
     assert all(abs(each.sigmas) < checks.LIMIT for each in figures)
