@@ -320,7 +320,7 @@ BAD = {
     "albedo": (SKIN + "albedo = 0.9", "albedo = 0.9 ", "(1 - albedo) sigma_t"),
     # layers
     "both": (SKIN + GROUND, "eta and [[layers]] are both given", "leave [[layers]] out"),
-    "dotted deep": ("a" + ".a" * 20000 + " = 1\n" + SKIN, "a = tables nested", "Known keys"),
+    "dotted deep": ("a" + ".a" * 3000 + " = 1\n" + SKIN, "a = tables nested", "Known keys"),
     "layers table": ("[layers]\n" + SKIN, "layers = {'eta': 1.3, ", "two brackets"),
     "layers none": ("layers = []", "layers = [];", "one [[layers]] table"),
     "layers of numbers": ("layers = [1]", "layers[0] = 1 is not a table", "under [[layers]]"),
