@@ -84,11 +84,17 @@ def two_layers_by_convolution(top, bottom, pitch, half):
     R1 + T1 * R2 * T1' + T1 * R2 * R1' * R2 * T1' + ..., * a convolution; T likewise. A layer is
     (sigma_a, sigma_s', A outside, thickness), and A = 1 where the two meet.
     """
-    x = pitch * np.arange(-half, half + 1)
+    x = pitch * np.arange(half + 1)
     r = np.hypot(x[:, None], x)
-    r_1, t_1 = slab_density(r, top[0], top[1], top[2], 1.0, top[3], 40)
-    r_1_up, t_1_up = slab_density(r, top[0], top[1], 1.0, top[2], top[3], 40)
-    r_2, t_2 = slab_density(r, bottom[0], bottom[1], 1.0, bottom[2], bottom[3], 40)
+
+    def density(*layer):
+        """Of a quarter of the plane, and its mirror images."""
+        quarters = slab_density(r, *layer, 40)
+        return [np.pad(each, ((half, 0), (half, 0)), mode="reflect") for each in quarters]
+
+    r_1, t_1 = density(top[0], top[1], top[2], 1.0, top[3])
+    r_1_up, t_1_up = density(top[0], top[1], 1.0, top[2], top[3])
+    r_2, t_2 = density(bottom[0], bottom[1], 1.0, bottom[2], bottom[3])
 
     def after(one, other):
         return pitch**2 * fftconvolve(one, other, mode="same")

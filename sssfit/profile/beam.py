@@ -254,18 +254,25 @@ def lens_area(one: FloatArray, other: float, apart: FloatArray) -> FloatArray:
 
     Weisstein, "Circle-Circle Intersection", equation 14.
     """
-    smaller = np.pi * np.minimum(one, other) ** 2
-    with np.errstate(divide="ignore", invalid="ignore"):
-        to_one = (apart**2 + one**2 - other**2) / (2.0 * apart * one)
-        to_other = (apart**2 + other**2 - one**2) / (2.0 * apart * other)
+    one, apart = np.broadcast_arrays(one, apart)
+    found: FloatArray = np.where(
+        apart <= np.abs(one - other), np.pi * np.minimum(one, other) ** 2, 0.0
+    )
+    # Of 9 mm under a beam of 1 mm, four disks in five are one inside the other, or apart.
+    cross = (apart > np.abs(one - other)) & (apart < one + other)
+    found[cross] = _lens_of_crossing(one[cross], other, apart[cross])
+    return found
+
+
+def _lens_of_crossing(one: FloatArray, other: float, apart: FloatArray) -> FloatArray:
+    to_one = (apart**2 + one**2 - other**2) / (2.0 * apart * one)
+    to_other = (apart**2 + other**2 - one**2) / (2.0 * apart * other)
     kite = (other + one - apart) * (apart + one - other) * (apart - one + other)
     kite = kite * (apart + one + other)
     angles = one**2 * np.arccos(np.clip(to_one, -1.0, 1.0))
     angles = angles + other**2 * np.arccos(np.clip(to_other, -1.0, 1.0))
-    area = angles - 0.5 * np.sqrt(np.maximum(kite, 0.0))
-    inside, outside = apart <= np.abs(one - other), apart >= one + other
-    found: FloatArray = np.where(inside, smaller, np.where(outside, 0.0, area))
-    return found
+    area: FloatArray = angles - 0.5 * np.sqrt(np.maximum(kite, 0.0))
+    return area
 
 
 # How much of light that enters at a point returns within radii; a new kind is one function and one
