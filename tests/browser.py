@@ -48,7 +48,7 @@ class Browser:
         where = {"behavior": "allow", "downloadPath": str(downloads)}
         self.driver.execute_cdp_cmd("Browser.setDownloadBehavior", where)
 
-    def open(self, path, hash_="", *, width=1600, dark=False):
+    def open(self, path, hash_="", *, width=900, dark=False):
         """Open a page at a width of the window, and wait until it is drawn."""
         size = {"width": width, "height": 1000, "deviceScaleFactor": 1, "mobile": False}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
