@@ -333,8 +333,8 @@ def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch, whi
 
     verb = import_module("sssfit.cli.compare")
     real = verb.load_source
-    film = 'channels = ["R"]\neta = 1.4\ng = 0.97\nsigma_a_per_mm = [0.1]\n'
-    film += "sigma_s_per_mm = [30]\nthickness_mm = 0.03\n"
+    film = 'channels = ["R"]\neta = 1.4\ng = 0.99\nsigma_a_per_mm = [0.1]\n'
+    film += "sigma_s_per_mm = [30]\nthickness_mm = 0.003\n"
     (tmp_path / "marble.toml").write_text(film)
     # In place of the shipped marble, a film that has too few directions.
     paths = {"marble": "marble.toml"}
@@ -342,7 +342,7 @@ def test_all_goes_on_after_a_material_that_fails(run, tmp_path, monkeypatch, whi
     monkeypatch.setattr(material, "material_names", lambda **_: ("marble", "skin1"))
     (tmp_path / "out").mkdir()
     err = run(which, "-o", "out", *SMALL, status=1)
-    assert "1 of 2 materials failed; marble: marble R (a thin slab of g = 0.97" in err
+    assert "1 of 2 materials failed; marble: marble R (a thin slab of g = 0.99" in err
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         "skin1-pareto.md",
         "skin1-pareto.png",
