@@ -13,23 +13,19 @@ from sssfit.simulate.stack.quarter import quarter_of
 from sssfit.simulate.stack.sampling import Family
 from sssfit.simulate.stack.slabs import stacks_of
 
-PHOTONS = 100_000
+SMALL = 100_000, 5e-4  # photons, which know a total to 1e-3, and the tolerance
 FEW = (2, 4, 8)  # a half space on two layers, a slab, a half space that scatters far ahead
 
 
 @functools.cache
-def figures_of(seed, photons):
-    material = checks_stack.random_stack(seed)
-    return list(
-        checks_stack.against_walk(
-            f"stack {seed}", *checks_stack.solved_and_walked(material, photons)
-        )
-    )
+def figures_of(seed, photons, tolerance=checks_stack.TOLERANCE):
+    pair = checks_stack.solved_and_walked(checks_stack.random_stack(seed), photons, tolerance)
+    return list(checks_stack.against_walk(f"stack {seed}", *pair))
 
 
 @pytest.mark.parametrize("seed", FEW)
 def test_a_stack_is_that_of_the_walk(seed):
-    for figure in figures_of(seed, PHOTONS):
+    for figure in figures_of(seed, *SMALL):
         assert abs(figure.sigmas) < checks.LIMIT, figure
 
 
@@ -75,6 +71,6 @@ def test_a_slab_of_few_optical_depths_gets_more_directions_in_azimuth():
 
 
 def test_absorption_by_layer_is_that_of_the_walk():
-    figures = [each for each in figures_of(FEW[0], PHOTONS) if "absorbed" in each.what]
+    figures = [each for each in figures_of(FEW[0], *SMALL) if "absorbed" in each.what]
     assert len(figures) == len(checks_stack.random_stack(FEW[0]).layers)
     assert all(abs(each.sigmas) < checks.LIMIT for each in figures)
