@@ -48,10 +48,10 @@ def choice(skin1):
     return choose(skin1, mm_per_pixel=0.6, frame=FRAME)
 
 
-def rendered_again(profile, option, mm_per_pixel, distance_mm=600.0, fitted_to=None):
+def rendered_again(profile, option, mm_per_pixel, distance_mm=600.0, fitted_to=None, size=128):
     """Score on the head, from fitting to measuring with the parts one by one."""
     scene = make_scene(
-        "head", height=128, width=128, mm_per_pixel=mm_per_pixel, distance_mm=distance_mm
+        "head", height=size, width=size, mm_per_pixel=mm_per_pixel, distance_mm=distance_mm
     )
     fitted = fit_result(
         fitted_to or profile, option.method, mm_per_pixel=mm_per_pixel, **option.settings
@@ -403,13 +403,13 @@ def test_of_a_picture_of_ones_own_the_middle_counts():
 
 def test_a_close_up_has_to_hold_on_the_wider_view(skin1, monkeypatch):
     quick(monkeypatch)
-    near = choose(skin1, mm_per_pixel=0.25, distance_mm=250.0, frame=FRAME)
+    near = choose(skin1, mm_per_pixel=0.5, distance_mm=250.0, frame=(64, 64))
     pitches = [each.mm_per_pixel for each in near.scenes]
-    assert pitches == [0.25, 0.5, 0.625, 0.6875]  # 32 mm, and views of 64, 80 and 88 mm
+    assert pitches == [0.5, 1.0, 1.25, 1.375]  # 32 mm, and views of 64, 80 and 88 mm
     assert near.scenes[1].distance_mm == pytest.approx(500.0)
     exact = simulate_exact(skin1)
-    for mm_per_pixel, distance in ((0.25, 250.0), (0.5, 500.0)):
-        again = rendered_again(exact, near.chosen.option, mm_per_pixel, distance)
+    for mm_per_pixel, distance in ((0.5, 250.0), (1.0, 500.0)):
+        again = rendered_again(exact, near.chosen.option, mm_per_pixel, distance, size=64)
         assert again.delta_e_2000_p95 <= 1.0
 
 
