@@ -12,7 +12,7 @@ from checks_layers import layer, stack
 
 from sssfit.errors import SimulationError, StoppedError
 from sssfit.material import Material, load_material
-from sssfit.simulate import simulate_exact, simulate_exact_many
+from sssfit.simulate import simulate_exact, simulate_exact_many, simulate_montecarlo
 from sssfit.simulate.half_space import diffuse_reflectance
 from sssfit.simulate.stack import limits
 from sssfit.simulate.stack.assembly import Assembly, _spans, reflected_at, transforms_at
@@ -26,6 +26,7 @@ from sssfit.simulate.stack.phase import henyey_greenstein, legendre_series, medi
 from sssfit.simulate.stack.sampling import Family, Sampler
 from sssfit.simulate.stack.single import single_cumulative, single_transform
 from sssfit.simulate.stack.slabs import Slab, SlabStack, stacks_of
+from sssfit.simulate.stack.solution import Answer, Errors, Side, SideErrors, Step
 from sssfit.simulate.stack.spline import Spline
 from sssfit.simulate.stack.transform import Wavenumbers, bessel_tail, refined
 
@@ -349,6 +350,27 @@ def test_thin_slabs_that_scatter_far_ahead_are_refused_by_name():
     thin = Material("film", ("red",), (layer(0.1, 30.0, 0.97, 1.0, 0.03),))
     with pytest.raises(SimulationError, match=r"film red.*thin slab of g = 0\.97.*montecarlo"):
         simulate_exact(thin, dr_mm=0.01, radius_mm=0.3)
+
+
+def test_a_falling_f_is_an_error_of_its_own():
+    # Two numbers of directions differed by less than .002 for a film of g = .97 whose F fell by .006.
+    rising, falling = Side(np.array([0.1, 0.3]), 0.4), Side(np.array([0.1, 0.3, 0.25, 0.5]), 0.4)
+    assert (rising.fall, falling.fall) == (0.0, pytest.approx(0.1))
+    assert Side(np.array([0.1, -0.2]), -0.2).fall == pytest.approx(0.2)
+    none = SideErrors(np.zeros(5), np.zeros(5), 0.0)
+    step = Step(12, [Answer(rising, falling, (0.2,))], [Errors(none, none)])
+    assert step.share(0) == pytest.approx(0.1 / 0.8)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
+def test_a_thin_film_that_scatters_far_ahead_is_right_where_it_is_not_refused(tolerance):
+    film = stack(layer(0.1, 30.0, 0.97, 1.4, 0.03))
+    grid = {"dr_mm": 0.01, "radius_mm": 0.5}
+    ours = simulate_exact(film, tolerance=tolerance, **grid)
+    walk = simulate_montecarlo(film, photons=2_000_000, **grid)
+    off = np.cumsum(ours.annulus_energy - walk.annulus_energy)
+    assert np.abs(off).max() < tolerance + 4.0 * walk.diffuse_reflectance_stderr[0]
 
 
 def test_a_thousand_layers_are_refused_with_the_memory_they_take():

@@ -36,6 +36,13 @@ class Side:
         """F at the radii and, last, altogether (n + 1,)."""
         return np.append(self.cumulative, self.total)
 
+    @property
+    def fall(self) -> float:
+        """By how much F falls or exceeds the total anywhere, which no F does: a least error."""
+        most = max(self.total, 0.0)
+        rising = np.minimum(np.maximum.accumulate(self.cumulative), most)
+        return float(np.max(np.abs(rising - self.cumulative), initial=most - self.total))
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Answer:
@@ -50,6 +57,11 @@ class Answer:
         """All light that leaves on the two sides."""
         below = self.transmitted.total if self.transmitted is not None else 0.0
         return self.reflected.total + below
+
+    @property
+    def fall(self) -> float:
+        """The larger fall of F on the two sides."""
+        return max(each.fall for each in (self.reflected, self.transmitted) if each is not None)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,7 +108,8 @@ class Step:
 
     def share(self, number: int) -> float:
         """Return the largest error of a stack as a share of the light that leaves it."""
-        return self.errors[number].worst / self.answers[number].leaving
+        answer = self.answers[number]
+        return max(self.errors[number].worst, answer.fall) / answer.leaving
 
     @property
     def spline_share(self) -> float:

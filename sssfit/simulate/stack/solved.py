@@ -9,7 +9,11 @@ from sssfit.arrays import FloatArray
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
 from sssfit.profile import Profile
-from sssfit.simulate._deterministic import computed_profile, energies_from_cumulative
+from sssfit.simulate._deterministic import (
+    ROUNDING,
+    computed_profile,
+    energies_from_cumulative,
+)
 from sssfit.simulate.stack.solution import Answer, Errors, Side, SideErrors
 
 
@@ -32,12 +36,16 @@ def profile_of(
 ) -> Profile:
     """Assemble the answers of a material's channels."""
     sides = [each.answer.reflected for each in solved]
-    reflected = _energies(sides, tolerance)
+    allowed = tolerance * max(each.answer.leaving for each in solved)
+    reflected = _energies(sides, allowed)
     stderr = np.stack([_stderr(each.errors.reflected) for each in solved], axis=1)
     below = [each.answer.transmitted for each in solved if each.answer.transmitted is not None]
     under = [each.errors.transmitted for each in solved if each.errors.transmitted is not None]
     absorbed = np.maximum([each.answer.absorbed for each in solved], 0.0).T
-    shares = [each.errors.worst / max(each.answer.leaving, 1e-300) for each in solved]
+    shares = [
+        max(each.errors.worst, each.answer.fall) / max(each.answer.leaving, 1e-300)
+        for each in solved
+    ]
     totals = material.specular_reflectance + np.array([each.answer.leaving for each in solved])
     return computed_profile(
         material,
@@ -45,7 +53,7 @@ def profile_of(
         grid,
         reflected,
         stderr=stderr,
-        transmitted=_energies(below, tolerance) if below else None,
+        transmitted=_energies(below, allowed) if below else None,
         transmitted_stderr=np.stack([_stderr(each) for each in under], axis=1) if under else None,
         absorbed=absorbed,
         relative_error=max(shares),
@@ -59,11 +67,12 @@ def profile_of(
     )
 
 
-def _energies(sides: Sequence[Side], tolerance: float) -> FloatArray:
-    """Return energies of the annuli and beyond the grid (n + 1, C)."""
+def _energies(sides: Sequence[Side], allowed: float) -> FloatArray:
+    """Return energies of the annuli and beyond the grid (n + 1, C); F may fall by ``allowed``."""
     cumulative = np.stack([np.append(0.0, each.cumulative) for each in sides], axis=1)
     totals = np.array([each.total for each in sides])
-    return energies_from_cumulative(cumulative, totals, tolerance=tolerance)
+    share = allowed / max(float(totals.max()), ROUNDING)
+    return energies_from_cumulative(cumulative, totals, tolerance=share)
 
 
 def _stderr(errors: SideErrors) -> FloatArray:
