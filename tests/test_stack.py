@@ -353,7 +353,7 @@ def test_thin_slabs_that_scatter_far_ahead_are_refused_by_name():
 
 
 def test_a_falling_f_is_an_error_of_its_own():
-    # Two numbers of directions differed by less than .002 for a film of g = .97 whose F fell by .006.
+    # Two numbers of directions were within .002 for a film of g = .97 whose F fell by .006.
     rising, falling = Side(np.array([0.1, 0.3]), 0.4), Side(np.array([0.1, 0.3, 0.25, 0.5]), 0.4)
     assert (rising.fall, falling.fall) == (0.0, pytest.approx(0.1))
     assert Side(np.array([0.1, -0.2]), -0.2).fall == pytest.approx(0.2)
