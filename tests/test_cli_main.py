@@ -16,6 +16,7 @@ import click
 import fork_server
 import processes
 import pytest
+from turns import in_turn
 
 import sssfit
 from sssfit.cli import cli, main
@@ -249,19 +250,17 @@ def test_no_color_is_honoured_on_a_terminal(tmp_path):
 MATPLOTLIBRC = "no_such_key: 5\nbackend: nonsense\nfont.size: large?\n"
 
 
-@pytest.mark.parametrize(
-    "changed",
-    [
-        {"HOME": "{there}/file", "MPLCONFIGDIR": "{there}/file/x"},  # nowhere to keep its fonts
-        {"MPLBACKEND": "nonsense"},
-        {"MPLBACKEND": ""},
-        {"MPLCONFIGDIR": "{there}/config"},
-    ],
-)
-@pytest.mark.parametrize(
-    "module",
-    ["sssfit.chart.page", "colour"],  # what draws, and what judges colours: both import matplotlib
-)
+CHANGED = [
+    {"HOME": "{there}/file", "MPLCONFIGDIR": "{there}/file/x"},  # nowhere to keep its fonts
+    {"MPLBACKEND": "nonsense"},
+    {"MPLBACKEND": ""},
+    {"MPLCONFIGDIR": "{there}/config"},
+]
+# What draws, and what judges colours: both import matplotlib.
+MODULES = ["sssfit.chart.page", "colour"]
+
+
+@pytest.mark.parametrize(("changed", "module"), in_turn(CHANGED, MODULES))
 def test_matplotlib_says_nothing_and_draws_without_a_display(tmp_path, changed, module):
     (tmp_path / "file").write_text("in the way of a folder")
     (tmp_path / "config").mkdir()

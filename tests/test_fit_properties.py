@@ -180,5 +180,5 @@ def fitted(examples):
     return test
 
 
-test_what_every_fit_promises = fitted(12)
+test_what_every_fit_promises = fitted(6)
 test_what_every_fit_promises_on_many_profiles = pytest.mark.slow(fitted(100))
