@@ -213,10 +213,10 @@ SIMULATE = {
         words="MFP_min / 20; deon-skin: 0.008",
     ),
     "--beam": Row(
-        "simulate wax.toml --method burley",
+        _BURLEY,
         "--beam flat:0.8",
         made_profile,
-        lambda: _content(under_beam(simulate_burley(wax()), parse_beam("flat:0.8"))),
+        lambda: _content(under_beam(simulate_burley(wax(), **_GRID), parse_beam("flat:0.8"))),
     ),
     "--radius": Row(
         "simulate wax.toml --method burley",
