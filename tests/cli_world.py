@@ -545,6 +545,7 @@ def small_sheet() -> Any:
     real = _unrecorded(sheet.compute_sheet)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pictures, "PIXELS", 13)  # of the pictures that a close fit looks at
+        patch.setattr("sssfit.fit.artist._MAX_EVALUATIONS", 60)
         return real(profile(), mm_per_pixel=0.5, pixels=24, most_terms=1)
 
 
@@ -735,7 +736,9 @@ def recording():
         for module in ("sssfit.material", "sssfit.simulate.runner"):
             patch.setattr(
                 f"{module}.material_names",
-                lambda *, paper=False: ("marble",) if paper else ("skin1", "marble"),
+                lambda *, paper=False, layered=False: (
+                    ("marble",) if paper else () if layered else ("skin1", "marble")
+                ),
             )
         yield
 

@@ -14,6 +14,7 @@ from option_rows import COMMANDS, FITS, ROWS, SEEDS, STREAMS, THREADS, VERBOSE, 
 from sssfit.cli import cli
 from sssfit.cli._options import common_options
 from sssfit.compare import pictures
+from sssfit.fit import artist
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -90,6 +91,7 @@ def test_seed_and_threads_reach_the_library(option, name, row):
 @pytest.mark.parametrize("name", list(FITS))
 def test_an_option_of_several_methods_reaches_each_of_them(name, monkeypatch):
     monkeypatch.setattr(pictures, "PIXELS", 13)  # fits to pictures of 67 x 67 took 7 s
+    monkeypatch.setattr(artist, "_MAX_EVALUATIONS", 60)  # of 500: near enough to compare bits
     check(FITS[name])
 
 
