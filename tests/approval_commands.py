@@ -712,7 +712,7 @@ COMPARE = [
         set_up=_SKINS,
     ),
     C("compare"),
-    C("compare --all --picture disk --size 16x12 --mm-per-pixel .4 -o out", few=True),
+    C("compare --all --only svd --picture disk --size 16x12 --mm-per-pixel .4 -o out", few=True),
     C("compare --paper --picture edge --size 16x12 --mm-per-pixel .9 --error l2 --json", few=True),
     C("simulate --paper --method burley --dr 2 --radius 20 -o out", few=True),
     C("compare wax.profile.npz --picture disk --size 16x12 --mm-per-pixel 20 --what kernels"),
@@ -787,7 +787,7 @@ CHOOSE = [
         "choose wax.profile.npz --distance 3m --resolution 40x24 --irradiance disk --fetches 16 "
         "--passes 4 --tolerance 9 --json"
     ),
-    C("choose wax.profile.npz --fetches 7 --passes 1"),
+    C("choose wax.profile.npz --distance 40cm --fov 3 --resolution 40x48 --fetches 7 --passes 1"),
     C("choose wax.profile.npz --fetches 5"),
     C(
         "choose wax.profile.npz --distance 40cm --fov 3 --resolution 40x48 --irradiance disk --tolerance 2"

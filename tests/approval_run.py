@@ -36,6 +36,7 @@ import sssfit
 from sssfit.cli import main
 from sssfit.compare.candidates import Candidate, candidates, every_candidate
 from sssfit.fit import TapsFit
+from sssfit.methods import PRESETS
 from sssfit.process import available_cores
 from sssfit.profile import Profile
 
@@ -50,6 +51,8 @@ _TRIED = (
     "pre-integrated on 5 taps",
     "gaussians 2",
 )
+# One of every kind of look: a medium is solved for 1 s each, and both with a note are among these.
+_PRESETS = ("blender", "hdrp", "iryoku", "community-shaders", "babylon", "gltf")
 STEPS_SECONDS = tuple(k / 32 for k in (3, 11, 5, 17, 7))
 
 
@@ -183,7 +186,8 @@ def stand_ins(
     """All that stands in for what depends on the machine; ``charts`` receives descriptions."""
     from sssfit import material, simulate
     from sssfit.choose import options, truth
-    from sssfit.compare import pictures, sheet
+    from sssfit.compare import pictures, presets, sheet
+    from sssfit.crowd import table
     from sssfit.measure import cost
 
     clock = Clock()
@@ -208,6 +212,11 @@ def stand_ins(
             *_in_place_of(
                 sheet.compute_sheet, functools.partial(sheet.compute_sheet, pixels=24, most_terms=2)
             ),
+            *_in_place_of(
+                table.measure_table,
+                functools.partial(table.measure_table, heads=(1, 4), distances=(2.5, 20.0)),
+            ),
+            mock.patch.object(presets, "PRESETS", {name: PRESETS[name] for name in _PRESETS}),
             mock.patch.object(pictures, "PIXELS", 13),
             *(mock.patch.object(*each) for each in shared_work.SHORT),  # searches of cascades
             mock.patch.object(options, "fit_result", _fitted_once(options.fit_result, clock)),
