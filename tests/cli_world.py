@@ -684,7 +684,7 @@ def blank(*_) -> Figure:
 
 _CHARTS = (
     *("profile", "kernel", "material", "pareto", "budget", "sheet", "models", "guide", "spectrum"),
-    *("stability", "moving_light", "variates", "speed_up", "presets"),
+    *("stability", "moving_light", "variates", "speed_up", "presets", "frequency", "angles"),
 )
 STAND_INS = {
     "sssfit.simulate.simulate_montecarlo_many": few_photons,

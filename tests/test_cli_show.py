@@ -14,11 +14,18 @@ import numpy as np
 import pytest
 
 from sssfit import __version__
+from sssfit.chart import page
 from sssfit.cli import main
 from sssfit.fit import fit_gaussians, fit_svd
 from sssfit.material import Layer, Material, load_material
 from sssfit.profile import Profile
 from sssfit.simulate import Checkpoint, simulate_montecarlo, simulate_montecarlo_many
+
+
+@pytest.fixture(autouse=True)
+def no_layout(monkeypatch):
+    """Leave panels where they are: half of a chart's time, and nothing here looks at them."""
+    monkeypatch.setattr(page, "lay_out", lambda figure: figure.set_layout_engine("none"))
 
 
 @pytest.fixture(scope="module")
