@@ -1,11 +1,13 @@
 """Heads in a row: where they stand, what savings leave out, and the paper's table."""
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from meshes import sphere
 
+import sssfit.crowd.table
 from sssfit.chart import figure_of
 from sssfit.crowd.frame import measure_frame
 from sssfit.crowd.row import Row
@@ -86,6 +88,25 @@ def test_every_cell_leaves_out_as_much_as_the_papers(kernel):
         kernel, heads=(1, 4), distances=(2.5, 20.0), map_size=64, resolution=SMALL
     )
     assert (found.texels >= PUBLISHED[[0, 2]][:, [0, 3]]).all()
+
+
+def test_unless_told_otherwise_the_table_is_the_papers(monkeypatch):
+    seen = []
+    monkeypatch.setattr(
+        *(sssfit.crowd.table, "measure_frame"), lambda row, *_, **__: SimpleNamespace(row=row)
+    )
+    found = measure_table(None, progress=lambda *told: seen.append(told))
+    np.testing.assert_array_equal(found.published, PUBLISHED)
+    assert (found.heads[-1], found.distances[-1]) == (16, 100.0)
+    assert seen[0] == (0, 30, "1 at 2.5 units")
+    assert seen[-1] == (29, 30, "16 at 100 units")
+
+
+@pytest.mark.slow
+def test_the_whole_table_is_measured(kernel):
+    found = measure_table(kernel, map_size=16, resolution=(6, 8))
+    np.testing.assert_array_equal(found.published, PUBLISHED)
+    assert (found.texels > 1.0).all()
 
 
 def test_savings_are_chosen_by_name():
