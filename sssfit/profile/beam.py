@@ -258,7 +258,7 @@ def lens_area(one: FloatArray, other: float, apart: FloatArray) -> FloatArray:
     found: FloatArray = np.where(
         apart <= np.abs(one - other), np.pi * np.minimum(one, other) ** 2, 0.0
     )
-    # Of 9 mm under a beam of 1 mm, four disks in five are one inside the other, or apart.
+    # With edges to 9 mm and a beam of 1 mm, four pairs in five lie one inside the other, or apart.
     cross = (apart > np.abs(one - other)) & (apart < one + other)
     found[cross] = _lens_of_crossing(one[cross], other, apart[cross])
     return found
