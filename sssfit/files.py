@@ -261,7 +261,9 @@ def remove_unfinished() -> None:
     for path in tuple(_unfinished):
         with contextlib.suppress(OSError):
             if path.is_dir():
-                shutil.rmtree(path)
+                # Two signals may remove it twice at a time: what the other took is no reason to
+                # stop before the folder itself, after which this one ends the process.
+                shutil.rmtree(path, ignore_errors=True)
             else:
                 path.unlink()
 

@@ -14,6 +14,7 @@ import processes
 import pytest
 from reference_pixels import make_profile
 
+from sssfit import files
 from sssfit.fit import fit_svd
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
@@ -153,6 +154,22 @@ def test_what_is_under_way_is_removed_by_the_second_signal(tmp_path, apart_secon
     if process.returncode == 130:
         assert_nothing_is_left(tmp_path, folder)
     assert (tmp_path / "out").read_bytes() == b"old"
+
+
+def test_a_folder_is_removed_though_its_files_are_taken_meanwhile(monkeypatch):
+    """As by the first signal's cleaning, while the second one's goes on and ends the process."""
+    real = os.unlink
+
+    def taken(*given, **settings):
+        real(*given, **settings)
+        raise FileNotFoundError
+
+    with files.temporary_folder() as folder:
+        (folder / "picture").write_bytes(b"half")
+        monkeypatch.setattr(os, "unlink", taken)
+        files.remove_unfinished()
+        monkeypatch.undo()
+        assert not folder.exists()
 
 
 def assert_nothing_is_left(tmp_path, folder):
