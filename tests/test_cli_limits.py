@@ -154,9 +154,12 @@ def test_any_limit_gives_a_result_or_one_line(folder, verb, arguments):
 
 
 @posix
-def test_a_picture_too_large_for_the_limit_is_one_line(folder):
-    large = ("--irradiance", "disk", "--size", "3500x3500", "--threads", "1")
-    ended = sssfit(folder, "render", "wax.kernel.json", *large, megabytes=900)
+@pytest.mark.parametrize(
+    ("side", "megabytes"), [(3500, 900), pytest.param(6000, 1600, marks=pytest.mark.slow)]
+)
+def test_a_picture_too_large_for_the_limit_is_one_line(folder, side, megabytes):
+    large = ("--irradiance", "disk", "--size", f"{side}x{side}", "--threads", "1")
+    ended = sssfit(folder, "render", "wax.kernel.json", *large, megabytes=megabytes)
     assert ended.returncode == 1
     assert ended.stderr.splitlines()[-1].startswith("Error: out of memory: use a smaller grid or")
 

@@ -65,14 +65,12 @@ def energies_from_cumulative(
     SimulationError
         A value is not finite, or F does not start at 0 or falls by more.
     """
-    total = np.asarray(total, dtype=np.float64)
-    everywhere = np.vstack((cumulative, total))
+    everywhere = np.vstack((cumulative, np.asarray(total, dtype=np.float64)))
     if not np.isfinite(everywhere).all():
         raise SimulationError("F(r) is not finite everywhere; this is a defect of the method.")
     if np.any(everywhere[0] != 0.0):
         raise SimulationError(f"F(0) = {everywhere[0].tolist()}; expected 0 in every channel.")
-    rising = np.minimum(np.maximum.accumulate(everywhere[:-1], axis=0), np.maximum(total, 0.0))
-    rising = np.vstack((rising, np.maximum(total, 0.0)))
+    rising = without_falls(everywhere)
     fall = float(np.max(np.abs(rising - everywhere)))
     if fall > tolerance * max(float(np.max(total)), ROUNDING):
         raise SimulationError(
@@ -81,6 +79,16 @@ def energies_from_cumulative(
         )
     energies: FloatArray = np.diff(rising, axis=0)
     return energies
+
+
+def without_falls(everywhere: FloatArray) -> FloatArray:
+    """Return F at radii and, last, altogether (n + 1, ...) as its running maximum up to the total.
+
+    What this changes is the least error of F, which cannot fall.
+    """
+    total = np.maximum(everywhere[-1:], 0.0)
+    rising = np.minimum(np.maximum.accumulate(everywhere[:-1], axis=0), total)
+    return np.concatenate((rising, total))
 
 
 def energies_from_beyond(beyond: FloatArray) -> FloatArray:

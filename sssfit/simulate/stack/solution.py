@@ -12,6 +12,7 @@ from itertools import pairwise
 import numpy as np
 
 from sssfit.arrays import FloatArray
+from sssfit.simulate._deterministic import without_falls
 from sssfit.simulate.stack.assembly import Assembly
 from sssfit.simulate.stack.changes import Changes, ready
 from sssfit.simulate.stack.quarter import Each, Quarter, without_rounding
@@ -21,6 +22,7 @@ from sssfit.simulate.stack.spline import Spline
 from sssfit.simulate.stack.transform import Wavenumbers
 
 _MISS = 0.1  # of the tolerance, between two wavenumbers; F is then off by less
+_DARK = 1e-300  # where no light leaves, no error has a share
 _FEW_RADII, _PER_DECADE = 120, 40  # more radii than this are interpolated: 1e-7 of F
 
 
@@ -39,9 +41,7 @@ class Side:
     @property
     def fall(self) -> float:
         """By how much F falls or exceeds the total anywhere, which no F does: a least error."""
-        most = max(self.total, 0.0)
-        rising = np.minimum(np.maximum.accumulate(self.cumulative), most)
-        return float(np.max(np.abs(rising - self.cumulative), initial=most - self.total))
+        return float(np.max(np.abs(without_falls(self.edges) - self.edges)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,6 +98,11 @@ class Errors:
         return [each for each in (self.reflected, self.transmitted) if each is not None]
 
 
+def share_of(errors: Errors, answer: Answer) -> float:
+    """Return the largest error of an answer, its own fall included, as a share of its light."""
+    return max(errors.worst, answer.fall) / max(answer.leaving, _DARK)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Step:
     """Answers of all stacks with ``count`` directions, and their errors."""
@@ -108,8 +113,7 @@ class Step:
 
     def share(self, number: int) -> float:
         """Return the largest error of a stack as a share of the light that leaves it."""
-        answer = self.answers[number]
-        return max(self.errors[number].worst, answer.fall) / answer.leaving
+        return share_of(self.errors[number], self.answers[number])
 
     @property
     def spline_share(self) -> float:

@@ -14,7 +14,7 @@ from sssfit.simulate._deterministic import (
     computed_profile,
     energies_from_cumulative,
 )
-from sssfit.simulate.stack.solution import Answer, Errors, Side, SideErrors
+from sssfit.simulate.stack.solution import Answer, Errors, Side, SideErrors, share_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,10 +42,7 @@ def profile_of(
     below = [each.answer.transmitted for each in solved if each.answer.transmitted is not None]
     under = [each.errors.transmitted for each in solved if each.errors.transmitted is not None]
     absorbed = np.maximum([each.answer.absorbed for each in solved], 0.0).T
-    shares = [
-        max(each.errors.worst, each.answer.fall) / max(each.answer.leaving, 1e-300)
-        for each in solved
-    ]
+    shares = [share_of(each.errors, each.answer) for each in solved]
     totals = material.specular_reflectance + np.array([each.answer.leaving for each in solved])
     return computed_profile(
         material,
