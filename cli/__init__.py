@@ -6,6 +6,8 @@ so nothing but the handling of signals is imported here.
 
 from __future__ import annotations
 
+import sys
+
 try:
     from typing import TYPE_CHECKING, Any
 
@@ -33,6 +35,9 @@ def main(args: Sequence[str] | None = None) -> NoReturn:
         from ._main import run
 
         run(args)
+    except KeyboardInterrupt:  # between the imports and what `run` catches, or after that
+        sys.stderr.write("Interrupted.\n")
+        raise SystemExit(130) from None
     finally:
         if args is not None:
             interrupts.give_back()

@@ -15,6 +15,8 @@ import pytest
 from reference_pixels import make_profile
 
 from sssfit import files
+from sssfit.cli import _main as cli_main
+from sssfit.cli import main
 from sssfit.fit import fit_svd
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
@@ -225,6 +227,20 @@ def test_a_signal_during_imports_leaves_no_traceback(tmp_path, number, times):
         assert "Traceback" not in err
         assert "Exception" not in err
         assert not list(tmp_path.glob("*.tmp"))
+
+
+@pytest.mark.parametrize("step", ["_keep_matplotlib_quiet", "_fail"])
+def test_a_signal_beside_what_the_verbs_catch_leaves_no_traceback(monkeypatch, capsys, step):
+    """As in the instructions between the imports and the first verb, or while an error is told."""
+
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli_main, step, interrupted)
+    with pytest.raises(SystemExit) as end:
+        main(["show", "no-such-file"])
+    assert end.value.code == 130
+    assert capsys.readouterr().err == "Interrupted.\n"
 
 
 # A look at what is imported where.
