@@ -90,6 +90,9 @@ for _verb in (
 def run(args: Sequence[str] | None) -> NoReturn:
     """Run the command line and exit."""
     _keep_matplotlib_quiet()
+    # BLAS starts a thread a core with numpy, 70 ms of the processor, and waits for all of them at
+    # each of the small products here.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     with warnings.catch_warnings():
         warnings.simplefilter("always", SssfitWarning)
         warnings.showwarning = _show_warning

@@ -65,7 +65,7 @@ FOR_TYPES = {
 ROOMS_ON_JIT = {"profile", "scene", "simulate", "render"}
 # Neighbours that hand records on and know nothing of each other.
 APART = {"simulate", "fit", "render"}
-JIT_MAY_IMPORT = {"numpy", "numba", "math", "sssfit"} | set(sys.stdlib_module_names)
+JIT_MAY_IMPORT = {"numpy", "numba", "llvmlite", "math", "sssfit"} | set(sys.stdlib_module_names)
 
 CLI = sorted((ROOT / "cli").rglob("*.py"))
 JIT = sorted((ROOT / "sssfit" / "_jit").rglob("*.py"))

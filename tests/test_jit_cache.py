@@ -1,5 +1,6 @@
 """Where machine code is kept: keyed by every source, where the user says, or nowhere at all."""
 
+import ctypes
 import errno
 import io
 import os
@@ -7,13 +8,17 @@ import random
 import shutil
 import subprocess
 import sys
+import types
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numba
 import numpy as np
 import pytest
+from numpy.ctypeslib import ndpointer
 
 from sssfit import __version__, _jit, process
+from sssfit._jit import half_space_walk, layered_walk, machine_code
 from sssfit.material import load_material
 from sssfit.simulate import simulate_montecarlo
 
@@ -219,11 +224,124 @@ def test_a_flipped_bit_in_any_file_is_compiled_again(tmp_path, flips):
     assert ended.stdout.split() == [".nbc", ".nbi", str(10 + flips)]
 
 
+# Machine code that is loaded without numba
+
+
+WITHOUT_NUMBA = """
+import sys
+from sssfit._jit import half_space_walk, layered_walk
+from sssfit.material import load_material
+from sssfit.simulate import simulate_montecarlo
+assert half_space_walk.ENTRY.is_ready() and layered_walk.ENTRY.is_ready()
+for name in ("skin1", "skin-melanin-12"):
+    simulate_montecarlo(load_material(name), photons=1000, threads=2)
+print(*(name for name in ("numba", "scipy") if name in sys.modules))
+"""
+
+
+def test_a_walk_that_was_compiled_before_needs_no_numba():
+    half_space_walk.ENTRY.load()
+    layered_walk.ENTRY.load()
+    assert python(WITHOUT_NUMBA) == []
+
+
+@pytest.fixture
+def tripled(tmp_path, monkeypatch):
+    """An entry of a module of its own, which keeps its code in a folder of its own."""
+    monkeypatch.setattr(_jit, "_CACHE_FOLDER", str(tmp_path / "code"))
+    (tmp_path / "code").mkdir()
+    module = types.ModuleType("sssfit._jit.tripled")
+    module.enter = lambda x, values, count: 3 * x + int(numba.carray(values, count, np.float64)[1])
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    arguments = ctypes.c_int64, ndpointer(np.float64, 1, flags="C"), ctypes.c_int64
+    return lambda: machine_code.Entry("tripled", arguments)
+
+
+def result_of(entry):
+    return entry(2, np.array([0.0, 1.0]), 2)
+
+
+def test_an_entry_is_compiled_once_and_then_read(tripled, monkeypatch):
+    first, second = tripled(), tripled()
+    assert not first.is_ready()
+    assert result_of(first) == 7
+    assert first.is_ready()
+    assert second.is_ready()
+    monkeypatch.delitem(sys.modules, "sssfit._jit.tripled")  # what would be compiled is gone
+    assert result_of(second) == 7
+    assert list(first.path().parent.iterdir()) == [first.path()]
+
+
+def test_what_an_entry_is_given_is_checked(tripled):
+    entry = tripled()
+    for wrong in (np.zeros(2, np.float32), np.zeros((2, 2)), np.zeros(4)[::2], [0.0, 1.0]):
+        with pytest.raises((TypeError, ctypes.ArgumentError)):
+            entry(2, wrong, 2)
+
+
+def test_without_a_folder_an_entry_is_compiled_all_the_same(tripled, monkeypatch):
+    monkeypatch.setattr(_jit, "_CACHE_FOLDER", "")
+    entry = tripled()
+    assert entry.path() is None
+    assert result_of(entry) == 7
+
+
+def test_threads_that_call_an_entry_at_once_load_it_once(tripled, monkeypatch):
+    entry, links, real = tripled(), [], machine_code.Entry._link
+
+    def counted(self, code):
+        links.append(code)
+        return real(self, code)
+
+    monkeypatch.setattr(machine_code.Entry, "_link", counted)
+    with ThreadPoolExecutor(8) as pool:
+        assert list(pool.map(lambda _: result_of(entry), range(32))) == [7] * 32
+    assert len(links) == 1
+
+
+def test_another_processor_has_a_file_of_its_own(tripled, monkeypatch):
+    ours = tripled().path()
+    machine_code._machine_key.cache_clear()
+    monkeypatch.setenv("NUMBA_CPU_FEATURES", "-avx")
+    theirs = tripled().path()
+    machine_code._machine_key.cache_clear()
+    assert theirs.parent == ours.parent
+    assert theirs != ours
+
+
+def test_a_flipped_bit_in_machine_code_is_compiled_again(tripled):
+    assert result_of(tripled()) == 7
+    path, chance = tripled().path(), random.Random(3)
+    whole = path.read_bytes()
+    damaged = [whole[:k] for k in (0, 1, 31, 32, 33, len(whole) - 1)]
+    for _ in range(4):
+        content = bytearray(whole)
+        content[chance.randrange(len(whole))] ^= 1 << chance.randrange(8)
+        damaged.append(bytes(content))
+    for content in damaged:
+        path.write_bytes(content)
+        entry = tripled()
+        assert not entry.is_ready()
+        assert result_of(entry) == 7
+        assert tripled().is_ready()  # and mended
+
+
+def test_code_that_could_ask_for_python_is_refused(tripled, monkeypatch):
+    def fails(x, values, count):
+        if x < 0:
+            raise ValueError
+        return x + int(np.zeros(count)[0])
+
+    monkeypatch.setattr(sys.modules["sssfit._jit.tripled"], "enter", fails)
+    with pytest.raises(TypeError, match=r"needs .*(Py|NRT_)"):
+        tripled().load()
+
+
 @pytest.mark.slow
 def test_a_flipped_bit_in_the_cache_of_the_walk_changes_nothing(tmp_path):
     cache = tmp_path / "cache"
     expected = python(WALK, NUMBA_CACHE_DIR=str(cache))
-    whole = {each: each.read_bytes() for each in cache.rglob("*.nb?")}
+    whole = {each: each.read_bytes() for each in cache.rglob("*.o")}
     chance = random.Random(2)
     for file in [*whole, *chance.choices(list(whole), k=20)]:
         content = bytearray(whole[file])

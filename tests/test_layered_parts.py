@@ -22,9 +22,17 @@ from sssfit._jit import (
     layered_lanes,
     layered_slots,
     layered_tally,
+    layered_walk,
 )
-from sssfit._jit.fused import STRIDE
-from sssfit._jit.sampling import LANES
+from sssfit._jit.lanes import (
+    FLOAT_ROWS,
+    LANES,
+    SLOT_ROWS,
+    SLOT_WORD_ROWS,
+    STRIDE,
+    SUMS,
+    WORD_ROWS,
+)
 from sssfit.grid import RadialGrid
 from sssfit.simulate.walk_layered import LayeredWalk
 
@@ -159,7 +167,7 @@ def test_phase_function_is_normalised_and_has_mean_cosine_g(g):
 
 def scattering_lanes(g, start):
     """Lanes of one direction in a medium of that g."""
-    floats = np.zeros(layered_lanes.FLOAT_ROWS * STRIDE, np.float32)
+    floats = np.zeros(FLOAT_ROWS * STRIDE, np.float32)
     row(floats, layered_lanes.BACK)[:] = 1.0 - g
     for k, each in enumerate(start):
         row(floats, k * STRIDE + int(layered_lanes.UX))[:] = each
@@ -215,8 +223,8 @@ def test_directions_are_forgotten_as_g_to_the_number_of_collisions(g):
 
 
 def test_flights_that_end_inside_are_flown_and_the_others_flagged():
-    floats, rng = np.zeros(layered_lanes.FLOAT_ROWS * STRIDE, np.float32), np.random.default_rng(1)
-    for at in range(layered_lanes.FLOAT_ROWS):
+    floats, rng = np.zeros(FLOAT_ROWS * STRIDE, np.float32), np.random.default_rng(1)
+    for at in range(FLOAT_ROWS):
         row(floats, at * STRIDE)[:] = rng.uniform(0.0, 1.0, LANES)
     row(floats, layered_lanes.UZ)[:] = rng.uniform(-1.0, 1.0, LANES)
     row(floats, layered_lanes.FLIGHT)[:] = rng.exponential(0.5, LANES)
@@ -269,7 +277,7 @@ def test_the_last_lanes_move_into_the_gaps():
 
 def slots_at(uz, ratio, thickness=1.0):
     """Slots half way down a layer, headed for its interfaces; free paths of 0 beyond them."""
-    e = np.zeros(layered_slots.SLOT_ROWS * STRIDE, np.float32)
+    e = np.zeros(SLOT_ROWS * STRIDE, np.float32)
     row(e, layered_lanes.UX)[:] = np.sqrt(1.0 - uz.astype(float) ** 2)
     row(e, layered_lanes.UZ)[:] = uz
     row(e, layered_lanes.Z)[:] = 0.5 * thickness
@@ -284,7 +292,7 @@ def test_an_interface_lets_light_through_by_fresnels_formula(ratio):
     # 300 x 256 photons, decision by decision: a reflectance 1 % high would hold back some 18 more
     cosines = np.random.default_rng(1).uniform(-1.0, 1.0, (300, LANES)).astype(np.float32)
     for batch, uz in enumerate(cosines):
-        e, words = slots_at(uz, ratio), streams(layered_slots.SLOT_WORD_ROWS, 1, batch)
+        e, words = slots_at(uz, ratio), streams(SLOT_WORD_ROWS, 1, batch)
         drawn = words.copy()
         layered_slots.meet(e, words, LANES)
         reflectance = [reference.fresnel(abs(float(each)), ratio) for each in uz]
@@ -308,7 +316,7 @@ def test_an_interface_lets_light_through_by_fresnels_formula(ratio):
 def test_beyond_the_critical_angle_everything_is_reflected():
     uz = np.linspace(1e-3, math.sqrt(1.0 - 1.0 / 1.5**2) - 1e-6, LANES).astype(np.float32)
     for stream in range(300):
-        e, words = slots_at(uz, 1.5), streams(layered_slots.SLOT_WORD_ROWS, 1, stream)
+        e, words = slots_at(uz, 1.5), streams(SLOT_WORD_ROWS, 1, stream)
         layered_slots.meet(e, words, LANES)
         assert not row(words, layered_slots._CROSSES).any()
 
@@ -319,7 +327,7 @@ def test_a_fresh_free_path_begins_at_the_interface():
     for stream in range(400):
         e = slots_at(np.ones(LANES, np.float32), 1.0)
         row(e, layered_slots._NEXT_FREE_PATH)[:] = 2.0
-        words = streams(layered_slots.SLOT_WORD_ROWS, 1, stream)
+        words = streams(SLOT_WORD_ROWS, 1, stream)
         layered_slots.meet(e, words, LANES)
         meets = row(words, layered_slots._MEETS_AGAIN) == 1
         z = row(e, layered_lanes.Z).astype(float)
@@ -341,8 +349,8 @@ def lane_inside(task, collisions):
     """One lane of weight 10 after so many collisions; blocks, the lane, the sweep, the ledger."""
     _, bins = task.groups[0]
     lane, sweep = np.uint64(3), np.uint32(2_000_000)
-    floats = np.zeros(layered_lanes.FLOAT_ROWS * STRIDE, np.float32)
-    words = streams(layered_lanes.WORD_ROWS)
+    floats = np.zeros(FLOAT_ROWS * STRIDE, np.float32)
+    words = streams(WORD_ROWS)
     row(floats, layered_lanes.WEIGHT)[:] = 1.0
     floats[layered_lanes.WEIGHT + lane] = floats[layered_lanes.BOOKED + lane] = 10.0
     floats[layered_lanes.PATH + lane] = 0.5
@@ -360,7 +368,7 @@ def event_of(task, collisions):
     flags, exits = np.zeros(STRIDE, np.uint8), np.zeros(STRIDE, np.uint64)
     layered_end.flag_weak(floats, words, flags, LANES, sweep)
     layers = stack_.layers.size // 4
-    absorbed = np.zeros(bins.channel.size * layered_slots.SUMS * layers)
+    absorbed = np.zeros(bins.channel.size * SUMS * layers)
     ended = layered_end.end_or_boost(
         floats,
         words,
@@ -397,6 +405,17 @@ def test_a_layered_walk_ends_unfinished_at_a_million_collisions_and_not_before()
     np.testing.assert_array_equal(balance, 10.0)
 
 
+def blocks_of(stack_, *, channels, layers):
+    """The memory of a walk, as `layered.enter` lays it over the addresses that it gets."""
+    made = layered_walk.blocks(layers, channels)
+    floats, words, shares, flags, gone, slots, slot_words, *rest = made
+    return layered.Blocks(
+        *(floats, floats.view(np.uint32), words, shares, flags, flags.view(np.uint64), gone),
+        *(slots, slots.view(np.uint32), slot_words, *rest),
+        *(stack_.layers.view(np.uint32), stack_.crossings.view(np.uint32)),
+    )
+
+
 def test_photons_that_meet_interfaces_without_end_are_kept_apart_as_unfinished(monkeypatch):
     """Given up after two rounds instead of 100 000; the rest of the walk is that of the library."""
     monkeypatch.setattr(layered, "_MOST_ROUNDS", 1)
@@ -405,7 +424,9 @@ def test_photons_that_meet_interfaces_without_end_are_kept_apart_as_unfinished(m
     )
     task = LayeredWalk((material,), (RadialGrid(1.0, 5),), 1, 300)
     (stack_, bins), ledger = task.groups[0], task.empty_tally().ledger
-    layered.trace_batch.py_func(np.uint64(1), np.int64(0), 300, 0, False, stack_, bins, ledger)
+    blocks = blocks_of(stack_, channels=bins.channel.size, layers=len(material.layers))
+    given = np.uint64(1), np.int64(0), 300, 0, False
+    layered.trace_batch.py_func(*given, stack_, bins, ledger, blocks)
     out = (ledger.reflected + ledger.transmitted)[..., 0].sum(axis=0)
     inside = ledger.absorbed.sum(axis=0) + ledger.unfinished[:, 0]
     assert np.all(ledger.unfinished > 0.0)
@@ -436,6 +457,7 @@ LOOPS = """
 import hashlib, sys
 import numpy as np
 sys.path.insert(0, sys.argv[1])
+from sssfit._jit.lanes import FLOAT_ROWS, SLOT_WORD_ROWS
 from test_layered_parts import (
     LANES, collide, layered_lanes, layered_slots, row, scattering_lanes, slots_at, streams
 )
@@ -443,14 +465,14 @@ digest = hashlib.sha256()
 for g in (0.0, .6, .9999):
     floats, words = scattering_lanes(g, (.48, .6, .64)), streams(6)
     row(floats, layered_lanes.THICKNESS)[:] = 1.0
-    flags = np.zeros(floats.size // layered_lanes.FLOAT_ROWS, np.uint8)
+    flags = np.zeros(floats.size // FLOAT_ROWS, np.uint8)
     for sweep in range(60):
         collide(floats, words, sweep)
         layered_lanes.fly(floats, flags, LANES)
         digest.update(floats.tobytes() + words.tobytes() + flags.tobytes())
 uz = np.random.default_rng(1).uniform(-1.0, 1.0, LANES).astype(np.float32)
 for ratio in (1.5, 1.0, 1.0 / 1.33):
-    slots, words = slots_at(uz, ratio), streams(layered_slots.SLOT_WORD_ROWS)
+    slots, words = slots_at(uz, ratio), streams(SLOT_WORD_ROWS)
     layered_slots.meet(slots, words, LANES)
     digest.update(slots.tobytes() + words.tobytes())
 print(digest.hexdigest())

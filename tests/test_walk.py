@@ -8,7 +8,7 @@ import pytest
 import reference
 from scipy import stats
 
-from sssfit._jit import sampling
+from sssfit._jit import half_space_walk, sampling
 from sssfit._jit import semi_infinite as walk
 from sssfit.grid import RadialGrid
 from sssfit.simulate import simulate_montecarlo
@@ -198,9 +198,9 @@ def test_first_flights_leave_where_fresnel_lets_them_and_nowhere_else(eta):
             for lane in np.flatnonzero(z < 0.0)
         )
         ledger = task.empty_tally().ledger
-        walk.trace_batch(
-            np.uint64(1),
-            np.int64(batch),
+        half_space_walk.trace_batch(
+            1,
+            batch,
             walk.LANES,
             eta,
             task.roulette_at,

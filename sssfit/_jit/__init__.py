@@ -9,8 +9,9 @@ The cache folder is therefore keyed by the version and by a hash of every source
 folder. Without a writable folder (read-only home, or none) functions are compiled in each process:
 slower to start, otherwise the same.
 
-numba itself, 0.35 s, is imported with the first compiled function (``compilation``): much of what
-asks for a thread pool or for the cache's key runs none.
+numba itself, 0.2 to 0.35 s, is imported with the first compiled function (``compilation``): much
+of what asks for a thread pool or for the cache's key runs none, and the photon walks are loaded
+without it (``machine_code``).
 """
 
 import hashlib
@@ -24,6 +25,7 @@ from sssfit import __version__
 from sssfit.process import user_cache_folder
 
 Function = TypeVar("Function", bound=Callable[..., object])
+Address = Any  # in C's functions: of an array's first element
 
 
 def source_key() -> str:
@@ -51,7 +53,12 @@ def _writable_cache_folder() -> str:
 _CACHE_FOLDER = _writable_cache_folder()
 
 
-def compiled_before(file: str, function: str = "trace_batch") -> bool:
+def cache_folder() -> str:
+    """Return the folder of machine code from these sources; "" where none can be written."""
+    return _CACHE_FOLDER
+
+
+def compiled_before(file: str, function: str) -> bool:
     """Return whether the cache has machine code for that file's function from these sources."""
     pattern = f"{file}.{function}-*.nbc"
     return bool(_CACHE_FOLDER) and any(Path(_CACHE_FOLDER).rglob(pattern))
@@ -64,7 +71,8 @@ def thread_pool(
 
     Otherwise the first call would do 0.3 s of imports on several threads at once, where an
     interrupt or a MemoryError in one of them can leave the others waiting for its locks forever.
-    A ``first`` call, of a function of `jit_entry` that is in the cache, does without them.
+    A ``first`` call, which loads machine code that needs no numba (``machine_code``), does without
+    them.
     """
     if first is not None:
         first()
@@ -81,16 +89,6 @@ def thread_pool(
 def jit(function: Function) -> Function:
     """Compile ``function`` on first call with the common policy; ``.py_func`` is its slow twin."""
     return _compile(function, inline="never")
-
-
-def jit_entry(function: Function) -> Function:
-    """Like ``jit``, for what a run calls from Python, if it compiles to arithmetic alone.
-
-    The cache gives its machine code without numba's tables of all that it could compile, which take
-    0.4 s of the processor (and import scipy), so it may need no symbols but those of numba's
-    reference counts and of the mathematics library.
-    """
-    return _compile(function, inline="never", is_entry=True)
 
 
 def jit_inline(function: Function) -> Function:

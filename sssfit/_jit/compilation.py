@@ -5,18 +5,27 @@ flipped bits in machine code 4 crashed every later run and one silently gave a d
 """
 
 import contextlib
+import ctypes
 import hashlib
 import pickle
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Literal, TypeVar
+from typing import Any, Literal, TypeVar
 
+import llvmlite.binding as llvm
 import numba
+from numba import types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
-from numba.core.runtime.nrt import rtsys
+
+from sssfit._jit.machine_code import SYMBOL, target_machine
 
 Function = TypeVar("Function", bound=Callable[..., object])
 
+_NUMBERS = {
+    ctypes.c_int64: types.int64,
+    ctypes.c_uint64: types.uint64,
+    ctypes.c_double: types.float64,
+}
 _SUM_BYTES = 32  # of SHA-256
 
 
@@ -26,7 +35,6 @@ def compiled(
     *,
     inline: Literal["never", "always"],
     forceinline: bool = False,
-    is_entry: bool = False,
 ) -> Function:
     """Decorate with the common policy, and with a cache in a folder; "" is without one.
 
@@ -40,10 +48,39 @@ def compiled(
         before = numba.config.CACHE_DIR  # type: ignore[attr-defined]
         numba.config.CACHE_DIR = folder  # type: ignore[attr-defined]
         try:
-            found._cache = _ForgivingCache(function, is_entry=is_entry)  # type: ignore[attr-defined]
+            found._cache = _ForgivingCache(function)  # type: ignore[attr-defined]
         finally:
             numba.config.CACHE_DIR = before  # type: ignore[attr-defined]
     return found
+
+
+def object_code(function: Callable[..., int], arguments: Sequence[Any]) -> bytes:
+    """Compile a function of numbers and addresses as C would call it; return its object code.
+
+    numba's C functions report exceptions through Python. Here every other function is made internal
+    and the whole is optimised once more: LLVM then sees that nothing can fail, and what would ask
+    for Python goes. Without it, walks are 1.2 to 1.5 times as fast as by numba's own call.
+
+    Raises
+    ------
+    TypeError
+        The function can fail, or allocates memory: its code would still need Python.
+    """
+    signature = types.int64(*(_NUMBERS.get(each, types.voidptr) for each in arguments))
+    found = numba.cfunc(signature, error_model="numpy")(function)
+    module = llvm.parse_assembly(found.inspect_llvm())
+    for each in (*module.functions, *module.global_variables):
+        if not each.is_declaration and each.name != found.native_name:
+            each.linkage = "internal"
+    machine = target_machine()
+    builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=3))
+    builder.getModulePassManager().run(module, builder)
+    needed = [each.name for each in module.functions if each.is_declaration]
+    if pythons := [each for each in needed if each.startswith(("Py", "NRT_", "numba_"))]:
+        raise TypeError(f"{function.__module__}: compiled code needs {', '.join(pythons)}.")
+    module.get_function(found.native_name).name = SYMBOL
+    code: bytes = machine.emit_object(module)
+    return code
 
 
 class _DamagedError(Exception):
@@ -96,8 +133,7 @@ class _ForgivingCache(FunctionCache):
     Otherwise a full disk or quota, or a truncated or damaged file, would stop every later run.
     """
 
-    def __init__(self, function: object, *, is_entry: bool) -> None:
-        self.is_entry = is_entry
+    def __init__(self, function: object) -> None:
         super().__init__(function)  # type: ignore[no-untyped-call]
         self._cache_file = _CheckedFiles(  # type: ignore[no-untyped-call]
             cache_path=self._cache_path,
@@ -107,9 +143,6 @@ class _ForgivingCache(FunctionCache):
 
     def load_overload(self, sig: object, target_context: object) -> object:
         try:
-            if self.is_entry:
-                rtsys.initialize(target_context)
-                return self._load_overload(sig, target_context)  # type: ignore[no-untyped-call]
             return super().load_overload(sig, target_context)  # type: ignore[no-untyped-call]
         except Exception:  # _DamagedError, OSError, or the errors of other versions of numba
             self._forget()

@@ -16,11 +16,8 @@ from numba.core import types
 from numba.extending import intrinsic, overload
 
 from sssfit._jit import jit, jit_merged
-from sssfit._jit.sampling import LANES, LaneWords, splitmix64
-
-# Rows are 64 bytes further apart than a power of two, or the same lane of every row would fall into
-# the same set of the cache.
-STRIDE = LANES + 16
+from sssfit._jit.lanes import LANES, STRIDE, LaneWords
+from sssfit._jit.sampling import splitmix64
 
 _F32 = np.float32
 _U32 = np.uint32

@@ -20,16 +20,31 @@ This estimates the same energy, with weights that never exceed the walk's own.
 Lengths are in mm.
 """
 
-import numpy as np
+from typing import NamedTuple
 
-from sssfit._jit import jit_entry
-from sssfit._jit.fused import STRIDE, seed_streams
-from sssfit._jit.layered_end import end_or_boost, flag_weak, give_up
-from sssfit._jit.layered_entry import Stack, launch
-from sssfit._jit.layered_lanes import (
+import numpy as np
+from numba import carray  # type: ignore[attr-defined]
+
+from sssfit._jit import Address, jit
+from sssfit._jit.fused import seed_streams
+from sssfit._jit.lanes import (
     FLOAT_ROWS,
-    VECTOR,
+    LANES,
+    SCRATCH_ROWS,
+    SLOT_ROWS,
+    SLOT_WORD_ROWS,
+    STRIDE,
+    SUMS,
     WORD_ROWS,
+    LaneFloats,
+    LaneWords,
+)
+from sssfit._jit.layered_end import end_or_boost, flag_weak, give_up
+from sssfit._jit.layered_entry import launch
+from sssfit._jit.layered_lanes import (
+    VECTOR,
+    Flags,
+    Indices,
     draw,
     fly,
     list_flagged,
@@ -37,24 +52,9 @@ from sssfit._jit.layered_lanes import (
     renormalise,
     rotate,
 )
-from sssfit._jit.layered_slots import (
-    SLOT_ROWS,
-    SLOT_WORD_ROWS,
-    SUMS,
-    gather,
-    meet,
-    settle,
-)
-from sssfit._jit.layered_tally import (
-    SCRATCH_ROWS,
-    Bins,
-    Ledger,
-    add_absorbed,
-    book_alone,
-    book_channels,
-    score_exits,
-)
-from sssfit._jit.sampling import LANES
+from sssfit._jit.layered_slots import gather, meet, settle
+from sssfit._jit.layered_tally import add_absorbed, book_alone, book_channels, score_exits
+from sssfit._jit.layered_walk import Bins, FloatArray, Ledger, Stack
 
 _U32 = np.uint32
 _U64 = np.uint64
@@ -63,7 +63,28 @@ _SWEEPS_BETWEEN = 8
 _MOST_ROUNDS = 100_000  # a photon caught in clear layers meets interfaces without a collision
 
 
-@jit_entry
+class Blocks(NamedTuple):
+    """The memory of a walk, some of it as floats and as words, for copies."""
+
+    floats: LaneFloats  # (FLOAT_ROWS STRIDE,)
+    bits: LaneWords  # the same
+    words: LaneWords  # (WORD_ROWS STRIDE,)
+    shares: LaneFloats  # (K STRIDE,)
+    flags: Flags  # (STRIDE,)
+    eights: Indices  # the same, as words of eight flags
+    gone: Flags  # (STRIDE,)
+    slots: LaneFloats  # (SLOT_ROWS STRIDE,)
+    slot_bits: LaneWords  # the same
+    slot_words: LaneWords  # (SLOT_WORD_ROWS STRIDE,)
+    scratch: LaneFloats  # (SCRATCH_ROWS STRIDE,)
+    absorbed: FloatArray  # (K SUMS (L + 2),)
+    events: Indices  # (STRIDE,)
+    exits: Indices  # (STRIDE,)
+    layers: LaneWords  # those of the stack
+    crossings: LaneWords  # those of the stack
+
+
+@jit
 def trace_batch(
     seed: np.uint64,
     batch: np.int64,
@@ -73,28 +94,16 @@ def trace_batch(
     stack: Stack,
     bins: Bins,
     ledger: Ledger,
+    blocks: Blocks,
 ) -> int:
-    """Walk ``photons`` photons of one batch into ``ledger``; return the number of flights.
-
-    ``first_layer`` is the first that is not clear, counted from 0; the reflection of the beam by
-    the clear ones above it counts as specular.
-    """
-    channels = bins.channel.size
-    is_alone = channels == 1
-    floats = np.zeros(FLOAT_ROWS * STRIDE, np.float32)
-    words = np.zeros(WORD_ROWS * STRIDE, np.uint32)
-    shares = np.ones(channels * STRIDE, np.float32)
-    flags, gone = np.zeros(STRIDE, np.uint8), np.zeros(STRIDE, np.uint8)
-    slots = np.ones(SLOT_ROWS * STRIDE, np.float32)
-    slot_words = np.zeros(SLOT_WORD_ROWS * STRIDE, np.uint32)
-    scratch = np.ones(SCRATCH_ROWS * STRIDE, np.float32)
-    layer_count = stack.layers.size // 4
-    absorbed = np.zeros(channels * SUMS * layer_count)
-    events, exits = np.empty(STRIDE, np.uint64), np.empty(STRIDE, np.uint64)
-    # floats as words, for copies, and flags as words of eight
-    bits, slot_bits = floats.view(np.uint32), slots.view(np.uint32)
-    layers, crossings = stack.layers.view(np.uint32), stack.crossings.view(np.uint32)
-    eights = flags.view(np.uint64)
+    """See ``layered_walk.trace_batch``."""
+    is_alone = bins.channel.size == 1
+    floats, bits, words, shares = blocks.floats, blocks.bits, blocks.words, blocks.shares
+    flags, eights, gone = blocks.flags, blocks.eights, blocks.gone
+    slots, slot_bits, slot_words = blocks.slots, blocks.slot_bits, blocks.slot_words
+    scratch, absorbed = blocks.scratch, blocks.absorbed
+    events, exits = blocks.events, blocks.exits
+    layers, crossings = blocks.layers, blocks.crossings
     coefficients, excess = stack.layers, stack.excess_per_mm
     reflected, transmitted = ledger.reflected, ledger.transmitted
     seed_streams(words, seed, _U64(_U2 * _U64(batch)))
@@ -140,7 +149,8 @@ def trace_batch(
             rounds += 1
             if rounds > _MOST_ROUNDS:
                 give_up(floats, shares, events, met, bins, ledger)
-                exits[ended : ended + met] = events[:met]
+                for k in range(met):
+                    exits[ended + k] = events[k]
                 ended += met
                 met = 0
         if removed > 0:
@@ -174,3 +184,81 @@ def trace_batch(
         met = list_flagged(flags, eights, live, events)
     add_absorbed(absorbed, bins, ledger)
     return flights
+
+
+def enter(
+    seed: np.uint64,
+    batch: np.int64,
+    photons: int,
+    first_layer: int,
+    diffuse: int,
+    inside: int,
+    all_channels: int,
+    per_mm: float,
+    last: int,
+    channels: int,
+    above_count: int,
+    below_count: int,
+    layers: Address,
+    crossings: Address,
+    excess: Address,
+    channel: Address,
+    above: Address,
+    below: Address,
+    reflected: Address,
+    transmitted: Address,
+    absorbed_of: Address,
+    unfinished: Address,
+    roulette: Address,
+    floats: Address,
+    words: Address,
+    shares: Address,
+    flags: Address,
+    gone: Address,
+    slots: Address,
+    slot_words: Address,
+    scratch: Address,
+    absorbed: Address,
+    events: Address,
+    exits: Address,
+) -> int:
+    """Call `trace_batch` with arrays at the addresses that ``layered_walk.ENTRY`` passes."""
+    rows = inside + 2
+    stack = Stack(
+        carray(layers, (rows * 4,), np.float32),
+        carray(crossings, (rows * 6,), np.float32),
+        carray(excess, (rows * channels,), np.float32),
+    )
+    bins = Bins(
+        per_mm,
+        last,
+        carray(channel, (channels,), np.int64),
+        carray(above, (above_count,), np.float64),
+        carray(below, (below_count,), np.float64),
+    )
+    ledger = Ledger(
+        carray(reflected, ((last + 1) * (above_count + 1), all_channels, 2), np.float64),
+        carray(transmitted, ((last + 1) * (below_count + 1), all_channels, 2), np.float64),
+        carray(absorbed_of, (inside, all_channels), np.float64),
+        carray(unfinished, (all_channels, 2), np.float64),
+        carray(roulette, (all_channels, 2), np.float64),
+    )
+    blocks = Blocks(
+        carray(floats, (FLOAT_ROWS * STRIDE,), np.float32),
+        carray(floats, (FLOAT_ROWS * STRIDE,), np.uint32),
+        carray(words, (WORD_ROWS * STRIDE,), np.uint32),
+        carray(shares, (channels * STRIDE,), np.float32),
+        carray(flags, (STRIDE,), np.uint8),
+        carray(flags, (STRIDE // 8,), np.uint64),
+        carray(gone, (STRIDE,), np.uint8),
+        carray(slots, (SLOT_ROWS * STRIDE,), np.float32),
+        carray(slots, (SLOT_ROWS * STRIDE,), np.uint32),
+        carray(slot_words, (SLOT_WORD_ROWS * STRIDE,), np.uint32),
+        carray(scratch, (SCRATCH_ROWS * STRIDE,), np.float32),
+        carray(absorbed, (channels * SUMS * rows,), np.float64),
+        carray(events, (STRIDE,), np.uint64),
+        carray(exits, (STRIDE,), np.uint64),
+        carray(layers, (rows * 4,), np.uint32),
+        carray(crossings, (rows * 6,), np.uint32),
+    )
+    return trace_batch(seed, batch, photons, first_layer, diffuse != 0, stack, bins, ledger, blocks)

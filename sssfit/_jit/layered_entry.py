@@ -1,11 +1,10 @@
-"""Entry of the layered walk: the tables of its layers, and photons put at the top of one."""
-
-from typing import NamedTuple
+"""Entry of the layered walk: photons put at the top of a layer."""
 
 import numpy as np
 
 from sssfit._jit import jit_merged
-from sssfit._jit.fused import STRIDE, free_path, turn, uniform
+from sssfit._jit.fused import free_path, turn, uniform
+from sssfit._jit.lanes import STRIDE, LaneFloats, LaneWords
 from sssfit._jit.layered_lanes import (
     BACK,
     BOOKED,
@@ -25,28 +24,12 @@ from sssfit._jit.layered_lanes import (
     Y,
     Z,
 )
-from sssfit._jit.sampling import LaneFloats, LaneWords
 
 _F32 = np.float32
 _U32 = np.uint32
 _U64 = np.uint64
 _ZERO, _ONE = _F32(0.0), _F32(1.0)
 _U1, _U2, _U3 = _U64(1), _U64(2), _U64(3)
-
-
-class Stack(NamedTuple):
-    """Tables for a walk's least absorbing channel; L layers from 1 downwards, K channels.
-
-    Layer 0 lies above the stack and layer L + 1 below; their thickness is infinite, and their mean
-    free path is 0, so that a photon that leaves stays where it left.
-    """
-
-    # thickness [mm], mean free path [mm], capture = 1 - albedo and back = 1 - g, which float32
-    # holds better than an albedo or a g near 1
-    layers: LaneFloats  # ((L + 2) 4,)
-    # down and up: index over that beyond the interface; thickness and mean free path there
-    crossings: LaneFloats  # ((L + 2) 2 3,)
-    excess_per_mm: LaneFloats  # ((L + 2) K,): absorption beyond that of the least absorbing
 
 
 @jit_merged

@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit._jit import jit, jit_merged
-from sssfit._jit.fused import STRIDE, fma, free_path, turn, uniform, with_sign
-from sssfit._jit.sampling import GENERATOR_ROWS, LaneFloats, LaneWords
+from sssfit._jit.fused import fma, free_path, turn, uniform, with_sign
+from sssfit._jit.lanes import GENERATOR_ROWS, STRIDE, LaneFloats, LaneWords
 
 _F32 = np.float32
 _U32 = np.uint32
@@ -28,11 +28,9 @@ PATH = _U64(8 * STRIDE)  # since the last tally, in one layer
 THICKNESS, FREE_PATH, CAPTURE, BACK = (_U64(k * STRIDE) for k in range(9, 13))
 # What one sweep draws: 1 - cosine of a deflection, its azimuth and a flight
 LESS, COS_PHI, SIN_PHI, FLIGHT = (_U64(k * STRIDE) for k in range(13, 17))
-TILT = _U64(17 * STRIDE)  # 1 / (1 + |uz|)
-FLOAT_ROWS = 18
+TILT = _U64(17 * STRIDE)  # 1 / (1 + |uz|); the last row
 LAYER = _U64(GENERATOR_ROWS * STRIDE)  # 1 for the topmost, 0 above and L + 1 below the stack
-BORN = _U64((GENERATOR_ROWS + 1) * STRIDE)  # the sweep in which the photon entered
-WORD_ROWS = GENERATOR_ROWS + 2
+BORN = _U64((GENERATOR_ROWS + 1) * STRIDE)  # the sweep of its entry; the last row
 
 COLUMNS = _U64(4)  # of a table of layers: thickness, mean free path, capture, back
 VECTOR = 16  # lanes of the widest vectors: loops run over multiples of it

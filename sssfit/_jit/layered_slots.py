@@ -8,7 +8,8 @@ good as the rest of the old one: free paths have no memory.
 import numpy as np
 
 from sssfit._jit import jit_merged
-from sssfit._jit.fused import STRIDE, fma, free_path, uniform, with_sign
+from sssfit._jit.fused import fma, free_path, uniform, with_sign
+from sssfit._jit.lanes import GENERATOR_ROWS, STRIDE, SUMS, LaneFloats, LaneWords
 from sssfit._jit.layered_lanes import (
     BACK,
     CAPTURE,
@@ -25,7 +26,6 @@ from sssfit._jit.layered_lanes import (
     Y,
     Z,
 )
-from sssfit._jit.sampling import GENERATOR_ROWS, LaneFloats, LaneWords
 
 _F32 = np.float32
 _U32 = np.uint32
@@ -37,13 +37,10 @@ _FRESH = _U64(7 * STRIDE)  # the path flown after the event
 _OWN_THICKNESS, _OWN_FREE_PATH = _U64(8 * STRIDE), _U64(9 * STRIDE)
 _RATIO = _U64(10 * STRIDE)  # refractive index over that beyond the interface
 _NEXT_THICKNESS, _NEXT_FREE_PATH = _U64(11 * STRIDE), _U64(12 * STRIDE)
-SLOT_ROWS = 13
 _CROSSES = _U64(GENERATOR_ROWS * STRIDE)
 _MEETS_AGAIN = _U64((GENERATOR_ROWS + 1) * STRIDE)
-SLOT_WORD_ROWS = GENERATOR_ROWS + 2
 
 CROSSING_COLUMNS = _U64(3)  # of a table of interfaces: ratio, thickness and mean free path beyond
-SUMS = 4  # sums of absorption that take turns: each addition waits for the one before it
 SUM_MASK = _U64(SUMS - 1)
 
 _ZERO, _HALF, _ONE = _F32(0.0), _F32(0.5), _F32(1.0)

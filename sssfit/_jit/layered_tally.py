@@ -5,13 +5,12 @@ what is booked for a photon then adds up to exactly 1, and a run's balance holds
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from sssfit._jit import jit, jit_merged
-from sssfit._jit.fused import STRIDE, decay
+from sssfit._jit.fused import decay
+from sssfit._jit.lanes import STRIDE, SUMS, LaneFloats, LaneWords
 from sssfit._jit.layered_lanes import (
     BOOKED,
     LAYER,
@@ -22,8 +21,9 @@ from sssfit._jit.layered_lanes import (
     X,
     Y,
 )
-from sssfit._jit.layered_slots import LENGTH, SUM_MASK, SUMS
-from sssfit._jit.sampling import LaneFloats, LaneWords, falling_bin
+from sssfit._jit.layered_slots import LENGTH, SUM_MASK
+from sssfit._jit.layered_walk import Bins, FloatArray, Ledger
+from sssfit._jit.sampling import falling_bin
 
 _F64 = np.float64
 _U64 = np.uint64
@@ -31,31 +31,6 @@ _U0, _U1 = _U64(0), _U64(1)
 
 # Rows of the scratch block of ``book_channels``
 _WEIGHT_NOW, _WEIGHT_BOOKED, _SHARE, _EXCESS, _BEFORE, _NOW = (_U64(k * STRIDE) for k in range(6))
-SCRATCH_ROWS = 6
-
-FloatArray = npt.NDArray[np.float64]
-
-
-class Bins(NamedTuple):
-    """Positions of the walk's K channels among all channels of the ledger."""
-
-    per_mm: float  # bins of the radial grid per mm
-    last: int  # the bin that stands for "beyond the grid"
-    channel: npt.NDArray[np.int64]  # (K,)
-    # falling cosines outside the stack that separate the directions of each annulus: (B - 1,)
-    # above, (D - 1,) below
-    above: FloatArray
-    below: FloatArray
-
-
-class Ledger(NamedTuple):
-    """Sums over photons of weight and of weight squared; a photon enters with weight 1."""
-
-    reflected: FloatArray  # ((n + 1) B, C, 2): by radius and direction
-    transmitted: FloatArray  # ((n + 1) D, C, 2)
-    absorbed: FloatArray  # (L, C)
-    unfinished: FloatArray  # (C, 2)
-    roulette: FloatArray  # (C, 2): what roulette added, zero on average, and its variance
 
 
 @jit_merged

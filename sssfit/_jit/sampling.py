@@ -15,9 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit._jit import jit, jit_inline
-
-LANES = 256  # 128 to 1024 took the same time; fewer waste less at the end of a batch
-GENERATOR_ROWS = 4
+from sssfit._jit.lanes import LANES, LaneWords
 
 _F32 = np.float32
 _U32 = np.uint32
@@ -29,9 +27,6 @@ _UNIT = _F32(2.0**-23)
 _SQRT_HALF_BITS = _U32(0x3F3504F3)  # sqrt(1/2) as float32
 _ONE_BITS = _U32(0x3F800000)
 _MANTISSA = _U32(0x007FFFFF)
-
-LaneFloats = npt.NDArray[np.float32]
-LaneWords = npt.NDArray[np.uint32]
 
 
 @jit

@@ -15,17 +15,24 @@ few long walks at the end of a batch do not process empty lanes.
 """
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+from numba import carray  # type: ignore[attr-defined]
 
-from sssfit._jit import jit, jit_entry, jit_inline
+from sssfit._jit import Address, jit, jit_inline
+from sssfit._jit.half_space_walk import (
+    COLLISION_CAP,
+    FLOAT_ROWS,
+    POWER_BLOCK,
+    ROULETTE_SPREAD,
+    WORD_ROWS,
+    Channels,
+    FloatArray,
+    Ledger,
+)
+from sssfit._jit.lanes import GENERATOR_ROWS, LANES, LaneFloats, LaneWords
 from sssfit._jit.sampling import (
-    GENERATOR_ROWS,
-    LANES,
-    LaneFloats,
-    LaneWords,
     cos_sin_turn,
     falling_bin,
     fresnel_reflectance,
@@ -34,8 +41,6 @@ from sssfit._jit.sampling import (
     seed_lanes,
 )
 
-COLLISION_CAP = 1_000_000  # walks end here unfinished; with albedo 1 they might never end
-POWER_BLOCK = 1024  # albedo^n = low[n % 1024] * high[n // 1024] reaches past the collision cap
 _BLOCK_BITS, _BLOCK_MASK = 10, POWER_BLOCK - 1
 
 _F32 = np.float32
@@ -46,42 +51,14 @@ _X, _Y, _Z = 0, LANES, 2 * LANES
 _DX, _DY, _DZ = 3 * LANES, 4 * LANES, 5 * LANES  # the last flight, in mean free paths
 _COS = 6 * LANES  # its direction cosine against the inward normal
 _BOOST = 7 * LANES  # weight factor gained by surviving roulette
-_FLOAT_ROWS = 8
 _COLLISIONS = GENERATOR_ROWS * LANES  # path so far
 _EVENT = (GENERATOR_ROWS + 1) * LANES  # number of collisions that triggers roulette
 _LEVEL = (GENERATOR_ROWS + 2) * LANES  # roulettes survived
 _SETTLED = (GENERATOR_ROWS + 3) * LANES  # collisions already tallied
-_WORD_ROWS = GENERATOR_ROWS + 4
 
 _ONE, _TWO = _F32(1.0), _F32(2.0)
 _SURVIVAL = _F32(0.1)  # MCML's roulette: one in ten survives with ten times the weight
 _GAIN = _F32(10.0)
-# Variance of the weight it adds, in squared weights: .9 * 1^2 + .1 * 9^2. It is the expected one
-# because gains are rare: a short run without any would estimate a small spread around a wrong mean.
-ROULETTE_SPREAD = 9.0
-
-FloatArray = npt.NDArray[np.float64]
-
-
-class Channels(NamedTuple):
-    """Tables that turn a walk into energy per channel, for all materials of a walk together."""
-
-    power_low: FloatArray  # (POWER_BLOCK, C): albedo^k
-    power_high: FloatArray  # (POWER_BLOCK, C): albedo^(POWER_BLOCK k)
-    bins_per_mean_free_path: FloatArray  # (C,)
-    last_bin: npt.NDArray[np.int64]  # (C,): the bin that stands for "beyond the grid"
-    first_cell: npt.NDArray[np.int64]  # (C,): start of the channel's bins in the tally
-    # (B - 1,): falling cosines inside the medium that separate the B directions of each annulus
-    cosines: FloatArray
-
-
-class Ledger(NamedTuple):
-    """Sums over photons of weight and of weight squared; a photon enters with weight 1."""
-
-    bins: FloatArray  # (cells, 2): energy leaving, per bin
-    absorbed: FloatArray  # (C,)
-    unfinished: FloatArray  # (C, 2): energy of walks stopped at the collision cap
-    roulette: FloatArray  # (C, 2): energy added by roulette, zero on average, and its variance
 
 
 @jit
@@ -228,9 +205,9 @@ def survives_event(
 @jit
 def move_lane(floats: LaneFloats, words: LaneWords, source: int, target: int) -> None:
     """Copy one lane's whole state, generator included, over another's."""
-    for row in range(_FLOAT_ROWS):
+    for row in range(FLOAT_ROWS):
         floats[row * LANES + target] = floats[row * LANES + source]
-    for row in range(_WORD_ROWS):
+    for row in range(WORD_ROWS):
         words[row * LANES + target] = words[row * LANES + source]
 
 
@@ -256,7 +233,7 @@ def handle_event(
     return True
 
 
-@jit_entry
+@jit
 def trace_batch(
     seed: np.uint64,
     batch: np.int64,
@@ -265,15 +242,11 @@ def trace_batch(
     roulette_at: LaneWords,
     channels: Channels,
     ledger: Ledger,
+    floats: LaneFloats,
+    words: LaneWords,
+    events: npt.NDArray[np.int64],
 ) -> int:
-    """Walk ``photons`` photons of one batch into ``ledger``; return the number of flights.
-
-    ``eta`` is the index of the medium relative to the outside, at least 1. ``roulette_at[k]`` is
-    the number of collisions at which a walk that survived k roulettes plays the next.
-    """
-    floats = np.zeros(_FLOAT_ROWS * LANES, np.float32)
-    words = np.zeros(_WORD_ROWS * LANES, np.uint32)
-    events = np.empty(LANES, np.int64)
+    """See ``half_space_walk.trace_batch``; the last three are the memory of the lanes."""
     seed_lanes(words, seed, batch)
     critical_cos = _F32(math.sqrt(max(0.0, 1.0 - 1.0 / (eta * eta))))
     live = min(LANES, photons)
@@ -297,3 +270,56 @@ def trace_batch(
                 live -= 1
                 move_lane(floats, words, live, lane)
     return flights
+
+
+def enter(
+    seed: np.uint64,
+    batch: np.int64,
+    photons: int,
+    eta: float,
+    roulettes: int,
+    count: int,
+    cosine_count: int,
+    cells: int,
+    roulette_at: Address,
+    power_low: Address,
+    power_high: Address,
+    bins_per_mean_free_path: Address,
+    last_bin: Address,
+    first_cell: Address,
+    cosines: Address,
+    bins: Address,
+    absorbed: Address,
+    unfinished: Address,
+    roulette: Address,
+    floats: Address,
+    words: Address,
+    events: Address,
+) -> int:
+    """Call `trace_batch` with arrays at the addresses that ``half_space_walk.ENTRY`` passes."""
+    channels = Channels(
+        carray(power_low, (POWER_BLOCK, count), np.float64),
+        carray(power_high, (POWER_BLOCK, count), np.float64),
+        carray(bins_per_mean_free_path, (count,), np.float64),
+        carray(last_bin, (count,), np.int64),
+        carray(first_cell, (count,), np.int64),
+        carray(cosines, (cosine_count,), np.float64),
+    )
+    ledger = Ledger(
+        carray(bins, (cells, 2), np.float64),
+        carray(absorbed, (count,), np.float64),
+        carray(unfinished, (count, 2), np.float64),
+        carray(roulette, (count, 2), np.float64),
+    )
+    return trace_batch(
+        seed,
+        batch,
+        photons,
+        eta,
+        carray(roulette_at, (roulettes,), np.uint32),
+        channels,
+        ledger,
+        carray(floats, (FLOAT_ROWS * LANES,), np.float32),
+        carray(words, (WORD_ROWS * LANES,), np.uint32),
+        carray(events, (LANES,), np.int64),
+    )

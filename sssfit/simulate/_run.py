@@ -178,7 +178,7 @@ def _in_order(
     """Yield the tallies of the remaining batches in order, while a few more are computed."""
     batches = iter(range(photons_done // BATCH_PHOTONS, -(-task.photons // BATCH_PHOTONS)))
     pending: deque[Future[Tally]] = deque()
-    with thread_pool(threads, "sssfit-walk", task.first_call()) as pool:
+    with thread_pool(threads, "sssfit-walk", task.prepare) as pool:
         try:
             stopped = False
             while True:

@@ -18,7 +18,7 @@ import math
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._jit.semi_infinite import COLLISION_CAP
+from sssfit._jit.half_space_walk import COLLISION_CAP
 from sssfit.arrays import FloatArray
 from sssfit.material import Material
 from sssfit.optics import entering_of_diffuse

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from sssfit._jit import compiled_before
+from sssfit._jit import half_space_walk, layered_walk
 from sssfit.errors import SimulationError, SssfitWarning, StoppedError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
@@ -268,7 +268,8 @@ def shared_walks(materials: Sequence[Material]) -> list[list[int]]:
 
 def is_compiled(material: Material) -> bool:
     """Whether the walk of a material can start at once; otherwise it compiles first, about 10 s."""
-    return compiled_before("semi_infinite" if has_fast_walk(material) else "layered")
+    entry = half_space_walk.ENTRY if has_fast_walk(material) else layered_walk.ENTRY
+    return entry.is_ready()
 
 
 def make_walk(
@@ -281,7 +282,7 @@ def make_walk(
     """Choose the simplest walk for the material."""
     given = tuple(materials), tuple(grids), seed, photons
     if has_fast_walk(materials[0]):
-        from sssfit.simulate.walk_half_space import SemiInfiniteWalk  # numba: 0.35 s
+        from sssfit.simulate.walk_half_space import SemiInfiniteWalk
 
         return SemiInfiniteWalk(*given, directions=directions)
     from sssfit.simulate.walk_layered import LayeredWalk

@@ -4,14 +4,14 @@ Every channel rides on the same paths.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from functools import lru_cache, partial
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._jit import compiled_before, semi_infinite
+from sssfit._jit import half_space_walk
 from sssfit.arrays import FloatArray
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
@@ -31,7 +31,7 @@ class SemiInfiniteWalk:
     photons: int
     directions: Directions = EVERYWHERE
     eta: float = field(init=False)
-    channels: semi_infinite.Channels = field(init=False)
+    channels: half_space_walk.Channels = field(init=False)
     roulette_at: npt.NDArray[np.uint32] = field(init=False)
 
     def __post_init__(self) -> None:
@@ -45,9 +45,9 @@ class SemiInfiniteWalk:
         """Walk one batch; the result depends only on the seed and the batch number."""
         tally = self.empty_tally()
         tally.photons = min(BATCH_PHOTONS, self.photons - batch * BATCH_PHOTONS)
-        tally.flights = semi_infinite.trace_batch(
-            np.uint64(self.seed),
-            np.int64(batch),
+        tally.flights = half_space_walk.trace_batch(
+            self.seed,
+            batch,
             tally.photons,
             self.eta,
             self.roulette_at,
@@ -56,17 +56,16 @@ class SemiInfiniteWalk:
         )
         return tally
 
-    def first_call(self) -> Callable[[], object] | None:
-        """Return a walk of no photons, if its code need only be loaded."""
-        known = compiled_before("semi_infinite")
-        return partial(replace(self, photons=0).trace, 0) if known else None
+    def prepare(self) -> None:
+        """Load or compile the machine code."""
+        half_space_walk.ENTRY.load()
 
     def empty_tally(self) -> Tally:
         """Return a tally with all sums zero."""
         n_channels = self.channels.last_bin.size
         cells = int(np.sum(self.channels.last_bin + 1)) * (self.channels.cosines.size + 1)
         check_cells(cells, self.directions)
-        ledger = semi_infinite.Ledger(
+        ledger = half_space_walk.Ledger(
             bins=np.zeros((cells, 2)),
             absorbed=np.zeros(n_channels),
             unfinished=np.zeros((n_channels, 2)),
@@ -100,7 +99,7 @@ def roulette_schedule(albedo: float) -> npt.NDArray[np.uint32]:
 
     The smallest n with albedo^n 10^k under the threshold, or the collision cap if that is smaller.
     """
-    schedule = np.full(ROULETTE_LEVELS + 1, semi_infinite.COLLISION_CAP, np.uint32)
+    schedule = np.full(ROULETTE_LEVELS + 1, half_space_walk.COLLISION_CAP, np.uint32)
     if albedo == 1.0:
         return schedule
     decay = -math.log(albedo) if albedo > 0.0 else math.inf
@@ -108,13 +107,13 @@ def roulette_schedule(albedo: float) -> npt.NDArray[np.uint32]:
     for level in range(ROULETTE_LEVELS):
         under = (level * math.log(10.0) - math.log(ROULETTE_THRESHOLD)) / decay
         previous = max(previous + 1, math.floor(under) + 1)
-        schedule[level] = min(previous, semi_infinite.COLLISION_CAP)
+        schedule[level] = min(previous, half_space_walk.COLLISION_CAP)
     return schedule
 
 
 def _channels(
     materials: tuple[Material, ...], grids: tuple[RadialGrid, ...], cosines: FloatArray
-) -> semi_infinite.Channels:
+) -> half_space_walk.Channels:
     """Lay the channels of all materials side by side."""
     albedo = np.concatenate([each.layers[0].albedo for each in materials])
     bins_per_mfp = np.concatenate(
@@ -128,7 +127,7 @@ def _channels(
     directions = cosines.size + 1
     first_cell = np.concatenate([[0], np.cumsum(last_bin[:-1] + 1)]).astype(np.int64) * directions
     power_low, power_high = _power_tables(tuple(albedo.tolist()))
-    return semi_infinite.Channels(
+    return half_space_walk.Channels(
         power_low=power_low,
         power_high=power_high,
         bins_per_mean_free_path=bins_per_mfp,
@@ -151,5 +150,5 @@ def _powers(base: Sequence[float]) -> FloatArray:
 
     Uses Python's power, because numpy's differs in the last bit between processors.
     """
-    rows = [[each**k for each in base] for k in range(semi_infinite.POWER_BLOCK)]
+    rows = [[each**k for each in base] for k in range(half_space_walk.POWER_BLOCK)]
     return np.array(rows)

@@ -5,14 +5,12 @@ walk on the same random streams, so that their noise is similar. A batch include
 that every channel of a profile has the same number of photons.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._jit import compiled_before, layered, layered_entry, layered_tally
+from sssfit._jit import layered_walk
 from sssfit.grid import RadialGrid
 from sssfit.material import Material
 from sssfit.simulate._directions import EVERYWHERE, Directions, check_cells
@@ -33,7 +31,7 @@ class LayeredWalk:
     photons: int
     diffuse: bool = False
     directions: Directions = EVERYWHERE
-    groups: tuple[tuple[layered_entry.Stack, layered_tally.Bins], ...] = field(init=False)
+    groups: tuple[tuple[layered_walk.Stack, layered_walk.Bins], ...] = field(init=False)
 
     def __post_init__(self) -> None:
         material, grid = self.materials[0], self.grids[0]
@@ -41,7 +39,7 @@ class LayeredWalk:
         groups = tuple(
             (
                 _stack(material, members),
-                layered_tally.Bins(1.0 / grid.dr_mm, grid.annuli, members, *cosines),
+                layered_walk.Bins(1.0 / grid.dr_mm, grid.annuli, members, *cosines),
             )
             for members in channels_with_equal_scattering(material)
         )
@@ -52,9 +50,9 @@ class LayeredWalk:
         tally = self.empty_tally()
         tally.photons = min(BATCH_PHOTONS, self.photons - batch * BATCH_PHOTONS)
         for stack, bins in self.groups:
-            tally.flights += layered.trace_batch(
-                np.uint64(self.seed),
-                np.int64(batch),
+            tally.flights += layered_walk.trace_batch(
+                self.seed,
+                batch,
                 tally.photons,
                 self.materials[0].first_scattering_layer,
                 self.diffuse,
@@ -64,16 +62,16 @@ class LayeredWalk:
             )
         return tally
 
-    def first_call(self) -> Callable[[], object] | None:
-        """Return a walk of no photons, if its code need only be loaded."""
-        return partial(replace(self, photons=0).trace, 0) if compiled_before("layered") else None
+    def prepare(self) -> None:
+        """Load or compile the machine code."""
+        layered_walk.ENTRY.load()
 
     def empty_tally(self) -> Tally:
         """Return a tally with all sums zero."""
         material, cells = self.materials[0], self.grids[0].annuli + 1
         n, bins = material.n_channels, self.groups[0][1]
         check_cells(cells * (bins.above.size + 1) * n, self.directions)
-        ledger = layered_tally.Ledger(
+        ledger = layered_walk.Ledger(
             reflected=np.zeros((cells * (bins.above.size + 1), n, 2)),
             transmitted=np.zeros((cells * (bins.below.size + 1), n, 2)),
             absorbed=np.zeros((len(material.layers), n)),
@@ -97,7 +95,7 @@ class LayeredWalk:
         )
 
 
-def _stack(material: Material, members: npt.NDArray[np.int64]) -> layered_entry.Stack:
+def _stack(material: Material, members: npt.NDArray[np.int64]) -> layered_walk.Stack:
     """Lay out the tables of a group; its walk follows each layer's least absorbing channel."""
     layers = material.layers
     sigma_a = np.array([layer.sigma_a_per_mm[members] for layer in layers])
@@ -113,7 +111,7 @@ def _stack(material: Material, members: npt.NDArray[np.int64]) -> layered_entry.
     rows[1:-1, 3] = [1.0 - layer.g[members[0]] for layer in layers]
     excess = np.zeros((len(layers) + 2, members.size), np.float32)
     excess[1:-1] = sigma_a - least[:, None]
-    return layered_entry.Stack(rows.ravel(), _crossings(material, rows).ravel(), excess.ravel())
+    return layered_walk.Stack(rows.ravel(), _crossings(material, rows).ravel(), excess.ravel())
 
 
 def _crossings(material: Material, rows: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:
