@@ -143,6 +143,20 @@ def check_threads_of_numba() -> None:
         )
 
 
+def check_that_numba_compiles() -> None:
+    """Raise an error if numba is told to leave Python functions as they are.
+
+    Raises
+    ------
+    SssfitError
+        NUMBA_DISABLE_JIT is set.
+    """
+    if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
+        raise SssfitError(
+            "NUMBA_DISABLE_JIT is set, and a photon walk runs as machine code only; unset it."
+        )
+
+
 def is_out_of_memory(error: BaseException | None) -> bool:
     """Return whether an error means a lack of memory, under any library's name for it."""
     while error is not None:

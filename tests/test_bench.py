@@ -34,7 +34,7 @@ TABLES = [
     (SPEEDS, ["three layers, g .8"]),
     (["material", "one thread", "two threads", "speed-up"], ["skin1", "ketchup"]),
     (
-        ["command", "seconds"],
+        ["command", "seconds", "of the processor"],
         [
             "`sssfit simulate skin1 --photons 1000`, first use, compiling",
             "`sssfit simulate skin1 --photons 1000`",

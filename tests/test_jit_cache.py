@@ -19,6 +19,7 @@ from numpy.ctypeslib import ndpointer
 
 from sssfit import __version__, _jit, process
 from sssfit._jit import half_space_walk, layered_walk, machine_code
+from sssfit.errors import SssfitError
 from sssfit.material import load_material
 from sssfit.simulate import simulate_montecarlo
 
@@ -153,6 +154,7 @@ def test_a_second_process_does_not_compile_again(tmp_path):
 
 WALK = """
 from sssfit import _jit
+from sssfit.errors import SssfitError
 from sssfit.material import load_material
 from sssfit.simulate import simulate_montecarlo
 print(repr(_jit._CACHE_FOLDER))
@@ -230,6 +232,7 @@ def test_a_flipped_bit_in_any_file_is_compiled_again(tmp_path, flips):
 WITHOUT_NUMBA = """
 import sys
 from sssfit._jit import half_space_walk, layered_walk
+from sssfit.errors import SssfitError
 from sssfit.material import load_material
 from sssfit.simulate import simulate_montecarlo
 assert half_space_walk.ENTRY.is_ready() and layered_walk.ENTRY.is_ready()
@@ -284,6 +287,12 @@ def test_without_a_folder_an_entry_is_compiled_all_the_same(tripled, monkeypatch
     entry = tripled()
     assert entry.path() is None
     assert result_of(entry) == 7
+
+
+def test_an_entry_says_that_it_cannot_do_without_compiling(tripled, monkeypatch):
+    monkeypatch.setenv("NUMBA_DISABLE_JIT", "1")
+    with pytest.raises(SssfitError, match=r"NUMBA_DISABLE_JIT is set, .* unset it\.$"):
+        tripled().load()
 
 
 def test_threads_that_call_an_entry_at_once_load_it_once(tripled, monkeypatch):

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from sssfit._jit import cache_folder
+from sssfit.process import check_that_numba_compiles
 
 _SUM_BYTES = 32  # of SHA-256
 SYMBOL = "enter"
@@ -67,6 +68,7 @@ class Entry:
 
     def _compile(self) -> bytes:
         """Return the object code, compiled by numba, and keep it where that is possible."""
+        check_that_numba_compiles()
         from sssfit._jit.compilation import object_code
 
         function = import_module(f"sssfit._jit.{self._module}").enter

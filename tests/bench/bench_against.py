@@ -1,4 +1,4 @@
-"""Speed of the layered walk against that of another revision of this repository.
+"""Speed of the photon walks against those of another revision of this repository.
 
     python tests/bench/bench_against.py REVISION            a table on stdout, some two minutes
     python tests/bench/bench_against.py REVISION --write    the same into docs/benchmarks.md
@@ -24,6 +24,10 @@ PAIRS = 7
 _INF = float("inf")
 _SAMPLE = ((10.0, 0.9, 1.0), (1.0, 0.0, 1.0), (1.0, 0.7, 2.0))  # sigma_s, g and mm of MCML's sample
 CASES = {
+    "half space, g 0: skin1's green": (
+        [(1.3, 0.0, [0.17], [0.88], _INF)],
+        2_000_000,
+    ),
     "thin: MCML's sample": (
         [(1.37, g, [a], [s], mm) for (s, g, mm), a in zip(_SAMPLE, (0.1, 0.1, 0.2), strict=True)],
         400_000,
@@ -158,8 +162,8 @@ def main():
 
     script = "tests/bench/bench_against.py"
     page = (
-        "## The layered walk against an earlier one\n\nPhotons a second of processor time on one "
-        f"core, by the walk of revision {commit} and by that of today, in turn; medians of "
+        "## The walks against earlier ones\n\nPhotons a second of processor time on one "
+        f"core, by the walks of revision {commit} and by those of today, in turn; medians of "
         f"{PAIRS} pairs. Annuli of 0.05 mm, to 10 mm.\n\n{text}"
     )
     put_section("benchmarks.md", script, page, f"python {script} {commit} --write")

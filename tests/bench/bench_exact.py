@@ -69,14 +69,14 @@ def command_rows(small):
     names = material_names(paper=True)[:2] if small else material_names(paper=True)
     with tempfile.TemporaryDirectory() as folder:
         cache = None if small else folder  # compiling takes 10 s
-        compiling = command("simulate", "skin1", "--method", "exact", cache=cache, folder=folder)
+        compiling, _ = command("simulate", "skin1", "--method", "exact", cache=cache, folder=folder)
         rows.append(("`sssfit simulate skin1 --method exact`, first use", f"{compiling:.2f}"))
         times = [
-            command("simulate", "skin1", "--method", "exact", folder=folder)
+            command("simulate", "skin1", "--method", "exact", folder=folder)[0]
             for _ in range(1 if small else 5)
         ]
         rows.append(("`sssfit simulate skin1 --method exact`", f"{statistics.median(times):.2f}"))
-        each = [command("simulate", name, "--method", "exact", folder=folder) for name in names]
+        each = [command("simulate", name, "--method", "exact", folder=folder)[0] for name in names]
         rows.append((f"{len(names)} materials, as many commands", f"{sum(each):.2f}"))
     took = seconds(lambda: simulate_exact_many([load_material(name) for name in names]))
     rows.append((f"{len(names)} materials, one process, without start-up", f"{took:.2f}"))
