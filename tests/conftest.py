@@ -7,6 +7,9 @@ Linear algebra has one thread in the tests' own process: a worker a core leaves 
 threads, and waiting for each other they took a tenth of the processor time. Children of the tests
 have as many as a user's process.
 
+Each worker has a core, and so have its children: where a worker and another's threads took turns
+on a core, waiting for Python's lock cost a twentieth of the processor time.
+
 Nor does the C library give memory back to the system between two arrays here: to have it again,
 page by page, took two fifths of the processor time of a cascade's fit. And what collecting the
 tests made is not looked through for garbage again and again: that took a third of the collection.
@@ -51,8 +54,18 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 def pytest_sessionstart():
     """Share work between tests from here on, and leave each worker its core."""
     shared_work.begin()
+    keep_to_a_core()
     threadpool_limits(limits=1, user_api="blas")
     keep_memory()
+
+
+def keep_to_a_core():
+    """Leave this worker one of the cores, if there is one for each."""
+    if not (worker := _worker()) or not hasattr(os, "sched_setaffinity"):
+        return
+    cores = sorted(os.sched_getaffinity(0))
+    if worker[1] <= len(cores):
+        os.sched_setaffinity(0, {cores[worker[0]]})
 
 
 def keep_memory():
