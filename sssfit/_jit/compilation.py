@@ -17,9 +17,13 @@ import numba
 from numba import types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
-from sssfit._jit.machine_code import SYMBOL, target_machine
+from sssfit._jit.machine_code import SYMBOL, processor_features, target_machine
 
 Function = TypeVar("Function", bound=Callable[..., object])
+
+# Read when numba first compiles in a process; the walks' loops become vectors there.
+if numba.config.CPU_FEATURES is None:  # type: ignore[attr-defined]
+    numba.config.CPU_FEATURES = processor_features()  # type: ignore[attr-defined]
 
 _NUMBERS = {
     ctypes.c_int64: types.int64,

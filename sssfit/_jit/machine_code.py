@@ -104,9 +104,25 @@ def _processor() -> tuple[str, str]:
     """Return the processor's name and features, or those for which numba is told to compile."""
     import llvmlite.binding as llvm
 
-    name, features = os.environ.get("NUMBA_CPU_NAME"), os.environ.get("NUMBA_CPU_FEATURES")
-    found = llvm.get_host_cpu_features().flatten() if features is None else features
-    return name or llvm.get_host_cpu_name(), found
+    return os.environ.get("NUMBA_CPU_NAME") or llvm.get_host_cpu_name(), processor_features()
+
+
+def processor_features() -> str:
+    """Return the features to compile for: numba's setting, or all that the processor has.
+
+    LLVM makes vectors of 256 bits for Intel's processors with AVX-512, because the first ones ran
+    slower with wider ones. On a Xeon of 2023 vectors of 512 bits walk through layers 1.1 to 1.35
+    times as fast.
+    """
+    import llvmlite.binding as llvm
+
+    if (chosen := os.environ.get("NUMBA_CPU_FEATURES")) is not None:
+        return chosen
+    found = llvm.get_host_cpu_features()
+    if found.get("avx512f"):
+        found["prefer-256-bit"] = False
+    features: str = found.flatten()
+    return features
 
 
 @functools.cache
