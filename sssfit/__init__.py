@@ -78,9 +78,9 @@ if not TYPE_CHECKING:  # for a type checker every misspelt name would be there t
         """Load a public name at its first use; a callable room is its package."""
         if name in _CALLABLE_ROOMS:
             return import_module(f"sssfit.{name}")
-        if name not in _HOMES:
-            raise AttributeError(f"module 'sssfit' has no attribute {name!r}")
-        value = globals()[name] = getattr(import_module(f"sssfit.{_HOMES[name]}"), name)
+        from sssfit.methods import named
+
+        value = globals()[name] = named(__name__, name, _HOMES)
         return value
 
 

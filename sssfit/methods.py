@@ -21,6 +21,21 @@ def imported(where: str) -> Callable[..., Any]:
     return found
 
 
+def named(package: str, name: str, homes: Mapping[str, str]) -> Any:
+    """Import a package's public name from its home, a module given without ``sssfit.``.
+
+    For a package's ``__getattr__`` (PEP 562).
+
+    Raises
+    ------
+    AttributeError
+        It is no public name.
+    """
+    if name not in homes:
+        raise AttributeError(f"module {package!r} has no attribute {name!r}")
+    return getattr(import_module(f"sssfit.{homes[name]}"), name)
+
+
 @dataclass(frozen=True, slots=True)
 class Setting:
     """A keyword of a method's function, and its option.

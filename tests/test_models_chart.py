@@ -316,7 +316,7 @@ def test_bad_input_is_one_clear_line(run, tmp_path, skin1, arguments, status, fr
     skin1.walk.profile.save(tmp_path / "walk.profile.npz")
     (tmp_path / "film.toml").write_text(
         'channels = ["a"]\neta = 1.4\ng = 0.97\nsigma_a_per_mm = [0.1]\nsigma_s_per_mm = [30]\n'
-        "thickness_mm = 0.03\n"
+        "thickness_mm = 0.01\n"
     )
     code, out, err = run(*arguments)
     assert code == status

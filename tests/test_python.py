@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import sssfit
+import sssfit.compare
 from sssfit.errors import FitError, MaterialError, RenderError, SimulationError
 from sssfit.fit import fit_svd
 from sssfit.formats.pictures import save_image
@@ -197,6 +198,22 @@ sssfit.SssfitError
 assert not {HEAVY!r} & {{name.partition(".")[0] for name in sys.modules}}
 """
     subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
+
+
+def test_a_chart_of_a_profile_loads_no_optimiser_and_no_compiler():
+    program = """
+import sys, sssfit.compare.drawing, sssfit.export, sssfit.fit
+heavy = {"numba", "nlopt", "scipy"} & {name.partition(".")[0] for name in sys.modules}
+assert not heavy, heavy
+"""
+    subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
+
+
+def test_names_of_comparisons_are_loaded_and_misspelt_ones_are_refused():
+    for name in sssfit.compare.__all__:
+        assert getattr(sssfit.compare, name).__name__ == name
+    with pytest.raises(AttributeError, match=r"'sssfit.compare' has no attribute 'mesure'"):
+        sssfit.compare.mesure  # noqa: B018
 
 
 def test_import_and_help_answer_at_once():

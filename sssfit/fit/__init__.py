@@ -23,7 +23,6 @@ from sssfit.fit.burley import fit_burley
 from sssfit.fit.falloff import fit_falloff
 from sssfit.fit.gaussians import fit_gaussians
 from sssfit.fit.guided import fit_guided
-from sssfit.fit.on_taps import PLACES, on_taps
 from sssfit.fit.preintegrated import fit_preintegrated
 from sssfit.fit.svd import fit_svd
 from sssfit.fit.weighted import fit_weighted
@@ -121,6 +120,8 @@ def fit_result(
     dense = fit_separable(profile, method, **settings)
     if taps is None:
         return dense
+    from sssfit.fit.on_taps import PLACES, on_taps  # scipy.optimize: 0.3 s
+
     begun = time.perf_counter()
     pictures = {key: settings[key] for key in ("spectrum", "irradiance") if key in settings}
     thinned = on_taps(dense.kernel, taps, place=place or PLACES[0], profile=profile, **pictures)

@@ -21,7 +21,6 @@ from pathlib import Path
 from typing import TypeAlias
 
 import numpy as np
-from scipy import fft
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import FitError
@@ -214,7 +213,9 @@ def power_of(light: FloatArray, w: FloatArray) -> FloatArray:
     its mean, which is left out. Kernels are the same along both axes, and so is the mean of the
     two.
     """
-    power = fft.dctn(light, norm="ortho") ** 2
+    from scipy.fft import dctn  # 0.1 s that other methods do not need
+
+    power = dctn(light, norm="ortho") ** 2
     for _ in range(2):
         power = _at(power, w).T
     power[0, 0] = 0.0

@@ -18,7 +18,6 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from scipy import optimize
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import FitError
@@ -166,7 +165,9 @@ def _minimised(
         by_seen[:, 0] -= 4.0 * scale / own * float(np.vdot(weighted, product)) * seen[:, 0]
         return float(np.vdot(weighted, apart)), (by_seen @ cosines).ravel()
 
-    found = optimize.minimize(
+    from scipy.optimize import minimize  # 0.3 s that other methods do not need
+
+    found = minimize(
         misfit,
         start.ravel(),
         jac=True,
