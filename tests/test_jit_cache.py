@@ -12,9 +12,11 @@ import types
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+import llvmlite.binding as llvm
 import numba
 import numpy as np
 import pytest
+from llvmlite.binding.targets import FeatureMap
 from numpy.ctypeslib import ndpointer
 
 from sssfit import __version__, _jit, process
@@ -316,6 +318,26 @@ def test_another_processor_has_a_file_of_its_own(tripled, monkeypatch):
     machine_code._machine_key.cache_clear()
     assert theirs.parent == ours.parent
     assert theirs != ours
+
+
+def test_features_are_numbas_setting_or_the_processors_with_its_widest_vectors(monkeypatch):
+    monkeypatch.delenv("NUMBA_CPU_FEATURES", raising=False)
+    for found, expected in (
+        ({"avx2": True, "avx512f": True, "prefer-256-bit": True}, {"-prefer-256-bit", "+avx512f"}),
+        ({"avx2": True, "avx512f": False}, {"+avx2", "-avx512f"}),
+    ):
+        monkeypatch.setattr(llvm, "get_host_cpu_features", lambda found=found: FeatureMap(found))
+        features = set(machine_code.processor_features().split(","))
+        assert features >= expected
+        assert ("-prefer-256-bit" in features) == found["avx512f"]
+
+    def unknown():
+        raise RuntimeError("LLVM reports no features of this processor")
+
+    monkeypatch.setattr(llvm, "get_host_cpu_features", unknown)
+    assert machine_code.processor_features() == ""
+    monkeypatch.setenv("NUMBA_CPU_FEATURES", "+sse2")
+    assert machine_code.processor_features() == "+sse2"
 
 
 def test_a_flipped_bit_in_machine_code_is_compiled_again(tripled):

@@ -118,7 +118,10 @@ def processor_features() -> str:
 
     if (chosen := os.environ.get("NUMBA_CPU_FEATURES")) is not None:
         return chosen
-    found = llvm.get_host_cpu_features()
+    try:
+        found = llvm.get_host_cpu_features()
+    except RuntimeError:  # not known for this kind of processor; numba does the same
+        return ""
     if found.get("avx512f"):
         found["prefer-256-bit"] = False
     features: str = found.flatten()
