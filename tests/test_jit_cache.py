@@ -20,7 +20,7 @@ from llvmlite.binding.targets import FeatureMap
 from numpy.ctypeslib import ndpointer
 
 from sssfit import __version__, _jit, process
-from sssfit._jit import half_space_walk, layered_walk, machine_code
+from sssfit._jit import depth_matrix, half_space_walk, layered_walk, machine_code
 from sssfit.errors import SssfitError
 from sssfit.material import load_material
 from sssfit.simulate import simulate_montecarlo
@@ -156,7 +156,6 @@ def test_a_second_process_does_not_compile_again(tmp_path):
 
 WALK = """
 from sssfit import _jit
-from sssfit.errors import SssfitError
 from sssfit.material import load_material
 from sssfit.simulate import simulate_montecarlo
 print(repr(_jit._CACHE_FOLDER))
@@ -233,20 +232,21 @@ def test_a_flipped_bit_in_any_file_is_compiled_again(tmp_path, flips):
 
 WITHOUT_NUMBA = """
 import sys
-from sssfit._jit import half_space_walk, layered_walk
-from sssfit.errors import SssfitError
+from sssfit._jit import depth_matrix, half_space_walk, layered_walk
 from sssfit.material import load_material
-from sssfit.simulate import simulate_montecarlo
-assert half_space_walk.ENTRY.is_ready() and layered_walk.ENTRY.is_ready()
+from sssfit.simulate import simulate_exact, simulate_montecarlo
+assert all(each.ENTRY.is_ready() for each in (depth_matrix, half_space_walk, layered_walk))
 for name in ("skin1", "skin-melanin-12"):
     simulate_montecarlo(load_material(name), photons=1000, threads=2)
 print(*(name for name in ("numba", "scipy") if name in sys.modules))
+simulate_exact(load_material("skin1"), tolerance=0.1, threads=2)
+print(*(name for name in ("numba",) if name in sys.modules))
 """
 
 
-def test_a_walk_that_was_compiled_before_needs_no_numba():
-    half_space_walk.ENTRY.load()
-    layered_walk.ENTRY.load()
+def test_what_was_compiled_before_needs_no_numba():
+    for each in (depth_matrix, half_space_walk, layered_walk):
+        each.ENTRY.load()
     assert python(WITHOUT_NUMBA) == []
 
 

@@ -10,8 +10,8 @@ folder. Without a writable folder (read-only home, or none) functions are compil
 slower to start, otherwise the same.
 
 numba itself, 0.2 to 0.35 s, is imported with the first compiled function (``compilation``): much
-of what asks for a thread pool or for the cache's key runs none, and the photon walks are loaded
-without it (``machine_code``).
+of what asks for a thread pool or for the cache's key runs none, and the photon walks and the
+matrices of the exact solver are loaded without it (``machine_code``).
 """
 
 import hashlib
@@ -56,12 +56,6 @@ _CACHE_FOLDER = _writable_cache_folder()
 def cache_folder() -> str:
     """Return the folder of machine code from these sources; "" where none can be written."""
     return _CACHE_FOLDER
-
-
-def compiled_before(file: str, function: str) -> bool:
-    """Return whether the cache has machine code for that file's function from these sources."""
-    pattern = f"{file}.{function}-*.nbc"
-    return bool(_CACHE_FOLDER) and any(Path(_CACHE_FOLDER).rglob(pattern))
 
 
 def thread_pool(

@@ -9,17 +9,14 @@ the formulas and makes the tables of K_d and X. Lengths are in mean free paths.
 import math
 
 import numpy as np
-import numpy.typing as npt
+from numba import carray  # type: ignore[attr-defined]
 
-from sssfit._jit import jit, jit_inline
+from sssfit._jit import Address, jit, jit_inline
+from sssfit._jit.depth_matrix import FloatArray, Tables
 
-FloatArray = npt.NDArray[np.float64]
-
-# A table of K_d, the logarithm of its first distance and entries per unit of logarithm; a table of
-# X from distance 0 and entries per mean free path.
-Tables = tuple[FloatArray, float, float, FloatArray, float]
-# Nodes, weights and barycentric weights of one panel; nodes and weights of a rule on [0, 1].
-Panel = tuple[FloatArray, FloatArray, FloatArray, FloatArray]
+# Nodes, weights and barycentric weights of one panel; nodes and weights of a rule on [0, 1]; and
+# memory for the shares of the panel's nodes in one source.
+Panel = tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]
 
 FALL = 3.0  # K_d falls like exp(-kappa d): no interval of the quadrature spans more than exp(-3)
 NEGLIGIBLE = 36.0  # exp(-36) = 2e-16
@@ -68,8 +65,7 @@ def add_stretch(
     ``side`` is the target's depth and the direction (-1 or 1) of the interval.
     """
     target, sign = side
-    nodes, _, barycentric, rule = panel
-    shares = np.empty(nodes.size)
+    nodes, _, barycentric, rule, shares = panel
     for q in range(rule.shape[0]):
         x = rule[q, 0]
         distance = inner + (outer - inner) * x**power
@@ -130,13 +126,14 @@ def add_panel(
         sign = 1.0 if is_above else -1.0
         add_side(row, near, near + width, kappa, (target, sign), panel, tables)
         return
-    nodes, weights, _, _ = panel
+    nodes, weights, _, _, _ = panel
     for j in range(nodes.size):
         row[j] += weights[j] * kernel(abs(target - nodes[j]), target < 0.0, tables)
 
 
 @jit
-def kernel_matrix(
+def fill(
+    matrix: FloatArray,
     edges: FloatArray,
     nodes: FloatArray,
     weights: FloatArray,
@@ -145,34 +142,60 @@ def kernel_matrix(
     kappa: float,
     is_matched: bool,
     tables: Tables,
-) -> FloatArray:
-    """Return the integrals over all panels for all nodes, (P p, P p).
-
-    Parameters
-    ----------
-    edges : (P+1,) [MFP]
-        Panel edges from 0 downwards.
-    nodes, weights : (P, p) [MFP]
-        Gauss nodes of the panels and their weights.
-    barycentric : (p,)
-        Barycentric weights of the nodes of a panel.
-    rule : (q, 2)
-        Nodes and weights of a Gauss rule on [0, 1].
-    kappa : float
-        sqrt(1 + k^2): K_d falls like exp(-kappa d).
-    is_matched : bool
-        Whether the refractive indices are equal, without a mirror path.
-    tables : Tables
-        Tables of K_d and X.
-    """
+    shares: FloatArray,
+) -> None:
+    """See ``depth_matrix.kernel_matrix``; the matrix is 0 before."""
     panels, order = nodes.shape
-    matrix = np.zeros((panels * order, panels * order))
     for p in range(panels):
-        panel = (nodes[p], weights[p], barycentric, rule)
+        panel = (nodes[p], weights[p], barycentric, rule, shares)
         for i in range(panels * order):
             target = nodes[i // order, i % order]
             row = matrix[i, p * order : (p + 1) * order]
             add_panel(row, edges[p], edges[p + 1], target, kappa, panel, tables)
             if not is_matched:
                 add_panel(row, edges[p], edges[p + 1], -target, kappa, panel, tables)
-    return matrix
+
+
+def enter(
+    panels: int,
+    order: int,
+    rules: int,
+    kappa: float,
+    is_matched: int,
+    near_entries: int,
+    log_first: float,
+    per_log: float,
+    far_entries: int,
+    per_mfp: float,
+    edges: Address,
+    nodes: Address,
+    weights: Address,
+    barycentric: Address,
+    rule: Address,
+    direct: Address,
+    escape: Address,
+    shares: Address,
+    matrix: Address,
+) -> int:
+    """Call `fill` with arrays at the addresses that ``depth_matrix.ENTRY`` passes."""
+    rows = panels * order
+    tables = (
+        carray(direct, (near_entries,), np.float64),
+        log_first,
+        per_log,
+        carray(escape, (far_entries,), np.float64),
+        per_mfp,
+    )
+    fill(
+        carray(matrix, (rows, rows), np.float64),
+        carray(edges, (panels + 1,), np.float64),
+        carray(nodes, (panels, order), np.float64),
+        carray(weights, (panels, order), np.float64),
+        carray(barycentric, (order,), np.float64),
+        carray(rule, (rules, 2), np.float64),
+        kappa,
+        is_matched != 0,
+        tables,
+        carray(shares, (order,), np.float64),
+    )
+    return 0

@@ -29,15 +29,12 @@ import functools
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sssfit._jit.depth_matrix import Tables, kernel_matrix
 from sssfit.arrays import FloatArray
 from sssfit.optics import Cone, gauss_legendre, is_matched, normal_transmittance
-
-if TYPE_CHECKING:
-    from sssfit._jit.transport import Tables
 
 # Depth of the last panel: components that do not fall like exp(-nu z) are exp(-26) = 5e-12 there.
 _DEPTH = 26.0
@@ -159,8 +156,6 @@ class _Equation:
     @classmethod
     def of(cls, k: float, eta: float, resolution: Resolution) -> "_Equation":
         """Set up the equation."""
-        from sssfit._jit.transport import kernel_matrix  # numba: 0.35 s
-
         panels = _panels(math.sqrt(1.0 + k * k), resolution)
         escape, tables = _tables(k, eta, panels, resolution)
         matrix = kernel_matrix(
@@ -225,7 +220,7 @@ def _panels(kappa: float, resolution: Resolution) -> _Panels:
 
 def _tables(
     k: float, eta: float, panels: _Panels, resolution: Resolution
-) -> "tuple[FloatArray, Tables]":
+) -> tuple[FloatArray, Tables]:
     """Return E at the nodes and the tables of K_d and X."""
     kappa = math.hypot(1.0, k)
     shortest = 1e-9 * panels.nodes[0, 0]  # nearer sources contribute 1e-9 log(1e-9) of a panel

@@ -13,7 +13,7 @@ from dataclasses import replace
 from itertools import compress
 from typing import Any
 
-from sssfit._jit import thread_pool
+from sssfit._jit import depth_matrix, thread_pool
 from sssfit.errors import SimulationError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Layer, Material
@@ -115,7 +115,7 @@ def simulate_exact_many(
 
     # One BLAS thread for each of ours: matrices of 100 to 400 rows do not profit from more, and
     # with another process on one core BLAS's waiting threads made skin1 take 14 s instead of 1.8.
-    with _workers(threads, is_compiled=any(is_plain)) as pool, one_blas_thread():
+    with _workers(threads, is_plain=any(is_plain)) as pool, one_blas_thread():
         plain = half_space.solve_half_spaces(
             *_chosen(materials, grids, is_plain), tolerance, pool, stop
         )
@@ -138,15 +138,13 @@ def simulate_exact_many(
         return [_with_angles(each, material, directions) for each, material in pairs]
 
 
-def _workers(threads: int, *, is_compiled: bool) -> ThreadPoolExecutor:
-    """Return threads, for which what compiled functions need is imported: 0.7 s less without."""
-    if not is_compiled:
+def _workers(threads: int, *, is_plain: bool) -> ThreadPoolExecutor:
+    """Return threads, before which what half spaces need is imported and loaded."""
+    if not is_plain:
         return ThreadPoolExecutor(threads, thread_name_prefix="sssfit")
     from scipy import optimize, special  # noqa: F401 (before the threads, which need them)
 
-    from sssfit._jit import transport  # noqa: F401
-
-    return thread_pool(threads)
+    return thread_pool(threads, first=depth_matrix.ENTRY.load)
 
 
 def _with_angles(profile: Profile, material: Material, directions: Directions) -> Profile:

@@ -25,7 +25,7 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._jit import compiled_before
+from sssfit._jit.depth_matrix import ENTRY
 from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError, StoppedError
 from sssfit.grid import RadialGrid
@@ -112,7 +112,7 @@ def solve_half_spaces(
 
 def is_solver_compiled() -> bool:
     """Return whether the solver can start at once; otherwise it first compiles, about 3 s."""
-    return compiled_before("transport", "kernel_matrix")
+    return ENTRY.is_ready()
 
 
 def diffuse_reflectance(
