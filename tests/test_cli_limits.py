@@ -205,7 +205,7 @@ def test_threads_of_numba_that_are_no_number(folder, value):
 
 
 def test_warnings_of_others_are_one_line(folder):
-    ended = sssfit(folder, "simulate", "wax.toml", "--method", "exact", "-q", NUMBA_OPT="abc")
+    ended = sssfit(folder, "fit", "wax.profile.npz", "--method", "svd", "-q", NUMBA_OPT="abc")
     assert ended.returncode == 0
     assert ended.stderr.count("\n") == 1
     assert ended.stderr.startswith("Warning: Environment variable 'NUMBA_OPT' is defined but")
