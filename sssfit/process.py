@@ -25,7 +25,7 @@ import select
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any, NoReturn
@@ -155,6 +155,14 @@ def check_that_numba_compiles() -> None:
         raise SssfitError(
             "NUMBA_DISABLE_JIT is set, and a photon walk runs as machine code only; unset it."
         )
+
+
+def unfit_settings(settings: Sequence[str]) -> SssfitError:
+    """Return the error for settings of numba with which a photon walk cannot be compiled."""
+    return SssfitError(
+        f"with {' '.join(settings)} the code of a photon walk would need Python as it runs; unset "
+        f"{'it' if len(settings) == 1 else 'them'} once, and the code is kept for later runs."
+    )
 
 
 def is_out_of_memory(error: BaseException | None) -> bool:

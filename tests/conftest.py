@@ -37,6 +37,8 @@ import shared_work
 from processes import end_all
 from threadpoolctl import threadpool_limits
 
+import sssfit._jit.compilation  # noqa: F401 (before numba compiles what is the tests' own)
+
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of malloc.h
 _KEPT_BYTES = 1 << 29
 _NEW_OBJECTS = 50_000  # before garbage is looked for

@@ -409,7 +409,7 @@ def blocks_of(stack_, *, channels, layers):
     """The memory of a walk, as `layered.enter` lays it over the addresses that it gets."""
     made = layered_walk.blocks(layers, channels)
     floats, words, shares, flags, gone, slots, slot_words, *rest = made
-    return layered.Blocks(
+    return layered_walk.Blocks(
         *(floats, floats.view(np.uint32), words, shares, flags, flags.view(np.uint64), gone),
         *(slots, slots.view(np.uint32), slot_words, *rest),
         *(stack_.layers.view(np.uint32), stack_.crossings.view(np.uint32)),

@@ -100,16 +100,16 @@ def test_a_damaged_cache_is_a_miss_and_mends_itself(tmp_path):
     cache = tmp_path / "cache"
     run = ("simulate", "skin1", "--photons", "1000", "-q")
     ENTRY.load()  # what this run of the tests has compiled need not be compiled for a copy
-    if kept := ENTRY.path():
-        copy = cache / _jit.source_key() / kept.name
-        copy.parent.mkdir(parents=True)
-        shutil.copyfile(kept, copy)
+    copy = cache / _jit.source_key()
+    copy.mkdir(parents=True)
+    for kept in Path(_jit.cache_folder()).glob("semi_infinite-*.o") if _jit.cache_folder() else ():
+        shutil.copyfile(kept, copy / kept.name)
     assert sssfit(tmp_path, *run, NUMBA_CACHE_DIR=str(cache)) == (0, "", "")
     good = (tmp_path / "skin1.profile.npz").read_bytes()
-    (code,) = cache.rglob("semi_infinite-*.o")
-    half = code.stat().st_size // 2
-    os.truncate(code, half)
+    whole = {each: each.stat().st_size for each in copy.glob("semi_infinite-*.o")}
+    for each, size in whole.items():
+        os.truncate(each, size // 2)
     for _ in range(2):
         assert sssfit(tmp_path, *run, NUMBA_CACHE_DIR=str(cache)) == (0, "", "")
         assert (tmp_path / "skin1.profile.npz").read_bytes() == good
-        assert code.stat().st_size > half
+        assert any(each.stat().st_size > size // 2 for each, size in whole.items())

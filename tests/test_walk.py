@@ -222,6 +222,16 @@ def test_light_just_inside_the_critical_angle_gets_out():
     assert abs(profile.diffuse_reflectance[0] - theory) < 4.5 * error
 
 
+def test_light_that_leaves_farther_than_whole_numbers_count_goes_beyond_the_grid():
+    """Of a mean free path of 5e8 mm on a grid of 1e-12 mm: its bin was -2^63, and memory broke."""
+    material = checks.medium([1.0, 1e-9], [1.0, 1e-9], 1.4)
+    profile = simulate_montecarlo(material, photons=2000, dr_mm=1e-12, radius_mm=1e-12)
+    inside = profile.annulus_energy.sum(axis=0)
+    np.testing.assert_allclose(inside + profile.beyond_grid, profile.diffuse_reflectance)
+    assert inside[1] == 0.0
+    assert profile.beyond_grid[1] == pytest.approx(profile.diffuse_reflectance[1])
+
+
 def event_far_inside(collisions, task):
     """One lane of boost 10 that has its event now; whether it goes on, and the ledger."""
     floats, words = np.zeros(8 * walk.LANES, np.float32), words_of(1, 0)

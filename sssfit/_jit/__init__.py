@@ -51,11 +51,23 @@ def _writable_cache_folder() -> str:
 
 
 _CACHE_FOLDER = _writable_cache_folder()
+# Settings of numba that change where code is kept, how it is run or for which processor it is, of
+# which numba keeps account; all others may change the code itself.
+_HARMLESS = {
+    *("NUMBA_CACHE_DIR", "NUMBA_CPU_FEATURES", "NUMBA_CPU_NAME", "NUMBA_DISABLE_JIT"),
+    *("NUMBA_NUM_THREADS", "NUMBA_THREADING_LAYER"),
+}
 
 
 def cache_folder() -> str:
     """Return the folder of machine code from these sources; "" where none can be written."""
     return _CACHE_FOLDER
+
+
+def numbas_settings() -> list[str]:
+    """Return the settings of numba by which code may come out different, as NAME=value."""
+    given = {name: value for name, value in os.environ.items() if name.startswith("NUMBA_")}
+    return sorted(f"{name}={value}" for name, value in given.items() if name not in _HARMLESS)
 
 
 def thread_pool(
@@ -103,7 +115,14 @@ def jit_merged(function: Function) -> Function:
 
 
 def _compile(function: Function, **policy: Any) -> Function:
-    """Compile by `compilation.compiled`, with machine code in our folder."""
+    """Compile by `compilation.compiled`, with machine code in our folder.
+
+    With bounds checks, say, it has a folder of its own: numba would give code with checks to
+    functions without.
+    """
     from sssfit._jit.compilation import compiled
 
-    return compiled(function, _CACHE_FOLDER, **policy)
+    folder, settings = _CACHE_FOLDER, numbas_settings()
+    if folder and settings:
+        folder += "-" + hashlib.sha256("\n".join(settings).encode()).hexdigest()[:8]
+    return compiled(function, folder, **policy)

@@ -16,6 +16,7 @@ import llvmlite.binding as llvm
 import numba
 from numba import types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.registry import cpu_target
 
 from sssfit._jit.machine_code import SYMBOL, processor_features, target_machine
 
@@ -58,8 +59,11 @@ def compiled(
     return found
 
 
-def object_code(function: Callable[..., int], arguments: Sequence[Any]) -> bytes:
-    """Compile a function of numbers and addresses as C would call it; return its object code.
+def object_code(function: Callable[..., int], arguments: Sequence[Any]) -> tuple[bytes, str]:
+    """Compile a function of numbers and addresses as C would call it.
+
+    Returns its object code, and the features for which numba compiles in this process: other ones
+    than ours if the host program used numba before.
 
     numba's C functions report exceptions through Python. Here every other function is made internal
     and the whole is optimised once more: LLVM then sees that nothing can fail, and what would ask
@@ -76,15 +80,15 @@ def object_code(function: Callable[..., int], arguments: Sequence[Any]) -> bytes
     for each in (*module.functions, *module.global_variables):
         if not each.is_declaration and each.name != found.native_name:
             each.linkage = "internal"
-    machine = target_machine()
+    features: str = cpu_target.target_context.codegen().magic_tuple()[2]
+    machine = target_machine(features)
     builder = llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options(speed_level=3))
     builder.getModulePassManager().run(module, builder)
     needed = [each.name for each in module.functions if each.is_declaration]
     if pythons := [each for each in needed if each.startswith(("Py", "NRT_", "numba_"))]:
         raise TypeError(f"{function.__module__}: compiled code needs {', '.join(pythons)}.")
     module.get_function(found.native_name).name = SYMBOL
-    code: bytes = machine.emit_object(module)
-    return code
+    return machine.emit_object(module), features
 
 
 class _DamagedError(Exception):

@@ -18,3 +18,5 @@ SUMS = 4  # sums of absorption that take turns: each addition waits for the one 
 
 LaneFloats = npt.NDArray[np.float32]
 LaneWords = npt.NDArray[np.uint32]
+Flags = npt.NDArray[np.uint8]
+Indices = npt.NDArray[np.uint64]

@@ -20,8 +20,6 @@ This estimates the same energy, with weights that never exceed the walk's own.
 Lengths are in mm.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from numba import carray  # type: ignore[attr-defined]
 
@@ -36,15 +34,11 @@ from sssfit._jit.lanes import (
     STRIDE,
     SUMS,
     WORD_ROWS,
-    LaneFloats,
-    LaneWords,
 )
 from sssfit._jit.layered_end import end_or_boost, flag_weak, give_up
 from sssfit._jit.layered_entry import launch
 from sssfit._jit.layered_lanes import (
     VECTOR,
-    Flags,
-    Indices,
     draw,
     fly,
     list_flagged,
@@ -54,34 +48,13 @@ from sssfit._jit.layered_lanes import (
 )
 from sssfit._jit.layered_slots import gather, meet, settle
 from sssfit._jit.layered_tally import add_absorbed, book_alone, book_channels, score_exits
-from sssfit._jit.layered_walk import Bins, FloatArray, Ledger, Stack
+from sssfit._jit.layered_walk import Bins, Blocks, Ledger, Stack
 
 _U32 = np.uint32
 _U64 = np.uint64
 _U1, _U2 = _U64(1), _U64(2)
 _SWEEPS_BETWEEN = 8
 _MOST_ROUNDS = 100_000  # a photon caught in clear layers meets interfaces without a collision
-
-
-class Blocks(NamedTuple):
-    """The memory of a walk, some of it as floats and as words, for copies."""
-
-    floats: LaneFloats  # (FLOAT_ROWS STRIDE,)
-    bits: LaneWords  # the same
-    words: LaneWords  # (WORD_ROWS STRIDE,)
-    shares: LaneFloats  # (K STRIDE,)
-    flags: Flags  # (STRIDE,)
-    eights: Indices  # the same, as words of eight flags
-    gone: Flags  # (STRIDE,)
-    slots: LaneFloats  # (SLOT_ROWS STRIDE,)
-    slot_bits: LaneWords  # the same
-    slot_words: LaneWords  # (SLOT_WORD_ROWS STRIDE,)
-    scratch: LaneFloats  # (SCRATCH_ROWS STRIDE,)
-    absorbed: FloatArray  # (K SUMS (L + 2),)
-    events: Indices  # (STRIDE,)
-    exits: Indices  # (STRIDE,)
-    layers: LaneWords  # those of the stack
-    crossings: LaneWords  # those of the stack
 
 
 @jit

@@ -5,8 +5,14 @@ import numpy as np
 from sssfit._jit import jit, jit_merged
 from sssfit._jit.fused import decay, uniform
 from sssfit._jit.half_space_walk import COLLISION_CAP, ROULETTE_SPREAD
-from sssfit._jit.lanes import STRIDE, SUMS, LaneFloats, LaneWords
-from sssfit._jit.layered_lanes import BOOKED, BORN, LAYER, PATH, WEIGHT, Flags, Indices
+from sssfit._jit.lanes import STRIDE, SUMS, Flags, Indices, LaneFloats, LaneWords
+from sssfit._jit.layered_lanes import (
+    BOOKED,
+    BORN,
+    LAYER,
+    PATH,
+    WEIGHT,
+)
 from sssfit._jit.layered_walk import Bins, FloatArray, Ledger
 
 _F32 = np.float32

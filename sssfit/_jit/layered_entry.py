@@ -4,7 +4,7 @@ import numpy as np
 
 from sssfit._jit import jit_merged
 from sssfit._jit.fused import free_path, turn, uniform
-from sssfit._jit.lanes import STRIDE, LaneFloats, LaneWords
+from sssfit._jit.lanes import STRIDE, Indices, LaneFloats, LaneWords
 from sssfit._jit.layered_lanes import (
     BACK,
     BOOKED,
@@ -19,7 +19,6 @@ from sssfit._jit.layered_lanes import (
     UY,
     UZ,
     WEIGHT,
-    Indices,
     X,
     Y,
     Z,

@@ -10,11 +10,10 @@ takes as long as the loops that copy lanes.
 import math
 
 import numpy as np
-import numpy.typing as npt
 
 from sssfit._jit import jit, jit_merged
 from sssfit._jit.fused import fma, free_path, turn, uniform, with_sign
-from sssfit._jit.lanes import GENERATOR_ROWS, STRIDE, LaneFloats, LaneWords
+from sssfit._jit.lanes import GENERATOR_ROWS, STRIDE, Flags, Indices, LaneFloats, LaneWords
 
 _F32 = np.float32
 _U32 = np.uint32
@@ -37,9 +36,6 @@ VECTOR = 16  # lanes of the widest vectors: loops run over multiples of it
 
 _ZERO, _HALF, _ONE, _TWO = _F32(0.0), _F32(0.5), _F32(1.0), _F32(2.0)
 _THREE_HALVES = _F32(1.5)
-
-Flags = npt.NDArray[np.uint8]
-Indices = npt.NDArray[np.uint64]
 
 
 @jit

@@ -9,7 +9,7 @@ import numpy as np
 
 from sssfit._jit import jit_merged
 from sssfit._jit.fused import fma, free_path, uniform, with_sign
-from sssfit._jit.lanes import GENERATOR_ROWS, STRIDE, SUMS, LaneFloats, LaneWords
+from sssfit._jit.lanes import GENERATOR_ROWS, STRIDE, SUMS, Indices, LaneFloats, LaneWords
 from sssfit._jit.layered_lanes import (
     BACK,
     CAPTURE,
@@ -21,7 +21,6 @@ from sssfit._jit.layered_lanes import (
     UX,
     UY,
     UZ,
-    Indices,
     X,
     Y,
     Z,

@@ -10,14 +10,13 @@ import numpy as np
 
 from sssfit._jit import jit, jit_merged
 from sssfit._jit.fused import decay
-from sssfit._jit.lanes import STRIDE, SUMS, LaneFloats, LaneWords
+from sssfit._jit.lanes import STRIDE, SUMS, Indices, LaneFloats, LaneWords
 from sssfit._jit.layered_lanes import (
     BOOKED,
     LAYER,
     UZ,
     VECTOR,
     WEIGHT,
-    Indices,
     X,
     Y,
 )

@@ -15,7 +15,10 @@ from sssfit._jit.lanes import (
     STRIDE,
     SUMS,
     WORD_ROWS,
+    Flags,
+    Indices,
     LaneFloats,
+    LaneWords,
 )
 from sssfit._jit.machine_code import Entry
 
@@ -57,6 +60,27 @@ class Ledger(NamedTuple):
     absorbed: FloatArray  # (L, C)
     unfinished: FloatArray  # (C, 2)
     roulette: FloatArray  # (C, 2): what roulette added, zero on average, and its variance
+
+
+class Blocks(NamedTuple):
+    """The memory of a walk as ``layered`` sees it: some as floats and as words, for copies."""
+
+    floats: LaneFloats  # (FLOAT_ROWS STRIDE,)
+    bits: LaneWords  # the same
+    words: LaneWords  # (WORD_ROWS STRIDE,)
+    shares: LaneFloats  # (K STRIDE,)
+    flags: Flags  # (STRIDE,)
+    eights: Indices  # the same, as words of eight flags
+    gone: Flags  # (STRIDE,)
+    slots: LaneFloats  # (SLOT_ROWS STRIDE,)
+    slot_bits: LaneWords  # the same
+    slot_words: LaneWords  # (SLOT_WORD_ROWS STRIDE,)
+    scratch: LaneFloats  # (SCRATCH_ROWS STRIDE,)
+    absorbed: FloatArray  # (K SUMS (L + 2),)
+    events: Indices  # (STRIDE,)
+    exits: Indices  # (STRIDE,)
+    layers: LaneWords  # those of the stack
+    crossings: LaneWords  # those of the stack
 
 
 _ROW, _TABLE, _BLOCK = (ndpointer(np.float64, rank, flags="C") for rank in (1, 2, 3))

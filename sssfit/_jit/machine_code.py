@@ -10,7 +10,6 @@ begins with a checksum of the rest, which is verified before LLVM sees a byte of
 
 import contextlib
 import ctypes
-import functools
 import hashlib
 import os
 import threading
@@ -19,8 +18,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from sssfit._jit import cache_folder
-from sssfit.process import check_that_numba_compiles
+from sssfit._jit import cache_folder, numbas_settings
+from sssfit.process import check_that_numba_compiles, unfit_settings
 
 _SUM_BYTES = 32  # of SHA-256
 SYMBOL = "enter"
@@ -45,8 +44,17 @@ class Entry:
         return function(*arguments)
 
     def is_ready(self) -> bool:
-        """Return whether the machine code is loaded or kept, and need not be compiled."""
-        return self._function is not None or self._read() is not None
+        """Return whether the machine code is loaded or kept, and need not be compiled.
+
+        Raises
+        ------
+        SssfitError
+            It would have to be compiled, and numba is told not to.
+        """
+        if self._function is not None or self._read() is not None:
+            return True
+        check_that_numba_compiles()
+        return False
 
     def load(self) -> Callable[..., int]:
         """Link the kept machine code, or else compile and keep it; once in a process."""
@@ -72,8 +80,14 @@ class Entry:
         from sssfit._jit.compilation import object_code
 
         function = import_module(f"sssfit._jit.{self._module}").enter
-        code = object_code(function, self._arguments)
-        if path := self.path():
+        try:
+            code, features = object_code(function, self._arguments)
+        except TypeError as error:
+            if not (settings := numbas_settings()):
+                raise
+            raise unfit_settings(settings) from error
+        path = None if numbas_settings() else self.path(features)
+        if path is not None:
             temporary = path.with_suffix(f".{os.getpid()}")
             with contextlib.suppress(OSError):
                 try:
@@ -84,27 +98,32 @@ class Entry:
         return code
 
     def _read(self) -> bytes | None:
-        """Return the kept object code; None if there is none, or if its file has changed."""
-        if not (path := self.path()):
-            return None
-        try:
-            content = path.read_bytes()
-        except OSError:
-            return None
-        said, code = content[:_SUM_BYTES], content[_SUM_BYTES:]
-        return code if hashlib.sha256(code).digest() == said else None
+        """Return the kept object code; None if there is none, or if its file has changed.
 
-    def path(self) -> Path | None:
-        """Return the file of the code for this processor, in the folder of these sources."""
-        folder = cache_folder()
-        return Path(folder) / f"{self._module}-{_machine_key()}.o" if folder else None
+        Code with the widest vectors is preferred to that of a host program's numba.
+        """
+        for features in (processor_features(), own_features()):
+            path = self.path(features)
+            try:
+                content = path.read_bytes() if path else b""
+            except OSError:
+                continue
+            said, code = content[:_SUM_BYTES], content[_SUM_BYTES:]
+            if hashlib.sha256(code).digest() == said:
+                return code
+        return None
+
+    def path(self, features: str | None = None) -> Path | None:
+        """Return the file of the code for a processor, by default all of this one's features."""
+        folder, has = cache_folder(), processor_features() if features is None else features
+        return Path(folder) / f"{self._module}-{_machine_key(has)}.o" if folder else None
 
 
-def _processor() -> tuple[str, str]:
-    """Return the processor's name and features, or those for which numba is told to compile."""
+def _processor_name() -> str:
+    """Return the processor's name, or that for which numba is told to compile."""
     import llvmlite.binding as llvm
 
-    return os.environ.get("NUMBA_CPU_NAME") or llvm.get_host_cpu_name(), processor_features()
+    return os.environ.get("NUMBA_CPU_NAME") or str(llvm.get_host_cpu_name())
 
 
 def processor_features() -> str:
@@ -114,40 +133,53 @@ def processor_features() -> str:
     slower with wider ones. On a Xeon of 2023 vectors of 512 bits walk through layers 1.1 to 1.35
     times as fast.
     """
-    import llvmlite.binding as llvm
-
-    if (chosen := os.environ.get("NUMBA_CPU_FEATURES")) is not None:
-        return chosen
-    try:
-        found = llvm.get_host_cpu_features()
-    except RuntimeError:  # not known for this kind of processor; numba does the same
-        return ""
+    found = _host_features()
     if found.get("avx512f"):
         found["prefer-256-bit"] = False
-    features: str = found.flatten()
-    return features
+    chosen = _chosen_features()
+    return str(found.flatten()) if chosen is None else chosen
 
 
-@functools.cache
-def _machine_key() -> str:
+def own_features() -> str:
+    """Return the features for which numba compiles by itself: its setting, or the processor's."""
+    chosen = _chosen_features()
+    return str(_host_features().flatten()) if chosen is None else chosen
+
+
+def _chosen_features() -> str | None:
+    """Return numba's setting; an empty one is the baseline of the processor's family."""
+    return os.environ.get("NUMBA_CPU_FEATURES")
+
+
+def _host_features() -> Any:
+    """Return the processor's features, none where LLVM does not know them, as numba does."""
+    import llvmlite.binding as llvm
+    from llvmlite.binding.targets import FeatureMap
+
+    try:
+        return llvm.get_host_cpu_features()
+    except RuntimeError:
+        return FeatureMap()
+
+
+def _machine_key(features: str) -> str:
     """Return a hash of what object code depends on beside the sources."""
     import llvmlite
     import llvmlite.binding as llvm
 
-    parts = (llvm.get_process_triple(), *_processor(), llvmlite.__version__)
+    parts = (llvm.get_process_triple(), _processor_name(), features, llvmlite.__version__)
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
 
-def target_machine() -> Any:
+def target_machine(features: str | None = None) -> Any:
     """Return a new code generator for this processor, with numba's options; an engine owns its."""
     import llvmlite.binding as llvm
 
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
-    name, features = _processor()
     return llvm.Target.from_triple(llvm.get_process_triple()).create_target_machine(
-        cpu=name,
-        features=features,
+        cpu=_processor_name(),
+        features=processor_features() if features is None else features,
         opt=3,
         reloc="static" if llvm.Target.from_default_triple().name.startswith("x86") else "default",
         codemodel="jitdefault",

@@ -140,7 +140,9 @@ def score_exit(
     for c in range(channels.last_bin.size):
         weight = boost * power(channels, collisions, c)
         ledger.absorbed[c] += boost * power(channels, settled, c) - weight
-        radial_bin = min(int(rho * channels.bins_per_mean_free_path[c]), channels.last_bin[c])
+        # The least of two floats: a whole number cannot hold the bin of mean free paths of 1e9 mm.
+        last = float(channels.last_bin[c])
+        radial_bin = int(min(rho * channels.bins_per_mean_free_path[c], last))
         cell = channels.first_cell[c] + radial_bin * directions + direction
         ledger.bins[cell, 0] += weight
         ledger.bins[cell, 1] += weight * weight

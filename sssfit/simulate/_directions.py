@@ -49,6 +49,8 @@ class Directions:
             raise SimulationError(
                 f"numerical_aperture = {self.aperture}; give a number above 0, such as 0.22."
             )
+        if self.aperture is not None:  # as a profile's file records it
+            object.__setattr__(self, "aperture", float(self.aperture))
         if self.angles is not None and self.aperture is not None:
             raise SimulationError(
                 "`angles` and `numerical_aperture` are both given; the angles up to that of the "

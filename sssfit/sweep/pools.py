@@ -14,7 +14,7 @@ from sssfit.errors import SweepError
 from sssfit.process import thread_count
 from sssfit.stability.workers import Workers
 from sssfit.sweep.plan import Plan
-from sssfit.sweep.tasks import Done, Task, perform
+from sssfit.sweep.tasks import Done, Task, perform, prepare
 
 LOST = (
     "a worker process ended before its work was done: it was killed, memory ran out, or the script "
@@ -97,4 +97,7 @@ def pool_for(plan: Plan, threads: int | None, scheduler: str | None) -> Pool:
 
         return Cluster(plan, scheduler)
     workers = min(thread_count(threads), plan.count if plan.photons is None else 1024)
-    return ThisProcess(plan) if workers == 1 else Processes(plan, workers)
+    if workers == 1:
+        return ThisProcess(plan)
+    prepare(plan)
+    return Processes(plan, workers)

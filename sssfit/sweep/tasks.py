@@ -5,6 +5,7 @@ that sums are made of the same parts with one worker or twenty. A task is one or
 go to a worker together. `perform` is pure: a plan and a task give the same results everywhere.
 """
 
+import contextlib
 import io
 import math
 import warnings
@@ -116,6 +117,14 @@ def tasks_of(plan: Plan, indices: Sequence[int], workers: int) -> Iterator[Task]
             gathered += own
     if parts:
         yield Task(tuple(parts), gathered, code)
+
+
+def prepare(plan: Plan) -> None:
+    """Compile the walk of the first point, which each worker would otherwise do for itself."""
+    if plan.photons is None:
+        return
+    with contextlib.suppress(ValueError, TypeError, ArithmeticError):  # a point that will fail
+        walk_of(plan.material(0), plan.grid, *_walked(plan, 0)).prepare()
 
 
 def perform(plan: Plan, task: Task) -> list[Done]:
