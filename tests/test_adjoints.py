@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.optimize
 from reference_pixels import one_over_r_profile
 
 from sssfit.fit import _by_hand, _fitted_taps, artist, burley, falloff, guided, weighted
@@ -277,7 +278,7 @@ def misfit_of_weighted_terms(monkeypatch) -> Pair:
     profile = one_over_r_profile(60, 0.1, [0.3])
     (given, *_), _ = caught(
         monkeypatch,
-        weighted.optimize,
+        scipy.optimize,
         "minimize",
         lambda: weighted.fit_weighted(profile, rank=2, mm_per_pixel=0.3, support_mm=3.0),
     )
