@@ -91,7 +91,7 @@ class Entry:
             temporary = path.with_suffix(f".{os.getpid()}")
             with contextlib.suppress(OSError):
                 try:
-                    temporary.write_bytes(hashlib.sha256(code).digest() + code)
+                    temporary.write_bytes(sealed(code))
                     temporary.replace(path)
                 finally:
                     temporary.unlink(missing_ok=True)
@@ -104,19 +104,26 @@ class Entry:
         """
         for features in (processor_features(), own_features()):
             path = self.path(features)
-            try:
-                content = path.read_bytes() if path else b""
-            except OSError:
-                continue
-            said, code = content[:_SUM_BYTES], content[_SUM_BYTES:]
-            if hashlib.sha256(code).digest() == said:
-                return code
+            with contextlib.suppress(OSError):
+                if path and (code := unsealed(path.read_bytes())) is not None:
+                    return code
         return None
 
     def path(self, features: str | None = None) -> Path | None:
         """Return the file of the code for a processor, by default all of this one's features."""
         folder, has = cache_folder(), processor_features() if features is None else features
         return Path(folder) / f"{self._module}-{_machine_key(has)}.o" if folder else None
+
+
+def sealed(content: bytes) -> bytes:
+    """Return bytes with their SHA-256 before them."""
+    return hashlib.sha256(content).digest() + content
+
+
+def unsealed(content: bytes) -> bytes | None:
+    """Return the bytes after their checksum; None if they have changed since it was written."""
+    said, data = content[:_SUM_BYTES], content[_SUM_BYTES:]
+    return data if hashlib.sha256(data).digest() == said else None
 
 
 def _processor_name() -> str:
