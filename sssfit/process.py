@@ -186,6 +186,9 @@ _SHOW_CURSOR = b"\x1b[?25h"  # a progress bar hides it
 # Whether the first signal has arrived; from then on the listening thread alone acts.
 _heard = threading.Event()
 _listening = threading.Event()
+# Whether the main thread does what need not be finished, such as compiling, and whether a signal
+# has been noted by `asked_to_stop`.
+_nothing_to_save, _noted = threading.Event(), threading.Event()
 
 
 class Interrupts:
@@ -238,7 +241,8 @@ class Interrupts:
 def asked_to_stop() -> Iterator[Callable[[], bool]]:
     """Yield a function that tells whether SIGINT or SIGTERM has arrived since.
 
-    After the first signal the former handlers stand again.
+    After the first signal the former handlers stand again. Under `nothing_to_save` it raises
+    KeyboardInterrupt.
     """
     asked = False
     before: dict[signal.Signals, Any] = {}
@@ -247,11 +251,14 @@ def asked_to_stop() -> Iterator[Callable[[], bool]]:
         for number, handler in before.items():
             signal.signal(number, handler)
 
-    def note(_signal: int, _frame: FrameType | None) -> None:
+    def note(_signal: int, frame: FrameType | None) -> None:
         nonlocal asked
         asked = True
         _heard.set()
+        _noted.set()
         restore()
+        if _nothing_to_save.is_set():
+            _interrupt(frame)
 
     for number in _SIGNALS:
         if signal.getsignal(number) is not signal.SIG_IGN:
@@ -261,7 +268,23 @@ def asked_to_stop() -> Iterator[Callable[[], bool]]:
     try:
         yield lambda: asked
     finally:
+        _noted.clear()
         restore()
+
+
+@contextlib.contextmanager
+def nothing_to_save() -> Iterator[None]:
+    """Let a signal end what takes seconds and leaves nothing behind: ten of compiling a walk."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    _nothing_to_save.set()
+    try:
+        if _noted.is_set():  # just before
+            raise KeyboardInterrupt
+        yield
+    finally:
+        _nothing_to_save.clear()
 
 
 def _raise(_signal: int, frame: FrameType | None) -> None:
@@ -269,7 +292,12 @@ def _raise(_signal: int, frame: FrameType | None) -> None:
     if _heard.is_set():
         return
     _heard.set()
-    if _is_importing(frame):
+    _interrupt(frame)
+
+
+def _interrupt(frame: FrameType | None) -> NoReturn:
+    """Raise KeyboardInterrupt; end a program of ours where that would not get through."""
+    if _listening.is_set() and _is_importing(frame):
         _end(b"\nInterrupted.\n")
     raise KeyboardInterrupt
 

@@ -9,11 +9,12 @@ import time
 
 import fork_server
 import numpy as np
+import processes
 import pytest
 
 from sssfit.cli import main
 from sssfit.material import load_material
-from sssfit.process import asked_to_stop
+from sssfit.process import asked_to_stop, nothing_to_save
 from sssfit.profile import Profile
 from sssfit.simulate import run_figures, simulate_montecarlo
 from sssfit.simulate._walks import BATCH_PHOTONS
@@ -281,6 +282,39 @@ def test_a_second_signal_meets_the_former_handler(first, second):
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+@posix
+def test_a_signal_ends_at_once_what_leaves_nothing_behind():
+    with asked_to_stop() as stop:
+        with pytest.raises(KeyboardInterrupt), nothing_to_save():
+            os.kill(os.getpid(), signal.SIGINT)
+        assert stop()
+        with pytest.raises(KeyboardInterrupt), nothing_to_save():
+            pytest.fail("it had been asked to stop before")
+    with asked_to_stop() as stop:
+        with nothing_to_save():
+            assert not stop()
+        os.kill(os.getpid(), signal.SIGINT)  # after it only what comes next is told
+        assert stop()
+
+
+@posix
+def test_ctrl_c_ends_the_compiling_of_a_walk(tmp_path):
+    """It went on to the end of the compiling, ten seconds for layers."""
+    cache = tmp_path / "cache"
+    process = processes.start(
+        [*COMMAND, "skin1", "--photons", "1e11"],
+        cwd=tmp_path,
+        env=os.environ | {"NUMBA_CACHE_DIR": str(cache)},
+    )
+    assert process.stderr.readline().startswith("Compiling the photon walk")
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=60)
+    assert (process.returncode, err.strip()) == (130, "Interrupted.")
+    assert names(tmp_path) == ["cache"]
+    assert not list(cache.rglob("*.o"))
 
 
 @posix

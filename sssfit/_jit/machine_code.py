@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from sssfit._jit import cache_folder, numbas_settings
-from sssfit.process import check_that_numba_compiles, unfit_settings
+from sssfit.process import check_that_numba_compiles, nothing_to_save, unfit_settings
 
 _SUM_BYTES = 32  # of SHA-256
 SYMBOL = "enter"
@@ -81,7 +81,8 @@ class Entry:
 
         function = import_module(f"sssfit._jit.{self._module}").enter
         try:
-            code, features = object_code(function, self._arguments)
+            with nothing_to_save():
+                code, features = object_code(function, self._arguments)
         except TypeError as error:
             if not (settings := numbas_settings()):
                 raise
