@@ -296,8 +296,11 @@ def _raise(_signal: int, frame: FrameType | None) -> None:
 
 
 def _interrupt(frame: FrameType | None) -> NoReturn:
-    """Raise KeyboardInterrupt; end a program of ours where that would not get through."""
-    if _listening.is_set() and _is_importing(frame):
+    """Raise KeyboardInterrupt; end a program of ours where that would not get through.
+
+    In the midst of compiling it leaves half-made objects of LLVM, which complain as they are freed.
+    """
+    if _listening.is_set() and (_nothing_to_save.is_set() or _is_importing(frame)):
         _end(b"\nInterrupted.\n")
     raise KeyboardInterrupt
 
