@@ -34,7 +34,7 @@ _CONNECT_SECONDS = 10.0
 _WORKERS_SECONDS = 30.0
 _MOST_LOCAL = 256
 _AHEAD = 3  # ranges of a walk for each worker
-_RANGE_STEPS, _MESSAGE_BYTES = 2e8, 8_000_000
+_RANGE_STEPS, _MESSAGE_BYTES = 5e8, 8_000_000
 
 
 class Connection:
@@ -201,7 +201,9 @@ def _hand_over(ended: Any, result: "Future[Any]") -> None:
         try:
             result.set_result(ended.result())
         except Exception as error:
-            result.set_exception(SweepError(f"a result was lost ({type(error).__name__})"))
+            result.set_exception(
+                SweepError(f"a result, or the scheduler, was lost ({type(error).__name__})")
+            )
     elif ended.status == "error":
         failed = ended.exception()
         is_ours = isinstance(failed, SweepError)
