@@ -18,7 +18,6 @@ import numpy as np
 import pytest
 from llvmlite.binding.targets import FeatureMap
 from numba.core.registry import cpu_target
-from numpy.ctypeslib import ndpointer
 
 from sssfit import __version__, _jit, process
 from sssfit._jit import depth_matrix, half_space_walk, layered_walk, machine_code
@@ -259,7 +258,7 @@ def tripled(tmp_path, monkeypatch):
     module = types.ModuleType("sssfit._jit.tripled")
     module.enter = lambda x, values, count: 3 * x + int(numba.carray(values, count, np.float64)[1])
     monkeypatch.setitem(sys.modules, module.__name__, module)
-    arguments = ctypes.c_int64, ndpointer(np.float64, 1, flags="C"), ctypes.c_int64
+    arguments = ctypes.c_int64, machine_code.Array(np.float64), ctypes.c_int64
     return lambda: machine_code.Entry("tripled", arguments)
 
 
@@ -284,6 +283,14 @@ def test_what_an_entry_is_given_is_checked(tripled):
     for wrong in (np.zeros(2, np.float32), np.zeros((2, 2)), np.zeros(4)[::2], [0.0, 1.0]):
         with pytest.raises((TypeError, ctypes.ArgumentError)):
             entry(2, wrong, 2)
+
+
+def test_an_entry_takes_arrays_that_are_read_only_or_empty(tripled):
+    fixed = np.array([0.0, 1.0])
+    fixed.flags.writeable = False
+    assert tripled()(2, fixed, 2) == 7
+    kind = machine_code.Array(np.float64)
+    assert kind.from_param(np.zeros(0)) is not None
 
 
 def test_without_a_folder_an_entry_is_compiled_all_the_same(tripled, monkeypatch):

@@ -51,8 +51,8 @@ def _writable_cache_folder() -> str:
 
 
 _CACHE_FOLDER = _writable_cache_folder()
-# Settings of numba that change where code is kept, how it is run or for which processor it is, of
-# which numba keeps account; all others may change the code itself.
+# Settings of numba that leave the code as it is, or of which its key takes account: where code is
+# kept, how it is run and for which processor it is. Any other may change the code itself.
 _HARMLESS = {
     *("NUMBA_CACHE_DIR", "NUMBA_CPU_FEATURES", "NUMBA_CPU_NAME", "NUMBA_DISABLE_JIT"),
     *("NUMBA_NUM_THREADS", "NUMBA_THREADING_LAYER"),

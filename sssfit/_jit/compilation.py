@@ -71,7 +71,7 @@ def object_code(function: Callable[..., int], arguments: Sequence[Any]) -> tuple
 
     numba's C functions report exceptions through Python. Here every other function is made internal
     and the whole is optimised once more: LLVM then sees that nothing can fail, and what would ask
-    for Python goes. Half spaces are then walked 1.1 to 2.4 times as fast as by numba's own call.
+    for Python goes. Half spaces are then walked up to twice as fast as by numba's own call.
 
     Raises
     ------

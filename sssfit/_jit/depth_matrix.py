@@ -4,9 +4,8 @@ from ctypes import c_double, c_int64
 
 import numpy as np
 import numpy.typing as npt
-from numpy.ctypeslib import ndpointer
 
-from sssfit._jit.machine_code import Entry
+from sssfit._jit.machine_code import Array, Entry
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -14,7 +13,7 @@ FloatArray = npt.NDArray[np.float64]
 # X from distance 0 and entries per mean free path.
 Tables = tuple[FloatArray, float, float, FloatArray, float]
 
-_ROW, _TABLE = ndpointer(np.float64, 1, flags="C"), ndpointer(np.float64, 2, flags="C")
+_ROW, _TABLE = Array(np.float64), Array(np.float64, 2)
 
 ENTRY = Entry(
     "transport",

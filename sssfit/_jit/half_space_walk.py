@@ -5,10 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numpy.ctypeslib import ndpointer
 
 from sssfit._jit.lanes import GENERATOR_ROWS, LANES, LaneWords
-from sssfit._jit.machine_code import Entry
+from sssfit._jit.machine_code import Array, Entry
 
 COLLISION_CAP = 1_000_000  # walks end here unfinished; with albedo 1 they might never end
 POWER_BLOCK = 1024  # albedo^n = low[n % 1024] * high[n // 1024] reaches past the collision cap
@@ -42,9 +41,8 @@ class Ledger(NamedTuple):
     roulette: FloatArray  # (C, 2): energy added by roulette, zero on average, and its variance
 
 
-_ROW, _TABLE = ndpointer(np.float64, 1, flags="C"), ndpointer(np.float64, 2, flags="C")
-_COUNTS = ndpointer(np.int64, 1, flags="C")
-_FLOATS, _WORDS = ndpointer(np.float32, 1, flags="C"), ndpointer(np.uint32, 1, flags="C")
+_ROW, _TABLE, _COUNTS = Array(np.float64), Array(np.float64, 2), Array(np.int64)
+_FLOATS, _WORDS = Array(np.float32), Array(np.uint32)
 
 ENTRY = Entry(
     "semi_infinite",

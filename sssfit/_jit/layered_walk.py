@@ -5,7 +5,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from numpy.ctypeslib import ndpointer
 
 from sssfit._jit.lanes import (
     FLOAT_ROWS,
@@ -20,7 +19,7 @@ from sssfit._jit.lanes import (
     LaneFloats,
     LaneWords,
 )
-from sssfit._jit.machine_code import Entry
+from sssfit._jit.machine_code import Array, Entry
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -83,10 +82,9 @@ class Blocks(NamedTuple):
     crossings: LaneWords  # those of the stack
 
 
-_ROW, _TABLE, _BLOCK = (ndpointer(np.float64, rank, flags="C") for rank in (1, 2, 3))
-_COUNTS, _INDICES = ndpointer(np.int64, 1, flags="C"), ndpointer(np.uint64, 1, flags="C")
-_FLOATS, _WORDS = ndpointer(np.float32, 1, flags="C"), ndpointer(np.uint32, 1, flags="C")
-_FLAGS = ndpointer(np.uint8, 1, flags="C")
+_ROW, _TABLE, _BLOCK = (Array(np.float64, rank) for rank in (1, 2, 3))
+_COUNTS, _INDICES, _FLAGS = Array(np.int64), Array(np.uint64), Array(np.uint8)
+_FLOATS, _WORDS = Array(np.float32), Array(np.uint32)
 
 ENTRY = Entry(
     "layered",
