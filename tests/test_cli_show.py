@@ -25,7 +25,7 @@ from sssfit.simulate import Checkpoint, simulate_montecarlo, simulate_montecarlo
 @pytest.fixture(autouse=True)
 def no_layout(monkeypatch):
     """Leave panels where they are: half of a chart's time, and nothing here looks at them."""
-    monkeypatch.setattr(page, "lay_out", lambda figure: figure.set_layout_engine("none"))
+    monkeypatch.setattr(page, "lay_out", lambda figure: figure.set_layout_engine(None))
 
 
 @pytest.fixture(scope="module")

@@ -169,7 +169,7 @@ QUICK = [
 @pytest.mark.parametrize("call", QUICK)
 def test_our_own_files_are_known_again_and_force_replaces_others(run, folder, call, monkeypatch):
     # Half of a chart's time; files are known by other things than where its panels are.
-    monkeypatch.setattr(page, "lay_out", lambda figure: figure.set_layout_engine("none"))
+    monkeypatch.setattr(page, "lay_out", lambda figure: figure.set_layout_engine(None))
     target = folder / f"theirs.{call.rpartition('.')[2]}"
     target.write_bytes(foreign(target.suffix[1:]))
     assert run(call.format("theirs"), "--force")[0] == 0

@@ -281,7 +281,7 @@ def lay_out(figure: Figure) -> None:
     if not isinstance(engine, ConstrainedLayoutEngine):
         return
     engine.execute(figure)
-    figure.set_layout_engine("none")
+    figure.set_layout_engine(None)  # "none" leaves an engine, for which every figure is drawn twice
     for each in figure.findobj(SubFigure):
         each.bbox_relative.set_points(np.round(each.bbox_relative.get_points(), 9))
     for axes in figure.axes:
@@ -314,9 +314,8 @@ def save_figure(
 
 
 def _print(figure: Figure, stream: BinaryIO, chosen: str) -> None:
-    # Level 8 takes 0.2 s more than the default and saves 5 % of a PNG's 310 kB.
     settings: dict[str, Style] = {
-        "png": {"pil_kwargs": {"compress_level": 8}, "metadata": {"Software": MAKER}},
+        "png": {"metadata": {"Software": MAKER}},
         "svg": {"metadata": {"Creator": MAKER, "Date": None}},
         "pdf": {"metadata": {"Creator": MAKER, "CreationDate": None}},
     }
