@@ -18,7 +18,7 @@ from sssfit import __version__
 from sssfit.errors import SssfitError, SssfitWarning
 from sssfit.files import reason
 from sssfit.messages import printable
-from sssfit.process import is_out_of_memory
+from sssfit.process import is_out_of_memory, keep_memory
 
 from ._options import in_options
 from .chart import chart
@@ -93,6 +93,7 @@ def run(args: Sequence[str] | None) -> NoReturn:
     # BLAS starts a thread a core with numpy, 70 ms of the processor, and waits for all of them at
     # each of the small products here.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    keep_memory()
     with warnings.catch_warnings():
         warnings.simplefilter("always", SssfitWarning)
         warnings.showwarning = _show_warning

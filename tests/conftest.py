@@ -10,10 +10,9 @@ have as many as a user's process.
 Each worker has a core, and so have its children: where a worker and another's threads took turns
 on a core, waiting for Python's lock cost a twentieth of the processor time.
 
-Nor does the C library give memory back to the system between two arrays here: to have it again,
-page by page, took two fifths of the processor time of a cascade's fit. And what collecting the
-tests made is not looked through for garbage again and again: that took a third of the collection.
-Looking through the rest after every 700 new objects, as Python does, took a thirtieth of the tests.
+Freed memory stays with the process, as on the command line. What collecting the tests made is not
+looked through for garbage again and again: that took a third of the collection. Looking through the
+rest after every 700 new objects, as Python does, took a thirtieth of the tests.
 
 Figures that are approved or documented are those of one kind of processor (``processor``).
 
@@ -23,7 +22,6 @@ Each worker begins to collect at another file, so that the others find that byte
 compiled all of it.
 """
 
-import ctypes
 import gc
 import os
 import signal
@@ -38,9 +36,8 @@ from processes import end_all
 from threadpoolctl import threadpool_limits
 
 import sssfit._jit.compilation  # noqa: F401 (before numba compiles what is the tests' own)
+from sssfit.process import keep_memory
 
-_M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of malloc.h
-_KEPT_BYTES = 1 << 29
 _NEW_OBJECTS = 50_000  # before garbage is looked for
 SLOW_SECONDS = 4 * 3600.0  # the longest, a walk of 1e8 photons through layers, takes under one
 
@@ -68,14 +65,6 @@ def keep_to_a_core():
     cores = sorted(os.sched_getaffinity(0))
     if worker[1] <= len(cores):
         os.sched_setaffinity(0, {cores[worker[0]]})
-
-
-def keep_memory():
-    """Let free memory stay with this process, where the C library is GNU's."""
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None) if sys.platform == "linux" else None
-    if mallopt is not None:
-        mallopt(_M_TRIM_THRESHOLD, _KEPT_BYTES)
-        mallopt(_M_MMAP_THRESHOLD, _KEPT_BYTES // 16)
 
 
 @pytest.hookimpl(tryfirst=True)

@@ -9,7 +9,7 @@ import pytest
 from reference_motion import sampled_pixel
 from reference_pixels import make_profile, one_over_r_profile
 
-from sssfit._jit.pixels import quadrant_energy
+from sssfit._jit.pixel_energy import quadrant_energy
 from sssfit.errors import ArgumentError, RenderError
 from sssfit.methods import LIGHTS
 from sssfit.motion.adaptive import AdaptiveRenderer, averaged_around

@@ -205,7 +205,8 @@ def test_threads_of_numba_that_are_no_number(folder, value):
 
 
 def test_warnings_of_others_are_one_line(folder):
-    ended = sssfit(folder, "fit", "wax.profile.npz", "--method", "svd", "-q", NUMBA_OPT="abc")
+    arguments = "render", "wax.kernel.json", "--irradiance", "disk", "--size", "16x16", "-q"
+    ended = sssfit(folder, *arguments, NUMBA_OPT="abc")
     assert ended.returncode == 0
     assert ended.stderr.count("\n") == 1
     assert ended.stderr.startswith("Warning: Environment variable 'NUMBA_OPT' is defined but")

@@ -14,8 +14,9 @@ import math
 
 import numpy as np
 import numpy.typing as npt
+from numba import carray  # type: ignore[attr-defined]
 
-from sssfit._jit import jit
+from sssfit._jit import Address, jit
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -86,17 +87,10 @@ def span(k: int, pitch: float) -> tuple[float, float, float]:
 
 
 @jit
-def line_energy(
-    radii: FloatArray, densities: FloatArray, pitch: float, half_pixels: int
-) -> FloatArray:
-    """Energy in strips of one pixel's width at x >= 0: (half_pixels+1, C).
-
-    ``radii`` (m) are the outer edges, increasing; ``densities`` (m, C) belong to the annuli inside
-    them.
-    """
-    line = np.zeros((half_pixels + 1, densities.shape[1]))
+def fill_line(line: FloatArray, radii: FloatArray, densities: FloatArray, pitch: float) -> None:
+    """Add to ``line`` (h+1, C) the energy in strips of one pixel's width at x >= 0."""
     first = 0
-    for k in range(half_pixels + 1):
+    for k in range(line.shape[0]):
         x0, x1, copies = span(k, pitch)
         while first < radii.size and radii[first] <= x0:
             first += 1
@@ -105,19 +99,17 @@ def line_energy(
             area = disk_strip_area(radii[j], x0, x1)
             add_share(line[k], densities[j], copies * (area - inner))
             inner = area
-    return line
 
 
 @jit
-def quadrant_energy(
-    radii: FloatArray, densities: FloatArray, pitch: float, half_pixels: int
-) -> FloatArray:
-    """Energy in the pixels of a quadrant, axes included: (half_pixels+1, half_pixels+1, C).
+def fill_quadrant(
+    quadrant: FloatArray, radii: FloatArray, densities: FloatArray, pitch: float
+) -> None:
+    """Add to ``quadrant`` (h+1, h+1, C) the energy in its pixels.
 
     A pixel and its mirror in the diagonal are equal, so half of them are computed.
     """
-    n = half_pixels + 1
-    quadrant = np.zeros((n, n, densities.shape[1]))
+    n = quadrant.shape[0]
     first_on_diagonal = 0
     for k in range(n):
         first_on_diagonal = first_beyond(radii, first_on_diagonal, k, k, pitch)
@@ -130,7 +122,6 @@ def quadrant_energy(
             # Channel by channel: the assignment of a row takes 3 s to compile.
             for c in range(quadrant.shape[2]):
                 quadrant[k, i, c] = quadrant[i, k, c]
-    return quadrant
 
 
 @jit
@@ -172,3 +163,24 @@ def add_share(energy: FloatArray, density: FloatArray, area: float) -> None:
     """Add density times area, channel by channel."""
     for c in range(energy.size):
         energy[c] += density[c] * max(area, 0.0)
+
+
+def enter(
+    is_plane: int,
+    edges: int,
+    channels: int,
+    half_pixels: int,
+    pitch: float,
+    radii: Address,
+    densities: Address,
+    energies: Address,
+) -> int:
+    """Call the functions above with arrays at the addresses that ``pixel_energy.ENTRY`` passes."""
+    n = half_pixels + 1
+    outer = carray(radii, (edges,), np.float64)
+    inside = carray(densities, (edges, channels), np.float64)
+    if is_plane != 0:
+        fill_quadrant(carray(energies, (n, n, channels), np.float64), outer, inside, pitch)
+    else:
+        fill_line(carray(energies, (n, channels), np.float64), outer, inside, pitch)
+    return 0

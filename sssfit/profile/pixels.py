@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from sssfit._jit.pixel_energy import line_energy, quadrant_energy
 from sssfit.arrays import FloatArray
 from sssfit.errors import ProfileError
 
@@ -122,11 +123,9 @@ def line_kernel(
     half_pixels: int | None,
 ) -> FloatArray:
     """Return the energy in strips one pixel wide: (2h+1, C)."""
-    from sssfit._jit import pixels  # numba: 0.4 s that reading a profile does not need
-
     pitch_mm, half = checked_support(r_edges_mm[-1], mm_per_pixel, half_pixels, dimensions=1)
     edges, densities = flat_annuli(r_edges_mm, annulus_energy)
-    half_line = pixels.line_energy(edges[1:], densities, pitch_mm, half)
+    half_line = line_energy(edges[1:], densities, pitch_mm, half)
     return np.concatenate((half_line[:0:-1], half_line))
 
 
@@ -137,11 +136,9 @@ def quadrant_kernel(
     half_pixels: int | None,
 ) -> FloatArray:
     """Return the energy in the pixels of a quadrant with its axes: (h+1, h+1, C)."""
-    from sssfit._jit import pixels
-
     pitch_mm, half = checked_support(r_edges_mm[-1], mm_per_pixel, half_pixels, dimensions=2)
     edges, densities = flat_annuli(r_edges_mm, annulus_energy)
-    return pixels.quadrant_energy(edges[1:], densities, pitch_mm, half)
+    return quadrant_energy(edges[1:], densities, pitch_mm, half)
 
 
 def full_kernel(quadrant: FloatArray) -> FloatArray:
