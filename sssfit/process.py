@@ -107,7 +107,7 @@ _KEPT_BYTES, _MAPPED_BYTES = 1 << 27, 1 << 25
 def keep_memory() -> None:
     """Let freed memory stay with the process for its next arrays, where the C library is GNU's.
 
-    By itself it maps every array from 128 kB up anew, whose pages the system then clears: a sixth
+    By itself it maps pages for every array from 128 kB up, which the system has to clear: a sixth
     of the time of a cascade's fit.
     """
     if sys.platform != "linux":

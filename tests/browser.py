@@ -8,7 +8,12 @@ import time
 import pytest
 
 _ALWAYS = ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--no-first-run")
-_SOFTWARE = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader")
+# WebGL is drawn by software, but the page around it is not: three quarters of the time.
+_SOFTWARE = (
+    "--use-angle=swiftshader",
+    "--enable-unsafe-swiftshader",
+    "--disable-gpu-compositing",
+)
 _WAIT = 20.0  # seconds
 _AT = "return arguments[0].selectedIndex"
 _PUT = """const [control, at] = arguments;
@@ -68,8 +73,9 @@ class Browser:
         return self.driver.execute_script(code, *arguments)
 
     def log(self, kind):
-        """What was logged since the last call."""
-        return self.driver.get_log(kind)
+        """What was logged since the last call, but for what WebGL's driver says of its speed."""
+        every = self.driver.get_log(kind)
+        return [each for each in every if "GL Driver Message" not in each["message"]]
 
     def wait(self, condition=_DRAWN):
         """Wait until a condition holds."""

@@ -21,6 +21,9 @@ from sssfit.export.passes import pass_list
 
 TOOLS = {"glsl": ("moderngl",), "hlsl": ("moderngl",), "wgsl": ("wgpu",)}
 PROGRAMS = ("glslangValidator", "spirv-val", "spirv-cross")
+# Mesa's drivers compile each shader for pictures of a few pixels: without optimisation, and for
+# narrow vectors, that takes half of the time.
+os.environ |= {"GALLIVM_PERF": "nopt", "LP_NATIVE_VECTOR_WIDTH": "128"}
 PRECISION = "".join(f"precision highp {each};\n" for each in ("float", "int", "sampler2D"))
 _TRIANGLE = np.array([-1, -1, 3, -1, -1, 3], np.float32)
 _GLSL_VERTEX = "#version 450\nin vec2 at; void main() { gl_Position = vec4(at, 0.0, 1.0); }"
