@@ -12,6 +12,7 @@ halvings and stages up to l. Their squares are added to the misfit with the spec
 and the weight ``aliasing``. Those along y are equal, and those of other images much smaller.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -83,8 +84,12 @@ class PairChain(Chain):
         self._weights_at = np.zeros((self.channels, len(shapes), most + 1), np.intp)
         for k, own in enumerate(self.counts):
             self._steps_at[k, :own], self._weights_at[:, k, : own + 1] = self.places(k)
-        n, size = target.frequencies.size, self.parameters[0].size
-        self._spare = np.empty((size, n, n))  # new, the system clears its pages: twice the time
+        self._has = np.concatenate((self._has_step, self._has_weight), axis=1)
+        self._used = self._has.ravel()
+        stages, n = self.channels * len(shapes), target.frequencies.size
+        rows = stages * self._has.shape[1] * (len(shapes) + 1) * n
+        # New, the system clears its pages: twice the time.
+        self._spare = [np.empty(size) for size in (stages * n * n, rows, rows)]
 
     def spectrum(self, x: FloatArray) -> FloatArray:
         """Return the chain's spectrum (C, n, n)."""
@@ -113,42 +118,85 @@ class PairChain(Chain):
 
     def matrix(self, x: FloatArray) -> FloatArray:
         """Return the Gauss-Newton part of its second derivatives, (size, size)."""
-        blurs, m = self._blurs(x), self._blend(x)
-        slopes = self._slopes(blurs)  # (C, parameters, L+1, n)
+        blurs, m = self._blurs(x), self._blend(x).T
+        own, after = self._slopes(blurs), self._after(blurs)
         found = np.zeros((self.size, self.size))
-        for c in range(self.channels):
-            own = self.parameters[c]
-            for view in self.views:
-                products = self._products(view, blurs.chain[c], slopes[c], m[:, c], c)
-                found[np.ix_(own, own)] += 2.0 * products
+        for view in self.views:
+            products = self._products(view, blurs.chain, own, after, m)
+            for at, each in zip(self.parameters, products, strict=True):
+                found[np.ix_(at, at)] += 2.0 * each
         return found
 
     def _products(
-        self, view: _View, chain: FloatArray, slopes: FloatArray, m: FloatArray, c: int
+        self, view: _View, chain: FloatArray, own: FloatArray, after: FloatArray, m: FloatArray
     ) -> FloatArray:
-        """Return the weighted products of a view's derivatives by a channel's parameters.
+        """Return the weighted products of a view's derivatives by channels' parameters, (C, p, p).
 
-        A view's derivative by the parameter p is A_p + B_p with
+        A parameter p of stage k changes the stage's spectrum by s_p(w), and a view by
 
-            A_p(i, j) = sum_l a_pl(i) uy_l(j),    B_p(i, j) = sum_l ux_l(i) b_pl(j).
+            s_p(i) G_k(i, j) + s_p(j) H_k(i, j),
+            G_k(i, j) = sum_l g_kl(i) uy_l(j),    H_k(i, j) = sum_l ux_l(i) h_kl(j),
 
-        Nothing but A needs both frequencies at once: the products of all derivatives as pictures
-        took 1.1 to 1.4 times as long.
+        with g_kl and h_kl what is left of m_l ux_l and m_l uy_l without that spectrum. So only G
+        needs both frequencies at once, and there is one a stage, not one a parameter: half of the
+        time. Given are the chain (C, L+1, n), s (C, S, 2k+1, n), the chain's derivatives by the
+        stages' spectra (C, S, L+1, n) and the blend (C, L+1).
         """
-        part, own = chain[view.stages], m[view.stages]
-        ux, uy, moved = part * view.x, part * view.y, slopes[:, view.stages] * own[:, None]
-        power = view.weight * self.target.power[c]
-        shares = np.diag(m)[:, view.stages] - m[:, None] * own / self.target.energy[c]
-        a = np.concatenate((shares[:, :, None] * ux, moved * view.x))  # (L+1 + parameters, l, n)
-        b = moved * view.y
-        lit = np.matmul(a.transpose(0, 2, 1), uy, out=self._spare)
-        lit *= power
-        crossed = _products_with(ux @ lit, b)
-        found = _products_with(_across(a, uy, power), a)
-        found[:, m.size :] += crossed
-        found[m.size :] += crossed.T
-        found[m.size :, m.size :] += _products_with(_across(b, ux, power.T), b)
+        part, blend = chain[:, view.stages], m[:, view.stages]
+        ux, uy = part * view.x, part * view.y  # (C, l, n)
+        left = after[:, :, view.stages] * blend[:, None, :, None]
+        g, h = left * view.x, left * view.y  # (C, S, l, n)
+        power = view.weight * self.target.power
+        by_x, by_y = _across(uy, power), _across(ux, power.swapaxes(1, 2))
+        gx, hy = _frequencies_first(g), _frequencies_first(h)  # (C, n, S, l)
+        with_x, with_y = gx @ by_x, hy @ by_y
+        alike = _frequencies_last(with_x @ gx.swapaxes(2, 3) + with_y @ hy.swapaxes(2, 3))
+        crossed = self._crossed(self._lit(g, uy, power), ux, h, own)
+        blended = with_x * ux.swapaxes(1, 2)[:, :, None] + with_y * uy.swapaxes(1, 2)[:, :, None]
+        to_blend = (_frequencies_last(blended) @ own.swapaxes(2, 3)).swapaxes(1, 2)
+        shares = m[:, :, None] * np.eye(m.shape[1])[:, view.stages]
+        shares -= m[:, :, None] * blend[:, None] / self.target.energy[:, None, None]
+        squares = np.einsum("cnkl,ckn,cln->ckl", by_x, ux, ux)
+        count = m.shape[1]
+        found = np.empty((len(m), count + crossed.shape[1], count + crossed.shape[1]))
+        found[:, :count, :count] = shares @ squares @ shares.swapaxes(1, 2)
+        found[:, :count, count:] = shares @ to_blend[:, :, self._has]
+        found[:, count:, :count] = found[:, :count, count:].swapaxes(1, 2)
+        found[:, count:, count:] = crossed + crossed.swapaxes(1, 2) + self._alike(alike, own)
         return found
+
+    def _lit(self, g: FloatArray, uy: FloatArray, power: FloatArray) -> FloatArray:
+        """Return all G with the weights of their squares, (C, S, n, n)."""
+        shape = *g.shape[:2], g.shape[3], g.shape[3]
+        found = np.matmul(g.swapaxes(2, 3), uy[:, None], out=_room(self._spare[0], shape))
+        found *= power[:, None]
+        return found
+
+    def _crossed(
+        self, lit: FloatArray, ux: FloatArray, h: FloatArray, own: FloatArray
+    ) -> FloatArray:
+        """Return the products (C, p, p) of all s_p(i) G_k(i, j), weighted, and s_p(j) H_k(i, j).
+
+        Given are the weighted G (C, S, n, n), ux (C, l, n), h (C, S, l, n) and s (C, S, 2k+1, n).
+        """
+        channels, stages, most, n = own.shape
+        shape, per_stage = (channels, stages, most, ux.shape[1], n), (channels, stages, -1, n)
+        rows = _room(self._spare[1], shape)
+        np.multiply(own[:, :, :, None], ux[:, None, None], out=rows)
+        rows = rows.reshape(per_stage)
+        moved = np.matmul(rows, lit, out=_room(self._spare[2], rows.shape))
+        other = np.multiply(own[:, :, :, None], h[:, :, None], out=rows.reshape(shape))
+        left, right = (each.reshape(channels, stages * most, -1) for each in (moved, other))
+        found: FloatArray = (left @ right.swapaxes(1, 2))[:, self._used][:, :, self._used]
+        return found
+
+    def _alike(self, alike: FloatArray, own: FloatArray) -> FloatArray:
+        """Return the sums (C, p, p) of s_p s_q alike over frequencies, for alike (C, S, S, n)."""
+        rows = alike[:, :, :, None] * own[:, None]
+        shape = rows.shape[:4]
+        rows = rows.reshape(*shape[:2], -1, own.shape[3]) @ own.swapaxes(2, 3)
+        found: FloatArray = rows.reshape(*shape, -1).transpose(0, 2, 3, 1, 4)
+        return found[:, self._has][:, :, self._has]
 
     def _blurs(self, x: FloatArray) -> _Blurs:
         step = texels_of(x[self._steps_at]) * self._has_step
@@ -177,21 +225,20 @@ class PairChain(Chain):
         gradient[self._weights_at[:, self._has_weight]] = by_weight[:, self._has_weight]
 
     def _slopes(self, blurs: _Blurs) -> FloatArray:
-        """Return derivatives of the chain by a channel's parameters, (C, p, L+1, n)."""
+        """Return derivatives of the stages' spectra by their own parameters, (C, S, 2k+1, n)."""
         weights, spectrum = blurs.weights[..., None], blurs.spectrum[:, :, None]
         by_weight = weights * (blurs.fetched - blurs.copies[:, None] * spectrum)
         moved = (weights[:, :, 1:] * blurs.by_offset).swapaxes(2, 3)
         by_step = (_of_farther(moved) * blurs.step[:, None]).swapaxes(2, 3)
-        has = np.concatenate((self._has_step, self._has_weight), axis=1)
-        own = np.concatenate((by_step, by_weight), axis=2)[:, has]  # (C, p, n)
-        stage = np.nonzero(has)[0]
-        found = np.zeros((*own.shape[:2], blurs.chain.shape[1], own.shape[2]))
-        found[:, np.arange(stage.size), stage + 1] = (
-            own * (blurs.chain[:, :-1] * self._down)[:, stage]
-        )
-        for k in range(1, len(self.shapes)):
-            before = stage < k
-            found[:, before, k + 1] = found[:, before, k] * blurs.factors[:, k, None]
+        return np.concatenate((by_step, by_weight), axis=2)
+
+    def _after(self, blurs: _Blurs) -> FloatArray:
+        """Return the derivatives of the chain by the stages' spectra, (C, S, L+1, n)."""
+        channels, stages, n = blurs.factors.shape
+        found = np.zeros((channels, stages, stages + 1, n))
+        for k in range(stages):
+            found[:, :k, k + 1] = found[:, :k, k] * blurs.factors[:, k, None]
+            found[:, k, k + 1] = blurs.chain[:, k] * self._down[k]
         return found
 
 
@@ -200,17 +247,25 @@ def _of_farther(by_offset: FloatArray) -> FloatArray:
     return np.cumsum(by_offset[..., ::-1], axis=-1)[..., ::-1]
 
 
-def _across(rows: FloatArray, other: FloatArray, power: FloatArray) -> FloatArray:
-    """Return sums over stages (p, l, n), with the other axis's functions (l, n) summed over."""
-    pairs = (other[:, None] * other) @ power.T
-    found: FloatArray = np.matmul(rows.transpose(2, 0, 1), pairs.transpose(2, 0, 1))
-    return found.transpose(1, 2, 0)
+def _across(other: FloatArray, power: FloatArray) -> FloatArray:
+    """Return the products of the other axis's functions (C, l, n), summed over it, (C, n, l, l)."""
+    pairs = other[:, :, None] * other[:, None]
+    return _frequencies_first(pairs @ power.swapaxes(1, 2)[:, None])
 
 
-def _products_with(rows: FloatArray, others: FloatArray) -> FloatArray:
-    """Return the products (p, q) of functions (p, l, n) and (q, l, n)."""
-    found: FloatArray = rows.reshape(len(rows), -1) @ others.reshape(len(others), -1).T
-    return found
+def _frequencies_first(functions: FloatArray) -> FloatArray:
+    """Return functions (C, p, q, n) as (C, n, p, q), in one piece, as BLAS wants them."""
+    return np.ascontiguousarray(functions.transpose(0, 3, 1, 2))
+
+
+def _frequencies_last(functions: FloatArray) -> FloatArray:
+    """Return functions (C, n, p, q) as (C, p, q, n), in one piece."""
+    return np.ascontiguousarray(functions.transpose(0, 2, 3, 1))
+
+
+def _room(spare: FloatArray, shape: Sequence[int]) -> FloatArray:
+    """Return the beginning of spare memory as an array."""
+    return spare[: math.prod(shape)].reshape(shape)
 
 
 def _sum(ux: FloatArray, uy: FloatArray, blend: FloatArray) -> FloatArray:
