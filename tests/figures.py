@@ -3,6 +3,7 @@
 import itertools
 import warnings
 
+import numpy as np
 from matplotlib.legend import Legend
 from matplotlib.text import Text
 
@@ -20,9 +21,17 @@ def assert_legible(draw):
     for text, box in texts:
         inside = box.x0 >= 0 and box.y0 >= 0 and box.x1 <= width and box.y1 <= height
         assert inside, (text, box)
-    for (text, box), (other, other_box) in itertools.combinations(texts, 2):
-        assert not box.padded(-1).overlaps(other_box.padded(-1)), (text, other)
+    assert not overlapping(texts)
     return figure
+
+
+def overlapping(texts):
+    """The pairs of texts that share more than a pixel's width, compared as arrays: some 10 000."""
+    low = np.array([(box.x0, box.y0) for _, box in texts]).reshape(-1, 2) + 1.0
+    high = np.array([(box.x1, box.y1) for _, box in texts]).reshape(-1, 2) - 1.0
+    shared = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)
+    pairs = np.argwhere(np.triu(shared, 1))
+    return [(texts[i][0], texts[j][0]) for i, j in pairs]
 
 
 def drawn_texts(figure):
