@@ -170,15 +170,15 @@ def check_that_numba_compiles() -> None:
     """
     if os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0"):
         raise SssfitError(
-            "NUMBA_DISABLE_JIT is set, and a photon walk runs as machine code only; unset it."
+            "NUMBA_DISABLE_JIT is set, and only machine code computes walks and kernels; unset it."
         )
 
 
 def unfit_settings(settings: Sequence[str]) -> SssfitError:
-    """Return the error for settings of numba with which a photon walk cannot be compiled."""
+    """Return the error for settings of numba with which walks and kernels cannot be compiled."""
     return SssfitError(
-        f"with {' '.join(settings)} the code of a photon walk would need Python as it runs; unset "
-        f"{'it' if len(settings) == 1 else 'them'} once, and the code is kept for later runs."
+        f"with {' '.join(settings)} the code of walks and kernels would need Python as it runs; "
+        f"unset {'it' if len(settings) == 1 else 'them'} once, and the code is kept for later runs."
     )
 
 

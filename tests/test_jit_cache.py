@@ -331,7 +331,7 @@ def test_settings_that_change_code_are_refused_and_leave_nothing_behind(tmp_path
     """Helpers with bounds checks were linked into the code of later runs without them."""
     own = {"PYTHONWARNINGS": "ignore"} | dict([setting.split("=")])
     refused = python(LOADING, NUMBA_CACHE_DIR=str(tmp_path), **own)
-    assert " ".join(refused).startswith(f"with {setting} the code of a photon walk would need")
+    assert " ".join(refused).startswith(f"with {setting} the code of walks and kernels would need")
     assert python(LOADING, NUMBA_CACHE_DIR=str(tmp_path)) == ["loaded"]
     assert python(LOADING, NUMBA_CACHE_DIR=str(tmp_path), **own) == ["loaded"]
 
