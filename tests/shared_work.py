@@ -37,8 +37,9 @@ _OWN_FITS = {"test_approved"}  # its clock counts how often it is asked, fits in
 # What these ask is how good a cascade is. The others, approvals among them, fit dozens, and one
 # descent, few frequencies and short descents will do for them: a fifth of the time.
 LONG_SEARCHES = {
-    *("test_cascade", "test_disks_page", "test_distance", "test_docs", "test_docs_tables"),
+    *("test_borders_page", "test_cascade", "test_disks_page", "test_distance", "test_docs"),
     *(
+        "test_docs_tables",
         "test_engines",
         "test_frames",
         "test_motion",
