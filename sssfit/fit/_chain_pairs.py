@@ -12,6 +12,7 @@ halvings and stages up to l. Their squares are added to the misfit with the spec
 and the weight ``aliasing``. Those along y are equal, and those of other images much smaller.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -85,11 +86,13 @@ class PairChain(Chain):
         for k, own in enumerate(self.counts):
             self._steps_at[k, :own], self._weights_at[:, k, : own + 1] = self.places(k)
         self._has = np.concatenate((self._has_step, self._has_weight), axis=1)
-        self._used = self._has.ravel()
-        stages, n = self.channels * len(shapes), target.frequencies.size
-        rows = stages * self._has.shape[1] * (len(shapes) + 1) * n
+        self._stage_of = np.nonzero(self._has)[0]  # of a channel's parameters after the blend
+        ends = np.cumsum([2 * own + 1 for own in self.counts]).tolist()
+        self._own_at = [slice(*each) for each in itertools.pairwise([0, *ends])]
+        n = target.frequencies.size
+        planes, rows = len(shapes) * n * n, ends[-1] * (len(shapes) + 1) * n
         # New, the system clears its pages: twice the time.
-        self._spare = [np.empty(size) for size in (stages * n * n, rows, rows)]
+        self._spare = [np.empty(self.channels * size) for size in (planes, rows, rows)]
 
     def spectrum(self, x: FloatArray) -> FloatArray:
         """Return the chain's spectrum (C, n, n)."""
@@ -139,8 +142,8 @@ class PairChain(Chain):
 
         with g_kl and h_kl what is left of m_l ux_l and m_l uy_l without that spectrum. So only G
         needs both frequencies at once, and there is one a stage, not one a parameter: half of the
-        time. Given are the chain (C, L+1, n), s (C, S, 2k+1, n), the chain's derivatives by the
-        stages' spectra (C, S, L+1, n) and the blend (C, L+1).
+        time. Given are the chain (C, L+1, n), s (C, p, n), the chain's derivatives by the stages'
+        spectra (C, S, L+1, n) and the blend (C, L+1).
         """
         part, blend = chain[:, view.stages], m[:, view.stages]
         ux, uy = part * view.x, part * view.y  # (C, l, n)
@@ -151,25 +154,22 @@ class PairChain(Chain):
         gx, hy = _frequencies_first(g), _frequencies_first(h)  # (C, n, S, l)
         with_x, with_y = gx @ by_x, hy @ by_y
         alike = _frequencies_last(with_x @ gx.swapaxes(2, 3) + with_y @ hy.swapaxes(2, 3))
-        crossed = self._crossed(self._lit(g, uy, power), ux, h, own)
+        lit = np.matmul(g.swapaxes(2, 3), uy[:, None], out=_room(self._spare[0], _plane(g)))
+        lit *= power[:, None]
         blended = with_x * ux.swapaxes(1, 2)[:, :, None] + with_y * uy.swapaxes(1, 2)[:, :, None]
-        to_blend = (_frequencies_last(blended) @ own.swapaxes(2, 3)).swapaxes(1, 2)
+        blended = _frequencies_last(blended)  # (C, S, l, n)
         shares = m[:, :, None] * np.eye(m.shape[1])[:, view.stages]
         shares -= m[:, :, None] * blend[:, None] / self.target.energy[:, None, None]
         squares = np.einsum("cnkl,ckn,cln->ckl", by_x, ux, ux)
-        count = m.shape[1]
-        found = np.empty((len(m), count + crossed.shape[1], count + crossed.shape[1]))
+        count, size = m.shape[1], m.shape[1] + own.shape[1]
+        found = np.empty((len(m), size, size))
         found[:, :count, :count] = shares @ squares @ shares.swapaxes(1, 2)
-        found[:, :count, count:] = shares @ to_blend[:, :, self._has]
+        for k, at in enumerate(self._own_at):
+            stages = blended[:, k] @ own[:, at].swapaxes(1, 2)
+            found[:, :count, count + at.start : count + at.stop] = shares @ stages
         found[:, count:, :count] = found[:, :count, count:].swapaxes(1, 2)
+        crossed = self._crossed(lit, ux, h, own)
         found[:, count:, count:] = crossed + crossed.swapaxes(1, 2) + self._alike(alike, own)
-        return found
-
-    def _lit(self, g: FloatArray, uy: FloatArray, power: FloatArray) -> FloatArray:
-        """Return all G with the weights of their squares, (C, S, n, n)."""
-        shape = *g.shape[:2], g.shape[3], g.shape[3]
-        found = np.matmul(g.swapaxes(2, 3), uy[:, None], out=_room(self._spare[0], shape))
-        found *= power[:, None]
         return found
 
     def _crossed(
@@ -177,26 +177,27 @@ class PairChain(Chain):
     ) -> FloatArray:
         """Return the products (C, p, p) of all s_p(i) G_k(i, j), weighted, and s_p(j) H_k(i, j).
 
-        Given are the weighted G (C, S, n, n), ux (C, l, n), h (C, S, l, n) and s (C, S, 2k+1, n).
+        Given are the weighted G (C, S, n, n), ux (C, l, n), h (C, S, l, n) and s (C, p, n).
         """
-        channels, stages, most, n = own.shape
-        shape, per_stage = (channels, stages, most, ux.shape[1], n), (channels, stages, -1, n)
-        rows = _room(self._spare[1], shape)
-        np.multiply(own[:, :, :, None], ux[:, None, None], out=rows)
-        rows = rows.reshape(per_stage)
-        moved = np.matmul(rows, lit, out=_room(self._spare[2], rows.shape))
-        other = np.multiply(own[:, :, :, None], h[:, :, None], out=rows.reshape(shape))
-        left, right = (each.reshape(channels, stages * most, -1) for each in (moved, other))
-        found: FloatArray = (left @ right.swapaxes(1, 2))[:, self._used][:, :, self._used]
+        channels, count, n = own.shape
+        shape = channels, count, ux.shape[1], n
+        rows, moved = (_room(each, shape) for each in self._spare[1:])
+        np.multiply(own[:, :, None], ux[:, None], out=rows)
+        for k, at in enumerate(self._own_at):
+            given, out = (each[:, at].reshape(channels, -1, n) for each in (rows, moved))
+            np.matmul(given, lit[:, k], out=out)
+            np.multiply(own[:, at, None], h[:, k, None], out=rows[:, at])
+        left, right = (each.reshape(channels, count, -1) for each in (moved, rows))
+        found: FloatArray = left @ right.swapaxes(1, 2)
         return found
 
     def _alike(self, alike: FloatArray, own: FloatArray) -> FloatArray:
         """Return the sums (C, p, p) of s_p s_q alike over frequencies, for alike (C, S, S, n)."""
-        rows = alike[:, :, :, None] * own[:, None]
-        shape = rows.shape[:4]
-        rows = rows.reshape(*shape[:2], -1, own.shape[3]) @ own.swapaxes(2, 3)
-        found: FloatArray = rows.reshape(*shape, -1).transpose(0, 2, 3, 1, 4)
-        return found[:, self._has][:, :, self._has]
+        found = np.empty((*own.shape[:2], own.shape[1]))
+        for k, at in enumerate(self._own_at):
+            rows = own * alike[:, self._stage_of, k]
+            found[:, :, at] = rows @ own[:, at].swapaxes(1, 2)
+        return found
 
     def _blurs(self, x: FloatArray) -> _Blurs:
         step = texels_of(x[self._steps_at]) * self._has_step
@@ -225,12 +226,12 @@ class PairChain(Chain):
         gradient[self._weights_at[:, self._has_weight]] = by_weight[:, self._has_weight]
 
     def _slopes(self, blurs: _Blurs) -> FloatArray:
-        """Return derivatives of the stages' spectra by their own parameters, (C, S, 2k+1, n)."""
+        """Return derivatives of the stages' spectra by their own parameters, (C, p, n)."""
         weights, spectrum = blurs.weights[..., None], blurs.spectrum[:, :, None]
         by_weight = weights * (blurs.fetched - blurs.copies[:, None] * spectrum)
         moved = (weights[:, :, 1:] * blurs.by_offset).swapaxes(2, 3)
         by_step = (_of_farther(moved) * blurs.step[:, None]).swapaxes(2, 3)
-        return np.concatenate((by_step, by_weight), axis=2)
+        return np.concatenate((by_step, by_weight), axis=2)[:, self._has]
 
     def _after(self, blurs: _Blurs) -> FloatArray:
         """Return the derivatives of the chain by the stages' spectra, (C, S, L+1, n)."""
@@ -261,6 +262,12 @@ def _frequencies_first(functions: FloatArray) -> FloatArray:
 def _frequencies_last(functions: FloatArray) -> FloatArray:
     """Return functions (C, n, p, q) as (C, p, q, n), in one piece."""
     return np.ascontiguousarray(functions.transpose(0, 2, 3, 1))
+
+
+def _plane(functions: FloatArray) -> tuple[int, int, int, int]:
+    """Return the shape (C, S, n, n) of products of functions (C, S, l, n) of both axes."""
+    channels, stages, _, n = functions.shape
+    return channels, stages, n, n
 
 
 def _room(spare: FloatArray, shape: Sequence[int]) -> FloatArray:
