@@ -101,16 +101,17 @@ _THREADED = {"simulate", "picture fit", "render", "compare", "choose", "figures"
 
 _NO_MORE = ("allocate memory", "can't start new thread", "failed to map segment")
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of GNU's malloc.h
+_MALLOC = ("GLIBC_TUNABLES", "MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_")
 _KEPT_BYTES, _MAPPED_BYTES = 1 << 27, 1 << 25
 
 
 def keep_memory() -> None:
     """Let freed memory stay with the process for its next arrays, where the C library is GNU's.
 
-    By itself it maps pages for every array from 128 kB up, which the system has to clear: a sixth
-    of the time of a cascade's fit.
+    By itself it soon gives memory back, and the system clears the pages when they are wanted again:
+    a sixth of the time of a cascade's fit. What the environment says of it stays.
     """
-    if sys.platform != "linux":
+    if sys.platform != "linux" or any(name in os.environ for name in _MALLOC):
         return
     import ctypes
 

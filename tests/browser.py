@@ -75,7 +75,8 @@ class Browser:
     def log(self, kind):
         """What was logged since the last call, but for what WebGL's driver says of its speed."""
         every = self.driver.get_log(kind)
-        return [each for each in every if "GL Driver Message" not in each["message"]]
+        slow = "GL Driver Message (OpenGL, Performance"
+        return [each for each in every if slow not in each["message"]]
 
     def wait(self, condition=_DRAWN):
         """Wait until a condition holds."""

@@ -26,7 +26,7 @@ def assert_legible(draw):
 
 
 def overlapping(texts):
-    """The pairs of texts that share more than a pixel's width, compared as arrays: some 10 000."""
+    """The pairs of texts that share two pixels or more; a page has some 10 000 pairs."""
     low = np.array([(box.x0, box.y0) for _, box in texts]).reshape(-1, 2) + 1.0
     high = np.array([(box.x1, box.y1) for _, box in texts]).reshape(-1, 2) - 1.0
     shared = ((low[:, None] <= high) & (low <= high[:, None])).all(axis=2)

@@ -19,7 +19,7 @@ from reference_pixels import (
 from scipy.integrate import dblquad
 from scipy.special import erf
 
-from sssfit._jit import pixels
+from sssfit._jit import pixel_energy, pixels
 from sssfit.errors import ProfileError
 from sssfit.profile import full_kernel
 from sssfit.profile import pixels as integrals
@@ -287,3 +287,9 @@ def test_pixel_arguments_are_refused_in_one_line(integral, arguments, said):
 def test_channel_that_is_not_there_is_refused(channel):
     with pytest.raises(ProfileError, match="expected 0 to 1"):
         NOISY.quadrant_kernel(1.0, channel=channel)
+
+
+@pytest.mark.parametrize("radii", [1, 4])
+def test_compiled_code_gets_as_many_radii_as_densities(radii):
+    with pytest.raises(ValueError, match=f"{radii} radii and 3 densities; expected as many"):
+        pixel_energy.line_energy(np.arange(1.0, 1.0 + radii), np.ones((3, 2)), 0.5, 2)

@@ -4,9 +4,11 @@ Told by what happens while something else is under way, never by how long it tak
 """
 
 import contextlib
+import ctypes
 import math
 import sys
 import threading
+from types import SimpleNamespace
 
 import checks
 import numpy as np
@@ -14,7 +16,7 @@ import pytest
 
 from sssfit.grid import RadialGrid
 from sssfit.material import Layer, Material
-from sssfit.process import one_blas_thread
+from sssfit.process import keep_memory, one_blas_thread
 from sssfit.simulate import montecarlo, simulate_montecarlo
 from sssfit.simulate._walks import BATCH_PHOTONS
 from sssfit.simulate.walk_half_space import SemiInfiniteWalk
@@ -122,3 +124,20 @@ def test_all_linear_algebra_is_held_to_one_thread():
             assert set(threads()) == {1}
         assert threads() == before
     assert len(before) >= 2
+
+
+@pytest.mark.parametrize(("own", "calls"), [(None, 2), ("MALLOC_TRIM_THRESHOLD_", 0)])
+def test_freed_memory_stays_unless_the_environment_says_otherwise(monkeypatch, own, calls):
+    if own:
+        monkeypatch.setenv(own, "131072")
+    asked = []
+    library = SimpleNamespace(mallopt=lambda *given: asked.append(given))
+    monkeypatch.setattr(ctypes, "CDLL", lambda _: library)
+    monkeypatch.setattr(sys, "platform", "linux")
+    keep_memory()
+    assert len(asked) == calls
+
+
+def test_another_c_library_is_left_alone(monkeypatch):
+    monkeypatch.setattr(ctypes, "CDLL", lambda _: SimpleNamespace())
+    keep_memory()

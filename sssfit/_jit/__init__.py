@@ -10,8 +10,8 @@ folder. Without a writable folder (read-only home, or none) functions are compil
 slower to start, otherwise the same.
 
 numba itself, 0.2 to 0.35 s, is imported with the first compiled function (``compilation``): much
-of what asks for a thread pool or for the cache's key runs none, and the photon walks and the
-matrices of the exact solver are loaded without it (``machine_code``).
+of what asks for a thread pool or for the cache's key runs none, and the photon walks, the matrices
+of the exact solver and the integrals of kernels are loaded without it (``machine_code``).
 """
 
 import hashlib

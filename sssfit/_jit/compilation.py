@@ -7,6 +7,7 @@ flipped bits in machine code 4 crashed every later run and one silently gave a d
 import contextlib
 import ctypes
 import pickle
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal, TypeVar
@@ -15,6 +16,7 @@ import llvmlite.binding as llvm
 import numba
 from numba import types
 from numba.core.caching import FunctionCache, IndexDataCacheFile
+from numba.core.errors import NumbaWarning
 from numba.core.registry import cpu_target
 
 from sssfit._jit.machine_code import (
@@ -79,7 +81,10 @@ def object_code(function: Callable[..., int], arguments: Sequence[Any]) -> tuple
         The function can fail, or allocates memory: its code would still need Python.
     """
     signature = types.int64(*(_NUMBERS.get(each, types.voidptr) for each in arguments))
-    found = numba.cfunc(signature, error_model="numpy")(function)
+    with warnings.catch_warnings():
+        # With some settings numba does not keep what it compiles on the way, and says so of each.
+        warnings.simplefilter("ignore", NumbaWarning)
+        found = numba.cfunc(signature, error_model="numpy")(function)
     module = llvm.parse_assembly(found.inspect_llvm())
     for each in (*module.functions, *module.global_variables):
         if not each.is_declaration and each.name != found.native_name:

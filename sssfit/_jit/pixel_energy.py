@@ -51,6 +51,8 @@ def _energy(
     pixels: tuple[int, ...], radii: FloatArray, densities: FloatArray, pitch: float
 ) -> FloatArray:
     edges, channels = densities.shape
+    if len(radii) != edges:
+        raise ValueError(f"{len(radii)} radii and {edges} densities; expected as many.")
     energies = np.zeros((*pixels, channels))
     given = np.ascontiguousarray(radii), np.ascontiguousarray(densities), energies.reshape(-1)
     ENTRY(len(pixels) == 2, edges, channels, pixels[0] - 1, pitch, *given)
