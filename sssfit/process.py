@@ -102,7 +102,7 @@ _THREADED = {"simulate", "picture fit", "render", "compare", "choose", "figures"
 _NO_MORE = ("allocate memory", "can't start new thread", "failed to map segment")
 _M_TRIM_THRESHOLD, _M_MMAP_THRESHOLD = -1, -3  # of GNU's malloc.h
 _MALLOC = ("GLIBC_TUNABLES", "MALLOC_MMAP_THRESHOLD_", "MALLOC_TRIM_THRESHOLD_")
-_KEPT_BYTES, _MAPPED_BYTES = 1 << 27, 1 << 25
+_KEPT_BYTES, _MAPPED_BYTES = 1 << 27, 1 << 25  # the second is the most that glibc allows
 
 
 def keep_memory() -> None:

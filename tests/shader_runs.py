@@ -22,7 +22,7 @@ from sssfit.export.passes import pass_list
 TOOLS = {"glsl": ("moderngl",), "hlsl": ("moderngl",), "wgsl": ("wgpu",)}
 PROGRAMS = ("glslangValidator", "spirv-val", "spirv-cross")
 # Mesa's drivers compile each shader for pictures of a few pixels: without optimisation, and for
-# narrow vectors, that takes half of the time.
+# narrow vectors, their tests take three fifths of the time.
 os.environ |= {"GALLIVM_PERF": "nopt", "LP_NATIVE_VECTOR_WIDTH": "128"}
 PRECISION = "".join(f"precision highp {each};\n" for each in ("float", "int", "sampler2D"))
 _TRIANGLE = np.array([-1, -1, 3, -1, -1, 3], np.float32)

@@ -14,9 +14,10 @@ import checks
 import numpy as np
 import pytest
 
+from sssfit import process
 from sssfit.grid import RadialGrid
 from sssfit.material import Layer, Material
-from sssfit.process import keep_memory, one_blas_thread
+from sssfit.process import one_blas_thread
 from sssfit.simulate import montecarlo, simulate_montecarlo
 from sssfit.simulate._walks import BATCH_PHOTONS
 from sssfit.simulate.walk_half_space import SemiInfiniteWalk
@@ -128,16 +129,23 @@ def test_all_linear_algebra_is_held_to_one_thread():
 
 @pytest.mark.parametrize(("own", "calls"), [(None, 2), ("MALLOC_TRIM_THRESHOLD_", 0)])
 def test_freed_memory_stays_unless_the_environment_says_otherwise(monkeypatch, own, calls):
+    for each in process._MALLOC:
+        monkeypatch.delenv(each, raising=False)
     if own:
         monkeypatch.setenv(own, "131072")
     asked = []
     library = SimpleNamespace(mallopt=lambda *given: asked.append(given))
     monkeypatch.setattr(ctypes, "CDLL", lambda _: library)
     monkeypatch.setattr(sys, "platform", "linux")
-    keep_memory()
+    process.keep_memory()
     assert len(asked) == calls
 
 
 def test_another_c_library_is_left_alone(monkeypatch):
-    monkeypatch.setattr(ctypes, "CDLL", lambda _: SimpleNamespace())
-    keep_memory()
+    for each in process._MALLOC:
+        monkeypatch.delenv(each, raising=False)
+    opened = []
+    monkeypatch.setattr(ctypes, "CDLL", lambda _: opened.append(1) or SimpleNamespace())
+    monkeypatch.setattr(sys, "platform", "linux")
+    process.keep_memory()
+    assert opened

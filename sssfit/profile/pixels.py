@@ -12,7 +12,6 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from sssfit._jit.pixel_energy import line_energy, quadrant_energy
 from sssfit.arrays import FloatArray
 from sssfit.errors import ProfileError
 
@@ -123,6 +122,8 @@ def line_kernel(
     half_pixels: int | None,
 ) -> FloatArray:
     """Return the energy in strips one pixel wide: (2h+1, C)."""
+    from sssfit._jit.pixel_energy import line_energy  # 7 ms that reading a profile does not need
+
     pitch_mm, half = checked_support(r_edges_mm[-1], mm_per_pixel, half_pixels, dimensions=1)
     edges, densities = flat_annuli(r_edges_mm, annulus_energy)
     half_line = line_energy(edges[1:], densities, pitch_mm, half)
@@ -136,6 +137,8 @@ def quadrant_kernel(
     half_pixels: int | None,
 ) -> FloatArray:
     """Return the energy in the pixels of a quadrant with its axes: (h+1, h+1, C)."""
+    from sssfit._jit.pixel_energy import quadrant_energy
+
     pitch_mm, half = checked_support(r_edges_mm[-1], mm_per_pixel, half_pixels, dimensions=2)
     edges, densities = flat_annuli(r_edges_mm, annulus_energy)
     return quadrant_energy(edges[1:], densities, pitch_mm, half)
