@@ -6,6 +6,7 @@ Read the difference (``git diff tests/approved``) before you commit it: a fault 
 worse than no test.
 """
 
+import functools
 import sys
 import time
 import warnings
@@ -30,6 +31,7 @@ def recorded(each: Command | Call) -> list[str]:
     return calls.lines_of(each) if isinstance(each, Call) else lines_of(each, run(each))
 
 
+@functools.cache
 def approved(group: str) -> dict[str, list[str]]:
     """What the invocations or calls of a group are to do, by their titles."""
     path = FOLDER / f"{group}.txt"

@@ -3,6 +3,8 @@
 All depend on their arguments alone and cannot be changed. What one worker made, the others read
 from a folder of this run, which no other run reads: nothing of older sources can pass a test.
 
+Long searches of cascades are shared as well, in the files of LONG_SEARCHES.
+
 The tests of the solver and of the head compute them themselves, as do those that count threads or
 interrupt a run, and whatever runs within ``alone``.
 """
@@ -27,6 +29,7 @@ import sssfit.fit.cascade
 import sssfit.scene.head
 import sssfit.simulate.half_space
 import sssfit.simulate.stack
+from sssfit.fit._chain import Chain
 
 OWN = {
     *("test_deterministic", "test_exact", "test_head", "test_head_through", "test_interrupts"),
@@ -107,6 +110,7 @@ def begin():
     fits.fit_separable = _fitted_once(fits.fit_separable)
     fits.fit_taps = _fitted_once(fits.fit_taps)
     sssfit.choose.options.fit_result = _fitted_once(sssfit.choose.options.fit_result)
+    sssfit.fit.cascade.searched = _searched_once(sssfit.fit.cascade.searched)
 
 
 def _once(known, key, make):
@@ -198,6 +202,23 @@ def _fitted_once(real):
         return _once(known, (real.__name__, *key), lambda: real(profile, method, **settings))
 
     return fit
+
+
+def _searched_once(real):
+    """The usual cascade takes 2.4 s, and six files of tests look at it."""
+    known = {}
+
+    @functools.wraps(real)
+    def searched(chain, seed, starts=(), *, effort=1):
+        if not _state["fits"] or _state["short"] or not isinstance(chain, Chain):
+            return real(chain, seed, starts, effort=effort)
+        given = (*dataclasses.astuple(chain.target), *starts)
+        given = [each.tobytes() if isinstance(each, np.ndarray) else each for each in given]
+        key = "search", type(chain), chain.shapes, chain.aliasing, *given, seed, effort
+        x, count = _once(known, key, lambda: real(chain, seed, starts, effort=effort))
+        return x.copy(), count
+
+    return searched
 
 
 def contents(profile):

@@ -36,7 +36,7 @@ def plane_point(i, j):
 @pytest.fixture(scope="module")
 def head():
     """The smooth head on nodes 1 mm apart, lit by the key light alone."""
-    field = bust(1.0, 0.0, 2)
+    field = bust(1.0, 2)
     return field, light_field(field, Lighting(KEY), floor_mm=FLOOR_MM, smooth=False, **SEEN)
 
 

@@ -1,5 +1,6 @@
 """The head as a height field: the forms, the fine relief, and the grids they are sampled on."""
 
+import functools
 import math
 from collections.abc import Callable
 
@@ -280,16 +281,18 @@ def head_field(
     return HeightField(heights, float(x[0]), float(y[0]), spacing_mm, eyes)
 
 
-def bust(spacing_mm: float, detail_mm: float, threads: int) -> HeightField:
-    """Return the whole model."""
+@functools.lru_cache(2)
+def bust(spacing_mm: float, threads: int) -> HeightField:
+    """Return the whole model, smooth; it is the same in every picture, and is made once."""
     x = nodes(-BUST_WIDTH_MM, BUST_WIDTH_MM, spacing_mm)
     y = nodes(BUST_LOW_MM, BUST_HIGH_MM, spacing_mm)
-    return head_field(x, y, spacing_mm, detail_mm, threads)
+    return head_field(x, y, spacing_mm, 0.0, threads)
 
 
+@functools.lru_cache(1)
 def solid_head(threads: int) -> Solid:
     """Return the smooth model with its back, the solid that light crosses."""
-    front = bust(SOLID_MM, 0.0, threads)
+    front = bust(SOLID_MM, threads)
     rows, columns = front.heights.shape
     x = front.x0_mm + SOLID_MM * np.arange(columns, dtype=np.float64)
     y = front.y0_mm + SOLID_MM * np.arange(rows, dtype=np.float64)

@@ -124,7 +124,7 @@ def head_scene(
     seen = light_field(
         fine,
         Lighting(key, _fill_direction(light_degrees, light_up_degrees), (1.0, fill, ambient)),
-        coarse=None if whole else bust(COARSE_MM, 0.0, cores),
+        coarse=None if whole else bust(COARSE_MM, cores),
         behind=solid if is_behind else None,
         smooth=smooth,
         **seeing,

@@ -68,7 +68,7 @@ class _Surface:
     """Where rays from the middle of the head leave it."""
 
     def __init__(self) -> None:
-        field = bust(_SPACING_MM, 0.0, thread_count(None))
+        field = bust(_SPACING_MM, thread_count(None))
         rows, columns = field.heights.shape
         x = field.x0_mm + _SPACING_MM * np.arange(columns, dtype=np.float64)
         y = field.y0_mm + _SPACING_MM * np.arange(rows, dtype=np.float64)
