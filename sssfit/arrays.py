@@ -40,6 +40,17 @@ def number_array(name: str, value: object, error: type[SssfitError]) -> FloatArr
     return array
 
 
+def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
+    """Return a view that cannot be written to.
+
+    For what compiled functions read: numba compiles them once for arrays that can be written to and
+    again, for up to 2 s, for those that cannot.
+    """
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
 def json_object(name: str, value: object, error: type[SssfitError]) -> Mapping[str, Any]:
     """Return a read-only copy as stored in a file: a tuple becomes a list."""
     if not isinstance(value, Mapping):

@@ -117,8 +117,8 @@ def pytest_collection():
 def pytest_sessionfinish():
     """Let everything be collected at the end: OpenImageIO complains of what is left over.
 
-    A worker looks through what its tests made once, not five times as pytest does, and does not take
-    down all that is loaded: that took the run another 5 s.
+    A worker looks once through what its tests made, where pytest does five times, and does not take
+    down all that is loaded, which took the run another 5 s.
     """
     fork_server.close()
     if _worker():

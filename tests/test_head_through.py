@@ -18,7 +18,7 @@ STEP_MM, GAP_MM = 0.02, 0.5
 def solid_of(front, back, spacing=0.5, reach=60.0):
     """A solid of two formulas of x and y, and its front as a field of its own."""
     x = np.arange(-reach, reach + spacing / 2, spacing)
-    heights = [np.broadcast_to(f(x[None, :], x[:, None]), (x.size, x.size)) for f in (front, back)]
+    heights = [f(x[None, :], x[:, None]) + np.zeros((x.size, x.size)) for f in (front, back)]
     return Solid(*heights, -reach, -reach, spacing), HeightField(
         heights[0], -reach, -reach, spacing
     )

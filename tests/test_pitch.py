@@ -5,7 +5,7 @@ import pytest
 from reference_pixels import one_over_r_profile
 
 from sssfit.choose.choice import mm_per_pixel_at
-from sssfit.compare import compute_guide, compute_spectrum
+from sssfit.compare import compute_guide, compute_spectrum, pictures
 from sssfit.compare.sheet import compute_sheet
 from sssfit.errors import FitError
 from sssfit.fit import METHODS, MM_PER_PIXEL, make_target, pitch_of
@@ -36,7 +36,8 @@ def test_every_view_of_a_kernel_takes_it(view):
 
 
 @pytest.mark.filterwarnings("ignore::sssfit.errors.SssfitWarning")
-def test_sheets_take_it():
+def test_sheets_take_it(monkeypatch):
+    monkeypatch.setattr(pictures, "PIXELS", 13)  # of those that the artist's kernel is fitted to
     small = {"pixels": 16, "scenes": ["disk"], "most_terms": 1}
     assert compute_sheet(PROFILE, **small).mm_per_pixel == MM_PER_PIXEL
     assert compute_sheet(PROFILE, mm_per_pixel="profile", **small).mm_per_pixel == DR_MM

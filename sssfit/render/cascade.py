@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.arrays import read_only
 from sssfit.kernel.taps import Stage, Taps
 from sssfit.process import thread_count
 from sssfit.render.borders import source_indices
@@ -56,12 +57,13 @@ def apply_cascade(
         for level, (read, total) in enumerate(zip(pictures, sums, strict=True)):
             half = pictures[level + 1] if level + 1 < len(sums) else total[:0, :0]
             given = _numbers(taps, level, mm_per_pixel, read, channels)
-            _run_blocks(pool, len(read), run_level, read, total, half, *given, level == 0)
+            planes = read_only(read), total, half
+            _run_blocks(pool, len(read), run_level, *planes, *given, level == 0)
         for fine in range(len(sums) - 2, -1, -1):
             total, coarse = sums[fine : fine + 2]
             height, width = coarse.shape[0], coarse.shape[1] // channels
             places = (source_indices(n, 1, "mirror") for n in (height, width))
-            both = total, coarse, *places
+            both = total, read_only(coarse), *places
             _run_blocks(pool, len(total), add_doubled, *both, channels, fine == 0)
     return sums[0].reshape(pixels.shape)
 
@@ -99,7 +101,8 @@ def _numbers(
     for s, (own, each) in enumerate(lines):
         at[s, : len(own)] = own
         weights[s, :, : len(each)] = each.T
-    shares = np.array(taps.blend[before : before + len(stages) + 1].T, picture.dtype)
+    blend = taps.blend[before : before + len(stages) + 1]
+    shares = np.array(blend.T, picture.dtype, order="C")  # as of one channel: compiled once
     if level > 0:  # what it is halved from is part of the finer sum
         shares[:, 0] = 0.0
     far, size = int(reach.sum()), (picture.shape[0], picture.shape[1] // channels)

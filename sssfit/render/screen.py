@@ -24,7 +24,7 @@ import numpy.typing as npt
 
 from sssfit._jit import screen as compiled
 from sssfit._jit import thread_pool
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, read_only
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
 from sssfit.messages import counted
@@ -320,11 +320,11 @@ def _pass(
     vertical: bool,
 ) -> FloatArray:
     """Return one pass over the whole picture (N, C), block by block."""
-    out = np.zeros_like(picture)
+    out, read = np.zeros_like(picture), read_only(picture)
 
     def block(first: int) -> None:
         last = min(first + _BLOCK, len(out))
-        compiled.blur(out, picture, weights, view, vertical, first, last)
+        compiled.blur(out, read, weights, view, vertical, first, last)
 
     list(pool.map(block, range(0, len(out), _BLOCK)))
     return out

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.arrays import read_only
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
 from sssfit.process import thread_count
@@ -126,9 +127,10 @@ def apply_passes(
     planes = np.empty((channels, height + 1, width), pixels.dtype)
     planes[:, height] = 0.0  # pixels outside a black border
     out = np.zeros((height, width, channels), pixels.dtype)
+    read = read_only(pixels)
     with thread_pool(thread_count(threads), "sssfit-passes") as pool:
         for t in range(len(weights)):
-            _run_blocks(pool, height, pass_across, pixels, columns, across[t], reach[t], planes)
+            _run_blocks(pool, height, pass_across, read, columns, across[t], reach[t], planes)
             _run_blocks(pool, height, pass_down, planes, rows, down[t], reach[t], out)
     return out
 
