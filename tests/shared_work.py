@@ -205,7 +205,7 @@ def _fitted_once(real):
 
 
 def _searched_once(real):
-    """The usual cascade takes 2.4 s, and six files of tests look at it."""
+    """A cascade takes up to 2.4 s, and four files of tests look at the same two."""
     known = {}
 
     @functools.wraps(real)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from test_taps import PITCH, stage, taps_of
 
+from sssfit._jit.cascade import add_doubled, run_level
 from sssfit.kernel import Stage
 from sssfit.render import cascade
 from sssfit.render.cascade import apply_cascade, is_quick
@@ -44,6 +45,16 @@ def test_bits_depend_neither_on_threads_nor_on_blocks(dtype, monkeypatch):
     if dtype == np.float32:
         double = apply_cascade(picture.astype(float), taps, PITCH)
         np.testing.assert_allclose(found[0], double, rtol=0, atol=1e-6)
+
+
+def test_it_is_compiled_once_for_pictures_that_can_be_written_to_and_others_grey_and_coloured():
+    kinds = []
+    for channels, is_writeable in itertools.product((1, 3), (True, False)):
+        picture = np.random.default_rng(24).uniform(size=(9, 8, channels))
+        picture.flags.writeable = is_writeable
+        apply_cascade(picture, taps_of("1|1-1", channels=channels), PITCH)
+        kinds.append([len(each.signatures) for each in (run_level, add_doubled)])
+    assert kinds == [kinds[0]] * 4
 
 
 def test_offsets_far_apart_and_within_a_texel():

@@ -86,17 +86,11 @@ def package_of(path: Path) -> list[str]:
     return list(folder) if folder[0] == "sssfit" else ["sssfit", *folder]
 
 
-@functools.cache
-def nodes_of(path: Path) -> list[ast.AST]:
-    """Every node of a file."""
-    return list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
-
-
 def walked(path: Path) -> Iterator[ast.AST]:
     """Every node of a file but what a record's ``plot`` and its return type may import."""
-    nodes, name = nodes_of(path), name_of(path)
+    tree, name = ast.parse(path.read_text(encoding="utf-8")), name_of(path)
     left_out: set[int] = set()
-    for node in nodes:
+    for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef) and node.name == "plot" and name in PLOT_MAY_IMPORT:
             allowed = PLOT_MAY_IMPORT[name]
         elif isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
@@ -105,27 +99,25 @@ def walked(path: Path) -> Iterator[ast.AST]:
             continue
         inside = [each for each in node.body if isinstance(each, ast.ImportFrom)]
         left_out |= {id(each) for each in inside if each.module in allowed}
-    yield from (node for node in nodes if id(node) not in left_out)
+    yield from (node for node in ast.walk(tree) if id(node) not in left_out)
 
 
 @functools.cache
 def imports(path: Path) -> list[str]:
     """Every module a file imports, inside functions too, with relative names resolved."""
-    return list(found_imports(path))
-
-
-def found_imports(path: Path) -> Iterator[str]:
+    found: list[str] = []
     for node in walked(path):
         if isinstance(node, ast.Import):
-            yield from (alias.name for alias in node.names)
+            found += [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             package = package_of(path)
             base = package[: len(package) - node.level + 1] if node.level else []
             module = [*base, *(node.module.split(".") if node.module else [])]
             if module == ["sssfit"]:  # from sssfit import errors
-                yield from (f"sssfit.{alias.name}" for alias in node.names)
+                found += [f"sssfit.{alias.name}" for alias in node.names]
             else:
-                yield ".".join(module)
+                found.append(".".join(module))
+    return found
 
 
 def room_of(module: str) -> str:
@@ -205,7 +197,7 @@ def test_compiled_layer_sees_numbers_only(path):
 def test_library_neither_prints_nor_knows_the_command_line(path):
     assert not any(module.partition(".")[0] in ("click", "rich") for module in imports(path))
     assert not any(module.startswith("sssfit.cli") for module in imports(path))
-    for node in nodes_of(path):
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
             assert node.func.id != "print", f"line {node.lineno}"
 

@@ -70,7 +70,6 @@ with asked_to_stop() as stop:
         time.sleep(60)
 """,
 }
-_SHORT_WHILE = 0.15  # seconds; the child needs a thousandth
 KEEPS_LOCK = {"compiled, lock kept", "one instruction of Python"}
 
 
@@ -83,7 +82,7 @@ def start_trial(body, folder):
     program = TRIAL.format(body=textwrap.indent(textwrap.dedent(body), "    "))
     process = fork_server.start([sys.executable, "-c", program], cwd=folder)
     assert process.stdout.readline() == "ready\n", process.stderr.read()
-    time.sleep(_SHORT_WHILE)  # from saying so to what is to be interrupted
+    time.sleep(0.15)  # for the step from saying so to what is to be interrupted
     return process
 
 
@@ -103,7 +102,7 @@ def end_of(process, *, within=60.0):
 def test_the_second_signal_ends_it_within_a_second(tmp_path, name, number):
     process = start_trial(BODIES[name], tmp_path)
     process.send_signal(number)
-    time.sleep(_SHORT_WHILE)
+    time.sleep(0.3)
     assert process.poll() is None
     process.send_signal(number)
     status, err = end_of(process, within=1.0)

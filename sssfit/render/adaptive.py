@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, read_only
 from sssfit.errors import RenderError
 from sssfit.messages import shown
 from sssfit.process import thread_count
@@ -173,7 +173,8 @@ def render_samples(
     everywhere = np.broadcast_to(far, scene.channels).astype(np.float32)
     out = np.empty((*shape, profile.n_channels))
     key = np.uint64(frame_key(seed, frame))
-    given = light, everywhere, *places, half, *tables, many, factor, key, out
+    maps = read_only(many), read_only(factor)
+    given = light, everywhere, *places, half, *tables, *maps, key, out
     _run_blocks(thread_pool(thread_count(threads), "sssfit-samples"), sample_rows, given)
     out += profile.beyond_grid * far
     return out

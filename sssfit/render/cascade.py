@@ -102,7 +102,7 @@ def _numbers(
         at[s, : len(own)] = own
         weights[s, :, : len(each)] = each.T
     blend = taps.blend[before : before + len(stages) + 1]
-    shares = np.array(blend.T, picture.dtype, order="C")  # as of one channel: compiled once
+    shares = np.array(blend.T, picture.dtype, order="C")  # as one channel has: compiled once
     if level > 0:  # what it is halved from is part of the finer sum
         shares[:, 0] = 0.0
     far, size = int(reach.sum()), (picture.shape[0], picture.shape[1] // channels)

@@ -28,6 +28,7 @@ import numpy.typing as npt
 
 from sssfit._jit import screen_taps as compiled
 from sssfit._jit import thread_pool
+from sssfit.arrays import read_only
 from sssfit.errors import RenderError
 from sssfit.kernel.taps import Stage, Taps
 from sssfit.process import thread_count
@@ -236,7 +237,7 @@ class _Chain:
         first = next(k for k, each in enumerate(self.taps.stages) if each.level == fine + 1)
         rate, coarse = self.rates[first], self.store(sums[fine + 1])
         small, large = levels[fine + 1].texels, levels[fine].texels
-        self._run(compiled.enlarge, sums[fine], _flat(coarse), rate, small, large)
+        self._run(compiled.enlarge, sums[fine], read_only(_flat(coarse)), rate, small, large)
 
     def _blurred(
         self, picture: FloatArray, stage: Stage, rate: FloatArray, level: _Level
@@ -245,7 +246,7 @@ class _Chain:
         texels, passes = level.texels, list(fetches(stage))
         for k, (places_mm, weights) in enumerate(passes):
             out = np.zeros(picture.shape)
-            given = _flat(picture), places_mm, weights, rate, texels, self.divide
+            given = read_only(_flat(picture)), places_mm, weights, rate, texels, self.divide
             self._run(compiled.gather, out, *given)
             picture = out if k == len(passes) - 1 else self.store(out)
         return picture

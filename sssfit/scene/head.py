@@ -11,7 +11,7 @@ from typing import Any
 from sssfit.process import thread_count
 from sssfit.scene._field import Lighting, light_field, light_through
 from sssfit.scene._head_shape import FLOOR_MM
-from sssfit.scene._head_surface import COARSE_MM, bust, solid_head, visible_part
+from sssfit.scene._head_surface import coarse_bust, solid_head, visible_part
 from sssfit.scene.patterns import check_range, check_size
 from sssfit.scene.record import Scene
 
@@ -124,7 +124,7 @@ def head_scene(
     seen = light_field(
         fine,
         Lighting(key, _fill_direction(light_degrees, light_up_degrees), (1.0, fill, ambient)),
-        coarse=None if whole else bust(COARSE_MM, cores),
+        coarse=None if whole else coarse_bust(cores),
         behind=solid if is_behind else None,
         smooth=smooth,
         **seeing,
