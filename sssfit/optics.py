@@ -1,4 +1,4 @@
-"""Light at a smooth surface, and the quadrature for integrals over directions.
+"""Light at a smooth surface, the quadrature for integrals over directions, and interpolation.
 
 This is the only place of Fresnel's equations outside the compiled layer, which may not import this
 module and has its own (`sssfit._jit.sampling.fresnel_reflectance`). ``eta`` is the refractive index
@@ -73,6 +73,18 @@ def gauss_legendre(
     x, w = _legendre(count)
     middle, half = 0.5 * (start + end), 0.5 * (end - start)
     return middle + half * x, half * w
+
+
+def lagrange_shares(places: npt.NDArray[np.intp], t: FloatArray) -> FloatArray:
+    """Return what values at ``places`` (K,) count in the polynomial through them at t (n,), (K, n).
+
+    Lagrange's formula: the product over all other places q of (t - q) / (place - q).
+    """
+    shares = np.ones((places.size, t.size))
+    for place, share in zip(places, shares, strict=True):
+        for other in places[places != place]:
+            share *= (t - other) / (place - other)
+    return shares
 
 
 _DIRECTIONS = 96  # 1e-13 of Duntley's closed form for indices from 1.0001 to 4

@@ -16,10 +16,12 @@ from sssfit.grid import make_grid
 from sssfit.material import Layer, Material, load_material
 from sssfit.optics import normal_transmittance
 from sssfit.profile import Profile
-from sssfit.simulate import half_space
+from sssfit.simulate import _depth, half_space
 from sssfit.simulate._depth import (
     _Equation,
     _integrate_over_w,
+    _panels,
+    _tables,
     decay_rate,
     respond,
     respond_to_diffuse_light,
@@ -164,9 +166,21 @@ def test_energy_is_conserved_at_every_albedo(eta):
 
 def test_an_integral_is_that_of_its_distance_alone():
     distances = np.geomspace(1e-9, 40.0, 300)  # more than one block of them
-    whole = _integrate_over_w(distances, 0.7, lambda tau, p: p / tau)
+    whole = _integrate_over_w(distances, 0.7, lambda tau, p: p / tau)[0]
     alone = [_integrate_over_w(each, 0.7, lambda tau, p: p / tau) for each in distances[:, None]]
     np.testing.assert_allclose(whole, np.ravel(alone), rtol=1e-13)
+
+
+@pytest.mark.parametrize("k", [0.0, 0.3, 20.0])
+@pytest.mark.parametrize("eta", [1.0005, 1.3, 3.0])
+def test_interpolated_entries_of_tables_are_those_that_would_be_computed(monkeypatch, eta, k):
+    resolution = _LEVELS[1].depth
+    panels = _panels(np.hypot(1.0, k), resolution)
+    _, (direct, _, _, escape, _) = _tables(k, eta, panels, resolution)
+    monkeypatch.setattr(_depth, "_COARSER", 1)
+    _, (all_direct, _, _, all_escape, _) = _tables(k, eta, panels, resolution)
+    np.testing.assert_allclose(direct, all_direct, rtol=0, atol=1e-11)
+    np.testing.assert_allclose(escape, all_escape, rtol=0, atol=1e-11)
 
 
 @pytest.mark.parametrize("albedo", [0.0, 0.01, 0.05, 0.0501, 0.3, 1 - 1e-5, 1 - 2e-6, 1 - 1e-9])

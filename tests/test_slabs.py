@@ -85,3 +85,11 @@ def test_bad_input_gets_one_line():
     mirror = GaussianSlab.symmetric(GaussianSum.of(1.0, 1.0), GaussianSum.of(0.0, 1.0))
     with pytest.raises(SimulationError, match="expected less than 1"):
         combined(mirror, mirror)
+
+
+def test_slabs_that_return_nearly_all_the_light_to_each_other_are_summed_to_the_end():
+    mirror = GaussianSum.of([0.4, 0.5995], [0.01, 0.2])
+    slab = GaussianSlab.symmetric(mirror, GaussianSum.of(5e-4, 0.3))
+    found = combined(slab, slab)
+    r, t = mirror.transform(K), slab.transmitted.transform(K)
+    np.testing.assert_allclose(found.transmitted.transform(K), t * t / (1.0 - r * r), atol=1e-10)

@@ -27,23 +27,25 @@ neglected beyond ``Resolution.phase`` radians.
 
 import functools
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from sssfit._jit.depth_matrix import Tables, kernel_matrix
 from sssfit.arrays import FloatArray
-from sssfit.optics import Cone, gauss_legendre, is_matched, normal_transmittance
+from sssfit.optics import Cone, gauss_legendre, is_matched, lagrange_shares, normal_transmittance
 
 # Depth of the last panel: components that do not fall like exp(-nu z) are exp(-26) = 5e-12 there.
 _DEPTH = 26.0
 _WIDEST = 2.5  # panel: C0 = exp(-z) needs it
 _NOTHING = 360.0  # kappa d: exp(-360) is 0 beside all else, and larger ones might overflow
 _BEYOND = 40.0  # exp(-40) = 4e-18: tables end here
-_MAX_ENTRIES = 8000  # largest size of the table of X; only indices under 1.005 need more
+_MAX_ENTRIES = 40_000  # largest size of the table of X; only indices under 1.0006 need more
 _AT_ONCE = 128  # distances times some 100 nodes: arrays that stay in the cache
-_OfTau = Callable[[FloatArray, FloatArray], FloatArray]
+# Of a table's entries one in five is computed and the others are interpolated, from twelve.
+_COARSER, _NEIGHBOURS = 5, np.arange(-5, 7)
+_OfTau = Callable[[FloatArray, FloatArray], FloatArray | float]
 _STRETCHES, _PER_STRETCH = 14, 8  # Gauss nodes over w; 14 times 8 give K_d to 1e-12
 
 
@@ -86,6 +88,7 @@ class _Panels:
     last_value: FloatArray  # (p,): gives a panel's polynomial at its lower end from its node values
 
 
+@functools.lru_cache(maxsize=256)  # each wavenumber asks for those of all albedos again
 def decay_rate(albedo: float) -> float:
     """Return lambda of a artanh(lambda) = lambda, in [0, 1] (Case and Zweifel 1967, eq. 4.2.10).
 
@@ -175,13 +178,12 @@ class _Equation:
         panels, k = self.panels, self.wavenumber
         z, weights = panels.nodes.ravel(), panels.weights.ravel()
         order = panels.last_value.size
-        below = panels.edges[-1] - z
         multiple, absorbed = np.empty(len(albedos)), np.empty(len(albedos))
-        for i, albedo in enumerate(albedos):
-            nu = math.hypot(k, decay_rate(albedo))
+        rates = [math.hypot(k, decay_rate(each)) for each in albedos]
+        tails = _tails(panels.edges[-1] - z, k, rates)
+        for i, (albedo, nu, tail) in enumerate(zip(albedos, rates, tails, strict=True)):
             system = np.eye(z.size) - albedo * self.matrix
-            tail = np.outer(_tail(below, k, nu), panels.last_value)
-            system[:, -order:] -= albedo * tail
+            system[:, -order:] -= albedo * np.outer(tail, panels.last_value)
             density = np.linalg.solve(system, first)
             deepest = float(panels.last_value @ density[-order:])
             deep = deepest * (1.0 - albedo) / nu if nu > 0.0 else 0.0
@@ -226,8 +228,10 @@ def _tables(
     shortest = 1e-9 * panels.nodes[0, 0]  # nearer sources contribute 1e-9 log(1e-9) of a panel
     per_log = 3.0 / resolution.step
     entries = int(math.log(_BEYOND / kappa / shortest) * per_log) + 4
-    distances = shortest * np.exp(np.arange(entries) / per_log)
-    direct = _integrate_over_w(distances, k, lambda tau, _: np.ones_like(tau))
+    direct = _tabulated(
+        lambda at: _integrate_over_w(shortest * np.exp(at / per_log), k, lambda *_: 1.0)[0],
+        entries,
+    )
     z = panels.nodes.ravel()
     if is_matched(eta):
         return _matched_escape(z, k), (direct, math.log(shortest), per_log, np.zeros(4), 1.0)
@@ -236,13 +240,26 @@ def _tables(
     reach = min(_BEYOND, resolution.phase / (k * steepest)) if k > 0.0 else _BEYOND
     rate = 1.0 / float(cone.cosine[0]) + k * steepest
     step = max(resolution.step / rate, reach / _MAX_ENTRIES)
-    along = step * np.arange(int(reach / step) + 4, dtype=np.float64)
-    escape_table = _over_cone(along, k, cone, cone.weight / cone.cosine)
+    escape_table = _tabulated(
+        lambda at: _over_cone(step * at, k, cone, cone.weight / cone.cosine), int(reach / step) + 4
+    )
     near = z <= reach
     escape = np.empty_like(z)
     escape[near] = _over_cone(z[near], k, cone, cone.weight)
     escape[~near] = _matched_escape(z[~near], k)
     return escape, (direct, math.log(shortest), per_log, escape_table, 1.0 / step)
+
+
+def _tabulated(function: Callable[[FloatArray], FloatArray], entries: int) -> FloatArray:
+    """Return a smooth function at 0, 1, .. entries - 1, by polynomials through one in five.
+
+    At these 1e-9 of what is tabulated is lost with the coarsest resolution, 1e-12 with the next.
+    """
+    coarse = -(-entries // _COARSER)
+    known = function(_COARSER * np.arange(_NEIGHBOURS[0], coarse + _NEIGHBOURS[-1], dtype=float))
+    shares = lagrange_shares(_NEIGHBOURS, np.arange(_COARSER) / _COARSER)
+    parts = np.lib.stride_tricks.sliding_window_view(known, _NEIGHBOURS.size) @ shares
+    return np.ascontiguousarray(parts.ravel()[:entries])
 
 
 def _over_cone(distances: FloatArray, k: float, cone: Cone, weight: FloatArray) -> FloatArray:
@@ -264,16 +281,24 @@ def _blocks(count: int) -> Iterator[slice]:
 
 def _matched_escape(z: FloatArray, k: float) -> FloatArray:
     """Return E without a surface: z/2 int (p - 1) exp(-tau z) dw, p = sqrt(tau^2 - k^2), (n,)."""
-    return z * _integrate_over_w(z, k, lambda _, p: p - 1.0)
+    found: FloatArray = z * _integrate_over_w(z, k, lambda _, p: p - 1.0)[0]
+    return found
 
 
-def _tail(below: FloatArray, k: float, nu: float) -> FloatArray:
-    """Integrate K_d(d + t) exp(-nu t) over t > 0 for nodes at distance d above the last edge."""
-    return _integrate_over_w(below, k, lambda tau, _: 1.0 / (tau + nu))
+def _tails(below: FloatArray, k: float, rates: Sequence[float]) -> FloatArray:
+    """Integrate K_d(d + t) exp(-nu t) over t > 0 for nodes at distance d above the last edge.
+
+    Returns (A, n), a row for each of the rates nu.
+    """
+    return _integrate_over_w(below, k, *(functools.partial(_of_rate, nu) for nu in rates))
 
 
-def _integrate_over_w(distances: FloatArray, k: float, function: _OfTau) -> FloatArray:
-    """Return 1/2 int_{w0}^inf function(tau, p) exp(-d tau) dw for distances above 0, (n,).
+def _of_rate(nu: float, tau: FloatArray, _: FloatArray) -> FloatArray:
+    return 1.0 / (tau + nu)
+
+
+def _integrate_over_w(distances: FloatArray, k: float, *functions: _OfTau) -> FloatArray:
+    """Return 1/2 int_{w0}^inf function(tau, p) exp(-d tau) dw for distances above 0, (F, n).
 
     tau = (e^w + k^2 e^-w)/2 and p = (e^w - k^2 e^-w)/2.
     """
@@ -284,10 +309,12 @@ def _integrate_over_w(distances: FloatArray, k: float, function: _OfTau) -> Floa
     weights = np.tile(w, _STRETCHES) / _STRETCHES
     start = math.log1p(kappa)
     length = np.log(2.0 * (_BEYOND + kappa * d) / d) - start  # to where d tau > 40 + kappa d
-    integral = np.empty_like(d)
+    integrals = np.empty((len(functions), d.size))
     for block in _blocks(d.size):
         power = np.exp(start + length[block, None] * places)
         tau, p = 0.5 * (power + k * k / power), 0.5 * (power - k * k / power)
-        values = function(tau, p) * np.exp(-d[block, None] * tau)
-        integral[block] = 0.5 * length[block] * (values @ weights)
-    return integral
+        falling = np.exp(-d[block, None] * tau)
+        for integral, function in zip(integrals, functions, strict=True):
+            values = function(tau, p) * falling
+            integral[block] = 0.5 * length[block] * (values @ weights)
+    return integrals

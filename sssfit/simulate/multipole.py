@@ -30,6 +30,7 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError, SssfitWarning
 from sssfit.grid import make_grid
 from sssfit.material import Material
+from sssfit.optics import lagrange_shares
 from sssfit.profile import Profile
 from sssfit.simulate._deterministic import (
     check_is_material,
@@ -46,7 +47,7 @@ _BIAS = -0.5
 # Extension of the range beyond the relevant scales; 1e-3 and 1e3 leave 1e-10.
 _BEYOND_LOW, _BEYOND_HIGH = 1e-13, 1e6
 
-_POINTS = range(-3, 5)  # eight nodes around a point: their error is step^8
+_POINTS = np.arange(-3, 5)  # eight nodes around a point: their error is step^8
 
 
 def cumulative_from_transform(
@@ -85,13 +86,9 @@ def cumulative_from_transform(
 def _interpolated(values: FloatArray, at: FloatArray) -> FloatArray:
     """Return Lagrange interpolation (C, m) between values (C, n) at 0, 1, 2, ..."""
     first = np.floor(at).astype(np.intp)
-    fraction = at - first
-    out = np.zeros((len(values), at.size))
-    for own in _POINTS:
-        weight = np.ones(at.size)
-        for other in (each for each in _POINTS if each != own):
-            weight *= (fraction - other) / (own - other)
-        out += weight * values[:, first + own]
+    out: FloatArray = np.zeros((len(values), at.size))
+    for place, share in zip(_POINTS, lagrange_shares(_POINTS, at - first), strict=True):
+        out += share * values[:, first + place]
     return out
 
 
