@@ -19,6 +19,12 @@ from sssfit.export.presets import (
     preset_of,
     preset_text,
 )
+from sssfit.export.presets.separable import (
+    LEAST_FALLOFF,
+    Separable,
+    separable_of_taps,
+    separable_taps,
+)
 from sssfit.fit import fit_burley, fit_preintegrated
 from sssfit.kernel import Taps
 from sssfit.material import Layer, Material, load_material
@@ -301,3 +307,14 @@ def test_media_need_coefficients(name):
     with pytest.raises(KernelError, match="without coefficients"):
         preset_of(name, skin)
     assert preset_of("unreal", skin).title == "painted"
+
+
+@pytest.mark.parametrize("taps", range(5, 32, 2))
+def test_taps_with_the_least_and_the_largest_falloff_are_known_again(taps):
+    kernel = Separable(1.7, np.array([0.3, 0.9, 1.0]), np.array([LEAST_FALLOFF, 1.0, 0.57]))
+    table = separable_taps("wax", "separable-sss", np.array([0.9, 0.5, 0.1]), kernel, taps)
+    found, count = separable_of_taps(table)
+    assert count == taps
+    assert found.unit_mm == pytest.approx(kernel.unit_mm, rel=1e-12)
+    np.testing.assert_allclose(found.falloff, kernel.falloff, rtol=1e-9)
+    np.testing.assert_allclose(found.strength, kernel.strength, rtol=1e-9)

@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, SymLogNorm
 from matplotlib.figure import Figure, SubFigure
-from matplotlib.ticker import LogLocator, NullFormatter
+from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.page import (
@@ -166,8 +166,8 @@ def _draw_pass(axes: Axes, guide: Guide, guided: FloatArray | None) -> None:
     top = 2.0 * float(max(guide.passes.max(), guide.preintegrated[0])) / pitch
     axes.set_ylim(top * 10.0**-_PASS_DECADES, top)
     axes.yaxis.set_major_locator(LogLocator(numticks=5))
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.xaxis.set_minor_formatter(NullFormatter())
 
 
 def _draw_bars(

@@ -16,10 +16,23 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, StrMethodFormatter
+from matplotlib.ticker import (
+    FuncFormatter,
+    NullFormatter,
+    NullLocator,
+    StrMethodFormatter,
+)
 
 from sssfit.arrays import FloatArray
-from sssfit.chart.page import Handle, Style, add_table, draw_steps, name_axes, new_page
+from sssfit.chart.page import (
+    Handle,
+    Style,
+    add_table,
+    draw_steps,
+    name_axes,
+    new_page,
+    tick_decades,
+)
 from sssfit.chart.text import WEIGHTED, count, grid, method_name, shortened, spread
 from sssfit.messages import counted
 
@@ -155,10 +168,10 @@ def _limit(panels: npt.NDArray[Any], comparison: ModelComparison, shown: Sequenc
         for c in shown
     )
     panels[0, 0].set_ylim(max(least, peak * 10.0**-_DECADES) / 2, 3 * peak)
-    panels[0, 0].yaxis.set_major_locator(LogLocator(numticks=7))
+    tick_decades(panels[0, 0].yaxis, 7)
     panels[1, 0].set_ylim(1.15 * _LEAST_PERCENT, _MOST_PERCENT)
     panels[1, 0].set_yticks(_TICKS_PERCENT)
-    panels[1, 0].yaxis.set_minor_formatter(NullFormatter())
+    panels[1, 0].yaxis.set_minor_locator(NullLocator())
     panels[1, 0].yaxis.set_major_formatter(FuncFormatter(_signed))
     first_mm = comparison.exact.profile.r_edges_mm[1]
     panels[0, 0].set_xscale("log")

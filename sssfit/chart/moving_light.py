@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure, SubFigure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, NullFormatter
+from matplotlib.ticker import FuncFormatter, NullLocator
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.page import (
@@ -108,7 +108,7 @@ def _draw_lines(place: SubFigure, moving: MovingLight, styles: dict[str, Style])
     most = max(_MOST, *(float(each.fetches.max()) for each in moving.tracks))
     _log(above, 0.8, 1.4 * most)
     above.set_yticks(_SAMPLE_TICKS, [f"{each:g}" for each in _SAMPLE_TICKS])
-    above.yaxis.set_minor_formatter(NullFormatter())
+    above.yaxis.set_minor_locator(NullLocator())
     largest = max((float(each.max()) for each in errors.values()), default=1.0) or 1.0
     seen = np.concatenate([each[each > 0.0] for each in errors.values()])
     least = float(seen.min()) if seen.size else largest / 10.0
@@ -162,7 +162,7 @@ def _draw_maps(place: SubFigure, adaptive: list[Track]) -> None:
             if k == 0:
                 axes.set_title(track.label, loc="left")
         bar = place.colorbar(image, ax=list(grid[k]), label=name, shrink=0.9, aspect=14, pad=0.01)
-        bar.ax.yaxis.set_minor_formatter(NullFormatter())
+        bar.ax.yaxis.set_minor_locator(NullLocator())
         bar.ax.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
         if k == 0:
             bar.set_ticks(_SAMPLE_TICKS)

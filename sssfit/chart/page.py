@@ -16,7 +16,7 @@ import numpy.typing as npt
 from matplotlib import font_manager
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
+from matplotlib.axis import Axis, XAxis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
@@ -28,7 +28,13 @@ from matplotlib.legend import Legend
 from matplotlib.legend_handler import HandlerBase
 from matplotlib.lines import Line2D
 from matplotlib.patches import StepPatch
-from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, StrMethodFormatter
+from matplotlib.ticker import (
+    LogLocator,
+    MaxNLocator,
+    NullFormatter,
+    NullLocator,
+    StrMethodFormatter,
+)
 from matplotlib.transforms import Bbox
 
 from sssfit.arrays import FloatArray
@@ -230,11 +236,17 @@ def tick(axis: Axis) -> None:
 
 
 def tick_decades(axis: Axis, most: int) -> None:
-    """Tick powers of ten, and label 2 and 5 too if an axis with limits is short."""
+    """Tick powers of ten, and label 2 and 5 too if an axis with limits is short.
+
+    Smaller ticks along y cannot be seen; matplotlib would place them all the same, a third of a
+    chart's layout.
+    """
     axis.set_major_locator(LogLocator(numticks=most))
-    axis.set_minor_locator(LogLocator(subs=(2, 5)))
     low, high = axis.get_view_interval()
-    axis.set_minor_formatter("{x:g}" if math.log10(high / low) < 1.3 else NullFormatter())
+    is_short = math.log10(high / low) < 1.3
+    is_seen = is_short or isinstance(axis, XAxis)
+    axis.set_minor_locator(LogLocator(subs=(2, 5)) if is_seen else NullLocator())
+    axis.set_minor_formatter("{x:g}" if is_short else NullFormatter())
 
 
 def name_axes(axes: Axes, title: str, x_label: str, y_label: str) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter, NullLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 from matplotlib.transforms import Bbox
 
 from sssfit.chart.page import (
@@ -285,7 +285,7 @@ def _limit(axes: Axes, comparison: Comparison, error: str, cost: str) -> None:
     axes.set_ylim(least * (least / top) ** 0.16, top * (top / least) ** 0.06)
     axes.yaxis.set_major_locator(LogLocator(numticks=6))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_minor_locator(NullLocator())
     if cost == "seconds" or len(set(costs)) > _MOST_TICKS:
         axes.xaxis.set_major_locator(LogLocator(subs=(1, 2, 5), numticks=12))
     else:

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullLocator
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.page import (
@@ -101,7 +101,7 @@ def _limit(axes: Axes, spectrum: Spectrum, shown: Sequence[int]) -> None:
     axes.set_ylim(max(least / 2.0, 10.0 ** (2 - _DECADES)), 160.0)
     axes.yaxis.set_major_locator(LogLocator(numticks=8))
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.yaxis.set_minor_locator(NullLocator())
 
 
 def _row(spectrum: Spectrum, channel: int) -> tuple[str, list[str]]:

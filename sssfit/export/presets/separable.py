@@ -199,14 +199,22 @@ def _channel_of(taps: int, weights: FloatArray) -> tuple[float, float]:
     def outer(f: float) -> FloatArray:
         return listing(taps, np.ones(1), np.array([f]))[1][1:, 0]
 
-    def excess(f: float) -> float:
-        near, far = outer(f)[0], outer(f)[len(weights) // 2]
-        return float(far * weights[1] - weights[1 + len(weights) // 2] * near)
-
-    if not (weights[1:] > 0.0).all():
+    own = weights[1:]
+    if not (own[0] > 0.0 and (own >= 0.0).all()):
         return 0.0, 1.0
+    # The weights of a steep falloff are 0 farther out, to rounding.
+    place = int(np.flatnonzero(own[: own.size // 2 + 2])[-1])
+
+    def excess(f: float) -> float:
+        near, far = outer(f)[[0, place]]
+        return float(far * own[0] - own[place] * near)
+
     low, high = LEAST_FALLOFF, 1.0
-    if excess(low) > 0.0 or excess(high) < 0.0:
-        return 0.0, 1.0  # the caller compares the weights, and refuses them
-    f = float(brentq(excess, low, high, xtol=1e-15, rtol=1e-14))
-    return float(weights[1:].sum() / outer(f).sum()), f
+    # At an end rounding decides the sign. The caller compares the weights, and refuses others.
+    if excess(low) >= 0.0:
+        f = low
+    elif excess(high) <= 0.0:
+        f = high
+    else:
+        f = float(brentq(excess, low, high, xtol=1e-15, rtol=1e-14))
+    return float(own.sum() / outer(f).sum()), f
