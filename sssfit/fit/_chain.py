@@ -32,6 +32,7 @@ from sssfit.kernel.structure import Shape
 _BARRIER = 0.01  # a squared misfit; an offset 1 % beyond the kernel adds 1e-6
 _STAR = "star"
 _FAR = 20.0  # a logarithm; a line search may try 1e4, whose exponential is not finite
+_ROUNDING = 1e-9
 _LEAST_TEXELS = 1e-9  # between fetches of a table: a stage that a fit has no need of shrinks to 0
 
 
@@ -90,6 +91,9 @@ class Chain(ABC):
         self.size = int(self._at[-1])
         steps = [np.arange(self._steps(k).start, self._steps(k).stop) for k in range(len(shapes))]
         self.step_parameters = np.concatenate(steps)  # which parameters are offset steps
+        self._first_steps = np.cumsum(count) - count  # of each stage, among these
+        half = (1.0 - _ROUNDING) * target.half_pixels
+        self._reach = half / 2.0 ** np.array([each.level for each in shapes])
         self.parameters = [self._parameters_of(c) for c in range(self.channels)]
 
     @abstractmethod
@@ -107,7 +111,7 @@ class Chain(ABC):
     def value_and_gradient(self, x: FloatArray) -> tuple[float, FloatArray]:
         """Return the misfit, and what offsets beyond the kernel add to it, with the gradient."""
         value, gradient = self.misfit(x)
-        for k in range(len(self.shapes)):
+        for k in self._far_stages(x):
             beyond, slopes = self._beyond(x, k)
             value += _BARRIER * beyond**2
             gradient[self._steps(k)] += 2.0 * _BARRIER * beyond * slopes
@@ -116,7 +120,7 @@ class Chain(ABC):
     def hessian(self, x: FloatArray) -> FloatArray:
         """Return the Gauss-Newton part of the second derivatives of both, (size, size)."""
         found = self.matrix(x)
-        for k in range(len(self.shapes)):
+        for k in self._far_stages(x):
             beyond, slopes = self._beyond(x, k)
             if beyond > 0.0:
                 found[self._steps(k), self._steps(k)] += 2.0 * _BARRIER * np.outer(slopes, slopes)
@@ -178,6 +182,17 @@ class Chain(ABC):
     def _steps(self, k: int) -> slice:
         """Return where a stage's offset steps are among the parameters."""
         return slice(int(self._at[k]), int(self._at[k]) + self.counts[k])
+
+    def _far_stages(self, x: FloatArray) -> list[int]:
+        """Return the stages that may reach beyond the kernel: hardly any, and the rest cost time.
+
+        The two offsets of a star are added up here, which is more than the farther one.
+        """
+        texels = texels_of(x[self.step_parameters])
+        found: list[int] = np.flatnonzero(
+            np.add.reduceat(texels, self._first_steps) > self._reach
+        ).tolist()
+        return found
 
     def _beyond(self, x: FloatArray, k: int) -> tuple[float, FloatArray]:
         """Return the logarithm by which a stage's last offset exceeds the kernel, and its slopes.

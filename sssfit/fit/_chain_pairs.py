@@ -63,7 +63,7 @@ class _View:
     x: FloatArray  # (l, n)
     y: FloatArray  # (l, n)
     wanted: FloatArray | float
-    weight: float  # of its squares
+    power: FloatArray  # (C, n, n), the weights of its squares
 
 
 class PairChain(Chain):
@@ -74,9 +74,10 @@ class PairChain(Chain):
     ) -> None:
         super().__init__(target, shapes, aliasing)
         up = np.concatenate((np.ones((1, target.frequencies.size)), self._up))
-        self.views = [_View(slice(None), up, up, target.wanted, 1.0)]
+        self.views = [_View(slice(None), up, up, target.wanted, target.power)]
+        of_images = aliasing * target.power
         for first, image in self._images():
-            self.views.append(_View(slice(first, None), image, up[first:], 0.0, aliasing))
+            self.views.append(_View(slice(first, None), image, up[first:], 0.0, of_images))
         self._w = 2.0 ** np.array([[each.level] for each in shapes]) * target.frequencies
         count, most = np.array(self.counts)[:, None], max(self.counts)
         self._has_step = np.arange(most) < count
@@ -107,7 +108,7 @@ class PairChain(Chain):
             part, own = blurs.chain[:, view.stages], m[view.stages]
             ux, uy = part * view.x, part * view.y
             apart = _sum(ux, uy, own) - view.wanted
-            weighted = view.weight * self.target.power * apart
+            weighted = view.power * apart
             value += float(np.vdot(weighted, apart))
             across, along = uy @ weighted.transpose(0, 2, 1), ux @ weighted
             by_blend[view.stages] += 2.0 * own * np.einsum("cln,cln->lc", ux, across)
@@ -149,8 +150,7 @@ class PairChain(Chain):
         ux, uy = part * view.x, part * view.y  # (C, l, n)
         left = after[:, :, view.stages] * blend[:, None, :, None]
         g, h = left * view.x, left * view.y  # (C, S, l, n)
-        power = view.weight * self.target.power
-        by_x, by_y = _across(uy, power), _across(ux, power.swapaxes(1, 2))
+        by_x, by_y = _across(uy, view.power), _across(ux, view.power.swapaxes(1, 2))
         gx, hy = _frequencies_first(g), _frequencies_first(h)  # (C, n, S, l)
         with_x, with_y = gx @ by_x, hy @ by_y
         alike = _frequencies_last(with_x @ gx.swapaxes(2, 3) + with_y @ hy.swapaxes(2, 3))
@@ -166,7 +166,7 @@ class PairChain(Chain):
             stages = blended[:, k] @ own[:, at].swapaxes(1, 2)
             found[:, :count, count + at.start : count + at.stop] = shares @ stages
         found[:, count:, :count] = found[:, :count, count:].swapaxes(1, 2)
-        crossed = self._crossed(g, h, (ux, uy), own, power)
+        crossed = self._crossed(g, h, (ux, uy), own, view.power)
         found[:, count:, count:] = crossed + crossed.swapaxes(1, 2) + self._alike(alike, own)
         return found
 
