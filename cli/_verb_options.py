@@ -156,7 +156,8 @@ FIT_PIXELS = (
     option("--method", list(FITS), None, "Fit method; --list describes each.", "cascade"),
     option("--mm-per-pixel", Length("profile"), "MM|profile", "Size of a pixel of the kernel; "
            "profile is the width of the profile's first annulus.  [default: 0.3]"),
-    option("--pitches", Lengths(), "MM,...", "Pixel sizes to make a kernel for, a file each."),
+    option("--pitches", Lengths(), "MM,...", "Pixel sizes to make a kernel for, a file each. "
+           "Cascades of the same --stages can be mixed between them."),
     option("--support", Length("auto"), "MM|auto", "Half width of the kernel; auto is the "
            "smallest that keeps 99.9 % of every channel, for cascade 99.99 %.", "auto"),
     flag("--smooth", "Take most of a walk's noise out of the profile before the fit."),

@@ -43,7 +43,7 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
         click.echo(lines_of(FITS))
         return
     from sssfit.export.reports import page
-    from sssfit.fit import fit_result
+    from sssfit.fit import fit_pitches
     from sssfit.kernel import is_kernel_file, is_taps_file
     from sssfit.profile import Profile
     from sssfit.stability.rules import warn_of_doubts
@@ -67,13 +67,15 @@ def fit(context: click.Context, /, profile: str | None, common: Common, **given:
     settings["support_mm"] = None if given["support"] == "auto" else given["support"]
     settings |= {"smooth": True} if given["smooth"] else {}
     is_ours, inputs = is_taps_file if is_taps else is_kernel_file, [name, given["irradiance"]]
-    kind, told, text = "fit-taps" if is_taps else "fit", list[dict[str, Any]](), list[str]()
+    kind, told = "fit-taps" if is_taps else "fit", dict[int, dict[str, Any]]()
+    each_of = fit_pitches(source, method, pitches or [given["mm_per_pixel"]], **settings)
     with held(paths, is_ours, inputs=inputs, force=given["force"], named=KERNEL):
-        for path, pitch in zip(paths, pitches or [given["mm_per_pixel"]], strict=True):
-            result = fit_result(source, method, mm_per_pixel=pitch, **settings)
+        for k, result in each_of:
             warn_of_doubts(result.kernel, source, strict=given["strict"])
-            write(result.kernel.write, path)
-            told.append({"profile": name, **result.to_dict()})
-            text.append(f"{page(kind, told[-1])}\nWrote {path or 'the kernel to stdout'}")
-    figures = {"profile": name, "kernels": told} if pitches else told[0]
+            write(result.kernel.write, paths[k])
+            told[k] = {"profile": name, **result.to_dict()}
+    kernels = [told[k] for k in range(len(paths))]
+    wrote = [f"Wrote {each or 'the kernel to stdout'}" for each in paths]
+    text = [f"{page(kind, each)}\n{line}" for each, line in zip(kernels, wrote, strict=True)]
+    figures = {"profile": name, "kernels": kernels} if pitches else kernels[0]
     finish(common, {"output": [str(each or "-") for each in paths], **figures}, "\n".join(text))

@@ -10,7 +10,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter
 from sections import DOCS, put_section
 
 from sssfit.chart.page import COLOURS, add_legend, name_axes, new_page, save_figure
-from sssfit.fit import fit_result, fit_taps
+from sssfit.fit import fit_pitches, fit_result, fit_taps
 from sssfit.kernel import taps_between
 from sssfit.measure.score import measure
 from sssfit.render import render
@@ -164,10 +164,8 @@ def main():
     """Write the section and draw its chart."""
     profile = whole_profile("skin1")
     pitches = [PITCH_MM * 2.0**each for each in OCTAVES]
-    tables = {
-        octave: fit_taps(profile, stages=CASCADE, mm_per_pixel=pitch).kernel
-        for octave, pitch in zip(OCTAVES, pitches, strict=True)
-    }
+    fitted = fit_pitches(profile, "cascade", pitches, stages=CASCADE)
+    tables = {OCTAVES[number]: each.kernel for number, each in fitted}
     errors = measured(profile, tables, single_tables(profile))
     shown = [k for k, step in enumerate(STEPS) if step % 0.5 == 0.0]
     least, most = limits(errors)

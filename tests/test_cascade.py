@@ -186,6 +186,16 @@ def test_the_matrix_of_aliasing_is_that_of_its_residuals_slopes(skin1):
     np.testing.assert_allclose(chain.hessian(x), 2 * rows @ rows.T, atol=1e-8)
 
 
+@pytest.mark.parametrize("structure", ["1-2|1", "*|1", "2-1-1"])
+def test_parameters_of_a_tables_numbers_are_those_it_was_made_of(skin1, structure):
+    chain = chain_of(skin1, structure)
+    x = chain.start(np.random.default_rng(3))
+    found = chain.start_from(cascade.numbers_of(taps_of(chain, x), [0, 1, 2], 0.3))
+    np.testing.assert_allclose(chain.spectrum(found), chain.spectrum(x), rtol=0, atol=1e-14)
+    again = chain.start_from(chain.numbers(found))
+    np.testing.assert_allclose(again, found, rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize(("structure", "level"), [("1|1-2", 1), ("1|1|2", 1), ("1|1|2", 2)])
 def test_aliasing_is_what_halved_pictures_show_of_a_wave(skin1, structure, level):
     """The image of a wave along x, at its frequency less 2 pi / 2^level, in a rendered picture."""

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from sssfit.cli import main
-from sssfit.errors import KernelError
-from sssfit.fit import fit_taps
+from sssfit.errors import FitError, KernelError
+from sssfit.fit import fit_pitches, fit_taps
 from sssfit.kernel import Taps, taps_between
 from sssfit.material import load_material
 from sssfit.measure.score import measure
@@ -69,6 +69,52 @@ def test_between_two_tables_it_is_better_than_either(skin1, tables, pitch):
     ]
     assert shown[0] < min(shown[1:])
     assert shown[0] < 1.0
+
+
+def test_pitches_are_fitted_from_the_largest_on_each_like_the_one_before(skin1):
+    pitches, found = (0.4, 1.6, 0.8), {}
+    for number, result in fit_pitches(skin1, "cascade", pitches, stages="1|1"):
+        found[number] = result.kernel
+    assert list(found) == [1, 2, 0]
+    settings = {k: each.meta["settings"] for k, each in found.items()}
+    assert "like_mm_per_pixel" not in settings[1]
+    assert [settings[k]["like_mm_per_pixel"] for k in (2, 0)] == [1.6, 0.8]
+    for number, pitch in enumerate(pitches):
+        alone = fit_taps(skin1, stages="1|1", mm_per_pixel=pitch).kernel
+        misfit, least = (np.linalg.norm(each.errors["spectral"]) for each in (found[number], alone))
+        assert misfit < 1.001 * least
+
+
+def test_a_cascade_of_other_stages_changes_nothing(skin1):
+    other = fit_taps(skin1, stages="1|1", mm_per_pixel=0.8).kernel
+    given = {"stages": "1-1", "mm_per_pixel": 0.4}
+    found, alone = (fit_taps(skin1, **given, **more).kernel for more in ({"like": other}, {}))
+    np.testing.assert_array_equal(found.blend, alone.blend)
+    assert found.meta == alone.meta
+    grey = replace(
+        other,
+        channels=("G",),
+        blend=other.blend[:, :1],
+        stages=tuple(replace(each, weights=each.weights[:, :1]) for each in other.stages),
+        errors={name: each[:1] for name, each in other.errors.items()},
+    )
+    with pytest.raises(FitError, match="1 channel to be alike"):
+        fit_taps(skin1, stages="1|1", mm_per_pixel=0.4, like=grey)
+
+
+@pytest.mark.slow
+def test_tables_for_pixels_an_octave_apart_mix(skin1):
+    """By themselves, these two searches end in unlike optima, and leave up to 2 between them."""
+    pitches, stages = (0.075, 0.15), "1-1|1-2|2-2|2-2"
+    tables = {k: each.kernel for k, each in fit_pitches(skin1, "cascade", pitches, stages=stages)}
+    pitch = np.sqrt(np.prod(pitches))
+    mixed = taps_between(tables[0], tables[1], pitch)
+    errors = []
+    for name in ("edge", "disk", "points"):
+        scene = make_scene(name, height=512, width=512, mm_per_pixel=pitch)
+        seen = measure(render_taps(scene, mixed), render_reference(scene, skin1))
+        errors.append(seen.delta_e_2000_p99)
+    assert np.mean(errors) < 0.5
 
 
 def test_tables_that_are_not_alike_are_one_line(skin1, tables):

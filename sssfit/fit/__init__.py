@@ -9,7 +9,7 @@ The package can also be called like the function `fit`: ``sssfit.fit(profile, "s
 
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
@@ -44,6 +44,7 @@ __all__ = [
     "fit_falloff",
     "fit_gaussians",
     "fit_guided",
+    "fit_pitches",
     "fit_preintegrated",
     "fit_result",
     "fit_separable",
@@ -127,6 +128,35 @@ def fit_result(
     thinned = on_taps(dense.kernel, taps, place=place or PLACES[0], profile=profile, **pictures)
     seconds = dense.seconds + time.perf_counter() - begun
     return TapsFit(thinned, sum(dense.evaluations), seconds)
+
+
+def fit_pitches(
+    profile: Profile | str | Path, method: str, pitches: Sequence[Pitch], **settings: Any
+) -> Iterator[tuple[int, FitResult | TapsFit]]:
+    """Fit a kernel for each of several pixel sizes, from the largest to the smallest.
+
+    A cascade's search also starts from the table before, so that they can be mixed: skin1 between
+    .075 and .15 mm leaves a Delta E of .23 in place of 2.
+
+    Parameters
+    ----------
+    profile : Profile, str or Path
+    method : str
+        A name of ``sssfit.methods.FITS``.
+    pitches : sequence of float [mm]
+    **settings
+        As of `fit_result`, errors too.
+
+    Yields
+    ------
+    int, FitResult or TapsFit
+        The number of the pixel size among the pitches, and its kernel.
+    """
+    alike: dict[str, Any] = {}
+    for number in sorted(range(len(pitches)), key=pitches.__getitem__, reverse=True):
+        found = fit_result(profile, method, mm_per_pixel=pitches[number], **alike, **settings)
+        yield number, found
+        alike = {"like": found.kernel} if method == "cascade" else {}
 
 
 def fit_separable(profile: Profile | str | Path, method: str = "svd", **settings: Any) -> FitResult:

@@ -159,6 +159,19 @@ class Chain(ABC):
             self._blend(x),
         )
 
+    def start_from(self, numbers: Numbers) -> FloatArray:
+        """Return parameters that stand for such numbers; those that are 0 become very small."""
+        x = np.empty(self.size)
+        shares = numbers.blend / numbers.blend.sum(axis=0)
+        x[: shares.size] = _logarithms(shares).ravel()
+        for k, shape in enumerate(self.shapes):
+            offsets, (steps, weights) = numbers.offsets[k], self.places(k)
+            x[steps] = _logarithms(
+                offsets if shape.kind == _STAR else np.diff(offsets, prepend=0.0)
+            )
+            x[weights] = _logarithms(numbers.weights[k].T)
+        return x
+
     def places(self, k: int) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
         """Return where a stage's steps (k,) and weights (C, k+1) are among the parameters."""
         at = np.arange(self._at[k], self._at[k + 1])
@@ -230,6 +243,11 @@ class Chain(ABC):
         count = self.counts[k]
         gradient[self._at[k] : self._at[k] + count] = own[:, :count].sum(axis=0)
         gradient[self._at[k] + count : self._at[k + 1]] = own[:, count:].ravel()
+
+
+def _logarithms(values: FloatArray) -> FloatArray:
+    logarithms: FloatArray = np.log(np.maximum(values, math.exp(-_FAR)))
+    return logarithms
 
 
 def texels_of(steps: FloatArray) -> FloatArray:

@@ -25,7 +25,7 @@ from scipy import optimize
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import FitError, KernelError
-from sssfit.fit._chain import Chain, Searched
+from sssfit.fit._chain import Chain, Numbers, Searched
 from sssfit.fit._chain_pairs import PairChain
 from sssfit.fit._chain_stars import StarChain
 from sssfit.fit._result import TapsFit, provenance
@@ -33,7 +33,7 @@ from sssfit.fit._spectrum import Pictures, pictures_of, recorded, spectral_targe
 from sssfit.fit._target import Pitch, Target, make_target, pitch_of
 from sssfit.fit._tied_chain import one_shape
 from sssfit.fit.structures import best_structure, width_pixels
-from sssfit.kernel.structure import Shape, cost_of_chain, parse
+from sssfit.kernel.structure import Shape, cost_of_chain, parse, text_of
 from sssfit.kernel.taps import Stage, Taps
 from sssfit.messages import counted, shown
 from sssfit.process import one_blas_thread
@@ -66,6 +66,7 @@ def fit_cascade(
     spectrum: str | None = None,
     irradiance: str | Path | Scene | None = None,
     still: bool = False,
+    like: Taps | None = None,
     seed: int = 1,
     mm_per_pixel: Pitch | None = None,
     support_mm: float | None = None,
@@ -93,6 +94,9 @@ def fit_cascade(
     still : bool
         Weigh the aliasing of halved pictures three times as much as for the least error: a point
         that moves by a pixel changes less.
+    like : Taps, optional
+        A cascade of the same channels for pixels of another size. If it has the same stages, the
+        search also starts from it: tables that end in like optima can be mixed (`taps_between`).
     seed : int
         Of the random starts; the same seed gives the same bits.
     mm_per_pixel, support_mm : float, optional [mm]
@@ -117,6 +121,9 @@ def fit_cascade(
     target, lit = whole_target(profile, mm_per_pixel, support_mm)
     pictures = pictures_of(target, spectrum, irradiance)
     first = ["natural"] if isinstance(pictures, Scene) else []
+    near = None
+    if like is not None and like.chained and like.structure == text_of(shapes):
+        near = numbers_of(like, lit, target.mm_per_pixel)
     starts: list[FloatArray] = []
     evaluations = 0
     with one_blas_thread():
@@ -124,6 +131,7 @@ def fit_cascade(
         for each in (*first, pictures):
             chain = kind(spectral_target(target, lit, each), shapes, _aliasing(each, still=still))
             starts += _of_one_shape(chain, seed)
+            starts += [] if near is None else [chain.start_from(near)]
             x, count = searched(chain, seed, starts, effort=_effort(shapes))
             starts, evaluations = [x], evaluations + count
     settings = {
@@ -135,6 +143,8 @@ def fit_cascade(
         "still": still,
         "fit_seed": seed,
     }
+    if like is not None and near is not None:
+        settings["like_mm_per_pixel"] = like.mm_per_pixel
     taps = table_of("cascade", target, chain, x, settings)
     return TapsFit(taps, evaluations, time.perf_counter() - begun)
 
@@ -318,6 +328,26 @@ def descent(
         method="trust-ncg",
         callback=check,
         options={"maxiter": most, "gtol": 1e-14},
+    )
+
+
+def numbers_of(taps: Taps, lit: list[int], mm_per_pixel: float) -> Numbers:
+    """Return a cascade's numbers for the lit channels on pixels of a size, as a chain has them.
+
+    Raises
+    ------
+    FitError
+        The table has other channels.
+    """
+    if max(lit) >= len(taps.channels):
+        raise FitError(
+            f"a cascade of {counted(len(taps.channels), 'channel')} to be alike, and the profile "
+            "has more; give one of the same channels."
+        )
+    return Numbers(
+        [each.offsets_mm / (mm_per_pixel * 2.0**each.level) for each in taps.stages],
+        [each.weights[:, lit] for each in taps.stages],
+        taps.blend[:, lit],
     )
 
 
