@@ -157,7 +157,7 @@ FIT_PIXELS = (
     option("--mm-per-pixel", Length("profile"), "MM|profile", "Size of a pixel of the kernel; "
            "profile is the width of the profile's first annulus.  [default: 0.3]"),
     option("--pitches", Lengths(), "MM,...", "Pixel sizes to make a kernel for, a file each. "
-           "Cascades of the same --stages can be mixed between them."),
+           "Cascades with the same --stages can be mixed for sizes in between."),
     option("--support", Length("auto"), "MM|auto", "Half width of the kernel; auto is the "
            "smallest that keeps 99.9 % of every channel, for cascade 99.99 %.", "auto"),
     flag("--smooth", "Take most of a walk's noise out of the profile before the fit."),

@@ -76,7 +76,7 @@ def gauss_legendre(
 
 
 def lagrange_shares(places: npt.NDArray[np.intp], t: FloatArray) -> FloatArray:
-    """Return what values at ``places`` (K,) count in the polynomial through them at t (n,), (K, n).
+    """Return the weights (K, n) of the values at ``places`` (K,) in their polynomial at t (n,).
 
     Lagrange's formula: the product over all other places q of (t - q) / (place - q).
     """

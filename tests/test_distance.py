@@ -72,16 +72,19 @@ def test_between_two_tables_it_is_better_than_either(skin1, tables, pitch):
 
 
 def test_pitches_are_fitted_from_the_largest_on_each_like_the_one_before(skin1):
-    pitches, found = (0.4, 1.6, 0.8), {}
-    for number, result in fit_pitches(skin1, "cascade", pitches, stages="1|1"):
-        found[number] = result.kernel
+    pitches = (0.4, 1.6, 0.8)
+    fits = dict(fit_pitches(skin1, "cascade", pitches, stages="1|1"))
+    found = {number: each.kernel for number, each in fits.items()}
     assert list(found) == [1, 2, 0]
     settings = {k: each.meta["settings"] for k, each in found.items()}
     assert "like_mm_per_pixel" not in settings[1]
     assert [settings[k]["like_mm_per_pixel"] for k in (2, 0)] == [1.6, 0.8]
     for number, pitch in enumerate(pitches):
-        alone = fit_taps(skin1, stages="1|1", mm_per_pixel=pitch).kernel
-        misfit, least = (np.linalg.norm(each.errors["spectral"]) for each in (found[number], alone))
+        alone = fit_taps(skin1, stages="1|1", mm_per_pixel=pitch)
+        is_first = number == 1
+        assert is_first == (fits[number].evaluations == alone.evaluations)
+        both = found[number], alone.kernel
+        misfit, least = (np.linalg.norm(each.errors["spectral"]) for each in both)
         assert misfit < 1.001 * least
 
 
@@ -98,8 +101,16 @@ def test_a_cascade_of_other_stages_changes_nothing(skin1):
         stages=tuple(replace(each, weights=each.weights[:, :1]) for each in other.stages),
         errors={name: each[:1] for name, each in other.errors.items()},
     )
-    with pytest.raises(FitError, match="1 channel to be alike"):
-        fit_taps(skin1, stages="1|1", mm_per_pixel=0.4, like=grey)
+    dark = replace(other, blend=other.blend * [1.0, 0.0, 1.0])
+    disk = fit_taps(skin1, "disk", taps=12, mm_per_pixel=0.8).kernel
+    for like, said in (
+        (grey, "expected those of the profile"),
+        (dark, "no light in a channel"),
+        (disk, "expected a cascade"),
+        ("skin1.taps.json", "expected a cascade"),
+    ):
+        with pytest.raises(FitError, match=said):
+            fit_taps(skin1, stages="1|1", mm_per_pixel=0.4, like=like)
 
 
 @pytest.mark.slow
@@ -161,20 +172,23 @@ def test_there_is_a_file_for_each_pixel_size(run, tmp_path, skin1):
     assert [line for line in out.splitlines() if line.startswith("Wrote")] == [
         f"Wrote {each}" for each in names
     ]
-    for name, pitch in zip(names, (0.5, 2.0), strict=True):
+    pitches = (0.5, 2.0)
+    fitted = fit_pitches(skin1, "cascade", pitches, stages="1-1")
+    tables = {pitches[number]: each.kernel for number, each in fitted}
+    for name, pitch in zip(names, pitches, strict=True):
         found = Taps.load(tmp_path / name)
-        expected = fit_taps(skin1, stages="1-1", mm_per_pixel=pitch).kernel
+        expected = tables[pitch]
         assert found.mm_per_pixel == pitch
         np.testing.assert_array_equal(found.blend, expected.blend)
     assert sorted(each.name for each in tmp_path.glob("*.json")) == names
 
 
 def test_kernels_of_other_methods_too_and_json(run):
-    status, out, _ = run("--method", "svd", "--pitches", "1,2", "--json")
+    status, out, _ = run("--method", "svd", "--pitches", "1,3,2", "--json")
     figures = json.loads(out)
     assert status == 0
-    assert figures["output"] == ["skin1.svd3.1mm.kernel.json", "skin1.svd3.2mm.kernel.json"]
-    assert [each["mm_per_pixel"] for each in figures["kernels"]] == [1.0, 2.0]
+    assert figures["output"] == [f"skin1.svd3.{each}mm.kernel.json" for each in (1, 3, 2)]
+    assert [each["mm_per_pixel"] for each in figures["kernels"]] == [1.0, 3.0, 2.0]
     assert figures["profile"] == "skin1.profile.npz"
 
 

@@ -171,8 +171,14 @@ def test_an_integral_is_that_of_its_distance_alone():
     np.testing.assert_allclose(whole, np.ravel(alone), rtol=1e-13)
 
 
+@pytest.mark.parametrize("eta", [1.0 + 1e-8, 1.0 + 1e-7, 1.0 + 1e-6, 1.00001, 1.0001, 1.001, 1.01])
+def test_all_light_comes_back_at_an_index_just_above_one(eta):
+    returned = diffuse_reflectance([1.0], eta)[0]
+    assert returned == pytest.approx(entering_light(eta), abs=5e-8 if eta <= 1.001 else 1e-8)
+
+
 @pytest.mark.parametrize("k", [0.0, 0.3, 20.0])
-@pytest.mark.parametrize("eta", [1.0005, 1.3, 3.0])
+@pytest.mark.parametrize("eta", [1.000001, 1.0005, 1.3, 3.0])
 def test_interpolated_entries_of_tables_are_those_that_would_be_computed(monkeypatch, eta, k):
     resolution = _LEVELS[1].depth
     panels = _panels(np.hypot(1.0, k), resolution)

@@ -309,6 +309,34 @@ def test_media_need_coefficients(name):
     assert preset_of("unreal", skin).title == "painted"
 
 
+def rounded(table, digits):
+    """The table with outer weights of so many digits, and the middle ones such that all add up."""
+    (stage,) = table.stages
+    weights = np.round(stage.weights, digits)
+    weights[0] = 1.0 - 2.0 * weights[1:].sum(axis=0)
+    return dataclasses.replace(table, stages=(dataclasses.replace(stage, weights=weights),))
+
+
+@pytest.mark.parametrize(
+    ("taps", "falloff", "digits"), [(25, 0.1, 9), (25, 0.3, 9), (9, 0.1, 9), (7, 0.3, 8)]
+)
+def test_rounded_taps_are_known_again(taps, falloff, digits):
+    kernel = Separable(1.7, np.array([0.3, 0.9, 1.0]), np.full(3, falloff))
+    table = separable_taps("wax", "separable-sss", np.array([0.9, 0.5, 0.1]), kernel, taps)
+    found, _ = separable_of_taps(rounded(table, digits))
+    np.testing.assert_allclose(found.falloff, falloff, rtol=1e-3)
+    np.testing.assert_allclose(found.strength, kernel.strength, rtol=1e-3)
+
+
+@pytest.mark.parametrize(("taps", "falloff"), [(7, 0.03), (7, 0.021)])
+def test_one_weight_alone_has_no_parameters(taps, falloff):
+    """A falloff and a strength could be found for it, of 60 for instance."""
+    kernel = Separable(1.7, np.array([0.3, 0.9, 1.0]), np.full(3, falloff))
+    table = separable_taps("wax", "separable-sss", np.array([0.9, 0.5, 0.1]), kernel, taps)
+    with pytest.raises(KernelError, match="no strength and falloff"):
+        separable_of_taps(rounded(table, 10))
+
+
 @pytest.mark.parametrize("taps", range(5, 32, 2))
 def test_taps_with_the_least_and_the_largest_falloff_are_known_again(taps):
     kernel = Separable(1.7, np.array([0.3, 0.9, 1.0]), np.array([LEAST_FALLOFF, 1.0, 0.57]))

@@ -39,6 +39,14 @@ def test_two_slabs_are_their_product_in_fourier_space(seed):
         np.testing.assert_allclose(getattr(found, name).transform(K), theory, rtol=0, atol=1e-10)
 
 
+def test_wide_slabs_on_a_grid_of_variances_are_not_taken_for_more_than_all_light():
+    mirror = GaussianSum.of(np.full(20, 0.95 / 20), np.geomspace(1e-3, 1e3, 20))
+    slab = GaussianSlab.symmetric(mirror, GaussianSum.of(0.05, 0.3))
+    found = combined(slab, slab)
+    r, t = mirror.transform(K), slab.transmitted.transform(K)
+    np.testing.assert_allclose(found.transmitted.transform(K), t * t / (1.0 - r * r), atol=1e-10)
+
+
 def test_two_gaussians_convolve_to_one():
     found = GaussianSum.of(0.5, 0.2) * GaussianSum.of(0.6, 0.5)
     np.testing.assert_allclose((found.weights, found.variances), [[0.3], [0.7]], rtol=1e-14)

@@ -32,7 +32,7 @@ from sssfit.kernel.structure import Shape
 _BARRIER = 0.01  # a squared misfit; an offset 1 % beyond the kernel adds 1e-6
 _STAR = "star"
 _FAR = 20.0  # a logarithm; a line search may try 1e4, whose exponential is not finite
-_ROUNDING = 1e-9
+_ROUNDING = 1e-9  # of a stage's reach, by which two sums of its steps may differ
 _LEAST_TEXELS = 1e-9  # between fetches of a table: a stage that a fit has no need of shrinks to 0
 
 

@@ -96,9 +96,10 @@ def fit_cascade(
         that moves by a pixel changes less.
     like : Taps, optional
         A cascade of the same channels for pixels of another size. If it has the same stages, the
-        search also starts from it: tables that end in like optima can be mixed (`taps_between`).
+        search also starts from it: tables of similar optima can be mixed (`taps_between`). One of
+        other stages is not used.
     seed : int
-        Of the random starts; the same seed gives the same bits.
+        Of the random starts; the same seed and ``like`` give the same bits.
     mm_per_pixel, support_mm : float, optional [mm]
         Pixel size, and half width of the pixels of the profile's kernel; see
         ``sssfit.fit.make_target``. By default 99.99 % of every channel's energy lies within; the
@@ -111,7 +112,8 @@ def fit_cascade(
     Raises
     ------
     FitError, ProfileError
-        The budget, structure, picture, profile, pixel size or support is invalid.
+        The budget, structure, picture, profile, pixel size or support is invalid, or ``like`` is
+        not a cascade of the same channels with light in those of the profile.
     ArgumentError, FileError, RenderError
         There is no such picture, or it cannot be read.
     """
@@ -122,8 +124,10 @@ def fit_cascade(
     pictures = pictures_of(target, spectrum, irradiance)
     first = ["natural"] if isinstance(pictures, Scene) else []
     near = None
-    if like is not None and like.chained and like.structure == text_of(shapes):
-        near = numbers_of(like, lit, target.mm_per_pixel)
+    if like is not None:
+        _check_like(like, profile, lit)
+        if like.structure == text_of(shapes):
+            near = numbers_of(like, lit, target.mm_per_pixel)
     starts: list[FloatArray] = []
     evaluations = 0
     with one_blas_thread():
@@ -147,6 +151,19 @@ def fit_cascade(
         settings["like_mm_per_pixel"] = like.mm_per_pixel
     taps = table_of("cascade", target, chain, x, settings)
     return TapsFit(taps, evaluations, time.perf_counter() - begun)
+
+
+def _check_like(like: object, profile: Profile, lit: list[int]) -> None:
+    """Refuse what no search for the profile's cascade can start from."""
+    if not isinstance(like, Taps) or not like.chained:
+        raise FitError(f"like = {shown(like)}; expected a cascade.")
+    if like.channels != profile.channels:
+        raise FitError(
+            f"like.channels = {shown(list(like.channels))}; expected those of the profile, "
+            f"{shown(list(profile.channels))}."
+        )
+    if not (like.blend[:, lit].sum(axis=0) > 0.0).all():
+        raise FitError("like has no light in a channel that the profile lights; leave it out.")
 
 
 def whole_target(
@@ -332,18 +349,7 @@ def descent(
 
 
 def numbers_of(taps: Taps, lit: list[int], mm_per_pixel: float) -> Numbers:
-    """Return a cascade's numbers for the lit channels on pixels of a size, as a chain has them.
-
-    Raises
-    ------
-    FitError
-        The table has other channels.
-    """
-    if max(lit) >= len(taps.channels):
-        raise FitError(
-            f"a cascade of {counted(len(taps.channels), 'channel')} to be alike, and the profile "
-            "has more; give one of the same channels."
-        )
+    """Return a cascade's numbers for the lit channels on pixels of a size, as a chain has them."""
     return Numbers(
         [each.offsets_mm / (mm_per_pixel * 2.0**each.level) for each in taps.stages],
         [each.weights[:, lit] for each in taps.stages],

@@ -41,10 +41,13 @@ _DEPTH = 26.0
 _WIDEST = 2.5  # panel: C0 = exp(-z) needs it
 _NOTHING = 360.0  # kappa d: exp(-360) is 0 beside all else, and larger ones might overflow
 _BEYOND = 40.0  # exp(-40) = 4e-18: tables end here
-_MAX_ENTRIES = 40_000  # largest size of the table of X; only indices under 1.0006 need more
+# Largest size of the table of X: the finest resolutions need more for any index, that of usual
+# tolerances for those under 1.0006.
+_MAX_ENTRIES = 40_000
 _AT_ONCE = 128  # distances times some 100 nodes: arrays that stay in the cache
 # Of a table's entries one in five is computed and the others are interpolated, from twelve.
 _COARSER, _NEIGHBOURS = 5, np.arange(-5, 7)
+_SMOOTH = 0.0601  # largest step of X for that, in radians and mean free paths: the coarsest's
 _OfTau = Callable[[FloatArray, FloatArray], FloatArray | float]
 _STRETCHES, _PER_STRETCH = 14, 8  # Gauss nodes over w; 14 times 8 give K_d to 1e-12
 
@@ -231,6 +234,7 @@ def _tables(
     direct = _tabulated(
         lambda at: _integrate_over_w(shortest * np.exp(at / per_log), k, lambda *_: 1.0)[0],
         entries,
+        _COARSER,
     )
     z = panels.nodes.ravel()
     if is_matched(eta):
@@ -241,7 +245,9 @@ def _tables(
     rate = 1.0 / float(cone.cosine[0]) + k * steepest
     step = max(resolution.step / rate, reach / _MAX_ENTRIES)
     escape_table = _tabulated(
-        lambda at: _over_cone(step * at, k, cone, cone.weight / cone.cosine), int(reach / step) + 4
+        lambda at: _over_cone(step * at, k, cone, cone.weight / cone.cosine),
+        int(reach / step) + 4,
+        _COARSER if step * rate <= _SMOOTH else 1,
     )
     near = z <= reach
     escape = np.empty_like(z)
@@ -250,14 +256,19 @@ def _tables(
     return escape, (direct, math.log(shortest), per_log, escape_table, 1.0 / step)
 
 
-def _tabulated(function: Callable[[FloatArray], FloatArray], entries: int) -> FloatArray:
-    """Return a smooth function at 0, 1, .. entries - 1, by polynomials through one in five.
+def _tabulated(
+    function: Callable[[FloatArray], FloatArray], entries: int, apart: int
+) -> FloatArray:
+    """Return a smooth function at 0, 1, .. entries - 1, computed at places this far apart.
 
-    At these 1e-9 of what is tabulated is lost with the coarsest resolution, 1e-12 with the next.
+    The polynomials between them go through twelve, five of which may lie below 0. With the coarsest
+    resolution they are off by 2e-11, with the next by 1e-14.
     """
-    coarse = -(-entries // _COARSER)
-    known = function(_COARSER * np.arange(_NEIGHBOURS[0], coarse + _NEIGHBOURS[-1], dtype=float))
-    shares = lagrange_shares(_NEIGHBOURS, np.arange(_COARSER) / _COARSER)
+    if apart == 1:
+        return function(np.arange(entries, dtype=float))
+    coarse = -(-entries // apart)
+    known = function(apart * np.arange(_NEIGHBOURS[0], coarse + _NEIGHBOURS[-1], dtype=float))
+    shares = lagrange_shares(_NEIGHBOURS, np.arange(apart) / apart)
     parts = np.lib.stride_tricks.sliding_window_view(known, _NEIGHBOURS.size) @ shares
     return np.ascontiguousarray(parts.ravel()[:entries])
 

@@ -47,7 +47,7 @@ class GaussianSum:
 
     @classmethod
     def of(cls, weights: npt.ArrayLike, variances: npt.ArrayLike) -> GaussianSum:
-        """Check the values, and put more than a thousand Gaussians on a grid of variances.
+        """Check the values, and put more than 250 Gaussians on a grid of variances.
 
         Raises
         ------
@@ -170,7 +170,7 @@ def combined(upper: GaussianSlab, lower: GaussianSlab) -> GaussianSlab:
 
 def _repeated(once: GaussianSum) -> GaussianSum:
     """Return 1 + x + x^2 + ... of a product of two reflectances."""
-    size = float(np.abs(once.weights).sum())
+    size = _largest(once)
     if size >= 1.0:
         raise SimulationError(
             f"two slabs return {size:.6g} of the light between them to it; expected less than 1."
@@ -182,6 +182,14 @@ def _repeated(once: GaussianSum) -> GaussianSum:
         left *= returned
         power, returned = power * power, returned * returned
     return found
+
+
+def _largest(profile: GaussianSum) -> float:
+    """Return the largest value of a transform; weights on a grid of variances have both signs."""
+    widths = np.sqrt(profile.variances[profile.variances > 0.0])
+    low, high = (0.01 / widths.max(), 10.0 / widths.min()) if widths.size else (1.0, 1.0)
+    at = np.append(0.0, np.geomspace(low, high, 200))
+    return float(np.abs(profile.transform(at)).max())
 
 
 def _merged(weights: FloatArray, variances: FloatArray) -> tuple[FloatArray, FloatArray]:

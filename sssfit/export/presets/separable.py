@@ -47,6 +47,7 @@ _ON_LINE = _WEIGHTS / np.sqrt(_VARIANCES) / float((_WEIGHTS / np.sqrt(_VARIANCES
 PIXEL_MM = 0.3  # frequencies up to those of such pixels count
 LEAST_FALLOFF = 0.02
 _SAME = 1e-6  # of taps that are to be those of a falloff
+_CLEAR = 1e-4  # of the largest weight: smaller ones of a printed table have lost digits
 _RINGS, _MOST_RINGS, _SIGMAS = 8.0, 4000.0, 6.0  # of the narrowest and the widest Gaussian
 
 
@@ -202,8 +203,12 @@ def _channel_of(taps: int, weights: FloatArray) -> tuple[float, float]:
     own = weights[1:]
     if not (own[0] > 0.0 and (own >= 0.0).all()):
         return 0.0, 1.0
-    # The weights of a steep falloff are 0 farther out, to rounding.
-    place = int(np.flatnonzero(own[: own.size // 2 + 2])[-1])
+    # The weights of a steep falloff are 0 farther out, or all rounding.
+    inner = own[: own.size // 2 + 2]
+    clear = np.flatnonzero(inner > _CLEAR * own[0])
+    place = int((clear if clear.size > 1 else np.flatnonzero(inner))[-1])
+    if place == 0:  # many pairs have this weight
+        return 0.0, 1.0
 
     def excess(f: float) -> float:
         near, far = outer(f)[[0, place]]
@@ -217,4 +222,5 @@ def _channel_of(taps: int, weights: FloatArray) -> tuple[float, float]:
         f = high
     else:
         f = float(brentq(excess, low, high, xtol=1e-15, rtol=1e-14))
-    return float(own.sum() / outer(f).sum()), f
+    strength = float(own.sum() / outer(f).sum())
+    return (strength, f) if strength <= 1.0 + _SAME else (0.0, 1.0)
