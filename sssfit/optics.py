@@ -11,6 +11,7 @@ this cone take mu = mu_c + (1 - mu_c) t^2, which removes the square root at the 
 import functools
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -75,7 +76,7 @@ def gauss_legendre(
     return middle + half * x, half * w
 
 
-def lagrange_shares(places: npt.NDArray[np.intp], t: FloatArray) -> FloatArray:
+def lagrange_shares(places: npt.NDArray[np.number[Any]], t: FloatArray) -> FloatArray:
     """Return the weights (K, n) of the values at ``places`` (K,) in their polynomial at t (n,).
 
     Lagrange's formula: the product over all other places q of (t - q) / (place - q).

@@ -123,11 +123,7 @@ def fit_cascade(
     target, lit = whole_target(profile, mm_per_pixel, support_mm)
     pictures = pictures_of(target, spectrum, irradiance)
     first = ["natural"] if isinstance(pictures, Scene) else []
-    near = None
-    if like is not None:
-        _check_like(like, profile, lit)
-        if like.structure == text_of(shapes):
-            near = numbers_of(like, lit, target.mm_per_pixel)
+    near = None if like is None else _near(like, shapes, target, lit)
     starts: list[FloatArray] = []
     evaluations = 0
     with one_blas_thread():
@@ -153,17 +149,21 @@ def fit_cascade(
     return TapsFit(taps, evaluations, time.perf_counter() - begun)
 
 
-def _check_like(like: object, profile: Profile, lit: list[int]) -> None:
-    """Refuse what no search for the profile's cascade can start from."""
+def _near(like: object, shapes: Sequence[Shape], target: Target, lit: list[int]) -> Numbers | None:
+    """Return a cascade's numbers on the target's pixels; None if it has other stages."""
+    channels = target.profile.channels
     if not isinstance(like, Taps) or not like.chained:
         raise FitError(f"like = {shown(like)}; expected a cascade.")
-    if like.channels != profile.channels:
+    if like.channels != channels:
         raise FitError(
             f"like.channels = {shown(list(like.channels))}; expected those of the profile, "
-            f"{shown(list(profile.channels))}."
+            f"{shown(list(channels))}."
         )
     if not (like.blend[:, lit].sum(axis=0) > 0.0).all():
         raise FitError("like has no light in a channel that the profile lights; leave it out.")
+    if like.structure != text_of(shapes):
+        return None
+    return numbers_of(like, lit, target.mm_per_pixel)
 
 
 def whole_target(

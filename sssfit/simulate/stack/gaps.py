@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from sssfit.arrays import FloatArray
+from sssfit.optics import lagrange_shares
 
 _RESOLVED = 0.8  # k d / N up to which polar directions resolve the phase: T is off by 1e-5 there
 _AZIMUTHS = 2.2  # k d up to which directions in azimuth do, for each of a quarter, 5 or more
@@ -40,11 +41,8 @@ class Gap:
     def __call__(self, k: float) -> float:
         """Return the transform by Lagrange's cubic for T k^2 in log k."""
         at, values = self._known
-        x, found = math.log(k), 0.0
-        for own in range(4):
-            others = np.delete(at, own)
-            found += float(values[own] * np.prod((x - others) / (at[own] - others)))
-        return found / k**2
+        shares = lagrange_shares(at, np.array([math.log(k)]))[:, 0]
+        return float(sum(values * shares)) / k**2
 
     @cached_property
     def _known(self) -> tuple[FloatArray, FloatArray]:
