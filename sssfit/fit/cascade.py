@@ -29,7 +29,7 @@ from sssfit.fit._chain import Chain, Numbers, Searched
 from sssfit.fit._chain_pairs import PairChain
 from sssfit.fit._chain_stars import StarChain
 from sssfit.fit._result import TapsFit, provenance
-from sssfit.fit._spectrum import Pictures, pictures_of, recorded, spectral_target
+from sssfit.fit._spectrum import Pictures, pictures_of, recorded, search_targets
 from sssfit.fit._target import Pitch, Target, make_target, pitch_of
 from sssfit.fit._tied_chain import one_shape
 from sssfit.fit.structures import best_structure, width_pixels
@@ -129,10 +129,11 @@ def fit_cascade(
     with one_blas_thread():
         kind = PairChain if all(each.is_upright for each in shapes) else StarChain
         for each in (*first, pictures):
-            chain = kind(spectral_target(target, lit, each), shapes, _aliasing(each, still=still))
-            starts += _of_one_shape(chain, seed)
-            starts += [] if near is None else [chain.start_from(near)]
-            x, count = searched(chain, seed, starts, effort=_effort(shapes))
+            weight = _aliasing(each, still=still)
+            few, chain = (kind(of, shapes, weight) for of in search_targets(target, lit, each))
+            starts += _of_one_shape(few, seed)
+            starts += [] if near is None else [few.start_from(near)]
+            x, count = searched(few, chain, seed, starts, effort=_effort(shapes))
             starts, evaluations = [x], evaluations + count
     settings = {
         "fetches": fetches,
@@ -260,7 +261,12 @@ def _effort(shapes: Sequence[Shape]) -> int:
 
 
 def searched(
-    chain: Searched, seed: int, starts: Sequence[FloatArray] = (), *, effort: int = 1
+    few: Searched,
+    many: Searched,
+    seed: int,
+    starts: Sequence[FloatArray] = (),
+    *,
+    effort: int = 1,
 ) -> tuple[FloatArray, int]:
     """Return the best parameters of a search, and evaluations.
 
@@ -271,27 +277,28 @@ def searched(
 
     Parameters
     ----------
-    chain : Searched
-        A chain, or fewer parameters that it follows.
+    few, many : Searched
+        A chain, or fewer parameters that it follows, on the frequencies of the search and on those
+        of its last descent.
     seed : int
-        Of the random starts.
+        Seed of the random starts.
     starts : sequence of array
         Others, all of which are followed.
     effort : int
         Multiplies the number of random starts.
     """
     rng = np.random.default_rng([seed])
-    rough = [_rough(chain, chain.start(rng)) for _ in range(effort * _STARTS)]
+    rough = [_rough(few, few.start(rng)) for _ in range(effort * _STARTS)]
     kept = [each.x for each in sorted(rough, key=lambda each: each.fun)[: effort * _KEPT_STARTS]]
-    found = [descent(chain, x, 25) for x in (*kept, *starts)]
+    found = [descent(few, x, 25) for x in (*kept, *starts)]
     best = min(found, key=lambda each: each.fun)
-    best = descent(chain, best.x, 60)
+    best = descent(few, best.x, 60)
     for width in _HOPS:
         x = best.x.copy()
-        x[chain.step_parameters] += rng.normal(0.0, width, chain.step_parameters.size)
-        found.append(descent(chain, x, 40))
+        x[few.step_parameters] += rng.normal(0.0, width, few.step_parameters.size)
+        found.append(descent(few, x, 40))
         best = min(best, found[-1], key=lambda each: each.fun)
-    best = descent(chain, best.x, 200, gain=1e-5)
+    best = descent(many, best.x, 200, gain=1e-5)
     return best.x, sum(each.nfev for each in (*rough, *found, best))
 
 
@@ -367,7 +374,7 @@ def table_of(
     method : str
     target : Target
     chain : Chain
-        Of the target's lit channels.
+        Of the target's lit channels; its energies are shares.
     x : array
         The chain's parameters.
     settings : mapping
@@ -391,8 +398,8 @@ def table_of(
         )
     ]
     blend, spectral = np.zeros((len(stages) + 1, channels)), np.zeros(channels)
-    blend[:, lit], spectral[lit] = numbers.blend, error
     total = target.total
+    blend[:, lit], spectral[lit] = numbers.blend * total[lit], error
     energy = np.where(total > 0.0, blend.sum(axis=0) / np.where(total > 0.0, total, 1.0) - 1.0, 0.0)
     return Taps(
         method=method,

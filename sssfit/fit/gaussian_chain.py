@@ -28,7 +28,7 @@ from sssfit.fit._chain_pairs import PairChain
 from sssfit.fit._gaussians_objective import SharedAnnuli, make_annuli
 from sssfit.fit._gaussians_search import fitted_annuli, search
 from sssfit.fit._result import TapsFit
-from sssfit.fit._spectrum import spectral_target
+from sssfit.fit._spectrum import search_targets
 from sssfit.fit._target import Pitch, Target
 from sssfit.fit._tied_chain import equal_pairs, gaussian_weights, one_shape
 from sssfit.fit.cascade import ALIASING, searched, table_of, whole_target
@@ -87,13 +87,15 @@ def fit_gaussian_chain(
         variances_mm2, weights, evaluations = shared_gaussians(target, lit, len(shapes))
         shapes = shapes[: len(variances_mm2)]
     with one_blas_thread():
-        chain = PairChain(spectral_target(target, lit, "natural"), shapes, ALIASING)
-        tied = one_shape(chain, is_fitted=blur == "shape")
+        few, tied = (
+            one_shape(PairChain(each, shapes, ALIASING), is_fitted=blur == "shape")
+            for each in search_targets(target, lit, "natural")
+        )
         if blur == "published":
             p = _parameters(variances_mm2 / target.mm_per_pixel**2, weights, shapes[0].pairs)
         else:
-            p, evaluations = searched(tied, seed)
-    taps = table_of("gaussian-chain", target, chain, tied.full(p), settings)
+            p, evaluations = searched(few, tied, seed)
+    taps = table_of("gaussian-chain", target, tied.chain, tied.full(p), settings)
     return TapsFit(taps, evaluations, time.perf_counter() - begun)
 
 

@@ -20,7 +20,7 @@ from sssfit.arrays import FloatArray
 from sssfit.fit._chain import Chain
 from sssfit.fit._chain_pairs import PairChain
 from sssfit.fit._result import TapsFit
-from sssfit.fit._spectrum import spectral_target
+from sssfit.fit._spectrum import search_targets
 from sssfit.fit._target import Pitch
 from sssfit.fit._tied_chain import TiedChain, equal_pairs
 from sssfit.fit.cascade import ALIASING, searched, table_of, whole_target
@@ -68,11 +68,13 @@ def fit_pyramid(
     shapes = equal_pairs(stages)
     target, lit = whole_target(profile, mm_per_pixel, support_mm)
     with one_blas_thread():
-        chain = PairChain(spectral_target(target, lit, spectrum), shapes, ALIASING)
-        tied = one_filter(chain)
-        p, evaluations = searched(tied, seed)
+        few, tied = (
+            one_filter(PairChain(each, shapes, ALIASING))
+            for each in search_targets(target, lit, spectrum)
+        )
+        p, evaluations = searched(few, tied, seed)
     settings = {"stages": stages, "spectrum": spectrum, "fit_seed": seed}
-    taps = table_of("pyramid", target, chain, tied.full(p), settings)
+    taps = table_of("pyramid", target, tied.chain, tied.full(p), settings)
     return TapsFit(taps, evaluations, time.perf_counter() - begun)
 
 

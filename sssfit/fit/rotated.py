@@ -22,7 +22,7 @@ from sssfit.errors import FitError
 from sssfit.fit._chain import Chain
 from sssfit.fit._chain_stars import StarChain
 from sssfit.fit._result import TapsFit
-from sssfit.fit._spectrum import spectral_target
+from sssfit.fit._spectrum import search_targets
 from sssfit.fit._target import Pitch
 from sssfit.fit._tied_chain import TiedChain
 from sssfit.fit.cascade import searched, table_of, whole_target
@@ -76,11 +76,13 @@ def fit_rotated(
     shapes = _checked(directions, taps)
     target, lit = whole_target(profile, mm_per_pixel, support_mm)
     with one_blas_thread():
-        chain = StarChain(spectral_target(target, lit, "natural"), shapes)
-        tied = last_shown(chain, _SHARED[len(shapes)])
-        p, evaluations = searched(tied, seed)
+        few, tied = (
+            last_shown(StarChain(each, shapes), _SHARED[len(shapes)])
+            for each in search_targets(target, lit, "natural")
+        )
+        p, evaluations = searched(few, tied, seed)
     settings = {"directions": directions, "taps": taps, "fit_seed": seed}
-    table = table_of("rotated", target, chain, tied.full(p), settings)
+    table = table_of("rotated", target, tied.chain, tied.full(p), settings)
     return TapsFit(table, evaluations, time.perf_counter() - begun)
 
 
