@@ -209,13 +209,14 @@ def _searched_once(real):
     known = {}
 
     @functools.wraps(real)
-    def searched(chain, seed, starts=(), *, effort=1):
-        if not _state["fits"] or _state["short"] or not isinstance(chain, Chain):
-            return real(chain, seed, starts, effort=effort)
-        given = (*dataclasses.astuple(chain.target), *starts)
-        given = [each.tobytes() if isinstance(each, np.ndarray) else each for each in given]
-        key = "search", type(chain), chain.shapes, chain.aliasing, *given, seed, effort
-        x, count = _once(known, key, lambda: real(chain, seed, starts, effort=effort))
+    def searched(few, many, seed, starts=(), *, effort=1):
+        if not _state["fits"] or _state["short"] or not isinstance(many, Chain):
+            return real(few, many, seed, starts, effort=effort)
+        targets = (each for of in (few, many) for each in dataclasses.astuple(of.target))
+        given = [each.tobytes() if isinstance(each, np.ndarray) else each for each in targets]
+        given += [each.tobytes() for each in starts]
+        key = "search", type(many), many.shapes, many.aliasing, *given, seed, effort
+        x, count = _once(known, key, lambda: real(few, many, seed, starts, effort=effort))
         return x.copy(), count
 
     return searched

@@ -269,7 +269,7 @@ def test_photons_are_tried_until_a_walk_will_do(skin1, choice):
     assert need.photons == need.counts[-1]
 
 
-def needed(monkeypatch, errors, *, walked=None):
+def needed(monkeypatch, errors, *, walked=None, own_seed=5):
     """photons_needed of walks whose errors are given; the seeds that were walked with, too."""
     left, seeds = iter(errors), []
 
@@ -278,7 +278,8 @@ def needed(monkeypatch, errors, *, walked=None):
         return next(left)
 
     monkeypatch.setattr(photon_walks, "_error", error_of)
-    profile = SimpleNamespace(photons=walked, meta={"method": "exact"})
+    meta = {"method": "exact"} if walked is None else {"method": "montecarlo", "seed": own_seed}
+    profile = SimpleNamespace(photons=walked, meta=meta)
     views = SimpleNamespace(profile=profile, tolerance=0.5)
     return photons_needed("material", "option", views, 5, 0.0), seeds
 
@@ -298,6 +299,8 @@ def test_a_walk_is_not_held_against_a_part_of_itself(monkeypatch):
     found, seeds = needed(monkeypatch, [3.0, 2.0], walked=10**6)
     assert (found.photons, found.counts) == (10**6, (10**4, 10**5))
     assert 5 not in seeds
+    _, seeds = needed(monkeypatch, [3.0, 2.0], walked=10**6, own_seed=4)
+    assert 4 not in seeds
 
 
 @pytest.mark.parametrize(

@@ -11,12 +11,15 @@ from turns import in_turn
 from sssfit.export import DIALECTS, Style, kernel_text, source
 from sssfit.export.dense import taps_of_kernel
 from sssfit.export.passes import pass_list
+from sssfit.fit.gaussians import fit_gaussians
 from sssfit.fit.on_taps import on_taps
 from sssfit.fit.svd import fit_svd
 from sssfit.material import load_material
 from sssfit.render.separable import render_separable
+from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
 from sssfit.simulate import simulate_dipole
+from sssfit.simulate.gaussians import simulate_deon_skin
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +43,16 @@ def test_ranks_of_svd_show_what_the_renderer_shows(skin1, rank, thinned, dialect
     assert [len(each.stages) for each in pass_list(taps)] == [rank, *[1] * rank]
     text, _ = kernel_text(found, dialect, keep_energy=True, with_shader=not thinned)
     assert apart(run(text, dialect, taps, light, PITCH), wanted) < 1e-5
+
+
+def test_a_channel_without_a_term_keeps_its_light_in_that_pass():
+    """Blue of this skin is fitted with fewer Gaussians than red."""
+    profile = simulate_deon_skin()
+    kernel = fit_gaussians(profile, mm_per_pixel=0.5, support_mm=4.0).kernel
+    assert (kernel.weights.sum(axis=1) == 0.0).any()
+    scene = Scene("light", light_of((37, 50), 3), 0.5)
+    found = render_taps(scene, taps_of_kernel(kernel, None))
+    np.testing.assert_allclose(found, render_separable(scene, kernel), atol=1e-12)
 
 
 @pytest.mark.parametrize(

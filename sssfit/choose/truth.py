@@ -63,8 +63,9 @@ def note_truth(source: Material | Profile) -> None:
     missing = source.beyond_grid.sum() / max(source.diffuse_reflectance.sum(), 1e-300)
     if missing > _WORTH_A_NOTE:
         note(
-            f"{number(missing, '.2g%')} of the light lies beyond the profile's grid, where the "
-            "true picture lacks it and a kernel does not: simulate with a larger radius."
+            f"{number(missing, '.2g%')} of the light lies beyond the profile's grid. The true "
+            "picture spreads it evenly, or lacks it where the border is black, and a kernel has it "
+            "near the beam: simulate with a larger radius."
         )
 
 
@@ -155,9 +156,8 @@ def photons_needed(
     if material is None:
         return None
     walked = views.profile.photons
-    if walked is not None:
-        # The truth is itself a walk: of the same seed, a shorter one would be a part of it.
-        seed ^= 1
+    if walked is not None and seed == views.profile.meta.get("seed"):
+        seed ^= 1  # a shorter walk of the same seed would be a part of the truth
     errors: list[float] = []
     seconds: list[float] = []
     enough = walked

@@ -218,8 +218,8 @@ class Comparison:
     def missing_share(self) -> FloatArray:
         """Share of the diffuse reflectance that lies beyond the profile's grid (C,).
 
-        True pictures lack it. A kernel with its energy restored has it, and cannot be nearer to
-        them than that.
+        True pictures have it spread evenly, or lack it where the border is black. A kernel with its
+        energy restored has it near the beam, and cannot be nearer to them than that.
         """
         total = self.profile.diffuse_reflectance
         beyond = self.profile.beyond_grid

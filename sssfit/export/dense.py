@@ -55,8 +55,10 @@ def taps_of_kernel(kernel: SeparableKernel, most: int | None) -> Taps:
     middle = kernel.pixels // 2
     offsets_mm: FloatArray = kernel.mm_per_pixel * np.arange(1.0, middle + 1.0)
     sums = kernel.weights.sum(axis=1)  # (R, C)
-    whole: FloatArray = np.where(sums != 0.0, sums, 1.0)
-    halves: FloatArray = np.divide(kernel.weights[:, middle:], whole[:, None])
+    empty = (sums == 0.0)[:, None]  # a term that a channel does not have: its pass changes nothing
+    one = np.eye(middle + 1)[:, :1]
+    scaled = kernel.weights[:, middle:] / np.where(empty, 1.0, sums[:, None])
+    halves: FloatArray = np.where(empty, one, scaled)
     stages = [Stage(0, "pair", offsets_mm, halves[k]) for k in range(kernel.rank)]
     blend = np.concatenate((np.zeros((1, len(kernel.channels))), kernel.signs * sums**2))
     return Taps(

@@ -199,7 +199,11 @@ class Profile:
 
     @property
     def diffuse_reflectance(self) -> FloatArray:
-        """Energy reflected diffusely, on the grid and beyond (C,), without specular reflection."""
+        """Energy reflected diffusely, on the grid and beyond (C,), without specular reflection.
+
+        As in MCML, it includes light that the lower interfaces of a stack reflect without a
+        collision.
+        """
         return self.total_on_grid + self.beyond_grid
 
     @property
