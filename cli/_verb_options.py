@@ -161,7 +161,10 @@ FIT_PIXELS = (
     option("--support", Length("auto"), "MM|auto", "Half width of the kernel; auto is the "
            "smallest that keeps 99.9 % of every channel, for cascade 99.99 %.", "auto"),
     flag("--smooth", "Take most of a walk's noise out of the profile before the fit."),
-    flag("--normalize", "Scale every channel to unit energy, and store its energy as a factor."),
+    flag(
+        "--normalize",
+        "Separable kernels: scale every channel to unit energy, and store its energy as a factor.",
+    ),
 )
 FIT_OUTPUT = (STRICT, *output("PROFILE.METHOD.taps.json, .kernel.json without taps",
                              "is not our kernel"))

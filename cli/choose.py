@@ -23,8 +23,8 @@ def choose(material: str, common: Common, **given: Any) -> None:
     """Choose the cheapest table of taps whose error the scene does not show, and save it.
 
     Cost is texture fetches a pixel. By default 95 % of the pixels must be within a Delta E of 1,
-    about the smallest difference seen side by side. With --fetches alone it is the table that shows
-    the least within them; with --tolerance as well, the cheapest of those within both.
+    about the smallest difference seen side by side. With --fetches alone it is the table with the
+    least error within that budget; with --tolerance as well, the cheapest one that meets both.
 
     Distance, field of view and rows give the size of a pixel. The picture is the middle of the
     frame, 512 x 512 pixels at most. For a close-up of the head, less than 88 mm across, the kernel

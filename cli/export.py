@@ -29,13 +29,14 @@ def export(
     """Export FILES for other programs, or the parameters that an engine asks for.
 
     A file is a .taps.json or .kernel.json file, for csv and lut a .profile.npz file too, or - for
-    stdin; by default the newest in this folder. Source holds a table's constants and its passes, a
-    function each, or the signs and weights of every separable term, and a comment that says how
-    they are applied, with material, fit, cost, energy and errors. Several tables with the same
-    stages share one source, and an index says which. The csv of a profile has the energy of each
-    annulus and its standard error, against the annulus' outer edge r_mm (inf: beyond the grid),
-    with every digit; `sssfit import` reads it back. It has no specular reflectance, absorption and
-    transmittance. Textures of lut are linear floats; a PNG shows them over their largest value.
+    stdin; by default the newest in this folder. For a table of taps the source holds its constants
+    and a function for each pass; for a separable kernel, the signs and weights of every term. A
+    comment says how they are applied, and gives the material, fit, cost, energy and errors. Several
+    tables with the same stages share one source, and an index says which. The csv of a profile has
+    the energy of each annulus and its standard error, against the annulus' outer edge r_mm (inf:
+    beyond the grid), with every digit; `sssfit import` reads it back. It has no specular
+    reflectance, absorption and transmittance. Textures of lut are linear floats; a PNG shows them
+    over their largest value.
 
     --preset takes a material, its profile or a table of an engine's own taps, and NAME=VALUE of
     what a user chooses; --list says which.

@@ -31,10 +31,10 @@ _BEHIND_DEGREES = 170.0
 def render(context: click.Context, /, kernel: str | None, common: Common, **given: Any) -> None:
     """Apply KERNEL to a picture of irradiance, and measure its error.
 
-    KERNEL is a .kernel.json or .taps.json file, or - for stdin; by default the newest .kernel.json
-    in this folder. The result is radiant exitance in linear light. Made pictures use the kernel's
-    pixel size; your own file (EXR, HDR, TIFF, PNG, JPG, TGA) must have it too, except with --screen
-    and for a table of taps, which serves any size. The true picture is the same irradiance
+    KERNEL is a .kernel.json or .taps.json file, or - for stdin; by default the newest of either
+    kind in this folder. The result is radiant exitance in linear light. Made pictures use the
+    kernel's pixel size; your own file (EXR, HDR, TIFF, PNG, JPG, TGA) must have it too, except with
+    --screen and for a table of taps, which serves any size. The true picture is the same irradiance
     convolved with the whole 2D kernel of the profile; Delta E 2000 compares the two in sRGB at the
     exposure. The alpha channel of your file is copied unchanged.
 

@@ -23,8 +23,9 @@ from ._verb_options import STABILITY
 def stability(material: str | None, common: Common, **given: Any) -> None:
     """Stress every method on MATERIAL until it breaks, and say where it is safe.
 
-    Cascades and published methods side by side, a stress at a time: each is made harder step by
-    step, and a method is safe up to where its measure passes the limit; places have a range.
+    Cascades and published methods are compared under one stress at a time. Each stress grows step
+    by step, and a method is safe until its measure exceeds the limit. A measure that depends on the
+    place has a range.
 
     MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or a .profile.npz
     file, - for one on stdin; stresses that walk photons need a profile that says its material.

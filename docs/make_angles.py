@@ -23,15 +23,16 @@ HEAD = """\
 Made by `python docs/make_angles.py`: R_d by exit angle of the exact solver, over that of a medium
 that returns the same light, Lambertian inside, through Fresnel's transmittance (`sssfit simulate
 NAME --method exact --angles 90`). Misplaced is half the sum of the differences by angle, as a share
-of the light: what leaves at another angle than a shader sends it. The albedo is that of single
+of the light: what leaves at another angle than in a shader. The albedo is that of single
 scattering.
 
 | material | albedo | at 0° | 30° | 60° | 80° | misplaced |
 |---|---|---|---|---|---|---|
 """
 NEAR = """
-Far from the beam the light differs more than near it. Misplaced by angle of skin1's walk
-({photons:,} photons, `--angles 30`), with the noise still in it:
+Far from the beam the angular distribution differs more than near it. The table gives the share of
+skin1's light that is misplaced in angle, from the walk ({photons:,} photons, `--angles 30`) and
+with its noise included:
 
 | skin1, light | R | G | B |
 |---|---|---|---|

@@ -76,9 +76,9 @@ FULL = """The same means with nothing halved (the structure is that of skin1):
 |---|---|---|---|{rules}|
 {budget}
 
-Each picture of marble, on the profile with all of its light, and on the one that is cut at
-{edge_mm:.1f} mm, where the paper's grid ends, and scaled to the same energy; each is fitted and is
-the truth of its own rows:
+Each picture of marble for two profiles: the one with all of its light, and the one that is cut at
+{edge_mm:.1f} mm, where the paper's grid ends, and scaled to the same energy. In each row the same
+profile is fitted and gives the true picture:
 
 | profile | structure | {names} | mean |
 |---|---|{name_rules}|---|

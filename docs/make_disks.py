@@ -24,9 +24,10 @@ frame, and its mean over the eight pictures:
 |---|---|---|---|---|---|---|---|
 {samplers}
 
-The best that we make of a disk (`--method disk`, rings of equal energy by the exact profile, exact
-energy in every channel, bilinear fetches) over frames: the newest counts 1/8 once there are eight.
-Error against the true picture, and noise, the same figure against the mean of 64 frames:
+Our best disk (`--method disk`: rings of equal energy from the exact profile, exact energy in every
+channel, bilinear fetches), averaged over frames. Once there are eight frames, the newest has a
+weight of 1/8. Error against the true picture, and noise, the same figure against the mean of 64
+frames:
 
 | fetches | frames | {heads} | mean | mean noise |
 |---|---|---|---|---|---|---|---|

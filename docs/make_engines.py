@@ -89,7 +89,8 @@ def walks():
     source = source_of(record)
     first = "\n".join(f"{k}. {each}" for k, each in enumerate(begin(source), 1))
     parts = [walk(name, source, record) for name in PRESETS]
-    return "\n\n".join((f"Every walk of skin1 starts from (red, green, blue):\n\n{first}", *parts))
+    head = "Every conversion of skin1 starts from these values (red, green, blue):"
+    return "\n\n".join((f"{head}\n\n{first}", *parts))
 
 
 def burleys_range():

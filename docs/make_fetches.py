@@ -266,11 +266,11 @@ percentile of Delta E):
   {hundred:.1f}. `sssfit fit` makes one of 24 fetches, `sssfit fit --fetches 14` the cheaper one.
 - **Let the scene say how few will do:** `sssfit choose skin1 --distance 0.6m`. It also knows when
   no blur is needed.
-- **Under 12 fetches nothing comes near:** the best of 11 fetches leaves {eleven:.0f}.
+- **Under 12 fetches nothing comes close:** the best kernel within 11 fetches leaves {eleven:.0f}.
 - **Where two passes are all there is**, {two} on {two_fetches:.0f} fetches leaves {two_error:.1f};
   four passes of stars (`--passes 4`) leave {stars:.1f} for 16.
-- **Simulate exactly** where possible: all but thin slabs that scatter far ahead. Elsewhere 1e6
-  photons are enough."""
+- **Simulate exactly** where possible, that is, everything but thin slabs with strong
+  forward scattering. For those, 1e6 photons are enough."""
 
 TEXT = """![Error over fetches: cascades, and every published method on taps](skin1-fetches.png)
 
@@ -288,8 +288,10 @@ The samplers of engines, in one frame as they ship (sources in `sssfit/compare/e
 |---|---|---|---|
 {engines}
 
-The same for other materials, cascade / best published on taps, and over all budgets from 14 to 100
-fetches the smallest ratio of the two:
+The same for five materials, but with cascades of 14, 17 and 24 fetches only and published kernels
+on cumulative taps only, so that skin1's figures differ from those above. Each pair is cascade /
+best published on taps; the last column is the smallest ratio of the two over all budgets from 14 to
+100 fetches:
 
 | material | 14 fetches | 24 | 50 | 100 | smallest ratio |
 |---|---|---|---|---|---|

@@ -15,10 +15,10 @@ from sssfit.render.adaptive import make_sampler, render_samples
 COUNTS = (1, 2, 4, 8, 16, 32, 64)
 ROUNDS = 25  # in turns: what else the machine does then hits all alike
 
-TEXT = """A frame of the head, 512 x 512 pixels of skin1 in three channels, on two threads. Least of
-{rounds} times: the processor time of both threads, with the line a + b n that fits it in ratio, and
-the seconds on the clock, from which the rate is. The load of the machine was {load:.1f} on {cores}
-cores, ours included:
+TEXT = """A frame of the head, 512 x 512 pixels of skin1 in three channels, on two threads. Figures
+are the least of {rounds} runs: the processor time of both threads, the line a + b n fitted to it by
+relative error, and the wall-clock time, from which the rate is computed. The load of the machine
+was {load:.1f} on {cores} cores, ours included:
 
 | samples a pixel n | processor, ms | line, ms | off | clock, ms | million samples a second |
 |---|---|---|---|---|---|

@@ -37,21 +37,21 @@ FETCHES, TAPS = 14, 7
 AMPLIFIED = 10.0
 
 TEXT = """Every pixel has its own mean free path: a map of factors from 1/2 to 2 in {steps} steps,
-waves of {period} pixels over the head. The true picture takes each pixel from that of the profile
-which is so wide. skin1 under the strobe, {frames} frames, target variance {target:g}. Errors are
-shares of the root mean square of the true frames: of single frames after the first {cold}, and of
-their mean over time:
+waves of {period} pixels over the head. The true picture renders each pixel with the profile scaled
+by that pixel's factor. skin1 under the strobe, {frames} frames, target variance {target:g}. Errors
+are shares of the root mean square of the true frames: of single frames after the first {cold}, and
+of their mean over time:
 
 | renderer | fetches a pixel | error of a frame | error of the mean of {warm} frames |
 |---|---|---|---|
 {rows}
 
-Samples follow the map for one multiplication a sample. A cascade that was fitted once is
-{wrong:.1f} % off in every frame, and no number of frames mends it. In a single frame that is
-still the error of {like_once:.0f} fixed samples a pixel; over time, where noise falls as the root
-of the number of frames, {frames_once} frames of the sampler with variates pass it. A cascade for
-each step of the map has the error of {like_steps} samples, for {fetches:.0f} fetches. With
-variates the sampler takes {saved:.0f} % fewer samples than without.
+Samples follow the map at the cost of one multiplication each. A cascade that was fitted once is
+{wrong:.1f} % off in every frame, and no number of frames mends it. In a single frame that is still
+the error of {like_once:.0f} fixed samples a pixel; over time, where noise falls with the square
+root of the number of frames, the sampler with variates does better after {frames_once} frames. A
+cascade for each step of the map has the error of {like_steps} samples, for {fetches:.0f} fetches.
+With variates the sampler takes {saved:.0f} % fewer samples than without.
 
 ![The head with a map of mean free paths, by a cascade and by samples](skin1-radii.png)
 """

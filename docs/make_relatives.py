@@ -25,7 +25,8 @@ RELATIVES = (
 SEEDS = (1, 2)
 
 TEXT = """Mean 99th percentile of Delta E as in the first table. The last columns are the cascade
-that `--fetches` gives for no more fetches; of a relative's two searches the one of less misfit:
+that `--fetches` gives for no more fetches. Each relative is searched for twice, and the result with
+the smaller misfit is shown:
 
 | | structure | fetches | passes | {heads} | cascade, {cascades} |
 |---|---|---|---|{rules}|{rules}|

@@ -34,9 +34,9 @@ Rescaled SVD is better than the same number of Gaussians in {gaussians} of {coun
 With {most} terms the worst of all cases is {worst_rescaled:.2f} rescaled, {worst_kept:.2f} kept
 and {worst_gaussians:.2f} with Gaussians.
 
-**Light beyond the grid.** Rescaled kernels return it, too near to the beam; kept kernels lose it.
-In the true picture it sees the mean of the picture, and black around the disk. With {most} terms,
-on the head:
+**Light beyond the grid.** Rescaled kernels return this light too near to the beam; kept kernels
+lose it. The true picture takes it from the mean of the picture, or from black around the disk. With
+{most} terms, on the head:
 
 | | energy beyond the grid, R G B | rescaled | kept |
 |---|---|---|---|

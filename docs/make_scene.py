@@ -37,13 +37,14 @@ def lines(head, rows):
 # The paper's table
 
 TABLE_TEXT = """Six Gaussians of skin1, maps of {maps} texels and pictures of {width} x {height}
-pixels, both a quarter of the paper's; all three savings, culled by normals of vertices. Times
-fewer texels convolved, times as fast (on {cores} cores), and the paper's speed-up:
+pixels, both a quarter of the paper's; all three savings, culled by normals of vertices. Each cell
+has the factor by which fewer texels are convolved, our speed-up (on {cores} cores) and the paper's
+speed-up:
 
 {table}
 
-Ours is at least the paper's in texels in {above} of {cells} cells, and in time in {faster}.
-The mean Delta E of the savings is {worst:.2f} at most, at {where}.
+Our factor is at least the paper's speed-up in {above} of {cells} cells by texels and in {faster} by
+time. The mean Delta E of the savings is {worst:.2f} at most, at {where}.
 
 ![Speed-ups, texture space beside screen space, and the error of the savings](scene-table.png)
 

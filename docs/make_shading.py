@@ -50,8 +50,8 @@ with the same rule, conv(A E) / conv(A) times the energy:
 ![The true kernel and a cascade at the outline of an ear](skin1-outline.png)
 
 **Tilted surfaces.** A plane tilted by 60 degrees about the vertical, seen from afar, so that a
-pixel covers .3 x .6 mm of it, against the true kernel on the surface; depth differences followed by
-the Gaussian factor, and not at all:
+pixel covers .3 x .6 mm of it, compared with the true kernel on the surface, with depth differences
+weighted by the Gaussian factor and with depth ignored:
 
 | kernel | picture | facing the eye | 60 degrees | 60 degrees, not followed |
 |---|---|---|---|---|
@@ -59,9 +59,9 @@ the Gaussian factor, and not at all:
 
 **Motion.** 99th percentile of Delta E within 16 pixels of a point as large as a pixel, and of the
 middle of an edge at 30 degrees, each at 10 x 10 positions in steps of a tenth of a pixel, against
-the true kernel at the same position: least to largest, and their difference. Last, the point moved
-by a whole pixel (along x, y and both; the largest) and the picture moved back, against the unmoved
-one:
+the true kernel at the same position: least to largest, and their difference. In the last column the
+point is moved by a whole pixel along x, y and both, and the picture is shifted back and compared
+with the unmoved one; the largest of the three is given:
 
 | kernel | point | change | edge | change | moved by a pixel |
 |---|---|---|---|---|---|

@@ -7,13 +7,13 @@ Three calls take a material to a picture::
     kernel = sssfit.fit(profile, "svd", rank=3)
     picture = sssfit.render(image, kernel)
 
-Each is also the package of its room (``from sssfit.fit import fit_svd``). The rooms, in the order
+Each of the three is also a package (``from sssfit.fit import fit_svd``). The packages, in the order
 of the work:
 
 - ``sssfit.material``: absorption and scattering coefficients, loaded and checked.
 - ``sssfit.simulate``: material to diffuse reflectance profile R_d(r).
 - ``sssfit.profile``: the profile itself, stored as energy in annuli.
-- ``sssfit.fit``: profile to separable kernel, ``sssfit.kernel``.
+- ``sssfit.fit``: profile to kernel, separable or a table of taps (``sssfit.kernel``).
 - ``sssfit.render``: kernels applied to pictures.
 - ``sssfit.chart``: records to figures.
 

@@ -267,8 +267,8 @@ _TAPS = (
     Setting(
         "taps",
         "whole",
-        "bilinear fetches a pass, an odd number up to 129 that a kernel is thinned to; of disk all "
-        "of them, from 4.",
+        "bilinear fetches a pass to which a kernel is thinned, an odd number up to 129; for disk, "
+        "all of its fetches, at least 4.",
         "N",
         (3, 256),
     ),
@@ -291,7 +291,11 @@ FITS: Mapping[str, Method] = {
             _STAGES,
             Setting("passes", "whole", "most passes of the stages.", "N", (1, 1000)),
             Setting("full_resolution", "flag", "do not halve the picture."),
-            Setting("still", "flag", "weigh in what changes as light moves by a pixel."),
+            Setting(
+                "still",
+                "flag",
+                "give three times the weight to what changes as light moves by a pixel.",
+            ),
             _SPECTRUM,
             _IRRADIANCE,
         ),
@@ -478,7 +482,9 @@ _SOURCE = (
     Setting("coverage", "flag", "keep light within a mask, the fourth channel of the pictures."),
     Setting("depth", "flag", "follow depth: a fetch loses weight by its depth difference."),
     Setting("jitter", "flag", "move the outer taps of a pass by pixel and frame, against bands."),
-    Setting("tilt", "flag", "take a pixel's mm right and down apart, for tilted surfaces."),
+    Setting(
+        "tilt", "flag", "take mm per pixel separately for right and down, for tilted surfaces."
+    ),
     Setting("transmittance", "flag", "add a function for the light through a thickness."),
     Setting("compute", "flag", "write compute shaders, one a level, that work in group memory."),
     Setting("keep_energy", "flag", "leave the energy in the blend, not in a constant of its own."),

@@ -163,7 +163,7 @@ def source_text(
     depth : bool
         Whether fetches lose weight by their depth difference, too.
     jitter : bool
-        Whether each pixel moves the outer taps of its passes, otherwise in each frame.
+        Whether each pixel moves the outer taps of its passes, differently in each frame.
     tilt : bool
         Whether passes take the mm of a pixel along either side apart, for tilted surfaces.
     transmittance : bool

@@ -60,7 +60,7 @@ def lut_bytes(
     Parameters
     ----------
     sources : sequence of Profile, SeparableKernel or Taps
-        One of them. Kernels have lines and kernels, on their own pixels.
+        Exactly one. A kernel has the tables "line" and "kernel", on its own pixels.
     ending : ".exr", ".dds" or ".png"
         EXR has float32 and the pitch in its header; DDS float32, with three channels as four, the
         last one 1; PNG 16-bit sRGB of the values over the largest, to look at.

@@ -1,8 +1,9 @@
-"""Profile to kernel: one method per file, with one signature ``fit_x(profile, ...) -> FitResult``.
+"""Profile to kernel: one method per file, ``fit_x(profile, ...)`` to a FitResult or a TapsFit.
 
 ``METHODS`` maps the names of the command line to the methods; its entries come from
-``sssfit.methods``. Every ``fit_x`` takes a profile and ``mm_per_pixel`` (0.3 by default),
-``support_mm`` and ``normalize`` by keyword, and its own settings.
+``sssfit.methods``. Every ``fit_x`` takes a profile and, by keyword, ``mm_per_pixel`` (0.3 by
+default), ``support_mm`` and its own settings; the fits of separable kernels also take
+``normalize``.
 
 The package can also be called like the function `fit`: ``sssfit.fit(profile, "svd", rank=3)``.
 """

@@ -374,7 +374,7 @@ def table_of(
     method : str
     target : Target
     chain : Chain
-        Of the target's lit channels; its energies are shares.
+        Of the target's lit channels; its energies may be shares.
     x : array
         The chain's parameters.
     settings : mapping
@@ -399,7 +399,8 @@ def table_of(
     ]
     blend, spectral = np.zeros((len(stages) + 1, channels)), np.zeros(channels)
     total = target.total
-    blend[:, lit], spectral[lit] = numbers.blend * total[lit], error
+    blend[:, lit] = numbers.blend * (total[lit] / chain.target.energy)
+    spectral[lit] = error
     energy = np.where(total > 0.0, blend.sum(axis=0) / np.where(total > 0.0, total, 1.0) - 1.0, 0.0)
     return Taps(
         method=method,

@@ -8,9 +8,9 @@ halves its energy, and every channel's weight is its own energy of the ring,
 
 so that a channel's weights add up to its energy. This is stratified importance sampling (Golubev
 2018, "Efficient screen space subsurface scattering") with the weights integrated over their rings
-and not taken at one radius. Of the widest channel, since with rings of equal energy of the mean
-of the channels skin1's pictures have 1.4 times its Delta E in one frame, and 2 times after 16.
-``sssfit.render.disk`` has the angles.
+and not taken at one radius. The rings are those of the widest channel: with rings of equal energy
+of the channels' mean, skin1's pictures have 1.4 times the Delta E in one frame, and 2 times after
+16. ``sssfit.render.disk`` has the angles.
 """
 
 import time

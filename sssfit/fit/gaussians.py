@@ -10,7 +10,7 @@ restores the energy of the Gaussians outside the support, unless ``energy="keep"
 Gaussians of skin1's red on 13 pixels of .3 mm.
 
 The fit uses the profile's annuli and not the pixels, so variances and weights do not depend on the
-pixel size. The exception are profiles with R_d ~ 1/r near the beam, where the integral of r R^2
+pixel size. The exceptions are profiles with R_d ~ 1/r near the beam, where the integral of r R^2
 diverges as annuli narrow; these are evaluated at the resolution of the pixels, with a warning.
 
 Next: ``_gaussians_objective.py`` has the objective, ``_gaussians_search.py`` the search and the

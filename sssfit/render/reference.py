@@ -29,8 +29,8 @@ def render_reference(
 ) -> FloatArray:
     """Convolve irradiance with a profile's own 2D kernel on the scene's pixels.
 
-    Light that leaves beyond the profile's grid, or beyond the kernel's pixels, is replaced by an
-    average of the distance: the picture's mean with mirrored borders, the mean of its corners with
+    Light that leaves beyond the profile's grid, or beyond the kernel's pixels, is replaced by the
+    mean irradiance far away: the picture's mean with mirrored borders, the mean of its corners with
     clamped ones. A constant picture therefore returns all of the diffuse reflectance.
 
     Parameters

@@ -1,8 +1,9 @@
 """What pixels show of a map: a trilinear look-up, as a shader's.
 
 A pixel that covers many texels takes their mean, from a map of half, a quarter ... the size, and
-between two of them by the binary logarithm of the texels that it is wide. From far away a pixel
-would else show one texel of a hundred, and a smaller map, which holds their mean, another picture.
+between two of them by the binary logarithm of the texels that it is wide. Otherwise a distant pixel
+would show one texel of a hundred, and a smaller map, which holds their mean, would give a different
+picture.
 """
 
 from typing import Any

@@ -9,8 +9,8 @@ rendering translucent materials". With z_v = z_r + 4 A D and d = sqrt(r^2 + z^2)
 
 and the energy beyond r is (1 - R_sp) alpha'/2 times the sum of z exp(-sigma_tr d) / d, so no
 quadrature is needed. The factor 1 - R_sp, which the paper applies separately, makes it a share of
-the incident light. The dipole has no single scattering, so it is finite near the beam, where R_d ~
-1/r.
+the incident light. The dipole has no single scattering, so it is finite near the beam, where the
+true R_d grows like 1/r.
 
 The coefficients and the boundary condition here serve all diffusion models. Scattering enters as
 sigma_s' = (1 - g) sigma_s: diffusion depends on directions only through their mean, so g other than

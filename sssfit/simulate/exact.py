@@ -101,10 +101,10 @@ def simulate_exact_many(
 ) -> list[Profile]:
     """Solve for several materials, which share what they have in common.
 
-    Half spaces of one relative refractive index share all work, stacks the modes of layers that
-    they share. Parameters and errors are those of ``simulate_exact``. Returns the profiles in the
-    order of ``materials``; they differ from those of single runs by less than their error
-    estimates.
+    Half spaces of one relative refractive index share all work; stacks share the modes of the
+    layers they have in common. Parameters and errors are those of ``simulate_exact``. Returns the
+    profiles in the order of ``materials``; they differ from those of single runs by less than their
+    error estimates.
     """
     threads = available_cores() if threads is None else threads
     _check_settings(materials, tolerance, threads)

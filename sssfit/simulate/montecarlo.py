@@ -93,9 +93,8 @@ def simulate_montecarlo(
         1/64 to 1/32 apart, so the end depends only on the seed. Channels that do not scatter are
         ignored.
     angles : int, optional
-        Bins of the exit angle, 1 to 180, from 0 to pi/2 to the normal: the profile then has
-        R_d(r, angle) too, and takes as many times the memory.
-    numerical_aperture : float, optional
+        Bins of the exit angle, 1 to 180, from 0 to pi/2 from the normal; the profile then also has
+    R_d(r, angle), and takes as many times the memory. numerical_aperture : float, optional
         Of a detector above the surface, which sees the light within asin(NA / n_above) of the
         normal; the rest is ``outside_aperture``. In place of ``angles``.
     checkpoint : Checkpoint or Path, optional

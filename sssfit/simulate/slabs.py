@@ -1,6 +1,6 @@
 """Slabs whose reflectance and transmittance are sums of Gaussians, put on one another.
 
-Section 2 of Jimenez and Gutierrez 2010, "Faster rendering of human skin", after d'Eon, Luebke and
+Section 2 of Jimenez and Gutierrez 2008, "Faster rendering of human skin", after d'Eon, Luebke and
 Enderton 2007: the radial convolution of two Gaussians is G(v1) * G(v2) = G(v1 + v2), so the
 convolutions and sums of Donner and Jensen 2005 are products and sums of polynomials:
 
