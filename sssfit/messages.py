@@ -109,7 +109,7 @@ def counted(value: Any, noun: str, form: str = "") -> str:
     noun : str
         In the singular, also of several words: "mean free path".
     form : str
-        As of `number`.
+        Format as in `number`.
     """
     text = number(value, form)
     ending = "es" if noun.endswith(("s", "x", "ch", "sh")) else "s"

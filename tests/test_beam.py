@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from sssfit.errors import ProfileError
-from sssfit.material import load_material
+from sssfit.material import Layer, Material, load_material
 from sssfit.profile import FORMAT, Profile
 from sssfit.profile.beam import Beam, lens_area, parse_beam, under_beam
+from sssfit.profile.bins import merged
+from sssfit.profile.directions import angular_reflectance
+from sssfit.profile.frequency import frequency_response
 from sssfit.simulate import simulate_exact, simulate_montecarlo
 from sssfit.simulate.runner import simulate_to_files
 
@@ -108,6 +111,46 @@ def test_errors_of_walks_are_those_of_other_seeds():
     ratio = energy.std(axis=0, ddof=1) / told
     # The standard deviation of 40 values is known to 11 %; 60 of them, correlated, to less.
     assert abs(ratio.mean() - 1.0) < 0.15
+
+
+def test_a_beam_leaves_the_errors_of_all_light(tmp_path):
+    """On either side, in files too; of sums over some annuli nothing is said."""
+    slab = Material("slab", ("R", "G"), (Layer(1.3, 0.0, [0.1, 0.2], [3.0, 1.0], 2.0),))
+    pencil = simulate_montecarlo(slab, photons=3000, dr_mm=0.2, radius_mm=6.0, angles=5)
+    found = under_beam(pencil, Beam("gaussian", 0.8))
+    found.save(tmp_path / "wide.profile.npz")
+    for each in (found, Profile.load(tmp_path / "wide.profile.npz")):
+        for name in ("diffuse_reflectance_stderr", "transmittance_stderr"):
+            assert (getattr(pencil, name) > 0.0).all()
+            np.testing.assert_array_equal(getattr(each, name), getattr(pencil, name))
+        assert np.isnan(each.cumulative_stderr[1:]).all()
+        response = frequency_response(each)
+        assert (
+            response.stderr[response.k_per_mm == 0.0] == pencil.diffuse_reflectance_stderr
+        ).all()
+        assert np.isnan(response.stderr[response.k_per_mm > 0.0]).all()
+    before, after = (angular_reflectance(each).per_sr_stderr for each in (pencil, found))
+    np.testing.assert_allclose(after, before, rtol=0.02)
+    with pytest.raises(ProfileError, match=r"meta.diffuse_reflectance_stderr = .*; expected a n"):
+        dataclasses.replace(found, meta={**found.meta, "diffuse_reflectance_stderr": [1.0]})
+
+
+def test_bins_under_a_beam_are_no_better_than_they_say():
+    """Merged annuli of 40 walks, against the largest standard error that is told."""
+    material = load_material("skin1")
+    made = [
+        under_beam(
+            simulate_montecarlo(material, photons=4000, seed=seed, dr_mm=0.1, radius_mm=12.0),
+            Beam("gaussian", 1.0),
+        )
+        for seed in range(1, 41)
+    ]
+    bins = merged(made[0], 0)
+    ends = np.searchsorted(made[0].r_edges_mm, bins.edges_mm)
+    energy = np.stack([np.diff(each.cumulative[ends, 0]) for each in made])
+    ratio = (energy.std(axis=0, ddof=1) / bins.stderr)[bins.is_drawn]
+    assert ratio.size > 20
+    assert 0.5 < ratio.mean() < 1.15
 
 
 def test_transmitted_light_is_spread_too():

@@ -319,14 +319,14 @@ def run_level(
         Source rows and columns, beyond each border as far as all stages reach, and another where
         the size is odd.
     reach, many : array (S)
-        Of each stage: how far it reaches [texels], and its number of pairs of texels.
+        For each stage, how far it reaches [texels], and its number of pairs of texels.
     margin, kept : array (S + 1)
         Of the picture and what each stage makes of it: how far past its borders the later stages
         need it (its lines begin there), and the rows that are kept of it.
     at : array (S, K)
     weights : array (S, C, 1 + K)
     shares : array (C, S + 1)
-        Of the picture and each stage in the sum.
+        Shares of the picture and of each stage in the sum.
     is_packed : bool
         Whether picture and sum have the channels of a pixel side by side, or planes.
     """

@@ -29,7 +29,7 @@ def line_energy(
     radii : array (m,)
         The outer edges of the annuli, increasing.
     densities : array (m, C)
-        Of the annuli inside these edges, per area.
+        Densities of the annuli inside these edges, per area.
     pitch : float
         Width of a pixel, in the unit of the radii.
     half_pixels : int

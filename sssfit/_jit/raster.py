@@ -32,7 +32,7 @@ def draw(
         1 / depth of the corners; 1 where the picture is flat, and the last triangle wins.
     drawn : array (F,) of bool
     first_number : int
-        That of the first triangle in ``owner``.
+        Number of the first triangle in ``owner``.
     owner : array (H, W) of int
         The triangle of each pixel, -1 where there is none.
     places : array (H, W, 2)

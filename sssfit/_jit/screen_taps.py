@@ -45,7 +45,7 @@ def gather(
     Parameters
     ----------
     places_mm : array (F, 2) [mm]
-        Of the fetches beside the texel, down and right.
+        Places of the fetches beside the texel, down and right.
     weights : array (F, C)
     rate : array (C,) [1/mm^2]
     divide : bool

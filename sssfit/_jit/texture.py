@@ -76,7 +76,7 @@ def gather(
     Parameters
     ----------
     places_mm : array (F, 2) [mm]
-        Of the fetches beside the texel, down and right.
+        Places of the fetches beside the texel, down and right.
     weights : array (F, C)
     divide : bool
         By the sum of weights times coverage. Where that is 0 the texel stays as it was.

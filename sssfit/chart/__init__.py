@@ -46,7 +46,7 @@ def figure_of(record: Any, **options: Any) -> Figure:
     Parameters
     ----------
     record : Profile, Material, KernelView, Comparison, ...
-        Of a class in ``FIGURES``; of budgets a list.
+        A record of a class in ``FIGURES``, or a list of budgets.
     **options
         Those of the record's figure.
 

@@ -34,7 +34,7 @@ def angles_figure(found: AngularReflectance) -> Figure:
     Parameters
     ----------
     found : AngularReflectance
-        Of more than eight channels the first eight are drawn.
+        If it has more than eight channels, the first eight are drawn.
 
     Returns
     -------

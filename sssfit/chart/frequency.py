@@ -35,7 +35,7 @@ def frequency_figure(found: FrequencyResponse) -> Figure:
     Parameters
     ----------
     found : FrequencyResponse
-        Of more than eight channels the first eight are drawn.
+        If it has more than eight channels, the first eight are drawn.
 
     Returns
     -------

@@ -65,7 +65,7 @@ def models_figure(comparison: ModelComparison) -> Figure:
     Parameters
     ----------
     comparison : ModelComparison
-        Of more than three channels the first, the middle and the last one are drawn.
+        If it has more than three channels, the first, the middle and the last one are drawn.
 
     Returns
     -------

@@ -275,7 +275,7 @@ def draw_steps(
     values, edges : array (n,), (n+1,)
     color : matplotlib colour
     baseline : array (n,), optional
-        Of a filled band; without one a line is drawn.
+        Baseline of a filled band; without one a line is drawn.
     **style
         Further properties of a patch.
     """

@@ -43,7 +43,7 @@ def spectrum_figure(spectrum: Spectrum) -> Figure:
     Parameters
     ----------
     spectrum : Spectrum
-        Of more than three channels the first, the middle and the last one are drawn.
+        If it has more than three channels, the first, the middle and the last one are drawn.
 
     Returns
     -------

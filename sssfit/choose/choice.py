@@ -72,9 +72,9 @@ class Step:
         The figure that the tolerance is of, on its worst view; on the first that was out of
         tolerance, where one was.
     delta_e_2000_mean, delta_e_2000_p95, delta_e_2000_p99, share_above_1 : float
-        Of that view; see `ImageScore`.
+        Errors of that view; see `ImageScore`.
     mm_per_pixel : float [mm]
-        Of that view.
+        Pixel size of that view.
     within : bool
         Whether every view is within the tolerance, wider ones within 95 % of it.
     """
@@ -272,7 +272,7 @@ def choose(
     passes : int, optional
         Most passes of the stages.
     seed : int
-        Of the walks.
+        Seed of the walks.
     threads : int, optional
         By default all cores; the choice does not depend on it.
     progress : callable, optional

@@ -43,7 +43,7 @@ class Option:
     fetches : float
         A pixel. What decides.
     passes : int
-        Of its stages.
+        Passes of its stages.
     known : float
         The error to expect, from that of the known kernels.
     settings : mapping
@@ -94,7 +94,7 @@ def options(width: float, fetches: float | None = None, passes: int | None = Non
     Parameters
     ----------
     width : float
-        Of the kernel, in pixels; see `sssfit.fit.structures.width_pixels`.
+        Width of the kernel, in pixels; see `sssfit.fit.structures.width_pixels`.
     fetches : float, optional
         The most fetches a pixel.
     passes : int, optional

@@ -116,14 +116,14 @@ class PhotonNeed:
     counts : tuple of int
         What was tried, up to that.
     errors : tuple of float
-        Of the worst view by each, in the figure the tolerance is of; inf where the profile cannot
-        be fitted.
+        Error of the worst view by each, in the figure the tolerance is of; inf where the profile
+        cannot be fitted.
     seconds : tuple of float [s]
-        That each took, compilation included.
+        What each took, compilation included.
     truth_method : str
         How the profile that the choice was made on was found.
     truth_seconds : float [s]
-        That it took.
+        What it took.
     """
 
     photons: int | None

@@ -82,7 +82,7 @@ def mm_per_pixel_at(distance_mm: float, fov_degrees: float, rows: int) -> float:
     fov_degrees : float [degrees]
         Vertical field of view, of which half lies above the middle: above 0, below 180.
     rows : int
-        Of the frame.
+        Rows of the frame.
 
     Raises
     ------
@@ -125,7 +125,7 @@ class ViewScore:
     ----------
     score : ImageScore
     mm_per_pixel : float [mm]
-        Of that view.
+        Pixel size of that view.
     error : float
         The figure that the tolerance is of.
     within : bool
@@ -144,7 +144,7 @@ class Views:
     Parameters
     ----------
     profile : Profile
-        Of the truth.
+        The profile of the truth.
     scenes : list of Scene
         The first is what was asked for.
     threads : int, optional

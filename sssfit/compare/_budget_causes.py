@@ -209,7 +209,7 @@ class Cause:
     difference : array (H, W, C)
         The picture with this cause alone less the true one.
     score : ImageScore
-        Of truth + difference against the truth, within the scene's mask.
+        Score of truth + difference against the truth, within the scene's mask.
     """
 
     name: str

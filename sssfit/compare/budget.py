@@ -51,9 +51,9 @@ class Budget:
     material : Material
     scene : Scene
     photons, seed : int
-        Of the walk.
+        Those of the walk.
     radius_mm : float [mm]
-        Of the grid that the kernel's profile is on.
+        Radius of the grid that the kernel's profile is on.
     beyond_grid : array (C,) [1]
         Energy beyond that grid, by the exact solution.
     model, storage : str or None, str
@@ -185,7 +185,7 @@ def error_budgets(
     photons, seed, progress
         Of the photon walk; see ``simulate_montecarlo``.
     radius_mm : float, optional [mm]
-        Of the grid of the kernel's profile; by default the paper's.
+        Radius of the grid of the kernel's profile; by default the paper's.
     method, settings
         The fit, one of ``sssfit.fit.METHODS`` or "cascade", and its keywords; by default svd of
         rank 3.

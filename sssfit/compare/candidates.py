@@ -117,9 +117,10 @@ def candidates(pixels: int, *, most_terms: int = MOST_TERMS) -> tuple[Candidate,
     Parameters
     ----------
     pixels : int
-        Of a pass: 2 h + 1. Over 513 the guided fit is left out, as over h + 1 terms the others.
+        Pixels of a pass: 2 h + 1. Over 513 the guided fit is left out, as over h + 1 terms the
+        others.
     most_terms : int
-        Of svd and gaussians.
+        Most terms of svd and gaussians.
     """
     most = min(most_terms, pixels // 2 + 1)
     found = [*_one_pass(pixels), *_several(most)]

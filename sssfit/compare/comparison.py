@@ -121,7 +121,7 @@ class KernelRow:
         A sum of Gaussians continues from the smaller ones found before, whose time is not counted;
         nor is the fit of the dense kernel for the tables of taps that are made from it.
     relative_frobenius_error : array (C,)
-        Of the kernel, as in `FitResult`; NaN for tables of taps.
+        The kernel's, as in `FitResult`; NaN for tables of taps.
     stop_reasons : tuple of str
         Why the fit of each channel ended; empty for tables of taps.
     fronts : frozenset of (error, cost)
@@ -196,9 +196,9 @@ class Comparison:
     profile : Profile
     mm_per_pixel : float [mm]
     pixels : int
-        Of a pass.
+        Pixels of a pass.
     threads : int
-        That the seconds were measured with.
+        Threads that the seconds were measured with.
     pictures : tuple of Picture
     rows : tuple of KernelRow
         Kernel by kernel in the candidates' order, for each all pictures.

@@ -81,9 +81,9 @@ def computed(
     ----------
     found : Profile, SeparableKernel, Taps, Material or Swatches
     kind : str
-        Of `drawn_of`; what is not in `COMPUTED` is drawn as it is.
+        One of `drawn_of`; what is not in `COMPUTED` is drawn as it is.
     profile : Profile, optional
-        That a kernel was fitted to.
+        The profile that a kernel was fitted to.
     ks, channel, mm_per_pixel
         As `compute_guide`, `compute_spectrum` and `view_kernel`.
     photons, seed, threads

@@ -70,14 +70,14 @@ class Engine:
     ----------
     label : str
     fetches : float
-        Of light, a pixel and frame; depth and masks are read as often.
+        Fetches of light, a pixel and frame; depth and masks are read as often.
     passes : int
     source : str
         Repository, file and function.
     method : str
         How it samples, in a sentence.
     picture : function
-        Of a scene and a profile.
+        Takes a scene and a profile, and returns the picture.
     """
 
     label: str

@@ -47,9 +47,9 @@ class Evaluation:
     truth : array (H, W, C), optional
         The same by the profile's 2D kernel; None where there is no profile.
     score : ImageScore, optional
-        Of the picture against the truth; within the scene's mask, where it has one.
+        Score of the picture against the truth; within the scene's mask, where it has one.
     cost : Cost
-        Of the kernel, with measured seconds.
+        Cost of the kernel, with measured seconds.
     asymmetry, true_asymmetry : array (C,)
         `radial_asymmetry` of the kernel, and of the profile's on the same pixels: round kernels
         whose light lies within a few pixels have much of it, since pixels are square. NaN where
@@ -57,7 +57,7 @@ class Evaluation:
     transmitted_maximum : array (C,), optional
         The most that comes through the object, where that was asked for.
     difference : DifferenceMap, optional
-        Of picture and truth, by `with_difference`.
+        Difference of picture and truth, by `with_difference`.
     """
 
     scene: Scene
@@ -111,9 +111,9 @@ class Evaluation:
         Parameters
         ----------
         targets : mapping of str to path or stream
-            Of "picture", "truth" and "difference"; a stream is given EXR.
+            Where to write "picture", "truth" and "difference"; a stream is given EXR.
         exposure : float, optional
-            Of PNG files; by default the one that Delta E was measured at.
+            Exposure of PNG files; by default the one that Delta E was measured at.
 
         Raises
         ------

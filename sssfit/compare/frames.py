@@ -46,7 +46,7 @@ def over_frames(
     Parameters
     ----------
     picture : function
-        Of the number of a frame, from 0: its picture (H, W, C).
+        Takes the number of a frame, from 0, and returns its picture (H, W, C).
     truth : array (H, W, C)
     mask : array (H, W), optional
         Pixels that count, as of `sssfit.measure.score.measure`.

@@ -36,7 +36,7 @@ class Guide:
     ----------
     profile : Profile
     channel : int
-        Which of the profile's.
+        Number of the profile's channel.
     mm_per_pixel : float [mm]
     ks : tuple of float
         0 (near) to 4 (far).

@@ -33,7 +33,7 @@ class KernelView:
     profile : Profile or None
         What it is compared with.
     channels : tuple of K int
-        Which of the kernel's.
+        Numbers of the kernel's channels.
     block : int
         Odd; 1 up to 600 pixels.
     image, true_image : array (K, m+1, m+1) [1/mm^2]

@@ -53,8 +53,8 @@ def compare_kernels(
     profile : Profile
         What is fitted, and what the true pictures are made from.
     scenes : sequence of Scene
-        Of different names and of one pixel size, which the kernels have; what counts of them says
-        `evaluated_scene`.
+        Scenes of different names and of one pixel size, which the kernels have; `evaluated_scene`
+        says what counts of them.
     support_mm : float, optional [mm]
         As `make_target`.
     candidates : sequence of Candidate, optional

@@ -43,7 +43,7 @@ class Panel:
         CIE lightness L* shown less that of the truth, -100 to 100; 0 outside the scene's mask.
         Not luminance: light leaks into shadows, where eyes and Delta E tell small steps apart.
     score : ImageScore
-        Of the picture against the truth, within the mask.
+        Score of the picture against the truth, within the mask.
     """
 
     codes: FloatArray
@@ -108,7 +108,7 @@ def picture_error(pixels: Target) -> Callable[[FloatArray], float]:
     Parameters
     ----------
     pixels : Target
-        Of the kernel. The pictures have its pixels, or wider ones of a 24th of its support.
+        Pixels of the kernel. The pictures have the same, or wider ones of a 24th of its support.
 
     Returns
     -------
@@ -151,7 +151,7 @@ class _Picture:
         How often weight i of a pass takes a pixel's light from another, with mirrored borders: over
         so small a picture a pass is a matrix, and needs no threads.
     counted : array (H, W)
-        Which pixels count, N.
+        True for the N pixels that count.
     truth : array (N, C)
         Exposed.
     exposure : float

@@ -116,7 +116,7 @@ def compare_presets(
     Parameters
     ----------
     source : Material or Profile
-        Of three channels.
+        Has three channels.
     scenes : sequence of Scene
         Flat pictures.
     threads : int, optional

@@ -86,15 +86,15 @@ def compare(
     name : str
         The source's name in messages.
     profile : Profile, optional
-        That of the source, where it is computed already.
+        The source's profile, where it is computed already.
     error : str
         The error of the front that will be drawn: those of Delta E need channels with a colour.
     only : collection of str, optional
         Methods of the kernels that are compared; by default all.
     mm_per_pixel : float or "profile", optional [mm]
-        Of a sheet.
+        Pixel size of a sheet.
     photons : int, optional
-        Of the budget's walk; by default 1e6.
+        Photons of the budget's walk; by default 1e6.
     threads : int, optional
     steps, walk : callable
         Take a label, and return a context whose value is called with the progress: of

@@ -64,7 +64,7 @@ class Sheet:
         Half width of the kernels.
     scenes : tuple of str
     exposures : tuple of float
-        Of each scene: `auto_exposure` of its truth.
+        Exposure of each scene: `auto_exposure` of its truth.
     rows : tuple of SheetRow
         Input first, truth last.
     production : mapping
@@ -110,15 +110,15 @@ def compute_sheet(
     Parameters
     ----------
     profile : Profile
-        Of 1 or 3 channels.
+        Has 1 or 3 channels.
     mm_per_pixel : float or "profile", optional [mm]
         By default 0.3; see ``sssfit.fit.make_target``.
     pixels : int
         Rows and columns.
     scenes : sequence of str
-        Of ``sssfit.scene.made.MADE``; the edge is upright, as in the paper's figure.
+        Names in ``sssfit.scene.made.MADE``; the edge is upright, as in the paper's figure.
     most_terms : int
-        Of Gaussians and SVD.
+        Most terms of Gaussians and SVD.
     threads : int, optional
 
     Raises

@@ -23,9 +23,9 @@ class Swatches:
     Parameters
     ----------
     name : str
-        Of the material that was varied.
+        Name of the material that was varied.
     method : str
-        Of the simulation.
+        Method of the simulation.
     wavelengths_nm : (n,) [nm]
     axes : mapping of str to (m,)
         The values of each other axis, in the order of the dimensions.

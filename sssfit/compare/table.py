@@ -163,7 +163,8 @@ def _flat(figures: dict[str, Any], channels: Sequence[str]) -> dict[str, Any]:
     flat: dict[str, Any] = {}
     for key, value in figures.items():
         if isinstance(value, list):
-            flat |= {f"{key}_{name}": each for name, each in zip(channels, value, strict=True)}
+            own = value or [None] * len(channels)  # tables of taps have no stop reasons
+            flat |= {f"{key}_{name}": each for name, each in zip(channels, own, strict=True)}
         elif key == "on_front":
             flat |= {f"{key}_{e}_{c}": int(is_on) for e in value for c, is_on in value[e].items()}
         else:

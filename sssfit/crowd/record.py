@@ -26,7 +26,7 @@ class Work:
     Parameters
     ----------
     texels_lit, texels_convolved : int
-        Of maps, or pixels of a picture in screen space; of all passes.
+        Texels of maps, or pixels of a picture in screen space; those convolved are of all passes.
     seconds : mapping of str to float
         By stage.
     mean_delta_e, largest_delta_e : float
@@ -74,7 +74,7 @@ class CrowdFrame:
     savings : Savings
     map_size : int
     map_sizes : tuple of int
-        Of each head, with savings.
+        Size of each head's maps, with savings.
     picture : array (H, W, C)
         With savings.
     work : mapping of str to Work

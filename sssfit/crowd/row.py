@@ -33,7 +33,7 @@ class Row:
     heads : int
         1 to 64.
     distance_units : float [100 mm]
-        Of the camera from the row's middle.
+        Distance of the camera from the row's middle.
     head_units, spacing_units : float [100 mm]
         Height of a head, and from one's middle to the next.
     fov_degrees : float [degrees]

@@ -61,7 +61,7 @@ def exported(
     form : str
         A name of ``sssfit.methods.EXPORTS``.
     ending : str
-        That of the file's name; textures are written as it says, by default as ".exr".
+        Ending of the file's name; textures are written as it says, by default as ".exr".
     **settings
         Those of the form there.
 
@@ -157,7 +157,7 @@ def source_text(
     form : str
         A name of ``DIALECTS``.
     prefix : str
-        Of all names.
+        Prefix of all names.
     coverage : bool
         Whether light stays within a mask unless the shader says otherwise.
     depth : bool

@@ -42,7 +42,7 @@ class Functions:
     passes : sequence of Pass
     dialect : Dialect
     prefix : str
-        Of all names.
+        Prefix of all names.
     is_indexed : bool
         Whether the arrays hold several profiles, of which an argument names one.
     is_jittered : bool

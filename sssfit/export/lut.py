@@ -66,7 +66,7 @@ def lut_bytes(
         last one 1; PNG 16-bit sRGB of the values over the largest, to look at.
     table : "radial", "line" or "kernel"
     texels : int, optional
-        Of the radial table, by default 256.
+        Texels of the radial table, by default 256.
     radius_mm : float, optional [mm]
         How far a profile's table reaches, by default as far as 99.9 % of every channel's light.
     mm_per_pixel : float, optional [mm]

@@ -33,7 +33,7 @@ class Pass:
         then added with the blend as well.
     writes : tuple of str
     fetches : int
-        Of each pixel of what it writes.
+        Fetches for each pixel that it writes.
     is_added : bool
         Whether the target adds what is written to what it holds.
     axis : tuple of float, optional

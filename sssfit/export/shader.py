@@ -37,7 +37,7 @@ class Style:
     Parameters
     ----------
     prefix : str
-        Of all names.
+        Prefix of all names.
     with_passes : bool
         Whether the functions of the passes follow the constants.
     normalized : bool
@@ -45,7 +45,7 @@ class Style:
     half : bool
         Whether numbers are rounded to half floats.
     features : tuple of str
-        Of `FEATURES`: which are on where nothing else is said.
+        Those of `FEATURES` that are on where nothing else is said.
     tilted : bool
         Whether passes take the mm of a pixel along either side apart.
     compute : bool

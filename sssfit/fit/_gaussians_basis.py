@@ -70,7 +70,7 @@ def basis_of(inner: FloatArray, width: FloatArray, bounds: tuple[float, float]) 
     inner, width : array (n, 1) [mm^2]
         r0^2 / 2 and (r1^2 - r0^2) / 2 of each annulus.
     bounds : (float, float)
-        Of the logarithm of variance.
+        Bounds of the logarithm of variance.
     """
     return _basis_of(inner.tobytes(), width.tobytes(), bounds)
 

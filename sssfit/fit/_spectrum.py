@@ -61,7 +61,7 @@ class SpectralTarget:
         Weight of a squared error, with the cell of each node; sum power wanted^2 = 1.
     energy : array (C,)
     half_pixels : int
-        Of the kernel.
+        Half width of the kernel.
     """
 
     frequencies: FloatArray

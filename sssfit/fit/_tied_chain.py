@@ -32,9 +32,9 @@ class TiedChain:
     base : array (S,)
     ties : array (S, P)
     step_parameters : array
-        Which of the P set widths or offset steps.
+        Indices of those of the P that set widths or offset steps.
     begin : function
-        Of a random generator; returns parameters (P,) from which a search may start.
+        Takes a random generator and returns parameters (P,) from which a search may start.
     """
 
     chain: Chain

@@ -86,7 +86,7 @@ def fit_cascade(
     full_resolution : bool
         Use no structure that halves the picture.
     spectrum : {"natural", "white"}, optional
-        Of the pictures that the kernel is for, by default natural.
+        Spectrum of the pictures that the kernel is for, by default natural.
     irradiance : str, Path or Scene, optional
         The picture that the kernel is for, in place of a spectrum: a name of
         ``sssfit.scene.made.MADE``, a file or a scene, at least as large as the kernel. Takes twice
@@ -99,7 +99,7 @@ def fit_cascade(
         search also starts from it: tables of similar optima can be mixed (`taps_between`). One of
         other stages is not used.
     seed : int
-        Of the random starts; the same seed and ``like`` give the same bits.
+        Seed of the random starts; the same seed and ``like`` give the same bits.
     mm_per_pixel, support_mm : float, optional [mm]
         Pixel size, and half width of the pixels of the profile's kernel; see
         ``sssfit.fit.make_target``. By default 99.99 % of every channel's energy lies within; the
@@ -374,7 +374,7 @@ def table_of(
     method : str
     target : Target
     chain : Chain
-        Of the target's lit channels; its energies may be shares.
+        The chain of the target's lit channels; its energies may be shares.
     x : array
         The chain's parameters.
     settings : mapping

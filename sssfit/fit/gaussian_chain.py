@@ -63,9 +63,9 @@ def fit_gaussian_chain(
         What of the stages is fitted as pictures see it: their widths and one common shape, their
         widths alone, or nothing.
     seed : int
-        Of the random starts; the same seed gives the same bits.
+        Seed of the random starts; the same seed gives the same bits.
     mm_per_pixel, support_mm : float, optional [mm]
-        As of `sssfit.fit.cascade.fit_cascade`.
+        As in `sssfit.fit.cascade.fit_cascade`.
 
     Returns
     -------

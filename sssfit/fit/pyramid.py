@@ -49,11 +49,11 @@ def fit_pyramid(
         The structure: the same number of tap pairs in each stage, such as "1|1|1|1|1"
         (`sssfit.kernel.structure`).
     spectrum : {"natural", "white"}
-        Of the pictures that the kernel is for.
+        Spectrum of the pictures that the kernel is for.
     seed : int
-        Of the random starts; the same seed gives the same bits.
+        Seed of the random starts; the same seed gives the same bits.
     mm_per_pixel, support_mm : float, optional [mm]
-        As of `sssfit.fit.cascade.fit_cascade`.
+        As in `sssfit.fit.cascade.fit_cascade`.
 
     Returns
     -------

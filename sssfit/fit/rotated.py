@@ -58,9 +58,9 @@ def fit_rotated(
     taps : int
         Fetches of a pass, odd, 3 to 129, by default 9.
     seed : int
-        Of the random starts; the same seed gives the same bits.
+        Seed of the random starts; the same seed gives the same bits.
     mm_per_pixel, support_mm : float, optional [mm]
-        As of `sssfit.fit.cascade.fit_cascade`.
+        As in `sssfit.fit.cascade.fit_cascade`.
 
     Returns
     -------

@@ -119,7 +119,7 @@ def best_structure(
     Parameters
     ----------
     width : float
-        Of the kernel, in pixels; see `width_pixels`.
+        Width of the kernel, in pixels; see `width_pixels`.
     fetches : float
         The most a pixel.
     passes : int, optional

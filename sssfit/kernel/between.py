@@ -25,7 +25,7 @@ def taps_between(first: Taps, second: Taps, mm_per_pixel: float) -> Taps:
     Parameters
     ----------
     first, second : Taps
-        Of the same material, stages and channels, for two pixel sizes.
+        Tables of the same material, stages and channels, for two pixel sizes.
     mm_per_pixel : float [mm]
         From the smaller to the larger of the two.
 

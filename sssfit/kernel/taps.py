@@ -148,7 +148,7 @@ class Stage:
         offsets_mm : array (n,) [mm]
         weights : array (n, C)
         mm_per_texel : float [mm]
-            Of the stage's own picture.
+            Size of a texel of the stage's own picture.
         """
         texels = offsets_mm / mm_per_texel
         whole = np.floor(texels)

@@ -26,7 +26,7 @@ class FrameFiles:
     folder : Path
         It is made if its own folder is there.
     name : str
-        Of the renderer whose pictures are written.
+        Name of the renderer whose pictures are written.
     frames : Frames
         All PNG files have the exposure of its brightest true frame.
     form : str

@@ -21,7 +21,7 @@ class Frames:
     scene : Scene
         At the intensity 1; what leaves it on one side comes in on the other.
     profile : Profile
-        Of the truth.
+        The profile of the truth.
     intensity : array (F,)
     shift : (int, int) [pixels]
         Down and right, of every frame after the first.

@@ -77,7 +77,7 @@ class MovingLight:
     shift : (int, int) [pixels]
         Down and right, of every frame.
     intensity : array (F,)
-        Of the light.
+        Intensity of the light.
     target_variance : float
     seed : int
     level : float

@@ -50,7 +50,7 @@ def moving_light(
     length : int
         Number of frames, 2 to 100 000; means leave out the first ones (`cold_frames`).
     target_variance : float
-        Of `AdaptiveRenderer`.
+        Target variance, as in `AdaptiveRenderer`.
     shift : (int, int) [pixels]
         By how much the picture moves down and right in every frame.
     ways : collection of str, optional

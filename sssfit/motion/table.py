@@ -47,7 +47,7 @@ class Trace:
     Parameters
     ----------
     coefficient, residual, error : array (6, 100)
-        Of the frames 1 to 100; the error is the root of the residual's moving variance.
+        Values in the frames 1 to 100; the error is the root of the residual's moving variance.
     true_coefficient : float
     """
 
@@ -68,11 +68,11 @@ class VariateTable:
     seed : int
         The first of them.
     errors : mapping of str to array (seeds, 6)
-        Of "still" and "moving".
+        Errors of "still" and "moving".
     coefficients : mapping of str to array (seeds,)
-        Of "still", "moving" and "in_frame".
+        Coefficients of "still", "moving" and "in_frame".
     traces : mapping of str to Trace
-        Of "still" and "moving".
+        Traces of "still" and "moving".
     """
 
     seeds: int
@@ -137,7 +137,7 @@ def measure_table(*, seeds: int = 200, seed: int = 1) -> VariateTable:
     seeds : int
         Number of runs, 1 to 10 000; their random numbers do not depend on each other.
     seed : int
-        Of the first; the others follow it.
+        Seed of the first; the others follow it.
 
     Raises
     ------

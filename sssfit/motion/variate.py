@@ -85,9 +85,9 @@ def variance_split(
     Parameters
     ----------
     mean_t, variance_t : float
-        Of the light's intensity T.
+        Those of the light's intensity T.
     mean_residual, variance_residual : float
-        Of F - alpha G.
+        Those of F - alpha G.
     """
     return Split(
         mean_t**2 * variance_residual,

@@ -32,9 +32,9 @@ class Task:
     ----------
     frames : Frames
     target_variance : float
-        Of adaptive samplers.
+        Target variance of adaptive samplers.
     fetches : float
-        Of a pixel, for the others.
+        Fetches a pixel, for the others.
     seed : int
     """
 
@@ -51,7 +51,7 @@ class Way:
     Parameters
     ----------
     picture : callable
-        Of a frame's number; returns the picture (H, W, C), and fetches a pixel.
+        Takes a frame's number; returns the picture (H, W, C), and fetches a pixel.
     maps : callable
         After a frame: moving variance and samples (H, W) of an adaptive sampler.
     """

@@ -16,6 +16,7 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import ProfileError
 from sssfit.messages import did_you_mean, shown
 from sssfit.optics import gauss_legendre
+from sssfit.profile.checks import TOTAL_ERRORS
 from sssfit.profile.frequency import annulus_waves
 from sssfit.profile.pixels import flat_annuli
 from sssfit.profile.record import Profile
@@ -79,12 +80,14 @@ def under_beam(profile: Profile, beam: Beam) -> Profile:
     """Return a profile under a beam, on its grid and as far beyond as the beam reaches.
 
     Light beyond the profile's grid stays beyond. Errors are of the same walk; estimates of
-    other methods add up.
+    other methods add up. Those of all light stay as they are, and ``meta`` records them. Errors by
+    angle are those of a walk whose photons enter all over the beam, so that they can be added up
+    over the annuli; within an annulus they are too large.
 
     Parameters
     ----------
     profile : Profile
-        Of a pencil beam.
+        The profile under a pencil beam.
     beam : Beam
 
     Raises
@@ -102,13 +105,25 @@ def under_beam(profile: Profile, beam: Beam) -> Profile:
         "annulus_energy": energy,
         "annulus_energy_stderr": stderr,
         "beyond_grid": beyond,
-        "meta": {**profile.meta, "beam": str(beam)},
+        "meta": {**profile.meta, "beam": str(beam), **_total_errors(profile)},
     }
     if profile.annulus_transmittance is not None:
         found |= _below(profile, edges, beam)
     for name in ("angle_reflected", "angle_transmitted"):
         found |= _by_angle(profile, edges, name, beam)
     return replace(profile, **found)
+
+
+def _total_errors(profile: Profile) -> dict[str, list[float]]:
+    """Return the standard errors of all light of a walk on either side, for ``meta``."""
+    if profile.photons is None:
+        return {}
+    errors = {name: getattr(profile, name) for name in TOTAL_ERRORS}
+    return {
+        name: own.tolist()
+        for name, own in errors.items()
+        if own is not None and np.isfinite(own).all()
+    }
 
 
 def _below(profile: Profile, edges: FloatArray, beam: Beam) -> dict[str, FloatArray | None]:
@@ -164,6 +179,7 @@ def _spread(
     """
     edges, photons = profile.r_edges_mm, profile.photons
     square = _squares(energy, stderr, photons)
+    power = 2 if photons is not None and whole is None else 1  # one photon a place, by angle
     fine, densities = flat_annuli(edges, energy if whole is None else whole)
     areas = np.pi * np.diff(fine**2)
     annulus = np.searchsorted(edges[1:-1], fine[:-1], side="right")
@@ -181,8 +197,8 @@ def _spread(
         shares = np.diff(within, axis=0)
         found += shares @ fine_energy[begin:end]
         firsts = np.flatnonzero(np.diff(annulus[begin:end], prepend=-1))
-        whole = np.add.reduceat(shares * part[begin:end], firsts, axis=1)
-        error += whole ** (1 if photons is None else 2) @ square[annulus[begin:end][firsts]]
+        of_annuli = np.add.reduceat(shares * part[begin:end], firsts, axis=1)
+        error += of_annuli**power @ square[annulus[begin:end][firsts]]
     if energy.min() >= 0.0:  # rounding, 1e-13 of the total, would give negative light
         found = np.maximum(found, 0.0)
     left = beyond + energy.sum(axis=0) - found.sum(axis=0)

@@ -4,8 +4,11 @@ The noise of a simulated profile grows outwards, so charts and comparisons use m
 a known error. Without photons the annuli are not merged.
 """
 
+import functools
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -26,6 +29,7 @@ def mean_free_paths_mm(profile: Profile) -> FloatArray | None:
     return paths_mm if np.isfinite(paths_mm).all() else None
 
 
+Parts: TypeAlias = Callable[[FloatArray], FloatArray]  # values of annuli to sums of some of them
 # 100 hits of equal weight have a standard error of 10 %: a tenth of the 2.3 that make a decade.
 MIN_HITS = 100
 # No bin is narrower than 1/40 of its radius. Over that width R_d falls by under 10 % out to 4 decay
@@ -70,8 +74,8 @@ def merged(profile: Profile, channel: int) -> Bins:
 
     With N photons, e and s an annulus' energy and standard error, S2 = N ((N-1) s^2 + e^2) is its
     sum of squared weights, and (N e)^2 / S2 hits of equal weight would have the same relative
-    error. S2 of merged annuli is a sum, see `Profile.cumulative_stderr`. Without photons or errors
-    the annuli are not merged.
+    error. S2 of merged annuli is a sum, see `Profile.cumulative_stderr`; under a beam annuli share
+    photons, and their errors add up at most. Without photons or errors the annuli are not merged.
     """
     energy = profile.annulus_energy[:, channel]
     stderr = profile.annulus_energy_stderr[:, channel]
@@ -79,32 +83,43 @@ def merged(profile: Profile, channel: int) -> Bins:
     if photons is None or photons < 2 or np.isnan(stderr).any():
         return Bins(profile.r_edges_mm, energy, stderr, np.ones(len(energy), dtype=np.bool_))
     mean_square = (photons - 1) * stderr**2 + energy**2
-    cuts = _cuts(energy, mean_square, photons)
-    summed = np.add.reduceat(energy, cuts[:-1])
-    summed_square = np.add.reduceat(mean_square, cuts[:-1])
-    variance = np.maximum(summed_square - summed**2, 0.0) / (photons - 1)
-    is_full = effective_hits(summed, summed_square, photons) >= MIN_HITS
+
+    def hits(parts: Parts) -> FloatArray:
+        if profile.shares_photons:
+            return effective_hits(parts(energy), parts(stderr) ** 2, 1)
+        return effective_hits(parts(energy), parts(mean_square), photons)
+
+    cuts = _cuts(len(energy), hits)
+    between = functools.partial(np.add.reduceat, indices=cuts[:-1])
+    summed, variance = between(energy), between(stderr) ** 2
+    if not profile.shares_photons:
+        variance = np.maximum(between(mean_square) - summed**2, 0.0) / (photons - 1)
+    is_full = hits(between) >= MIN_HITS
     n_drawn = int(np.max(np.flatnonzero(is_full & _is_in_step(cuts)), initial=-1)) + 1
     is_drawn = np.arange(len(summed)) < n_drawn
     return Bins(profile.r_edges_mm[cuts], summed, np.sqrt(variance), is_drawn)
 
 
 def effective_hits(energy: FloatArray, mean_square: FloatArray, photons: int) -> FloatArray:
-    """Return the hits of equal weight with the same relative error, from e and S2 / N."""
+    """Return the hits of equal weight with the same relative error, from e and S2 / N.
+
+    One photon with e and s^2 gives those of an error s.
+    """
     out = np.zeros_like(energy)
     return np.divide(photons * energy**2, mean_square, out=out, where=mean_square > 0)
 
 
-def _cuts(energy: FloatArray, mean_square: FloatArray, photons: int) -> list[int]:
-    """Choose the remaining edges; bins never get narrower outwards."""
+def _cuts(end: int, hits: Callable[[Parts], FloatArray]) -> list[int]:
+    """Choose the remaining edges; bins never get narrower outwards.
+
+    ``hits`` takes the function that adds up values over the annuli of a bin.
+    """
 
     def is_full(first: int, last: int) -> bool:
         # Sums of slices, because differences of running sums lose the tails: S2 spans 20 decades.
-        annuli = slice(first, last)
-        total = energy[annuli].sum(keepdims=True), mean_square[annuli].sum(keepdims=True)
-        return bool(effective_hits(*total, photons)[0] >= MIN_HITS)
+        return bool(hits(lambda each: each[first:last].sum(keepdims=True))[0] >= MIN_HITS)
 
-    cuts, width, end = [0], 1, len(energy)
+    cuts, width = [0], 1
     while (first := cuts[-1]) < end:
         width = max(width, math.ceil(first / _RADII_PER_WIDTH))
         while first + width < end and not is_full(first, first + width):

@@ -18,6 +18,8 @@ _MIN_MM = 1e-12
 # Least width of an annulus as a share of its radius, so that the 64 parts used for pixels stay
 # distinct in double precision. 100 000 annuli, the maximum, have 1e-5 at the rim.
 _NARROWEST = 1e-9
+# Of all light on a side: in ``meta`` where they do not follow from those of annuli (`under_beam`).
+TOTAL_ERRORS = ("diffuse_reflectance_stderr", "transmittance_stderr")
 
 
 def checked(given: Mapping[str, Any]) -> dict[str, Any]:
@@ -124,17 +126,22 @@ def _check_meta(meta: Mapping[str, Any], n_channels: int) -> None:
         )
     check_names(names, ProfileError)
     check_provenance(meta, ProfileError)
-    error, errors = meta.get("relative_error"), meta.get("energy_balance_stderr")
+    error = meta.get("relative_error")
     if error is not None and not _is_error(error):
         raise ProfileError(f"meta.relative_error = {shown(error)}; expected 0 or more, or null.")
+    for name in ("energy_balance_stderr", *TOTAL_ERRORS):
+        _check_errors(name, meta.get(name), n_channels)
+    _check_material(meta)
+
+
+def _check_errors(name: str, errors: object, n_channels: int) -> None:
     if errors is not None and not (
         isinstance(errors, list) and len(errors) == n_channels and all(map(_is_error, errors))
     ):
         raise ProfileError(
-            f"meta.energy_balance_stderr = {shown(errors)}; expected a number from 0 up for each "
+            f"meta.{name} = {shown(errors)}; expected a number from 0 up for each "
             f"of {counted(n_channels, 'channel')}, or null."
         )
-    _check_material(meta)
 
 
 def _is_error(value: object) -> bool:

@@ -87,10 +87,13 @@ def _variance(profile: Profile, k: FloatArray) -> FloatArray:
     """Return the variance of R(k); annuli of a walk are anticorrelated.
 
     As `Profile.cumulative_stderr`: of N photons, mean squares add up, less the square of the mean.
+    Unknown under a beam.
     """
     stderr, edges, photons = profile.annulus_energy_stderr, profile.r_edges_mm, profile.photons
     if photons is None:
         return _summed(k, edges, stderr**2, squared=True)
+    if profile.shares_photons:
+        return np.full((len(k), profile.n_channels), np.nan)
     squares = (photons - 1) * stderr**2 + profile.annulus_energy**2
     mean = _summed(k, edges, profile.annulus_energy)
     found = _summed(k, edges, squares, squared=True) - mean**2

@@ -180,6 +180,14 @@ class Profile:
         return self.meta.get("photons")
 
     @property
+    def shares_photons(self) -> bool:
+        """Whether each photon of a walk counts in many annuli, as under a beam.
+
+        Errors of their sums then do not follow from those of the annuli.
+        """
+        return self.photons is not None and "beam" in self.meta
+
+    @property
     def sha256(self) -> str:
         """Fingerprint of the data used by fits and true pictures; kernels record it.
 
@@ -208,7 +216,12 @@ class Profile:
 
     @property
     def diffuse_reflectance_stderr(self) -> FloatArray:
-        """Standard error of `diffuse_reflectance` (C,); see `cumulative_stderr`."""
+        """Standard error of `diffuse_reflectance` (C,); see `cumulative_stderr`.
+
+        A beam does not change it.
+        """
+        if self.shares_photons:
+            return self._recorded_stderr("diffuse_reflectance_stderr")
         energy = np.vstack((self.annulus_energy, self.beyond_grid))
         stderr = np.vstack((self.annulus_energy_stderr, self.beyond_grid_stderr))
         of_total: FloatArray = _stderr_of_sums(energy, stderr, self.photons)[-1]
@@ -232,12 +245,18 @@ class Profile:
         on_grid, beyond = self.annulus_transmittance_stderr, self.beyond_grid_transmittance_stderr
         if self.annulus_transmittance is None or on_grid is None or beyond is None:
             return None
+        if self.shares_photons:
+            return self._recorded_stderr("transmittance_stderr")
         energy = self.annulus_transmittance
         if self.beyond_grid_transmittance is not None:
             energy = np.vstack((energy, self.beyond_grid_transmittance))
             on_grid = np.vstack((on_grid, beyond))
         of_total: FloatArray = _stderr_of_sums(energy, on_grid, self.photons)[-1]
         return of_total
+
+    def _recorded_stderr(self, name: str) -> FloatArray:
+        """Return the standard error of all light on a side (C,) that `under_beam` has recorded."""
+        return np.array(self.meta.get(name) or [np.nan] * self.n_channels, dtype=np.float64)
 
     @property
     def material_name(self) -> str | None:
@@ -294,9 +313,12 @@ class Profile:
         A photon of N lands in at most one annulus, so annuli are anticorrelated and their variances
         do not add. The walk's s_i^2 = (S2_i/N - e_i^2)/(N-1) gives the sum of squared weights
         S2_i = N ((N-1) s_i^2 + e_i^2), which do add: Var F_k = (sum_{i<k} S2_i/N - F_k^2)/(N-1).
-        Without photons the variances are added.
+        Without photons the variances are added. Under a beam, which spreads each photon over many
+        annuli, the errors are unknown: NaN.
         """
         stderr = _stderr_of_sums(self.annulus_energy, self.annulus_energy_stderr, self.photons)
+        if self.shares_photons:
+            stderr = np.full_like(stderr, np.nan)
         return np.concatenate((np.zeros((1, self.n_channels)), stderr))
 
     @property

@@ -127,7 +127,7 @@ def render_samples(
     scene : Scene
         A flat picture: only its irradiance and pixel size are used.
     sampler : KernelSampler
-        Of the scene's pixel size.
+        A sampler for the scene's pixel size.
     counts : int or array (H, W) of int
         Samples of each pixel, 1 to 64; the mean of n samples has 1/n of the variance of one.
     scale : float or array (H, W)
@@ -197,9 +197,9 @@ def samples_for(
     Parameters
     ----------
     variance : array (...)
-        Of one sample.
+        Variance of one sample.
     target_variance : float
-        Of the mean, above 0: that of n samples is 1/n of that of one.
+        Variance of the mean, above 0: that of n samples is 1/n of that of one.
     start : int or array (...)
         Where the variance is not known, NaN.
 

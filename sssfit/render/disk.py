@@ -88,7 +88,7 @@ def apply_disk(
     pixels : array (H, W, 1) or (H, W, C)
         float32 or float64, the precision of all sums.
     stage : Stage
-        Of the kind "disk".
+        A stage of the kind "disk".
     mm_per_pixel : float [mm]
     frame : int
         From 0; each frame turns the fetches differently.

@@ -22,9 +22,9 @@ class Drawn:
     Parameters
     ----------
     copies : array (H, W) of int
-        Which copy of the mesh a pixel shows; -1 where there is none.
+        The copy of the mesh that a pixel shows; -1 where there is none.
     faces : array (H, W) of int
-        Which of its triangles; 0 where there is none.
+        The triangle of that copy; 0 where there is none.
     places : array (H, W, 2)
         Shares of the second and third corner.
     """
@@ -57,7 +57,7 @@ def draw_view(mesh: Mesh, offsets_mm: npt.ArrayLike, camera: Camera) -> Drawn:
     ----------
     mesh : Mesh
     offsets_mm : array (K, 3) [mm]
-        Of each copy.
+        Offset of each copy.
     camera : Camera
     """
     shape = camera.height, camera.width

@@ -30,7 +30,7 @@ class Jitter:
     Parameters
     ----------
     share : float
-        Of the mirrored pairs of a pass, the outermost ones, rounded up: 0 to 1.
+        Share of the mirrored pairs of a pass, the outermost ones, rounded up: 0 to 1.
     scale : float
         Most by which a pixel lengthens or shortens their offsets, as a share, below 1.
     degrees : float

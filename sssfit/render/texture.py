@@ -122,7 +122,7 @@ def render_texture(
     ----------
     mesh : Mesh
     offsets_mm : array (K, 3) [mm]
-        Of each copy.
+        Offset of each copy.
     camera : Camera
     lights : sequence of PointLight
     kernel : SeparableKernel or Taps

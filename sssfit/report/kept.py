@@ -51,7 +51,7 @@ def kept(key: str, make: Callable[[], dict[str, Any]]) -> dict[str, Any]:
     Parameters
     ----------
     key : str
-        Of `page_key`.
+        The page's key, from `page_key`.
     make : callable
         Returns JSON values.
     """

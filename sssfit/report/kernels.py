@@ -140,7 +140,7 @@ def shown_candidates(pixels: int, only: Collection[str] | None = None) -> list[C
     Parameters
     ----------
     pixels : int
-        Of a pass; as `every_candidate`.
+        Pixels of a pass, as in `every_candidate`.
     only : collection of str, optional
         Names of methods; then all of their kernels that a shader runs.
     """

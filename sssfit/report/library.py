@@ -30,7 +30,7 @@ class Swatch:
     name, source : str
     reflectance : array (C,)
     radius_mm : array (C,) [mm]
-        That holds 90 % of a channel's light.
+        The radius that holds 90 % of a channel's light.
     picture : array (H, W, 3)
         The lit head, exposed.
     """

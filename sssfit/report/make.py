@@ -53,9 +53,9 @@ def make_report(
     Parameters
     ----------
     source : Material or Profile
-        Of 1 or 3 channels, which a page can show as colours.
+        Has 1 or 3 channels, which a page can show as colours.
     name : str, optional
-        Of the page of a profile that does not name its material.
+        Name of the page of a profile that does not name its material.
     origin : str, optional
         What the source was named as, in the command lines of the page; by default its title.
     named : sequence of (str, Taps)
@@ -67,11 +67,11 @@ def make_report(
     only : collection of str, optional
         Methods of the other kernels; by default those that are fitted in seconds.
     mm_per_pixel : float, optional [mm]
-        Of the kernels' pixels; by default those of the picture's file, else 0.3.
+        Size of the kernels' pixels; by default that of the picture's file, else 0.3.
     side : int
         Rows and columns of the pictures.
     photons, seed : int
-        Of the walk in models and error budget; walks of up to so many show convergence.
+        Those of the walk in models and error budget; walks of up to so many show convergence.
     threads : int, optional
     progress : callable, optional
         Called with how many steps are done, of how many, and the name of the next.

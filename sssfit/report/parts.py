@@ -29,7 +29,7 @@ def parts_of(source: Material | Profile, flat: Sequence[Scene], walk: dict[str, 
     source : Material or Profile
         A profile has no coefficients, and so none of the parts.
     flat : sequence of Scene
-        Of the budget.
+        The scenes of the budget.
     walk : dict
         ``photons``, ``seed`` and ``threads`` of the photon walks.
     """

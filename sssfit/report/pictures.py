@@ -36,7 +36,7 @@ class Shown:
     name : str
         "head", "disk", "edge", or the name of a file.
     light_degrees, distance_mm : float, optional
-        Of a head.
+        Where a head's light and its camera are.
     reference : Reference
         The lit scene with its mask, the border, the truth and its exposure.
     """
@@ -102,7 +102,7 @@ def shown_pictures(
     profile : Profile
         What the truths are made from.
     mm_per_pixel : float [mm]
-        Of disk, edge and the nearest head.
+        Pixel size of disk, edge and the nearest head.
     own : Scene, optional
         A user's picture, which comes first.
     side : int

@@ -31,9 +31,9 @@ class Camera:
     Parameters
     ----------
     distance_mm : float [mm]
-        Of the eye from the origin.
+        Distance of the eye from the origin.
     height, width : int
-        Of the picture in pixels.
+        Size of the picture in pixels.
     fov_degrees : float [degrees]
         Vertical field of view, up to 170.
     near_mm, far_mm : float [mm]

@@ -33,8 +33,8 @@ class Mesh:
     faces : array (F, 3) of int
         Vertices of each triangle. Triangles without an area are left out, with a warning.
     normals : array (V, 3), optional
-        Of any length. By default the sum of the normals of the triangles around a place, by area,
-        over seams.
+        Vectors of any length. By default the sum of the normals of the triangles around a place, by
+        area, over seams.
 
     Raises
     ------

@@ -45,7 +45,7 @@ def walk_of(material: Material, grid: RadialGrid, seed: int, photons: int) -> Wa
     grid : RadialGrid
     seed : int
     photons : int
-        Of all batches.
+        Number of photons in all batches.
     """
     return make_walk([material], [grid], seed, photons)
 

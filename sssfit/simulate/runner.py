@@ -215,7 +215,7 @@ def simulate_to_files(
     inputs : iterable of str or Path
         Files that are read and must not be overwritten.
     beam : Beam, optional
-        That the profiles are under, in place of a pencil beam.
+        The beam that the profiles are under, in place of a pencil beam.
     stop : callable
         When it returns true, a walk ends with the photons so far, and no other run begins.
     watch : callable

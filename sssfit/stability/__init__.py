@@ -57,7 +57,7 @@ def stability(
     mm_per_pixel : float [mm]
         Where pixels are not what is made harder.
     seed : int
-        Of walks and searches.
+        Seed of walks and searches.
     threads : int, optional
         Processes that share the work, by default as many as there are cores; a script that calls
         this needs its ``if __name__ == "__main__":`` then. With 1 there is none but the caller's.

@@ -72,7 +72,7 @@ class Axis:
         The end or place from which the search for the limit begins.
     is_log : bool
     form : str
-        Of its numbers in tables.
+        Format of its numbers in tables.
     """
 
     label: str

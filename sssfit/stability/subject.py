@@ -45,7 +45,7 @@ class Subject:
     mm_per_pixel : float [mm]
     seed : int
     threads : int, optional
-        Of the exact solver.
+        Threads of the exact solver.
     is_whole : bool
         Whether cascades are searched again for every walk and have as many sizes as the others.
     workers : Workers, optional

@@ -41,7 +41,7 @@ class Workers:
     Parameters
     ----------
     count : int
-        Of processes, which start at the first call.
+        Number of processes, which start at the first call.
     shared : object
         The first argument of every call. Each process has a copy, so what is cached on it stays.
     """

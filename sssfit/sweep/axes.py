@@ -25,11 +25,11 @@ class Axis:
     Parameters
     ----------
     name : str
-        Of its dimension in the store, and in formulas.
+        Name of its dimension in the store, and in formulas.
     values : tuple of float (n,)
         Its coordinates.
     units : str
-        Of the coordinates: "1/mm", "mm", "nm" or "1".
+        Units of the coordinates: "1/mm", "mm", "nm" or "1".
     key : str
         The coefficient that it sets; empty where only formulas use it.
     columns : mapping

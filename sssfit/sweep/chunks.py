@@ -28,7 +28,7 @@ class Chunks:
     plan : Plan
         Its plan.
     variable : Variable
-        Of float64 or int64.
+        A variable of float64 or int64.
     """
 
     def __init__(self, store: Path, plan: Plan, variable: Variable) -> None:

@@ -28,7 +28,7 @@ def local_workers(count: int) -> Any:
     Parameters
     ----------
     count : int
-        Of worker processes, each of one thread.
+        Number of worker processes, each of one thread.
 
     Returns
     -------

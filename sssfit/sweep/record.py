@@ -16,7 +16,7 @@ class SweepResults:
     ----------
     plan : Plan
     path : Path
-        Of its store.
+        Path of its store.
     before : int
         Points that were finished when it began.
     done : int

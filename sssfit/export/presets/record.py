@@ -34,7 +34,7 @@ class Preset:
     model : str
         The diffusion model that the engine's parameters stand for.
     ending : str
-        That of the file that `write` makes, such as ".py".
+        Ending of the file that `write` makes, such as ".py".
     fields : tuple of Field
     convert : function
         From a source and the chosen parameters to the values of all fields.

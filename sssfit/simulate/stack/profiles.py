@@ -59,7 +59,7 @@ def solve_stacks(
         Largest error of F(r) at an edge, above and below, and of the totals, as a share of the
         light that leaves on both sides.
     pool : ThreadPoolExecutor
-        Of ``threads`` threads; the result does not depend on them.
+        A pool of ``threads`` threads; the result does not depend on them.
     reduced : sequence of Material, optional
         What is solved for in place of each material, by the similarity relation.
     stop : callable, optional

@@ -137,9 +137,9 @@ def steps(
     ----------
     family : Family
     radii : list of (n,) [mm]
-        Of each stack, above 0 and ascending.
+        Radii of each stack, above 0 and ascending.
     specular : list of float
-        Of each stack, the share of the beam that returns and is not part of F.
+        For each stack the share of the beam that returns and is not part of F.
     counts : sequence of int
         Numbers of directions.
     quarter : Quarter
