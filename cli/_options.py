@@ -43,7 +43,7 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
     """Add -q, -v, --json, --threads, --seed and hand them to the command as ``common``."""
 
     @options(
-        flag("-q --quiet", "Print errors only."),
+        flag("-q --quiet", "Print errors and warnings only."),
         flag("-v --verbose", "Print more."),
         flag("--json", "Print one JSON object on stdout."),
         option(

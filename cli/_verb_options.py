@@ -161,10 +161,7 @@ FIT_PIXELS = (
     option("--support", Length("auto"), "MM|auto", "Half width of the kernel; auto is the "
            "smallest that keeps 99.9 % of every channel, for cascade 99.99 %.", "auto"),
     flag("--smooth", "Take most of a walk's noise out of the profile before the fit."),
-    flag(
-        "--normalize",
-        "Separable kernels: scale every channel to unit energy, and store its energy as a factor.",
-    ),
+    flag("--normalize", "Separable kernels: scale each channel to unit energy, kept as a factor."),
 )
 FIT_OUTPUT = (STRICT, *output("PROFILE.METHOD.taps.json, .kernel.json without taps",
                              "is not our kernel"))
@@ -254,7 +251,7 @@ _OF_CHARTS = {  # options of single charts: what of it they are for, and the cha
     "photons": ("the walk of --models", {"models"}),
     "mm_per_pixel": ("the kernel of --spectrum or --guide", {"spectrum", "guide"}),
     "ks": ("the fits of --guide", {"guide"}),
-    "channel": ("the fits of --guide, or for a kernel", {"guide", "kernel"}),
+    "channel": ("the fits of --guide, or for a separable kernel", {"guide", "kernel"}),
     "profile": ("a kernel", {"kernel", "taps"}),
 }
 

@@ -35,11 +35,9 @@ def export(
     tables with the same stages share one source, and an index says which. The csv of a profile has
     the energy of each annulus and its standard error, against the annulus' outer edge r_mm (inf:
     beyond the grid), with every digit; `sssfit import` reads it back. It has no specular
-    reflectance, absorption and transmittance. Textures of lut are linear floats; a PNG shows them
-    over their largest value.
-
-    --preset takes a material, its profile or a table of an engine's own taps, and NAME=VALUE of
-    what a user chooses; --list says which.
+    reflectance, absorption and transmittance. Textures of lut are linear floats, in a PNG over the
+    largest value. --preset takes a material, its profile or a table of an engine's own taps, and
+    NAME=VALUE of what a user chooses; --list says which.
 
     \b
       sssfit export --format hlsl

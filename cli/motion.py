@@ -7,7 +7,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
-from sssfit.messages import counted
+from sssfit.messages import counted, stated
 from sssfit.methods import LIGHTS, RENDERERS, lines_of
 from sssfit.scene.made import check_pictures
 
@@ -64,7 +64,7 @@ def motion(context: click.Context, /, material: str | None, common: Common, **gi
         for each in outputs:
             write_chart(found, each)
     wrote = [f"{counted(len(frames), 'frame')} to {given['frames']}"] if frames else []
-    words = [found.text(), *(f"Wrote {each}" for each in [*wrote, *charts])]
+    words = [found.text(), *map(stated, [*wrote, *charts])]
     finish(common, {"output": [*frames, *charts], **found.to_dict()}, "\n".join(words))
 
 

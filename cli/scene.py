@@ -45,6 +45,7 @@ def scene(kernel: str | None, common: Common, **given: Any) -> None:
     from sssfit.crowd import runner
     from sssfit.formats.pictures import image_format, is_image_file
     from sssfit.kernel import read_kernel
+    from sssfit.messages import stated
 
     if given["chart"] not in (None, "-"):
         chart_format(given["chart"])
@@ -64,5 +65,5 @@ def scene(kernel: str | None, common: Common, **given: Any) -> None:
         if given["output"]:
             save = partial(found.save, format=form, bloom=given["bloom"] or 0.0)
             write(save, target(given["output"]))
-    text = [found.text(), *map("Wrote {}".format, wrote)]
-    finish(common, {"output": wrote, "kernel": kernel, **found.to_dict()}, "\n".join(text))
+    text = "\n".join([found.text(), *map(stated, wrote)])
+    finish(common, {"output": wrote, "kernel": kernel, **found.to_dict()}, text)

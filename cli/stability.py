@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+from sssfit.messages import stated
 from sssfit.methods import STRESSES, lines_of
 
 from ._input import load_source
@@ -23,9 +24,8 @@ from ._verb_options import STABILITY
 def stability(material: str | None, common: Common, **given: Any) -> None:
     """Stress every method on MATERIAL until it breaks, and say where it is safe.
 
-    Cascades and published methods are compared under one stress at a time. Each stress grows step
-    by step, and a method is safe until its measure exceeds the limit. A measure that depends on the
-    place has a range.
+    Cascades and published methods are compared under one stress at a time, which grows step by
+    step. A method is safe until its measure exceeds the limit, or has a range if places differ.
 
     MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or a .profile.npz
     file, - for one on stdin; stresses that walk photons need a profile that says its material.
@@ -68,4 +68,4 @@ def stability(material: str | None, common: Common, **given: Any) -> None:
                 write(words.encode(), target(table))
     figures = found[0].to_dict() if material else {"materials": [each.to_dict() for each in found]}
     text = [found[0].text()] * bool(material)
-    finish(common, {"output": wrote, **figures}, "\n".join([*text, *map("Wrote {}".format, wrote)]))
+    finish(common, {"output": wrote, **figures}, "\n".join([*text, *map(stated, wrote)]))

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING, Any, BinaryIO, TypeAlias
 
 from sssfit.errors import FileError
 from sssfit.files import is_marked, read_at_most, reason
-from sssfit.messages import did_you_mean, printable
-from sssfit.methods import imported
+from sssfit.messages import did_you_mean, printable, shown
+from sssfit.methods import DEON_SKIN, imported
 from sssfit.text import decode
 
 if TYPE_CHECKING:
@@ -96,6 +96,8 @@ def load(source: "str | Path | BinaryIO", origin: str | None = None) -> "Loaded"
     'skin1'
     """
     if not isinstance(source, str | Path):
+        if not hasattr(source, "read"):
+            raise FileError(f"{shown(source)} is not a path; expected one, or a binary stream.")
         origin = printable(origin or "the stream")
         source = _whole(source, origin)
         kind = _kind(source)
@@ -133,6 +135,10 @@ def _check_regular_file(path: Path, origin: str, names: Any) -> None:
         path.stat()
     except (OSError, ValueError) as error:  # ValueError: a null character
         why = reason(error) if isinstance(error, OSError) else str(error)
+        if origin == DEON_SKIN:
+            raise FileError(
+                f"{origin} has no coefficients and no file; simulate it, and name its profile."
+            ) from None
         near = did_you_mean(origin, names).strip()
         raise FileError(f"{origin} cannot be read: {why}.{f' {near}' if near else ''}") from None
     if path.is_dir():

@@ -37,6 +37,11 @@ def shown(value: object) -> str:
     return text if len(text) <= _MOST_SHOWN else text[: _MOST_SHOWN - 3] + "..."
 
 
+def stated(path: str) -> str:
+    """Return that a file was written, or what "-" stands for."""
+    return f"Wrote {path}" if path != "-" else "Wrote to stdout"
+
+
 def did_you_mean(word: str, known: Sequence[str]) -> str:
     """Return ``did you mean X? `` for the nearest known word, or nothing if none is near."""
     import difflib  # 5 ms that help does not need

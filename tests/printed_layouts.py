@@ -61,7 +61,8 @@ def materials_list(f: Figures) -> list[Any]:
         Table([*heads, "radius, mm"], rows),
         Table(["layers", "eta", "thickness, mm", "source"], layered),
         Words(
-            "{}: a profile without coefficients, for simulate, compare and choose", *f["profiles"]
+            "{}: a profile without coefficients, for simulate, compare, choose, motion and report",
+            *f["profiles"],
         ),
     ]
 
@@ -239,7 +240,9 @@ def _balance(rows: list[Figures]) -> list[Words]:
     parts += " + transmitted" if any(row["transmittance"] is not None for row in rows) else ""
     unfinished = max(value for row in rows for value in row["unfinished"])
     parts += " + unfinished" if unfinished else ""
-    balance, stderr, name = max(each, key=lambda one: abs(one[0]) / (4.5 * one[1] + 1e-12))
+    balance, stderr, name = max(
+        each, key=lambda one: max(abs(one[0]) - 1e-12, 0.0) / (4.5 * one[1] + 1e-12)
+    )
     if not rows[0]["photons"]:
         words = Words("energy: {} = 1 to {} (worst channel, {})", parts, Rough(abs(balance)), name)
         return [*lines, words]
@@ -976,7 +979,7 @@ def _where_light_went(f: Figures) -> Table:
         stderr = f["energy_balance_stderr"]
         balance: Any = Rough(f["energy_balance"][c])
         if stderr is not None:
-            balance = Words("{} +- {}", balance, Rough(stderr[c]))
+            balance = Words("{} +- {}", balance, Rough(max(stderr[c], 1e-12)))
         rows.append(
             [
                 *(name, diffuse, f["diffuse_reflectance_stderr"][c], beyond),
@@ -1033,9 +1036,10 @@ def _safe(finding: Figures) -> Any:
 
 def motion(f: Figures) -> list[Any]:
     head = Words(
-        "{}, {} under {} light: {} frames of {} x {} pixels, target variance {}",
+        "{}, {} under {} light: {} frames of {} x {} pixels, target variance {}; means leave out "
+        "the first {}",
         *(f["material"], f["irradiance"], f["light"], f["frames"], f["width"], f["height"]),
-        f["target_variance"],
+        *(f["target_variance"], f["cold_frames"]),
     )
     rows = [
         [each["label"], each["mean_fetches"], each["rmse"], Percent(each["rmse"] / f["level"])]

@@ -126,6 +126,16 @@ def test_chart_and_tables_are_written(run, tmp_path):
     )
 
 
+def test_tables_of_taps_are_rows_of_a_csv_too(run, tmp_path):
+    """They have no reasons for stopping; their columns are empty."""
+    run("skin1", *SMALL, "--only", "preintegrated", "--what", "front", "--table", "t.csv")
+    table = (tmp_path / "t.csv").read_text().partition("\n")[2]
+    lines = list(csv.DictReader(io.StringIO(table)))
+    assert len({len(line) for line in lines}) == 1
+    assert [line["taps"] for line in lines] == ["", "5", "11"]
+    assert [line["stop_reasons_R"] == "" for line in lines] == [False, True, True]
+
+
 def test_a_profile_stands_for_its_material(run, tmp_path):
     simulate_exact(load_material("skin1")).save(tmp_path / "p.profile.npz")
     ours, theirs = (

@@ -45,7 +45,7 @@ def test_list_names_every_material_within_100_columns(run):
     assert [line.split()[0] for line in layered] == list(material_names(layered=True))
     fat = next(line for line in layered if line.startswith("skin-melanin-12-fat"))
     assert fat.split()[1:7] == ["1.4", "1.4", "1.44", "0.06", "1.5", "inf"]
-    uses = "a profile without coefficients, for simulate, compare and choose"
+    uses = "a profile without coefficients, for simulate, compare, choose, motion and report"
     assert lines[-2:] == ["", f"deon-skin: {uses}"]
     assert max(map(len, lines)) <= 100
     skin1 = next(line for line in lines if line.startswith("skin1"))

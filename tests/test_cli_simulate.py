@@ -129,6 +129,14 @@ def test_an_energy_balance_that_is_off_is_said(sigmas, said, sign):
         assert "(worst channel, skin1 R)" in line
 
 
+def test_rounding_is_not_the_worst_channel():
+    """Of a channel without roulette the balance is rounding, and so is its standard error."""
+    row = run_figures(simulate_montecarlo(load_material("skin1"), photons=20_000), 1.0)
+    row["energy_balance"] = np.array([-4e-14, 3e-9, 0.0])
+    row["energy_balance_stderr"] = np.array([2e-20, 1e-7, 0.0])
+    assert "+3.0e-09, standard error 1e-07 (worst channel, skin1 G)" in energy_lines([row])[1]
+
+
 def test_quiet_is_quiet(run):
     assert run("skin1", "--photons", "2000", "-q") == (0, "", "")
 

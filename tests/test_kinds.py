@@ -61,6 +61,11 @@ def test_what_is_foreign_is_refused_by_its_name():
     with pytest.raises(FileError, match=r"skin11 cannot be read: .*did you mean skin1\?"):
         load("skin11")
     assert load("skin1").name == "skin1"
+    with pytest.raises(FileError, match="deon-skin has no coefficients and no file; simulate it"):
+        load("deon-skin")
+    for source in (3, None, b"art.toml"):
+        with pytest.raises(FileError, match="is not a path; expected one, or a binary stream"):
+            load(source)
 
 
 def test_a_path_stays_on_its_line():

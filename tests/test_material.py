@@ -290,8 +290,8 @@ BAD = {
     "missing eta": (skin("eta = 1.3\n", ""), "eta is missing", "to_toml()` gives an example"),
     "missing g": (skin("g = 0.0\n", ""), "g is missing", "add g = 0.0"),
     "unknown": ("etta = 1\n" + SKIN, "etta = 1 is not a key", "did you mean eta?"),
-    "unknown far": ("zzz = 1\n" + SKIN, "zzz = 1 is not a key", "Known keys: name, source"),
-    "unknown odd": ('"a\\u0000 b" = 1\n' + SKIN, "'a\\x00 b' = 1 is not", "Known keys"),
+    "unknown far": ("zzz = 1\n" + SKIN, "zzz = 1 is not a key", "known keys: name, source"),
+    "unknown odd": ('"a\\u0000 b" = 1\n' + SKIN, "'a\\x00 b' = 1 is not", "known keys"),
     "per cm": (
         skin("sigma_a_per_mm", "sigma_a_per_cm"),
         "sigma_a_per_cm = [0.032, 0.17, 0.48] ",
@@ -320,13 +320,13 @@ BAD = {
     "albedo": (SKIN + "albedo = 0.9", "albedo = 0.9 ", "(1 - albedo) sigma_t"),
     # layers
     "both": (SKIN + GROUND, "eta and [[layers]] are both given", "leave [[layers]] out"),
-    "dotted deep": ("a" + ".a" * 3000 + " = 1\n" + SKIN, "a = tables nested", "Known keys"),
+    "dotted deep": ("a" + ".a" * 3000 + " = 1\n" + SKIN, "a = tables nested", "known keys"),
     "layers table": ("[layers]\n" + SKIN, "layers = {'eta': 1.3, ", "two brackets"),
     "layers none": ("layers = []", "layers = [];", "one [[layers]] table"),
     "layers of numbers": ("layers = [1]", "layers[0] = 1 is not a table", "under [[layers]]"),
     "layer missing": ("[[layers]]\neta = 1.3", "layers[0].g is missing", "add g = 0.0"),
     "layer value": (GLASS + GROUND.replace("0.48", "-1"), "layers[1].sigma_a_per_mm[2] = -1 ", "0"),
-    "layer unknown": (GLASS + "colour = 3\n" + GROUND, "layers[0].colour = 3 ", "Known keys: eta"),
+    "layer unknown": (GLASS + "colour = 3\n" + GROUND, "layers[0].colour = 3 ", "known keys: eta"),
     "layer of another length": (
         GLASS.replace("[0, 0, 0]", "[0, 0]") + GROUND,
         "channels is missing",

@@ -18,6 +18,7 @@ from sssfit.shapes import gaussian_cdf
 from sssfit.simulate import simulate_exact, simulate_montecarlo
 from sssfit.stability import rules
 from sssfit.stability.facts import Facts
+from sssfit.stability.kernel_rules import crawling
 from sssfit.stability.noise_floor import noise_ratio, rank_of_noise
 
 PITCH = 0.3
@@ -225,6 +226,9 @@ def test_a_halving_behind_one_stage_is_named():
         assert ("crawling" in fired(taps_of(structure))) is is_named
     still = taps_of("1|1", meta={"settings": {"still": True}})
     assert "crawling" not in fired(still)
+    for method, is_said in (("cascade", True), ("pyramid", False)):
+        said = crawling(Facts(taps_of("1|1", method=method), None), 2.0)
+        assert ("`still`" in said) is is_said
 
 
 def test_few_taps_are_named(exact):

@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from sssfit.compare.taps_view import TapsView
 
 _DECADES = 6  # of the pictures' brightness and of the slices
-_COLOURS = 3  # channels that are a colour
+_COLOURS = 3  # channels that are a colour, and the most whose sums are drawn
 _MOST_COLUMNS = 4
 _TRUE: Style = {"color": "black", "linestyle": (0, (1, 1.5)), "lw": 1.3}
 
@@ -71,7 +71,7 @@ def taps_figure(view: TapsView) -> Figure:
         known = view.truth is not None
         lower = add_legend(lower, handles[: count + known], [*labels, "profile"][: count + known])
         left, right = lower.subplots(1, 2, sharex=True, sharey=True)
-        widest = int(np.argmax(taps.blend[-1] / np.maximum(taps.energy, 1e-300)))
+        widest = _widest(view)
         name = shortened(taps.channels[widest])
         _draw_stages(left, view, widest)
         _draw_sums(right, view)
@@ -100,10 +100,20 @@ def _subtitle(view: TapsView) -> str:
 def _notes(view: TapsView) -> list[str]:
     """Return what the pictures show."""
     side = (2 * _shown_pixels(view) + 1) * view.taps.mm_per_pixel
-    return [
+    notes = [
         f"Pictures: one lit pixel in the middle of {side:.3g} mm after each stage; brightness is "
         f"the logarithm over {_DECADES} decades."
     ]
+    if len(view.channels) not in (1, _COLOURS):
+        notes.append(f"Pictures show {shortened(view.channels[_widest(view)])}.")
+    if (left := len(view.channels) - _COLOURS) > 0:
+        notes.append(f"(b) leaves out {counted(left, 'channel')} between those drawn.")
+    return notes
+
+
+def _widest(view: TapsView) -> int:
+    """Return the channel of which the last stage has the largest share."""
+    return int(np.argmax(view.taps.blend[-1] / np.maximum(view.taps.energy, 1e-300)))
 
 
 def _shown_pixels(view: TapsView) -> int:
@@ -129,7 +139,7 @@ def _draw_pictures(upper: SubFigure, view: TapsView, columns: int, rows: int) ->
     axes = new_mosaic(upper, columns * 1.05 - 0.05, rows * (1.0 + gap))
     for k, each in enumerate(sums):
         x, y = k % columns * 1.05, k // columns * (1.0 + gap) + gap
-        put_picture(axes, x, y, _shaded(each, top))
+        put_picture(axes, x, y, _shaded(each, top, _widest(view)))
         axes.text(x, y - 0.03, texts[k], fontsize=7.5, va="bottom")
 
 
@@ -142,13 +152,16 @@ def _stage_texts(view: TapsView) -> list[str]:
     return found
 
 
-def _shaded(light: FloatArray, top: float) -> FloatArray:
-    """Return sRGB codes (H, W, 3): 0 to 1 over the decades below the brightest."""
+def _shaded(light: FloatArray, top: float, channel: int) -> FloatArray:
+    """Return sRGB codes (H, W, 3): 0 to 1 over the decades below the brightest.
+
+    Unless there are three channels, they are those of one of them.
+    """
     with np.errstate(divide="ignore"):
         codes = 1.0 + np.log10(light / top) / _DECADES
     shown = np.clip(codes, 0.0, 1.0)
     grey = shown.shape[2] != _COLOURS
-    return np.repeat(shown[:, :, :1], _COLOURS, axis=2) if grey else shown
+    return np.repeat(shown[:, :, [channel]], _COLOURS, axis=2) if grey else shown
 
 
 def _stage_style(stage: int, stages: int) -> Style:
@@ -178,17 +191,23 @@ def _draw_stages(axes: Axes, view: TapsView, channel: int) -> None:
 def _draw_sums(axes: Axes, view: TapsView) -> None:
     middle = view.half_pixels
     distance = np.arange(middle + 1) * view.taps.mm_per_pixel
-    for c in range(min(len(view.channels), _COLOURS)):
-        line = view.stages.sum(axis=0)[middle, middle:, c]
-        style: Style = {"color": COLOURS[c], "linestyle": LINE_STYLES[c], "lw": LINE_WIDTH}
+    count = len(view.channels)
+    drawn = np.linspace(0, count - 1, min(count, _COLOURS)).round().astype(int)
+    lines = view.stages.sum(axis=0)[middle, middle:][:, drawn].T
+    ends = np.argmax(lines < 1e-4 * lines[:, :1], axis=1)
+    rank = np.argsort(np.argsort(-ends, kind="stable")).tolist()
+    for k, (c, line) in enumerate(zip(drawn.tolist(), lines, strict=True)):
+        style: Style = {"color": COLOURS[k], "linestyle": LINE_STYLES[k], "lw": LINE_WIDTH}
         axes.plot(distance, np.where(line > 0.0, line, np.nan), **style)
-        place = int(np.argmax(line < 1e-4 * line[0]))
+        # Each name on its own decade, the widest on the highest: lines of one width would have all
+        # names in one place.
+        place = int(np.argmax(line < 0.01 * 0.1 ** rank[k] * line[0]))
         axes.annotate(
             shortened(view.channels[c]),
             (distance[place], line[place]),
             xytext=(4, 3),
             textcoords="offset points",
-            color=COLOURS[c],
+            color=COLOURS[k],
         )
         if view.truth is not None:
             axes.plot(distance, view.truth[0, :, c], **_TRUE)

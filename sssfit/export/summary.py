@@ -25,6 +25,7 @@ from sssfit.messages import (
 )
 from sssfit.methods import DEON_SKIN
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS
+from sssfit.simulate.summary import ROUNDING
 
 if TYPE_CHECKING:
     from sssfit.kinds import Loaded
@@ -180,7 +181,8 @@ def shipped_page(figures: Figures) -> str:
     )
     return (
         f"{text}\n\n{_layered_table(figures['layered'])}\n\n"
-        f"{DEON_SKIN}: a profile without coefficients, for simulate, compare and choose"
+        f"{DEON_SKIN}: a profile without coefficients, for simulate, compare, choose, motion and "
+        "report"
     )
 
 
@@ -325,7 +327,7 @@ def _balance(figures: Figures, channel: int) -> str:
         return "-"
     balance = f"{figures['energy_balance'][channel]:+.0e}"
     stderr = figures["energy_balance_stderr"]
-    return balance if stderr is None else f"{balance} +- {stderr[channel]:.0e}"
+    return balance if stderr is None else f"{balance} +- {max(stderr[channel], ROUNDING):.0e}"
 
 
 def checkpoint_page(figures: Figures) -> str:

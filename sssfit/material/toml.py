@@ -224,7 +224,7 @@ def _remedy(key: str, known: Sequence[str]) -> str:
         return f"{verb} sigma_{letter}_per_mm{with_g}{_TO_PER_MM[unit and unit.lower()]}"
     if match := re.fullmatch(_THICKNESS, key, re.IGNORECASE):
         return f"rename it thickness_mm{_TO_MM[match[1] and match[1].lower()]}"
-    return _ALIASES.get(key.lower()) or f"{did_you_mean(key, known)}Known keys: {', '.join(known)}"
+    return _ALIASES.get(key.lower()) or f"{did_you_mean(key, known)}known keys: {', '.join(known)}"
 
 
 def _check_complete(layer: Mapping[str, object], where: str) -> None:

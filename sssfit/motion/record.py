@@ -156,7 +156,7 @@ class MovingLight:
         head = (
             f"{self.material}, {self.scene} under {self.light} light: "
             f"{counted(len(self.intensity), 'frame')} of {self.width} x {self.height} pixels, "
-            f"target variance {self.target_variance:g}"
+            f"target variance {self.target_variance:g}; means leave out the first {self.cold}"
         )
         saved = [
             f"{self.track(name).label}: {100.0 * abs(share):.1f} % "

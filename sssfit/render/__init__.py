@@ -62,7 +62,8 @@ def render(image: Irradiance, kernel: Kernel | str | Path, **settings: Any) -> F
         kernel = read_kernel(kernel)
     if not isinstance(kernel, SeparableKernel | Taps):
         raise RenderError(
-            f"kernel = {shown(kernel)}; expected a SeparableKernel, or the path of its file."
+            f"kernel = {shown(kernel)}; expected a SeparableKernel, Taps, or the path of a file of "
+            "either."
         )
     scene = _scene(image, kernel.mm_per_pixel)
     if isinstance(kernel, Taps):

@@ -118,7 +118,7 @@ def depths(scene: Scene, mask: npt.NDArray[np.int32]) -> FloatArray:
         missing = "depth_mm" if scene.depth_mm is None else "distance_mm"
         raise RenderError(
             f"{scene.name}: rendering in screen space needs {missing}, and the scene has none; "
-            "give depth_mm and distance_mm, or render it flat."
+            "use the scene head or one that has depth_mm and distance_mm, or render it flat."
         )
     if not (np.isfinite(scene.distance_mm) and scene.distance_mm > 0.0):
         raise RenderError(

@@ -283,7 +283,9 @@ def channel_names(given: str | None, reflectance: list[float] | str) -> list[str
         )
     names = [each.strip() for each in (given or "R,G,B").split(",")]
     if len(names) != count:
-        raise ArgumentError(f"`channels` has {len(names)} names for {count} reflectances.")
+        raise ArgumentError(
+            f"`channels` has {counted(len(names), 'name')} for {counted(count, 'reflectance')}."
+        )
     return names
 
 

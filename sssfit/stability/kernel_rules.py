@@ -43,9 +43,10 @@ def crawling(facts: Facts, limit: float) -> str:
     before = sum(each.level == 0 for each in kernel.stages)
     if before >= limit or kernel.stages[-1].level == 0:
         return ""
+    fitted = ", and a fit with `still` reduces it" if kernel.method == "cascade" else ""
     return (
         f"light may crawl as the camera moves, with {counted(before, 'stage')} before the first "
-        f"halving; {limit:.0f} stages do not show it, and `still` weighs it in"
+        f"halving; {limit:.0f} stages do not show it{fitted}"
     )
 
 
