@@ -163,7 +163,9 @@ def test_what_cannot_be_is_one_line():
             kernel_text(taps, "glsl", compute=True, **{asked: True})
     with pytest.raises(KernelError, match=r"level 0 reach \d+ texels, and 16384 bytes of group"):
         kernel_text(wide("4-4", by=30.0), "wgsl", compute=True)
-    with pytest.raises(KernelError, match="`compute`: for passes, and these are not written"):
+    with pytest.raises(
+        KernelError, match="compute: only passes have this, and they are not written"
+    ):
         kernel_text(taps, "glsl", compute=True, without_shader=True)
 
 

@@ -196,9 +196,9 @@ def source_text(
     }
     switches = {**asked, "TILT": tilt, "COMPUTE": compute}
     if any(switches.values()) and (without_shader or not (tables or with_shader or dense)):
-        given = ", ".join(f"`{name.lower()}`" for name, each in switches.items() if each)
+        given = ", ".join(name.lower() for name, each in switches.items() if each)
         remedy = "leave out `without_shader`" if without_shader else "give `with_shader`"
-        raise KernelError(f"{given}: for passes, and these are not written; {remedy}.")
+        raise KernelError(f"{given}: only passes have this, and they are not written; {remedy}.")
     if without_shader and (with_shader or dense):
         raise KernelError("source is written with its passes or without them; ask for one.")
     if not tables and len(kernels) == 1 and isinstance(kernels[0], SeparableKernel):

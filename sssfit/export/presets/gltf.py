@@ -143,7 +143,7 @@ GLTF = Preset(
     write=write,
     look=medium.exact_look(material),
     profile=medium.exact_look(material),
-    lost="nothing of a medium of one g; viewers draw it by their own approximations.",
+    lost="nothing if all channels have one g; viewers draw it by their own approximations.",
     origin=(
         "github.com/KhronosGroup/glTF: extensions/2.0/Khronos/KHR_materials_volume_scatter/"
         "README.md, Multi-Scatter Albedo",

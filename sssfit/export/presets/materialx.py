@@ -119,7 +119,7 @@ MATERIALX = Preset(
     write=write,
     look=medium.exact_look(material),
     profile=medium.exact_look(material),
-    lost="nothing of a medium of one g; a renderer's own inversion of the colour may err.",
+    lost="nothing if all channels have one g; a renderer's own inversion of the colour may err.",
     origin=(
         "github.com/AcademySoftwareFoundation/MaterialX: libraries/bxdf/standard_surface.mtlx",
         "github.com/Autodesk/standard-surface: reference/standard_surface.mtlx",

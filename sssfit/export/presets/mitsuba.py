@@ -93,7 +93,7 @@ MITSUBA = Preset(
     write=write,
     look=medium.exact_look(material),
     profile=medium.exact_look(material),
-    lost="nothing of a medium of one g.",
+    lost="nothing if all channels have one g.",
     origin=("github.com/mitsuba-renderer/mitsuba3: src/media/homogeneous.cpp",),
     material=material,
 )

@@ -96,7 +96,7 @@ OPENPBR = Preset(
     write=write,
     look=medium.exact_look(material),
     profile=medium.exact_look(material),
-    lost="nothing of a medium of one g; a renderer's own inversion of the colour may err.",
+    lost="nothing if all channels have one g; a renderer's own inversion of the colour may err.",
     origin=(
         "github.com/AcademySoftwareFoundation/OpenPBR: index.md.html, Subsurface, the definition "
         "of subsurface_color",

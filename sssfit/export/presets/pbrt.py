@@ -77,7 +77,7 @@ PBRT = Preset(
     write=write,
     look=medium.exact_look(material),
     profile=medium.exact_look(material),
-    lost="nothing of a medium of one g, but that the renderer makes spectra of three numbers.",
+    lost="nothing if all channels have one g, but the renderer makes spectra of three numbers.",
     origin=(
         "github.com/mmp/pbrt-v4: src/pbrt/media.cpp, HomogeneousMedium::Create",
         "pbrt.org/fileformat-v4: Participating Media",
