@@ -18,6 +18,7 @@ from approval_calls import CALLS, Call
 from approval_commands import COMMANDS
 from approval_files import lines_of
 from approval_run import Command, run
+from threadpoolctl import threadpool_limits
 
 FOLDER = Path(__file__).parent / "approved"
 _MARK = "$ "  # no line of an output begins with it: those have a bar before them
@@ -58,6 +59,8 @@ def approve(group: str) -> None:
 
 if __name__ == "__main__":
     warnings.simplefilter("error")
+    # As in conftest.py: products of several threads have other last digits.
+    threadpool_limits(limits=1, user_api="blas")
     for name in sys.argv[1:] or EVERY:
         begun = time.process_time()
         approve(name)
