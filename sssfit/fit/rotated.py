@@ -76,11 +76,9 @@ def fit_rotated(
     shapes = _checked(directions, taps)
     target, lit = whole_target(profile, mm_per_pixel, support_mm)
     with one_blas_thread():
-        few, tied = (
-            last_shown(StarChain(each, shapes), _SHARED[len(shapes)])
-            for each in search_targets(target, lit, "natural")
-        )
-        p, evaluations = searched(few, tied, seed)
+        wanted = search_targets(target, lit, "natural")[1]  # few miss the waves of a long line
+        tied = last_shown(StarChain(wanted, shapes), _SHARED[len(shapes)])
+        p, evaluations = searched(tied, tied, seed)
     settings = {"directions": directions, "taps": taps, "fit_seed": seed}
     table = table_of("rotated", target, tied.chain, tied.full(p), settings)
     return TapsFit(table, evaluations, time.perf_counter() - begun)
