@@ -206,7 +206,9 @@ def test_tables_that_are_to_be_mixed_have_the_same_stages():
     text, _ = kernel_text(taps_of("1|1"), "hlsl")
     assert "mix the numbers of two tables with these stages, an octave apart" in text
     page = (Path(__file__).parents[1] / "docs" / "cascades.md").read_text("utf-8")
-    assert re.search(r"`sssfit fit --stages '\S+' --pitches \S+` makes one\s+table for each", page)
+    assert re.search(
+        r"`sssfit fit --stages '\S+'\s+--pitches \S+` makes one\s+table for each", page
+    )
 
 
 def test_the_comment_says_on_which_pixels_a_table_serves():
