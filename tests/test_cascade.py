@@ -111,6 +111,24 @@ def test_the_wanted_spectrum_is_the_kernels(skin1):
         np.testing.assert_allclose(found.wanted[c], waves @ kernel @ waves.T, atol=1e-13)
 
 
+@pytest.mark.parametrize("pictures", ["natural", "white"])
+def test_the_last_digits_of_a_profile_change_no_search(skin1, pictures):
+    """Profiles apart by 3e-15, as two versions of a solver may be, ask for the same bits."""
+    noise = 1.0 + 3e-15 * np.random.default_rng(4).standard_normal(skin1.annulus_energy.shape)
+    other = replace(skin1, annulus_energy=skin1.annulus_energy * noise)
+    found, again = (
+        search_targets(make_target(each, 0.3, 9.0), [0, 1, 2], pictures) for each in (skin1, other)
+    )
+    assert [len(each.frequencies) for each in found] == [38, 65]
+    for own, theirs in zip(found, again, strict=True):
+        np.testing.assert_array_equal(own.wanted, theirs.wanted)
+        np.testing.assert_array_equal(own.power, theirs.power)
+        assert (own.energy == 1.0).all()
+    exact = spectral_target(make_target(skin1, 0.3, 9.0), [0, 1, 2], pictures)
+    apart = found[1].wanted - exact.wanted / exact.energy[:, None, None]
+    assert 1e-9 < np.abs(apart).max() < 6e-8
+
+
 def test_weights_of_the_spectra(skin1):
     target = make_target(skin1, 0.3, 9.0)
     natural, white = (spectral_target(target, [0], each) for each in ("natural", "white"))
