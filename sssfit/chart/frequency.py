@@ -61,10 +61,11 @@ def frequency_figure(found: FrequencyResponse) -> Figure:
 
 def _note(found: FrequencyResponse) -> str:
     beyond = float((found.profile.beyond_grid / _nonzero(found.response[0])).max())
+    is_known = np.isfinite(found.stderr[1:]).any()  # not under a beam
     return (
-        "R(k) = 2π ∫ R_d(r) J_0(kr) r dr, the amplitude that returns of light cos(kx); bands show "
-        f"one standard error. Light beyond the grid, at most {100.0 * beyond:.2g} % of a channel, "
-        "counts at k = 0 only."
+        "R(k) = 2π ∫ R_d(r) J_0(kr) r dr, the amplitude that returns of light cos(kx)"
+        f"{'; bands show one standard error' if is_known else ''}. Light beyond the grid, at most "
+        f"{100.0 * beyond:.2g} % of a channel, counts at k = 0 only."
     )
 
 
