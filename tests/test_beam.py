@@ -5,15 +5,18 @@ import dataclasses
 import numpy as np
 import pytest
 
+from sssfit.choose.truth import material_of
 from sssfit.errors import ProfileError
 from sssfit.material import Layer, Material, load_material
-from sssfit.profile import FORMAT, Profile
+from sssfit.profile import FORMAT, Profile, full_kernel
 from sssfit.profile.beam import Beam, lens_area, parse_beam, under_beam
 from sssfit.profile.bins import merged
 from sssfit.profile.directions import angular_reflectance
 from sssfit.profile.frequency import frequency_response
+from sssfit.profile.smooth import smoothed
 from sssfit.simulate import simulate_exact, simulate_montecarlo
 from sssfit.simulate.runner import simulate_to_files
+from sssfit.stability.noise_floor import noise_ratio
 
 VARIANCES = np.array([0.05, 0.3, 2.0])
 WEIGHTS = np.array([0.2, 0.3, 0.1])
@@ -151,6 +154,25 @@ def test_bins_under_a_beam_are_no_better_than_they_say():
     ratio = (energy.std(axis=0, ddof=1) / bins.stderr)[bins.is_drawn]
     assert ratio.size > 20
     assert 0.5 < ratio.mean() < 1.15
+
+
+def test_what_takes_annuli_for_apart_does_not_take_a_beams():
+    """The noise of kernels of 12 walks against what one of them tells; smoothing, and choices."""
+    material = load_material("skin1")
+    made = [
+        under_beam(
+            simulate_montecarlo(material, photons=4000, seed=seed, dr_mm=0.1, radius_mm=12.0),
+            Beam("gaussian", 1.0),
+        )
+        for seed in range(1, 13)
+    ]
+    kernels = np.stack([full_kernel(each.quadrant_kernel(0.6, 19, channel=0)) for each in made])
+    noise = np.linalg.norm(kernels.std(axis=0, ddof=1)) / np.linalg.norm(kernels.mean(axis=0))
+    assert 0.8 * noise < noise_ratio(made[0], 0.6)[0] < 1.5 * noise
+    with pytest.raises(ProfileError, match="is under a beam, where each photon counts in many"):
+        smoothed(made[0])
+    assert material_of(made[0]) is None
+    assert material_of(simulate_montecarlo(material, photons=1000, dr_mm=1.0)) == material
 
 
 def test_transmitted_light_is_spread_too():

@@ -40,7 +40,7 @@ def frequency_figure(found: FrequencyResponse) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        8 x 4.4 inches; bands of one standard error.
+        8 x 4.4 inches; bands of one standard error where it is known.
     """
     profile = found.profile
     shown = in_legend(min(profile.n_channels, len(COLOURS)))

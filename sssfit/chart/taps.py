@@ -194,14 +194,15 @@ def _draw_sums(axes: Axes, view: TapsView) -> None:
     count = len(view.channels)
     drawn = np.linspace(0, count - 1, min(count, _COLOURS)).round().astype(int)
     lines = view.stages.sum(axis=0)[middle, middle:][:, drawn].T
-    ends = np.argmax(lines < 1e-4 * lines[:, :1], axis=1)
-    rank = np.argsort(np.argsort(-ends, kind="stable")).tolist()
+    widths = (lines >= 1e-4 * lines[:, :1]).sum(axis=1) * (lines[:, 0] > 0.0)
+    rank = np.argsort(np.argsort(-widths, kind="stable")).tolist()
     for k, (c, line) in enumerate(zip(drawn.tolist(), lines, strict=True)):
         style: Style = {"color": COLOURS[k], "linestyle": LINE_STYLES[k], "lw": LINE_WIDTH}
         axes.plot(distance, np.where(line > 0.0, line, np.nan), **style)
         # Each name on its own decade, the widest on the highest: lines of one width would have all
         # names in one place.
-        place = int(np.argmax(line < 0.01 * 0.1 ** rank[k] * line[0]))
+        is_above = line >= 0.01 * 0.1 ** rank[k] * line[0]
+        place = min(int(np.count_nonzero(is_above)), middle)
         axes.annotate(
             shortened(view.channels[c]),
             (distance[place], line[place]),

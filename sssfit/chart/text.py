@@ -138,9 +138,10 @@ def footnotes(profile: Profile, image: str) -> list[str]:
         f"Specular reflectance ({profile.specular_reflectance:.4g}) is not included.",
     ]
     if profile.photons is not None:
+        most = "at most " if profile.shares_photons else ""
         notes.append(
             f"Steps: means over annuli merged to {MIN_HITS} effective photons or more; curves "
-            "end where there are too few. Bands: ±1 standard error."
+            f"end where there are too few. Bands: {most}±1 standard error."
         )
     if profile.n_channels > _MOST_IN_LEGEND:
         others = profile.n_channels - _MOST_IN_LEGEND

@@ -149,7 +149,7 @@ class Choice:
         The next dearer option, which may be beyond the budget.
     photons : PhotonNeed, optional
         How few photons would have done; None where no blur is needed, without a tolerance, or where
-        no walk can tell: the profile is of no material, or not by transport.
+        no walk can tell: the profile is of no material, under a beam, or not by transport.
     seconds_per_megapixel : float, optional [s]
         Measured, of the chosen table.
     unfitted : tuple of str

@@ -72,13 +72,14 @@ def note_truth(source: Material | Profile) -> None:
 def material_of(source: Material | Profile) -> Material | None:
     """Return the material whose walks can be compared with the profile.
 
-    None for a profile without coefficients behind it, and for one that is not by transport: a
-    model's error would be taken for noise.
+    None for a profile without coefficients behind it, for one under a beam, and for one that is not
+    by transport: a model's error would be taken for noise.
     """
     if isinstance(source, Material):
         return source
     record = source.meta.get("material")
-    if source.meta.get("method") not in _TRANSPORT or not isinstance(record, Mapping):
+    is_transport = source.meta.get("method") in _TRANSPORT and "beam" not in source.meta
+    if not is_transport or not isinstance(record, Mapping):
         return None
     try:
         return Material.from_dict(record)

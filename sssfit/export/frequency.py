@@ -13,7 +13,10 @@ from sssfit.profile import Profile
 from sssfit.profile.frequency import frequency_response
 
 _MARK = "# sssfit.frequency.csv/1"
-_HOW = "R(k) = 2 pi int R_d(r) J0(k r) r dr, by k_per_mm [rad/mm]; X_stderr has its standard error."
+_HOW = (
+    "R(k) = 2 pi int R_d(r) J0(k r) r dr, by k_per_mm [rad/mm]; X_stderr has its standard error, "
+    "nan if unknown."
+)
 
 
 def frequency_text(sources: Sequence[Profile | Kernel]) -> str:

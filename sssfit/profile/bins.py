@@ -74,8 +74,9 @@ def merged(profile: Profile, channel: int) -> Bins:
 
     With N photons, e and s an annulus' energy and standard error, S2 = N ((N-1) s^2 + e^2) is its
     sum of squared weights, and (N e)^2 / S2 hits of equal weight would have the same relative
-    error. S2 of merged annuli is a sum, see `Profile.cumulative_stderr`; under a beam annuli share
-    photons, and their errors add up at most. Without photons or errors the annuli are not merged.
+    error. S2 of merged annuli is a sum, see `Profile.cumulative_stderr`. Under a beam annuli share
+    photons; the error of a sum is then taken for the sum of their errors, the most that it can be.
+    Without photons or errors the annuli are not merged.
     """
     energy = profile.annulus_energy[:, channel]
     stderr = profile.annulus_energy_stderr[:, channel]

@@ -51,9 +51,14 @@ def smoothed(profile: Profile) -> Profile:
     Raises
     ------
     ProfileError
-        The profile has no standard errors.
+        The profile has no standard errors, or is under a beam, where annuli share photons.
     """
     stderr = profile.annulus_energy_stderr
+    if profile.shares_photons:
+        raise ProfileError(
+            f"{profile.label}: the profile is under a beam, where each photon counts in many "
+            "annuli, and their noise is not Poisson's; smooth the pencil beam's profile."
+        )
     if profile.photons is None or not np.isfinite(stderr).all():
         raise ProfileError(
             f"{profile.label}: the profile has no standard errors, and only a walk's noise can be "

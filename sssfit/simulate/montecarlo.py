@@ -94,8 +94,9 @@ def simulate_montecarlo(
         ignored.
     angles : int, optional
         Bins of the exit angle, 1 to 180, from 0 to pi/2 from the normal; the profile then also has
-    R_d(r, angle), and takes as many times the memory. numerical_aperture : float, optional
-        Of a detector above the surface, which sees the light within asin(NA / n_above) of the
+        R_d(r, angle), and takes as many times the memory.
+    numerical_aperture : float, optional
+        That of a detector above the surface, which sees the light within asin(NA / n_above) of the
         normal; the rest is ``outside_aperture``. In place of ``angles``.
     checkpoint : Checkpoint or Path, optional
         Where to save the sums at intervals, so that a killed run can continue and end in the same
