@@ -37,8 +37,8 @@ def material_figure(material: Material) -> Figure:
     Parameters
     ----------
     material : Material
-        Of more than six layers the first, the last and some between are drawn; clear ones are
-        omitted.
+        If it has more than six layers, the first, the last and some between are drawn; clear ones
+        are omitted.
 
     Returns
     -------

@@ -33,7 +33,8 @@ def swatches_figure(found: Swatches) -> Figure:
     Parameters
     ----------
     found : Swatches
-        Of more than 10 columns or 24 rows, that many spread from the first to the last are drawn.
+        If there are more than 10 columns or 24 rows, that many are drawn, spread from the first to
+        the last.
 
     Returns
     -------

@@ -103,7 +103,7 @@ def make_sources(
     reach_mm : float [mm]
         How far apart two pixels of the picture can be along an axis.
     photons, seed, threads, progress
-        Of the walk; see ``simulate_montecarlo``.
+        Those of the walk; see ``simulate_montecarlo``.
     radius_mm : float, optional [mm]
         The grid of which the budget says what it loses; by default the paper's.
 

@@ -183,7 +183,7 @@ def error_budgets(
         Flat, all of the same pixel size; their profiles and kernels are shared. What counts of
         them says `evaluated_scene`.
     photons, seed, progress
-        Of the photon walk; see ``simulate_montecarlo``.
+        Those of the photon walk; see ``simulate_montecarlo``.
     radius_mm : float, optional [mm]
         Radius of the grid of the kernel's profile; by default the paper's.
     method, settings

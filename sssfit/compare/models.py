@@ -142,12 +142,12 @@ def compare_models(
     Parameters
     ----------
     material : Material
-        Of layers there is the multipole, if it covers them; of half spaces with g other than 0
+        For layers there is the multipole, if it covers them; for half spaces with g other than 0
         the models warn that it is reduced.
     walk : Profile, optional
         The material's photon walk, if there is one already; its grid then serves all.
     photons, seed, threads, progress
-        Of the walk otherwise; see `simulate_montecarlo`.
+        Those of the walk otherwise; see `simulate_montecarlo`.
     dr_mm, radius_mm : float, optional
         The grid [mm]; by default the paper's.
 

@@ -147,7 +147,7 @@ def measure_table(
     heads, distances : sequence
         The paper's by default.
     **geometry
-        Of `Row`: ``head_units``, ``spacing_units``, ``fov_degrees``.
+        Those of `Row`: ``head_units``, ``spacing_units``, ``fov_degrees``.
     """
     rows = []
     for i, count in enumerate(heads):

@@ -147,7 +147,7 @@ def fit_pitches(
     pitches : sequence of float [mm]
         Or "profile", for the width of its first annulus.
     **settings
-        As of `fit_result`, errors too; a ``like`` serves the first of the fits.
+        As in `fit_result`, errors too; a ``like`` serves the first of the fits.
 
     Yields
     ------

@@ -65,7 +65,8 @@ def fit_weighted(
     rank : int
         Number of terms, 1 to 8, or less for a smaller kernel.
     spectrum : {"natural", "white"}, optional
-        Of the pictures that the kernel is for, by default natural; "white" is the decomposition.
+        Spectrum of the pictures that the kernel is for, by default natural; "white" is the
+        decomposition.
     irradiance : str, Path or Scene, optional
         The picture that the kernel is for, in place of a spectrum: a name of
         ``sssfit.scene.made.MADE``, a file or a scene, at least as large as the kernel.

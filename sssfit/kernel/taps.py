@@ -91,15 +91,15 @@ class Stage:
         "pair" is a pass along x and the same pass along y; "star" one pass of nine fetches; "disk"
         one pass of single fetches on a golden-angle spiral; "line" one pass in one direction.
     offsets_mm : array (n,) [mm]
-        Of a pair or line rising, without the middle; of a star the distances (diagonal, axis),
-        where the diagonal fetches lie at (+-o, +-o); of a disk the radii of its fetches, from the
+        For a pair or line rising, without the middle; for a star the distances (diagonal, axis),
+        where the diagonal fetches lie at (+-o, +-o); for a disk the radii of its fetches, from the
         inside out.
     weights : array (n+1, C)
         The middle first; the middle and all fetches of its passes add up to 1. A disk whose middle
         row is 0 does not fetch the pixel itself.
     angle_degrees : float
-        Of a pair's first pass, below 90, or of a line, below 180: from x to the right towards y
-        down. 0 otherwise.
+        Angle of a pair's first pass, below 90, or of a line, below 180: from x to the right towards
+        y down. 0 otherwise.
     """
 
     level: int

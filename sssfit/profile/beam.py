@@ -38,7 +38,7 @@ class Beam:
     kind : str
         "gaussian" or "flat".
     radius_mm : float [mm]
-        Of a Gaussian where its irradiance has fallen to 1/e^2, as in conv; of a flat disk.
+        Radius at which a Gaussian's irradiance has fallen to 1/e^2, as in conv, or of a flat disk.
     """
 
     kind: str

@@ -92,7 +92,7 @@ def source_of(record: Material | Profile | SeparableKernel | Taps | Source) -> S
     Parameters
     ----------
     record : Material, Profile or Source
-        Of a material the exact profile is computed, which takes seconds; a source stays as it is.
+        For a material the exact profile is computed, which takes seconds; a source stays as it is.
 
     Raises
     ------
