@@ -67,6 +67,7 @@ SHORT = (
     (sssfit.fit.cascade, "_HOPS", ()),
     (sssfit.fit.cascade, "descent", _short_descent),
     (sssfit.fit._spectrum, "_FREQUENCIES", 28),
+    (sssfit.fit._spectrum, "_SEARCHED", 28),
 )
 _LONG = tuple((module, name, getattr(module, name)) for module, name, _ in SHORT)
 

@@ -99,16 +99,22 @@ def test_a_narrow_beam_changes_little_and_two_radii_are_apart(kind):
     assert (apart[1] > 5.0 * apart[0]).all()
 
 
-def test_errors_of_walks_are_those_of_other_seeds():
-    """The spread of 40 walks under a beam, against the standard error that each tells."""
-    material = load_material("skin1")
-    made = [
+def walks_under_a_beam(count, dr_mm):
+    """Walks of 4000 photons through skin1, of the seeds from 1 on."""
+    return [
         under_beam(
-            simulate_montecarlo(material, photons=4000, seed=seed, dr_mm=0.4, radius_mm=12.0),
+            simulate_montecarlo(
+                load_material("skin1"), photons=4000, seed=seed, dr_mm=dr_mm, radius_mm=12.0
+            ),
             Beam("gaussian", 1.0),
         )
-        for seed in range(1, 41)
+        for seed in range(1, count + 1)
     ]
+
+
+def test_errors_of_walks_are_those_of_other_seeds():
+    """The spread of 40 walks under a beam, against the standard error that each tells."""
+    made = walks_under_a_beam(40, 0.4)
     energy = np.stack([each.annulus_energy[:20] for each in made])
     told = np.sqrt(np.mean([each.annulus_energy_stderr[:20] ** 2 for each in made], axis=0))
     ratio = energy.std(axis=0, ddof=1) / told
@@ -140,14 +146,7 @@ def test_a_beam_leaves_the_errors_of_all_light(tmp_path):
 
 def test_bins_under_a_beam_are_no_better_than_they_say():
     """Merged annuli of 40 walks, against the largest standard error that is told."""
-    material = load_material("skin1")
-    made = [
-        under_beam(
-            simulate_montecarlo(material, photons=4000, seed=seed, dr_mm=0.1, radius_mm=12.0),
-            Beam("gaussian", 1.0),
-        )
-        for seed in range(1, 41)
-    ]
+    made = walks_under_a_beam(40, 0.1)
     bins = merged(made[0], 0)
     ends = np.searchsorted(made[0].r_edges_mm, bins.edges_mm)
     energy = np.stack([np.diff(each.cumulative[ends, 0]) for each in made])
@@ -158,20 +157,14 @@ def test_bins_under_a_beam_are_no_better_than_they_say():
 
 def test_what_takes_annuli_for_apart_does_not_take_a_beams():
     """The noise of kernels of 12 walks against what one of them tells; smoothing, and choices."""
-    material = load_material("skin1")
-    made = [
-        under_beam(
-            simulate_montecarlo(material, photons=4000, seed=seed, dr_mm=0.1, radius_mm=12.0),
-            Beam("gaussian", 1.0),
-        )
-        for seed in range(1, 13)
-    ]
+    made = walks_under_a_beam(12, 0.1)
     kernels = np.stack([full_kernel(each.quadrant_kernel(0.6, 19, channel=0)) for each in made])
     noise = np.linalg.norm(kernels.std(axis=0, ddof=1)) / np.linalg.norm(kernels.mean(axis=0))
     assert 0.8 * noise < noise_ratio(made[0], 0.6)[0] < 1.5 * noise
     with pytest.raises(ProfileError, match="is under a beam, where each photon counts in many"):
         smoothed(made[0])
     assert material_of(made[0]) is None
+    material = load_material("skin1")
     assert material_of(simulate_montecarlo(material, photons=1000, dr_mm=1.0)) == material
 
 

@@ -23,14 +23,20 @@ def skin1():
     return simulate_exact(load_material("skin1"))
 
 
+def tables_of(profile, pitches):
+    """Searched for one like the other, as `sssfit fit --pitches` does."""
+    found = dict(fit_pitches(profile, "cascade", pitches, stages="1-1|1-2|2-2|2-2"))
+    return [found[k].kernel for k in range(2)]
+
+
 @pytest.fixture(scope="module")
 def tables(skin1):
-    """Searched for one like the other, as `sssfit fit --pitches` does.
+    return tables_of(skin1, (0.4, 0.8))
 
-    How well two tables mix is partly luck: those for .4 and .8 mm leave 1.5 at .48 and .57.
-    """
-    found = dict(fit_pitches(skin1, "cascade", (0.3, 0.6), stages="1-1|1-2|2-2|2-2"))
-    return [found[k].kernel for k in range(2)]
+
+@pytest.fixture(scope="module")
+def documented(skin1):
+    return tables_of(skin1, (0.3, 0.6))
 
 
 @pytest.mark.parametrize("end", [0, 1])
@@ -43,18 +49,18 @@ def test_at_a_tables_own_pixels_it_is_that_table(tables, end):
 
 
 def test_halfway_is_at_the_geometric_mean(tables):
-    pitch = np.sqrt(0.3 * 0.6)
+    pitch = np.sqrt(0.4 * 0.8)
     found, swapped = taps_between(*tables, pitch), taps_between(*tables[::-1], pitch)
     first, second = (each.stages[1] for each in tables)
     expected = np.sqrt(first.offsets_mm * second.offsets_mm)
     np.testing.assert_allclose(found.stages[1].offsets_mm, expected, rtol=1e-12)
     np.testing.assert_allclose(found.stages[1].weights, 0.5 * (first.weights + second.weights))
     np.testing.assert_allclose(found.blend, swapped.blend)
-    assert found.mm_per_pixel == swapped.mm_per_pixel == pytest.approx(0.4243, abs=1e-4)
+    assert found.mm_per_pixel == swapped.mm_per_pixel == pytest.approx(0.5657, abs=1e-4)
     assert np.isnan(found.errors["spectral"]).all()
 
 
-@pytest.mark.parametrize("pitch", [0.31, 0.42, 0.59])
+@pytest.mark.parametrize("pitch", [0.41, 0.57, 0.79])
 def test_energy_is_kept_and_fetches_are_those_of_one(skin1, tables, pitch):
     found = taps_between(*tables, pitch)
     np.testing.assert_allclose(found.energy, skin1.diffuse_reflectance, rtol=1e-9)
@@ -62,8 +68,20 @@ def test_energy_is_kept_and_fetches_are_those_of_one(skin1, tables, pitch):
     assert found.structure == tables[0].structure
 
 
-@pytest.mark.parametrize("pitch", [0.36, 0.42, 0.5])
-def test_between_two_tables_it_is_better_than_either(skin1, tables, pitch):
+# How well two tables mix is partly luck: these two leave 1.5 at both (docs/cascades.md, Distance).
+_UNLUCKY = pytest.mark.xfail(strict=True, reason="the finer table alone leaves .4 and 1.3 there")
+
+
+@pytest.mark.parametrize(
+    ("pair", "pitch"),
+    [
+        *(("documented", pitch) for pitch in (0.36, 0.42, 0.5)),
+        *(pytest.param("tables", pitch, marks=_UNLUCKY) for pitch in (0.48, 0.57)),
+        ("tables", 0.67),
+    ],
+)
+def test_between_two_tables_it_is_better_than_either(skin1, pair, pitch, request):
+    tables = request.getfixturevalue(pair)
     scene = make_scene("edge", height=160, width=160, mm_per_pixel=pitch, angle_degrees=30.0)
     truth = render_reference(scene, skin1)
     shown = [
@@ -141,7 +159,7 @@ def test_tables_that_are_not_alike_are_one_line(skin1, tables):
             "one table has structure 1-1|1-2|2-2|2-2 and the other 1|1; expected",
         ),
         ((tables[0], renamed), 0.5, "has channels ('R', 'G', 'B') and the other ('X', 'Y', 'Z')"),
-        (tables, 0.9, "mm_per_pixel = 0.9; expected 0.3 to 0.6, between the tables' own"),
+        (tables, 0.9, "mm_per_pixel = 0.9; expected 0.4 to 0.8, between the tables' own"),
         (tables, np.nan, "mm_per_pixel = nan"),
     ):
         with pytest.raises(KernelError) as caught:

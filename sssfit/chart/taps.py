@@ -126,7 +126,7 @@ def _shown_pixels(view: TapsView) -> int:
 
 def _draw_pictures(upper: SubFigure, view: TapsView, columns: int, rows: int) -> None:
     """Draw the sum of the first stages, for each number of them."""
-    middle, half = view.half_pixels, _shown_pixels(view)
+    middle, half, widest = view.half_pixels, _shown_pixels(view), _widest(view)
     kept = slice(middle - half, middle + half + 1)
     sums = list(np.cumsum(view.stages[:, kept, kept], axis=0))
     texts = ["irradiance", *_stage_texts(view)]
@@ -139,7 +139,7 @@ def _draw_pictures(upper: SubFigure, view: TapsView, columns: int, rows: int) ->
     axes = new_mosaic(upper, columns * 1.05 - 0.05, rows * (1.0 + gap))
     for k, each in enumerate(sums):
         x, y = k % columns * 1.05, k // columns * (1.0 + gap) + gap
-        put_picture(axes, x, y, _shaded(each, top, _widest(view)))
+        put_picture(axes, x, y, _shaded(each, top, widest))
         axes.text(x, y - 0.03, texts[k], fontsize=7.5, va="bottom")
 
 

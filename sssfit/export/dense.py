@@ -54,19 +54,15 @@ def taps_of_kernel(kernel: SeparableKernel, most: int | None) -> Taps:
         )
     middle = kernel.pixels // 2
     offsets_mm: FloatArray = kernel.mm_per_pixel * np.arange(1.0, middle + 1.0)
-    sums = kernel.weights.sum(axis=1)  # (R, C)
-    empty = (sums == 0.0)[:, None]  # a term that a channel does not have: its pass changes nothing
-    one = np.eye(middle + 1)[:, :1]
-    scaled = kernel.weights[:, middle:] / np.where(empty, 1.0, sums[:, None])
-    halves: FloatArray = np.where(empty, one, scaled)
-    stages = [Stage(0, "pair", offsets_mm, halves[k]) for k in range(kernel.rank)]
+    terms = [Stage.of_term(offsets_mm, each) for each in kernel.weights[:, middle:]]
+    sums = np.array([each for _, each in terms])  # (R, C)
     blend = np.concatenate((np.zeros((1, len(kernel.channels))), kernel.signs * sums**2))
     return Taps(
         method=kernel.method,
         mm_per_pixel=kernel.mm_per_pixel,
         channels=kernel.channels,
         chained=False,
-        stages=tuple(stages),
+        stages=tuple(stage for stage, _ in terms),
         blend=blend * kernel.scale,
         errors={"spectral": np.full(len(kernel.channels), np.nan), "energy": kernel.energy_error},
         meta=kernel.meta,

@@ -24,8 +24,8 @@ from sssfit.messages import (
     table,
 )
 from sssfit.methods import DEON_SKIN
+from sssfit.profile.checks import BALANCE_ROUNDING
 from sssfit.shapes import SKIN_VARIANCES_MM2, SKIN_WEIGHTS
-from sssfit.simulate.summary import ROUNDING
 
 if TYPE_CHECKING:
     from sssfit.kinds import Loaded
@@ -327,7 +327,9 @@ def _balance(figures: Figures, channel: int) -> str:
         return "-"
     balance = f"{figures['energy_balance'][channel]:+.0e}"
     stderr = figures["energy_balance_stderr"]
-    return balance if stderr is None else f"{balance} +- {max(stderr[channel], ROUNDING):.0e}"
+    return (
+        balance if stderr is None else f"{balance} +- {max(stderr[channel], BALANCE_ROUNDING):.0e}"
+    )
 
 
 def checkpoint_page(figures: Figures) -> str:

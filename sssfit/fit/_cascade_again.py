@@ -2,7 +2,7 @@
 
 from sssfit.fit._chain_pairs import PairChain
 from sssfit.fit._chain_stars import StarChain
-from sssfit.fit._spectrum import search_targets
+from sssfit.fit._spectrum import search_target
 from sssfit.fit.cascade import ALIASING, descent, numbers_of, table_of, whole_target
 from sssfit.kernel.structure import parse
 from sssfit.kernel.taps import Taps
@@ -31,7 +31,7 @@ def followed(taps: Taps, profile: Profile) -> Taps:
     target, lit = whole_target(profile, taps.mm_per_pixel, None)
     kind = PairChain if all(each.is_upright for each in shapes) else StarChain
     with one_blas_thread():
-        chain = kind(search_targets(target, lit, "natural")[1], shapes, ALIASING)
+        chain = kind(search_target(target, lit, "natural"), shapes, ALIASING)
         start = chain.start_from(numbers_of(taps, lit, taps.mm_per_pixel))
         found = descent(chain, start, _STEPS)
     return table_of("cascade", target, chain, found.x, {**taps.meta["settings"]})

@@ -192,15 +192,25 @@ def spectral_target(
 def search_targets(
     target: Target, channels: list[int], pictures: Pictures
 ) -> tuple[SpectralTarget, SpectralTarget]:
-    """Return what a search is for: on the few frequencies of its steps, and on all, for its end.
+    """Return what a search is for: on the few frequencies of its steps, and on all, for its end."""
+    few = search_target(target, channels, pictures, count=_SEARCHED)
+    return few, search_target(target, channels, pictures)
 
-    Both are shares of the energy, so that this is 1, and rounded: the last digits of a profile then
+
+def search_target(
+    target: Target, channels: list[int], pictures: Pictures, *, count: int | None = None
+) -> SpectralTarget:
+    """Return what a search is for on a number of frequencies.
+
+    It is a share of the energy, so that this is 1, and rounded: the last digits of a profile then
     cannot decide in which of many optima the search ends.
 
     Parameters
     ----------
     target, channels, pictures
         As in `spectral_target`.
+    count : int, optional
+        As in `graded_frequencies`.
 
     Raises
     ------
@@ -208,14 +218,10 @@ def search_targets(
         As `spectral_target`.
     """
     energy = np.ones(len(channels))
-    found = []
-    for count in (_SEARCHED, _FREQUENCIES):
-        w, cell = graded_frequencies(target.half_pixels, count)
-        wanted = np.round(_transforms(target, channels, energy, w), _DECIMALS)
-        power = _power(channels, pictures, w, cell, wanted)
-        found.append(SpectralTarget(w, wanted, power, energy, target.half_pixels))
-    few, many = found
-    return few, many
+    w, cell = graded_frequencies(target.half_pixels, count)
+    wanted = np.round(_transforms(target, channels, energy, w), _DECIMALS)
+    power = _power(channels, pictures, w, cell, wanted)
+    return SpectralTarget(w, wanted, power, energy, target.half_pixels)
 
 
 def _transforms(
@@ -300,16 +306,14 @@ def even_frequencies(half_pixels: int) -> tuple[FloatArray, FloatArray]:
     return np.pi * np.arange(count) / (count - 1), weights
 
 
-def graded_frequencies(
-    half_pixels: int, count: int = _FREQUENCIES
-) -> tuple[FloatArray, FloatArray]:
+def graded_frequencies(half_pixels: int, count: int | None = None) -> tuple[FloatArray, FloatArray]:
     """Return frequencies (n,) in radians a pixel, dense near 0, and trapezoid weights (n,).
 
-    Those of the ``count`` asked for that round to the same frequency of a picture are one: 65 of 72
-    and 38 of 40 for skin1 at .3 mm.
+    Those of the ``count`` asked for, by default 72, that round to the same frequency of a picture
+    are one: 65 of 72 and 38 of 40 for skin1 at .3 mm.
     """
     pixels = max(_PICTURE_PIXELS, 2 * half_pixels + 1)
-    steps = np.linspace(0.0, 1.0, count) ** _GRADING
+    steps = np.linspace(0.0, 1.0, count or _FREQUENCIES) ** _GRADING
     k = np.unique(np.round(pixels * steps))
     w = np.pi * np.minimum(k, pixels - 0.5) / pixels
     apart = 0.5 * np.diff(w)

@@ -87,10 +87,8 @@ def on_taps(
         offsets, passes = _thinned(half, count, place)
     stages, blend = [], [np.zeros(len(kernel.channels))]
     for signs, own in zip(kernel.signs, passes, strict=True):
-        sums = own[0] + 2.0 * own[1:].sum(axis=0)
-        empty = sums == 0.0  # a term that a channel does not have
-        own = np.where(empty, np.eye(len(own))[:, :1], own / np.where(empty, 1.0, sums))
-        stages.append(Stage(0, "pair", offsets * kernel.mm_per_pixel, own))
+        stage, sums = Stage.of_term(offsets * kernel.mm_per_pixel, own)
+        stages.append(stage)
         blend.append(signs * sums**2 * kernel.scale)
     error = np.full(len(kernel.channels), np.nan)
     if wanted is not None:

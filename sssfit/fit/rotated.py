@@ -22,7 +22,7 @@ from sssfit.errors import FitError
 from sssfit.fit._chain import Chain
 from sssfit.fit._chain_stars import StarChain
 from sssfit.fit._result import TapsFit
-from sssfit.fit._spectrum import search_targets
+from sssfit.fit._spectrum import search_target
 from sssfit.fit._target import Pitch
 from sssfit.fit._tied_chain import TiedChain
 from sssfit.fit.cascade import searched, table_of, whole_target
@@ -76,7 +76,7 @@ def fit_rotated(
     shapes = _checked(directions, taps)
     target, lit = whole_target(profile, mm_per_pixel, support_mm)
     with one_blas_thread():
-        wanted = search_targets(target, lit, "natural")[1]  # few miss the waves of a long line
+        wanted = search_target(target, lit, "natural")  # few frequencies miss a long line's waves
         tied = last_shown(StarChain(wanted, shapes), _SHARED[len(shapes)])
         p, evaluations = searched(tied, tied, seed)
     settings = {"directions": directions, "taps": taps, "fit_seed": seed}

@@ -108,6 +108,17 @@ class Stage:
     weights: FloatArray
     angle_degrees: float = 0.0
 
+    @classmethod
+    def of_term(cls, offsets_mm: FloatArray, weights: FloatArray) -> tuple[Self, FloatArray]:
+        """Return two passes with weights (n+1, C) that add up to 1, and what they added up to (C,).
+
+        Where all are 0, because a channel does not have the term, its light stays where it is.
+        """
+        sums = weights[0] + 2.0 * weights[1:].sum(axis=0)
+        empty = sums == 0.0
+        shares = np.where(empty, np.eye(len(weights))[:, :1], weights / np.where(empty, 1.0, sums))
+        return cls(0, "pair", offsets_mm, shares), sums
+
     @property
     def shape(self) -> Shape:
         """The stage without its numbers."""

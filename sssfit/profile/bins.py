@@ -92,8 +92,10 @@ def merged(profile: Profile, channel: int) -> Bins:
 
     cuts = _cuts(len(energy), hits)
     between = functools.partial(np.add.reduceat, indices=cuts[:-1])
-    summed, variance = between(energy), between(stderr) ** 2
-    if not profile.shares_photons:
+    summed = between(energy)
+    if profile.shares_photons:
+        variance = between(stderr) ** 2
+    else:
         variance = np.maximum(between(mean_square) - summed**2, 0.0) / (photons - 1)
     is_full = hits(between) >= MIN_HITS
     n_drawn = int(np.max(np.flatnonzero(is_full & _is_in_step(cuts)), initial=-1)) + 1

@@ -18,6 +18,7 @@ _MIN_MM = 1e-12
 # Least width of an annulus as a share of its radius, so that the 64 parts used for pixels stay
 # distinct in double precision. 100 000 annuli, the maximum, have 1e-5 at the rim.
 _NARROWEST = 1e-9
+BALANCE_ROUNDING = 1e-12  # below this an energy balance is rounding, not roulette
 # Of all light on a side: in ``meta`` where they do not follow from those of annuli (`under_beam`).
 TOTAL_ERRORS = ("diffuse_reflectance_stderr", "transmittance_stderr")
 

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 from typing import Any
 
 from sssfit.messages import columns, counted
+from sssfit.profile.checks import BALANCE_ROUNDING
 
 _NOTED_BEYOND = 1e-3  # share of a channel beyond the grid that causes a remark
 _SIGMAS = 4.5  # a deviation beyond this many standard errors is not random
-ROUNDING = 1e-12  # below this an energy balance is rounding, not roulette
 
 Rows = Sequence[dict[str, Any]]
 
@@ -128,7 +128,9 @@ def energy_lines(rows: Rows) -> list[str]:
             (float(row["energy_balance"][c]), float(row["energy_balance_stderr"][c]), name)
             for name, row, c in _channels(rows)
         ),
-        key=lambda each: max(abs(each[0]) - ROUNDING, 0.0) / (_SIGMAS * each[1] + ROUNDING),
+        key=lambda each: (
+            max(abs(each[0]) - BALANCE_ROUNDING, 0.0) / (_SIGMAS * each[1] + BALANCE_ROUNDING)
+        ),
     )
     unfinished = max(float(each) for row in rows for each in row["unfinished"])
     parts = "specular + diffuse + absorbed"
@@ -137,10 +139,11 @@ def energy_lines(rows: Rows) -> list[str]:
     parts += " + unfinished" if unfinished > 0.0 else ""
     if not rows[0]["photons"]:
         return [*lines, f"energy: {parts} = 1 to {abs(balance):.0e} (worst channel, {name})"]
-    within = abs(balance) <= _SIGMAS * stderr + ROUNDING
+    within = abs(balance) <= _SIGMAS * stderr + BALANCE_ROUNDING
     lines.append(
         f"energy: {parts} = 1 {'within' if within else 'NOT WITHIN'} the run's own error: "
-        f"{balance:+.1e}, standard error {max(stderr, ROUNDING):.0e} (worst channel, {name})"
+        f"{balance:+.1e}, standard error {max(stderr, BALANCE_ROUNDING):.0e} "
+        f"(worst channel, {name})"
     )
     return [*lines, *([f"unfinished, at most: {unfinished:.6f}"] if unfinished > 0.0 else [])]
 

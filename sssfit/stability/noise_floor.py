@@ -25,12 +25,9 @@ def noise_ratio(profile: Profile, mm_per_pixel: float) -> FloatArray:
     rings = np.floor(middle_pixels + 1.0 - _DISK).astype(np.intp)
     shape = rings[-1] + 1, len(profile.channels)
     variance, energy = np.zeros(shape), np.zeros(shape)
-    stderr = np.nan_to_num(profile.annulus_energy_stderr)
-    if profile.shares_photons:
-        np.add.at(variance, rings, stderr)
-        variance **= 2
-    else:
-        np.add.at(variance, rings, stderr**2)
+    power = 1 if profile.shares_photons else 2
+    np.add.at(variance, rings, np.nan_to_num(profile.annulus_energy_stderr) ** power)
+    variance **= 2 // power
     np.add.at(energy, rings, profile.annulus_energy)
     outer = np.arange(rings[-1] + 1) + _DISK
     areas = annulus_areas(mm_per_pixel * np.concatenate(([0.0], outer)))[:, None]
