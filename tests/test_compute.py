@@ -96,6 +96,38 @@ def test_several_materials(dialect):
         assert apart(found * taps.energy, rendered(light, taps)) < 1e-5
 
 
+def of_several_pixels():
+    """Tables of one structure for pixels of two sizes, of which the finer one reaches as far."""
+    fine = replace(wide("1-1|2", by=1.5), meta={"material": "clay"})
+    stages = (replace(each, offsets_mm=3.0 * each.offsets_mm) for each in fine.stages)
+    coarse = taps_of("1-1|2", channels=3)
+    coarse = replace(coarse, mm_per_pixel=3.0 * PITCH, stages=tuple(stages))
+    return [coarse, fine]
+
+
+@pytest.mark.parametrize(("is_turned", "dialect"), in_turn([(False,), (True,)], RUN))
+def test_tables_for_several_pixels_are_right_on_their_own(is_turned, dialect):
+    every = of_several_pixels()[:: -1 if is_turned else 1]
+    text, _ = kernel_text(every, dialect, compute=True)
+    light = light_of((37, 50), 3)
+    for k, taps in enumerate(every):
+        scene = Scene("light", light, taps.mm_per_pixel)
+        found = run_compute(text, dialect, every, light, taps.mm_per_pixel, profile=k)
+        assert apart(found * taps.energy, render_taps(scene, taps, border="clamp")) < 1e-5
+    assert "Halos\n// are those for each profile's own; for less the blur stays" in text
+
+
+def test_the_memory_of_a_group_is_that_of_the_widest_table():
+    """Whatever the order, and whatever the pixels that a table was made for."""
+    coarse, fine = of_several_pixels()
+    assert levels_of([coarse, fine]) == levels_of([fine, coarse]) == levels_of([fine])
+    stages = (replace(each, offsets_mm=30.0 * each.offsets_mm) for each in fine.stages)
+    fine = replace(fine, stages=tuple(stages))
+    for tables in ([fine], [coarse, fine], [fine, coarse]):
+        with pytest.raises(KernelError, match=r"level 0 reach \d+ texels, and 16384 bytes of"):
+            kernel_text(tables, "wgsl", compute=True)
+
+
 def rows_of(text):
     """Reads, writes and numbers of each level in the table of the comment, and those of adding."""
     levels = re.findall(

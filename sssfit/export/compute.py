@@ -14,6 +14,7 @@ from sssfit.errors import KernelError
 from sssfit.export.certificate import columns
 from sssfit.export.dialects import Dialect
 from sssfit.export.functions import Functions
+from sssfit.export.profiles import has_own_pixels
 from sssfit.kernel import Taps
 
 GROUP = 16  # threads a side: 256 are the most that WebGPU promises
@@ -88,7 +89,7 @@ def levels_of(tables: Sequence[Taps]) -> list[Level]:
     found = []
     for level in range(count):
         stages = [k for k, each in enumerate(first.stages) if each.level == level]
-        reaches = [max(_reach(each, k, first.mm_per_pixel) for each in tables) for k in stages]
+        reaches = [max(_reach(each, k) for each in tables) for k in stages]
         halo = sum(reaches)
         tile = min(GROUP, (most - 2 * halo) // 2 * 2)
         if tile < 2:
@@ -102,10 +103,10 @@ def levels_of(tables: Sequence[Taps]) -> list[Level]:
     return found
 
 
-def _reach(taps: Taps, k: int, mm_per_pixel: float) -> int:
-    """Return how many texels around it a stage's fetches touch."""
+def _reach(taps: Taps, k: int) -> int:
+    """Return how many texels around it a stage's fetches touch on the table's own pixels."""
     stage = taps.stages[k]
-    return math.floor(float(stage.offsets_mm.max()) / (mm_per_pixel * 2.0**stage.level)) + 1
+    return math.floor(float(stage.offsets_mm.max()) / (taps.mm_per_pixel * 2.0**stage.level)) + 1
 
 
 def shared_bytes(taps: Taps, levels: Sequence[Level]) -> int:
@@ -124,8 +125,9 @@ def bytes_moved(levels: Sequence[Level], *, with_halos: bool) -> float:
     return _HALF_FLOATS * pictures
 
 
-def compute_table(taps: Taps, levels: Sequence[Level], prefix: str) -> Iterator[str]:
+def compute_table(tables: Sequence[Taps], levels: Sequence[Level], prefix: str) -> Iterator[str]:
     """Yield the dispatches as a table, and what their functions take."""
+    taps = tables[0]
     yield ""
     yield f"Dispatches in their order, groups of {GROUP} x {GROUP} threads. E is the irradiance, M0"
     yield "the result; sizes are rounded up. A group of Level writes a tile, and holds it with a"
@@ -146,12 +148,17 @@ def compute_table(taps: Taps, levels: Sequence[Level], prefix: str) -> Iterator[
     yield "those below half of it term[1] to group * tile / 2 + thread of the other, if inside."
     yield "Add: position is the middle of the texel that is written, texel 1 / size of M."
     yield "mm_per_pixel: of the full picture, 2 d tan(vertical fov / 2) / rows at depth d. Halos"
-    yield f"are those for {taps.mm_per_pixel:.6g} mm; for less the blur stays as many texels wide."
+    own = "each profile's own" if has_own_pixels(tables) else f"{taps.mm_per_pixel:.6g} mm"
+    yield f"are those for {own}; for less the blur stays as many texels wide."
     yield "Sampler: bilinear, clamped."
 
 
 class ComputeFunctions(Functions):
-    """The functions of tables with the same stages, for levels in groupshared memory."""
+    """The functions of tables with the same stages, for levels in groupshared memory.
+
+    It takes what `Functions` takes but passes, their ``levels``, and ``has_own_pixels``, whether
+    each profile has a pixel size of its own, below which its halo would not suffice.
+    """
 
     def __init__(
         self,
@@ -161,9 +168,11 @@ class ComputeFunctions(Functions):
         prefix: str,
         *,
         is_indexed: bool,
+        has_own_pixels: bool = False,
     ) -> None:
         super().__init__(taps, (), dialect, prefix, is_indexed=is_indexed)
         self.levels = levels
+        self.least_mm = f"{prefix}_MM_PER_PIXEL{'[profile]' if has_own_pixels else ''}"
         self.side = max(each.side for each in levels)
         self.own_profile = [name for _, name in self.profile]
 
@@ -274,7 +283,7 @@ class ComputeFunctions(Functions):
 
     def _begun(self) -> str:
         """Return the line that finds the size of a texel, for which the halo suffices."""
-        size = f"max(mm_per_pixel, {self.prefix}_MM_PER_PIXEL) * {self.prefix}_SIZE[stage]"
+        size = f"max(mm_per_pixel, {self.least_mm}) * {self.prefix}_SIZE[stage]"
         return f"{self.dialect.new('float', 'mm_per_texel')} = {size};"
 
     def _loop(self, made: str, slot: str, indent: str) -> str:

@@ -1,4 +1,4 @@
-"""Names of the profiles of a source that holds several tables, as constants of their numbers."""
+"""Constants of a source that holds several tables: the names of the profiles, their pixels."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -44,6 +44,20 @@ def profile_constants(tables: Sequence[Taps], write: Writer) -> Iterator[str]:
     """Yield a constant for each profile of a known material, its number in the arrays."""
     for name, k in profile_names(tables).items():
         yield write.scalar("uint", f"PROFILE_{name}", [k])
+
+
+def has_own_pixels(tables: Sequence[Taps]) -> bool:
+    """Return whether tables were made for pixels of different sizes."""
+    return len({each.mm_per_pixel for each in tables}) > 1
+
+
+def pixel_constant(tables: Sequence[Taps], write: Writer) -> Iterator[str]:
+    """Yield the size of the pixels that tables were made for, of each where they differ."""
+    sizes_mm = [each.mm_per_pixel for each in tables]
+    if has_own_pixels(tables):
+        yield from write.rows("MM_PER_PIXEL", [[each] for each in sizes_mm])
+    else:
+        yield write.scalar("float", "MM_PER_PIXEL", sizes_mm[:1])
 
 
 def _identifier(text: str) -> str:

@@ -16,7 +16,7 @@ from sssfit.export.dialects import Dialect, commented, mark, switch
 from sssfit.export.functions import Functions
 from sssfit.export.jitter import check_jitter, jitter_lines
 from sssfit.export.passes import pass_list
-from sssfit.export.profiles import profile_constants
+from sssfit.export.profiles import has_own_pixels, pixel_constant, profile_constants
 from sssfit.export.remarks import remarked
 from sssfit.export.through import ROWS, through_table
 from sssfit.kernel import Taps
@@ -107,7 +107,7 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
 def _table(tables: Sequence[Taps], style: Style) -> Iterator[str]:
     """Return the passes or dispatches in words."""
     if style.compute:
-        return compute_table(tables[0], levels_of(tables), style.prefix)
+        return compute_table(tables, levels_of(tables), style.prefix)
     return pass_table(
         tables[0],
         style.prefix,
@@ -123,7 +123,14 @@ def _functions(tables: Sequence[Taps], dialect: Dialect, style: Style) -> Functi
     first, is_indexed = tables[0], len(tables) > 1
     if style.compute:
         levels = levels_of(tables)
-        return ComputeFunctions(first, levels, dialect, style.prefix, is_indexed=is_indexed)
+        return ComputeFunctions(
+            first,
+            levels,
+            dialect,
+            style.prefix,
+            is_indexed=is_indexed,
+            has_own_pixels=has_own_pixels(tables),
+        )
     depth = style.has("DEPTH")
     kind = DepthFunctions if depth else Functions
     return kind(
@@ -227,7 +234,7 @@ def _constants(
     """Yield the constants: stages, offsets, weights and blend, profile after profile."""
     first, write = tables[0], Writer(dialect, style.prefix, half=style.half)
     counts = [len(each.weights) for each in first.stages]
-    yield write.scalar("float", "MM_PER_PIXEL", [first.mm_per_pixel])
+    yield from pixel_constant(tables, write)
     if len(tables) > 1:
         yield from profile_constants(tables, write)
         yield write.scalar("uint", "TAPS", [sum(counts)])
