@@ -493,7 +493,7 @@ _SOURCE = (
     Setting(
         "with_shader", "flag", "write the passes of a dense kernel too, up to 65 weights each."
     ),
-    Setting("dense", "flag", "write them with any number of weights a pass."),
+    Setting("dense", "flag", "write them with up to 513 weights a pass."),
 )
 _OF_C = tuple(each for each in _SOURCE if each.name in ("prefix", "keep_energy", "half"))
 

@@ -14,8 +14,12 @@ from reference_pixels import make_profile
 import sssfit
 from sssfit.errors import KernelError
 from sssfit.export import DIALECTS, dense, json_document, kernel_text
+from sssfit.export.dense import MOST_DENSE, taps_of_kernel
 from sssfit.fit import fit_preintegrated
 from sssfit.kernel import SeparableKernel
+from sssfit.methods import EXPORTS, settings_of
+from sssfit.render.taps import render_taps
+from sssfit.scene.record import Scene
 
 SCHEMA = json.loads((Path(sssfit.__file__).parent / "kernel.schema.json").read_text("utf-8"))
 
@@ -252,3 +256,24 @@ def test_only_dense_writes_passes_of_more_than_65_weights():
         kernel_text(kernel, "hlsl", with_shader=True)
     assert "SSS_Blur" in kernel_text(kernel, "hlsl", dense=True)[0]
     assert "SSS_Blur" in kernel_text(small_kernel(pixels=65), "hlsl", with_shader=True)[0]
+
+
+def test_what_dense_cannot_write_is_said_of_the_kernel():
+    assert f"up to {MOST_DENSE} weights" in dict(settings_of(EXPORTS))["dense"][0].help
+    assert "SSS_Blur" in kernel_text(small_kernel(pixels=MOST_DENSE), "hlsl", dense=True)[0]
+    for asked in ("dense", "with_shader"):
+        with pytest.raises(KernelError, match=r"has 515 weights, and \d+ .* as fetches; thin"):
+            kernel_text(small_kernel(pixels=MOST_DENSE + 2), "hlsl", **{asked: True})
+        with pytest.raises(KernelError, match=r"kernel has 25 terms, and 24 are the most"):
+            kernel_text(small_kernel(terms=25), "hlsl", **{asked: True})
+
+
+@pytest.mark.parametrize("asked", ["dense", "with_shader"])
+def test_a_kernel_of_one_pixel_has_passes(asked):
+    kernel = small_kernel(pixels=1)
+    text, _ = kernel_text(kernel, "hlsl", keep_energy=True, **{asked: True})
+    assert "SSS_Terms0" in text
+    scene = Scene("light", np.random.default_rng(2).random((7, 9, 3)), kernel.mm_per_pixel)
+    found = render_taps(scene, taps_of_kernel(kernel, None))
+    wanted = scene.irradiance * kernel.energy * kernel.scale
+    np.testing.assert_allclose(found, wanted, rtol=1e-12)

@@ -179,7 +179,7 @@ def source_text(
     with_shader : bool
         Whether a dense kernel gets passes too, up to 65 weights each.
     dense : bool
-        Whether it gets them with any number of weights.
+        Whether it gets them with up to 513 weights each.
 
     Raises
     ------

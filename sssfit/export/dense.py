@@ -9,6 +9,9 @@ from sssfit.export.dialects import Dialect, commented, mark
 from sssfit.export.document import description
 from sssfit.export.remarks import remarked
 from sssfit.kernel import SeparableKernel, Stage, Taps
+from sssfit.kernel.structure import MOST_IN_PASS, MOST_STAGES
+
+MOST_DENSE = 2 * MOST_IN_PASS + 1  # weights of a pass: the middle, and pairs of fetches
 
 
 def dense(
@@ -45,16 +48,15 @@ def taps_of_kernel(kernel: SeparableKernel, most: int | None) -> Taps:
     Raises
     ------
     KernelError
-        A pass has more weights than ``most``.
+        A pass has more weights than ``most``, or than a table of taps holds; or there are too many
+        terms.
     """
-    if most is not None and kernel.pixels > most:
-        raise KernelError(
-            f"a pass of this kernel has {kernel.pixels} weights, and {most} are the most that are "
-            "written as fetches unless `dense` is set; thin it to taps, or fit a cascade."
-        )
-    middle = kernel.pixels // 2
-    offsets_mm: FloatArray = kernel.mm_per_pixel * np.arange(1.0, middle + 1.0)
-    terms = [Stage.of_term(offsets_mm, each) for each in kernel.weights[:, middle:]]
+    _check_size(kernel, most)
+    # A pass has a pair of fetches at least; beside a single pixel they weigh nothing.
+    beside = (0, 1 if kernel.pixels == 1 else 0)
+    halves = np.pad(kernel.weights[:, kernel.half_pixels :], ((0, 0), beside, (0, 0)))
+    offsets_mm: FloatArray = kernel.mm_per_pixel * np.arange(1.0, halves.shape[1])
+    terms = [Stage.of_term(offsets_mm, each) for each in halves]
     sums = np.array([each for _, each in terms])  # (R, C)
     blend = np.concatenate((np.zeros((1, len(kernel.channels))), kernel.signs * sums**2))
     return Taps(
@@ -67,6 +69,23 @@ def taps_of_kernel(kernel: SeparableKernel, most: int | None) -> Taps:
         errors={"spectral": np.full(len(kernel.channels), np.nan), "energy": kernel.energy_error},
         meta=kernel.meta,
     )
+
+
+def _check_size(kernel: SeparableKernel, most: int | None) -> None:
+    """Refuse kernels of more weights a pass, or terms, than are written as passes."""
+    limit = MOST_DENSE if most is None else most
+    if kernel.pixels > limit:
+        # Beyond what `dense` allows that option would be no remedy.
+        unless = " unless `dense` is set" if kernel.pixels <= MOST_DENSE else ""
+        raise KernelError(
+            f"a pass of this kernel has {kernel.pixels} weights, and {limit} are the most that are "
+            f"written as fetches{unless}; thin it to taps, or fit a cascade."
+        )
+    if kernel.rank > MOST_STAGES:
+        raise KernelError(
+            f"this kernel has {kernel.rank} terms, and {MOST_STAGES} are the most that are written "
+            "as passes; fit one with fewer, or a cascade."
+        )
 
 
 def energy_in_half(kernel: SeparableKernel) -> FloatArray:

@@ -16,6 +16,7 @@ from sssfit.messages import counted, shown
 
 MOST_PAIRS, MOST_STAGES, MOST_LEVELS = 64, 24, 10
 MOST_ON_DISK = 256  # fetches
+MOST_IN_PASS = 256  # pairs of fetches, of dense passes, too
 _STAR, _DIAGONAL = "*", "x"
 DIAGONAL_DEGREES = 45.0
 STAR_FETCHES = 9

@@ -38,6 +38,7 @@ from sssfit.kernel import taps_json
 from sssfit.kernel.checks import MAX_MM, MIN_MM, MOST, checked_pitch
 from sssfit.kernel.record import PROVENANCE, SeparableKernel
 from sssfit.kernel.structure import (
+    MOST_IN_PASS,
     MOST_LEVELS,
     MOST_ON_DISK,
     MOST_STAGES,
@@ -64,7 +65,7 @@ _ERRORS = ("spectral", "energy")
 # Fetches with one weight: a pair of passes and a line have the middle and mirrored pairs, a star
 # the middle, four diagonal neighbours and four on the axes, a disk single fetches.
 _COPIES = {"pair": 2.0, "star": 4.0, "disk": 1.0, "line": 2.0}
-_MOST_OFFSETS = dict.fromkeys(("pair", "disk", "line"), MOST_ON_DISK)  # of dense passes, too
+_MOST_OFFSETS = {"pair": MOST_IN_PASS, "disk": MOST_ON_DISK, "line": MOST_IN_PASS}
 # Angles below which a stage is its own mirror image: the passes of a pair are perpendicular.
 _TURNS = {"pair": 90.0, "line": 180.0}
 _ROUNDING = 1e-9  # of sums that are computed in another order
