@@ -277,3 +277,15 @@ def test_a_kernel_of_one_pixel_has_passes(asked):
     found = render_taps(scene, taps_of_kernel(kernel, None))
     wanted = scene.irradiance * kernel.energy * kernel.scale
     np.testing.assert_allclose(found, wanted, rtol=1e-12)
+
+
+def test_what_half_floats_cost_is_that_of_weights_and_scale(caplog):
+    caplog.set_level("INFO", "sssfit")
+    kernel = small_kernel(channels=1, signs=np.ones((2, 1)))
+    text, _ = kernel_text(kernel, "c", half=True)
+    text = re.sub(r"(?<=\d)f\b", "", text)
+    (scale,) = numbers_of(text, "SSS_SCALE")
+    weights = np.array(numbers_of(text, "SSS_WEIGHT")).reshape(2, 5)
+    change = scale * (weights.sum(axis=1) ** 2).sum() / (kernel.energy * kernel.scale)[0] - 1.0
+    assert 1e-5 < abs(scale / kernel.scale[0] - 1.0) < 1e-3
+    assert caplog.messages == [f"Half floats change the energy of wax: c1 {100 * change:+.2g} %."]

@@ -21,6 +21,7 @@ from sssfit.export import DIALECTS, Style, is_ours, kernel_text, source, taps_do
 from sssfit.export.certificate import SERVES
 from sssfit.export.passes import pass_list
 from sssfit.kernel import Stage, Taps
+from sssfit.messages import by_channel
 from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
 
@@ -282,3 +283,56 @@ def test_what_half_floats_cannot_hold_is_refused(form):
     with pytest.raises(KernelError, match=r"does not fit in a half float, of which 65504 is the"):
         kernel_text(taps, form, half=True)
     assert "inf" not in kernel_text(taps, form)[0].split("static")[1]
+
+
+def energy_of(text, taps):
+    """The energy (C,) of exported constants: the blend times what the fetches add up to."""
+    channels = len(taps.channels)
+    albedo = np.array(numbers_of(text, "SSS_ALBEDO")) if "SSS_ALBEDO" in text else 1.0
+    first = [int(each) for each in numbers_of(text, "SSS_FIRST")]
+    weights = np.array(numbers_of(text, "SSS_WEIGHT")).reshape(-1, channels)
+    total, passed = np.zeros(channels), np.ones(channels)
+    blend = np.vstack((np.zeros(channels), np.ones(channels)))
+    if "SSS_BLEND" in text:
+        blend = np.array(numbers_of(text, "SSS_BLEND")).reshape(-1, channels)
+    total += blend[0]
+    for stage, begin, end, share in zip(taps.stages, first, first[1:], blend[1:], strict=False):
+        copies = {"pair": 2.0, "star": 4.0, "disk": 1.0}[stage.kind]
+        whole = weights[begin] + copies * weights[begin + 1 : end].sum(axis=0)
+        whole = whole**2 if stage.kind == "pair" else whole
+        passed = passed * whole if taps.chained else whole
+        total += share * passed
+    return albedo * total
+
+
+def change_of(before, after, taps):
+    """The line that says by how much half floats change the energy."""
+    change = by_channel(taps.channels, (after / before - 1.0).tolist(), "+.2g%")
+    return f"Half floats change the energy of unknown material: {change}."
+
+
+@pytest.mark.parametrize("keep_energy", [False, True])
+@pytest.mark.parametrize("form", ["c", "hlsl"])
+@pytest.mark.parametrize(
+    "taps",
+    [
+        taps_of("1-2|*|2", channels=3, meta={}),
+        taps_of("2-1", channels=3, chained=False, meta={}),
+        replace(disk_of(9), meta={}),
+        replace(taps_of("2", channels=3, meta={}), blend=[[0.0] * 3, [0.4321, 0.2099, 0.1137]]),
+    ],
+)
+def test_what_half_floats_cost_is_the_energy_of_what_is_written(taps, form, keep_energy, caplog):
+    caplog.set_level("INFO", "sssfit")
+    text, _ = kernel_text(taps, form, half=True, keep_energy=keep_energy)
+    text = re.sub(r"(?<=\d)f\b", "", text)
+    assert caplog.messages == [change_of(taps.energy, energy_of(text, taps), taps)]
+
+
+def test_passes_within_a_mask_divide_by_their_rounded_weights(caplog):
+    caplog.set_level("INFO", "sssfit")
+    taps = taps_of("1-2|2", channels=3, meta={})
+    text, _ = kernel_text(taps, "hlsl", half=True, coverage=True)
+    blend = np.array(numbers_of(text, "SSS_BLEND")).reshape(-1, 3)
+    energy = np.array(numbers_of(text, "SSS_ALBEDO")) * blend.sum(axis=0)
+    assert caplog.messages == [change_of(taps.energy, energy, taps)]

@@ -218,7 +218,7 @@ def source_text(
     )
     text = source(tables, DIALECTS[form], style)
     for each in tables if half else ():
-        _note_half(each, taps_in_half(each))
+        _note_half(each, each.energy, taps_in_half(each, DIALECTS[form], style))
     return text
 
 
@@ -232,13 +232,12 @@ def _dense_text(kernel: SeparableKernel, form: str, prefix: str, *, half: bool) 
             "a cascade comes nearer for 24 fetches."
         )
     if half:
-        _note_half(kernel, dense_in_half(kernel))
+        _note_half(kernel, kernel.energy * kernel.scale, dense_in_half(kernel))
     return text
 
 
-def _note_half(kernel: Kernel, rounded: FloatArray) -> None:
-    """Say by how much half floats change the energy."""
-    energy = kernel.energy
+def _note_half(kernel: Kernel, energy: FloatArray, rounded: FloatArray) -> None:
+    """Say by how much half floats change the energy (C,)."""
     change = np.where(energy != 0.0, rounded / np.where(energy != 0.0, energy, 1.0) - 1.0, 0.0)
     words = by_channel(kernel.channels, change.tolist(), "+.2g%|unknown")
     note(f"Half floats change the energy of {of_material(kernel.meta.get('material'))}: {words}.")

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
+from sssfit.arrays import FloatArray
 from sssfit.errors import KernelError
 from sssfit.export.dialects import KINDS, Dialect
 from sssfit.messages import shown
@@ -107,5 +108,10 @@ def _in_half(values: Sequence[float]) -> list[float]:
             f"{most:.6g} does not fit in a half float, of which {_MOST_HALF:.0f} is the largest; "
             "export in single precision."
         )
-    rounded: list[float] = np.array(values, np.float16).astype(float).tolist()
+    rounded: list[float] = in_half(np.array(values)).tolist()
     return rounded
+
+
+def in_half(values: FloatArray) -> FloatArray:
+    """Return an array of the nearest half floats, in double precision."""
+    return values.astype(np.float16).astype(np.float64)

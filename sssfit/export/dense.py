@@ -4,7 +4,7 @@ import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import KernelError
-from sssfit.export.constants import Writer, check_prefix
+from sssfit.export.constants import Writer, check_prefix, in_half
 from sssfit.export.dialects import Dialect, commented, mark
 from sssfit.export.document import description
 from sssfit.export.remarks import remarked
@@ -89,7 +89,7 @@ def _check_size(kernel: SeparableKernel, most: int | None) -> None:
 
 
 def energy_in_half(kernel: SeparableKernel) -> FloatArray:
-    """Return the energy (C,) of a kernel whose weights are rounded to half floats."""
-    sums = kernel.weights.astype(np.float16).astype(float).sum(axis=1)
-    energy: FloatArray = (kernel.signs * sums**2).sum(axis=0) * kernel.scale
+    """Return the energy (C,), with its scale, of a kernel's constants rounded to half floats."""
+    sums = in_half(kernel.weights).sum(axis=1)
+    energy: FloatArray = (kernel.signs * sums**2).sum(axis=0) * in_half(kernel.scale)
     return energy

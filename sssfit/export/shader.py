@@ -10,7 +10,7 @@ from sssfit.arrays import FloatArray
 from sssfit.errors import KernelError
 from sssfit.export.certificate import certificate, how_to_run, pass_table
 from sssfit.export.compute import ComputeFunctions, compute_table, levels_of
-from sssfit.export.constants import Writer, check_prefix
+from sssfit.export.constants import Writer, check_prefix, in_half
 from sssfit.export.depth import DepthFunctions, check_depth, depth_rates
 from sssfit.export.dialects import Dialect, commented, mark, switch
 from sssfit.export.functions import Functions
@@ -19,7 +19,7 @@ from sssfit.export.passes import pass_list
 from sssfit.export.profiles import has_own_pixels, pixel_constant, profile_constants
 from sssfit.export.remarks import remarked
 from sssfit.export.through import ROWS, through_table
-from sssfit.kernel import Taps
+from sssfit.kernel import Stage, Taps
 
 _COPIES = {
     "pair": 2.0,
@@ -262,11 +262,9 @@ def _constants(
     yield from write.rows("WEIGHT", np.concatenate(weights).tolist())
     if passes and style.has("DEPTH"):
         yield from write.rows("RATE", [row for each in tables for row in depth_rates(each)])
-    listed = pass_list(first, normalized=style.normalized)
-    if passes and not style.compute and not listed[-1].is_blended:
-        return
-    blends = [_blend(each, style) for each in tables]
-    yield from write.rows("BLEND", np.concatenate(blends).tolist())
+    if _writes_blend(first, style, passes=passes):
+        blends = [_blend(each, style) for each in tables]
+        yield from write.rows("BLEND", np.concatenate(blends).tolist())
 
 
 def _through(tables: Sequence[Taps], functions: Functions, write: Writer) -> Iterator[str]:
@@ -295,6 +293,12 @@ def _places(taps: Taps) -> Iterator[list[float]]:
             yield [each * math.cos(turn), each * math.sin(turn)] if taps.is_disk else [each]
 
 
+def _writes_blend(taps: Taps, style: Style, *, passes: bool) -> bool:
+    """Return whether there is a blend, which passes of a single stage alone do without."""
+    is_left_out = passes and not style.compute
+    return not is_left_out or pass_list(taps, normalized=style.normalized)[-1].is_blended
+
+
 def _blend(taps: Taps, style: Style) -> FloatArray:
     """Return the blend, of unit energy where the energy is written apart."""
     energy = np.where(taps.energy != 0.0, taps.energy, 1.0)
@@ -302,16 +306,28 @@ def _blend(taps: Taps, style: Style) -> FloatArray:
     return blend
 
 
-def energy_in_half(taps: Taps) -> FloatArray:
-    """Return the energy (C,) of a table whose weights and blend are rounded to half floats."""
-    shares = taps.blend / np.where(taps.energy != 0.0, taps.energy, 1.0)
-    blend = shares.astype(np.float16).astype(float)
+def energy_in_half(taps: Taps, dialect: Dialect, style: Style) -> FloatArray:
+    """Return the energy (C,) of the constants of a table as `source` rounds them to half floats.
+
+    Passes that keep light within a mask divide by the sum of their weights, whatever that is.
+    """
+    passes = dialect.has_passes and style.with_passes
+    blend = _blend(taps, style)
+    if _writes_blend(taps, style, passes=passes):
+        blend = in_half(blend)
     total, passed = blend[0].copy(), np.ones(len(taps.channels))
     for stage, share in zip(taps.stages, blend[1:], strict=True):
-        rows = stage.weights.astype(np.float16).astype(float)
-        whole = rows[0] + _COPIES[stage.kind] * rows[1:].sum(axis=0)
-        whole = whole**2 if stage.kind == "pair" else whole
+        whole = _sum_in_half(stage)
+        if passes and style.has("COVERAGE"):
+            whole = np.ones_like(whole)
         passed = passed * whole if taps.chained else whole
         total += share * passed
-    energy: FloatArray = total * taps.energy
+    energy: FloatArray = total * in_half(taps.energy) if style.normalized else total
     return energy
+
+
+def _sum_in_half(stage: Stage) -> FloatArray:
+    """Return what all fetches of a stage add up to (C,) with rounded weights."""
+    rows = in_half(stage.weights)
+    whole: FloatArray = rows[0] + _COPIES[stage.kind] * rows[1:].sum(axis=0)
+    return whole**2 if stage.kind == "pair" else whole
