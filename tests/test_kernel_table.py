@@ -5,13 +5,16 @@ import dataclasses
 
 import numpy as np
 import pytest
+from test_disk import disk_of
 from test_export import small_kernel
 from test_profile import full_profile
 from test_taps import taps_of
+from test_turned import turned
 
 from sssfit.errors import KernelError
 from sssfit.export.table import is_our_table, table_text
 from sssfit.formats.csv import csv_text
+from sssfit.render.disk import spiral
 
 
 def rows_of(record):
@@ -50,6 +53,32 @@ def test_taps_come_back_from_their_rows(structure):
         offsets_mm = [float(row["offset_mm"]) for row in own]
         np.testing.assert_array_equal(offsets_mm, [0.0, *stage.offsets_mm])
         assert {(int(row["level"]), row["kind"]) for row in own} == {(stage.level, stage.kind)}
+
+
+def test_the_fetches_of_a_disk_lie_where_its_rows_say():
+    taps = disk_of(9)
+    weights = [row for row in rows_of(taps) if row["part"] == "weight"]
+    middle, *fetches = [
+        (float(row["offset_mm"]), np.radians(float(row["angle_degrees"]))) for row in weights
+    ]
+    assert middle == (0.0, 0.0)
+    found = [(away * np.sin(turn), away * np.cos(turn)) for away, turn in fetches]
+    np.testing.assert_allclose(found, spiral(taps.stages[0]), atol=1e-14)
+    text = table_text([taps])
+    assert "# A disk is one pass of single bilinear fetches at offset_mm in the direction" in text
+    assert "either side" not in text
+
+
+def test_the_comment_explains_the_kinds_and_levels_that_there_are():
+    flat, halved = table_text([taps_of("1-2")]), table_text([taps_of("*|1")])
+    assert "# A pair is a pass along x" in flat
+    assert "A star" not in flat
+    assert "level v" not in flat
+    assert "# A star is one pass of nine fetches" in halved
+    assert "# A stage of level v works on the picture halved v times" in halved
+    angles = table_text([turned("1-1", ["x30", ""], channels=2)])
+    assert "# A pair with angle_degrees runs along it, from x to the right" in angles
+    assert "A pair with angle" not in flat
 
 
 def test_a_profile_keeps_its_own_table_and_both_are_ours(tmp_path):

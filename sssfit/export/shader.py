@@ -20,6 +20,7 @@ from sssfit.export.profiles import has_own_pixels, pixel_constant, profile_const
 from sssfit.export.remarks import remarked
 from sssfit.export.through import ROWS, through_table
 from sssfit.kernel import Stage, Taps
+from sssfit.kernel.structure import turn_on_disk
 
 _COPIES = {
     "pair": 2.0,
@@ -289,7 +290,7 @@ def _places(taps: Taps) -> Iterator[list[float]]:
     for stage in taps.stages:
         yield [0.0, 0.0] if taps.is_disk else [0.0]
         for k, each in enumerate(stage.offsets_mm.tolist()):
-            turn = 2.0 * math.pi * (k * 2.0 / (1.0 + math.sqrt(5.0)) % 1.0)
+            turn = 2.0 * math.pi * turn_on_disk(k)
             yield [each * math.cos(turn), each * math.sin(turn)] if taps.is_disk else [each]
 
 

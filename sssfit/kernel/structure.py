@@ -46,6 +46,11 @@ class Shape(NamedTuple):
         return 2 if self.kind == "pair" else 1
 
 
+def turn_on_disk(k: int) -> float:
+    """Return where the k-th fetch of a disk lies, from 0, as a share of a full turn."""
+    return k * 2.0 / (1.0 + math.sqrt(5.0)) % 1.0
+
+
 def directions(shape: Shape) -> tuple[tuple[float, float], ...]:
     """Return unit vectors (down, right) of the passes of a pair or a line, in their order."""
     turns = {"pair": (0.0, 90.0), "line": (0.0,)}[shape.kind]
