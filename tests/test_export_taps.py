@@ -275,6 +275,12 @@ def test_one_pass_is_one_pass():
     assert "24 fetches a pixel in 1 pass; all stages" in kernel_text(disk_of(24), "hlsl")[0]
 
 
+@pytest.mark.parametrize("asked", ["with_shader", "dense"])
+def test_what_is_for_dense_kernels_is_refused_of_a_table(asked):
+    with pytest.raises(KernelError, match=f"`{asked}` is for dense kernels, and a table of taps h"):
+        kernel_text(taps_of("1|1"), "glsl", **{asked: True})
+
+
 @pytest.mark.parametrize("form", ["hlsl", "c"])
 def test_what_half_floats_cannot_hold_is_refused(form):
     taps = taps_of("1", channels=3, mm_per_pixel=1e5)

@@ -201,6 +201,11 @@ def source_text(
         raise KernelError(f"{given}: only passes have this, and they are not written; {remedy}.")
     if without_shader and (with_shader or dense):
         raise KernelError("source is written with its passes or without them; ask for one.")
+    if tables and (with_shader or dense):
+        raise KernelError(
+            f"`{'dense' if dense else 'with_shader'}` is for dense kernels, and a table of taps "
+            "has its passes already; leave it out."
+        )
     if not tables and len(kernels) == 1 and isinstance(kernels[0], SeparableKernel):
         if not (with_shader or dense):
             return _dense_text(kernels[0], form, prefix, half=half)
