@@ -13,7 +13,7 @@ from reference_pixels import make_profile
 
 import sssfit
 from sssfit.errors import KernelError
-from sssfit.export import DIALECTS, dense, json_document, kernel_text
+from sssfit.export import DIALECTS, dense, exported, json_document, kernel_text
 from sssfit.export.dense import MOST_DENSE, taps_of_kernel
 from sssfit.fit import fit_preintegrated
 from sssfit.kernel import SeparableKernel
@@ -289,3 +289,31 @@ def test_what_half_floats_cost_is_that_of_weights_and_scale(caplog):
     change = scale * (weights.sum(axis=1) ** 2).sum() / (kernel.energy * kernel.scale)[0] - 1.0
     assert 1e-5 < abs(scale / kernel.scale[0] - 1.0) < 1e-3
     assert caplog.messages == [f"Half floats change the energy of wax: c1 {100 * change:+.2g} %."]
+
+
+def test_settings_of_other_forms_are_refused_from_python_too():
+    kernel, profile = small_kernel(), make_profile(np.linspace(0.0, 2.0, 21), np.full((20, 2), 0.1))
+    for name in ("coverage", "depth", "jitter", "tilt", "compute", "transmittance", "nope"):
+        with pytest.raises(KernelError, match=f"^{name} is no setting of c; expected prefix, keep"):
+            kernel_text(kernel, "c", **{name: True})
+    for form, record in (("frequency", profile), ("angles", profile), ("json", kernel)):
+        with pytest.raises(KernelError, match=f"^half is no setting of {form}; expected none"):
+            exported([record], form, half=True)
+    # What is off stays away, and a setting may have the option's name or the function's.
+    assert kernel_text(kernel, "c", coverage=False) == kernel_text(kernel, "c")
+    named = [exported([profile], "lut", **{each: 1.5}) for each in ("radius", "radius_mm")]
+    assert named[0] == named[1]
+    with pytest.raises(KernelError, match=r"^nope is no setting of csv"):
+        exported([kernel], "csv", nope=None)
+
+
+def test_records_that_a_form_is_not_made_of_are_refused():
+    profile = make_profile(np.linspace(0.0, 2.0, 21), np.full((20, 2), 0.1))
+    for form in ("hlsl", "c", "json"):
+        with pytest.raises(KernelError, match=rf"^{form} is written of kernels, .* fit a kernel"):
+            exported([small_kernel(), profile], form)
+    for form, wanted in (("csv", "a profile or a kernel"), ("wgsl", "a kernel")):
+        with pytest.raises(KernelError, match=f"^nothing to write as {form}; give {wanted}"):
+            exported([], form)
+        with pytest.raises(KernelError, match=f"^'skin1' cannot be written as {form}; expected a"):
+            exported(["skin1"], form)

@@ -21,8 +21,8 @@ from sssfit.export.shader import energy_in_half as taps_in_half
 from sssfit.export.table import is_our_table
 from sssfit.files import has_mark
 from sssfit.kernel import Kernel, SeparableKernel, Taps, is_kernel_file, is_taps_file
-from sssfit.messages import by_channel, note, of_material, printable
-from sssfit.methods import EXPORTS
+from sssfit.messages import by_channel, note, of_material, printable, shown
+from sssfit.methods import EXPORTS, settings_of
 from sssfit.profile import Profile
 
 __all__ = ["DIALECTS", "Style", "dense", "json_document", "kernel_text", "source", "taps_document"]
@@ -68,11 +68,13 @@ def exported(
     Raises
     ------
     KernelError
-        The form is unknown or not for these records, several cannot be one, or a setting is
-        invalid.
+        The form is unknown or not for these records, there are none, several cannot be one, or a
+        setting is invalid or not of this form.
     """
     if form not in EXPORTS:
         raise KernelError(f"no format {form!r} of a kernel; expected one of {', '.join(EXPORTS)}.")
+    _check_sources(sources, form)
+    settings = _own_settings(form, settings)
     write = EXPORTS[form].load()
     of = "profile" if isinstance(sources[0], Profile) else "kernel"
     if form == "lut":
@@ -85,6 +87,36 @@ def exported(
     text = write(sources, **({"form": form} if form in DIALECTS else {}), **settings)
     what = {"json": "a kernel", "csv": "a table"}.get(form, "source")
     return Exported(text.encode(), of, what, "", f".{form}", _figures(sources[0]))
+
+
+def _check_sources(sources: Sequence[object], form: str) -> None:
+    """Refuse records that a form is not made of, and none."""
+    of_profiles = EXPORTS[form].of_profiles
+    kinds = (Profile, SeparableKernel, Taps) if of_profiles else (SeparableKernel, Taps)
+    wanted = "a profile or a kernel" if of_profiles else "a kernel"
+    if not sources:
+        raise KernelError(f"nothing to write as {form}; give {wanted}.")
+    for each in sources:
+        if isinstance(each, Profile) and not of_profiles:
+            raise KernelError(
+                f"{form} is written of kernels, and that of {of_material(each.material_name)} is a "
+                "profile; fit a kernel to it."
+            )
+        if not isinstance(each, kinds):
+            raise KernelError(f"{shown(each)} cannot be written as {form}; expected {wanted}.")
+
+
+def _own_settings(form: str, given: dict[str, Any]) -> dict[str, Any]:
+    """Return settings by the keywords of a form's function; refuse those of others that are on."""
+    own = {each.name: each.keyword or each.name for each in EXPORTS[form].settings}
+    own |= {each: each for each in own.values()}
+    others = settings_of(EXPORTS).keys() - own.keys()
+    for name, value in given.items():
+        is_off = value is None or value is False
+        if name not in own and not (name in others and is_off):
+            known = ", ".join(dict.fromkeys(own.values())) or "none"
+            raise KernelError(f"{name} is no setting of {form}; expected {known}.")
+    return {own[name]: value for name, value in given.items() if name in own}
 
 
 def read_exportable(source: str | Path | BinaryIO, origin: str | None = None) -> Profile | Kernel:
