@@ -30,7 +30,7 @@ from sssfit.kernel import Taps
 from sssfit.material import Layer, Material, load_material
 from sssfit.methods import PRESETS
 from sssfit.profile import Profile
-from sssfit.simulate import simulate_exact, simulate_gaussians
+from sssfit.simulate import simulate_exact, simulate_gaussians, simulate_multipole
 
 MEDIA = ("openpbr", "materialx", "pbrt", "mitsuba", "gltf")
 # Every preset, and what a user may choose that changes the conversion.
@@ -299,6 +299,25 @@ def test_what_cannot_be_converted_is_said(name):
     ):
         with pytest.raises(SssfitError, match=said):
             preset_of(name, record)
+
+
+@pytest.mark.parametrize("name", PRESETS)
+def test_layers_are_sent_where_a_preset_takes_them(name):
+    """A preset of a medium has no use for the profile of layers, either."""
+    skin = load_material("skin1")
+    slab = Material(
+        "slab", skin.channels, (dataclasses.replace(skin.layers[0], thickness_mm=20.0),)
+    )
+    profile = simulate_multipole(slab)
+    if name in MEDIA:
+        for record in (slab, profile):
+            with pytest.raises(KernelError, match=f"{name} describes one layer .* unreal or hdrp"):
+                preset_of(name, record)
+        return
+    with pytest.raises(KernelError, match="simulate its profile and give that"):
+        preset_of(name, slab)
+    if name in ("unreal", "hdrp"):
+        assert preset_of(name, profile).title == "slab"
 
 
 @pytest.mark.parametrize("name", MEDIA)

@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from sssfit.errors import ArgumentError
 from sssfit.export.presets.fields import Field
 from sssfit.export.presets.record import Parameters, Preset
-from sssfit.export.presets.source import Source, source_of
+from sssfit.export.presets.source import Source, check_medium, source_of
 from sssfit.kernel import SeparableKernel, Taps
 from sssfit.material import Material
 from sssfit.material.checks import check_texts
@@ -79,13 +79,16 @@ def preset_of(
     ArgumentError
         The preset or a chosen parameter is unknown, or its value is invalid.
     KernelError
-        The record cannot become such parameters: a kernel, a missing medium, a dark channel.
+        The record cannot become such parameters: a kernel, a missing medium, layers where the
+        engine has none, a dark channel.
     """
     wanted = preset(name)
     values = wanted.read(chosen, title=name, chosen=True)
     if isinstance(record, Taps) and wanted.of_taps is not None:
         title = str(record.meta.get("material") or name)
         return _warned(wanted, title, {**wanted.of_taps(record, values)})
+    if wanted.material is not None:
+        check_medium(record, name)
     source = source_of(record)
     return _warned(wanted, source.title, {**wanted.convert(source, values)})
 

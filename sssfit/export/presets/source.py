@@ -123,6 +123,23 @@ def source_of(record: Material | Profile | SeparableKernel | Taps | Source) -> S
     return _checked(Source(simulate_exact(record), record))
 
 
+def check_medium(record: object, name: str) -> None:
+    """Refuse what has layers or a bottom for a preset of a medium, by its name.
+
+    Raises
+    ------
+    KernelError
+        A material, or that of a profile or of a source, is no half space.
+    """
+    material = record.material if isinstance(record, Profile | Source) else record
+    if isinstance(material, Material) and not material.is_semi_infinite:
+        raise KernelError(
+            f"{material.name} has layers or a bottom, and {name} describes one layer without a "
+            "bottom; give a half space that looks alike, or the profile to a preset that takes "
+            "one, such as unreal or hdrp."
+        )
+
+
 def _title(record: Material | Profile) -> str:
     return record.name if isinstance(record, Material) else record.label
 
