@@ -203,6 +203,18 @@ def test_profile_names_that_clash_are_refused_in_one_line():
         assert "\n" not in str(caught.value)
 
 
+def test_tables_that_cannot_share_a_source_are_named():
+    with pytest.raises(KernelError, match=r"A_B_0_3MM: a-b and a\.b for pixels of 0\.3 mm; leave"):
+        kernel_text([named("a-b"), named("a.b")], "hlsl")
+    with pytest.raises(KernelError, match=r"called WAX_0_3MM: two tables of wax for pixels"):
+        kernel_text([named("wax"), named("wax")], "hlsl")
+    other = replace(named("clay"), channels=("c1", "c0"))
+    with pytest.raises(KernelError, match="their channels, and c1, c0 of clay are not c0, c1 of w"):
+        kernel_text([named("wax"), other], "hlsl")
+    with pytest.raises(KernelError, match=r"those of 2 are not those of 1; fit them with the same"):
+        kernel_text([taps_of("1"), taps_of("2")], "hlsl")
+
+
 def test_tables_that_are_to_be_mixed_have_the_same_stages():
     text, _ = kernel_text(taps_of("1|1"), "hlsl")
     assert "mix the numbers of two tables with these stages, an octave apart" in text

@@ -31,10 +31,13 @@ def profile_names(tables: Sequence[Taps]) -> dict[str, int]:
         if plain.count(name) > 1:
             name += f"_{_identifier(f'{pixel_mm:.6g}mm')}"
         if name in names:
+            other = known[names[name]]
+            both = f"two tables of {of_material(material)}"
+            if other != material:
+                both = f"{of_material(other)} and {of_material(material)}"
             raise KernelError(
-                f"profiles {names[name]} and {k} would both be called {name}: two tables of "
-                f"{of_material(material)} for pixels of {pixel_mm:.6g} mm; leave one out, or "
-                "export it on its own."
+                f"profiles {names[name]} and {k} would both be called {name}: {both} for pixels of "
+                f"{pixel_mm:.6g} mm; leave one out, or export it on its own."
             )
         names[name] = k
     return names

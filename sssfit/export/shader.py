@@ -21,6 +21,7 @@ from sssfit.export.remarks import remarked
 from sssfit.export.through import ROWS, through_table
 from sssfit.kernel import Stage, Taps
 from sssfit.kernel.structure import turn_on_disk
+from sssfit.messages import of_material
 
 _COPIES = {
     "pair": 2.0,
@@ -190,12 +191,25 @@ def _check(tables: Sequence[Taps], style: Style) -> None:
             "table without coverage, or fit one without such weights, such as a cascade."
         )
     for each in tables[1:]:
-        if each.channels != first.channels or pass_list(each) != pass_list(first):
-            raise KernelError(
-                f"tables of one file share their passes, and those of {each.structure} of "
-                f"{', '.join(each.channels)} are not those of {first.structure} of "
-                f"{', '.join(first.channels)}; fit them with the same stages."
-            )
+        _check_alike(first, each)
+
+
+def _check_alike(first: Taps, other: Taps) -> None:
+    """Refuse two tables that cannot share a source."""
+    if other.channels != first.channels:
+        own, others = (
+            f"{', '.join(each.channels)} of {of_material(each.meta.get('material'))}"
+            for each in (first, other)
+        )
+        raise KernelError(
+            f"tables of one file share their channels, and {others} are not {own}; export each on "
+            "its own, or fit profiles whose channels have the same names and order."
+        )
+    if pass_list(other) != pass_list(first):
+        raise KernelError(
+            f"tables of one file share their passes, and those of {other.structure} are not those "
+            f"of {first.structure}; fit them with the same stages."
+        )
 
 
 def _defines(dialect: Dialect, style: Style) -> Iterator[str]:
