@@ -46,8 +46,6 @@ def certificate(taps: Taps) -> Iterator[str]:
 def _distances(taps: Taps) -> str:
     """Say on which pixels the table serves, and so at which distances."""
     own = taps.mm_per_pixel
-    if not taps.chained:
-        return "Serves pixels of any size: its error does not grow with the distance."
     if all(each.level == 0 for each in taps.stages):
         return f"Serves pixels of {own:.3g} mm and more; nearer by, points of light fall apart."
     least, most = (own * each for each in SERVES)
