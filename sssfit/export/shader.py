@@ -324,7 +324,7 @@ def _blend(taps: Taps, style: Style) -> FloatArray:
 def energy_in_half(taps: Taps, dialect: Dialect, style: Style) -> FloatArray:
     """Return the energy (C,) of the constants of a table as `source` rounds them to half floats.
 
-    Passes that keep light within a mask divide by the sum of their weights, whatever that is.
+    Passes that keep light within a mask divide by the sum of their rounded weights.
     """
     passes = dialect.has_passes and style.with_passes
     blend = _blend(taps, style)
