@@ -166,9 +166,11 @@ STRICT = flag("--strict", "End with an error in place of a warning of an unsafe 
 
 def refuse(given: Mapping[str, Any], whose: Mapping[str, str]) -> None:
     """Refuse options that would do nothing; ``whose`` says of each parameter what it is for."""
-    named = {each.name: each.opts[-1] for each in click.get_current_context().command.params}
+    context = click.get_current_context()
+    named = {each.name: each.opts[-1] for each in context.command.params}
     for key, owner in whose.items():
-        if given[key] not in (None, False, ()):
+        is_said = context.get_parameter_source(key) is ParameterSource.COMMANDLINE
+        if is_said and given[key] not in (None, False, ()):
             raise click.UsageError(f"{named[key]} is for {owner}; leave it out.")
 
 

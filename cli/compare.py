@@ -17,7 +17,8 @@ from ._output import finish, held, target, write, write_chart
 from ._progress import step_progress, walk_progress
 from ._verb_options import COMPARE
 
-_OF_BUDGETS = ("budget_chart", "photons", "rank", "terms", "model")
+_OF_BUDGETS = ("budget_chart", "photons", "method", "rank", "terms", "model")
+_OF_KERNELS = ["table", "only", "error", "cost"]
 
 
 @click.command()
@@ -140,8 +141,8 @@ def _check(material: str | None, given: Mapping[str, Any], names: Sequence[str])
     if given["output"] is not None and not several:
         raise click.UsageError("-o is the folder of --all; name files by --chart and --table.")
     idle = list(_OF_BUDGETS) if several or what not in (None, "budget") else []
-    idle += {"budget": ["chart", "table", "only"], "presets": ["table", "only"]}.get(what, [])
-    idle += ["pictures", "size", "layer", "mask", "table", "only"] if what == "sheet" else []
+    idle += _OF_KERNELS if what in ("budget", "presets", "sheet") else []
+    idle += {"budget": ["chart"], "sheet": ["pictures", "size", "layer", "mask"]}.get(what, [])
     refuse(given, dict.fromkeys(idle, "another --what"))
     if what == "sheet" and not given["chart"]:
         raise click.UsageError("--what sheet is a picture; name its file with --chart.")

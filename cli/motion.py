@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import click
-from click.core import ParameterSource
 
 from sssfit.messages import counted, stated
 from sssfit.methods import LIGHTS, RENDERERS, lines_of
@@ -26,8 +25,7 @@ _OF_TABLES = {"table", "seeds", "chart", "force"}
 @click.argument("material", required=False)
 @options(*MOTION)
 @common_options
-@click.pass_context
-def motion(context: click.Context, /, material: str | None, common: Common, **given: Any) -> None:
+def motion(material: str | None, common: Common, **given: Any) -> None:
     """Render MATERIAL under light that changes, by adaptive sampling and by other renderers.
 
     Every pixel takes the samples that its variance over the last frames asks for, 1 to 64. Light
@@ -44,7 +42,7 @@ def motion(context: click.Context, /, material: str | None, common: Common, **gi
       sssfit motion skin1 --light gunshot --frames shots --format exr --of ahead
       sssfit motion --table --chart table.png
     """
-    _check(context, material, given)
+    _check(material, given)
     from sssfit.chart.files import chart_format, is_chart_file
     from sssfit.motion import runner, table
 
@@ -68,14 +66,12 @@ def motion(context: click.Context, /, material: str | None, common: Common, **gi
     finish(common, {"output": [*frames, *charts], **found.to_dict()}, "\n".join(words))
 
 
-def _check(context: click.Context, material: str | None, given: dict[str, Any]) -> None:
+def _check(material: str | None, given: dict[str, Any]) -> None:
     """Refuse options that do not go together, or that would do nothing."""
     if (material is None) != given["table"]:
         raise click.UsageError("name one MATERIAL, or give --table without one.")
     if given["table"]:
-        source = context.get_parameter_source
-        said = {key: source(key) is ParameterSource.COMMANDLINE for key in {*given} - _OF_TABLES}
-        refuse(said, dict.fromkeys(said, "a sequence"))
+        refuse(given, dict.fromkeys({*given} - _OF_TABLES, "a sequence"))
         return
     of_frames = {} if given["frames"] else {"form": "--frames", "of": "--frames"}
     refuse(given, {"seeds": "--table", **of_frames})
