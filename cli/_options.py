@@ -214,6 +214,7 @@ Size = functools.partial(Value, "size", text.size)
 Names = functools.partial(Value, "list of names", text.names)
 Shift = functools.partial(Value, "shift", text.shift)
 Share = functools.partial(Value, "share", text.share)
+Part = functools.partial(Value, "share", text.part)
 BaseColour = functools.partial(Value, "list of reflectances", text.base_colour)
 
 
@@ -235,6 +236,8 @@ _KINDS: dict[str, Callable[[Setting], Any]] = {
     "numbers": lambda _: Numbers(),
     "length": lambda _: Length(),
     "share": lambda _: Share(),
+    "part": lambda _: Part(),
+    "parts": lambda _: Value("list of shares", text.parts),
     "seconds": lambda _: NumberRange(min=0),
     "count": lambda each: Count(*each.among),
     "whole": lambda each: WholeRange(*each.among),

@@ -16,6 +16,7 @@ from ._options import (
     Number,
     NumberRange,
     Numbers,
+    Part,
     Shift,
     Size,
     WholeRange,
@@ -216,8 +217,8 @@ SCENE = (
     option("--margin", _FACTOR, "D", "clipped: half widths of the picture that are kept.", 1.0),
     option("--mesh", None, "FILE", "OBJ, PLY, glTF or GLB with texture coordinates; needs the "
            "extra mesh.  [default: the made head]"),
-    option("--bloom", NumberRange(0.0, 1.0), "SHARE", "Light of -o that glare spreads over the "
-           "picture, such as 0.05.  [default: 0]"),
+    option("--bloom", Part(), "SHARE", "Light of -o that glare spreads over the "
+           "picture, such as 0.05 or 5%.  [default: 0]"),
     flag("--table", "Measure the paper's Table 1 in place of a frame."),
     option("--chart", None, "FILE", "With --table: figure, PNG, SVG or PDF by its ending; - for "
            "PNG on stdout."),
@@ -238,6 +239,14 @@ REPORT = (
     option("--photons", Count(2, 10**12), "N", "Photons of the walk of models and budget.  "
            "[default: 200000]"),
     *output("MATERIAL.html, materials.html with --all", "is not our page"),
+)
+SWEEP = (
+    flag("--dry-run", "Print points, photons, time and bytes from a short calibration, and end."),
+    option("--scheduler", None, "ADDRESS", "Dask cluster that does the work: tcp://HOST:PORT, or "
+           "local:N for N new workers.  [default: --threads processes of this machine]"),
+    flag("--resume", "Compute only what an existing store of the same plan lacks."),
+    option("-o --output", None, "FOLDER", "Zarr store to make.  [default: PLAN.zarr]"),
+    flag("--force", "Replace an existing store of a sweep."),
 )
 EXPORT = (
     option("--format form", list(EXPORTS), None, "Output format, as below."),

@@ -57,8 +57,7 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
         runner.check_budget(material)
     what = given["what"] if material else "front"
     run = {"seed": common.seed, "threads": common.threads}
-    on = {key: given[key] for key in ("mm_per_pixel", "size", "layer", "mask")}
-    on["seed"] = common.seed
+    on = {k: given[k] for k in ("mm_per_pixel", "size", "layer", "mask")} | {"seed": common.seed}
     asked = {k: given[k] for k in ("error", "only", "mm_per_pixel", "photons", "method", "model")}
     asked |= {"settings": own or None, "steps": step_progress, "walk": walk_progress, **run}
     front = {key: given[key] for key in ("error", "cost")}

@@ -11,28 +11,15 @@ from click.core import ParameterSource
 
 from sssfit.messages import note
 
-from ._options import Common, common_options, flag, option, options, refuse
+from ._options import Common, common_options, options, refuse
 from ._output import finish, stem_of
 from ._progress import step_progress
-
-_OPTIONS = (
-    flag("--dry-run", "Print points, photons, time and bytes from a short calibration, and end."),
-    option(
-        "--scheduler",
-        None,
-        "ADDRESS",
-        "Dask cluster that does the work: tcp://HOST:PORT, or local:N for N new workers.  "
-        "[default: --threads processes of this machine]",
-    ),
-    flag("--resume", "Compute only what an existing store of the same plan lacks."),
-    option("-o --output", None, "FOLDER", "Zarr store to make.  [default: PLAN.zarr]"),
-    flag("--force", "Replace an existing store of a sweep."),
-)
+from ._verb_options import SWEEP
 
 
 @click.command()
 @click.argument("plan")
-@options(*_OPTIONS)
+@options(*SWEEP)
 @common_options
 @click.pass_context
 def sweep(context: click.Context, /, plan: str, common: Common, **given: Any) -> None:

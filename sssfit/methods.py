@@ -45,8 +45,9 @@ class Setting:
     name : str
         Name of the option, with underscores.
     kind : str
-        "number", "numbers" (one, or one per channel), "length", "share", "seconds", "whole",
-        "count" (a whole number, 1e7 is understood), "text", "choice" or "flag".
+        "number", "numbers" (one, or one per channel), "length", "share" (between 0 and 1, or in
+        per cent), "part" (the same, with 0 and 1), "parts" (one, or one per channel), "seconds",
+        "whole", "count" (a whole number, 1e7 is understood), "text", "choice" or "flag".
     help : str
         Help text; the names of its methods are put before it.
     metavar : str
@@ -348,8 +349,8 @@ FITS: Mapping[str, Method] = {
             ),
             Setting(
                 "centre_bound",
-                "number",
-                "largest share of the pass in its middle pixel.",
+                "part",
+                "largest share of the pass in its middle pixel, such as 5%.",
                 "SHARE",
                 words="none",
             ),
@@ -384,8 +385,8 @@ FITS: Mapping[str, Method] = {
             ),
             Setting(
                 "weight",
-                "numbers",
-                "share of the narrow Gaussian, one or one per channel.",
+                "parts",
+                "share of the narrow Gaussian, such as 0.2 or 20%, one or one per channel.",
                 "SHARE,...",
             ),
             *_TAPS,
@@ -398,9 +399,9 @@ FITS: Mapping[str, Method] = {
             Setting("width", "number", "width, the same for all channels.", "W"),
             Setting(
                 "strength",
-                "numbers",
-                "share of the light that scatters, one or one per channel.",
-                "T,...",
+                "parts",
+                "share of the light that scatters, such as 0.78 or 78%, one or one per channel.",
+                "SHARE,...",
             ),
             Setting(
                 "falloff",

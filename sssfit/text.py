@@ -235,6 +235,19 @@ def share(text: str) -> float:
     return number
 
 
+def part(text: str) -> float:
+    """Read a share from 0 to 1, both included, which may be written in per cent: 20% or 0.2."""
+    number = _number_or_percent(text)
+    if number is None or not 0.0 <= number <= 1.0:
+        raise ArgumentError(f"{text!r} is not a share from 0 to 100 %, such as 20% or 0.2.")
+    return number
+
+
+def parts(text: str) -> list[float]:
+    """Read shares from 0 to 1 with commas between them, as `part`."""
+    return [part(each) for each in text.split(",")]
+
+
 def base_colour(text: str) -> list[float] | str:
     """Read reflectances, 0.44 or 44%, with commas between them; an sRGB colour in hex stays."""
     text = text.strip()

@@ -385,13 +385,13 @@ FIT = {
     "--free-energy": _fitted("--free-energy", "", "gaussians", free_energy=True),
     "--k": _fitted("--k", "3", "guided", "1.55", k=3.0),
     "--b": _fitted("--b", "5", "guided", "50", b=5.0),
-    "--centre-bound": _fitted("--centre-bound", ".1", "guided", "1.0", "none", centre_bound=0.1),
+    "--centre-bound": _fitted("--centre-bound", "10%", "guided", "1.0", "none", centre_bound=0.1),
     "--target": _fitted("--target", "kernel", "artist", "line", target="kernel"),
     "--near": _by_hand("--near", ".3", "artist", _HAND, near_mm2=0.3),
     "--far": _by_hand("--far", "3,4,5", "artist", _HAND, far_mm2=[3.0, 4.0, 5.0]),
-    "--weight": _by_hand("--weight", ".2,.3,.9", "artist", _HAND, weight=[0.2, 0.3, 0.9]),
+    "--weight": _by_hand("--weight", "20%,.3,90%", "artist", _HAND, weight=[0.2, 0.3, 0.9]),
     "--width": _by_hand("--width", ".2", "falloff", _SKIN, width=0.2),
-    "--strength": _by_hand("--strength", ".5,.6,.9", "falloff", _SKIN, strength=[0.5, 0.6, 0.9]),
+    "--strength": _by_hand("--strength", "50%,60%,.9", "falloff", _SKIN, strength=[0.5, 0.6, 0.9]),
     "--falloff": _by_hand("--falloff", ".3,.4,.5", "falloff", _SKIN, falloff=[0.3, 0.4, 0.5]),
     "--fetches": _tapped("--fetches", "7.5", "24", fetches=7.5),
     "--stages": replace(
@@ -1424,7 +1424,7 @@ SCENE = {
     "--margin": _scene_row("--margin 1.5", "1.0", margin=1.5),
     "--mesh": _scene_row("--mesh square.obj", words="the made head", mesh="square.obj"),
     "--bloom": Row(
-        f"{_SCENE} -o s.exr", "--bloom .2", made_picture, lambda: _shown(0.2), default="0"
+        f"{_SCENE} -o s.exr", "--bloom 20%", made_picture, lambda: _shown(0.2), default="0"
     ),
     "--table": Row(_SCENE, f"{_SCENE} --table", calls, _row_table),
     "--chart": Row(f"{_SCENE} --table", "--chart t.png", is_written("png"), lambda: ["t.png"]),
