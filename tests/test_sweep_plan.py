@@ -1,13 +1,14 @@
 """Plans of sweeps: what they say of each point, and one line for every fault."""
 
 import math
+import pickle
 
 import numpy as np
 import pytest
 
 from sssfit.errors import PlanError
 from sssfit.material import load_material
-from sssfit.sweep import load_plan
+from sssfit.sweep import Axis, load_plan
 from sssfit.sweep.expression import Expression
 from sssfit.sweep.plan import Plan
 
@@ -101,6 +102,61 @@ def test_what_changes_a_result_changes_the_fingerprint(spectral):
     assert len(prints) == 4
 
 
+def in_python(**fields):
+    """A plan of two points made in Python; a dictionary is an axis's fields."""
+    axis = Axis(**({"name": "eta", "values": (1.3, 1.4), "key": "eta"} | fields.pop("axis", {})))
+    return Plan(**({"base": load_material("skin1"), "axes": (axis,), "method": "exact"} | fields))
+
+
+BAD_IN_PYTHON = {
+    "base = 'skin1'; expected a Material": {"base": "skin1"},
+    "method = 'exat'; did you mean exact?": {"method": "exat"},
+    "method = ['exact']; expected one of": {"method": ["exact"]},
+    "seed = -1; expected a whole number": {"seed": -1},
+    "seed = 2.5; expected a whole number": {"seed": 2.5},
+    "seed = True; expected a whole number": {"seed": True},
+    "axes = ({'name': 'eta'},); expected a tuple of Axis": {"axes": ({"name": "eta"},)},
+    "axes is missing": {"axes": ()},
+    "axis eta has the values (); expected a list of 1 or more": {"axis": {"values": ()}},
+    "axis eta has the values (1.3, nan)": {"axis": {"values": (1.3, math.nan)}},
+    "axis eta: values is not an array of numbers": {"axis": {"values": ("a",)}},
+    "axis eta has the value 1.3 twice": {"axis": {"values": (1.3, 1.4, 1.3)}},
+    "axis eta, column m, has 1 values and the axis 2": {"axis": {"columns": {"m": (1.0,)}}},
+    "settings.nope is none of exact's": {"settings": {"nope": 1}},
+    "settings.dr_mm is none of exact's": {"settings": {"dr_mm": 0.2}},
+    "settings.3 is none of exact's": {"settings": {3: 1}},
+    "settings = 3; expected a mapping": {"settings": 3},
+    "settings.target_error is none of montecarlo's": {
+        "method": "montecarlo",
+        "settings": {"target_error": 0.01},
+    },
+    "fit.method = 'nope'": {"fit": {"method": "nope"}},
+    "fit.rang is unknown; did you mean rank?": {"fit": {"method": "svd", "rang": 3}},
+    "fit = 'svd'; expected a mapping": {"fit": "svd"},
+    "set.g = None; expected a formula": {"formulas": {"g": None}},
+}
+
+
+@pytest.mark.parametrize("words", BAD_IN_PYTHON)
+def test_a_fault_of_a_plan_in_python_is_one_line_too(words):
+    with pytest.raises(PlanError) as caught:
+        in_python(**BAD_IN_PYTHON[words])
+    assert words in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_numbers_of_numpy_become_numbers_of_python():
+    given = {"axis": {"values": np.array([1.25, 1.5], np.float32)}, "method": "montecarlo"}
+    given |= {"settings": {"photons": np.int64(5)}, "seed": np.int64(3)}
+    given |= {"formulas": {"g": np.float32(0.5)}, "fit": {"method": "svd", "rank": np.int32(2)}}
+    plain = {"axis": {"values": (1.25, 1.5)}, "method": "montecarlo", "settings": {"photons": 5}}
+    plain |= {"seed": 3, "formulas": {"g": "0.5"}, "fit": {"method": "svd", "rank": 2}}
+    grid = {"dr_mm": 0.25, "radius_mm": 5.0}
+    ours, theirs = (in_python(**each, **grid) for each in (given, plain))
+    assert ours.sha256 == theirs.sha256
+    assert pickle.loads(pickle.dumps(ours)).to_dict() == theirs.to_dict()
+
+
 @pytest.mark.parametrize(
     ("text", "value"),
     [("1 + 2 * x", 7.0), ("-(x - 1) ** 2 / 4", -1.0), ("1e3*x", 3000.0), ("2 ** -x", 0.125)],
@@ -131,6 +187,7 @@ BAD = {
     HEAD + '[[axes]]\nkey = "g"\nfrom = 0\nto = 1\ncount = 3\nspacing = "log"': "above 0 for log",
     HEAD + '[[axes]]\nkey = "eta"\nfrom = 1\nto = inf\ncount = 3': "expected finite ends",
     HEAD + '[[axes]]\nkey = "eta"\nfrom = 1\nto = 2\ncount = 3\nspacing = "lin"': "linear or log",
+    HEAD + AXIS.replace("1.4", "1.3"): "axis eta has the value 1.3 twice",
     HEAD + AXIS + AXIS: "two axes or columns are called eta",
     HEAD + AXIS + AXIS.replace("key", 'name = "n"\nkey'): "key = 'eta' is set twice",
     HEAD + AXIS + '[[axes]]\nname = "m"\nvalues = [1.0]': "axis m sets nothing",

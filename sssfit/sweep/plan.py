@@ -36,8 +36,17 @@ from sssfit.simulate.montecarlo import check_media
 from sssfit.sweep.axes import Axis
 from sssfit.sweep.expression import Expression
 from sssfit.sweep.keys import Key, key_of, with_values
+from sssfit.sweep.plan_checks import (
+    WALK,
+    checked_axes,
+    checked_base,
+    checked_fit,
+    checked_formulas,
+    checked_method,
+    checked_seed,
+    checked_settings,
+)
 
-WALK = "montecarlo"
 # A spectral library of 64 bands by 10 x 10 x 10 is 64 000.
 MOST_POINTS = 100_000
 _RESERVED = ("channel", "layer", "r_mm", "edge", "r_edges_mm")
@@ -55,21 +64,23 @@ class Plan:
     method : str
         A name of ``sssfit.methods.SIMULATIONS``.
     settings : mapping
-        Keyword arguments of the method: photons, tolerance.
+        Keyword arguments of the method: photons, tolerance. Numbers of numpy become Python's.
     formulas : mapping
-        An expression of the axes' names and columns for each key that it sets.
+        An expression of the axes' names and columns, or a number, for each key that it sets.
     dr_mm, radius_mm : float, optional [mm]
         The grid that all points share; by default rings of a 20th of the shortest mean free path
         of any point, and 32 of the longest.
     fit : mapping, optional
         Keyword arguments of ``sssfit.fit.fit_result`` for each profile.
     seed : int
-        Every point's own seed is made of it and the point's number; see `point_seed`.
+        From 0 to 2^63 - 1. Every point's own seed is made of it and the point's number; see
+        `point_seed`.
 
     Raises
     ------
     PlanError
-        Anything is invalid; one line that says what.
+        Anything is invalid; one line that says what. What a point's values or the grid have wrong
+        is found by `grid`, which makes all points.
     """
 
     base: Material
@@ -83,6 +94,17 @@ class Plan:
     seed: int = 1
 
     def __post_init__(self) -> None:
+        method = checked_method(self.method)
+        plain = {
+            "base": checked_base(self.base),
+            "axes": checked_axes(self.axes),
+            "settings": checked_settings(self.settings, method),
+            "formulas": checked_formulas(self.formulas),
+            "fit": checked_fit(self.fit),
+            "seed": checked_seed(self.seed),
+        }
+        for name, each in plain.items():
+            object.__setattr__(self, name, each)
         self._check_names()
         if self.count > MOST_POINTS:
             raise PlanError(
@@ -97,8 +119,6 @@ class Plan:
 
     def _check_names(self) -> None:
         names = [*chain(*([each.name, *each.columns] for each in self.axes))]
-        if not self.axes:
-            raise PlanError("axes is missing; give one [[axes]] table or more.")
         for name in names:
             if names.count(name) > 1:
                 raise PlanError(
