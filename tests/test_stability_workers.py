@@ -16,11 +16,13 @@ from test_profile import make_profile
 from worker_calls import killed, refused, scaled
 
 from sssfit.errors import FitError, SssfitError
+from sssfit.report import make_report
 from sssfit.shapes import gaussian_cdf
-from sssfit.stability import imports
+from sssfit.stability import imports, stability
 from sssfit.stability.subject import Subject
 from sssfit.stability.ways import Way
 from sssfit.stability.workers import Workers
+from sssfit.sweep import sweep_to_store
 
 
 def is_alive(pid):
@@ -104,6 +106,11 @@ def test_a_script_without_its_guard_gets_one_line(tmp_path):
     assert run.returncode == 1
     last = run.stderr.strip().splitlines()[-1]
     assert "the script lacks the main guard" in last
+
+
+@pytest.mark.parametrize("call", [stability, sweep_to_store, make_report])
+def test_what_starts_workers_says_that_a_script_needs_its_guard(call):
+    assert 'if __name__ == "__main__":' in call.__doc__
 
 
 @pytest.fixture(scope="module")

@@ -73,6 +73,8 @@ def make_report(
     photons, seed : int
         Those of the walk in models and error budget; walks of up to so many show convergence.
     threads : int, optional
+        All cores by default. With more than one a second process does half of the work, and a
+        script that calls this needs its ``if __name__ == "__main__":``.
     progress : callable, optional
         Called with how many steps are done, of how many, and the name of the next.
 

@@ -44,7 +44,8 @@ def sweep_to_store(
     path : str or Path
         The Zarr folder to make.
     threads : int, optional
-        Worker processes on this machine; all cores by default, and 1 takes no further process.
+        Worker processes on this machine; all cores by default. A script that calls this needs its
+        ``if __name__ == "__main__":`` then. With 1 there is no process but the caller's.
     scheduler : str, optional
         A Dask cluster in their place: its scheduler's address, or "local:N" for N new workers.
     resume : bool
