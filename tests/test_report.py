@@ -15,15 +15,17 @@ import numpy as np
 import pytest
 import report_world as world
 
-from sssfit.errors import KernelError, RenderError, SimulationError
+from sssfit.errors import FitError, KernelError, RenderError, SimulationError
 from sssfit.formats.pictures import save_image
 from sssfit.material import parse_material
 from sssfit.measure.delta_e import delta_e_of_lab, lab
+from sssfit.methods import FITS
 from sssfit.report import finished_page, is_report_file, library_page, make_report, page, parts
 from sssfit.report.charts import charts_of
 from sssfit.report.commands import commands_of
 from sssfit.report.html import SCRIPTS, script_text
 from sssfit.report.kept import kept, page_key
+from sssfit.report.kernels import shown_candidates
 from sssfit.report.pack import packed_picture, unpacked_picture
 from sssfit.report.pictures import _reduced
 from sssfit.report.tables import tables_of
@@ -365,6 +367,31 @@ def test_kernels_of_one_name_are_refused(labels):
     named = [(each, cli_world.taps()) for each in labels]
     with pytest.raises(KernelError, match=f"two kernels are called {labels[0]}"):
         make_report(cli_world.profile(), named=named, only=["disk"], side=16, threads=1)
+
+
+def test_every_method_that_can_be_asked_for_has_kernels():
+    """Of burley a comparison has the dense kernel only, which no shader runs."""
+    found = {each: shown_candidates(41, [each]) for each in FITS}
+    assert all(found.values())
+    assert [each.label for each in found["burley"]] == [
+        f"burley on {taps} taps" for taps in (5, 11, 25)
+    ]
+    both = [each.method for each in shown_candidates(41, ["burley", "cascade"])]
+    assert {*both} == {"burley", "cascade"}
+
+
+def test_a_method_without_a_kernel_on_these_pixels_is_named(caplog):
+    caplog.set_level("INFO", logger="sssfit")
+    coarse = {"mm_per_pixel": 4.0, "side": 16, "threads": 1}
+    with pytest.raises(FitError, match="no kernel could be fitted"):
+        make_report(cli_world.profile(), only=["burley"], **coarse)
+    assert "burley is left out: no shader runs a kernel of it on 3 x 3 pixels." in caplog.text
+
+
+def test_a_page_of_burley():
+    made = make_report(cli_world.profile(), only=["burley"], side=16, threads=1)
+    assert made.kernels[0].label == "burley on 5 taps"
+    assert "--method burley --taps 5 " in made.kernels[0].command
 
 
 def luminance(colour):

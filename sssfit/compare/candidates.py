@@ -6,7 +6,7 @@ thinned to the bilinear fetches of a budget.
 
 import time
 import warnings
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -138,7 +138,8 @@ def every_candidate(pixels: int, only: Collection[str] | None = None) -> tuple[C
         Names of methods.
     """
     dense = [*candidates(pixels), *_weighted(pixels)]
-    found = [*dense, *_on_taps(dense, pixels), *_cascades(), *_relatives(), *_disks(pixels)]
+    thinned = on_budgets([each for each in dense if each.label in _THINNED], pixels)
+    found = [*dense, *thinned, *_cascades(), *_relatives(), *_disks(pixels)]
     return tuple(each for each in found if only is None or each.method in only)
 
 
@@ -168,11 +169,16 @@ def _weighted(pixels: int) -> Iterator[Candidate]:
         yield Candidate(f"weighted {n}", "weighted", n, {"rank": n})
 
 
-def _on_taps(dense: Sequence[Candidate], pixels: int) -> Iterator[Candidate]:
-    """Yield the kernels that are thinned to each budget: terms share their first pass."""
+def on_budgets(dense: Iterable[Candidate], pixels: int) -> Iterator[Candidate]:
+    """Yield dense kernels thinned to each of `BUDGETS`: terms share their first pass.
+
+    Parameters
+    ----------
+    dense : iterable of Candidate
+    pixels : int
+        Pixels of a pass, the most taps that it can have.
+    """
     for each in dense:
-        if each.label not in _THINNED:
-            continue
         budgeted = (int(budget / (each.terms + 1) - 1) // 2 * 2 + 1 for budget in BUDGETS)
         for taps in dict.fromkeys(budgeted):
             if LEAST_TAPS <= taps <= pixels:

@@ -49,6 +49,8 @@ def begun_fits(
     """
     pixels = 2 * make_target(profile, mm_per_pixel, None).half_pixels + 1
     wanted = shown_candidates(pixels, only)
+    for method in sorted({*(only or ())}.difference(each.method for each in wanted)):
+        note(f"{method} is left out: no shader runs a kernel of it on {pixels} x {pixels} pixels.")
     _check_labels(labels, [each.label for each in wanted])
     dense: dict[str, FitResult] = {}
 

@@ -8,7 +8,7 @@ import math
 from collections.abc import Collection
 from typing import Any
 
-from sssfit.compare.candidates import Candidate, every_candidate
+from sssfit.compare.candidates import Candidate, every_candidate, on_budgets
 from sssfit.export import kernel_text
 from sssfit.export.passes import Pass, pass_list
 from sssfit.fit import FitResult, TapsFit
@@ -142,10 +142,13 @@ def shown_candidates(pixels: int, only: Collection[str] | None = None) -> list[C
     pixels : int
         Pixels of a pass, as in `every_candidate`.
     only : collection of str, optional
-        Names of methods; then all of their kernels that a shader runs.
+        Names of methods; then all of their kernels that a shader runs. A method whose kernels are
+        dense in `every_candidate`, such as burley, has them thinned here.
     """
     every = [each for each in every_candidate(pixels, only) if is_shown(each)]
     if only is not None:
+        lacking = {*only}.difference(each.method for each in every)
+        every += on_budgets(every_candidate(pixels, lacking), pixels)
         return every
     return [each for each in every if _fetches(each) <= MOST_FETCHES or each.label in CHAINS]
 
