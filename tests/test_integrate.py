@@ -1,6 +1,7 @@
 """The code of docs/integrate.md, compiled around an export, and its list of passes against ours."""
 
 import json
+import math
 import re
 import shutil
 import subprocess
@@ -10,8 +11,9 @@ import numpy as np
 import pytest
 from shader_runs import device_of, needs, spirv_of
 from test_docs import STRUCTURE, code_blocks
-from test_shaders import PITCH, apart, light_of, rendered
+from test_shaders import PITCH, apart, disk_of, light_of, of_two_materials, rendered
 from test_taps import taps_of
+from test_turned import turned
 
 from sssfit.export import DIALECTS, Style, source
 from sssfit.export.passes import pass_list
@@ -31,6 +33,27 @@ UNITY = """
 PASSES, OWN, COMPUTE, *OTHERS = code_blocks("hlsl", PAGE)
 HLSL = dict(zip(("own", "unity", "unreal"), (OWN, *OTHERS), strict=True))
 GODOT, *ES = code_blocks("glsl", PAGE)
+PLAIN = Style()
+# What the scripts draw, and what they have to refuse.
+SERVED = {
+    "cascade": taps_of(STRUCTURE, channels=3),
+    "stars": taps_of("*|1-*|1", channels=3),
+    "lines": turned("2-2-2", ["@0", "@60", "@120"], channels=3),
+    "turned": turned("1-1|1-2", ["@45", "@135", "x30", ""], channels=3),
+    "term": taps_of("6", channels=3, chained=False),
+}
+_CASCADE, _TERMS = [SERVED["cascade"]], [taps_of("2-1", channels=3, chained=False)]
+REFUSED = {
+    "terms": (_TERMS, PLAIN),
+    "disk": ([disk_of(9)], PLAIN),
+    "two tables": (of_two_materials(), PLAIN),
+    "depth of a term": ([SERVED["term"]], Style(features=("DEPTH",))),
+    "tilt": (_CASCADE, Style(tilted=True)),
+    "compute": (_CASCADE, Style(compute=True)),
+    "prefix": (_CASCADE, Style(prefix="SKIN")),
+    "no passes": (_CASCADE, Style(with_passes=False)),
+    **{each: (_CASCADE, Style(features=(each,))) for each in ("JITTER", "DEPTH")},
+}
 LANGUAGES = {"ScatterPass.cs": "csharp", "scatter.gd": "gdscript", "scatter.glsl": "glsl"}
 LANGUAGES |= dict.fromkeys(("passes.js", "three-scattering.js", "babylon-scattering.js"), "js")
 
@@ -109,13 +132,19 @@ def test_webgl_shaders_compile(text, tmp_path):
     accepted(text, "frag", tmp_path)
 
 
+def axis_of(axis):
+    """A direction as the list of passes has it."""
+    degrees = math.degrees(math.atan2(axis[1], axis[0]))
+    return {(1.0, 0.0): "x", (0.0, 1.0): "y"}.get(axis, f"{degrees:.4g} deg")
+
+
 def listed(taps):
     """Our list of passes, as the scripts of the page read it from the comment."""
     return [
         {
             "name": f"SSS_{each.name}",
-            "stage": str(each.stages[0]) if each.name == "Blur" else None,
-            "axis": {(1.0, 0.0): "x", (0.0, 1.0): "y"}[each.axis] if each.name == "Blur" else None,
+            "stage": str(each.stages[0]) if each.name in ("Blur", "Star") else None,
+            "axis": axis_of(each.axis) if each.name == "Blur" else None,
             "reads": list(dict.fromkeys((each.reads, *(name for name, _ in each.adds)))),
             "writes": each.writes[0],
             "size": 2**each.level,
@@ -124,16 +153,39 @@ def listed(taps):
     ]
 
 
-@pytest.mark.parametrize(("name", "quote"), [("ScatterPass.cs", '@"'), ("scatter.gd", 'r"(?m)')])
-def test_regular_expressions_find_every_pass(taps, glsl, name, quote):
-    (pattern,) = re.findall(re.escape(quote) + r'(\^//[^"]+)"', script(name))
+def read_by_expressions(name, text):
+    """The list of passes as a script's own regular expressions find it; None if it refuses it."""
+    own = script(name)
+    found = re.findall(r'[Rr](?:ow|OW)\b[^"]*"(?:\(\?m\))?(\^//[^"]+)"', own)
+    found += re.findall(r'(?:List|LIST)\b[^"]*"(?:\(\?m\))?(\^//[^"]+)"', own)
+    found += re.findall(r'(?:Other|OTHER)\b[^"]*"(uint[^"]+)"', own)
+    row, rows, other = found
+    passes = re.search(rows, text, re.MULTILINE)
+    passes = passes[1] if passes else ""
     keys = ("name", "stage", "axis", "reads", "writes", "size")
-    found = [
+    made = [
         dict(zip(keys, each.groups(), strict=True))
         | {"reads": each[4].split(" "), "size": int(each[6] or 1)}
-        for each in re.finditer(pattern, glsl, re.MULTILINE)
+        for each in re.finditer(row, passes, re.MULTILINE)
     ]
-    assert found == listed(taps)
+    refused = not made or len(made) != passes.count("\n") or re.search(other, text)
+    return None if refused else made
+
+
+@pytest.mark.parametrize("name", ["ScatterPass.cs", "scatter.gd"])
+@pytest.mark.parametrize("served", SERVED)
+def test_regular_expressions_find_every_pass(served, name):
+    dialect = DIALECTS["hlsl" if name.endswith(".cs") else "glsl"]
+    text = source([SERVED[served]], dialect, PLAIN)
+    assert read_by_expressions(name, text) == listed(SERVED[served])
+
+
+@pytest.mark.parametrize("name", ["ScatterPass.cs", "scatter.gd"])
+@pytest.mark.parametrize("refused", REFUSED)
+def test_regular_expressions_refuse_what_cannot_be_drawn(refused, name):
+    tables, style = REFUSED[refused]
+    text = source(tables, DIALECTS["hlsl" if name.endswith(".cs") else "glsl"], style)
+    assert read_by_expressions(name, text) is None
 
 
 def node():
@@ -164,16 +216,29 @@ def made_by_javascript(text, folder):
     return found["passes"], [f"#version 300 es\n{each}" for each in found["fragments"]]
 
 
-def test_javascript_makes_a_shader_for_every_pass(taps, glsl, tmp_path):
-    passes, fragments = made_by_javascript(glsl, tmp_path)
+@pytest.mark.parametrize("served", SERVED)
+def test_javascript_makes_a_shader_for_every_pass(served, tmp_path):
+    taps = SERVED[served]
+    passes, fragments = made_by_javascript(source([taps], DIALECTS["glsl"], PLAIN), tmp_path)
     assert [{"stage": None, "axis": None, **each} for each in passes] == listed(taps)
     assert len(fragments) == len(passes)
     for each in fragments:
         accepted(each, "frag", tmp_path)
 
 
-def test_shaders_made_by_javascript_show_what_the_renderer_shows(taps, tmp_path):
+@pytest.mark.parametrize("refused", REFUSED)
+def test_javascript_ends_with_one_line_at_what_it_cannot_draw(refused, tmp_path):
+    tables, style = REFUSED[refused]
+    with pytest.raises(subprocess.CalledProcessError) as ended:
+        made_by_javascript(source(tables, DIALECTS["glsl"], style), tmp_path)
+    (line,) = [each for each in ended.value.stderr.splitlines() if each.startswith("Error: ")]
+    assert line.startswith("Error: This script cannot draw an export with ")
+
+
+@pytest.mark.parametrize("served", SERVED)
+def test_shaders_made_by_javascript_show_what_the_renderer_shows(served, tmp_path):
     needs("glsl")
+    taps = SERVED[served]
     style = Style(normalized=False, features=("COVERAGE",))
     passes, fragments = made_by_javascript(source([taps], DIALECTS["glsl"], style), tmp_path)
     size = 37, 50

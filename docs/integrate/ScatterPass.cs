@@ -1,4 +1,4 @@
-using System.Collections.Generic; using System.Reflection; using System.Text.RegularExpressions; using UnityEngine;
+using System.Collections.Generic; using System.Globalization; using System.Reflection; using System.Text.RegularExpressions; using UnityEngine;
 using UnityEngine.Rendering; using UnityEngine.Rendering.HighDefinition; using UnityEngine.Experimental.Rendering;
 
 class ScatterPass : CustomPass
@@ -7,11 +7,28 @@ class ScatterPass : CustomPass
     public TextAsset table;
     public float distance = 0.6f; // metres, of the head
     static readonly Regex Row = new Regex(
-        @"^// (SSS_\w+)(?:\((\d+), ([xy])\))? +(.+?) {2,}(\w+) +1(?:/(\d+))? +\d+\r?$", RegexOptions.Multiline);
+        @"^// (SSS_\w+)(?:\((\d+)(?:, (x|y|[\d.]+ deg))?\))? +(.+?) {2,}(\w+) +1(?:/(\d+))? +\d+\r?$", RegexOptions.Multiline);
+    static readonly Regex List = new Regex(@"^// call .*\n((?:// .* \d+\r?\n)*)", RegexOptions.Multiline);
+    static readonly Regex Other = new Regex(@"uint (?:frame|profile)\b|float2 mm_per_pixel|\bD0\b");
     readonly Dictionary<string, RTHandle> pictures = new Dictionary<string, RTHandle>();
 
     static RTHandle Internal(CustomPassContext ctx, string field) => (RTHandle)typeof(CustomPassContext)
         .GetField(field, BindingFlags.Instance | BindingFlags.NonPublic).GetValue(ctx);
+
+    static MatchCollection Passes(string source)
+    {
+        string list = List.Match(source).Groups[1].Value;
+        MatchCollection rows = Row.Matches(list);
+        if (rows.Count > 0 && rows.Count == list.Split('\n').Length - 1 && !Other.IsMatch(source)) return rows;
+        throw new System.NotSupportedException("ScatterPass cannot draw this export; docs/integrate.md says which it can.");
+    }
+
+    static Vector2 Along(string axis)
+    {
+        if (!axis.EndsWith("deg")) return axis == "x" ? Vector2.right : Vector2.up;
+        float angle = float.Parse(axis.Split(' ')[0], CultureInfo.InvariantCulture) * Mathf.Deg2Rad;
+        return new Vector2(Mathf.Cos(angle), Mathf.Sin(angle));
+    }
 
     protected override void Execute(CustomPassContext ctx)
     {
@@ -21,11 +38,11 @@ class ScatterPass : CustomPass
         float tangent = Mathf.Tan(ctx.hdCamera.camera.fieldOfView * Mathf.Deg2Rad / 2);
         ctx.propertyBlock.SetFloat("Mm", 2000 * distance * tangent / ctx.hdCamera.actualHeight);
         Draw(ctx, "Light", Picture(ctx, "E", 1));
-        foreach (Match row in Row.Matches(table.text))
+        foreach (Match row in Passes(table.text))
         {
             string[] reads = row.Groups[4].Value.Split(' ');
             for (int k = 0; k < reads.Length; k++) ctx.propertyBlock.SetTexture("T" + k, pictures[reads[k]]);
-            ctx.propertyBlock.SetVector("Axis", row.Groups[3].Value == "x" ? Vector2.right : Vector2.up);
+            ctx.propertyBlock.SetVector("Axis", Along(row.Groups[3].Value));
             ctx.propertyBlock.SetFloat("Stage", row.Groups[2].Success ? int.Parse(row.Groups[2].Value) : 0);
             int size = row.Groups[6].Success ? int.Parse(row.Groups[6].Value) : 1;
             Draw(ctx, row.Groups[1].Value.Substring(4), Picture(ctx, row.Groups[5].Value, size));
@@ -37,8 +54,10 @@ class ScatterPass : CustomPass
 
     void Draw(CustomPassContext ctx, string pass, RTHandle target)
     {
+        int number = material.FindPass(pass);
+        if (number < 0) throw new System.MissingMemberException($"the shader has no Pass {pass}, which the export asks for.");
         CoreUtils.SetRenderTarget(ctx.cmd, target);
-        CoreUtils.DrawFullScreen(ctx.cmd, material, ctx.propertyBlock, material.FindPass(pass));
+        CoreUtils.DrawFullScreen(ctx.cmd, material, ctx.propertyBlock, number);
     }
 
     RTHandle Picture(CustomPassContext ctx, string name, int size)

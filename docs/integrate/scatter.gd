@@ -5,7 +5,9 @@ extends CompositorEffect
 @export var mm_per_pixel := 0.3
 const LIGHT := "vec4 c = texelFetch(t0, at, 0); float m = float(c.a != 0.0); made = vec4(m * c.rgb, m);"
 const ADD := "made = texelFetch(t0, at, 0); if (made.a == 0.0) return; made.a = imageLoad(result, at).a;"
-const ROW := r"(?m)^// (SSS_\w+)(?:\((\d+), ([xy])\))? +(.+?) {2,}(\w+) +1(?:/(\d+))? +\d+$"
+const ROW := r"(?m)^// (SSS_\w+)(?:\((\d+)(?:, (x|y|[\d.]+ deg))?\))? +(.+?) {2,}(\w+) +1(?:/(\d+))? +\d+$"
+const LIST := r"(?m)^// call .*\n((?:// .* \d+\n)*)"
+const OTHER := r"uint (?:frame|profile)\b|vec2 mm_per_pixel|\bD0\b"
 var rd: RenderingDevice
 var sampler: RID
 var pipelines := {}
@@ -16,6 +18,8 @@ func _init() -> void:
     access_resolved_color = true
 
 func _render_callback(_type: int, data: RenderData) -> void:
+    var rows := passes()
+    if rows.is_empty(): return
     var buffers: RenderSceneBuffersRD = data.get_render_scene_buffers()
     if not rd:
         rd = RenderingServer.get_rendering_device()
@@ -25,16 +29,26 @@ func _render_callback(_type: int, data: RenderData) -> void:
         sampler = rd.sampler_create(state)
     var color := buffers.get_color_layer(0)
     var pictures := { "E": run(buffers, "E", LIGHT, [color], 1) }
-    for row in RegEx.create_from_string(ROW).search_all(source):
+    for row in rows:
         var name := row.get_string(1)
         var words := Array(row.get_string(4).split(" "))
         var reads := words.map(func(each): return pictures[each])
         words = range(reads.size()).map(func(k): return "t%d" % k) + ["position", "texel"]
-        if row.get_string(3): words = [row.get_string(2) + "u", "vec2(%d, %d)" % ([1, 0] if row.get_string(3) == "x" else [0, 1])] + words
+        var angle := deg_to_rad({ "x": 0.0, "y": 90.0 }.get(row.get_string(3), row.get_string(3).to_float()))
+        if row.get_string(3): words.push_front("vec2(%.9f, %.9f)" % [cos(angle), sin(angle)])
+        if row.get_string(2): words.push_front(row.get_string(2) + "u")
         if RegEx.create_from_string("vec4 " + name + r"\([^)]*mm_per_pixel").search(source): words.append("mm_per_pixel")
         var call := "made = %s(%s);" % [name, ", ".join(words)]
         pictures[row.get_string(5)] = run(buffers, row.get_string(5), call, reads, maxi(1, row.get_string(6).to_int()))
     run(buffers, "add", ADD, [pictures["M0"]], 1, color)
+
+func passes() -> Array[RegExMatch]: # none, and an error, where one of the list cannot be drawn
+    var list := RegEx.create_from_string(LIST).search(source)
+    var text := list.get_string(1) if list else ""
+    var rows := RegEx.create_from_string(ROW).search_all(text)
+    if text and rows.size() == text.count("\n") and not RegEx.create_from_string(OTHER).search(source): return rows
+    push_error("scatter.gd cannot draw this export; docs/integrate.md says which it can.")
+    return []
 
 func run(buffers: RenderSceneBuffersRD, name: String, code: String, reads: Array, part: int, target := RID()) -> RID:
     var size := (buffers.get_internal_size() + Vector2i.ONE * (part - 1)) / part
