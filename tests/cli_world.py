@@ -9,6 +9,7 @@ import functools
 import importlib
 import inspect
 import json
+import os
 import shlex
 import shutil
 import tempfile
@@ -271,7 +272,7 @@ def run(command: str, *, both: bool = False) -> Ran:
     """Run a command in a copy of `files`; ``both`` prints the JSON object and then the text."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        shutil.copytree(files(), folder, dirs_exist_ok=True)
+        shutil.copytree(files(), folder, dirs_exist_ok=True, copy_function=os.link)
         CALLS.clear()
         with contextlib.chdir(folder), warnings.catch_warnings(), finishing(both):
             warnings.simplefilter("ignore", SssfitWarning)

@@ -1,4 +1,4 @@
-"""Work that tests share: solutions of the exact solvers, lit heads, and fits of candidates.
+"""Work that tests share: exact solutions, lit heads, fits of candidates, and the sizes of texts.
 
 All depend on their arguments alone and cannot be changed. What one worker made, the others read
 from a folder of this run, which no other run reads: nothing of older sources can pass a test.
@@ -20,7 +20,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from types import NoneType
 
+import matplotlib as mpl
 import numpy as np
+from matplotlib.backends.backend_agg import RendererAgg
 
 import sssfit.choose.options
 import sssfit.compare.candidates
@@ -54,6 +56,7 @@ LONG_SEARCHES = {
 # These ask which of two cascades is nearer, or draw lines: far ones, where a descent stops early.
 _WHOLE_DESCENTS = {"test_rotated"}
 _PLAIN = str | int | float | NoneType  # a setting that is a function, or a scene, is not shared
+_TEXT_STYLE = "mathtext.fontset", "text.hinting", "text.hinting_factor", "text.usetex"
 _state = {"allowed": True, "fits": True, "short": 0, "folder": None, "begun": False}
 
 
@@ -112,6 +115,9 @@ def begin():
     fits.fit_taps = _fitted_once(fits.fit_taps)
     sssfit.choose.options.fit_result = _fitted_once(sssfit.choose.options.fit_result)
     sssfit.fit.cascade.searched = _searched_once(sssfit.fit.cascade.searched)
+    RendererAgg.get_text_width_height_descent = _measured_once(
+        RendererAgg.get_text_width_height_descent
+    )
 
 
 def _once(known, key, make):
@@ -221,6 +227,21 @@ def _searched_once(real):
         return x.copy(), count
 
     return searched
+
+
+def _measured_once(real):
+    """Matplotlib measures "0.1" again for every figure; of a chart's layout that is a third."""
+    known = {}
+
+    @functools.wraps(real)
+    def measure(self, text, font, ismath):
+        style = tuple(mpl.rcParams[name] for name in _TEXT_STYLE)
+        key = text, tuple(vars(font).values()), ismath, self.dpi, style
+        if key not in known:
+            known[key] = real(self, text, font, ismath)
+        return known[key]
+
+    return measure
 
 
 def contents(profile):
