@@ -93,11 +93,12 @@ def test_no_worker_outlives_its_caller(tmp_path, number):
     assert waited_for(lambda: not any(map(is_alive, pids)))
 
 
-def test_a_script_without_its_guard_gets_one_line(tmp_path):
+@pytest.mark.parametrize("size", [1, 1_000_000], ids=["little", "more than a pipe holds"])
+def test_a_script_without_its_guard_gets_one_line(tmp_path, size):
     script = tmp_path / "unguarded.py"
     script.write_text(
         "from sssfit.stability.workers import Workers\n"
-        "with Workers(1, None) as workers:\n"
+        f"with Workers(1, bytes({size})) as workers:\n"
         "    workers.each(print, [0])\n"
     )
     run = subprocess.run(

@@ -8,13 +8,16 @@ import ctypes
 import math
 import sys
 import threading
+import time
 from types import SimpleNamespace
 
 import checks
 import numpy as np
 import pytest
+from numba.core.registry import cpu_target
 
 from sssfit import process
+from sssfit._jit import thread_pool
 from sssfit.grid import RadialGrid
 from sssfit.material import Layer, Material
 from sssfit.process import one_blas_thread
@@ -149,3 +152,31 @@ def test_another_c_library_is_left_alone(monkeypatch):
     monkeypatch.setattr(sys, "platform", "linux")
     process.keep_memory()
     assert opened
+
+
+def test_two_callers_take_turns_where_numba_does_not(monkeypatch):
+    """Rendering from two threads left numba without types: refreshing goes through a generator."""
+    inside, most = [], []
+
+    def refresh(real):
+        def refreshed():
+            inside.append(threading.get_ident())
+            most.append(len(set(inside)))
+            time.sleep(0.02)  # lets the other thread run
+            real()
+            inside.pop()
+
+        return refreshed
+
+    for context in (cpu_target.typing_context, cpu_target.target_context):
+        monkeypatch.setattr(context, "refresh", refresh(context.refresh))
+    pools = []
+    callers = [threading.Thread(target=lambda: pools.append(thread_pool(1))) for _ in range(3)]
+    for each in callers:
+        each.start()
+    for each in callers:
+        each.join()
+    for each in pools:
+        each.shutdown()
+    assert len(pools) == 3
+    assert set(most) == {1}

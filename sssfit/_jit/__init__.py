@@ -78,17 +78,20 @@ def thread_pool(
     Otherwise the first call would do 0.3 s of imports on several threads at once, where an
     interrupt or a MemoryError in one of them can leave the others waiting for its locks forever.
     A ``first`` call, which loads machine code that needs no numba (``machine_code``), does without
-    them.
+    them. Two of the caller's threads take turns: numba's contexts are refreshed by generators, and
+    a second caller in the midst of them left types unknown for the rest of the process.
     """
     if first is not None:
         first()
         return ThreadPoolExecutor(threads, thread_name_prefix=name)
     from numba.core import boxing  # noqa: F401
+    from numba.core.compiler_lock import global_compiler_lock
     from numba.core.registry import cpu_target
     from numba.core.runtime import context as runtime  # noqa: F401
 
-    for context in (cpu_target.typing_context, cpu_target.target_context):
-        context.refresh()
+    with global_compiler_lock:
+        for context in (cpu_target.typing_context, cpu_target.target_context):
+            context.refresh()
     return ThreadPoolExecutor(threads, thread_name_prefix=name)
 
 

@@ -8,6 +8,7 @@ its death, so none is left behind; Ctrl-C reaches the caller alone, also while a
 import contextlib
 import multiprocessing
 import os
+import pickle
 import signal
 import sys
 import threading
@@ -17,8 +18,9 @@ from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.connection import Connection
 from multiprocessing.resource_tracker import ensure_running
+from multiprocessing.shared_memory import SharedMemory
 from types import TracebackType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from sssfit.errors import SssfitError
 from sssfit.process import one_blas_thread
@@ -50,7 +52,13 @@ class Workers:
         context = multiprocessing.get_context("spawn")
         _start_tracker()
         self._theirs, self._ours = context.Pipe(duplex=False)
-        self._pool = ProcessPoolExecutor(min(count, _MOST), context, _begin, (self._theirs, shared))
+        # In memory, not with the start: over 64 kB there wait until they are read, forever if the
+        # process dies while it starts, as in a script without a main guard.
+        data = pickle.dumps(shared)
+        self._kept = SharedMemory(create=True, size=len(data))
+        cast(memoryview, self._kept.buf)[: len(data)] = data  # None only after it is closed
+        given = self._theirs, self._kept.name
+        self._pool = ProcessPoolExecutor(min(count, _MOST), context, _begin, given)
 
     def __enter__(self) -> "Workers":
         return self
@@ -66,6 +74,8 @@ class Workers:
         self._pool.shutdown(cancel_futures=True)
         self._ours.close()
         self._theirs.close()
+        self._kept.close()
+        self._kept.unlink()
 
     def submit(self, work: Callable[[Any, _Given], _Found], given: _Given) -> "Future[_Found]":
         """Return the future of work(shared, given); its exception is BrokenProcessPool if lost."""
@@ -138,10 +148,12 @@ def _deaf() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _begin(theirs: Connection, shared: object) -> None:
-    """Make this process a worker."""
+def _begin(theirs: Connection, name: str) -> None:
+    """Make this process a worker; what all share is in the memory of this name."""
     global _shared  # the pool hands nothing else from the initializer to the calls
-    _shared = shared
+    kept = SharedMemory(name)
+    _shared = pickle.loads(cast(memoryview, kept.buf))
+    kept.close()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if sys.platform != "win32":
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
