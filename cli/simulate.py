@@ -35,8 +35,8 @@ _OPTIONS = (
     option("--run number", WholeRange(1), "N", "Simulate only this run of an .mci file."),
     method_options(SIMULATIONS),
     option("--dr", Length(), "MM", "Annulus width.  [default: MFP_min / 20; deon-skin: 0.008]"),
-    option("--beam", None, "KIND:MM", "Beam in place of a pencil: gaussian:RADIUS, to 1/e^2, or "
-           "flat:RADIUS."),
+    option("--beam", None, "KIND:RADIUS", "Beam in place of a pencil: gaussian, to 1/e^2, or flat, "
+           "such as gaussian:500um."),
     option("--radius", Length("auto"), "MM|auto", "Grid radius; auto (montecarlo) enlarges it "
            "until under 0.1 % of any channel lies beyond.  [default: 32 MFP_max; deon-skin: 17.2]"),
     option("--scheduler", None, "ADDRESS", "montecarlo: Dask cluster that traces the photons: "

@@ -1,19 +1,23 @@
 """Profiles under a beam of finite width: closed forms, slow integrals, walks, and bad input."""
 
+import contextlib
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
+from scipy import integrate, stats
 
 from sssfit.choose.truth import material_of
 from sssfit.errors import ProfileError
 from sssfit.material import Layer, Material, load_material
 from sssfit.profile import FORMAT, Profile, full_kernel
-from sssfit.profile.beam import Beam, lens_area, parse_beam, under_beam
+from sssfit.profile.beam import Beam, parse_beam, under_beam
 from sssfit.profile.bins import merged
 from sssfit.profile.directions import angular_reflectance
 from sssfit.profile.frequency import frequency_response
 from sssfit.profile.smooth import smoothed
+from sssfit.profile.spreads import lens_area, within_gaussian
 from sssfit.simulate import simulate_exact, simulate_montecarlo
 from sssfit.simulate.runner import simulate_to_files
 from sssfit.stability.noise_floor import noise_ratio
@@ -27,7 +31,7 @@ def within(r, variances):
     return (WEIGHTS * -np.expm1(-(r[:, None] ** 2) / (2.0 * variances))).sum(axis=1)
 
 
-def gaussians(finer=60.0):
+def gaussians(finer=15.0):
     """A profile of three Gaussians in annuli of a part of the narrowest one's deviation."""
     width = np.sqrt(VARIANCES[0]) / finer
     edges = width * np.arange(int(9.0 / width) + 1)
@@ -193,18 +197,73 @@ def test_disks_share_their_lens():
     ("text", "words"),
     [
         ("gausian:1", "did you mean gaussian"),
-        ("flat", "positive number of mm"),
-        ("flat:0", "positive number of mm"),
-        ("flat:-1", "positive number of mm"),
-        ("gaussian:nan", "positive number of mm"),
-        ("gaussian:inf", "positive number of mm"),
-        ("gaussian:1cm", "positive number of mm"),
+        ("flat", "a length from 1e-09 to"),
+        ("flat:0", "a length from 1e-09 to"),
+        ("flat:-1", "a length from 1e-09 to"),
+        ("gaussian:nan", "a length from 1e-09 to"),
+        ("gaussian:inf", "a length from 1e-09 to"),
+        ("gaussian:1kg", "a length from 1e-09 to"),
         ("", "expected gaussian:RADIUS or flat:RADIUS"),
     ],
 )
 def test_bad_beams_are_refused(text, words):
     with pytest.raises(ProfileError, match=words):
         parse_beam(text)
+
+
+def test_a_radius_may_have_a_unit():
+    assert parse_beam("gaussian:500um") == parse_beam("gaussian:0.05cm") == Beam("gaussian", 0.5)
+    assert Beam("flat", np.float32(0.5)) == Beam("flat", 0.5)
+
+
+@pytest.mark.parametrize(
+    ("kind", "radius", "words"),
+    [("gausian", 1.0, "kind"), ("flat", 0.0, "radius_mm"), ("flat", "1", "radius_mm")],
+)
+def test_invalid_fields_are_refused(kind, radius, words):
+    with pytest.raises(ProfileError, match=words):
+        Beam(kind, radius)
+
+
+@pytest.mark.parametrize("radius", [5.0, 1.0, 0.2, 0.02, 1e-3])
+def test_a_gaussian_beam_spreads_light_like_rices_distribution(radius):
+    """Annuli wider and narrower than the beam, against adaptive quadrature of its definition."""
+    edges = np.array([0.0, 0.1, 0.13, 0.5, 0.52, 2.0])
+    radii = np.append(edges, [2.5, 4.0])
+    found = within_gaussian(radii, edges, radius)
+    deviation = 0.5 * radius
+    for annulus, (low, high) in enumerate(itertools.pairwise(edges)):
+        for k, r in enumerate(radii):
+
+            def within(s, r=r):
+                return 2.0 * s * stats.ncx2.cdf((r / deviation) ** 2, 2, (s / deviation) ** 2)
+
+            near = np.clip([r - 9.0 * deviation, r, r + 9.0 * deviation], low, high)
+            ends = itertools.pairwise([low, *near, high])
+            parts = [integrate.quad(within, *each, epsabs=1e-13)[0] for each in ends]
+            expected = sum(parts) / (high**2 - low**2)
+            assert found[k, annulus] == pytest.approx(expected, abs=2e-10)
+
+
+def test_a_beam_far_narrower_than_annuli_changes_nothing():
+    profile = gaussians(finer=1.0)
+    found = under_beam(profile, Beam("gaussian", 1e-6))
+    annuli = len(profile.annulus_energy)
+    np.testing.assert_allclose(found.annulus_energy[:annuli], profile.annulus_energy, atol=1e-6)
+    np.testing.assert_allclose(found.beyond_grid, profile.beyond_grid, atol=1e-6)
+
+
+@pytest.mark.parametrize("kind", ["gaussian", "flat"])
+def test_a_beam_over_too_many_annuli_is_refused_before_the_walk(kind, tmp_path):
+    begun = []
+    with pytest.raises(ProfileError, match=r"more annuli .* mm wide, and 20,000 is the limit"):
+        simulate_to_files(
+            [load_material("skin1")],
+            [tmp_path / "a.npz"],
+            beam=Beam(kind, 1e4),
+            watch=lambda label: begun.append(label) or contextlib.nullcontext(),
+        )
+    assert not begun
 
 
 def test_a_beam_is_not_put_on_a_beam():

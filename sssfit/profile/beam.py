@@ -6,26 +6,24 @@ beam incident on multi-layered tissues", has it in polar coordinates (equations 
 """
 
 import itertools
-from collections.abc import Callable
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import Any
 
 import numpy as np
 
 from sssfit.arrays import FloatArray
-from sssfit.errors import ProfileError
+from sssfit.errors import ArgumentError, ProfileError
 from sssfit.messages import did_you_mean, shown
-from sssfit.optics import gauss_legendre
 from sssfit.profile.checks import TOTAL_ERRORS
-from sssfit.profile.frequency import annulus_waves
 from sssfit.profile.pixels import flat_annuli
 from sssfit.profile.record import Profile
+from sssfit.profile.spreads import SPREADS
+from sssfit.text import length_mm
 
 _REACH = 2.5  # 1/e^2 radii of a Gaussian beam beyond which it has 4e-6 of its light
-_LEAST = 1e-13  # of the spectrum of a Gaussian beam where its integral ends
-_PERIODS, _NODES = 4, 20  # of the fastest wave, and of Gauss and Legendre, in an interval
-_AT_ONCE = 4e6  # numbers of an array
-_ACROSS = 4  # nodes across an annulus
+_NARROWEST, _WIDEST = 1e-9, 1e9  # mm
+_MOST_ANNULI = 20_000  # under a beam: half a minute, and 16 times those of skin1
 _COLUMNS = 512  # annuli whose shares are held at once
 
 
@@ -39,10 +37,25 @@ class Beam:
         "gaussian" or "flat".
     radius_mm : float [mm]
         Radius at which a Gaussian's irradiance has fallen to 1/e^2, as in conv, or of a flat disk.
+
+    Raises
+    ------
+    ProfileError
+        The kind is unknown, or the radius is out of range.
     """
 
     kind: str
     radius_mm: float
+
+    def __post_init__(self) -> None:
+        if self.kind not in SPREADS:
+            raise ProfileError(f"kind = {shown(self.kind)}; expected {' or '.join(SPREADS)}.")
+        is_number = isinstance(self.radius_mm, Real)
+        if not (is_number and _NARROWEST <= self.radius_mm <= _WIDEST):
+            raise ProfileError(
+                f"radius_mm = {shown(self.radius_mm)}; expected {_NARROWEST:g} to {_WIDEST:g} mm."
+            )
+        object.__setattr__(self, "radius_mm", float(self.radius_mm))
 
     def __str__(self) -> str:
         return f"{self.kind}:{self.radius_mm:g}"
@@ -54,12 +67,12 @@ class Beam:
 
 
 def parse_beam(text: str) -> Beam:
-    """Return the beam of "gaussian:0.5" or "flat:1", a kind and its radius in mm.
+    """Return the beam of "gaussian:0.5" or "flat:500um", a kind and its radius, in mm without unit.
 
     Raises
     ------
     ProfileError
-        The kind is unknown, or the radius is not a positive number.
+        The kind is unknown, or the radius is no length above 0.
     """
     kind, _, words = text.partition(":")
     if kind not in SPREADS:
@@ -68,12 +81,12 @@ def parse_beam(text: str) -> Beam:
             f"a beam {shown(text)}: {hint}expected gaussian:RADIUS or flat:RADIUS in mm."
         )
     try:
-        radius = float(words)
-    except ValueError:
-        radius = 0.0
-    if not 0.0 < radius < np.inf:
-        raise ProfileError(f"a beam {shown(text)}; its radius is a positive number of mm.")
-    return Beam(kind, radius)
+        return Beam(kind, float(length_mm(words)))
+    except (ArgumentError, ProfileError):
+        raise ProfileError(
+            f"a beam {shown(text)}; its radius is a length from {_NARROWEST:g} to {_WIDEST:g} mm, "
+            "such as 0.5, 500um or 0.1cm."
+        ) from None
 
 
 def under_beam(profile: Profile, beam: Beam) -> Profile:
@@ -93,7 +106,7 @@ def under_beam(profile: Profile, beam: Beam) -> Profile:
     Raises
     ------
     ProfileError
-        The profile is under a beam already.
+        The profile is under a beam already, or the beam reaches too many annuli.
     """
     if "beam" in profile.meta:
         raise ProfileError(f"the profile is under a beam already: {profile.meta['beam']}.")
@@ -157,9 +170,20 @@ def _by_angle(profile: Profile, edges: FloatArray, name: str, beam: Beam) -> dic
 
 
 def wider_edges(edges: FloatArray, reach_mm: float) -> FloatArray:
-    """Return edges, continued by annuli as wide as the last until they reach so much farther."""
+    """Return edges, continued by annuli as wide as the last until they reach so much farther.
+
+    Raises
+    ------
+    ProfileError
+        There would be too many.
+    """
     width = float(edges[-1] - edges[-2])
     count = int(np.ceil(reach_mm / width))
+    if len(edges) + count > _MOST_ANNULI:
+        raise ProfileError(
+            f"a beam that reaches {reach_mm:g} mm takes {count:,} more annuli {width:.4g} mm wide, "
+            f"and {_MOST_ANNULI:,} is the limit; use wider annuli or a narrower beam."
+        )
     return np.concatenate((edges, edges[-1] + width * np.arange(1, count + 1)))
 
 
@@ -226,74 +250,3 @@ def _errors(
     scale = np.divide(before, after, out=np.ones_like(after), where=after > 0.0)
     found: FloatArray = np.maximum(spread, 0.0) * scale  # rounding, as of the energy
     return found
-
-
-def _within_gaussian(radii: FloatArray, edges: FloatArray, radius_mm: float) -> FloatArray:
-    """Return the share (m, n) of flat annuli within radii: r int B(k) W(k) J1(k r) dk.
-
-    B = exp(-(k w)^2 / 8) is the spectrum of the beam, W that of an annulus. The integral ends where
-    B is 1e-13, and has 5 nodes in every period of its fastest wave.
-    """
-    from scipy import special
-
-    last = np.sqrt(-8.0 * np.log(_LEAST)) / radius_mm
-    periods = last * float(radii[-1] + edges[-1]) / (2.0 * np.pi)
-    intervals = max(1, int(np.ceil(periods / _PERIODS)))
-    x, weight = gauss_legendre(_NODES, -1.0, 1.0)
-    width = last / intervals
-    found = np.zeros((len(radii), len(edges) - 1))
-    step = max(1, int(_AT_ONCE / (_NODES * max(len(edges), len(radii)))))
-    for begin in range(0, intervals, step):
-        middle = width * (np.arange(begin, min(begin + step, intervals)) + 0.5)
-        k = (middle[:, None] + 0.5 * width * x).ravel()
-        share = np.tile(0.5 * width * weight, len(middle)) * np.exp(-((k * radius_mm) ** 2) / 8.0)
-        found += special.j1(radii[:, None] * k) @ (share[:, None] * annulus_waves(k, edges))
-    return found * radii[:, None]
-
-
-def _within_disk(radii: FloatArray, edges: FloatArray, radius_mm: float) -> FloatArray:
-    """Return the share (m, n) of flat annuli within radii: of light at s, a disk around it.
-
-    Of an annulus s^2 is distributed evenly; four nodes of Gauss and Legendre in it stand for it.
-    """
-    nodes, weight = gauss_legendre(_ACROSS)
-    square = edges**2
-    found = np.zeros((len(radii), len(edges) - 1))
-    for node, share in zip(nodes, weight, strict=True):
-        s = np.sqrt(square[:-1] + node * np.diff(square))
-        found += share * lens_area(radii[:, None], radius_mm, s)
-    return found / (np.pi * radius_mm**2)
-
-
-def lens_area(one: FloatArray, other: float, apart: FloatArray) -> FloatArray:
-    """Return the area that two disks share, whose centres are so far apart.
-
-    Weisstein, "Circle-Circle Intersection", equation 14.
-    """
-    one, apart = np.broadcast_arrays(one, apart)
-    found: FloatArray = np.where(
-        apart <= np.abs(one - other), np.pi * np.minimum(one, other) ** 2, 0.0
-    )
-    # With edges to 9 mm and a beam of 1 mm, four pairs in five lie one inside the other, or apart.
-    cross = (apart > np.abs(one - other)) & (apart < one + other)
-    found[cross] = _lens_of_crossing(one[cross], other, apart[cross])
-    return found
-
-
-def _lens_of_crossing(one: FloatArray, other: float, apart: FloatArray) -> FloatArray:
-    to_one = (apart**2 + one**2 - other**2) / (2.0 * apart * one)
-    to_other = (apart**2 + other**2 - one**2) / (2.0 * apart * other)
-    kite = (other + one - apart) * (apart + one - other) * (apart - one + other)
-    kite = kite * (apart + one + other)
-    angles = one**2 * np.arccos(np.clip(to_one, -1.0, 1.0))
-    angles = angles + other**2 * np.arccos(np.clip(to_other, -1.0, 1.0))
-    area: FloatArray = angles - 0.5 * np.sqrt(np.maximum(kite, 0.0))
-    return area
-
-
-# How much of light that enters at a point returns within radii; a new kind is one function and one
-# line, and its reach.
-SPREADS: dict[str, Callable[[FloatArray, FloatArray, float], FloatArray]] = {
-    "gaussian": _within_gaussian,
-    "flat": _within_disk,
-}

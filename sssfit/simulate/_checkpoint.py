@@ -98,6 +98,7 @@ class Checkpoint:
     _saved_at: float = field(init=False, default=0.0)
 
     def __post_init__(self) -> None:
+        self.path = Path(self.path)
         if not 0.0 <= self.every_seconds < math.inf:
             raise SimulationError(
                 f"a checkpoint every {self.every_seconds} s; give a time from 0 s up."

@@ -12,14 +12,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sssfit.errors import FileError, ProfileError, StoppedError
+from sssfit.errors import FileError, ProfileError, SimulationError, StoppedError
 from sssfit.files import check_output, held
 from sssfit.formats.mci import is_mci, load_mci
+from sssfit.grid import make_grid
 from sssfit.material import Material, load_material, material_names
-from sssfit.messages import note
+from sssfit.messages import counted, note
 from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile, is_profile_file
-from sssfit.profile.beam import Beam, under_beam
+from sssfit.profile.beam import Beam, under_beam, wider_edges
 from sssfit.simulate._checkpoint import EVERY_SECONDS, Checkpoint, is_checkpoint_file
 from sssfit.simulate._elsewhere import Elsewhere
 from sssfit.simulate._finished import is_complete, is_finished, run_figures
@@ -180,7 +181,7 @@ def paths_of(
 
 def simulate_to_files(
     materials: Sequence[Any],
-    paths: Sequence[Path | None],
+    paths: Sequence[str | Path | None],
     method: str = WALK,
     settings: Mapping[str, Any] | Sequence[Mapping[str, Any]] | None = None,
     *,
@@ -199,7 +200,7 @@ def simulate_to_files(
     materials : sequence of Material or ProfileSource
         Materials that can share a run do so. For a method that makes one profile without a
         material, the source of that profile.
-    paths : sequence of Path or None
+    paths : sequence of str, Path or None
         Path of each profile; None if the caller writes it.
     method : str
         A name of `sssfit.methods.SIMULATIONS`.
@@ -229,25 +230,35 @@ def simulate_to_files(
     ------
     SimulationError, FileError
         Settings, outputs or checkpoints are invalid.
+    ProfileError
+        The beam reaches too many annuli.
     """
+    files: list[Path | None] = [None if each is None else Path(each) for each in paths]
     if settings is None or isinstance(settings, Mapping):
-        every, shares = [settings or {}] * len(paths), SIMULATIONS[method].shares
+        every, shares = [settings or {}] * len(files), SIMULATIONS[method].shares
     else:
         every, shares = list(settings), False
-    groups = shared_walks(materials) if shares else [[k] for k in range(len(paths))]
+    if not len(materials) == len(every) == len(files):
+        raise SimulationError(
+            f"{counted(len(materials), 'material')}, {counted(len(files), 'path')} and settings of "
+            f"{counted(len(every), 'run')}; expected as many of each."
+        )
+    for material, given in zip(materials, every, strict=True):
+        _check_reach(beam, material, given)
+    groups = shared_walks(materials) if shares else [[k] for k in range(len(files))]
     is_walk = method == WALK
     inputs = tuple(inputs)
     found: dict[int, Outcome] = {}
-    with held(paths, is_profile_file, inputs=inputs, force=force, named=("a profile", ".npz")):
+    with held(files, is_profile_file, inputs=inputs, force=force, named=("a profile", ".npz")):
         saves = [
             Checkpoint(_beside(path), checkpoint_every, resume=resume) if is_walk and path else None
-            for path in (paths[group[0]] for group in groups)
+            for path in (files[group[0]] for group in groups)
         ]
         for save in saves:
             if save and not resume:
                 check_output(save.path, is_checkpoint_file, force=force, inputs=inputs)
         for group, save in zip(groups, saves, strict=True):
-            own = [materials[k] for k in group], [paths[k] for k in group]
+            own = [materials[k] for k in group], [files[k] for k in group]
             given = every[group[0]]
             try:
                 if is_walk:
@@ -259,6 +270,15 @@ def simulate_to_files(
             found |= zip(group, made, strict=True)
     missing = [each.name for k, each in enumerate(materials) if k not in found]
     return Results(tuple(found[k] for k in sorted(found)), tuple(missing))
+
+
+def _check_reach(beam: Beam | None, material: Any, settings: Mapping[str, Any]) -> None:
+    """Refuse a beam that reaches too many annuli, before what it is laid over is computed."""
+    if beam is None or not isinstance(material, Material):
+        return
+    known = {key: settings.get(key) for key in ("dr_mm", "radius_mm")}
+    wide = {key: None if isinstance(each, str) else each for key, each in known.items()}
+    wider_edges(make_grid(material, **wide).r_edges_mm, beam.reach_mm)
 
 
 def _beside(path: Path) -> Path:
