@@ -1,12 +1,13 @@
-"""Checks of the fields of records: arrays of numbers, names of channels, JSON, provenance.
+"""Checks of settings and of the fields of records: numbers, names of channels, JSON, provenance.
 
 Files edited by hand and records made in Python get the same checks; each caller passes the error to
 raise.
 """
 
+import inspect
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -14,8 +15,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.errors import MaterialError, SssfitError
-from sssfit.messages import shown
+from sssfit.errors import ArgumentError, MaterialError, SssfitError
+from sssfit.messages import did_you_mean, shown
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -38,6 +39,31 @@ def number_array(name: str, value: object, error: type[SssfitError]) -> FloatArr
         raise error(f"{name} is not an array of numbers.")
     array.flags.writeable = False
     return array
+
+
+def is_whole(value: object) -> bool:
+    """Return whether a value is a whole number of Python or numpy; True and 2.0 are not."""
+    return isinstance(value, int | np.integer) and not isinstance(value, bool)
+
+
+def check_settings(function: Callable[..., Any], given: Mapping[str, Any], who: str) -> None:
+    """Refuse keyword arguments that a function does not have; ``who`` is its name in the message.
+
+    Raises
+    ------
+    ArgumentError
+    """
+    known = [
+        name
+        for name, each in inspect.signature(function).parameters.items()
+        if each.kind is each.KEYWORD_ONLY
+    ]
+    for name in given:
+        if name not in known:
+            raise ArgumentError(
+                f"{who} has no setting {name}; {did_you_mean(name, known)}expected some of "
+                f"{', '.join(known)}."
+            )
 
 
 def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
@@ -125,6 +151,8 @@ def _json_value(path: str, value: object) -> Any:
         return _json_text(path, value)
     if value is None or isinstance(value, bool):
         return value
+    if isinstance(value, np.number | np.bool_):
+        return _json_value(path, value.item())
     if not isinstance(value, (int, float)):
         raise ValueError(f"{path} is of type {type(value).__name__}")  # noqa: TRY004 (one for all)
     if not _is_finite(value):

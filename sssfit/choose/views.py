@@ -272,6 +272,7 @@ def checked_scene(scene: Scene, mm_per_pixel: float) -> Scene:
         pixels,
         scene.mm_per_pixel,
         mask=None if scene.mask is None else scene.mask[rows, columns],
+        channel_names=scene.channel_names,
     )
 
 

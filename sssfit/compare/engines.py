@@ -24,7 +24,7 @@ from sssfit.fit.falloff import scale_of
 from sssfit.kernel import Stage, Taps
 from sssfit.kernel.listing import listing
 from sssfit.profile import Profile
-from sssfit.render.borders import check_channels, source_indices
+from sssfit.render.borders import scene_for, source_indices
 from sssfit.render.disk import turns
 from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
@@ -95,8 +95,7 @@ class Engine:
         RenderError, FitError
             The picture has other channels, or the profile cannot be fitted.
         """
-        check_channels(scene.channels, profile.n_channels)
-        return self.picture(scene, profile)
+        return self.picture(scene_for(scene, profile.channels), profile)
 
 
 def engines() -> tuple[Engine, ...]:

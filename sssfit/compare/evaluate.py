@@ -196,6 +196,7 @@ def evaluate(
     RenderError
         The kernel does not fit the scene or the profile, or as `measure`.
     """
+    scene = scene.for_channels(kernel.channels)
     through = None
     if transmit:
         through = _most_through(scene, kernel)

@@ -80,6 +80,7 @@ def evaluated_scene(scene: Scene, profile: Profile) -> Scene:
         With a mask of its own it is returned as it is.
     profile : Profile
     """
+    scene = scene.for_channels(profile.channels)
     if scene.mask is not None or scene.name not in ("disk", "edge"):
         return scene
     reach = support_of(profile) / scene.mm_per_pixel

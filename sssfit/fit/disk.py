@@ -17,7 +17,7 @@ import time
 
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, is_whole
 from sssfit.errors import FitError
 from sssfit.fit._result import TapsFit, provenance
 from sssfit.fit._target import Pitch, make_target
@@ -59,7 +59,7 @@ def fit_disk(
         The number, profile, pixel size or support is invalid.
     """
     begun = time.perf_counter()
-    if isinstance(taps, bool) or not isinstance(taps, int) or not FEWEST <= taps <= MOST_ON_DISK:
+    if not (is_whole(taps) and FEWEST <= taps <= MOST_ON_DISK):
         raise FitError(
             f"taps = {shown(taps)}; expected a whole number from {FEWEST} to {MOST_ON_DISK}."
         )

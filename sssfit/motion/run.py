@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection
 
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, is_whole
 from sssfit.errors import ArgumentError
 from sssfit.messages import did_you_mean, shown
 from sssfit.methods import LIGHTS, RENDERERS
@@ -135,13 +135,13 @@ def make_frames(
     if light not in LIGHTS:
         near = did_you_mean(str(light), list(LIGHTS))
         raise ArgumentError(f"light {shown(light)}: {near}expected one of {', '.join(LIGHTS)}.")
-    is_whole = isinstance(length, int) and not isinstance(length, bool)
-    if not (is_whole and _FEWEST_FRAMES <= length <= MOST_FRAMES):
+    if not (is_whole(length) and _FEWEST_FRAMES <= length <= MOST_FRAMES):
         raise ArgumentError(
             f"length = {shown(length)}; expected {_FEWEST_FRAMES} to {MOST_FRAMES} frames."
         )
     of_frame = LIGHTS[light].load()
     intensity = np.array([of_frame(k) for k in range(length)])
+    scene = scene.for_channels(profile.channels)
     return Frames(scene, profile, intensity, _checked_shift(shift), threads)
 
 
@@ -158,6 +158,6 @@ def _asked(ways: Collection[str] | None) -> list[str]:
 
 def _checked_shift(shift: Shift) -> Shift:
     is_pair = isinstance(shift, tuple | list) and len(shift) == 2
-    if not is_pair or any(isinstance(k, bool) or not isinstance(k, int) for k in shift):
+    if not is_pair or not all(map(is_whole, shift)):
         raise ArgumentError(f"shift = {shown(shift)}; expected two whole numbers of pixels.")
     return int(shift[0]), int(shift[1])

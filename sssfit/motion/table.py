@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import FloatArray, plain
+from sssfit.arrays import FloatArray, is_whole, plain
 from sssfit.errors import ArgumentError
 from sssfit.messages import shown, table
 from sssfit.motion.moving import MovingCovariance, MovingMean, MovingVariance
@@ -144,7 +144,7 @@ def measure_table(*, seeds: int = 200, seed: int = 1) -> VariateTable:
     ArgumentError
         The number of seeds is out of range.
     """
-    if isinstance(seeds, bool) or not isinstance(seeds, int) or not 1 <= seeds <= _MOST_SEEDS:
+    if not (is_whole(seeds) and 1 <= seeds <= _MOST_SEEDS):
         raise ArgumentError(
             f"seeds = {shown(seeds)}; expected a whole number from 1 to {_MOST_SEEDS}."
         )

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.arrays import check_settings
 from sssfit.errors import RenderError
 from sssfit.formats.colours import as_light
 from sssfit.formats.pictures import Image, load_image
@@ -65,10 +66,11 @@ def render(image: Irradiance, kernel: Kernel | str | Path, **settings: Any) -> F
             f"kernel = {shown(kernel)}; expected a SeparableKernel, Taps, or the path of a file of "
             "either."
         )
-    scene = _scene(image, kernel.mm_per_pixel)
     if isinstance(kernel, Taps):
-        return render_taps(scene, kernel, **settings)
-    return render_separable(scene, kernel, **settings)
+        check_settings(render_taps, settings, "a table of taps")
+        return render_taps(_scene(image, kernel.mm_per_pixel), kernel, **settings)
+    check_settings(render_separable, settings, "a separable kernel")
+    return render_separable(_scene(image, kernel.mm_per_pixel), kernel, **settings)
 
 
 def _scene(image: Irradiance, mm_per_pixel: float) -> Scene:

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.arrays import FloatArray, read_only
+from sssfit.arrays import FloatArray, is_whole, read_only
 from sssfit.errors import RenderError
 from sssfit.messages import shown
 from sssfit.process import thread_count
 from sssfit.profile import Profile
-from sssfit.render.borders import check_channels, check_memory, source_indices
+from sssfit.render.borders import check_memory, scene_for, source_indices
 from sssfit.render.reference import far_irradiance, reference_half_pixels
 from sssfit.scene.record import Scene
 
@@ -156,12 +156,12 @@ def render_samples(
     from sssfit._jit.adaptive import frame_key, sample_rows  # numba: 0.4 s
 
     profile = sampler.profile
-    check_channels(scene.channels, profile.n_channels)
+    scene = scene_for(scene, profile.channels)
     _check_pitch(scene, sampler)
     shape = scene.height, scene.width
     many, factor = _checked_counts(counts, shape), _checked_scale(scale, shape)
     for name, value in (("frame", frame), ("seed", seed)):
-        if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= _LARGEST:
+        if not (is_whole(value) and 0 <= value <= _LARGEST):
             raise RenderError(f"{name} = {shown(value)}; expected a whole number from 0.")
     pitch = scene.mm_per_pixel / float(factor.max())  # of the widest profile's own pixels
     half = reference_half_pixels(profile, pitch, *shape)

@@ -1,9 +1,13 @@
 """What all flat renderers share: a table of source pixels past the border, a limit of memory."""
 
+from collections.abc import Sequence
+
 import numpy as np
 import numpy.typing as npt
 
 from sssfit.errors import RenderError
+from sssfit.messages import shown
+from sssfit.scene.record import Scene
 
 # mirror repeats the pixel at the rim and then its neighbours (numpy.pad's "symmetric"), so that no
 # light is lost; clamp repeats only the pixel at the rim ("edge"); zero is black.
@@ -55,6 +59,23 @@ def check_channels(picture: int, kernel: int) -> None:
         raise RenderError(
             f"the picture has {picture} channels and the kernel {kernel}; expected {expected}."
         )
+
+
+def scene_for(scene: Scene, channels: Sequence[str]) -> Scene:
+    """Return the scene with its channels in a kernel's order; see `Scene.for_channels`.
+
+    Raises
+    ------
+    RenderError
+        It is no scene, or has other channels than one or as many.
+    """
+    if not isinstance(scene, Scene):
+        raise RenderError(
+            f"scene = {shown(scene)}; expected a Scene. sssfit.render takes arrays and files, too."
+        )
+    found = scene.for_channels(channels)
+    check_channels(found.channels, len(channels))
+    return found
 
 
 def check_memory(needed_bytes: float, what: str, remedy: str) -> None:

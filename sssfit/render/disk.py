@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.arrays import is_whole
 from sssfit.errors import RenderError
 from sssfit.kernel.taps import Stage
 from sssfit.messages import shown
@@ -40,10 +41,10 @@ NEWEST = 1.0 / 8.0  # share of the newest frame; filters for stable pictures tak
 
 def turns(height: int, width: int, frame: int) -> npt.NDArray[np.float64]:
     """Return the angle of each pixel (H, W), from 0 to 2 pi."""
-    if isinstance(frame, bool) or not isinstance(frame, int) or frame < 0:
+    if not is_whole(frame) or frame < 0:
         raise RenderError(f"frame = {shown(frame)}; expected a whole number from 0.")
     words = _words if height * width <= _KEPT_PIXELS else _words.__wrapped__
-    word = words(height, width) + np.uint32(frame * _STEP % 2**32)
+    word = words(height, width) + np.uint32(int(frame) * _STEP % 2**32)
     return word.astype(np.float64) * (2.0 * math.pi / 2.0**32)
 
 

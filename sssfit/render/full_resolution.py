@@ -17,7 +17,7 @@ from scipy import fft
 from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
 from sssfit.kernel.taps import Stage, Taps
-from sssfit.render.borders import check_channels
+from sssfit.render.borders import scene_for
 from sssfit.scene.record import Scene
 
 
@@ -48,7 +48,7 @@ def render_full_resolution(scene: Scene, taps: Taps) -> FloatArray:
             f"{taps.structure} has stages in other directions than the axes, which mix a picture's "
             "cosines; render it as it is."
         )
-    check_channels(scene.channels, len(taps.channels))
+    scene = scene_for(scene, taps.channels)
     wy, wx = (np.pi * np.arange(n) / n for n in (scene.height, scene.width))
     spectrum = _spectrum(taps, scene.mm_per_pixel, wy, wx)
     waves = fft.dctn(scene.irradiance, axes=(0, 1), norm="ortho")

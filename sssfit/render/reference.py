@@ -16,7 +16,7 @@ from sssfit.arrays import FloatArray
 from sssfit.process import thread_count
 from sssfit.profile import Profile
 from sssfit.profile.pixels import checked_support
-from sssfit.render.borders import check_channels, check_memory, source_indices
+from sssfit.render.borders import check_channels, check_memory, scene_for, source_indices
 from sssfit.scene.record import Scene
 
 ComplexArray = npt.NDArray[np.complex128]
@@ -54,7 +54,7 @@ def render_reference(
     RenderError
         The channels do not match, the border is unknown, or the memory limit is exceeded.
     """
-    check_channels(scene.channels, profile.n_channels)
+    scene = scene_for(scene, profile.channels)
     thread_count(threads)  # raises before the kernel's pixels are computed
     half = reference_half_pixels(profile, scene.mm_per_pixel, scene.height, scene.width)
     _plan(scene.height, scene.width, half, profile.n_channels, border)

@@ -17,7 +17,7 @@ from sssfit.arrays import read_only
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
 from sssfit.process import thread_count
-from sssfit.render.borders import check_channels, check_memory, source_indices
+from sssfit.render.borders import check_memory, scene_for, source_indices
 from sssfit.scene.record import Scene
 
 FloatArray = npt.NDArray[np.floating[Any]]
@@ -60,8 +60,8 @@ def render_separable(
     RenderError
         Kernel and scene differ in pixel size or channels, or a setting is invalid.
     """
+    scene = scene_for(scene, kernel.channels)
     check_pitch(scene, kernel)
-    check_channels(scene.channels, len(kernel.channels))
     precision = np.dtype(dtype)
     if precision not in (np.float32, np.float64):
         raise RenderError(f"dtype = {precision}; expected float32 or float64.")

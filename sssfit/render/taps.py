@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from sssfit.errors import RenderError
 from sssfit.kernel.taps import Stage, Taps
-from sssfit.render.borders import check_channels, check_memory, source_indices
+from sssfit.render.borders import check_memory, scene_for, source_indices
 from sssfit.render.cascade import apply_cascade, is_quick
 from sssfit.render.disk import all_turns, apply_disk
 from sssfit.render.jitter import Jitter, apply_jittered
@@ -89,7 +89,7 @@ def render_taps(
         the intermediate format holds.
     """
     channels = len(taps.channels)
-    check_channels(scene.channels, channels)
+    scene = scene_for(scene, taps.channels)
     precision = np.dtype(dtype)
     if precision not in (np.float32, np.float64):
         raise RenderError(f"dtype = {precision}; expected float32 or float64.")

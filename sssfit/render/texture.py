@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.arrays import is_whole
 from sssfit.errors import RenderError
 from sssfit.kernel import Kernel
 from sssfit.messages import shown
@@ -142,7 +143,7 @@ def render_texture(
     """
     _check_light(lights, ambient)
     for name, value in (("map_size", map_size), ("shadow_size", shadow_size)):
-        if isinstance(value, bool) or not isinstance(value, int) or not 8 <= value <= 16384:
+        if not (is_whole(value) and 8 <= value <= 16384):
             raise RenderError(f"{name} = {shown(value)}; expected 8 to 16384 texels.")
     offsets = np.asarray(offsets_mm, dtype=np.float64).reshape(-1, 3)
     seconds: dict[str, float] = {}

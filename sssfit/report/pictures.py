@@ -164,7 +164,13 @@ def _reduced(scene: Scene, side: int) -> Scene:
         part = _means((scene.mask[..., None] > 0).astype(np.float64), factor)[..., 0]
         mask = (part >= _HALF).astype(np.int32)
     light = _means(scene.irradiance, factor)
-    return Scene(scene.name, light, scene.mm_per_pixel * factor, mask=mask)
+    return Scene(
+        scene.name,
+        light,
+        scene.mm_per_pixel * factor,
+        mask=mask,
+        channel_names=scene.channel_names,
+    )
 
 
 def _means(picture: FloatArray, factor: int) -> FloatArray:

@@ -3,12 +3,11 @@
 Border pixels of a white shape on black hold exactly the covered share of their area.
 """
 
-import math
-
 import numpy as np
 
-from sssfit.arrays import FloatArray
+from sssfit.arrays import FloatArray, is_whole
 from sssfit.errors import RenderError
+from sssfit.messages import shown
 from sssfit.scene.record import Scene
 
 # A render needs about 120 bytes per RGB pixel, and 8 GB is its limit. Checked before a head is
@@ -18,22 +17,19 @@ _MIN_MM = 1e-12  # of a pixel, as in the fits: a made head of 1e-320 mm per pixe
 MAX_PIXELS = 60_000_000
 
 
-def is_integer(value: float) -> bool:
-    """Return whether a number is finite and an integer."""
-    return math.isfinite(value) and value == int(value)
-
-
 def check_seed(name: str, seed: float) -> None:
     """Check the seed of the random numbers."""
-    if not is_integer(seed) or seed < 0:
-        raise RenderError(f"{name}: seed = {seed}; expected a whole number from 0.")
+    if not is_whole(seed) or seed < 0:
+        raise RenderError(f"{name}: seed = {shown(seed)}; expected a whole number from 0.")
 
 
 def check_size(name: str, height: int, width: int, mm_per_pixel: float) -> None:
     """Check the number and the size of the pixels, and the memory they need."""
     for word, value in (("height", height), ("width", width)):
-        if not is_integer(value) or value < 1:
-            raise RenderError(f"{name}: {word} = {value}; expected a whole number, 1 or more.")
+        if not is_whole(value) or value < 1:
+            raise RenderError(
+                f"{name}: {word} = {shown(value)}; expected a whole number, 1 or more."
+            )
     if height * width > MAX_PIXELS:
         raise RenderError(
             f"{name}: {width} x {height} pixels would take {height * width * 120e-9:.3g} GB to "

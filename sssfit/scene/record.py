@@ -1,6 +1,7 @@
 """What a kernel is applied to: a picture of irradiance, optionally with geometry."""
 
 import dataclasses
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -50,6 +51,9 @@ class Scene:
         Coverage of a picture from a file, kept for the output and never blurred.
     alpha_is_multiplied : bool
         Whether the irradiance is multiplied by the coverage.
+    channel_names : tuple of str, optional
+        Names of the C channels in a file. Where a kernel has the same names in another order,
+        `for_channels` puts them into its order; otherwise channels belong to each other by place.
 
     Raises
     ------
@@ -68,6 +72,7 @@ class Scene:
     back_irradiance: FloatArray | None = None
     alpha: FloatArray | None = None
     alpha_is_multiplied: bool = False
+    channel_names: tuple[str, ...] | None = None
 
     @classmethod
     def from_image(
@@ -98,6 +103,7 @@ class Scene:
                 mm_per_pixel,
                 alpha=alpha,
                 alpha_is_multiplied=image.alpha_is_multiplied,
+                channel_names=image.channels,
             )
         if alpha is None:
             raise RenderError(f"{image.name} has no alpha that could be the mask.")
@@ -108,7 +114,14 @@ class Scene:
             )
         share = np.where(inside, alpha, 1.0) if image.alpha_is_multiplied else 1.0
         light = np.where(inside[..., None], image.pixels / np.expand_dims(share, -1), 0.0)
-        return cls(image.name, light, mm_per_pixel, mask=inside.astype(np.int32), alpha=alpha)
+        return cls(
+            image.name,
+            light,
+            mm_per_pixel,
+            mask=inside.astype(np.int32),
+            alpha=alpha,
+            channel_names=image.channels,
+        )
 
     def __post_init__(self) -> None:
         shape = as_light(self.irradiance, f"{self.name}: irradiance").shape
@@ -151,6 +164,19 @@ class Scene:
         kept = values.astype(dtype, order="C")
         kept.setflags(write=False)
         object.__setattr__(self, field, kept)
+
+    def for_channels(self, names: Sequence[str]) -> "Scene":
+        """Return the scene with its channels in this order, if a file named them the same.
+
+        An EXR holds its channels by the alphabet: 1050nm comes before 950nm.
+        """
+        own = self.channel_names
+        if own is None or own == tuple(names) or sorted(own) != sorted(names):
+            return self
+        order = [own.index(each) for each in names]
+        return dataclasses.replace(
+            self, irradiance=self.irradiance[..., order], channel_names=tuple(names)
+        )
 
     def corner(self, pixels: int) -> "Scene":
         """Return the upper left corner of the scene with this height and width."""
