@@ -54,6 +54,7 @@ FIGURES = {
     "radius_of_50_percent_mm": lambda made: made.energy_radii_mm([0.5])[0],
     "radius_of_90_percent_mm": lambda made: made.energy_radii_mm([0.9])[0],
     "radius_of_99_percent_mm": lambda made: made.energy_radii_mm([0.99])[0],
+    "settings": lambda made: dict(made.meta.get("settings", {})),
     "empty_annuli": lambda made: (
         None if made.photons is None else (made.annulus_energy == 0.0).sum(axis=0)
     ),

@@ -218,8 +218,11 @@ def deon_skin_page(figures: Figures) -> str:
 _SHARES = (50, 90, 99)
 _PROFILE_HEAD = """\
 material  {name}{origin}
-method    {method:|unknown}, {walks}, sssfit {version:|version unknown}
+method    {method:|unknown}{settings}, {walks}, sssfit {version:|version unknown}
 grid      {annuli:#annulus} of {width}, to {radius_mm:.4g} mm"""
+_TOLD_ELSEWHERE = {
+    *("dr_mm", "radius", "photons", "angles", "numerical_aperture"),
+}
 _ENERGIES = Columns(
     "channel",
     "channels",
@@ -261,6 +264,7 @@ def profile_page(figures: Figures) -> str:
         **figures,
         "name": material["name"],
         "origin": f" ({source})" if source else "",
+        "settings": _settings(figures["settings"]),
         "walks": _walks(figures),
         "width": filled("{dr_mm:.4g} mm", figures) if figures["uniform"] else "varying width",
         "absorbed": figures["absorbed"] or [None] * len(names),
@@ -291,6 +295,17 @@ def _directions(figures: Figures) -> str:
     return (
         filled("numerical aperture {numerical_aperture:g|unknown}; outside it ", figures) + outside
     )
+
+
+def _settings(given: Figures) -> str:
+    """Return the settings of a method as text: mapping diffuse, similarity."""
+    told = {name: each for name, each in given.items() if name not in _TOLD_ELSEWHERE}
+    words = [
+        name.replace("_", " ") + ("" if each is True else f" {printable(str(each))}")
+        for name, each in told.items()
+        if each is True or (isinstance(each, str | int | float) and each is not False)
+    ]
+    return f" ({', '.join(words)})" if words else ""
 
 
 def _walks(figures: Figures) -> str:

@@ -483,6 +483,7 @@ class Profile:
                     for share, each in zip(_SHARES, radii_mm, strict=True)
                 },
                 "empty_annuli": self._empty_annuli(),
+                "settings": meta.get("settings", {}),
                 **({"beam": meta["beam"]} if "beam" in meta else {}),
                 **directed_figures(self),
             }
