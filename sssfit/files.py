@@ -117,6 +117,8 @@ def check_output(
     _check_target(path)
     path = _followed(path)
     folder = path.parent
+    if folder.exists() and not folder.is_dir():
+        raise FileError(f"{path}: {folder} is a file; name a folder.")
     if not folder.is_dir():
         raise FileError(f"{path}: there is no folder {folder}; make it, or name another.")
     if path.is_dir():

@@ -333,7 +333,10 @@ def test_a_gap_is_said_in_the_unit_of_the_table(unit, mm):
         ("r_mm,R,R\n1,0.1,0.1\n", "line 1: the column 'R' is there twice"),
         ("r_mm,r_mm,R\n1,0.1,0.1\n", "line 1: the column 'r_mm' is there twice"),
         ("r_mm,R,\n1,0.1,\n", "line 1: a column has no name"),
-        ("r_mm,R_stderr\n1,0.1\n2,0.1\n", "line 1: channels = [] has 0 names"),
+        (
+            "r_mm,R_stderr\n1,0.1\n2,0.1\n",
+            "line 1: the column 'R_stderr' has standard errors of a column that does not exist",
+        ),
         ("r_mm,R,G_stderr\n1,0.1,0.1\n", "the column 'G_stderr' has standard errors of a column"),
         ("r_mm," + ",".join(f"c{k}" for k in range(65)) + "\n", "expected 1 to 64"),
         ("r_mm,R\n", "a.csv ends after its header"),

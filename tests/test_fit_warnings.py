@@ -272,7 +272,7 @@ FALLOFF = ("--method", "falloff")
         (("--method", "guided", "--k", "-1"), 1, "k = -1 is outside [0, 4]"),
         (("--method", "guided", "--k", "nan"), 2, "'nan' is not"),
         (("--method", "guided", "--b", "0"), 1, "b = 0; expected a number above 0"),
-        (("--method", "guided", "--centre-bound", "2"), 1, "centre_bound = 2; expected a share"),
+        (("--method", "guided", "--centre-bound", "2"), 2, "'2' is not a share from 0 to 100 %"),
         (("--method", "svd", "--mm-per-pixel", "0"), 2, "'0' is not a length above 0"),
         (("--method", "svd", "--mm-per-pixel", "-1"), 2, "'-1' is not a length above 0"),
         (("--method", "svd", "--mm-per-pixel", "nan"), 2, "'nan' is not a length above 0"),

@@ -409,3 +409,17 @@ def test_bad_input_is_one_clear_line(run, tmp_path, arguments, status, fragment)
     if status == 1:
         assert err.count("\n") == 1
     assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("eta", [np.float64(1.0), np.float64(1.4), np.float32(1.5)])
+@pytest.mark.parametrize("light", LIGHTS)
+def test_an_index_of_numpy_is_a_number(eta, light):
+    found = invert_reflectance(0.4, eta, light=light)
+    assert found.albedo == invert_reflectance(0.4, float(eta), light=light).albedo
+
+
+@pytest.mark.parametrize("asked", [1e-8, 1e-6, 1e-4])
+def test_dim_reflectances_are_found_to_a_share_of_themselves(asked):
+    found = invert_reflectance([asked, 0.5], 1.3)
+    assert found.reflectance[0] == pytest.approx(asked, rel=1e-4)
+    assert reflectance_of(found.albedo, 1.3) == pytest.approx([asked, 0.5], rel=1e-4)

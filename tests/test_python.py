@@ -1,5 +1,6 @@
 """The toolkit in a notebook: three calls, names or records, loaded when they are asked for."""
 
+import functools
 import inspect
 import subprocess
 import sys
@@ -9,11 +10,18 @@ import pytest
 
 import sssfit
 import sssfit.compare
-from sssfit.errors import FitError, MaterialError, RenderError, SimulationError
+from sssfit.choose.truth import truth_of
+from sssfit.compare.evaluate import evaluate
+from sssfit.compare.references import references
+from sssfit.errors import FitError, MaterialError, RenderError, SimulationError, SssfitError
 from sssfit.fit import fit_svd
 from sssfit.formats.pictures import save_image
+from sssfit.material import Layer
+from sssfit.measure.score import measure
 from sssfit.methods import SIMULATIONS
+from sssfit.render.reference import render_reference
 from sssfit.render.separable import render_separable
+from sssfit.scene.made import make_scene
 from sssfit.simulate import simulate_burley, simulate_dipole, simulate_montecarlo
 
 HEAVY = {"numpy", "numba", "scipy", "colour", "matplotlib", "rich", "OpenImageIO", "click"}
@@ -113,6 +121,113 @@ def test_a_picture_file_takes_its_own_pixels_or_the_kernels(kernel, tmp_path):
     assert np.array_equal(sssfit.render(sssfit.load_image(tmp_path / "bare.exr"), kernel), expected)
     with pytest.raises(RenderError, match="mm per pixel"):
         sssfit.render(str(tmp_path / "sized.exr"), kernel)
+
+
+@pytest.mark.parametrize("names", [("950nm", "1050nm"), ("B", "G", "R"), ("R", "G", "B")])
+def test_a_files_channels_are_the_kernels_of_the_same_names(names, tmp_path):
+    """An EXR holds them by the alphabet: what is drawn into one channel stays in it."""
+    count = len(names)
+    medium = sssfit.Material(
+        "mine", names, (Layer(1.4, 0.0, np.geomspace(0.05, 0.5, count), np.ones(count)),)
+    )
+    profile = sssfit.simulate(medium, "burley")
+    light = np.random.default_rng(6).uniform(size=(12, 10, count)).astype(np.float32)
+    path = tmp_path / "light.exr"
+    save_image(path, light, channels=names)
+    for method, settings in (("svd", {"rank": 2}), ("disk", {})):
+        kernel = sssfit.fit(profile, method, mm_per_pixel=1.0, **settings)
+        seen = sssfit.render(path, kernel)
+        assert np.array_equal(seen, sssfit.render(light, kernel))
+        scene = sssfit.Scene.from_image(sssfit.load_image(path), 1.0)
+        found = evaluate(scene, kernel, profile, is_timed=False)
+        assert np.array_equal(found.picture, seen)
+        as_array = sssfit.Scene("light", light, 1.0)
+        truth = render_reference(as_array, profile)
+        assert np.array_equal(found.truth, truth)
+        assert np.array_equal(references([scene], profile)[0].truth, truth)
+
+
+def test_a_files_channels_of_other_names_are_taken_by_their_place(tmp_path):
+    light = np.random.default_rng(7).uniform(size=(8, 6, 3)).astype(np.float32)
+    save_image(tmp_path / "light.exr", light)
+    medium = sssfit.Material(
+        "mine", ("650nm", "550nm", "450nm"), (Layer(1.4, 0.0, [0.05, 0.2, 0.5], np.ones(3)),)
+    )
+    kernel = sssfit.fit(sssfit.simulate(medium, "burley"), "svd", rank=1, mm_per_pixel=1.0)
+    seen = sssfit.render(tmp_path / "light.exr", kernel)
+    assert np.array_equal(seen, sssfit.render(light, kernel))
+
+
+def test_numbers_of_numpy_are_numbers(profile):
+    found = sssfit.fit(profile, "disk", taps=np.int64(9), mm_per_pixel=np.float32(1.0))
+    assert found.to_dict() == sssfit.fit(profile, "disk", taps=9, mm_per_pixel=1.0).to_dict()
+    exact = sssfit.simulate("skin1", "exact", tolerance=np.float32(0.125), angles=np.int64(3))
+    assert exact.meta["settings"]["angles"] == 3
+    assert exact.meta["settings"]["tolerance"] == 0.125
+    guided = sssfit.fit(profile, "guided", k=np.float32(0.5), mm_per_pixel=1.0)
+    assert guided.meta["settings"]["k"] == 0.5
+    size = {"height": np.int64(8), "width": np.int64(9), "mm_per_pixel": np.float32(1.0)}
+    assert make_scene("noise", seed=np.int64(3), **size).irradiance.shape == (8, 9, 1)
+
+
+@pytest.mark.parametrize("name", ["noise", "points", "highlights", "disk"])
+@pytest.mark.parametrize("wrong", [{"height": 16.0}, {"height": True}, {"width": "9"}])
+def test_sizes_are_whole_numbers(name, wrong):
+    with pytest.raises(RenderError, match="expected a whole number, 1 or more"):
+        make_scene(name, **({"height": 8, "width": 8, "mm_per_pixel": 1.0} | wrong))
+
+
+@pytest.mark.parametrize(
+    ("room", "given", "words"),
+    [
+        (
+            "simulate",
+            ("skin1", "exact", {"photons": 10}),
+            "exact has no setting photons",
+        ),
+        (
+            "fit",
+            ("PROFILE", "svd", {"fetches": 24}),
+            "svd has no setting fetches; expected",
+        ),
+        ("fit", ("PROFILE", "svd", {"ranks": 2}), "did you mean rank"),
+        ("fit", ("PROFILE", "cascade", {"taps": 9}), "the fit cascade has no setting taps"),
+        ("render", (np.ones((4, 4, 3)), "KERNEL", {"frame": 1}), "kernel has no setting frame"),
+        ("fit", ("PROFILE", "svd", {"mm_per_pixel": [1, 2]}), "expected a length in mm, or"),
+        ("fit", ("PROFILE", "svd", {"support_mm": "wide"}), "expected a length in mm"),
+    ],
+)
+def test_settings_of_other_methods_are_refused_in_one_line(room, given, words, profile, kernel):
+    records = {"PROFILE": profile, "KERNEL": kernel}
+    *first, settings = given
+    first = [records.get(each, each) if isinstance(each, str) else each for each in first]
+    with pytest.raises(SssfitError, match=words) as caught:
+        getattr(sssfit, room)(*first, **settings)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("function", "given", "words"),
+    [
+        (fit_svd, ["a.profile.npz"], "expected a Profile"),
+        (render_reference, [np.ones((4, 4, 3)), "PROFILE"], "expected a Scene"),
+        (measure, ["a.png", "a.png"], "not an array of real numbers"),
+        (functools.partial(truth_of, seed=1, threads=1), ["skin1"], "not a Material"),
+    ],
+    ids=["fit", "reference", "measure", "choose"],
+)
+def test_what_is_no_record_is_refused_in_one_line(function, given, words, profile):
+    given = [profile if isinstance(each, str) and each == "PROFILE" else each for each in given]
+    with pytest.raises(SssfitError, match=words):
+        function(*given)
+
+
+def test_masked_arrays_are_refused(kernel):
+    light = np.ma.masked_greater(np.full((4, 4, 3), [0.1, 0.2, 0.3]), 0.25)
+    with pytest.raises(RenderError, match="masked array; fill it first"):
+        sssfit.render(light, kernel)
+    filled = sssfit.render(light.filled(0.0), kernel)
+    assert np.array_equal(sssfit.render(np.ma.masked_array(light.filled(0.0)), kernel), filled)
 
 
 @pytest.mark.parametrize(

@@ -117,7 +117,7 @@ def test_a_folder_that_is_a_file_is_refused_before_the_work(run, monkeypatch):
     Path("folder").write_text("")
     status, _, err = run("-o", "folder/a.html")
     assert (status, err.count("\n")) == (1, 1)
-    assert "folder/a.html: there is no folder folder; make it, or name another." in err
+    assert "folder/a.html: folder is a file; name a folder." in err
 
 
 @posix

@@ -350,7 +350,7 @@ def test_thin_slabs_that_scatter_far_ahead_are_refused_by_name():
     thin = Material("film", ("red",), (layer(0.1, 30.0, 0.97, 1.0, 0.03),))
     with pytest.raises(
         SimulationError,
-        match=r"film red.*thin slab of g = 0\.97.*`simulate_montecarlo\(material\)`",
+        match=r"film red.*thin slab of g = 0\.97.*`method = montecarlo`",
     ):
         simulate_exact(thin, dr_mm=0.01, radius_mm=0.3)
 

@@ -23,6 +23,7 @@ from sssfit.material import Material
 from sssfit.messages import note, number
 from sssfit.profile import Profile
 from sssfit.simulate import simulate_montecarlo
+from sssfit.simulate._deterministic import check_is_material
 from sssfit.simulate.truth import exact_with_all_light, radius_of
 
 WALK_PHOTONS = 10_000_000  # the papers' number
@@ -44,6 +45,7 @@ def truth_of(
     """
     if isinstance(source, Profile):
         return source, 0.0
+    check_is_material(source)
     begun = time.perf_counter()
     try:
         profile = exact_with_all_light(source, make_grid(source), math.inf, threads=threads)

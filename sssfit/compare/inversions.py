@@ -76,7 +76,7 @@ def compute_inversions(
     MaterialError, SimulationError
         A colour, an index or the light is out of range.
     """
-    colours = np.linspace(_LEAST, _MOST, _COLOURS) if colour is None else np.asarray(colour, float)
+    colours = np.linspace(_LEAST, _MOST, _COLOURS) if colour is None else np.array(colour, float)
     formula = van_de_hulst_albedo(colours)
     exact, seen = [], []
     for eta in etas:

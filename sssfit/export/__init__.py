@@ -235,8 +235,8 @@ def source_text(
         raise KernelError("source is written with its passes or without them; ask for one.")
     if tables and (with_shader or dense):
         raise KernelError(
-            f"`{'dense' if dense else 'with_shader'}` is for dense kernels, and a table of taps "
-            "has its passes already; leave it out."
+            "`with_shader` and `dense` are for dense kernels, and a table of taps has its passes "
+            "already; leave them out."
         )
     if not tables and len(kernels) == 1 and isinstance(kernels[0], SeparableKernel):
         if not (with_shader or dense):

@@ -16,6 +16,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from sssfit.arrays import check_settings
 from sssfit.errors import FitError
 from sssfit.fit._result import FitResult, TapsFit
 from sssfit.fit._target import MM_PER_PIXEL, Pitch, make_target, pitch_of, support_of
@@ -187,6 +188,7 @@ def fit_separable(profile: Profile | str | Path, method: str = "svd", **settings
     """
     if not isinstance(method, str) or method not in METHODS:
         raise FitError(f"method = {shown(method)}; expected one of {', '.join(METHODS)}.")
+    check_settings(METHODS[method].fit, settings, f"the fit {method}")
     return METHODS[method].fit(_loaded(profile), **settings)
 
 
@@ -209,7 +211,9 @@ def fit_taps(profile: Profile | str | Path, method: str = "cascade", **settings:
     """
     if not isinstance(method, str) or method not in TAPS:
         raise FitError(f"method = {shown(method)}; expected one of {', '.join(TAPS)}.")
-    found: TapsFit = TAPS[method].load()(_loaded(profile), **settings)
+    function = TAPS[method].load()
+    check_settings(function, settings, f"the fit {method}")
+    found: TapsFit = function(_loaded(profile), **settings)
     return found
 
 

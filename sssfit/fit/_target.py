@@ -8,6 +8,7 @@ pixels take 12 MB and 0.07 s, 3932 x 3932 take 124 MB and 0.7 s.
 import math
 import warnings
 from dataclasses import dataclass
+from numbers import Real
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -101,6 +102,8 @@ def make_target(
     """
     _check_profile(profile)
     pitch = pitch_of(profile, mm_per_pixel)
+    if not isinstance(support_mm, Real | None):
+        raise FitError(f"support_mm = {shown(support_mm)}; expected a length in mm.")
     support = support_of(profile) if support_mm is None else float(support_mm)
     for name, value in (("mm_per_pixel", pitch), ("support", support)):
         if not _MIN_MM <= value <= _MAX_MM:
@@ -142,13 +145,13 @@ def pitch_of(profile: Profile, mm_per_pixel: Pitch | None = None) -> float:
     """Return the pixel size [mm]: the given one, `MM_PER_PIXEL`, or the profile's for "profile"."""
     if mm_per_pixel is None:
         return MM_PER_PIXEL
-    if isinstance(mm_per_pixel, str):
-        if mm_per_pixel != "profile":
-            raise FitError(
-                f"mm_per_pixel = {shown(mm_per_pixel)}; expected a length in mm, or 'profile' for "
-                "the width of the profile's first annulus."
-            )
+    if isinstance(mm_per_pixel, str) and mm_per_pixel == "profile":
         return float(profile.r_edges_mm[1])
+    if not isinstance(mm_per_pixel, Real):
+        raise FitError(
+            f"mm_per_pixel = {shown(mm_per_pixel)}; expected a length in mm, or 'profile' for "
+            "the width of the profile's first annulus."
+        )
     return float(mm_per_pixel)
 
 
@@ -188,6 +191,8 @@ def _check_light(target: Target) -> None:
 
 def _check_profile(profile: Profile) -> None:
     """Raise FitError for data that no fit can use."""
+    if not isinstance(profile, Profile):
+        raise FitError(f"profile = {shown(profile)}; expected a Profile. sssfit.load reads files.")
     energy, name = profile.annulus_energy, profile.label
     if not np.isfinite(energy).all():
         raise FitError(f"{name}: the profile holds NaN or infinite energies; compute it again.")

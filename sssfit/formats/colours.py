@@ -149,7 +149,12 @@ _ROUNDING = 1e-6  # share of white: clipping that changes no code is not reporte
 
 
 def as_light(values: npt.ArrayLike, what: str) -> FloatArray:
-    """Return numbers as float64; raises for words, objects, complex numbers and ragged rows."""
+    """Return numbers as float64; raises for words, objects, complex numbers and ragged rows.
+
+    Masked arrays are refused, because the values under a mask would be used as light.
+    """
+    if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
+        raise RenderError(f"{what} is a masked array; fill it first: array.filled(0.0).")
     try:
         array = np.asarray(values)
         found = f"of type {array.dtype}"

@@ -302,10 +302,6 @@ class _Table:
     def channels(self) -> list[str]:
         """Return the names of the columns that are channels."""
         channels = [name for name in self.value_names if not name.endswith(_STDERR)]
-        try:
-            check_names(channels)
-        except MaterialError as error:
-            raise self._failure(self._head, str(error)) from None
         for name in self.value_names:
             if name not in channels and name.removesuffix(_STDERR) not in channels:
                 raise self._failure(
@@ -313,6 +309,10 @@ class _Table:
                     f"the column {shown(name)} has standard errors of a column that does not "
                     "exist.",
                 )
+        try:
+            check_names(channels)
+        except MaterialError as error:
+            raise self._failure(self._head, str(error)) from None
         return channels
 
     def numbers(self, quantity: str, power: int) -> tuple[FloatArray, FloatArray]:

@@ -119,7 +119,10 @@ def _check_edges(r_edges_mm: FloatArray, n_annuli: int) -> None:
 
 def _check_meta(meta: Mapping[str, Any], n_channels: int) -> None:
     if meta.get("format") not in (FORMAT, FORMAT_OF_DIRECTIONS):
-        raise ProfileError(f"meta has format {shown(meta.get('format'))}; expected {FORMAT!r}.")
+        raise ProfileError(
+            f"meta has format {shown(meta.get('format'))}; expected {FORMAT!r} or "
+            f"{FORMAT_OF_DIRECTIONS!r}."
+        )
     names = meta.get("channels")
     if not isinstance(names, list) or len(names) != n_channels:
         raise ProfileError(

@@ -69,7 +69,7 @@ def frequency_response(
     ProfileError
         A frequency is negative or not finite.
     """
-    k = _frequencies(profile) if k_per_mm is None else np.atleast_1d(np.asarray(k_per_mm, float))
+    k = _frequencies(profile) if k_per_mm is None else np.atleast_1d(np.array(k_per_mm, float))
     if k.ndim != 1 or not (np.isfinite(k).all() and (k >= 0.0).all()):
         raise ProfileError("k_per_mm holds a frequency that is not a number from 0 up.")
     edges, densities = flat_annuli(profile.r_edges_mm, profile.annulus_energy)

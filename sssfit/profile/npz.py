@@ -145,7 +145,9 @@ def _unpack_stream(stream: BinaryIO) -> tuple[dict[str, FloatArray], dict[str, A
         meta = _read_meta(archive)
         if (found := _file_format(meta)) not in (FORMAT, FORMAT_OF_DIRECTIONS):
             other = "has" if found.startswith("sssfit.profile/") else "is not a profile: it has"
-            raise ProfileError(f"{other} format {shown(found)} where {FORMAT!r} was expected")
+            raise ProfileError(
+                f"{other} format {shown(found)} where {FORMAT!r} or its /2 was expected"
+            )
         if missing := [name for name in REQUIRED if name not in names]:
             raise ProfileError(f"lacks {', '.join(missing)}")
         if len(set(names)) < len(names) or set(names) - {*REQUIRED, *OPTIONAL, *DIRECTED, "meta"}:

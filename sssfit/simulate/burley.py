@@ -124,7 +124,7 @@ def _own_reflectance(material: Material, layer: Layer) -> FloatArray:
     if eta < 1.0:
         raise SimulationError(
             f"{material.name}: what is above is denser, by {1.0 / eta:.4g}, and burley has no "
-            "reflectance of its own for that; give it one."
+            "reflectance of its own for that; use `method = exact`."
         )
     warn_of_similarity(material, "burley")
     return diffuse_reflectance(layer.reduced_sigma_s_per_mm / layer.reduced_sigma_t_per_mm, eta)

@@ -144,7 +144,7 @@ def diffuse_reflectance(
     if not ((albedos >= 0.0) & (albedos <= 1.0)).all():
         raise SimulationError(f"albedo = {albedo!r}; expected numbers from 0 to 1.")
     _check_light(eta, light)
-    level = _LEVELS[3]
+    eta, level = float(eta), _LEVELS[3]
     with one_blas_thread():
         if light == "diffuse":
             once = single_scattering_of_diffuse_light(eta)

@@ -39,6 +39,7 @@ from sssfit.simulate.half_space import (
 
 SKIN_ETA = 1.4  # d'Eon and Luebke 2007, GPU Gems 3, chapter 14: .028 at normal incidence
 _CLOSE = 1e-8  # in reflectance; the precision of the exact solver
+_DIM = 1e-4  # a reflectance below which errors are relative
 _DARK = 1e-9  # a reflectance that no relative error is given for: the fits were not made for it
 _PUBLISHED = {"chiang2016": "Chiang et al. 2016", "van_de_hulst": "van de Hulst"}
 _ASKED = {"normal": "diffuse reflectance", "diffuse": "base colour under diffuse light"}
@@ -79,6 +80,7 @@ def reflectance_of(albedo: npt.ArrayLike, eta: float, light: Light = "normal") -
     SimulationError
         An argument is out of range.
     """
+    eta = float(eta)
     total = diffuse_reflectance(albedo, eta, light=light)
     return total / entering_light(eta, light) if light == "diffuse" else total
 
@@ -96,7 +98,8 @@ def invert_reflectance(
 ) -> Inversion:
     """Find the albedos for total diffuse reflectances, g = 0, with the exact solver.
 
-    Solves R(1 - s^2) = reflectance for s in [0, 1], all channels at once, to 1e-8 in R.
+    Solves R(1 - s^2) = reflectance for s in [0, 1], all channels at once, to 1e-8 in R, and to 1e-4
+    of R.
 
     Parameters
     ----------
@@ -124,19 +127,22 @@ def invert_reflectance(
     >>> invert_reflectance([0.44], 1.3, light="diffuse").albedo.round(4)
     array([0.954])
     """
+    eta = float(eta)
     asked = _reachable(reflectance, eta, light)
     darkest, brightest = reflectance_of(np.array([0.0, 1.0]), eta, light)
     # Rounding may place the solver's end values slightly inside; the root is then that end.
     aim = np.clip(asked, darkest, brightest)
+    # Of 1e-8 nothing would be left: a dim reflectance is found to 1e-4 of itself.
+    scale = np.maximum(1.0, _DIM / np.maximum(aim, np.finfo(np.float64).tiny))
 
-    def excess(s: FloatArray, /, wanted: FloatArray) -> FloatArray:
-        return reflectance_of(1.0 - s**2, eta, light) - wanted
+    def excess(s: FloatArray, /, wanted: FloatArray, scale: FloatArray) -> FloatArray:
+        return (reflectance_of(1.0 - s**2, eta, light) - wanted) * scale
 
     ends = np.zeros_like(aim), np.ones_like(aim)
-    found = find_root(excess, ends, args=(aim,), tolerances={"fatol": _CLOSE})
+    found = find_root(excess, ends, args=(aim, scale), tolerances={"fatol": _CLOSE})
     if not np.all(found.success):
         raise SimulationError(f"no albedo found for reflectances {asked.tolist()} at eta = {eta}.")
-    return Inversion(1.0 - np.asarray(found.x) ** 2, aim + np.asarray(found.f_x))
+    return Inversion(1.0 - np.asarray(found.x) ** 2, aim + np.asarray(found.f_x) / scale)
 
 
 def published_inversions(

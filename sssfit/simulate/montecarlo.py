@@ -232,7 +232,7 @@ def check_media(materials: Sequence[Material]) -> None:
         for g in every_g[(every_g < MIN_G) | (every_g > MAX_G)].tolist():
             raise SimulationError(
                 f"{material.name}: g = {g:.9g}; the photon walk covers {MIN_G} to {MAX_G}: give "
-                "a smaller g, with sigma_s such that (1 - g) sigma_s stays as it is."
+                "a g between them, with sigma_s such that (1 - g) sigma_s stays as it is."
             )
     if len(materials) == 1:
         return

@@ -39,7 +39,7 @@ def azimuths_cannot(
         f"{channel.name}, which light crosses without being scattered: the tolerance of "
         f"{tolerance:g} cannot be met: {AZIMUTHS[-1]} and {quarter.count} directions in azimuth "
         f"differ by {quarter.share:.2g} of the light; give {_rounded_up(quarter.share / part):g} "
-        "or more, or use `simulate_montecarlo(material)`."
+        "or more, or use `method = montecarlo`."
     )
 
 
@@ -58,7 +58,7 @@ def cannot_meet(channel: Channel, step: Step, worst: float, tolerance: float) ->
     return SimulationError(
         f"{channel.name}{why}: the tolerance of {tolerance:g} cannot be met: {step.count} and "
         f"{step.count - 4} directions differ by {worst:.2g} of the light; give "
-        f"{_rounded_up(worst):g} or more, or use `simulate_montecarlo(material)`."
+        f"{_rounded_up(worst):g} or more, or use `method = montecarlo`."
     )
 
 
@@ -81,7 +81,7 @@ def check_tolerance(channels: Sequence[Channel], tolerance: float) -> None:
     if tolerance < _LEAST_TOLERANCE:
         raise SimulationError(
             f"{channels[0].name}: the tolerance of {tolerance:g} cannot be met by the solver for "
-            f"layers; give {_LEAST_TOLERANCE:g} or more, or use `simulate_montecarlo(material)`."
+            f"layers; give {_LEAST_TOLERANCE:g} or more, or use `method = montecarlo`."
         )
 
 
@@ -99,7 +99,7 @@ def check_time(channels: Sequence[Channel], count: int, tolerance: float) -> Non
             f"{channels[layers.index(most)].name} has {most} layers, which to a tolerance of "
             f"{tolerance:g} would take over {seconds / 60.0:.0f} minutes of a processor, more than "
             f"{_MOST_SECONDS / 60.0:g}; merge layers, give a larger tolerance, or use "
-            "`simulate_montecarlo(material)`."
+            "`method = montecarlo`."
         )
 
 
@@ -112,5 +112,5 @@ def check_memory(channels: Sequence[Channel], count: int, azimuths: int, threads
             f"{most.name} has {len(most.stack.slabs)} layers, whose matrices would take "
             f"{needed:.1f} GB on {counted(threads, 'thread')}, over the limit of "
             f"{_MOST_BYTES / 1e9:g} GB; merge layers, use fewer threads, or "
-            "`simulate_montecarlo(material)`."
+            "`method = montecarlo`."
         )
