@@ -53,11 +53,8 @@ def check_settings(function: Callable[..., Any], given: Mapping[str, Any], who: 
     ------
     ArgumentError
     """
-    known = [
-        name
-        for name, each in inspect.signature(function).parameters.items()
-        if each.kind is each.KEYWORD_ONLY
-    ]
+    taken = inspect.signature(function).parameters.items()
+    known = [name for name, each in taken if each.kind is each.KEYWORD_ONLY]
     for name in given:
         if name not in known:
             raise ArgumentError(
@@ -151,8 +148,10 @@ def _json_value(path: str, value: object) -> Any:
         return _json_text(path, value)
     if value is None or isinstance(value, bool):
         return value
-    if isinstance(value, np.number | np.bool_):
-        return _json_value(path, value.item())
+    if isinstance(value, np.integer | np.bool_):
+        value = value.item()
+    elif isinstance(value, np.floating):
+        value = float(value)
     if not isinstance(value, (int, float)):
         raise ValueError(f"{path} is of type {type(value).__name__}")  # noqa: TRY004 (one for all)
     if not _is_finite(value):

@@ -270,6 +270,7 @@ ASIDE = {"progress", "stop", "clock"}  # arguments that only report, stop or mea
 @functools.cache
 def run(command: str, *, both: bool = False) -> Ran:
     """Run a command in a copy of `files`; ``both`` prints the JSON object and then the text."""
+    first = first_contents()  # read before a command could change what the copies are linked to
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         shutil.copytree(files(), folder, dirs_exist_ok=True, copy_function=os.link)
@@ -282,7 +283,7 @@ def run(command: str, *, both: bool = False) -> Ran:
         ):
             raise ended.exception
         after = contents(folder)
-    changed = {name: data for name, data in after.items() if first_contents().get(name) != data}
+    changed = {name: data for name, data in after.items() if first.get(name) != data}
     stdout = ended.stdout_bytes.decode(errors="replace")
     calls = tuple(CALLS)
     return Ran(ended.exit_code, stdout, ended.stderr, changed, calls, ended.stdout_bytes)

@@ -51,6 +51,7 @@ LONG_SEARCHES = {
         "test_on_taps",
         "test_readme_figures",
         "test_shading",
+        "test_stability_seeds",
     ),
 }
 # These ask which of two cascades is nearer, or draw lines: far ones, where a descent stops early.

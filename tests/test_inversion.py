@@ -423,3 +423,9 @@ def test_dim_reflectances_are_found_to_a_share_of_themselves(asked):
     found = invert_reflectance([asked, 0.5], 1.3)
     assert found.reflectance[0] == pytest.approx(asked, rel=1e-4)
     assert reflectance_of(found.albedo, 1.3) == pytest.approx([asked, 0.5], rel=1e-4)
+
+
+@pytest.mark.parametrize("eta", ["abc", None, [1.4]])
+def test_an_index_that_is_no_number_is_refused_in_one_line(eta):
+    with pytest.raises(MaterialError, match="is not a number; expected one refractive index"):
+        invert_reflectance([0.4], eta)

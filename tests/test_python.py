@@ -20,6 +20,8 @@ from sssfit.material import Layer
 from sssfit.measure.score import measure
 from sssfit.methods import SIMULATIONS
 from sssfit.render.reference import render_reference
+from sssfit.render.screen import render_screen
+from sssfit.render.screen_taps import render_screen_taps
 from sssfit.render.separable import render_separable
 from sssfit.scene.made import make_scene
 from sssfit.simulate import simulate_burley, simulate_dipole, simulate_montecarlo
@@ -145,6 +147,42 @@ def test_a_files_channels_are_the_kernels_of_the_same_names(names, tmp_path):
         truth = render_reference(as_array, profile)
         assert np.array_equal(found.truth, truth)
         assert np.array_equal(references([scene], profile)[0].truth, truth)
+
+
+def test_fits_and_screens_see_a_files_channels_by_their_names():
+    medium = sssfit.Material(
+        "mine", ("950nm", "1050nm"), (Layer(1.4, 0.0, [0.05, 0.5], [1.0, 1.0]),)
+    )
+    profile = sssfit.simulate(medium, "burley")
+    random = np.random.default_rng(8)
+    light = np.cumsum(random.uniform(size=(64, 64, 2)), axis=1) * [1.0, 0.1] + random.uniform(
+        size=(64, 64, 2)
+    )
+    more = {"distance_mm": 600.0, "depth_mm": np.full((64, 64), 600.0)}
+    ours = sssfit.Scene("light", light, 1.0, specular=light, **more)
+    theirs = sssfit.Scene(
+        "light",
+        light[..., ::-1],
+        1.0,
+        specular=light[..., ::-1],
+        channel_names=("1050nm", "950nm"),
+        **more,
+    )
+    weighted = [
+        sssfit.fit(profile, "weighted", rank=1, mm_per_pixel=1.0, irradiance=each)
+        for each in (ours, theirs)
+    ]
+    assert np.array_equal(weighted[0].weights, weighted[1].weights)
+    seen = [render_screen(each, weighted[0]) for each in (ours, theirs)]
+    assert np.array_equal(*seen)
+    disk = sssfit.fit(profile, "svd", taps=5, rank=1, mm_per_pixel=1.0)
+    assert np.array_equal(*[render_screen_taps(each, disk) for each in (ours, theirs)])
+
+
+@pytest.mark.parametrize("names", [("R", "G"), ("R", "R", "G"), ("R", "G", "B", "A")])
+def test_channels_have_one_name_each(names):
+    with pytest.raises(RenderError, match="for 3 channels; give each one name"):
+        sssfit.Scene("light", np.ones((2, 2, 3)), 1.0, channel_names=names)
 
 
 def test_a_files_channels_of_other_names_are_taken_by_their_place(tmp_path):

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from multiprocessing.shared_memory import SharedMemory
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,27 @@ def test_results_come_in_order_from_processes_of_their_own_that_end():
         assert [each[:2] for each in found] == [("shared", 3 * k) for k in range(20)]
         assert os.getpid() not in {each[2] for each in found}
     assert multiprocessing.active_children() == before
+
+
+def test_shared_memory_is_given_back(monkeypatch):
+    """Also where no pool could be made, and after work that failed."""
+    made = []
+
+    def remembered(*given, **more):
+        made.append(SharedMemory(*given, **more))
+        return made[-1]
+
+    monkeypatch.setattr("sssfit.stability.workers.SharedMemory", remembered)
+    with Workers(1, bytes(100_000)):
+        pass
+    with pytest.raises(ValueError, match="max_workers"):
+        Workers(0, bytes(100))
+    with pytest.raises(FitError), Workers(1, None) as workers:
+        workers.each(refused, [7])
+    assert len(made) == 3
+    for each in made:
+        with pytest.raises(FileNotFoundError):
+            SharedMemory(each.name)
 
 
 def test_an_error_of_the_work_is_raised_here():

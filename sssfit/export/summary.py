@@ -220,9 +220,7 @@ _PROFILE_HEAD = """\
 material  {name}{origin}
 method    {method:|unknown}{settings}, {walks}, sssfit {version:|version unknown}
 grid      {annuli:#annulus} of {width}, to {radius_mm:.4g} mm"""
-_TOLD_ELSEWHERE = {
-    *("dr_mm", "radius", "photons", "angles", "numerical_aperture"),
-}
+_TOLD_ELSEWHERE = {"dr_mm", "radius", "photons", "angles", "numerical_aperture"}
 _ENERGIES = Columns(
     "channel",
     "channels",

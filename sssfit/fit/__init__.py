@@ -104,6 +104,8 @@ def fit_result(
     ------
     FitError
         The method is unknown, or cannot fit this profile with these settings.
+    ArgumentError
+        The method has no such setting.
     ProfileError
         The file cannot be read as a profile, or a profile to smooth has no standard errors.
     """
@@ -183,6 +185,8 @@ def fit_separable(profile: Profile | str | Path, method: str = "svd", **settings
     ------
     FitError
         The method is unknown, or cannot fit this profile with these settings.
+    ArgumentError
+        The method has no such setting.
     ProfileError
         The file cannot be read as a profile.
     """

@@ -112,6 +112,7 @@ def pictures_of(
             "its own; leave out one of the two."
         )
     scene = irradiance if isinstance(irradiance, Scene) else _loaded(target, str(irradiance))
+    scene = scene.for_channels(target.profile.channels)
     _check_picture(target, scene)
     return scene
 

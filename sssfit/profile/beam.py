@@ -23,7 +23,7 @@ from sssfit.text import length_mm
 
 _REACH = 2.5  # 1/e^2 radii of a Gaussian beam beyond which it has 4e-6 of its light
 _NARROWEST, _WIDEST = 1e-9, 1e9  # mm
-_MOST_ANNULI = 20_000  # under a beam: half a minute, and 16 times those of skin1
+_MOST_MORE = 20_000  # annuli beyond the profile's own, 16 times those of skin1
 _COLUMNS = 512  # annuli whose shares are held at once
 
 
@@ -179,10 +179,10 @@ def wider_edges(edges: FloatArray, reach_mm: float) -> FloatArray:
     """
     width = float(edges[-1] - edges[-2])
     count = int(np.ceil(reach_mm / width))
-    if len(edges) + count > _MOST_ANNULI:
+    if count > _MOST_MORE:
         raise ProfileError(
             f"a beam that reaches {reach_mm:g} mm takes {count:,} more annuli {width:.4g} mm wide, "
-            f"and {_MOST_ANNULI:,} is the limit; use wider annuli or a narrower beam."
+            f"and {_MOST_MORE:,} is the limit; use wider annuli or a narrower beam."
         )
     return np.concatenate((edges, edges[-1] + width * np.arange(1, count + 1)))
 

@@ -56,6 +56,8 @@ def render(image: Irradiance, kernel: Kernel | str | Path, **settings: Any) -> F
     ------
     RenderError
         The picture is invalid, or does not fit the kernel.
+    ArgumentError
+        The kernel has no such setting.
     KernelError, FileError
         A file cannot be read.
     """

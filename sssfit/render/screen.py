@@ -266,6 +266,7 @@ def render_screen(
         The scene has no depth or other channels than the kernel, or a setting is invalid.
     """
     channels = len(kernel.channels)
+    scene = scene.for_channels(kernel.channels)
     check_buffers(scene, channels)
     workers = thread_count(threads)
     view = make_view(

@@ -94,6 +94,7 @@ def render_screen_taps(
     channels = len(taps.channels)
     if taps.is_disk:
         raise RenderError("a disk of fetches serves flat pictures only; give another table.")
+    scene = scene.for_channels(taps.channels)
     check_buffers(scene, channels)
     if follow not in FOLLOW:
         raise RenderError(f"follow = {follow!r}; a table of taps has {' or '.join(FOLLOW)}.")

@@ -17,7 +17,7 @@ _MIN_MM = 1e-12  # of a pixel, as in the fits: a made head of 1e-320 mm per pixe
 MAX_PIXELS = 60_000_000
 
 
-def check_seed(name: str, seed: float) -> None:
+def check_seed(name: str, seed: int) -> None:
     """Check the seed of the random numbers."""
     if not is_whole(seed) or seed < 0:
         raise RenderError(f"{name}: seed = {shown(seed)}; expected a whole number from 0.")

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from sssfit.arrays import FloatArray
 from sssfit.errors import RenderError
 from sssfit.formats.colours import as_light, positive
-from sssfit.messages import counted
+from sssfit.messages import counted, shown
 
 if TYPE_CHECKING:
     from sssfit.formats.pictures import Image
@@ -130,6 +130,12 @@ class Scene:
                 f"{self.name}: irradiance of shape {shape}; expected rows, columns and channels, "
                 "at least one of each."
             )
+        names = self.channel_names
+        if names is not None and len({*names}) != shape[2]:
+            raise RenderError(
+                f"{self.name}: channel_names = {shown(names)} for {counted(shape[2], 'channel')}; "
+                "give each one name."
+            )
         positive(self.mm_per_pixel, f"{self.name}: mm_per_pixel")
         for field in ("irradiance", "specular", "thickness_mm", "back_irradiance", "depth_mm"):
             self._store(field, np.float64)
@@ -174,9 +180,12 @@ class Scene:
         if own is None or own == tuple(names) or sorted(own) != sorted(names):
             return self
         order = [own.index(each) for each in names]
-        return dataclasses.replace(
-            self, irradiance=self.irradiance[..., order], channel_names=tuple(names)
-        )
+        light = {
+            field: buffer[..., order]
+            for field in ("irradiance", "specular", "back_irradiance")
+            if (buffer := getattr(self, field)) is not None and buffer.shape[-1] == len(own)
+        }
+        return dataclasses.replace(self, **light, channel_names=tuple(names))
 
     def corner(self, pixels: int) -> "Scene":
         """Return the upper left corner of the scene with this height and width."""

@@ -89,6 +89,8 @@ def simulate(
     ------
     SimulationError
         The method is unknown, or cannot simulate this material with these settings.
+    ArgumentError
+        The method has no such setting.
     MaterialError
         The material is unknown, or its file cannot be read.
     """

@@ -80,9 +80,8 @@ def reflectance_of(albedo: npt.ArrayLike, eta: float, light: Light = "normal") -
     SimulationError
         An argument is out of range.
     """
-    eta = float(eta)
     total = diffuse_reflectance(albedo, eta, light=light)
-    return total / entering_light(eta, light) if light == "diffuse" else total
+    return total / entering_light(float(eta), light) if light == "diffuse" else total
 
 
 def largest_reflectance(eta: float, light: Light = "normal") -> float:
@@ -99,7 +98,7 @@ def invert_reflectance(
     """Find the albedos for total diffuse reflectances, g = 0, with the exact solver.
 
     Solves R(1 - s^2) = reflectance for s in [0, 1], all channels at once, to 1e-8 in R, and to 1e-4
-    of R.
+    of R above 1e-12.
 
     Parameters
     ----------
@@ -127,12 +126,11 @@ def invert_reflectance(
     >>> invert_reflectance([0.44], 1.3, light="diffuse").albedo.round(4)
     array([0.954])
     """
-    eta = float(eta)
-    asked = _reachable(reflectance, eta, light)
+    asked, eta = _reachable(reflectance, eta, light), float(eta)
     darkest, brightest = reflectance_of(np.array([0.0, 1.0]), eta, light)
     # Rounding may place the solver's end values slightly inside; the root is then that end.
     aim = np.clip(asked, darkest, brightest)
-    # Of 1e-8 nothing would be left: a dim reflectance is found to 1e-4 of itself.
+    # To 1e-8 of all light, a reflectance of 1e-8 would be 0 as well.
     scale = np.maximum(1.0, _DIM / np.maximum(aim, np.finfo(np.float64).tiny))
 
     def excess(s: FloatArray, /, wanted: FloatArray, scale: FloatArray) -> FloatArray:

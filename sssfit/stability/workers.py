@@ -52,13 +52,17 @@ class Workers:
         context = multiprocessing.get_context("spawn")
         _start_tracker()
         self._theirs, self._ours = context.Pipe(duplex=False)
-        # In memory, not with the start: over 64 kB there wait until they are read, forever if the
-        # process dies while it starts, as in a script without a main guard.
+        # In shared memory, not among the arguments: a pipe holds 64 kB, and to write more waits for
+        # a reader, forever if the process dies while it starts, as without a main guard.
         data = pickle.dumps(shared)
         self._kept = SharedMemory(create=True, size=len(data))
         cast(memoryview, self._kept.buf)[: len(data)] = data  # None only after it is closed
         given = self._theirs, self._kept.name
-        self._pool = ProcessPoolExecutor(min(count, _MOST), context, _begin, given)
+        try:
+            self._pool = ProcessPoolExecutor(min(count, _MOST), context, _begin, given)
+        except BaseException:
+            self._close()
+            raise
 
     def __enter__(self) -> "Workers":
         return self
@@ -71,7 +75,13 @@ class Workers:
     ) -> None:
         if error is not None:
             self._ours.close()  # which ends them in the midst of their work
-        self._pool.shutdown(cancel_futures=True)
+        try:
+            self._pool.shutdown(cancel_futures=True)
+        finally:
+            self._close()
+
+    def _close(self) -> None:
+        """Close the pipe, and give the shared memory back."""
         self._ours.close()
         self._theirs.close()
         self._kept.close()

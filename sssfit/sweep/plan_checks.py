@@ -149,4 +149,6 @@ def _mapping(name: str, value: object) -> Mapping[Any, Any]:
 
 def _scalar(value: object) -> object:
     """Return a number of numpy as one of Python, which JSON can hold."""
+    if isinstance(value, np.floating):
+        return float(value)
     return value.item() if isinstance(value, np.generic) else value
