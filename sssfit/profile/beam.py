@@ -6,11 +6,13 @@ beam incident on multi-layered tissues", has it in polar coordinates (equations 
 """
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from numbers import Real
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import ArgumentError, ProfileError
@@ -66,6 +68,18 @@ class Beam:
         return self.radius_mm * (_REACH if self.kind == "gaussian" else 1.0)
 
 
+class _Side(NamedTuple):
+    """Energies (n, C) by annulus, their errors, and what is beyond (C,).
+
+    Of energies that are parts of a ``whole``, this says how they lie within an annulus.
+    """
+
+    energy: FloatArray
+    stderr: FloatArray
+    beyond: FloatArray
+    whole: FloatArray | None = None
+
+
 def parse_beam(text: str) -> Beam:
     """Return the beam of "gaussian:0.5" or "flat:500um", a kind and its radius, in mm without unit.
 
@@ -111,19 +125,13 @@ def under_beam(profile: Profile, beam: Beam) -> Profile:
     if "beam" in profile.meta:
         raise ProfileError(f"the profile is under a beam already: {profile.meta['beam']}.")
     edges = wider_edges(profile.r_edges_mm, beam.reach_mm)
-    sides = profile.annulus_energy, profile.annulus_energy_stderr, profile.beyond_grid
-    energy, stderr, beyond = _spread(profile, edges, *sides, beam)
+    sides = _sides(profile)
     found: dict[str, Any] = {
         "r_edges_mm": edges,
-        "annulus_energy": energy,
-        "annulus_energy_stderr": stderr,
-        "beyond_grid": beyond,
         "meta": {**profile.meta, "beam": str(beam), **_total_errors(profile)},
     }
-    if profile.annulus_transmittance is not None:
-        found |= _below(profile, edges, beam)
-    for name in ("angle_reflected", "angle_transmitted"):
-        found |= _by_angle(profile, edges, name, beam)
+    for name, each in zip(sides, _spread(profile, edges, list(sides.values()), beam), strict=True):
+        found |= _fields(profile, name, each)
     return replace(profile, **found)
 
 
@@ -139,34 +147,46 @@ def _total_errors(profile: Profile) -> dict[str, list[float]]:
     }
 
 
-def _below(profile: Profile, edges: FloatArray, beam: Beam) -> dict[str, FloatArray | None]:
-    """Return the light that leaves through the bottom; what is unknown of it stays so."""
-    energy, stderr = profile.annulus_transmittance, profile.annulus_transmittance_stderr
-    beyond = profile.beyond_grid_transmittance
-    assert energy is not None
-    known = np.full(energy.shape, np.nan) if stderr is None else stderr
-    outside = np.zeros(energy.shape[1]) if beyond is None else beyond
-    found, error, left = _spread(profile, edges, energy, known, outside, beam)
-    return {
-        "annulus_transmittance": found,
-        "annulus_transmittance_stderr": None if stderr is None else error,
-        "beyond_grid_transmittance": None if beyond is None else left,
+def _sides(profile: Profile) -> dict[str, _Side]:
+    """Return all energies by annulus, by the names of their fields."""
+    found = {
+        "annulus_energy": _Side(
+            profile.annulus_energy, profile.annulus_energy_stderr, profile.beyond_grid
+        )
     }
+    through, stderr = profile.annulus_transmittance, profile.annulus_transmittance_stderr
+    if through is not None:
+        beyond = profile.beyond_grid_transmittance
+        found["annulus_transmittance"] = _Side(
+            through,
+            np.full(through.shape, np.nan) if stderr is None else stderr,
+            np.zeros(through.shape[1]) if beyond is None else beyond,
+        )
+    wholes = {"angle_reflected": profile.annulus_energy, "angle_transmitted": through}
+    for name, whole in wholes.items():
+        energy, error = getattr(profile, name), getattr(profile, f"{name}_stderr")
+        if energy is not None and len(energy) > 1:
+            flat = [each.reshape(len(energy), -1) for each in (energy, error)]
+            found[name] = _Side(flat[0][:-1], flat[1][:-1], flat[0][-1], whole)
+    return found
 
 
-def _by_angle(profile: Profile, edges: FloatArray, name: str, beam: Beam) -> dict[str, FloatArray]:
-    """Return energies by angle; within an annulus all angles are spread like their sum."""
-    energy, stderr = getattr(profile, name), getattr(profile, f"{name}_stderr")
-    if energy is None or len(energy) == 1:
-        return {}
-    bins, channels = energy.shape[1:]
-    flat = [each.reshape(len(energy), -1) for each in (energy, stderr)]
-    whole = profile.annulus_energy if name == "angle_reflected" else profile.annulus_transmittance
-    sides = flat[0][:-1], flat[1][:-1], flat[0][-1]
-    found, error, left = _spread(profile, edges, *sides, beam, whole=whole)
-    shape = (len(edges), bins, channels)
-    values = {name: (found, left), f"{name}_stderr": (error, flat[1][-1])}
-    return {key: np.vstack(each).reshape(shape) for key, each in values.items()}
+def _fields(profile: Profile, name: str, spread: _Side) -> dict[str, FloatArray | None]:
+    """Return the fields of a profile that hold a side; what was unknown of it stays so."""
+    energy, stderr, beyond, _ = spread
+    if name == "annulus_energy":
+        return {name: energy, f"{name}_stderr": stderr, "beyond_grid": beyond}
+    before = getattr(profile, f"{name}_stderr")
+    if name == "annulus_transmittance":
+        is_known = profile.beyond_grid_transmittance is not None
+        return {
+            name: energy,
+            f"{name}_stderr": None if before is None else stderr,
+            "beyond_grid_transmittance": beyond if is_known else None,
+        }
+    shape = (len(energy) + 1, *before.shape[1:])
+    rows = {name: (energy, beyond), f"{name}_stderr": (stderr, before[-1].ravel())}
+    return {key: np.vstack(each).reshape(shape) for key, each in rows.items()}
 
 
 def wider_edges(edges: FloatArray, reach_mm: float) -> FloatArray:
@@ -187,48 +207,53 @@ def wider_edges(edges: FloatArray, reach_mm: float) -> FloatArray:
     return np.concatenate((edges, edges[-1] + width * np.arange(1, count + 1)))
 
 
-def _spread(
-    profile: Profile,
-    wider: FloatArray,
-    energy: FloatArray,
-    stderr: FloatArray,
-    beyond: FloatArray,
-    beam: Beam,
-    *,
-    whole: FloatArray | None = None,
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return energies (m, C) in wider annuli, their standard errors, and what is beyond (C,).
-
-    Of energies that are parts of a ``whole``, this says how they lie within an annulus.
-    """
+def _spread(profile: Profile, wider: FloatArray, sides: Sequence[_Side], beam: Beam) -> list[_Side]:
+    """Return sides in wider annuli; where a beam takes an annulus' light is found once for all."""
     edges, photons = profile.r_edges_mm, profile.photons
-    square = _squares(energy, stderr, photons)
-    power = 2 if photons is not None and whole is None else 1  # one photon a place, by angle
-    fine, densities = flat_annuli(edges, energy if whole is None else whole)
+    fine = flat_annuli(edges, profile.annulus_energy)[0]
     areas = np.pi * np.diff(fine**2)
     annulus = np.searchsorted(edges[1:-1], fine[:-1], side="right")
-    fine_energy = densities * areas[:, None]
-    if whole is not None:
-        of_annulus = np.where(whole > 0.0, whole, 1.0)[annulus]
-        times = energy.shape[1] // whole.shape[1]
-        fine_energy = energy[annulus] * np.tile(fine_energy / of_annulus, times)
     part = areas / np.bincount(annulus, areas)[annulus]  # of its annulus
-    found = np.zeros((len(wider) - 1, energy.shape[1]))
-    error = np.zeros_like(found)
-    ends = np.searchsorted(annulus, np.arange(0, len(energy) + _COLUMNS, _COLUMNS))
+    sources = [_in_parts(each, edges, areas, annulus) for each in sides]
+    squares = [_squares(each.energy, each.stderr, photons) for each in sides]
+    found = [np.zeros((len(wider) - 1, each.energy.shape[1])) for each in sides]
+    error = [np.zeros_like(each) for each in found]
+    ends = np.searchsorted(annulus, np.arange(0, len(edges) - 1 + _COLUMNS, _COLUMNS))
     for begin, end in itertools.pairwise(ends):
         within = SPREADS[beam.kind](wider, fine[begin : end + 1], beam.radius_mm)
         shares = np.diff(within, axis=0)
-        found += shares @ fine_energy[begin:end]
         firsts = np.flatnonzero(np.diff(annulus[begin:end], prepend=-1))
         of_annuli = np.add.reduceat(shares * part[begin:end], firsts, axis=1)
-        error += of_annuli**power @ square[annulus[begin:end][firsts]]
-    if energy.min() >= 0.0:  # rounding, 1e-13 of the total, would give negative light
+        for k, side in enumerate(sides):
+            # A photon leaves at one place, but by angle as one of many over the whole beam.
+            power = 2 if photons is not None and side.whole is None else 1
+            found[k] += shares @ sources[k][begin:end]
+            error[k] += of_annuli**power @ squares[k][annulus[begin:end][firsts]]
+    return [_with_rest(*each, photons) for each in zip(sides, found, error, strict=True)]
+
+
+def _in_parts(
+    side: _Side, edges: FloatArray, areas: FloatArray, annulus: npt.NDArray[np.intp]
+) -> FloatArray:
+    """Return the energy of the flat parts of annuli, by their area and annulus."""
+    whole = side.energy if side.whole is None else side.whole
+    energy = flat_annuli(edges, whole)[1] * areas[:, None]
+    if side.whole is None:
+        return energy
+    of_annulus = np.where(whole > 0.0, whole, 1.0)[annulus]
+    times = side.energy.shape[1] // whole.shape[1]
+    found: FloatArray = side.energy[annulus] * np.tile(energy / of_annulus, times)
+    return found
+
+
+def _with_rest(side: _Side, found: FloatArray, error: FloatArray, photons: int | None) -> _Side:
+    """Return a side from its energies and sums of errors in wider annuli; the rest is beyond."""
+    if side.energy.min() >= 0.0:  # rounding, 1e-13 of the total, would give negative light
         found = np.maximum(found, 0.0)
-    left = beyond + energy.sum(axis=0) - found.sum(axis=0)
-    if (beyond >= 0.0).all():
+    left = side.beyond + side.energy.sum(axis=0) - found.sum(axis=0)
+    if (side.beyond >= 0.0).all():
         left = np.maximum(left, 0.0)
-    return found, _errors(error, found, stderr, photons), left
+    return _Side(found, _errors(error, found, side.stderr, photons), left)
 
 
 def _squares(energy: FloatArray, stderr: FloatArray, photons: int | None) -> FloatArray:
