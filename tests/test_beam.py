@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import itertools
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from sssfit.profile.bins import merged
 from sssfit.profile.directions import angular_reflectance
 from sssfit.profile.frequency import frequency_response
 from sssfit.profile.smooth import smoothed
-from sssfit.profile.spreads import lens_area, within_gaussian
+from sssfit.profile.spreads import SPREADS, lens_area, within_gaussian
 from sssfit.simulate import simulate_exact, simulate_montecarlo
 from sssfit.simulate.runner import simulate_to_files
 from sssfit.stability.noise_floor import noise_ratio
@@ -104,16 +105,23 @@ def test_a_narrow_beam_changes_little_and_two_radii_are_apart(kind):
 
 
 def walks_under_a_beam(count, dr_mm):
-    """Walks of 4000 photons through skin1, of the seeds from 1 on."""
-    return [
-        under_beam(
-            simulate_montecarlo(
-                load_material("skin1"), photons=4000, seed=seed, dr_mm=dr_mm, radius_mm=12.0
-            ),
-            Beam("gaussian", 1.0),
+    """Walks of 4000 photons through skin1, of the seeds from 1 on; they share their annuli."""
+    pencils = [
+        simulate_montecarlo(
+            load_material("skin1"), photons=4000, seed=seed, dr_mm=dr_mm, radius_mm=12.0
         )
         for seed in range(1, count + 1)
     ]
+    known = {}
+
+    def once(radii, edges, radius_mm):
+        key = radii.tobytes(), edges.tobytes(), radius_mm
+        if key not in known:
+            known[key] = within_gaussian(radii, edges, radius_mm)
+        return known[key]
+
+    with mock.patch.dict(SPREADS, gaussian=once):
+        return [under_beam(each, Beam("gaussian", 1.0)) for each in pencils]
 
 
 def test_errors_of_walks_are_those_of_other_seeds():
