@@ -96,7 +96,7 @@ def test_axes_carry_units(skin1_figure):
 
 def test_without_a_material_the_third_plot_is_in_mm_and_says_so():
     axes = profile_figure(hand_made(exponential(3))).axes[2]
-    assert axes.get_xlabel() == "r (mm; no one mean free path)"
+    assert axes.get_xlabel() == "r (mm; mean free paths unknown)"
 
 
 def test_channels_differ_in_dashes_and_colour(skin1_figure):

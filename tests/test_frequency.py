@@ -5,12 +5,13 @@ import csv
 import numpy as np
 import pytest
 from figures import assert_legible
+from matplotlib.text import Text
 
 from sssfit.chart.frequency import frequency_figure
 from sssfit.errors import KernelError, ProfileError
 from sssfit.export import exported, is_ours
 from sssfit.kernel import SeparableKernel
-from sssfit.material import load_material
+from sssfit.material import Layer, Material, load_material
 from sssfit.profile.frequency import frequency_response
 from sssfit.simulate import simulate_burley, simulate_exact, simulate_montecarlo
 
@@ -99,3 +100,28 @@ def test_the_chart_draws_each_channel_with_its_error(skin1):
     np.testing.assert_array_equal(left.lines[0].get_ydata(), found.response[:, 0])
     np.testing.assert_allclose(right.lines[2].get_xdata(), found.k_per_mm / (2.0 * np.pi))
     assert len(left.collections) == 3
+
+
+def test_of_many_channels_eight_are_drawn_and_the_rest_is_told(skin1):
+    names = tuple(f"{400 + 30 * k}nm" for k in range(12))
+    layer = Layer(1.4, 0.0, np.linspace(2.0, 0.05, 12), np.full(12, 3.0))
+    found = frequency_response(simulate_burley(Material("bands", names, (layer,))))
+    figure = assert_legible(lambda: frequency_figure(found))
+    left, right = (each for each in figure.axes if each.get_title(loc="left"))
+    drawn = np.array([each.get_ydata() for each in left.lines])
+    np.testing.assert_array_equal(drawn, found.response[:, [0, 2, 3, 5, 6, 8, 9, 11]].T)
+    assert len({str(each.get_color()) for each in left.lines}) == 8
+    words = " ".join(each.get_text() for each in figure.findobj(Text))
+    assert "4 channels between these are not drawn." in words
+
+
+def test_errors_are_named_for_what_they_are(skin1):
+    """Noise of a walk, estimates of the exact solver; diffusion has none."""
+    made = (
+        (simulate_montecarlo(skin1, photons=20_000), "bands show one standard error"),
+        (simulate_exact(skin1), "bands show the estimated error"),
+        (simulate_burley(skin1), "light cos(kx)."),
+    )
+    for profile, words in made:
+        figure = frequency_figure(frequency_response(profile))
+        assert words in " ".join(each.get_text().replace("\n", " ") for each in figure.findobj(Text))

@@ -162,7 +162,7 @@ def test_what_is_drawn_is_what_was_computed(guide, figure):
     for i, (gamma_of, residual) in enumerate(zip(guides, residuals, strict=True)):
         halfway = gamma_of[len(gamma_of) // 2, len(gamma_of) // 2]
         for image, quadrant in zip(
-            drawn[2 * i : 2 * i + 2], (gamma_of / halfway, residual), strict=True
+            drawn[2 * i : 2 * i + 2], (gamma_of / halfway, -residual), strict=True
         ):
             np.testing.assert_array_equal(image.get_array(), full_kernel(quadrant))
             assert image.get_extent() == [-reach, reach, -reach, reach]

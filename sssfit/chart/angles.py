@@ -10,16 +10,21 @@ from matplotlib.lines import Line2D
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.page import (
-    COLOURS,
-    LINE_STYLES,
-    LINE_WIDTH,
     Style,
     add_legend,
+    channel_style,
     name_axes,
     new_page,
     tick,
 )
-from sssfit.chart.text import channel_label, in_legend, legend_title, subtitle, titled
+from sssfit.chart.text import (
+    channel_label,
+    in_legend,
+    left_out_note,
+    legend_title,
+    subtitle,
+    titled,
+)
 from sssfit.messages import by_channel
 from sssfit.profile.directions import AngularReflectance
 
@@ -34,18 +39,20 @@ def angles_figure(found: AngularReflectance) -> Figure:
     Parameters
     ----------
     found : AngularReflectance
-        If it has more than eight channels, the first eight are drawn.
+        If it has more than eight channels, eight from the first to the last are drawn.
 
     Returns
     -------
     matplotlib.figure.Figure
-        8 x 4.4 inches; bands of one standard error.
+        8 x 4.4 inches; bands of one standard or estimated error.
     """
     profile = found.profile
-    shown = in_legend(min(profile.n_channels, len(COLOURS)))
+    shown = in_legend(profile.n_channels)
     title = titled(profile, "light by exit angle")
-    with new_page(HEIGHT_INCHES, title, subtitle(profile), [_note(found)]) as (figure, below):
-        handles = [Line2D([], [], **_style(c)) for c in shown] + [Line2D([], [], **_LAMBERT)]
+    notes = [_note(found), *left_out_note(profile.n_channels - len(shown))]
+    with new_page(HEIGHT_INCHES, title, subtitle(profile), notes) as (figure, below):
+        styles = [channel_style(c, profile.n_channels) for c in shown]
+        handles = [Line2D([], [], **each) for each in (*styles, _LAMBERT)]
         labels = [channel_label(profile, c, is_drawn=True) for c in shown] + ["Lambert, Fresnel"]
         rest = add_legend(below, handles, labels, title=legend_title(profile))
         left, right = rest.subplots(1, 2)
@@ -56,36 +63,32 @@ def angles_figure(found: AngularReflectance) -> Figure:
             _draw(right, found, c, found.ratio[:, c], found.per_sr_stderr[:, c] / scale)
         right.axhline(1.0, **_LAMBERT)
         _limit(left, right, found, shown)
-        name_axes(left, "(a) R_d by exit angle", "exit angle (degrees)", "R_d (1/sr)")
+        name_axes(left, "(a) by exit angle", "exit angle (degrees)", "$R_d$ (1/sr)")
         name_axes(right, "(b) over Lambert and Fresnel", "exit angle (degrees)", "ratio")
     return figure
 
 
 def _note(found: AngularReflectance) -> str:
     names = found.profile.channels
+    is_exact = found.profile.photons is None
+    alone, kind = ("the estimated error", "estimated") if is_exact else ("noise", "standard")
     shares = by_channel(names, (100.0 * found.misplaced).tolist(), ".2g")
     noise = by_channel(names, (100.0 * found.misplaced_stderr).tolist(), ".2g")
     return (
         "Dotted: the same energy by the cosine times Fresnel's transmittance, as shaders assume. "
-        f"Of the light, at other angles than there, in %: {shares}; by noise alone {noise}."
+        f"Of the light, at other angles than there, in %: {shares}; by {alone} alone {noise}. "
+        f"Bands: ± the {kind} error."
     )
-
-
-def _style(channel: int) -> Style:
-    return {
-        "color": COLOURS[channel],
-        "linestyle": LINE_STYLES[channel % len(LINE_STYLES)],
-        "lw": LINE_WIDTH,
-    }
 
 
 def _draw(
     axes: Axes, found: AngularReflectance, channel: int, mean: FloatArray, error: FloatArray
 ) -> None:
     """Draw a channel's curve, and a band where it has errors."""
-    axes.plot(found.angles_deg, mean, **_style(channel))
+    style = channel_style(channel, found.profile.n_channels)
+    axes.plot(found.angles_deg, mean, **style)
     if np.isfinite(error).all():
-        band: Style = {"lw": 0, "alpha": 0.3, "color": COLOURS[channel]}
+        band: Style = {"lw": 0, "alpha": 0.3, "color": style["color"]}
         axes.fill_between(found.angles_deg, mean - error, mean + error, **band)
 
 

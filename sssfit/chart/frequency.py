@@ -10,17 +10,22 @@ from matplotlib.lines import Line2D
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.page import (
-    COLOURS,
-    LINE_STYLES,
-    LINE_WIDTH,
     Style,
     add_legend,
+    channel_style,
     name_axes,
     new_page,
     tick,
     tick_decades,
 )
-from sssfit.chart.text import channel_label, in_legend, legend_title, subtitle, titled
+from sssfit.chart.text import (
+    channel_label,
+    in_legend,
+    left_out_note,
+    legend_title,
+    subtitle,
+    titled,
+)
 from sssfit.profile.frequency import FrequencyResponse
 
 HEIGHT_INCHES = 4.4
@@ -30,42 +35,45 @@ _DECADES = 4.0  # most decades of the other's ordinate
 
 
 def frequency_figure(found: FrequencyResponse) -> Figure:
-    """Draw R(k) of each channel, logarithmic over k and linear over lines per mm.
+    """Draw R(k) of each channel, logarithmic over k and linear over cycles per mm.
 
     Parameters
     ----------
     found : FrequencyResponse
-        If it has more than eight channels, the first eight are drawn.
+        If it has more than eight channels, eight from the first to the last are drawn.
 
     Returns
     -------
     matplotlib.figure.Figure
-        8 x 4.4 inches; bands of one standard error where it is known.
+        8 x 4.4 inches; bands of one standard or estimated error where it is known.
     """
     profile = found.profile
-    shown = in_legend(min(profile.n_channels, len(COLOURS)))
+    shown = in_legend(profile.n_channels)
     title = titled(profile, "response to sinusoids of light")
-    with new_page(HEIGHT_INCHES, title, subtitle(profile), [_note(found)]) as (figure, below):
-        handles = [Line2D([], [], **_style(c)) for c in shown]
+    notes = [_note(found), *left_out_note(profile.n_channels - len(shown))]
+    with new_page(HEIGHT_INCHES, title, subtitle(profile), notes) as (figure, below):
+        handles = [Line2D([], [], **channel_style(c, profile.n_channels)) for c in shown]
         labels = [channel_label(profile, c, is_drawn=True) for c in shown]
         rest = add_legend(below, handles, labels, title=legend_title(profile))
         left, right = rest.subplots(1, 2)
         for channel in shown:
             _draw(left, found.k_per_mm, found, channel)
             _draw(right, found.k_per_mm / _TURN, found, channel)
-        _limit(left, right, found)
+        _limit(left, right, found.k_per_mm, found.response[:, shown])
         name_axes(left, "(a) logarithmic, over k", "k (rad/mm)", "R(k)")
-        name_axes(right, "(b) linear, over lines per mm", "k / 2π (1/mm)", "")
+        name_axes(right, "(b) linear, over cycles per mm", "k / 2π (1/mm)", "R(k)")
     return figure
 
 
 def _note(found: FrequencyResponse) -> str:
     beyond = float((found.profile.beyond_grid / _nonzero(found.response[0])).max())
-    is_known = np.isfinite(found.stderr[1:]).any()  # not under a beam
+    kind = "the estimated" if found.profile.photons is None else "one standard"
+    is_known = (found.stderr[1:] > 0.0).any()  # not under a beam, nor of diffusion models
+    share = f"at most {100.0 * beyond:.2g} % of a channel"
+    lost = f" Light beyond the grid, {share}, counts at k = 0 only." if beyond > 0.0 else ""
     return (
-        "R(k) = 2π ∫ R_d(r) J_0(kr) r dr, the amplitude that returns of light cos(kx)"
-        f"{'; bands show one standard error' if is_known else ''}. Light beyond the grid, at most "
-        f"{100.0 * beyond:.2g} % of a channel, counts at k = 0 only."
+        "R(k) = 2π ∫ R_d(r) J₀(kr) r dr, the amplitude that returns of light cos(kx)"
+        f"{f'; bands show {kind} error' if is_known else ''}.{lost}"
     )
 
 
@@ -73,26 +81,18 @@ def _nonzero(values: FloatArray) -> FloatArray:
     return np.where(values > 0.0, values, np.inf)
 
 
-def _style(channel: int) -> Style:
-    return {
-        "color": COLOURS[channel],
-        "linestyle": LINE_STYLES[channel % len(LINE_STYLES)],
-        "lw": LINE_WIDTH,
-    }
-
-
 def _draw(axes: Axes, x: FloatArray, found: FrequencyResponse, channel: int) -> None:
     """Draw a channel's curve, and a band where it has errors."""
     mean, error = found.response[:, channel], found.stderr[:, channel]
-    axes.plot(x, mean, **_style(channel))
+    style = channel_style(channel, found.profile.n_channels)
+    axes.plot(x, mean, **style)
     if np.isfinite(error).all():
-        band: Style = {"lw": 0, "alpha": 0.3, "color": COLOURS[channel]}
+        band: Style = {"lw": 0, "alpha": 0.3, "color": style["color"]}
         axes.fill_between(x, mean - error, mean + error, **band)
 
 
-def _limit(left: Axes, right: Axes, found: FrequencyResponse) -> None:
+def _limit(left: Axes, right: Axes, k: FloatArray, response: FloatArray) -> None:
     """End the linear panel where every channel has fallen to a quarter."""
-    response, k = found.response, found.k_per_mm
     top = float(response.max()) or 1.0
     left.set_xscale("log")
     left.set_yscale("log")

@@ -48,9 +48,10 @@ _PASS_DECADES = 6
 _GREY = "#666666"
 _DISTANCE = "distance from the middle (mm)"
 _NOTE = (
-    "Residual: 2D kernel less a aᵀ, as a share of the channel's energy; red where the fit has too "
-    "little light, blue where it has too much. Misplaced: half the sum of |residual|. Misfit: "
-    "Γ residual² over Γ kernel², summed. Γ is drawn over its value on the diagonal halfway out; "
+    "Difference: a aᵀ less the 2D kernel, as a share of the channel's energy; red where the fit "
+    "has too much light, blue where it has too little. Misplaced: half the sum of |difference|. "
+    "Misfit: Γ difference² over Γ kernel², summed. Γ is drawn over its value on the diagonal "
+    "halfway out; "
     "Γₚ = 1/(a(x) a(y)) of the pre-integrated pass has that pass for its best (S.8). The first "
     "step of a pass is its middle pixel."
 )
@@ -77,7 +78,7 @@ def guide_figure(guide: Guide) -> Figure:
     -------
     matplotlib.figure.Figure
         8 inches wide. Gamma, logarithmic, over its value on the diagonal halfway out, and the
-        residual R_d - a a^T as a share of the channel's energy in each pixel, over mm: symmetric
+        difference a a^T - R_d as a share of the channel's energy in each pixel, over mm: symmetric
         and logarithmic, one scale for all rows. a / sum(a) per mm over the distance from the
         middle, with the pre-integrated pass.
     """
@@ -134,10 +135,10 @@ def _draw_row(
     first, second, third = panels
     half_mm = 0.5 * guide.pixels * guide.mm_per_pixel
     draw_plane(first, _over_halfway(row.gamma), half_mm, shades[0], "cividis")
-    draw_plane(second, row.residual, half_mm, shades[1], "RdBu_r")
+    draw_plane(second, -row.residual, half_mm, shades[1], "RdBu_r")
     _draw_pass(third, guide, row.guided)
     name_axes(first, f"guide function {row.guide}", "", "y (mm)")
-    name_axes(second, f"residual, {row.name}", "", "")
+    name_axes(second, f"difference, {row.name}", "", "")
     name_axes(third, f"pass, {row.name}", "", "share per mm")
     second.tick_params(labelleft=False)
 
@@ -179,7 +180,7 @@ def _draw_bars(
     first.set_label("Γ over Γ halfway out")
     first.ax.xaxis.set_major_formatter("{x:g}")
     second = below.colorbar(ScalarMappable(shades[1], "RdBu_r"), ax=panels[:, 1], **place)
-    second.set_label("energy per pixel, of the channel's")
+    second.set_label("share of the channel's energy in a pixel")
     tick_powers(second, shades[1])
 
 

@@ -33,8 +33,7 @@ from sssfit.chart.page import (
     new_page,
     tick_decades,
 )
-from sssfit.chart.text import WEIGHTED, count, grid, method_name, shortened, spread
-from sssfit.messages import counted
+from sssfit.chart.text import WEIGHTED, count, grid, left_out_note, method_name, shortened, spread
 
 if TYPE_CHECKING:
     from sssfit.compare.models import ModelComparison, ModelCurve
@@ -247,9 +246,4 @@ def _notes(comparison: ModelComparison, shown: Sequence[int]) -> list[str]:
             "g is not 0: the models are of isotropic scattering of (1 - g) sigma_s, which is an "
             "approximation; the exact solution and the walk follow g itself."
         )
-    left = comparison.material.n_channels - len(shown)
-    if left:
-        notes.append(
-            f"{counted(left, 'channel')} between these {'is' if left == 1 else 'are'} not drawn."
-        )
-    return notes
+    return [*notes, *left_out_note(comparison.material.n_channels - len(shown))]

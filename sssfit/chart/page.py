@@ -80,6 +80,18 @@ LINE_STYLES: tuple[Any, ...] = ("-", (0, (4, 1.6)), (0, (6, 1.6, 1.2, 1.6)), (0,
 NOTE_SIZE, NOTE_COLOUR = 7.5, "#444444"
 
 
+def channel_style(channel: int, n_channels: int) -> Style:
+    """Return colour and dashes of a channel's curve, distinguishable without colour too."""
+    dashes = LINE_STYLES[channel % (3 if n_channels <= 3 else len(LINE_STYLES))]
+    # The last tenth of viridis is too light on white.
+    colour = (
+        COLOURS[channel]
+        if n_channels <= len(COLOURS)
+        else mpl.colormaps["viridis"](0.9 * channel / (n_channels - 1))
+    )
+    return {"color": colour, "linestyle": dashes, "lw": LINE_WIDTH}
+
+
 @contextlib.contextmanager
 def chart_style() -> Iterator[None]:
     """Use matplotlib's defaults with ours on top, independent of the user's matplotlibrc."""

@@ -3,7 +3,6 @@
 Supplement G: 2 pi r R_d linear and logarithmic, R_d against mean free paths, and the 2D profile.
 """
 
-import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
@@ -15,11 +14,9 @@ from sssfit.arrays import FloatArray
 from sssfit.chart import text as words
 from sssfit.chart.data import Picture, drawn_radius_mm, picture
 from sssfit.chart.page import (
-    COLOURS,
-    LINE_STYLES,
-    LINE_WIDTH,
     Style,
     add_legend,
+    channel_style,
     draw_steps,
     lay_out,
     name_axes,
@@ -71,21 +68,9 @@ def profile_figure(profile: Profile) -> Figure:
 def _draw_legend(below: SubFigure, profile: Profile, bins: list[Bins]) -> SubFigure:
     """Draw the legend with channels and totals; return the rest for panels."""
     shown = words.in_legend(profile.n_channels)
-    handles = [Line2D([], [], **_line_style(k, profile.n_channels)) for k in shown]
+    handles = [Line2D([], [], **channel_style(k, profile.n_channels)) for k in shown]
     labels = [words.channel_label(profile, k, is_drawn=bool(bins[k].is_drawn.any())) for k in shown]
     return add_legend(below, handles, labels, title=words.legend_title(profile))
-
-
-def _line_style(channel: int, n_channels: int) -> Style:
-    """Return colour and dashes of a channel, distinguishable without colour too."""
-    dashes = LINE_STYLES[channel % (3 if n_channels <= 3 else len(LINE_STYLES))]
-    if n_channels <= len(COLOURS):
-        return {"color": COLOURS[channel], "linestyle": dashes}
-    # The last tenth of viridis is too light on white.
-    return {
-        "color": mpl.colormaps["viridis"](0.9 * channel / (n_channels - 1)),
-        "linestyle": dashes,
-    }
 
 
 def _draw_linear(axes: Axes, profile: Profile, bins: list[Bins]) -> None:
@@ -122,11 +107,7 @@ def _draw_unweighted(axes: Axes, profile: Profile, bins: list[Bins]) -> None:
         for each, (mean, _) in zip(edges, values, strict=True)
     ]
     axes.set_xlim(0, max(ends) or 1)
-    if paths_mm is None:
-        name_axes(axes, "(c) unweighted", "r (mm; no one mean free path)", _UNWEIGHTED)
-    else:
-        label = words.path_label(profile, paths_mm)
-        name_axes(axes, "(c) unweighted, in mean free paths", label, _UNWEIGHTED)
+    name_axes(axes, *words.of_paths(profile, paths_mm), _UNWEIGHTED)
 
 
 def _draw_curves(
@@ -135,13 +116,13 @@ def _draw_curves(
     """Draw a step per bin, and a band of one standard error for the channels in the legend."""
     named = words.in_legend(len(edges))
     for channel, (mean, error) in enumerate(values):
-        style = _line_style(channel, len(edges))
+        style = channel_style(channel, len(edges))
         if axes.get_yscale() == "log":
             mean = np.where(mean > 0, mean, np.nan)  # a gap
         if channel not in named:
             draw_steps(axes, mean, edges[channel], lw=0.3, snap=False, color=style["color"])
             continue
-        draw_steps(axes, mean, edges[channel], lw=LINE_WIDTH, snap=False, **style)
+        draw_steps(axes, mean, edges[channel], snap=False, **style)
         low, high = mean - error, mean + error
         if np.isfinite(low).any():
             band: Style = {"lw": 0, "alpha": 0.3, "snap": False, "color": style["color"]}

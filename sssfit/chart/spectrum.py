@@ -23,8 +23,7 @@ from sssfit.chart.page import (
     name_axes,
     new_page,
 )
-from sssfit.chart.text import kernel_subtitle, shortened, spread, titled
-from sssfit.messages import counted
+from sssfit.chart.text import kernel_subtitle, left_out_note, shortened, spread, titled
 
 if TYPE_CHECKING:
     from sssfit.compare.spectrum import Spectrum
@@ -116,13 +115,8 @@ def _row(spectrum: Spectrum, channel: int) -> tuple[str, list[str]]:
 
 def _notes(spectrum: Spectrum, shown: Sequence[int]) -> list[str]:
     """Return the notes on drawn and omitted parts."""
-    notes = [
+    note = (
         "Term: a horizontal and a vertical pass. The squares that N terms leave are the square of "
         "the relative Frobenius error of the best N-term kernel. Hollow: negative eigenvalue."
-    ]
-    left = spectrum.profile.n_channels - len(shown)
-    if left:
-        notes.append(
-            f"{counted(left, 'channel')} between these {'is' if left == 1 else 'are'} not drawn."
-        )
-    return notes
+    )
+    return [note, *left_out_note(spectrum.profile.n_channels - len(shown))]

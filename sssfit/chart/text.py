@@ -6,8 +6,9 @@ import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.data import Picture
-from sssfit.messages import counted
+from sssfit.messages import by_channel, counted
 from sssfit.profile import Profile
+from sssfit.profile.beam import parse_beam
 from sssfit.profile.bins import MIN_HITS
 
 WEIGHTED = r"$2\pi r\,R_d$ (1/mm)"
@@ -133,8 +134,9 @@ def shortened(name: str, longest: int = 12) -> str:
 
 def footnotes(profile: Profile, image: str) -> list[str]:
     """Return the notes on the curves and the ``image``."""
+    reach = f"Beyond the grid (r > {profile.r_edges_mm[-1]:.4g} mm)"
     notes = [
-        f"Beyond the grid (r > {profile.r_edges_mm[-1]:.4g} mm): {_beyond(profile)} of diffuse. "
+        f"{_through(profile)}{reach}: {_beyond(profile)} of diffuse. "
         f"Specular reflectance ({profile.specular_reflectance:.4g}) is not included.",
     ]
     if profile.photons is not None:
@@ -143,12 +145,35 @@ def footnotes(profile: Profile, image: str) -> list[str]:
             f"Steps: means over annuli merged to {MIN_HITS} effective photons or more; curves "
             f"end where there are too few. Bands: {most}±1 standard error."
         )
+    elif (profile.annulus_energy_stderr > 0.0).any():
+        notes.append(
+            "Bands: ± the estimated error of an annulus; where it is as large as the value, the "
+            "curve means nothing."
+        )
+    if beam := profile.meta.get("beam"):
+        notes.append(_of_beam(str(beam)))
     if profile.n_channels > _MOST_IN_LEGEND:
         others = profile.n_channels - _MOST_IN_LEGEND
         notes.append(
             f"Thin lines: the {counted(others, 'channel')} not named above, without bands."
         )
     return [*notes, image] if image else notes
+
+
+def _of_beam(beam: str) -> str:
+    """Return a note on the end of a grid that grew by a beam's reach."""
+    lost_mm = 2.0 * parse_beam(beam).reach_mm
+    return (
+        f"The last {lost_mm:.3g} mm of r are too dark: light from beyond the grid of the pencil "
+        "beam's profile is missing there."
+    )
+
+
+def left_out_note(count: int) -> list[str]:
+    """Return a note on so many channels between those that are drawn; none for 0."""
+    if count <= 0:
+        return []
+    return [f"{counted(count, 'channel')} between these {'is' if count == 1 else 'are'} not drawn."]
 
 
 def image_note(profile: Profile, image: Picture) -> str:
@@ -162,7 +187,20 @@ def image_note(profile: Profile, image: Picture) -> str:
     )
 
 
-def path_label(profile: Profile, paths_mm: FloatArray) -> str:
+def of_paths(profile: Profile, paths_mm: FloatArray | None) -> tuple[str, str]:
+    """Return the title of the panel in mean free paths, and the label of its axis.
+
+    Of a medium that scatters forward they are the reduced ones; without any it is in mm.
+    """
+    if paths_mm is None:
+        why = "unknown" if profile.material is None else "of layers differ"
+        return "(c) unweighted", f"r (mm; mean free paths {why})"
+    is_reduced = profile.material is not None and profile.material.layers[0].g.any()
+    title = f"(c) unweighted, in {'reduced ' if is_reduced else ''}mean free paths"
+    return title, _path_label(profile, paths_mm)
+
+
+def _path_label(profile: Profile, paths_mm: FloatArray) -> str:
     """Return the label of the axis in mean free paths, with the lengths if they fit."""
     if profile.n_channels > 4:
         return "r (mean free paths)"
@@ -172,6 +210,13 @@ def path_label(profile: Profile, paths_mm: FloatArray) -> str:
     )
     # 48 letters are as wide as the panel.
     return f"r (mean free paths: {lengths} mm)" if len(lengths) <= 26 else "r (mean free paths)"
+
+
+def _through(profile: Profile) -> str:
+    """Return a slab's transmittance, which no panel shows."""
+    if profile.transmittance is None:
+        return ""
+    return f"Transmittance: {by_channel(profile.channels, profile.transmittance.tolist(), '.4g')}. "
 
 
 def _beyond(profile: Profile) -> str:

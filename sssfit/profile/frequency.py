@@ -1,7 +1,7 @@
 """The response of a medium to a sinusoid of light: R(k), the Hankel transform of its profile.
 
 R(k) = 2 pi int R_d(r) J0(k r) r dr is the amplitude of what returns under light that varies as
-cos(k x); R(0) is the diffuse reflectance. k is in radians per mm: a pattern of f lines per mm, as
+cos(k x); R(0) is the diffuse reflectance. k is in radians per mm: a pattern of f cycles per mm, as
 in spatial frequency domain imaging, has k = 2 pi f.
 """
 
