@@ -107,7 +107,7 @@ def test_of_many_channels_eight_are_drawn_and_the_rest_is_told(skin1):
     layer = Layer(1.4, 0.0, np.linspace(2.0, 0.05, 12), np.full(12, 3.0))
     found = frequency_response(simulate_burley(Material("bands", names, (layer,))))
     figure = assert_legible(lambda: frequency_figure(found))
-    left, right = (each for each in figure.axes if each.get_title(loc="left"))
+    left = next(each for each in figure.axes if each.get_title(loc="left"))
     drawn = np.array([each.get_ydata() for each in left.lines])
     np.testing.assert_array_equal(drawn, found.response[:, [0, 2, 3, 5, 6, 8, 9, 11]].T)
     assert len({str(each.get_color()) for each in left.lines}) == 8
@@ -124,4 +124,5 @@ def test_errors_are_named_for_what_they_are(skin1):
     )
     for profile, words in made:
         figure = frequency_figure(frequency_response(profile))
-        assert words in " ".join(each.get_text().replace("\n", " ") for each in figure.findobj(Text))
+        texts = [each.get_text().replace("\n", " ") for each in figure.findobj(Text)]
+        assert words in " ".join(texts)
