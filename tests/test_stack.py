@@ -11,7 +11,7 @@ from checks import medium
 from checks_layers import layer, stack
 
 from sssfit.errors import SimulationError, StoppedError
-from sssfit.material import Material, load_material
+from sssfit.material import Layer, Material, load_material
 from sssfit.simulate import simulate_exact, simulate_exact_many, simulate_montecarlo
 from sssfit.simulate.half_space import diffuse_reflectance
 from sssfit.simulate.stack import limits
@@ -459,3 +459,52 @@ def test_a_pair_of_modes_is_two_real_columns():
     real = np.where(factor.imag < 0.0, -columns.imag, columns.real)
     powers = np.linalg.matrix_power(matrix, 3)
     np.testing.assert_allclose(times(real, factor**3), powers @ real, atol=1e-12)
+
+
+LOSSLESS = {
+    "on an absorbing ground": ((1.4, 0.8, 0.0, 10.0, 1.0), (1.4, 0.0, 5.0, 0.5, math.inf)),
+    "of another index": ((1.4, 0.0, 0.0, 2.0, 0.6), (1.2, 0.0, 3.0, 2.0, math.inf)),
+    "inside": (
+        (1.4, 0.8, 0.5, 2.0, 0.5),
+        (1.4, 0.8, 0.0, 2.0, 1.0),
+        (1.4, 0.8, 0.3, 2.0, math.inf),
+    ),
+    "alone": ((1.4, 0.8, 0.0, 10.0, 1.0),),
+}
+
+
+@pytest.mark.parametrize("name", LOSSLESS)
+def test_a_layer_without_loss_passes_light_on(name):
+    """At k = 0 its modes along and against are one, from which R(0) came out 2.8 times too high."""
+    layers = tuple(Layer(eta, g, [a], [s], d) for eta, g, a, s, d in LOSSLESS[name])
+    material = Material("lossless", ("grey",), layers)
+    exact = simulate_exact(material, tolerance=2e-3)
+    walk = simulate_montecarlo(material, photons=100_000, seed=3)
+    apart = exact.diffuse_reflectance - walk.diffuse_reflectance
+    error = np.hypot(exact.diffuse_reflectance_stderr, walk.diffuse_reflectance_stderr)
+    assert np.abs(apart / error) < 4.0
+    lossless = [not any(each.sigma_a_per_mm) for each in layers]
+    assert np.abs(exact.absorbed[lossless]).max() < 1e-7
+
+
+@pytest.mark.parametrize("sigma_a", [0.0, 1e-14, 1e-10, 1e-8, 1e-7, 1e-6])
+def test_less_and_less_absorption_tends_to_none(sigma_a):
+    """Those of 1e-6 are solved at k = 0 itself, the others beside it."""
+
+    def total(absorption):
+        slabs = Slab(absorption, 10.0, 0.8, 1.4, 1.0), Slab(5.0, 0.5, 0.0, 1.4)
+        return Sampler(Family((SlabStack(slabs),)), 16).at_zero()[0].reflected
+
+    assert total(sigma_a) == pytest.approx(total(2e-6), abs=4e-6)
+
+
+def test_all_light_returns_where_nothing_absorbs():
+    slabs = Slab(0.0, 2.0, 0.0, 1.4, 0.5), Slab(0.0, 4.0, 0.5, 1.4)
+    found = Sampler(Family((SlabStack(slabs),)), 16).at_zero()[0].reflected
+    assert found == pytest.approx(1.0 - (0.4 / 2.4) ** 2, abs=1e-5)
+
+
+def test_a_layer_too_thick_for_its_modes_to_differ_is_refused():
+    slabs = Slab(0.0, 1000.0, 0.0, 1.4, 20.0), Slab(5.0, 0.5, 0.0, 1.4)
+    with pytest.raises(SimulationError, match="a layer of 20 mm absorbs too little beside"):
+        Sampler(Family((SlabStack(slabs),)), 16).at_zero()

@@ -57,9 +57,10 @@ def _by_angle(stack: SlabStack, count: int, edges_rad: FloatArray, *, is_below: 
     beam = assembly.beam.transmitted if is_below else assembly.beam.reflected
     found = np.zeros(len(edges_rad) - 1)
     if stack.scattering:
-        modes = KnownModes(sampler.zero, sampler.azimuth(sampler.zero))
-        leaving = leaving_by_node(assembly, sampler.zero, modes.azimuth, modes)
-        found += _between(assembly, leaving, edges_rad)
+        for weight, k in sampler.family.near_zero:
+            modes = KnownModes(k, sampler.azimuth(k))
+            leaving = leaving_by_node(assembly, k, modes.azimuth, modes)
+            found += weight * _between(assembly, leaving, edges_rad)
     found[0] += beam
     return found
 

@@ -96,6 +96,17 @@ class Transforms:
     transmitted: float
     absorbed: tuple[float, ...]
 
+    def times(self, factor: float) -> "Transforms":
+        """Return a multiple."""
+        absorbed = tuple(factor * each for each in self.absorbed)
+        return Transforms(factor * self.reflected, factor * self.transmitted, absorbed)
+
+    def plus(self, other: "Transforms") -> "Transforms":
+        """Return a sum."""
+        absorbed = tuple(a + b for a, b in zip(self.absorbed, other.absorbed, strict=True))
+        both = self.reflected + other.reflected, self.transmitted + other.transmitted
+        return Transforms(*both, absorbed)
+
 
 def reflected_at(
     assembly: Assembly, k: float, azimuth: Azimuth, modes: ModesOf, last: int | None = None

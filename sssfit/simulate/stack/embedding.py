@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sssfit.arrays import FloatArray
+from sssfit.errors import SimulationError
 from sssfit.simulate.stack.azimuth import Azimuth
 from sssfit.simulate.stack.modes import Modes, times
 from sssfit.simulate.stack.nodes import snell_reflectance
@@ -61,7 +62,17 @@ def span_of(medium: Medium, modes: Modes, down: float, up: float, floor: Floor) 
     """Return a layer on a floor: modes a decay from the top, modes b from the bottom, b = G a + h.
 
     (U - R V) b = (R U - V) e a + R p+ - p- + s at the bottom, with e = exp(-lambda d).
+
+    Raises
+    ------
+    SimulationError
+        Modes a and b are the same to rounding.
     """
+    if modes.is_rounded:
+        raise SimulationError(
+            f"a layer of {medium.thickness:g} mm absorbs too little beside its scattering of "
+            f"{medium.slab.sigma_s:g} per mm for the exact solution; use `method = montecarlo`."
+        )
     u, v, beam = modes.along, modes.against, medium.attenuation
     e = np.exp(-modes.rate * medium.thickness)
     ue, ve = times(u, e), times(v, e)

@@ -31,6 +31,9 @@ class Modes:
         Columns: the radiance of a mode on the side to which it decays, and on the other one.
     beam_along, beam_against : (n,)
         The radiance scattered from a beam of power 1, exp(-sigma_t* z).
+    is_rounded : bool
+        Whether a rate is below rounding: its mode is the same along and against, and a layer that
+        ends lets no light through.
     """
 
     rate: ComplexArray
@@ -38,6 +41,7 @@ class Modes:
     against: FloatArray
     beam_along: FloatArray
     beam_against: FloatArray
+    is_rounded: bool
 
 
 def modes_of(medium: Medium, k: float, azimuth: Azimuth) -> Modes:
@@ -50,7 +54,8 @@ def modes_of(medium: Medium, k: float, azimuth: Azimuth) -> Modes:
     a_v = _streaming_and_collision(medium, medium.odd, k, azimuth)
     product = a_v @ a_u
     squares, x = np.linalg.eig(product)
-    rate = np.sqrt(_positive(squares))
+    positive, is_rounded = _positive(squares)
+    rate = np.sqrt(positive)
     if np.iscomplexobj(x):
         x = np.where(squares.imag < 0.0, -x.imag, x.real)
     y = times(a_u @ x, 1.0 / rate)
@@ -61,7 +66,7 @@ def modes_of(medium: Medium, k: float, azimuth: Azimuth) -> Modes:
     shifted = product - sigma**2 * np.eye(len(product))
     u = np.linalg.solve(shifted, a_v @ both + sigma * difference)
     v = (a_u @ u - both) / sigma
-    return Modes(rate, 0.5 * (x + y), 0.5 * (x - y), 0.5 * (u + v), 0.5 * (u - v))
+    return Modes(rate, 0.5 * (x + y), 0.5 * (x - y), 0.5 * (u + v), 0.5 * (u - v), is_rounded)
 
 
 def times(columns: FloatArray, factor: ComplexArray) -> FloatArray:
@@ -74,11 +79,12 @@ def times(columns: FloatArray, factor: ComplexArray) -> FloatArray:
     return found
 
 
-def _positive(squares: ComplexArray) -> ComplexArray:
-    """Return squares of rates, the real ones of which are positive."""
+def _positive(squares: ComplexArray) -> tuple[ComplexArray, bool]:
+    """Return squares of rates, the real ones of which are positive, and whether any was not."""
     least = _NEVER_NEGATIVE * np.abs(squares).max()
-    found: ComplexArray = np.where((squares.imag == 0.0) & (squares.real < least), least, squares)
-    return found
+    is_below = (squares.imag == 0.0) & (squares.real < least)
+    found: ComplexArray = np.where(is_below, least, squares)
+    return found, bool(is_below.any())
 
 
 def _streaming_and_collision(

@@ -1,5 +1,6 @@
 """Transforms of several stacks at one wavenumber, with the modes of layers that they share."""
 
+import functools
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,6 +20,13 @@ _DEEP = 14.0  # k z from which a layer goes on without end: exp(-14) is 8e-7
 _SEEN = 1e-3  # share of the light in a beam that needs the forward peak's greater depth
 _STEEPEST = 1e-3  # least 1 - g^2, so that g near 1 asks for no infinite depth
 _NEXT_TO_ZERO = 1e-2  # of the least wavenumber, in place of 0 where 0 is singular
+# A layer that ends and hardly absorbs carries light to what is below it by the difference of two
+# modes, of rates +-r with r^2 = k^2 at sigma_a = 0. That is known to 3e-7 of the light where r is
+# 1e-3 of the extinction, to 3e-6 at 3e-4, and lost at 1e-5: so R(0) is extrapolated from there.
+_HARDLY = 3e-4
+_KNOWN = 1e-3
+_EVEN = (4.0 / 3.0, -1.0 / 3.0)  # R(0) from k and 2k, for R(k) = a + b k^2
+_ODD = (8.0 / 3.0, -2.0, 1.0 / 3.0)  # with 4k, for a + b k + c k^2: below, nothing absorbs
 
 
 @dataclass(frozen=True)
@@ -35,10 +43,33 @@ class Family:
     @cached_property
     def least_wavenumber(self) -> float:
         """The first wavenumber above 0 [1/mm]: a 20th of the slowest decay, within limits."""
-        slowest = min(each.diffuse_rate for each in self._scattering)
         thickest = max(sum(slab.thickness for slab in each.slabs) for each in self.stacks)
-        decay = max(slowest, 1.0 / thickest) / 20.0
-        return max(1e-4 / self.longest, min(0.03 / self.longest, decay))
+        return self._first(max(min(self._decays), 1.0 / thickest))
+
+    def _first(self, decay: float) -> float:
+        return max(1e-4 / self.longest, min(0.03 / self.longest, decay / 20.0))
+
+    @cached_property
+    def _decays(self) -> list[float]:
+        """Rates at which light fades sideways; where nothing absorbs, through a layer's ends."""
+        ends = [[each.thickness for each in stack.slabs] for stack in self.stacks]
+        deepest = max(sum(filter(math.isfinite, each)) for each in ends)
+        return [
+            max(each.diffuse_rate, 1.0 / deepest) if _hardly_absorbs(each) else each.diffuse_rate
+            for each in self._scattering
+        ]
+
+    @cached_property
+    def near_zero(self) -> tuple[tuple[float, float], ...]:
+        """Weights and wavenumbers of what stands for R(0)."""
+        lossless = [each.sigma_t for each in self._scattering if _hardly_absorbs(each)]
+        if not lossless:
+            return ((1.0, _NEXT_TO_ZERO * self.least_wavenumber if self.is_singular else 0.0),)
+        least = 1e-4 / self.longest
+        fading = [each for each in self._decays if each > least]
+        k = min(0.5 * self._first(min(fading)), _KNOWN * max(lossless))
+        weights = _EVEN if len(fading) == len(self._decays) else _ODD
+        return tuple((weight, k * 2.0**n) for n, weight in enumerate(weights))
 
     @property
     def has_layers(self) -> bool:
@@ -75,12 +106,6 @@ class Sampler:
         return tuple(Assembly.of(each, self.count, self.azimuths) for each in self.family.stacks)
 
     @cached_property
-    def zero(self) -> float:
-        """The wavenumber that stands for 0."""
-        family = self.family
-        return _NEXT_TO_ZERO * family.least_wavenumber if family.is_singular else 0.0
-
-    @cached_property
     def most_sigma_t(self) -> float:
         """The largest extinction with delta-M scaling [1/mm]."""
         return max(each.sigma_t for assembly in self.assemblies for each in assembly.media)
@@ -91,12 +116,24 @@ class Sampler:
 
     def at_zero(self) -> list[Transforms]:
         """Return the total of each stack, without the beam."""
-        known = KnownModes(self.zero, self.azimuth(self.zero))
-        return [transforms_at(each, self.zero, known.azimuth, known) for each in self.assemblies]
+        parts = []
+        for weight, k in self.family.near_zero:
+            known = KnownModes(k, self.azimuth(k))
+            found = [transforms_at(each, k, known.azimuth, known) for each in self.assemblies]
+            parts.append([each.times(weight) for each in found])
+        return [functools.reduce(Transforms.plus, each) for each in zip(*parts, strict=True)]
 
     def at(self, k: float) -> FloatArray:
         """Return R(k) and T(k) of each stack less single scattering, (2 stacks,)."""
-        known = self._modes(k)
+        if k == 0.0:
+            parts = [weight * self._at(0.0, near) for weight, near in self.family.near_zero]
+            found: FloatArray = np.sum(parts, axis=0)
+            return found
+        return self._at(k, k)
+
+    def _at(self, k: float, near: float) -> FloatArray:
+        """Return what is asked for at k, by the modes of a wavenumber near it."""
+        known = KnownModes(near, self.azimuth(near))
         found = [
             _multiple(each, k, known, gap(k) if gap and k in gap else None)
             for each, gap in zip(self.assemblies, self.gaps, strict=True)
@@ -114,12 +151,9 @@ class Sampler:
         last = 1.001 * _forward_depth(assembly) / depths[-1]  # just above it
 
         def transmitted(k: float) -> float:
-            return _multiple(assembly, k, self._modes(k))[1]
+            return _multiple(assembly, k, KnownModes(k, self.azimuth(k)))[1]
 
         return Gap(first, last, transmitted) if first < last else None
-
-    def _modes(self, k: float) -> "KnownModes":
-        return KnownModes(k or self.zero, self.azimuth(k or self.zero))
 
 
 class KnownModes:
@@ -136,6 +170,11 @@ class KnownModes:
         if key not in self._found:
             self._found[key] = modes_of(medium, self.k, self.azimuth)
         return self._found[key]
+
+
+def _hardly_absorbs(slab: Slab) -> bool:
+    """Tell whether light crosses a layer that ends, at k = 0, by modes that are nearly one."""
+    return math.isfinite(slab.thickness) and slab.diffuse_rate < _HARDLY * slab.sigma_t
 
 
 def _multiple(

@@ -33,6 +33,11 @@ class Slab:
         return self.sigma_a + self.sigma_s == 0.0
 
     @property
+    def sigma_t(self) -> float:
+        """Extinction sigma_a + sigma_s [1/mm]."""
+        return self.sigma_a + self.sigma_s
+
+    @property
     def reduced_sigma_t(self) -> float:
         """Reduced extinction sigma_a + (1 - g) sigma_s [1/mm]."""
         return self.sigma_a + (1.0 - self.g) * self.sigma_s
