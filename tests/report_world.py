@@ -2,10 +2,13 @@
 
 import dataclasses
 import functools
+import re
 
 import cli_world
 
+from sssfit.material import parse_material
 from sssfit.report import Report, make_report, page
+from sssfit.simulate import simulate_exact
 
 NAME = "<script>alert(1)</script>"
 LABEL = "<img src=x onerror=alert(2)>"
@@ -26,3 +29,12 @@ def report() -> Report:
 def text() -> str:
     """Its page."""
     return page(report())
+
+
+@functools.cache
+def grey() -> Report:
+    """Of one channel, with disks on smaller pictures."""
+    text = cli_world.WAX.replace("eta", 'channels = ["grey"]\neta', 1)
+    text = re.sub(r"\[([\d.]+), [\d.]+, [\d.]+\]", r"[\1]", text)
+    profile = simulate_exact(parse_material(text, "grey.toml"), threads=1)
+    return make_report(profile, only=["disk"], side=16, threads=1)

@@ -15,6 +15,7 @@ from sssfit.measure.delta_e import delta_e_2000
 from sssfit.measure.score import measure
 from sssfit.render import render
 from sssfit.render.reference import render_reference
+from sssfit.report import page as html_page
 from sssfit.report.pack import unpacked_picture
 
 SHOWN = ("svd 2 on 7 taps", "svd 3 on 11 taps", "disk 24")
@@ -86,6 +87,36 @@ def test_kernels_that_run_in_the_page_show_the_librarys_pictures(page, window, k
         border = "mirror" if reference.border == "mirror" else "clamp"
         ours = render(reference.scene, taps, border=border)
         assert np.abs(seen - ours).max() < 2e-3, label
+
+
+def middle_of(id_):
+    """Code that reads the middle of a canvas, as rows of red, green, blue and alpha."""
+    return (
+        f"(() => {{ const at = document.getElementById('{id_}'), {{ width, height }} = at;"
+        "const [x, y] = [width, height].map((side) => Math.floor(side / 2) - 10);"
+        "return [...at.getContext('2d').getImageData(x, y, 20, 20).data]; })()"
+    )
+
+
+def test_one_channel_is_grey_wherever_it_is_shown(tmp_path, window):
+    path = tmp_path / "grey.html"
+    path.write_text(html_page(world.grey()), encoding="utf-8")
+    window.open(path, "#mode=single&pane=kernel")
+    canvases = ("single", "loupe-truth", "loupe-kernel")
+    for seen in window.js(f"return [{', '.join(map(middle_of, canvases))}]"):
+        red, green, blue, _ = np.reshape(seen, (-1, 4)).T
+        assert red.max() > 0
+        assert (red == green).all()
+        assert (red == blue).all()
+    reference = world.grey().pictures[0].reference
+    label = window.js("return document.getElementById('kernel').value")
+    (kernel,) = (each for each in world.grey().kernels if each.label == label)
+    ours = render(reference.scene, kernel.taps, border=reference.border)
+    made = load_image(window.download("kernel")).pixels
+    assert np.abs(made - ours).max() < 2e-3
+    truth = np.broadcast_to(reference.truth.astype(np.float16).astype(float), made.shape)
+    score = measure(made, truth, exposure=reference.exposure, mask=reference.scene.mask)
+    assert float(window.text("figure-mean")) == pytest.approx(score.delta_e_2000_mean, rel=0.01)
 
 
 def test_the_truth_is_the_librarys_in_half_floats(page, window):
