@@ -1,13 +1,16 @@
 """Error over fetches: every kernel a point that tells about itself and can be chosen."""
 
+from itertools import pairwise
+
 from markupsafe import Markup
 
 from sssfit.compare.comparison import KernelRow
+from sssfit.report.charts.names import Box, Place, named
 from sssfit.report.charts.svg import Chart, Plot, limits
 from sssfit.report.record import COST, ERROR, Report
 
 _NOTICED = 1.0  # Delta E, just noticeable
-_LETTER, _LINE = 7.0, 14.0  # width and height of a label's letter on a phone, its largest
+_POINT, _STROKE = 6.0, 2.0  # radius of the largest point, and what a line takes beside it
 _ROOM = 0.12  # of a label below a point, in lengths of the axis
 _LABEL = 0.45  # room of a label of 15 letters, in lengths of the axis
 
@@ -26,32 +29,43 @@ def pareto_chart(report: Report) -> Chart:
     )
     noticed = plot.y.place(_NOTICED)
     plot.line([(plot.x.begin, noticed), (plot.x.end, noticed)], "noticed")
-    places = [(plot.x.place(r.fetches), plot.y.place(r.delta_e_2000_mean)) for r in front]
-    plot.line(_staircase(places, plot.x.end), "front")
+    plot.line(_staircase([_place(plot, row) for row in front], plot.x.end), "front")
     for row in sorted(rows, key=lambda each: each in front):
         plot.add(_point(plot, row, is_front=row in front))
-    plot.text(plot.x.end - 4, noticed - 5, "ΔE 1, just noticeable", "small end")
-    _name_front(plot, places, [row.label for row in front])
-    legend = (("front-point", "on the Pareto front"), ("other-point", "another kernel is better"))
+    _name_front(plot, rows, [row.label for row in front], noticed)
+    # Words at the dashed line would lie on points wherever they stood, with many kernels.
+    legend = (
+        ("front-point", "on the Pareto front"),
+        ("other-point", "another kernel is better"),
+        ("noticed", "ΔE 1, just noticeable"),
+    )
     words = (
         f"On {name}. Choose a point to run its kernel above; the arrow keys move along the front."
     )
     return Chart("pareto", "Error and cost", words, legend, (("", plot.svg(role="group")),))
 
 
-def _name_front(plot: Plot, places: list[tuple[float, float]], labels: list[str]) -> None:
-    """Write labels left of and below the front, where no point is; of two that meet, one."""
-    taken: list[tuple[float, float, float, float]] = []
-    for (x, y), label in zip(places, labels, strict=True):
-        words = label.replace(" on ", "\non ").split("\n")
-        end, top, low = x - 9.0, y, y + _LINE * len(words)
-        begin = end - _LETTER * max(map(len, words))
-        meets = any(begin < b and a < end and top < d and c < low for a, b, c, d in taken)
-        if meets or begin < plot.x.begin or low > plot.y.begin:
-            continue
-        taken.append((begin, end, top, low))
-        for k, line in enumerate(words):
-            plot.text(end, top + _LINE * (k + 1), line, "small end")
+def _name_front(plot: Plot, rows: list[KernelRow], front: list[str], noticed: float) -> None:
+    """Write the names of the front's kernels beside their points."""
+    places = {row.label: _place(plot, row) for row in rows}
+    stairs = _staircase([places[label] for label in front], plot.x.end)
+    lines = [((plot.x.begin, noticed), (plot.x.end, noticed)), *pairwise(stairs)]
+    taken = [_around(each, each, _POINT) for each in places.values()]
+    taken += [_around(*each, _STROKE) for each in lines]
+    room = (plot.x.begin, plot.y.end, plot.x.end, plot.y.begin)
+    for name in named([(places[label], label) for label in front], taken, room).values():
+        for base, words in name.placed_lines():
+            plot.text(name.x, base, words, f"small {name.kind}")
+
+
+def _place(plot: Plot, row: KernelRow) -> Place:
+    return plot.x.place(row.fetches), plot.y.place(row.delta_e_2000_mean)
+
+
+def _around(one: Place, other: Place, apart: float) -> Box:
+    """Return the box around a line that goes along an axis, or around a point."""
+    (left, right), (top, low) = (sorted(each) for each in zip(one, other, strict=True))
+    return left - apart, top - apart, right + apart, low + apart
 
 
 def _fetches(rows: list[KernelRow]) -> tuple[float, float]:
@@ -66,7 +80,7 @@ def _errors(rows: list[KernelRow]) -> tuple[float, float]:
     return low * (low / high) ** _ROOM, high
 
 
-def _staircase(places: list[tuple[float, float]], end: float) -> list[tuple[float, float]]:
+def _staircase(places: list[Place], end: float) -> list[Place]:
     """Return the corners of a falling front."""
     found = []
     for k, (x, y) in enumerate(places):
@@ -86,7 +100,7 @@ def _point(plot: Plot, row: KernelRow, *, is_front: bool) -> Markup:
         '<circle class="{}" cx="{:.1f}" cy="{:.1f}" r="{}" tabindex="{}" role="button" '
         'data-kernel="{}" aria-label="{}"><title>{}</title></circle>'
     )
-    x, y = plot.x.place(row.fetches), plot.y.place(row.delta_e_2000_mean)
+    x, y = _place(plot, row)
     kind = "point front-point" if is_front else "point other-point"
-    place = (f"{6 if is_front else 4.5}", "0" if is_front else "-1")
+    place = (f"{_POINT if is_front else 4.5:g}", "0" if is_front else "-1")
     return head.format(kind, x, y, *place, row.label, words, words)

@@ -13,7 +13,7 @@ function startPanels() {
 
 export function startCharts(choose) {
   startPanels();
-  const words = document.getElementById('pareto-words'), points = [...document.querySelectorAll('.point')];
+  const words = document.getElementById('pareto-words'), points = [...document.querySelectorAll('.point[data-kernel]')];
   const front = points.filter((each) => each.classList.contains('front-point'));
   const tell = (point) => { words.textContent = point.getAttribute('aria-label'); };
   for (const point of points) {
