@@ -8,6 +8,7 @@ import os
 import re
 import shutil
 import subprocess
+from itertools import combinations, pairwise
 from pathlib import Path
 
 import cli_world
@@ -22,15 +23,15 @@ from sssfit.measure.delta_e import delta_e_of_lab, lab
 from sssfit.methods import FITS
 from sssfit.report import finished_page, is_report_file, library_page, make_report, page, parts
 from sssfit.report.charts import charts_of
+from sssfit.report.charts.names import meet, named
 from sssfit.report.commands import commands_of
 from sssfit.report.html import SCRIPTS, script_text
 from sssfit.report.kept import kept, page_key
 from sssfit.report.kernels import shown_candidates
 from sssfit.report.pack import packed_picture, unpacked_picture
 from sssfit.report.pictures import _reduced
-from sssfit.report.tables import tables_of
+from sssfit.report.tables import Table, tables_of
 from sssfit.scene.record import Scene
-from sssfit.simulate import simulate_exact
 
 STATIC = Path(__file__).parents[1] / "sssfit" / "report" / "static"
 
@@ -185,6 +186,80 @@ def test_two_channels_have_no_colour():
         make_report(parse_material(text, "two.toml"))
 
 
+def boxes_of(svg):
+    """The boxes of the points of a chart, and those of the lines that are drawn across it."""
+    points = re.findall(r'<circle class="point[^"]*" cx="([\d.]+)" cy="([\d.]+)"', svg)
+    found = [(float(x), float(y), float(x), float(y)) for x, y in points]
+    for path in re.findall(r'<polyline class="(?:front|noticed)" points="([^"]*)"', svg):
+        places = [tuple(map(float, each.split(","))) for each in path.split()]
+        found += [(min(a, c), min(b, d), max(a, c), max(b, d))
+                  for (a, b), (c, d) in pairwise(places)]  # fmt: skip
+    return found
+
+
+def test_every_kernel_of_the_front_has_its_name_on_nothing_else():
+    (svg,) = (str(each.panels[0][1]) for each in charts_of(world.report()) if each.key == "pareto")
+    text = r'<text class="small (end|start)" x="([\d.]+)" y="([\d.]+)">([^<]*)</text>'
+    lines = [(kind, float(x), float(y), html.unescape(words))
+             for kind, x, y, words in re.findall(text, svg)]  # fmt: skip
+    written = " ".join(words for *_, words in lines)
+    assert all(label in written for label in world.report().front)
+    for kind, x, y, words in lines:
+        width = 5.0 * len(words)
+        box = (x - width, y - 10.0, x, y) if kind == "end" else (x, y - 10.0, x + width, y)
+        assert not [each for each in boxes_of(svg) if meet(box, each)], words
+
+
+def crowded(count):
+    """Points of one place, whose names cannot all stand beside it."""
+    return [((100.0, 100.0), f"kernel {k} on {k} taps") for k in range(count)]
+
+
+def test_names_never_meet_and_one_without_room_is_left_out():
+    room, taken = (0.0, 0.0, 300.0, 200.0), [(0.0, 90.0, 300.0, 95.0), (94.0, 94.0, 106.0, 106.0)]
+    found = named(crowded(12), taken, room)
+    boxes = [each.box for each in found.values()]
+    assert 2 < len(boxes) < 12
+    assert not any(meet(*pair) for pair in combinations(boxes, 2))
+    assert not any(meet(box, each) for box in boxes for each in taken)
+    assert named(crowded(1), taken, (95.0, 0.0, 105.0, 200.0)) == {}
+
+
+def test_the_budget_has_an_axis_with_numbers():
+    (chart,) = (each for each in charts_of(world.report()) if each.key == "budget")
+    svg = str(chart.panels[0][1])
+    ticks = re.findall(r'<text class="tick middle" x="([\d.]+)"[^>]*>([^<]*)<', svg)
+    ends = {float(x) for x, _ in ticks}
+    assert len(ticks) == len(ends) > 1
+    assert ">mean ΔE 2000, logarithmic<" in svg
+    (line,) = re.findall(r'<polyline class="noticed" points="([\d.]+),', svg)
+    for kind, x, words in re.findall(r'<text class="small( end)?" x="([\d.]+)"[^>]*>([^<]*)<', svg):
+        ends = sorted((float(x), float(x) + (-6.0 if kind else 6.0) * len(words)))
+        assert not ends[0] < float(line) < ends[1], words
+    (square,) = {*re.findall(r'<(\w+) class="bar b1"', svg)}
+    assert square == "rect"
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [(0.0, "0"), (29.2, "29.20"), (24.45, "24.45"), (1234.5, "1234"), (2e-5, "2.000·10⁻⁵")],
+)
+def test_cells_have_four_digits(value, words):
+    (shown, exact, _), *_ = Table("k", "t", "", ("a",), ((value,), (0.5,))).cells()[0]
+    assert (shown, exact) == (words, repr(value))
+
+
+def test_columns_of_whole_numbers_have_no_decimals():
+    cells = Table("k", "t", "", ("a", "b"), ((200_000, 9.0), (None, 12.0))).cells()
+    assert [[shown for shown, *_ in row] for row in cells] == [["200000", "9"], ["-", "12"]]
+
+
+def test_an_index_is_lowered():
+    svg = str(next(each for each in charts_of(world.report()) if each.key == "profile"))
+    assert "R_d" not in svg
+    assert '2π r R<tspan class="index" dy="3">d</tspan><tspan dy="-3"> (1/mm)</tspan>' in svg
+
+
 def test_a_page_knows_itself(tmp_path):
     ours, other = tmp_path / "a.html", tmp_path / "b.html"
     ours.write_text(world.text(), encoding="utf-8")
@@ -337,11 +412,9 @@ def test_the_table_begins_with_the_front_of_the_first_picture():
 
 
 def test_one_channel_is_grey():
-    text = cli_world.WAX.replace("eta", 'channels = ["grey"]\neta', 1)
-    text = re.sub(r"\[([\d.]+), [\d.]+, [\d.]+\]", r"[\1]", text)
-    grey = simulate_exact(parse_material(text, "grey.toml"), threads=1)
-    made = make_report(grey, only=["disk"], side=16, threads=1)
-    assert made.to_dict()["kernels"][0]["albedo"] == [pytest.approx(grey.diffuse_reflectance[0])]
+    made = world.grey()
+    reflectance = made.profile.diffuse_reflectance[0]
+    assert made.to_dict()["kernels"][0]["albedo"] == [pytest.approx(reflectance)]
     assert "grey" in page(made)
 
 

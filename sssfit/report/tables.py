@@ -7,6 +7,7 @@ from typing import Any
 from sssfit.arrays import plain_value
 from sssfit.compare.comparison import Comparison, KernelRow
 from sssfit.compare.convergence import Convergence
+from sssfit.report.charts.svg import digits
 from sssfit.report.record import COST, ERROR, Report
 
 
@@ -30,15 +31,26 @@ class Table:
 
     def cells(self) -> list[list[tuple[str, str, bool]]]:
         """Return what is shown of each cell, its exact value, and whether it is a number."""
-        return [[_cell(each) for each in row] for row in self.rows]
+        are_whole = [all(map(_is_whole, column)) for column in zip(*self.rows, strict=True)]
+        return [[_cell(*each) for each in zip(row, are_whole, strict=True)] for row in self.rows]
 
 
-def _cell(value: Any) -> tuple[str, str, bool]:
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _is_whole(value: Any) -> bool:
+    """Return whether a value asks for no decimals: what is no number does not."""
+    return not _is_number(value) or float(value).is_integer()
+
+
+def _cell(value: Any, is_whole: bool) -> tuple[str, str, bool]:
+    """Return a cell; numbers of a column have four digits, or are all whole ones."""
     if value is None:
         return "-", "", False
-    if isinstance(value, bool) or not isinstance(value, int | float):
+    if not _is_number(value):
         return str(value), str(value), False
-    return f"{value:.4g}", repr(value), True
+    return f"{value:.0f}" if is_whole else digits(value), repr(value), True
 
 
 def tables_of(report: Report) -> list[Table]:

@@ -3,32 +3,60 @@
 from markupsafe import Markup
 
 from sssfit.compare.budget import Budget
-from sssfit.report.charts.svg import WIDTH, Axis, Chart, limits, picture
+from sssfit.report.charts.svg import (
+    WIDTH,
+    Axis,
+    Chart,
+    limits,
+    line_of,
+    picture,
+    text_of,
+    written,
+)
 from sssfit.report.record import Report
 
-_ROW, _TOP, _LEFT = 34.0, 12.0, 188.0
-_LEAST = 1e-4  # Delta E that stands for 0 on a logarithmic axis
+_ROW, _TOP, _LEFT, _RIGHT = 38.0, 8.0, 188.0, WIDTH - 58.0
+_FOOT = 48.0  # of the axis' numbers and name
+_SIZE = 4.5  # half of a mark
+_APART, _DIGIT = 10.0, 7.5  # a figure from its mark's middle, and width of a digit on a phone
+_LEAST = 1e-4  # Delta E: smaller ones stand at the left end
+_NOTICED = 1.0
 
 
 def budget_chart(report: Report) -> Chart | None:
-    """Draw the mean Delta E of each cause as a bar, for every picture."""
+    """Draw the mean Delta E of each cause as a mark on a logarithmic axis, for every picture."""
     if not report.budgets:
         return None
     names = _names(report.budgets[0])
     values = [[_value(each, name) for name in names] for each in report.budgets]
-    low, high = limits([v for each in values for v in each], is_log=True, decades=4.0)
-    x = Axis(low, high, _LEFT, WIDTH - 50.0, is_log=True)
-    parts: list[Markup] = []
+    every = [max(each, _LEAST) for own in values for each in own]
+    low, high = limits([*every, _NOTICED], is_log=True)
+    x = Axis(max(low, _LEAST), high, _LEFT, _RIGHT, is_log=True)
+    parts = _scale(x, _TOP + _ROW * len(names))
     for row, name in enumerate(names):
-        parts += _bars(x, _TOP + _ROW * row, name, [each[row] for each in values])
+        parts += _marks(x, _TOP + _ROW * row, name, [each[row] for each in values])
     legend = tuple((f"b{k}", each.scene.name) for k, each in enumerate(report.budgets))
     words = (
-        "Mean ΔE 2000 of each cause alone, for a separable kernel of rank 3; bars are "
-        "logarithmic, since causes differ by powers of ten."
+        "Mean ΔE 2000 of each cause alone, for a separable kernel of rank 3; dashed: ΔE 1, just "
+        "noticeable."
     )
-    describe = "Mean Delta E of each cause of the error"
-    svg = picture(parts, _TOP + _ROW * len(names) + 8.0, describe)
+    describe = "Mean Delta E of each cause of the error, on a logarithmic axis"
+    svg = picture(parts, _TOP + _ROW * len(names) + _FOOT, describe)
     return Chart("budget", "Error budget", words, legend, (("", svg),))
+
+
+def _scale(x: Axis, low: float) -> list[Markup]:
+    """Return the axis under the rows, with a line through them at each of its numbers."""
+    parts = []
+    for value in x.ticks():
+        at = x.place(value)
+        parts.append(line_of([(at, _TOP), (at, low)], "grid"))
+        parts.append(text_of(at, low + 16.0, written(value), "tick middle"))
+    noticed = x.place(_NOTICED)
+    parts.append(line_of([(noticed, _TOP), (noticed, low)], "noticed"))
+    parts.append(line_of([(x.begin, _TOP), (x.begin, low), (x.end, low)], "axis"))
+    name = "mean ΔE 2000, logarithmic"
+    return [*parts, text_of(0.5 * (x.begin + x.end), low + 40.0, name, "name middle")]
 
 
 def _names(budget: Budget) -> list[str]:
@@ -39,17 +67,36 @@ def _names(budget: Budget) -> list[str]:
 def _value(budget: Budget, name: str) -> float:
     every = (*budget.causes, budget.interaction, budget.whole)
     cause = next(each for each in every if each.name == name)
-    return max(float(cause.score.delta_e_2000_mean), _LEAST)
+    return float(cause.score.delta_e_2000_mean)
 
 
-def _bars(x: Axis, top: float, name: str, values: list[float]) -> list[Markup]:
-    """Return the name of a cause and a bar for each picture."""
-    text = Markup('<text class="{}" x="{:.1f}" y="{:.1f}">{}</text>')
-    parts = [text.format("tick end", _LEFT - 8.0, top + 15.0, name)]
-    high = (_ROW - 8.0) / len(values)
+def _marks(x: Axis, top: float, name: str, values: list[float]) -> list[Markup]:
+    """Return the name of a cause, and a mark with its figure for each picture."""
+    parts = [text_of(_LEFT - 8.0, top + 0.5 * _ROW + 4.0, name, "tick end")]
+    high = (_ROW - 6.0) / len(values)
     for k, value in enumerate(values):
-        y, end = top + k * high, x.place(value)
-        bar = '<rect class="bar b{}" x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}"/>'
-        parts.append(Markup(bar).format(k, _LEFT, y, max(end - _LEFT, 1.0), high - 1.0))
-        parts.append(text.format("small", end + 5.0, y + high - 2.5, f"{value:.2g}"))
+        at, y = x.place(max(value, x.low)), top + 3.0 + (k + 0.5) * high
+        parts.append(_mark(at, y, k))
+        place, kind = _beside(at, _figure(value), x.place(_NOTICED))
+        parts.append(text_of(place, y + 4.0, _figure(value), kind))
     return parts
+
+
+def _beside(at: float, words: str, noticed: float) -> tuple[float, str]:
+    """Return where a mark's figure stands: right of it, but left where the dashed line would be."""
+    begin = at + _APART
+    is_crossed = begin - 2.0 < noticed < begin + _DIGIT * len(words)
+    return (at - _APART, "small end") if is_crossed else (begin, "small")
+
+
+def _mark(x: float, y: float, k: int) -> Markup:
+    """Return a disk for the first picture and a square for others: not the colour alone tells."""
+    if k == 0:
+        return Markup('<circle class="bar b0" cx="{:.1f}" cy="{:.1f}" r="{}"/>').format(x, y, _SIZE)
+    square = '<rect class="bar b{}" x="{:.1f}" y="{:.1f}" width="{}" height="{}"/>'
+    return Markup(square).format(k, x - _SIZE, y - _SIZE, 2.0 * _SIZE, 2.0 * _SIZE)
+
+
+def _figure(value: float) -> str:
+    """Return a Delta E, which has no digits where its mark is not at its place."""
+    return f"{value:#.2g}" if value >= _LEAST else f"< {_LEAST:g}" if value > 0.0 else "0"

@@ -2,11 +2,17 @@
 
 import numpy as np
 
+from sssfit.profile import Profile
 from sssfit.profile.bins import Bins, merged
 from sssfit.report.charts.svg import Chart, Plot, limits
 from sssfit.report.record import Report
 
-KINDS = ("c0", "c1", "c2")
+_KINDS = ("c0", "c1", "c2")
+
+
+def kinds_of(profile: Profile) -> tuple[str, ...]:
+    """Return the class of each channel's line: one channel alone is no red."""
+    return _KINDS if profile.n_channels > 1 else ("grey",)
 
 
 def profile_chart(report: Report) -> Chart:
@@ -22,9 +28,10 @@ def profile_chart(report: Report) -> Chart:
         log=(False, True),
         describe="Diffuse reflectance profile over the radius, by channel",
     )
-    for kind, each in zip(KINDS, bins, strict=False):
+    kinds = kinds_of(profile)
+    for kind, each in zip(kinds, bins, strict=True):
         _draw(plot, each, kind)
-    legend = tuple(zip(KINDS, profile.channels, strict=False))
+    legend = tuple(zip(kinds, profile.channels, strict=True))
     note = (
         "Energy that leaves the surface at a radius; bands show one standard error of a walk, or a "
         "solver's estimate, which may be thinner than the line."

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sssfit.report.charts.profile import KINDS
+from sssfit.report.charts.profile import kinds_of
 from sssfit.report.charts.svg import Chart, Plot, limits
 from sssfit.report.record import Report
 
@@ -21,8 +21,9 @@ def spectrum_chart(report: Report) -> Chart:
         log=(False, True),
         describe="Error of the best separable kernel over its number of terms, by channel",
     )
-    for kind, own in zip(KINDS, errors.T, strict=False):
+    kinds = kinds_of(report.profile)
+    for kind, own in zip(kinds, errors.T, strict=True):
         plot.curve(terms.tolist(), np.where(own > 0.0, own, np.nan).tolist(), kind)
-    legend = tuple(zip(KINDS, report.profile.channels, strict=False))
+    legend = tuple(zip(kinds, report.profile.channels, strict=True))
     note = "The error of the best sum of so many separable terms: a singular value decomposition."
     return Chart("spectrum", "Singular values", note, legend, (("", plot.svg()),))

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import re
 from collections.abc import Callable, Iterable, Sequence
 
 from markupsafe import Markup, escape
@@ -12,6 +13,7 @@ _LEFT, _RIGHT, _TOP, _BOTTOM = 74.0, 14.0, 14.0, 48.0
 _TICKS = 6
 _ROOM = 0.05  # of an axis, beyond the values at either end
 _LEAST = 1e-30  # stands for 0 on a logarithmic axis
+_INDEX = re.compile(r"(?<=\bR)_(\w)\b")
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -147,8 +149,7 @@ class Plot:
 
     def text(self, x: float, y: float, words: str, kind: str, more: Markup | str = "") -> None:
         """Add words at a place."""
-        head = Markup('<text class="{}" x="{:.1f}" y="{:.1f}"{}>').format(kind, x, y, more)
-        self.parts.append(head + escape(words) + Markup("</text>"))
+        self.parts.append(text_of(x, y, words, kind, more))
 
     def add(self, part: Markup) -> None:
         """Add what is drawn elsewhere."""
@@ -165,13 +166,36 @@ def line_of(points: Iterable[tuple[float, float]], kind: str) -> Markup:
     return Markup('<polyline class="{}" points="{}"/>').format(kind, path)
 
 
+def text_of(x: float, y: float, words: str, kind: str, more: Markup | str = "") -> Markup:
+    """Return words at a place; a letter after an underscore is an index, as of R_d."""
+    head = Markup('<text class="{}" x="{:.1f}" y="{:.1f}"{}>').format(kind, x, y, more)
+    lowered = Markup('<tspan class="index" dy="3">{}</tspan><tspan dy="-3">{}</tspan>')
+    first, *rest = _INDEX.split(words)
+    indexed = (lowered.format(*pair) for pair in zip(rest[::2], rest[1::2], strict=True))
+    return head + escape(first) + Markup("").join(indexed) + Markup("</text>")
+
+
 def written(value: float) -> str:
     """Return a value as an axis has it: powers of ten beyond three zeros raised."""
     if value == 0.0 or 1e-3 <= abs(value) < 1e4:
         return f"{value:.4g}"
     mantissa, exponent = f"{value:.3e}".split("e")
-    power = f"10{str(int(exponent)).translate(_RAISED)}"
+    power = _power(exponent)
     return power if float(mantissa) == 1.0 else f"{float(mantissa):g}·{power}"
+
+
+def digits(value: float) -> str:
+    """Return a value with four digits, zeros at its end among them."""
+    if value == 0.0:
+        return "0"
+    if 1e-4 <= abs(value) < 9999.5:
+        return f"{value:#.4g}".rstrip(".")
+    mantissa, exponent = f"{value:.3e}".split("e")
+    return f"{mantissa}·{_power(exponent)}"
+
+
+def _power(exponent: str) -> str:
+    return f"10{str(int(exponent)).translate(_RAISED)}"
 
 
 def picture(parts: Iterable[Markup], height: float, describe: str, role: str = "img") -> Markup:
