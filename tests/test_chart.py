@@ -386,6 +386,35 @@ def test_a_material_is_drawn_by_its_coefficients():
     assert words.endswith("1 clear layer without absorption or scattering.")
 
 
+def test_equal_layers_lie_side_by_side_and_are_points_in_the_legend_too():
+    same = tuple(Layer(1.4, 0.0, [0.1], [1.0], 0.1) for _ in range(7))
+    figure = material_figure(Material("same", ("a",), same))
+    for axes in figure.axes:
+        left, right = axes.get_xlim()
+        places = sorted({round(float(each.get_xdata()[0]), 6) for each in axes.lines})
+        assert len(places) == 7
+        assert left < places[0] < places[-1] < right
+    (legend,) = legends_of(figure)
+    assert [each.get_linestyle() for each in legend.get_lines()] == ["None"] * 7
+    assert len({each.get_marker() for each in legend.get_lines()}) == 7
+    assert "Not drawn" not in words_of(figure)
+
+
+@pytest.mark.parametrize(("count", "told"), [(8, "1 layer (4)"), (12, "5 layers (2, 4, 6, 9, 11)")])
+def test_layers_that_are_not_drawn_are_named(count, told):
+    layers = tuple(Layer(1.4, 0.0, [0.1 + k], [1.0], 0.1) for k in range(count))
+    words = words_of(material_figure(Material("many", ("a",), layers)))
+    assert f"Not drawn: {told}" in words
+
+
+def test_a_labelled_minor_tick_has_a_mark():
+    figure = material_figure(load_material("skin1"))
+    axes = figure.axes[1]  # less than a decade of mean free paths
+    ticks = [each for each in axes.yaxis.get_minor_ticks() if each.label1.get_text()]
+    assert ticks
+    assert all(each.tick1line.get_markersize() > 0.0 for each in ticks)
+
+
 def odd_materials():
     wavelengths = [f"{400 + 5 * k} nm" for k in range(64)]
     channels = ("near-infrared-850nm", "Wm@$漢" * 10)

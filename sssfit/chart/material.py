@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from sssfit.chart.page import (
-    COLOURS,
     LINE_STYLES,
+    SHADES,
     Style,
     add_legend,
     drawable,
@@ -25,10 +25,12 @@ from sssfit.messages import counted
 HEIGHT_INCHES = 3.9
 _LETTERS = 20  # letters of channel names that fit side by side under a panel
 _MOST_NAMES = 12  # number of names that fit there upright
-_MOST_LAYERS = 6
+_MOST_LAYERS = 7
 _FEW_CHANNELS = 4  # up to this many channels are points, more are lines
-_MARKERS = "os^Dv<"
-_SHADES = (*COLOURS, "#cc79a7", "#444444", "#e69f00")
+_MARKERS = "os^Dv<>"
+# Layers lie side by side in a channel, so that equal ones can be seen: distance between two of
+# them, and the most that all of them take, in channels.
+_APART, _MOST_APART = 0.2, 0.6
 
 
 def material_figure(material: Material) -> Figure:
@@ -37,7 +39,7 @@ def material_figure(material: Material) -> Figure:
     Parameters
     ----------
     material : Material
-        If it has more than six layers, the first, the last and some between are drawn; clear ones
+        If it has more than seven layers, the first, the last and some between are drawn; clear ones
         are omitted.
 
     Returns
@@ -54,14 +56,16 @@ def material_figure(material: Material) -> Figure:
     names = [shortened(each) for each in material.channels]
     height = HEIGHT_INCHES + (0.07 * max(map(len, names)) if _are_upright(names) else 0.0)
     with new_page(height, title, _subtitle(material), notes) as (figure, below):
-        handles = [Line2D([], [], **_style(k)) for k in range(len(shown))]
+        count = len(names)
+        handles = [Line2D([], [], **_style(k, count)) for k in range(len(shown))]
         below = add_legend(below, handles, [_label(material, each) for each in shown])
         panels = below.subplots(1, 3)
         for axes in panels:
             axes.set_yscale("log")
-        for k, layer in enumerate(shown):
-            _draw_layer(panels, material.layers[layer], k)
-        titles = ("(a) sigma_s' and, hollow, sigma_a", "(b) mean free path", "(c) 1 - albedo")
+        for k, (layer, shift) in enumerate(zip(shown, _shifts(len(shown), count), strict=True)):
+            _draw_layer(panels, material.layers[layer], k, shift)
+        filled_or_hollow = "(a) scattering σₛ' (filled)\nand absorption σₐ (hollow)"
+        titles = (filled_or_hollow, "(b) mean free path", "(c) 1 - albedo")
         units = ("1/mm", "mm", "1 - albedo")
         for axes, title, unit in zip(panels, titles, units, strict=True):
             name_axes(axes, title, "channel", unit)
@@ -88,18 +92,30 @@ def _label(material: Material, index: int) -> str:
     return f"layer {index + 1}: {thickness}, eta {layer.eta:g}"
 
 
-def _style(place: int) -> Style:
+def _style(place: int, channels: int) -> Style:
     """Return colour, marker and dashes of a layer, distinguishable without colour too."""
+    is_line = channels > _FEW_CHANNELS
     return {
-        "color": _SHADES[place],
+        "color": SHADES[place],
         "marker": _MARKERS[place],
-        "markersize": 4.5,
-        "linestyle": LINE_STYLES[place % len(LINE_STYLES)],
+        "markersize": 4.5 if _has_room(channels) else 2.0,
+        "linestyle": LINE_STYLES[place % len(LINE_STYLES)] if is_line else "",
         "lw": 0.9,
     }
 
 
-def _draw_layer(panels: Sequence[Axes], layer: Layer, place: int) -> None:
+def _has_room(channels: int) -> bool:
+    """Return whether there is room between channels for large markers and for shifts."""
+    return channels <= 2 * _FEW_CHANNELS
+
+
+def _shifts(layers: int, channels: int) -> list[float]:
+    """Return how far to the right of a channel each layer is drawn, in channels."""
+    apart = min(_APART, _MOST_APART / max(layers - 1, 1)) if _has_room(channels) else 0.0
+    return [apart * (k - 0.5 * (layers - 1)) for k in range(layers)]
+
+
+def _draw_layer(panels: Sequence[Axes], layer: Layer, place: int, shift: float) -> None:
     """Draw a layer's points into the three panels."""
     coefficients, path, absorption = panels
     for axes, values, is_hollow in (
@@ -108,15 +124,11 @@ def _draw_layer(panels: Sequence[Axes], layer: Layer, place: int) -> None:
         (path, layer.mean_free_path_mm, False),
         (absorption, 1.0 - layer.albedo, False),
     ):
-        style = _style(place)
-        if len(values) <= _FEW_CHANNELS:
-            style["lw"] = 0
-        elif len(values) > 2 * _FEW_CHANNELS:
-            style["markersize"] = 2.0
+        style = _style(place, len(values))
         if is_hollow:
             style["mfc"] = "white"
         is_drawn = (values > 0.0) & np.isfinite(values) & (layer.sigma_t_per_mm > 0.0)
-        axes.plot(np.arange(len(values)), np.where(is_drawn, values, np.nan), **style)
+        axes.plot(np.arange(len(values)) + shift, np.where(is_drawn, values, np.nan), **style)
 
 
 def _are_upright(names: Sequence[str]) -> bool:
@@ -130,7 +142,8 @@ def _name_channels(axes: Axes, names: Sequence[str]) -> None:
     shown = spread(len(names), _MOST_NAMES) if is_upright else range(len(names))
     rotation = 90 if is_upright else 0
     axes.set_xticks(shown, [drawable(names[k]) for k in shown], rotation=rotation)
-    axes.margins(x=max(0.5 / len(names), 0.04))
+    beside = max(0.5, 0.04 * len(names))
+    axes.set_xlim(-beside, len(names) - 1.0 + beside)
 
 
 def _limit(axes: Axes) -> None:
@@ -147,13 +160,23 @@ def _limit(axes: Axes) -> None:
 def _notes(material: Material, shown: Sequence[int]) -> list[str]:
     """Return the notes on the panels and on omitted layers."""
     notes = [
-        "sigma_s' = (1 - g) sigma_s. Mean free path: 1 / (sigma_a + sigma_s'). Albedo: sigma_s / "
-        "(sigma_a + sigma_s). What is 0 has no point."
+        "σₛ' = (1 - g) σₛ. Mean free path: 1 / (σₐ + σₛ'). Albedo: σₛ / (σₐ + σₛ). Values "
+        "of 0 have no point."
     ]
-    clear = sum(layer.is_clear for layer in material.layers)
-    left_out = len(material.layers) - clear - len(shown)
+    clear = [k for k, layer in enumerate(material.layers) if layer.is_clear]
+    left_out = sorted({*range(len(material.layers))} - {*clear, *shown})
     if clear:
-        notes.append(f"{counted(clear, 'clear layer')} without absorption or scattering.")
+        notes.append(f"{counted(len(clear), 'clear layer')} without absorption or scattering.")
     if left_out:
-        notes.append(f"{left_out} more layers are not drawn.")
+        notes.append(f"Not drawn: {counted(len(left_out), 'layer')} ({_ranges(left_out)}).")
     return notes
+
+
+def _ranges(indices: Sequence[int]) -> str:
+    """Return ascending indices as numbers from 1, those that follow each other as one range."""
+    starts = [k for k in indices if k - 1 not in indices]
+    ends = [k for k in indices if k + 1 not in indices]
+    return ", ".join(
+        f"{first + 1}" if first == last else f"{first + 1} to {last + 1}"
+        for first, last in zip(starts, ends, strict=True)
+    )

@@ -74,6 +74,8 @@ RC: Style = {
 }
 # Vermillion, bluish green and blue of Okabe and Ito 2008, "Color Universal Design".
 COLOURS = ("#d55e00", "#009e73", "#0072b2")
+# For more than three: their reddish purple, orange and sky blue too, and a dark grey.
+SHADES = (*COLOURS, "#cc79a7", "#444444", "#e69f00", "#56b4e9")
 LINE_STYLES: tuple[Any, ...] = ("-", (0, (4, 1.6)), (0, (6, 1.6, 1.2, 1.6)), (0, (1.2, 1.4)))
 
 
@@ -259,6 +261,8 @@ def tick_decades(axis: Axis, most: int) -> None:
     is_seen = is_short or isinstance(axis, XAxis)
     axis.set_minor_locator(LogLocator(subs=(2, 5)) if is_seen else NullLocator())
     axis.set_minor_formatter("{x:g}" if is_short else NullFormatter())
+    if is_short:
+        axis.set_tick_params(which="minor", length=2.0, width=0.6)  # a label needs its mark
 
 
 def name_axes(axes: Axes, title: str, x_label: str, y_label: str) -> None:
