@@ -21,6 +21,7 @@ from sssfit.chart.page import (
     LINE_WIDTH,
     Style,
     add_legend,
+    drawable,
     name_axes,
     new_mosaic,
     new_page,
@@ -53,23 +54,25 @@ def taps_figure(view: TapsView) -> Figure:
     matplotlib.figure.Figure
         8 inches wide: the picture of one lit pixel after each stage, its brightness over six
         decades; below it, along the axis, what each stage adds in the channel that reaches
-        farthest, and the sum of all channels beside the profile's kernel, where it is known.
+        farthest, and the sum of all channels beside the profile's kernel, where it is known. Stages
+        that add nothing, whose light only later ones read, are not drawn.
     """
     taps = view.taps
-    count = len(view.stages)
-    pictures = count + (view.truth is not None)
+    shown = _shown_stages(view)
+    pictures = len(shown) + (view.truth is not None)
     rows = math.ceil(pictures / _MOST_COLUMNS)
     columns = math.ceil(pictures / rows)
-    side = 7.8 / columns  # of a picture, in inches
+    side = min(7.8 / columns, 3.9)  # of a picture, in inches
     height = 4.4 + side * 1.1 * rows
     with new_page(height, _title(view), _subtitle(view), _notes(view)) as (figure, below):
         upper, lower = cast(Any, below.subfigures(2, height_ratios=(side * 1.1 * rows, 3.2)))
         _draw_pictures(upper, view, columns, rows)
-        labels = ["irradiance", *(f"stage {k}" for k in range(1, count))]
-        handles = [Line2D([], [], **_stage_style(k, count)) for k in range(count)]
-        handles.append(Line2D([], [], **_TRUE))
-        known = view.truth is not None
-        lower = add_legend(lower, handles[: count + known], [*labels, "profile"][: count + known])
+        labels = ["irradiance" if k == 0 else f"stage {k}" for k in shown]
+        handles = [Line2D([], [], **_stage_style(k, len(view.stages))) for k in shown]
+        if view.truth is not None:
+            labels.append("profile")
+            handles.append(Line2D([], [], **_TRUE))
+        lower = add_legend(lower, handles, labels)
         left, right = lower.subplots(1, 2, sharex=True, sharey=True)
         widest = _widest(view)
         name = shortened(taps.channels[widest])
@@ -104,11 +107,30 @@ def _notes(view: TapsView) -> list[str]:
         f"Pictures: one lit pixel in the middle of {side:.3g} mm after each stage; brightness is "
         f"the logarithm over {_DECADES} decades."
     ]
+    distance = "the distance of the stage's farthest tap"
+    notes.append(f'Over the pictures: "to", {distance}{_sizes(view)}.')
+    if still := [k for k in range(len(view.stages)) if k not in _shown_stages(view)]:
+        names = ", ".join("irradiance" if k == 0 else f"stage {k}" for k in still)
+        notes.append(f"Weight 0 in the sum, so not drawn: {names}.")
     if len(view.channels) not in (1, _COLOURS):
         notes.append(f"Pictures show {shortened(view.channels[_widest(view)])}.")
     if (left := len(view.channels) - _COLOURS) > 0:
         notes.append(f"(b) leaves out {counted(left, 'channel')} between those drawn.")
     return notes
+
+
+def _sizes(view: TapsView) -> str:
+    """Explain the sizes of pixels in the stages' titles, if there are any."""
+    levels = [view.taps.stages[k - 1].level for k in _shown_stages(view) if k > 0]
+    least = min((each for each in levels if each > 0), default=0)
+    times = "twice" if least == 1 else f"{2**least} times"
+    return f'; "1/{2**least}", on pixels {times} as large' if least else ""
+
+
+def _shown_stages(view: TapsView) -> list[int]:
+    """Return the stages that add to the sum, 0 for the irradiance; all if none does."""
+    adds = np.flatnonzero((view.taps.blend != 0.0).any(axis=1)).tolist()
+    return adds or list(range(len(view.stages)))
 
 
 def _widest(view: TapsView) -> int:
@@ -125,11 +147,12 @@ def _shown_pixels(view: TapsView) -> int:
 
 
 def _draw_pictures(upper: SubFigure, view: TapsView, columns: int, rows: int) -> None:
-    """Draw the sum of the first stages, for each number of them."""
+    """Draw the sum of the first stages, for each number of them that adds something."""
+    shown = _shown_stages(view)
     middle, half, widest = view.half_pixels, _shown_pixels(view), _widest(view)
     kept = slice(middle - half, middle + half + 1)
-    sums = list(np.cumsum(view.stages[:, kept, kept], axis=0))
-    texts = ["irradiance", *_stage_texts(view)]
+    sums = list(np.cumsum(view.stages[shown][:, kept, kept], axis=0))
+    texts = [_stage_text(view, k) for k in shown]
     if view.truth is not None:
         true = view.truth[: half + 1, : half + 1]
         sums.append(np.stack([full_kernel(true[:, :, c]) for c in range(true.shape[2])], axis=2))
@@ -140,16 +163,17 @@ def _draw_pictures(upper: SubFigure, view: TapsView, columns: int, rows: int) ->
     for k, each in enumerate(sums):
         x, y = k % columns * 1.05, k // columns * (1.0 + gap) + gap
         put_picture(axes, x, y, _shaded(each, top, widest))
-        axes.text(x, y - 0.03, texts[k], fontsize=7.5, va="bottom")
+        text = f"+ {texts[k]}" if 0 < k < len(shown) else texts[k]
+        axes.text(x, y - 0.03, text, fontsize=7.5, va="bottom")
 
 
-def _stage_texts(view: TapsView) -> list[str]:
-    """Return each stage's place and width in words."""
-    found = []
-    for k, stage in enumerate(view.taps.stages, 1):
-        size = f", 1/{2**stage.level}" if stage.level else ""
-        found.append(f"+ stage {k}: to {float(stage.offsets_mm.max()):.2g} mm{size}")
-    return found
+def _stage_text(view: TapsView, place: int) -> str:
+    """Return a stage's place and width in words."""
+    if place == 0:
+        return "irradiance"
+    stage = view.taps.stages[place - 1]
+    size = f", 1/{2**stage.level}" if stage.level else ""
+    return f"stage {place}: to {float(stage.offsets_mm.max()):.2g} mm{size}"
 
 
 def _shaded(light: FloatArray, top: float, channel: int) -> FloatArray:
@@ -165,22 +189,28 @@ def _shaded(light: FloatArray, top: float, channel: int) -> FloatArray:
 
 
 def _stage_style(stage: int, stages: int) -> Style:
-    """Return colour and dashes of a stage, distinguishable without colour too."""
+    """Return colour and dashes of a stage, distinguishable without colour too.
+
+    The irradiance is one point, because it lights one pixel.
+    """
     # The last tenth of viridis is too light on white.
     colour = mpl.colormaps["viridis"](0.9 * stage / (stages - 1))
+    if stage == 0:
+        return {"color": colour, "linestyle": "", "marker": "o", "markersize": 3.5}
     return {"color": colour, "linestyle": LINE_STYLES[stage % len(LINE_STYLES)], "lw": LINE_WIDTH}
 
 
 def _draw_stages(axes: Axes, view: TapsView, channel: int) -> None:
     middle = view.half_pixels
     distance = np.arange(middle + 1) * view.taps.mm_per_pixel
-    for k, each in enumerate(view.stages[:, middle, middle:, channel]):
+    top = float(view.stages.sum(axis=0).max())
+    for k in _shown_stages(view):
+        each = view.stages[k, middle, middle:, channel]
         seen = np.where(each > 0.0, each, np.nan)
-        marker: Style = {"marker": "o", "markersize": 3.5} if k == 0 else {}
-        axes.plot(distance, seen, **_stage_style(k, len(view.stages)), **marker)
+        is_inside = k == 0 and each[0] > top * 10.0**-_DECADES  # the point is whole on the axis
+        axes.plot(distance, seen, clip_on=not is_inside, **_stage_style(k, len(view.stages)))
     if view.truth is not None:
         axes.plot(distance, view.truth[0, :, channel], **_TRUE)
-    top = float(view.stages.sum(axis=0).max())
     axes.set_yscale("log", nonpositive="clip")
     axes.set_ylim(top * 10.0**-_DECADES, 3.0 * top)
     axes.set_xlim(0.0, distance[_shown_pixels(view)])
@@ -194,21 +224,10 @@ def _draw_sums(axes: Axes, view: TapsView) -> None:
     count = len(view.channels)
     drawn = np.linspace(0, count - 1, min(count, _COLOURS)).round().astype(int)
     lines = view.stages.sum(axis=0)[middle, middle:][:, drawn].T
-    widths = (lines >= 1e-4 * lines[:, :1]).sum(axis=1) * (lines[:, 0] > 0.0)
-    rank = np.argsort(np.argsort(-widths, kind="stable")).tolist()
     for k, (c, line) in enumerate(zip(drawn.tolist(), lines, strict=True)):
         style: Style = {"color": COLOURS[k], "linestyle": LINE_STYLES[k], "lw": LINE_WIDTH}
-        axes.plot(distance, np.where(line > 0.0, line, np.nan), **style)
-        # Each name on its own decade, the widest on the highest: lines of one width would have all
-        # names in one place.
-        is_above = line >= 0.01 * 0.1 ** rank[k] * line[0]
-        place = min(int(np.count_nonzero(is_above)), middle)
-        axes.annotate(
-            shortened(view.channels[c]),
-            (distance[place], line[place]),
-            xytext=(4, 3),
-            textcoords="offset points",
-            color=COLOURS[k],
-        )
+        name = drawable(shortened(view.channels[c]))
+        axes.plot(distance, np.where(line > 0.0, line, np.nan), label=name, **style)
         if view.truth is not None:
             axes.plot(distance, view.truth[0, :, c], **_TRUE)
+    axes.legend(loc="upper right", handlelength=2.8, labelspacing=0.35)
