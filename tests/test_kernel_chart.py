@@ -12,7 +12,7 @@ from reference_pixels import make_profile, one_over_r_centre_pixel, one_over_r_p
 from scipy.integrate import dblquad
 from turns import mostly_slow
 
-from sssfit.chart.kernel import kernel_figure
+from sssfit.chart.kernel import _percent, kernel_figure
 from sssfit.chart.page import save_figure
 from sssfit.cli import main
 from sssfit.compare import view_kernel
@@ -262,7 +262,52 @@ def test_the_table_has_the_figures(figure, view):
     for c in range(3):
         assert f"{view.energy[c]:.5f}" in texts
         assert f"{100 * view.relative_frobenius_error[c]:.2g} %" in texts
-        assert f"{100 * view.misplaced[c]:.2g} %" in texts
+        assert f"{100 * view.misplaced[c]:#.2g}".rstrip(".") + " %" in texts
+
+
+@pytest.mark.parametrize(
+    ("share", "text"),
+    [
+        (0.01, "1.0 %"),
+        (-0.053, "-5.3 %"),
+        (0.207, "21 %"),
+        (0.996, "100 %"),
+        (12.0, "1200 %"),
+        (1e-7, "<0.0001 %"),
+        (math.nan, "unknown"),
+    ],
+)
+def test_shares_have_two_digits(share, text):
+    assert _percent(share) == text
+
+
+def test_channels_that_are_not_drawn_and_grey_are_told():
+    profile = one_over_r_profile(60, 0.1, np.linspace(0.4, 1.0, 5))
+    kernel = fit_svd(profile, rank=1, mm_per_pixel="profile", support_mm=9.0).kernel
+    words = words_of(kernel_figure(view_kernel(kernel, profile)))
+    assert "Not drawn: 2 channels." in words
+    assert "Images are grey where there is no light." in words
+    only = words_of(kernel_figure(view_kernel(kernel, channels=["c1"])))
+    assert "Not drawn: 4 channels." in only
+
+
+def test_nothing_is_said_of_what_is_not_there(figure):
+    assert "Not drawn" not in words_of(figure)
+
+
+def test_long_names_stand_beside_the_images():
+    profile = one_over_r_profile(60, 0.1, LENGTHS_MM)
+    names = ["near-infrared-850nm", "G", "B"]
+    long = make_profile(
+        profile.r_edges_mm, profile.annulus_energy, meta=dict(profile.meta) | {"channels": names}
+    )
+    kernel = fit_svd(long, rank=1, mm_per_pixel="profile").kernel
+    drawn = panels(kernel_figure(view_kernel(kernel, long)), "profile")
+    assert [each.get_ylabel() for each in drawn] == [
+        "near-…-850nm\ny (mm)",
+        "G\ny (mm)",
+        "B\ny (mm)",
+    ]
 
 
 def odd_views():

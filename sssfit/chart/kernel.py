@@ -35,6 +35,7 @@ from sssfit.chart.page import (
     add_table,
     draw_plane,
     draw_steps,
+    drawable,
     name_axes,
     new_page,
     signed_norm,
@@ -120,7 +121,12 @@ def _table(view: KernelView) -> tuple[list[str], list[tuple[str, list[str]]]]:
 def _percent(share: float) -> str:
     if math.isnan(share):
         return "unknown"
-    return "<0.0001 %" if abs(share) < 1e-6 else f"{100.0 * share:.2g} %"
+    if abs(share) < 1e-6:
+        return "<0.0001 %"
+    percent = 100.0 * share
+    if abs(percent) >= 99.5:  # two digits would need an exponent
+        return f"{percent:.0f} %"
+    return f"{percent:#.2g}".rstrip(".") + " %"
 
 
 def _term_labels(view: KernelView) -> list[str]:
@@ -172,15 +178,20 @@ def _scale_passes(axes: Axes, values: FloatArray) -> None:
         tick_decades(axes.yaxis, 6)
     else:
         axes.set_yscale("symlog", linthresh=least, linscale=0.5)
-        axes.set_ylim(min(2.0 * float(values.min()), -least), 2.0 * most)
-        _tick_signed(axes.yaxis, least, most)
+        low = min(2.0 * float(values.min()), -least)
+        axes.set_ylim(low, 2.0 * most)
+        _tick_signed(axes.yaxis, least, most, low)
         axes.axhline(0.0, color="#888888", lw=0.5, zorder=1)
 
 
-def _tick_signed(axis: Axis, least: float, most: float) -> None:
-    """Tick 0 and every second power of ten on either side of it."""
+def _tick_signed(axis: Axis, least: float, most: float, low: float) -> None:
+    """Tick 0 and every second power of ten on either side of it.
+
+    The powers next to 0 are left out if there are decades below it too: labels would touch.
+    """
     top = math.floor(math.log10(2.0 * most))
-    powers = range(top, math.floor(math.log10(least)), -2)
+    is_crowded = low < -10.0 * least
+    powers = range(top, math.floor(math.log10(least)) + is_crowded, -2)
     ticks = [sign * 10.0**each for each in powers for sign in (-1.0, 1.0)]
     axis.set_major_locator(FixedLocator([0.0, *ticks]))
     axis.set_major_formatter(FuncFormatter(lambda value, _: _power(value)))
@@ -222,16 +233,15 @@ def _draw_planes(lower: SubFigure, view: KernelView) -> None:
     norms = _image_norm(view), signed_norm(_or_zero(view.difference), _DIFFERENCE_DECADES)
     rows, widths = len(view.channels), [*[1.0] * len(planes), _WIDTHS - len(planes)]
     panels = lower.subplots(rows, len(widths), squeeze=False, sharex="col", width_ratios=widths)
-    for row, channel in enumerate(view.channels):
-        name = shortened(view.kernel.channels[channel])
+    names = [shortened(view.kernel.channels[channel]) for channel in view.channels]
+    is_long = max(map(len, names)) > 6  # such a name has room beside the images, not over them
+    for row, name in enumerate(names):
         for axes, (title, images, is_signed) in zip(panels[row], planes, strict=False):
             _draw_plane(axes, images[row], _half_mm(view), norms[is_signed])
-            if len(name) <= 6:  # a longer one has no room over an image
-                title += f", {name}"
-            name_axes(axes, title, "", "")
+            name_axes(axes, title if is_long else f"{title}, {name}", "", "")
         _draw_slices(panels[row, -1], view, row)
         name_axes(panels[row, -1], f"slices, {name}", "", "per mm²")
-        panels[row, 0].set_ylabel("y (mm)")
+        panels[row, 0].set_ylabel(f"{drawable(name)}\ny (mm)" if is_long else "y (mm)")
         panels[row, 0].tick_params(labelleft=True)
     for axes in panels[-1]:
         axes.set_xlabel("x (mm)")
@@ -333,7 +343,7 @@ def _draw_bars(
     bar.ax.xaxis.set_major_locator(LogLocator(numticks=4))
     bar.ax.minorticks_off()
     if any(is_signed):
-        label = "energy per pixel, of the channel's"
+        label = "share of the channel's energy in a pixel"
         tick_powers(_bar(lower, panels[:, plain:-1], norms[1], label), norms[1])
 
 
@@ -355,6 +365,11 @@ def _notes(view: KernelView) -> list[str]:
         f"Kernel: {scaled}sum over terms of sign x pass x pass. Steps are pixels; the first is the "
         "middle one."
     ]
+    if left := len(kernel.channels) - len(view.channels):
+        notes.append(f"Not drawn: {counted(left, 'channel')}.")
+    images = [view.image, *([] if view.true_image is None else [view.true_image])]
+    if any((each == 0.0).any() for each in images):
+        notes.append("Images are grey where there is no light.")
     if any((each < 0.0).any() for each in (view.image, view.axis, view.diagonal)):
         notes.append("Where the kernel is below 0, images are grey, and slices dotted (its size).")
     if view.profile is None:
