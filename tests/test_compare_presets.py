@@ -1,9 +1,11 @@
 """What engines show of a material, and what is said where a preset cannot carry it."""
 
+import dataclasses
 import warnings
 
 import numpy as np
 import pytest
+from figures import assert_legible
 
 from sssfit.chart import figure_of
 from sssfit.compare.presets import compare_presets
@@ -108,6 +110,56 @@ def test_the_chart_has_a_row_a_preset(found):
     ]
     line = axes.lines[0]
     np.testing.assert_allclose(line.get_xdata()[-1], found.rows[-1].p95[0])
+
+
+def drawn_pictures(found, count):
+    """The marked lines of a chart of this many pictures, and its axes."""
+    more = [
+        dataclasses.replace(each, p95=tuple(each.p95[k % 2] for k in range(count)))
+        for each in found.rows
+    ]
+    names = tuple(f"picture {k}" for k in range(count))
+    record = dataclasses.replace(found, pictures=names, rows=tuple(more))
+    (axes,) = assert_legible(lambda: figure_of(record)).axes
+    return axes.lines[:count], axes
+
+
+@pytest.mark.parametrize("count", [1, 4, 9])
+def test_pictures_have_looks_and_places_of_their_own(found, count):
+    lines, _ = drawn_pictures(found, count)
+    looks = {(each.get_color(), str(each.get_marker())) for each in lines}
+    assert len(looks) == len({each.get_marker() for each in lines}) == count
+    assert len({each.get_color() for each in lines}) == min(count, 7)
+    rows = np.array([each.get_ydata() for each in lines])
+    assert len({*rows[:, 0].round(6)}) == count
+    assert (np.abs(rows - np.arange(len(found.rows))) < 0.5).all()
+
+
+def test_errors_of_0_stand_at_a_tick_of_their_own(found):
+    """Not at 0.01, which a medium's error is not."""
+    lines, axes = drawn_pictures(found, 2)
+    labels = dict(
+        zip(axes.get_xticks(), (each.get_text() for each in axes.get_xticklabels()), strict=True)
+    )
+    zeros = [k for k, each in enumerate(found.rows) if max(each.p95) < 1e-2]
+    assert len(zeros) >= 4
+    assert {labels[lines[0].get_xdata()[k]] for k in zeros} == {"<0.01"}
+    others = {label: place for place, label in labels.items() if label != "<0.01"}
+    assert {"0.1", "1"} <= {*others}
+    assert all(place == pytest.approx(float(label)) for label, place in others.items())
+
+
+def test_without_errors_of_0_the_axis_is_whole(found):
+    rows = tuple(each for each in found.rows if min(each.p95) > 1e-2)
+    figure = assert_legible(lambda: figure_of(dataclasses.replace(found, rows=rows)))
+    (axes,) = figure.axes
+    assert len(axes.lines) == len(found.pictures) + 1  # and the difference that is seen
+    assert "<0.01" not in [each.get_text() for each in axes.get_xticklabels()]
+
+
+def test_errors_that_are_all_0_are_drawn(found):
+    rows = tuple(each for each in found.rows if max(each.p95) < 1e-2)
+    assert_legible(lambda: figure_of(dataclasses.replace(found, rows=rows)))
 
 
 def test_words_are_files_and_parameters():

@@ -5,25 +5,29 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
 
-from sssfit.chart.page import COLOURS, Style, add_legend, name_axes, new_page, tick_decades
+from sssfit.arrays import FloatArray
+from sssfit.chart.page import SHADES, Style, add_legend, name_axes, new_page
 
 if TYPE_CHECKING:
     from sssfit.compare.presets import PresetComparison
 
-_HEIGHT_INCHES, _ROW_INCHES = 1.7, 0.26
+_HEIGHT_INCHES, _LINE_INCHES, _GAP_INCHES = 1.8, 0.075, 0.09  # of a row: per picture, and between
 _MARKERS = "os^Dv<>P*X"
-_LEAST = 1e-2  # what is drawn at the left edge: an engine that takes the medium has no error
+_LEAST = 1e-2  # what is smaller has a place of its own: a logarithmic axis has none for 0
 _NOTE = (
-    "Delta E 2000, 95th percentile over the pixels of each picture, of the engine's own diffusion "
-    "model with the exported parameters against the exact 2D kernel. Engines that take the medium "
-    "itself have the exact profile by construction and lie at the left edge. 1 is about the least "
-    "difference that is seen side by side."
+    "ΔE 2000, 95th percentile over the pixels of each picture, of the engine's own diffusion model "
+    "with the exported parameters against the exact 2D kernel. Engines that take the medium itself "
+    "have the exact profile by construction, so their error is 0. A difference of 1 is about the "
+    "least that is seen side by side."
 )
 
 
@@ -37,26 +41,71 @@ def presets_figure(found: PresetComparison) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
-        8 inches wide; a row takes .26 inches.
+        8 inches wide; a row takes .09 inches and .075 more for each picture.
     """
     names = [each.parameters.preset.name for each in found.rows]
-    height = _HEIGHT_INCHES + _ROW_INCHES * len(names)
+    errors = np.array([each.p95 for each in found.rows])
+    count = len(found.pictures)
+    row_inches = max(_GAP_INCHES + _LINE_INCHES * count, 0.26)
+    height = _HEIGHT_INCHES + row_inches * len(names)
     where = f"{found.material}, pixels of {found.mm_per_pixel:g} mm"
     with new_page(height, "What engines show of a material", where, [_NOTE]) as (figure, below):
-        styles: list[Style] = [
-            {"color": COLOURS[k % len(COLOURS)], "marker": _MARKERS[k % len(_MARKERS)], "ls": ""}
-            for k in range(len(found.pictures))
-        ]
+        styles = [_style(k) for k in range(count)]
         below = add_legend(below, [Line2D([], [], **each) for each in styles], found.pictures)
         axes = below.subplots()
+        least = _scale(axes, errors)
         places = np.arange(len(names))
+        # Pictures lie under each other within a row, so that equal errors can be seen.
+        shifts = _LINE_INCHES / row_inches * (np.arange(count) - 0.5 * (count - 1))
         for k, style in enumerate(styles):
-            errors = np.maximum([each.p95[k] for each in found.rows], _LEAST)
-            axes.plot(errors, places, markersize=4.5, **style)
+            seen = np.where(errors[:, k] < _LEAST, least, errors[:, k])
+            axes.plot(seen, places + shifts[k], **style)
         axes.axvline(1.0, color="#666666", lw=0.6)
-        axes.set_xscale("log")
-        tick_decades(axes.xaxis, 6)
-        name_axes(axes, "", "Delta E 2000, 95th percentile", "")
+        if (errors < _LEAST).any():
+            _break(axes, least * 10.0**0.25)
+        name_axes(axes, "", "ΔE 2000, 95th percentile", "")
         axes.set_yticks(places, names)
         axes.set_ylim(len(names) - 0.5, -0.5)
     return figure
+
+
+def _style(picture: int) -> Style:
+    """Return colour and marker of a picture, distinguishable without colour too."""
+    return {
+        "color": SHADES[picture % len(SHADES)],
+        "marker": _MARKERS[picture % len(_MARKERS)],
+        "markersize": 4.2,
+        "ls": "",
+    }
+
+
+def _scale(axes: Axes, errors: FloatArray) -> float:
+    """Scale errors logarithmically; return where those too small for it are drawn.
+
+    Their place is half a decade left of the least power of ten, beyond a break of the axis.
+    """
+    seen = errors[errors >= _LEAST]
+    low, high = (float(seen.min()), float(seen.max())) if seen.size else (1.0, 1.0)
+    first = 10.0 ** math.floor(math.log10(min(low, 0.5)))
+    powers = first * 10.0 ** np.arange(math.floor(math.log10(max(high, 1.0) / first)) + 1)
+    least = first / math.sqrt(10.0)
+    is_broken = seen.size < errors.size
+    axes.set_xscale("log")
+    axes.set_xlim(least / 1.4 if is_broken else first / 1.1, 1.4 * max(high, 1.0))
+    axes.xaxis.set_major_locator(FixedLocator([least, *powers] if is_broken else [*powers]))
+    axes.xaxis.set_major_formatter(
+        FuncFormatter(lambda x, _: f"<{_LEAST:g}" if x < 0.9 * first else f"{x:g}")
+    )
+    minor = LogLocator(subs=(2, 5)).tick_values(first, 10.0 * high)
+    axes.xaxis.set_minor_locator(FixedLocator([each for each in minor if each > first]))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    return least
+
+
+def _break(axes: Axes, x: float) -> None:
+    """Mark a break of the axis: a gap between two short slanted lines."""
+    ends = [x / 1.025, x * 1.025]
+    style: Style = {"transform": axes.get_xaxis_transform(), "clip_on": False}
+    axes.plot(ends, [0.0, 0.0], color="white", lw=2.0, zorder=5, **style)
+    slash: Style = {"marker": [(-1, -2), (1, 2)], "ms": 6, "mec": "black", "mew": 0.6, "ls": ""}
+    axes.plot(ends, [0.0, 0.0], zorder=6, **slash, **style)
