@@ -205,4 +205,4 @@ def _is_part(budget: Budget, name: str) -> bool:
 def _left_out(budgets: Sequence[Budget]) -> list[str]:
     """Return a note on the number of pictures that are not drawn."""
     more = len(budgets) - len(_MARKERS)
-    return [f"{more} more pictures are not drawn."] if more > 0 else []
+    return [f"Not drawn: {counted(more, 'more picture')}."] if more > 0 else []

@@ -73,7 +73,7 @@ def _subtitle(sheet: Sheet) -> str:
     ]
     return (
         f"{' · '.join(parts)}\nright of each picture its difference of lightness, amplified "
-        f"{AMPLIFIED:g} times; below, mean Delta E 2000"
+        f"{AMPLIFIED:g} times; below, mean ΔE 2000"
     )
 
 
@@ -84,9 +84,8 @@ def _draw_row(axes: Axes, row: SheetRow, down: float, wide: float) -> None:
         put_difference(axes, wide * k + 1.0 + _APART, down, panel.difference, AMPLIFIED)
         error = panel.score.delta_e_2000_mean
         if row.passes is not None or error > 0.0:
-            axes.text(
-                wide * k, down + 1.02, f"ΔE {error:.3g}", va="top", size=RC["xtick.labelsize"]
-            )
+            text = f"ΔE {error:#.3g}".rstrip(".")
+            axes.text(wide * k, down + 1.02, text, va="top", size=RC["xtick.labelsize"])
 
 
 def _label(row: SheetRow) -> str:
