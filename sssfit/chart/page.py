@@ -260,9 +260,14 @@ def tick_decades(axis: Axis, most: int) -> None:
     is_short = math.log10(high / low) < 1.3
     is_seen = is_short or isinstance(axis, XAxis)
     axis.set_minor_locator(LogLocator(subs=(2, 5)) if is_seen else NullLocator())
-    axis.set_minor_formatter("{x:g}" if is_short else NullFormatter())
-    if is_short:
-        axis.set_tick_params(which="minor", length=2.0, width=0.6)  # a label needs its mark
+    label_minor(axis, is_short)
+
+
+def label_minor(axis: Axis, is_labelled: bool) -> None:
+    """Label minor ticks, or none; labels need marks, and line up with those of the major ones."""
+    axis.set_minor_formatter("{x:g}" if is_labelled else NullFormatter())
+    if is_labelled:
+        axis.set_tick_params(which="minor", length=2.0, width=0.6, pad=5.0)
 
 
 def name_axes(axes: Axes, title: str, x_label: str, y_label: str) -> None:

@@ -12,10 +12,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator
 
 from sssfit.arrays import FloatArray
-from sssfit.chart.page import SHADES, Style, add_legend, name_axes, new_page
+from sssfit.chart.page import SHADES, Style, add_legend, label_minor, name_axes, new_page
 
 if TYPE_CHECKING:
     from sssfit.compare.presets import PresetComparison
@@ -85,20 +85,20 @@ def _scale(axes: Axes, errors: FloatArray) -> float:
     Their place is half a decade left of the least power of ten, beyond a break of the axis.
     """
     seen = errors[errors >= _LEAST]
-    low, high = (float(seen.min()), float(seen.max())) if seen.size else (1.0, 1.0)
-    first = 10.0 ** math.floor(math.log10(min(low, 0.5)))
-    powers = first * 10.0 ** np.arange(math.floor(math.log10(max(high, 1.0) / first)) + 1)
+    low, high = (f(seen, initial=1.0) for f in (np.min, np.max))
+    first = 10.0 ** math.floor(math.log10(low))
+    powers = first * 10.0 ** np.arange(math.floor(math.log10(high / first)) + 1)
     least = first / math.sqrt(10.0)
     is_broken = seen.size < errors.size
     axes.set_xscale("log")
-    axes.set_xlim(least / 1.4 if is_broken else first / 1.1, 1.4 * max(high, 1.0))
+    axes.set_xlim((least if is_broken else low) / 1.4, 1.4 * high)
     axes.xaxis.set_major_locator(FixedLocator([least, *powers] if is_broken else [*powers]))
     axes.xaxis.set_major_formatter(
         FuncFormatter(lambda x, _: f"<{_LEAST:g}" if x < 0.9 * first else f"{x:g}")
     )
     minor = LogLocator(subs=(2, 5)).tick_values(first, 10.0 * high)
     axes.xaxis.set_minor_locator(FixedLocator([each for each in minor if each > first]))
-    axes.xaxis.set_minor_formatter(NullFormatter())
+    label_minor(axes.xaxis, high < 20.0 * low)
     return least
 
 
