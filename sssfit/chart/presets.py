@@ -98,7 +98,7 @@ def _scale(axes: Axes, errors: FloatArray) -> float:
     )
     minor = LogLocator(subs=(2, 5)).tick_values(first, 10.0 * high)
     axes.xaxis.set_minor_locator(FixedLocator([each for each in minor if each > first]))
-    label_minor(axes.xaxis, high < 20.0 * low)
+    label_minor(axes.xaxis, bool(high < 20.0 * low))
     return least
 
 
