@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections import Counter
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -40,7 +41,7 @@ _COLOURS = (*COLOURS, "#e69f00", "#56b4e9", "#cc79a7", "#000000", "#999999")
 _MARKERS = "os^Dv<>P"
 _SAFE, _SMALL = "#e8f3ec", 6.5
 _HEADROOM = 0.25  # of the axis above the limit, at least
-_CROWDED = 3  # curves; more leave no room for a legend, which stands above them
+_CROWDED = 3  # curves; above more stands their legend. Of as many labels it is the largest
 _SHORT_DECADES = 1.3  # as `tick_decades` has it
 _LEGEND_LINE = 0.135  # of the axis of a crowded panel
 
@@ -65,7 +66,7 @@ def stability_figure(stability: Stability) -> Figure:
     columns = _WIDE_COLUMNS if is_wide else _COLUMNS
     rows = math.ceil(len(panels) / columns)
     where = f"pixels of {stability.mm_per_pixel:g} mm, seed {stability.seed}"
-    notes = ["Shaded: within the limit. Bars: where other seeds lie.", *stability.notes]
+    notes = [_note(panels), *stability.notes]
     height = _HEAD_INCHES + rows * (_WIDE_PANEL_INCHES if is_wide else _PANEL_INCHES)
     width = _WIDE_INCHES if is_wide else WIDTH_INCHES
     title = f"{stability.material}: where fits are safe"
@@ -81,12 +82,31 @@ def stability_figure(stability: Stability) -> Figure:
     return figure
 
 
+def _note(panels: Sequence[Panel]) -> str:
+    """Return what shades and lines mean."""
+    note = "Shaded: within the limit. Bars: where other seeds lie."
+    if any(map(_reaches_floor, panels)):
+        note += " Dotted: the least that a panel shows; points on it are as small or smaller, or 0."
+    return note
+
+
+def _reaches_floor(panel: Panel) -> bool:
+    """Return whether measures were raised to the panel's floor."""
+    return any(bool((each.y <= panel.floor).any()) for each in panel.curves) and panel.is_log
+
+
 def _shared(stability: Stability) -> list[str]:
-    """Return the labels that panels of several stresses have, in their order."""
+    """Return the labels of the figure's legend, in their order.
+
+    They are those of several stresses, and those of panels whose own legend would leave no room.
+    """
     seen = {(panel.stress, each.label) for panel in stability.panels for each in panel.curves}
     stresses = Counter(label for _, label in seen)
-    labels = dict.fromkeys(each.label for panel in stability.panels for each in panel.curves)
-    return [label for label in labels if stresses[label] > 1]
+    labels = [[each.label for each in panel.curves] for panel in stability.panels]
+    own = [[each for each in some if stresses[each] == 1] for some in labels]
+    crowds = {each for some in own if len(some) > _CROWDED for each in some}
+    every = dict.fromkeys(itertools.chain.from_iterable(labels))
+    return [label for label in every if stresses[label] > 1 or label in crowds]
 
 
 def _style(k: int) -> Style:
@@ -127,6 +147,8 @@ def _draw(axes: Axes, panel: Panel, shared: list[str]) -> None:
         tick(axes.yaxis)
     axes.axhspan(low, panel.limit, color=_SAFE, zorder=0)
     axes.axhline(panel.limit, color="#666666", lw=0.6, zorder=1)
+    if _reaches_floor(panel):
+        axes.axhline(panel.floor, color="#666666", lw=0.8, ls=":", zorder=1)
     if own:
         place: Style = {"loc": "upper right" if is_crowded else "best"}
         legend = axes.legend(handles=own, fontsize=_SMALL, frameon=True, framealpha=0.85, **place)
@@ -142,10 +164,9 @@ def _tick_decades(axis: Axis, most: int) -> None:
 
 
 def _styles(labels: list[str], shared: list[str]) -> dict[str, int]:
-    """Return the number of each curve's style: that of the figure's legend, or one left over."""
-    of_legend = {each: shared.index(each) for each in labels if each in shared}
-    free = (k for k in itertools.count() if k not in of_legend.values())
-    return of_legend | {each: next(free) for each in labels if each not in shared}
+    """Return the number of each curve's style: that of the figure's legend, or one after them."""
+    free = itertools.count(len(shared))
+    return {each: shared.index(each) if each in shared else next(free) for each in labels}
 
 
 def _line(axes: Axes, curve: Curve, style: Style) -> Line2D:
@@ -170,8 +191,9 @@ def _bars(y: FloatArray, low: FloatArray, high: FloatArray) -> FloatArray:
 
 
 def _range(panel: Panel) -> tuple[float, float]:
-    """Return the limits of the measure's axis, with room above the limit."""
-    values = np.concatenate([each.y for each in panel.curves])
+    """Return the limits of the measure's axis, with room above the limit and for bars."""
+    ends = [each.high for each in panel.curves if each.high is not None]
+    values = np.concatenate([*(each.y for each in panel.curves), *ends])
     values = np.append(values[np.isfinite(values)], panel.limit)
     if not panel.is_log:
         return 0.0, float(values.max()) * (1.0 + _HEADROOM) or 1.0

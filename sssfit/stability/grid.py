@@ -17,6 +17,7 @@ from sssfit.stability.subject import Subject
 from sssfit.stability.ways import WAYS, Way
 
 LIMIT = 1.0  # Delta E
+_FLOOR = 1e-3  # Delta E, for logarithmic axes
 _RINGS = (1.0, 4.0, 16.0, 64.0, 256.0)  # times the width of the subject's annuli
 _RADII = (1.0, 0.5, 0.25, 0.125, 0.06, 0.03)  # of the subject's
 
@@ -37,6 +38,7 @@ def stress(subject: Subject) -> list[Panel]:
             limit=LIMIT,
             curves=_curves(ways, _RINGS, by_ring, "finer annuli"),
             fails="the middle of the kernel is unresolved",
+            floor=_FLOOR,
         ),
         Panel(
             stress="grid",
@@ -46,6 +48,7 @@ def stress(subject: Subject) -> list[Panel]:
             limit=LIMIT,
             curves=_curves(ways, _RADII, by_radius, "a larger radius"),
             fails="light beyond the grid is lost or gathered",
+            floor=_FLOOR,
         ),
     ]
 
@@ -78,6 +81,6 @@ def _curves(
     for way, own in zip(ways, changes, strict=True):
         x = np.array(factors[: len(own)])
         order = np.argsort(x)
-        y = np.maximum(own, 1e-3)[order]
+        y = np.maximum(own, _FLOOR)[order]
         found.append(Curve(way.label, x[order], y, advice=advice))
     return found

@@ -23,7 +23,7 @@ _KS = (0.0, 0.5, 1.0, 1.55, 2.0, 3.0, 4.0, 5.0, 6.0)
 _BS = (5.0, 12.5, 25.0, 50.0, 100.0, 200.0, 500.0)
 _PIXELS = (9, 17, 33, 65, 129, 257, 513)
 _SPREADS, _STARTS = (0.1, 1.0, 10.0), 8
-_FLOOR = 1e-3  # Delta E, for logarithmic axes
+_FLOOR, _LEAST_ENERGY = 1e-3, 1e-12  # Delta E and a share, for logarithmic axes
 _ADVICE_K, _ADVICE_B = "k between 1 and 4", "b near 50"
 
 
@@ -48,6 +48,7 @@ def stress(subject: Subject) -> list[Panel]:
             limit=LIMIT,
             curves=_by_picture(_KS, by_k, _ADVICE_K),
             fails="near and far light trade places",
+            floor=_FLOOR,
         ),
         Panel(
             stress="guided",
@@ -57,6 +58,7 @@ def stress(subject: Subject) -> list[Panel]:
             limit=LIMIT,
             curves=_by_picture(_BS, by_b, _ADVICE_B),
             fails="the guide's cross widens or vanishes",
+            floor=_FLOOR,
         ),
         Panel(
             stress="guided",
@@ -66,6 +68,7 @@ def stress(subject: Subject) -> list[Panel]:
             limit=LIMIT,
             curves=[_by_start(by_start.reshape(len(_SPREADS), _STARTS))],
             fails="the search ends elsewhere",
+            floor=_FLOOR,
         ),
         Panel(
             stress="guided",
@@ -73,8 +76,9 @@ def stress(subject: Subject) -> list[Panel]:
             axis=Axis("pixels of the pass", mild=float(_PIXELS[2])),
             y_label="share of the energy",
             limit=1e-6,
-            curves=[Curve("guided", np.array(_PIXELS), np.maximum(misses, 1e-12), advice="")],
+            curves=[Curve("guided", np.array(_PIXELS), np.maximum(misses, _LEAST_ENERGY))],
             fails="the constraint is violated",
+            floor=_LEAST_ENERGY,
         ),
         Panel(
             stress="guided",

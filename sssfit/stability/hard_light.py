@@ -19,6 +19,7 @@ from sssfit.stability.subject import SIDE, Subject, error_of, shown
 from sssfit.stability.ways import Way
 
 NEGATIVE_LIMIT = 1e-3  # of the pixels: what a display would show as black holes
+_FLOOR = 1e-6  # of every measure, for logarithmic axes
 ASYMMETRY_LIMIT = 0.1  # a tenth of the light at a radius
 LIMIT = 2.0  # Delta E
 RANKS = (1, 2, 3, 4, 5, 6, 8, 10)
@@ -45,6 +46,7 @@ def stress(subject: Subject) -> list[Panel]:
                 for label, own in kernels.items()
             ],
             fails="negative light, black in the picture",
+            floor=_FLOOR,
         ),
         Panel(
             stress="hard-light",
@@ -59,6 +61,7 @@ def stress(subject: Subject) -> list[Panel]:
                 for label, own in kernels.items()
             ],
             fails="lobes around the highlight",
+            floor=_FLOOR,
         ),
         Panel(
             stress="hard-light",
@@ -71,6 +74,7 @@ def stress(subject: Subject) -> list[Panel]:
                 for label, own in kernels.items()
             ],
             fails="a cross or a diamond in place of a disk",
+            floor=_FLOOR,
         ),
     ]
 
@@ -96,7 +100,7 @@ def unround(subject: Subject, kernel: Kernel) -> float:
 
 
 def _curve(label: str, values: list[float]) -> Curve:
-    return Curve(label, np.array(RANKS), np.maximum(values, 1e-6), advice=_ADVICE)
+    return Curve(label, np.array(RANKS), np.maximum(values, _FLOOR), advice=_ADVICE)
 
 
 def _negative(picture: FloatArray) -> float:

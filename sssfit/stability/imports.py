@@ -21,6 +21,7 @@ from sssfit.stability.subject import Subject
 from sssfit.stability.ways import WAYS, Way
 
 LIMIT = 1.0  # Delta E
+_FLOOR = 1e-3  # Delta E, for logarithmic axes
 _NONE = 1e-3  # of a share, for logarithmic axes
 _SHARES = (_NONE, 0.01, 0.03, 0.1, 0.3, 0.6)
 _DEVIATIONS = (1e-6, 1e-5, 1e-4, 1e-3, 1e-2)
@@ -77,10 +78,11 @@ def _panel(
         y_label="p99 of Delta E 2000",
         limit=LIMIT,
         curves=[
-            Curve(way.label, np.array(steps[: len(own)]), np.maximum(own, 1e-3), advice=advice)
+            Curve(way.label, np.array(steps[: len(own)]), np.maximum(own, _FLOOR), advice=advice)
             for way, own in zip(ways, changes, strict=True)
         ],
         fails="the import shows in the picture, or is refused",
+        floor=_FLOOR,
     )
 
 

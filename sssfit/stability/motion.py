@@ -26,6 +26,7 @@ from sssfit.stability.subject import SIDE, Subject, error_of, shown
 from sssfit.stability.ways import CASCADE, Way, cascade
 
 LIMIT = 0.85  # docs/cascades.md asks it of two stages before the first halving
+_FLOOR = 1e-4  # Delta E, for logarithmic axes
 _FETCHES = (14, 17, 24)
 _SHIFTS = np.arange(0.0, 4.01, 0.5)
 _SPEEDS = (0.001, 0.003, 0.01, 0.03, 0.1)  # of a pixel's size, a frame
@@ -80,6 +81,7 @@ def stress(subject: Subject) -> list[Panel]:
             limit=LIMIT,
             curves=_nearing(subject),
             fails="blurs jump as texels change places",
+            floor=_FLOOR,
         ),
     ]
 
@@ -92,7 +94,7 @@ def _nearing(subject: Subject) -> list[Curve]:
     percent = 100.0 * np.array(_SPEEDS)
     advice = "two stages before the first halving; no jitter"
     return [
-        Curve(label, percent, np.maximum(y, 1e-4), advice=advice)
+        Curve(label, percent, np.maximum(y, _FLOOR), advice=advice)
         for label, y in zip((*tables, *moving), zip(*flickers, strict=True), strict=True)
     ]
 

@@ -20,6 +20,7 @@ from sssfit.stability.panel import Panel
 from sssfit.stability.subject import Subject
 
 BEYOND_LIMIT, MODEL_LIMIT, TERMS_LIMIT = 1e-3, 0.1, 6
+_LEAST_SHARE = 1e-9  # for logarithmic axes
 CONDITION_LIMIT = 1e8  # half of double precision's digits
 ALBEDOS = (0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 0.99, 0.997, 0.999, 0.9999, 0.99999)
 _INDICES = (1.0, 1.3, 1.5, 2.0)
@@ -48,6 +49,7 @@ def stress(subject: Subject) -> list[Panel]:
             limit=BEYOND_LIMIT,
             curves=[_beyond(subject, eta) for eta in _INDICES],
             fails="the grid ends before the light does",
+            floor=_LEAST_SHARE,
         ),
         Panel(
             stress="optics",
@@ -104,7 +106,7 @@ def _profiles(eta: float, threads: int | None) -> Sequence[Profile]:
 def _beyond(subject: Subject, eta: float) -> Curve:
     profiles = _profiles(eta, subject.threads)
     shares = [float((each.beyond_grid / each.diffuse_reflectance)[0]) for each in profiles]
-    floor = np.maximum(_ascending(shares), 1e-9)
+    floor = np.maximum(_ascending(shares), _LEAST_SHARE)
     return Curve(
         f"index {eta:g}",
         _lost(ALBEDOS),

@@ -30,6 +30,8 @@ class Panel:
         What goes wrong beyond the limit, in a few words.
     is_log : bool
         Whether the measure is drawn and interpolated by its logarithm.
+    floor : float
+        What smaller measures are raised to, for their logarithms; 0 if none is.
     """
 
     stress: str
@@ -40,6 +42,7 @@ class Panel:
     curves: Sequence[Curve]
     fails: str
     is_log: bool = True
+    floor: float = 0.0
 
     def edges(self, curve: Curve) -> tuple[Edge | None, Edge | None]:
         """Return where a curve stops being safe below and above the mild place.

@@ -58,6 +58,7 @@ def stress(subject: Subject) -> list[Panel]:
             limit=LIMIT,
             curves=curves,
             fails="points of light spread or sharpen",
+            floor=_FLOOR,
         )
     ]
 

@@ -16,6 +16,7 @@ from sssfit.stability.subject import SIDE, Subject, attempted, error_of, shown
 from sssfit.stability.ways import CASCADE, Way, cascade
 
 LIMIT = 1.0  # Delta E
+_FLOOR, _LEAST_GRAIN = 1e-6, 1e-3  # Delta E, for logarithmic axes
 _TAPS = (5, 9, 17, 33, 65)  # a pass
 _FETCHES = (7, 12, 17, 24)  # a pixel
 _FETCHES_OF_PAPERS = (7, 10, 12, 14, 17, 20, 24, 36, 60)
@@ -48,6 +49,7 @@ def stress(subject: Subject) -> list[Panel]:
             limit=LIMIT,
             curves=subject.each(_rounded_pictures, tables.items()),
             fails="steps of colour in smooth light",
+            floor=_FLOOR,
         ),
         Panel(
             stress="taps",
@@ -59,6 +61,7 @@ def stress(subject: Subject) -> list[Panel]:
                 _eight_bits, [(*each, form) for each in tables.items() for form in _EIGHT_BITS]
             ),
             fails="steps of colour where light is dim",
+            floor=_FLOOR,
         ),
         Panel(
             stress="taps",
@@ -70,6 +73,7 @@ def stress(subject: Subject) -> list[Panel]:
                 _jittered, [(*each, frames) for each in tables.items() for frames in (1, _FRAMES)]
             ),
             fails="grain",
+            floor=_LEAST_GRAIN,
         ),
         Panel(
             stress="taps",
@@ -79,6 +83,7 @@ def stress(subject: Subject) -> list[Panel]:
             limit=LIMIT,
             curves=subject.each(_rounded_table, tables.items()),
             fails="the kernel changes its energy or its width",
+            floor=_FLOOR,
         ),
         Panel(
             stress="taps",
@@ -88,6 +93,7 @@ def stress(subject: Subject) -> list[Panel]:
             limit=LIMIT,
             curves=subject.each(_firefly, tables.items()),
             fails="the pixel's light exceeds 65504 or drowns its neighbours",
+            floor=_FLOOR,
         ),
     ]
 
@@ -131,7 +137,7 @@ def _rounded_pictures(subject: Subject, given: tuple[str, Kernel]) -> Curve:
         return float(np.mean([error_of(a, b) for a, b in zip(pictures, plain, strict=True)]))
 
     forms = sorted(_FORMATS, key=lambda each: _FORMATS[each])
-    errors = np.maximum([attempted(functools.partial(error, each)) for each in forms], 1e-6)
+    errors = np.maximum([attempted(functools.partial(error, each)) for each in forms], _FLOOR)
     bits = np.array([_FORMATS[each] for each in forms])
     return Curve(label, bits, errors, advice="half floats")
 
@@ -152,7 +158,7 @@ def _eight_bits(subject: Subject, given: tuple[str, Kernel, str]) -> Curve:
 
     errors = [attempted(functools.partial(error, each)) for each in _STOPS]
     advice = "half floats; or sRGB codes, and light near 1"
-    return Curve(f"{label}, {form}", np.array(_STOPS), np.maximum(errors, 1e-6), advice=advice)
+    return Curve(f"{label}, {form}", np.array(_STOPS), np.maximum(errors, _FLOOR), advice=advice)
 
 
 def _jittered(subject: Subject, given: tuple[str, Kernel, int]) -> Curve:
@@ -167,7 +173,7 @@ def _jittered(subject: Subject, given: tuple[str, Kernel, int]) -> Curve:
         pictures = [_with_jitter(scene, taps, jitter, frames) for scene in subject.scenes()]
         return float(np.mean([error_of(a, b) for a, b in zip(pictures, plain, strict=True)]))
 
-    errors = [1e-3, *(max(error(each), 1e-3) for each in _STRENGTHS[1:])]
+    errors = [_LEAST_GRAIN, *(max(error(each), _LEAST_GRAIN) for each in _STRENGTHS[1:])]
     advice = "no jitter for cascades; for pairs more frames in the mean"
     name = label if frames == 1 else f"{label}, mean of {frames} frames"
     return Curve(name, np.array(_STRENGTHS), np.array(errors), advice=advice)
@@ -184,7 +190,7 @@ def _rounded_table(subject: Subject, given: tuple[str, Kernel]) -> Curve:
     forms = sorted(_STORAGES, key=lambda each: _STORAGES[each])
     errors = [subject.error(stored(taps, each), plain) for each in forms]
     bits = np.array([_STORAGES[each] for each in forms])
-    return Curve(label, bits, np.maximum(errors, 1e-6), advice="half floats or more")
+    return Curve(label, bits, np.maximum(errors, _FLOOR), advice="half floats or more")
 
 
 def _firefly(subject: Subject, given: tuple[str, Kernel]) -> Curve:
@@ -198,7 +204,7 @@ def _firefly(subject: Subject, given: tuple[str, Kernel]) -> Curve:
 
     errors = [attempted(functools.partial(error, each)) for each in _BRIGHTNESS]
     advice = "clamp the light before the first pass"
-    return Curve(label, np.array(_BRIGHTNESS), np.maximum(errors, 1e-6), advice=advice)
+    return Curve(label, np.array(_BRIGHTNESS), np.maximum(errors, _FLOOR), advice=advice)
 
 
 def _through(scene: Scene, taps: Taps, form: str) -> FloatArray:
