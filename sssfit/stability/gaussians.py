@@ -21,6 +21,7 @@ _STARTED = (1, 2, 4, 6, 8, 10)
 _STARTS, _AS_GOOD = 16, 1.01  # of the error of the best start
 _NARROWEST = 0.25  # of the first annulus, as the fit has it
 _ADVICE = "fewer Gaussians; six serve skin and marble"
+_ADVICE_ERROR = "more Gaussians; six serve skin and marble"
 
 
 def stress(subject: Subject) -> list[Panel]:
@@ -36,7 +37,10 @@ def stress(subject: Subject) -> list[Panel]:
             title="error of the profile",
             y_label="relative error",
             limit=ERROR_LIMIT,
-            curves=[_curve(label, [each.error for each in own]) for label, own in fits.items()],
+            curves=[
+                _curve(label, [each.error for each in own], _ADVICE_ERROR)
+                for label, own in fits.items()
+            ],
             fails="too few Gaussians near the beam",
             axis=many,
         ),
@@ -75,8 +79,8 @@ def stress(subject: Subject) -> list[Panel]:
     ]
 
 
-def _curve(label: str, values: Sequence[float]) -> Curve:
-    return Curve(label, np.array(_COUNTS), np.array(values), advice=_ADVICE)
+def _curve(label: str, values: Sequence[float], advice: str = _ADVICE) -> Curve:
+    return Curve(label, np.array(_COUNTS), np.array(values), advice=advice)
 
 
 def sums(subject: Subject, signed: bool) -> list[GaussianSum]:
