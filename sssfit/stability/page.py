@@ -10,7 +10,7 @@ Pixels of {pitch:g} mm, exact profile, seed {seed}. A place is followed by its u
 
 {table}
 
-![Where fits of {material} are safe]({chart})
+[![Where fits of {material} are safe]({chart})]({chart})
 """
 
 
