@@ -5,12 +5,15 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullLocator
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.page import COLOURS, Style, add_legend, name_axes, new_page, tick_decades
@@ -22,6 +25,8 @@ if TYPE_CHECKING:
 _HEIGHT_INCHES = 7.6
 _COLOURS = (*COLOURS, "#e69f00", "#000000")
 _MARKERS = "os^Dv"
+_SHORT_DECADES, _LEAST_DECADES = 2.0, 0.5  # of the y axis
+_SOME, _MANY = (1.0, 2.0, 5.0), (1.0, 2.0, 3.0, 4.0, 6.0)  # numbers of a decade
 _NOTE = (
     "Speed-up: without savings over with all three. Dotted: Jimenez and Gutierrez 2008, Table 1, "
     "frames a second on a GeForce 8800 GTX. Texture over screen: texels that texture space with "
@@ -72,10 +77,27 @@ def _draw(axes: Axes, table: SpeedUpTable, values: FloatArray, title: str, y_lab
     for k, line in enumerate(values):
         axes.plot(table.distances, line, **_style(k))
     name_axes(axes, title, "distance (units of 100 mm)", y_label)
-    for axis in (axes.xaxis, axes.yaxis):
-        scale = axes.set_xscale if axis is axes.xaxis else axes.set_yscale
-        scale("log")
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(FixedLocator(list(table.distances)))
+    axes.xaxis.set_major_formatter("{x:g}")
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.set_yscale("log")
+    _tick(axes.yaxis)
+
+
+def _tick(axis: Axis) -> None:
+    """Tick powers of ten; on a short axis, where one or two would lie, plain numbers between."""
+    low, high = axis.get_view_interval()
+    decades = math.log10(high / low)
+    if decades > _SHORT_DECADES:
         tick_decades(axis, 6)
+        return
+    if decades > _LEAST_DECADES:
+        axis.set_major_locator(LogLocator(subs=_MANY if decades < 1.0 else _SOME))
+    else:
+        axis.set_major_locator(MaxNLocator(5))
+    axis.set_major_formatter("{x:g}")
+    axis.set_minor_locator(NullLocator())
 
 
 def _draw_published(axes: Axes, table: SpeedUpTable) -> None:
