@@ -57,6 +57,8 @@ up to the solution with 20 directions.
 
 ![Errors of ten stacks over the directions, and over the seconds](layers.png)
 
+Dashed in the figure: the tolerance of 1e-4, the default of the solver.
+
 The walk comes to the same answer. {walked}: the largest difference of F(r) between the
 walk and the exact profile (tolerance 2e-5), beside the walk's own standard error:
 
@@ -122,7 +124,10 @@ def draw(results):
         for k in range(len(results))
     ]
     title = "Error of F(r): ten stacks by the layer solver"
-    note = "From the answer with 28 directions; processor time on one thread, from the beginning."
+    note = (
+        "From the answer with 28 directions; processor time on one thread, from the beginning. "
+        f"Dashed: the tolerance of {TOLERANCE:g}."
+    )
     with new_page(5.4, title, "Largest error, as a share of the light that leaves", [note]) as page:
         figure, below = page
         left, right = add_legend(below, handles, list(results)).subplots(1, 2, sharey=True)
@@ -133,7 +138,7 @@ def draw(results):
             right.plot([seconds[each] for each in errors], values, ms=4, **style)
         for axes in (left, right):
             axes.set_yscale("log")
-            axes.axhline(1e-4, color="#666666", lw=0.8, ls=(0, (4, 2)), zorder=1)
+            axes.axhline(TOLERANCE, color="#666666", lw=0.8, ls=(0, (4, 2)), zorder=1)
         right.set_xscale("log")
         left.set_xticks(COUNTS[1:-1])
         name_axes(left, "", "directions on either side, N", "largest error of F")
