@@ -65,6 +65,8 @@ def speed_up_figure(table: SpeedUpTable) -> Figure:
         grid[2].axhline(1.0, color="#666666", lw=0.6)
         errors = np.array([[f.work["saved"].mean_delta_e for f in row] for row in table.frames])
         _draw(grid[3], table, np.maximum(errors, 1e-4), "error of the savings", "mean Delta E 2000")
+        for axes in grid:
+            _tick(axes.yaxis)
     return figure
 
 
@@ -82,7 +84,6 @@ def _draw(axes: Axes, table: SpeedUpTable, values: FloatArray, title: str, y_lab
     axes.xaxis.set_major_formatter("{x:g}")
     axes.xaxis.set_minor_locator(NullLocator())
     axes.set_yscale("log")
-    _tick(axes.yaxis)
 
 
 def _tick(axis: Axis) -> None:
