@@ -3,10 +3,12 @@
 import dataclasses
 import functools
 import io
+import itertools
 
 import numpy as np
 import pytest
 from figures import assert_legible, drawn_texts, words_of
+from matplotlib.path import Path
 from turns import in_turn
 
 from sssfit.chart.page import lay_out, new_page, save_figure
@@ -208,3 +210,28 @@ def test_labels_never_meet_however_dense_the_front(many):
         pixels = axes.transData.transform(np.transpose([x, y]))
         assert not box.y0 < axes.transData.transform((0.5, y[0] - 0.05))[1] < box.y1
         assert not any(box.contains(*each) for each in pixels)
+
+
+@pytest.mark.parametrize("cost", COSTS)
+def test_labels_are_read_as_their_own_points(comparison, drawn, cost):
+    """They are clear of every marker and of the front's line, nearest to their point, and tied."""
+    figure = drawn(error="delta-e", cost=cost)
+    for axes, picture in zip(panels_of(figure), PICTURES, strict=True):
+        front = {row.label: k for k, row in enumerate(comparison.front(picture, "delta-e", cost))}
+        lines = {each.get_drawstyle(): each for each in axes.lines}
+        corners = axes.transData.transform(np.transpose(lines["steps-post"].get_data()))
+        marked = [each for each in axes.lines if each.get_marker() != "None"]
+        markers = axes.transData.transform([np.ravel(each.get_data()) for each in marked])
+        ties = [each for each in axes.lines if each.get_color() == "#999999" and each.get_lw() < 1]
+        for text in axes.texts:
+            box = text.get_window_extent()
+            assert not any(box.padded(8.0).contains(*each) for each in markers)
+            for (x, y), (x_next, y_next) in itertools.pairwise(corners):
+                corner = (x_next, y)
+                for side in ((x, y), corner), (corner, (x_next, y_next)):
+                    assert not Path(side).intersects_bbox(box)
+            apart = [np.hypot(*(np.clip(each, box.min, box.max) - each)) for each in corners[:-1]]
+            own = front[text.get_text()]
+            assert int(np.argmin(apart)) == own
+            starts = [axes.transData.transform((e.get_xdata()[0], e.get_ydata()[0])) for e in ties]
+            assert any(np.allclose(each, corners[own], atol=0.1) for each in starts)

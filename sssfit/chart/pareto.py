@@ -5,16 +5,21 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.path import Path
 from matplotlib.ticker import FixedLocator, FuncFormatter, LogLocator, NullLocator
 from matplotlib.transforms import Bbox
 
+from sssfit.arrays import FloatArray
 from sssfit.chart.page import (
     COLOURS,
     RC,
@@ -31,6 +36,7 @@ from sssfit.messages import counted
 if TYPE_CHECKING:
     from sssfit.compare.comparison import Comparison, KernelRow, Picture
 
+Point = tuple[float, float]
 
 _HEAD_INCHES, _PANEL_INCHES = 1.9, 2.3  # heights of title, legend and notes; of a panel
 # Those of `COLOURS` and more of Okabe and Ito's and of Tol's, safe for colour blindness.
@@ -53,7 +59,10 @@ _GREY = "#666666"
 _FAINT = 0.35
 _MOST_TICKS = 8
 _LANE = 0.014  # share of the panel's width between points of equal cost
-_FARTHEST = 8  # most lines by which a label is moved down
+# Labels: points from their markers, and between places down and along
+_BESIDE, _LINE, _STEP = 5.5, 4.5, 4.0
+_FARTHEST = 16  # most places down or up
+_MARKER, _CLEAR_PIXELS = 0.045, 4.0  # half a marker in inches, and what labels keep clear of
 _JUST_NOTICEABLE = 1.0  # Delta E
 _NOTICED: Style = {"color": _GREY, "lw": 0.8, "ls": (0, (4, 2))}
 _WORTH_A_NOTE = 1e-3  # share of the light
@@ -177,55 +186,127 @@ def place_labels(
     *,
     level: float | None = None,
 ) -> None:
-    """Write a label below and left of each point of a falling front, where no other point can be.
+    """Write a label beside each point of a falling front, with a line to its point.
 
-    A label that would overlap another is moved down, with a line to its point; one without room is
-    omitted. Limits and position of the axes must be final.
+    A label is clear of all that the panel shows, and nearer to its own point than to another of
+    the front; one without such a place is left out.
 
     Parameters
     ----------
     axes : Axes
+        With its markers and limits.
     points : sequence of (x, y)
         Points in data coordinates, x rising and y falling.
     labels : sequence of str
     level : float, optional
         A horizontal line in data coordinates that labels avoid.
     """
-    panel, pixels = axes.get_window_extent(), axes.transData.transform
-    taken = [Bbox([pixel, pixel]).padded(0.045 * axes.figure.dpi) for pixel in map(pixels, points)]
-    if level is not None:
-        y = pixels((points[0][0], level))[1]
-        taken.append(Bbox.from_extents(panel.x0, y - 2.0, panel.x1, y + 2.0))
-    for point, label in zip(points, labels, strict=True):
-        style: Style = {"size": RC["xtick.labelsize"], "va": "top", "in_layout": False, "zorder": 4}
+    panel, dpi = axes.get_window_extent(), axes.figure.dpi
+    front = [_pixel(axes, *point) for point in points]
+    lines = _steps(front, panel)
+    if level is not None and points:
+        y = _pixel(axes, points[0][0], level)[1]
+        lines.append(Path([(panel.x0, y), (panel.x1, y)]))
+    taken = _Taken(panel, _markers(axes, front), _MARKER * dpi + _CLEAR_PIXELS, lines)
+    style: Style = {"size": RC["xtick.labelsize"], "va": "bottom", "in_layout": False, "zorder": 4}
+    for k, (point, label) in enumerate(zip(points, labels, strict=True)):
         text = axes.annotate(
             drawable(label), point, (0.0, 0.0), textcoords="offset points", **style
         )
-        for line, right, side in _places():
-            text.set(position=(right, -4.3 - 9.0 * line), ha=side)
-            box = text.get_window_extent()
-            inside = panel.contains(*box.min) and panel.contains(*box.max)
-            if inside and not any(box.overlaps(other) for other in taken):
-                break
-        else:
+        others = [*front[:k], *front[k + 1 :]]
+        places = _boxes(text.get_window_extent(), dpi / 72.0)
+        found = next((each for each in places if taken.allows(each[1], front[k], others)), None)
+        if found is None:
             text.remove()
             continue
-        taken.append(box)
-        if line > 0:
-            _tie(axes, point, box)
+        offset, box = found
+        text.set_position(offset)
+        tie = [front[k], _nearest(box, front[k])]
+        taken.labels.append(box)
+        taken.lines.append(Path(tie))
+        ends = axes.transData.inverted().transform(tie)
+        axes.plot(*ends.T, color="#999999", lw=0.5, zorder=2)
 
 
-def _places() -> Iterator[tuple[int, float, str]]:
-    """Yield positions by preference: lines down, points to the right, and the label's end."""
-    for line in range(_FARTHEST):
-        yield from ((line, -2.0, "right"), (line, 0.0, "center"), (line, 2.0, "left"))
+@dataclass(frozen=True, slots=True)
+class _Taken:
+    """What a panel shows already, in pixels; ``reach`` is what a label keeps from markers."""
+
+    panel: Bbox
+    markers: FloatArray
+    reach: float
+    lines: list[Path]
+    labels: list[Bbox] = field(default_factory=list)
+
+    def allows(self, box: Bbox, own: Point, others: Sequence[Point]) -> bool:
+        """Return whether a label is free there, and is read as its own point's."""
+        room = box.padded(_CLEAR_PIXELS)
+        return (
+            bool(self.panel.contains(*room.min) and self.panel.contains(*room.max))
+            and not self._covers_marker(box)
+            and not any(map(room.overlaps, self.labels))
+            and not any(each.intersects_bbox(room) for each in self.lines)
+            and self._is_of(box, own, others)
+        )
+
+    def _covers_marker(self, box: Bbox) -> bool:
+        room = box.padded(self.reach)
+        inside = (self.markers > np.array(room.min)) & (self.markers < np.array(room.max))
+        return bool(inside.all(axis=1).any())
+
+    def _is_of(self, box: Bbox, own: Point, others: Sequence[Point]) -> bool:
+        """Return whether a label is nearest to its own point, and no label between them."""
+        end = _nearest(box, own)
+        tie = Path([own, end])
+        return all(
+            math.dist(_nearest(box, each), each) > math.dist(end, own) for each in others
+        ) and (not any(tie.intersects_bbox(each) for each in self.labels))
 
 
-def _tie(axes: Axes, point: tuple[float, float], box: Bbox) -> None:
-    """Connect a point with a distant label."""
-    x = min(max(axes.transData.transform(point)[0], box.x0), box.x1)
-    end = axes.transData.inverted().transform((x, box.y1))
-    axes.plot(*zip(point, end, strict=True), color="#999999", lw=0.5, zorder=2)
+def _pixel(axes: Axes, x: float, y: float) -> Point:
+    """Return where a point in data coordinates lies."""
+    found = axes.transData.transform((x, y))
+    return float(found[0]), float(found[1])
+
+
+def _markers(axes: Axes, front: Sequence[Point]) -> FloatArray:
+    """Return where a panel has markers (N, 2), those of its front among them."""
+    drawn = [each for each in axes.lines if each.get_marker() not in (None, "None", "")]
+    points = [axes.transData.transform(each.get_path().vertices) for each in drawn]
+    found: FloatArray = np.concatenate([np.reshape(front, (-1, 2)), *points])
+    return found[np.isfinite(found).all(axis=1)]
+
+
+def _steps(front: Sequence[Point], panel: Bbox) -> list[Path]:
+    """Return the lines of a front, which goes on to the panel's right side."""
+    if not front:
+        return []
+    lines = [Path([(x, y), (x_next, y)]) for (x, y), (x_next, _) in itertools.pairwise(front)]
+    lines += [Path([(x, y), (x, y_next)]) for (_, y), (x, y_next) in itertools.pairwise(front)]
+    return [*lines, Path([front[-1], (panel.x1, front[-1][1])])]
+
+
+def _boxes(own: Bbox, pixels: float) -> Iterator[tuple[Point, Bbox]]:
+    """Yield offsets of a label in points, and its box, by preference: left, below, above.
+
+    ``pixels`` are those of a point.
+    """
+    for x, y in _places(own.width / pixels, own.height / pixels):
+        yield (x, y), own.translated(x * pixels, y * pixels)
+
+
+def _places(width: float, height: float) -> Iterator[Point]:
+    """Yield lower left corners of a label, in points from its own point."""
+    yield -_BESIDE - width, -0.5 * height
+    for side, line in itertools.product((-1.0, 1.0), range(_FARTHEST)):
+        y = side * (_BESIDE + _LINE * line) - height * (side < 0.0)
+        yield from ((float(x), y) for x in np.arange(-2.0 - width, 2.0, _STEP))
+
+
+def _nearest(box: Bbox, point: Point) -> Point:
+    """Return the place of a box that is nearest to a point."""
+    x, y = point
+    return min(max(x, box.x0), box.x1), min(max(y, box.y0), box.y1)
 
 
 def _lanes(rows: Sequence[KernelRow], front: Sequence[KernelRow], cost: str) -> list[int]:
@@ -279,7 +360,7 @@ def _limit(axes: Axes, comparison: Comparison, error: str, cost: str) -> None:
     axes.set_xscale("log")
     axes.set_yscale("log")
     most = max(max(costs), 1.5 * min(costs))
-    axes.set_xlim(min(costs) * (min(costs) / most) ** 0.16, most * (most / min(costs)) ** 0.08)
+    axes.set_xlim(min(costs) * (min(costs) / most) ** 0.24, most * (most / min(costs)) ** 0.08)
     top = max(*errors, 1.3 * _JUST_NOTICEABLE) if error != "l2" else max(errors)
     least = min(*errors, top / 10.0)
     axes.set_ylim(least * (least / top) ** 0.16, top * (top / least) ** 0.06)
