@@ -60,7 +60,7 @@ _FAINT = 0.35
 _MOST_TICKS = 8
 _LANE = 0.014  # share of the panel's width between points of equal cost
 # Labels: points from their markers, and between places down and along
-_BESIDE, _LINE, _STEP = 5.5, 4.5, 4.0
+_BESIDE, _LINE, _STEP = 5.5, 4.5, 2.0
 _FARTHEST = 16  # most places down or up
 _MARKER, _CLEAR_PIXELS = 0.045, 4.0  # half a marker in inches, and what labels keep clear of
 _JUST_NOTICEABLE = 1.0  # Delta E
