@@ -115,6 +115,29 @@ def test_no_worker_outlives_its_caller(tmp_path, number):
     assert waited_for(lambda: not any(map(is_alive, pids)))
 
 
+_FAILING = """
+import sys
+sys.path[:0] = {paths!r}
+from sssfit.stability.workers import Workers
+from worker_calls import large
+
+if __name__ == "__main__":
+    with Workers(2, None) as workers:
+        results = [workers.submit(large, 60_000_000) for _ in range(50)]
+        results[0].result()
+        raise OSError("the disk is full")
+"""
+
+
+def test_an_error_ends_workers_in_the_midst_of_a_result(tmp_path):
+    """Their results take longer to come than to make, so one is always under way."""
+    script = tmp_path / "failing.py"
+    script.write_text(_FAILING.format(paths=[str(Path(__file__).parent)]))
+    caller = start([sys.executable, str(script)])
+    _, errors = caller.communicate(timeout=60.0)
+    assert errors.strip().splitlines()[-1] == "OSError: the disk is full"
+
+
 @pytest.mark.parametrize("size", [1, 1_000_000], ids=["little", "more than a pipe holds"])
 def test_a_script_without_its_guard_gets_one_line(tmp_path, size):
     script = tmp_path / "unguarded.py"

@@ -23,3 +23,8 @@ def killed(_shared, _given):
 def asleep(folder, given):
     (folder / str(given)).write_text(str(os.getpid()))
     time.sleep(600.0)
+
+
+def large(_shared, given):
+    """Give a result that takes a while to come through a pipe."""
+    return bytes(given)

@@ -75,10 +75,22 @@ class Workers:
     ) -> None:
         if error is not None:
             self._ours.close()  # which ends them in the midst of their work
+            self._end_results()
         try:
             self._pool.shutdown(cancel_futures=True)
         finally:
             self._close()
+
+    def _end_results(self) -> None:
+        """Close this process's own end of what results come through.
+
+        A worker may end in the midst of a result. The pool's thread waits for the rest of it, and
+        `shutdown` for that thread: for ever, as long as anybody could still write. Python has no
+        public way to say that nobody will.
+        """
+        writer = getattr(getattr(self._pool, "_result_queue", None), "_writer", None)
+        if writer is not None:
+            writer.close()
 
     def _close(self) -> None:
         """Close the pipe, and give the shared memory back."""
