@@ -208,6 +208,30 @@ def test_a_damaged_chunk_is_noticed_and_computed_again(walked, tmp_path):
     assert content(tmp_path / "x.zarr") == content(path)
 
 
+@pytest.mark.parametrize("length", [0, 5])
+def test_points_of_a_damaged_fingerprint_are_computed_again(walked, tmp_path, length):
+    plan, path = walked
+    shutil.copytree(path, tmp_path / "x.zarr")
+    os.truncate(tmp_path / "x.zarr" / "fingerprint" / "1.0", length)
+    found = sweep_to_store(plan, tmp_path / "x.zarr", threads=1, resume=True)
+    assert found.done == 2
+    assert content(tmp_path / "x.zarr") == content(path)
+
+
+def test_damaged_heads_coordinates_and_seeds_are_written_again(walked, tmp_path, caplog):
+    plan, path = walked
+    shutil.copytree(path, tmp_path / "x.zarr")
+    for name in ("fingerprint/.zarray", "eta/0", "seed/1.0"):
+        (tmp_path / "x.zarr" / name).write_text("{")
+    (tmp_path / "x.zarr" / "absorbed" / ".zarray").unlink()
+    with caplog.at_level("INFO"):
+        found = sweep_to_store(plan, tmp_path / "x.zarr", threads=1, resume=True)
+    assert found.done == 0
+    assert content(tmp_path / "x.zarr") == content(path)
+    told = "absorbed/.zarray and 3 other files differed from the plan; written again."
+    assert told in caplog.text
+
+
 @pytest.mark.parametrize("points", [2, 300])
 def test_chunks_are_the_files_that_zarr_would_write(tmp_path, points):
     """Some points of rows of one chunk and of two; values, fill values and a row without any."""
@@ -313,6 +337,11 @@ def test_the_store_of_another_plan_is_refused(walked, tmp_path):
         sweep_to_store(other, path, threads=1, resume=True)
     with pytest.raises(FileError, match="`resume = True` computes what it lacks"):
         sweep_to_store(plan, path, threads=1)
+    begun = tmp_path / "begun.zarr"
+    begun.mkdir()
+    (begun / ".zattrs").write_text('{"format": "sssfit.sweep/1", "plan": 3}')
+    with pytest.raises(SweepError, match=r"begun\.zarr: \.zattrs says plan = 3, and the plan was"):
+        sweep_to_store(plan, begun, threads=1, resume=True)
     (tmp_path / "mine.zarr").mkdir()
     for force in (False, True):
         with pytest.raises(FileError, match="no store of a sweep"):

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from sssfit import __version__
 from sssfit.errors import FileError
 from sssfit.files import reason, temporary_folder
+from sssfit.messages import counted, note
 from sssfit.simulate.batches import code_version
 from sssfit.sweep.layout import (
     FINGERPRINT,
@@ -53,20 +54,60 @@ def make_store(path: Path, plan: Plan, *, replaces: bool = False) -> None:
     FileError
         The disk lacks the room, or the folder cannot be written.
     """
-    zarr = needed("zarr", "sweep")
     try:
         _check_room(path, plan)
         with temporary_folder(beside=path) as folder:
-            made = folder / "made"
-            with quiet():
-                _fill(zarr.create_group(str(made), zarr_format=2, attributes=_head(plan)), plan)
-                zarr.consolidate_metadata(str(made), zarr_format=2)
+            made = _made(folder, plan)
             made.chmod(path.parent.stat().st_mode & 0o777)
             if replaces:
                 path.rename(folder / "before")
             made.rename(path)
     except OSError as error:
         raise FileError(f"{path} cannot be written: {reason(error)}.") from error
+
+
+def restore(path: Path, plan: Plan) -> None:
+    """Write again what a store has from its beginning, where it was damaged, and tell of it.
+
+    Those are the arrays' heads, the coordinates and the seeds. Points are left as they are.
+
+    Raises
+    ------
+    FileError
+        The folder cannot be written.
+    """
+    try:
+        with temporary_folder(beside=path) as folder:
+            made = _made(folder, plan)
+            files = [each.relative_to(made) for each in sorted(made.rglob("*")) if each.is_file()]
+            marks = FINGERPRINT.name  # which are 0 only at the beginning
+            own = [each for each in files if each.name[0] == "." or each.parts[0] != marks]
+            damaged = [each for each in own if not _is_same(path / each, made / each)]
+            for each in damaged:
+                (path / each).parent.mkdir(exist_ok=True)
+                (made / each).replace(path / each)
+    except OSError as error:
+        raise FileError(f"{path} cannot be written: {reason(error)}.") from error
+    if damaged:
+        others = f" and {counted(len(damaged) - 1, 'other file')}" if len(damaged) > 1 else ""
+        note(f"{path}: {damaged[0].as_posix()}{others} differed from the plan; written again.")
+
+
+def _is_same(there: Path, here: Path) -> bool:
+    try:
+        return there.read_bytes() == here.read_bytes()
+    except FileNotFoundError:
+        return False
+
+
+def _made(folder: Path, plan: Plan) -> Path:
+    """Make a store without any point in a temporary folder."""
+    zarr = needed("zarr", "sweep")
+    made = folder / "made"
+    with quiet():
+        _fill(zarr.create_group(str(made), zarr_format=2, attributes=_head(plan)), plan)
+        zarr.consolidate_metadata(str(made), zarr_format=2)
+    return made
 
 
 def _check_room(path: Path, plan: Plan) -> None:

@@ -11,7 +11,7 @@ from sssfit.errors import FileError, SweepError
 from sssfit.files import locked
 from sssfit.messages import note
 from sssfit.simulate.batches import Tally, code_version
-from sssfit.sweep.made import make_store
+from sssfit.sweep.made import make_store, restore
 from sssfit.sweep.needed import needed
 from sssfit.sweep.plan import Plan
 from sssfit.sweep.pools import LOST, Pool, pool_for
@@ -78,6 +78,7 @@ def sweep_to_store(
     with locked(path), pool_for(plan, threads, scheduler) as pool:
         if resume and exists:
             check_same(path, plan)
+            restore(path, plan)
         else:
             if resume:
                 note(f"No {path} to continue from: starting a new sweep.")

@@ -15,8 +15,6 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from sssfit.errors import FileError, SweepError
 from sssfit.files import reason
 from sssfit.messages import printable, shown
@@ -57,8 +55,15 @@ class Store:
 
     def finished(self) -> list[int]:
         """Return the points whose arrays are as their fingerprints say."""
-        marks = self._array(FINGERPRINT.name)[:].ravel()
-        return [int(k) for k in np.flatnonzero(marks) if self._mark_of(int(k)) == marks[k]]
+        marks = {k: self._kept_mark(k) for k in range(self.plan.count)}
+        return [k for k, mark in marks.items() if mark and self._mark_of(k) == mark]
+
+    def _kept_mark(self, index: int) -> int:
+        *row, last = self.plan.position(index)
+        try:
+            return int(self._chunks[FINGERPRINT.name].get((*row,), last))
+        except OSError:  # a fault of the disk: it is computed again
+            return 0
 
     def _array(self, name: str) -> Any:
         zarr = needed("zarr", "sweep")
@@ -143,7 +148,12 @@ def check_same(path: Path, plan: Plan) -> None:
     head = _read_head(path)
     if head.get("format") != FORMAT:
         raise SweepError(f"{path} has format {shown(head.get('format'))}; expected {FORMAT!r}.")
-    there, here = head.get("plan", {}), json.loads(json.dumps(plan.to_dict()))
+    if not isinstance(there := head.get("plan"), dict):
+        raise SweepError(
+            f"{path}: .zattrs says plan = {shown(there)}, and the plan was expected; restore the "
+            "file, or use `force = True` to begin again."
+        )
+    here = json.loads(json.dumps(plan.to_dict()))
     differ = [key for key in here if there.get(key) != here[key]]
     if differ:
         named = "; ".join(
