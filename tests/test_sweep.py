@@ -25,8 +25,9 @@ from sssfit.sweep import Plan, Store, load_plan, pools, sweep_to_store, tasks
 from sssfit.sweep import runner as runner_module
 from sssfit.sweep.chunks import Chunks
 from sssfit.sweep.dry_run import estimate
-from sssfit.sweep.layout import FINGERPRINT, bytes_of, variables_of
+from sssfit.sweep.layout import bytes_of, variables_of
 from sssfit.sweep.runner import Run
+from sssfit.sweep.variables import FINGERPRINT
 
 GRID = "[grid]\ndr_mm = 0.25\nradius_mm = 5.0\n"
 AXES = (

@@ -193,6 +193,8 @@ BAD = {
     HEAD + AXIS + '[[axes]]\nname = "m"\nvalues = [1.0]': "axis m sets nothing",
     HEAD + '[[axes]]\nname = "m"\nvalues = [1.0]': "no axis has a key",
     HEAD + AXIS.replace("key", 'name = "channel"\nkey'): "is a dimension of the store",
+    HEAD + AXIS.replace("key", 'name = "absorbed"\nkey'): "absorbed is an array of results in the",
+    HEAD + AXIS.replace("key", 'name = "seed"\nkey'): "seed is an array of results in the store",
     HEAD + AXIS.replace("eta", "layers[1].eta"): "skin1 has layers[0] to [0]",
     HEAD + AXIS.replace("eta", "sigma_a_per_mm.X"): "has the channels R, G, B",
     HEAD + AXIS.replace("eta", "eta.R"): "the same for all channels",

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.sweep.layout import Variable, chunk_points, sizes_of
+from sssfit.sweep.layout import chunk_points, sizes_of
 from sssfit.sweep.plan import Plan
+from sssfit.sweep.variables import Variable
 
 
 class Chunks:

@@ -15,17 +15,10 @@ from sssfit.errors import FileError
 from sssfit.files import reason, temporary_folder
 from sssfit.messages import counted, note
 from sssfit.simulate.batches import code_version
-from sssfit.sweep.layout import (
-    FINGERPRINT,
-    SEED,
-    Variable,
-    bytes_of,
-    chunk_points,
-    sizes_of,
-    variables_of,
-)
+from sssfit.sweep.layout import bytes_of, chunk_points, sizes_of, variables_of
 from sssfit.sweep.needed import needed
 from sssfit.sweep.plan import Plan
+from sssfit.sweep.variables import FINGERPRINT, SEED, Variable
 
 FORMAT = "sssfit.sweep/1"
 _SPARE_BYTES = 1e7

@@ -46,6 +46,7 @@ from sssfit.sweep.plan_checks import (
     checked_seed,
     checked_settings,
 )
+from sssfit.sweep.variables import NAMES
 
 # A spectral library of 64 bands by 10 x 10 x 10 is 64 000.
 MOST_POINTS = 100_000
@@ -126,6 +127,11 @@ class Plan:
                 )
             if name in _RESERVED:
                 raise PlanError(f"{name} is a dimension of the store; give the axis another name.")
+            if name in NAMES:
+                raise PlanError(
+                    f"{name} is an array of results in the store; give the axis or column another "
+                    "name."
+                )
 
     @property
     def shape(self) -> tuple[int, ...]:

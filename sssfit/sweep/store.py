@@ -20,16 +20,12 @@ from sssfit.files import reason
 from sssfit.messages import printable, shown
 from sssfit.simulate.batches import code_version
 from sssfit.sweep.chunks import Chunks
-from sssfit.sweep.layout import (
-    FINGERPRINT,
-    content_of,
-    values_of,
-    variables_of,
-)
+from sssfit.sweep.layout import content_of, values_of, variables_of
 from sssfit.sweep.made import FORMAT, quiet
 from sssfit.sweep.needed import needed
 from sssfit.sweep.plan import Plan
 from sssfit.sweep.tasks import Done
+from sssfit.sweep.variables import FINGERPRINT
 
 _WAITS_SECONDS, _WAITS_POINTS = 1.0, 512  # the most that a kill can make be computed again
 

@@ -10,9 +10,9 @@ from sssfit.compare.swatches import Swatches
 from sssfit.errors import ArgumentError, FileError, SweepError
 from sssfit.files import reason
 from sssfit.messages import printable
-from sssfit.sweep.layout import FINGERPRINT
 from sssfit.sweep.needed import needed
 from sssfit.sweep.store import is_store
+from sssfit.sweep.variables import FINGERPRINT
 
 _REFLECTANCE, _ERROR = "diffuse_reflectance", "diffuse_reflectance_stderr"
 
