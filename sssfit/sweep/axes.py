@@ -80,6 +80,7 @@ def read_axis(table: object, folder: Path, where: str) -> Axis:
             f"{where} has {' and '.join(given) or 'no values'}; give one of values = [...], "
             "from, to and count, or table = a CSV file."
         )
+    _check_alone(given[0], table, where)
     texts = {key: table[key] for key in ("name", "key", "units", "table") if key in table}
     for key, each in texts.items():
         if not isinstance(each, str) or not each:
@@ -93,6 +94,16 @@ def read_axis(table: object, folder: Path, where: str) -> Axis:
     values = _listed(table, where) if "values" in table else _ranged(table, where)
     units = table.get("units") or (UNITS.get(last, "1") if coefficient else _units(name))
     return Axis(name, values, units, coefficient)
+
+
+def _check_alone(given: str, table: Mapping[str, Any], where: str) -> None:
+    """Raise an error for keys of a range beside a list or a table, which would do nothing."""
+    others = [key for key in ("to", "count", "spacing") if key in table]
+    if given != "from" and others:
+        raise PlanError(
+            f"{where} has {given} and {' and '.join(others)}; only a range, which begins with "
+            f"from, has {others[0]}: leave it out."
+        )
 
 
 def _check_name(name: str, where: str) -> None:

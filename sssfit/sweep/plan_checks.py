@@ -16,7 +16,8 @@ from sssfit.methods import FITS, SIMULATIONS, Setting
 from sssfit.sweep.axes import Axis, as_float
 
 WALK = "montecarlo"
-_OF_WALKS = ("photons",)  # the others are of a single run, or of profiles that no store holds
+_OF_WALKS = ("photons",)  # the others are of a single run
+_OF_PROFILES = ("angles",)  # which a store does not hold
 
 
 def checked_base(value: object) -> Material:
@@ -79,7 +80,7 @@ def _floats(where: str, values: object) -> tuple[float, ...]:
 def checked_settings(value: object, method: str) -> dict[str, Any]:
     """Return the settings of a method by the keywords of its function, as JSON values."""
     given = {key: _scalar(each) for key, each in _mapping("settings", value).items()}
-    own = SIMULATIONS[method].settings
+    own = [each for each in SIMULATIONS[method].settings if each.name not in _OF_PROFILES]
     known = {each.name: each for each in own if method != WALK or each.name in _OF_WALKS}
     for key, each in given.items():
         if key not in known:
