@@ -165,6 +165,15 @@ def test_arithmetic(text, value):
     assert Expression(text, {"x": 0})({"x": 3.0}) == value
 
 
+@pytest.mark.parametrize("named", ["micro sign \u00b5", "Greek letter \u03bc"])
+@pytest.mark.parametrize("used", ["\u00b5", "\u03bc"])
+def test_the_micro_sign_is_the_greek_letter(tmp_path, named, used):
+    axis = f'[[axes]]\nname = "{named[-1]}"\nvalues = [0.1]\n'
+    path = tmp_path / "plan.toml"
+    path.write_text(HEAD + axis + f'[set]\ng = "2 * {used}"', encoding="utf-8")
+    assert load_plan(path).material(0).layers[0].g[0] == 0.2
+
+
 BAD = {
     "x = 1": "x is not a key of a plan",
     "material = 3": "material = 3; expected a name",
@@ -199,6 +208,7 @@ BAD = {
     HEAD + AXIS.replace("key", 'name = "channel"\nkey'): "is a dimension of the store",
     HEAD + AXIS.replace("key", 'name = "absorbed"\nkey'): "absorbed is an array of results in the",
     HEAD + AXIS.replace("key", 'name = "seed"\nkey'): "seed is an array of results in the store",
+    HEAD + AXIS.replace("key", 'name = "lambda"\nkey'): "axes[0].name = 'lambda'; the word has",
     HEAD + AXIS.replace("eta", "layers[1].eta"): "skin1 has layers[0] to [0]",
     HEAD + AXIS.replace("eta", "sigma_a_per_mm.X"): "has the channels R, G, B",
     HEAD + AXIS.replace("eta", "eta.R"): "the same for all channels",
@@ -246,7 +256,8 @@ TABLES = {
     "a,b\n1\n": "row 2, has 1 cells and the head has 2",
     "a,b\n1,x\n": "'x' is not a number",
     "a,a\n1,2\n": "names a column twice",
-    "1,2\n1,2\n": "a letter first",
+    "1,2\n1,2\n": "column '1'; an axis that sets no key has a name of letters",
+    "a,lambda\n1,2\n": "column 'lambda'; the word has another meaning in formulas",
     "a,b\n1,nan\n": "'nan' is not a number",
 }
 

@@ -2,7 +2,9 @@
 
 import csv
 import io
+import keyword
 import math
+import unicodedata
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -89,8 +91,7 @@ def read_axis(table: object, folder: Path, where: str) -> Axis:
         return _of_table(table, folder, where)
     coefficient = table.get("key", "")
     last = coefficient.split("].")[-1].split(".")[0]
-    name = table.get("name") or last
-    _check_name(name, where)
+    name = _checked_name(table.get("name") or last, f"{where}.name =")
     values = _listed(table, where) if "values" in table else _ranged(table, where)
     units = table.get("units") or (UNITS.get(last, "1") if coefficient else _units(name))
     return Axis(name, values, units, coefficient)
@@ -106,12 +107,19 @@ def _check_alone(given: str, table: Mapping[str, Any], where: str) -> None:
         )
 
 
-def _check_name(name: str, where: str) -> None:
+def _checked_name(name: str, where: str) -> str:
+    """Return a name as formulas have it: Python takes the micro sign for the Greek letter."""
     if not name.isidentifier():
         raise PlanError(
-            f"{where}.name = {shown(name)}; an axis that sets no key has a name of letters, "
+            f"{where} {shown(name)}; an axis that sets no key has a name of letters, "
             "digits and _, a letter first."
         )
+    if keyword.iskeyword(name):
+        raise PlanError(
+            f"{where} {shown(name)}; the word has another meaning in formulas, give another name, "
+            f"such as {name}_nm."
+        )
+    return unicodedata.normalize("NFKC", name)
 
 
 def _units(name: str) -> str:
@@ -179,8 +187,7 @@ def _of_table(table: Mapping[str, Any], folder: Path, where: str) -> Axis:
     if len(rows) < 2 or len(rows) > MOST_VALUES + 1:
         raise PlanError(f"{path} has no rows below its head; expected at least one.")
     head, *body = rows
-    for name in head:
-        _check_name(name, str(path))
+    head = [_checked_name(name, f"{path}: column") for name in head]
     if len({*head}) < len(head):
         raise PlanError(f"{path} names a column twice: {', '.join(head)}.")
     columns: list[list[float]] = [[] for _ in head]
@@ -193,7 +200,6 @@ def _of_table(table: Mapping[str, Any], folder: Path, where: str) -> Axis:
             if (value := finite_number(cell)) is None:
                 raise PlanError(f"{path}, row {number}: {shown(cell)} is not a number.")
             column.append(value)
-    name = table.get("name") or head[0]
-    _check_name(name, where)
+    name = _checked_name(table["name"], f"{where}.name =") if "name" in table else head[0]
     others = {key: tuple(each) for key, each in zip(head[1:], columns[1:], strict=True)}
     return Axis(name, tuple(columns[0]), table.get("units") or _units(name), "", others)
