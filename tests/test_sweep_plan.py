@@ -11,6 +11,7 @@ from sssfit.material import load_material
 from sssfit.sweep import Axis, load_plan
 from sssfit.sweep.expression import Expression
 from sssfit.sweep.plan import Plan
+from sssfit.sweep.plan_checks import in_keys
 
 AXIS = '[[axes]]\nkey = "eta"\nvalues = [1.3, 1.4]\n'
 HEAD = 'material = "skin1"\nmethod = "exact"\n'
@@ -202,14 +203,18 @@ BAD = {
     HEAD + '[[axes]]\nkey = "eta"\nfrom = 1\nto = 2\ncount = 3\nspacing = "lin"': "linear or log",
     HEAD + AXIS.replace("1.4", "1.3"): "axis eta has the value 1.3 twice",
     HEAD + AXIS + AXIS: "two axes or columns are called eta",
-    HEAD + AXIS + AXIS.replace("key", 'name = "n"\nkey'): "key = 'eta' is set twice",
+    HEAD + AXIS + AXIS.replace("key", 'name = "n"\nkey'): "key = 'eta' is set twice; leave",
     HEAD + AXIS + '[[axes]]\nname = "m"\nvalues = [1.0]': "axis m sets nothing",
+    HEAD + AXIS.replace("eta", "albedo") + '[set]\n"sigma_a_per_mm.R" = 0.1': (
+        "key = 'sigma_a_per_mm.R' sets a number that 'albedo' sets as well"
+    ),
+    HEAD + AXIS + "[grid]\ndr_mm = 1e-5": "; use [grid] dr_mm = ",
     HEAD + '[[axes]]\nname = "m"\nvalues = [1.0]': "no axis has a key",
     HEAD + AXIS.replace("key", 'name = "channel"\nkey'): "is a dimension of the store",
     HEAD + AXIS.replace("key", 'name = "absorbed"\nkey'): "absorbed is an array of results in the",
     HEAD + AXIS.replace("key", 'name = "seed"\nkey'): "seed is an array of results in the store",
     HEAD + AXIS.replace("key", 'name = "lambda"\nkey'): "axes[0].name = 'lambda'; the word has",
-    HEAD + AXIS.replace("eta", "layers[1].eta"): "skin1 has layers[0] to [0]",
+    HEAD + AXIS.replace("eta", "layers[1].eta"): "skin1 has layers[0] only",
     HEAD + AXIS.replace("eta", "sigma_a_per_mm.X"): "has the channels R, G, B",
     HEAD + AXIS.replace("eta", "eta.R"): "the same for all channels",
     HEAD + AXIS + '[set]\ng = "x + 1"': "'x' is no axis and no column",
@@ -246,15 +251,28 @@ BAD = {
 def test_a_fault_is_one_line_that_names_file_and_remedy(tmp_path, text):
     path = written(tmp_path, text)
     with pytest.raises(PlanError) as caught:
-        _ = load_plan(path).grid
+        load_plan(path)
+    assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
     assert BAD[text] in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    ("said", "in_plan"),
+    [
+        ("use a smaller `dr_mm`.", "use a smaller [grid] dr_mm."),
+        ("use `mm_per_pixel = 0.5` or more", "use [fit] mm_per_pixel = 0.5 or more"),
+        ("with `similarity = True`", "with [settings] similarity = true"),
+    ],
+)
+def test_arguments_of_messages_become_keys_of_a_plan(said, in_plan):
+    assert in_keys(PlanError(said)) == in_plan
+
+
 TABLES = {
-    "a\n": "no rows below its head",
-    "a,b\n1\n": "row 2, has 1 cells and the head has 2",
-    "a,b\n1,x\n": "'x' is not a number",
+    "a\n": "t.csv has 0 rows below its head; expected 1 to 100000",
+    "a,b\n1\n": "line 2 has 1 cell, and the head has 2",
+    "# made up\n\na,b\n1,2\n# more\n1,x\n": "t.csv: line 6: 'x' is not a number",
     "a,a\n1,2\n": "names a column twice",
     "1,2\n1,2\n": "column '1'; an axis that sets no key has a name of letters",
     "a,lambda\n1,2\n": "column 'lambda'; the word has another meaning in formulas",

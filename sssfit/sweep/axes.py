@@ -1,7 +1,6 @@
 """The axes of a plan: a list, a range, or a table of wavelengths, and what a point has on each."""
 
 import csv
-import io
 import keyword
 import math
 import unicodedata
@@ -11,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from sssfit.errors import PlanError
-from sssfit.messages import did_you_mean, shown
+from sssfit.messages import counted, did_you_mean, printable, shown
 from sssfit.sweep.keys import UNITS
 from sssfit.text import finite_number, read_text
 
@@ -176,29 +175,43 @@ def _ranged(table: Mapping[str, Any], where: str) -> tuple[float, ...]:
     return (low, *inner, high) if count > 1 else (low,)
 
 
+def _cells(line: str, where: str) -> list[str]:
+    """Cut a line by the rules of CSV."""
+    try:
+        return [cell.strip() for cell in next(csv.reader([line]))]
+    except csv.Error as error:
+        raise PlanError(f"{where} is not valid CSV: {printable(str(error))}.") from None
+
+
 def _of_table(table: Mapping[str, Any], folder: Path, where: str) -> Axis:
     """Return the axis of a CSV file: its first column is the coordinate, the others are names."""
     if "key" in table:
         raise PlanError(f"{where} has table and key; a table's columns are used in [set].")
     path = folder / table["table"]
     text = read_text(path, str(path), expected="a CSV file with a head", error=PlanError).content
-    lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
-    rows = [[cell.strip() for cell in row] for row in csv.reader(io.StringIO("\n".join(lines)))]
-    if len(rows) < 2 or len(rows) > MOST_VALUES + 1:
-        raise PlanError(f"{path} has no rows below its head; expected at least one.")
-    head, *body = rows
+    rows = [
+        (number, _cells(line, f"{path}: line {number}"))
+        for number, line in enumerate(text.split("\n"), 1)
+        if line.strip() and not line.startswith("#")
+    ]
+    if not 2 <= len(rows) <= MOST_VALUES + 1:
+        raise PlanError(
+            f"{path} has {max(len(rows) - 1, 0)} rows below its head; expected 1 to {MOST_VALUES}."
+        )
+    (_, head), *body = rows
     head = [_checked_name(name, f"{path}: column") for name in head]
     if len({*head}) < len(head):
         raise PlanError(f"{path} names a column twice: {', '.join(head)}.")
     columns: list[list[float]] = [[] for _ in head]
-    for number, row in enumerate(body, 2):
+    for number, row in body:
         if len(row) != len(head):
             raise PlanError(
-                f"{path}, row {number}, has {len(row)} cells and the head has {len(head)}."
+                f"{path}: line {number} has {counted(len(row), 'cell')}, and the head has "
+                f"{len(head)}; give as many."
             )
         for column, cell in zip(columns, row, strict=True):
             if (value := finite_number(cell)) is None:
-                raise PlanError(f"{path}, row {number}: {shown(cell)} is not a number.")
+                raise PlanError(f"{path}: line {number}: {shown(cell)} is not a number.")
             column.append(value)
     name = _checked_name(table["name"], f"{where}.name =") if "name" in table else head[0]
     others = {key: tuple(each) for key, each in zip(head[1:], columns[1:], strict=True)}

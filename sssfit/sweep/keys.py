@@ -66,7 +66,8 @@ def key_of(text: str, material: Material) -> Key:
             f"layers[0].{name}."
         )
     if int(layer or 0) >= count:
-        raise PlanError(f"key = {shown(text)}; {material.name} has layers[0] to [{count - 1}].")
+        there = "layers[0] only" if count == 1 else f"layers[0] to layers[{count - 1}]"
+        raise PlanError(f"key = {shown(text)}; {material.name} has {there}.")
     if channel is not None and channel not in material.channels:
         raise PlanError(
             f"key = {shown(text)}; {material.name} has the channels {', '.join(material.channels)}."

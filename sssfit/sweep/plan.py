@@ -45,6 +45,7 @@ from sssfit.sweep.plan_checks import (
     checked_method,
     checked_seed,
     checked_settings,
+    in_keys,
 )
 from sssfit.sweep.variables import NAMES
 
@@ -156,11 +157,13 @@ class Plan:
         known = self.values(0)
         given = [(each.key, each.name) for each in self.axes if each.key]
         found: dict[Key, Expression] = {}
+        texts: list[str] = []
         for text, formula in [*given, *self.formulas.items()]:
             key = key_of(text, self.base)
-            for other in found:
-                _check_apart(text, key, other)
+            for other_text, other in zip(texts, found, strict=True):
+                _check_apart((text, other_text), key, other)
             found[key] = Expression(formula, known)
+            texts.append(text)
         if not found:
             raise PlanError("no axis has a key and [set] is empty: all points would be the same.")
         used = {*chain(*(each.names for each in found.values()))}
@@ -233,13 +236,13 @@ class Plan:
                     check_media([material])
                 grid = make_grid(material, dr_mm=self.dr_mm, radius_mm=self.radius_mm)
             except SimulationError as error:
-                raise PlanError(f"point {self.label(index)}: {error}") from None
+                raise PlanError(f"point {self.label(index)}: {in_keys(error)}") from None
             narrowest = grid.dr_mm if narrowest is None else min(narrowest, grid.dr_mm)
             widest = max(widest, grid.radius_mm)
         try:
             return make_grid(self.base, dr_mm=narrowest, radius_mm=self.radius_mm or widest)
         except SimulationError as error:
-            raise PlanError(f"the grid that all points share: {error}") from None
+            raise PlanError(f"the grid that all points share: {in_keys(error)}") from None
 
     def to_dict(self) -> dict[str, Any]:
         """Return all that determines the bits of the results, as JSON values."""
@@ -261,7 +264,7 @@ class Plan:
         return hashlib.sha256(json.dumps(self.to_dict(), sort_keys=True).encode()).hexdigest()
 
 
-def _check_apart(text: str, key: Key, other: Key) -> None:
+def _check_apart(texts: tuple[str, str], key: Key, other: Key) -> None:
     """Raise an error for two keys that set the same number."""
     sets = (
         {"sigma_a_per_mm", "sigma_s_per_mm"} if each == "albedo" else {each}
@@ -270,4 +273,6 @@ def _check_apart(text: str, key: Key, other: Key) -> None:
     if key.layer != other.layer or set.isdisjoint(*sets):
         return
     if None in (key.channel, other.channel) or key.channel == other.channel:
-        raise PlanError(f"key = {shown(text)} is set twice, or by {other.name}; leave one out.")
+        text, before = map(shown, texts)
+        said = "is set twice" if text == before else f"sets a number that {before} sets as well"
+        raise PlanError(f"key = {text} {said}; leave one out.")

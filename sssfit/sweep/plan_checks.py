@@ -2,6 +2,7 @@
 
 import inspect
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -16,6 +17,7 @@ from sssfit.methods import FITS, SIMULATIONS, Setting
 from sssfit.sweep.axes import Axis, as_float
 
 WALK = "montecarlo"
+_MARKED = re.compile(r"\x60(\w+)( = [^\x60]+)?\x60")  # `dr_mm = 0.1`
 _OF_WALKS = ("photons",)  # the others are of a single run
 _OF_PROFILES = ("angles",)  # which a store does not hold
 
@@ -140,6 +142,21 @@ def checked_fit(value: object) -> dict[str, Any] | None:
             near = did_you_mean(key, known)
             raise PlanError(f"fit.{key} is unknown; {near}expected {', '.join(known)}.")
     return given
+
+
+def in_keys(error: Exception) -> str:
+    """Return what an error says with keys of a plan in place of the arguments that it marks.
+
+    The command line would put options in their place, and a sweep has none of them.
+    """
+    own = {each.name for method in SIMULATIONS.values() for each in method.settings}
+
+    def key(found: re.Match[str]) -> str:
+        name, value = found[1], found[2] or ""
+        table = "grid" if name in ("dr_mm", "radius_mm") else "settings" if name in own else "fit"
+        return f"[{table}] {name}{value.replace('True', 'true').replace('False', 'false')}"
+
+    return _MARKED.sub(key, str(error))
 
 
 def _mapping(name: str, value: object) -> Mapping[Any, Any]:

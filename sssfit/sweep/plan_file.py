@@ -28,7 +28,7 @@ def load_plan(path: str | Path, *, seed: int | None = None) -> Plan:
     Raises
     ------
     PlanError
-        The file cannot be read or is invalid; the message begins with its name.
+        The file cannot be read, or it or a point is invalid; the message begins with its name.
     """
     path, origin = Path(path), printable(str(path))
     text = read_text(path, origin, expected="a plan in TOML", error=PlanError).content
@@ -37,9 +37,11 @@ def load_plan(path: str | Path, *, seed: int | None = None) -> Plan:
     except (ValueError, RecursionError) as error:
         raise PlanError(f"{origin}: not valid TOML: {printable(str(error))}.") from None
     try:
-        return _plan_of(content | ({} if seed is None else {"seed": seed}), path.parent)
+        plan = _plan_of(content | ({} if seed is None else {"seed": seed}), path.parent)
+        _ = plan.grid  # which checks all points
     except SssfitError as error:
         raise PlanError(f"{origin}: {error}") from None
+    return plan
 
 
 def _plan_of(content: Mapping[str, Any], folder: Path) -> Plan:

@@ -28,6 +28,7 @@ from sssfit.simulate.batches import (
 )
 from sssfit.simulate.half_space import covers
 from sssfit.sweep.plan import Plan
+from sssfit.sweep.plan_checks import in_keys
 
 # At 4 to 6 ns a step a task takes two seconds, of which the 5 ms of client and scheduler are a
 # four-hundredth, and at the end of a sweep no worker waits longer than that for another.
@@ -162,7 +163,7 @@ def _done(plan: Plan, part: Part, profile: Profile | None) -> Done:
             profile = _solved(plan, part.index)
         kernel = None if plan.fit is None else kernel_text(profile, plan)
     except (ValueError, TypeError, ArithmeticError, np.linalg.LinAlgError) as error:
-        return Done(part, failure=str(error))
+        return Done(part, failure=in_keys(error))
     return Done(part, profile, kernel)
 
 
