@@ -115,7 +115,7 @@ def check_output(
         The folder is missing or not writable, or the file is an input or not ours.
     """
     _check_target(path)
-    path = _followed(path)
+    path = followed(path)
     folder = path.parent
     if folder.exists() and not folder.is_dir():
         raise FileError(f"{path}: {folder} is a file; name a folder.")
@@ -219,7 +219,7 @@ def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
         The disk is full, the folder read-only, or another failure; an older file at ``path`` stays
         unchanged.
     """
-    path = _followed(path)
+    path = followed(path)
     with _clear_errors(path):
         handle, temporary = _temporary(path)
         _unfinished.add(temporary)
@@ -297,7 +297,7 @@ def locked(path: Path) -> Iterator[None]:
     FileError
         Another run holds it.
     """
-    path = _followed(path)
+    path = followed(path)
     lock_path = path.with_name(f".{path.name}.lock")
     with _clear_errors(path):
         handle = _open_locked(lock_path, path)
@@ -406,7 +406,7 @@ def _temporary(path: Path) -> tuple[int, Path]:
     return handle, Path(name)
 
 
-def _followed(path: Path) -> Path:
+def followed(path: Path) -> Path:
     """Return the target of a symbolic link, so that a rename replaces the file and not the link."""
     return path.resolve() if path.is_symlink() else path
 

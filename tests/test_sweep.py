@@ -407,6 +407,24 @@ def test_a_chunk_that_cannot_be_written_leaves_nothing_behind(walked, tmp_path, 
     assert content(tmp_path / "x.zarr") == content(path)
 
 
+def test_a_link_to_a_store_stays_one(walked, tmp_path, monkeypatch):
+    plan, path = walked
+    there, link = tmp_path / "disk" / "x.zarr", tmp_path / "link.zarr"
+    there.parent.mkdir()
+    shutil.copytree(path, there)
+    link.symlink_to(there)
+    looked, usage = [], shutil.disk_usage(tmp_path)
+    monkeypatch.setattr(shutil, "disk_usage", lambda each: looked.append(each) or usage)
+    found = sweep_to_store(plan, link, threads=1, force=True, stop=lambda: True)
+    assert link.is_symlink()
+    assert (found.done, looked) == (0, [there.parent])
+    assert content(there) != content(path)
+    (there / "eta" / "0").unlink()
+    sweep_to_store(plan, link, threads=1, resume=True)
+    assert content(there) == content(path)
+    assert sorted(tmp_path.iterdir()) == [there.parent, link]
+
+
 def test_the_estimate_of_bytes_is_what_a_store_takes(walked):
     plan, path = walked
     chunks = {name: len(each) for name, each in content(path).items() if ".z" not in name}

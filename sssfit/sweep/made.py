@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from sssfit import __version__
 from sssfit.errors import FileError
-from sssfit.files import reason, temporary_folder
+from sssfit.files import followed, reason, temporary_folder
 from sssfit.messages import counted, note
 from sssfit.simulate.batches import code_version
 from sssfit.sweep.layout import bytes_of, chunk_points, sizes_of, variables_of
@@ -40,13 +40,14 @@ def make_store(path: Path, plan: Plan, *, replaces: bool = False) -> None:
     path : Path
     plan : Plan
     replaces : bool
-        Whether to delete the store that is there.
+        Whether to delete the store that is there; a symbolic link to it stays.
 
     Raises
     ------
     FileError
         The disk lacks the room, or the folder cannot be written.
     """
+    path = followed(path)
     try:
         _check_room(path, plan)
         with temporary_folder(beside=path) as folder:
@@ -69,6 +70,7 @@ def restore(path: Path, plan: Plan) -> None:
     FileError
         The folder cannot be written.
     """
+    path = followed(path)
     try:
         with temporary_folder(beside=path) as folder:
             made = _made(folder, plan)
