@@ -14,6 +14,7 @@ from sssfit.motion.curve import SampleCurves, sample_curves
 from sssfit.motion.files import FrameFiles
 from sssfit.motion.record import cold_frames
 from sssfit.motion.run import make_frames, moving_light
+from sssfit.motion.runner import run_sequence
 from sssfit.render.adaptive import make_sampler, render_samples
 from sssfit.render.reference import render_reference
 from sssfit.scene.load import load_scenes
@@ -308,6 +309,12 @@ def test_frames_do_not_replace_foreign_files(skin1, scenes, tmp_path):
         write(tmp_path / "no" / "folder")
     with pytest.raises(FileError, match="the folder cannot be made"):
         write(tmp_path / "frame-0002.png")
+
+
+@pytest.mark.parametrize("name", ["", "-"])
+def test_frames_go_into_a_folder_with_a_name(skin1, name):
+    with pytest.raises(ArgumentError, match=f"`frames` is '{name}'; expected the name of a folder"):
+        run_sequence(skin1, "dot", frames=name)
 
 
 @pytest.mark.parametrize("stops", [KeyboardInterrupt, FileError])

@@ -347,6 +347,8 @@ def test_the_store_of_another_plan_is_refused(walked, tmp_path):
     for force in (False, True):
         with pytest.raises(FileError, match="no store of a sweep"):
             sweep_to_store(plan, tmp_path / "mine.zarr", threads=1, force=force)
+    with pytest.raises(FileError, match="- is stdout, and a store is a folder"):
+        sweep_to_store(plan, "-", threads=1)
     with pytest.raises(FileError, match="there is no folder"):
         sweep_to_store(plan, tmp_path / "no" / "x.zarr", threads=1)
 

@@ -287,3 +287,8 @@ def test_faults_of_tables(tmp_path, table):
     with pytest.raises(PlanError, match=r"t\.csv") as caught:
         load_plan(written(tmp_path, text))
     assert TABLES[table] in str(caught.value)
+
+
+def test_a_plan_does_not_come_from_stdin():
+    with pytest.raises(PlanError, match="- is stdin, and what a plan names lies in the plan's"):
+        load_plan("-")

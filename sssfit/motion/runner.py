@@ -6,8 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from sssfit.compare.runner import profile_of
+from sssfit.errors import ArgumentError
 from sssfit.fit import MM_PER_PIXEL
 from sssfit.material import Material
+from sssfit.messages import shown
 from sssfit.motion.adaptive import TARGET_VARIANCE
 from sssfit.motion.files import FrameFiles
 from sssfit.motion.record import MovingLight
@@ -62,6 +64,8 @@ def run_sequence(
     SssfitError
         As the functions above.
     """
+    if frames in ("", "-"):
+        raise ArgumentError(f"`frames` is {shown(frames)}; expected the name of a folder.")
     profile = profile_of(source, threads=threads)
     pictures: dict[str, Any] = {"mm_per_pixel": mm_per_pixel, "size": size, "layer": layer}
     (scene,) = load_scenes([irradiance], otherwise=MM_PER_PIXEL, seed=seed, **pictures)

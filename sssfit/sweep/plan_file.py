@@ -31,6 +31,11 @@ def load_plan(path: str | Path, *, seed: int | None = None) -> Plan:
         The file cannot be read, or it or a point is invalid; the message begins with its name.
     """
     path, origin = Path(path), printable(str(path))
+    if origin == "-":
+        raise PlanError(
+            "- is stdin, and what a plan names lies in the plan's own folder; give the path of a "
+            "file."
+        )
     text = read_text(path, origin, expected="a plan in TOML", error=PlanError).content
     try:
         content = tomllib.loads(text)

@@ -94,6 +94,8 @@ def sweep_to_store(
 
 def _check_path(path: Path, *, resume: bool, force: bool) -> bool:
     """Return whether there is a store to continue or replace; refuse anything else."""
+    if str(path) == "-":
+        raise FileError("- is stdout, and a store is a folder, which goes to a path; name one.")
     if not path.parent.is_dir():
         raise FileError(f"{path}: there is no folder {path.parent}; make it, or name another.")
     if not (path.exists() or path.is_symlink()):
