@@ -311,6 +311,30 @@ def test_frames_do_not_replace_foreign_files(skin1, scenes, tmp_path):
         write(tmp_path / "frame-0002.png")
 
 
+def test_frames_of_a_longer_sequence_are_removed(skin1, scenes, tmp_path):
+    """Up to the first that is not ours, and not where the new ones do not come."""
+
+    def write(length, stops=False):
+        frames = make_frames(skin1, scenes["edge"], length=length)
+        files = FrameFiles(tmp_path, "variates", frames)
+        with files.held():
+            for k in frames:
+                files.write("variates", k, np.full((4, 4, 3), 0.5))
+            if stops:
+                raise KeyboardInterrupt
+
+    def numbers():
+        return [int(each.stem[-4:]) for each in sorted(tmp_path.glob("frame-*.png"))]
+
+    write(7)
+    (tmp_path / "frame-0005.png").write_bytes(b"mine")
+    with pytest.raises(KeyboardInterrupt):
+        write(3, stops=True)
+    assert numbers() == [0, 1, 2, 3, 4, 5, 6]
+    write(3)
+    assert numbers() == [0, 1, 2, 5, 6]
+
+
 @pytest.mark.parametrize("name", ["", "-"])
 def test_frames_go_into_a_folder_with_a_name(skin1, name):
     with pytest.raises(ArgumentError, match=f"`frames` is '{name}'; expected the name of a folder"):

@@ -1,9 +1,11 @@
 """A sequence of pictures in a folder, numbered: frame-0000.png, frame-0001.png and so on.
 
-All of them come into the folder at the end, together, or none does.
+All of them come into the folder at the end, together, or none does. Our own frames that follow the
+last one there are of an earlier, longer sequence, and are removed: a player would show them.
 """
 
 import contextlib
+import itertools
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -54,7 +56,8 @@ class FrameFiles:
                 f"{counted(len(channels), 'channel')}; write EXR."
             )
         digits = max(len(str(len(frames.intensity) - 1)), 4)
-        self.paths = [folder / f"frame-{k:0{digits}}.{form}" for k in frames]
+        self._name_of = f"frame-{{:0{digits}}}.{form}".format
+        self.paths = [folder / self._name_of(k) for k in frames]
         self._name, self._channels = name, list(channels) if form == "exr" else None
         self._frames, self._force = frames, force
         self._exposure = 1.0  # an EXR keeps the light as it is
@@ -67,7 +70,8 @@ class FrameFiles:
         Raises
         ------
         FileError
-            The folder cannot be made, a file not written or replaced, or another run writes them.
+            The folder cannot be made, a file not written, replaced or removed, or another run
+            writes them.
         """
         with _folder(self.paths[0].parent):
             for each in self.paths:
@@ -78,6 +82,21 @@ class FrameFiles:
                 yield
                 for each in self.paths:
                     (self._aside / each.name).replace(each)
+                self._remove_longer()
+
+    def _remove_longer(self) -> None:
+        """Remove our frames that follow the last one, up to one that is missing or foreign."""
+        for k in itertools.count(len(self.paths)):
+            path = self.paths[0].with_name(self._name_of(k))
+            if not is_image_file(path):
+                return
+            try:
+                path.unlink()
+            except OSError as error:
+                raise FileError(
+                    f"{path} of an earlier, longer sequence cannot be removed: {reason(error)}; "
+                    "the new frames are written."
+                ) from None
 
     def write(self, name: str, frame: int, picture: FloatArray) -> None:
         """Write a frame, if it is of the renderer that was asked for."""
