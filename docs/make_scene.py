@@ -4,6 +4,7 @@ python docs/make_scene.py table errors full geometry pictures    ten minutes; or
 """
 
 import argparse
+import math
 from pathlib import Path
 
 import numpy as np
@@ -179,8 +180,8 @@ def geometry():
 
 def fewer(frame):
     """Return how many times fewer texels are convolved."""
-    is_seen = frame.work["saved"].texels_convolved > 0
-    return f"{frame.speed_up[0]:.2f}" if is_seen else "none in view"
+    texels, _ = frame.speed_up
+    return "none in view" if math.isnan(texels) else f"{texels:.2f}"
 
 
 # Pictures

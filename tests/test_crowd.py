@@ -12,7 +12,7 @@ from sssfit.chart import figure_of
 from sssfit.crowd.frame import measure_frame
 from sssfit.crowd.row import Row
 from sssfit.crowd.runner import savings_of
-from sssfit.crowd.table import ALL, PUBLISHED, measure_table
+from sssfit.crowd.table import ALL, PUBLISHED, SpeedUpTable, measure_table
 from sssfit.errors import ArgumentError, RenderError
 from sssfit.fit import fit_result
 from sssfit.formats.pictures import load_image
@@ -75,6 +75,14 @@ def test_culled_and_clipped_pictures_are_the_same_inside(kernel):
     assert whole.mean_delta_e == 0.0
     assert found.to_dict()["speed_up_texels"] == found.speed_up[0]
     assert "times fewer texels" in found.text()
+
+
+def test_without_a_head_in_view_nothing_is_said_of_texels(kernel):
+    found = measure_frame(row(2, 2.5, spacing_units=8.0), kernel, savings=ALL, map_size=64)
+    assert found.work["saved"].texels_convolved == 0
+    assert found.to_dict()["speed_up_texels"] is None
+    assert "\nnone in view, " in found.text()
+    assert np.isnan(SpeedUpTable(((found,),)).texels).all()
 
 
 def test_smaller_maps_far_away_show_little(kernel):

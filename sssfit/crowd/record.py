@@ -1,5 +1,6 @@
 """A frame of a row of heads: what it took, and how far it is from the one without savings."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -108,9 +109,13 @@ class CrowdFrame:
 
     @property
     def speed_up(self) -> tuple[float, float]:
-        """How many times fewer texels are convolved, and how much less time is taken."""
+        """How many times fewer texels are convolved, and how much less time is taken.
+
+        The first is NaN where savings leave none, because no head is in view.
+        """
         whole, saved = self.work["whole"], self.work["saved"]
-        texels = whole.texels_convolved / max(saved.texels_convolved, 1)
+        few = saved.texels_convolved
+        texels = whole.texels_convolved / few if few else math.nan
         return texels, whole.total_seconds / saved.total_seconds
 
     def to_dict(self) -> dict[str, Any]:
@@ -166,7 +171,8 @@ class CrowdFrame:
             ],
         ]
         heads = ["", *(_NAMES[name] for name in self.work)]
-        ends = f"{texels:.2f} times fewer texels convolved, {seconds:.2f} times as fast"
+        fewer = f"{texels:.2f} times fewer texels convolved"
+        ends = f"{'none in view' if math.isnan(texels) else fewer}, {seconds:.2f} times as fast"
         return f"{head}\n{table(heads, rows)}\n{ends}"
 
 
