@@ -13,7 +13,7 @@ import sssfit.choose.choice as rooms
 import sssfit.choose.truth as truths
 from sssfit.choose import truth as photon_walks
 from sssfit.choose.choice import choose, mm_per_pixel_at
-from sssfit.choose.options import PREINTEGRATED, Option, options
+from sssfit.choose.options import PREINTEGRATED, Option, check_caps, options
 from sssfit.choose.report import sentences, step_line
 from sssfit.choose.truth import material_of, photons_needed
 from sssfit.choose.views import Views, checked_scene, head_scenes
@@ -122,6 +122,15 @@ def options_of_all(width):
         yield Option(f"cascade {text}", "cascade", cost.fetches, cost.passes, between(known, width))
     for taps, known in PREINTEGRATED.items():
         yield Option(f"pre-integrated on {taps} taps", "", 2 * taps, 2, between(known, width))
+
+
+@pytest.mark.parametrize("width", [0.5, 5.0, 60.0])
+def test_the_least_budget_buys_the_cheapest_table(width):
+    (cheapest, *_) = options(width)
+    check_caps(cheapest.fetches, None)
+    assert options(width, cheapest.fetches) == [cheapest]
+    with pytest.raises(RenderError, match="expected a number from 6 up"):
+        check_caps(cheapest.fetches - 0.1, None)
 
 
 @pytest.mark.parametrize("budget", [{"fetches": 12.0}, {"fetches": 100.0, "passes": 2}])
@@ -561,10 +570,10 @@ def flat(value, mm_per_pixel=0.6):
         ({"tolerance": 0.0}, "tolerance = 0"),
         ({"tolerance": -1.0}, "tolerance = -1"),
         ({"tolerance": math.nan}, "tolerance = nan"),
-        ({"fetches": 6.9}, "fetches = 6.9; expected a number from 7 up"),
-        ({"fetches": math.nan}, "fetches = nan; expected a number from 7 up"),
+        ({"fetches": 5.9}, "fetches = 5.9; expected a number from 6 up"),
+        ({"fetches": math.nan}, "fetches = nan; expected a number from 6 up"),
         ({"passes": 0}, "passes = 0; expected a whole number from 1 up"),
-        ({"fetches": 7.0, "passes": 1}, "no known table has at most 7 fetches and 1 pass"),
+        ({"fetches": 6.0, "passes": 1}, "no known table has at most 6 fetches and 1 pass"),
         ({"tolerance_of": "p50"}, "tolerance_of = 'p50'; expected one of p95, p99, mean"),
         ({"mm_per_pixel": 1e-300}, "mm_per_pixel = 1e-300; expected a length from 0.0005 mm up"),
         ({"mm_per_pixel": 0.001}, "8193 are the most; expected pixels of 0.0052 mm or more"),

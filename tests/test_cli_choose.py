@@ -281,7 +281,7 @@ def test_budgets_are_printed_and_kept():
         (("skin1", "--fov", "180"), 2, "180"),
         (("skin1", "--fov", "0"), 2, "0.0"),
         (("skin1", "--fov", "nan"), 2, "nan"),
-        (("skin1", "--fetches", "6.9"), 1, "fetches = 6.9; expected a number from 7 up"),
+        (("skin1", "--fetches", "5.9"), 1, "fetches = 5.9; expected a number from 6 up"),
         (("skin1", "--fetches", "nan"), 2, "nan"),
         (("skin1", "--passes", "0"), 2, "0"),
         (("skin1", "--fetches", "7", "--passes", "1"), 1, "allow more of either"),

@@ -267,7 +267,7 @@ def choose(
     tolerance_of : str
         A key of `TOLERANCES`: "p95", "p99" or "mean" of Delta E 2000.
     fetches : float, optional
-        Most texture fetches a pixel, from 7 up. Without a tolerance the table that leaves the least
+        Most texture fetches a pixel, from 6 up. Without a tolerance the table that leaves the least
         error is chosen.
     passes : int, optional
         Most passes of the stages.

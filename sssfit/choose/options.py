@@ -12,7 +12,6 @@ from typing import Any
 
 from sssfit.errors import RenderError
 from sssfit.fit import TapsFit, fit_result, support_of
-from sssfit.fit.cascade import FEWEST
 from sssfit.fit.structures import STRUCTURES, between
 from sssfit.kernel.structure import cost_of_chain, parse
 from sssfit.messages import counted, shown
@@ -29,6 +28,7 @@ PREINTEGRATED: Mapping[int, tuple[float, float]] = {
     33: (7.03, 12.5),
     49: (6.83, 10.4),
 }
+_FEWEST = 2 * min(PREINTEGRATED)  # below any cascade
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,8 +82,8 @@ def check_caps(fetches: float | None, passes: int | None) -> None:
     ------
     RenderError
     """
-    if fetches is not None and not fetches >= FEWEST:
-        raise RenderError(f"fetches = {shown(fetches)}; expected a number from {FEWEST} up.")
+    if fetches is not None and not fetches >= _FEWEST:
+        raise RenderError(f"fetches = {shown(fetches)}; expected a number from {_FEWEST} up.")
     if passes is not None and passes < 1:
         raise RenderError(f"passes = {shown(passes)}; expected a whole number from 1 up.")
 
