@@ -123,6 +123,23 @@ def test_the_overview_of_the_python_pages_runs(capsys):
     assert [capsys.readouterr().out] == code_blocks("text", "api/index.md")
 
 
+def defined_on(page: str) -> set[str]:
+    """The functions and classes of the packages whose modules a page of the API shows."""
+    shown = re.findall(r"^::: sssfit\.(\w+)", (DOCS / "api" / page).read_text(), re.MULTILINE)
+    files = [each for room in shown for each in (ROOT / "sssfit").glob(f"{room}*/**/*.py")]
+    files += [ROOT / "sssfit" / f"{room}.py" for room in shown]
+    code = "\n".join(each.read_text(encoding="utf-8") for each in files if each.exists())
+    return {*re.findall(r"(?:def|class) (\w+)", code)}
+
+
+def test_the_overview_of_the_python_pages_names_what_its_pages_show():
+    text = (DOCS / "api" / "index.md").read_text(encoding="utf-8").partition("```python")[0]
+    for item in text.split("\n- ")[1:]:
+        known = set[str]().union(*map(defined_on, re.findall(r"\]\((\w+\.md)\)", item)))
+        named = set(re.findall(r"`(\w+)(?:\(.*?\))?`", item))
+        assert not known or named <= known, item
+
+
 def test_a_material_by_its_colour_is_printed_as_documented(tmp_path):
     command, *_ = commands_of("own-materials.md", "sssfit materials --from")
     (prints,) = code_blocks("text", "own-materials.md")
