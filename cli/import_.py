@@ -26,7 +26,7 @@ _OPTIONS = (
     option("--channels", None, "A,B,...", "Names for several .mco, in their order.  [default: "
            "R,G,B for three]"),
     option("--preset", list(PRESETS), None, "FILE... are an engine's own parameters, NAME=VALUE."),
-    *output("NAME.profile.npz; of a preset .toml or .taps.json", "is not our profile"),
+    *output("NAME.profile.npz; of some presets .toml or .taps.json", "is not our profile"),
 )
 # fmt: on
 

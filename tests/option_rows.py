@@ -1042,7 +1042,7 @@ IMPORT = {
         names,
         lambda: ["x.profile.npz"],
         default="table.profile.npz",
-        words="NAME.profile.npz; of a preset .toml or .taps.json",
+        words="NAME.profile.npz; of some presets .toml or .taps.json",
     ),
     "--force": Row(
         "import table.csv -o foreign.npz", "--force", is_written("npz"), lambda: ["foreign.npz"]
