@@ -25,6 +25,7 @@ from sssfit.export.presets.separable import (
     separable_of_taps,
     separable_taps,
 )
+from sssfit.export.presets.source import Source
 from sssfit.fit import fit_burley, fit_preintegrated
 from sssfit.kernel import Taps
 from sssfit.material import Layer, Material, load_material
@@ -223,6 +224,18 @@ def test_only_bright_materials_are_outside_the_range_of_burley(skin1, marble):
         assert "R 0.804, G 0.767, B 0.731" in warning
         assert not [each for each in preset_of(name, skin1).warnings if "0.7" in each]
     assert not preset_of("pbrt", marble).warnings
+
+
+MIXED = Layer(1.3, np.array([0.85, 0.7, 0.0]), np.array([0.02, 0.1, 0.9]), np.array([6, 5, 2.0]))
+
+
+@pytest.mark.parametrize("name", MEDIA)
+def test_a_medium_that_stands_in_for_channels_of_several_g_says_what_it_changes(name, skin1):
+    """G returns 0.35395 by the exact solver, and 0.36363 with g = 0."""
+    mixed = Source(skin1, Material("mixed", ("R", "G", "B"), (MIXED,)))
+    first = preset_of(name, mixed).warnings[0]
+    assert first.endswith("which changes R_d: R +0.71 %, G +2.7 %, B 0 %.")
+    assert name == "gltf" or first in preset_text(preset_of(name, mixed))
 
 
 @pytest.mark.parametrize(

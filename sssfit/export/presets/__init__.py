@@ -90,7 +90,10 @@ def preset_of(
     if wanted.material is not None:
         check_medium(record, name)
     source = source_of(record)
-    return _warned(wanted, source.title, {**wanted.convert(source, values)})
+    found = _warned(wanted, source.title, {**wanted.convert(source, values)})
+    if wanted.losses is None:
+        return found
+    return dataclasses.replace(found, warnings=(*wanted.losses(source), *found.warnings))
 
 
 def parameters_from(name: str, given: Mapping[str, object], title: str = "") -> Parameters:

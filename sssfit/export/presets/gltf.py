@@ -149,5 +149,6 @@ GLTF = Preset(
         "README.md, Multi-Scatter Albedo",
     ),
     material=material,
+    losses=medium.losses,
     doubts=doubts,
 )

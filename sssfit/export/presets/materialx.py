@@ -125,4 +125,5 @@ MATERIALX = Preset(
         "github.com/Autodesk/standard-surface: reference/standard_surface.mtlx",
     ),
     material=material,
+    losses=medium.losses,
 )

@@ -5,6 +5,7 @@ The look is the exact profile of the medium that the parameters describe, lit al
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
@@ -21,9 +22,12 @@ from sssfit.profile import Profile
 from sssfit.simulate import simulate_exact
 from sssfit.simulate.half_space import diffuse_reflectance
 from sssfit.simulate.inversion import invert_reflectance
+from sssfit.simulate.stack.angles import energies_by_angle
 
 CHANNELS = ("R", "G", "B")
 _STEP, _LEAST, _NEAR_ONE = 1e-4, 1e-300, 1e-4  # of albedos
+_HEMISPHERE = np.array([0.0, 0.5 * math.pi])
+_ROUNDING = 5  # decimals of a relative change of R_d; two solvers differ by 1e-7
 
 
 def medium_of(source: Source) -> tuple[FloatArray, FloatArray, float, float]:
@@ -46,6 +50,27 @@ def medium_of(source: Source) -> tuple[FloatArray, FloatArray, float, float]:
         said = by_channel(source.profile.channels, sigma_s.tolist(), ".3g")
         raise KernelError(f"{source.title} does not scatter in every channel ({said} per mm).")
     return 1.0 / sigma_t, sigma_s / sigma_t, 0.0 if is_reduced else g, source.eta
+
+
+def losses(source: Source) -> tuple[str, ...]:
+    """Return a warning where `medium_of` replaces channels of several g by a medium of g = 0."""
+    layer = source.layer("the engine asks for coefficients")
+    if source.material is None or (layer.g == layer.g[0]).all():
+        return ()
+    _, albedo, g, eta = medium_of(source)
+    seen = entering_colour(albedo, g, eta) * normal_transmittance(eta)
+    change = np.round(seen / total_reflectance(source.material) - 1.0, _ROUNDING)
+    said = by_channel(source.profile.channels, change.tolist(), "+.2g%")
+    return (
+        f"The channels of {source.title} differ in g and the engine takes one: sigma_s' = (1 - g) "
+        f"sigma_s with g = 0 stands in for them, which changes R_d: {said}.",
+    )
+
+
+def total_reflectance(material: Material) -> FloatArray:
+    """Return R_d (C,) of any material under normal light, exactly, in hundredths of a second."""
+    by_angle = energies_by_angle(material, _HEMISPHERE)["angle_reflected"]
+    return np.asarray(by_angle.sum(axis=(0, 1)))
 
 
 def reduced_albedo(albedo: npt.ArrayLike, g: float) -> FloatArray:

@@ -96,4 +96,5 @@ MITSUBA = Preset(
     lost="nothing if all channels have one g.",
     origin=("github.com/mitsuba-renderer/mitsuba3: src/media/homogeneous.cpp",),
     material=material,
+    losses=medium.losses,
 )

@@ -102,4 +102,5 @@ OPENPBR = Preset(
         "of subsurface_color",
     ),
     material=material,
+    losses=medium.losses,
 )

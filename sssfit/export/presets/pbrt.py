@@ -83,4 +83,5 @@ PBRT = Preset(
         "pbrt.org/fileformat-v4: Participating Media",
     ),
     material=material,
+    losses=medium.losses,
 )

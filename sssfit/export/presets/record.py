@@ -52,6 +52,8 @@ class Preset:
         From parameters to the medium that they describe, where they describe one.
     doubts : function, optional
         Warnings about parameters, each a sentence.
+    losses : function, optional
+        Warnings about what of a source the parameters cannot say, each a sentence.
     of_taps : function, optional
         From a table of taps that `look` returns, and the chosen parameters, to the values.
     """
@@ -69,6 +71,7 @@ class Preset:
     origin: tuple[str, ...]
     material: Callable[[Parameters], Material] | None = None
     doubts: Callable[[Parameters], tuple[str, ...]] | None = None
+    losses: Callable[[Source], tuple[str, ...]] | None = None
     of_taps: Callable[[Taps, Values], Values] | None = None
 
     def read(self, given: Mapping[str, object], *, title: str, chosen: bool = False) -> Values:
