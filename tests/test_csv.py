@@ -91,6 +91,30 @@ def test_density_at_the_axis_and_its_errors():
     )
 
 
+@pytest.mark.parametrize("quantity", ["density", "energy"])
+def test_the_total_of_a_table_that_ends_has_the_error_of_its_annuli(quantity, caplog):
+    """What lies beyond is taken as 0, which is said; a column without errors has none."""
+    text = "r_mm,R,R_stderr,G\n0.5,0.02,0.001,0.02\n1.5,0.01,0.0005,0.01\n2.5,0.004,0.0002,0\n"
+    with caplog.at_level("INFO", logger="sssfit"):
+        profile = parse_csv(text, "a.csv", quantity=quantity)
+    assert profile.beyond_grid_stderr.tolist() == pytest.approx([0.0, np.nan], nan_ok=True)
+    total = np.sqrt((profile.annulus_energy_stderr[:, 0] ** 2).sum())
+    assert profile.diffuse_reflectance_stderr.tolist() == pytest.approx(
+        [total, np.nan], nan_ok=True
+    )
+    end = 3 if quantity == "density" else 2.5
+    assert f"a.csv has no light beyond {end} mm: it is taken as 0" in caplog.text
+    assert_same_bits(parse_csv(csv_text(profile), "b.csv"), profile)
+
+
+def test_an_unknown_error_beyond_stays_unknown_and_needs_no_note(caplog):
+    text = "r_mm,R,R_stderr\n0.5,0.02,0.001\ninf,0.01,nan\n"
+    with caplog.at_level("INFO", logger="sssfit"):
+        profile = parse_csv(text, "a.csv", quantity="energy")
+    assert np.isnan(profile.diffuse_reflectance_stderr).all()
+    assert not caplog.text
+
+
 def test_densities_of_bin_centres_are_the_energies_they_came_from():
     walk = simulate_montecarlo(load_material("skin1"), photons=20_000)
     centres_mm = 0.5 * (walk.r_edges_mm[1:] + walk.r_edges_mm[:-1])

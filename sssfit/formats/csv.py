@@ -16,6 +16,9 @@ energy
     whose inner edge is that of the line before (0 for the first). A last line whose radius is inf
     holds the energy beyond.
 
+Light beyond a table without such a line is taken as 0, with the standard error 0 if the column has
+standard errors: the total's is then that of its annuli.
+
 Radii may be unequally spaced. We write energies with every digit, so radii, energies and standard
 errors are read back to the same bits. A table cannot hold specular reflectance, absorption and
 transmittance.
@@ -36,7 +39,7 @@ from sssfit import __version__
 from sssfit.arrays import FloatArray, check_names
 from sssfit.errors import MaterialError, ProfileError, SssfitWarning
 from sssfit.files import has_mark
-from sssfit.messages import counted, printable, shown
+from sssfit.messages import counted, note, printable, shown
 from sssfit.profile import FORMAT, Profile
 from sssfit.profile import pixels as integrals
 from sssfit.text import decimal_shifted, finite_number, read_text
@@ -130,13 +133,15 @@ def parse_csv(
     energy = np.stack([columns[name] for name in channels], axis=1)
     stderr = np.stack([columns.get(name + _STDERR, none) for name in channels], axis=1)
     is_beyond = len(values) > n
+    has_errors = [name + _STDERR in columns for name in channels]
     try:
         profile = Profile(
             r_edges_mm=edges_mm,
             annulus_energy=energy[:n],
             annulus_energy_stderr=stderr[:n],
             beyond_grid=energy[n] if is_beyond else np.zeros(len(channels)),
-            beyond_grid_stderr=stderr[n] if is_beyond else np.full(len(channels), np.nan),
+            # Taken as 0 with certainty: the total's error is then that of the annuli.
+            beyond_grid_stderr=stderr[n] if is_beyond else np.where(has_errors, 0.0, np.nan),
             specular_reflectance=0.0,
             absorbed=np.zeros((0, len(channels))),
             unfinished=np.zeros(len(channels)),
@@ -156,6 +161,11 @@ def parse_csv(
     except ProfileError as error:
         raise ProfileError(f"{printable(origin)}: {error}") from None
     _check_total(profile, table, per_unit)
+    if not is_beyond and np.isfinite(profile.diffuse_reflectance_stderr).any():
+        note(
+            f"{table.origin} has no light beyond {edges_mm[-1]:g} mm: it is taken as 0, and "
+            "standard errors of totals are those of the annuli alone."
+        )
     if quantity == "density":
         _warn_of_gap(profile, radii_mm, table)
     return profile
