@@ -164,8 +164,11 @@ def taps_edge(offsets, weights):
 
 
 def colours():
-    """Tabulate the formula's albedos, the exact ones, and the colours that the formula's have."""
-    curves = compute_inversions(COLOURS)
+    """Tabulate the formula's albedos, the exact ones, and the colours that the formula's have.
+
+    All are for diffuse light, for which the formula was fitted.
+    """
+    curves = compute_inversions(COLOURS, light="diffuse")
     rows = [
         (
             f"{COLOURS[k]:g}",

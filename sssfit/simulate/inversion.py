@@ -107,7 +107,8 @@ def invert_reflectance(
     eta : float
         Refractive index relative to what is above.
     light : "normal" or "diffuse"
-        The incident light of the reflectance; base colours are defined for diffuse light.
+        The incident light of the reflectance; base colours are defined for diffuse light, OpenPBR's
+        ``subsurface_color`` for normal light.
 
     Returns
     -------
