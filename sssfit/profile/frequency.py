@@ -3,6 +3,9 @@
 R(k) = 2 pi int R_d(r) J0(k r) r dr is the amplitude of what returns under light that varies as
 cos(k x); R(0) is the diffuse reflectance. k is in radians per mm: a pattern of f cycles per mm, as
 in spatial frequency domain imaging, has k = 2 pi f.
+
+Annuli are cut into flat parts as the integrals over pixels cut them (``sssfit.profile.pixels``), of
+which the transform has a closed form.
 """
 
 from dataclasses import dataclass
@@ -54,8 +57,9 @@ def frequency_response(
 ) -> FrequencyResponse:
     """Compute R(k) from a profile's energies.
 
-    An annulus of constant density from a to b holds [2 / k (b J1(k b) - a J1(k a))] / (b^2 - a^2)
-    of its energy at k. The annuli are those that `Profile.quadrant_kernel` integrates.
+    A flat part of an annulus, from a to b, holds [2 / k (b J1(k b) - a J1(k a))] / (b^2 - a^2) of
+    its energy at k. The parts, 64 for each of the first ten annuli and then fewer, are those that
+    `Profile.quadrant_kernel` integrates. Standard errors are of whole annuli, taken as flat.
 
     Parameters
     ----------
