@@ -19,7 +19,7 @@ from sssfit.export.presets.medium import albedo_of_colour, entering_colour
 from sssfit.export.presets.separable import FALLOFF, STRENGTH
 from sssfit.export.presets.unreal import distance_mm
 from sssfit.kernel.listing import listing
-from sssfit.material import load_material
+from sssfit.material import Layer, Material, load_material
 from sssfit.shapes import diffusion_radius, s_diffuse_mean_free_path, s_perpendicular
 from sssfit.simulate import simulate_dipole, simulate_exact
 from sssfit.simulate.inversion import reflectance_of, van_de_hulst_albedo
@@ -138,6 +138,22 @@ def test_the_albedo_of_a_colour_has_it_to_nine_digits():
         albedo = albedo_of_colour(colour, g, eta)
         assert ((albedo >= 0.0) & (albedo <= 1.0)).all()
         np.testing.assert_allclose(entering_colour(albedo, g, eta), colour, rtol=2e-8, atol=1e-12)
+
+
+def test_openpbrs_colour_of_forward_scattering_is_exact():
+    """Taken as g = 0 it would be 0.3 %, 2.7 % and 58 % too bright."""
+    layer = Layer(1.3, np.full(3, 0.7), np.array([0.02, 0.1, 0.9]), np.array([6.0, 5.0, 2.0]))
+    profile = simulate_exact(Material("forward", ("R", "G", "B"), (layer,)))
+    for name in ("openpbr", "materialx"):
+        found = preset_of(name, profile)
+        seen = np.array(found["subsurface_color"]) * (1.0 - profile.specular_reflectance)
+        np.testing.assert_allclose(seen, profile.diffuse_reflectance, rtol=1e-5)
+        again = import_preset(name, found.values).layers[0]
+        np.testing.assert_allclose(again.sigma_s_per_mm, layer.sigma_s_per_mm, rtol=1e-9)
+
+
+def test_an_albedo_of_backward_scattering_does_not_exceed_1():
+    assert albedo_of_colour(np.array([0.3, 1.0]), -0.9, 1.4)[1] == 1.0
 
 
 def test_gltf_reads_the_coefficients_back(skin1):
