@@ -1,6 +1,7 @@
 """The solver for layers against published values, the other solver, reciprocity and energy."""
 
 import math
+import re
 import subprocess
 import sys
 
@@ -14,7 +15,7 @@ from sssfit.errors import SimulationError, StoppedError
 from sssfit.material import Layer, Material, load_material
 from sssfit.simulate import simulate_exact, simulate_exact_many, simulate_montecarlo
 from sssfit.simulate.half_space import diffuse_reflectance
-from sssfit.simulate.stack import limits
+from sssfit.simulate.stack import limits, profiles
 from sssfit.simulate.stack.assembly import Assembly, _spans, reflected_at, transforms_at
 from sssfit.simulate.stack.azimuth import FEWEST, azimuth_of
 from sssfit.simulate.stack.changes import Changes, ready
@@ -389,6 +390,20 @@ def test_hundreds_of_layers_to_a_millionth_are_refused_at_once():
         simulate_exact(many, tolerance=1e-6, threads=1, stop=never)
     channels = [limits.Channel("skin", each, 0.0, np.array([0.0, 1.0])) for each in stacks_of(many)]
     limits.check_time(channels, 16, 1e-4)
+
+
+def test_directions_that_take_long_are_told(monkeypatch, caplog):
+    """After a tenth of the time, which shows how many are needed."""
+    skin = medium(0.1, 10.0, 1.4, g=0.8)
+    monkeypatch.setattr(profiles, "_MANY", 0)
+    with caplog.at_level("INFO", logger="sssfit"):
+        simulate_exact(skin, tolerance=0.01, threads=1)
+        assert not caplog.text
+        monkeypatch.setattr(limits, "_WORTH_A_NOTE", 1e-3)
+        simulate_exact(skin, tolerance=0.01, threads=1)
+    assert re.search(
+        r"a tolerance of 0.01 needs 5 directions.* some 0.\d+ s of a proc", caplog.text
+    )
 
 
 def test_directions_stop_where_memory_does(monkeypatch):

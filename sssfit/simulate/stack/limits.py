@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError
-from sssfit.messages import counted
+from sssfit.messages import counted, note
 from sssfit.simulate.stack.azimuth import FEWEST
 from sssfit.simulate.stack.nodes import Nodes
 from sssfit.simulate.stack.quarter import AZIMUTHS, Quarter
@@ -17,6 +17,9 @@ _LEAST_TOLERANCE = 1e-6  # 40 directions reach 5e-8 of a half space and 1e-6 of 
 _MOST_BYTES = 2_000_000_000  # of matrices at once
 _MOST_SECONDS = 600.0  # of one processor, for the first number of directions
 _SECONDS = 2.1e-9  # of a layer at one wavenumber, for each cube of an unknown; measured
+_WORTH_A_NOTE = 20.0  # seconds
+_OF_MANY = 0.5  # of that time, with many directions in azimuth: not every wavenumber has them all
+_NAMED = 4  # channels in a note
 _WAVENUMBERS = 70.0  # at a tolerance of 1e-4; a spline's error goes with the fourth power
 _MATRICES = 6  # complex ones for each layer of a stack, and the modes of each
 
@@ -85,21 +88,45 @@ def check_tolerance(channels: Sequence[Channel], tolerance: float) -> None:
         )
 
 
+def _seconds(channels: Sequence[Channel], count: int, azimuths: int, tolerance: float) -> float:
+    """Return the processor time that so many polar directions and directions in azimuth take."""
+    cubes = sum(
+        len(each.stack.slabs)
+        * (2 * azimuths * Nodes.of(each.stack.indices, count).invariant.size) ** 3
+        for each in channels
+    )
+    return float(_SECONDS * cubes * _WAVENUMBERS * (1e-4 / tolerance) ** 0.25)
+
+
 def check_time(channels: Sequence[Channel], count: int, tolerance: float) -> None:
-    """Raise an error for stacks of many layers to a small tolerance, before an hour is spent."""
-    unknowns = [
-        2 * FEWEST * Nodes.of(each.stack.indices, count).invariant.size for each in channels
-    ]
-    layers = [len(each.stack.slabs) for each in channels]
-    cubes = sum(n * size**3 for n, size in zip(layers, unknowns, strict=True))
-    seconds = _SECONDS * cubes * _WAVENUMBERS * (1e-4 / tolerance) ** 0.25
+    """Raise an error for stacks of many layers to a small tolerance, before an hour is spent.
+
+    The time is the least that it can take: how many directions are needed is not known yet.
+    """
+    seconds = _seconds(channels, count, FEWEST, tolerance)
     if seconds > _MOST_SECONDS:
-        most = max(layers)
+        most = max(channels, key=lambda each: len(each.stack.slabs))
         raise SimulationError(
-            f"{channels[layers.index(most)].name} has {most} layers, which to a tolerance of "
+            f"{most.name} has {len(most.stack.slabs)} layers, which to a tolerance of "
             f"{tolerance:g} would take over {seconds / 60.0:.0f} minutes of a processor, more than "
             f"{_MOST_SECONDS / 60.0:g}; merge layers, give a larger tolerance, or use "
             "`method = montecarlo`."
+        )
+
+
+def note_time(channels: Sequence[Channel], count: int, azimuths: int, tolerance: float) -> None:
+    """Say that the directions that turned out to be needed take long.
+
+    Estimates were 0.8 to 1.7 times the time that three stacks then took.
+    """
+    seconds = _OF_MANY * _seconds(channels, count, azimuths, tolerance)
+    if seconds > _WORTH_A_NOTE:
+        names = ", ".join(each.name for each in channels[:_NAMED])
+        more = f" and {len(channels) - _NAMED} more" if len(channels) > _NAMED else ""
+        note(
+            f"{names}{more}: a tolerance of {tolerance:g} needs {azimuths} directions in azimuth, "
+            f"which take some {_rounded_up(seconds):g} s of a processor. A larger tolerance takes "
+            "less, and so may `method = montecarlo`."
         )
 
 

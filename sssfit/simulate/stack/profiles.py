@@ -24,6 +24,7 @@ from sssfit.simulate.stack.limits import (
     check_time,
     check_tolerance,
     fits,
+    note_time,
 )
 from sssfit.simulate.stack.quarter import Quarter, quarter_of
 from sssfit.simulate.stack.sampling import Family
@@ -142,6 +143,7 @@ def _solve_family(
         if quarter.share > _MOST_AZIMUTH * tolerance:
             raise azimuths_cannot(channels[quarter.worst], quarter, _MOST_AZIMUTH, tolerance)
         check_memory(channels, counts[1], quarter.count, threads)
+        note_time(channels, needed, quarter.count, tolerance)
     step = solution(counts, quarter, 1.0)
     pairs = zip(step.answers, step.errors, strict=True)
     return [Solved(*pair, step.count) for pair in pairs]
