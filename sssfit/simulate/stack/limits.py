@@ -101,7 +101,7 @@ def _seconds(channels: Sequence[Channel], count: int, azimuths: int, tolerance: 
 def check_time(channels: Sequence[Channel], count: int, tolerance: float) -> None:
     """Raise an error for stacks of many layers to a small tolerance, before an hour is spent.
 
-    The time is the least that it can take: how many directions are needed is not known yet.
+    The time is that of the fewest directions: how many are needed is not known yet.
     """
     seconds = _seconds(channels, count, FEWEST, tolerance)
     if seconds > _MOST_SECONDS:
