@@ -1,7 +1,8 @@
 """Wording of figures, values and names: on one line, in printable characters."""
 
+import contextlib
 import logging
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from string import Formatter
 from typing import Any, TypeAlias
@@ -16,6 +17,21 @@ def note(line: str) -> None:
     The command line prints it; in Python ``logging.basicConfig(level="INFO")`` does.
     """
     logging.getLogger("sssfit").info("%s", line)
+
+
+@contextlib.contextmanager
+def without_notes() -> Iterator[None]:
+    """Tell the user nothing in this block: what one of thousands of runs notes is no news."""
+    log = logging.getLogger("sssfit")
+    log.addFilter(_nothing)
+    try:
+        yield
+    finally:
+        log.removeFilter(_nothing)
+
+
+def _nothing(record: logging.LogRecord) -> bool:
+    return record.levelno > logging.INFO
 
 
 def printable(text: str) -> str:

@@ -81,7 +81,7 @@ def test_without_a_head_in_view_nothing_is_said_of_texels(kernel):
     found = measure_frame(row(2, 2.5, spacing_units=8.0), kernel, savings=ALL, map_size=64)
     assert found.work["saved"].texels_convolved == 0
     assert found.to_dict()["speed_up_texels"] is None
-    assert "\nnone in view, " in found.text()
+    assert "\nno texel in view is convolved, " in found.text()
     assert np.isnan(SpeedUpTable(((found,),)).texels).all()
 
 

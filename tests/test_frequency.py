@@ -118,8 +118,8 @@ def test_of_many_channels_eight_are_drawn_and_the_rest_is_told(skin1):
 def test_errors_are_named_for_what_they_are(skin1):
     """Noise of a walk, estimates of the exact solver; diffusion has none."""
     made = (
-        (simulate_montecarlo(skin1, photons=20_000), "bands show one standard error"),
-        (simulate_exact(skin1), "bands show the estimated error"),
+        (simulate_montecarlo(skin1, photons=20_000), "bands show ± the standard error"),
+        (simulate_exact(skin1), "bands show ± the estimated error"),
         (simulate_burley(skin1), "light cos(kx)."),
     )
     for profile, words in made:

@@ -523,3 +523,25 @@ def test_a_layer_too_thick_for_its_modes_to_differ_is_refused():
     slabs = Slab(0.0, 1000.0, 0.0, 1.4, 20.0), Slab(5.0, 0.5, 0.0, 1.4)
     with pytest.raises(SimulationError, match="a layer of 20 mm absorbs too little beside"):
         Sampler(Family((SlabStack(slabs),)), 16).at_zero()
+
+
+@pytest.mark.parametrize("sigma_a", [0.0, 5e-9, 3.2e-8, 1e-6])
+def test_a_lossless_layer_on_a_ground_of_hardly_any_loss(sigma_a):
+    """A half space of the same absorption throughout, by the other solver."""
+    slabs = Slab(sigma_a, 10.0, 0.0, 1.4, 1.0), Slab(sigma_a, 10.0, 0.0, 1.4)
+    found = Sampler(Family((SlabStack(slabs),)), 16).at_zero()[0].reflected
+    albedo = np.array([10.0 / (10.0 + sigma_a)])
+    assert found == pytest.approx(float(diffuse_reflectance(albedo, 1.4)[0]), abs=2e-5)
+
+
+def test_a_lossless_slab_returns_what_it_does_not_pass():
+    """T is (z + zb) / (d + 2 zb) by diffusion: z = 1 / sigma_s, zb by what the surface reflects."""
+    # At 20 m, 2e5 paths, k coth(k d) is taken for sqrt(k^2 + 1 / d^2) at k d = 10.
+    for thickness, miss in ((5.0, 1e-6), (100.0, 1e-6), (20_000.0, 2e-5)):
+        slab = SlabStack((Slab(0.0, 10.0, 0.0, 1.4, thickness),))
+        (found,) = Sampler(Family((slab,)), 16).at_zero()
+        entering = 1.0 - (0.4 / 2.4) ** 2
+        assert found.reflected + found.transmitted == pytest.approx(entering, abs=miss)
+        beyond = 2.0 / 3.0 / 10.0 * (1.0 + 0.529) / (1.0 - 0.529)  # Groenhuis 1983, eta 1.4
+        passed = entering * (0.1 + beyond) / (thickness + 2.0 * beyond)
+        assert found.transmitted == pytest.approx(passed, rel=0.1, abs=miss)

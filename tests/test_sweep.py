@@ -1,5 +1,6 @@
 """Sweeps: the same bits on any number of workers, nothing lost or doubled, and one store of it."""
 
+import json
 import os
 import shutil
 import signal
@@ -229,8 +230,29 @@ def test_damaged_heads_coordinates_and_seeds_are_written_again(walked, tmp_path,
         found = sweep_to_store(plan, tmp_path / "x.zarr", threads=1, resume=True)
     assert found.done == 0
     assert content(tmp_path / "x.zarr") == content(path)
-    told = "absorbed/.zarray and 3 other files differed from the plan; written again."
+    told = "absorbed/.zarray and 3 other files were damaged or missing; written again."
     assert told in caplog.text
+
+
+def test_what_else_a_store_has_stays(walked, tmp_path, caplog):
+    """Attributes and arrays of the user's own, and a head that is written otherwise."""
+    plan, path = walked
+    store = tmp_path / "x.zarr"
+    shutil.copytree(path, store)
+    group = zarr.open_group(store, zarr_format=2)
+    group.attrs["author"] = "me"
+    group.create_array("mine", data=np.arange(3.0))
+    head = store / "eta" / ".zarray"
+    head.write_text(json.dumps(json.loads(head.read_text()) | {"compressor": {"id": "zlib"}}))
+    kept = head.read_bytes(), (store / "eta" / "0").read_bytes()
+    (store / ".zmetadata").unlink()
+    with caplog.at_level("INFO"):
+        assert sweep_to_store(plan, store, threads=1, resume=True).done == 0
+    assert ".zmetadata was damaged or missing; written again." in caplog.text
+    assert (head.read_bytes(), (store / "eta" / "0").read_bytes()) == kept
+    again = zarr.open_consolidated(store, zarr_format=2)
+    assert again.attrs["author"] == "me"
+    assert again["mine"][:].tolist() == [0.0, 1.0, 2.0]
 
 
 @pytest.mark.parametrize("points", [2, 300])

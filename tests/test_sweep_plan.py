@@ -292,3 +292,13 @@ def test_faults_of_tables(tmp_path, table):
 def test_a_plan_does_not_come_from_stdin():
     with pytest.raises(PlanError, match="- is stdin, and what a plan names lies in the plan's"):
         load_plan("-")
+
+
+def test_advice_names_keys_of_the_plan():
+    told = ValueError(
+        "use `method = montecarlo`, `dr_mm = 0.1`, `normalize = True` or `tolerance`."
+    )
+    assert in_keys(told) == (
+        'use method = "montecarlo", [grid] dr_mm = 0.1, [fit] normalize = true or [settings] '
+        "tolerance."
+    )

@@ -20,6 +20,7 @@ from sssfit.chart.page import (
 from sssfit.chart.text import (
     channel_label,
     in_legend,
+    kind_of_error,
     left_out_note,
     legend_title,
     subtitle,
@@ -70,8 +71,8 @@ def angles_figure(found: AngularReflectance) -> Figure:
 
 def _note(found: AngularReflectance) -> str:
     names = found.profile.channels
-    is_exact = found.profile.photons is None
-    alone, kind = ("the estimated error", "estimated") if is_exact else ("noise", "standard")
+    kind = kind_of_error(found.profile)
+    alone = "the estimated error" if kind == "estimated" else "noise"
     shares = by_channel(names, (100.0 * found.misplaced).tolist(), ".2g")
     noise = by_channel(names, (100.0 * found.misplaced_stderr).tolist(), ".2g")
     return (

@@ -21,6 +21,7 @@ from sssfit.chart.page import (
 from sssfit.chart.text import (
     channel_label,
     in_legend,
+    kind_of_error,
     left_out_note,
     legend_title,
     subtitle,
@@ -67,13 +68,13 @@ def frequency_figure(found: FrequencyResponse) -> Figure:
 
 def _note(found: FrequencyResponse) -> str:
     beyond = float((found.profile.beyond_grid / _nonzero(found.response[0])).max())
-    kind = "the estimated" if found.profile.photons is None else "one standard"
+    kind = kind_of_error(found.profile)
     is_known = (found.stderr[1:] > 0.0).any()  # not under a beam, nor of diffusion models
     share = f"at most {100.0 * beyond:.2g} % of a channel"
     lost = f" Light beyond the grid, {share}, counts at k = 0 only." if beyond > 0.0 else ""
     return (
         "R(k) = 2π ∫ R_d(r) J₀(kr) r dr, the amplitude that returns of light cos(kx)"
-        f"{f'; bands show {kind} error' if is_known else ''}.{lost}"
+        f"{f'; bands show ± the {kind} error' if is_known else ''}.{lost}"
     )
 
 

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from sssfit.chart.page import NOTE_COLOUR, RC, drawable, new_mosaic, new_page
-from sssfit.chart.text import method_name, shortened, spread
+from sssfit.chart.text import left_out_note, method_name, shortened, spread
 from sssfit.messages import counted
 
 if TYPE_CHECKING:
@@ -120,9 +120,7 @@ def _notes(found: Swatches, drawn: int) -> list[str]:
         notes.append(f"Standard error of the luminance Y: at most {noise.max():.2g} of a white's.")
     if found.outside:
         notes.append(f"{counted(found.outside, 'colour')} outside sRGB, drawn clipped.")
-    left_out = found.luminance_stderr.size - drawn
-    if left_out:
-        notes.append(f"{counted(left_out, 'swatch')} between these are not drawn.")
+    notes += left_out_note(found.luminance_stderr.size - drawn, "swatch")
     if found.missing:
         notes.append("Crossed out: not all of the wavelengths are finished.")
     return notes

@@ -41,8 +41,7 @@ def legend_title(profile: Profile) -> str:
     """Return the head of the channels' legend."""
     if not (profile.diffuse_reflectance_stderr > 0).any():
         return "Total diffuse reflectance"
-    kind = "estimated" if profile.photons is None else "standard"
-    return f"Total diffuse reflectance ± {kind} error"
+    return f"Total diffuse reflectance ± {kind_of_error(profile)} error"
 
 
 def subtitle(profile: Profile) -> str:
@@ -147,8 +146,8 @@ def footnotes(profile: Profile, image: str) -> list[str]:
         )
     elif (profile.annulus_energy_stderr > 0.0).any():
         notes.append(
-            "Bands: ± the estimated error of an annulus; where it is as large as the value, the "
-            "curve means nothing."
+            f"Bands: ± the {kind_of_error(profile)} error of an annulus; where it is as large as "
+            "the value, the curve means nothing."
         )
     if beam := profile.meta.get("beam"):
         notes.append(_of_beam(str(beam)))
@@ -169,11 +168,16 @@ def _of_beam(beam: str) -> str:
     )
 
 
-def left_out_note(count: int) -> list[str]:
+def left_out_note(count: int, what: str = "channel") -> list[str]:
     """Return a note on so many channels between those that are drawn; none for 0."""
     if count <= 0:
         return []
-    return [f"{counted(count, 'channel')} between these {'is' if count == 1 else 'are'} not drawn."]
+    return [f"{counted(count, what)} between these {'is' if count == 1 else 'are'} not drawn."]
+
+
+def kind_of_error(profile: Profile) -> str:
+    """Return what a profile's errors are: a solver's estimate, or of a walk, perhaps imported."""
+    return "estimated" if profile.meta.get("method") == "exact" else "standard"
 
 
 def image_note(profile: Profile, image: Picture) -> str:

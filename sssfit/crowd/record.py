@@ -172,7 +172,8 @@ class CrowdFrame:
         ]
         heads = ["", *(_NAMES[name] for name in self.work)]
         fewer = f"{texels:.2f} times fewer texels convolved"
-        ends = f"{'none in view' if math.isnan(texels) else fewer}, {seconds:.2f} times as fast"
+        worked = "no texel in view is convolved" if math.isnan(texels) else fewer
+        ends = f"{worked}, {seconds:.2f} times as fast"
         return f"{head}\n{table(heads, rows)}\n{ends}"
 
 

@@ -16,7 +16,7 @@ from sssfit.errors import FileError, RenderError
 from sssfit.files import check_output, locked, reason, temporary_folder
 from sssfit.formats.pictures import is_image_file, save_image
 from sssfit.measure.score import auto_exposure
-from sssfit.messages import counted
+from sssfit.messages import counted, note
 from sssfit.motion.frames import Frames
 
 
@@ -86,10 +86,11 @@ class FrameFiles:
 
     def _remove_longer(self) -> None:
         """Remove our frames that follow the last one, up to one that is missing or foreign."""
+        removed: list[str] = []
         for k in itertools.count(len(self.paths)):
             path = self.paths[0].with_name(self._name_of(k))
             if not is_image_file(path):
-                return
+                break
             try:
                 path.unlink()
             except OSError as error:
@@ -97,6 +98,10 @@ class FrameFiles:
                     f"{path} of an earlier, longer sequence cannot be removed: {reason(error)}; "
                     "the new frames are written."
                 ) from None
+            removed.append(path.name)
+        if removed:
+            last = f" to {removed[-1]}" if len(removed) > 1 else ""
+            note(f"Removed {removed[0]}{last} of an earlier, longer sequence.")
 
     def write(self, name: str, frame: int, picture: FloatArray) -> None:
         """Write a frame, if it is of the renderer that was asked for."""

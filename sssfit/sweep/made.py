@@ -1,5 +1,6 @@
 """Makes a sweep's store: all arrays, with their units and coordinates, and none of the points."""
 
+import json
 import shutil
 import warnings
 from collections.abc import Iterator
@@ -63,7 +64,9 @@ def make_store(path: Path, plan: Plan, *, replaces: bool = False) -> None:
 def restore(path: Path, plan: Plan) -> None:
     """Write again what a store has from its beginning, where it was damaged, and tell of it.
 
-    Those are the arrays' heads, the coordinates and the seeds. Points are left as they are.
+    Those are the arrays' heads, the coordinates and the seeds. Points are left as they are, and so
+    are a head that can be read, which may have more in it, and arrays with another one, whose
+    numbers may be packed otherwise.
 
     Raises
     ------
@@ -77,22 +80,40 @@ def restore(path: Path, plan: Plan) -> None:
             files = [each.relative_to(made) for each in sorted(made.rglob("*")) if each.is_file()]
             marks = FINGERPRINT.name  # which are 0 only at the beginning
             own = [each for each in files if each.name[0] == "." or each.parts[0] != marks]
-            damaged = [each for each in own if not _is_same(path / each, made / each)]
+            damaged = [each for each in own if _is_damaged(path / each, made / each)]
             for each in damaged:
                 (path / each).parent.mkdir(exist_ok=True)
                 (made / each).replace(path / each)
+            if damaged:
+                with quiet():  # the heads of all that is there, the user's own arrays too
+                    needed("zarr", "sweep").consolidate_metadata(str(path), zarr_format=2)
     except OSError as error:
         raise FileError(f"{path} cannot be written: {reason(error)}.") from error
     if damaged:
         others = f" and {counted(len(damaged) - 1, 'other file')}" if len(damaged) > 1 else ""
-        note(f"{path}: {damaged[0].as_posix()}{others} differed from the plan; written again.")
+        was = "were" if len(damaged) > 1 else "was"
+        note(f"{path}: {damaged[0].as_posix()}{others} {was} damaged or missing; written again.")
 
 
-def _is_same(there: Path, here: Path) -> bool:
+def _is_damaged(there: Path, here: Path) -> bool:
+    """Tell whether a file of a store is missing, cannot be read, or has other numbers."""
+    if not there.exists():
+        return True
+    if here.name[0] == ".":
+        return _read_json(there) is None
+    is_packed_alike = _read_json(there.with_name(".zarray")) == _read_json(
+        here.with_name(".zarray")
+    )
+    return is_packed_alike and there.read_bytes() != here.read_bytes()
+
+
+def _read_json(path: Path) -> object:
+    """Return what a file holds, None if it is no JSON, or missing."""
     try:
-        return there.read_bytes() == here.read_bytes()
-    except FileNotFoundError:
-        return False
+        found: object = json.loads(path.read_bytes())
+    except (FileNotFoundError, ValueError):
+        return None
+    return found
 
 
 def _made(folder: Path, plan: Plan) -> Path:

@@ -153,6 +153,8 @@ def in_keys(error: Exception) -> str:
 
     def key(found: re.Match[str]) -> str:
         name, value = found[1], found[2] or ""
+        if name == "method":  # of the plan itself
+            return re.sub(r"= (\w+)", r'= "\1"', f"{name}{value}")
         table = "grid" if name in ("dr_mm", "radius_mm") else "settings" if name in own else "fit"
         return f"[{table}] {name}{value.replace('True', 'true').replace('False', 'false')}"
 

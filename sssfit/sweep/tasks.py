@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sssfit.errors import SweepError
+from sssfit.messages import without_notes
 from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile
 from sssfit.simulate.batches import (
@@ -137,7 +138,7 @@ def perform(plan: Plan, task: Task) -> list[Done]:
         This process has other code than the one that asks, and would make other bits.
     """
     check_code(task.code)
-    with warnings.catch_warnings():
+    with warnings.catch_warnings(), without_notes():
         warnings.simplefilter("ignore")  # what they warn of is in the figures: `unfinished`
         return [_done(plan, part, task.profile) for part in task.parts]
 

@@ -61,6 +61,8 @@ def losses(source: Source) -> tuple[str, ...]:
     _, albedo, g, eta = medium_of(source)
     seen = entering_colour(albedo, g, eta) * normal_transmittance(eta)
     change = np.round(seen / total_reflectance(source.material) - 1.0, _ROUNDING)
+    if not change.any():
+        return ()
     said = by_channel(source.profile.channels, change.tolist(), "+.2g%")
     return (
         f"The channels of {source.title} differ in g and the engine takes one: sigma_s' = (1 - g) "

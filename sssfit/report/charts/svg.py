@@ -186,8 +186,8 @@ def written(value: float) -> str:
 
 def digits(value: float) -> str:
     """Return a value with four digits, zeros at its end among them."""
-    if value == 0.0:
-        return "0"
+    if value == 0.0 or not math.isfinite(value):
+        return f"{value:g}"
     if 1e-4 <= abs(value) < 9999.5:
         return f"{value:#.4g}".rstrip(".")
     mantissa, exponent = f"{value:.3e}".split("e")

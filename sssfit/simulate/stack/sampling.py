@@ -25,8 +25,11 @@ _NEXT_TO_ZERO = 1e-2  # of the least wavenumber, in place of 0 where 0 is singul
 # 1e-3 of the extinction, to 3e-6 at 3e-4, and lost at 1e-5: so R(0) is extrapolated from there.
 _HARDLY = 3e-4
 _KNOWN = 1e-3
-_EVEN = (4.0 / 3.0, -1.0 / 3.0)  # R(0) from k and 2k, for R(k) = a + b k^2
-_ODD = (8.0 / 3.0, -2.0, 1.0 / 3.0)  # with 4k, for a + b k + c k^2: below, nothing absorbs
+# Of the wavenumber that it is extrapolated from, the decay of a layer without end, or of one much
+# thicker than its paths are long, below which R(k) is not a + b k^2: there it has a term in that
+# layer's own rate, sqrt(k^2 + decay^2), too.
+_FAST = 39.0
+_SMALLER = 0.1  # with clear layers, of whose R(k) the third term is k^2 log k
 
 
 @dataclass(frozen=True)
@@ -62,14 +65,17 @@ class Family:
     @cached_property
     def near_zero(self) -> tuple[tuple[float, float], ...]:
         """Weights and wavenumbers of what stands for R(0)."""
-        lossless = [each.sigma_t for each in self._scattering if _hardly_absorbs(each)]
+        pairs = list(zip(self._scattering, self._decays, strict=True))
+        lossless = [(slab.sigma_t, decay) for slab, decay in pairs if _hardly_absorbs(slab)]
         if not lossless:
             return ((1.0, _NEXT_TO_ZERO * self.least_wavenumber if self.is_singular else 0.0),)
-        least = 1e-4 / self.longest
-        fading = [each for each in self._decays if each > least]
-        k = min(0.5 * self._first(min(fading)), _KNOWN * max(lossless))
-        weights = _EVEN if len(fading) == len(self._decays) else _ODD
-        return tuple((weight, k * 2.0**n) for n, weight in enumerate(weights))
+        extinctions, decays = zip(*lossless, strict=True)
+        first = self._first(min(decays)) * (_SMALLER if self.has_clear_layers else 1.0)
+        k = min(0.5 * first, _KNOWN * max(extinctions))
+        slowest = min(
+            rate for slab, rate in pairs if _hardly_absorbs(slab) or math.isinf(slab.thickness)
+        )
+        return tuple(zip(_weights(slowest / k), (k, 2.0 * k, 4.0 * k), strict=False))
 
     @property
     def has_layers(self) -> bool:
@@ -170,6 +176,19 @@ class KnownModes:
         if key not in self._found:
             self._found[key] = modes_of(medium, self.k, self.azimuth)
         return self._found[key]
+
+
+def _weights(decay: float) -> list[float]:
+    """Return the weights of R(1), R(2) and perhaps R(4) in R(0).
+
+    R(k) is a + b k^2, and + c sqrt(k^2 + decay^2) of the slowest layer without end.
+    """
+    if decay > _FAST:
+        return [4.0 / 3.0, -1.0 / 3.0]
+    k = np.array([1.0, 2.0, 4.0])
+    terms = np.stack([np.ones(3), np.hypot(k, decay), k**2])
+    found: list[float] = np.linalg.solve(terms, [1.0, decay, 0.0]).tolist()
+    return found
 
 
 def _hardly_absorbs(slab: Slab) -> bool:
