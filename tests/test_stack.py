@@ -502,6 +502,28 @@ def test_a_layer_without_loss_passes_light_on(name):
     assert np.abs(exact.absorbed[lossless]).max() < 1e-7
 
 
+OTHERS = {
+    "between two that absorb": (
+        *((1.0, 0.0, 0.5, 2.0, 0.5), (1.4, 0.0, 0.0, 2.0, 1.0), (1.4, 0.0, 0.3, 2.0, math.inf)),
+    ),
+    "of 5 paths a mm": ((1.4, 0.95, 0.0, 100.0, 1.0), (1.4, 0.0, 5.0, 0.5, math.inf)),
+    "of 40 paths": ((1.4, 0.8, 0.0, 10.0, 20.0), (1.4, 0.0, 5.0, 0.5, math.inf)),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*LOSSLESS, *OTHERS])
+def test_stacks_with_layers_without_loss_are_those_of_two_million_photons(name):
+    layers = tuple(Layer(eta, g, [a], [s], d) for eta, g, a, s, d in (LOSSLESS | OTHERS)[name])
+    material = Material("lossless", ("grey",), layers)
+    exact = simulate_exact(material)
+    walk = simulate_montecarlo(material, photons=2_000_000, seed=5)
+    assert (walk.unfinished < 1e-4).all()
+    apart = exact.diffuse_reflectance - walk.diffuse_reflectance
+    error = np.hypot(exact.diffuse_reflectance_stderr, walk.diffuse_reflectance_stderr)
+    assert np.abs(apart / error) < 4.0
+
+
 @pytest.mark.parametrize("sigma_a", [0.0, 1e-14, 1e-10, 1e-8, 1e-7, 1e-6])
 def test_less_and_less_absorption_tends_to_none(sigma_a):
     """Those of 1e-6 are solved at k = 0 itself, the others beside it."""
