@@ -180,7 +180,7 @@ def _draw_bars(
     first.set_label("Γ over Γ halfway out")
     first.ax.xaxis.set_major_formatter("{x:g}")
     second = below.colorbar(ScalarMappable(shades[1], "RdBu_r"), ax=panels[:, 1], **place)
-    second.set_label("share of the channel's energy in a pixel")
+    second.set_label("share of the channel's\nenergy in a pixel")
     tick_powers(second, shades[1])
 
 
