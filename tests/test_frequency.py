@@ -10,6 +10,7 @@ from matplotlib.text import Text
 from sssfit.chart.frequency import frequency_figure
 from sssfit.errors import KernelError, ProfileError
 from sssfit.export import exported, is_ours
+from sssfit.formats.csv import csv_text, parse_csv
 from sssfit.kernel import SeparableKernel
 from sssfit.material import Layer, Material, load_material
 from sssfit.profile.frequency import frequency_response
@@ -115,12 +116,18 @@ def test_of_many_channels_eight_are_drawn_and_the_rest_is_told(skin1):
     assert "4 channels between these are not drawn." in words
 
 
+def imported(profile):
+    """A walk as it comes back from a table, which does not say how many photons it took."""
+    return parse_csv(csv_text(profile), "walk.csv")
+
+
 def test_errors_are_named_for_what_they_are(skin1):
-    """Noise of a walk, estimates of the exact solver; diffusion has none."""
+    """Noise of a walk, imported too, estimates of the exact solver; diffusion has none."""
     made = (
         (simulate_montecarlo(skin1, photons=20_000), "bands show ± the standard error"),
         (simulate_exact(skin1), "bands show ± the estimated error"),
         (simulate_burley(skin1), "light cos(kx)."),
+        (imported(simulate_montecarlo(skin1, photons=20_000)), "bands show ± the standard error"),
     )
     for profile, words in made:
         figure = frequency_figure(frequency_response(profile))

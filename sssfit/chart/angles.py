@@ -8,11 +8,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from sssfit.arrays import FloatArray
 from sssfit.chart.page import (
     Style,
     add_legend,
     channel_style,
+    draw_curve,
     name_axes,
     new_page,
     tick,
@@ -57,11 +57,13 @@ def angles_figure(found: AngularReflectance) -> Figure:
         labels = [channel_label(profile, c, is_drawn=True) for c in shown] + ["Lambert, Fresnel"]
         rest = add_legend(below, handles, labels, title=legend_title(profile))
         left, right = rest.subplots(1, 2)
-        for c in shown:
-            left.plot(found.angles_deg, found.lambertian[:, c], **_LAMBERT)
-            _draw(left, found, c, found.per_sr[:, c], found.per_sr_stderr[:, c])
-            scale = np.where(found.lambertian[:, c] > 0.0, found.lambertian[:, c], np.inf)
-            _draw(right, found, c, found.ratio[:, c], found.per_sr_stderr[:, c] / scale)
+        x = found.angles_deg
+        for c, style in zip(shown, styles, strict=True):
+            lambertian, error = found.lambertian[:, c], found.per_sr_stderr[:, c]
+            left.plot(x, lambertian, **_LAMBERT)
+            draw_curve(left, x, found.per_sr[:, c], error, style)
+            scale = np.where(lambertian > 0.0, lambertian, np.inf)
+            draw_curve(right, x, found.ratio[:, c], error / scale, style)
         right.axhline(1.0, **_LAMBERT)
         _limit(left, right, found, shown)
         name_axes(left, "(a) by exit angle", "exit angle (degrees)", "$R_d$ (1/sr)")
@@ -80,17 +82,6 @@ def _note(found: AngularReflectance) -> str:
         f"Of the light, at other angles than there, in %: {shares}; by {alone} alone {noise}. "
         f"Bands: ± the {kind} error."
     )
-
-
-def _draw(
-    axes: Axes, found: AngularReflectance, channel: int, mean: FloatArray, error: FloatArray
-) -> None:
-    """Draw a channel's curve, and a band where it has errors."""
-    style = channel_style(channel, found.profile.n_channels)
-    axes.plot(found.angles_deg, mean, **style)
-    if np.isfinite(error).all():
-        band: Style = {"lw": 0, "alpha": 0.3, "color": style["color"]}
-        axes.fill_between(found.angles_deg, mean - error, mean + error, **band)
 
 
 def _limit(left: Axes, right: Axes, found: AngularReflectance, shown: list[int]) -> None:

@@ -10,9 +10,9 @@ from matplotlib.lines import Line2D
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.page import (
-    Style,
     add_legend,
     channel_style,
+    draw_curve,
     name_axes,
     new_page,
     tick,
@@ -53,13 +53,15 @@ def frequency_figure(found: FrequencyResponse) -> Figure:
     title = titled(profile, "response to sinusoids of light")
     notes = [_note(found), *left_out_note(profile.n_channels - len(shown))]
     with new_page(HEIGHT_INCHES, title, subtitle(profile), notes) as (figure, below):
-        handles = [Line2D([], [], **channel_style(c, profile.n_channels)) for c in shown]
+        styles = [channel_style(c, profile.n_channels) for c in shown]
+        handles = [Line2D([], [], **each) for each in styles]
         labels = [channel_label(profile, c, is_drawn=True) for c in shown]
         rest = add_legend(below, handles, labels, title=legend_title(profile))
         left, right = rest.subplots(1, 2)
-        for channel in shown:
-            _draw(left, found.k_per_mm, found, channel)
-            _draw(right, found.k_per_mm / _TURN, found, channel)
+        for c, style in zip(shown, styles, strict=True):
+            curve = found.response[:, c], found.stderr[:, c], style
+            draw_curve(left, found.k_per_mm, *curve)
+            draw_curve(right, found.k_per_mm / _TURN, *curve)
         _limit(left, right, found.k_per_mm, found.response[:, shown])
         name_axes(left, "(a) logarithmic, over k", "k (rad/mm)", "R(k)")
         name_axes(right, "(b) linear, over cycles per mm", "k / 2π (1/mm)", "R(k)")
@@ -80,16 +82,6 @@ def _note(found: FrequencyResponse) -> str:
 
 def _nonzero(values: FloatArray) -> FloatArray:
     return np.where(values > 0.0, values, np.inf)
-
-
-def _draw(axes: Axes, x: FloatArray, found: FrequencyResponse, channel: int) -> None:
-    """Draw a channel's curve, and a band where it has errors."""
-    mean, error = found.response[:, channel], found.stderr[:, channel]
-    style = channel_style(channel, found.profile.n_channels)
-    axes.plot(x, mean, **style)
-    if np.isfinite(error).all():
-        band: Style = {"lw": 0, "alpha": 0.3, "color": style["color"]}
-        axes.fill_between(x, mean - error, mean + error, **band)
 
 
 def _limit(left: Axes, right: Axes, k: FloatArray, response: FloatArray) -> None:

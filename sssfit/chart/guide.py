@@ -51,9 +51,8 @@ _NOTE = (
     "Difference: a aᵀ less the 2D kernel, as a share of the channel's energy; red where the fit "
     "has too much light, blue where it has too little. Misplaced: half the sum of |difference|. "
     "Misfit: Γ difference² over Γ kernel², summed. Γ is drawn over its value on the diagonal "
-    "halfway out; "
-    "Γₚ = 1/(a(x) a(y)) of the pre-integrated pass has that pass for its best (S.8). The first "
-    "step of a pass is its middle pixel."
+    "halfway out; Γₚ = 1/(a(x) a(y)) of the pre-integrated pass has that pass for its best (S.8). "
+    "The first step of a pass is its middle pixel."
 )
 
 

@@ -263,6 +263,15 @@ def tick_decades(axis: Axis, most: int) -> None:
     label_minor(axis, is_short)
 
 
+def draw_curve(
+    axes: Axes, x: FloatArray, mean: FloatArray, error: FloatArray, style: Style
+) -> None:
+    """Draw a curve, and a band of its errors where all are known."""
+    axes.plot(x, mean, **style)
+    if np.isfinite(error).all():
+        axes.fill_between(x, mean - error, mean + error, lw=0, alpha=0.3, color=style["color"])
+
+
 def label_minor(axis: Axis, is_labelled: bool) -> None:
     """Label minor ticks, or none; labels need marks, and line up with those of the major ones."""
     axis.set_minor_formatter("{x:g}" if is_labelled else NullFormatter())
