@@ -10,7 +10,7 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
-from typing import NoReturn, TextIO
+from typing import Any, NoReturn
 
 import click
 
@@ -42,7 +42,6 @@ _LIBRARIES = (
     *("colour-science", "OpenImageIO", "click", "rich", "jinja2", "markupsafe"),
 )
 _LONGEST_LINE = 1000  # a path may be 4096 characters, an option's value anything
-_OUT_OF_MEMORY = "out of memory: use a smaller grid or picture, fewer channels or --threads."
 
 
 @click.group(invoke_without_command=True, context_settings={"help_option_names": ["-h", "--help"]})
@@ -110,7 +109,7 @@ def run(args: Sequence[str] | None) -> NoReturn:
             _leave_quietly()
         except Exception as error:
             if is_out_of_memory(error):
-                _fail(_OUT_OF_MEMORY)
+                _fail("out of memory: use a smaller grid or picture, fewer channels or --threads.")
             if isinstance(error, OSError):
                 _fail(f"{error.filename or 'operating system'}: {reason(error)}.")
             if os.environ.get("SSSFIT_TRACEBACK"):
@@ -130,13 +129,13 @@ def _fail(line: str) -> NoReturn:
 
 def _refuse(error: click.ClickException) -> NoReturn:
     """Print the usage, as click does, and then on one line what is wrong with it."""
-    context = getattr(error, "ctx", None)
+    line, context = error.format_message(), getattr(error, "ctx", None)
     if context is not None:
+        line = " ".join(line.split())  # click lists the choices of an option on lines of their own
         help_option = context.help_option_names[-1]
         click.echo(context.get_usage(), err=True)
         click.echo(f"Try '{context.command_path} {help_option}' for help.\n", err=True)
-    # click lists the choices of an option on lines of their own.
-    click.echo(f"Error: {_one_line(' '.join(error.format_message().split()))}", err=True)
+    click.echo(f"Error: {_one_line(line)}", err=True)
     sys.exit(error.exit_code)
 
 
@@ -153,17 +152,10 @@ def _leave_quietly() -> NoReturn:
     sys.exit(141)
 
 
-def _show_warning(
-    message: Warning | str,
-    category: type[Warning],
-    filename: str,
-    lineno: int,
-    file: TextIO | None = None,  # noqa: ARG001 (part of the protocol)
-    line: str | None = None,
-) -> None:
+def _show_warning(message: Warning | str, category: type[Warning], *where: Any, **_: Any) -> None:
     """Print a warning as one line; of others than ours what they begin with, and their kind."""
     if os.environ.get("SSSFIT_TRACEBACK"):
-        click.echo(warnings.formatwarning(message, category, filename, lineno, line), err=True)
+        click.echo(warnings.formatwarning(message, category, *where[:2]), err=True)
     elif issubclass(category, SssfitWarning):
         click.echo(f"Warning: {_one_line(in_options(str(message)))}", err=True)
     else:

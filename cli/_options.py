@@ -12,7 +12,7 @@ import click
 from click.core import ParameterSource
 
 from sssfit import text
-from sssfit.errors import ArgumentError
+from sssfit.errors import ArgumentError, SssfitError
 from sssfit.messages import did_you_mean, printable
 from sssfit.methods import SIMULATIONS, Method, Setting, settings_of
 from sssfit.process import check_memory, check_threads_of_numba
@@ -57,13 +57,14 @@ def common_options(command: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(command)
     def wrapper(*args: Any, **given: Any) -> Any:
         common = Common(**{each.name: given.pop(each.name) for each in fields(Common)})
-        check_threads_of_numba()
-        check_memory(command.__name__.rstrip("_"), common.threads)
         try:
+            check_threads_of_numba()
+            check_memory(command.__name__.rstrip("_"), common.threads)
             with _notes_on_stderr(common.quiet):
                 return command(*args, common=common, **given)
-        except ArgumentError as error:
-            raise click.UsageError(in_options(str(error))) from None
+        except SssfitError as error:
+            kind = click.UsageError if isinstance(error, ArgumentError) else click.ClickException
+            raise kind(in_options(str(error))) from None
 
     return wrapper
 
@@ -91,30 +92,42 @@ def in_options(message: str) -> str:
 
     ``rank = 3`` between backquotes becomes ``--rank 3``; an argument that is True becomes the
     option alone, and "with" one that is False becomes "without" it. Units at the end of an
-    argument's name are not part of the option's.
+    argument's name are not part of the option's. An option of another verb is named with it.
     """
-    from ._main import cli
-
-    options = {
-        parameter.name: parameter.opts[-1]
-        for verb in cli.commands.values()
-        for parameter in verb.params
-        if isinstance(parameter, click.Option)
-    }
 
     def option(found: re.Match[str]) -> str:
-        before, name, value = found[1] or "", found[2], found[3]
-        named = options.get(name) or options.get(re.sub(r"_mm2?$", "", name))
-        if named is None:
-            return found[0]
-        if value in (None, "True"):
-            return before + named
-        plain = value.strip('"')
-        return f"without {named}" if plain == "False" else f"{before}{named} {plain}"
+        before, name, value = found[1] or "", found[2], (found[3] or "True").strip('"')
+        verb, named = _named(name, value)
+        if value == "False":
+            before, value = "without ", "True"
+        words = named if value == "True" else f"{named} {value}"
+        return before + (f"`sssfit {verb} {words}`" if verb else words) if named else found[0]
 
     for call, command in _COMMANDS.items():
         message = message.replace(call, command)
     return _ARGUMENT.sub(option, message)
+
+
+def _named(name: str, value: str) -> tuple[str, str]:
+    """Return the verb, if it is not the one that runs, and its option for an argument, or none."""
+    from ._main import cli
+
+    context = click.get_current_context(silent=True)
+    own, names = context and context.command.name, (name, re.sub(r"_mm2?$", "", name))
+    found = [
+        ((not _takes(each, value), verb != own, verb != "simulate"), verb, each.opts[-1])
+        for verb, command in cli.commands.items()
+        for each in command.params
+        if each.name in names and isinstance(each, click.Option)
+    ]
+    _, verb, option = min(found, key=lambda each: each[0], default=(None, "", ""))
+    return "" if own in (None, verb) else verb, option
+
+
+def _takes(option: click.Option, value: str) -> bool:
+    """Return whether the option can have this value; True and False are those of a switch."""
+    among = option.type.choices if isinstance(option.type, click.Choice) else (value,)
+    return option.is_flag == (value in ("True", "False")) and value in among
 
 
 def option(
@@ -197,10 +210,8 @@ class Value(click.ParamType[Any]):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Read ``value``; a default that is no text stays as it is."""
-        if not isinstance(value, str):
-            return value
         try:
-            return self.read(value, *self.how)
+            return self.read(value, *self.how) if isinstance(value, str) else value
         except ArgumentError as error:
             self.fail(str(error), param, ctx)
 
@@ -296,10 +307,9 @@ def method_for(context: click.Context, method: str, material: str | None) -> str
     """
     made = SIMULATIONS[method].makes
     if made is not None and material != made:
-        asked = "--all" if material is None else material
         raise click.UsageError(
-            f"--method {method} makes {made} only, and this is {asked}; for sums of Gaussians of a "
-            "material's profile use sssfit fit --method gaussians."
+            f"--method {method} makes {made} only, and this is {material or '--all'}; for "
+            "sums of Gaussians of a material's profile use sssfit fit --method gaussians."
         )
     owners = [name for name, each in SIMULATIONS.items() if each.makes == material]
     if material is None or not owners or method in owners:

@@ -45,7 +45,7 @@ def solved_and_walked(material, photons, tolerance=TOLERANCE):
     try:
         exact = simulate_exact(material, tolerance=tolerance, **grid)
     except SimulationError as refusal:
-        (named,) = re.findall(r"give ([\d.e-]+) or more", str(refusal))
+        (named,) = re.findall(r"give .tolerance = ([\d.e-]+). or more", str(refusal))
         exact = simulate_exact(material, tolerance=float(named), **grid)
     return exact, simulate_montecarlo(material, photons=photons, **grid)
 

@@ -376,7 +376,9 @@ def test_tolerances_out_of_range_are_refused(tolerance):
 
 
 def test_a_tolerance_that_cannot_be_met_says_what_can():
-    with pytest.raises(SimulationError, match=r"1e-13 cannot be met.*give \S+ or more"):
+    with pytest.raises(
+        SimulationError, match=r"1e-13 cannot be met.*give `tolerance = \S+` or more"
+    ):
         simulate_exact(checks.medium(0.3, 0.7, 1.0), tolerance=1e-13, radius_mm=1.0)
 
 

@@ -5,9 +5,11 @@ import functools
 import re
 from pathlib import Path
 
+import click
 import pytest
 
 from sssfit.cli import main
+from sssfit.cli._main import cli
 from sssfit.cli._options import in_options
 from sssfit.messages import Columns, counted, filled, note, number, report
 
@@ -94,6 +96,37 @@ def test_the_command_line_knows_every_argument_that_a_message_marks():
 )
 def test_arguments_become_options_where_the_command_line_prints_them(said, printed):
     assert in_options(said) == printed
+
+
+@pytest.mark.parametrize(
+    ("verb", "said", "printed"),
+    [
+        ("simulate", "give `tolerance = 0.005` or more", "give --tolerance 0.005 or more"),
+        ("report", "give `tolerance = 0.005` or more", "give `sssfit simulate --tolerance 0.005`"),
+        ("choose", "give a larger `tolerance`", "give a larger --tolerance"),
+        ("compare", "`method = montecarlo`", "`sssfit simulate --method montecarlo`"),  # fits only
+        ("fit", "`method = cascade`", "--method cascade"),
+        ("chart", "compute it with `angles = 30`", "compute it with `sssfit simulate --angles 30`"),
+        ("chart", "use `dr_mm = 0.2`", "use `sssfit simulate --dr 0.2`"),
+        ("render", "start with `resume = False`", "start without `sssfit simulate --resume`"),
+        ("render", "replace it with `force = True`", "replace it with --force"),
+    ],
+)
+def test_an_option_that_the_verb_lacks_is_named_with_its_own_verb(verb, said, printed):
+    with click.Context(cli.commands[verb], info_name=verb):
+        assert in_options(said).startswith(printed)
+
+
+def test_errors_name_options_of_the_verb_that_ran(tmp_path, capsys):
+    path = tmp_path / "wide.toml"
+    path.write_text(
+        'name = "wide"\nsource = "a test"\nchannels = ["R", "G"]\neta = 1.3\ng = 0\n'
+        "sigma_a_per_mm = [0.001, 1.0]\nsigma_s_per_mm = [0.0009, 8.0]\n"
+    )
+    for verb, words in ("simulate", "use --dr"), ("stability", "use `sssfit simulate --dr"):
+        with pytest.raises(SystemExit, match=r"^1$"):
+            main([verb, str(path)])
+        assert words in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

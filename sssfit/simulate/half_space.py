@@ -228,7 +228,8 @@ def _solve_group(
         coarse = fine
     raise SimulationError(
         f"the tolerance of {tolerance:g} cannot be met: resolutions {number - 1} and {number} of "
-        f"{len(_LEVELS)} differ by {worst:.2g} of the total; give {_rounded_up(worst):g} or more."
+        f"{len(_LEVELS)} differ by {worst:.2g} of the total; give `tolerance = "
+        f"{_rounded_up(worst):g}` or more."
     )
 
 

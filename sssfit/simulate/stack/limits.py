@@ -41,8 +41,9 @@ def azimuths_cannot(
     return SimulationError(
         f"{channel.name}, which light crosses without being scattered: the tolerance of "
         f"{tolerance:g} cannot be met: {AZIMUTHS[-1]} and {quarter.count} directions in azimuth "
-        f"differ by {quarter.share:.2g} of the light; give {_rounded_up(quarter.share / part):g} "
-        "or more, or use `method = montecarlo`."
+        f"differ by {quarter.share:.2g} of the light; give "
+        f"`tolerance = {_rounded_up(quarter.share / part):g}` or more, or use "
+        "`method = montecarlo`."
     )
 
 
@@ -61,7 +62,7 @@ def cannot_meet(channel: Channel, step: Step, worst: float, tolerance: float) ->
     return SimulationError(
         f"{channel.name}{why}: the tolerance of {tolerance:g} cannot be met: {step.count} and "
         f"{step.count - 4} directions differ by {worst:.2g} of the light; give "
-        f"{_rounded_up(worst):g} or more, or use `method = montecarlo`."
+        f"`tolerance = {_rounded_up(worst):g}` or more, or use `method = montecarlo`."
     )
 
 
@@ -84,7 +85,8 @@ def check_tolerance(channels: Sequence[Channel], tolerance: float) -> None:
     if tolerance < _LEAST_TOLERANCE:
         raise SimulationError(
             f"{channels[0].name}: the tolerance of {tolerance:g} cannot be met by the solver for "
-            f"layers; give {_LEAST_TOLERANCE:g} or more, or use `method = montecarlo`."
+            f"layers; give `tolerance = {_LEAST_TOLERANCE:g}` or more, or use "
+            "`method = montecarlo`."
         )
 
 
@@ -109,7 +111,7 @@ def check_time(channels: Sequence[Channel], count: int, tolerance: float) -> Non
         raise SimulationError(
             f"{most.name} has {len(most.stack.slabs)} layers, which to a tolerance of "
             f"{tolerance:g} would take over {seconds / 60.0:.0f} minutes of a processor, more than "
-            f"{_MOST_SECONDS / 60.0:g}; merge layers, give a larger tolerance, or use "
+            f"{_MOST_SECONDS / 60.0:g}; merge layers, give a larger `tolerance`, or use "
             "`method = montecarlo`."
         )
 
