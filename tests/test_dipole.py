@@ -17,6 +17,7 @@ from sssfit.simulate.dipole import (
     mismatch_by_moments,
     mismatch_by_polynomial,
 )
+from sssfit.simulate.half_space import diffuse_reflectance
 
 BOTH = [simulate_dipole, simulate_dipole_grosjean]
 
@@ -74,6 +75,24 @@ def test_figures_of_skin1():
     assert simulate_dipole(load_material("skin1")).diffuse_reflectance[1] == pytest.approx(
         0.2235, abs=5e-5
     )
+
+
+@pytest.mark.parametrize(
+    ("simulate", "albedo", "eta", "percent"),
+    [
+        (simulate_dipole, 0.75, 1.0, -15),
+        (simulate_dipole, 0.75, 1.3, 11),
+        (simulate_dipole, 0.75, 1.4, 25),
+        (simulate_dipole_grosjean, 0.99, 1.4, 1),
+        (simulate_dipole_grosjean, 0.73, 1.0, -9),
+        (simulate_dipole_grosjean, 0.73, 1.3, 23),
+        (simulate_dipole_grosjean, 0.73, 1.4, 40),
+    ],
+)
+def test_the_documented_errors_of_totals(simulate, albedo, eta, percent):
+    exact = diffuse_reflectance(albedo, eta)
+    total = simulate(medium(1.0 - albedo, albedo, eta=eta)).diffuse_reflectance
+    assert 100.0 * (total / exact - 1.0) == pytest.approx(percent, abs=0.5)
 
 
 @pytest.mark.parametrize("eta", [0.3, 0.7, 0.999, 1.0, 1.0001, 1.05, 1.3, 1.5, 2.5, 4.0])

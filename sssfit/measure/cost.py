@@ -61,7 +61,7 @@ def cost_of(kernel: Kernel, seconds_per_megapixel: float | None = None) -> Cost:
     >>> from sssfit.simulate import simulate_dipole
     >>> profile = simulate_dipole(load_material("skin1"))
     >>> cost_of(fit_svd(profile, rank=3, mm_per_pixel=0.5, support_mm=8).kernel)
-    Cost(fetches=198.0, passes=6, all_passes=6, bytes_per_pixel=96.0, kernel_bytes=1188, \
+    Cost(fetches=198.0, passes=6, all_passes=6, bytes_per_pixel=112.0, kernel_bytes=1188, \
 seconds_per_megapixel=None)
     """
     if isinstance(kernel, Taps):

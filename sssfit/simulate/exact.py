@@ -42,7 +42,7 @@ def simulate_exact(
     Parameters
     ----------
     material : Material
-        Any; thin slabs with g of .9 or more may not meet a small tolerance.
+        Any; g of .9 or more may not meet the tolerance, above all in thin slabs.
     dr_mm, radius_mm : float, optional
         Grid, as in ``sssfit.grid.make_grid``.
     tolerance : float
