@@ -84,7 +84,7 @@ def test_figures_of_skin1():
         (simulate_dipole, 0.75, 1.3, 11),
         (simulate_dipole, 0.75, 1.4, 25),
         (simulate_dipole_grosjean, 0.99, 1.4, 1),
-        (simulate_dipole_grosjean, 0.73, 1.0, -9),
+        (simulate_dipole_grosjean, 0.73, 1.0, -9.5),
         (simulate_dipole_grosjean, 0.73, 1.3, 23),
         (simulate_dipole_grosjean, 0.73, 1.4, 40),
     ],

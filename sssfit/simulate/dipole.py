@@ -175,7 +175,7 @@ def simulate_dipole_grosjean(
     At an albedo of 0.99 totals are good to 1 % for indices up to 1.4. For indices from 1.3 they are
     worse than the classical ones below 0.95 (23 % too high at 0.73 for 1.3, 40 % for 1.4), because
     Grosjean's theory separates single scattering from the diffuse light, which is then fainter by a
-    factor alpha', and the dipole has no such part; for index 1 they are the better ones (9 % too
+    factor alpha', and the dipole has no such part; for index 1 they are the better ones (10 % too
     low at 0.73, the classical ones 15 %).
 
     Examples
