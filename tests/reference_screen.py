@@ -1,5 +1,6 @@
 """What a shader does in screen space, pixel by pixel and sample by sample, for tiny pictures."""
 
+import functools
 import math
 
 import numpy as np
@@ -11,6 +12,7 @@ def pixels_per_mm(scene, depth_mm):
     return (scene.height / 2) / (depth_mm * math.tan(half_angle))
 
 
+@functools.cache
 def wrapped(j, n, border):
     """Index of pixel j by what numpy.pad does; None where it is dark."""
     reach = 40 * n
