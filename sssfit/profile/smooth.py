@@ -16,6 +16,7 @@ from scipy.interpolate import BSpline
 
 from sssfit.arrays import FloatArray
 from sssfit.errors import ProfileError
+from sssfit.process import one_blas_thread
 from sssfit.profile import Profile
 from sssfit.profile.pixels import annulus_areas
 
@@ -64,13 +65,12 @@ def smoothed(profile: Profile) -> Profile:
             f"{profile.label}: the profile has no standard errors, and only a walk's noise can be "
             "smoothed; expected a profile of photons."
         )
-    energy = np.stack(
-        [
+    with one_blas_thread():
+        channels = [
             _smooth(profile.r_edges_mm, profile.annulus_energy[:, c], stderr[:, c] ** 2)
             for c in range(profile.n_channels)
-        ],
-        axis=1,
-    )
+        ]
+    energy = np.stack(channels, axis=1)
     unknown = np.full(energy.shape, np.nan)
     meta = {**profile.meta, "smoothed_sha256": profile.sha256}
     return dataclasses.replace(
