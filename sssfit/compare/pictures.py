@@ -6,7 +6,7 @@ is judged in some milliseconds: for skin1 in pixels of .9 mm, whose optimum is t
 mm within 1 % of its Delta E.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -126,7 +126,9 @@ def picture_error(pixels: Target) -> Callable[[FloatArray], float]:
     support_mm = pixels.half_pixels * pixels.mm_per_pixel
     coarse_mm = max(pixels.mm_per_pixel, support_mm / _SUPPORT_PIXELS)
     target = Target(pixels.profile, coarse_mm, int(support_mm / coarse_mm + 1e-9))
-    pictures = [_prepare(pixels.profile, target.half_pixels, *each) for each in _scenes(coarse_mm)]
+    pictures = [_prepare(pixels.profile, *each) for each in _scenes(coarse_mm)]
+    sizes = {size for each in pictures for size in each.irradiance.shape}
+    takes = {size: _takes(size, target.half_pixels) for size in sizes}
     truth = np.concatenate([each.truth for each in pictures])
     shares = np.concatenate([np.full(len(each.truth), 1.0 / len(each.truth)) for each in pictures])
 
@@ -134,7 +136,10 @@ def picture_error(pixels: Target) -> Callable[[FloatArray], float]:
 
     def error(x: FloatArray) -> float:
         passes = [artist_pass(target, c, each) for c, each in enumerate(x.T)]
-        seen = np.concatenate([each.rendered(passes) for each in pictures])
+        matrices = {
+            size: [np.tensordot(half, own, 1) for half in passes] for size, own in takes.items()
+        }
+        seen = np.concatenate([each.rendered(matrices) for each in pictures])
         return float(shares @ delta_e_of_lab(lab(shown(seen)), true)) / len(pictures)
 
     return error
@@ -147,9 +152,6 @@ class _Picture:
     Parameters
     ----------
     irradiance : array (H, W)
-    down, across : array (h+1, H, H), (h+1, W, W)
-        How often weight i of a pass takes a pixel's light from another, with mirrored borders: over
-        so small a picture a pass is a matrix, and needs no threads.
     counted : array (H, W)
         True for the N pixels that count.
     truth : array (N, C)
@@ -158,20 +160,18 @@ class _Picture:
     """
 
     irradiance: FloatArray
-    down: FloatArray
-    across: FloatArray
     counted: BoolArray
     truth: FloatArray
     exposure: float
 
-    def rendered(self, passes: list[FloatArray]) -> FloatArray:
-        """Return the pixels that count (N, C), exposed, by a pass (h+1,) for every channel."""
-        pictures = [
-            np.tensordot(half, self.down, 1)
-            @ self.irradiance
-            @ np.tensordot(half, self.across, 1).T
-            for half in passes
-        ]
+    def rendered(self, matrices: Mapping[int, list[FloatArray]]) -> FloatArray:
+        """Return the pixels that count (N, C), exposed.
+
+        Over so small a picture a pass is a matrix, and needs no threads. Given are those of every
+        channel, by the size of a picture.
+        """
+        down, across = (matrices[size] for size in self.irradiance.shape)
+        pictures = [y @ self.irradiance @ x.T for y, x in zip(down, across, strict=True)]
         return self.exposure * np.stack([each[self.counted] for each in pictures], axis=1)
 
 
@@ -191,14 +191,12 @@ def _scenes(mm_per_pixel: float) -> Iterator[tuple[Scene, BoolArray]]:
         yield head, head.mask > 0
 
 
-def _prepare(profile: Profile, half_pixels: int, scene: Scene, counted: BoolArray) -> _Picture:
-    """Render the truth of a picture and prepare its passes."""
+def _prepare(profile: Profile, scene: Scene, counted: BoolArray) -> _Picture:
+    """Render the truth of a picture."""
     truth = render_reference(scene, profile)
     exposure = auto_exposure(truth, scene.mask)
     return _Picture(
         np.asarray(scene.irradiance[..., 0], dtype=np.float64),
-        _takes(scene.height, half_pixels),
-        _takes(scene.width, half_pixels),
         counted,
         exposure * truth[counted],
         exposure,
@@ -206,7 +204,7 @@ def _prepare(profile: Profile, half_pixels: int, scene: Scene, counted: BoolArra
 
 
 def _takes(size: int, half_pixels: int) -> FloatArray:
-    """Return how often weight i takes the light of pixel k to pixel j, as [i, j, k]."""
+    """Return how often weight i takes the light of pixel k to pixel j, mirrored, as [i, j, k]."""
     sources = source_indices(size, half_pixels, "mirror")
     counts = np.zeros((half_pixels + 1, size, size))
     here = np.arange(size)
