@@ -1,5 +1,7 @@
 """Work that tests share: exact solutions, lit heads, fits of candidates, and the sizes of texts.
 
+So are the taps that are fitted for engines.
+
 All depend on their arguments alone and cannot be changed. What one worker made, the others read
 from a folder of this run, which no other run reads: nothing of older sources can pass a test.
 
@@ -26,6 +28,7 @@ from matplotlib.backends.backend_agg import RendererAgg
 
 import sssfit.choose.options
 import sssfit.compare.candidates
+import sssfit.export.presets.separable_fit
 import sssfit.fit._spectrum
 import sssfit.fit.cascade
 import sssfit.scene.head
@@ -115,6 +118,8 @@ def begin():
     fits.fit_separable = _fitted_once(fits.fit_separable)
     fits.fit_taps = _fitted_once(fits.fit_taps)
     sssfit.choose.options.fit_result = _fitted_once(sssfit.choose.options.fit_result)
+    engines = sssfit.export.presets.separable_fit  # whose callers are imported after this
+    engines.fit_separable = _matched_once(engines.fit_separable)
     sssfit.fit.cascade.searched = _searched_once(sssfit.fit.cascade.searched)
     RendererAgg.get_text_width_height_descent = _measured_once(
         RendererAgg.get_text_width_height_descent
@@ -210,6 +215,20 @@ def _fitted_once(real):
         return _once(known, (real.__name__, *key), lambda: real(profile, method, **settings))
 
     return fit
+
+
+def _matched_once(real):
+    """The taps of an engine take .8 s, and a dozen files make the presets of skin1."""
+    known = {}
+
+    @functools.wraps(real)
+    def fit_separable(source, taps):
+        if not _state["fits"]:
+            return real(source, taps)
+        key = "engine", contents(source.profile), taps
+        return _once(known, key, lambda: real(source, taps))
+
+    return fit_separable
 
 
 def _searched_once(real):
