@@ -57,6 +57,8 @@ LONG_SEARCHES = {
         "test_stability_seeds",
     ),
 }
+# These ask what is done with cascades, of which they fit dozens: any will do.
+_HASTY_SEARCHES = {"test_budget", "test_choose", "test_pareto"}
 # These ask which of two cascades is nearer, or draw lines: far ones, where a descent stops early.
 _WHOLE_DESCENTS = {"test_rotated"}
 _PLAIN = str | int | float | NoneType  # a setting that is a function, or a scene, is not shared
@@ -76,7 +78,12 @@ SHORT = (
     (sssfit.fit._spectrum, "_FREQUENCIES", 28),
     (sssfit.fit._spectrum, "_SEARCHED", 28),
 )
-_LONG = tuple((module, name, getattr(module, name)) for module, name, _ in SHORT)
+_HASTY = (
+    *SHORT,
+    (sssfit.fit.cascade, "_SHAPES", 1),
+    (sssfit.fit.cascade, "_ROUGH_STEPS", 30),
+)
+_LONG = tuple((module, name, getattr(module, name)) for module, name, _ in _HASTY)
 
 
 def allow(file):
@@ -84,8 +91,9 @@ def allow(file):
     _state["allowed"] = file not in OWN
     _state["fits"] = _state["allowed"] and file not in _OWN_FITS
     short = 0 if file in LONG_SEARCHES else 3 if file in _WHOLE_DESCENTS else len(SHORT)
+    short = len(_HASTY) if file in _HASTY_SEARCHES else short
     _state["short"] = short
-    for module, name, value in (*SHORT[:short], *_LONG[short:]):
+    for module, name, value in (*_HASTY[:short], *_LONG[short:]):
         setattr(module, name, value)
 
 

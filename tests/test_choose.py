@@ -36,6 +36,7 @@ from sssfit.simulate import (
 )
 
 FRAME = (128, 128)
+NEAR_MM = 0.65  # 83 mm of the head: one wider view beside it
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +46,7 @@ def skin1():
 
 @pytest.fixture(scope="module")
 def choice(skin1):
-    return choose(skin1, mm_per_pixel=0.6, frame=FRAME)
+    return choose(skin1, mm_per_pixel=NEAR_MM, frame=FRAME)
 
 
 def rendered_again(profile, option, mm_per_pixel, distance_mm=600.0, fitted_to=None, size=128):
@@ -136,7 +137,7 @@ def test_the_least_budget_buys_the_cheapest_table(width):
 @pytest.mark.parametrize("budget", [{"fetches": 12.0}, {"fetches": 100.0, "passes": 2}])
 def test_within_a_budget_the_least_error_is_chosen(skin1, budget, monkeypatch):
     quick(monkeypatch)
-    found = choose(skin1, mm_per_pixel=0.6, frame=FRAME, **budget)
+    found = choose(skin1, mm_per_pixel=NEAR_MM, frame=FRAME, **budget)
     assert found.tolerance is None
     assert found.photons is None
     kernel = found.fit.kernel
@@ -144,7 +145,7 @@ def test_within_a_budget_the_least_error_is_chosen(skin1, budget, monkeypatch):
     assert kernel.passes <= budget.get("passes", 99)
     tried = [each for each in found.steps if each.option]
     assert [each.option for each in tried[:3]] == options(
-        width_pixels(found.profile, 0.6), **budget
+        width_pixels(found.profile, NEAR_MM), **budget
     )[-3:]
     assert found.chosen == min(tried, key=lambda each: each.error)
     assert (found.fetches, found.passes) == (budget["fetches"], budget.get("passes"))
@@ -222,7 +223,7 @@ def test_dearer_looks_beyond_the_budget(skin1, monkeypatch):
 
 def test_a_tolerance_and_a_budget_hold_together(skin1, monkeypatch):
     quick(monkeypatch)
-    view = {"mm_per_pixel": 0.6, "frame": FRAME}
+    view = {"mm_per_pixel": NEAR_MM, "frame": FRAME}
     free = choose(skin1, tolerance=0.5, **view)
     held = choose(skin1, tolerance=0.5, fetches=100.0, passes=4, **view)
     assert held.chosen.within
@@ -240,20 +241,20 @@ def test_unless_told_otherwise_95_percent_of_the_pixels_are_within_1(choice):
 
 def test_the_kernel_is_the_one_that_was_judged(choice):
     kernel, option = choice.fit.kernel, choice.chosen.option
-    assert (kernel.method, kernel.mm_per_pixel) == (option.method, 0.6)
+    assert (kernel.method, kernel.mm_per_pixel) == (option.method, NEAR_MM)
     assert (kernel.fetches, kernel.passes) == (option.fetches, option.passes)
     assert (choice.chosen.fetches, choice.chosen.passes) == (kernel.fetches, kernel.passes)
     scene = choice.scenes[0]
     truth = render_reference(scene, choice.profile)
     score = measure(render_taps(scene, kernel), truth, mask=scene.mask)
-    again = rendered_again(choice.profile, option, 0.6)
+    again = rendered_again(choice.profile, option, NEAR_MM)
     assert score.delta_e_2000_p95 == pytest.approx(again.delta_e_2000_p95, rel=1e-9)
     assert score.delta_e_2000_p95 <= choice.chosen.error  # which is that of the worst view
 
 
 def test_the_same_choice_twice(skin1, choice):
     with shared_work.alone():
-        again = choose(skin1, mm_per_pixel=0.6, frame=FRAME, threads=1)
+        again = choose(skin1, mm_per_pixel=NEAR_MM, frame=FRAME, threads=1)
     assert again.steps == choice.steps
     assert (again.chosen, again.cheaper, again.dearer) == (
         *(choice.chosen, choice.cheaper, choice.dearer),
@@ -514,11 +515,11 @@ def test_the_seed_is_the_walks(monkeypatch):
 def test_a_profile_is_its_own_truth(skin1, choice, monkeypatch):
     quick(monkeypatch)
     given = simulate_exact(skin1)
-    found = choose(given, mm_per_pixel=0.6, frame=FRAME)
+    found = choose(given, mm_per_pixel=NEAR_MM, frame=FRAME)
     assert found.profile is given
     assert found.steps == choice.steps  # skin1's grid has all of the light
     nameless = replace(given, meta={**given.meta, "material": None, "material_sha256": None})
-    assert choose(nameless, mm_per_pixel=0.6, frame=FRAME).chosen == choice.chosen
+    assert choose(nameless, mm_per_pixel=NEAR_MM, frame=FRAME).chosen == choice.chosen
 
 
 def test_walks_are_held_against_transport_alone(skin1):

@@ -44,6 +44,7 @@ FETCHES = 24  # skin1 at .3 mm: 99 % of a picture's pixels within a Delta E of .
 FEWEST = 7
 _KEPT, _MOST_PIXELS = 0.9999, 320
 _STARTS, _KEPT_STARTS, _SHAPES = 16, 4, 2
+_ROUGH_STEPS = 150  # at most, of a start
 # Weights of aliasing. skin1, 24 fetches: mean over eight pictures of the 99th percentile of Delta
 # E .261 with 0, .101 with .3, .107 with 1; of a point moved by a pixel 3.1, .74 and .69.
 ALIASING, _TIMES = 0.3, 10.0 / 3.0
@@ -326,7 +327,7 @@ def _rough(chain: Searched, x: FloatArray) -> optimize.OptimizeResult:
         x,
         jac=True,
         method="L-BFGS-B",
-        options={"maxiter": 150, "maxcor": 20},
+        options={"maxiter": _ROUGH_STEPS, "maxcor": 20},
     )
 
 
