@@ -27,7 +27,7 @@ from sssfit.render.separable import render_separable
 from sssfit.render.taps import render_taps
 from sssfit.scene.made import make_scene
 from sssfit.scene.record import Scene
-from sssfit.simulate import simulate_exact, simulate_montecarlo
+from sssfit.simulate import simulate, simulate_exact, simulate_montecarlo
 
 PHOTONS = 100_000
 MATERIALS = ("skin1", "wholemilk", "ketchup")
@@ -365,8 +365,15 @@ def test_a_million_photons_unless_told_otherwise(monkeypatch, capsys):
     given = ("--photons", "2e4", "--seed", "3", "--picture", "disk", "--size", "8x8")
     run(capsys, "skin1", "--what", "budget", *given)
     assert asked == [(1_000_000, 1), (20_000, 3)]
+    walked = []
+
+    def few(material, method, *, photons, **settings):
+        walked.append(photons)
+        return simulate(material, method, photons=1000, **settings)
+
+    monkeypatch.setattr("sssfit.compare._budget_causes.simulate", few)
     found = error_budgets(load_material("skin1"), [noise_scene(4)])
-    assert found[0].photons == 1_000_000
+    assert walked == [found[0].photons] == [1_000_000]
 
 
 def run(capsys, *arguments):
