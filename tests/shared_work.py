@@ -70,6 +70,10 @@ def _short_descent(chain, x, most, gain=3e-3, real=sssfit.fit.cascade.descent):
     return real(chain, x, min(most, 20), max(gain, 0.02))
 
 
+def _hasty_descent(chain, x, most, gain=3e-3, real=sssfit.fit.cascade.descent):
+    return real(chain, x, min(most, 6), gain)
+
+
 SHORT = (
     (sssfit.fit.cascade, "_STARTS", 2),
     (sssfit.fit.cascade, "_KEPT_STARTS", 1),
@@ -82,6 +86,7 @@ _HASTY = (
     *SHORT,
     (sssfit.fit.cascade, "_SHAPES", 1),
     (sssfit.fit.cascade, "_ROUGH_STEPS", 30),
+    (sssfit.fit.cascade, "descent", _hasty_descent),
 )
 _LONG = tuple((module, name, getattr(module, name)) for module, name, _ in _HASTY)
 
@@ -93,7 +98,7 @@ def allow(file):
     short = 0 if file in LONG_SEARCHES else 3 if file in _WHOLE_DESCENTS else len(SHORT)
     short = len(_HASTY) if file in _HASTY_SEARCHES else short
     _state["short"] = short
-    for module, name, value in (*_HASTY[:short], *_LONG[short:]):
+    for module, name, value in (*_LONG, *_HASTY[:short]):
         setattr(module, name, value)
 
 
