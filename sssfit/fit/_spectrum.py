@@ -16,6 +16,7 @@ with E^ its orthonormal cosine transform (DCT-II), so the weighted misfit is the
 the rendered picture. Mirrored pictures have no edges but their own: no window is needed.
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
@@ -185,7 +186,7 @@ def spectral_target(
     """
     w, cell = graded_frequencies(target.half_pixels) if grid is None else grid
     energy = target.total[channels]
-    wanted = _transforms(target, channels, energy, w)
+    (wanted,) = _transforms(target, channels, energy, [w])
     power = _power(channels, pictures, w, cell, wanted)
     return SpectralTarget(w, wanted, power, energy, target.half_pixels)
 
@@ -194,8 +195,8 @@ def search_targets(
     target: Target, channels: list[int], pictures: Pictures
 ) -> tuple[SpectralTarget, SpectralTarget]:
     """Return what a search is for: on the few frequencies of its steps, and on all, for its end."""
-    few = search_target(target, channels, pictures, count=_SEARCHED)
-    return few, search_target(target, channels, pictures)
+    few, many = _search_targets(target, channels, pictures, (_SEARCHED, None))
+    return few, many
 
 
 def search_target(
@@ -218,23 +219,37 @@ def search_target(
     FitError
         As `spectral_target`.
     """
+    (found,) = _search_targets(target, channels, pictures, (count,))
+    return found
+
+
+def _search_targets(
+    target: Target, channels: list[int], pictures: Pictures, counts: Sequence[int | None]
+) -> list[SpectralTarget]:
+    """Return it for each of several numbers of frequencies."""
     energy = np.ones(len(channels))
-    w, cell = graded_frequencies(target.half_pixels, count)
-    wanted = np.round(_transforms(target, channels, energy, w), _DECIMALS)
-    power = _power(channels, pictures, w, cell, wanted)
-    return SpectralTarget(w, wanted, power, energy, target.half_pixels)
+    grids = [graded_frequencies(target.half_pixels, each) for each in counts]
+    spectra = _transforms(target, channels, energy, [w for w, _ in grids])
+    found = []
+    for (w, cell), exact in zip(grids, spectra, strict=True):
+        wanted = np.round(exact, _DECIMALS)
+        power = _power(channels, pictures, w, cell, wanted)
+        found.append(SpectralTarget(w, wanted, power, energy, target.half_pixels))
+    return found
 
 
 def _transforms(
-    target: Target, channels: list[int], energy: FloatArray, w: FloatArray
-) -> FloatArray:
-    """Return the kernel's spectrum (C, n, n), scaled to an energy (C,)."""
-    cosines = _cosines(w, target)
-    wanted = np.empty((len(channels), w.size, w.size))
-    for row, channel, total in zip(wanted, channels, energy, strict=True):
-        row[...] = cosines @ target.quadrant(channel) @ cosines.T
-        row *= total / row[0, 0]
-    return wanted
+    target: Target, channels: list[int], energy: FloatArray, grids: Sequence[FloatArray]
+) -> list[FloatArray]:
+    """Return the kernel's spectrum (C, n, n) on each grid, scaled to an energy (C,)."""
+    cosines = [_cosines(w, target) for w in grids]
+    found = [np.empty((len(channels), w.size, w.size)) for w in grids]
+    for k, (channel, total) in enumerate(zip(channels, energy, strict=True)):
+        quadrant = target.quadrant(channel)
+        for wanted, waves in zip(found, cosines, strict=True):
+            wanted[k] = waves @ quadrant @ waves.T
+            wanted[k] *= total / wanted[k, 0, 0]
+    return found
 
 
 def _power(
