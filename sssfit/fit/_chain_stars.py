@@ -130,7 +130,7 @@ class StarChain(Chain):
         share = m / self.target.energy
         gradient = np.empty(self.size)
         gradient[: m.size] = (by_blend - share * by_blend.sum(axis=0)).ravel()
-        self._backwards(blurs, by_chain, gradient)
+        self._backwards(blurs, chain, by_chain, gradient)
         return value, gradient
 
     def matrix(self, x: FloatArray) -> FloatArray:
@@ -257,14 +257,17 @@ class StarChain(Chain):
         return found
 
     def _backwards(
-        self, blurs: Sequence[_Blur | _Star], by_rows: FloatArray, gradient: FloatArray
+        self,
+        blurs: Sequence[_Blur | _Star],
+        chain: FloatArray,
+        by_rows: FloatArray,
+        gradient: FloatArray,
     ) -> None:
         """Fill in the gradient by the stages from that by their chain (L+1, C, M)."""
-        before = self._chain(blurs)
-        by_chain = np.zeros(before.shape[1:])
+        by_chain = np.zeros(chain.shape[1:])
         for k in range(len(blurs) - 1, -1, -1):
             by_chain = by_chain + by_rows[k + 1]
-            by_blur = by_chain * before[k] * self._halvings[k]
+            by_blur = by_chain * chain[k] * self._halvings[k]
             self._put_stage(gradient, k, blurs[k].gradient(by_blur))
             by_chain = by_chain * (self._halvings[k] * blurs[k].spectrum)
 
