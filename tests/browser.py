@@ -15,10 +15,27 @@ _SOFTWARE = (
     "--disable-gpu-compositing",
 )
 _WAIT = 20.0  # seconds
-_AT = "return arguments[0].selectedIndex"
-_PUT = """const [control, at] = arguments;
-control[control.tagName === 'SELECT' ? 'selectedIndex' : 'value'] = at;"""
+_MOVE = 50  # milliseconds; five times as long if nothing is said
+# Puts a control beside a value; returns the direction to it (0 if it cannot go), and what it is.
+_BESIDE = """const [control, value] = arguments, isList = control.tagName === 'SELECT';
+const key = isList ? 'selectedIndex' : 'value', step = isList ? 1 : Number(control.step);
+const goal = isList ? [...control.options].findIndex((at) => at.value === value) : Number(value);
+if (isList && goal < 0) throw new Error(`there is no ${value}`);
+const side = control.matches(':disabled') ? 0 : Math.sign(Math.round((goal - control[key]) / step));
+if (side) control[key] = goal - side * step;
+return [side, isList];"""
+# Looks in the page: of each look from here the way took longer than what is waited for.
+_WAITED = """const done = arguments[0], end = performance.now() + {ms};
+const look = () => {{
+  const holds = Boolean({condition});
+  if (holds || performance.now() > end) done(holds);
+  else setTimeout(look, 1);
+}};
+look();"""
 _DRAWN = "document.body.dataset.drawn && document.body.dataset.busy !== 'true'"
+# As where somebody edits the address, and also where it is the same.
+_VIEW = """history.replaceState(null, '', location.pathname + arguments[0]);
+window.dispatchEvent(new HashChangeEvent('hashchange'));"""
 
 
 def needs_browser():
@@ -48,8 +65,9 @@ class Browser:
         service = Service(shutil.which("chromedriver"))
         self.driver = webdriver.Chrome(options=options, service=service)
         self.driver.set_page_load_timeout(_WAIT)
-        self.driver.set_script_timeout(_WAIT)
+        self.driver.set_script_timeout(2.0 * _WAIT)
         self.downloads = downloads
+        self.opened = None
         where = {"behavior": "allow", "downloadPath": str(downloads)}
         self.driver.execute_cdp_cmd("Browser.setDownloadBehavior", where)
 
@@ -62,9 +80,22 @@ class Browser:
         given |= {"prefers-reduced-motion": "reduce"}
         features = [{"name": name, "value": value} for name, value in given.items()]
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+        self.opened = None
         self.driver.get("about:blank")
         self.log("browser"), self.log("performance")
         self.driver.get(f"file://{path}{hash_}")
+        self.wait()
+        self.opened = path, width, dark
+        return self
+
+    def show(self, path, hash_=""):
+        """Show a view of a page, which is opened only if it is not.
+
+        What the address does not hold stays as it was: the order of tables, the panels of charts.
+        """
+        if self.opened != (path, 900, False):
+            return self.open(path, hash_)
+        self.js(_VIEW, hash_)
         self.wait()
         return self
 
@@ -80,10 +111,9 @@ class Browser:
 
     def wait(self, condition=_DRAWN):
         """Wait until a condition holds."""
-        end = time.monotonic() + _WAIT
-        while not self.js(f"return Boolean({condition})"):
-            assert time.monotonic() < end, f"not true after {_WAIT} s: {condition}"
-            time.sleep(0.02)
+        code = _WAITED.format(condition=condition, ms=1000.0 * _WAIT)
+        holds = self.driver.execute_async_script(code)
+        assert holds, f"not true after {_WAIT} s: {condition}"
 
     def set(self, id_, value):
         """Give a control a value by one press of a key, from the step beside it.
@@ -93,17 +123,12 @@ class Browser:
         from selenium.webdriver import Keys
 
         control = self.driver.find_element("id", id_)
-        if control.tag_name == "select":
-            options = self.js("return [...arguments[0].options].map((at) => at.value)", control)
-            now, goal, step = (self.js(_AT, control), options.index(str(value)), 1)
-            on, back = Keys.ARROW_DOWN, Keys.ARROW_UP
-        else:
-            now, step = (float(control.get_attribute(each)) for each in ("value", "step"))
-            goal, on, back = float(value), Keys.ARROW_RIGHT, Keys.ARROW_LEFT
-        if control.is_enabled() and round((goal - now) / step):
-            is_up = goal > now
-            self.js(_PUT, control, goal - step if is_up else goal + step)
-            control.send_keys(on if is_up else back)
+        side, is_list = self.js(_BESIDE, control, str(value))
+        on, back = (
+            (Keys.ARROW_DOWN, Keys.ARROW_UP) if is_list else (Keys.ARROW_RIGHT, Keys.ARROW_LEFT)
+        )
+        if side:
+            control.send_keys(on if side > 0 else back)
         self.wait()
 
     def click(self, selector):
@@ -118,11 +143,15 @@ class Browser:
 
     def point(self, selector, *, click=False):
         """Move the pointer onto an element, and click there."""
-        from selenium.webdriver import ActionChains
-
-        mouse = ActionChains(self.driver).move_to_element(self._seen(selector))
+        mouse = self.mouse().move_to_element(self._seen(selector))
         (mouse.click() if click else mouse).perform()
         self.wait()
+
+    def mouse(self):
+        """What moves the pointer, in a few steps each."""
+        from selenium.webdriver import ActionChains
+
+        return ActionChains(self.driver, duration=_MOVE)
 
     def key(self, *keys):
         """Press keys while no control has the focus."""
@@ -156,5 +185,5 @@ class Browser:
         end = time.monotonic() + _WAIT
         while not (found := list(self.downloads.glob("*.exr"))):
             assert time.monotonic() < end, "nothing was downloaded"
-            time.sleep(0.02)
+            time.sleep(0.005)
         return found[0]

@@ -63,7 +63,7 @@ def test_the_page_loads_without_an_error_and_without_a_network(page, window):
 
 
 def test_a_dangerous_name_is_text(page, window):
-    window.open(page)
+    window.show(page)
     assert window.js("return document.querySelector('h1').textContent") == world.NAME
     window.set("kernel", world.LABEL)
     assert window.text("single-title").endswith(world.LABEL)
@@ -78,7 +78,7 @@ def test_a_dangerous_name_is_text(page, window):
     ],
 )
 def test_kernels_that_run_in_the_page_show_the_librarys_pictures(page, window, key, kernels):
-    window.open(page, f"#picture={key}")
+    window.show(page, f"#picture={key}")
     reference = picture_of(key).reference
     for label in labels()[kernels]:
         taps = kernel_of(label).taps
@@ -120,14 +120,14 @@ def test_one_channel_is_grey_wherever_it_is_shown(tmp_path, window):
 
 
 def test_the_truth_is_the_librarys_in_half_floats(page, window):
-    window.open(page)
+    window.show(page)
     truth = picture_of("head-45-1").reference.truth
     seen = load_image(window.download("truth")).pixels
     np.testing.assert_array_equal(seen, truth.astype(np.float16))
 
 
 def test_figures_are_the_librarys(page, window):
-    window.open(page)
+    window.show(page)
     reference = picture_of("head-45-1").reference
     for label in labels()[::3]:
         window.set("kernel", label)
@@ -151,7 +151,7 @@ def differences_of(window):
 
 
 def test_quartiles_are_those_of_the_error_as_its_own_weight(page, window):
-    window.open(page)
+    window.show(page)
     mask = picture_of("head-45-1").reference.scene.mask
     differences = differences_of(window)[2]
     counted = np.sort(differences.ravel() if mask is None else differences[mask > 0])
@@ -163,11 +163,9 @@ def test_quartiles_are_those_of_the_error_as_its_own_weight(page, window):
 
 
 def test_the_loupe_tells_the_pixel_under_the_mouse(page, window):
-    from selenium.webdriver import ActionChains
-
-    window.open(page)
+    window.show(page)
     canvas = window.driver.find_element("id", "single")
-    ActionChains(window.driver).move_to_element(canvas).perform()
+    window.mouse().move_to_element(canvas).perform()
     column, row = (int(each) for each in window.text("pixel-place").split(", "))
     pictures = differences_of(window)
     height, width = pictures[2].shape
@@ -214,12 +212,10 @@ def test_every_control_does_something(page, window, kernels):
 
 
 def test_the_divider_is_dragged_and_elsewhere_the_picture(page, window):
-    from selenium.webdriver import ActionChains
-
-    window.open(page, "#zoom=4")
+    window.show(page, "#zoom=4")
     canvas = window.driver.find_element("id", "single")
     width = canvas.size["width"]
-    mouse = ActionChains(window.driver)
+    mouse = window.mouse()
     mouse.move_to_element(canvas).click_and_hold().move_by_offset(width // 4, 0).release().perform()
     assert float(window.js("return document.getElementById('split').value")) == pytest.approx(
         0.75, abs=0.02
@@ -232,7 +228,7 @@ def test_the_divider_is_dragged_and_elsewhere_the_picture(page, window):
 
 
 def test_stages_are_shown_one_by_one(page, window):
-    window.open(page)
+    window.show(page)
     window.set("kernel", world.LABEL)
     window.set("show", "H1")
     assert window.text("figure-mean") == "-"
@@ -241,7 +237,7 @@ def test_stages_are_shown_one_by_one(page, window):
 
 
 def test_jitter_changes_the_picture_and_its_frames_average(page, window):
-    still = window.open(page, "#kernel=" + quote(world.LABEL)).download("kernel")
+    still = window.show(page, "#kernel=" + quote(world.LABEL)).download("kernel")
     still = load_image(still).pixels
     window.click("#jitter")
     moved = load_image(window.download("kernel")).pixels
@@ -252,7 +248,7 @@ def test_jitter_changes_the_picture_and_its_frames_average(page, window):
 
 
 def test_the_address_holds_the_view(page, window):
-    window.open(page)
+    window.show(page)
     window.set("kernel", labels()[3])
     window.set("scene", "edge")
     window.key("b")
@@ -269,7 +265,7 @@ def test_the_address_holds_the_view(page, window):
 
 
 def test_a_point_of_the_front_tells_and_runs_its_kernel(page, window):
-    window.open(page)
+    window.show(page)
     label = world.report().front[0]
     point = f'.point[data-kernel="{label}"]'
     window.point(point)
@@ -301,7 +297,7 @@ def test_tables_sort_and_copy(page, window):
 
 
 def test_the_copied_export_is_the_export(page, window):
-    window.open(page)
+    window.show(page)
     window.set("kernel", world.LABEL)
     for form in ("hlsl", "glsl", "wgsl", "json"):
         window.js("document.getElementById('status').textContent = ''")
@@ -311,7 +307,7 @@ def test_the_copied_export_is_the_export(page, window):
 
 
 def test_a_key_is_seen_in_the_controls(page, window):
-    window.open(page)
+    window.show(page)
     for key, mode, pane in (
         *(("3", "single", "difference"), ("1", "single", "truth"), ("s", "swipe", "kernel")),
         *(("f", "flicker", "kernel"), ("b", "side", "kernel")),
@@ -323,7 +319,7 @@ def test_a_key_is_seen_in_the_controls(page, window):
 
 
 def test_the_scale_ends_where_the_gain_says(page, window):
-    window.open(page)
+    window.show(page)
     assert window.text("scale-end") == "5 and more"
     window.set("gain", 8)
     assert window.text("scale-end") == "0.625 and more"
@@ -331,7 +327,7 @@ def test_the_scale_ends_where_the_gain_says(page, window):
 
 @pytest.mark.parametrize(("key", "times"), [("disk", 2), ("edge", 0.5)])
 def test_the_page_computes_truths_for_other_pixels(page, window, key, times):
-    window.open(page, f"#picture={key}&kernel=" + quote(labels()[0]))
+    window.show(page, f"#picture={key}&kernel=" + quote(labels()[0]))
     window.set("distance", times)
     assert f"times={times:g}" in window.js("return location.hash")
     reference = picture_of(key).reference
@@ -348,7 +344,7 @@ def test_the_page_computes_truths_for_other_pixels(page, window, key, times):
 
 
 def test_fetches_go_along_the_front(page, window):
-    window.open(page)
+    window.show(page)
     front = world.report().front
     for k, label in enumerate(front):
         window.set("most", k)
@@ -367,7 +363,7 @@ def test_a_chart_shows_one_channel_at_a_time(page, window):
 
 
 def test_the_difference_is_downloaded(page, window):
-    window.open(page)
+    window.show(page)
     errors = load_image(window.download("difference")).pixels
     np.testing.assert_array_equal(errors[..., 0], errors[..., 2])
     mask = picture_of("head-45-1").reference.scene.mask > 0
@@ -390,7 +386,7 @@ def test_no_width_loses_anything(page, window, width, dark):
 
 
 def test_every_control_has_a_name(page, window):
-    window.open(page)
+    window.show(page)
     nameless = window.js(
         "return [...document.querySelectorAll("
         "'button, select, input, canvas, [role=img], [tabindex]')]"
