@@ -2,6 +2,8 @@
 
 import signal
 import subprocess
+import time
+from pathlib import Path
 
 _started = []
 
@@ -21,6 +23,23 @@ def start(command, **options):
     finally:
         signal.signal(signal.SIGINT, before)
     return ended_with_the_test(process)
+
+
+def wait_until_at_work(process):
+    """Wait until a child is past the step from its last word to what it then does.
+
+    It sleeps by then, or has computed for 10 ms; where nothing tells, it is given time for that.
+    """
+    path, begun = Path(f"/proc/{process.pid}/stat"), None
+    if not path.exists():
+        return time.sleep(0.15)
+    while True:
+        state, *fields = path.read_text().rpartition(")")[2].split()
+        ticks = int(fields[10]) + int(fields[11])
+        begun = ticks if begun is None else begun
+        if state == "S" or ticks >= begun + 2:
+            return None
+        time.sleep(0.005)
 
 
 def ended_with_the_test(process):

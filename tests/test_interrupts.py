@@ -82,7 +82,7 @@ def start_trial(body, folder):
     program = TRIAL.format(body=textwrap.indent(textwrap.dedent(body), "    "))
     process = fork_server.start([sys.executable, "-c", program], cwd=folder)
     assert process.stdout.readline() == "ready\n", process.stderr.read()
-    time.sleep(0.15)  # for the step from saying so to what is to be interrupted
+    processes.wait_until_at_work(process)
     return process
 
 

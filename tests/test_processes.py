@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import fork_server
+import inner_pytest
 import pytest
 from processes import end_all, start
 
@@ -35,11 +36,12 @@ def test_a_child_is_interrupted_where_the_parent_ignores_it(start):
 @pytest.mark.skipif(os.name != "posix", reason="signals are POSIX")
 def test_tests_of_interrupts_pass_where_the_parent_ignores_it():
     # What a background job of a shell is: sh -c 'pytest ... &'.
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider"]
+    command = [*inner_pytest.COMMAND, "-q"]
     command += ["-k", "during_imports and 1-2", str(TESTS / "test_interrupts.py")]
     ended = subprocess.run(
         ["sh", "-c", 'trap "" INT; exec "$@"', "sh", *command],
         cwd=TESTS.parent,
+        env=inner_pytest.ENVIRONMENT,
         capture_output=True,
         text=True,
         timeout=120,

@@ -8,7 +8,7 @@ import sys
 import time
 from pathlib import Path
 
-import processes
+import fork_server
 import pytest
 
 from sssfit import files
@@ -20,7 +20,7 @@ PAGE = f'<!doctype html><meta name="generator" content="{MARK}"><p>é'
 
 # The verb at work in both of its processes.
 WORKING = """
-import functools, sys, time
+import functools, os, sys, time
 import sssfit.report
 from sssfit.report.aside import Aside
 
@@ -32,6 +32,7 @@ def finished_page(*_, **__):
         print("working", flush=True)
         begun()
 
+os.setsid()
 sssfit.report.finished_page = finished_page
 from sssfit.cli import main
 sys.argv[1:] = ["report", "skin1", "-q", "-o", "a.html"]
@@ -57,7 +58,7 @@ def run(tmp_path, monkeypatch, capfd):
 def working(folder, when):
     """The verb in a process group of its own, with its second process starting or ready."""
     command = [sys.executable, "-c", WORKING.format(is_ready=when == "ready")]
-    process = processes.start(command, cwd=folder, start_new_session=True)
+    process = fork_server.start(command, cwd=folder)
     assert process.stdout.readline() == "working\n"
     return process
 

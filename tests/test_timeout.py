@@ -1,9 +1,9 @@
 """A test that hangs fails, in compiled code too."""
 
 import subprocess
-import sys
 from pathlib import Path
 
+import inner_pytest
 import pytest
 
 ROOT = Path(__file__).parents[1]
@@ -24,9 +24,10 @@ def test_a_test_that_hangs_fails(tmp_path, kind):
     (tmp_path / "test_hang.py").write_text(HANGS[kind])
     ended = subprocess.run(
         [
-            *(sys.executable, "-m", "pytest", "-p", "no:cacheprovider"),
-            *("-c", ROOT / "pyproject.toml", "-o", "timeout=1", tmp_path / "test_hang.py"),
+            *inner_pytest.COMMAND,
+            *("-c", ROOT / "pyproject.toml", "-o", "timeout=0.2", tmp_path / "test_hang.py"),
         ],
+        env=inner_pytest.ENVIRONMENT,
         cwd=tmp_path,
         capture_output=True,
         text=True,
