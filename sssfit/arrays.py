@@ -17,6 +17,7 @@ import numpy.typing as npt
 
 from sssfit.errors import ArgumentError, MaterialError, SssfitError
 from sssfit.messages import did_you_mean, shown
+from sssfit.methods import Method, Setting
 
 FloatArray = npt.NDArray[np.float64]
 BoolArray = npt.NDArray[np.bool_]
@@ -61,6 +62,33 @@ def check_settings(function: Callable[..., Any], given: Mapping[str, Any], who: 
                 f"{who} has no setting {name}; {did_you_mean(name, known)}expected some of "
                 f"{', '.join(known)}."
             )
+
+
+def check_kinds(
+    method: Method, given: Mapping[str, Any], error: type[SssfitError], where: str = ""
+) -> None:
+    """Refuse texts for numbers and the like; the method's function checks the values themselves.
+
+    ``where`` comes before a setting's name in the message.
+    """
+    seed = Setting("seed", "whole", "of random numbers")  # of every method that has random numbers
+    kinds = {each.keyword or each.name: each for each in (*method.settings, seed)}
+    for key, value in given.items():
+        expected = _expected(kinds[key], value) if key in kinds else ""
+        if expected:
+            raise error(f"{where}{key} = {shown(value)}; expected {expected}.")
+
+
+def _expected(setting: Setting, value: Any) -> str:
+    """Return what was expected in place of a value of another kind, and nothing if it is one."""
+    if value is None or setting.kind in ("text", "flag"):
+        return ""
+    if setting.kind == "choice":
+        return "" if isinstance(value, str) else " or ".join(setting.among)
+    if setting.kind in ("numbers", "parts"):
+        return "a number, or one per channel" if isinstance(value, str) else ""
+    is_number = hasattr(value, "__float__") and not isinstance(value, bool)
+    return "" if is_number else f"a {'whole ' * (setting.kind in ('whole', 'count'))}number"
 
 
 def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:

@@ -233,6 +233,14 @@ def test_sizes_are_whole_numbers(name, wrong):
         ("render", (np.ones((4, 4, 3)), "KERNEL", {"frame": 1}), "kernel has no setting frame"),
         ("fit", ("PROFILE", "svd", {"mm_per_pixel": [1, 2]}), "expected a length in mm, or"),
         ("fit", ("PROFILE", "svd", {"support_mm": "wide"}), "expected a length in mm"),
+        ("fit", ("PROFILE", "cascade", {"fetches": "12"}), "fetches = '12'; expected a number"),
+        ("fit", ("PROFILE", "cascade", {"passes": "4"}), "passes = '4'; expected a whole number"),
+        ("fit", ("PROFILE", "guided", {"centre_bound": "5%"}), "= '5%'; expected a number"),
+        ("fit", ("PROFILE", "falloff", {"width": True}), "width = True; expected a number"),
+        ("fit", ("PROFILE", "artist", {"near_mm2": "a"}), "'a'; expected a number, or one per"),
+        ("simulate", ("skin1", "exact", {"tolerance": "1%"}), "'1%'; expected a number"),
+        ("simulate", ("skin1", "montecarlo", {"target_error": "1%"}), "expected a number"),
+        ("simulate", ("skin1", "burley", {"mapping": ["diffuse"]}), "expected perpendicular or"),
     ],
 )
 def test_settings_of_other_methods_are_refused_in_one_line(room, given, words, profile, kernel):

@@ -16,7 +16,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from sssfit.arrays import check_settings
+from sssfit.arrays import check_kinds, check_settings
 from sssfit.errors import FitError
 from sssfit.fit._result import FitResult, TapsFit
 from sssfit.fit._target import MM_PER_PIXEL, Pitch, make_target, pitch_of, support_of
@@ -111,6 +111,7 @@ def fit_result(
     """
     if not isinstance(method, str) or method not in FITS:
         raise FitError(f"method = {shown(method)}; expected one of {', '.join(FITS)}.")
+    check_kinds(FITS[method], settings | {"taps": taps}, FitError)
     if place is not None and taps is None:
         raise FitError(f"place = {shown(place)} is where taps lie; give their number as `taps`.")
     if smooth:

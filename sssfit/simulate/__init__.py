@@ -8,7 +8,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from sssfit.arrays import check_settings
+from sssfit.arrays import check_kinds, check_settings
 from sssfit.errors import SimulationError
 from sssfit.material import Material, load_material
 from sssfit.messages import shown
@@ -113,6 +113,7 @@ def simulate(
         )
     profiles = chosen.load()
     check_settings(profiles, settings, f"the method {method}")
+    check_kinds(chosen, settings, SimulationError)
     if own is not None:
         return _single_profile(profiles(**settings))
     record = load_material(material) if isinstance(material, str | Path) else material

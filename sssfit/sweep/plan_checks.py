@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from sssfit.arrays import is_whole, json_object, number_array
+from sssfit.arrays import check_kinds, is_whole, json_object, number_array
 from sssfit.errors import PlanError
 from sssfit.material import Material
 from sssfit.messages import did_you_mean, shown
@@ -141,6 +141,7 @@ def checked_fit(value: object) -> dict[str, Any] | None:
         if key not in known:
             near = did_you_mean(key, known)
             raise PlanError(f"fit.{key} is unknown; {near}expected {', '.join(known)}.")
+    check_kinds(FITS[method], given, PlanError, "fit.")
     return given
 
 
