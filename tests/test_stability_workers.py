@@ -123,7 +123,7 @@ from worker_calls import large
 
 if __name__ == "__main__":
     with Workers(2, None) as workers:
-        results = [workers.submit(large, 60_000_000) for _ in range(50)]
+        results = [workers.submit(large, 20_000_000) for _ in range(50)]
         results[0].result()
         raise OSError("the disk is full")
 """
