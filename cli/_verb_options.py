@@ -160,7 +160,8 @@ FIT_PIXELS = (
     option("--pitches", Lengths(), "MM,...", "Pixel sizes to make a kernel for, a file each. "
            "Cascades with the same --stages can be mixed for sizes in between."),
     option("--support", Length("auto"), "MM|auto", "Half width of the kernel; auto is the "
-           "smallest that keeps 99.9 % of every channel, for cascade 99.99 %.", "auto"),
+           "smallest that keeps 99.9 % of every channel, for cascade, gaussian-chain, rotated and "
+           "pyramid 99.99 %.", "auto"),
     flag("--smooth", "Take most of a walk's noise out of the profile before the fit."),
     flag("--normalize", "Separable kernels: scale each channel to unit energy, kept as a factor."),
 )
@@ -168,7 +169,7 @@ FIT_OUTPUT = (STRICT, *output("PROFILE.METHOD.taps.json, .kernel.json without ta
                              "is not our kernel"))
 
 STABILITY = (
-    option("--only", Names(STRESSES), "NAME,...", "Stresses, as below.  [default: all]"),
+    option("--only", Names(STRESSES), "NAME,...", "Stresses, as below.  [default: every one]"),
     option("--mm-per-pixel", Length(), "MM", "Size of a pixel, where it is not what is made "
            "harder.", 0.3),
     flag("--whole is_whole", "As many seeds and sizes for cascades as for the others; slow."),
@@ -192,7 +193,7 @@ MOTION = (
     option("--shift", Shift(), "X,Y", "Whole pixels by which the picture moves to the right and "
            "down in every frame.", "0,0"),
     option("--only", Names(RENDERERS), "NAME,...", "Renderers, as below; variates always runs.  "
-           "[default: all]"),
+           "[default: every one]"),
     option("--frames", None, "DIR", "Write every frame there, as frame-0000 and so on."),
     option("--format form", ["png", "exr"], None, "With --frames: format.  [default: png]"),
     option("--of", list(RENDERERS), None, "With --frames: renderer.  [default: variates]"),
@@ -212,7 +213,8 @@ SCENE = (
            "480x300 with --table]"),
     option("--map-size", WholeRange(8, 16384), "N", "Side of a whole map in texels.  [default: "
            "1024; 512 with --table]"),
-    option("--savings", Names((*SAVINGS, "none")), "NAME,...", "What is left out.  [default: all]"),
+    option("--savings", Names((*SAVINGS, "none")), "NAME,...|none", "What is left out, as below.  "
+           "[default: every one]"),
     option("--culled-by", ["vertex", "face"], None, "Normals by which texels face away.", "vertex"),
     option("--margin", _FACTOR, "D", "clipped: half widths of the picture that are kept.", 1.0),
     option("--mesh", None, "FILE", "OBJ, PLY, glTF or GLB with texture coordinates; needs the "

@@ -17,7 +17,7 @@ from ._output import finish, held, target, write, write_chart
 from ._progress import step_progress, walk_progress
 from ._verb_options import COMPARE
 
-_OF_BUDGETS = ("budget_chart", "photons", "method", "rank", "terms", "model")
+_OF_BUDGETS = "budget_chart", "photons", "method", "rank", "terms", "model"
 _OF_KERNELS = ["table", "only", "error", "cost"]
 
 
@@ -32,7 +32,7 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
     The error budget comes first: simulation noise, energy beyond the grid, separability and
     storage, each alone compared with the exact profile's 2D kernel, the largest first. Then come
     cascades, and every method dense and on taps, with error and cost. A star marks the Pareto
-    front: no other kernel is better in both. Seconds are measured on this machine.
+    front: no other kernel is as good in both and better in one. Seconds are those of this machine.
 
     MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or a .profile.npz
     file, - for one on stdin; a budget needs a material.
@@ -142,7 +142,7 @@ def _check(material: str | None, given: Mapping[str, Any], names: Sequence[str])
     idle = list(_OF_BUDGETS) if several or what not in (None, "budget") else []
     idle += _OF_KERNELS if what in ("budget", "presets", "sheet") else []
     idle += {"budget": ["chart"], "sheet": ["pictures", "size", "layer", "mask"]}.get(what, [])
-    refuse(given, dict.fromkeys(idle, "another --what"))
+    refuse(given, {k: "--what budget" if k in _OF_BUDGETS else "another --what" for k in idle})
     if what == "sheet" and not given["chart"]:
         raise click.UsageError("--what sheet is a picture; name its file with --chart.")
     if given["chart"] == given["budget_chart"] == "-":

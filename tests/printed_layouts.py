@@ -927,7 +927,7 @@ def shown(f: Figures) -> list[Any]:
         _radii(f),
         Words(
             "specular reflectance {}, not part of diffuse R; sum = specular + diffuse + absorbed + "
-            "unfinished" + ("" if f["transmitted"] is None else " + transmitted"),
+            "unfinished" + ("" if f["transmittance"] is None else " + transmitted"),
             f["specular_reflectance"],
         ),
         *_empty(f),
@@ -972,7 +972,7 @@ def _coefficients(f: Figures) -> list[Table]:
 
 def _where_light_went(f: Figures) -> Table:
     heads = ["channel", "diffuse R", "+- stderr", "beyond grid", "of diffuse", "absorbed"]
-    heads += ["transmitted"] * (f["transmitted"] is not None) + ["unfinished", "sum - 1"]
+    heads += ["transmitted"] * (f["transmittance"] is not None) + ["unfinished", "sum - 1"]
     rows = []
     for c, name in enumerate(f["channels"]):
         diffuse, beyond = f["diffuse_reflectance"][c], f["beyond_grid"][c]
@@ -985,7 +985,7 @@ def _where_light_went(f: Figures) -> Table:
                 *(name, diffuse, f["diffuse_reflectance_stderr"][c], beyond),
                 Percent(beyond / diffuse) if diffuse > 0 else None,
                 None if f["absorbed"] is None else f["absorbed"][c],
-                *([] if f["transmitted"] is None else [f["transmitted"][c]]),
+                *([] if f["transmittance"] is None else [f["transmittance"][c]]),
                 Rough(f["unfinished"][c]),
                 None if f["absorbed"] is None else balance,
             ]

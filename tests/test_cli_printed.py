@@ -45,7 +45,6 @@ FIGURES = {
     "absorbed": lambda made: sum(made.absorbed) if len(made.absorbed) else None,
     "absorbed_by_layer": lambda made: made.absorbed if len(made.absorbed) else None,
     "transmittance": lambda made: through(made),
-    "transmitted": lambda made: through(made),
     "transmittance_stderr": lambda made: made.transmittance_stderr,
     "unfinished": lambda made: made.unfinished,
     "energy_balance": lambda made: made.energy_balance,

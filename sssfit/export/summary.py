@@ -230,7 +230,7 @@ _ENERGIES = Columns(
         ("beyond grid", "beyond_grid", ".2e"),
         ("of diffuse", "beyond_share", ""),
         ("absorbed", "absorbed", ".6f"),
-        ("transmitted", "transmitted", ".6f"),
+        ("transmitted", "transmittance", ".6f"),
         ("unfinished", "unfinished", ".1e"),
         ("sum - 1", "balance", ""),
     ),
@@ -276,7 +276,7 @@ def profile_page(figures: Figures) -> str:
     parts.append(
         filled("specular reflectance {specular_reflectance:.6f}, not part of diffuse R; ", figures)
         + "sum = specular + diffuse + absorbed + unfinished"
-        + ("" if figures["transmitted"] is None else " + transmitted")
+        + ("" if figures["transmittance"] is None else " + transmitted")
         + (" + outside the aperture" if "outside_aperture" in figures else "")
     )
     parts += [_directions(figures)] if {"exit_angles", "outside_aperture"} & figures.keys() else []

@@ -14,7 +14,7 @@ from sssfit.text import Text, read_text
 _DEFAULT_CHANNELS = {1: ["mono"], 3: ["R", "G", "B"]}
 _FIGURES = (
     *("method", "channels", "annuli", "radius_mm", "diffuse_reflectance"),
-    *("diffuse_reflectance_stderr", "specular_reflectance", "beyond_grid", "transmitted"),
+    *("diffuse_reflectance_stderr", "specular_reflectance", "beyond_grid", "transmittance"),
     *("energy_balance", "photons"),
 )
 _PAGE = (
@@ -100,7 +100,7 @@ def imported_figures(profile: Profile) -> dict[str, Any]:
     return {
         "source": profile.meta["source"],
         "material": material and material["name"],
-        **{key.replace("transmitted", "transmittance"): figures[key] for key in _FIGURES},
+        **{key: figures[key] for key in _FIGURES},
     }
 
 

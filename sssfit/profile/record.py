@@ -474,7 +474,7 @@ class Profile:
                 "specular_reflectance": self.specular_reflectance,
                 "beyond_grid": self.beyond_grid,
                 "absorbed": self.absorbed.sum(axis=0) if len(self.absorbed) else None,
-                "transmitted": self.transmittance,
+                "transmittance": self.transmittance,
                 "unfinished": self.unfinished,
                 "energy_balance": self.energy_balance,
                 "energy_balance_stderr": meta.get("energy_balance_stderr"),
