@@ -14,6 +14,7 @@ of what asks for a thread pool or for the cache's key runs none, and the photon 
 of the exact solver and the integrals of kernels are loaded without it (``machine_code``).
 """
 
+import functools
 import hashlib
 import os
 from collections.abc import Callable
@@ -28,6 +29,7 @@ Function = TypeVar("Function", bound=Callable[..., object])
 Address = Any  # in C's functions: of an array's first element
 
 
+@functools.cache  # each walk records it: of 1000 photons, reading the sources took a third
 def source_key() -> str:
     """Return version and a hash of the compiled layer's sources, which key the cache."""
     digest = hashlib.sha256()
