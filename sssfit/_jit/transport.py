@@ -71,10 +71,11 @@ def add_stretch(
         distance = inner + (outer - inner) * x**power
         weight = rule[q, 1] * (outer - inner) * power * x ** (power - 1)
         source = target + sign * distance
-        total = 0.0
-        for j in range(nodes.size):
+        for j in range(nodes.size):  # apart from their sum: several divisions at once
             # 1e-300 for a source on a node: its share is then 1 and those of the others 0
             shares[j] = barycentric[j] / (source - nodes[j] + 1e-300)
+        total = 0.0
+        for j in range(nodes.size):
             total += shares[j]
         scale = weight * kernel(distance, target < 0.0, tables) / total
         for j in range(nodes.size):
