@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from scipy.spatial.distance import cdist
 
 from sssfit.compare.candidates import Candidate
 from sssfit.compare.pareto import compare_kernels
@@ -33,7 +34,7 @@ def scene_of(name, size, **options):
 
 def near(places, chosen, reach):
     """Whether each place has a chosen one within reach, all pairs."""
-    return [any(math.dist(place, each) <= reach for each in chosen) for place in places]
+    return (cdist(places, chosen) <= reach).any(axis=1).tolist()
 
 
 def test_of_a_disk_what_is_near_a_lit_pixel_counts(skin1):
