@@ -48,7 +48,7 @@ def gaussians(finer=15.0):
 @pytest.mark.parametrize("radius", [0.5, 1.3])
 def test_a_sum_of_gaussians_under_a_gaussian_has_its_closed_form(radius):
     """A beam of 1/e^2 radius w has the variance w^2 / 4, and variances add: to 1e-6."""
-    found = under_beam(gaussians(), Beam("gaussian", radius))
+    found = under_beam(gaussians(finer=10.0), Beam("gaussian", radius))
     theory = within(found.r_edges_mm, VARIANCES + radius**2 / 4.0)
     assert np.abs(found.cumulative[:, 0] - theory).max() < 1e-6
 
