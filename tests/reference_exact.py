@@ -6,6 +6,7 @@ surface, where it is reflected specularly), and the way out, each a quadrature o
 
 import functools
 import itertools
+import math
 import warnings
 
 import numpy as np
@@ -15,12 +16,12 @@ from scipy import integrate, interpolate, special
 
 def direct_kernel(distance, k):
     """K_d = 1/2 int_kappa^inf exp(-tau d) / sqrt(tau^2 - k^2) dtau, by adaptive quadrature."""
-    kappa = np.sqrt(1.0 + k * k)
+    kappa = math.sqrt(1.0 + k * k)
     value, _ = integrate.quad(
         # tau = kappa + t^2 / (1 - t)^2
         lambda t: (
-            np.exp(-distance * (t / (1 - t)) ** 2)
-            / np.sqrt((kappa + (t / (1 - t)) ** 2) ** 2 - k * k)
+            math.exp(-distance * (t / (1 - t)) ** 2)
+            / math.sqrt((kappa + (t / (1 - t)) ** 2) ** 2 - k * k)
             * 2.0
             * t
             / (1 - t) ** 3
@@ -31,7 +32,7 @@ def direct_kernel(distance, k):
         epsrel=1e-11,
         limit=400,
     )
-    return 0.5 * np.exp(-kappa * distance) * value
+    return 0.5 * math.exp(-kappa * distance) * value
 
 
 def _over_directions(function, eta):
@@ -54,8 +55,8 @@ def mirror_kernel(distance, k, eta):
     def integrand(mu):
         if mu <= 0.0:
             return 0.0
-        tangent = np.sqrt(1.0 - mu * mu) / mu
-        path = np.exp(-distance / mu) * special.j0(k * distance * tangent)
+        tangent = math.sqrt(1.0 - mu * mu) / mu
+        path = math.exp(-distance / mu) * special.j0(k * distance * tangent)
         return reference.fresnel(mu, eta) * path / mu
 
     return 0.5 * _over_directions(integrand, eta)
@@ -67,8 +68,8 @@ def escape(depth, k, eta):
     def integrand(mu):
         if mu <= 0.0:
             return 0.0
-        tangent = np.sqrt(1.0 - mu * mu) / mu
-        path = np.exp(-depth / mu) * special.j0(k * depth * tangent)
+        tangent = math.sqrt(1.0 - mu * mu) / mu
+        path = math.exp(-depth / mu) * special.j0(k * depth * tangent)
         return (1.0 - reference.fresnel(mu, eta)) * path
 
     return 0.5 * _over_directions(integrand, eta)

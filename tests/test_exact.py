@@ -53,7 +53,7 @@ def plain():
 
 @pytest.fixture(scope="module")
 def skin1():
-    return simulate_exact(load_material("skin1"))
+    return checks_exact.exact_profiles(("skin1",), 1e-4)[0]
 
 
 def test_totals_are_chandrasekhars():
@@ -73,7 +73,7 @@ def test_totals_under_diffuse_light_are_chandrasekhars():
 
 @pytest.mark.parametrize(("eta", "albedo", "seed"), [(1.3, 0.9, 1), (1.3, 0.5, 2), (2.0, 0.9, 3)])
 def test_totals_under_diffuse_light_are_a_literal_walks(eta, albedo, seed):
-    photons = 2_000_000
+    photons = 500_000
     specular, left = np.array(reference.diffuse_light_walk(seed, photons, albedo, eta)) / photons
     for share, expected in (
         (specular, 1.0 - entering_light(eta, "diffuse")),
@@ -120,9 +120,13 @@ def test_light_along_the_normal_and_view_along_it_change_places():
     assert multiple + once == pytest.approx(diffuse_reflectance([albedo], eta)[0], abs=1e-7)
 
 
-@pytest.mark.parametrize("eta", [1.0, 1.0001, pytest.param(1.3, marks=pytest.mark.slow), 2.0])
-def test_without_absorption_everything_comes_back(eta):
-    profile = simulate_exact(checks.medium([0.0], [1.0], eta))
+# At an index of 1.0001 each wavenumber takes five times as long, and a smaller grid has fewer.
+@pytest.mark.parametrize(
+    ("eta", "radius_mm"),
+    [(1.0, None), (1.0001, 2.0), pytest.param(1.3, None, marks=pytest.mark.slow), (2.0, None)],
+)
+def test_without_absorption_everything_comes_back(eta, radius_mm):
+    profile = simulate_exact(checks.medium([0.0], [1.0], eta), radius_mm=radius_mm)
     assert profile.diffuse_reflectance[0] == pytest.approx(
         1.0 - profile.specular_reflectance, abs=1e-6
     )
@@ -235,7 +239,7 @@ def test_profile_is_that_of_the_walk():
 
 
 def test_eleven_profiles_are_those_of_the_walk():
-    for figure in checks_exact.against_walk(200_000):
+    for figure in checks_exact.against_walk(150_000):
         assert abs(figure.sigmas) < checks.LIMIT, figure
 
 
@@ -313,7 +317,7 @@ def test_materials_share_work_and_keep_their_answers(skin1):
 
 def test_threads_do_not_change_the_result():
     material = checks.medium([0.3, 0.001], [0.7, 1.0], 1.3)
-    one, two = (simulate_exact(material, threads=n) for n in (1, 2))
+    one, two = (simulate_exact(material, threads=n, tolerance=0.01) for n in (1, 2))
     np.testing.assert_array_equal(one.annulus_energy, two.annulus_energy)
 
 
