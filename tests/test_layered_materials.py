@@ -40,16 +40,16 @@ def test_an_interface_lets_diffuse_light_in_as_walsh_found():
     assert 1.0 - make_layered_materials.interface(90.0, 1.5) == pytest.approx(0.0918, abs=5e-5)
 
 
-def leaf_is_prospects(name):
+def leaf_is_prospects(name, **settings):
     """Solve for a leaf, and compare its totals with PROSPECT's."""
     material = load_material(name)
-    profile = simulate_exact(material, dr_mm=0.05, radius_mm=5.0)
+    profile = simulate_exact(material, dr_mm=0.05, radius_mm=5.0, **settings)
     found = profile.diffuse_reflectance + material.specular_reflectance, profile.transmittance
     np.testing.assert_allclose(found, make_layered_materials.leaf_light(**LEAVES[name]), atol=2e-5)
 
 
 def test_a_leaf_has_the_light_of_prospect():
-    leaf_is_prospects("leaf-young")
+    leaf_is_prospects("leaf-young", tolerance=3e-4)  # the same directions, and so the same totals
 
 
 @pytest.mark.slow

@@ -337,8 +337,8 @@ def test_a_channel_without_scattering_stands_beside_others():
 
 
 def test_similarity_is_used_where_it_is_asked_for():
-    skin = stack(layer(0.5, 20.0, 0.8, 1.45, 0.1), layer(0.1, 10.0, 0.8, 1.38))
-    reduced = stack(layer(0.5, 4.0, 0.0, 1.45, 0.1), layer(0.1, 2.0, 0.0, 1.38))
+    skin = stack(layer(0.5, 20.0, 0.8, 1.4, 0.1), layer(0.1, 10.0, 0.8, 1.4))
+    reduced = stack(layer(0.5, 4.0, 0.0, 1.4, 0.1), layer(0.1, 2.0, 0.0, 1.4))
     similar = simulate_exact(skin, tolerance=0.01, similarity=True)
     np.testing.assert_allclose(
         similar.annulus_energy, simulate_exact(reduced, tolerance=0.01).annulus_energy, atol=1e-12
@@ -353,7 +353,7 @@ def test_thin_slabs_that_scatter_far_ahead_are_refused_by_name():
         SimulationError,
         match=r"film red.*thin slab of g = 0\.97.*`method = montecarlo`",
     ):
-        simulate_exact(thin, dr_mm=0.01, radius_mm=0.3)
+        simulate_exact(thin, tolerance=3e-4, dr_mm=0.01, radius_mm=0.3)
 
 
 def test_a_falling_f_is_an_error_of_its_own():
