@@ -24,7 +24,7 @@ LIMIT = checks.LIMIT
 ROUNDING = 1e-12  # what is booked for a photon adds up to 1 exactly; sums are double
 
 sizes = pytest.mark.parametrize(
-    "photons", [300_000, pytest.param(30_000_000, marks=pytest.mark.slow)], ids=["3e5", "3e7"]
+    "photons", [150_000, pytest.param(30_000_000, marks=pytest.mark.slow)], ids=["1.5e5", "3e7"]
 )
 
 
@@ -158,7 +158,10 @@ def test_one_layer_equals_the_semi_infinite_walk(name, photons):
     assert_within(checks_layers.one_layer(name, photons))
 
 
-@sizes
+# With half of these photons a deflection 3 % off would pass in layers of g = .8.
+@pytest.mark.parametrize(
+    "photons", [300_000, pytest.param(30_000_000, marks=pytest.mark.slow)], ids=["3e5", "3e7"]
+)
 @pytest.mark.parametrize("name", list(STACKS))
 def test_lanes_equal_the_scalar_mcml(name, photons):
     assert_within(checks_layers.against_scalar_mcml(name, photons))
