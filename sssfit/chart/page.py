@@ -33,6 +33,7 @@ from matplotlib.ticker import (
     MaxNLocator,
     NullFormatter,
     NullLocator,
+    ScalarFormatter,
     StrMethodFormatter,
 )
 from matplotlib.transforms import Bbox
@@ -280,8 +281,13 @@ def label_minor(axis: Axis, is_labelled: bool) -> None:
 
 
 def name_axes(axes: Axes, title: str, x_label: str, y_label: str) -> None:
-    """Give a panel its title and labels; only the last may hold formulas."""
-    axes.set_title(drawable(title), loc="left")
+    """Give a panel its title and labels; only the last may hold formulas.
+
+    Where no power of ten can stand over the y axis the title's height is given: matplotlib measures
+    all labels again to find the same one, a tenth of a chart.
+    """
+    may_move = isinstance(axes.yaxis.get_major_formatter(), ScalarFormatter)
+    axes.set_title(drawable(title), loc="left", y=None if may_move else 1.0)
     axes.set_xlabel(drawable(x_label))
     axes.set_ylabel(y_label)
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -213,14 +214,13 @@ def place_labels(
         text = axes.annotate(
             drawable(label), point, (0.0, 0.0), textcoords="offset points", **style
         )
-        others = [*front[:k], *front[k + 1 :]]
-        places = _boxes(text.get_window_extent(), dpi / 72.0)
-        found = next((each for each in places if taken.allows(each[1], front[k], others)), None)
+        offsets, boxes = _boxes(text.get_window_extent(), dpi / 72.0)
+        found = taken.first_free(boxes, front[k], [*front[:k], *front[k + 1 :]])
         if found is None:
             text.remove()
             continue
-        offset, box = found
-        text.set_position(offset)
+        box = Bbox(boxes[found])
+        text.set_position(offsets[found])
         tie = [front[k], _nearest(box, front[k])]
         taken.labels.append(box)
         taken.lines.append(Path(tie))
@@ -238,29 +238,48 @@ class _Taken:
     lines: list[Path]
     labels: list[Bbox] = field(default_factory=list)
 
-    def allows(self, box: Bbox, own: Point, others: Sequence[Point]) -> bool:
-        """Return whether a label is free there, and is read as its own point's."""
-        room = box.padded(_CLEAR_PIXELS)
-        return (
-            bool(self.panel.contains(*room.min) and self.panel.contains(*room.max))
-            and not self._covers_marker(box)
-            and not any(map(room.overlaps, self.labels))
-            and not any(each.intersects_bbox(room) for each in self.lines)
-            and self._is_of(box, own, others)
+    def first_free(self, boxes: FloatArray, own: Point, others: Sequence[Point]) -> int | None:
+        """Return the first place of a label, of boxes (P, 2, 2), that `allows` it.
+
+        Most are refused on arrays; one by one, 40 labels in a crowd took 2.5 s for .3.
+        """
+        rooms = _padded(boxes, _CLEAR_PIXELS)
+        inside = (rooms[:, 0] >= self.panel.min) & (rooms[:, 1] <= self.panel.max)
+        left = np.flatnonzero(inside.all(axis=1))
+        left = left[~_holds_any(_padded(boxes[left], self.reach), self.markers)]
+        nearest = _distances(boxes[left], others).min(axis=1, initial=np.inf)
+        left = left[nearest > _distances(boxes[left], [own])[:, 0]]
+        return next((int(k) for k in left if self.allows(Bbox(boxes[k]), own)), None)
+
+    def allows(self, box: Bbox, own: Point) -> bool:
+        """Return whether a label is clear of lines and labels there, and none is on its own tie."""
+        room, tie = box.padded(_CLEAR_PIXELS), Path([own, _nearest(box, own)])
+        return not (
+            any(map(room.overlaps, self.labels))
+            or any(each.intersects_bbox(room) for each in self.lines)
+            or any(map(tie.intersects_bbox, self.labels))
         )
 
-    def _covers_marker(self, box: Bbox) -> bool:
-        room = box.padded(self.reach)
-        inside = (self.markers > np.array(room.min)) & (self.markers < np.array(room.max))
-        return bool(inside.all(axis=1).any())
 
-    def _is_of(self, box: Bbox, own: Point, others: Sequence[Point]) -> bool:
-        """Return whether a label is nearest to its own point, and no label between them."""
-        end = _nearest(box, own)
-        tie = Path([own, end])
-        return all(
-            math.dist(_nearest(box, each), each) > math.dist(end, own) for each in others
-        ) and (not any(tie.intersects_bbox(each) for each in self.labels))
+def _padded(boxes: FloatArray, pixels: float) -> FloatArray:
+    """Return boxes (P, 2, 2), lower left and upper right, with so much on every side."""
+    padded: FloatArray = boxes + np.array([[-pixels], [pixels]])
+    return padded
+
+
+def _holds_any(boxes: FloatArray, points: FloatArray) -> npt.NDArray[np.bool_]:
+    """Return which boxes (P, 2, 2) have a point inside."""
+    inside = (points > boxes[:, None, 0]) & (points < boxes[:, None, 1])
+    found: npt.NDArray[np.bool_] = np.any(np.all(inside, axis=2), axis=1)
+    return found
+
+
+def _distances(boxes: FloatArray, points: Sequence[Point]) -> FloatArray:
+    """Return the distance of every point (N) from every box (P, 2, 2), as (P, N)."""
+    at = np.reshape(points, (-1, 2))
+    apart = np.clip(at, boxes[:, None, 0], boxes[:, None, 1]) - at
+    found: FloatArray = np.hypot(apart[..., 0], apart[..., 1])
+    return found
 
 
 def _pixel(axes: Axes, x: float, y: float) -> Point:
@@ -286,13 +305,13 @@ def _steps(front: Sequence[Point], panel: Bbox) -> list[Path]:
     return [*lines, Path([front[-1], (panel.x1, front[-1][1])])]
 
 
-def _boxes(own: Bbox, pixels: float) -> Iterator[tuple[Point, Bbox]]:
-    """Yield offsets of a label in points, and its box, by preference: left, below, above.
+def _boxes(own: Bbox, pixels: float) -> tuple[FloatArray, FloatArray]:
+    """Return offsets of a label in points (P, 2), and its boxes (P, 2, 2), by preference.
 
-    ``pixels`` are those of a point.
+    To the left, below, above. ``pixels`` are those of a point.
     """
-    for x, y in _places(own.width / pixels, own.height / pixels):
-        yield (x, y), own.translated(x * pixels, y * pixels)
+    offsets = np.array(list(_places(own.width / pixels, own.height / pixels)))
+    return offsets, own.get_points() + offsets[:, None] * pixels
 
 
 def _places(width: float, height: float) -> Iterator[Point]:
