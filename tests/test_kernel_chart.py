@@ -233,7 +233,7 @@ def test_what_is_below_zero_is_grey_and_dotted(kernel):
         **{name: getattr(kernel, name) for name in kernel.__slots__}
         | {"signs": -kernel.signs, "scale": np.ones(3)}
     )
-    drawn = kernel_figure(view_kernel(negative))
+    drawn = kernel_figure(view_kernel(negative, channels=["c1"]))
     (image,) = panels(drawn, "kernel")[0].images
     assert image.norm(image.get_array()).mask.all()
     positive, below = steps(panels(drawn, "slices")[0])[:2]
@@ -416,7 +416,7 @@ def test_the_verb_gives_json_of_one_channel(run, view):
 
 def test_a_kernel_without_its_profile_is_drawn_alone(run, tmp_path):
     (tmp_path / "wax.profile.npz").unlink()
-    status, out, err = run("wax.svd3.kernel.json", "--json")
+    status, out, err = run("wax.svd3.kernel.json", "--json", "--channel", "c1")
     assert status == 0
     assert "No profile here is the one that wax.svd3.kernel.json was fitted to" in err
     figures = json.loads(out)
