@@ -170,7 +170,7 @@ def test_small_benchmarks_of_sweeps_run_and_fill_every_table(small, monkeypatch)
         [name, workers] for workers in "12" for name in ("processes", "cluster")
     ]
     assert [row[0] for row in memory[1]] == ["5", "10"]
-    assert [row[0] for row in photons[1]] == ["1e+04"] * 2 + ["3e+04"] * 2
+    assert [row[0] for row in photons[1]] == ["1e+03"] * 2 + ["2e+03"] * 2
     assert [row[0] for row in albedos[1]] == ["0.5", "0.9", "0.99", "0.999", "0.9999"]
     assert [row[1] for row in cores[1]] == ["2", "10", "100", "1000"] * 2
     for row in [*(row[2:5] for row in costs[1]), *(row[2:] for row in photons[1]), *albedos[1]]:

@@ -6,6 +6,7 @@ from reference_head import first_run, height_at
 from test_head import SEEN, plane_point
 
 from sssfit.errors import RenderError
+from sssfit.process import thread_count
 from sssfit.scene._field import HeightField, Lighting, Solid, light_field, light_through
 from sssfit.scene._head_shape import EAR_MM, FLOOR_MM
 from sssfit.scene._head_surface import SOLID_MM, solid_head
@@ -35,7 +36,7 @@ def points_of(depth_mm):
 @pytest.fixture(scope="module")
 def head():
     """The smooth head as a body, and its front as what is seen: no sliver lies between them."""
-    solid = solid_head(2)
+    solid = solid_head(thread_count(None))  # as scenes have it: it is kept for one number
     return solid, HeightField(solid.front, solid.x0_mm, solid.y0_mm, solid.spacing_mm)
 
 

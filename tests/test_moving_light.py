@@ -23,7 +23,7 @@ from sssfit.simulate import simulate_dipole, simulate_exact
 
 PITCH = 0.3
 # Of CI; 512 x 512 x 100 run under ``slow``. In the first 20 frames histories are still beginning.
-SIDE, LENGTH = 64, 40
+SIDE, LENGTH = 48, 40
 SAMPLERS = ("without", "variates", "ahead")
 
 

@@ -115,9 +115,9 @@ def memory(folder, photons, sizes):
     return markdown(("points", *(f"MB a worker, {name}" for name in PLACES)), rows)
 
 
-def client_seconds(folder, bands):
+def client_seconds(folder, photons, bands):
     """Seconds of the client's processor for each further point, on a cluster."""
-    plans = [skin_plan(10_000, each) for each in (bands, 5 * bands)]
+    plans = [skin_plan(photons, each) for each in (bands, 5 * bands)]
     own = [measured(plan, folder, scheduler="local:2")[1] for plan in plans]
     return (own[1] - own[0]) / (plans[1].count - plans[0].count)
 
@@ -195,13 +195,13 @@ def extrapolated(client, per_point, work, photons):
 
 def section(small):
     """All tables, as they stand in docs/scaling.md."""
-    photons, bands, pairs = (20_000, 1, 1) if small else (300_000, 25, 3)
-    numbers = (1e4, 3e4) if small else (1e4, 1e5, 1e6)
+    photons, bands, pairs = (2_000, 1, 1) if small else (300_000, 25, 3)
+    numbers = (1e3, 2e3) if small else (1e4, 1e5, 1e6)
     with tempfile.TemporaryDirectory() as made:
         plan, table = costs(Path(made), photons, bands, pairs)
         curve = by_photons(Path(made), [int(each) for each in numbers], 1 if small else 6)
         sizes = memory(Path(made), 2000, (5, 10) if small else (50, 500))
-        client = client_seconds(Path(made), 1 if small else 5)
+        client = client_seconds(Path(made), int(numbers[0]), 1 if small else 5)
     begun = time.process_time()
     for index in range(plan.count):
         perform(plan, whole(plan, index))
