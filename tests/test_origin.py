@@ -9,6 +9,7 @@ from reference_pixels import make_profile
 
 from sssfit.fit import fit_svd
 from sssfit.kernel.origin import find_profile
+from sssfit.profile import Profile
 
 EDGES = [0.0, 1.0, 4.0, 9.0]
 MADE_OF = {"material": {"name": "wax"}, "method": "exact"}
@@ -46,6 +47,19 @@ def test_of_several_the_newest_is_taken(tmp_path, profile, kernel):
         profile.save(tmp_path / name)
         os.utime(tmp_path / name, (1e9 - age, 1e9 - age))
     assert Path(look(kernel, tmp_path)[1]).name == "new.npz"
+
+
+def test_older_profiles_than_the_one_that_is_found_are_not_read(
+    tmp_path, profile, kernel, monkeypatch
+):
+    read, load = [], Profile.load
+    monkeypatch.setattr(Profile, "load", lambda path: read.append(path.name) or load(path))
+    other = make_profile(EDGES, [[0.3, 0.1], [0.1, 0.1], [0.1, 0.05]])
+    for age, name in enumerate(("newer.npz", "fitted.npz", "older.npz")):
+        (profile if name == "fitted.npz" else other).save(tmp_path / name)
+        os.utime(tmp_path / name, (1e9 - age, 1e9 - age))
+    assert Path(look(kernel, tmp_path)[1]).name == "fitted.npz"
+    assert read == ["newer.npz", "fitted.npz"]
 
 
 def test_why_there_is_none_is_noted(tmp_path, profile, kernel, caplog):

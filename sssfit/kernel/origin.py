@@ -30,10 +30,13 @@ def find_profile(
     """
     files = [path for folder in folders for path in folder.glob("*.npz") if path.is_file()]
     files.sort(key=lambda each: each.stat().st_mtime_ns, reverse=True)
-    profiles = [(path, found) for path in files if (found := _read(path)) is not None]
-    for path, profile in profiles:
+    profiles = []
+    for path in files:
+        if (profile := _read(path)) is None:
+            continue
         if profile.sha256 == kernel.meta.get("profile_sha256"):
             return profile, str(path)
+        profiles.append((path, profile))
     note(_missing(kernel, printable(kernel_file), profiles))
     return None, None
 
