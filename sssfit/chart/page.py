@@ -21,7 +21,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.cm import ScalarMappable
 from matplotlib.colorbar import Colorbar
 from matplotlib.colors import Normalize, SymLogNorm
-from matplotlib.figure import Figure, SubFigure
+from matplotlib.figure import Figure, FigureBase, SubFigure
 from matplotlib.ft2font import FT2Font
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.legend import Legend
@@ -330,11 +330,18 @@ def lay_out(figure: Figure) -> None:
         return
     engine.execute(figure)
     figure.set_layout_engine(None)  # "none" leaves an engine, for which every figure is drawn twice
-    for each in figure.findobj(SubFigure):
+    for each in _subfigures(figure):
         each.bbox_relative.set_points(np.round(each.bbox_relative.get_points(), 9))
     for axes in figure.axes:
         points = axes.get_position(original=True).get_points()
         axes.set_position(Bbox(np.round(points, 9)))
+
+
+def _subfigures(figure: FigureBase) -> Iterator[SubFigure]:
+    """Go through all figures within a figure; ``findobj`` would place every tick to look at it."""
+    for each in figure.subfigs:
+        yield each
+        yield from _subfigures(each)
 
 
 def save_figure(
