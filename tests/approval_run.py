@@ -19,7 +19,7 @@ import sys
 import time
 import types
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -152,15 +152,21 @@ def _walk(name: str, path: Any) -> Iterator[pkgutil.ModuleInfo]:
     )
 
 
-def _in_place_of(real: Any, stand_in: Any) -> Iterator[contextlib.AbstractContextManager[Any]]:
+def _in_place_of(
+    holders: Mapping[int, list[tuple[types.ModuleType, str]]], real: Any, stand_in: Any
+) -> Iterator[contextlib.AbstractContextManager[Any]]:
     """Put a stand-in wherever one of our modules holds the real thing."""
-    for module, name in _holders(tuple(len(vars(each)) for each in modules()))[id(real)]:
+    for module, name in holders.get(id(real), ()):
         yield mock.patch.object(module, name, stand_in)
 
 
-@functools.lru_cache(maxsize=1)
-def _holders(_names: tuple[int, ...]) -> dict[int, list[tuple[types.ModuleType, str]]]:
+def _holders() -> dict[int, list[tuple[types.ModuleType, str]]]:
     """Where our modules hold what, by its identity; looked for again when they have more names."""
+    return _found_holders(tuple(len(vars(each)) for each in modules()))
+
+
+@functools.lru_cache(maxsize=1)
+def _found_holders(_names: tuple[int, ...]) -> dict[int, list[tuple[types.ModuleType, str]]]:
     found: dict[int, list[tuple[types.ModuleType, str]]] = collections.defaultdict(list)
     for module in modules():
         for name, value in vars(module).items():
@@ -198,21 +204,21 @@ def stand_ins(
         charts[name] = figure_lines(figure, settings)
         stream.write(name)
 
-    modules()
+    in_place_of = functools.partial(_in_place_of, _holders())
     with contextlib.ExitStack() as stack:
         patches = [
-            *_in_place_of(time.perf_counter, clock),
-            *_in_place_of(time, _Time(clock)),
-            *_in_place_of(simulate.is_compiled, lambda *_: compiled),
-            *_in_place_of(simulate.is_solver_compiled, lambda: compiled),
-            *_in_place_of(available_cores, lambda: 2),
-            *(_in_place_of(material.material_names, _few_names) if few else ()),
-            *_in_place_of(candidates, functools.partial(_some_of, candidates)),
-            *_in_place_of(every_candidate, functools.partial(_some_of, every_candidate)),
-            *_in_place_of(
+            *in_place_of(time.perf_counter, clock),
+            *in_place_of(time, _Time(clock)),
+            *in_place_of(simulate.is_compiled, lambda *_: compiled),
+            *in_place_of(simulate.is_solver_compiled, lambda: compiled),
+            *in_place_of(available_cores, lambda: 2),
+            *(in_place_of(material.material_names, _few_names) if few else ()),
+            *in_place_of(candidates, functools.partial(_some_of, candidates)),
+            *in_place_of(every_candidate, functools.partial(_some_of, every_candidate)),
+            *in_place_of(
                 sheet.compute_sheet, functools.partial(sheet.compute_sheet, pixels=24, most_terms=2)
             ),
-            *_in_place_of(
+            *in_place_of(
                 table.measure_table,
                 functools.partial(table.measure_table, heads=(1, 4), distances=(2.5, 20.0)),
             ),
