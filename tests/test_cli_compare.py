@@ -23,7 +23,7 @@ from sssfit.simulate import half_space, simulate_dipole, simulate_exact
 
 SMALL = ("--picture", "disk", "--size", "32x32", "--mm-per-pixel", "2.5")
 SLAB = (
-    "eta = 1.3\ng = 0\nsigma_a_per_mm = [0.1, 0.1, 0.1]\nsigma_s_per_mm = [1, 1, 1]\n"
+    "eta = 1.3\ng = 0\nsigma_a_per_mm = [0.3, 0.3, 0.3]\nsigma_s_per_mm = [0.3, 0.3, 0.3]\n"
     "thickness_mm = 2\n"
 )
 
