@@ -69,7 +69,7 @@ sigma_a_per_mm = [0.2, 0.4, 0.5]
 sigma_s_per_mm = [1.0, 1.5, 1.25]
 """,
 )
-# Clear above what scatters once: solved in a thirtieth of the time that plate.toml takes.
+# Clear above what scatters little: with twice the scattering it takes three times as long.
 _FILM = _as(
     "varnish.toml", "film.toml", f"g = 0.8{_DENSE}[20]", f"g = 0{_DENSE}[0.5]\nthickness_mm = 2"
 )
