@@ -84,7 +84,7 @@ def _expected(setting: Setting, value: Any) -> str:
     if value is None or setting.kind in ("text", "flag"):
         return ""
     if setting.kind == "choice":
-        return "" if isinstance(value, str) else " or ".join(setting.among)
+        return "" if isinstance(value, str) or callable(value) else " or ".join(setting.among)
     if setting.kind in ("numbers", "parts"):
         return "a number, or one per channel" if isinstance(value, str) else ""
     is_number = hasattr(value, "__float__") and not isinstance(value, bool)

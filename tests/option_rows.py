@@ -1265,7 +1265,7 @@ STABILITY = {
         "--only noise,taps",
         calls,
         lambda: _stressed(only=["noise", "taps"]),
-        words="all",
+        words="every one",
     ),
     "--mm-per-pixel": Row(
         _STABILITY,
@@ -1345,7 +1345,7 @@ MOTION = {
         "--only fixed,cascade",
         calls,
         lambda: _moved(only=["fixed", "cascade"]),
-        words="all",
+        words="every one",
     ),
     "--frames": Row(_MOTION, "--frames shots", names, lambda: _frame_names("png")),
     "--format": Row(
@@ -1419,7 +1419,9 @@ SCENE = {
         "--resolution 40x30", words="1920x1200; 480x300 with --table", resolution=(30, 40)
     ),
     "--map-size": _scene_row("--map-size 64", words="1024; 512 with --table", map_size=64),
-    "--savings": _scene_row("--savings depth,clipped", words="all", savings=["depth", "clipped"]),
+    "--savings": _scene_row(
+        "--savings depth,clipped", words="every one", savings=["depth", "clipped"]
+    ),
     "--culled-by": _scene_row("--culled-by face", "vertex", culled_by="face"),
     "--margin": _scene_row("--margin 1.5", "1.0", margin=1.5),
     "--mesh": _scene_row("--mesh square.obj", words="the made head", mesh="square.obj"),

@@ -58,7 +58,10 @@ LONG_SEARCHES = {
     ),
 }
 # These ask what is done with cascades, of which they fit dozens: any will do.
-_HASTY_SEARCHES = {"test_budget", "test_choose", "test_pareto"}
+_HASTY_SEARCHES = {
+    *("test_budget", "test_choose", "test_cli_choose", "test_cli_options", "test_pareto"),
+    *("test_pareto_chart", "test_records"),
+}
 # These ask which of two cascades is nearer, or draw lines: far ones, where a descent stops early.
 _WHOLE_DESCENTS = {"test_rotated"}
 _PLAIN = str | int | float | NoneType  # a setting that is a function, or a scene, is not shared
