@@ -26,6 +26,9 @@ PROGRAMS = ("glslangValidator", "spirv-val", "spirv-cross")
 os.environ |= {"GALLIVM_PERF": "nopt", "LP_NATIVE_VECTOR_WIDTH": "128"}
 PRECISION = "".join(f"precision highp {each};\n" for each in ("float", "int", "sampler2D"))
 _TRIANGLE = np.array([-1, -1, 3, -1, -1, 3], np.float32)
+_PLANE = {"texel": (1.0, 1.0), "mm": (1.0, 1.0), "axis": (0.0, 0.0)}
+NUMBERS = _PLANE | {"stage": 0, "frame": 0, "profile": 0}  # the uniforms of shaders
+_VIEW = "6f3I4x"  # how they lie in WGSL's
 _GLSL_VERTEX = "#version 450\nin vec2 at; void main() { gl_Position = vec4(at, 0.0, 1.0); }"
 
 
@@ -64,10 +67,8 @@ def run(
     With depth (H, W) [mm] the source must follow it; with mm a pixel (right, down) take them apart.
     """
     settings = {"cover": cover, "depth": depth, "prefix": prefix, "half": half, "frame": frame}
-    settings["jitter"] = jitter
-    draws = _draws(
-        text, dialect, taps, light, mm_per_pixel, profile=profile, normalized=normalized, **settings
-    )
+    settings |= {"jitter": jitter, "profile": profile, "literal": False}
+    draws = _draws(text, dialect, taps, light, mm_per_pixel, normalized=normalized, **settings)
     last = None
     for targets, draw in draws:
         draw(1.0)
@@ -76,7 +77,10 @@ def run(
 
 
 def prepared(text, dialect, taps, light, mm_per_pixel, *, normalized):
-    """A function that draws all passes in half floats, on a part of either side of the picture."""
+    """A function that draws all passes in half floats, on a part of either side of the picture.
+
+    Each pass has a shader of its own, which is what a renderer's times are measured with.
+    """
     settings = {
         "cover": None,
         "depth": None,
@@ -85,6 +89,7 @@ def prepared(text, dialect, taps, light, mm_per_pixel, *, normalized):
         "frame": 0,
         "jitter": False,
         "profile": None,
+        "literal": True,
     }
     draws = list(
         _draws(text, dialect, taps, light, mm_per_pixel, normalized=normalized, **settings)
@@ -112,8 +117,13 @@ def _draws(
     jitter,
     profile,
     normalized,
+    literal,
 ):
-    """Yield the targets of each pass and what draws it, in the order of the passes."""
+    """Yield the targets of each pass and what draws it, in the order of the passes.
+
+    Unless numbers are to be literal, stages and frames are uniforms, and passes share a shader:
+    drivers and glslang compile half as many.
+    """
     needs(dialect)
     height, width = light.shape[:2]
     whole = np.zeros((height, width, 4), np.float32)
@@ -128,14 +138,22 @@ def _draws(
     mm = "mm.x" if np.isscalar(mm_per_pixel) else "mm"
     for each in pass_list(taps, normalized=normalized, depth=depth is not None):
         size = [-(-side // 2**each.level) for side in (width, height)]
-        reads, number = each.pictures, each.stages[0]
+        reads = each.pictures
+        numbers = NUMBERS | {"stage": each.stages[0], "frame": frame, "profile": profile or 0}
+        numbers["axis"] = each.axis or NUMBERS["axis"]
+        numbers["texel"] = tuple(1.0 / side for side in pictures[reads[0]].size[:2])
+        numbers["mm"] = tuple(np.broadcast_to(mm_per_pixel, 2).tolist())
+        words = dict(zip(numbers, numbers, strict=True))
+        if literal:
+            words = {key: _literal(value, dialect) for key, value in numbers.items()}
+        if profile is None:
+            del words["profile"]
         targets, draw = device.prepare(
             text,
-            _call(each, dialect, prefix, reads, number, frame, jitter, profile, mm),
+            _call(each, dialect, prefix, words, jitter, mm),
             [pictures[name] for name in reads],
             size,
-            [1.0 / side for side in pictures[reads[0]].size[:2]],
-            np.broadcast_to(mm_per_pixel, 2).tolist(),
+            numbers,
             count=len(each.writes),
             onto=pictures.get(each.writes[0]) if each.is_added else None,
             half=half and each.writes[0] != "M0",
@@ -145,22 +163,25 @@ def _draws(
         yield targets, draw
 
 
-def _call(each, dialect, prefix, reads, number, frame, jitter, profile, mm):
-    """The call of a pass's function in the words of a dialect."""
-    vec2 = {"hlsl": "float2", "glsl": "vec2", "wgsl": "vec2f"}[dialect]
-    pictures = [f"t{k}" for k in range(len(reads))]
+def _literal(value, dialect):
+    """A whole number, or a vector of two, in the words of a dialect."""
+    vector = {"hlsl": "float2", "glsl": "vec2", "wgsl": "vec2f"}[dialect]
+    return f"{vector}{value}" if isinstance(value, tuple) else f"{value}u"
+
+
+def _call(each, dialect, prefix, words, jitter, mm):
+    """The call of a pass's function, with these words for its numbers."""
     sampler = [] if dialect == "glsl" else ["bilinear"]
-    arguments = [*pictures, *sampler, "position", "texel"]
+    arguments = [*(f"t{k}" for k in range(len(each.pictures))), *sampler, "position", "texel"]
     if each.name in ("Blur", "Star") or (each.depths and each.name == "Halve"):
-        axis = each.axis
-        first = [f"{number}u", *([f"{vec2}{axis}"] if axis else [])]
+        first = [words["stage"], *([words["axis"]] if each.axis else [])]
         arguments = [*first, *arguments]
     if each.kind not in ("halve", "sum"):
         arguments.append(mm)
     if each.takes_frame(jitter=jitter):
-        arguments.append(f"{frame}u")
-    if profile is not None and (each.depths or each.kind != "halve"):
-        arguments.append(f"{profile}u")
+        arguments.append(words["frame"])
+    if "profile" in words and (each.depths or each.kind != "halve"):
+        arguments.append(words["profile"])
     return f"{prefix}_{each.name}({', '.join(arguments)})"
 
 
@@ -205,7 +226,7 @@ class _OpenGL:
         found = np.frombuffer(picture.read(), kind).reshape(picture.height, picture.width, 4)
         return found.astype(np.float64)
 
-    def prepare(self, text, call, pictures, size, texel, mm, *, count, onto, half, prefix):
+    def prepare(self, text, call, pictures, size, numbers, *, count, onto, half, prefix):
         """The targets of a pass, and a function that draws it."""
         program = self._program(text, call, len(pictures), count, prefix)
         empty = np.zeros((size[1], size[0], 4))
@@ -213,6 +234,12 @@ class _OpenGL:
         frame = self.context.framebuffer(color_attachments=targets)
         vertices = self.context.simple_vertex_array(program, self.vertices, "at")
         members = {name: program[name] for name in program}
+        given = [
+            (each, value)
+            for name, each in members.items()
+            for key, value in numbers.items()
+            if isinstance(each, self.gl.Uniform) and name.endswith(key)
+        ]
         samplers = {
             each: int(found[1])
             for name, each in members.items()
@@ -227,11 +254,8 @@ class _OpenGL:
                 each.use(k)
             for each, place in samplers.items():
                 each.value = place
-            for name, each in members.items():
-                if isinstance(each, self.gl.Uniform) and name.endswith("texel"):
-                    each.value = tuple(texel)
-                elif isinstance(each, self.gl.Uniform) and name.endswith("mm"):
-                    each.value = tuple(mm)
+            for each, value in given:
+                each.value = value
             if onto is not None:
                 self.context.enable(self.gl.BLEND)
                 self.context.blend_func = self.gl.ONE, self.gl.ONE
@@ -264,7 +288,8 @@ def glsl_program(text, call, pictures, count, prefix):
             f" out{k} = all.term[{k}];" for k in range(count)
         )
     return (
-        f"#version 450\n{text}\n{textures}uniform vec2 texel;\nuniform vec2 mm;\n{outs}"
+        f"#version 450\n{text}\n{textures}uniform vec2 texel, mm, axis;\n"
+        f"uniform uint stage, frame, profile;\n{outs}"
         f"void main() {{ vec2 position = gl_FragCoord.xy; {body} }}"
     )
 
@@ -279,8 +304,9 @@ def hlsl_source(text, call, pictures, count, prefix):
             f" o.out{k} = all.term[{k}];" for k in range(count)
         )
     return (
-        f"{text}\n{textures}SamplerState bilinear;\nuniform float2 texel;\nuniform float2 mm;\n"
-        f"struct Out {{ {outs}}};\nOut main(float4 at : SV_Position) {{\n"
+        f"{text}\n{textures}SamplerState bilinear;\nuniform float2 texel, mm, axis;\n"
+        f"uniform uint stage, frame, profile;\nstruct Out {{ {outs}}};\n"
+        "Out main(float4 at : SV_Position) {\n"
         f"float2 position = at.xy; Out o; {body} return o; }}"
     )
 
@@ -358,7 +384,7 @@ class _Vulkan:
         kind = np.float16 if half else np.float32
         return np.ascontiguousarray(rows).view(kind).reshape(height, width, 4).astype(np.float64)
 
-    def prepare(self, text, call, pictures, size, texel, mm, *, count, onto, half, prefix):
+    def prepare(self, text, call, pictures, size, numbers, *, count, onto, half, prefix):
         """The targets of a pass, and a function that draws it, on the whole picture."""
         targets = [self._texture(*size, half) for _ in range(count)] if onto is None else [onto]
         key = text, call, len(pictures), count, targets[0].format, onto is not None
@@ -366,9 +392,14 @@ class _Vulkan:
             self.pipelines[key] = self._pipeline(text, call, len(pictures), targets, onto, prefix)
         pipeline = self.pipelines[key]
         view = self.device.create_buffer_with_data(
-            data=struct.pack("ffff", *texel, *mm), usage=self.wgpu.BufferUsage.UNIFORM
-        )
-        own = [{"binding": 0, "resource": {"buffer": view, "offset": 0, "size": 16}}]
+            data=struct.pack(
+                _VIEW,
+                *numbers["texel"], *numbers["mm"], *numbers["axis"],
+                numbers["stage"], numbers["frame"], numbers["profile"],
+            ),
+            usage=self.wgpu.BufferUsage.UNIFORM,
+        )  # fmt: skip
+        own = [{"binding": 0, "resource": {"buffer": view, "offset": 0, "size": view.size}}]
         own.append({"binding": 1, "resource": self.sampler})
         views = [each.create_view() for each in pictures]
         own += [{"binding": 2 + k, "resource": each} for k, each in enumerate(views)]
@@ -428,7 +459,7 @@ def wgsl_program(text, call, pictures, count, prefix):
     if count > 1:
         body = f"var all = {call};" + "".join(f" o.out{k} = all.term[{k}];" for k in range(count))
     return f"""{text}
-struct View {{ texel: vec2f, mm: vec2f }}
+struct View {{ texel: vec2f, mm: vec2f, axis: vec2f, stage: u32, frame: u32, profile: u32 }}
 @group(0) @binding(0) var<uniform> view: View;
 @group(0) @binding(1) var bilinear: sampler;
 {textures}struct Out {{ {outs} }}
@@ -436,6 +467,7 @@ struct View {{ texel: vec2f, mm: vec2f }}
     return vec4f(f32(k / 2u) * 4.0 - 1.0, f32(k % 2u) * 4.0 - 1.0, 0.0, 1.0);
 }}
 @fragment fn fragment(@builtin(position) at: vec4f) -> Out {{
-    let position = at.xy; let texel = view.texel; let mm = view.mm;
+    let position = at.xy; let texel = view.texel; let mm = view.mm; let axis = view.axis;
+    let stage = view.stage; let frame = view.frame; let profile = view.profile;
     var o: Out; {body} return o;
 }}"""

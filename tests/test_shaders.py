@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from reference_taps import fetch, gathered, passes_of, turn_of
-from shader_runs import device_of, glsl_program, hlsl_source, needs, run, spirv_of
+from shader_runs import NUMBERS, device_of, glsl_program, hlsl_source, needs, run, spirv_of
 from test_disk import disk_of
 from test_export import small_kernel
 from test_taps import signed_taps, taps_of
@@ -478,7 +478,7 @@ def through_of(text, dialect, channels, step_mm, *more):
     zeros = ", 0.0" * (4 - channels)
     device = device_of(dialect)
     (target,), draw = device.prepare(
-        text, f"{kind}(SSS_Through({call}){zeros})", [], (300, 1), (1.0, 1.0), (1.0, 1.0),
+        text, f"{kind}(SSS_Through({call}){zeros})", [], (300, 1), NUMBERS,
         count=1, onto=None, half=False, prefix="SSS",
     )  # fmt: skip
     draw(1.0)
