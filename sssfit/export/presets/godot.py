@@ -2,9 +2,9 @@
 
 The shader has the tables of separable-sss for 11, 17 and 25 taps: ``skin_kernel`` for the skin mode
 with three weights a tap, and ``kernel`` with one. It moves by strength / 3 for each unit of an
-offset, times depth_scale (projection[0][0] / depth) in texture coordinates: with the setting scale
-0 one unit is 2/3 of strength depth_scale to the sides, in the scene's metres, and less up and down
-by the picture's width over its height.
+offset, times depth_scale (`projection[0][0]` / depth) in texture coordinates: with the setting
+scale 0 one unit is 2/3 of strength depth_scale to the sides, in the scene's metres, and less up and
+down by the picture's width over its height.
 """
 
 from __future__ import annotations

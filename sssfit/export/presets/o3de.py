@@ -1,7 +1,7 @@
 """Open 3D Engine: scatterColor and scatterDistance of the EnhancedPBR and Skin materials.
 
 Normalised diffusion with d = scatterColor scatterDistance by channel, in mm. The pass multiplies
-radii by projectionMatrix[0][0] / depth times the picture's width in pixels, where half the width
+radii by `projectionMatrix[0][0]` / depth times the picture's width in pixels, where half the width
 spans that: light moves twice as far as the radius says, so d on the surface is twice the number.
 """
 
