@@ -1,5 +1,6 @@
 """The parts of the layered walk: samplers, deflections, interfaces, events; each against theory."""
 
+import hashlib
 import math
 import os
 import platform
@@ -436,65 +437,54 @@ def test_photons_that_meet_interfaces_without_end_are_kept_apart_as_unfinished(m
 # The same bits on every processor
 
 
-BITS = """
-import hashlib, sys
-sys.path.insert(0, sys.argv[1])
-from checks_layers import STACKS, layer, stack
-from sssfit.grid import RadialGrid
-from sssfit.simulate.walk_layered import LayeredWalk
-channels = stack(layer([.02, .3, 1.], 5., .6, 1.4, .4), layer([.5, .1, .3], 3., 0., 1.3))
-digest = hashlib.sha256()
-for material in (*STACKS.values(), channels, stack(layer(.1, 5., .9999, 1.3, 1.))):
-    task = LayeredWalk((material,), (RadialGrid(.02, 200),), 1, 1000)
-    for each in task.trace(0).ledger:
-        digest.update(each.tobytes())
-print(digest.hexdigest())
-"""
+def walks():
+    """Digest of walks through layers."""
+    top = layer([0.02, 0.3, 1.0], 5.0, 0.6, 1.4, 0.4)
+    channels = stack(top, layer([0.5, 0.1, 0.3], 3.0, 0.0, 1.3))
+    digest = hashlib.sha256()
+    for material in (*STACKS.values(), channels, stack(layer(0.1, 5.0, 0.9999, 1.3, 1.0))):
+        task = LayeredWalk((material,), (RadialGrid(0.02, 200),), 1, 1000)
+        for each in task.trace(0).ledger:
+            digest.update(each.tobytes())
+    return digest.hexdigest()
 
 
-# The loops over lanes alone, which are what becomes vectors: a walk takes 20 s to compile.
-LOOPS = """
-import hashlib, sys
-import numpy as np
-sys.path.insert(0, sys.argv[1])
-from sssfit._jit.lanes import FLOAT_ROWS, SLOT_WORD_ROWS
-from test_layered_parts import (
-    LANES, collide, layered_lanes, layered_slots, row, scattering_lanes, slots_at, streams
-)
-digest = hashlib.sha256()
-for g in (0.0, .6, .9999):
-    floats, words = scattering_lanes(g, (.48, .6, .64)), streams(6)
-    row(floats, layered_lanes.THICKNESS)[:] = 1.0
-    flags = np.zeros(floats.size // FLOAT_ROWS, np.uint8)
-    for sweep in range(60):
-        collide(floats, words, sweep)
-        layered_lanes.fly(floats, flags, LANES)
-        digest.update(floats.tobytes() + words.tobytes() + flags.tobytes())
-uz = np.random.default_rng(1).uniform(-1.0, 1.0, LANES).astype(np.float32)
-for ratio in (1.5, 1.0, 1.0 / 1.33):
-    slots, words = slots_at(uz, ratio), streams(SLOT_WORD_ROWS)
-    layered_slots.meet(slots, words, LANES)
-    digest.update(slots.tobytes() + words.tobytes())
-print(digest.hexdigest())
-"""
+def loops():
+    """Digest of loops over lanes, which are what becomes vectors: a walk takes 20 s to compile."""
+    digest = hashlib.sha256()
+    for g in (0.0, 0.6, 0.9999):
+        floats, words = scattering_lanes(g, (0.48, 0.6, 0.64)), streams(6)
+        row(floats, layered_lanes.THICKNESS)[:] = 1.0
+        flags = np.zeros(floats.size // FLOAT_ROWS, np.uint8)
+        for sweep in range(60):
+            collide(floats, words, sweep)
+            layered_lanes.fly(floats, flags, LANES)
+            digest.update(floats.tobytes() + words.tobytes() + flags.tobytes())
+    uz = np.random.default_rng(1).uniform(-1.0, 1.0, LANES).astype(np.float32)
+    for ratio in (1.5, 1.0, 1.0 / 1.33):
+        slots, words = slots_at(uz, ratio), streams(SLOT_WORD_ROWS)
+        layered_slots.meet(slots, words, LANES)
+        digest.update(slots.tobytes() + words.tobytes())
+    return digest.hexdigest()
 
 
-def bits(program, **environment):
-    """Digest of a program's numbers in a process whose compiler knows these instructions only."""
+def elsewhere(digest, **environment):
+    """A digest from a process whose compiler knows these instructions only."""
+    program = "import sys; sys.path.insert(0, sys.argv[1]); import test_layered_parts as parts; "
     ended = subprocess.run(
-        [sys.executable, "-c", program, str(Path(__file__).parent)],
+        [sys.executable, "-c", f"{program}print(parts.{digest.__name__}())", Path(__file__).parent],
         env=os.environ | environment,
         capture_output=True,
         text=True,
         timeout=300,
     )
     assert ended.returncode == 0, ended.stderr
-    return ended.stdout
+    return ended.stdout.strip()
 
 
 @pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="names of x86-64")
 @pytest.mark.parametrize(
-    "program", [LOOPS, pytest.param(BITS, marks=pytest.mark.slow)], ids=["loops", "walks"]
+    "digest", [loops, pytest.param(walks, marks=pytest.mark.slow)], ids=["loops", "walks"]
 )
 @pytest.mark.parametrize(
     ("name", "features"),
@@ -505,8 +495,8 @@ def bits(program, **environment):
     ],
     ids=["SSE2", "AVX2 without FMA", "AVX2"],
 )
-def test_the_same_bits_come_from_any_vectors(name, features, program):
-    assert bits(program, NUMBA_CPU_NAME=name, NUMBA_CPU_FEATURES=features) == bits(program)
+def test_the_same_bits_come_from_any_vectors(name, features, digest):
+    assert elsewhere(digest, NUMBA_CPU_NAME=name, NUMBA_CPU_FEATURES=features) == digest()
 
 
 def test_the_same_bits_come_from_any_number_of_channels_beside_the_least_absorbing_one():
