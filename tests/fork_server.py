@@ -35,7 +35,8 @@ _LOADED = (
     *("sssfit.compare", "sssfit.export", "sssfit.fit", "sssfit.fit.cascade", "sssfit.formats.csv"),
     *("sssfit.formats.mci", "sssfit.formats.mco", "sssfit.motion.runner", "sssfit.render.screen"),
     "sssfit.simulate",
-    *("colour", "matplotlib.pyplot", "scipy.optimize", "scipy.sparse.linalg", "scipy.special"),
+    *("colour", "distributed", "matplotlib.pyplot"),
+    *("scipy.optimize", "scipy.sparse.linalg", "scipy.special"),
 )
 _NUMBER = struct.Struct("=q")  # a length, a process, or the status that it ended with
 _STREAMS = 3

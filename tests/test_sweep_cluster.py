@@ -9,8 +9,9 @@ import time
 from concurrent.futures import Future
 from types import SimpleNamespace
 
+import fork_server
 import pytest
-from processes import end_all, start
+from processes import end_all
 from test_sweep import WALK, content, plan_of
 
 from sssfit.errors import ArgumentError, SweepError
@@ -44,7 +45,7 @@ class Machines:
     def _begin(self, what, *arguments):
         dashboard = ("--no-dashboard",) if what == "scheduler" else ()
         command = [sys.executable, "-m", "distributed.cli.dask_" + what, *arguments, *dashboard]
-        return start(command, stdout=-3, stderr=-3)
+        return fork_server.start(command, stdout=-3, stderr=-3)
 
 
 @pytest.fixture(scope="module")
@@ -99,10 +100,9 @@ if __name__ == "__main__":
 
 def kill_a_client(machines, folder, path, seconds):
     """Begin the sweep in a process, and kill -9 it a time after its store is there."""
-    (folder / "client.py").write_text(CLIENT)
     (folder / "plan.toml").write_text(LONG)
-    command = [sys.executable, folder / "client.py", folder / "plan.toml", path, machines.address]
-    process = start(command, stdout=-3, stderr=-3)
+    command = [sys.executable, "-c", CLIENT, folder / "plan.toml", path, machines.address]
+    process = fork_server.start(command, stdout=-3, stderr=-3)
     end = time.monotonic() + 60.0
     while not path.exists() and process.poll() is None and time.monotonic() < end:
         time.sleep(0.01)
