@@ -407,7 +407,7 @@ def test_show_of_a_checkpoint_has_the_profiles_so_far(run, tmp_path):
     assert lines[0] == "c: checkpoint of a photon walk"
     assert lines[1] == (
         f"so far    {profiles[0].photons:,} photons, {figures['flights']:,} flights, "
-        f"{figures['seconds']:.1f} s; --resume continues from there"
+        f"{figures['seconds']:.1f} s; `sssfit simulate --resume` continues from there"
     )
     error = profiles[0].meta["relative_error"]
     assert lines[2] == f"error     {100 * error:.3g} % of F(r), in the worst channel"
