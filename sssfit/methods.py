@@ -11,12 +11,15 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
 from operator import attrgetter
+from pathlib import Path
 from typing import Any
 
 
 def imported(where: str) -> Callable[..., Any]:
     """Import a function or a method of a class: "module:name" or "module:class.name"."""
-    module, names = where.split(":")
+    module, colon, names = where.partition(":")
+    if not colon:
+        raise ValueError(f'{where!r} names no function; expected "module:name".')
     found: Callable[..., Any] = attrgetter(names)(import_module(module))
     return found
 
@@ -95,8 +98,6 @@ class Method:
         Whether a fit starts at random places, and takes a ``seed``.
     makes : str, optional
         Name of the only profile it makes, without a material; that name needs no ``--method``.
-    of_profiles : bool
-        Whether a format takes profiles as well as kernels; by default it is then given the newest.
     """
 
     function: str
@@ -107,7 +108,6 @@ class Method:
     makes_taps: bool = False
     is_seeded: bool = False
     makes: str | None = None
-    of_profiles: bool = False
 
     def load(self) -> Callable[..., Any]:
         """Import the method's function."""
@@ -127,6 +127,36 @@ class Method:
         """Return those of the options of all fits that this one takes."""
         found = {} if self.makes_taps else {"normalize": normalize}
         return found | ({"seed": seed} if self.is_seeded else {})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Format(Method):
+    """What kernels or a profile are written as; its function takes them and returns text or bytes.
+
+    Parameters
+    ----------
+    what : str
+        What is written, with its article if it has one: "a table".
+    knows : str
+        "module:name" of a function from a path to whether the file is one that we wrote in this
+        form. Only such a file is replaced without being asked to.
+    of_profiles : bool
+        Whether it takes profiles as well as kernels; by default it is then given the newest.
+    ending : str
+        Ending of the file's name; by default a dot and the name of the form.
+    told : tuple of str
+        Attributes of the record that ``--json`` tells; by default those of its class.
+    """
+
+    what: str
+    knows: str
+    of_profiles: bool = False
+    ending: str = ""
+    told: tuple[str, ...] = ()
+
+    def is_ours(self, path: Path) -> bool:
+        """Return whether a file is one that we wrote in this form."""
+        return bool(imported(self.knows)(path))
 
 
 _ANGLES = Setting(
@@ -498,26 +528,50 @@ _SOURCE = (
 )
 _OF_C = tuple(each for each in _SOURCE if each.name in ("prefix", "keep_energy", "half"))
 
-EXPORTS: Mapping[str, Method] = {
-    "hlsl": Method("sssfit.export:source_text", "shader source of Direct3D", _SOURCE),
-    "glsl": Method("sssfit.export:source_text", "shader source of OpenGL and Vulkan", _SOURCE),
-    "wgsl": Method("sssfit.export:source_text", "shader source of WebGPU", _SOURCE),
-    "c": Method("sssfit.export:source_text", "constants for C and C++", _OF_C),
-    "json": Method("sssfit.export:document_text", "a kernel as a document"),
-    "csv": Method(
-        "sssfit.export.table:table_text", "a profile or a kernel as a table", of_profiles=True
+
+def _source(dialect: str, summary: str, settings: tuple[Setting, ...] = _SOURCE) -> Format:
+    """Return the entry of a language."""
+    knows = f"sssfit.export.dialects:{dialect}.is_ours"
+    return Format("sssfit.export:source_text", summary, settings, what="source", knows=knows)
+
+
+EXPORTS: Mapping[str, Format] = {
+    "hlsl": _source("HLSL", "shader source of Direct3D"),
+    "glsl": _source("GLSL", "shader source of OpenGL and Vulkan"),
+    "wgsl": _source("WGSL", "shader source of WebGPU"),
+    "c": _source("C", "constants for C and C++", _OF_C),
+    "json": Format(
+        "sssfit.export:document_text",
+        "a kernel as a document",
+        what="a kernel",
+        knows="sssfit.export.document:is_our_document",
     ),
-    "angles": Method(
+    "csv": Format(
+        "sssfit.export.table:table_text",
+        "a profile or a kernel as a table",
+        what="a table",
+        knows="sssfit.export.table:is_our_table",
+        of_profiles=True,
+    ),
+    "angles": Format(
         "sssfit.export.angles:angles_text",
         "a profile's R_d by exit angle beside Lambert's law, as a table: NAME.angles.csv",
+        what="a table",
+        knows="sssfit.export.angles:is_our_angles",
         of_profiles=True,
+        ending=".angles.csv",
+        told=("channels",),
     ),
-    "frequency": Method(
+    "frequency": Format(
         "sssfit.export.frequency:frequency_text",
         "a profile's response to sinusoids of light, R(k), as a table: NAME.frequency.csv",
+        what="a table",
+        knows="sssfit.export.frequency:is_our_frequencies",
         of_profiles=True,
+        ending=".frequency.csv",
+        told=("channels",),
     ),
-    "lut": Method(
+    "lut": Format(
         "sssfit.export.lut:lut_bytes",
         "a profile or a kernel as a texture: NAME.exr, .dds, or .png to look at",
         (
@@ -545,6 +599,8 @@ EXPORTS: Mapping[str, Method] = {
                 words="0.3",
             ),
         ),
+        what="a texture",
+        knows="sssfit.export.lut:is_our_texture",
         of_profiles=True,
     ),
 }

@@ -4,20 +4,24 @@ import dataclasses
 import io
 import json
 import re
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import jsonschema
 import numpy as np
 import pytest
+from angled import angled
 from reference_pixels import make_profile
 
 import sssfit
 from sssfit.errors import KernelError
-from sssfit.export import DIALECTS, dense, exported, json_document, kernel_text
+from sssfit.export import DIALECTS, dense, exported, is_ours, json_document, kernel_text
 from sssfit.export.dense import MOST_DENSE, taps_of_kernel
+from sssfit.files import has_mark
 from sssfit.fit import fit_preintegrated
 from sssfit.kernel import SeparableKernel
-from sssfit.methods import EXPORTS, settings_of
+from sssfit.methods import EXPORTS, Format, settings_of
 from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
 
@@ -317,3 +321,35 @@ def test_records_that_a_form_is_not_made_of_are_refused():
             exported([], form)
         with pytest.raises(KernelError, match=f"^'skin1' cannot be written as {form}; expected a"):
             exported(["skin1"], form)
+
+
+@pytest.mark.parametrize("form", EXPORTS)
+def test_a_format_knows_its_own_files_and_no_other_does(form, tmp_path):
+    profile = angled(make_profile(np.linspace(0.0, 2.0, 21), np.full((20, 3), 0.01)))
+    made = exported([profile if EXPORTS[form].of_profiles else small_kernel()], form)
+    path = tmp_path / f"x{made.tag}{made.ending}"
+    path.write_bytes(made.content)
+    assert [each for each in EXPORTS if is_ours(path, each)] == [form]
+
+
+def test_one_file_and_one_entry_are_a_format(monkeypatch, tmp_path):
+    """The file is written, known when it is there already, and told by its word."""
+    lines = SimpleNamespace(
+        lines_text=lambda kernels: f"# sssfit.lines/1\n{kernels[0].pixels}\n",
+        is_our_lines=lambda path: has_mark(path, {b"# sssfit.lines/1": b""}),
+    )
+    monkeypatch.setitem(sys.modules, "sssfit.export.lines", lines)
+    entry = Format(
+        "sssfit.export.lines:lines_text",
+        "a line a kernel",
+        what="a list",
+        knows="sssfit.export.lines:is_our_lines",
+    )
+    monkeypatch.setitem(EXPORTS, "lines", entry)
+    made = exported([small_kernel()], "lines")
+    assert (made.stdout, made.tag, made.ending) == ("the list", "", ".lines")
+    path = tmp_path / "x.lines"
+    path.write_bytes(made.content)
+    assert is_ours(path, "lines")
+    path.write_text("mine")
+    assert not is_ours(path, "lines")

@@ -106,3 +106,8 @@ def test_one_entry_is_a_method_with_help_and_options():
     with pytest.raises(click.BadParameter):
         option.type.convert("10", None, None)
     assert len(command.params) == len(settings_of(SEPARABLE)) + 1
+
+
+def test_an_entry_without_a_function_says_what_is_expected():
+    with pytest.raises(ValueError, match=r"'sssfit.fit' names no function; expected \"module:name"):
+        Method("sssfit.fit", "as the test says").load()

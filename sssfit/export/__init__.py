@@ -9,18 +9,14 @@ import numpy as np
 from sssfit import kinds
 from sssfit.arrays import FloatArray
 from sssfit.errors import FileError, KernelError
-from sssfit.export.angles import is_our_angles
 from sssfit.export.dense import dense, taps_of_kernel
 from sssfit.export.dense import energy_in_half as dense_in_half
-from sssfit.export.dialects import DIALECTS, mark
+from sssfit.export.dialects import DIALECTS
 from sssfit.export.document import json_document, taps_document
-from sssfit.export.frequency import is_our_frequencies
-from sssfit.export.lut import ENDINGS, is_our_texture
+from sssfit.export.lut import ENDINGS
 from sssfit.export.shader import Style, source
 from sssfit.export.shader import energy_in_half as taps_in_half
-from sssfit.export.table import is_our_table
-from sssfit.files import has_mark
-from sssfit.kernel import Kernel, SeparableKernel, Taps, is_kernel_file, is_taps_file
+from sssfit.kernel import Kernel, SeparableKernel, Taps
 from sssfit.messages import by_channel, note, of_material, printable, shown
 from sssfit.methods import EXPORTS, settings_of
 from sssfit.profile import Profile
@@ -28,7 +24,6 @@ from sssfit.profile import Profile
 __all__ = ["DIALECTS", "Style", "dense", "json_document", "kernel_text", "source", "taps_document"]
 
 MOST_WEIGHTS = 65  # of a pass that is written as a loop of fetches without being asked twice
-_TABLES = {"angles": is_our_angles, "frequency": is_our_frequencies}  # of one profile
 _FIGURES = ("channels", "rank", "pixels", "mm_per_pixel")
 _TAPS_FIGURES = ("channels", "structure", "fetches", "passes", "mm_per_pixel")
 
@@ -75,18 +70,17 @@ def exported(
         raise KernelError(f"no format {form!r} of a kernel; expected one of {', '.join(EXPORTS)}.")
     _check_sources(sources, form)
     settings = _own_settings(form, settings)
-    write = EXPORTS[form].load()
+    entry = EXPORTS[form]
+    write, what = entry.load(), entry.what
     of = "profile" if isinstance(sources[0], Profile) else "kernel"
     if form == "lut":
         ending = ending or ENDINGS[0]
         content, figures = write(sources, ending=ending, **settings)
-        return Exported(content, of, "a texture", f".{figures['table']}", ending, figures)
-    if form in _TABLES:
-        text, own = write(sources), {"channels": sources[0].channels}
-        return Exported(text.encode(), of, "a table", f".{form}", ".csv", own)
-    text = write(sources, **({"form": form} if form in DIALECTS else {}), **settings)
-    what = {"json": "a kernel", "csv": "a table"}.get(form, "source")
-    return Exported(text.encode(), of, what, "", f".{form}", _figures(sources[0]))
+        return Exported(content, of, what, f".{figures['table']}", ending, figures)
+    made = write(sources, **({"form": form} if form in DIALECTS else {}), **settings)
+    tag, dot, last = (entry.ending or f".{form}").rpartition(".")
+    content = made.encode() if isinstance(made, str) else made
+    return Exported(content, of, what, tag, dot + last, _figures(sources[0], entry.told))
 
 
 def _check_sources(sources: Sequence[object], form: str) -> None:
@@ -143,7 +137,10 @@ def kernel_text(
     return found.content.decode(), found.figures
 
 
-def _figures(source: Profile | Kernel) -> dict[str, Any]:
+def _figures(source: Profile | Kernel, told: tuple[str, ...]) -> dict[str, Any]:
+    """Return what ``--json`` tells of a record: attributes, by default those of its class."""
+    if told:
+        return {key: getattr(source, key) for key in told}
     if isinstance(source, Profile):
         return {"channels": source.channels, "annuli": source.n_annuli}
     keys = _TAPS_FIGURES if isinstance(source, Taps) else _FIGURES
@@ -281,13 +278,5 @@ def _note_half(kernel: Kernel, energy: FloatArray, rounded: FloatArray) -> None:
 
 
 def is_ours(path: Path, form: str) -> bool:
-    """Return whether a file is one that `exported` wrote in this form."""
-    if form == "csv":
-        return is_our_table(path)
-    if form in _TABLES:
-        return _TABLES[form](path)
-    if form == "lut":
-        return is_our_texture(path)
-    if form == "json":
-        return is_kernel_file(path) or is_taps_file(path)
-    return has_mark(path, {mark(DIALECTS[form]).encode(): b""})
+    """Return whether a file is one that `exported` wrote in this form, a name of ``EXPORTS``."""
+    return EXPORTS[form].is_ours(path)

@@ -5,7 +5,7 @@ import numpy as np
 from sssfit.arrays import FloatArray
 from sssfit.errors import KernelError
 from sssfit.export.constants import Writer, check_prefix, in_half
-from sssfit.export.dialects import Dialect, commented, mark
+from sssfit.export.dialects import Dialect, commented
 from sssfit.export.document import description
 from sssfit.export.remarks import remarked
 from sssfit.kernel import SeparableKernel, Stage, Taps
@@ -30,7 +30,7 @@ def dense(
     write = Writer(dialect, prefix, half=half)
     terms, pixels, channels = kernel.weights.shape
     lines = [
-        mark(dialect),
+        dialect.mark,
         *(commented(line) for line in description(kernel)),
         write.scalar("uint", "TERMS", [terms]),
         write.scalar("uint", "PIXELS", [pixels]),

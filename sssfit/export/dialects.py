@@ -5,8 +5,10 @@ A dialect is data; ``constants`` and ``functions`` write in it.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from sssfit.export.numbers import literal
+from sssfit.files import has_mark
 from sssfit.messages import printable
 
 # What a line is that differs in another engine or language (sssfit.export.remarks). No semicolon,
@@ -88,6 +90,15 @@ class Dialect:
     def has_passes(self) -> bool:
         """Whether passes can be written in it, not tables alone."""
         return bool(self.fetch)
+
+    @property
+    def mark(self) -> str:
+        """The first line of our files, which may be replaced."""
+        return f"// sssfit.{self.name}/1"
+
+    def is_ours(self, path: Path) -> bool:
+        """Return whether a file is source that we wrote in this language."""
+        return has_mark(path, {self.mark.encode(): b""})
 
     def literal(self, values: Sequence[float]) -> str:
         """Return a constant of single precision for each channel, as one value."""
@@ -217,8 +228,3 @@ def switch(prefix: str, feature: str) -> str:
 def commented(words: str) -> str:
     """Return a line of comment, with # apart: Babylon.js finds directives anywhere in a line."""
     return f"// {printable(words).replace('#', '# ')}".rstrip()
-
-
-def mark(dialect: Dialect) -> str:
-    """Return the first line of our files, which may be replaced."""
-    return f"// sssfit.{dialect.name}/1"

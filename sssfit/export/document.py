@@ -1,9 +1,10 @@
 """Kernels and tables of taps as JSON documents: their files with a comment in words."""
 
 import json
+from pathlib import Path
 
 from sssfit.export.certificate import certificate, errors_text, how_to_run, values_text
-from sssfit.kernel import SeparableKernel, Taps
+from sssfit.kernel import SeparableKernel, Taps, is_kernel_file, is_taps_file
 from sssfit.kernel.taps_json import pack
 from sssfit.messages import counted, printable
 
@@ -55,3 +56,8 @@ def taps_document(taps: Taps) -> str:
     words = [printable(each) for each in (*certificate(taps), *how_to_run(taps))]
     lines = json.dumps(words, ensure_ascii=False)
     return "\n".join([first, rest[0], f' "comment": {lines},', *rest[1:]])
+
+
+def is_our_document(path: Path) -> bool:
+    """Return whether a file is a kernel's document or a table's, with or without a comment."""
+    return is_kernel_file(path) or is_taps_file(path)

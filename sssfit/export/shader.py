@@ -12,7 +12,7 @@ from sssfit.export.certificate import certificate, how_to_run, pass_table
 from sssfit.export.compute import ComputeFunctions, compute_table, levels_of
 from sssfit.export.constants import Writer, check_prefix, in_half
 from sssfit.export.depth import DepthFunctions, check_depth, depth_rates
-from sssfit.export.dialects import Dialect, commented, mark, switch
+from sssfit.export.dialects import Dialect, commented, switch
 from sssfit.export.functions import Functions
 from sssfit.export.jitter import check_jitter, jitter_lines
 from sssfit.export.passes import pass_list
@@ -91,7 +91,7 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
     words += _table(tables, style) if passes else how_to_run(tables[0])
     words += list(_notes(tables, style, passes=passes))
     words += list(_versions(dialect, style)) if passes else []
-    lines = [mark(dialect), *(commented(each) for each in words)]
+    lines = [dialect.mark, *(commented(each) for each in words)]
     lines += _defines(dialect, style) if passes else []
     lines += _constants(tables, dialect, style, passes=passes)
     if passes:
