@@ -129,11 +129,6 @@ CHOOSE = (
 )
 
 CHART = (
-    flag("--models", "Draw a material by every method, and the methods' errors."),
-    flag("--spectrum", "Draw the energy of the kernel's singular values."),
-    flag("--guide", "Draw the guide function beside the residual of the guided fit."),
-    flag("--frequency", "Draw the response to sinusoids of light, R(k)."),
-    flag("--angles", "Draw R_d by exit angle, beside a Lambertian medium's."),
     option("--mm-per-pixel", Length("profile"), "MM|profile", "Pixels of the kernel, with "
            "--spectrum or --guide; profile is the width of the profile's first annulus.  "
            "[default: 0.3]"),
@@ -145,11 +140,6 @@ CHART = (
            "beside it or here, by its hash]"),
     option("--photons", Count(2, 10**12), "N", "Photons of the walk, with --models.  "
            "[default: 1e7]"),
-    *output("NAME.profile.png, NAME.kernel.png, NAME.material.png, NAME.checkpoint.png, "
-            "NAME.spectrum.png, NAME.guide.png, NAME.frequency.png, NAME.angles.png, "
-            "NAME.swatches.png, MATERIAL.models.png",
-            "is not our chart",
-            "Output file, PNG, SVG or PDF by its ending; - for PNG on stdout"),
 )
 
 FIT_PIXELS = (
@@ -257,16 +247,3 @@ EXPORT = (
 )
 EXPORT_OUTPUT = STRICT, *output("NAME.FORMAT", "sssfit did not write")
 # fmt: on
-
-_OF_CHARTS = {  # options of single charts: what of it they are for, and the charts
-    "photons": ("the walk of --models", {"models"}),
-    "mm_per_pixel": ("the kernel of --spectrum or --guide", {"spectrum", "guide"}),
-    "ks": ("the fits of --guide", {"guide"}),
-    "channel": ("the fits of --guide, or for a separable kernel", {"guide", "kernel"}),
-    "profile": ("a kernel", {"kernel", "taps"}),
-}
-
-
-def of_other_charts(charts: set[str]) -> dict[str, str]:
-    """Return the options that are for other charts than these, with what they are for."""
-    return {key: what for key, (what, owners) in _OF_CHARTS.items() if not owners & charts}

@@ -8,23 +8,33 @@ from typing import Any
 
 import click
 
-from sssfit.methods import imported
+from sssfit.methods import VIEWS, imported
 from sssfit.process import check_memory
 
 from ._input import load, load_source, profile_name, profile_of_kernel
-from ._options import Common, common_options, options, refuse
+from ._options import Common, common_options, flag, options, output, refuse
 from ._output import finish_one, held, stem_of, target, write_chart
 from ._progress import walk_progress
-from ._verb_options import CHART, of_other_charts
+from ._verb_options import CHART
 
-_VIEWS = ("models", "spectrum", "guide", "frequency", "angles")
-_FILES = {"profile", "kernel", "taps", "material", "checkpoint"}
-_MEMORY = {"kernel": "kernel chart", "taps": "kernel chart", **dict.fromkeys(_VIEWS, "figures")}
+_FLAGS = {name: each.flag for name, each in VIEWS.items() if each.flag}
+_OUTPUT = output(
+    ", ".join(f"NAME.{name}.png" for name in VIEWS if name != "models") + ", MATERIAL.models.png",
+    "is not our chart",
+    "Output file, PNG, SVG or PDF by its ending; - for PNG on stdout",
+)
+_OF_CHARTS = {  # what options of single charts are for; {} are the flags of the views
+    "photons": "the walk of {}",
+    "mm_per_pixel": "the kernel of {}",
+    "ks": "the fits of {}",
+    "channel": "the fits of {}, or for a separable kernel",
+    "profile": "a kernel",
+}
 
 
 @click.command()
 @click.argument("file", required=False)
-@options(*CHART)
+@options(*(flag(f"--{name}", text) for name, text in _FLAGS.items()), *CHART, *_OUTPUT)
 @common_options
 def chart(file: str | None, common: Common, **given: Any) -> None:
     """Draw FILE: a profile, a kernel, a table of taps, a material or the checkpoint of a walk.
@@ -67,8 +77,7 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
     """
     from sssfit import kinds
     from sssfit.chart.files import chart_format, is_chart_file
-    from sssfit.compare.drawing import COMPUTED, computed, drawn_of
-    from sssfit.export.reports import page
+    from sssfit.compare.drawing import computed, drawn_of
     from sssfit.profile import Profile
 
     if given["output"] not in (None, "-"):
@@ -78,35 +87,49 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
     read = imported("sssfit.sweep.swatches:read_swatches") if Path(name).is_dir() else kinds.load
     loaded = load_source(name) if view == "models" else load(read, name)
     found, kind, made_of = drawn_of(loaded, view, name)
-    refuse(given, of_other_charts({kind}))
+    refuse(given, _of_others({kind}))
     if kind == "models" and isinstance(found, Profile):
         refuse(given, {"photons": "a new walk, and FILE is already one"})
-    check_memory(_MEMORY.get(kind, "chart"), common.threads)
-    profile, source = None, name if kind in ("profile", *_VIEWS[1:]) else None
-    if kind in ("kernel", "taps"):
+    drawn = VIEWS[kind]
+    check_memory(drawn.memory, common.threads)
+    profile, source = None, name if drawn.of == ("Profile",) else None
+    if "profile" in drawn.takes:
         profile, source = profile_of_kernel(found, name, given["profile"])
     stem = made_of if kind == "models" else stem_of(name, made_of)
     path = target(given["output"], f"{stem}.{kind}.png")
     with held([path], is_chart_file, inputs=[name, source], force=given["force"]):
-        own = {key: given[key] for key in ("ks", "channel", "mm_per_pixel", "photons")}
-        own |= {"seed": common.seed, "threads": common.threads, "walk": walk_progress}
-        record = computed(found, kind, profile, **own)
+        known = {**given, "profile": profile, "seed": common.seed, "threads": common.threads}
+        known["walk"] = walk_progress
+        record = computed(found, kind, **{key: known[key] for key in drawn.takes})
+        figures: dict[str, Any] = {} if view else {"kind": kind, "file": name}
+        figures |= {"profile": source} if kind != "models" else {}
+        if drawn.page:
+            figures |= record.to_dict()
+        else:
+            figures |= {"material": made_of, "channels": found.channels}
+        text = imported(drawn.page)(figures) if drawn.page else ""
         write_chart(record, path)
-    figures: dict[str, Any] = {} if view else {"kind": kind, "file": name}
-    figures |= {"profile": source} if kind != "models" else {}
-    plain = {"material": made_of, "channels": found.channels} if kind not in COMPUTED else {}
-    figures |= plain or record.to_dict()
-    text = page(kind, figures) if kind in COMPUTED else ""
     finish_one(common, path, figures, text, "a PNG")
 
 
 def _view(file: str | None, given: Mapping[str, Any]) -> str:
     """Return the chart that was asked for by its name; by default it is that of the file."""
-    views = [f"--{name}" for name in _VIEWS if given[name]]
+    views = [f"--{name}" for name in _FLAGS if given[name]]
     if len(views) > 1:
         raise click.UsageError(f"{' and '.join(views[:2])} are two charts; ask for one at a time.")
     view = views[0].removeprefix("--") if views else ""
-    refuse(given, of_other_charts({view} if view else _FILES))
+    refuse(given, _of_others({view} if view else VIEWS.keys() - _FLAGS.keys()))
     if view == "models" and file is None:
         raise click.UsageError("--models needs a material, or a profile of a photon walk.")
     return view
+
+
+def _of_others(charts: set[str]) -> dict[str, str]:
+    """Return the options that are for other charts than these, with what they are for."""
+    found = {}
+    for key, what in _OF_CHARTS.items():
+        owners = [name for name, each in VIEWS.items() if key in each.takes]
+        if charts.isdisjoint(owners):
+            flags = (f"--{name}" for name in owners if name in _FLAGS)
+            found[key] = what.format(" or ".join(flags))
+    return found

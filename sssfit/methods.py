@@ -159,6 +159,54 @@ class Format(Method):
         return bool(imported(self.knows)(path))
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class View:
+    """A chart that ``sssfit chart`` draws: of a file as it is, or computed from it with a flag.
+
+    Parameters
+    ----------
+    of : tuple of str
+        Classes of the records in the files that it is for.
+    record : str
+        Class of the record that is drawn.
+    figure : str
+        "module:name" of the function that draws the record.
+    flag : str
+        Help of its option; without one it is what is drawn of such a file without a flag.
+    function : str
+        "module:name" of the function that computes the record; without one the file's is drawn.
+    takes : tuple of str
+        Keywords of the function: options of the verb, "profile" (to which a kernel was fitted),
+        "seed", "threads" and "walk" (what shows the progress of a walk).
+    page : str
+        "module:name" of the function from the record's ``to_dict`` to what is printed; without one
+        only the file is named.
+    memory : str
+        What it takes, a key of `sssfit.process.check_memory`.
+
+    Raises
+    ------
+    ValueError
+        A view with a flag has no function, or one with a function has no page.
+    """
+
+    of: tuple[str, ...]
+    record: str
+    figure: str
+    flag: str = ""
+    function: str = ""
+    takes: tuple[str, ...] = ()
+    page: str = ""
+    memory: str = "figures"
+
+    def __post_init__(self) -> None:
+        """Refuse an entry that lacks what would be missed after the chart is drawn."""
+        if self.flag and not self.function:
+            raise ValueError(f"the view of {self.record} has a flag; give its function, too.")
+        if self.function and not self.page:
+            raise ValueError(f"the view of {self.record} is computed; give its page, too.")
+
+
 _ANGLES = Setting(
     "angles",
     "whole",
@@ -602,6 +650,99 @@ EXPORTS: Mapping[str, Format] = {
         what="a texture",
         knows="sssfit.export.lut:is_our_texture",
         of_profiles=True,
+    ),
+}
+
+_PROFILES = ("Profile",)
+_PRINTED = "sssfit.export.reports"
+
+# What ``sssfit chart`` draws; the name is that of the flag and in the name of the file.
+VIEWS: Mapping[str, View] = {
+    "profile": View(
+        of=_PROFILES,
+        record="Profile",
+        figure="sssfit.chart.profile:profile_figure",
+        memory="chart",
+    ),
+    "kernel": View(
+        of=("SeparableKernel",),
+        record="KernelView",
+        figure="sssfit.chart.kernel:kernel_figure",
+        function="sssfit.compare.drawing:kernel_of",
+        takes=("profile", "channel"),
+        page=f"{_PRINTED}:kernel_page",
+        memory="kernel chart",
+    ),
+    "taps": View(
+        of=("Taps",),
+        record="TapsView",
+        figure="sssfit.chart.taps:taps_figure",
+        function="sssfit.compare.taps_view:view_taps",
+        takes=("profile",),
+        page=f"{_PRINTED}:taps_page",
+        memory="kernel chart",
+    ),
+    "material": View(
+        of=("Material",),
+        record="Material",
+        figure="sssfit.chart.material:material_figure",
+        memory="chart",
+    ),
+    "checkpoint": View(
+        of=("SoFar",),
+        record="Profile",
+        figure="sssfit.chart.profile:profile_figure",
+        memory="chart",
+    ),
+    "models": View(
+        of=("Profile", "Material"),
+        record="ModelComparison",
+        figure="sssfit.chart.models:models_figure",
+        flag="Draw a material by every method, and the methods' errors.",
+        function="sssfit.compare.drawing:models_of",
+        takes=("photons", "seed", "threads", "walk"),
+        page=f"{_PRINTED}:models_page",
+    ),
+    "spectrum": View(
+        of=_PROFILES,
+        record="Spectrum",
+        figure="sssfit.chart.spectrum:spectrum_figure",
+        flag="Draw the energy of the kernel's singular values.",
+        function="sssfit.compare.spectrum:compute_spectrum",
+        takes=("mm_per_pixel",),
+        page=f"{_PRINTED}:spectrum_page",
+    ),
+    "guide": View(
+        of=_PROFILES,
+        record="Guide",
+        figure="sssfit.chart.guide:guide_figure",
+        flag="Draw the guide function beside the residual of the guided fit.",
+        function="sssfit.compare.guide:compute_guide",
+        takes=("mm_per_pixel", "ks", "channel"),
+        page=f"{_PRINTED}:guide_page",
+    ),
+    "frequency": View(
+        of=_PROFILES,
+        record="FrequencyResponse",
+        figure="sssfit.chart.frequency:frequency_figure",
+        flag="Draw the response to sinusoids of light, R(k).",
+        function="sssfit.profile.frequency:frequency_response",
+        page=f"{_PRINTED}:frequency_page",
+    ),
+    "angles": View(
+        of=_PROFILES,
+        record="AngularReflectance",
+        figure="sssfit.chart.angles:angles_figure",
+        flag="Draw R_d by exit angle, beside a Lambertian medium's.",
+        function="sssfit.profile.directions:angular_reflectance",
+        page=f"{_PRINTED}:angles_page",
+    ),
+    "swatches": View(
+        of=("Swatches",),
+        record="Swatches",
+        figure="sssfit.chart.swatches:swatches_figure",
+        page=f"{_PRINTED}:swatches_page",
+        memory="chart",
     ),
 }
 

@@ -1238,9 +1238,9 @@ CHART = {
         is_written("svg", "png"),
         lambda: ["x.svg"],
         default="wax.profile.png",
-        words="NAME.profile.png, NAME.kernel.png, NAME.material.png, NAME.checkpoint.png, "
-        "NAME.spectrum.png, NAME.guide.png, NAME.frequency.png, NAME.angles.png, "
-        "NAME.swatches.png, MATERIAL.models.png",
+        words="NAME.profile.png, NAME.kernel.png, NAME.taps.png, NAME.material.png, "
+        "NAME.checkpoint.png, NAME.spectrum.png, NAME.guide.png, NAME.frequency.png, "
+        "NAME.angles.png, NAME.swatches.png, MATERIAL.models.png",
     ),
     "--force": Row("chart -o foreign.png", "--force", is_written("png"), lambda: ["foreign.png"]),
 }

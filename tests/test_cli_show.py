@@ -18,6 +18,7 @@ from sssfit.chart import page
 from sssfit.cli import main
 from sssfit.fit import fit_gaussians, fit_svd
 from sssfit.material import Layer, Material, load_material
+from sssfit.methods import VIEWS
 from sssfit.profile import Profile
 from sssfit.simulate import Checkpoint, simulate_montecarlo, simulate_montecarlo_many
 
@@ -507,6 +508,14 @@ def test_what_is_not_a_file_is_one_line(run, name, said):
     assert run("show", name) == (1, "", f"Error: {said}\n")
     drawn = said.replace("in it.", "in it, or the store of a sweep.")  # which is a folder
     assert run("chart", name) == (1, "", f"Error: {drawn}\n")
+
+
+def test_a_chart_whose_page_fails_is_not_written(run, tmp_path, profile, monkeypatch):
+    profile.save(tmp_path / "p.profile.npz")
+    broken = dataclasses.replace(VIEWS["frequency"], page="sssfit.export.reports:no_page")
+    monkeypatch.setitem(VIEWS, "frequency", broken)
+    assert run("chart", "--frequency", "p.profile.npz")[0] != 0
+    assert [each.name for each in tmp_path.iterdir()] == ["p.profile.npz"]
 
 
 def test_chart_draws_materials_and_checkpoints(run, tmp_path):

@@ -1,6 +1,7 @@
 """One registry of methods: help, options and functions are made from its entries."""
 
 import inspect
+import re
 import subprocess
 import sys
 
@@ -12,8 +13,22 @@ from option_rows import ROWS
 
 from sssfit import fit
 from sssfit.cli import cli
-from sssfit.cli._options import method_options
-from sssfit.methods import FITS, SEPARABLE, SIMULATIONS, Method, Setting, lines_of, settings_of
+from sssfit.cli._options import in_options, method_options
+from sssfit.cli.chart import _OF_CHARTS
+from sssfit.compare.drawing import computed, drawn_of
+from sssfit.errors import ProfileError
+from sssfit.methods import (
+    FITS,
+    SEPARABLE,
+    SIMULATIONS,
+    VIEWS,
+    Method,
+    Setting,
+    View,
+    imported,
+    lines_of,
+    settings_of,
+)
 
 VERBS = {"simulate": SIMULATIONS, "fit": FITS}
 ENTRIES = [(verb, name) for verb, methods in VERBS.items() for name in methods]
@@ -111,3 +126,54 @@ def test_one_entry_is_a_method_with_help_and_options():
 def test_an_entry_without_a_function_says_what_is_expected():
     with pytest.raises(ValueError, match=r"'sssfit.fit' names no function; expected \"module:name"):
         Method("sssfit.fit", "as the test says").load()
+
+
+@pytest.mark.parametrize("name", VIEWS)
+def test_a_view_names_what_there_is(name):
+    """Its function takes what it says, which are options that the other charts refuse."""
+    view = VIEWS[name]
+    assert callable(imported(view.figure))
+    if view.page:
+        assert list(inspect.signature(imported(view.page)).parameters) == ["figures"]
+    options = {each.name for each in cli.commands["chart"].params}
+    assert set(view.takes) <= _OF_CHARTS.keys() | {"seed", "threads", "walk"}
+    assert set(view.takes) & _OF_CHARTS.keys() <= options
+    if view.flag:
+        assert in_options(f"`{name} = True`") == f"--{name}"
+    if view.function:
+        assert set(view.takes) <= inspect.signature(imported(view.function)).parameters.keys()
+
+
+def test_a_view_that_lacks_its_page_or_its_function_is_refused():
+    own = {"of": ("Profile",), "record": "Spectrum", "figure": "sssfit.chart.x:x_figure"}
+    with pytest.raises(ValueError, match=r"view of Spectrum is computed; give its page, too"):
+        View(**own, function="sssfit.compare.spectrum:compute_spectrum")
+    with pytest.raises(ValueError, match=r"view of Spectrum has a flag; give its function, too"):
+        View(**own, flag="Draw it.")
+
+
+def test_an_entry_is_a_view_of_the_records_that_it_names(monkeypatch):
+    entry = View(
+        of=("SeparableKernel", "Material"),
+        record="tuple",
+        figure="sssfit.chart.x:x_figure",
+        flag="Draw the sum.",
+        function="builtins:sorted",
+        takes=("reverse",),
+        page="sssfit.chart.x:x_page",
+    )
+    monkeypatch.setitem(VIEWS, "new", entry)
+    assert drawn_of(world.kernel(), "new", "k.json")[1] == "new"
+    assert drawn_of(world.kernel(), "", "k.json")[1] == "kernel"
+    assert computed([1, 3, 2], "new", reverse=True) == [3, 2, 1]
+    assert computed([1, 3, 2], "new", reverse=None) == [1, 2, 3]
+    said = (
+        "p.npz is not a separable kernel or a material; `new = True` draws one, a .kernel.json "
+        "file or a TOML file."
+    )
+    with pytest.raises(ProfileError, match=f"^{re.escape(said)}$"):
+        drawn_of(world.profile(), "new", "p.npz")
+    with pytest.raises(ProfileError, match=r"^no view 'old' of a file; expected one of profile, "):
+        drawn_of(world.profile(), "old", "p.npz")
+    with pytest.raises(ProfileError, match=r"^x: there is no chart of str"):
+        drawn_of("", "", "x")

@@ -11,33 +11,27 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from sssfit.methods import imported
+from sssfit.methods import VIEWS, imported
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-# Where a record is drawn, by the record's class; a new chart is one file and one line.
-FIGURES: Mapping[str, str] = {
-    "AngularReflectance": "sssfit.chart.angles:angles_figure",
+# The charts that `sssfit.methods.VIEWS` does not have: a record's class, and where it is drawn.
+_OTHERS = {
     "Budget": "sssfit.chart.budget:budget_figure",
     "Comparison": "sssfit.chart.pareto:pareto_figure",
-    "FrequencyResponse": "sssfit.chart.frequency:frequency_figure",
-    "Guide": "sssfit.chart.guide:guide_figure",
     "InversionCurves": "sssfit.chart.inversions:inversions_figure",
-    "KernelView": "sssfit.chart.kernel:kernel_figure",
-    "Material": "sssfit.chart.material:material_figure",
-    "ModelComparison": "sssfit.chart.models:models_figure",
     "MovingLight": "sssfit.chart.moving_light:moving_light_figure",
     "PresetComparison": "sssfit.chart.presets:presets_figure",
-    "Profile": "sssfit.chart.profile:profile_figure",
     "Sheet": "sssfit.chart.sheet:sheet_figure",
-    "Stability": "sssfit.chart.stability:stability_figure",
     "SpeedUpTable": "sssfit.chart.speed_up:speed_up_figure",
-    "Spectrum": "sssfit.chart.spectrum:spectrum_figure",
-    "Swatches": "sssfit.chart.swatches:swatches_figure",
-    "TapsView": "sssfit.chart.taps:taps_figure",
+    "Stability": "sssfit.chart.stability:stability_figure",
     "VariateTable": "sssfit.chart.variates:variates_figure",
 }
+# Where a record is drawn, by the record's class.
+FIGURES: Mapping[str, str] = dict(
+    sorted((_OTHERS | {each.record: each.figure for each in VIEWS.values()}).items())
+)
 
 
 def figure_of(record: Any, **options: Any) -> Figure:

@@ -1,6 +1,7 @@
 """What the verbs print of their results: lines and tables by the keys of their JSON objects.
 
-`page` fills them, from the figures that a record's ``to_dict`` returns.
+The figures that a record's ``to_dict`` returns fill them: for verbs in `page`, for charts in the
+functions that ``sssfit.methods.VIEWS`` names.
 """
 
 from collections.abc import Callable, Mapping
@@ -149,17 +150,18 @@ def _asked_words(figures: Mapping[str, Any]) -> str:
     return text
 
 
-def _taps_words(figures: Mapping[str, Any]) -> dict[str, Any]:
+def taps_page(figures: Mapping[str, Any]) -> str:
     """Return the shares of the energy that the irradiance and each stage have, by channel."""
     energy, rows = figures["energy"], figures["stage_energy"]
     shares = [
         [each / total if total else 0.0 for each, total in zip(row, energy, strict=True)]
         for row in rows
     ]
-    return {
+    columns = {
         "stages": ["irradiance", *map(str, range(1, len(rows)))],
         "shares": [by_channel(figures["channels"], row, ".3g%") for row in shares],
     }
+    return report(_TAPS, {**figures, **columns})
 
 
 def _rendered_words(figures: Mapping[str, Any]) -> dict[str, Any]:
@@ -185,19 +187,21 @@ def _no_colour(channels: int) -> str:
     return f"{counted(channels, 'channel')} {'is' if channels == 1 else 'are'} no colour"
 
 
-def _kernel_words(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Say what a kernel's errors are against."""
+def kernel_page(figures: Mapping[str, Any]) -> str:
+    """Return a kernel's errors, and what they are against."""
     profile = figures["profile"]
-    return {"against": f"against {profile}" if profile else "errors as the fit recorded them"}
+    against = f"against {profile}" if profile else "errors as the fit recorded them"
+    return report(_KERNEL, {**figures, "against": against})
 
 
-def _spectrum_words(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Return what the report of a spectrum says beyond its figures: the first terms."""
-    return {f"first_{key}": figures[f"{key}_share"][0] for key in ("squared", "absolute")}
+def spectrum_page(figures: Mapping[str, Any]) -> str:
+    """Return the shares of a kernel's first term, and how many terms an error of 1 % takes."""
+    first = {f"first_{key}": figures[f"{key}_share"][0] for key in ("squared", "absolute")}
+    return report(_SPECTRUM, {**figures, **first})
 
 
-def _frequency_words(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the columns of a response: its total, and where it is a half and a tenth of it."""
+def frequency_page(figures: Mapping[str, Any]) -> str:
+    """Return the total of a response, and where it is a half and a tenth of it."""
     rows = figures["rows"]
     totals = rows[0]["response"]
 
@@ -205,21 +209,24 @@ def _frequency_words(figures: Mapping[str, Any]) -> dict[str, Any]:
         return [_fallen(rows, c, share * total) for c, total in enumerate(totals)]
 
     found = {"total": totals, "half": where(0.5), "tenth": where(0.1)}
-    return {"frequencies": len(rows), "last": rows[-1]["k_per_mm"], **found}
+    found |= {"frequencies": len(rows), "last": rows[-1]["k_per_mm"]}
+    return report(_FREQUENCY, {**figures, **found})
 
 
-def _swatches_words(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the number of swatches, and what else there is to say of them, None for nothing."""
+def swatches_page(figures: Mapping[str, Any]) -> str:
+    """Return the number of swatches, and of those that are no colour of a screen or missing."""
     swatches = 1
     for values in figures["axes"].values():
         swatches *= len(values)
     told = {key: figures[key] or None for key in ("outside_srgb", "missing")}
-    return {"swatches": swatches, "wavelengths": len(figures["wavelengths_nm"]), **told}
+    told |= {"swatches": swatches, "wavelengths": len(figures["wavelengths_nm"])}
+    return report(_SWATCHES, {**figures, **told})
 
 
-def _angles_words(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the number of bins, and the light of the first, next to the normal."""
-    return {"bins": len(figures["rows"]), "first": figures["rows"][0]["per_sr"]}
+def angles_page(figures: Mapping[str, Any]) -> str:
+    """Return the number of bins, the light of the first, next to the normal, and what differs."""
+    rows = figures["rows"]
+    return report(_ANGLES, {**figures, "bins": len(rows), "first": rows[0]["per_sr"]})
 
 
 def _fallen(rows: list[dict[str, Any]], channel: int, least: float) -> float | None:
@@ -228,8 +235,8 @@ def _fallen(rows: list[dict[str, Any]], channel: int, least: float) -> float | N
     return next(below, None)
 
 
-def _guide_words(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the columns of guided fits, the pre-integrated one last."""
+def guide_page(figures: Mapping[str, Any]) -> str:
+    """Return what guided fits leave, the pre-integrated one last."""
     last = {
         "centre_share": "preintegrated_centre_share",
         "misplaced": "preintegrated_misplaced",
@@ -237,34 +244,28 @@ def _guide_words(figures: Mapping[str, Any]) -> dict[str, Any]:
         "weighted_residual": "preintegrated_weighted_residual",
     }
     names = [*(f"{k:g}" for k in figures["k"]), "pre-integrated"]
-    return {"fits": names, **{key: [*figures[key], figures[own]] for key, own in last.items()}}
+    columns = {key: [*figures[key], figures[own]] for key, own in last.items()}
+    return report(_GUIDE, {**figures, "fits": names, **columns})
 
 
-def _models_words(figures: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the columns of methods, a row a method and channel; the exact one has no errors."""
+def models_page(figures: Mapping[str, Any]) -> str:
+    """Return the methods' errors, a row a method and channel; the exact one has none."""
     rows = [(row, c) for row in figures["rows"] for c in range(len(figures["channels"]))]
     found = {
         key: [None if row["method"] == "exact" else row[key][c] for row, c in rows]
         for key in ("total_error", "cumulative_error", "l2_error")
     }
     found["diffuse_reflectance"] = [row["diffuse_reflectance"][c] for row, c in rows]
-    return {"curves": [f"{row['method']} {figures['channels'][c]}" for row, c in rows], **found}
+    found["curves"] = [f"{row['method']} {figures['channels'][c]}" for row, c in rows]
+    return report(_MODELS, {**figures, **found})
 
 
 # By what is told, and what the words of its lines add to the figures.
 _PAGES: dict[str, tuple[tuple[Part, ...], Callable[[Mapping[str, Any]], dict[str, Any]]]] = {
     "choose": (_CHOSEN, _chosen_words),
     "fit": (_FITTED, dict),
-    "guide": (_GUIDE, _guide_words),
-    "kernel": (_KERNEL, _kernel_words),
-    "models": (_MODELS, _models_words),
     "render": (_RENDERED, _rendered_words),
     "fit-taps": (_TAPS_FITTED, dict),
-    "taps": (_TAPS, _taps_words),
-    "spectrum": (_SPECTRUM, _spectrum_words),
-    "frequency": (_FREQUENCY, _frequency_words),
-    "angles": (_ANGLES, _angles_words),
-    "swatches": (_SWATCHES, _swatches_words),
 }
 
 
@@ -274,8 +275,7 @@ def page(kind: str, figures: Mapping[str, Any]) -> str:
     Parameters
     ----------
     kind : str
-        "choose", "fit" or "render", the verbs; or "angles", "frequency", "guide", "kernel",
-        "models" or "spectrum", which are drawn.
+        "choose", "fit", "fit-taps" or "render".
     figures : mapping
         The JSON object.
     """
