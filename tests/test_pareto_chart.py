@@ -8,6 +8,7 @@ import itertools
 import numpy as np
 import pytest
 from figures import assert_legible, drawn_texts, words_of
+from matplotlib.legend import Legend
 from matplotlib.path import Path
 from turns import in_turn
 
@@ -18,6 +19,7 @@ from sssfit.compare.comparison import COSTS, ERRORS
 from sssfit.compare.pareto import _with_fronts, compare_kernels
 from sssfit.errors import RenderError
 from sssfit.material import load_material
+from sssfit.methods import FITS
 from sssfit.scene.made import make_scene
 from sssfit.simulate import simulate_exact
 
@@ -147,6 +149,32 @@ def test_methods_have_a_colour_and_a_marker_of_their_own(comparison, drawn):
     assert len({next(iter(each))[0] for each in looks.values()}) == len(looks) == 13
     assert len({next(iter(each))[1] for each in looks.values()}) == 13
     assert max(sizes[True]) < min(sizes[False])  # what no shader applies is small
+
+
+def test_a_method_without_a_style_has_spare_ones_and_its_name_in_the_legend(
+    comparison, monkeypatch
+):
+    for name in ("new", "newer"):
+        monkeypatch.setitem(FITS, name, FITS["svd"])
+
+    def renamed(row):
+        named = {"burley": "new", "svd": "newer"}.get(row.method, row.method)
+        return dataclasses.replace(row, method=named)
+
+    found = dataclasses.replace(with_rows(comparison, renamed), pictures=comparison.pictures[:1])
+    figure = pareto_figure(found)
+    (legend,) = [each for each in figure.findobj(Legend) if each.get_texts()]
+    looks = {
+        text.get_text(): (line.get_color(), line.get_marker())
+        for text, line in zip(legend.get_texts(), legend.get_lines(), strict=True)
+    }
+    assert looks["newer"] == looks.pop("newer, energy kept")
+    colours, markers = zip(*looks.values(), strict=True)
+    assert markers.count(looks["new"][1]) == markers.count(looks["newer"][1]) == 1
+    assert colours.count(looks["new"][0]) == colours.count(looks["newer"][0]) == 1
+    (axes,) = panels_of(figure)
+    drawn = {(line.get_color(), line.get_marker()) for line in axes.lines}
+    assert {looks["new"], looks["newer"]} <= drawn
 
 
 @pytest.mark.parametrize(

@@ -33,6 +33,7 @@ from sssfit.chart.page import (
 )
 from sssfit.chart.text import kernel_subtitle, shortened, titled
 from sssfit.messages import counted
+from sssfit.methods import FITS
 
 if TYPE_CHECKING:
     from sssfit.compare.comparison import Comparison, KernelRow, Picture
@@ -56,6 +57,9 @@ _METHODS: dict[str, tuple[str, str, str]] = {
     "rotated": ("passes in 3 or 4 directions", "#aa4499", "8"),
     "disk": ("disk, one frame", "#999933", "p"),
 }
+# Of the other methods of `FITS`, each in turn; these are Tol's, too.
+_SPARE_COLOURS = ("#332288", "#117733", "#ddcc77")
+_SPARE_MARKERS = (">", "H", (4, 1, 0), (6, 1, 0))
 _GREY = "#666666"
 _FAINT = 0.35
 _MOST_TICKS = 8
@@ -145,16 +149,14 @@ def _method_handles(comparison: Comparison) -> list[Line2D]:
     for row in comparison.rows:  # of the size that a shader's kernels have, where there is one
         if row.method not in drawn or drawn[row.method].is_dense:
             drawn[row.method] = row
-    kept = next((row for row in comparison.rows if _is_kept(row)), None)
-    handles = [
-        Line2D([], [], label=_METHODS[method][0], **_style(drawn[method], is_kept=False))
-        for method in _METHODS
-        if method in drawn
-    ]
-    if kept is not None:
-        name = f"{_METHODS[kept.method][0]}, energy kept"
-        place = [method for method in _METHODS if method in drawn].index(kept.method)
-        handles.insert(place + 1, Line2D([], [], label=name, **_style(kept, is_kept=True)))
+    kept = {row.method: row for row in reversed(comparison.rows) if _is_kept(row)}
+    handles = []
+    for method in sorted(drawn, key=lambda each: _kind(drawn[each])[0]):
+        name = _look(method)[0]
+        handles.append(Line2D([], [], label=name, **_style(drawn[method], is_kept=False)))
+        if method in kept:
+            style = _style(kept[method], is_kept=True)
+            handles.append(Line2D([], [], label=f"{name}, energy kept", **style))
     return handles
 
 
@@ -343,8 +345,23 @@ def _lanes(rows: Sequence[KernelRow], front: Sequence[KernelRow], cost: str) -> 
 
 def _kind(row: KernelRow) -> tuple[int, bool]:
     """Return the position of a row's method in the legend."""
-    known = list(_METHODS)
+    known = [*_METHODS, *_others()]
     return known.index(row.method) if row.method in known else len(known), _is_kept(row)
+
+
+def _others() -> list[str]:
+    """Return the methods that have no colour and marker of their own."""
+    return [method for method in FITS if method not in _METHODS]
+
+
+def _look(method: str) -> tuple[str, str, str | tuple[int, int, int]]:
+    """Return a method's name in the legend, its colour and its marker, spare ones if need be."""
+    if method in _METHODS:
+        return _METHODS[method]
+    others = _others()
+    k = others.index(method) if method in others else len(others)
+    colour = _SPARE_COLOURS[k % len(_SPARE_COLOURS)]
+    return method, colour, _SPARE_MARKERS[k % len(_SPARE_MARKERS)]
 
 
 def _is_kept(row: KernelRow) -> bool:
@@ -354,7 +371,7 @@ def _is_kept(row: KernelRow) -> bool:
 
 def _style(row: KernelRow, *, is_kept: bool) -> Style:
     """Return colour and marker of a row's method: small if dense, hollow if with a fit's energy."""
-    _, colour, marker = _METHODS.get(row.method, (row.method, _GREY, "*"))
+    _, colour, marker = _look(row.method)
     return {
         "color": colour,
         "marker": marker,
