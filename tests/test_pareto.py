@@ -19,6 +19,7 @@ from sssfit.compare.candidates import (
     Candidate,
     candidates,
     every_candidate,
+    missing,
 )
 from sssfit.compare.comparison import COSTS, ERRORS, check_error, pareto_front, verdicts
 from sssfit.compare.evaluate import evaluate
@@ -295,6 +296,27 @@ def test_what_cannot_be_fitted_is_left_out_by_name(skin1, scenes):
 def test_nothing_fitted_is_an_error(skin1, scenes):
     with pytest.raises(FitError, match=r"skin1: no kernel of 1 could be fitted: .*rank"):
         compare_kernels(skin1, scenes, candidates=[IMPOSSIBLE])
+
+
+@pytest.mark.parametrize(
+    ("only", "pitch", "reason"),
+    [
+        (["guided"], 0.05, "the guided fit takes 3 to 513 pixels a pass, and the kernel is of 855"),
+        (["disk"], 15.0, "disks have 16 fetches or more, .* of 3 x 3 pixels of 15 mm; give a "),
+        (["nope"], 2.0, "no kernel of nope is compared"),
+        ([], 2.0, "there are none; give one or more"),
+    ],
+)
+def test_no_kernel_to_compare_says_why(skin1, only, pitch, reason):
+    scene = make_scene("edge", height=8, width=8, mm_per_pixel=pitch)
+    with pytest.raises(FitError, match=f"^skin1: no kernel to compare: {reason}"):
+        compare_kernels(skin1, [scene], only=only)
+
+
+def test_a_method_asked_for_that_has_no_kernel_is_left_out_by_name():
+    assert missing(41, 2.0, ["svd", "disk"]) == missing(855, 0.05, None) == []
+    ((label, reason),) = missing(855, 0.05, ["svd", "guided"])
+    assert (label, "513 pixels" in reason) == ("guided", True)
 
 
 @pytest.mark.parametrize("value", [0.0, 0.5])

@@ -143,6 +143,31 @@ def every_candidate(pixels: int, only: Collection[str] | None = None) -> tuple[C
     return tuple(each for each in found if only is None or each.method in only)
 
 
+def missing(
+    pixels: int, mm_per_pixel: float, only: Collection[str] | None
+) -> list[tuple[str, str]]:
+    """Return the methods asked for of which no kernel is compared, and why.
+
+    Parameters
+    ----------
+    pixels : int
+    mm_per_pixel : float [mm]
+        Of the pixels of a pass.
+    only : collection of str, optional
+        As `every_candidate`; by default nothing is missing.
+    """
+    found = {each.method for each in every_candidate(pixels, only)}
+    here = f"and the kernel is of {pixels} x {pixels} pixels of {mm_per_pixel:.4g} mm"
+    reasons = {
+        "guided": f"the guided fit takes 3 to {MOST_PIXELS} pixels a pass, {here}; give another "
+        "`mm_per_pixel`.",
+        "disk": f"disks have {min(DISKS)} fetches or more, each in a pixel of its own, {here}; "
+        "give a smaller `mm_per_pixel`.",
+    }
+    lacking = [each for each in sorted(only or ()) if each not in found]
+    return [(each, reasons.get(each, f"no kernel of {each} is compared.")) for each in lacking]
+
+
 def _one_pass(pixels: int) -> Iterator[Candidate]:
     """Yield the kernels of one term, which every budget includes."""
     yield Candidate("pre-integrated", "preintegrated", 1)

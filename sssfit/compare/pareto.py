@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from sssfit.compare.candidates import Candidate, every_candidate
+from sssfit.compare.candidates import Candidate, every_candidate, missing
 from sssfit.compare.comparison import COSTS, ERRORS, Comparison, KernelRow, Picture, pareto_front
 from sssfit.compare.evaluate import Evaluation, evaluate
 from sssfit.compare.references import Reference, check_one_pitch, references
@@ -85,10 +85,13 @@ def compare_kernels(
     target = make_target(profile, scenes[0].mm_per_pixel, support_mm)
     pixels = 2 * target.half_pixels + 1
     wanted = every_candidate(pixels, only) if candidates is None else tuple(candidates)
+    left_out = missing(pixels, target.mm_per_pixel, only) if candidates is None else []
+    if not wanted:
+        reason = left_out[0][1] if left_out else "there are none; give one or more."
+        raise FitError(f"{target.name}: no kernel to compare: {reason}")
     true = references(scenes, profile, threads=threads)
     evaluated: list[_Evaluated] = []
     dense: dict[str, FitResult] = {}
-    left_out: list[tuple[str, str]] = []
     for done, candidate in enumerate(wanted):
         if progress is not None:
             progress(done, len(wanted), candidate.label)
@@ -102,7 +105,7 @@ def compare_kernels(
             dense[candidate.label] = fit
         evaluated.append((candidate, fit, [_evaluated(each, fit, threads) for each in true]))
     if not evaluated:
-        reason = left_out[0][1] if left_out else "there are none."
+        reason = left_out[-1][1]
         raise FitError(f"{target.name}: no kernel of {len(wanted)} could be fitted: {reason}")
     if progress is not None:
         progress(len(wanted), len(wanted), "timing")
