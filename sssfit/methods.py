@@ -1,8 +1,8 @@
 """The methods of ``sssfit simulate`` and ``sssfit fit``, with summary, function and settings.
 
-A new method is one file with its function and one entry here: help, ``--method``, the documentation
-and the tests of options are made from the entries. Nothing of the library is imported before a
-function is asked for, so that help answers at once.
+A new method is one file with its function and one entry here: help, ``--method`` and docs/cli.md
+are made from the entries. Each setting takes a row in tests/option_rows.py, and a test asks for it.
+Nothing of the library is imported before a function is asked for, so that help answers at once.
 """
 
 from __future__ import annotations

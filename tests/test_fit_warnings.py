@@ -99,6 +99,35 @@ def fit_a_dim_spike(profile):
     return fit_channels(target, "burley", fit_channel, settings={})
 
 
+@pytest.mark.parametrize(
+    ("signs", "half", "said"),
+    [
+        (
+            np.ones(1),
+            np.ones(5),
+            r"signs of shape \(1,\) \(float64\) and half passes of shape \(5,\)",
+        ),
+        (
+            np.ones(2),
+            np.ones((1, 5)),
+            r"shape \(1, 5\) \(float64\); expected real numbers of shapes",
+        ),
+        (np.ones(1), np.ones((1, 4)), r"expected real numbers of shapes \(T,\) and \(T, 5\) for T"),
+        (np.ones(1), np.ones((1, 5), complex), r"half passes of shape \(1, 5\) \(complex128\)"),
+        (
+            np.ones((1, 1)),
+            np.ones((1, 5)),
+            r"channel c0: the own fit gives signs of shape \(1, 1\)",
+        ),
+        (np.ones(0), np.ones((0, 5)), r"signs of shape \(0,\)"),
+    ],
+)
+def test_terms_of_other_shapes_and_numbers_are_told(signs, half, said):
+    target = make_target(make_profile(EDGES, 0.5 * SMOOTH[:, None]), 0.5, 2.0)
+    with pytest.raises(FitError, match=said):
+        fit_channels(target, "own", lambda _: ChannelFit(signs, half, "made up"), settings={})
+
+
 def test_what_the_warnings_say():
     with pytest.warns(SssfitWarning) as caught:
         fit_a_dim_spike(many_channels())

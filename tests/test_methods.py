@@ -15,7 +15,7 @@ from sssfit import fit
 from sssfit.cli import cli
 from sssfit.cli._options import in_options, method_options
 from sssfit.cli.chart import _OF_CHARTS
-from sssfit.compare.drawing import computed, drawn_of
+from sssfit.compare.drawing import _FILES, computed, drawn_of
 from sssfit.errors import ProfileError
 from sssfit.methods import (
     FITS,
@@ -133,6 +133,7 @@ def test_a_view_names_what_there_is(name):
     """Its function takes what it says, which are options that the other charts refuse."""
     view = VIEWS[name]
     assert callable(imported(view.figure))
+    assert set(view.of) <= _FILES.keys()
     if view.page:
         assert list(inspect.signature(imported(view.page)).parameters) == ["figures"]
     options = {each.name for each in cli.commands["chart"].params}

@@ -146,8 +146,8 @@ def test_methods_have_a_colour_and_a_marker_of_their_own(comparison, drawn):
         looks.setdefault(row.method, set()).add((line.get_color(), line.get_marker()))
         sizes.setdefault(row.is_dense, set()).add(line.get_markersize())
     assert all(len(each) == 1 for each in looks.values())
-    assert len({next(iter(each))[0] for each in looks.values()}) == len(looks) == 13
-    assert len({next(iter(each))[1] for each in looks.values()}) == 13
+    assert len({next(iter(each))[0] for each in looks.values()}) == len(looks) >= 13
+    assert len({next(iter(each))[1] for each in looks.values()}) == len(looks)
     assert max(sizes[True]) < min(sizes[False])  # what no shader applies is small
 
 

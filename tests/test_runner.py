@@ -1,9 +1,12 @@
 """Runs to files from Python: what the command line does, without one."""
 
+from dataclasses import replace
+
 import cli_world as world
 import pytest
 
 from sssfit.errors import SssfitError
+from sssfit.methods import SIMULATIONS, Setting
 from sssfit.profile import Profile
 from sssfit.simulate import run_figures, simulate_montecarlo_many, simulate_to_files
 from sssfit.simulate._walks import BATCH_PHOTONS
@@ -67,3 +70,20 @@ def test_each_material_may_have_its_own_settings_and_no_file():
     found = simulate_to_files([world.wax()] * 2, [None, None], "burley", settings)
     assert [each.profile.n_annuli for each in found.outcomes] == [20, 40]
     assert [each.path for each in found.outcomes] == [None, None]
+
+
+def test_the_settings_of_an_entry_are_told(monkeypatch):
+    """Those of a method, however new, and what is told elsewhere once."""
+    settings = (
+        Setting("sharpness", "number", "how sharp."),
+        Setting("w", "number", "how wide.", keyword="w_mm"),
+    )
+    entry = replace(SIMULATIONS["dipole"], settings=settings)
+    monkeypatch.setitem(SIMULATIONS, "dipole", entry)
+    made = world.profile()
+    told = {"sharpness": 3.0, "w_mm": 0.5, "solver": "layer", "angles": 4}
+    meta = {**made.meta, "settings": {**made.meta["settings"], **told, "reflectance": [0.5]}}
+    figures = run_figures(replace(made, meta=meta), 0.25)
+    assert {key: figures[key] for key in told} == told
+    assert "reflectance" not in figures
+    assert figures["photons"] == made.photons

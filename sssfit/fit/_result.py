@@ -210,7 +210,8 @@ def fit_channels(
     Raises
     ------
     FitError
-        The fit is not finite, or has no energy that could be normalised.
+        The fit is not finite, has no energy that could be normalised, or terms that are not those
+        of a `ChannelFit`.
 
     Warns
     -----
@@ -224,6 +225,8 @@ def fit_channels(
     # core.
     with one_blas_thread():
         fits = [_zero_fit(target) if empty[c] else fit_channel(c) for c in channels]
+        for c in channels:
+            _check_terms(target, c, method, fits[c])
         errors = _frobenius_errors(target, fits)
     signs, half = _stacked(fits)
     name = target.name
@@ -257,6 +260,19 @@ def fit_channels(
         tuple(each.stop_reason for each in fits),
         time.perf_counter() - begun,
     )
+
+
+def _check_terms(target: Target, channel: int, method: str, fit: ChannelFit) -> None:
+    """Refuse terms of a channel that a method gives in other shapes, or that are not real."""
+    signs, half = np.asarray(fit.signs), np.asarray(fit.half)
+    wanted = (signs.size, target.half_pixels + 1)
+    is_real = all(each.dtype.kind in "fiu" for each in (signs, half))
+    if signs.ndim != 1 or not signs.size or half.shape != wanted or not is_real:
+        raise FitError(
+            f"channel {target.profile.channels[channel]}: the {method} fit gives signs of shape "
+            f"{signs.shape} ({signs.dtype}) and half passes of shape {half.shape} ({half.dtype}); "
+            f"expected real numbers of shapes (T,) and (T, {wanted[1]}) for T terms."
+        )
 
 
 def _zero_fit(target: Target) -> ChannelFit:

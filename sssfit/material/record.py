@@ -1,7 +1,7 @@
 """Materials: absorption and scattering of a medium, loaded from TOML and checked.
 
 A ``Material`` is one or more ``Layer`` records from the top down, each with coefficients per colour
-channel in 1/mm. 22 measured ones ship with sssfit (Jensen et al. 2001, Narasimhan et al. 2006);
+channel in 1/mm. Measured ones ship with sssfit (Jensen et al. 2001, Narasimhan et al. 2006);
 your own file has the same form::
 
     name = "skin1"
@@ -313,7 +313,12 @@ def load_material(name_or_path: str | Path) -> Material:
     if not isinstance(name_or_path, Path) and wanted in shipped_names():
         folder = "layered/" if wanted in material_names(layered=True) else ""
         shipped = resources.files("sssfit.materials") / f"{folder}{wanted}.toml"
-        return parse_material(shipped.read_text("utf-8"), f"{wanted}.toml")
+        found = parse_material(shipped.read_text("utf-8"), f"{wanted}.toml")
+        if found.name != wanted:
+            raise MaterialError(
+                f"{wanted}.toml: name = {shown(found.name)}; expected that of its file, {wanted!r}."
+            )
+        return found
     if isinstance(name_or_path, Path) or is_path(wanted):
         return read_material(Path(wanted), wanted)
     raise MaterialError(

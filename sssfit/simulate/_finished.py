@@ -3,7 +3,7 @@
 import math
 import operator
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,6 +14,7 @@ from sssfit.arrays import FloatArray, plain
 from sssfit.errors import SimulationError, SssfitWarning
 from sssfit.grid import make_grid
 from sssfit.material import Material
+from sssfit.methods import SIMULATIONS
 from sssfit.profile import Profile
 from sssfit.profile.beam import Beam, wider_edges
 from sssfit.simulate._directions import Directions, by_angle, mean_and_error
@@ -226,15 +227,15 @@ def is_finished(
     )
 
 
-_OWN_SETTINGS = (
-    "tolerance",
-    "similarity",
-    "solver",
-    "directions",
-    "mapping",
-    "angles",
-    "numerical_aperture",
-)  # for methods that have them
+_CHOSEN = {"solver", "directions"}  # by the exact solver, with its settings
+_ASKED = {"photons", "target_error"}  # which are told beside what they came to
+
+
+def _own_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return those of a profile's settings that methods have in ``sssfit.methods.SIMULATIONS``."""
+    entries = [each for method in SIMULATIONS.values() for each in method.settings]
+    own = {name for each in entries for name in (each.name, each.keyword)} | _CHOSEN
+    return {key: value for key, value in settings.items() if key in own - _ASKED}
 
 
 def run_figures(profile: Profile, seconds: float | None) -> dict[str, Any]:
@@ -279,7 +280,7 @@ def run_figures(profile: Profile, seconds: float | None) -> dict[str, Any]:
             "relative_error": meta["relative_error"],
             "finished_before": seconds is None,
             **({"beam": meta["beam"]} if "beam" in meta else {}),
-            **{key: settings[key] for key in _OWN_SETTINGS if key in settings},
+            **_own_settings(settings),
             **({} if unseen is None else {"outside_aperture": unseen}),
         }
     )
