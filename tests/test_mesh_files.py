@@ -13,46 +13,61 @@ from sssfit.scene.mesh_files import load_mesh
 POINTS = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype="<f4")
 UV = np.array([[0.25, 0.25], [0.75, 0.25], [0.75, 0.5], [0.25, 0.5]], dtype="<f4")
 FACES = np.array([[0, 1, 2], [0, 2, 3]], dtype="<u4")
+TILTED = np.array([[0.6, 0, 0.8], [0, 0.6, 0.8], [-0.6, 0, 0.8], [0, -0.6, 0.8]], dtype="<f4")
 
 
 def obj(uv=True, normals=False, extra=""):
     lines = [f"v {x} {y} {z}" for x, y, z in POINTS]
     lines += [f"vt {u} {v}" for u, v in UV] if uv else []
-    lines += ["vn 0 0 2"] if normals else []
-    form = "{0}" + ("/{0}" if uv else "/" if normals else "") + ("/1" if normals else "")
+    lines += [f"vn {2 * x} {2 * y} {2 * z}" for x, y, z in TILTED] if normals else []
+    form = "{0}" + ("/{0}" if uv else "/" if normals else "") + ("/{0}" if normals else "")
     lines += ["f " + " ".join(form.format(k + 1) for k in face) for face in FACES]
     return ("\n".join([*lines, extra]) + "\n").encode()
 
 
-def ply():
-    names = ("x", "y", "z", "s", "t")
+def ply(normals=False):
+    names = ("x", "y", "z", "s", "t", *(("nx", "ny", "nz") if normals else ()))
     head = ["ply", "format ascii 1.0", f"element vertex {len(POINTS)}"]
     head += [f"property float {each}" for each in names]
     head += [f"element face {len(FACES)}", "property list uchar int vertex_indices", "end_header"]
-    rows = [" ".join(map(str, each)) for each in np.hstack((POINTS, UV)).tolist()]
+    columns = np.hstack((POINTS, UV, *((TILTED,) if normals else ())))
+    rows = [" ".join(map(str, each)) for each in columns.tolist()]
     rows += ["3 " + " ".join(map(str, each)) for each in FACES.tolist()]
     return ("\n".join([*head, *rows]) + "\n").encode()
 
 
-def glb(material=True):
-    """glTF has v downwards."""
+def glb(material=True, normals=(False,)):
+    """glTF has v downwards; each further mesh lies 5 above the last, a quarter turn about x."""
     parts = [POINTS.tobytes(), np.stack((UV[:, 0], 1 - UV[:, 1]), 1).tobytes(), FACES.tobytes()]
+    parts += [TILTED.tobytes()]
     ends = np.cumsum([0, *map(len, parts)]).tolist()
     document = {
         "asset": {"version": "2.0"},
-        "scenes": [{"nodes": [0]}],
+        "scenes": [{"nodes": list(range(len(normals)))}],
         "scene": 0,
-        "nodes": [{"mesh": 0}],
+        "nodes": [
+            {
+                "mesh": k,
+                "translation": [0, 5 * k, 0],
+                "rotation": [k * 0.5**0.5, 0, 0, 0.5 ** (k / 2)],
+            }
+            for k in range(len(normals))
+        ],
         "meshes": [
             {
                 "primitives": [
                     {
-                        "attributes": {"POSITION": 0, "TEXCOORD_0": 1},
+                        "attributes": {
+                            "POSITION": 0,
+                            "TEXCOORD_0": 1,
+                            **({"NORMAL": 3} if has_normals else {}),
+                        },
                         "indices": 2,
                         **({"material": 0} if material else {}),
                     }
                 ]
             }
+            for has_normals in normals
         ],
         "materials": [{"name": "skin"}],
         "accessors": [
@@ -66,9 +81,10 @@ def glb(material=True):
             },
             {"bufferView": 1, "componentType": 5126, "count": 4, "type": "VEC2"},
             {"bufferView": 2, "componentType": 5125, "count": 6, "type": "SCALAR"},
+            {"bufferView": 3, "componentType": 5126, "count": 4, "type": "VEC3"},
         ],
         "bufferViews": [
-            {"buffer": 0, "byteOffset": ends[k], "byteLength": len(parts[k])} for k in range(3)
+            {"buffer": 0, "byteOffset": ends[k], "byteLength": len(parts[k])} for k in range(4)
         ],
         "buffers": [{"byteLength": ends[-1]}],
     }
@@ -80,20 +96,40 @@ def glb(material=True):
     return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
 
 
-@pytest.mark.parametrize(
-    ("name", "content"),
-    [("a.obj", obj()), ("b.obj", obj(normals=True)), ("c.ply", ply()), ("d.glb", glb())],
-)
-def test_files_give_the_same_square(tmp_path, name, content):
-    path = tmp_path / name
-    path.write_bytes(content)
+@pytest.mark.parametrize("has_normals", [False, True])
+@pytest.mark.parametrize("ending", ["obj", "ply", "glb"])
+def test_files_give_the_same_square(tmp_path, ending, has_normals):
+    """Normals are the file's where it has some, of length 1."""
+    content = {
+        "obj": obj(normals=has_normals),
+        "ply": ply(normals=has_normals),
+        "glb": glb(normals=(has_normals,)),
+    }
+    path = tmp_path / f"square.{ending}"
+    path.write_bytes(content[ending])
     mesh = load_mesh(path, mm_per_unit=10.0)
     assert mesh.name == path.stem
     corners = mesh.faces.ravel()
     np.testing.assert_allclose(mesh.positions_mm[corners], 10.0 * POINTS[FACES.ravel()])
     np.testing.assert_allclose(mesh.uv[corners], UV[FACES.ravel()], atol=1e-7)
-    np.testing.assert_allclose(mesh.normals[corners], [[0.0, 0.0, 1.0]] * 6)
+    normals = TILTED if has_normals else np.array([[0.0, 0.0, 1.0]] * 4)
+    np.testing.assert_allclose(mesh.normals[corners], normals[FACES.ravel()], atol=1e-7)
     np.testing.assert_allclose(mesh.stretch_mm(), [[40.0, 80.0]] * 2)
+
+
+@pytest.mark.parametrize("first", [False, True])
+def test_of_several_meshes_those_with_normals_keep_them(tmp_path, first):
+    """They turn with their mesh: a quarter turn about x takes y to z and z to -y."""
+    path = tmp_path / "two.glb"
+    path.write_bytes(glb(normals=(first, True)))
+    mesh = load_mesh(path)
+    assert len(mesh.faces) == 4
+    x, y, z = TILTED.T
+    second = mesh.normals[np.abs(mesh.positions_mm[:, 1] - 5.0) < 1e-6]
+    np.testing.assert_allclose(second, np.stack((x, -z, y), axis=1), atol=1e-7)
+    normals = TILTED if first else [[0.0, 0.0, 1.0]] * 4
+    is_first = np.abs(mesh.positions_mm[:, 1]) < 1.5
+    np.testing.assert_allclose(mesh.normals[is_first], normals, atol=1e-7)
 
 
 def test_objects_of_a_file_are_one_mesh_and_vertices_on_a_seam_are_apart(tmp_path):

@@ -118,7 +118,7 @@ class Mesh:
 
     def _unit_normals(self, points: FloatArray, faces: IndexArray) -> FloatArray:
         if self.normals is None:
-            normals = _smooth_normals(points, faces)
+            normals = smooth_normals(points, faces)
         else:
             normals = self._numbers("normals", self.normals, 3, len(points))
         length = np.linalg.norm(normals, axis=1, keepdims=True)
@@ -177,7 +177,7 @@ def _normals_by_area(points: FloatArray, faces: IndexArray) -> FloatArray:
     return normals
 
 
-def _smooth_normals(points: FloatArray, faces: IndexArray) -> FloatArray:
+def smooth_normals(points: FloatArray, faces: IndexArray) -> FloatArray:
     """Return the sums of the triangles' normals around each place (V, 3)."""
     _, place = np.unique(points, axis=0, return_inverse=True)
     place = place.reshape(-1)

@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 
+from sssfit.arrays import FloatArray
 from sssfit.errors import FileError, RenderError
 from sssfit.files import reason
 from sssfit.messages import shown
-from sssfit.scene.mesh import Mesh
+from sssfit.scene.mesh import IndexArray, Mesh, smooth_normals
 
 FORMATS = (".obj", ".ply", ".gltf", ".glb")
 
@@ -45,7 +46,8 @@ def load_mesh(path: str | Path, *, mm_per_unit: float = 1.0) -> Mesh:
         ) from None
     try:
         # Without merging: a vertex on a seam is there once for each chart.
-        loaded = trimesh.load(path, force="mesh", process=False)
+        parts = _parts(trimesh.load(path, force="scene", process=False))
+        loaded = trimesh.util.concatenate([part for part, _ in parts])
     except OSError as error:
         raise FileError(f"{path}: {reason(error)}.") from None
     except Exception as error:  # of a dozen readers
@@ -61,11 +63,44 @@ def load_mesh(path: str | Path, *, mm_per_unit: float = 1.0) -> Mesh:
             f"{path}: no texture coordinates were found; trimesh reads those of a glTF only where "
             "the mesh has a material as well."
         )
-    normals = loaded.vertex_normals if "vertex_normals" in loaded._cache else None
-    return Mesh(
-        path.stem,
-        np.asarray(loaded.vertices, dtype=np.float64) * mm_per_unit,
-        uv,
-        np.asarray(loaded.faces, dtype=np.int64),
-        normals,
-    )
+    points = np.asarray(loaded.vertices, dtype=np.float64) * mm_per_unit
+    faces = np.asarray(loaded.faces, dtype=np.int64)
+    return Mesh(path.stem, points, uv, faces, _normals(parts, points, faces))
+
+
+def _parts(scene: Any) -> list[tuple[Any, FloatArray | None]]:
+    """Return the meshes of trimesh's scene in their places, and the file's normals (V, 3) of each.
+
+    Only the first object holds normals from a file, as a cached result; copies have lost them.
+    """
+    parts = []
+    for node in scene.graph.nodes_geometry:
+        place, name = scene.graph[node]
+        found = scene.geometry[name]
+        if not hasattr(found, "faces"):
+            continue
+        part = found.copy()
+        is_given = "vertex_normals" in found._cache
+        if is_given:
+            part.vertex_normals = found.vertex_normals
+        part.apply_transform(place)
+        parts.append((part, part.vertex_normals if is_given else None))
+    return parts
+
+
+def _normals(
+    parts: list[tuple[Any, FloatArray | None]], points: FloatArray, faces: IndexArray
+) -> FloatArray | None:
+    """Return the file's normals (V, 3), smooth ones for meshes without; None without any."""
+    if all(given is None for _, given in parts):
+        return None
+    if faces.max() >= len(points):  # which a mesh refuses
+        return None
+    normals = smooth_normals(points, faces)
+    first = 0
+    for part, given in parts:
+        past = first + len(part.vertices)
+        if given is not None:
+            normals[first:past] = given
+        first = past
+    return normals
