@@ -18,7 +18,11 @@ from sssfit.kernel.structure import Cost
 from sssfit.render.disk import averaged, turns
 from sssfit.render.screen_taps import render_screen_taps
 from sssfit.render.taps import reach_pixels, render_taps, response
+from sssfit.render.texture import render_texture
+from sssfit.render.texture_blur import Level, blur_texture
+from sssfit.scene.camera import Camera
 from sssfit.scene.made import make_scene
+from sssfit.scene.mesh import Mesh
 from sssfit.scene.record import Scene
 from sssfit.simulate import simulate_dipole
 
@@ -239,6 +243,21 @@ def test_a_filter_over_time_starts_as_the_mean():
             next(averaged(frames, share))
 
 
+def test_a_disk_is_refused_where_surfaces_are_not_flat():
+    flat, texture = np.ones((4, 5, 1)), Level(np.ones((4, 5)), np.ones((4, 5, 2)))
+    head = make_scene("head", height=8, width=8, mm_per_pixel=20.0)
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    mesh = Mesh("triangle", corners, corners[:, :2], [[0, 1, 2]])
+    calls = [
+        lambda taps: render_screen_taps(head, taps),
+        lambda taps: blur_texture(flat, texture, taps),
+        lambda taps: render_texture(mesh, [[0, 0, 0]], Camera(100.0, 4, 5, 30.0), [], taps),
+    ]
+    for call in calls:
+        with pytest.raises(RenderError, match="a disk of fetches serves flat pictures only"):
+            call(disk_of())
+
+
 def test_bad_settings_of_a_picture_are_one_line():
     scene = Scene("grey", np.ones((4, 5, 1)), PITCH)
     for frame in (-1, 1.5, True, "a"):
@@ -247,8 +266,6 @@ def test_bad_settings_of_a_picture_are_one_line():
     tiny = Scene("grey", np.ones((4, 5, 1)), 1e-9)
     with pytest.raises(RenderError, match="GB of memory"):
         render_taps(tiny, disk_of())
-    with pytest.raises(RenderError, match="serves flat pictures only"):
-        render_screen_taps(make_scene("head", height=8, width=8, mm_per_pixel=20.0), disk_of())
     assert reach_pixels(disk_of()) >= disk_of().stages[0].offsets_mm.max() / PITCH
 
 

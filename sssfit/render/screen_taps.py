@@ -30,6 +30,7 @@ from sssfit._jit import screen_taps as compiled
 from sssfit._jit import thread_pool
 from sssfit.arrays import read_only
 from sssfit.errors import RenderError
+from sssfit.kernel import Kernel
 from sssfit.kernel.taps import Stage, Taps
 from sssfit.process import thread_count
 from sssfit.render.screen import (
@@ -92,8 +93,7 @@ def render_screen_taps(
         exceeds what the intermediate format holds.
     """
     channels = len(taps.channels)
-    if taps.is_disk:
-        raise RenderError("a disk of fetches serves flat pictures only; give another table.")
+    check_no_disk(taps)
     scene = scene.for_channels(taps.channels)
     check_buffers(scene, channels)
     if follow not in FOLLOW:
@@ -120,6 +120,12 @@ def render_screen_taps(
                 covered[..., None] > 0.0, _Chain(taps, rates, pool, store).of(lit, full), picture
             )
     return picture if scene.specular is None else picture + scene.specular
+
+
+def check_no_disk(kernel: Kernel) -> None:
+    """Raise an error for a disk, which has no fetches on a surface that is not flat."""
+    if isinstance(kernel, Taps) and kernel.is_disk:
+        raise RenderError("a disk of fetches serves flat pictures only; give another table.")
 
 
 def _mm_per_texel(scene: Scene) -> float:

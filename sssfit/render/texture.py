@@ -30,6 +30,7 @@ from sssfit.render.lights import (
     specular_at,
     unit,
 )
+from sssfit.render.screen_taps import check_no_disk
 from sssfit.render.texture_blur import Level, blur_texture
 from sssfit.render.texture_lookup import look_up
 from sssfit.scene.camera import Camera
@@ -139,8 +140,9 @@ def render_texture(
     Raises
     ------
     RenderError
-        There is no light, or a setting is invalid.
+        There is no light, a setting is invalid, or the kernel is a disk of fetches.
     """
+    check_no_disk(kernel)
     _check_light(lights, ambient)
     for name, value in (("map_size", map_size), ("shadow_size", shadow_size)):
         if not (is_whole(value) and 8 <= value <= 16384):

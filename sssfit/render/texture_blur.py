@@ -19,7 +19,7 @@ from sssfit._jit import texture as compiled
 from sssfit._jit import thread_pool
 from sssfit.kernel import Kernel, SeparableKernel, Taps
 from sssfit.process import thread_count
-from sssfit.render.screen_taps import fetches
+from sssfit.render.screen_taps import check_no_disk, fetches
 from sssfit.render.taps import divided_once, four_texels
 
 FloatArray = npt.NDArray[np.floating[Any]]
@@ -101,7 +101,13 @@ def blur_texture(
         Radiant exitance; 0 where nothing is covered.
     int
         Texels of all passes, those of halved textures included.
+
+    Raises
+    ------
+    RenderError
+        The kernel is a disk of fetches.
     """
+    check_no_disk(kernel)
     own, steps = _steps_of(kernel)
     levels = [texture]
     for _ in range(max((each.level for each in steps), default=0)):
