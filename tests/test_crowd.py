@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from meshes import sphere
+from meshes import quad, sphere
 
 import sssfit.crowd.table
 from sssfit.chart import figure_of
@@ -62,6 +62,13 @@ def test_rows_that_cannot_be_are_refused_in_one_line(changes, said):
         row(**changes)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_mesh_without_height_is_refused_in_one_line():
+    flat = quad()
+    flat = dataclasses.replace(flat, positions_mm=flat.positions_mm[:, [0, 2, 1]], normals=None)
+    with pytest.raises(RenderError, match=r"^quad: the mesh is 0 mm high .*100 wide and 100 deep"):
+        Row(1, 10.0, mesh=flat)
 
 
 def test_culled_and_clipped_pictures_are_the_same_inside(kernel):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sssfit.arrays import FloatArray
-from sssfit.errors import ArgumentError
+from sssfit.errors import ArgumentError, RenderError
 from sssfit.messages import shown
 from sssfit.render.lights import PointLight
 from sssfit.render.texture import UNIT_MM
@@ -22,6 +22,7 @@ MOST_HEADS = 64
 # Two lights far before the row, on both sides, so that all heads are lit alike: direction, power.
 _LIGHTS = (((-0.5, 0.45, 0.75), 0.9), ((0.75, 0.1, 0.65), 0.45))
 _LIGHT_UNITS = 100.0
+_FLAT = 1e-6  # of width or depth: a mesh of less height cannot be scaled by it
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +47,7 @@ class Row:
     Raises
     ------
     ArgumentError, RenderError
-        A setting is out of range, or the camera stands among the heads.
+        A setting is out of range, the mesh is flat, or the camera stands among the heads.
     """
 
     heads: int
@@ -103,5 +104,11 @@ class Row:
 def _scaled(mesh: Mesh, height_mm: float) -> Mesh:
     """Return a mesh of a height, its middle at the origin."""
     low, high = mesh.positions_mm.min(axis=0), mesh.positions_mm.max(axis=0)
-    points = (mesh.positions_mm - 0.5 * (low + high)) * (height_mm / (high[1] - low[1]))
+    width, height, depth = high - low
+    if height <= _FLAT * max(width, depth):
+        raise RenderError(
+            f"{mesh.name}: the mesh is {height:.3g} mm high (along y), {width:.3g} wide and "
+            f"{depth:.3g} deep; expected a height, by which it is scaled. Turn it upright."
+        )
+    points = (mesh.positions_mm - 0.5 * (low + high)) * (height_mm / height)
     return Mesh(mesh.name, points, mesh.uv, mesh.faces, mesh.normals)
