@@ -71,6 +71,15 @@ def test_a_mesh_without_height_is_refused_in_one_line():
         Row(1, 10.0, mesh=flat)
 
 
+def test_the_camera_stands_before_a_mesh_deeper_than_it_is_high():
+    """Four times: half the depth of a head 2.5 units high is 5, and 10 mm before it are cut off."""
+    ball = sphere(rows=6, columns=12)
+    deep = dataclasses.replace(ball, positions_mm=ball.positions_mm * [1, 1, 4], normals=None)
+    with pytest.raises(ArgumentError, match=r"distance_units = 5.1.*more than 5.1, as sphere at a"):
+        Row(1, 5.1, mesh=deep)
+    assert Row(1, 5.101, mesh=deep).shape.positions_mm[:, 2].max() == pytest.approx(500.0)
+
+
 def test_culled_and_clipped_pictures_are_the_same_inside(kernel):
     """Farther than the kernel reaches from outlines and from the border."""
     found = measure_frame(

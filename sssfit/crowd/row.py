@@ -72,6 +72,18 @@ class Row:
                 f"`distance_units = {self.distance_units:g}`: expected more than half a head's "
                 f"height of {self.head_units:g} units."
             )
+        if self.mesh is not None:
+            self._check_front(self.mesh)
+
+    def _check_front(self, mesh: Mesh) -> None:
+        """Raise an error for a camera that the mesh is not before, at its height in the row."""
+        front_mm = self.shape.positions_mm[:, 2].max() + self.camera.near_mm
+        if self.camera.distance_mm <= front_mm:
+            raise ArgumentError(
+                f"`distance_units = {self.distance_units:g}`: expected more than "
+                f"{math.ceil(1000.0 * front_mm / UNIT_MM) / 1000.0:g}, as {mesh.name} at a height "
+                f"of {self.head_units:g} units reaches that far towards the camera."
+            )
 
     @property
     def shape(self) -> Mesh:
