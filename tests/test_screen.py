@@ -349,6 +349,15 @@ def test_bad_input_is_one_line(rng, fields, settings, words):
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.parametrize("field", ["depth_mm", "mask", "thickness_mm", "alpha", "specular"])
+def test_buffers_of_a_scene_have_their_number_of_axes(field):
+    """Rows and columns, and channels of light alone."""
+    wrong = (4, 5) if field == "specular" else (4, 5, 1)
+    with pytest.raises(RenderError, match=rf"^bad: {field} of shape .*; expected rows") as error:
+        Scene("bad", np.ones((4, 5, 3)), 0.5, **{field: np.ones(wrong)})
+    assert str(wrong) in str(error.value)
+
+
 def test_the_documented_figures_are_up_to_date():
     """Those of the steepest slope, whose rows are the last of their tables."""
     page = (ROOT / "docs" / "screen-space.md").read_text(encoding="utf-8")

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 _MAX_OBJECTS = 2**31 - 1  # largest number of 32 bits
 _HALF = 0.5  # of coverage: a pixel on an outline belongs to the object that covers more of it
+_WITH_CHANNELS = ("irradiance", "specular", "back_irradiance")
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -148,11 +149,7 @@ class Scene:
         if given is None:
             return
         values = as_light(given, f"{self.name}: {field}")
-        if values.shape[:2] != np.shape(self.irradiance)[:2]:
-            raise RenderError(
-                f"{self.name}: {field} is {values.shape[:2]} and irradiance "
-                f"{np.shape(self.irradiance)[:2]}; expected the same rows and columns."
-            )
+        self._check_shape(field, values.shape)
         # Only depth may be infinite, on the background.
         bad = np.isnan(values) if field == "depth_mm" else ~np.isfinite(values)
         if bad.any() or (values < 0).any():
@@ -171,6 +168,17 @@ class Scene:
         kept.setflags(write=False)
         object.__setattr__(self, field, kept)
 
+    def _check_shape(self, field: str, shape: tuple[int, ...]) -> None:
+        size = np.shape(self.irradiance)[:2]
+        if shape[:2] != size:
+            raise RenderError(
+                f"{self.name}: {field} is {shape[:2]} and irradiance {size}; expected the same "
+                "rows and columns."
+            )
+        if (len(shape) == 3) != (field in _WITH_CHANNELS) or len(shape) > 3:
+            has = "rows, columns and channels" if field in _WITH_CHANNELS else "rows and columns"
+            raise RenderError(f"{self.name}: {field} of shape {shape}; expected {has}.")
+
     def for_channels(self, names: Sequence[str]) -> "Scene":
         """Return the scene with its channels in this order, if a file named them the same.
 
@@ -182,7 +190,7 @@ class Scene:
         order = [own.index(each) for each in names]
         light = {
             field: buffer[..., order]
-            for field in ("irradiance", "specular", "back_irradiance")
+            for field in _WITH_CHANNELS
             if (buffer := getattr(self, field)) is not None and buffer.shape[-1] == len(own)
         }
         return dataclasses.replace(self, **light, channel_names=tuple(names))
