@@ -310,6 +310,35 @@ def test_the_first_part_with_colour_is_read(tmp_path):
     assert found.notes == ("part 2 of 2 used", "channels N left out")
 
 
+@pytest.mark.parametrize(
+    ("names", "said"),
+    [
+        ("ab", "channels a, b are read back as b alone, with a as alpha"),
+        ("cbAd", "channels c, b, A, d are read back as c, b, d alone, with A as alpha"),
+        ("XY", "channels X, Y are read back as Y alone"),
+        ("RGBN", "channels R, G, B, N are read back as R, G, B alone"),
+        (("s.a", "s.b"), "channels s.a, s.b are not read back"),
+        ("abc", None),
+        ("rgb", None),
+        ("XYZ", None),
+        (("s.R", "s.G", "s.B"), None),
+        ("Y", None),
+        ("A", None),
+    ],
+)
+def test_names_that_are_read_as_something_else_are_noted(tmp_path, names, said):
+    path, light = tmp_path / "a.exr", picture(channels=len(names))
+    notes = image.save_image(path, light, channels=tuple(names))
+    assert [each.partition(";")[0] for each in notes] == ([said] if said else [])
+    try:
+        found = image.load_image(path)
+    except RenderError:
+        assert "not read back" in said
+        return
+    assert (found.pixels.shape == light.shape) == (said is None)
+    assert (found.alpha is not None) == ("as alpha" in (said or ""))
+
+
 def test_a_window_of_data_is_put_into_its_picture(tmp_path):
     window = {"x": 2, "y": -1, "full_width": 6, "full_height": 8, "full_x": 0, "full_y": 0}
     exr(tmp_path / "a.exr", picture(), "RGB", **window)

@@ -32,6 +32,7 @@ from sssfit.formats._picture_files import (
     found_format,
     image_format,
     is_image_file,
+    note_on_names,
     read_header,
     without_lines_of_libpng,
 )
@@ -492,6 +493,7 @@ def save_image(
         Linear light; row 0 is the top.
     channels : sequence of str, optional
         Names for EXR; needed for other counts than 1 (Y) and 3 (R, G, B), which only EXR can hold.
+        `load_image` interprets some: of X and Y it reads Y, and of a and b it takes a for alpha.
     format : str, optional
         "exr", "tiff" or "png"; by default from the ending.
     exposure : float
@@ -506,7 +508,8 @@ def save_image(
     Returns
     -------
     tuple of str
-        Conversions of the values, as text for stderr.
+        Conversions of the values, and names of channels that `load_image` takes for something
+        else, as text for stderr.
 
     Raises
     ------
@@ -543,7 +546,8 @@ def save_image(
         _write(as_path(target), data)
     else:
         target.write(data)
-    return (*done, *clipped)
+    own = note_on_names(names) if chosen == "exr" else ()
+    return (*done, *clipped, *own)
 
 
 def _write(path: Path, data: bytes) -> None:
