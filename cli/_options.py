@@ -19,6 +19,7 @@ from sssfit.process import check_memory, check_threads_of_numba
 
 # The library's messages have arguments and calls of Python between backquotes.
 _ARGUMENT = re.compile(r"(with )?`(\w+)(?: = ([^`]+))?`")
+_OF_SWITCHES = "", "True", "False"
 _COMMANDS = {
     "`simulate`": "`sssfit simulate`",
     '`simulate("deon-skin")`': "sssfit simulate deon-skin",
@@ -96,11 +97,10 @@ def in_options(message: str) -> str:
     """
 
     def option(found: re.Match[str]) -> str:
-        before, name, value = found[1] or "", found[2], (found[3] or "True").strip('"')
+        before, name, value = found[1] or "", found[2], (found[3] or "").strip('"')
         verb, named = _named(name, value)
-        if value == "False":
-            before, value = "without ", "True"
-        words = named if value == "True" else f"{named} {value}"
+        before = "without " if value == "False" else before
+        words = named if value in _OF_SWITCHES else f"{named} {value}"
         return before + (f"`sssfit {verb} {words}`" if verb else words) if named else found[0]
 
     for call, command in _COMMANDS.items():
@@ -125,9 +125,9 @@ def _named(name: str, value: str) -> tuple[str, str]:
 
 
 def _takes(option: click.Option, value: str) -> bool:
-    """Return whether the option can have this value; True and False are those of a switch."""
+    """Return whether the option can have this value; "" is one that is not said."""
     among = option.type.choices if isinstance(option.type, click.Choice) else (value,)
-    return option.is_flag == (value in ("True", "False")) and value in among
+    return not value or (option.is_flag == (value in _OF_SWITCHES) and value in among)
 
 
 def option(

@@ -107,6 +107,7 @@ def test_arguments_become_options_where_the_command_line_prints_them(said, print
         ("choose", "give a larger `tolerance`", "give a larger --tolerance"),
         ("compare", "`method = montecarlo`", "`sssfit simulate --method montecarlo`"),  # fits only
         ("fit", "`method = cascade`", "--method cascade"),
+        ("simulate", "give fewer `angles`", "give fewer --angles"),  # which chart has as a switch
         ("chart", "compute it with `angles = 30`", "compute it with `sssfit simulate --angles 30`"),
         ("chart", "use `dr_mm = 0.2`", "use `sssfit simulate --dr 0.2`"),
         ("render", "start with `resume = False`", "start without `sssfit simulate --resume`"),
