@@ -415,10 +415,39 @@ def test_directions_stop_where_memory_does(monkeypatch):
         simulate_exact(skin, tolerance=1e-5, threads=1)
 
 
+@pytest.mark.parametrize(
+    ("worst", "spline", "said"),
+    [
+        (2.37e-4, 2.23e-5, "give `tolerance = 0.0005` or more, or use `method = montecarlo`"),
+        (4.28e-4, 3.9e-4, "give `tolerance = 0.0005` or more, or use"),
+        (0.3, 0.0, "of the light; use `method = montecarlo`"),
+    ],
+)
+def test_the_tolerance_that_is_advised_has_room_for_its_own_wavenumbers(worst, spline, said):
+    """Blood of g = .995 was told 3e-4, and at 3e-4 that it was 5e-4."""
+    blood = medium(0.4, 60.0, 1.4, g=0.995)
+    channel = limits.Channel("blood", stacks_of(blood)[0], 0.0, np.array([0.0, 1.0]))
+    side = Side(np.array([0.2, 1.0]), 1.0)
+    errors = SideErrors(np.array([0.0, worst]), np.zeros(2), spline)
+    step = Step(36, [Answer(side, None, (0.0,))], [Errors(errors, None)])
+    assert said in str(limits.cannot_meet([channel], 0, step, 1e-4))
+
+
+@pytest.mark.slow
+def test_a_tolerance_that_is_advised_is_met():
+    blood = medium(0.4, 60.0, 1.4, g=0.995)
+    grid = {"dr_mm": 0.1, "radius_mm": 5.0}
+    for refused in (1e-4, 3e-4):
+        with pytest.raises(SimulationError) as caught:
+            simulate_exact(blood, tolerance=refused, **grid)
+        advised = float(re.search(r"`tolerance = (\S+)`", str(caught.value))[1])
+        assert simulate_exact(blood, tolerance=advised, **grid).meta["relative_error"] <= advised
+
+
 def test_tolerances_below_what_directions_reach_are_refused_at_once():
     skin = stack(layer(0.5, 20.0, 0.8, 1.45, 0.1), layer(0.1, 10.0, 0.8, 1.38))
     never = lambda: pytest.fail("it began to solve")  # noqa: E731
-    with pytest.raises(SimulationError, match=r"1e-09 .* = 1e-06` or more.*montecarlo"):
+    with pytest.raises(SimulationError, match=r"1e-09 cannot be met.*= 1e-06` or more.*montecarlo"):
         simulate_exact(skin, tolerance=1e-9, threads=1, stop=never)
 
 

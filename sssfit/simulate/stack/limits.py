@@ -14,6 +14,8 @@ from sssfit.simulate.stack.slabs import SlabStack
 from sssfit.simulate.stack.solution import Step
 
 _LEAST_TOLERANCE = 1e-6  # 40 directions reach 5e-8 of a half space and 1e-6 of most stacks
+_LARGEST_ADVISED = 0.5
+_OF_DIRECTIONS = 0.5  # of a tolerance: what their difference may take beside the wavenumbers
 _MOST_BYTES = 2_000_000_000  # of matrices at once
 _MOST_SECONDS = 600.0  # of one processor, for the first number of directions
 _SECONDS = 2.1e-9  # of a layer at one wavenumber, for each cube of an unknown; measured
@@ -41,9 +43,7 @@ def azimuths_cannot(
     return SimulationError(
         f"{channel.name}, which light crosses without being scattered: the tolerance of "
         f"{tolerance:g} cannot be met: {AZIMUTHS[-1]} and {quarter.count} directions in azimuth "
-        f"differ by {quarter.share:.2g} of the light; give "
-        f"`tolerance = {_rounded_up(quarter.share / part):g}` or more, or use "
-        "`method = montecarlo`."
+        f"differ by {quarter.share:.2g} of the light; {_advised(quarter.share / part)}."
     )
 
 
@@ -53,16 +53,29 @@ def _rounded_up(value: float) -> float:
     return math.ceil(value / digit) * digit
 
 
-def cannot_meet(channel: Channel, step: Step, worst: float, tolerance: float) -> SimulationError:
-    """Say which channel is too hard, why, and what to do."""
-    stack = channel.stack
-    steepest = max(each.g for each in stack.scattering)
-    is_thin = stack.is_seen_through and steepest > 0.5
+def _advised(tolerance: float) -> str:
+    """Say what to do where this tolerance can be met."""
+    if tolerance > _LARGEST_ADVISED:
+        return "use `method = montecarlo`"
+    return f"give `tolerance = {_rounded_up(tolerance):g}` or more, or use `method = montecarlo`"
+
+
+def cannot_meet(
+    channels: Sequence[Channel], number: int, step: Step, tolerance: float
+) -> SimulationError:
+    """Say which channel is too hard, why, and what to do.
+
+    Wavenumbers lie farther apart for the tolerance that is advised, and may take half of it.
+    """
+    channel, worst = channels[number], step.share(number)
+    steepest = max(each.g for each in channel.stack.scattering)
+    is_thin = channel.stack.is_seen_through and steepest > 0.5
     why = f" (a thin slab of g = {steepest:g}, which the walk does well)" if is_thin else ""
+    by_directions = worst - step.spline_share(number)
     return SimulationError(
         f"{channel.name}{why}: the tolerance of {tolerance:g} cannot be met: {step.count} and "
-        f"{step.count - 4} directions differ by {worst:.2g} of the light; give "
-        f"`tolerance = {_rounded_up(worst):g}` or more, or use `method = montecarlo`."
+        f"{step.count - 4} directions differ by {worst:.2g} of the light; "
+        f"{_advised(max(worst, by_directions / _OF_DIRECTIONS))}."
     )
 
 
@@ -85,8 +98,7 @@ def check_tolerance(channels: Sequence[Channel], tolerance: float) -> None:
     if tolerance < _LEAST_TOLERANCE:
         raise SimulationError(
             f"{channels[0].name}: the tolerance of {tolerance:g} cannot be met by the solver for "
-            f"layers; give `tolerance = {_LEAST_TOLERANCE:g}` or more, or use "
-            "`method = montecarlo`."
+            f"layers; {_advised(_LEAST_TOLERANCE)}."
         )
 
 

@@ -175,7 +175,7 @@ def _last(
         if is_hopeless or not fits(channels, left[0], quarter.count, threads):
             if worst <= patience * tolerance:
                 return step
-            raise cannot_meet(channels[shares.index(worst)], step, worst, tolerance)
+            raise cannot_meet(channels, shares.index(worst), step, tolerance)
         before = worst
     raise AssertionError("steps end with the last number of directions")
 

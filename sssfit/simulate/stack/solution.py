@@ -115,11 +115,9 @@ class Step:
         """Return the largest error of a stack as a share of the light that leaves it."""
         return share_of(self.errors[number], self.answers[number])
 
-    @property
-    def spline_share(self) -> float:
-        """The largest share that comes from the wavenumbers."""
-        pairs = zip(self.errors, self.answers, strict=True)
-        return max(errors.spline / answer.leaving for errors, answer in pairs)
+    def spline_share(self, number: int) -> float:
+        """Return what comes from the wavenumbers, as a share of the light that leaves a stack."""
+        return self.errors[number].spline / self.answers[number].leaving
 
 
 def steps(
@@ -162,7 +160,7 @@ def steps(
         fours = zip(fine, halved, coarse, quarter.errors, strict=True)
         step = Step(count, fine, [_errors(*four) for four in fours])
         yield step
-        if step.spline_share > 0.5 * tolerance:
+        if max(map(step.spline_share, range(len(fine)))) > 0.5 * tolerance:
             changes, miss = None, 0.1 * miss
         coarse = halved
 
