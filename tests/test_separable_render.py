@@ -213,6 +213,12 @@ def test_the_picture_and_the_kernel_have_to_match():
         render_separable(scene(), kernel, threads=0)
     with pytest.raises(RenderError, match="dtype = float16; expected float32 or float64"):
         render_separable(scene(), kernel, dtype=np.float16)
+    with pytest.raises(RenderError, match="dtype = 'foo'; expected float32 or float64"):
+        render_separable(scene(), kernel, dtype="foo")
+    bright = Scene("sun", np.full((4, 4, 3), 1e39), 0.5)
+    with pytest.raises(RenderError, match=r"sun: light of 1e\+39 is above 3.4e\+38.* float64"):
+        render_separable(bright, kernel, dtype=np.float32)
+    assert np.isfinite(render_separable(bright, kernel)).all()
 
 
 def test_a_picture_too_large_is_refused(monkeypatch):

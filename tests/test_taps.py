@@ -391,6 +391,9 @@ def test_bad_settings_are_one_line():
         render_taps(Scene("rgb", np.ones((4, 5, 3)), PITCH), taps)
     with pytest.raises(RenderError, match="dtype = int32"):
         render_taps(scene, taps, dtype=np.int32)
+    bright = Scene("sun", np.full((4, 4, 1), 1e39), scene.mm_per_pixel)
+    with pytest.raises(RenderError, match=r"sun: light of 1e\+39 is above"):
+        render_taps(bright, taps, dtype=np.float32)
 
 
 # The formats of the pictures between passes

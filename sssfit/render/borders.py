@@ -1,6 +1,7 @@
 """What all flat renderers share: a table of source pixels past the border, a limit of memory."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -76,6 +77,29 @@ def scene_for(scene: Scene, channels: Sequence[str]) -> Scene:
     found = scene.for_channels(channels)
     check_channels(found.channels, len(channels))
     return found
+
+
+def precision_for(dtype: npt.DTypeLike, scene: Scene) -> np.dtype[Any]:
+    """Return the type that a scene is rendered in.
+
+    Raises
+    ------
+    RenderError
+        It is neither float32 nor float64, or the scene's light is above what float32 holds.
+    """
+    try:
+        precision = np.dtype(dtype)
+    except TypeError:
+        raise RenderError(f"dtype = {shown(dtype)}; expected float32 or float64.") from None
+    if precision not in (np.float32, np.float64):
+        raise RenderError(f"dtype = {precision}; expected float32 or float64.")
+    most, brightest = np.finfo(precision).max, scene.irradiance.max()
+    if brightest > most:
+        raise RenderError(
+            f"{scene.name}: light of {brightest:.3g} is above {most:.3g}, the largest number of "
+            f"{precision}; render it as float64."
+        )
+    return precision
 
 
 def check_memory(needed_bytes: float, what: str, remedy: str) -> None:

@@ -17,7 +17,7 @@ from sssfit.arrays import read_only
 from sssfit.errors import RenderError
 from sssfit.kernel import SeparableKernel
 from sssfit.process import thread_count
-from sssfit.render.borders import check_memory, scene_for, source_indices
+from sssfit.render.borders import check_memory, precision_for, scene_for, source_indices
 from sssfit.scene.record import Scene
 
 FloatArray = npt.NDArray[np.floating[Any]]
@@ -62,9 +62,7 @@ def render_separable(
     """
     scene = scene_for(scene, kernel.channels)
     check_pitch(scene, kernel)
-    precision = np.dtype(dtype)
-    if precision not in (np.float32, np.float64):
-        raise RenderError(f"dtype = {precision}; expected float32 or float64.")
+    precision = precision_for(dtype, scene)
     # Two passes, the result and, in float32, a copy of the picture.
     samples = scene.height * scene.width * len(kernel.channels)
     check_memory(

@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from sssfit.errors import RenderError
 from sssfit.kernel.taps import Stage, Taps
-from sssfit.render.borders import check_memory, scene_for, source_indices
+from sssfit.render.borders import check_memory, precision_for, scene_for, source_indices
 from sssfit.render.cascade import apply_cascade, is_quick
 from sssfit.render.disk import all_turns, apply_disk
 from sssfit.render.jitter import Jitter, apply_jittered
@@ -90,9 +90,7 @@ def render_taps(
     """
     channels = len(taps.channels)
     scene = scene_for(scene, taps.channels)
-    precision = np.dtype(dtype)
-    if precision not in (np.float32, np.float64):
-        raise RenderError(f"dtype = {precision}; expected float32 or float64.")
+    precision = precision_for(dtype, scene)
     size = scene.height, scene.width
     check_memory(
         6.0 * scene.height * scene.width * channels * precision.itemsize,
