@@ -156,7 +156,8 @@ def test_tables_that_are_not_alike_are_one_line(skin1, tables):
         (
             (tables[0], other),
             0.5,
-            "one table has structure 1-1|1-2|2-2|2-2 and the other 1|1; expected",
+            "one table has structure 1-1|1-2|2-2|2-2 and the other 1|1; expected the same: "
+            "fit both with the same `stages`.",
         ),
         ((tables[0], renamed), 0.5, "has channels ('R', 'G', 'B') and the other ('X', 'Y', 'Z')"),
         (tables, 0.9, "mm_per_pixel = 0.9; expected 0.4 to 0.8, between the tables' own"),

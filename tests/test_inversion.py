@@ -174,6 +174,12 @@ def test_black_and_white_under_either_light(light, eta):
     np.testing.assert_allclose(found.albedo, [0.0, 1.0], rtol=0, atol=1e-7)
 
 
+@pytest.mark.parametrize("wrong", ["#fff", [[0.1], [0.2, 0.3]], {}])
+def test_what_is_no_number_a_channel_is_refused_in_one_line(wrong):
+    with pytest.raises(MaterialError, match=r"^reflectance = .*; expected one number a channel\."):
+        invert_reflectance(wrong, 1.3)
+
+
 def test_white_is_the_largest_base_colour_and_lights_have_names():
     with pytest.raises(
         MaterialError, match=r"1\.01 cannot be reached; under diffuse light the lar"

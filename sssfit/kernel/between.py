@@ -18,6 +18,13 @@ from sssfit.errors import KernelError
 from sssfit.kernel.checks import checked_pitch
 from sssfit.kernel.taps import Stage, Taps
 
+# What tables have in common, and what makes it so: a fit chooses the structure by the pixel size.
+_ALIKE = {
+    "structure": "fit both with the same `stages`",
+    "chained": "fit both with the same method",
+    "channels": "fit both to profiles of the same channels",
+}
+
 
 def taps_between(first: Taps, second: Taps, mm_per_pixel: float) -> Taps:
     """Return the table for a pixel size between those of two tables of the same structure.
@@ -70,10 +77,9 @@ def taps_between(first: Taps, second: Taps, mm_per_pixel: float) -> Taps:
 
 def _check_alike(first: Taps, second: Taps) -> None:
     """Refuse tables whose numbers do not stand for the same."""
-    for what in ("structure", "chained", "channels"):
+    for what, remedy in _ALIKE.items():
         own, other = getattr(first, what), getattr(second, what)
         if own != other:
             raise KernelError(
-                f"one table has {what} {own} and the other {other}; expected the same: fit both "
-                "with the same settings."
+                f"one table has {what} {own} and the other {other}; expected the same: {remedy}."
             )

@@ -26,7 +26,7 @@ from sssfit.errors import ArgumentError, MaterialError, RenderError, SimulationE
 from sssfit.formats.colours import linear_from_hex, reflectance_of_codes
 from sssfit.material import Layer, Material
 from sssfit.material.checks import check_texts, number
-from sssfit.messages import Columns, counted, report
+from sssfit.messages import Columns, counted, report, shown
 from sssfit.optics import normal_transmittance
 from sssfit.simulate._walks import note_compiling
 from sssfit.simulate.half_space import (
@@ -373,7 +373,12 @@ def _linear(reflectance: npt.ArrayLike | str) -> npt.ArrayLike:
 
 def _reachable(reflectance: npt.ArrayLike, eta: float, light: str) -> FloatArray:
     """Return the reflectances as an array (C,); raises for those that no albedo gives."""
-    asked = np.atleast_1d(np.asarray(reflectance, dtype=np.float64))
+    try:
+        asked = np.atleast_1d(np.asarray(reflectance, dtype=np.float64))
+    except (TypeError, ValueError):
+        raise MaterialError(
+            f"reflectance = {shown(reflectance)}; expected one number a channel."
+        ) from None
     if asked.ndim > 1 or asked.size == 0:
         raise MaterialError(f"reflectance has shape {asked.shape}; expected one number a channel.")
     if light not in LIGHTS:
