@@ -8,7 +8,8 @@ from scipy.spatial.distance import cdist
 
 from sssfit.compare.candidates import Candidate
 from sssfit.compare.pareto import compare_kernels
-from sssfit.compare.references import border_of, evaluated_scene
+from sssfit.compare.references import border_of, evaluated_scene, references
+from sssfit.errors import RenderError
 from sssfit.fit import support_of
 from sssfit.material import load_material
 from sssfit.scene.made import make_scene
@@ -81,6 +82,11 @@ def test_pictures_of_ones_own_count_as_they_are(skin1):
     points = scene_of("points", 48)
     assert evaluated_scene(points, skin1) is points
     assert border_of(points) == "mirror"
+
+
+def test_a_black_picture_is_refused_by_its_name(skin1):
+    with pytest.raises(RenderError, match=r"^night\.exr is black; expected a picture with light\."):
+        references([Scene("night.exr", np.zeros((4, 5, 3)), PITCH)], skin1)
 
 
 def test_where_the_disk_does_not_fit_the_picture_stays_as_it_is(skin1):

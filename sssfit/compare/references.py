@@ -45,9 +45,17 @@ class Reference:
 def references(
     scenes: Sequence[Scene], profile: Profile, *, threads: int | None = None
 ) -> list[Reference]:
-    """Render scenes by the profile itself, each with the pixels that count of it."""
+    """Render scenes by the profile itself, each with the pixels that count of it.
+
+    Raises
+    ------
+    RenderError
+        A scene is black.
+    """
     found = []
     for each in scenes:
+        if not each.irradiance.any():
+            raise RenderError(f"{each.name} is black; expected a picture with light.")
         scene = evaluated_scene(each, profile)
         border = border_of(scene)
         truth = render_reference(scene, profile, border=border, threads=threads)
