@@ -219,10 +219,14 @@ def test_an_aperture_of_the_half_space(skin):
     assert (np.abs(found.energy_balance) < balance).all()
 
 
-def test_the_widest_aperture_sees_everything():
+def test_the_widest_aperture_sees_everything(caplog):
     asked = {"photons": 20_000, "dr_mm": 0.1, "radius_mm": 1.0}
     whole = simulate_montecarlo(load_material("skin1"), **asked)
-    found = simulate_montecarlo(load_material("skin1"), numerical_aperture=1.2, **asked)
+    with caplog.at_level("INFO", logger="sssfit"):
+        Directions(aperture=1.0).note_wide(load_material("skin1"))
+        assert not caplog.text
+        found = simulate_montecarlo(load_material("skin1"), numerical_aperture=1.2, **asked)
+    assert "`numerical_aperture = 1.2` is above 1, the index above the surface" in caplog.text
     np.testing.assert_array_equal(found.annulus_energy, whole.annulus_energy)
     assert not found.outside_aperture.any()
 

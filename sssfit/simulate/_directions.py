@@ -13,6 +13,7 @@ import numpy as np
 from sssfit.arrays import FloatArray
 from sssfit.errors import SimulationError
 from sssfit.material import Material
+from sssfit.messages import note
 from sssfit.profile.npz import FORMAT, FORMAT_OF_DIRECTIONS
 
 MAX_ANGLES = 180  # single precision resolves the cosines between half degrees to .2 %
@@ -68,6 +69,14 @@ class Directions:
             return self.below()
         sine = self.aperture / material.eta_above
         return np.array([math.sqrt(1.0 - sine * sine)] if sine < 1.0 else [])
+
+    def note_wide(self, material: Material) -> None:
+        """Say that no aperture is as wide as the one given, which then has no effect."""
+        if self.aperture is not None and self.aperture > material.eta_above:
+            note(
+                f"`numerical_aperture = {self.aperture:g}` is above {material.eta_above:g}, the "
+                "index above the surface: the detector sees all light, as without it."
+            )
 
     def below(self) -> FloatArray:
         """Falling cosines between the directions below a stack, where no detector is."""

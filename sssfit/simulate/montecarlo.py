@@ -189,6 +189,7 @@ def simulate_montecarlo_many(
     directions = Directions(
         None if angles is None else whole_number("angles", angles), numerical_aperture
     )
+    directions.note_wide(materials[0])
     threads = available_cores() if threads is None else whole_number("threads", threads)
     _check_settings(ending.photons, seed, threads)
     note_compiling("photon walk", 10, is_compiled(materials[0]))
