@@ -19,7 +19,7 @@ from sssfit.formats.pictures import load_image
 from sssfit.material import load_material
 from sssfit.render.bloom import bloomed
 from sssfit.render.texture import Savings
-from sssfit.render.texture_blur import Level, halved
+from sssfit.render.texture_level import Level
 from sssfit.render.texture_lookup import look_up
 from sssfit.simulate import simulate_dipole
 
@@ -206,7 +206,7 @@ def test_a_wide_pixel_takes_the_mean_of_its_texels():
     """At widths that are powers of 2, in the middle of those texels: their mean by coverage."""
     rng = np.random.default_rng(5)
     light, cover = rng.uniform(size=(16, 16, 2)), rng.integers(0, 2, (16, 16)).astype(float)
-    level = Level(cover, np.ones((16, 16, 2)))
+    level = Level.of_map(cover, np.ones((16, 16, 2)))
     for n in (0, 1, 2):
         wide = 2**n
         places = np.array([[wide * 1.5 - 0.5, wide * 2.5 - 0.5]])
@@ -220,12 +220,23 @@ def test_a_wide_pixel_takes_the_mean_of_its_texels():
     np.testing.assert_allclose(between, 0.75 * ends[0] + 0.25 * ends[1])
 
 
+def test_a_pixel_shows_its_own_chart_where_that_has_texels():
+    """At the border of two charts, and of a third that is in the texture nowhere."""
+    charts = np.repeat([[0, 0, 0, 0, 1, 1, 1, 1]], 8, axis=0)
+    level = Level.of_map(np.ones((8, 8)), np.ones((8, 8, 2)), charts)
+    light, place = charts[..., None] * 1.0, np.full((3, 2), 3.5)
+    for wide in (1.0, 3.0, 8.0):
+        found = look_up(light, level, place, np.full(3, wide), np.array([0, 1, 2]))
+        np.testing.assert_allclose(found[:, 0], [0.0, 1.0, 0.5])
+
+
 def test_constant_light_stays_constant_from_any_distance():
     cover = np.random.default_rng(6).integers(0, 2, (9, 13)).astype(float)
     light = 0.3 * cover[..., None]
-    assert set(np.unique(halved(light, cover)).round(12)) <= {0.0, 0.3}
+    level = Level.of_map(cover, np.ones((9, 13, 2)))
+    np.testing.assert_allclose(level.mean(level.picked(light)), 0.3)
     places = np.stack(np.meshgrid(np.arange(9.0), np.arange(13.0)), axis=-1).reshape(-1, 2)
-    found = look_up(light, Level(cover, np.ones((9, 13, 2))), places, np.full(len(places), 5.0))
+    found = look_up(light, level, places, np.full(len(places), 5.0))
     assert set(np.unique(found).round(12)) <= {0.0, 0.3}
 
 

@@ -14,8 +14,11 @@ from sssfit.render import render
 from sssfit.render.drawn import draw_texture, draw_view
 from sssfit.render.lights import PointLight, draw_shadows, irradiance_at, specular_at
 from sssfit.render.texture import Savings, render_texture
-from sssfit.render.texture_blur import Level, blur_texture
+from sssfit.render.texture_blur import blur_texture
+from sssfit.render.texture_level import Level
 from sssfit.scene.camera import CLIP_PLANES, Camera
+from sssfit.scene.charts import charts_of
+from sssfit.scene.mesh import Mesh
 from sssfit.simulate import simulate_dipole
 
 PITCH = 0.5
@@ -53,12 +56,72 @@ def spots(size, seed=1):
 def test_a_flat_texture_is_the_image_space_picture(kernels, name):
     """Borders are far: what a chart's end does is not what a picture's border does."""
     light = spots(SIZE)
-    flat = Level(np.ones((SIZE, SIZE)), np.full((SIZE, SIZE, 2), 1.0 / PITCH))
+    flat = Level.of_map(np.ones((SIZE, SIZE)), np.full((SIZE, SIZE, 2), 1.0 / PITCH))
     found, _ = blur_texture(light, flat, kernels[name])
     wanted = render(light, kernels[name], border="zero")
     # Fetches at whole texels lie on them but for rounding.
     inner = slice(SIZE // 4, 3 * SIZE // 4)
     np.testing.assert_allclose(found[inner, inner], wanted[inner, inner], atol=1e-12)
+
+
+@pytest.mark.parametrize("gutter", [0, 1, 3])
+@pytest.mark.parametrize("name", ["dense", "negative", "cascade", "taps"])
+def test_no_light_leaves_its_chart(kernels, name, gutter):
+    """A lit chart beside a dark one, at odd columns: both are as they would be alone."""
+    cover, charts = np.ones((23, 41)), np.zeros((23, 41), int)
+    cover[:, 21 : 21 + gutter], charts[:, 21:] = 0.0, 1
+    light, per_mm = (
+        np.where(charts == 0, 1.0, 0.0)[..., None].repeat(3, -1),
+        np.full((23, 41, 2), 2),
+    )
+    found, _ = blur_texture(light, Level.of_map(cover, per_mm, charts), kernels[name])
+    assert (found[:, 21:] == 0.0).all()
+    alone, _ = blur_texture(light, Level.of_map(cover * (charts == 0), per_mm), kernels[name])
+    np.testing.assert_array_equal(found, alone)
+    np.testing.assert_allclose(found[:, :21], alone[:1, :1].repeat(23, 0).repeat(21, 1))
+
+
+def squares(apart=0.0, split=False):
+    """A square that looks along z beside one with normals along -z, ``apart`` in the texture."""
+    x, y = np.array([0.0, 1, 1, 0, 2, 3, 3, 2]), np.array([0.0, 0, 1, 1] * 2)
+    u = np.where(x < 2.0, x * (0.5 - apart), 0.5 + apart + (x - 2.0) * (0.5 - apart))
+    points, uv = np.stack((80.0 * x - 120.0, 80.0 * y - 40.0, 0.0 * x), 1), np.stack((u, y), 1)
+    faces = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
+    normals = np.where(x[:, None] < 2.0, [[0.0, 0.0, 1.0]], [[0.0, 0.0, -1.0]])
+    if split:
+        points, uv, normals, faces = (
+            *(each[faces].reshape(12, -1) for each in (points, uv, normals)),
+            np.arange(12).reshape(4, 3),
+        )
+    return Mesh("squares", points, uv, faces, normals)
+
+
+@pytest.mark.parametrize("distance", [400.0, 2000.0])
+def test_a_dark_chart_is_black_beside_a_lit_one(kernels, distance):
+    """From far away too, where a pixel shows halved maps."""
+    frame = frame_of(
+        squares(), kernels["cascade"], ambient=0.0, map_size=61, camera=Camera(distance, 40, 60)
+    )
+    is_dark = frame.drawn.covered & (frame.drawn.faces >= 2)
+    is_lit = frame.drawn.covered & (frame.drawn.faces < 2)
+    assert is_dark.any()
+    assert (frame.picture[is_dark] == 0.0).all()
+    assert (frame.picture[is_lit] > 0.0).all()
+
+
+def test_a_chart_is_a_piece_of_the_surface_and_of_the_texture():
+    assert charts_of(squares()).tolist() == [0, 0, 1, 1]  # they touch in the texture alone
+    assert charts_of(squares(split=True)).tolist() == [0, 0, 1, 1]  # each triangle with its corners
+    assert charts_of(cube()).tolist() == np.repeat(np.arange(6), 2).tolist()
+    assert charts_of(sphere()).max() == 0
+    one = squares()
+    mirrored = Mesh(
+        "x", one.positions_mm, np.concatenate((one.uv[:4], one.uv[[1, 0, 3, 2]])), one.faces
+    )
+    assert charts_of(mirrored).tolist() == [0, 0, 1, 1]  # the diagonals cross
+    faces = np.array([[0, 1, 2], [0, 2, 3], [5, 4, 7], [5, 7, 6]])
+    stacked = Mesh("x", one.positions_mm, mirrored.uv, faces)
+    assert charts_of(stacked).max() == 0  # two halves that share their texels
 
 
 @pytest.mark.parametrize("name", ["dense", "negative", "cascade", "taps"])
@@ -67,7 +130,8 @@ def test_constant_light_stays_constant_on_any_chart(kernels, name):
     cover = np.zeros((40, 40))
     cover[5:20, 3:30] = 1.0
     cover[25:36, 10:38] = rng.integers(0, 2, (11, 28))
-    level = Level(cover, rng.uniform(0.5, 4.0, (40, 40, 2)))
+    charts = np.where(np.arange(40) < 15, 0, rng.integers(1, 3, (40, 40)))
+    level = Level.of_map(cover, rng.uniform(0.5, 4.0, (40, 40, 2)), charts)
     found, _ = blur_texture(np.full((40, 40, 3), 0.7), level, kernels[name])
     kernel = kernels[name]
     energy = kernel.energy * getattr(kernel, "scale", 1.0)
@@ -81,11 +145,13 @@ def test_texels_of_half_the_size_have_half_the_kernel(kernels):
     """A table for .5 mm on texels of .25 mm: each fetch lies twice as many texels away."""
     kernel = kernels["dense"]
     light = spots(2 * SIZE)
-    level = Level(np.ones((2 * SIZE, 2 * SIZE)), np.full((2 * SIZE, 2 * SIZE, 2), 2.0 / PITCH))
+    level = Level.of_map(
+        np.ones((2 * SIZE, 2 * SIZE)), np.full((2 * SIZE, 2 * SIZE, 2), 2.0 / PITCH)
+    )
     found, count = blur_texture(light, level, kernel)
     even = light[::2, ::2]
     wanted, _ = blur_texture(
-        even, Level(np.ones((SIZE, SIZE)), np.full((SIZE, SIZE, 2), 1.0 / PITCH)), kernel
+        even, Level.of_map(np.ones((SIZE, SIZE)), np.full((SIZE, SIZE, 2), 1.0 / PITCH)), kernel
     )
     np.testing.assert_allclose(found[::2, ::2], wanted, atol=1e-12)
     assert count == 4 * (2 * SIZE) ** 2
@@ -96,7 +162,7 @@ def test_stretch_is_by_axis(kernels):
     light = np.zeros((64, 128, 3))
     light[32, 64] = 1.0
     rates = np.stack((np.full((64, 128), 0.5 / PITCH), np.full((64, 128), 1.0 / PITCH)), axis=-1)
-    found, _ = blur_texture(light, Level(np.ones((64, 128)), rates), kernels["dense"])
+    found, _ = blur_texture(light, Level.of_map(np.ones((64, 128)), rates), kernels["dense"])
     column, row = found[:, 64, 0], found[32, :, 0]
     x = np.arange(128) - 64.0
     wide = np.sqrt((row * x**2).sum() / row.sum())
@@ -160,8 +226,6 @@ def test_places_on_the_screen_are_those_of_the_projection():
 def test_pixels_show_the_nearest_triangle_and_its_place():
     """Random triangles against a test of each pixel's ray with each of them."""
     rng = np.random.default_rng(5)
-    from sssfit.scene.mesh import Mesh
-
     points = rng.uniform(-60.0, 60.0, (30, 3))
     mesh = Mesh("x", points, rng.uniform(0.0, 1.0, (30, 2)), np.arange(30).reshape(-1, 3))
     camera = Camera(400.0, 24, 32)
@@ -257,7 +321,7 @@ def test_energy_is_conserved_over_a_closed_map(kernels):
     per_mm[here] = size / mesh.stretch_mm()[texels.faces[here]][:, ::-1]
     light = np.zeros((size, size, 3))
     light[240:272, 200:264] = 1.0  # at the equator, where texels are even
-    found, _ = blur_texture(light, Level(here.astype(float), per_mm), kernels["dense"])
+    found, _ = blur_texture(light, Level.of_map(here.astype(float), per_mm), kernels["dense"])
     area = np.zeros((size, size, 1))
     area[here, 0] = 1.0 / per_mm[here].prod(axis=1)
     ratio = (found * area).sum(axis=(0, 1)) / (light * area).sum(axis=(0, 1))
@@ -266,8 +330,6 @@ def test_energy_is_conserved_over_a_closed_map(kernels):
 
 def test_a_shadow_falls_where_a_ray_is_stopped():
     """A small quad before a large one: the shadow of similar triangles."""
-    from sssfit.scene.mesh import Mesh
-
     big, small = quad(200.0), quad(20.0)
     both = Mesh(
         "two",
@@ -371,5 +433,5 @@ def test_no_light_is_refused(kernels):
 def test_six_gaussians_of_the_paper_are_twelve_passes(profile):
     """The six Gaussians of d'Eon, each blurred from the one before."""
     chain = fit_result(profile, "gaussian-chain", blur="published", mm_per_pixel=PITCH).kernel
-    flat = Level(np.ones((8, 8)), np.full((8, 8, 2), 1.0 / PITCH))
+    flat = Level.of_map(np.ones((8, 8)), np.full((8, 8, 2), 1.0 / PITCH))
     assert blur_texture(np.ones((8, 8, 3)), flat, chain)[1] == 12 * 64

@@ -1,6 +1,7 @@
 """Passes of a kernel in texture space: bilinear fetches that the surface's stretch places.
 
-Pictures are (N, C), N = H W texels row after row, of the texture or of one of half its size.
+Pictures are (N, C): the texels of a map that hold light, row after row, of the map itself or of one
+of half its size. Where charts meet in a texel, it is there once for each of them.
 """
 
 import math
@@ -12,12 +13,17 @@ import numpy.typing as npt
 from sssfit._jit import jit
 
 FloatArray = npt.NDArray[np.floating[Any]]
+IndexArray = npt.NDArray[np.int64]
 
 
 class Texture(NamedTuple):
-    """What of a texture is there, and how far its texels lie apart."""
+    """The texels of a map that hold light, and how far they lie apart."""
 
-    cover: FloatArray  # (N,) part of a texel that holds light; where it is 0 nothing is written
+    at: IndexArray  # (height width,) a texel of each place; -1 where there is none
+    following: IndexArray  # (N,) another texel of the same place, -1 behind the last
+    places: IndexArray  # (N,) row times width plus column
+    charts: IndexArray  # (N,)
+    cover: FloatArray  # (N,) part of a texel that the chart covers
     per_mm: FloatArray  # (N, 2) texels that a mm takes, down and right
     width: int
     height: int
@@ -27,13 +33,17 @@ class Texture(NamedTuple):
 def fetch(
     light: FloatArray,
     picture: FloatArray,
+    at: IndexArray,
+    following: IndexArray,
+    charts: IndexArray,
     cover: FloatArray,
     width: int,
     height: int,
+    chart: int,
     y: float,
     x: float,
 ) -> float:
-    """Fetch at a place in texels from the first one's middle; return coverage.
+    """Fetch from a chart at a place in texels from the first one's middle; return coverage.
 
     ``light`` (C,) becomes coverage times light. Beyond the texture there is none.
     """
@@ -47,16 +57,18 @@ def fetch(
         if part == 0.0 or row < 0 or row >= height:
             continue
         for j in range(2):
-            column = left + j
-            if column < 0 or column >= width:
+            column, side = left + j, right if j == 1 else 1.0 - right
+            if side == 0.0 or column < 0 or column >= width:
                 continue
-            q = row * width + column
-            weight = part * (right if j == 1 else 1.0 - right) * cover[q]
-            if weight == 0.0:
+            n = at[row * width + column]
+            while n >= 0 and charts[n] != chart:
+                n = following[n]
+            if n < 0:
                 continue
+            weight = part * side * cover[n]
             share += weight
             for c in range(light.size):
-                light[c] += weight * picture[q, c]
+                light[c] += weight * picture[n, c]
     return share
 
 
@@ -68,34 +80,37 @@ def gather(
     weights: FloatArray,
     texture: Texture,
     divide: bool,
-    first: int,
-    last: int,
+    begin: int,
+    end: int,
 ) -> None:
-    """Write texels ``first`` to ``last`` of a pass of fetches into ``out`` (N, C).
+    """Write texels ``begin`` to ``end`` of a pass of fetches, each within its chart.
 
     Parameters
     ----------
+    out : array (N, C)
+    picture : array (N, C)
     places_mm : array (F, 2) [mm]
         Places of the fetches beside the texel, down and right.
     weights : array (F, C)
+    texture : Texture
     divide : bool
         By the sum of weights times coverage. Where that is 0 the texel stays as it was.
+    begin, end : int
     """
     # Each read of an array from the tuple counts its references, so read them once.
-    cover, per_mm = texture.cover, texture.per_mm
+    at, following, places = texture.at, texture.following, texture.places
+    charts, cover, per_mm = texture.charts, texture.cover, texture.per_mm
     width, height = texture.width, texture.height
     channels = weights.shape[1]
     light, total, mass = np.empty(channels), np.empty(channels), np.empty(channels)
-    for p in range(first, last):
-        if cover[p] == 0.0:
-            continue
-        row, column = p // width, p % width
+    for p in range(begin, end):
+        row, column, chart = places[p] // width, places[p] % width, charts[p]
         down, right = per_mm[p, 0], per_mm[p, 1]
         for c in range(channels):
             total[c] = mass[c] = 0.0
         for k in range(weights.shape[0]):
             y, x = row + places_mm[k, 0] * down, column + places_mm[k, 1] * right
-            share = fetch(light, picture, cover, width, height, y, x)
+            share = fetch(light, picture, at, following, charts, cover, width, height, chart, y, x)
             for c in range(channels):
                 total[c] += weights[k, c] * light[c]
                 mass[c] += weights[k, c] * share
@@ -110,12 +125,51 @@ def gather(
 
 @jit
 def look_up(
-    out: FloatArray, share: FloatArray, picture: FloatArray, texture: Texture, places: FloatArray
+    out: FloatArray,
+    share: FloatArray,
+    picture: FloatArray,
+    texture: Texture,
+    places: FloatArray,
+    chart: IndexArray,
 ) -> None:
-    """Write light (M, C) and coverage (M,) at places (M, 2) in texels down and right."""
-    light, cover = np.empty(picture.shape[1]), texture.cover
+    """Write light (M, C) and coverage (M,) of a chart each (M,), at places in texels (M, 2)."""
+    light = np.empty(picture.shape[1])
+    at, following, charts, cover = texture.at, texture.following, texture.charts, texture.cover
     width, height = texture.width, texture.height
     for p in range(places.shape[0]):
-        share[p] = fetch(light, picture, cover, width, height, places[p, 0], places[p, 1])
+        y, x = places[p]
+        share[p] = fetch(
+            light, picture, at, following, charts, cover, width, height, chart[p], y, x
+        )
         for c in range(light.size):
             out[p, c] = light[c] / share[p] if share[p] > 0.0 else 0.0
+
+
+@jit
+def halve(half: Texture, wholes: IndexArray, texture: Texture) -> int:
+    """Find the texels of twice the size, one for each chart at a place; return their count.
+
+    ``at``, ``following``, ``places`` and ``charts`` of ``half`` become theirs, ``wholes`` (N,) the
+    number of that which holds each texel.
+    """
+    count = 0
+    for place in range(half.width * half.height):
+        half.at[place] = -1
+        for i in range(2):
+            row = 2 * (place // half.width) + i
+            for j in range(2):
+                column = 2 * (place % half.width) + j
+                if row >= texture.height or column >= texture.width:
+                    continue
+                n = texture.at[row * texture.width + column]
+                while n >= 0:
+                    whole = half.at[place]
+                    while whole >= 0 and half.charts[whole] != texture.charts[n]:
+                        whole = half.following[whole]
+                    if whole < 0:
+                        whole, count = count, count + 1
+                        half.places[whole], half.charts[whole] = place, texture.charts[n]
+                        half.at[place], half.following[whole] = whole, half.at[place]
+                    wholes[n] = whole
+                    n = texture.following[n]
+    return count

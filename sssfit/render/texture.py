@@ -1,11 +1,11 @@
 """Diffusion in texture space, and the computations that it can leave out.
 
 After Jimenez and Gutierrez 2008, "Faster rendering of human skin" (figure 2): shadow maps, an
-irradiance map of each head rasterised in its texture, a kernel's passes there, and the final
-picture, with specular light added after the diffusion. Three things may be left out of a map:
-texels that face away by more than 105 degrees (culled), texels too fine for the distance (a map of
-the side T = T_max min(d_ref / d, 1), equations 3 and 4), and what lies outside of the frustum
-(clipped, equation 6).
+irradiance map of each head rasterised in its texture, a kernel's passes there, within each chart
+(`sssfit.scene.charts`), and the final picture, with specular light added after the diffusion. Three
+things may be left out of a map: texels that face away by more than 105 degrees (culled), texels too
+fine for the distance (a map of the side T = T_max min(d_ref / d, 1), equations 3 and 4), and what
+lies outside of the frustum (clipped, equation 6).
 """
 
 import time
@@ -31,9 +31,11 @@ from sssfit.render.lights import (
     unit,
 )
 from sssfit.render.screen_taps import check_no_disk
-from sssfit.render.texture_blur import Level, blur_texture
+from sssfit.render.texture_blur import blur_texture
+from sssfit.render.texture_level import Level
 from sssfit.render.texture_lookup import look_up
 from sssfit.scene.camera import Camera
+from sssfit.scene.charts import IndexArray, charts_of
 from sssfit.scene.mesh import Mesh
 
 FloatArray = npt.NDArray[np.floating[Any]]
@@ -156,15 +158,17 @@ def render_texture(
     channels = len(kernel.channels)
     picture = np.zeros((camera.height, camera.width, channels))
     lit, convolved, sizes = 0, 0, list[int]()
+    with _clock(seconds, "irradiance"):
+        charts = charts_of(mesh)
     for k, offset in enumerate(offsets):
         size = _map_size(mesh, offset, camera, map_size) if savings.by_depth else map_size
         with _clock(seconds, "irradiance"):
-            needed, level = _map_of(mesh, offset, camera, savings, size)
+            needed, level = _map_of(mesh, charts, offset, camera, savings, size)
             light = _irradiance(mesh, offset, needed, shadows, ambient, channels)
         with _clock(seconds, "convolution"):
             blurred, count = blur_texture(light, level, kernel, threads=threads)
         with _clock(seconds, "picture"):
-            _show(picture, drawn, k, mesh, offset, camera, blurred, level)
+            _show(picture, drawn, k, mesh, charts, offset, camera, blurred, level)
         lit, convolved, sizes = lit + level.texels, convolved + count, [*sizes, size]
     with _clock(seconds, "picture"):
         if specular:
@@ -186,7 +190,12 @@ def _map_size(mesh: Mesh, offset: FloatArray, camera: Camera, most: int) -> int:
 
 
 def _map_of(
-    mesh: Mesh, offset: FloatArray, camera: Camera, savings: Savings, size: int
+    mesh: Mesh,
+    charts: IndexArray,
+    offset: FloatArray,
+    camera: Camera,
+    savings: Savings,
+    size: int,
 ) -> tuple[Drawn, Level]:
     """Return the texels of a map that are to be lit and convolved, twice."""
     texels = draw_texture(mesh, size)
@@ -197,7 +206,7 @@ def _map_of(
     # Down is along v, right along u.
     per_mm[here] = size / mesh.stretch_mm()[texels.faces[here]][:, ::-1]
     needed = Drawn(np.where(cover > 0.0, 0, -1), texels.faces, texels.places)
-    return needed, Level(cover, per_mm)
+    return needed, Level.of_map(cover, per_mm, charts[texels.faces])
 
 
 def _is_needed(
@@ -259,6 +268,7 @@ def _show(
     drawn: Drawn,
     copy: int,
     mesh: Mesh,
+    charts: IndexArray,
     offset: FloatArray,
     camera: Camera,
     blurred: FloatArray,
@@ -269,14 +279,15 @@ def _show(
     if not here.any():
         return
     own = Drawn(np.where(here, copy, -1), drawn.faces, drawn.places)
-    height, width = level.cover.shape
+    height, width = level.texture.height, level.texture.width
     uv = own.interpolated(mesh, mesh.uv)
     places = np.stack((height * (1.0 - uv[:, 1]) - 0.5, width * uv[:, 0] - 0.5), axis=1)
     depth = camera.distance_mm - (own.interpolated(mesh, mesh.positions_mm) + offset)[:, 2]
     pixel_mm = camera.mm_per_pixel * depth / camera.distance_mm
     # An anisotropic filter's: the texels of a pixel that looks straight at the surface.
-    across = np.sqrt(height * width / mesh.stretch_mm()[drawn.faces[here]].prod(axis=1))
-    picture[here] = look_up(blurred, level, places, across * pixel_mm)
+    faces = drawn.faces[here]
+    across = np.sqrt(height * width / mesh.stretch_mm()[faces].prod(axis=1))
+    picture[here] = look_up(blurred, level, places, across * pixel_mm, charts[faces])
 
 
 @contextmanager

@@ -1,9 +1,12 @@
 """A kernel in texture space: every pass on the texels that hold light, in mm of the surface.
 
 A fetch o mm beside a texel lies o / |dP/du| texels to the side (d'Eon, Luebke, Enderton 2007,
-"Efficient rendering of human skin": stretch maps). A pass is sum w A E / sum w A over its fetches,
-with the coverage A: charts end without dark borders, and light does not cross their seams. With
-weights below 0 light and coverage are blurred apart, added up and divided once.
+"Efficient rendering of human skin": stretch maps). It takes the texels of its own chart alone,
+however near others lie in the map and in its halved ones (`sssfit.render.texture_level`): no light
+crosses from chart to chart, not even where they are neighbours on the surface, but it does jump a
+gap between two arms of one chart. A pass is sum w A E / sum w A over its fetches, with the chart's
+coverage A, so charts end without dark borders. With weights below 0 light and coverage are blurred
+apart, added up and divided once.
 """
 
 import itertools
@@ -20,54 +23,13 @@ from sssfit._jit import thread_pool
 from sssfit.kernel import Kernel, SeparableKernel, Taps
 from sssfit.process import thread_count
 from sssfit.render.screen_taps import check_no_disk, fetches
-from sssfit.render.taps import divided_once, four_texels
+from sssfit.render.taps import divided_once
+from sssfit.render.texture_level import Level
 
 FloatArray = npt.NDArray[np.floating[Any]]
 
 _BLOCK = 16_384
 _Passes = Sequence[tuple[FloatArray, FloatArray]]  # places (F, 2) [mm] and weights (F, C)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Level:
-    """A texture of one size.
-
-    Parameters
-    ----------
-    cover : array (H, W)
-        Part of each texel that holds light.
-    per_mm : array (H, W, 2) [1/mm]
-        Texels that a mm of the surface takes, down and right.
-    """
-
-    cover: FloatArray
-    per_mm: FloatArray
-
-    @property
-    def compiled(self) -> compiled.Texture:
-        """The same for the compiled passes."""
-        height, width = self.cover.shape
-        return compiled.Texture(
-            np.ascontiguousarray(self.cover, dtype=np.float64).ravel(),
-            np.ascontiguousarray(self.per_mm, dtype=np.float64).reshape(-1, 2),
-            width,
-            height,
-        )
-
-    @property
-    def texels(self) -> int:
-        """How many texels a pass computes."""
-        return int(np.count_nonzero(self.cover))
-
-    def halved(self) -> "Level":
-        """Return it on texels of twice the size."""
-        four = four_texels(self.cover, "zero")
-        whole = four.sum(axis=0)
-        rates = (four[..., None] * four_texels(self.per_mm, "zero")).sum(axis=0)
-        per_mm = np.divide(
-            0.5 * rates, whole[..., None], out=np.zeros_like(rates), where=whole[..., None] > 0.0
-        )
-        return Level(0.25 * whole, per_mm)
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +43,7 @@ class _Step:
 
 
 def blur_texture(
-    light: FloatArray, texture: Level, kernel: Kernel, *, threads: int | None = None
+    light: FloatArray, level: Level, kernel: Kernel, *, threads: int | None = None
 ) -> tuple[FloatArray, int]:
     """Return a kernel's picture in texture space, and how many texels its passes computed.
 
@@ -89,7 +51,7 @@ def blur_texture(
     ----------
     light : array (H, W, C)
         Irradiance; it is not read where nothing is covered.
-    texture : Level
+    level : Level
         What is covered: of a pass only those texels are computed.
     kernel : SeparableKernel or Taps
     threads : int, optional
@@ -100,7 +62,8 @@ def blur_texture(
     array (H, W, C)
         Radiant exitance; 0 where nothing is covered.
     int
-        Texels of all passes, those of halved textures included.
+        Texels of all passes, those of halved textures included, which are there once for each
+        chart in them.
 
     Raises
     ------
@@ -109,22 +72,22 @@ def blur_texture(
     """
     check_no_disk(kernel)
     own, steps = _steps_of(kernel)
-    levels = [texture]
+    levels = [level]
     for _ in range(max((each.level for each in steps), default=0)):
         levels.append(levels[-1].halved())
     count = sum(len(each.passes) * levels[each.level].texels for each in steps)
     divide = not _has_negative_weights(kernel)
-    covered = texture.cover[..., None] > 0.0
-    lit = np.where(covered, light, 0.0)
+    lit = level.picked(light)
     with thread_pool(thread_count(threads)) as pool:
         chain = _Chain(levels, steps, own, pool, divide)
         picture = chain.of(lit)
         if divide:
-            return np.where(covered, picture, 0.0), count
+            return level.spread(picture), count
         part = chain.of(np.ones_like(lit))
     scale = kernel.scale if isinstance(kernel, SeparableKernel) else 1.0
-    cover = texture.cover[..., None]
-    return divided_once(picture, part, lit, cover, kernel.energy * scale), 2 * count
+    cover = level.texture.cover[:, None]
+    divided = divided_once(picture, part, lit, cover, kernel.energy * scale)
+    return level.spread(divided), 2 * count
 
 
 def _has_negative_weights(kernel: Kernel) -> bool:
@@ -166,10 +129,9 @@ class _Chain:
     ) -> None:
         self.levels, self.steps, self.own, self.pool = levels, steps, own, pool
         self.divide = divide
-        self.textures = [each.compiled for each in levels]
 
     def of(self, light: FloatArray) -> FloatArray:
-        """Return the sum of all blurs of light (H, W, C)."""
+        """Return the sum of all blurs of light (N, C)."""
         sums = [light * self.own]
         current, level = light, 0
         for step in self.steps:
@@ -177,11 +139,10 @@ class _Chain:
             if step.from_light:
                 level = 0
             while level < step.level:
-                source = halved(source, self.levels[level].cover)
+                source = self.levels[level].mean(source)
                 level += 1
             while len(sums) <= level:
-                shape = (*self.levels[len(sums)].cover.shape, light.shape[-1])
-                sums.append(np.zeros(shape))
+                sums.append(np.zeros((self.levels[len(sums)].texels, light.shape[-1])))
             for places, weights in step.passes:
                 source = self._pass(source, places, weights, level)
             current = source
@@ -193,14 +154,11 @@ class _Chain:
     def _pass(
         self, picture: FloatArray, places: FloatArray, weights: FloatArray, level: int
     ) -> FloatArray:
-        out = np.zeros(picture.shape)
-        flat = out.reshape(-1, picture.shape[-1])
-        texture = self.textures[level]
-        given = np.ascontiguousarray(picture).reshape(flat.shape), places, weights, texture
-        blocks = itertools.pairwise(_edges(len(flat)))
+        out = np.empty(picture.shape)
+        given = picture, places, weights, self.levels[level].texture, self.divide
         jobs = [
-            self.pool.submit(compiled.gather, flat, *given, self.divide, first, last)
-            for first, last in blocks
+            self.pool.submit(compiled.gather, out, *given, begin, end)
+            for begin, end in itertools.pairwise(_edges(len(out)))
         ]
         for each in jobs:
             each.result()
@@ -208,23 +166,11 @@ class _Chain:
 
     def _enlarged(self, picture: FloatArray, fine: int) -> FloatArray:
         """Return a picture of half the size by bilinear fetches."""
-        height, width = self.levels[fine].cover.shape
-        rows, columns = np.indices((height, width))
-        places = np.stack((rows, columns), axis=-1).reshape(-1, 2) * 0.5 - 0.25
-        channels = picture.shape[-1]
-        out, share = np.zeros((height * width, channels)), np.zeros(height * width)
-        flat = np.ascontiguousarray(picture).reshape(-1, channels)
-        compiled.look_up(out, share, flat, self.textures[fine + 1], places)
-        return out.reshape(height, width, channels)
-
-
-def halved(light: FloatArray, cover: FloatArray) -> FloatArray:
-    """Return means of 2 x 2 texels by coverage; 0 where nothing is covered."""
-    four = four_texels(cover, "zero")[..., None]
-    whole = four.sum(axis=0)
-    sums = (four * four_texels(light, "zero")).sum(axis=0)
-    mean: FloatArray = np.divide(sums, whole, out=np.zeros_like(sums), where=whole > 0.0)
-    return mean
+        level, smaller = self.levels[fine], self.levels[fine + 1]
+        places = level.rows_columns * 0.5 - 0.25
+        out, share = np.empty((level.texels, picture.shape[-1])), np.empty(level.texels)
+        compiled.look_up(out, share, picture, smaller.texture, places, level.texture.charts)
+        return out
 
 
 def _edges(count: int) -> Iterator[int]:

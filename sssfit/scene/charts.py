@@ -1,0 +1,39 @@
+"""The charts of a mesh: pieces of its surface that are also pieces of its texture."""
+
+import numpy as np
+import numpy.typing as npt
+
+from sssfit.scene.mesh import Mesh
+
+IndexArray = npt.NDArray[np.int64]
+
+
+def charts_of(mesh: Mesh) -> IndexArray:
+    """Return the chart of each triangle (F,), from 0.
+
+    Triangles belong together that share an edge on the surface as well as in the texture, or whose
+    corners lie on the same three places of the texture (mirrored halves that share their texels).
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    count = len(mesh.faces)
+    corners = _numbers(np.concatenate((mesh.positions_mm, mesh.uv), axis=1))[mesh.faces]
+    low, high = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2).T
+    edges = _numbers((low * len(mesh.uv) + high)[:, None])
+    shapes = _numbers(np.sort(_numbers(mesh.uv)[mesh.faces], axis=1))
+    shared = count + np.concatenate((edges, edges.max() + 1 + shapes))
+    faces = np.concatenate((np.repeat(np.arange(count), 3), np.arange(count)))
+    nodes = int(shared.max()) + 1
+    graph = coo_array((np.ones(len(faces), dtype=bool), (faces, shared)), shape=(nodes, nodes))
+    _, charts = connected_components(graph, directed=False)
+    return np.asarray(charts[:count], dtype=np.int64)
+
+
+def _numbers(rows: npt.NDArray[np.generic]) -> IndexArray:
+    """Return a number for each row (N,), the same for the same row."""
+    numbers = np.zeros(len(rows), dtype=np.int64)
+    for column in rows.T:  # ten times as fast as whole rows
+        values, own = np.unique(column, return_inverse=True)
+        _, numbers = np.unique(numbers * len(values) + own, return_inverse=True)
+    return numbers
