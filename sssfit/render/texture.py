@@ -95,7 +95,7 @@ class TextureFrame:
     texels_lit, texels_convolved : int
         Whose irradiance was computed; and computed in all passes.
     seconds : dict
-        By stage: shadows, irradiance, convolution, picture.
+        By stage: shadows, irradiance, convolution, picture. The mesh's charts are no frame's work.
     """
 
     picture: FloatArray
@@ -158,8 +158,7 @@ def render_texture(
     channels = len(kernel.channels)
     picture = np.zeros((camera.height, camera.width, channels))
     lit, convolved, sizes = 0, 0, list[int]()
-    with _clock(seconds, "irradiance"):
-        charts = charts_of(mesh)
+    charts = charts_of(mesh)
     for k, offset in enumerate(offsets):
         size = _map_size(mesh, offset, camera, map_size) if savings.by_depth else map_size
         with _clock(seconds, "irradiance"):

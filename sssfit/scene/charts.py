@@ -1,13 +1,17 @@
 """The charts of a mesh: pieces of its surface that are also pieces of its texture."""
 
+import functools
+
 import numpy as np
 import numpy.typing as npt
 
+from sssfit.arrays import read_only
 from sssfit.scene.mesh import Mesh
 
 IndexArray = npt.NDArray[np.int64]
 
 
+@functools.lru_cache(maxsize=2)
 def charts_of(mesh: Mesh) -> IndexArray:
     """Return the chart of each triangle (F,), from 0.
 
@@ -27,7 +31,7 @@ def charts_of(mesh: Mesh) -> IndexArray:
     nodes = int(shared.max()) + 1
     graph = coo_array((np.ones(len(faces), dtype=bool), (faces, shared)), shape=(nodes, nodes))
     _, charts = connected_components(graph, directed=False)
-    return np.asarray(charts[:count], dtype=np.int64)
+    return read_only(charts[:count].astype(np.int64))
 
 
 def _numbers(rows: npt.NDArray[np.generic]) -> IndexArray:
