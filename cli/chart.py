@@ -103,8 +103,8 @@ def chart(file: str | None, common: Common, **given: Any) -> None:
         record = computed(found, kind, **{key: known[key] for key in drawn.takes})
         figures: dict[str, Any] = {} if view else {"kind": kind, "file": name}
         figures |= {"profile": source} if kind != "models" else {}
-        plain = {"material": made_of, "channels": found.channels}
-        figures |= record.to_dict() if drawn.page else plain
+        figures |= record.to_dict() if drawn.page else {}
+        figures |= {} if drawn.page else {"material": made_of, "channels": found.channels}
         text = imported(drawn.page)(figures) if drawn.page else ""
         write_chart(record, path)
     finish_one(common, path, figures, text, "a PNG")

@@ -229,7 +229,7 @@ def test_a_signal_during_imports_leaves_no_traceback(tmp_path, number, times):
         assert not list(tmp_path.glob("*.tmp"))
 
 
-@pytest.mark.parametrize("step", ["_keep_matplotlib_quiet", "_fail"])
+@pytest.mark.parametrize("step", ["_keep_matplotlib_quiet", "_refuse"])
 def test_a_signal_beside_what_the_verbs_catch_leaves_no_traceback(monkeypatch, capsys, step):
     """As in the instructions between the imports and the first verb, or while an error is told."""
 
