@@ -19,7 +19,8 @@ from sssfit.render.disk import averaged, turns
 from sssfit.render.screen_taps import render_screen_taps
 from sssfit.render.taps import reach_pixels, render_taps, response
 from sssfit.render.texture import render_texture
-from sssfit.render.texture_blur import Level, blur_texture
+from sssfit.render.texture_blur import blur_texture
+from sssfit.render.texture_level import Level
 from sssfit.scene.camera import Camera
 from sssfit.scene.made import make_scene
 from sssfit.scene.mesh import Mesh
@@ -244,7 +245,7 @@ def test_a_filter_over_time_starts_as_the_mean():
 
 
 def test_a_disk_is_refused_where_surfaces_are_not_flat():
-    flat, texture = np.ones((4, 5, 1)), Level(np.ones((4, 5)), np.ones((4, 5, 2)))
+    flat, texture = np.ones((4, 5, 1)), Level.of_map(np.ones((4, 5)), np.ones((4, 5, 2)))
     head = make_scene("head", height=8, width=8, mm_per_pixel=20.0)
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
     mesh = Mesh("triangle", corners, corners[:, :2], [[0, 1, 2]])
