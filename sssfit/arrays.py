@@ -81,14 +81,21 @@ def check_kinds(
 
 def _expected(setting: Setting, value: Any) -> str:
     """Return what was expected in place of a value of another kind, and nothing if it is one."""
-    if value is None or setting.kind in ("text", "flag"):
+    if value is None or setting.kind == "text":
         return ""
+    if setting.kind == "flag":
+        return "True or False" if isinstance(value, str) else ""
     if setting.kind == "choice":
-        return "" if isinstance(value, str) or callable(value) else " or ".join(setting.among)
+        is_one = isinstance(value, str) or callable(value)
+        return "" if is_one else f"one of {', '.join(setting.among)}"
     if setting.kind in ("numbers", "parts"):
-        return "a number, or one per channel" if isinstance(value, str) else ""
-    is_number = hasattr(value, "__float__") and not isinstance(value, bool)
-    return "" if is_number else f"a {'whole ' * (setting.kind in ('whole', 'count'))}number"
+        return "a number, or one per channel" if isinstance(value, str | bool) else ""
+    if isinstance(value, bool | np.bool_):
+        return "a number"
+    if setting.kind in ("whole", "count"):
+        is_number = isinstance(value, float) or hasattr(value, "__index__")
+        return "" if is_number else "a whole number"
+    return "" if isinstance(value, int | float | np.integer | np.floating) else "a number"
 
 
 def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:

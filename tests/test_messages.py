@@ -104,7 +104,6 @@ def test_arguments_become_options_where_the_command_line_prints_them(said, print
     [
         ("simulate", "give `tolerance = 0.005` or more", "give --tolerance 0.005 or more"),
         ("report", "give `tolerance = 0.005` or more", "give `sssfit simulate --tolerance 0.005`"),
-        ("choose", "give a larger `tolerance`", "give a larger --tolerance"),
         ("compare", "`method = montecarlo`", "`sssfit simulate --method montecarlo`"),  # fits only
         ("fit", "`method = cascade`", "--method cascade"),
         ("simulate", "give fewer `angles`", "give fewer --angles"),  # which chart has as a switch

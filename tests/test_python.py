@@ -240,7 +240,13 @@ def test_sizes_are_whole_numbers(name, wrong):
         ("fit", ("PROFILE", "artist", {"near_mm2": "a"}), "'a'; expected a number, or one per"),
         ("simulate", ("skin1", "exact", {"tolerance": "1%"}), "'1%'; expected a number"),
         ("simulate", ("skin1", "montecarlo", {"target_error": "1%"}), "expected a number"),
-        ("simulate", ("skin1", "burley", {"mapping": ["diffuse"]}), "expected perpendicular or"),
+        (
+            "simulate",
+            ("skin1", "burley", {"mapping": ["diffuse"]}),
+            "expected one of perpendicular,",
+        ),
+        ("simulate", ("skin1", "exact", {"similarity": "no"}), "'no'; expected True or False"),
+        ("simulate", ("skin1", "exact", {"tolerance": np.array([0.1, 0.2])}), "expected a number"),
     ],
 )
 def test_settings_of_other_methods_are_refused_in_one_line(room, given, words, profile, kernel):

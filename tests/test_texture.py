@@ -124,6 +124,16 @@ def test_a_chart_is_a_piece_of_the_surface_and_of_the_texture():
     assert charts_of(stacked).max() == 0  # two halves that share their texels
 
 
+@pytest.mark.parametrize("noise", [0.0, 1e-8])
+def test_an_edge_that_is_split_on_one_side_alone_is_no_border(noise):
+    # A square, cut at u = .5: one triangle's edge on the left, two on the right, no corner between.
+    uv = np.array([[0, 0.5], [0.5, 0], [0.5, 1], [0.5, 0], [0.5, 0.4], [0.5, 1], [1, 0.4]], float)
+    uv[3:6, 0] += noise
+    points = np.c_[100.0 * uv, np.zeros(7)]
+    mesh = Mesh("cut", points, uv, np.array([[0, 1, 2], [3, 6, 4], [4, 6, 5]]))
+    assert charts_of(mesh).tolist() == [0, 0, 0]
+
+
 @pytest.mark.parametrize("name", ["dense", "negative", "cascade", "taps"])
 def test_constant_light_stays_constant_on_any_chart(kernels, name):
     rng = np.random.default_rng(3)

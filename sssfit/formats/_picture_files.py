@@ -385,9 +385,11 @@ def note_on_names(names: tuple[str, ...]) -> tuple[str, ...]:
         found = _choice([spec], Path("the file"), None)
     except RenderError:
         return (f"channels {_listed(list(names))} are not read back; leave out the dots",)
-    if len(found.colours) == len(names):
-        return ()
-    read = f"{_listed([names[place] for place in found.colours])} alone"
+    colours = tuple(names[place] for place in found.colours)
+    others = {*names} - {*colours}
+    if not others or (colours in (("R", "G", "B"), ("Y",)) and others <= {"A", "Z"}):
+        return ()  # alpha and depth are what these names are for
+    read = f"{_listed(list(colours))} alone"
     if found.alpha is not None:
         read += f", with {names[found.alpha]} as alpha"
     return (f"channels {_listed(list(names))} are read back as {read}; give other names",)

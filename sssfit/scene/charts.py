@@ -9,24 +9,26 @@ from sssfit.arrays import read_only
 from sssfit.scene.mesh import Mesh
 
 IndexArray = npt.NDArray[np.int64]
+_DECIMALS = 6
 
 
 @functools.lru_cache(maxsize=2)
 def charts_of(mesh: Mesh) -> IndexArray:
     """Return the chart of each triangle (F,), from 0.
 
-    Triangles belong together that share an edge on the surface as well as in the texture, or whose
-    corners lie on the same three places of the texture (mirrored halves that share their texels).
+    Triangles belong together that share a corner on the surface as well as in the texture (an edge
+    that is split on one side alone has its ends in common), or whose corners lie on the same three
+    places of the texture (mirrored halves that share their texels). Corners are the same to a
+    millionth of the mesh and of the texture.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     count = len(mesh.faces)
-    corners = _numbers(np.concatenate((mesh.positions_mm, mesh.uv), axis=1))[mesh.faces]
-    low, high = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]], axis=2).reshape(-1, 2).T
-    edges = _numbers((low * len(mesh.uv) + high)[:, None])
-    shapes = _numbers(np.sort(_numbers(mesh.uv)[mesh.faces], axis=1))
-    shared = count + np.concatenate((edges, edges.max() + 1 + shapes))
+    points, uv = mesh.positions_mm / np.ptp(mesh.positions_mm), np.round(mesh.uv, _DECIMALS)
+    corners = _numbers(np.concatenate((np.round(points, _DECIMALS), uv), axis=1))[mesh.faces]
+    shapes = _numbers(np.sort(_numbers(uv)[mesh.faces], axis=1))
+    shared = count + np.concatenate((corners.ravel(), corners.max() + 1 + shapes))
     faces = np.concatenate((np.repeat(np.arange(count), 3), np.arange(count)))
     nodes = int(shared.max()) + 1
     graph = coo_array((np.ones(len(faces), dtype=bool), (faces, shared)), shape=(nodes, nodes))
