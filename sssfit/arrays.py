@@ -90,12 +90,12 @@ def _expected(setting: Setting, value: Any) -> str:
         return "" if is_one else f"one of {', '.join(setting.among)}"
     if setting.kind in ("numbers", "parts"):
         return "a number, or one per channel" if isinstance(value, str | bool) else ""
-    if isinstance(value, bool | np.bool_):
-        return "a number"
+    is_bool = isinstance(value, bool | np.bool_)
     if setting.kind in ("whole", "count"):
         is_number = isinstance(value, float) or hasattr(value, "__index__")
-        return "" if is_number else "a whole number"
-    return "" if isinstance(value, int | float | np.integer | np.floating) else "a number"
+        return "" if is_number and not is_bool else "a whole number"
+    is_number = isinstance(value, int | float | np.integer | np.floating)
+    return "" if is_number and not is_bool else "a number"
 
 
 def read_only(array: npt.NDArray[Any]) -> npt.NDArray[Any]:

@@ -110,11 +110,13 @@ def test_a_dark_chart_is_black_beside_a_lit_one(kernels, distance):
 
 
 def test_a_chart_is_a_piece_of_the_surface_and_of_the_texture():
-    assert charts_of(squares()).tolist() == [0, 0, 1, 1]  # they touch in the texture alone
+    one = squares()
+    assert charts_of(one).tolist() == [0, 0, 1, 1]  # they touch in the texture alone
     assert charts_of(squares(split=True)).tolist() == [0, 0, 1, 1]  # each triangle with its corners
     assert charts_of(cube()).tolist() == np.repeat(np.arange(6), 2).tolist()
+    away = Mesh("x", np.add(one.positions_mm, [0.0, 0.0, 1e9]), one.uv, one.faces)
+    assert charts_of(away).tolist() == [0, 0, 1, 1]
     assert charts_of(sphere()).max() == 0
-    one = squares()
     mirrored = Mesh(
         "x", one.positions_mm, np.concatenate((one.uv[:4], one.uv[[1, 0, 3, 2]])), one.faces
     )

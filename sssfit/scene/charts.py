@@ -25,7 +25,8 @@ def charts_of(mesh: Mesh) -> IndexArray:
     from scipy.sparse.csgraph import connected_components
 
     count = len(mesh.faces)
-    points, uv = mesh.positions_mm / np.ptp(mesh.positions_mm), np.round(mesh.uv, _DECIMALS)
+    size_mm = np.ptp(mesh.positions_mm, axis=0).max()
+    points, uv = mesh.positions_mm / size_mm, np.round(mesh.uv, _DECIMALS)
     corners = _numbers(np.concatenate((np.round(points, _DECIMALS), uv), axis=1))[mesh.faces]
     shapes = _numbers(np.sort(_numbers(uv)[mesh.faces], axis=1))
     shared = count + np.concatenate((corners.ravel(), corners.max() + 1 + shapes))
