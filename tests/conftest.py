@@ -10,9 +10,9 @@ have as many as a user's process.
 Each worker has a core, and so have its children: where a worker and another's threads took turns
 on a core, waiting for Python's lock cost a twentieth of the processor time.
 
-Freed memory stays with the process, as on the command line. What collecting the tests made is not
-looked through for garbage again and again: that took a third of the collection. Looking through the
-rest after every 700 new objects, as Python does, took a thirtieth of the tests.
+Freed memory stays with the process and garbage is looked for seldom, as on the command line. What
+collecting the tests made is not looked through again and again: that took a third of the
+collection.
 
 Files of the tests are not flushed to the disk: they need not survive a power failure, and waiting
 for thousands of flushes took as long as a sixtieth of the tests.
@@ -42,7 +42,6 @@ from threadpoolctl import threadpool_limits
 import sssfit._jit.compilation  # noqa: F401 (before numba compiles what is the tests' own)
 from sssfit.process import keep_memory
 
-_NEW_OBJECTS = 50_000  # before garbage is looked for
 SLOW_SECONDS = 4 * 3600.0  # the longest, a walk of 1e8 photons through layers, takes under one
 
 os.environ["PYTHONDONTWRITEBYTECODE"] = ""
@@ -118,7 +117,6 @@ def pytest_collection():
         return (yield)
     finally:
         gc.freeze()
-        gc.set_threshold(_NEW_OBJECTS, 10, 10)
         gc.enable()
 
 

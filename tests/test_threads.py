@@ -5,6 +5,7 @@ Told by what happens while something else is under way, never by how long it tak
 
 import contextlib
 import ctypes
+import gc
 import math
 import sys
 import threading
@@ -142,6 +143,16 @@ def test_freed_memory_stays_unless_the_environment_says_otherwise(monkeypatch, o
     monkeypatch.setattr(sys, "platform", "linux")
     process.keep_memory()
     assert len(asked) == calls
+
+
+def test_garbage_is_looked_for_seldom():
+    first, *_ = gc.get_threshold()
+    gc.set_threshold(700)
+    try:
+        process.keep_memory()
+        assert gc.get_threshold()[0] > 700
+    finally:
+        gc.set_threshold(first, 10, 10)
 
 
 def test_another_c_library_is_left_alone(monkeypatch):
