@@ -205,8 +205,8 @@ def test_the_readme_says_how_near_its_session_ends(session):
     assert f"95th percentile {near.delta_e_2000_p95:.3g}" in said
     words = " ".join(README.split())
     assert (
-        f"is {far.delta_e_2000_p95:.2g} without blur and {near.delta_e_2000_p95:.2g} with the "
-        "cascade's 23 texture fetches"
+        f"below {far.delta_e_2000_p95:.2g} without blur and below {near.delta_e_2000_p95:.2g} with "
+        "the cascade's 23 texture fetches"
     ) in words
 
 
