@@ -59,14 +59,14 @@ def cli(ctx: click.Context, version: bool, verbose: bool) -> None:
       sssfit simulate skin1 --method exact  the same without noise, in a second
       sssfit chart skin1.profile.npz        draw it: skin1.profile.png
       sssfit show skin1.profile.npz         its figures
-      sssfit fit --method svd --rank 3      fit a separable kernel to it
+      sssfit fit                            fit a cascade of 24 fetches to it
       sssfit render --irradiance head       see it on a lit head, with its error
       sssfit export --format hlsl           write it as shader source
       sssfit compare skin1                  error and cost of every kernel, and the causes
       sssfit report skin1                   one page with its kernels running in it
       sssfit choose skin1 --distance 0.6m   the cheapest kernel for a view
 
-    Lengths are mm unless written with a unit (3cm, 0.6m). Every verb explains itself with --help.
+    Lengths are mm unless written with a unit (3cm, 0.6m). Every verb has --help.
     """
     if version:
         from importlib.metadata import version as of  # read, not imported

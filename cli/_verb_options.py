@@ -228,8 +228,8 @@ REPORT = (
            "before it is scaled down.  [default: from your own file, else 0.3]"),
     option("--only", Names(FITS), "METHOD,...", "Only kernels by these fit methods, beside your "
            "own.  [default: those that are fitted in seconds]"),
-    option("--photons", Count(2, 10**12), "N", "Photons of the walk of models and budget.  "
-           "[default: 200000]"),
+    option("--photons", Count(2, 10**12), "N", "Photons for the models and the error "
+           "budget.  [default: 200000]"),
     *output("MATERIAL.html, materials.html with --all", "is not our page"),
 )
 SWEEP = (

@@ -32,7 +32,7 @@ _OF_CHARTS = {  # what options of single charts are for; {} are the flags of the
 }
 
 
-@click.command()
+@click.command(short_help="Draw a profile, kernel, table of taps, material or sweep.")
 @click.argument("file", required=False)
 @options(*(flag(f"--{name}", text) for name, text in _FLAGS.items()), *CHART, *_OUTPUT)
 @common_options

@@ -15,12 +15,12 @@ from ._output import KERNEL, PROFILE, finish, held, stem_of, target, write
 from ._verb_options import CHOOSE
 
 
-@click.command()
+@click.command(short_help="Find the cheapest table of taps for a view.")
 @click.argument("material")
 @options(*CHOOSE)
 @common_options
 def choose(material: str, common: Common, **given: Any) -> None:
-    """Choose the cheapest table of taps whose error the scene does not show, and save it.
+    """Choose the cheapest table of taps whose error is invisible in the scene.
 
     Cost is texture fetches a pixel. By default 95 % of the pixels must be within a Delta E of 1,
     about the smallest difference seen side by side. With --fetches alone it is the table with the

@@ -17,11 +17,14 @@ from ._output import finish, held, target, write, write_chart
 from ._progress import step_progress, walk_progress
 from ._verb_options import COMPARE
 
-_OF_BUDGETS = "budget_chart", "photons", "method", "rank", "terms", "model"
-_OF_KERNELS = ["table", "only", "error", "cost"]
+_USED_BY = {  # what reads an option, where not every --what does
+    **dict.fromkeys(("budget_chart", "photons", "method", "rank", "terms", "model"), "budget"),
+    **dict.fromkeys(("table", "only", "error", "cost"), "front or kernels"),
+    **dict.fromkeys(("pictures", "size", "layer", "mask"), "front, kernels, budget or presets"),
+}
 
 
-@click.command()
+@click.command(short_help="Compare kernels by error and cost; split an error by cause.")
 @click.argument("material", required=False)
 @options(*COMPARE)
 @common_options
@@ -41,8 +44,7 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
       sssfit compare skin1
       sssfit compare skin1 --chart skin1-pareto.png --table skin1.csv
       sssfit compare skin1 --what budget --method gaussians --budget-chart budget.png
-      sssfit compare skin1 --what front --cost passes --only svd,cascade
-      sssfit compare skin1 --picture head --size 1024x1024 --mm-per-pixel 0.15 --cost seconds
+      sssfit compare skin1 --picture head --mm-per-pixel 0.15 --cost seconds --only svd,cascade
       sssfit compare --all -o charts
       sssfit compare skin1 --what sheet --chart skin1-sheet.png
       sssfit compare skin1 --what presets --chart skin1-engines.png
@@ -61,9 +63,8 @@ def compare(context: click.Context, /, material: str | None, common: Common, **g
     asked = {k: given[k] for k in ("error", "only", "mm_per_pixel", "photons", "method", "model")}
     asked |= {"settings": own or None, "steps": step_progress, "walk": walk_progress, **run}
     front = {key: given[key] for key in ("error", "cost")}
-    files, wrote, failed = _files(material, given), set[str](), []
+    files, wrote, failed, parts = _files(material, given), set[str](), [], list[Any]()
     outputs = [target(each) for own in files.values() for each in own.values()]
-    parts: list[Any] = []
     with held(outputs, _is_ours, inputs=[material, *pictures], force=given["force"]):
         source = load_source(material) if material else None
         if source is not None and given["mm_per_pixel"] == "profile":
@@ -118,8 +119,7 @@ def _write(part: Any, files: Mapping[str, str], front: Mapping[str, str]) -> set
 
     chart = files.get("budget_chart" if isinstance(part, list) else "chart")
     if chart:
-        options = front if isinstance(part, Comparison) else {}
-        write_chart(part, target(chart), **options)
+        write_chart(part, target(chart), **(front if isinstance(part, Comparison) else {}))
     table = files.get("table")
     if table and isinstance(part, Comparison):
         write(table_text(part, Path(table).suffix.lower(), **front).encode(), Path(table))
@@ -139,10 +139,10 @@ def _check(material: str | None, given: Mapping[str, Any], names: Sequence[str])
         raise click.UsageError("the pictures of --all share their pixels; give a length in mm.")
     if given["output"] is not None and not several:
         raise click.UsageError("-o is the folder of --all; name files by --chart and --table.")
-    idle = list(_OF_BUDGETS) if several or what not in (None, "budget") else []
-    idle += _OF_KERNELS if what in ("budget", "presets", "sheet") else []
-    idle += {"budget": ["chart"], "sheet": ["pictures", "size", "layer", "mask"]}.get(what, [])
-    refuse(given, {k: "--what budget" if k in _OF_BUDGETS else "another --what" for k in idle})
+    if what == "budget" and given["chart"]:
+        raise click.UsageError("--chart draws no budget; name its file with --budget-chart.")
+    asked = "front" if several else what
+    refuse(given, {k: f"--what {v}" for k, v in _USED_BY.items() if asked and asked not in v})
     if what == "sheet" and not given["chart"]:
         raise click.UsageError("--what sheet is a picture; name its file with --chart.")
     if given["chart"] == given["budget_chart"] == "-":

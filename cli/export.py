@@ -17,7 +17,8 @@ from ._verb_options import EXPORT, EXPORT_OUTPUT
 
 
 @click.command(
-    epilog="\b\nFormats:\n" + lines_of(EXPORTS) + "\n\n\b\nPresets:\n" + lines_of(PRESETS)
+    epilog="\b\nFormats:\n" + lines_of(EXPORTS) + "\n\n\b\nPresets:\n" + lines_of(PRESETS),
+    short_help="Write shader source, tables or an engine's parameters.",
 )
 @click.argument("files", nargs=-1)
 @options(*EXPORT, method_options(EXPORTS), *EXPORT_OUTPUT)
@@ -35,9 +36,9 @@ def export(
     tables with the same stages share one source, and an index says which. The csv of a profile has
     the energy of each annulus and its standard error, against the annulus' outer edge r_mm (inf:
     beyond the grid), with every digit; `sssfit import` reads it back. It has no specular
-    reflectance, absorption and transmittance. Textures of lut are linear floats, in a PNG over the
-    largest value. --preset takes a material, its profile or a table of an engine's own taps, and
-    NAME=VALUE of what a user chooses; --list says which.
+    reflectance, absorption and transmittance. lut writes linear floats; a PNG is scaled to its
+    largest value. --preset takes a material, a profile or an engine's own taps, and NAME=VALUE
+    options; see --list.
 
     \b
       sssfit export --format hlsl

@@ -15,7 +15,7 @@ from ._output import KERNEL, finish, held, stem_of, target, write
 from ._verb_options import FIT_OUTPUT, FIT_PIXELS
 
 
-@click.command(epilog="\b\nMethods:\n" + lines_of(FITS))
+@click.command(epilog="\b\nMethods:\n" + lines_of(FITS), short_help="Fit a kernel to a profile.")
 @click.argument("profile", required=False)
 @options(*FIT_PIXELS, method_options(FITS), *FIT_OUTPUT)
 @common_options

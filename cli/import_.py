@@ -31,7 +31,7 @@ _OPTIONS = (
 # fmt: on
 
 
-@click.command("import")
+@click.command("import", short_help="Convert a table or MCML output to a profile.")
 @click.argument("files", nargs=-1, required=True, metavar="FILE...")
 @options(*_OPTIONS)
 @common_options

@@ -40,7 +40,7 @@ _OPTIONS = (
 # fmt: on
 
 
-@click.command()
+@click.command(short_help="List, show or make materials.")
 @click.argument("material", required=False)
 @options(*_OPTIONS)
 @common_options

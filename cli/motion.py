@@ -26,7 +26,7 @@ _OF_TABLES = {"table", "seeds", "chart", "force"}
 @options(*MOTION)
 @common_options
 def motion(material: str | None, common: Common, **given: Any) -> None:
-    """Render MATERIAL under light that changes, by adaptive sampling and by other renderers.
+    """Render MATERIAL under changing light by adaptive sampling.
 
     Every pixel takes the samples that its variance over the last frames asks for, 1 to 64. Light
     that flickers looks like noise and asks for many; control variates take it out of the variance.

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 _BEHIND_DEGREES = 170.0
 
 
-@click.command()
+@click.command(short_help="Render a picture by a kernel, with its error.")
 @click.argument("kernel", required=False)
 @options(*RENDER_PICTURE, method_options(MADE), *RENDER)
 @common_options

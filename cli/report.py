@@ -15,7 +15,7 @@ from ._verb_options import REPORT
 _OF_ONE = ("kernels", "irradiance", "mm_per_pixel", "only", "photons")
 
 
-@click.command()
+@click.command(short_help="Write one HTML page with kernels running in it.")
 @click.argument("material", required=False)
 @options(*REPORT)
 @common_options

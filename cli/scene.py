@@ -17,7 +17,7 @@ _OF_FRAMES = dict.fromkeys(("heads", "distance_units", "output", "bloom"), "a si
 _OF_FILES = ("bloom", "table", "chart", "output", "force")
 
 
-@click.command()
+@click.command(short_help="Render heads with diffusion in texture space.")
 @click.argument("kernel", required=False)
 @options(*SCENE)
 @common_options

@@ -17,7 +17,7 @@ _TITLES = {
 }
 
 
-@click.command()
+@click.command(short_help="Print what a file holds.")
 @click.argument("file", required=False)
 @common_options
 def show(file: str | None, common: Common) -> None:

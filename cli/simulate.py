@@ -55,7 +55,7 @@ _OPTIONS = (
 def simulate(
     context: click.Context, /, material: str | None, method: str, common: Common, **given: Any
 ) -> None:
-    """Compute the diffuse reflectance profile of MATERIAL and write it.
+    """Compute the diffuse reflectance profile of MATERIAL.
 
     MATERIAL is a name (`sssfit materials` lists them), a path to your own TOML, or - for stdin; or
     an MCML input file (.mci), which gives one profile per run, with the file's photons and grid

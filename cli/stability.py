@@ -22,7 +22,7 @@ from ._verb_options import STABILITY
 @options(*STABILITY)
 @common_options
 def stability(material: str | None, common: Common, **given: Any) -> None:
-    """Stress every method on MATERIAL until it breaks, and say where it is safe.
+    """Find where each fit of MATERIAL is safe, and where it breaks.
 
     Cascades and published methods are compared under one stress at a time, which grows step by
     step. A method is safe until its measure exceeds the limit, or has a range if places differ.

@@ -17,7 +17,7 @@ from ._progress import step_progress
 from ._verb_options import SWEEP
 
 
-@click.command()
+@click.command(short_help="Simulate all points of a plan.")
 @click.argument("plan")
 @options(*SWEEP)
 @common_options

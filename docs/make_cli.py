@@ -11,9 +11,9 @@ from pathlib import Path
 from sssfit.cli import cli
 
 _HEAD = """\
-# Command line
+# Verbs and options
 
-Made by `python docs/make_cli.py` from the program's own help; edit that, not this.
+<!-- Made by `python docs/make_cli.py` from the program's own help; edit that, not this. -->
 """
 
 

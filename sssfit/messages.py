@@ -62,7 +62,7 @@ def did_you_mean(word: str, known: Sequence[str]) -> str:
     """Return ``did you mean X? `` for the nearest known word, or nothing if none is near."""
     import difflib  # 5 ms that help does not need
 
-    near = difflib.get_close_matches(word.lower(), known, n=1)
+    near = difflib.get_close_matches(word.lower(), known, n=1, cutoff=0.65)
     return f"did you mean {near[0]}? " if near else ""
 
 

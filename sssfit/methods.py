@@ -241,7 +241,8 @@ SIMULATIONS: Mapping[str, Method] = {
             Setting(
                 "numerical_aperture",
                 "number",
-                "of a detector, which sees light within asin(NA / n_above) of the normal only.",
+                "aperture of a detector that sees only light within asin(NA / n_above) of the "
+                "normal.",
                 "NA",
             ),
             Setting(
@@ -572,7 +573,7 @@ _SOURCE = (
     Setting(
         "with_shader", "flag", "write the passes of a dense kernel too, up to 65 weights each."
     ),
-    Setting("dense", "flag", "write them with up to 513 weights a pass."),
+    Setting("dense", "flag", "write the passes of a dense kernel with up to 513 weights each."),
 )
 _OF_C = tuple(each for each in _SOURCE if each.name in ("prefix", "keep_energy", "half"))
 
@@ -634,7 +635,7 @@ EXPORTS: Mapping[str, Format] = {
             Setting(
                 "radius",
                 "length",
-                "how far a profile's table reaches [mm].",
+                "how far a profile's table reaches.",
                 "MM",
                 words="99.9 % of the light",
                 keyword="radius_mm",
@@ -642,7 +643,7 @@ EXPORTS: Mapping[str, Format] = {
             Setting(
                 "mm_per_pixel",
                 "length",
-                "pixel size of a profile's line or kernel [mm].",
+                "pixel size of a profile's line or kernel.",
                 "MM",
                 words="0.3",
             ),

@@ -1201,7 +1201,7 @@ def report(f: Figures) -> list[Any]:
 
 
 def _axes(f: Figures) -> str:
-    return " x ".join(f"{name} {count}" for name, count in f["axes"].items())
+    return " x ".join(f"{n} {plural(n, 'value')} of {name}" for name, n in f["axes"].items())
 
 
 def sweep(f: Figures) -> list[Any]:

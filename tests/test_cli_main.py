@@ -101,6 +101,13 @@ def test_every_verb_explains_itself(name, run):
         assert err == ""
 
 
+def test_the_list_of_verbs_cuts_no_sentence():
+    context = click.Context(cli, info_name="sssfit", terminal_width=80)
+    lines = cli.get_help(context).partition("Commands:\n")[2].splitlines()
+    assert [each.split()[0] for each in lines] == sorted(cli.commands)
+    assert [each for each in lines if each.endswith("...") or not each.endswith(".")] == []
+
+
 def test_version(run):
     assert run("--version") == (0, f"sssfit {sssfit.__version__}\n", "")
 

@@ -290,12 +290,12 @@ BAD = {
     # keys
     "missing eta": (skin("eta = 1.3\n", ""), "eta is missing", "to_toml()` gives an example"),
     "missing g": (skin("g = 0.0\n", ""), "g is missing", "add g = 0.0"),
-    "unknown": ("etta = 1\n" + SKIN, "etta = 1 is not a key", "did you mean eta?"),
-    "unknown far": ("zzz = 1\n" + SKIN, "zzz = 1 is not a key", "known keys: name, source"),
-    "unknown odd": ('"a\\u0000 b" = 1\n' + SKIN, "'a\\x00 b' = 1 is not", "known keys"),
+    "unknown": ("etta = 1\n" + SKIN, "etta = 1: etta is not a key of a", "did you mean eta?"),
+    "unknown far": ("zzz = 1\n" + SKIN, "zzz = 1: zzz is not a key", "known keys: name, source"),
+    "unknown odd": ('"a\\u0000 b" = 1\n' + SKIN, "'a\\x00 b' = 1: ", "known keys"),
     "per cm": (
         skin("sigma_a_per_mm", "sigma_a_per_cm"),
-        "sigma_a_per_cm = [0.032, 0.17, 0.48] ",
+        "sigma_a_per_cm = [0.032, 0.17, 0.48]: sigma_a_per_cm is not a key",
         "rename it sigma_a_per_mm and divide its values by 10.",
     ),
     "no unit": (
@@ -316,9 +316,9 @@ BAD = {
         "mu_s_prime_per_cm = ",
         "give it as sigma_s_per_mm with g = 0 and divide its values by 10.",
     ),
-    "thickness_cm": (SKIN + "thickness_cm = 1", "thickness_cm = 1 ", "multiply it by 10"),
-    "ior": (skin("eta", "ior"), "ior = 1.3 ", "call it eta"),
-    "albedo": (SKIN + "albedo = 0.9", "albedo = 0.9 ", "(1 - albedo) sigma_t"),
+    "thickness_cm": (SKIN + "thickness_cm = 1", "thickness_cm = 1: ", "multiply it by 10"),
+    "ior": (skin("eta", "ior"), "ior = 1.3: ", "call it eta"),
+    "albedo": (SKIN + "albedo = 0.9", "albedo = 0.9: ", "(1 - albedo) sigma_t"),
     # layers
     "both": (SKIN + GROUND, "eta and [[layers]] are both given", "leave [[layers]] out"),
     "dotted deep": ("a" + ".a" * 3000 + " = 1\n" + SKIN, "a = tables nested", "known keys"),
@@ -327,7 +327,7 @@ BAD = {
     "layers of numbers": ("layers = [1]", "layers[0] = 1 is not a table", "under [[layers]]"),
     "layer missing": ("[[layers]]\neta = 1.3", "layers[0].g is missing", "add g = 0.0"),
     "layer value": (GLASS + GROUND.replace("0.48", "-1"), "layers[1].sigma_a_per_mm[2] = -1 ", "0"),
-    "layer unknown": (GLASS + "colour = 3\n" + GROUND, "layers[0].colour = 3 ", "known keys: eta"),
+    "layer unknown": (GLASS + "colour = 3\n" + GROUND, "layers[0].colour = 3: ", "known keys: eta"),
     "layer of another length": (
         GLASS.replace("[0, 0, 0]", "[0, 0]") + GROUND,
         "channels is missing",
@@ -340,8 +340,13 @@ BAD = {
     ),
     "head key in a layer": (
         GLASS + GROUND + "eta_below = 1.5",
-        "layers[1].eta_below = 1.5 is not a key of a material layer",
+        "layers[1].eta_below = 1.5: eta_below is not a key of a material layer",
         "above the first [[layers]]",
+    ),
+    "name of a layer": (
+        GLASS + 'name = "coat"\n' + GROUND,
+        "layers[0].name = 'coat': name is not a key of a material layer",
+        "leave it out, since layers have no names",
     ),
     "infinite on top": (GROUND + GROUND, "layers[0].thickness_mm is missing", "only the last"),
     "only clear": (GLASS + GLASS, "sigma_a_per_mm[0] + sigma_s_per_mm[0] = 0 in every", "needs"),

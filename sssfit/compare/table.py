@@ -274,7 +274,7 @@ def sheet_text(figures: Mapping[str, Any]) -> str:
         [
             each["label"],
             str(each["passes"] or "-"),
-            *(f"{value:.3g}" for value in each["delta_e_2000_mean"]),
+            *(f"{value:#.3g}".rstrip(".") for value in each["delta_e_2000_mean"]),
         ]
         for each in figures["rows"]
     ]

@@ -208,13 +208,17 @@ def _check_keys(table: Mapping[str, object], known: Sequence[str], where: str) -
         if key not in known:
             name = key if re.fullmatch(r"[\w'-]{1,60}", key, re.ASCII) else shown(key)
             raise MaterialError(
-                f"{where}{name} = {shown(table[key])} is not a key of a material"
+                f"{where}{name} = {shown(table[key])}: {name} is not a key of a material"
                 f"{' layer' if where else ''}; {_remedy(key, known)}."
             )
 
 
 def _remedy(key: str, known: Sequence[str]) -> str:
     """Return what to write in place of an unknown key."""
+    if key == "name":
+        return (
+            "leave it out, since layers have no names; a material's is above the first [[layers]]"
+        )
     if key in HEAD_KEYS:
         return "it belongs at the top level, above the first [[layers]]"
     if match := re.fullmatch(_COEFFICIENT, key, re.IGNORECASE):

@@ -88,9 +88,8 @@ class Estimate:
     def text(self) -> str:
         """Return the printed report."""
         figures = self.to_dict()
-        shape = " x ".join(f"{name} {count}" for name, count in figures["axes"].items())
         lines = [
-            "{material} by {method}: {points:#point} (" + shape + ")",
+            "{material} by {method}: {points:#point} (" + self.plan.shape_in_words + ")",
             "{annuli:#annulus} of {dr_mm:.4g} mm, " + f"{figures['bytes'] / 1e6:.3g} MB",
             *(["{photons:.3g} photons"] if figures["photons"] else []),
             "about {seconds:.3g} s on {workers:#worker}: {start_seconds:.2g} s to start, "

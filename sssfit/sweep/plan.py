@@ -30,7 +30,7 @@ from typing import Any
 from sssfit.errors import MaterialError, PlanError, SimulationError
 from sssfit.grid import RadialGrid, make_grid
 from sssfit.material import Material
-from sssfit.messages import shown
+from sssfit.messages import counted, shown
 from sssfit.simulate._finished import end_condition
 from sssfit.simulate.montecarlo import check_media
 from sssfit.sweep.axes import Axis
@@ -138,6 +138,13 @@ class Plan:
     def shape(self) -> tuple[int, ...]:
         """Number of values of each axis."""
         return tuple(len(each.values) for each in self.axes)
+
+    @property
+    def shape_in_words(self) -> str:
+        """The shape with the axes' names: "3 values of eta x 2 values of g"."""
+        return " x ".join(
+            f"{counted(len(each.values), 'value')} of {each.name}" for each in self.axes
+        )
 
     @property
     def count(self) -> int:

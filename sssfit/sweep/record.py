@@ -69,10 +69,11 @@ class SweepResults:
     def text(self) -> str:
         """Return the printed report."""
         figures = self.to_dict()
-        shape = " x ".join(f"{name} {count}" for name, count in figures["axes"].items())
         line = (
             f"{self.plan.base.name} by {self.plan.method}: "
-            "{points:#point} (" + shape + "), {computed} computed, {finished_before} before"
+            "{points:#point} ("
+            + self.plan.shape_in_words
+            + "), {computed} computed, {finished_before} before"
         )
         grid = "{annuli:#annulus} of {dr_mm:.4g} mm, {seconds:.1f} s"
         return "\n".join([filled(line, figures), filled(grid, figures)])
