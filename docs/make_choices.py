@@ -14,10 +14,10 @@ from sssfit.scene.made import make_scene
 DISTANCES_M = (0.3, 0.6, 1.5, 5.0, 20.0)
 # What is asked for, with the head of its column.
 ASKED = {
-    "within 1": {"tolerance": 1.0},
-    "within 0.3": {"tolerance": 0.3},
-    "mean within 1": {"tolerance": 1.0, "tolerance_of": "mean"},
-    "within 1 in 4 passes": {"tolerance": 1.0, "passes": 4},
+    "p95 ≤ 1": {"tolerance": 1.0},
+    "p95 ≤ 0.3": {"tolerance": 0.3},
+    "mean ≤ 1": {"tolerance": 1.0, "tolerance_of": "mean"},
+    "p95 ≤ 1, at most 4 passes": {"tolerance": 1.0, "passes": 4},
 }
 MATERIALS = ("skin1", "marble", "ketchup")
 BUDGETS = ("skin1", "wholemilk", "ketchup")
@@ -26,20 +26,20 @@ TEXT = """## No more than the scene needs
 
 `sssfit choose skin1 --distance 0.6m --fov 30 --resolution 1920x1080` finds the table of taps with
 the fewest fetches for which 95 % of the head's pixels stay within a Delta E of 1. Its choices at 30
-degrees and 1080 rows, with fetches a pixel and the 95th percentile of Delta E; the last columns are
-what `--tolerance-of mean` and `--passes 4` would choose:
+degrees and 1080 rows, with fetches a pixel and the 95th percentile of Delta E (p95); the last
+columns are what `--tolerance-of mean` and `--passes 4` would choose:
 
 {choices}
 
 Distance hardly matters for what a cascade costs, since fetches grow with the logarithm of the
-kernel's width: 11 to 16 are enough from .3 m on, and beyond some metres fewer, or none. `choose`
+kernel's width: 11 to 16 are enough from 0.3 m on, and beyond some metres fewer, or none. `choose`
 also prints what the next cheaper and the next dearer table would give, and how few photons would
 have been enough.
 
 ## Where the error comes from
 
 `sssfit compare wholemilk --what budget` splits a kernel's error by cause (here 1e6 photons, the
-paper's grid, `svd --rank 3`, half floats; head of 512 x 512 pixels of .3 mm). Mean Delta E,
+paper's grid, `svd --rank 3`, half floats; head of 512 x 512 pixels of 0.3 mm). Mean Delta E,
 relative L2 in percent; causes in brackets are not part of this kernel:
 
 {budgets}

@@ -32,7 +32,7 @@ TEXT = """## Cost compared with the papers
 {samples}
 
 Six times the passes take {pass_ratio:.1f} times as long here, and 2.3 to 2.9 times as long in the
-report. Its figures include a fixed part, given as .1 ms for two passes and .71 ms for six
+report. Its figures include a fixed part, given as 0.1 ms for two passes and 0.71 ms for six
 Gaussians where nothing scatters, and it does not say how many samples each Gaussian has. From 9
 to 33 weights, 3.7 times as many, the time grows {sample_ratio:.1f} times here and 3.1 times in
 the report. Here a pass has a high cost at any number of weights, so fewer terms save more than

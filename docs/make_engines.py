@@ -43,7 +43,8 @@ def overview():
     for name in PRESETS:
         each = preset(name)
         back = "material" if each.material else "taps, profile" if each.of_taps else "profile"
-        rows.append((f"`{name}`", each.engine, each.model, each.ending, back, each.lost))
+        engine = each.engine.partition(",")[0].partition(" (")[0]  # the rest heads its walk
+        rows.append((f"`{name}`", engine, each.model, each.ending, back, each.lost))
     return table(("preset", "engine", "model", "text", "inverse", "lost"), rows)
 
 

@@ -15,7 +15,7 @@ SINGLE = (
 )
 CASCADES = ("1-1-2-2", "1-1x-2-2x", "1-1|2-2|2-2", "1-1x|2-2x|2-2x")
 
-TEXT = """skin1, exact profile, .3 mm: the squared misfit that is minimised, of red, and the mean
+TEXT = """skin1, exact profile, 0.3 mm: the squared misfit that is minimised, of red, and the mean
 over the eight pictures of the 99th percentile of Delta E. An x marks a stage along the diagonals:
 
 | kernel | structure | fetches | passes | misfit of red | mean of p99 |

@@ -49,7 +49,7 @@ TEXT = """## Samples and bands
 
 Figure 5 of RR-02-12 shows a face with 9, 17 and 33 samples a pass, figure S.6 of Jimenez et al.
 (2015) an extreme close-up with 13 and 65: with few samples, harsh light leaves bands. Here is skin1
-on the nose, 320 x 320 pixels of .1 mm, lit from the side. The samples of the pre-integrated pass
+on the nose, 320 x 320 pixels of 0.1 mm, lit from the side. The samples of the pre-integrated pass
 lie at quadratic distances, as in the report, or by importance (equal shares of the cube root of the
 weights), as in the supplement:
 

@@ -50,8 +50,8 @@ with the same rule, conv(A E) / conv(A) times the energy:
 ![The true kernel and a cascade at the outline of an ear](skin1-outline.png)
 
 **Tilted surfaces.** A plane tilted by 60 degrees about the vertical, seen from afar, so that a
-pixel covers .3 x .6 mm of it, compared with the true kernel on the surface, with depth differences
-weighted by the Gaussian factor and with depth ignored:
+pixel covers 0.3 x 0.6 mm of it, compared with the true kernel on the surface, with depth
+differences weighted by the Gaussian factor and with depth ignored:
 
 | kernel | picture | facing the eye | 60 degrees | 60 degrees, not followed |
 |---|---|---|---|---|

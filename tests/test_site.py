@@ -31,6 +31,30 @@ def test_the_navigation_has_every_page_once():
     assert sorted(re.findall(r"^ .*: ([\w/-]+\.md)$", CONFIG, re.MULTILINE)) == PAGES
 
 
+def pages_between(start, end):
+    """Titles of the navigation from one of its lines to another, by page."""
+    lines = CONFIG.partition(f"  - {start}")[2].partition(f"  - {end}")[0]
+    found = re.findall(r"(?:- |^)([^-\n]+): ([\w-]+\.md)$", lines, re.MULTILINE)
+    return {page: title.strip() for title, page in found}
+
+
+def test_pages_have_the_titles_of_the_navigation():
+    pages = pages_between("Home", "Python:")
+    assert len(pages) > 20
+    for page, title in pages.items():
+        if page != "index.md":
+            text = (DOCS / page).read_text(encoding="utf-8")
+            heading = re.search(r"^# (.+)$", text, re.MULTILINE)[1]
+            assert heading.partition(":")[0] == title, page
+
+
+def test_readme_and_index_link_every_guide():
+    for path, folder in ((ROOT / "README.md", "docs/"), (DOCS / "index.md", "")):
+        text = path.read_text(encoding="utf-8")
+        guides = pages_between("Guide:", "Reference:")
+        assert [page for page in guides if f"]({folder}{page})" not in text] == []
+
+
 @pytest.mark.parametrize("module", sorted(modules_on_pages()))
 def test_modules_on_pages_are_there(module):
     assert importlib.import_module(module).__doc__
