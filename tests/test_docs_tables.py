@@ -212,6 +212,22 @@ def test_readme_quotes_its_pages():
     assert [row[1].split(", ") for row in rows] == expected
 
 
+def test_pages_say_which_seconds_they_quote():
+    """Of the step alone and of the whole command, as the benchmarks have them."""
+    (exact,) = rows_named("benchmarks-exact.md", "exact, tolerance 0.0001")
+    (solver,) = rows_named("benchmarks-exact.md", "`sssfit simulate skin1 --method exact`")[1:]
+    (walk,) = rows_named("benchmarks.md", "`sssfit simulate skin1 --photons 10000000`")
+    rates, threads = rows_named("benchmarks.md", "skin1")[:2]
+    million = f"{float(rates[2].replace(',', '')) / 1e6:.1f} million photons a second"
+    for page, words in (
+        ("README.md", f"whole commands take {walk[1]} s for the walk and {solver[1]} s for"),
+        ("docs/how-to-choose.md", f"1e7 photons take {threads[2]} s on two cores"),
+        ("docs/how-to-choose.md", f"and the exact method {exact[1]} s"),
+        ("docs/simulate.md", f"{million} on one core, and {exact[1]} s"),
+    ):
+        assert words in " ".join((ROOT / page).read_text("utf-8").split()), page
+
+
 def test_names_are_in_the_program():
     code = "\n".join(
         path.read_text(encoding="utf-8")
