@@ -461,6 +461,31 @@ def test_bad_settings_are_one_line(skin1, settings, said):
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(("pitch", "kept"), [(0.3, 0.9999), (0.1, 0.9999), (0.02, 0.999)])
+def test_the_target_keeps_the_light_on_pixels_of_any_size(skin1, pitch, kept):
+    """Cut off at 320 pixels of .02 mm a table was 8.8 off on an edge; it is .26 now."""
+    target, _ = cascade.whole_target(skin1, pitch, None)
+    reach = np.array([target.mm_per_pixel * (target.half_pixels + 1)])
+    assert (skin1.cumulative_at(reach)[0] >= kept * skin1.total_on_grid).all()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("pitch", [0.02, 0.04])
+def test_close_ups_are_as_near(skin1, pitch):
+    """Of 512 x 512 pixels near an edge; 8.8 and 4.1 where the target ended at 320 pixels."""
+    scene = make_scene("edge", height=512, width=512, mm_per_pixel=pitch)
+    taps = fit(skin1, "cascade", mm_per_pixel=pitch)
+    shown = measure(render_taps(scene, taps), render_reference(scene, skin1))
+    assert shown.delta_e_2000_p99 < 0.5
+
+
+@pytest.mark.parametrize("method", ["cascade", "gaussian-chain", "pyramid", "rotated"])
+def test_pixels_wider_than_the_kernel_are_one_line(method):
+    narrow = one_over_r_profile(20, 0.05, (0.1,))
+    with pytest.raises(FitError, match=r"a pixel of 5 mm is wider than the support of .* mm"):
+        fit(narrow, method, mm_per_pixel=5.0)
+
+
 def test_unknown_methods_are_named(skin1):
     with pytest.raises(FitError, match="method = 'svd'; expected one of cascade"):
         fit_taps(skin1, "svd")

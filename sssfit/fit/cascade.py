@@ -18,6 +18,7 @@ images are weighed in (``_chain_pairs``), which makes pictures better and light 
 
 import time
 from collections.abc import Mapping, Sequence
+from numbers import Real
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +31,7 @@ from sssfit.fit._chain_pairs import PairChain
 from sssfit.fit._chain_stars import StarChain
 from sssfit.fit._result import TapsFit, provenance
 from sssfit.fit._spectrum import Pictures, pictures_of, recorded, search_targets
-from sssfit.fit._target import Pitch, Target, make_target, pitch_of
+from sssfit.fit._target import Pitch, Target, make_target, pitch_of, support_of
 from sssfit.fit._tied_chain import one_shape
 from sssfit.fit.structures import best_structure, width_pixels
 from sssfit.kernel.structure import Shape, cost_of_chain, parse, text_of
@@ -171,8 +172,20 @@ def _near(like: object, shapes: Sequence[Shape], target: Target, lit: list[int])
 def whole_target(
     profile: Profile, mm_per_pixel: Pitch | None, support_mm: float | None
 ) -> tuple[Target, list[int]]:
-    """Return the pixels that hold nearly all light unless a support is given, and lit channels."""
+    """Return the pixels that hold nearly all light unless a support is given, and lit channels.
+
+    Raises
+    ------
+    FitError
+        As `make_target`; or a pixel is wider than the support, where it warns.
+    """
     support_mm = _reach_mm(profile, mm_per_pixel) if support_mm is None else support_mm
+    pitch = pitch_of(profile, mm_per_pixel)
+    if isinstance(support_mm, Real) and 0.0 < support_mm < (1.0 - 1e-9) * pitch:
+        raise FitError(
+            f"a pixel of {pitch:g} mm is wider than the support of {support_mm:.4g} mm, which "
+            "leaves nothing to blur; use a smaller `mm_per_pixel`."
+        )
     target = make_target(profile, mm_per_pixel, support_mm)
     return target, lit_channels(target)
 
@@ -183,14 +196,16 @@ def lit_channels(target: Target) -> list[int]:
 
 
 def _reach_mm(profile: Profile, mm_per_pixel: Pitch | None) -> float:
-    """Return the radius of 99.99 % of every channel's energy on the grid, at most 320 pixels [mm].
+    """Return the radius of 99.99 % of every channel's energy on the grid [mm].
 
-    With 99.9 %, the usual support, skin1's cascade has 1.4 times the Delta E.
+    With 99.9 %, the usual support, skin1's cascade has 1.4 times the Delta E at .3 mm. Where the
+    rest would go beyond 320 pixels it is left out, down to the usual support.
     """
     cumulative = profile.cumulative
     kept = (cumulative >= _KEPT * cumulative[-1]).all(axis=1)
     reach_mm = float(profile.r_edges_mm[int(np.argmax(kept))])
-    return min(reach_mm, _MOST_PIXELS * pitch_of(profile, mm_per_pixel))
+    most_mm = max(_MOST_PIXELS * pitch_of(profile, mm_per_pixel), support_of(profile))
+    return min(reach_mm, most_mm)
 
 
 def structure_for(
