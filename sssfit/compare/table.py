@@ -76,8 +76,11 @@ def fronts_text(done: Sequence[Comparison], error: str, cost: str) -> str:
 
 
 def left_out_lines(comparison: Comparison) -> list[str]:
-    """Say which candidates could not be fitted, and why."""
-    return [f"Left out {label}: {reason}" for label, reason in comparison.left_out]
+    """Say which candidates could not be fitted, and why; a reason once."""
+    labels = dict[str, list[str]]()
+    for label, reason in comparison.left_out:
+        labels.setdefault(reason, []).append(label)
+    return [f"Left out {', '.join(those)}: {reason}" for reason, those in labels.items()]
 
 
 def verdict_lines(comparison: Comparison, error: str, cost: str) -> list[str]:

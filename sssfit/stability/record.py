@@ -38,9 +38,12 @@ class Stability:
         }
 
     def table(self) -> str:
-        """Return the Markdown table "method x stress: safe up to, fails by, what to do"."""
+        """Return the Markdown table: of which quantity each method is safe, and what to do."""
         rows = [
-            [f"{panel.stress}: {panel.title}", f.label, f.words, panel.fails, f.advice]
+            [
+                *(f"{panel.stress}: {panel.title}", panel.axis.label),
+                *(f.label, f.words, panel.fails, f.advice),
+            ]
             for panel in self.panels
             for f in panel.findings()
         ]
@@ -60,4 +63,4 @@ class Stability:
 
 
 MARK = "<!-- sssfit.stability/1 -->"
-HEADS = ("stress", "method", "safe", "fails by", "what to do")
+HEADS = ("stress", "quantity", "method", "safe", "fails by", "what to do")
