@@ -173,7 +173,7 @@ def _call(each, dialect, prefix, words, jitter, mm):
     """The call of a pass's function, with these words for its numbers."""
     sampler = [] if dialect == "glsl" else ["bilinear"]
     arguments = [*(f"t{k}" for k in range(len(each.pictures))), *sampler, "position", "texel"]
-    if each.name in ("Blur", "Star") or (each.depths and each.name == "Halve"):
+    if each.takes_stage:
         first = [words["stage"], *([words["axis"]] if each.axis else [])]
         arguments = [*first, *arguments]
     if each.kind not in ("halve", "sum"):

@@ -252,6 +252,26 @@ def test_passes_with_depth_read_what_was_written(name, taps):
     assert f"{fetches_of(pass_list(taps, depth=True)):.6g} fetches a pixel with those of" in text
 
 
+@pytest.mark.parametrize("depth", [False, True])
+@pytest.mark.parametrize(("name", "taps"), FOLLOWED)
+def test_the_list_names_the_stage_of_every_function_that_takes_one(name, taps, depth):
+    text, _ = kernel_text(taps, "hlsl", depth=depth)
+    taking = set(re.findall(r"(SSS_\w+)\(uint stage", text)) - {"SSS_Near", "SSS_Larger"}
+    rows = re.findall(r"^// (SSS_\w+)(?:\((\d+).*?\))? {2}.* 1(?:/(\d+))? ", text, re.MULTILINE)
+    assert {call for call, stage, _ in rows if stage} == taking, name
+    for call, stage, size in rows:
+        if call == "SSS_Halve" and depth:
+            sizes = [2**each.level for each in taps.stages]
+            assert sizes.index(int(size)) == int(stage), name
+
+
+def test_the_comment_says_what_fetching_depth_needs():
+    taps = FOLLOWED[2][1]
+    for dialect, needed in {"wgsl": "float32-filterable", "glsl": "OES_texture_float_lin"}.items():
+        assert needed in kernel_text(taps, dialect, depth=True)[0]
+        assert needed not in kernel_text(taps, dialect)[0]
+
+
 @pytest.mark.parametrize("dialect", RUN)
 def test_the_switch_of_depth_is_in_no_source_that_did_not_ask(dialect):
     for _, taps in TABLES:

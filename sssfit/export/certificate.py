@@ -110,8 +110,9 @@ def columns(rows: Sequence[Sequence[str]], least: Sequence[int]) -> Iterator[str
 def _of_depth(passes: Sequence[Pass]) -> Iterator[str]:
     """Yield what passes that follow depth read besides light."""
     yield "of a surface at depth 1 mm, 2 tan(vertical fov / 2) / rows, over a pixel's own scale."
-    yield "D0 holds coverage times depth in mm in its first channel, in 32 bits; where the coverage"
-    yield f"is 0 nothing is read. {fetches_of(passes):.6g} fetches a pixel with those of depth."
+    yield "D0, D1, ... hold coverage times depth in mm in their first channel, in 32 bits; where"
+    total = f"{fetches_of(passes):.6g} fetches a pixel with those of depth."
+    yield f"coverage is 0 nothing is read. {total}"
 
 
 def how_to_run(taps: Taps) -> Iterator[str]:

@@ -61,6 +61,8 @@ class Dialect:
         Patterns of lines that differ in another language or engine, and what these lines are.
     versions, compute_versions : str
         The first versions that compile passes and compute shaders, where a file must name them.
+    deep : str
+        What a device must have to fetch from pictures of 32 bits, where it may lack it.
     """
 
     name: str
@@ -85,6 +87,7 @@ class Dialect:
     remarks: tuple[tuple[str, str], ...] = ()
     versions: str = ""
     compute_versions: str = ""
+    deep: str = ""
 
     @property
     def has_passes(self) -> bool:
@@ -168,6 +171,8 @@ GLSL = replace(
     ),
     versions="130 or 300 es",
     compute_versions="430 or 310 es",
+    deep="In WebGL 2 and OpenGL ES fetching from D0, D1, ... needs OES_texture_float_linear, and "
+    "writing them EXT_color_buffer_float.",
 )
 WGSL = Dialect(
     "wgsl",
@@ -192,6 +197,7 @@ WGSL = Dialect(
     struct="struct {name} {{ term: array<{kind}, {count}> }}",
     variable_of="var {name}: {kind}",
     shared="var<workgroup> {name}: array<f32, {count}>;",
+    deep="Fetching from D0, D1, ... needs a device with the feature float32-filterable.",
     barrier="workgroupBarrier()",
     has_defines=False,
     remarks=(

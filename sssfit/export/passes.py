@@ -80,9 +80,14 @@ class Pass:
         return {"halve": "Halve", "star": "Star"}.get(self.kind, "Blur")
 
     @property
+    def takes_stage(self) -> bool:
+        """Whether its function is told the stage; a change of size is where it follows depth."""
+        return not self.is_own and (self.kind != "halve" or bool(self.depths))
+
+    @property
     def call(self) -> str:
         """Its function with the stage and the direction."""
-        if self.is_own or self.kind == "halve":
+        if not self.takes_stage:
             return self.name
         along = {None: "", (1.0, 0.0): ", x", (0.0, 1.0): ", y"}
         return f"{self.name}({self.stages[0]}{along.get(self.axis, self._turned())})"

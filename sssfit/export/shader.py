@@ -90,7 +90,7 @@ def source(tables: Sequence[Taps], dialect: Dialect, style: Style) -> str:
     words = [line for each in tables for line in certificate(each)]
     words += _table(tables, style) if passes else how_to_run(tables[0])
     words += list(_notes(tables, style, passes=passes))
-    words += list(_versions(dialect, style)) if passes else []
+    words += list(_needs(dialect, style)) if passes else []
     lines = [dialect.mark, *(commented(each) for each in words)]
     lines += _defines(dialect, style) if passes else []
     lines += _constants(tables, dialect, style, passes=passes)
@@ -159,11 +159,13 @@ def _notes(tables: Sequence[Taps], style: Style, *, passes: bool) -> Iterator[st
         yield "Half floats between the passes cost nothing that is seen. Linear light throughout."
 
 
-def _versions(dialect: Dialect, style: Style) -> Iterator[str]:
-    """Yield which version of the language a program must name, if it must."""
+def _needs(dialect: Dialect, style: Style) -> Iterator[str]:
+    """Yield what a program must name or ask for: a version of the language, or of the device."""
     first = dialect.compute_versions if style.compute else dialect.versions
     if first:
         yield f"Needs GLSL version {first} or later; the directive is left to the program."
+    if dialect.deep and style.has("DEPTH"):
+        yield dialect.deep
 
 
 def _check(tables: Sequence[Taps], style: Style) -> None:

@@ -102,7 +102,7 @@ def _planned(each: Pass, *, jitter: bool) -> dict[str, Any]:
     """Return one pass."""
     words = [f"t{k}" for k in range(len(each.pictures))]
     words += ["position", "texel"]
-    if each.name in ("Blur", "Star"):
+    if each.takes_stage:
         axis = [] if each.axis is None else [f"vec2({each.axis[0]!r}, {each.axis[1]!r})"]
         words = [f"{each.stages[0]}u", *axis, *words]
     words += ["mm"] if each.kind not in ("halve", "sum") else []
