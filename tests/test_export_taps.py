@@ -22,6 +22,7 @@ from sssfit.export.certificate import SERVES
 from sssfit.export.passes import pass_list
 from sssfit.kernel import Stage, Taps
 from sssfit.messages import by_channel
+from sssfit.methods import FITS
 from sssfit.render.taps import render_taps
 from sssfit.scene.record import Scene
 
@@ -219,9 +220,13 @@ def test_tables_that_are_to_be_mixed_have_the_same_stages():
     text, _ = kernel_text(taps_of("1|1"), "hlsl")
     assert "mix the numbers of two tables with these stages, an octave apart" in text
     page = (Path(__file__).parents[1] / "docs" / "cascades.md").read_text("utf-8")
-    assert re.search(
-        r"`sssfit fit --stages '\S+'\s+--pitches \S+` makes one\s+table for each", page
+    found = re.search(
+        r"`sssfit fit --stages '(\S+)'\s+--pitches \.1,\S+` makes one\s+table for each octave of "
+        r"pixel sizes, `skin1\.exact\.cascade(\S+)\.0\.1mm\.taps\.json`",
+        page,
     )
+    stages, count = found.groups()
+    assert count == FITS["cascade"].count_of({"stages": stages})
 
 
 def test_the_comment_says_on_which_pixels_a_table_serves():
