@@ -14,13 +14,15 @@ from sssfit.export.compute import GROUP, levels_of
 VECTORS = {"hlsl": "float2", "glsl": "vec2", "wgsl": "vec2f"}
 
 
-def run_compute(text, dialect, tables, light, mm_per_pixel, *, prefix="SSS", profile=None):
-    """The result (H, W, C) of exported source on light (H, W, C)."""
+def run_compute(
+    text, dialect, tables, light, mm_per_pixel, *, prefix="SSS", profile=None, whole=False
+):
+    """The result (H, W, C) of exported source on light (H, W, C); the whole of it has alpha too."""
     pictures, run = prepared_compute(
         text, dialect, tables, light, mm_per_pixel, prefix=prefix, profile=profile
     )
     run(1.0)
-    return device_of(dialect).pixels(pictures["M0"])[..., : light.shape[2]]
+    return device_of(dialect).pixels(pictures["M0"])[..., : 4 if whole else light.shape[2]]
 
 
 def prepared_compute(

@@ -72,8 +72,9 @@ def test_a_wide_halo_leaves_a_smaller_tile(dialect):
 def test_larger_pixels_and_one_channel(dialect):
     taps, light = taps_of("1-2|2", channels=1), light_of((33, 40), 1)
     text = source([taps], DIALECTS[dialect], COMPUTE)
-    found = run_compute(text, dialect, [taps], light, 0.37)
-    assert apart(found, render_taps(Scene("light", light, 0.37), taps, border="clamp")) < 1e-5
+    found = run_compute(text, dialect, [taps], light, 0.37, whole=True)
+    wanted = render_taps(Scene("light", light, 0.37), taps, border="clamp")
+    assert apart(found[..., :3], wanted) < 1e-5  # grey
 
 
 @pytest.mark.parametrize("dialect", RUN)

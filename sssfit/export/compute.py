@@ -420,7 +420,8 @@ class ComputeFunctions(Functions):
         four = self._call("Four", f"at + {self.dialect.types['int2']}(thread)", "ends")
         yield f"    {made};"
         yield f"    made.term[0] = {self._whole('light', '1.0')};"
-        yield f"    made.term[1] = {self._whole(four, '1.0')};"
+        yield f"    {self.dialect.new(self.light, 'mean')} = {four};"
+        yield f"    made.term[1] = {self._whole('mean', '1.0')};"
         yield "    return made;"
 
     def _add(self) -> str:
@@ -430,5 +431,5 @@ class ComputeFunctions(Functions):
         return f"""
 // The sum of a level and of all coarser ones.
 {self._head("float4", "Add", arguments)} {{
-    return {self._whole(f"{self._load('sum')}{self.rgb} + {fetch}{self.rgb}", "1.0")};
+{self._shown(f"{self._load('sum')}{self.rgb} + {fetch}{self.rgb}", "1.0")}
 }}"""

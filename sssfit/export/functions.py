@@ -164,8 +164,9 @@ class Functions:
         return self._vector("float2", *(literal(number) for number in each.axis or (1.0, 0.0)))
 
     def _whole(self, light: str, cover: str) -> str:
-        """Return four numbers: light, and coverage in the last."""
-        beside = ["0.0"] * (MOST_CHANNELS - len(self.taps.channels))
+        """Return four numbers: light, that of one channel as grey, and coverage in the last."""
+        channels = len(self.taps.channels)
+        beside = [light if channels == 1 else "0.0"] * (MOST_CHANNELS - channels)
         return self._vector("float4", light, *beside, cover)
 
     def _covered(self) -> str:
@@ -179,14 +180,20 @@ class Functions:
 
     def _returned(self, light: str, part: str, cover: str) -> str:
         """Return the lines that end a function: light over what was covered, times coverage."""
-        least = self._all("1e-20")
-        shown = f"{cover} * {light} / max({part}, {least})"
+        shown = f"{cover} * {light} / max({part}, {self._all('1e-20')})"
         return f"""\
 {switch(self.prefix, "COVERAGE")}
-    return {self._whole(shown, cover)};
+{self._shown(shown, cover)}
 #else
     return {self._whole(light, "1.0")};
 #endif"""
+
+    def _shown(self, light: str, cover: str) -> str:
+        """Return the lines that return light and coverage; that of one channel needs a name."""
+        if len(self.taps.channels) > 1:
+            return f"    return {self._whole(light, cover)};"
+        named = f"    {self.dialect.new('float', 'shown')} = {light};"
+        return f"{named}\n    return {self._whole('shown', cover)};"
 
     def _end(self) -> str:
         """Return the lines that end a pass of a stage."""

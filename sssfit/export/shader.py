@@ -155,8 +155,18 @@ def _notes(tables: Sequence[Taps], style: Style, *, passes: bool) -> Iterator[st
         yield "Some weights are negative: unsigned formats between the passes would cut light off."
         if passes:
             yield "Within a mask their sums may vanish, so keep coverage for other tables."
+    if passes:
+        yield from _colours(tables[0].channels)
     if passes and tables[0].chained:
         yield "Half floats between the passes cost nothing that is seen. Linear light throughout."
+
+
+def _colours(channels: Sequence[str]) -> Iterator[str]:
+    """Yield where pictures hold the light of fewer channels than three."""
+    if len(channels) == 1:
+        yield f"Light of the one channel, {channels[0]}, is read in red and written as grey."
+    elif len(channels) == 2:
+        yield f"Light of {channels[0]} is in red and that of {channels[1]} in green; blue is 0."
 
 
 def _needs(dialect: Dialect, style: Style) -> Iterator[str]:

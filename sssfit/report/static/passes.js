@@ -158,8 +158,7 @@ export class Passes {
     const { width, height } = last.get(show), pixels = new Float32Array(3 * width * height);
     for (let i = 0; i < width * height; i++) {
       for (let c = 0; c < 3; c++) {
-        const own = c % albedo.length; // passes of one channel write red alone, which is grey here
-        pixels[3 * i + c] = sum[4 * i + own] * albedo[own] / frames;
+        pixels[3 * i + c] = sum[4 * i + c] * albedo[c % albedo.length] / frames;
       }
     }
     return { pixels, width, height, milliseconds: this.timed(source, plan, format, mm) };
