@@ -493,6 +493,15 @@ def test_ears_glow_red_under_a_light_from_behind(run, coarse):
     assert 25 < abs(at[1] - 45) < 42
 
 
+def test_a_picture_without_thin_parts_says_so(run, coarse):
+    small = ("--irradiance", "head", "--size", "20x20", "--transmit")
+    status, _, err = run("render", coarse, *small, "-o", "a.exr")
+    assert status == 0
+    assert "head: nothing goes through, since no part in the picture is both lit from" in err
+    assert "With a larger --size the made head shows its ears." in err
+    assert "goes through" not in run("render", coarse, *HEAD, "--transmit", "-o", "b.exr")[2]
+
+
 def test_transmitted_light_in_screen_space(run, coarse):
     kernel = SeparableKernel.load(coarse)
     options = ("--screen", "--mm-per-pixel", "2", "--transmit", "-o", "a.exr")

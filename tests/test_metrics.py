@@ -6,6 +6,7 @@ import sys
 import numpy as np
 import pytest
 import reference_delta_e as reference
+from test_taps import taps_of
 
 from sssfit.compare import Cost, auto_exposure, cost_of, flip, measure, seconds_per_megapixel, ssim
 from sssfit.errors import RenderError
@@ -252,6 +253,19 @@ def test_cost_counts_what_a_shader_does():
     # Two terms: four passes read and write 8 bytes, and the second term is added to the first.
     assert cost_of(kernel) == Cost(28.0, 4, 4, 8.0 * (8 + 1), 2 * 7 * 2 * 4, None)
     assert cost_of(kernel, 0.5).seconds_per_megapixel == 0.5
+
+
+@pytest.mark.parametrize(("channels", "textures"), [(1, 1), (3, 1), (4, 2), (5, 2)])
+def test_a_texture_holds_three_channels(channels, textures):
+    taps = taps_of("1-1", channels=channels)
+    one = taps_of("1-1", channels=3)
+    assert cost_of(taps).bytes_per_pixel == textures * cost_of(one).bytes_per_pixel
+    dense = SeparableKernel(
+        method="svd", mm_per_pixel=0.3, channels=taps.channels, signs=np.ones((1, channels)),
+        weights=np.ones((1, 3, channels)), relative_frobenius_error=np.zeros(channels),
+        energy_error=np.zeros(channels), scale=np.ones(channels), parameters={}, meta={},
+    )  # fmt: skip
+    assert cost_of(dense).bytes_per_pixel == textures * 8.0 * 4
 
 
 def test_seconds_are_the_least_after_a_call_that_warms_up():

@@ -9,7 +9,9 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from sssfit import __version__
 from sssfit.errors import ArgumentError, KernelError, SssfitError
+from sssfit.export import kernel_text
 from sssfit.export.presets import (
     engine_look,
     import_preset,
@@ -358,6 +360,12 @@ def test_rounded_taps_are_known_again(taps, falloff, digits):
     found, _ = separable_of_taps(rounded(table, digits))
     np.testing.assert_allclose(found.falloff, falloff, rtol=1e-3)
     np.testing.assert_allclose(found.strength, kernel.strength, rtol=1e-3)
+
+
+def test_an_export_of_an_engines_own_taps_names_the_version_that_made_them():
+    kernel = Separable(1.7, np.array([0.3, 0.9, 1.0]), np.full(3, 0.1))
+    table = separable_taps("wax", "separable-sss", np.array([0.9, 0.5, 0.1]), kernel, 9)
+    assert f"wax, separable-sss. sssfit {__version__}." in kernel_text(table, "glsl")[0]
 
 
 @pytest.mark.parametrize(("taps", "falloff"), [(7, 0.03), (7, 0.021)])

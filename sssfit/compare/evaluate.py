@@ -240,7 +240,15 @@ def _between_passes(kernel: Kernel, intermediate: str | None) -> dict[str, str]:
 def _most_through(scene: Scene, kernel: Kernel) -> FloatArray | None:
     """Return the most light that arrives through the object (C,)."""
     arrives = transmitted(scene, kernel)
-    return None if arrives is None else arrives.max(axis=(0, 1))
+    if arrives is None:
+        return None
+    if not arrives.any():
+        note(
+            f"{scene.name}: nothing goes through, since no part in the picture is both lit from "
+            "behind and thin enough. With a larger `size` the made head shows its ears."
+        )
+    most: FloatArray = arrives.max(axis=(0, 1))
+    return most
 
 
 def _within(scene: Scene, picture: FloatArray) -> FloatArray:

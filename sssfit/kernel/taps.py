@@ -16,6 +16,7 @@ of its own (`sssfit.render.disk`).
 """
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
@@ -78,6 +79,12 @@ BYTES = {
     "rgba8": 4,
     "srgb8": 4,
 }
+_IN_TEXEL = 3  # channels, beside coverage
+
+
+def textures_for(channels: int) -> int:
+    """Return how many textures hold a picture: each has three channels, used or not."""
+    return math.ceil(channels / _IN_TEXEL)
 
 
 @dataclasses.dataclass(frozen=True, slots=True, eq=False)
@@ -314,7 +321,7 @@ class Taps:
         return self.cost.passes
 
     def bytes_per_pixel(self, texel: str = "half") -> float:
-        """Return bytes read and written a pixel, each picture once a pass.
+        """Return bytes read and written a pixel, each picture once a pass; see `textures_for`.
 
         Parameters
         ----------
@@ -328,7 +335,7 @@ class Taps:
         """
         if texel not in BYTES:
             raise KernelError(f"texel = {shown(texel)}; expected {', '.join(BYTES)}.")
-        return BYTES[texel] * self.cost.pictures
+        return BYTES[texel] * self.cost.pictures * textures_for(len(self.channels))
 
     @property
     def has_negative_weights(self) -> bool:

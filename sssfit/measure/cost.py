@@ -8,7 +8,7 @@ import numpy as np
 
 from sssfit.errors import RenderError
 from sssfit.kernel import Kernel, SeparableKernel, Taps
-from sssfit.kernel.taps import BYTES
+from sssfit.kernel.taps import BYTES, textures_for
 from sssfit.messages import counted
 
 # Bytes of a weight in a shader, a float32.
@@ -29,7 +29,8 @@ class Cost:
     all_passes : int
         With those that change the picture's size.
     bytes_per_pixel : float
-        Read and written a pixel, each picture once a pass, in half floats.
+        Read and written a pixel, each picture once a pass, in textures of four half floats: three
+        channels, used or not, and coverage.
     kernel_bytes : int
         Size of a float32 table of all terms, pixels and channels: T P C 4, with both halves of a
         pass. Of a table of taps, of offsets, weights and blend.
@@ -87,7 +88,7 @@ def _dense_cost(kernel: SeparableKernel, seconds_per_megapixel: float | None) ->
         fetches=2.0 * float(np.count_nonzero(used)),
         passes=2 * terms,
         all_passes=2 * terms,
-        bytes_per_pixel=BYTES["half"] * pictures,
+        bytes_per_pixel=BYTES["half"] * pictures * textures_for(len(kernel.channels)),
         kernel_bytes=terms * kernel.pixels * len(kernel.channels) * FLOAT_BYTES,
         seconds_per_megapixel=seconds_per_megapixel,
     )

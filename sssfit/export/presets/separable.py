@@ -22,6 +22,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
+from sssfit import __version__
 from sssfit.arrays import FloatArray
 from sssfit.errors import KernelError
 from sssfit.export.presets.fields import Values
@@ -149,7 +150,7 @@ def separable_taps(
         stages=(Stage(0, "pair", offsets * kernel.unit_mm, weights),),
         blend=np.stack((0.0 * albedo, albedo)),
         errors={name: np.full(albedo.size, np.nan) for name in ("spectral", "energy")},
-        meta={"material": title},
+        meta={"material": title, "version": __version__},
     )
 
 
