@@ -231,7 +231,7 @@ def test_tables_that_are_to_be_mixed_have_the_same_stages():
 
 def test_the_comment_says_on_which_pixels_a_table_serves():
     words = {
-        "1-1|1": "Serves pixels of 0.234 to 0.402 mm, if it does as skin1's of 0.3 mm",
+        "1-1|1": "Serves pixels of 0.234 to 0.402 mm, judging by skin1, whose table for 0.3 mm",
         "1-1": "Serves pixels of 0.3 mm and more; nearer by",
     }
     for structure, said_of in words.items():

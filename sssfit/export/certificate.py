@@ -50,9 +50,10 @@ def _distances(taps: Taps) -> str:
         return f"Serves pixels of {own:.3g} mm and more; nearer by, points of light fall apart."
     least, most = (own * each for each in SERVES)
     return (
-        f"Serves pixels of {least:.3g} to {most:.3g} mm, if it does as skin1's of 0.3 mm, which is "
-        f"within 1 Delta E from {SERVES[0]:g} to {SERVES[1]:g} of its own; for other distances mix "
-        "the numbers of two tables with these stages, an octave apart."
+        f"Serves pixels of {least:.3g} to {most:.3g} mm, judging by skin1, whose table for 0.3 mm "
+        f"stays within 1 Delta E on {SERVES[0]:g} to {SERVES[1]:g} times its own pixels; much "
+        "narrower or wider kernels may differ. For other distances mix the numbers of two tables "
+        "with these stages, an octave apart."
     )
 
 
