@@ -36,12 +36,12 @@ def newest(made_by: str, *patterns: str) -> str:
 
 def profile_name(given: str | None) -> str:
     """Return the profile that was named, by default the newest in this folder."""
-    return given or newest("sssfit simulate skin1", "*.profile.npz")
+    return newest("sssfit simulate skin1", "*.profile.npz") if given is None else given
 
 
 def kernel_name(given: str | None) -> str:
     """Return the kernel that was named, by default the newest in this folder."""
-    return given or newest("sssfit fit", "*.taps.json", "*.kernel.json")
+    return newest("sssfit fit", "*.taps.json", "*.kernel.json") if given is None else given
 
 
 def profile_of_kernel(

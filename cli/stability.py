@@ -36,7 +36,7 @@ def stability(material: str | None, common: Common, **given: Any) -> None:
       sssfit stability skin1 --only gaussians --json
       sssfit stability --paper -o docs
     """
-    if (material is None) != given["paper"]:
+    if bool(material) == given["paper"]:
         raise click.UsageError("name one MATERIAL, or give --paper without one.")
     single = dict.fromkeys(("chart", "table"), "one MATERIAL")
     refuse(given, {"output": "--paper"} if material else single)

@@ -121,16 +121,20 @@ def check_output(
         raise FileError(f"{path}: {folder} is a file; name a folder.")
     if not folder.is_dir():
         raise FileError(f"{path}: there is no folder {folder}; make it, or name another.")
-    if path.is_dir():
-        raise FileError(f"{path} is a folder; name a file in it.")
-    if path.exists() and not path.is_file():
-        raise FileError(f"{path} is not an ordinary file; name another.")
+    _check_ordinary(path)
     if path.exists():
         _check_replaceable(path, is_own, force, inputs)
     with _clear_errors(path):
         handle, probe = _temporary(path)
         os.close(handle)
         probe.unlink()
+
+
+def _check_ordinary(path: Path) -> None:
+    if path.is_dir():
+        raise FileError(f"{path} is a folder; name a file in it.")
+    if path.exists() and not path.is_file():
+        raise FileError(f"{path} is not an ordinary file; name another.")
 
 
 def is_same_file(one: Path, other: Path) -> bool:
@@ -217,10 +221,11 @@ def write_atomically(path: Path, write: Callable[[BinaryIO], object]) -> None:
     ------
     FileError
         The disk is full, the folder read-only, or another failure; an older file at ``path`` stays
-        unchanged.
+        unchanged. Or it is a device or a pipe, which the new file would replace.
     """
     path = followed(path)
     with _clear_errors(path):
+        _check_ordinary(path)
         handle, temporary = _temporary(path)
         _unfinished.add(temporary)
         try:

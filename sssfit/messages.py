@@ -8,6 +8,8 @@ from string import Formatter
 from typing import Any, TypeAlias
 
 _MOST_NAMED = 4  # channels named in a record's repr
+SHARE = "share"  # format of a share of the light: six decimals, faint ones by their exponent
+_LEAST_FIXED = 1e-4
 _MOST_SHOWN = 60  # characters of a value that a message repeats
 
 
@@ -106,6 +108,8 @@ def number(value: Any, form: str) -> str:
     form, _, unknown = form.partition("|")
     if value is None or value != value:
         return unknown or "-"
+    if form == SHARE:
+        form = ".3e" if 0.0 < abs(value) < _LEAST_FIXED else ".6f"
     if not form.endswith("%"):
         return f"{value:{form}}"
     return "0 %" if abs(value) < 1e-9 else f"{_per_cent(100.0 * value, form[:-1])} %"

@@ -2,6 +2,7 @@
 
 import ast
 import io
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -15,14 +16,16 @@ from turns import mostly_slow
 from sssfit import chart
 from sssfit.chart.data import picture
 from sssfit.chart.files import FORMATS, chart_format, is_chart_file
+from sssfit.chart.frequency import frequency_figure
 from sssfit.chart.material import material_figure
-from sssfit.chart.page import save_figure
+from sssfit.chart.page import drawable, save_figure
 from sssfit.chart.profile import profile_figure
-from sssfit.chart.text import count, shortened, with_error
+from sssfit.chart.text import channel_name, channel_names, count, shortened, with_error
 from sssfit.errors import FileError
 from sssfit.material import Layer, Material, load_material
 from sssfit.profile import Profile
 from sssfit.profile.bins import MIN_HITS, effective_hits, merged
+from sssfit.profile.frequency import frequency_response
 from sssfit.simulate import simulate_montecarlo
 
 CHARTS = Path(chart.__file__).parent
@@ -321,9 +324,48 @@ def test_numbers_read_as_people_write_them():
     assert [count(each) for each in numbers] == words
     assert with_error(0.432012, 0.000113) == "0.43201 ± 0.00011"
     assert with_error(0.5, np.nan) == "0.5"
+    assert with_error(7.44e-7, 1.65e-16) == "(7.4400000000 ± 0.0000000017)×10⁻⁷"  # noqa: RUF001
+    assert with_error(0.0, 1.65e-16) == "(0.0 ± 1.6)×10⁻¹⁶"  # noqa: RUF001
     assert shortened("a" * 12) == "a" * 12
     assert shortened("near-infrared-850nm") == "near-…-850nm"
     assert shortened("near-infrared-940nm") == "near-…-940nm"
+
+
+def test_right_to_left_names_stand_before_their_figures():
+    assert drawable("R  0.4 ± 0.1, $x") == r"R  0.4 ± 0.1, \$x"
+    names = ["\u05d0\u05d3 \u05d5", "\u0623\u062e", "\u05d1"]
+    for name in names:
+        assert drawable(f"{name}  0.4 ± 0.1") == f"\u200e{name}\u200e  0.4 ± 0.1"
+    figure = profile_figure(hand_made(exponential(3), channels=names))
+    (legend,) = legends_of(figure)
+    labels = [each.get_text() for each in legend.get_texts()]
+    assert [each.split("  0.")[0] for each in labels] == [f"\u200e{name}\u200e" for name in names]
+    assert f": \u200e{names[0]}\u200e 0 %, \u200e{names[1]}\u200e 0 %" in words_of(figure)
+
+
+def test_names_without_letters_of_the_font_become_numbers_and_it_is_said_once(caplog):
+    caplog.set_level("INFO", "sssfit")
+    names = ["赤\u7dd1", "R赤", "青"]
+    for _ in range(2):
+        assert channel_names(names) == ["channel 1", "R赤", "channel 3"]
+    (line,) = caplog.messages
+    assert line == (
+        "The font of charts has no letters of '赤緑', '青'; in their place stand the channels' "
+        "numbers."
+    )
+    assert channel_name(names, 1) == "R赤"
+
+
+def test_a_profile_without_light_says_so():
+    dark = hand_made(np.zeros((20, 2)))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figures = profile_figure(dark), frequency_figure(frequency_response(dark))
+    for figure, empty in zip(figures, (3, 2), strict=True):
+        labels = [each.get_text() for each in legends_of(figure)[0].get_texts()]
+        assert labels == [f"c{k}  0 (returns no light)" for k in range(2)]
+        told = [each for axes in figure.axes for each in axes.texts]
+        assert [each.get_text() for each in told] == ["returns no light"] * empty
 
 
 def test_a_profile_so_far_says_so():
@@ -384,6 +426,15 @@ def test_a_material_is_drawn_by_its_coefficients():
         "stack: material 3 layers, half space below · made up · specular reflectance 0.02778 "
     )
     assert words.endswith("1 clear layer without absorption or scattering.")
+
+
+def test_equal_absorption_is_a_ring_around_the_scattering():
+    layer = Layer(1.3, 0.0, [1.0, 0.5], [0.0, 0.5])
+    axes = material_figure(Material("equal", ("a", "b"), (layer,))).axes[0]
+    scattering, absorption = axes.lines
+    np.testing.assert_array_equal(points(axes), [[np.nan, 0.5], [1.0, 0.5]])
+    assert absorption.get_markerfacecolor() == "none"
+    assert absorption.get_markersize() > scattering.get_markersize() + 2.0
 
 
 def test_equal_layers_lie_side_by_side_and_are_points_in_the_legend_too():

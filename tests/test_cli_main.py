@@ -16,6 +16,7 @@ import click
 import fork_server
 import processes
 import pytest
+from click.testing import CliRunner
 from turns import in_turn
 
 import sssfit
@@ -284,3 +285,13 @@ def test_matplotlib_says_nothing_and_draws_without_a_display(tmp_path, changed, 
     with processes.start(trial(body), env=environment) as program:
         out, err = program.communicate()
     assert (program.returncode, out.strip(), err) == (0, "agg", "")
+
+
+@pytest.mark.parametrize(("verb", "status"), [("stability", 2), ("show", 1), ("export", 2)])
+def test_an_empty_name_is_not_one_that_was_left_out(monkeypatch, tmp_path, verb, status):
+    """It stood for the newest file here, and for all eleven materials."""
+    monkeypatch.chdir(tmp_path)
+    Path("a.profile.npz").write_bytes(b"")
+    found = CliRunner().invoke(cli, [verb, ""])
+    assert found.exit_code == status
+    assert "Using" not in found.output

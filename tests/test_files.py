@@ -233,3 +233,13 @@ def test_the_temporary_folder_of_a_killed_write_is_removed(tmp_path):
         assert aside.match(".a.npz.????????.tmp")
         (aside / "part").write_bytes(b"half")
     assert names(tmp_path) == [other.name]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes with a name")
+def test_a_pipe_is_not_replaced_by_a_file(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(FileError, match=r"pipe is not an ordinary file; name another\."):
+        files.write_atomically(pipe, lambda stream: stream.write(b"new"))
+    assert pipe.is_fifo()
+    assert names(tmp_path) == ["pipe"]

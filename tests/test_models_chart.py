@@ -242,6 +242,11 @@ def test_no_text_is_cut_off_or_runs_into_another(name):
     assert_legible(lambda: models_figure(comparison))
 
 
+def test_a_channel_that_returns_no_light_says_so():
+    dark = compare_models(medium([1.0], [0.0]), photons=1000, dr_mm=5.0, radius_mm=5.0)
+    assert models_figure(dark).axes[0].get_title("left") == "c0 · returns no light"
+
+
 def test_skin1_is_legible(figure):
     assert_legible(lambda: figure)
 

@@ -19,6 +19,7 @@ from sssfit.chart.page import (
 )
 from sssfit.chart.text import (
     channel_label,
+    channel_names,
     in_legend,
     kind_of_error,
     left_out_note,
@@ -72,7 +73,7 @@ def angles_figure(found: AngularReflectance) -> Figure:
 
 
 def _note(found: AngularReflectance) -> str:
-    names = found.profile.channels
+    names = channel_names(found.profile.channels)
     kind = kind_of_error(found.profile)
     alone = "the estimated error" if kind == "estimated" else "noise"
     shares = by_channel(names, (100.0 * found.misplaced).tolist(), ".2g")

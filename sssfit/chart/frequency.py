@@ -15,10 +15,12 @@ from sssfit.chart.page import (
     draw_curve,
     name_axes,
     new_page,
+    say_nothing_is_drawn,
     tick,
     tick_decades,
 )
 from sssfit.chart.text import (
+    NO_LIGHT,
     channel_label,
     in_legend,
     kind_of_error,
@@ -63,6 +65,9 @@ def frequency_figure(found: FrequencyResponse) -> Figure:
             draw_curve(left, found.k_per_mm, *curve)
             draw_curve(right, found.k_per_mm / _TURN, *curve)
         _limit(left, right, found.k_per_mm, found.response[:, shown])
+        if not found.response.any():
+            for axes in (left, right):
+                say_nothing_is_drawn(axes, NO_LIGHT)
         name_axes(left, "(a) logarithmic, over k", "k (rad/mm)", "R(k)")
         name_axes(right, "(b) linear, over cycles per mm", "k / 2π (1/mm)", "R(k)")
     return figure
@@ -88,7 +93,8 @@ def _limit(left: Axes, right: Axes, k: FloatArray, response: FloatArray) -> None
     """End the linear panel where every channel has fallen to a quarter."""
     top = float(response.max()) or 1.0
     left.set_xscale("log")
-    left.set_yscale("log")
+    if response.any():
+        left.set_yscale("log")
     left.set_xlim(k[1], k[-1])
     least = response[response > 0.0].min(initial=top)
     left.set_ylim(max(float(least), top * 10.0**-_DECADES) / 1.5, 1.5 * top)

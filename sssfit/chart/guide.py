@@ -29,7 +29,7 @@ from sssfit.chart.page import (
     signed_norm,
     tick_powers,
 )
-from sssfit.chart.text import kernel_subtitle, shortened
+from sssfit.chart.text import channel_name, kernel_subtitle, shortened
 
 if TYPE_CHECKING:
     from sssfit.compare.guide import Guide
@@ -186,6 +186,6 @@ def _draw_bars(
 def _title(guide: Guide) -> str:
     """Return the title with material and channel."""
     material = guide.profile.material
-    channel = shortened(guide.profile.channels[guide.channel])
+    channel = channel_name(guide.profile.channels, guide.channel)
     what = "guide function and residual of the guided kernel"
     return f"{shortened(material.name, 24) + ', ' if material else ''}{channel}: {what}"

@@ -42,7 +42,7 @@ from sssfit.chart.page import (
     tick_decades,
     tick_powers,
 )
-from sssfit.chart.text import count, method_name, shortened
+from sssfit.chart.text import channel_name, count, method_name, shortened
 from sssfit.messages import counted
 
 if TYPE_CHECKING:
@@ -113,7 +113,7 @@ def _table(view: KernelView) -> tuple[list[str], list[tuple[str, list[str]]]]:
     rows = []
     for k, c in enumerate(view.channels):
         shares = ["" if each is None else _percent(float(each[k])) for each in columns]
-        name = shortened(view.kernel.channels[c])
+        name = channel_name(view.kernel.channels, c)
         rows.append((name, [f"{view.energy[k]:.5f}", *shares]))
     return heads if view.misplaced is not None else [*heads[:4], ""], rows
 
@@ -137,7 +137,7 @@ def _term_labels(view: KernelView) -> list[str]:
         signs = ["+" if kernel.signs[t, c] > 0 else "−" for c in view.channels]  # noqa: RUF001
         said = signs[0]
         if len(set(signs)) > 1:
-            names = (shortened(kernel.channels[c]) for c in view.channels)
+            names = (channel_name(kernel.channels, c) for c in view.channels)
             said = ", ".join(f"{name} {sign}" for name, sign in zip(names, signs, strict=True))
         labels.append(f"term {t + 1} ({said})")
     return labels
@@ -164,7 +164,7 @@ def _draw_passes(upper: SubFigure, view: KernelView) -> None:
         _scale_passes(axes, half)
         for t in range(kernel.rank):
             draw_steps(axes, half[t, :, k], edges, snap=False, **_term_style(t, kernel.rank))
-        title = f"passes, {shortened(kernel.channels[c])}"
+        title = f"passes, {channel_name(kernel.channels, c)}"
         name_axes(axes, title, "distance from the middle (mm)", "" if k else "weight (1/mm)")
 
 
@@ -233,7 +233,7 @@ def _draw_planes(lower: SubFigure, view: KernelView) -> None:
     norms = _image_norm(view), signed_norm(_or_zero(view.difference), _DIFFERENCE_DECADES)
     rows, widths = len(view.channels), [*[1.0] * len(planes), _WIDTHS - len(planes)]
     panels = lower.subplots(rows, len(widths), squeeze=False, sharex="col", width_ratios=widths)
-    names = [shortened(view.kernel.channels[channel]) for channel in view.channels]
+    names = [channel_name(view.kernel.channels, channel) for channel in view.channels]
     is_long = max(map(len, names)) > 6  # such a name has room beside the images, not over them
     for row, name in enumerate(names):
         for axes, (title, images, is_signed) in zip(panels[row], planes, strict=False):

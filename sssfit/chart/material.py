@@ -18,7 +18,7 @@ from sssfit.chart.page import (
     new_page,
     tick_decades,
 )
-from sssfit.chart.text import shortened, spread
+from sssfit.chart.text import channel_names, shortened, spread
 from sssfit.material import Layer, Material
 from sssfit.messages import counted
 
@@ -26,6 +26,7 @@ HEIGHT_INCHES = 3.9
 _LETTERS = 20  # letters of channel names that fit side by side under a panel
 _MOST_NAMES = 12  # number of names that fit there upright
 _MOST_LAYERS = 7
+_RING = 2.5  # points by which a hollow marker is wider than a filled one
 _FEW_CHANNELS = 4  # up to this many channels are points, more are lines
 _MARKERS = "os^Dv<>"
 # Layers lie side by side in a channel, so that equal ones can be seen: distance between two of
@@ -53,7 +54,7 @@ def material_figure(material: Material) -> Figure:
     shown = [matter[k] for k in spread(len(matter), _MOST_LAYERS)]
     title = f"{shortened(material.name, 24)}: material"
     notes = _notes(material, shown)
-    names = [shortened(each) for each in material.channels]
+    names = [shortened(each) for each in channel_names(material.channels)]
     height = HEIGHT_INCHES + (0.07 * max(map(len, names)) if _are_upright(names) else 0.0)
     with new_page(height, title, _subtitle(material), notes) as (figure, below):
         count = len(names)
@@ -125,8 +126,8 @@ def _draw_layer(panels: Sequence[Axes], layer: Layer, place: int, shift: float) 
         (absorption, 1.0 - layer.albedo, False),
     ):
         style = _style(place, len(values))
-        if is_hollow:
-            style["mfc"] = "white"
+        if is_hollow:  # a ring, so that an equal filled point is seen in it
+            style |= {"mfc": "none", "markersize": style["markersize"] + _RING}
         is_drawn = (values > 0.0) & np.isfinite(values) & (layer.sigma_t_per_mm > 0.0)
         axes.plot(np.arange(len(values)) + shift, np.where(is_drawn, values, np.nan), **style)
 

@@ -33,7 +33,17 @@ from sssfit.chart.page import (
     new_page,
     tick_decades,
 )
-from sssfit.chart.text import WEIGHTED, count, grid, left_out_note, method_name, shortened, spread
+from sssfit.chart.text import (
+    NO_LIGHT,
+    WEIGHTED,
+    channel_name,
+    count,
+    grid,
+    left_out_note,
+    method_name,
+    shortened,
+    spread,
+)
 
 if TYPE_CHECKING:
     from sssfit.compare.models import ModelComparison, ModelCurve
@@ -203,7 +213,7 @@ def _subtitle(comparison: ModelComparison) -> str:
 
 def _channel_name(comparison: ModelComparison, channel: int) -> str:
     """Return the name of a channel."""
-    return shortened(comparison.material.channels[channel])
+    return channel_name(comparison.material.channels, channel)
 
 
 def _panel_title(comparison: ModelComparison, channel: int) -> str:
@@ -211,7 +221,8 @@ def _panel_title(comparison: ModelComparison, channel: int) -> str:
     name, layer = _channel_name(comparison, channel), comparison.material.layers[0]
     apart = " · " if len(name) <= 4 else "\n"  # a longer one leaves too little room for the rest
     if comparison.edges_mm[channel].size < 2:
-        return f"{name}{apart}too few photons to draw"
+        is_dark = not comparison.exact.profile.diffuse_reflectance[channel] > 0.0
+        return f"{name}{apart}{NO_LIGHT if is_dark else 'too few photons to draw'}"
     if len(comparison.material.layers) > 1:
         return f"{name}{apart}{len(comparison.material.layers)} layers"
     albedo, path_mm = layer.albedo[channel], layer.mean_free_path_mm[channel]

@@ -6,6 +6,7 @@ All figures of ``sssfit.chart`` use this module; ``sssfit.chart.text`` has the w
 import contextlib
 import io
 import math
+import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, cast
@@ -81,6 +82,9 @@ LINE_STYLES: tuple[Any, ...] = ("-", (0, (4, 1.6)), (0, (6, 1.6, 1.2, 1.6)), (0,
 
 
 NOTE_SIZE, NOTE_COLOUR = 7.5, "#444444"
+# Hebrew, Arabic and the other right-to-left letters that the font may have; a name's words too.
+_LETTERS = r"[\u0590-\u08ff\ufb1d-\ufdff\ufe70-\ufefc]+"
+_RIGHT_TO_LEFT = re.compile(rf"{_LETTERS}(?:[ _-]{_LETTERS})*")
 
 
 def channel_style(channel: int, n_channels: int) -> Style:
@@ -238,10 +242,20 @@ def _font() -> FT2Font:
 
 
 def drawable(text: str) -> str:
-    """Replace characters that the font lacks, and escape dollars, which would start a formula."""
+    """Replace characters that the font lacks, and escape dollars, which would start a formula.
+
+    Right-to-left letters stand between left-to-right marks: they would turn the figures behind
+    them around, "name 0.4 ± 0.1" into "0.1 ± 0.4 name".
+    """
     font = _font()
     known = "".join(c if c == "\n" or font.get_char_index(ord(c)) else "?" for c in text)
-    return known.replace("$", r"\$")
+    return _RIGHT_TO_LEFT.sub("\u200e\\g<0>\u200e", known).replace("$", r"\$")
+
+
+def has_letters_of(text: str) -> bool:
+    """Return whether the font has any of a text's letters."""
+    font = _font()
+    return any(font.get_char_index(ord(c)) for c in text if not c.isspace())
 
 
 def tick(axis: Axis) -> None:
@@ -290,6 +304,12 @@ def name_axes(axes: Axes, title: str, x_label: str, y_label: str) -> None:
     axes.set_title(drawable(title), loc="left", y=None if may_move else 1.0)
     axes.set_xlabel(drawable(x_label))
     axes.set_ylabel(y_label)
+
+
+def say_nothing_is_drawn(axes: Axes, why: str) -> None:
+    """Write into the middle of an empty panel why it is empty."""
+    style: Style = {"ha": "center", "va": "center", "color": NOTE_COLOUR}
+    axes.text(0.5, 0.5, why, transform=axes.transAxes, **style)
 
 
 def draw_steps(

@@ -21,6 +21,7 @@ from sssfit.chart.page import (
     lay_out,
     name_axes,
     new_page,
+    say_nothing_is_drawn,
     tick,
 )
 from sssfit.profile import Profile
@@ -59,6 +60,9 @@ def profile_figure(profile: Profile) -> Figure:
         _draw_logarithmic(panels[0, 1], profile, bins)
         _draw_unweighted(panels[1, 0], profile, bins)
         _draw_image(below, panels[1, 1], profile, shown)
+        if not profile.diffuse_reflectance.any():
+            for axes in panels.flat[:3]:
+                say_nothing_is_drawn(axes, words.NO_LIGHT)
         below.align_ylabels(panels)
         lay_out(figure)
         _cut_to_squares(panels[1, 1], shown)
@@ -153,7 +157,7 @@ def _draw_image(below: SubFigure, axes: Axes, profile: Profile, shown: Picture) 
         scale = LogNorm(max(shown.per_mm2.min(), peak * 10.0**-_GREY_DECADES), peak, clip=True)
         shades = axes.imshow(shown.per_mm2[:, :, 0], cmap="gray", norm=scale, **_placed(shown))
         below.colorbar(shades, ax=axes, label=_UNWEIGHTED, aspect=25)
-        title = f"(d) log 2D profile of {words.shortened(profile.channels[0])}"
+        title = f"(d) log 2D profile of {words.channel_name(profile.channels, 0)}"
     axes.grid(visible=False)
     tick(axes.xaxis)
     tick(axes.yaxis)

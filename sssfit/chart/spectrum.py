@@ -23,7 +23,13 @@ from sssfit.chart.page import (
     name_axes,
     new_page,
 )
-from sssfit.chart.text import kernel_subtitle, left_out_note, shortened, spread, titled
+from sssfit.chart.text import (
+    channel_name,
+    kernel_subtitle,
+    left_out_note,
+    spread,
+    titled,
+)
 
 if TYPE_CHECKING:
     from sssfit.compare.spectrum import Spectrum
@@ -105,7 +111,7 @@ def _limit(axes: Axes, spectrum: Spectrum, shown: Sequence[int]) -> None:
 
 def _row(spectrum: Spectrum, channel: int) -> tuple[str, list[str]]:
     """Return name and figures of one channel in the table."""
-    name = shortened(spectrum.profile.channels[channel])
+    name = channel_name(spectrum.profile.channels, channel)
     first = (spectrum.squared_share[0, channel], spectrum.absolute_share[0, channel])
     if not first[0] > 0.0:
         return name, ["returns no light", "", ""]

@@ -29,7 +29,7 @@ from sssfit.chart.page import (
     tick,
     tick_decades,
 )
-from sssfit.chart.text import method_name, shortened
+from sssfit.chart.text import channel_name, method_name, shortened
 from sssfit.messages import counted
 from sssfit.profile import full_kernel
 
@@ -75,7 +75,7 @@ def taps_figure(view: TapsView) -> Figure:
         lower = add_legend(lower, handles, labels)
         left, right = lower.subplots(1, 2, sharex=True, sharey=True)
         widest = _widest(view)
-        name = shortened(taps.channels[widest])
+        name = channel_name(taps.channels, widest)
         _draw_stages(left, view, widest)
         _draw_sums(right, view)
         name_axes(left, f"(a) what each stage adds, {name}", "distance (mm)", "per pixel")
@@ -113,7 +113,7 @@ def _notes(view: TapsView) -> list[str]:
         names = ", ".join("irradiance" if k == 0 else f"stage {k}" for k in still)
         notes.append(f"Weight 0 in the sum, so not drawn: {names}.")
     if len(view.channels) not in (1, _COLOURS):
-        notes.append(f"Pictures show {shortened(view.channels[_widest(view)])}.")
+        notes.append(f"Pictures show {channel_name(view.channels, _widest(view))}.")
     if (left := len(view.channels) - _COLOURS) > 0:
         notes.append(f"(b) leaves out {counted(left, 'channel')} between those drawn.")
     return notes
@@ -226,7 +226,7 @@ def _draw_sums(axes: Axes, view: TapsView) -> None:
     lines = view.stages.sum(axis=0)[middle, middle:][:, drawn].T
     for k, (c, line) in enumerate(zip(drawn.tolist(), lines, strict=True)):
         style: Style = {"color": COLOURS[k], "linestyle": LINE_STYLES[k], "lw": LINE_WIDTH}
-        name = drawable(shortened(view.channels[c]))
+        name = drawable(channel_name(view.channels, c))
         axes.plot(distance, np.where(line > 0.0, line, np.nan), label=name, **style)
         if view.truth is not None:
             axes.plot(distance, view.truth[0, :, c], **_TRUE)

@@ -1,16 +1,20 @@
 """The text of a profile's chart."""
 
+import functools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.chart.data import Picture
-from sssfit.messages import by_channel, counted
+from sssfit.chart.page import has_letters_of
+from sssfit.messages import by_channel, counted, note, shown
 from sssfit.profile import Profile
 from sssfit.profile.beam import parse_beam
 from sssfit.profile.bins import MIN_HITS
 
+NO_LIGHT = "returns no light"
 WEIGHTED = r"$2\pi r\,R_d$ (1/mm)"
 _METHODS = {
     "montecarlo": "Monte Carlo",
@@ -22,7 +26,9 @@ _METHODS = {
     "gaussians": "Sum of Gaussians",
 }
 _MOST_IN_LEGEND = 8
-_SUPERSCRIPTS = str.maketrans("0123456789", "⁰¹²³⁴⁵⁶⁷⁸⁹")
+_MOST_DECIMALS = 12
+_MOST_TOLD = 4  # names that a note repeats
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def title(profile: Profile) -> str:
@@ -96,8 +102,36 @@ def channel_label(profile: Profile, channel: int, *, is_drawn: bool) -> str:
         float(profile.diffuse_reflectance[channel]),
         float(profile.diffuse_reflectance_stderr[channel]),
     )
-    label = f"{shortened(profile.channels[channel])}  {total}"
+    label = f"{channel_name(profile.channels, channel)}  {total}"
+    if not profile.diffuse_reflectance[channel] > 0.0:
+        return f"{label} ({NO_LIGHT})"
     return label if is_drawn else f"{label} (too few photons to draw)"
+
+
+def channel_name(channels: Sequence[str], channel: int) -> str:
+    """Return a channel's name as a chart shows it, short."""
+    return shortened(channel_names(channels)[channel])
+
+
+def channel_names(channels: Sequence[str]) -> list[str]:
+    """Return the channels' names: "channel 2" where the font has none of a name's letters.
+
+    The user is told once.
+    """
+    unknown = tuple(name for name in channels if not has_letters_of(name))
+    if unknown:
+        _tell(unknown)
+    return [f"channel {k + 1}" if name in unknown else name for k, name in enumerate(channels)]
+
+
+@functools.cache
+def _tell(unknown: tuple[str, ...]) -> None:
+    names = ", ".join(map(shown, unknown[:_MOST_TOLD]))
+    more = f" and {len(unknown) - _MOST_TOLD} more" if len(unknown) > _MOST_TOLD else ""
+    note(
+        f"The font of charts has no letters of {names}{more}; in their place stand the channels' "
+        "numbers."
+    )
 
 
 def in_legend(n_channels: int) -> list[int]:
@@ -113,11 +147,19 @@ def spread(n_channels: int, most: int) -> list[int]:
 
 
 def with_error(value: float, stderr: float) -> str:
-    """Return a value and its standard error as text; two digits of the error set the decimals."""
+    """Return a value and its standard error as text; two digits of the error set the decimals.
+
+    Where they would be more than 12, of the two over a power of ten: (7.4400 ± 0.0016)×10⁻⁷.
+    """
     if not stderr > 0:
         return f"{value:.4g}"
-    decimals = min(max(1 - math.floor(math.log10(stderr)), 0), 12)
-    return f"{value:.{decimals}f} ± {stderr:.{decimals}f}"
+    decimals = max(1 - math.floor(math.log10(stderr)), 0)
+    if decimals <= _MOST_DECIMALS:
+        return f"{value:.{decimals}f} ± {stderr:.{decimals}f}"
+    exponent = math.floor(math.log10(max(abs(value), stderr)))
+    unit, decimals = 10.0**exponent, max(decimals + exponent, 0)
+    power = f"10{str(exponent).translate(_SUPERSCRIPTS)}"
+    return f"({value / unit:.{decimals}f} ± {stderr / unit:.{decimals}f})×{power}"  # noqa: RUF001
 
 
 def shortened(name: str, longest: int = 12) -> str:
@@ -209,8 +251,8 @@ def _path_label(profile: Profile, paths_mm: FloatArray) -> str:
     if profile.n_channels > 4:
         return "r (mean free paths)"
     lengths = ", ".join(
-        f"{shortened(name)} {_digits(path_mm)}"
-        for name, path_mm in zip(profile.channels, paths_mm, strict=True)
+        f"{channel_name(profile.channels, k)} {_digits(path_mm)}"
+        for k, path_mm in enumerate(paths_mm)
     )
     # 48 letters are as wide as the panel.
     return f"r (mean free paths: {lengths} mm)" if len(lengths) <= 26 else "r (mean free paths)"
@@ -220,7 +262,8 @@ def _through(profile: Profile) -> str:
     """Return a slab's transmittance, which no panel shows."""
     if profile.transmittance is None:
         return ""
-    return f"Transmittance: {by_channel(profile.channels, profile.transmittance.tolist(), '.4g')}. "
+    names = channel_names(profile.channels)
+    return f"Transmittance: {by_channel(names, profile.transmittance.tolist(), '.4g')}. "
 
 
 def _beyond(profile: Profile) -> str:
@@ -228,10 +271,11 @@ def _beyond(profile: Profile) -> str:
     diffuse = profile.diffuse_reflectance
     shares = np.divide(profile.beyond_grid, diffuse, out=np.zeros_like(diffuse), where=diffuse > 0)
     if profile.n_channels <= 4:
-        pairs = zip(profile.channels, shares, strict=True)
-        return ", ".join(f"{shortened(name)} {_percent(share)}" for name, share in pairs)
+        names = [channel_name(profile.channels, k) for k in range(len(shares))]
+        pairs = zip(names, shares, strict=True)
+        return ", ".join(f"{name} {_percent(share)}" for name, share in pairs)
     worst = int(np.argmax(shares))
-    return f"at most {_percent(shares[worst])} ({shortened(profile.channels[worst])})"
+    return f"at most {_percent(shares[worst])} ({channel_name(profile.channels, worst)})"
 
 
 def _digits(value: float) -> str:

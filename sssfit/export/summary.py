@@ -13,6 +13,7 @@ from sssfit.grid import RadialGrid, paper_grid
 from sssfit.kernel import SeparableKernel, Taps
 from sssfit.material import Material, load_material, material_names
 from sssfit.messages import (
+    SHARE,
     Columns,
     by_channel,
     columns,
@@ -225,12 +226,12 @@ _ENERGIES = Columns(
     "channel",
     "channels",
     (
-        ("diffuse R", "diffuse_reflectance", ".6f"),
+        ("diffuse R", "diffuse_reflectance", SHARE),
         ("+- stderr", "diffuse_reflectance_stderr", ".1e"),
         ("beyond grid", "beyond_grid", ".2e"),
         ("of diffuse", "beyond_share", ""),
         ("absorbed", "absorbed", ".6f"),
-        ("transmitted", "transmittance", ".6f"),
+        ("transmitted", "transmittance", SHARE),
         ("unfinished", "unfinished", ".1e"),
         ("sum - 1", "balance", ""),
     ),

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from sssfit.messages import columns, counted
+from sssfit.messages import SHARE, columns, counted
 from sssfit.profile.checks import BALANCE_ROUNDING
 
 _NOTED_BEYOND = 1e-3  # share of a channel beyond the grid that causes a remark
@@ -109,9 +109,9 @@ def _table(rows: Rows) -> str:
     return columns(
         "channel",
         names,
-        ("diffuse reflectance", values("diffuse_reflectance"), ".6f"),
+        ("diffuse reflectance", values("diffuse_reflectance"), SHARE),
         (error, values("diffuse_reflectance_stderr"), form),
-        ("transmittance", values("transmittance", shown=is_slab), ".6f"),
+        ("transmittance", values("transmittance", shown=is_slab), SHARE),
         (error, values("transmittance_stderr", shown=is_slab), form),
         ("absorbed", values("absorbed"), ".6f"),
         ("beyond grid", values("beyond_grid"), ".6f"),
