@@ -48,7 +48,7 @@ def triptych(kernel, picture, truth):
     scene = make_scene("head", height=height, width=width, mm_per_pixel=MM_PER_PIXEL)
     unblurred = scene.irradiance * kernel.energy
     exposure = auto_exposure(truth, mask=scene.mask)
-    panels = [(unblurred, "no blur"), (picture, f"{kernel.fetches:.0f} fetches a pixel")]
+    panels = [(unblurred, "no blur"), (picture, f"{kernel.fetches:.0f} fetches")]
     rows = [(shown, label, error(shown, truth, scene.mask)) for shown, label in panels]
     rows.append((truth, "truth: the whole 2D kernel", None))
     return page([(codes(shown, exposure), words(*rest)) for shown, *rest in rows])
@@ -61,7 +61,7 @@ def error(picture, truth, mask):
 
 def words(label, value):
     """Return what stands under a picture."""
-    return label if value is None else f"{label}: 95 % within Delta E {value:.2g}"
+    return label if value is None else f"{label}: 95 % within ΔE {value:.2g}"
 
 
 def codes(linear, exposure):
