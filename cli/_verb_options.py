@@ -150,8 +150,8 @@ FIT_PIXELS = (
     option("--pitches", Lengths(), "MM,...", "Pixel sizes to make a kernel for, a file each. "
            "Cascades with the same --stages can be mixed for sizes in between."),
     option("--support", Length("auto"), "MM|auto", "Half width of the kernel; auto is the "
-           "smallest that keeps 99.9 % of every channel, for cascade, gaussian-chain, rotated and "
-           "pyramid 99.99 % within 320 pixels.", "auto"),
+           "smallest that keeps 99.9 % of every channel; cascade, gaussian-chain, rotated and "
+           "pyramid keep up to 99.99 % within 320 pixels.", "auto"),
     flag("--smooth", "Take most of a walk's noise out of the profile before the fit."),
     flag("--normalize", "Separable kernels: scale each channel to unit energy, kept as a factor."),
 )

@@ -71,8 +71,11 @@ def check_kinds(
 
     ``where`` comes before a setting's name in the message.
     """
-    seed = Setting("seed", "whole", "of random numbers")  # of every method that has random numbers
-    kinds = {each.keyword or each.name: each for each in (*method.settings, seed)}
+    shared = (
+        Setting("seed", "whole", "of random numbers"),  # of every method that has random numbers
+        Setting("normalize", "flag", "scale to unit energy"),  # of every dense fit
+    )
+    kinds = {each.keyword or each.name: each for each in (*method.settings, *shared)}
     for key, value in given.items():
         expected = _expected(kinds[key], value) if key in kinds else ""
         if expected:

@@ -114,7 +114,7 @@ def keep_memory() -> None:
     a sixth of the time of a cascade's fit. What the environment says of it stays.
 
     Garbage is looked for after 50 000 new objects, not 700 as Python does by itself: a twentieth of
-    the time of a comparison and a tenth of compiling, for no more memory.
+    the time of a comparison and of compiling, for no more memory.
     """
     gc.set_threshold(_NEW_OBJECTS, 10, 10)
     if sys.platform != "linux" or any(name in os.environ for name in _MALLOC):

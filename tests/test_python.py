@@ -238,6 +238,7 @@ def test_sizes_are_whole_numbers(name, wrong):
         ("fit", ("PROFILE", "guided", {"centre_bound": "5%"}), "= '5%'; expected a number"),
         ("fit", ("PROFILE", "falloff", {"width": True}), "width = True; expected a number"),
         ("fit", ("PROFILE", "svd", {"rank": True}), "rank = True; expected a whole number"),
+        ("fit", ("PROFILE", "svd", {"normalize": "no"}), "= 'no'; expected True or False"),
         ("fit", ("PROFILE", "artist", {"near_mm2": "a"}), "'a'; expected a number, or one per"),
         ("simulate", ("skin1", "exact", {"tolerance": "1%"}), "'1%'; expected a number"),
         ("simulate", ("skin1", "montecarlo", {"target_error": "1%"}), "expected a number"),

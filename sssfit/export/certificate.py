@@ -112,8 +112,9 @@ def _of_depth(passes: Sequence[Pass]) -> Iterator[str]:
     """Yield what passes that follow depth read besides light."""
     yield "of a surface at depth 1 mm, 2 tan(vertical fov / 2) / rows, over a pixel's own scale."
     yield "D0, D1, ... hold coverage times depth in mm in their first channel, in 32 bits; where"
-    total = f"{fetches_of(passes):.6g} fetches a pixel with those of depth."
-    yield f"coverage is 0 nothing is read. {total}"
+    yield "coverage is 0 nothing is read. " + (
+        f"{fetches_of(passes):.6g} fetches a pixel with those of depth."
+    )
 
 
 def how_to_run(taps: Taps) -> Iterator[str]:

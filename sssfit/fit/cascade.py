@@ -104,8 +104,8 @@ def fit_cascade(
         Seed of the random starts; the same seed and ``like`` give the same bits.
     mm_per_pixel, support_mm : float, optional [mm]
         Pixel size, and half width of the pixels of the profile's kernel; see
-        ``sssfit.fit.make_target``. By default 99.99 % of every channel's energy lies within, where
-        that takes more than 320 pixels at least 99.9 %; the kernel has all of it.
+        ``sssfit.fit.make_target``. By default 99.99 % of every channel's energy lies within, or at
+        least 99.9 % where that takes more than 320 pixels; the kernel has all of it.
 
     Returns
     -------
