@@ -33,6 +33,7 @@ from sssfit.fit._result import TapsFit, provenance
 from sssfit.fit._spectrum import Pictures, pictures_of, recorded, search_targets
 from sssfit.fit._target import Pitch, Target, make_target, pitch_of, support_of
 from sssfit.fit._tied_chain import one_shape
+from sssfit.fit._trust_region import Minimum, minimise
 from sssfit.fit.structures import best_structure, width_pixels
 from sssfit.kernel.structure import Shape, cost_of_chain, parse, text_of
 from sssfit.kernel.taps import Stage, Taps
@@ -346,29 +347,18 @@ def _rough(chain: Searched, x: FloatArray) -> optimize.OptimizeResult:
     )
 
 
-def descent(
-    chain: Searched, x: FloatArray, most: int, gain: float = 3e-3
-) -> optimize.OptimizeResult:
+def descent(chain: Searched, x: FloatArray, most: int, gain: float = 3e-3) -> Minimum:
     """Minimise from a point by a trust region with the Gauss-Newton matrix.
 
     It ends when ten steps together gain less than ``gain`` of the value.
     """
     values: list[float] = []
 
-    def check(intermediate_result: optimize.OptimizeResult) -> None:
-        values.append(intermediate_result.fun)
-        if len(values) > 10 and values[-11] - values[-1] < gain * values[-1]:
-            raise StopIteration
+    def has_ended(value: float) -> bool:
+        values.append(value)
+        return len(values) > 10 and values[-11] - values[-1] < gain * values[-1]
 
-    return optimize.minimize(
-        chain.value_and_gradient,
-        x,
-        jac=True,
-        hess=chain.hessian,
-        method="trust-ncg",
-        callback=check,
-        options={"maxiter": most, "gtol": 1e-14},
-    )
+    return minimise(chain.value_and_gradient, chain.hessian, x, most=most, has_ended=has_ended)
 
 
 def numbers_of(taps: Taps, lit: list[int], mm_per_pixel: float) -> Numbers:
