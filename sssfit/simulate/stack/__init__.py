@@ -5,7 +5,8 @@ wavenumber k, ``nodes`` and ``azimuth`` choose directions, ``phase`` has scatter
 ``modes`` the eigenmodes of a layer and ``embedding`` puts layers on one another. ``assembly`` does
 this for a stack, ``single`` separates light that is scattered once, ``sampling`` covers all stacks
 that share layers, ``changes`` gives most wavenumbers few directions, ``transform`` goes back to
-radii (between wavenumbers by ``spline``), ``solution`` adds directions until the answer stands,
+radii (between wavenumbers by ``spline``), ``solution`` adds directions until the answer stands
+(``tails``: what more would change),
 ``profiles`` does so for all channels and ``solved`` makes records of what they found.
 
 Sources: Stamnes et al. 1988, Applied Optics 27, 2502 (discrete ordinates); Liemert, Reitzle and

@@ -9,11 +9,10 @@ import numpy as np
 
 from sssfit.arrays import FloatArray
 from sssfit.simulate.stack.azimuth import FEWEST
-from sssfit.simulate.stack.quarter import Each
+from sssfit.simulate.stack.quarter import Each, highest_of
 from sssfit.simulate.stack.sampling import Family, Sampler
 from sssfit.simulate.stack.transform import Wavenumbers, refined
 
-_HIGHEST = 20.0  # largest wavenumber, in the largest extinctions; F is off by 9e-5 with 10
 _PER_DECADE = 3  # wavenumbers of a change at first, half of those of a transform
 
 
@@ -41,7 +40,7 @@ class Changes:
     """
 
     def __init__(self, family: Family, few: int, more: Sampler, miss: float, each: Each) -> None:
-        most, careful = _HIGHEST * more.most_sigma_t, 2.0 / family.longest
+        most, careful = highest_of(more), 2.0 / family.longest
         span = family.least_wavenumber, most, miss, careful
         self._each, self._more = each, more
         self._few = more if family.has_clear_layers else ready(family, few, FEWEST)

@@ -12,6 +12,7 @@ from sssfit.simulate.stack.nodes import Nodes
 from sssfit.simulate.stack.quarter import AZIMUTHS, Quarter
 from sssfit.simulate.stack.slabs import SlabStack
 from sssfit.simulate.stack.solution import Step
+from sssfit.simulate.stack.tails import Tail
 
 _LEAST_TOLERANCE = 1e-6  # 40 directions reach 5e-8 of a half space and 1e-6 of most stacks
 _LARGEST_ADVISED = 0.5
@@ -71,10 +72,12 @@ def cannot_meet(
     steepest = max(each.g for each in channel.stack.scattering)
     is_thin = channel.stack.is_seen_through and steepest > 0.5
     why = f" (a thin slab of g = {steepest:g}, which the walk does well)" if is_thin else ""
+    by = f"{step.count} and {step.count - 4} directions differ by {worst:.2g}"
+    if Tail.of(channel.stack).ratio > 0.0:
+        by = f"with {step.count} directions errors may be {worst:.2g}"
     by_directions = worst - step.spline_share(number)
     return SimulationError(
-        f"{channel.name}{why}: the tolerance of {tolerance:g} cannot be met: {step.count} and "
-        f"{step.count - 4} directions differ by {worst:.2g} of the light; "
+        f"{channel.name}{why}: the tolerance of {tolerance:g} cannot be met: {by} of the light; "
         f"{_advised(max(worst, by_directions / _OF_DIRECTIONS))}."
     )
 

@@ -31,6 +31,7 @@ from sssfit.simulate.stack.sampling import Family
 from sssfit.simulate.stack.slabs import stacks_of
 from sssfit.simulate.stack.solution import Answer, Errors, Side, SideErrors, Step, steps
 from sssfit.simulate.stack.solved import Solved, profile_of
+from sssfit.simulate.stack.tails import Tail
 
 COUNTS = (8, 12, 16, 20, 24, 28, 32, 36, 40)
 _QUICK = 2e-3  # a tolerance from which 8 and 12 directions may do
@@ -38,6 +39,7 @@ _MOST_AZIMUTH = 0.5  # of a tolerance that directions in azimuth may take
 _MANY = 9  # directions in azimuth
 _PATIENCE = 10.0  # with few directions in azimuth: their errors differ between polar ones
 _LEAST_GAIN = 2.0  # by which four more directions reduce an error, if it was not more before
+_STEEP_GAIN = 3.0  # of steep scattering, whose estimates fall slowly at first (`tails`)
 
 
 def solve_stacks(
@@ -164,13 +166,15 @@ def _last(
     times the tolerance.
     """
     before = math.inf
+    is_steep = any(Tail.of(each.stack).ratio > 0.0 for each in channels)
+    least = _STEEP_GAIN if is_steep else _LEAST_GAIN
     for step in under_way:
         shares = [step.share(number) for number in range(len(channels))]
         worst = max(shares)
         if worst <= tolerance:
             return step
         left = counts[counts.index(step.count) + 1 :]
-        gain = max(before / worst, _LEAST_GAIN)
+        gain = max(before / worst, least)
         is_hopeless = worst > tolerance * gain ** len(left)
         if is_hopeless or not fits(channels, left[0], quarter.count, threads):
             if worst <= patience * tolerance:

@@ -23,8 +23,12 @@ Each = Callable[[Callable[[float], FloatArray], FloatArray], FloatArray]
 
 AZIMUTHS = (FEWEST, 7, 9, 13, 17)
 _POLAR = 8  # directions on either side: the difference of two rules in azimuth hardly needs more
+_POLAR_BACK = 16  # where a layer scatters back: with 8, g = -.7 seems off by a fifth of what it is
+_SHORT = 1.4  # then the larger rule is off too, by a quarter of what the smaller is
 _PER_DECADE = 6  # wavenumbers; with 4, a milk on glass got too few directions: F off by 9e-5
-_HIGHEST = 20.0  # largest wavenumber, in the largest extinctions
+_HIGHEST = 20.0  # largest wavenumber, in the largest extinctions; F is off by 9e-5 with 10
+_STEEPEST = 1e-2  # least 1 + g
+_HIGHEST_BACK = 5.0  # of it times 1 + g: with 1, a half space of g = -.95 is off by 5e-4
 _ALIKE = 1.0  # k of one mean free path below which rules differ by 1e-9, without clear layers
 _RADII = 60  # at which the error of F is found, and taken as linear in log r in between
 _ROUNDING = 1e-4  # of T(0): T(k) below this is rounding of the directions, and counts as 0
@@ -37,13 +41,14 @@ _MOST_BELOW = 7  # directions that T asks for: with more, 8 polar ones leave the
 class Quarter:
     """The number of directions in azimuth, and what F is off by with it.
 
-    ``errors`` are those of F above at the radii of each stack, and of the total (n + 1,);
-    ``share`` is the largest as one of the light that leaves, and ``below`` that of light from
-    below; ``worst`` is the number of the stack with the largest.
+    ``errors`` are those of F above and below at the radii of each stack, and of the total (n + 1,);
+    ``share`` is the largest above as one of the light that leaves, and ``below`` that of light from
+    below; ``worst`` is the number of the stack with the largest. Where light is scattered ahead,
+    the errors below are zeros: N - 4 polar directions see them.
     """
 
     count: int
-    errors: list[FloatArray]
+    errors: list[tuple[FloatArray, FloatArray]]
     share: float
     below: float
     worst: int
@@ -62,10 +67,11 @@ def quarter_of(family: Family, radii: list[FloatArray], tolerance: float, each: 
     family, radii, tolerance, each
         As in ``solution.steps``.
     """
-    if not family.has_layers:
+    if not family.has_layers and not family.scatters_back:
         none = [np.zeros(own.size + 1) for own in radii]
-        return Quarter(FEWEST, none, 0.0, 0.0, 0)
-    samplers = (Sampler(family, _POLAR, count) for count in AZIMUTHS)
+        return Quarter(FEWEST, list(zip(none, none, strict=True)), 0.0, 0.0, 0)
+    polar = _POLAR_BACK if family.scatters_back else _POLAR
+    samplers = (Sampler(family, polar, count) for count in AZIMUTHS)
     values = (_Sampled.of(sampler, each) for sampler in samplers)
     for fewer, more in pairwise(values):
         found = _compared(fewer, more, radii)
@@ -85,7 +91,7 @@ class _Sampled:
 
     @classmethod
     def of(cls, sampler: Sampler, each: Each) -> "_Sampled":
-        family, most = sampler.family, _HIGHEST * sampler.most_sigma_t
+        family, most = sampler.family, highest_of(sampler)
         least = family.least_wavenumber if family.has_clear_layers else _ALIKE / family.longest
         many = math.ceil(_PER_DECADE * math.log10(most / least)) + 1
         k = np.geomspace(least, most, many)
@@ -103,13 +109,25 @@ def _compared(fewer: _Sampled, more: _Sampled, radii: list[FloatArray]) -> Quart
     least = float(fewer.k[0])
     k = np.concatenate(([0.0, 0.5 * least], fewer.k))
     apart = Wavenumbers(k, np.pad(more.values - fewer.values, ((2, 0), (0, 0))), least)
-    errors = [_at(apart, own) for own in radii]
+    is_back = fewer.sampler.family.scatters_back
+    errors = [(_SHORT if is_back else 1.0) * _at(apart, own) for own in radii]
     above = [error[:, 2 * number] for number, error in enumerate(errors)]
     below = [error[:, 2 * number + 1] for number, error in enumerate(errors)]
     shares = [np.array([np.abs(own).max() for own in side]) for side in (above, below)]
     up, down = (side / fewer.leaving for side in shares)
-    worst = int(up.argmax())
-    return Quarter(fewer.sampler.azimuths, above, float(up[worst]), float(down.max()), worst)
+    if is_back:
+        up = np.maximum(up, down)
+    else:
+        below = [np.zeros_like(own) for own in above]
+    worst, both = int(up.argmax()), list(zip(above, below, strict=True))
+    return Quarter(fewer.sampler.azimuths, both, float(up[worst]), float(down.max()), worst)
+
+
+def highest_of(sampler: Sampler) -> float:
+    """Return the largest wavenumber [1/mm]: light that turns back returns close to where it was."""
+    least = min(slab.g for stack in sampler.family.stacks for slab in stack.scattering)
+    steepness = _HIGHEST_BACK / max(1.0 + least, _STEEPEST) if least < 0.0 else 0.0
+    return max(_HIGHEST, steepness) * sampler.most_sigma_t
 
 
 def _at(apart: Wavenumbers, radii: FloatArray) -> FloatArray:

@@ -82,6 +82,11 @@ class Family:
         """Whether any layer ends, so that light comes back through it."""
         return any(math.isfinite(slab.thickness) for each in self.stacks for slab in each.slabs)
 
+    @property
+    def scatters_back(self) -> bool:
+        """Whether any layer scatters light back rather than ahead."""
+        return any(slab.g < 0.0 for slab in self._scattering)
+
     @cached_property
     def is_singular(self) -> bool:
         """Whether k = 0 is singular: a layer that hardly absorbs, or a clear one."""
@@ -228,9 +233,9 @@ def _forward_depth(assembly: Assembly) -> float:
     """Return k z that matters to a beam on its way out.
 
     The pole of Henyey and Greenstein's function at cos = (1 + g^2) / 2 g slows exp(-k z) to
-    exp(-k z (1 - g^2) / (1 + g^2)).
+    exp(-k z (1 - g^2) / (1 + g^2)), also of light that turns back twice.
     """
-    g = max(0.0, max(each.slab.g for each in assembly.media if each.slab.scatters))
+    g = max(abs(each.slab.g) for each in assembly.media if each.slab.scatters)
     return _DEEP * (1.0 + g**2) / max(1.0 - g**2, _STEEPEST)
 
 

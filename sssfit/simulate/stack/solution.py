@@ -1,8 +1,9 @@
 """F(r) of several stacks, with more and more directions until two numbers of them agree.
 
 The error estimate is the difference between N and N - 4 directions, both on every other wavenumber,
-plus what their spline and the directions in azimuth are off by (`quarter`). It belongs to the
-coarser of the two, and the finer one is returned: an estimate, not a bound.
+and more of steep phase functions (`tails`), plus what their spline and the directions in azimuth
+are off by (`quarter`). It belongs to the coarser of the two, and the finer one is returned: an
+estimate, not a bound.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -19,7 +20,10 @@ from sssfit.simulate.stack.quarter import Each, Quarter, without_rounding
 from sssfit.simulate.stack.sampling import Family, Sampler
 from sssfit.simulate.stack.single import single_cumulative
 from sssfit.simulate.stack.spline import Spline
+from sssfit.simulate.stack.tails import Tail
 from sssfit.simulate.stack.transform import Wavenumbers
+
+Both = tuple[FloatArray, FloatArray]
 
 _MISS = 0.1  # of the tolerance, between two wavenumbers; F is then off by less
 _DARK = 1e-300  # where no light leaves, no error has a share
@@ -68,12 +72,14 @@ class Answer:
 class SideErrors:
     """Errors of F at the radii and of the total (n + 1,), of the light in between (n + 1,).
 
-    ``spline`` is the largest that comes from the wavenumbers.
+    ``spline`` is the largest that comes from the wavenumbers, and ``apart`` by what F of two
+    numbers of directions differs (n + 1,).
     """
 
     edges: FloatArray
     annuli: FloatArray
     spline: float
+    apart: FloatArray | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,6 +102,9 @@ class Errors:
     @property
     def _sides(self) -> list[SideErrors]:
         return [each for each in (self.reflected, self.transmitted) if each is not None]
+
+
+_NONE = Errors(SideErrors(np.zeros(0), np.zeros(0), 0.0), None)
 
 
 def share_of(errors: Errors, answer: Answer) -> float:
@@ -148,6 +157,8 @@ def steps(
         Maps a function over wavenumbers, with threads.
     """
     coarse: list[Answer] | None = None
+    last = [_NONE] * len(family.stacks)
+    tails = [Tail.of(stack) for stack in family.stacks]
     changes: Changes | None = None
     miss = tolerance * _MISS
     for before, count in pairwise(counts):
@@ -157,12 +168,12 @@ def steps(
         if coarse is None:
             first = ready(family, before, quarter.count)
             coarse = _answers(first, changes.halved(first), radii, specular)
-        fours = zip(fine, halved, coarse, quarter.errors, strict=True)
-        step = Step(count, fine, [_errors(*four) for four in fours])
+        each_stack = zip(fine, halved, coarse, quarter.errors, tails, last, strict=True)
+        step = Step(count, fine, [_errors(*own) for own in each_stack])
         yield step
         if max(map(step.spline_share, range(len(fine)))) > 0.5 * tolerance:
             changes, miss = None, 0.1 * miss
-        coarse = halved
+        coarse, last = halved, step.errors
 
 
 def _answers(
@@ -205,22 +216,32 @@ def _interpolated(light: Callable[[FloatArray], FloatArray], radii: FloatArray) 
     return Spline.through(np.log(knots), light(knots)[:, None])(np.log(radii))[:, 0]
 
 
-def _errors(fine: Answer, halved: Answer, coarse: Answer, azimuth: FloatArray) -> Errors:
-    """Return the errors of both sides; ``azimuth`` is that of light above."""
-    up = _side_errors(fine.reflected, halved.reflected, coarse.reflected, azimuth)
+def _errors(
+    fine: Answer, halved: Answer, coarse: Answer, azimuth: Both, tail: Tail, last: Errors
+) -> Errors:
+    """Return the errors of both sides; ``azimuth`` are those of light above and below."""
+    above = fine.reflected, halved.reflected, coarse.reflected
+    up = _side_errors(*above, azimuth[0], tail, last.reflected)
     if fine.transmitted is None or halved.transmitted is None or coarse.transmitted is None:
         return Errors(up, None)
-    none = np.zeros(azimuth.size)
-    down = _side_errors(fine.transmitted, halved.transmitted, coarse.transmitted, none)
-    return Errors(up, down)
+    below = fine.transmitted, halved.transmitted, coarse.transmitted
+    return Errors(up, _side_errors(*below, azimuth[1], tail, last.transmitted))
 
 
-def _side_errors(fine: Side, halved: Side, coarse: Side, azimuth: FloatArray) -> SideErrors:
+def _side_errors(
+    fine: Side, halved: Side, coarse: Side, azimuth: FloatArray, tail: Tail, last: SideErrors | None
+) -> SideErrors:
     """Compare the light within each radius, and altogether: N with N - 4, and both splines."""
-    apart = [halved.edges - coarse.edges, fine.edges - halved.edges, azimuth]
-    of_annuli = [np.diff(np.append(0.0, each)) for each in apart]
-    spline = float(np.max(np.abs(apart[1])))
-    return SideErrors(_summed(apart), _summed(of_annuli), spline)
+    directions, others = halved.edges - coarse.edges, (fine.edges - halved.edges, azimuth)
+    before = directions if last is None or last.apart is None else last.apart
+    edges = [tail.left(directions, before), *others]
+    annuli = [tail.left(_steps(directions), _steps(before)), *map(_steps, others)]
+    return SideErrors(_summed(edges), _summed(annuli), float(np.max(np.abs(others[0]))), directions)
+
+
+def _steps(edges: FloatArray) -> FloatArray:
+    found: FloatArray = np.diff(np.append(0.0, edges))
+    return found
 
 
 def _summed(apart: list[FloatArray]) -> FloatArray:
