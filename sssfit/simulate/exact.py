@@ -135,7 +135,7 @@ def simulate_exact_many(
             return found
         solved_for = [_isotropic(each) if similarity else each for each in materials]
         pairs = zip(found, solved_for, strict=True)
-        return [_with_angles(each, material, directions) for each, material in pairs]
+        return [_with_angles(each, material, directions, tolerance) for each, material in pairs]
 
 
 def _workers(threads: int, *, is_plain: bool) -> ThreadPoolExecutor:
@@ -147,13 +147,15 @@ def _workers(threads: int, *, is_plain: bool) -> ThreadPoolExecutor:
     return thread_pool(threads, first=depth_matrix.ENTRY.load)
 
 
-def _with_angles(profile: Profile, material: Material, directions: Directions) -> Profile:
+def _with_angles(
+    profile: Profile, material: Material, directions: Directions, tolerance: float
+) -> Profile:
     """Add R_d(angle), which the solver for layers has at k = 0, whichever made the profile."""
     from sssfit.simulate.stack.angles import energies_by_angle
 
     settings = {**profile.meta["settings"], **directions.given()}
     meta = {**profile.meta, "format": directions.profile_format, "settings": settings}
-    fields: dict[str, Any] = dict(energies_by_angle(material, directions.edges_rad))
+    fields: dict[str, Any] = dict(energies_by_angle(material, directions.edges_rad, tolerance))
     return replace(profile, meta=meta, **fields)
 
 

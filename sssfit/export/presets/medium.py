@@ -28,6 +28,7 @@ from sssfit.simulate.stack.angles import energies_by_angle
 CHANNELS = ("R", "G", "B")
 _STEP, _LEAST, _NEAR_ONE = 1e-4, 1e-300, 1e-4  # of albedos
 _HEMISPHERE = np.array([0.0, 0.5 * math.pi])
+_TOLERANCE = 1e-4  # of R_d
 _ROUNDING = 5  # decimals of a relative change of R_d; two solvers differ by 1e-7
 
 
@@ -73,7 +74,7 @@ def losses(source: Source) -> tuple[str, ...]:
 def total_reflectance(material: Material) -> FloatArray:
     """Return R_d (C,) of any material under normal light, exactly, in hundredths of a second."""
     with one_blas_thread():
-        by_angle = energies_by_angle(material, _HEMISPHERE)["angle_reflected"]
+        by_angle = energies_by_angle(material, _HEMISPHERE, _TOLERANCE)["angle_reflected"]
     return np.asarray(by_angle.sum(axis=(0, 1)))
 
 

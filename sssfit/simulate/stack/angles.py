@@ -7,6 +7,7 @@ has the least index, t is 1 - 2 alpha / pi.
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 from numpy.polynomial import legendre
@@ -17,37 +18,56 @@ from sssfit.optics import gauss_legendre
 from sssfit.simulate.stack.assembly import Assembly, leaving_by_node
 from sssfit.simulate.stack.sampling import Family, KnownModes, Sampler
 from sssfit.simulate.stack.slabs import SlabStack, stacks_of
+from sssfit.simulate.stack.tails import Tail
 
-_COUNTS = (28, 36)  # directions; their difference is the error that is claimed
+# Directions; the difference of two numbers is the error that is claimed. More are used until it is
+# within the tolerance; at k = 0 even the most take a tenth of a second.
+_COUNTS = (28, 36, 48, 64, 96)
 _GRAZING = 1e-300  # square of a cosine
 
 
-def energies_by_angle(material: Material, edges_rad: FloatArray) -> dict[str, FloatArray]:
+def energies_by_angle(
+    material: Material, edges_rad: FloatArray, tolerance: float
+) -> dict[str, FloatArray]:
     """Return the fields of a profile by exit angle, (1, A, C): of all annuli together.
 
-    Their errors are differences between two numbers of directions.
+    Their errors are differences between two numbers of directions, or more (`tails`).
 
     Parameters
     ----------
     material : Material
     edges_rad : array (A+1,) [rad]
         From 0 to pi/2.
+    tolerance : float
+        Largest error of an angle's light that more directions are used for, a share of the light
+        that leaves on a side.
     """
     stacks = stacks_of(material)
     found = {"exit_angle_edges_rad": edges_rad}
     sides = [("angle_reflected", False)]
     sides += [("angle_transmitted", True)] if stacks[0].has_bottom else []
     for name, is_below in sides:
-        coarse, fine = (
-            np.stack([_by_angle(each, count, edges_rad, is_below=is_below) for each in stacks], 1)
-            for count in _COUNTS
-        )
+        known = [_within(each, edges_rad, tolerance, is_below=is_below) for each in stacks]
+        light, stderr = (np.stack(each, axis=1) for each in zip(*known, strict=True))
         if not is_below:
-            fine[0] -= material.specular_reflectance
-            coarse[0] -= material.specular_reflectance
-        fine = np.maximum(fine, 0.0)  # rounding
-        found |= {name: fine[None], f"{name}_stderr": np.abs(fine - coarse)[None]}
+            light[0] -= material.specular_reflectance
+        found |= {name: np.maximum(light, 0.0)[None], f"{name}_stderr": stderr[None]}  # rounding
     return found
+
+
+def _within(
+    stack: SlabStack, edges_rad: FloatArray, tolerance: float, *, is_below: bool
+) -> tuple[FloatArray, FloatArray]:
+    """Return light between the angles and its errors, by as many directions as are needed."""
+    coarse = _by_angle(stack, _COUNTS[0], edges_rad, is_below=is_below)
+    for before, count in pairwise(_COUNTS):
+        fine = _by_angle(stack, count, edges_rad, is_below=is_below)
+        apart, tail = fine - coarse, Tail.of(stack).over(count - before)
+        off = float(np.max(tail.left(np.cumsum(apart), np.zeros_like(apart))))
+        if off <= tolerance * float(np.sum(fine)):
+            break
+        coarse = fine
+    return fine, tail.left(apart, np.zeros_like(apart))
 
 
 def _by_angle(stack: SlabStack, count: int, edges_rad: FloatArray, *, is_below: bool) -> FloatArray:
