@@ -532,7 +532,7 @@ def test_a_page_of_layers_has_the_models_and_budgets_of_layers(caplog):
         *("exact", "montecarlo", "multipole"),
     ]
     assert {each.scene.name for each in made.budgets} == {"disk", "edge"}
-    assert made.profile.meta["method"] == "exact"
+    assert made.models.exact.profile is made.profile  # not solved for again
     assert caplog.text.count("stack is not one half space: dipoles and normalised") == 1
 
 
@@ -543,7 +543,8 @@ def test_what_does_not_cover_a_material_is_left_out_with_a_note(caplog, monkeypa
     caplog.set_level("INFO", logger="sssfit")
     for each in ("compare_models", "error_budgets", "compute_convergence"):
         monkeypatch.setattr(parts, each, refused)
-    found = parts.parts_of(layered(), [], {"photons": 1_000_000, "seed": 1, "threads": 1})
+    exact, walk = world.report().profile, {"photons": 1_000_000, "seed": 1, "threads": 1}
+    found = parts.parts_of(layered(), exact, [], walk)
     assert found == (None, (), None)
     for each in ("models", "error budget", "convergence"):
         assert f"The page has no {each}: stack is refused." in caplog.text

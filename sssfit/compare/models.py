@@ -127,6 +127,7 @@ def compare_models(
     material: Material,
     *,
     walk: Profile | None = None,
+    exact: Profile | None = None,
     photons: int | None = None,
     seed: int = 1,
     threads: int | None = None,
@@ -146,6 +147,8 @@ def compare_models(
         the models warn that it is reduced.
     walk : Profile, optional
         The material's photon walk, if there is one already; its grid then serves all.
+    exact : Profile, optional
+        Its exact profile on the grid of the others, if there is one already.
     photons, seed, threads, progress
         Those of the walk otherwise; see `simulate_montecarlo`.
     dr_mm, radius_mm : float, optional
@@ -170,7 +173,8 @@ def compare_models(
     """
     if walk is not None:
         dr_mm, radius_mm = _grid_of(walk)
-    exact = simulate_exact(material, dr_mm=dr_mm, radius_mm=radius_mm, threads=threads)
+    if exact is None:
+        exact = simulate_exact(material, dr_mm=dr_mm, radius_mm=radius_mm, threads=threads)
     if walk is None:
         walk = simulate_montecarlo(
             material,

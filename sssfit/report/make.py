@@ -101,7 +101,7 @@ def make_report(
         begun = begun_fits(profile, pitch, [label for label, _ in named], only, aside)
         steps.total += len(begun)
         flat = [evaluated_scene(each, profile) for each in flat_scenes(pitch, side)]
-        parts = aside.begin(partial(parts_of, source, flat, walk))
+        parts = aside.begin(partial(parts_of, source, profile, flat, walk))
         pictures = shown_pictures(
             profile, pitch, own=own, side=side, threads=threads, progress=steps
         )

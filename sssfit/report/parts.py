@@ -21,13 +21,17 @@ Part = TypeVar("Part")
 Parts = tuple[ModelComparison | None, tuple[Budget, ...], Convergence | None]
 
 
-def parts_of(source: Material | Profile, flat: Sequence[Scene], walk: dict[str, Any]) -> Parts:
+def parts_of(
+    source: Material | Profile, exact: Profile, flat: Sequence[Scene], walk: dict[str, Any]
+) -> Parts:
     """Return what needs coefficients; a part that does not cover the material is noted.
 
     Parameters
     ----------
     source : Material or Profile
         A profile has no coefficients, and so none of the parts.
+    exact : Profile
+        The material's exact profile, on the paper's grid.
     flat : sequence of Scene
         The scenes of the budget.
     walk : dict
@@ -37,7 +41,7 @@ def parts_of(source: Material | Profile, flat: Sequence[Scene], walk: dict[str, 
         return None, (), None
     with told_once():  # models and budget leave the same ones out
         return (
-            _covered("models", lambda: compare_models(source, **walk)),
+            _covered("models", lambda: compare_models(source, exact=exact, **walk)),
             tuple(_covered("error budget", lambda: error_budgets(source, flat, **walk)) or ()),
             _covered("convergence", lambda: _convergence(source, **walk)),
         )
