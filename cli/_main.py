@@ -90,8 +90,9 @@ def run(args: Sequence[str] | None) -> NoReturn:
     """Run the command line and exit."""
     _keep_matplotlib_quiet()
     # BLAS starts a thread a core with numpy, 70 ms of the processor, and waits for all of them at
-    # each of the small products here.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    # each of the small products here. Zarr's, up to ten, take 75 MB of address space each.
+    for name in ("OPENBLAS_NUM_THREADS", "ZARR_THREADING__MAX_WORKERS"):
+        os.environ.setdefault(name, "1")
     keep_memory()
     with warnings.catch_warnings():
         warnings.simplefilter("always", SssfitWarning)
@@ -141,8 +142,7 @@ def _refuse(error: click.ClickException) -> NoReturn:
 
 def _one_line(text: str) -> str:
     """Escape what would move the cursor or the line, and cut the middle out of what is too long."""
-    line = printable(text)
-    half = _LONGEST_LINE // 2
+    line, half = printable(text), _LONGEST_LINE // 2
     return line if len(line) <= _LONGEST_LINE else f"{line[:half]} ... {line[-half:]}"
 
 

@@ -93,6 +93,8 @@ _NEEDED_MB = {
     "show": 460,
     "figures": 680,  # of models, spectra and guide functions
     "inversion": 700,
+    "sweep": 880,
+    "cluster": 1300,  # the client, its threads, and the scheduler of workers of this machine
 }
 _OTHER_MB = 280
 # Of a thread: its stack, and what the C library sets aside for it. Without threads of our own a
@@ -221,6 +223,7 @@ class Interrupts:
     def __init__(self) -> None:
         self._before: dict[signal.Signals, Any] = {}
         self._hooks = sys.excepthook, sys.unraisablehook
+        self._thread_hook = threading.excepthook
 
     def take(self) -> None:
         """Handle SIGINT and SIGTERM from here on, unless they are ignored (``nohup``, ``&``)."""
@@ -233,6 +236,7 @@ class Interrupts:
             if signal.getsignal(number) is not signal.SIG_IGN:
                 self._before[number] = signal.signal(number, _raise)
         sys.excepthook, sys.unraisablehook = self._uncaught, self._unraisable
+        threading.excepthook = self._in_thread
         threading.Thread(target=_listen, args=(reader,), daemon=True).start()
         _listening.set()
         _reset_on_delivery()
@@ -242,6 +246,7 @@ class Interrupts:
         for number, handler in self._before.items():
             signal.signal(number, handler)
         sys.excepthook, sys.unraisablehook = self._hooks
+        threading.excepthook = self._thread_hook
         signal.set_wakeup_fd(self._wakeup)
         _listening.clear()
         os.close(self._writer)  # which ends the thread
@@ -253,6 +258,11 @@ class Interrupts:
         if issubclass(kind, KeyboardInterrupt):
             _end(b"\nInterrupted.\n")
         self._hooks[0](kind, error, traceback)
+
+    def _in_thread(self, failed: threading.ExceptHookArgs) -> None:
+        """Leave it to the main thread, which notices and says it in one line, to speak of it."""
+        if os.environ.get("SSSFIT_TRACEBACK"):
+            self._thread_hook(failed)
 
     def _unraisable(self, ignored: "sys.UnraisableHookArgs") -> None:
         """End where Python would print an interruption and ignore it, in its own clean-up."""

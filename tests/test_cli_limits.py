@@ -29,6 +29,14 @@ sigma_a_per_mm = [0.1]
 sigma_s_per_mm = [1.0]
 """
 
+PLAN = """
+material = "wax.toml"
+method = "dipole"
+[[axes]]
+key = "eta"
+values = [1.3, 1.4]
+"""
+
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
@@ -38,6 +46,7 @@ def made(tmp_path_factory):
     profile.save(folder / "wax.profile.npz")
     fit_svd(profile, rank=1, mm_per_pixel=0.2).kernel.save(folder / "wax.kernel.json")
     (folder / "wax.toml").write_text(TOML)
+    (folder / "plan.toml").write_text(PLAN)
     (folder / "wax.csv").write_text("r_mm,R\n0.5,0.1\n2,0.05\n")
     return folder
 
@@ -93,6 +102,7 @@ VERBS = {
     "import": ("wax.csv", "--quantity", "density", "-q"),
     "export": ("wax.kernel.json", "--format", "hlsl", "-q"),
     "materials": ("skin1", "-q"),
+    "sweep": ("plan.toml", "-q"),
 }
 
 
@@ -112,6 +122,16 @@ def test_the_limits_at_which_it_spun_or_crashed(folder):
         ended = sssfit(folder, "simulate", "skin1", "--threads", "2", megabytes=megabytes)
         assert (ended.returncode, ended.stdout) == (1, "")
         assert ended.stderr.endswith("MB; raise the limit, or give fewer --threads.\n")
+
+
+@posix
+@pytest.mark.parametrize("where", [("--threads", "2"), ("--scheduler", "local:2")])
+def test_the_limit_at_which_sweeps_hung(folder, where):
+    ended = sssfit(folder, "sweep", "plan.toml", *where, megabytes=819)
+    assert (ended.returncode, ended.stdout) == (1, "")
+    assert ended.stderr.startswith("Error: this process may use 819 MB of memory")
+    assert ended.stderr.count("\n") == 1
+    assert not [each for each in folder.iterdir() if "zarr" in each.name]
 
 
 @posix

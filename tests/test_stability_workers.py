@@ -83,6 +83,28 @@ def test_a_killed_worker_gets_one_line():
     assert "\n" not in str(caught.value)
 
 
+def ended(thread):
+    raise MemoryError
+
+
+def stuck(thread):
+    """Wait, as for the rest of a result, until nobody could write it any more."""
+    os.read(thread.result_queue._reader.fileno(), 1)
+    return None, True, None
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnhandledThreadExceptionWarning")
+@pytest.mark.parametrize("work", [ended, stuck])
+def test_a_pool_that_cannot_tell_of_its_workers_gets_one_line(monkeypatch, work):
+    """Python's thread for that has ended for lack of memory, or waits for half a result."""
+    told = "concurrent.futures.process._ExecutorManagerThread.wait_result_broken_or_wakeup"
+    monkeypatch.setattr(told, work)
+    monkeypatch.setattr("sssfit.stability.workers._TOLD_SECONDS", 0.1)
+    lost = pytest.raises(SssfitError, match="worker process ended before")
+    with lost, Workers(1, None) as workers:
+        workers.each(killed, [0])
+
+
 _CALLER = """
 import sys
 from pathlib import Path

@@ -12,11 +12,13 @@ import pickle
 import signal
 import sys
 import threading
+import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import wait as wait_for
 from concurrent.futures.process import BrokenProcessPool
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, wait
 from multiprocessing.resource_tracker import ensure_running
 from multiprocessing.shared_memory import SharedMemory
 from types import TracebackType
@@ -33,6 +35,9 @@ _LOST = (
     "a worker process ended before its work was done: it was killed, memory ran out, or the "
     "script lacks the main guard that multiprocessing needs; `threads = 1` takes no worker."
 )
+
+_LOOKS_SECONDS = 0.2
+_TOLD_SECONDS = 5.0  # after a worker's end the pool's thread tells of it at once, if at all
 
 _shared: Any = None
 
@@ -58,6 +63,7 @@ class Workers:
         self._kept = SharedMemory(create=True, size=len(data))
         cast(memoryview, self._kept.buf)[: len(data)] = data  # None only after it is closed
         given = self._theirs, self._kept.name
+        self._ended_at: float | None = None
         try:
             self._pool = ProcessPoolExecutor(min(count, _MOST), context, _begin, given)
         except BaseException:
@@ -75,22 +81,25 @@ class Workers:
     ) -> None:
         if error is not None:
             self._ours.close()  # which ends them in the midst of their work
-            self._end_results()
+            self._end_queues()
         try:
             self._pool.shutdown(cancel_futures=True)
         finally:
             self._close()
 
-    def _end_results(self) -> None:
-        """Close this process's own end of what results come through.
+    def _end_queues(self) -> None:
+        """Close this process's own end of what results come through, and leave calls unsent.
 
         A worker may end in the midst of a result. The pool's thread waits for the rest of it, and
-        `shutdown` for that thread: for ever, as long as anybody could still write. Python has no
-        public way to say that nobody will.
+        `shutdown` for that thread: for ever, as long as anybody could still write. Python at its
+        end waits for a call that no worker takes. It has no public way to say that nobody will.
         """
         writer = getattr(getattr(self._pool, "_result_queue", None), "_writer", None)
         if writer is not None:
             writer.close()
+        calls = getattr(self._pool, "_call_queue", None)
+        if calls is not None:
+            calls.cancel_join_thread()
 
     def _close(self) -> None:
         """Close the pipe, and give the shared memory back."""
@@ -118,12 +127,15 @@ class Workers:
         SssfitError
             A process ended. What the work itself raises is raised here.
         """
+        begun: list[Future[_Found]] = []
         try:
-            with _deaf():
-                found = self._pool.map(_call, ((work, each) for each in given))
-            return list(found)
+            begun.extend(self.submit(work, each) for each in given)
+            return [self.result(each) for each in begun]
         except BrokenProcessPool:
             raise SssfitError(_LOST) from None
+        finally:
+            for future in begun:
+                future.cancel()
 
     def begin(self, work: Callable[[Any, _Given], _Found], given: _Given) -> Callable[[], _Found]:
         """Begin work(shared, given); return a function that waits for what it returns.
@@ -137,11 +149,34 @@ class Workers:
 
         def result() -> Any:
             try:
-                return future.result()
+                return self.result(future)
             except BrokenProcessPool:
                 raise SssfitError(_LOST) from None
 
         return result
+
+    def result(self, future: "Future[_Found]") -> _Found:
+        """Wait for what `submit` began; raise BrokenProcessPool if no result will come."""
+        while not wait_for([future], _LOOKS_SECONDS).done:
+            self.check()
+        return future.result()
+
+    def check(self) -> None:
+        """Raise BrokenProcessPool if workers or the pool's thread have ended without a word.
+
+        Python tells of a worker that ended in that thread. It ends itself where memory is short,
+        and waits for ever for the rest of a result whose worker was killed as it wrote it.
+        """
+        thread = getattr(self._pool, "_executor_manager_thread", None)
+        if thread is not None and not thread.is_alive():
+            raise BrokenProcessPool
+        processes = getattr(self._pool, "_processes", None) or {}
+        if not wait([each.sentinel for each in [*processes.values()]], 0.0):
+            self._ended_at = None
+        elif self._ended_at is None:
+            self._ended_at = time.monotonic()
+        elif time.monotonic() - self._ended_at > _TOLD_SECONDS:
+            raise BrokenProcessPool
 
 
 def _start_tracker() -> None:

@@ -15,6 +15,7 @@ from typing import Any, Self, TypeVar
 from sssfit import __version__
 from sssfit.errors import ArgumentError, SweepError
 from sssfit.messages import printable, shown
+from sssfit.process import check_memory
 from sssfit.simulate.batches import (
     BATCH_PHOTONS,
     Tally,
@@ -58,6 +59,7 @@ class Connection:
         self.workers = 1
 
     def __enter__(self) -> Self:
+        check_memory("cluster", None)
         distributed = needed("distributed", "cluster")
         with self._stack, _quiet():
             address: Any = self._address

@@ -6,6 +6,8 @@ such points, and writes those to a store that is then deleted.
 """
 
 import time
+from concurrent.futures import wait
+from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -20,12 +22,13 @@ from sssfit.sweep.axes import Axis
 from sssfit.sweep.layout import bytes_of
 from sssfit.sweep.made import make_store
 from sssfit.sweep.plan import Plan
-from sssfit.sweep.pools import Pool, pool_for
+from sssfit.sweep.pools import LOST, Pool, pool_for
 from sssfit.sweep.store import Store
 from sssfit.sweep.tasks import Done, Part, Task, assembled, perform, point_steps, tasks_of
 
 _SAMPLES = 5  # points, from the shortest to the longest
 _MOST_BUSY = 16  # workers that do a sample at the same time
+_LOOKS_SECONDS = 0.2
 _WRITTEN = 32  # points of the store that is written
 
 
@@ -155,7 +158,12 @@ def _timed(plan: Plan, index: int, pool: Pool) -> tuple[float, Done]:
     task = Task((part,), 0.0, code_version())
     begun = time.perf_counter()
     done = [pool.submit(task) for _ in range(min(pool.workers, _MOST_BUSY))]
-    ((found,), *_) = [each.result() for each in done]
+    while wait(done, _LOOKS_SECONDS).not_done:
+        pool.check()
+    try:
+        ((found,), *_) = [each.result() for each in done]
+    except BrokenProcessPool:
+        raise SweepError(f"{LOST}.") from None
     if found.failure is not None:
         raise SweepError(f"the point at {plan.label(index)} cannot be computed: {found.failure}")
     return (time.perf_counter() - begun) / share, found

@@ -87,7 +87,11 @@ class Processes:
             raise SweepError(f"{LOST}.") from None
 
     def check(self) -> None:
-        """Do nothing: the results of a process that ended are exceptions, raised where taken."""
+        """Raise SweepError where processes, or what tells of their end, ended without a word."""
+        try:
+            self._pool.check()
+        except BrokenProcessPool:
+            raise SweepError(f"{LOST}.") from None
 
 
 def pool_for(plan: Plan, threads: int | None, scheduler: str | None) -> Pool:
