@@ -252,12 +252,14 @@ def temporary_folder(beside: Path | None = None) -> Iterator[Path]:
     where: dict[str, Any] = {}
     if beside is not None:
         where = {"dir": beside.parent, "prefix": f".{beside.name}.", "suffix": ".tmp"}
-    with tempfile.TemporaryDirectory(**where) as name:
-        _unfinished.add(Path(name))
-        try:
-            yield Path(name)
-        finally:
-            _unfinished.discard(Path(name))
+    folder = Path(tempfile.mkdtemp(**where))
+    _unfinished.add(folder)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        if not folder.exists():  # else at the end, when there may be memory and files again
+            _unfinished.discard(folder)
 
 
 def remove_unfinished() -> None:

@@ -154,6 +154,33 @@ def check_memory(what: str, threads: int | None) -> None:
         )
 
 
+def check_open_files(count: int) -> None:
+    """Raise an error where this process may not open so many files more.
+
+    Short of them, libraries leave half of their own behind, or wait for workers that cannot start.
+
+    Raises
+    ------
+    SssfitError
+        The limit is too low.
+    """
+    if sys.platform == "win32":
+        return
+    opened: list[int] = []
+    try:
+        for _ in range(count):
+            opened += [os.open(os.devnull, os.O_RDONLY)]
+    except OSError:
+        limit, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
+        raise SssfitError(
+            f"this process may have {limit} files open (ulimit -n), and this takes {count} besides "
+            "those that are; raise the limit."
+        ) from None
+    finally:
+        for each in opened:
+            os.close(each)
+
+
 def check_threads_of_numba() -> None:
     """Raise an error for a number of threads with which numba cannot be imported.
 

@@ -58,13 +58,16 @@ def folder(made, tmp_path, monkeypatch):
     return tmp_path
 
 
-def sssfit(folder, *arguments, megabytes=None, timeout=120, **environment):
-    """Run it in a new process, under a limit of its address space if one is given."""
+def sssfit(folder, *arguments, megabytes=None, most_open=None, timeout=120, **environment):
+    """Run it in a new process, under a limit of its address space or files if one is given."""
 
     def limit():
         import resource
 
-        resource.setrlimit(resource.RLIMIT_AS, (megabytes * 10**6, megabytes * 10**6))
+        if megabytes:
+            resource.setrlimit(resource.RLIMIT_AS, (megabytes * 10**6, megabytes * 10**6))
+        if most_open:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (most_open, most_open))
 
     return subprocess.run(
         [sys.executable, "-m", "sssfit.cli", *arguments],
@@ -73,7 +76,7 @@ def sssfit(folder, *arguments, megabytes=None, timeout=120, **environment):
         capture_output=True,
         text=True,
         timeout=timeout,
-        preexec_fn=limit if megabytes else None,
+        preexec_fn=limit if megabytes or most_open else None,
     )
 
 
@@ -130,6 +133,16 @@ def test_the_limit_at_which_sweeps_hung(folder, where):
     ended = sssfit(folder, "sweep", "plan.toml", *where, megabytes=819)
     assert (ended.returncode, ended.stdout) == (1, "")
     assert ended.stderr.startswith("Error: this process may use 819 MB of memory")
+    assert ended.stderr.count("\n") == 1
+    assert not [each for each in folder.iterdir() if "zarr" in each.name]
+
+
+@posix
+@pytest.mark.parametrize("threads", ["1", "2"])
+def test_a_sweep_that_may_open_few_files_leaves_nothing(folder, threads):
+    ended = sssfit(folder, "sweep", "plan.toml", "--threads", threads, most_open=20)
+    assert (ended.returncode, ended.stdout) == (1, "")
+    assert ended.stderr.startswith("Error: this process may have 20 files open")
     assert ended.stderr.count("\n") == 1
     assert not [each for each in folder.iterdir() if "zarr" in each.name]
 

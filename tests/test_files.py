@@ -235,6 +235,17 @@ def test_the_temporary_folder_of_a_killed_write_is_removed(tmp_path):
     assert names(tmp_path) == [other.name]
 
 
+def test_a_temporary_folder_that_cannot_be_removed_yet_is_removed_at_the_end(tmp_path, monkeypatch):
+    """As where no file more may be opened, which removing a folder has to."""
+    with monkeypatch.context() as short:
+        short.setattr(files.shutil, "rmtree", lambda *_, **__: None)
+        with pytest.raises(OSError, match="too many"), files.temporary_folder(tmp_path / "a"):
+            raise OSError("too many open files")
+    assert names(tmp_path)
+    files.remove_unfinished()
+    assert names(tmp_path) == []
+
+
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes with a name")
 def test_a_pipe_is_not_replaced_by_a_file(tmp_path):
     pipe = tmp_path / "pipe"

@@ -20,7 +20,7 @@ OPTION = re.compile(r"(?<![\w-])--?[a-zA-Z][\w-]*(?![\w\]])")
 COMMAND = re.compile(r"`sssfit |\bsssfit (simulate|fit|render|chart|show|export|import|compare) ")
 MARKED = re.compile(r"`[^`\n]+`")
 # Commands of others: Radiance's own program, the shell's limit.
-FOREIGN = ("ra_xyze -r", "ulimit -v")
+FOREIGN = ("ra_xyze -r", "ulimit -v", "ulimit -n")
 # Backquoted in messages without being an argument: a field of the profile. The name of a view is
 # one, which tests/test_methods.py asks of each.
 FIELDS = {"`unfinished`", "`0 = True`"}

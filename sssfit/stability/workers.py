@@ -25,12 +25,13 @@ from types import TracebackType
 from typing import Any, TypeVar, cast
 
 from sssfit.errors import SssfitError
-from sssfit.process import one_blas_thread
+from sssfit.process import check_open_files, one_blas_thread
 
 _Given = TypeVar("_Given")
 _Found = TypeVar("_Found")
 
 _MOST = 16  # workers; each takes 0.3 GB
+_FILES = 30  # open at a time, of the pool, of what is read, written or imported meanwhile
 _LOST = (
     "a worker process ended before its work was done: it was killed, memory ran out, or the "
     "script lacks the main guard that multiprocessing needs; `threads = 1` takes no worker."
@@ -54,6 +55,7 @@ class Workers:
     """
 
     def __init__(self, count: int, shared: object) -> None:
+        check_open_files(_FILES + 2 * min(count, _MOST))
         context = multiprocessing.get_context("spawn")
         _start_tracker()
         self._theirs, self._ours = context.Pipe(duplex=False)

@@ -15,7 +15,7 @@ from typing import Any, Self, TypeVar
 from sssfit import __version__
 from sssfit.errors import ArgumentError, SweepError
 from sssfit.messages import printable, shown
-from sssfit.process import check_memory
+from sssfit.process import check_memory, check_open_files
 from sssfit.simulate.batches import (
     BATCH_PHOTONS,
     Tally,
@@ -34,6 +34,7 @@ _Found = TypeVar("_Found")
 _CONNECT_SECONDS = 10.0
 _WORKERS_SECONDS = 30.0
 _MOST_LOCAL = 256
+_FILES = 50
 _AHEAD = 3  # ranges of a walk for each worker
 _RANGE_STEPS, _MESSAGE_BYTES = 5e8, 8_000_000
 
@@ -60,6 +61,7 @@ class Connection:
 
     def __enter__(self) -> Self:
         check_memory("cluster", None)
+        check_open_files(_FILES + 8 * self._count)
         distributed = needed("distributed", "cluster")
         with self._stack, _quiet():
             address: Any = self._address

@@ -11,11 +11,12 @@ from types import TracebackType
 from typing import Protocol, Self
 
 from sssfit.errors import SweepError
-from sssfit.process import thread_count
+from sssfit.process import check_open_files, thread_count
 from sssfit.stability.workers import Workers
 from sssfit.sweep.plan import Plan
 from sssfit.sweep.tasks import Done, Task, perform, prepare
 
+_FILES = 20  # Zarr's loop and a chunk, and what is imported meanwhile
 LOST = (
     "a worker process ended before its work was done: it was killed, memory ran out, or the script "
     "lacks the main guard that multiprocessing needs"
@@ -102,6 +103,7 @@ def pool_for(plan: Plan, threads: int | None, scheduler: str | None) -> Pool:
         return Cluster(plan, scheduler)
     workers = min(thread_count(threads), plan.count if plan.photons is None else 1024)
     if workers == 1:
+        check_open_files(_FILES)
         return ThisProcess(plan)
     prepare(plan)
     return Processes(plan, workers)
