@@ -63,11 +63,46 @@ def thread_count(threads: int | None) -> int:
 def one_blas_thread() -> contextlib.AbstractContextManager[Any]:
     """Return a context in which numpy's and scipy's linear algebra use one thread.
 
-    BLAS waits for its threads: up to ten times longer if another process holds a core.
+    BLAS waits for its threads: up to ten times longer if another process holds a core. The number
+    is one of the whole process: the first of several contexts, also of several threads, sets it,
+    and the last to end puts back what was there.
     """
-    limit: contextlib.AbstractContextManager[Any]
-    limit = _blas("scipy.linalg._fblas" in sys.modules).limit(limits=1, user_api="blas")
-    return limit
+    return _one_blas_thread
+
+
+class _OneBlasThread:
+    """A context that may be entered again before its end, by any thread."""
+
+    def __init__(self) -> None:
+        self._lock, self._inside = threading.Lock(), 0
+        self._before: dict[str, tuple[Any, int]] = {}
+
+    def __enter__(self) -> None:
+        with self._lock:
+            for each in _blas("scipy.linalg._fblas" in sys.modules):
+                # Of what was loaded since the first came in, this is the first that is seen.
+                self._before.setdefault(each.filepath, (each, each.get_num_threads()))
+                _set_threads(each, 1)
+            self._inside += 1
+
+    def __exit__(self, *_: object) -> None:
+        with self._lock:
+            self._inside -= 1
+            if self._inside == 0:
+                for library, count in self._before.values():
+                    _set_threads(library, count)
+                self._before.clear()
+
+
+def _set_threads(library: Any, count: int) -> None:
+    """Set the threads of a BLAS library, whichever thread asks.
+
+    From 3.8 on threadpoolctl ignores all threads but the one that set the number first.
+    """
+    getattr(library, "_real_set_num_threads", library.set_num_threads)(count)
+
+
+_one_blas_thread = _OneBlasThread()
 
 
 @functools.cache
@@ -75,7 +110,7 @@ def _blas(_scipys: bool) -> Any:
     """Return the loaded BLAS libraries; scipy has its own. Looking for them takes 3 ms."""
     from threadpoolctl import ThreadpoolController
 
-    return ThreadpoolController()
+    return ThreadpoolController().select(user_api="blas").lib_controllers
 
 
 # Memory

@@ -131,6 +131,30 @@ def test_all_linear_algebra_is_held_to_one_thread():
     assert len(before) >= 2
 
 
+def test_the_host_gets_its_threads_back_when_the_last_of_several_has_ended():
+    from threadpoolctl import threadpool_info, threadpool_limits
+
+    def threads():
+        return {each["num_threads"] for each in threadpool_info() if each["user_api"] == "blas"}
+
+    def hold(inside, leave):
+        with one_blas_thread():
+            inside.set()
+            leave.wait(60.0)
+
+    with threadpool_limits(limits=2, user_api="blas"):
+        events = [(threading.Event(), threading.Event()) for _ in range(2)]
+        holding = [threading.Thread(target=hold, args=each) for each in events]
+        for thread, (inside, _) in zip(holding, events, strict=True):
+            thread.start()
+            assert inside.wait(60.0)
+        for thread, (_, leave) in zip(holding, events, strict=True):  # the first to come goes first
+            assert threads() == {1}
+            leave.set()
+            thread.join()
+        assert threads() == {2}
+
+
 @pytest.mark.parametrize(("own", "calls"), [(None, 2), ("MALLOC_TRIM_THRESHOLD_", 0)])
 def test_freed_memory_stays_unless_the_environment_says_otherwise(monkeypatch, own, calls):
     for each in process._MALLOC:
