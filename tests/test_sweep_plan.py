@@ -216,6 +216,9 @@ BAD = {
     HEAD + AXIS.replace("key", 'name = "lambda"\nkey'): "axes[0].name = 'lambda'; the word has",
     HEAD + AXIS.replace("eta", "layers[1].eta"): "skin1 has layers[0] only",
     HEAD + AXIS.replace("eta", "sigma_a_per_mm.X"): "has the channels R, G, B",
+    HEAD + AXIS.replace("eta", "thickness_mm") + 'units = "cm"': (
+        "axes[0].units = 'cm'; thickness_mm is set in mm: give the values in that"
+    ),
     HEAD + AXIS.replace("eta", "eta.R"): "the same for all channels",
     HEAD + AXIS + '[set]\ng = "x + 1"': "'x' is no axis and no column",
     HEAD + AXIS + '[set]\ng = "eta("': "is not arithmetic",

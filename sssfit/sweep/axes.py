@@ -30,7 +30,8 @@ class Axis:
     values : tuple of float (n,)
         Its coordinates.
     units : str
-        Units of the coordinates: "1/mm", "mm", "nm" or "1".
+        Units of the coordinates: "1/mm", "mm", "nm", "1" or others. They are written to the store,
+        and no value is converted; those of an axis with a key are the key's own.
     key : str
         The coefficient that it sets; empty where only formulas use it.
     columns : mapping
@@ -92,7 +93,13 @@ def read_axis(table: object, folder: Path, where: str) -> Axis:
     last = coefficient.split("].")[-1].split(".")[0]
     name = _checked_name(table.get("name") or last, f"{where}.name =")
     values = _listed(table, where) if "values" in table else _ranged(table, where)
-    units = table.get("units") or (UNITS.get(last, "1") if coefficient else _units(name))
+    own = UNITS.get(last, "1") if coefficient else _units(name)
+    units = table.get("units", own)
+    if units != own and last in UNITS:
+        raise PlanError(
+            f"{where}.units = {shown(units)}; {last} is set in {own}: give the values in that, and "
+            "leave units out."
+        )
     return Axis(name, values, units, coefficient)
 
 
