@@ -481,6 +481,17 @@ def test_a_slab_is_held_against_its_exact_profile(monkeypatch):
     assert found.chosen.within
 
 
+def test_a_grid_that_no_method_can_have_is_said_once(caplog):
+    layer = Layer(1.4, np.zeros(3), np.array([1e-6, 0.1, 1.0]), np.array([0.001, 8.0, 1.0]))
+    wide = Material("wide", ("R", "G", "B"), (layer,))
+    with (
+        pytest.raises(SimulationError, match="over the limit of 100000"),
+        caplog.at_level("INFO", logger="sssfit"),
+    ):
+        choose(wide, mm_per_pixel=1.4, frame=(64, 64))
+    assert caplog.messages == []
+
+
 def test_what_the_exact_solver_refuses_is_held_against_a_walk(monkeypatch, caplog):
     monkeypatch.setattr(truths, "WALK_PHOTONS", 20_000)
     monkeypatch.setattr(truths, "exact_with_all_light", refused)

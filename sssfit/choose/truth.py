@@ -47,8 +47,9 @@ def truth_of(
         return source, 0.0
     check_is_material(source)
     begun = time.perf_counter()
+    grid = make_grid(source)  # a walk would have it, too
     try:
-        profile = exact_with_all_light(source, make_grid(source), math.inf, threads=threads)
+        profile = exact_with_all_light(source, grid, math.inf, threads=threads)
     except StoppedError:
         raise
     except SimulationError as refusal:
